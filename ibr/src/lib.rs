@@ -1,0 +1,1 @@
+//! Image-based rendering on the sampling core.

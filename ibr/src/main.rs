@@ -1,0 +1,2 @@
+//! The `hybank-ibr` binary.
+fn main() {}

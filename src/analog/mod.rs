@@ -1,0 +1,1 @@
+//! Analog front ends: transfer functions, filter families, realisations, responses.

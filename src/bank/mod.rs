@@ -1,0 +1,72 @@
+//! The bank: synthesis filters with the facts needed to run and judge them, and its file format.
+
+use crate::spec::{Method, Spec};
+
+/// N synthesis filters for one spec, whole: what `design` makes and every other verb reads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bank {
+    /// The spec it was designed for, with all defaults filled in; `None` for a bank made elsewhere.
+    pub spec: Option<Spec>,
+    /// h in seconds.
+    pub fast_period: f64,
+    /// M.
+    pub ratio: usize,
+    /// m0 in fast samples.
+    pub latency: usize,
+    /// How it was designed.
+    pub method: Method,
+    /// D_i in seconds, one a channel.
+    pub delays: Vec<f64>,
+    /// F_1 .. F_N.
+    pub filters: SynthesisFilters,
+    /// How good it is.
+    pub gamma: Gamma,
+}
+
+/// The synthesis filters in the form they run in.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SynthesisFilters {
+    /// `taps[i][n]` = f_i[n] at the fast rate.
+    Fir(Vec<Vec<f64>>),
+    /// One block for each slow tick.
+    StateSpace(BlockFilter),
+}
+
+/// x+ = a x + b u, y = c x + d u; u the N slow samples of a tick, y its M fast samples.
+/// Row-major lists of rows.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BlockFilter {
+    /// n x n.
+    pub a: Vec<Vec<f64>>,
+    /// n x N.
+    pub b: Vec<Vec<f64>>,
+    /// M x n.
+    pub c: Vec<Vec<f64>>,
+    /// M x N.
+    pub d: Vec<Vec<f64>>,
+}
+
+/// gamma = ||K|| in normalised time (h = 1), as an interval.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gamma {
+    /// The exact norm of the very coefficients of this bank.
+    pub upper: Option<f64>,
+    /// A proven lower bound for any bank of this method and size.
+    pub lower: Option<f64>,
+    /// The bound that no latency can beat.
+    pub noncausal: Option<f64>,
+}
+
+impl Bank {
+    /// N, the number of slow channels.
+    pub fn channel_count(&self) -> usize {
+        self.delays.len()
+    }
+
+    /// The slow period M h in seconds.
+    pub fn slow_period(&self) -> f64 {
+        self.fast_period * self.ratio as f64
+    }
+}

@@ -1,0 +1,281 @@
+//! The one place that knows which crate does which decomposition.
+//!
+//! Matrices are nalgebra's [`DMatrix`]; every decomposition of run-time size is faer's, because
+//! nalgebra's SVD is wrong on rank-deficient matrices and its Schur form may never end on delay
+//! lines. The two share memory (both are column-major), so nothing is copied on the way in.
+//! Everything here is sequential and therefore gives the same bits on every run.
+
+use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::{MatRef, Side};
+pub use nalgebra::Complex;
+use nalgebra::DMatrix;
+
+/// Real matrix of run-time size.
+pub type Mat = DMatrix<f64>;
+/// Complex matrix of run-time size.
+pub type CMat = DMatrix<Complex<f64>>;
+
+/// Why a decomposition could not be had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LinalgError {
+    /// A Cholesky factorisation met a pivot that is not positive.
+    #[error("the matrix is not positive definite (pivot {pivot})")]
+    NotPositiveDefinite {
+        /// Index of the failing pivot, from 0.
+        pivot: usize,
+    },
+    /// An iterative eigenvalue or singular value routine did not converge.
+    #[error("the {routine} iteration did not converge on a {rows} x {cols} matrix")]
+    NoConvergence {
+        /// Name of the routine.
+        routine: &'static str,
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        cols: usize,
+    },
+    /// A matrix holds NaN or infinity.
+    #[error("the {rows} x {cols} matrix given to {routine} holds a value that is not finite")]
+    NotFinite {
+        /// Name of the routine.
+        routine: &'static str,
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        cols: usize,
+    },
+}
+
+fn view<T>(m: &DMatrix<T>) -> MatRef<'_, T> {
+    MatRef::from_column_major_slice(m.as_slice(), m.nrows(), m.ncols())
+}
+
+fn owned<T: Copy + nalgebra::Scalar>(m: MatRef<'_, T>) -> DMatrix<T> {
+    DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)])
+}
+
+fn no_convergence<T>(routine: &'static str, m: &DMatrix<T>) -> LinalgError {
+    LinalgError::NoConvergence { routine, rows: m.nrows(), cols: m.ncols() }
+}
+
+/// Refuses NaN and infinity before an iteration that might never end on them.
+fn check_finite(routine: &'static str, m: &Mat) -> Result<(), LinalgError> {
+    if m.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(LinalgError::NotFinite { routine, rows: m.nrows(), cols: m.ncols() })
+}
+
+fn check_finite_c(routine: &'static str, m: &CMat) -> Result<(), LinalgError> {
+    if m.iter().all(|x| x.re.is_finite() && x.im.is_finite()) {
+        return Ok(());
+    }
+    Err(LinalgError::NotFinite { routine, rows: m.nrows(), cols: m.ncols() })
+}
+
+/// (m + m') / 2.
+pub fn symmetric_part(m: &Mat) -> Mat {
+    (m + m.transpose()) * 0.5
+}
+
+/// Lower trapezoidal `L` (rows x min(rows, cols)) with `L L' = m m'`, by a QR factorisation of `m'`:
+/// a square root is compressed without ever being squared.
+pub fn lq_factor(m: &Mat) -> Mat {
+    if m.is_empty() {
+        return Mat::zeros(m.nrows(), m.nrows().min(m.ncols()));
+    }
+    let qr = view(m).transpose().qr();
+    owned(qr.thin_R()).transpose()
+}
+
+/// Thin `(L, Q)` with `m = L Q`, `Q Q' = I`.
+pub fn lq(m: &Mat) -> (Mat, Mat) {
+    if m.is_empty() {
+        let k = m.nrows().min(m.ncols());
+        return (Mat::zeros(m.nrows(), k), Mat::zeros(k, m.ncols()));
+    }
+    let qr = view(m).transpose().qr();
+    (owned(qr.thin_R()).transpose(), owned(qr.compute_thin_Q().as_ref()).transpose())
+}
+
+/// Complex counterpart of [`lq_factor`]: `L L* = m m*`.
+pub fn lq_factor_c(m: &CMat) -> CMat {
+    if m.is_empty() {
+        return CMat::zeros(m.nrows(), m.nrows().min(m.ncols()));
+    }
+    let qr = view(&m.adjoint()).qr();
+    owned(qr.thin_R()).adjoint()
+}
+
+/// Lower Cholesky factor of a symmetric matrix; only the lower triangle is read.
+pub fn cholesky(m: &Mat) -> Result<Mat, LinalgError> {
+    match view(m).llt(Side::Lower) {
+        Ok(llt) => Ok(owned(llt.L())),
+        Err(faer::linalg::solvers::LltError::NonPositivePivot { index }) => {
+            Err(LinalgError::NotPositiveDefinite { pivot: index })
+        }
+    }
+}
+
+/// Solves `m x = rhs` for a symmetric positive definite `m` (lower triangle read).
+pub fn solve_positive(m: &Mat, rhs: &Mat) -> Result<Mat, LinalgError> {
+    match view(m).llt(Side::Lower) {
+        Ok(llt) => Ok(owned(llt.solve(view(rhs)).as_ref())),
+        Err(faer::linalg::solvers::LltError::NonPositivePivot { index }) => {
+            Err(LinalgError::NotPositiveDefinite { pivot: index })
+        }
+    }
+}
+
+/// Solves the square system `m x = rhs` by LU with partial pivoting. A singular `m` gives
+/// infinities or NaN, which the caller has to look for.
+pub fn solve(m: &Mat, rhs: &Mat) -> Mat {
+    owned(view(m).partial_piv_lu().solve(view(rhs)).as_ref())
+}
+
+/// Complex counterpart of [`solve`].
+pub fn solve_c(m: &CMat, rhs: &CMat) -> CMat {
+    owned(view(m).partial_piv_lu().solve(view(rhs)).as_ref())
+}
+
+/// Inverse by LU with partial pivoting; see [`solve`] for singular matrices.
+pub fn inverse(m: &Mat) -> Mat {
+    owned(view(m).partial_piv_lu().inverse().as_ref())
+}
+
+/// Solves `l x = rhs` with a lower triangular `l`.
+pub fn solve_lower(l: &Mat, rhs: &Mat) -> Mat {
+    let mut x = faer::Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)]);
+    view(l).solve_lower_triangular_in_place(x.as_mut());
+    owned(x.as_ref())
+}
+
+/// Thin singular value decomposition `m = u diag(s) v'`, s descending.
+#[derive(Debug, Clone)]
+pub struct Svd {
+    /// Left vectors, rows x k.
+    pub u: Mat,
+    /// Singular values, descending.
+    pub s: Vec<f64>,
+    /// Right vectors, cols x k.
+    pub v: Mat,
+}
+
+/// Thin SVD of a real matrix.
+pub fn svd(m: &Mat) -> Result<Svd, LinalgError> {
+    check_finite("svd", m)?;
+    let svd = view(m).thin_svd().map_err(|_| no_convergence("svd", m))?;
+    let s = svd.S().column_vector().iter().copied().collect();
+    Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
+}
+
+/// Singular values of a real matrix, descending.
+pub fn singular_values(m: &Mat) -> Result<Vec<f64>, LinalgError> {
+    check_finite("singular values", m)?;
+    view(m).singular_values().map_err(|_| no_convergence("singular values", m))
+}
+
+/// Singular values of a complex matrix, descending.
+pub fn singular_values_c(m: &CMat) -> Result<Vec<f64>, LinalgError> {
+    check_finite_c("singular values", m)?;
+    view(m).singular_values().map_err(|_| no_convergence("singular values", m))
+}
+
+/// Eigenvalues (ascending) and orthonormal eigenvectors (columns) of a symmetric matrix.
+pub fn symmetric_eigen(m: &Mat) -> Result<(Vec<f64>, Mat), LinalgError> {
+    check_finite("symmetric eigen", m)?;
+    let e = view(m).self_adjoint_eigen(Side::Lower).map_err(|_| no_convergence("symmetric eigen", m))?;
+    Ok((e.S().column_vector().iter().copied().collect(), owned(e.U())))
+}
+
+/// Eigenvalues of a symmetric matrix, ascending (lower triangle read).
+pub fn symmetric_eigenvalues(m: &Mat) -> Result<Vec<f64>, LinalgError> {
+    check_finite("symmetric eigenvalues", m)?;
+    view(m).self_adjoint_eigenvalues(Side::Lower).map_err(|_| no_convergence("symmetric eigenvalues", m))
+}
+
+/// Eigenvalues of a Hermitian matrix, ascending (lower triangle read).
+pub fn hermitian_eigenvalues(m: &CMat) -> Result<Vec<f64>, LinalgError> {
+    check_finite_c("hermitian eigenvalues", m)?;
+    view(m).self_adjoint_eigenvalues(Side::Lower).map_err(|_| no_convergence("hermitian eigenvalues", m))
+}
+
+/// Eigenvalues of a general real matrix.
+pub fn eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    check_finite("eigenvalues", m)?;
+    if m.is_empty() {
+        return Ok(Vec::new());
+    }
+    view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
+}
+
+/// Largest modulus of the eigenvalues of a square matrix.
+pub fn spectral_radius(m: &Mat) -> Result<f64, LinalgError> {
+    Ok(eigenvalues(m)?.iter().map(|z| z.norm()).fold(0.0, f64::max))
+}
+
+/// `e^m` by nalgebra's scaling and squaring with Padé approximants.
+pub fn expm(m: &Mat) -> Mat {
+    if m.is_empty() { m.clone() } else { m.exp() }
+}
+
+/// A real matrix as a complex one.
+pub fn to_complex(m: &Mat) -> CMat {
+    m.map(|x| Complex::new(x, 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn delay_line(n: usize) -> Mat {
+        Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)))
+    }
+
+    #[test]
+    fn svd_is_right_on_rank_one_matrices() {
+        for n in 2..16 {
+            let m = Mat::from_element(n, n, 1.0);
+            let svd = svd(&m).unwrap();
+            let back = &svd.u * Mat::from_diagonal(&svd.s.clone().into()) * svd.v.transpose();
+            assert!((svd.s[0] - n as f64).abs() < 1e-12, "n = {n}, sigma = {}", svd.s[0]);
+            assert!((back - m).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn eigenvalues_end_on_delay_lines_and_cyclic_shifts() {
+        for n in 2..17 {
+            assert!(spectral_radius(&delay_line(n)).unwrap() < 1e-12);
+            let mut cyclic = delay_line(n);
+            cyclic[(0, n - 1)] = 1.0;
+            for z in eigenvalues(&cyclic).unwrap() {
+                assert!((z.norm() - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn lq_factor_keeps_the_product_and_the_small_rows() {
+        let m = Mat::from_fn(4, 9, |i, j| 1e-9_f64.powi(i as i32) * ((i * 7 + j * 3) as f64).sin());
+        let l = lq_factor(&m);
+        assert_eq!(l.shape(), (4, 4));
+        for i in 0..4 {
+            let (a, b) = (l.row(i).norm(), m.row(i).norm());
+            assert!((a - b).abs() < 1e-13 * b, "row {i}: {a} {b}");
+        }
+    }
+
+    #[test]
+    fn cholesky_names_the_failing_pivot() {
+        let m = Mat::from_diagonal(&nalgebra::dvector![1.0, 2.0, -1.0]);
+        assert_eq!(cholesky(&m), Err(LinalgError::NotPositiveDefinite { pivot: 2 }));
+    }
+
+    #[test]
+    fn non_finite_input_is_refused() {
+        let m = Mat::from_element(3, 3, f64::NAN);
+        assert!(matches!(eigenvalues(&m), Err(LinalgError::NotFinite { .. })));
+        assert!(matches!(svd(&m), Err(LinalgError::NotFinite { .. })));
+    }
+}

@@ -1,0 +1,1 @@
+//! Interior-point methods for linear matrix inequalities. Knows no filter bank.

@@ -1,0 +1,1 @@
+//! Discrete-time state-space systems: Gramians, norms, Riccati equations. Knows no filter bank.

@@ -1,0 +1,1 @@
+//! Running a bank: kernels, reconstructor, pipeline. No allocation on the hot path, no design code.

@@ -1,0 +1,1 @@
+//! Virtual converters: exact samples of analytic sources and of recordings.
