@@ -1,1 +1,40 @@
-//! Discrete-time state-space systems: Gramians, norms, Riccati equations. Knows no filter bank.
+//! Discrete-time state-space systems: responses, Gramians, peak gains, Riccati equations.
+//!
+//! Knows no filter bank: a system has inputs, outputs and states, nothing else. Continuous-time
+//! helpers ([`exponential`]) serve exact discretisation.
+
+pub mod exponential;
+pub mod gramian;
+pub mod peak;
+mod response;
+pub mod riccati;
+mod state_space;
+
+pub use response::FrequencyResponse;
+pub use state_space::{StateSpace, StateSpaceError};
+
+use crate::linalg::LinalgError;
+
+/// Why a property of a system could not be computed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LtiError {
+    /// The property exists for stable systems only.
+    #[error("the system is not stable: spectral radius {radius} (must be below 1)")]
+    Unstable {
+        /// Largest modulus of the eigenvalues of `a`.
+        radius: f64,
+    },
+    /// A bounded iteration ran out.
+    #[error("{what} did not settle within {limit} steps (last relative change {change:e})")]
+    IterationLimit {
+        /// What was iterated.
+        what: &'static str,
+        /// The bound.
+        limit: usize,
+        /// How far it still moved.
+        change: f64,
+    },
+    /// A decomposition failed.
+    #[error(transparent)]
+    Linalg(#[from] LinalgError),
+}

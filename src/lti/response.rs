@@ -1,0 +1,130 @@
+//! Frequency responses at many points: one Hessenberg reduction, then O(n^2) a point.
+
+use super::StateSpace;
+use crate::linalg::{self, CMat, Complex, Mat};
+use nalgebra::linalg::Hessenberg;
+
+/// Evaluates G(z) = c (zI - a)^-1 b + d at many z.
+///
+/// With a' = Q H Q' the transposed problem (zI - H) X = Q' c' has as many right-hand sides as the
+/// system has outputs, which in this field are few, and G = X' Q' b + d.
+#[derive(Debug, Clone)]
+pub struct FrequencyResponse {
+    hessenberg: Mat,
+    /// Q' c', n x p.
+    outputs: Mat,
+    /// Q' b, n x m, complex once and for all.
+    inputs: CMat,
+    feedthrough: CMat,
+}
+
+impl FrequencyResponse {
+    /// Prepares the evaluation of `system`.
+    pub fn new(system: &StateSpace) -> Self {
+        let (q, hessenberg) = reduce(&system.a().transpose());
+        Self {
+            hessenberg,
+            outputs: q.transpose() * system.c().transpose(),
+            inputs: linalg::to_complex(&(q.transpose() * system.b())),
+            feedthrough: linalg::to_complex(system.d()),
+        }
+    }
+
+    /// G(z), p x m.
+    pub fn at(&self, z: Complex<f64>) -> CMat {
+        let mut x = linalg::to_complex(&self.outputs);
+        self.solve_shifted(z, &mut x);
+        x.transpose() * &self.inputs + &self.feedthrough
+    }
+
+    /// G(e^{jw}), p x m.
+    pub fn at_frequency(&self, w: f64) -> CMat {
+        self.at(Complex::from_polar(1.0, w))
+    }
+
+    /// x <- (zI - H)^-1 x by Gaussian elimination with exchange of neighbouring rows.
+    fn solve_shifted(&self, z: Complex<f64>, x: &mut CMat) {
+        let n = self.hessenberg.nrows();
+        let mut t = self.hessenberg.map(|h| Complex::new(-h, 0.0));
+        for i in 0..n {
+            t[(i, i)] += z;
+        }
+        for k in 0..n.saturating_sub(1) {
+            eliminate_subdiagonal(&mut t, x, k);
+        }
+        back_substitute(&t, x);
+    }
+}
+
+/// (Q, H) with m = Q H Q'. nalgebra's reduction is finite (no iteration), so its trouble with
+/// delay lines does not arise; it refuses sizes below two.
+fn reduce(m: &Mat) -> (Mat, Mat) {
+    if m.nrows() < 2 { (Mat::identity(m.nrows(), m.nrows()), m.clone()) } else { Hessenberg::new(m.clone()).unpack() }
+}
+
+fn eliminate_subdiagonal(t: &mut CMat, x: &mut CMat, k: usize) {
+    if t[(k + 1, k)].norm_sqr() > t[(k, k)].norm_sqr() {
+        t.swap_rows(k, k + 1);
+        x.swap_rows(k, k + 1);
+    }
+    if t[(k + 1, k)] == Complex::ZERO {
+        return;
+    }
+    let factor = t[(k + 1, k)] / t[(k, k)];
+    for j in k..t.ncols() {
+        let above = t[(k, j)];
+        t[(k + 1, j)] -= factor * above;
+    }
+    for j in 0..x.ncols() {
+        let above = x[(k, j)];
+        x[(k + 1, j)] -= factor * above;
+    }
+}
+
+fn back_substitute(t: &CMat, x: &mut CMat) {
+    let n = t.nrows();
+    for mut column in x.column_iter_mut() {
+        for k in (0..n).rev() {
+            let value = column[k] / t[(k, k)];
+            column[k] = value;
+            for i in 0..k {
+                column[i] -= t[(i, k)] * value;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(system: &StateSpace) {
+        let response = FrequencyResponse::new(system);
+        for w in [0.0, 0.3, 1.1, 2.7, std::f64::consts::PI] {
+            let (fast, slow) = (response.at_frequency(w), system.response_at(Complex::from_polar(1.0, w)));
+            assert!((&fast - &slow).norm() <= 1e-12 * slow.norm().max(1.0), "w = {w}: {fast} {slow}");
+        }
+    }
+
+    #[test]
+    fn agrees_with_the_plain_definition() {
+        for n in [0_usize, 1, 2, 5, 12] {
+            let a = Mat::from_fn(n, n, |i, j| 0.9 * ((i * 5 + j * 3 + 1) as f64).sin() / (n as f64));
+            let b = Mat::from_fn(n, 3, |i, j| ((i + j) as f64).cos());
+            let c = Mat::from_fn(2, n, |i, j| ((i * 2 + j) as f64).sin());
+            check(&StateSpace::new(a, b, c, Mat::from_element(2, 3, 0.5)).unwrap());
+        }
+    }
+
+    #[test]
+    fn agrees_on_delay_lines() {
+        for n in 2..12 {
+            let a = Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)));
+            let mut b = Mat::zeros(n, 1);
+            b[0] = 1.0;
+            let mut c = Mat::zeros(1, n);
+            c[n - 1] = 1.0;
+            check(&StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap());
+        }
+    }
+}

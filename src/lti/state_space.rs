@@ -1,0 +1,146 @@
+//! A discrete-time linear system with checked shapes.
+
+use crate::linalg::{self, CMat, Complex, Mat};
+
+/// x+ = a x + b u, y = c x + d u with n states, m inputs, p outputs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateSpace {
+    a: Mat,
+    b: Mat,
+    c: Mat,
+    d: Mat,
+}
+
+/// Matrices whose shapes do not belong together.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "state-space shapes do not fit: a is {}x{} (must be n x n), b {}x{} (n x m), c {}x{} (p x n), d {}x{} (p x m)",
+    a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1
+)]
+pub struct StateSpaceError {
+    /// Shape of a.
+    pub a: (usize, usize),
+    /// Shape of b.
+    pub b: (usize, usize),
+    /// Shape of c.
+    pub c: (usize, usize),
+    /// Shape of d.
+    pub d: (usize, usize),
+}
+
+impl StateSpace {
+    /// Checks a (n x n), b (n x m), c (p x n), d (p x m) against one another.
+    pub fn new(a: Mat, b: Mat, c: Mat, d: Mat) -> Result<Self, StateSpaceError> {
+        let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
+        if a.ncols() == n && b.nrows() == n && c.ncols() == n && d.shape() == (p, m) {
+            return Ok(Self { a, b, c, d });
+        }
+        Err(StateSpaceError { a: a.shape(), b: b.shape(), c: c.shape(), d: d.shape() })
+    }
+
+    /// State matrix, n x n.
+    pub fn a(&self) -> &Mat {
+        &self.a
+    }
+
+    /// Input matrix, n x m.
+    pub fn b(&self) -> &Mat {
+        &self.b
+    }
+
+    /// Output matrix, p x n.
+    pub fn c(&self) -> &Mat {
+        &self.c
+    }
+
+    /// Feedthrough, p x m.
+    pub fn d(&self) -> &Mat {
+        &self.d
+    }
+
+    /// n.
+    pub fn order(&self) -> usize {
+        self.a.nrows()
+    }
+
+    /// m.
+    pub fn inputs(&self) -> usize {
+        self.b.ncols()
+    }
+
+    /// p.
+    pub fn outputs(&self) -> usize {
+        self.c.nrows()
+    }
+
+    /// The same system with `rows` of its outputs only, in that order.
+    pub fn select_outputs(&self, rows: std::ops::Range<usize>) -> Self {
+        let count = rows.len();
+        Self {
+            a: self.a.clone(),
+            b: self.b.clone(),
+            c: self.c.rows(rows.start, count).into_owned(),
+            d: self.d.rows(rows.start, count).into_owned(),
+        }
+    }
+
+    /// `G G*` is unchanged when the inputs are rotated: compresses them to at most n + p.
+    pub fn compress_inputs(&self) -> Self {
+        let (n, p) = (self.order(), self.outputs());
+        if self.inputs() <= n + p {
+            return self.clone();
+        }
+        let mut stacked = Mat::zeros(p + n, self.inputs());
+        stacked.rows_mut(0, p).copy_from(&self.d);
+        stacked.rows_mut(p, n).copy_from(&self.b);
+        let l = linalg::lq_factor(&stacked);
+        Self {
+            a: self.a.clone(),
+            b: l.rows(p, n).into_owned(),
+            c: self.c.clone(),
+            d: l.rows(0, p).into_owned(),
+        }
+    }
+
+    /// Largest modulus of the poles.
+    pub fn spectral_radius(&self) -> Result<f64, linalg::LinalgError> {
+        linalg::spectral_radius(&self.a)
+    }
+
+    /// c (zI - a)^-1 b + d by one LU factorisation: the slow and plain definition.
+    pub fn response_at(&self, z: Complex<f64>) -> CMat {
+        let n = self.order();
+        let mut pencil = linalg::to_complex(&self.a) * Complex::new(-1.0, 0.0);
+        for i in 0..n {
+            pencil[(i, i)] += z;
+        }
+        let x = linalg::solve_c(&pencil, &linalg::to_complex(&self.b));
+        linalg::to_complex(&self.c) * x + linalg::to_complex(&self.d)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_shapes_are_named() {
+        let error =
+            StateSpace::new(Mat::zeros(2, 2), Mat::zeros(3, 1), Mat::zeros(1, 2), Mat::zeros(1, 1)).unwrap_err();
+        assert!(error.to_string().contains("b 3x1"), "{error}");
+    }
+
+    #[test]
+    fn compressing_inputs_keeps_the_spectrum() {
+        let b = Mat::from_fn(2, 9, |i, j| ((i + 3 * j) as f64).sin());
+        let d = Mat::from_fn(1, 9, |_, j| (j as f64).cos());
+        let a = Mat::from_row_slice(2, 2, &[0.5, 0.2, -0.1, 0.3]);
+        let full = StateSpace::new(a, b, Mat::from_row_slice(1, 2, &[1.0, -2.0]), d).unwrap();
+        let small = full.compress_inputs();
+        assert_eq!(small.inputs(), 3);
+        let z = Complex::from_polar(1.0, 0.7);
+        let (g, s) = (full.response_at(z), small.response_at(z));
+        let gap = (&g * g.adjoint() - &s * s.adjoint()).norm();
+        assert!(gap < 1e-12 * g.norm_squared(), "{gap}");
+    }
+}
