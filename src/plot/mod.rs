@@ -1,1 +1,5 @@
 //! SVG figures.
+
+mod chart;
+
+pub use chart::{Chart, PlotError, Series};

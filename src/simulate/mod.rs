@@ -1,1 +1,12 @@
-//! Virtual converters: exact samples of analytic sources and of recordings.
+//! Virtual converters: what ideal samplers behind the analog front ends would have captured.
+//!
+//! Analytic sources are answered by closed forms and matrix exponentials, recordings by exact Fourier
+//! synthesis; nothing is ever stepped on a coarse time grid.
+
+mod recording;
+mod response;
+mod source;
+
+pub use recording::Recording;
+pub use response::{Instants, sample};
+pub use source::{ParseSourceError, Source};

@@ -1,0 +1,158 @@
+//! Line charts as SVG text.
+
+use plotters::prelude::*;
+
+/// plotters places SVG points on whole pixels: draw large, let the view box scale it down.
+const OVERSIZE: u32 = 4;
+const WIDTH: u32 = 960;
+const HEIGHT: u32 = 420;
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(31, 119, 180),
+    RGBColor(214, 39, 40),
+    RGBColor(44, 160, 44),
+    RGBColor(148, 103, 189),
+    RGBColor(255, 127, 14),
+    RGBColor(80, 80, 80),
+];
+
+/// One curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Legend text.
+    pub label: String,
+    /// Points (x, y); what is not finite is left out.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Curves over a common axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// Title.
+    pub title: String,
+    /// Text under the x axis, with its unit.
+    pub x_label: String,
+    /// Text beside the y axis, with its unit.
+    pub y_label: String,
+    /// The curves, drawn in this order.
+    pub series: Vec<Series>,
+}
+
+/// A chart that could not be drawn.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PlotError {
+    /// No finite point in any series.
+    #[error("the chart `{title}` has no finite point to draw")]
+    Empty {
+        /// Title of the chart.
+        title: String,
+    },
+    /// The drawing library refused.
+    #[error("the chart `{title}` could not be drawn: {reason}")]
+    Drawing {
+        /// Title of the chart.
+        title: String,
+        /// What the library said.
+        reason: String,
+    },
+}
+
+impl Chart {
+    /// The chart as SVG text.
+    pub fn to_svg(&self) -> Result<String, PlotError> {
+        let (x, y) = self.ranges()?;
+        let mut svg = String::new();
+        self.draw(&mut svg, x, y)
+            .map_err(|e| PlotError::Drawing { title: self.title.clone(), reason: e.to_string() })?;
+        Ok(scale_by_view_box(&svg))
+    }
+
+    fn ranges(&self) -> Result<(std::ops::Range<f64>, std::ops::Range<f64>), PlotError> {
+        let points =
+            || self.series.iter().flat_map(|s| &s.points).filter(|p| p.0.is_finite() && p.1.is_finite());
+        if points().next().is_none() {
+            return Err(PlotError::Empty { title: self.title.clone() });
+        }
+        Ok((widened(points().map(|p| p.0), 0.0), widened(points().map(|p| p.1), 0.06)))
+    }
+
+    fn draw(
+        &self,
+        svg: &mut String,
+        x: std::ops::Range<f64>,
+        y: std::ops::Range<f64>,
+    ) -> Result<(), Box<dyn std::error::Error>> {
+        let root = SVGBackend::with_string(svg, (WIDTH * OVERSIZE, HEIGHT * OVERSIZE)).into_drawing_area();
+        root.fill(&WHITE)?;
+        let text = |size: u32| ("sans-serif", size * OVERSIZE).into_font();
+        let mut chart = ChartBuilder::on(&root)
+            .caption(&self.title, text(16))
+            .margin(10 * OVERSIZE)
+            .margin_right(24 * OVERSIZE)
+            .x_label_area_size(34 * OVERSIZE)
+            .y_label_area_size(64 * OVERSIZE)
+            .build_cartesian_2d(x, y)?;
+        chart
+            .configure_mesh()
+            .x_desc(&self.x_label)
+            .y_desc(&self.y_label)
+            .label_style(text(12))
+            .axis_desc_style(text(13))
+            .light_line_style(RGBColor(238, 238, 238))
+            .draw()?;
+        for (series, colour) in self.series.iter().zip(COLOURS.iter().cycle()) {
+            let points = series.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
+            let style = colour.stroke_width(OVERSIZE + OVERSIZE / 2);
+            let length = 20 * OVERSIZE as i32;
+            chart
+                .draw_series(LineSeries::new(points, style))?
+                .label(&series.label)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + length, y)], style));
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .legend_area_size(26 * OVERSIZE)
+            .background_style(WHITE.mix(0.85))
+            .border_style(RGBColor(200, 200, 200))
+            .label_font(text(12))
+            .draw()?;
+        root.present()?;
+        Ok(())
+    }
+}
+
+fn widened(values: impl Iterator<Item = f64>, share: f64) -> std::ops::Range<f64> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let span = if high > low { high - low } else { high.abs().max(1.0) };
+    let margin = if high > low { share * span } else { 0.5 * span };
+    low - margin..high + margin
+}
+
+fn scale_by_view_box(svg: &str) -> String {
+    let large = format!("width=\"{}\" height=\"{}\"", WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
+    svg.replacen(&large, &format!("width=\"{WIDTH}\" height=\"{HEIGHT}\""), 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(points: Vec<(f64, f64)>) -> Chart {
+        let series = vec![Series { label: "error <1>".into(), points }];
+        Chart { title: "t".into(), x_label: "x".into(), y_label: "y".into(), series }
+    }
+
+    #[test]
+    fn a_chart_is_svg_with_its_texts() {
+        let svg = chart(vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]).to_svg().unwrap();
+        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
+        assert!(svg.contains("width=\"960\"") && svg.contains("viewBox=\"0 0 3840 1680\""));
+        assert!(svg.contains("error &lt;1&gt;"));
+    }
+
+    #[test]
+    fn a_constant_and_an_empty_series_are_no_trouble() {
+        assert!(chart(vec![(1.0, 5.0)]).to_svg().is_ok());
+        assert_eq!(chart(vec![]).to_svg(), Err(PlotError::Empty { title: "t".into() }));
+    }
+}
