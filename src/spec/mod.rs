@@ -3,6 +3,20 @@
 //! Everything here is plain data in SI units; [`crate::analog`] turns a [`FilterSpec`] into a
 //! checked realisation and [`crate::design`] turns a [`Spec`] into a bank.
 
+mod decode;
+mod design;
+pub(crate) mod document;
+mod error;
+mod filter;
+mod limits;
+mod nearest;
+pub(crate) mod reader;
+
+pub use design::DesignOverrides;
+pub use error::{Place, SpecError, SpecProblem};
+pub use filter::{FilterProblem, MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
+pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
+
 use serde::{Deserialize, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
@@ -82,6 +96,12 @@ pub enum FilterSpec {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         attenuation_db: Option<f64>,
     },
+    /// Filters one after the other, for example a ladder filter and the pole of the sampling switch.
+    /// Only the whole has to be strictly proper.
+    Cascade {
+        /// The stages; none of them a cascade itself.
+        cascade: Vec<FilterSpec>,
+    },
 }
 
 /// The classical low-pass families.
@@ -130,4 +150,75 @@ pub struct DesignSpec {
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(default)]
     pub slack: Option<f64>,
+}
+
+impl Spec {
+    /// Reads a spec file's text; `file_name` only serves the messages.
+    ///
+    /// # Errors
+    /// [`SpecError`] with line, column, rule and remedy for the first thing that is wrong.
+    pub fn from_toml(text: &str, file_name: &str) -> Result<Self, SpecError> {
+        Self::from_toml_with(text, file_name, DesignOverrides::default())
+    }
+
+    /// Reads a spec file's text with parts of its `[design]` table replaced before it is checked: a file
+    /// without taps is complete when the command line gives them.
+    ///
+    /// # Errors
+    /// As [`Spec::from_toml`].
+    pub fn from_toml_with(
+        text: &str,
+        file_name: &str,
+        overrides: DesignOverrides,
+    ) -> Result<Self, SpecError> {
+        let document = document::Node::from_toml(text).map_err(|error| {
+            let problem = SpecProblem::Syntax { message: error.message().to_owned() };
+            SpecError::new(file_name, text, error.span(), String::new(), problem)
+        })?;
+        decode::spec(&reader::Value::root(&document), overrides)
+            .map_err(|fault| SpecError::new(file_name, text, fault.span, fault.path, fault.problem))
+    }
+
+    /// D_i / h of every channel, exactly whole where it is whole up to rounding.
+    pub fn delays_in_fast_periods(&self) -> Vec<f64> {
+        self.channels.iter().map(|channel| delay_in_fast_periods(channel.delay, self.fast_period)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const THESIS: &str = r#"
+name = "thesis example, FIR"
+fast_period = 1.0
+ratio = 2
+latency = 10
+[target]
+filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
+[[channel]]
+delay = 1.2
+[[channel]]
+delay = 0.6
+filter = { zeros = [], poles = [[-0.5, 0.0], [-0.5, 0.0]], gain = 0.25 }
+[design]
+method = "fir"
+taps = 22
+"#;
+
+    #[test]
+    fn the_thesis_example_reads() {
+        let spec = Spec::from_toml(THESIS, "thesis.toml").unwrap();
+        assert_eq!((spec.ratio, spec.latency, spec.fast_period), (2, Some(10), 1.0));
+        assert_eq!(spec.channels[0].filter, spec.target);
+        assert_eq!(spec.channels[1].delay, 0.6);
+        assert_eq!(spec.design, DesignSpec { method: Method::Fir, taps: Some(22), slack: None });
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_line_and_neighbour() {
+        let error = Spec::from_toml(&THESIS.replace("delay = 1.2", "dealy = 1.2"), "t.toml").unwrap_err();
+        assert_eq!(error.place().map(|p| (p.line, p.column)), Some((9, 1)));
+        assert!(error.to_string().contains("did you mean \"delay\"?"), "{error}");
+    }
 }

@@ -1,0 +1,43 @@
+//! Elliptic (Cauer) filters in closed form.
+//!
+//! Source: Orfanidis, "Lecture notes on elliptic filter design" (2006), equations for zeros and poles;
+//! the degree equation by nomes as in Lutovac, Tosic and Evans, "Filter design for signal processing"
+//! (2001).
+
+use super::jacobi::Modulus;
+use super::{excess_power, product_of_negatives};
+use crate::analog::Zpk;
+use crate::linalg::Complex;
+
+/// Elliptic: `ripple_db` up to the cutoff, at least `attenuation_db` (> `ripple_db` > 0) beyond the
+/// stop-band edge that order and ripples imply; an even order has as many zeros as poles.
+pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk {
+    let ripple = excess_power(ripple_db);
+    if order == 1 {
+        let p = 1.0 / ripple.sqrt();
+        return Zpk { zeros: Vec::new(), poles: vec![Complex::new(-p, 0.0)], gain: p };
+    }
+    let selectivity = Modulus::new((ripple / excess_power(attenuation_db)).sqrt());
+    let modulus = selectivity.with_nome_root(order);
+    let quarter = modulus.quarter_period();
+    // j v0 is where the rational function's square meets -1/ripple.
+    let v0 = quarter * selectivity.swapped().first_kind(1.0 / ripple.sqrt())
+        / (order as f64 * selectivity.quarter_period());
+    let v = modulus.swapped().functions(v0);
+
+    let (mut zeros, mut poles) = (Vec::new(), Vec::new());
+    for j in ((1 - order % 2)..order).step_by(2) {
+        let u = modulus.functions(quarter * j as f64 / order as f64);
+        let denominator = v.cn * v.cn + (modulus.k * u.sn * v.sn) * (modulus.k * u.sn * v.sn);
+        let pole = Complex::new(-u.cn * u.dn * v.sn * v.cn, u.sn * v.dn) / denominator;
+        if j == 0 {
+            poles.push(Complex::new(pole.re, 0.0));
+            continue;
+        }
+        let zero = Complex::new(0.0, 1.0 / (modulus.k * u.sn));
+        zeros.extend([zero, zero.conj()]);
+        poles.extend([pole, pole.conj()]);
+    }
+    let dc = if order % 2 == 0 { 1.0 / (1.0 + ripple).sqrt() } else { 1.0 };
+    Zpk { gain: dc * product_of_negatives(&poles) / product_of_negatives(&zeros), zeros, poles }
+}

@@ -1,0 +1,144 @@
+//! From a written filter to a gain and a chain of blocks in normalised time.
+
+use std::f64::consts::TAU;
+
+use crate::linalg::{Complex, Mat, eigenvalues, solve_c, to_complex};
+use crate::spec::{Family, FilterSpec};
+
+use super::balance::equalised;
+use super::rational::Rational;
+use super::roots::RootSet;
+use super::section::{Realisation, Section, pair_sections};
+use super::{AnalogError, Zpk, families};
+
+/// One link of a chain with one input and one output.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Block {
+    /// One or two poles with at most as many zeros.
+    Section(Section),
+    /// A polynomial fraction that would not be factored.
+    Rational(Rational),
+    /// State equations as they were given.
+    State(Realisation),
+}
+
+/// A gain and the blocks behind it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Chain {
+    pub(super) gain: f64,
+    pub(super) blocks: Vec<Block>,
+}
+
+impl Block {
+    pub(super) fn realise(&self) -> Realisation {
+        match self {
+            Self::Section(section) => section.realise(),
+            Self::Rational(rational) => rational.realise(),
+            Self::State(state) => state.clone(),
+        }
+    }
+
+    pub(super) fn response(&self, s: Complex<f64>) -> Complex<f64> {
+        match self {
+            Self::Section(section) => section.response(s),
+            Self::Rational(rational) => rational.response(s),
+            Self::State(state) => state_response(state, s),
+        }
+    }
+
+    pub(super) fn poles(&self) -> Result<Vec<Complex<f64>>, AnalogError> {
+        match self {
+            Self::Section(section) => Ok(section.poles.list()),
+            Self::Rational(rational) => rational.poles(),
+            Self::State(state) => Ok(eigenvalues(&equalised(&state.a))?),
+        }
+    }
+}
+
+/// d + c (s - a)^-1 b.
+pub(super) fn state_response(state: &Realisation, s: Complex<f64>) -> Complex<f64> {
+    let n = state.a.nrows();
+    let pencil = crate::linalg::CMat::identity(n, n) * s - to_complex(&state.a);
+    let x = solve_c(&pencil, &to_complex(&state.b));
+    (to_complex(&state.c) * x)[(0, 0)] + state.d
+}
+
+impl Chain {
+    /// Reads a filter whose written form has been checked; `h` is the time unit in seconds.
+    pub(super) fn new(filter: &FilterSpec, h: f64) -> Result<Self, AnalogError> {
+        match filter {
+            FilterSpec::TransferFunction { num, den } => Self::from_rational(Rational::new(num, den, h)),
+            FilterSpec::ZeroPoleGain { zeros, poles, gain } => {
+                let complex = |list: &[[f64; 2]]| list.iter().map(|&[re, im]| Complex::new(re, im)).collect();
+                Self::from_zpk(
+                    &Zpk { zeros: complex(zeros), poles: complex(poles), gain: *gain }.stretched(h),
+                    h,
+                )
+            }
+            FilterSpec::StateSpace { a, b, c } => Ok(Self::from_matrices(a, b, c, h)),
+            FilterSpec::Family { family, order, cutoff, ripple_db, attenuation_db } => {
+                let order = order.unwrap_or(1);
+                let prototype =
+                    prototype(*family, order, ripple_db.unwrap_or(0.0), attenuation_db.unwrap_or(0.0))?;
+                Self::from_zpk(&prototype.stretched(TAU * cutoff * h), h)
+            }
+            FilterSpec::Cascade { cascade } => {
+                let mut whole = Self { gain: 1.0, blocks: Vec::new() };
+                for stage in cascade {
+                    let stage = Self::new(stage, h)?;
+                    whole.gain *= stage.gain;
+                    whole.blocks.extend(stage.blocks);
+                }
+                Ok(whole)
+            }
+        }
+    }
+
+    /// `zpk` in normalised time; `h` only serves to name roots in rad/s.
+    fn from_zpk(zpk: &Zpk, h: f64) -> Result<Self, AnalogError> {
+        let poles = RootSet::new(&zpk.poles, "pole").map_err(|e| in_written_unit(e, h))?;
+        let zeros = RootSet::new(&zpk.zeros, "zero").map_err(|e| in_written_unit(e, h))?;
+        let sections = pair_sections(&poles, &zeros);
+        let gain = sections.iter().fold(zpk.gain, |gain, section| gain / section.scale());
+        Ok(Self { gain, blocks: sections.into_iter().map(Block::Section).collect() })
+    }
+
+    fn from_rational(rational: Rational) -> Result<Self, AnalogError> {
+        match rational.factored()? {
+            Some(zpk) => Self::from_zpk(&zpk, 1.0),
+            None => Ok(Self { gain: 1.0, blocks: vec![Block::Rational(rational)] }),
+        }
+    }
+
+    fn from_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>], h: f64) -> Self {
+        let n = a.len();
+        let state = Realisation {
+            a: Mat::from_fn(n, n, |i, j| a[i][j] * h),
+            b: Mat::from_fn(n, 1, |i, _| b[i][0] * h),
+            c: Mat::from_fn(1, n, |_, j| c[0][j]),
+            d: 0.0,
+        };
+        Self { gain: 1.0, blocks: vec![Block::State(state)] }
+    }
+}
+
+/// The family member with cutoff 1 rad/s.
+fn prototype(family: Family, order: usize, ripple_db: f64, attenuation_db: f64) -> Result<Zpk, AnalogError> {
+    Ok(match family {
+        Family::Butterworth => families::butterworth(order),
+        Family::Chebyshev1 => families::chebyshev1(order, ripple_db),
+        Family::Chebyshev2 => families::chebyshev2(order, attenuation_db),
+        Family::Elliptic => families::elliptic(order, ripple_db, attenuation_db),
+        Family::Bessel => families::bessel(order)?,
+        Family::Rc => families::rc(),
+    })
+}
+
+fn in_written_unit(error: AnalogError, h: f64) -> AnalogError {
+    match error {
+        AnalogError::NotConjugate { what, re, im } => {
+            AnalogError::NotConjugate { what, re: re / h, im: im / h }
+        }
+        other => other,
+    }
+}

@@ -1,0 +1,158 @@
+//! The checked filter.
+
+use crate::linalg::{Complex, Mat};
+use crate::spec::FilterSpec;
+
+use super::balance::with_unit_states;
+use super::realise::Chain;
+use super::section::Realisation;
+use super::{AnalogError, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_NORMALISED_POLE};
+
+/// A stable, strictly proper, real filter Phi in normalised time t' = t/h.
+///
+/// State equations x' = a x + b f, out = c x with a: n x n, b: n x 1, c: 1 x n. The gain is that of the
+/// written filter: Phi'(s') = Phi(s'/h), dimensionless. Two filters are equal when their normalised poles,
+/// zeros and gains are (for state-space forms: their matrices), however they were written down; channels
+/// with equal filters can share one state.
+///
+/// Source: thesis section 5.2 asks for exactly these properties (rational, stable, strictly proper).
+#[derive(Debug, Clone)]
+pub struct StrictlyProper {
+    chain: Chain,
+    poles: Vec<Complex<f64>>,
+    realisation: Realisation,
+}
+
+impl PartialEq for StrictlyProper {
+    fn eq(&self, other: &Self) -> bool {
+        self.chain == other.chain
+    }
+}
+
+impl StrictlyProper {
+    /// Checks and realises `filter` with time measured in units of `time_unit_seconds` (h).
+    ///
+    /// # Errors
+    /// [`AnalogError`]: a time unit that is not positive; a written form that breaks a rule; poles that are
+    /// unstable, without conjugate or outside [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a
+    /// response that is zero everywhere or beyond double precision.
+    pub fn new(filter: &FilterSpec, time_unit_seconds: f64) -> Result<Self, AnalogError> {
+        let h = time_unit_seconds;
+        if !(h.is_finite() && h > 0.0) {
+            return Err(AnalogError::TimeUnit { value: h });
+        }
+        filter.check()?;
+        let chain = Chain::new(filter, h)?;
+        if !chain.gain.is_normal() {
+            return Err(AnalogError::GainOutOfRange { value: chain.gain });
+        }
+        let mut poles = Vec::new();
+        for block in &chain.blocks {
+            poles.extend(block.poles()?);
+        }
+        poles.iter().try_for_each(|&pole| check_pole(pole, h))?;
+        let realisation = with_unit_states(&realise(&chain));
+        Self { chain, poles, realisation }.transmitting()
+    }
+
+    /// Refuses a filter whose response is zero or not a number where its poles are.
+    fn transmitting(self) -> Result<Self, AnalogError> {
+        let probes = self.poles.iter().map(|p| p.norm()).chain([0.0]);
+        let largest = probes.map(|w| self.response(w).norm()).fold(0.0, f64::max);
+        let sum: f64 = self.realisation.a.iter().chain(&self.realisation.b).chain(&self.realisation.c).sum();
+        if !(largest.is_finite() && sum.is_finite()) {
+            return Err(AnalogError::GainOutOfRange { value: self.chain.gain });
+        }
+        if largest == 0.0 { Err(AnalogError::NoTransmission) } else { Ok(self) }
+    }
+
+    /// a, n x n.
+    pub fn a(&self) -> &Mat {
+        &self.realisation.a
+    }
+
+    /// b, n x 1.
+    pub fn b(&self) -> &Mat {
+        &self.realisation.b
+    }
+
+    /// c, 1 x n.
+    pub fn c(&self) -> &Mat {
+        &self.realisation.c
+    }
+
+    /// n, the number of states and of poles.
+    pub fn order(&self) -> usize {
+        self.realisation.a.nrows()
+    }
+
+    /// Phi'(j w) with w in rad a fast period, from poles and zeros where the filter has them.
+    pub fn response(&self, w: f64) -> Complex<f64> {
+        let s = Complex::new(0.0, w);
+        self.chain
+            .blocks
+            .iter()
+            .fold(self.chain.gain.into(), |value: Complex<f64>, block| value * block.response(s))
+    }
+
+    /// The n poles in rad a fast period.
+    pub fn poles(&self) -> &[Complex<f64>] {
+        &self.poles
+    }
+}
+
+/// The blocks in a row; the gain goes to the output, so that states keep their size.
+fn realise(chain: &Chain) -> Realisation {
+    let mut whole =
+        chain.blocks.iter().fold(Realisation::wire(), |whole, block| whole.then(&block.realise()));
+    whole.c *= chain.gain;
+    whole
+}
+
+fn check_pole(pole: Complex<f64>, h: f64) -> Result<(), AnalogError> {
+    let (re, im, normalised) = (pole.re / h, pole.im / h, pole.norm());
+    // Written so that NaN is refused too.
+    if !(-pole.re >= MIN_DAMPING_RATIO * normalised && pole.re < 0.0) {
+        return Err(AnalogError::Unstable { re, im });
+    }
+    if !(MIN_NORMALISED_POLE..=MAX_NORMALISED_POLE).contains(&normalised) {
+        return Err(AnalogError::PoleOutOfRange { re, im, normalised });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::Family;
+
+    fn thesis() -> FilterSpec {
+        FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] }
+    }
+
+    #[test]
+    fn thesis_filter_is_a_double_pole_in_either_form() {
+        let tf = StrictlyProper::new(&thesis(), 1.0).unwrap();
+        let zpk = FilterSpec::ZeroPoleGain { zeros: vec![], poles: vec![[-0.5, 0.0]; 2], gain: 0.25 };
+        assert_eq!(tf, StrictlyProper::new(&zpk, 1.0).unwrap());
+        for w in [0.0, 0.1, 0.5, 3.0, 100.0] {
+            let expected = Complex::new(0.25, 0.0) / (Complex::new(0.5, w) * Complex::new(0.5, w));
+            assert!((tf.response(w) - expected).norm() <= 1e-15, "w = {w}");
+        }
+    }
+
+    #[test]
+    fn families_make_filters() {
+        for family in Family::ALL {
+            let filter = FilterSpec::Family {
+                family,
+                order: (family != Family::Rc).then_some(5),
+                cutoff: 2e4,
+                ripple_db: family.has_ripple().then_some(0.5),
+                attenuation_db: family.has_attenuation().then_some(60.0),
+            };
+            let phi = StrictlyProper::new(&filter, 1e-5).unwrap();
+            assert!((phi.response(0.0).norm() - 1.0).abs() < 1e-12, "{family:?}: {:?}", phi.response(0.0));
+        }
+    }
+}

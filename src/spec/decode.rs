@@ -1,0 +1,208 @@
+//! From a written document to a [`Spec`]: units resolved, omitted filters filled in, everything checked.
+
+use super::design::{DesignOverrides, WrittenDesign};
+use super::limits::{
+    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_latency, check_ratio,
+    check_slack, check_taps,
+};
+use super::reader::{Fault, Fields, Value};
+use super::{ChannelSpec, Family, FilterSpec, Method, Spec, SpecProblem};
+
+const TOP_KEYS: [&str; 8] =
+    ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
+const CHANNEL_KEYS: [&str; 3] = ["delay", "delay_samples", "filter"];
+const DESIGN_KEYS: [&str; 3] = ["method", "taps", "slack"];
+
+/// The keys of each written form of a filter; the first one names the form.
+const FILTER_FORMS: [&[&str]; 5] = [
+    &["num", "den"],
+    &["poles", "zeros", "gain"],
+    &["a", "b", "c"],
+    &["family", "order", "cutoff", "ripple_db", "attenuation_db"],
+    &["cascade"],
+];
+
+/// Reads the whole spec.
+pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<Spec, Fault> {
+    let top = document.fields(&TOP_KEYS)?;
+    let name = top.optional("name").map(|v| v.text()).transpose()?.unwrap_or_default().to_owned();
+    let fast_period = fast_period(&top)?;
+    let ratio =
+        checked_count(&top.required("ratio", "give M, the fast samples for each slow one")?, check_ratio)?;
+    let latency = top.optional("latency").map(|v| checked_count(&v, check_latency)).transpose()?;
+    let target = top
+        .required(
+            "target",
+            "describe the filter of the fast converter that you wish for, [target] filter = { .. }",
+        )?
+        .fields(&["filter"])?;
+    let target = filter(&target.required("filter", "give the target's analog filter")?)?;
+    let channels = channels(&top, fast_period, &target)?;
+    let design = design(&top, overrides, channels.len())?;
+    Ok(Spec { name, fast_period, ratio, latency, target, channels, design })
+}
+
+/// h, from one of its two spellings.
+fn fast_period(top: &Fields<'_>) -> Result<f64, Fault> {
+    match (top.optional("fast_period"), top.optional("fast_rate")) {
+        (Some(_), Some(rate)) => {
+            let remedy = "they say the same thing, keep one of them";
+            Err(rate.fault(SpecProblem::Conflict { first: "fast_period", second: "fast_rate", remedy }))
+        }
+        (Some(period), None) => checked_number(&period, check_fast_period),
+        (None, Some(rate)) => checked_number(&rate, check_fast_rate).map(f64::recip),
+        (None, None) => {
+            let remedy = "give fast_period in seconds or fast_rate in hertz";
+            Err(top.whole().fault(SpecProblem::MissingKey { key: "fast_period", remedy }))
+        }
+    }
+}
+
+fn checked_number(value: &Value<'_>, check: fn(f64) -> Result<(), SpecProblem>) -> Result<f64, Fault> {
+    let number = value.number()?;
+    check(number).map_err(|problem| value.fault(problem))?;
+    Ok(number)
+}
+
+fn checked_count(value: &Value<'_>, check: fn(usize) -> Result<(), SpecProblem>) -> Result<usize, Fault> {
+    let count = value.count("(a count)")?;
+    check(count).map_err(|problem| value.fault(problem))?;
+    Ok(count)
+}
+
+fn channels(top: &Fields<'_>, fast_period: f64, target: &FilterSpec) -> Result<Vec<ChannelSpec>, Fault> {
+    let list = top
+        .required("channel", "describe every slow converter in a table of its own, [[channel]] delay = ..")?;
+    let items = list.items("a list of tables, each headed [[channel]]")?;
+    check_channel_count(items.len()).map_err(|problem| list.fault(problem))?;
+    items.iter().map(|item| channel(item, fast_period, target)).collect()
+}
+
+fn channel(item: &Value<'_>, fast_period: f64, target: &FilterSpec) -> Result<ChannelSpec, Fault> {
+    let fields = item.fields(&CHANNEL_KEYS)?;
+    let delay = delay(&fields, fast_period)?;
+    let filter = match fields.optional("filter") {
+        Some(value) => filter(&value)?,
+        None => target.clone(),
+    };
+    Ok(ChannelSpec { delay, filter })
+}
+
+/// D_i in seconds, from one of its two spellings.
+fn delay(fields: &Fields<'_>, fast_period: f64) -> Result<f64, Fault> {
+    let (value, seconds_each, unit) = match (fields.optional("delay"), fields.optional("delay_samples")) {
+        (Some(_), Some(samples)) => {
+            let remedy = "they say the same thing, keep one of them";
+            return Err(samples.fault(SpecProblem::Conflict {
+                first: "delay",
+                second: "delay_samples",
+                remedy,
+            }));
+        }
+        (Some(delay), None) => (delay, 1.0, "s"),
+        (None, Some(samples)) => (samples, fast_period, "fast periods"),
+        (None, None) => {
+            let remedy = "give delay in seconds or delay_samples in fast periods (0 for none)";
+            return Err(fields.whole().fault(SpecProblem::MissingKey { key: "delay", remedy }));
+        }
+    };
+    let written = value.number()?;
+    let delay = written * seconds_each;
+    check_delay(delay / fast_period, written, unit).map_err(|problem| value.fault(problem))?;
+    // A delay of -0.0 is a delay of 0.0.
+    Ok(delay + 0.0)
+}
+
+fn design(top: &Fields<'_>, overrides: DesignOverrides, channels: usize) -> Result<super::DesignSpec, Fault> {
+    let fields = top.optional("design").map(|table| table.fields(&DESIGN_KEYS)).transpose()?;
+    let get = |key| fields.as_ref().and_then(|fields| fields.optional(key));
+    let written = WrittenDesign {
+        method: get("method").map(|v| v.name("method", &Method::ALL.map(|m| (m.name(), m)))).transpose()?,
+        taps: get("taps").map(|v| checked_count(&v, check_taps)).transpose()?,
+        slack: get("slack").map(|v| checked_number(&v, check_slack)).transpose()?,
+    };
+    let design = written.overridden(overrides).resolved();
+    let complain = |problem: SpecProblem| {
+        let key = match problem {
+            SpecProblem::NeedlessKey { key, .. } => Some(key),
+            SpecProblem::Range { .. } => Some("taps"),
+            _ => None,
+        };
+        fields.as_ref().unwrap_or(top).fault_at(key, problem)
+    };
+    design.check(channels).map_err(complain)?;
+    Ok(design)
+}
+
+/// Reads one filter in whichever form it is written.
+fn filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
+    let fields = value.fields(&FILTER_FORMS.concat())?;
+    let filter = unchecked_filter(&fields)?;
+    filter.check().map_err(|problem| fields.fault_at(problem.key(), problem))?;
+    Ok(filter)
+}
+
+fn unchecked_filter(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
+    let mut used = FILTER_FORMS.iter().filter_map(|form| form.iter().copied().find(|key| fields.has(key)));
+    let Some(first) = used.next() else { return Err(fields.whole().fault(SpecProblem::EmptyFilter)) };
+    if let Some(second) = used.next() {
+        let remedy = "they belong to different ways to write a filter, keep the keys of one way";
+        return Err(fields.fault_at(Some(second), SpecProblem::Conflict { first, second, remedy }));
+    }
+    match first {
+        "num" | "den" => Ok(FilterSpec::TransferFunction {
+            num: fields.required("num", "list the numerator in descending powers of s")?.numbers()?,
+            den: fields.required("den", "list the denominator in descending powers of s")?.numbers()?,
+        }),
+        "poles" | "zeros" | "gain" => Ok(FilterSpec::ZeroPoleGain {
+            zeros: fields.optional("zeros").map(|v| roots(&v)).transpose()?.unwrap_or_default(),
+            poles: roots(&fields.required("poles", "list the poles as [re, im] pairs in rad/s")?)?,
+            gain: fields
+                .required("gain", "give the factor before the product of zeros over poles")?
+                .number()?,
+        }),
+        "a" | "b" | "c" => Ok(FilterSpec::StateSpace {
+            a: fields.required("a", "give dx/dt = a x + b f, out = c x as lists of rows")?.matrix()?,
+            b: fields.required("b", "give the n x 1 input matrix, [[..], ..]")?.matrix()?,
+            c: fields.required("c", "give the 1 x n output matrix, [[..]]")?.matrix()?,
+        }),
+        "cascade" => {
+            let stages = fields
+                .required("cascade", "list the stages")?
+                .items("a list of filters, [{ .. }, { .. }]")?;
+            let read = |stage: &Value<'_>| unchecked_filter(&stage.fields(&FILTER_FORMS.concat())?);
+            Ok(FilterSpec::Cascade { cascade: stages.iter().map(read).collect::<Result<_, _>>()? })
+        }
+        _ => family(fields),
+    }
+}
+
+fn family(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
+    let named = fields.required("family", "name the family, for example family = \"butterworth\"")?;
+    let number = |key| fields.optional(key).map(|v: Value<'_>| v.number()).transpose();
+    Ok(FilterSpec::Family {
+        family: named.name("filter family", &Family::ALL.map(|f| (f.name(), f)))?,
+        order: fields.optional("order").map(|v| v.count("poles")).transpose()?,
+        cutoff: fields.required("cutoff", "give the cutoff in hertz")?.number()?,
+        ripple_db: number("ripple_db")?,
+        attenuation_db: number("attenuation_db")?,
+    })
+}
+
+/// Complex numbers as `[re, im]`; a bare number is real.
+fn roots(value: &Value<'_>) -> Result<Vec<[f64; 2]>, Fault> {
+    value.items("a list of [re, im] pairs")?.iter().map(root).collect()
+}
+
+fn root(value: &Value<'_>) -> Result<[f64; 2], Fault> {
+    if let Ok(re) = value.number() {
+        return Ok([re, 0.0]);
+    }
+    let pair = value.numbers()?;
+    <[f64; 2]>::try_from(pair).map_err(|_| {
+        value.fault(SpecProblem::WrongType {
+            expected: "a pair [re, im] of numbers",
+            found: "a list of another length",
+        })
+    })
+}

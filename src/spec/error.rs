@@ -1,0 +1,217 @@
+//! What can be wrong with a spec, and where.
+
+use std::fmt;
+use std::ops::Range;
+
+use super::FilterProblem;
+
+/// A spec that was refused: the file, the place in it, and the problem.
+///
+/// Displays as `file:line:column: path: problem` with the offending line below.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpecError {
+    inner: Box<Inner>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Inner {
+    file: String,
+    path: String,
+    place: Option<Place>,
+    problem: SpecProblem,
+}
+
+/// A place in a text file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// Characters concerned on that line, at least 1.
+    pub width: usize,
+    /// The line, without its end.
+    pub text: String,
+}
+
+/// The rule that a spec breaks, with the offending value and the remedy.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpecProblem {
+    /// The text is not TOML (or JSON) at all.
+    #[error("{message}")]
+    Syntax {
+        /// The parser's words.
+        message: String,
+    },
+    /// A key that no table of this kind has.
+    #[error("unknown key \"{key}\"{}; the keys here are {}", suggestion(.nearest), .known.join(", "))]
+    UnknownKey {
+        /// The key as written.
+        key: String,
+        /// A known key that is spelled much alike.
+        nearest: Option<&'static str>,
+        /// All known keys.
+        known: Vec<&'static str>,
+    },
+    /// A key that must be there.
+    #[error("the key {key} is missing; {remedy}")]
+    MissingKey {
+        /// The key.
+        key: &'static str,
+        /// What to write.
+        remedy: &'static str,
+    },
+    /// A value of the wrong type.
+    #[error("expected {expected}, found {found}")]
+    WrongType {
+        /// What belongs here.
+        expected: &'static str,
+        /// What stands here.
+        found: &'static str,
+    },
+    /// A name that is not on the list.
+    #[error("unknown {what} \"{name}\"{}; choose one of {}", suggestion(.nearest), .known.join(", "))]
+    UnknownName {
+        /// What the name should name.
+        what: &'static str,
+        /// The name as written.
+        name: String,
+        /// A known name that is spelled much alike.
+        nearest: Option<&'static str>,
+        /// All known names.
+        known: Vec<&'static str>,
+    },
+    /// Two keys of which only one can be meant.
+    #[error("both {first} and {second} are given; {remedy}")]
+    Conflict {
+        /// One of the two.
+        first: &'static str,
+        /// The other.
+        second: &'static str,
+        /// Which one to remove.
+        remedy: &'static str,
+    },
+    /// A number out of its range.
+    #[error("{value} {unit} is out of range: {rule}")]
+    Range {
+        /// The offending value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// The rule and the remedy.
+        rule: String,
+    },
+    /// A key that the chosen method does not read.
+    #[error("{key} has no meaning for the method {method}; remove it or choose the method {remedy}")]
+    NeedlessKey {
+        /// The key.
+        key: &'static str,
+        /// Name of the method.
+        method: &'static str,
+        /// Names of methods that read the key.
+        remedy: &'static str,
+    },
+    /// A filter table without any filter.
+    #[error(
+        "the filter is empty; give num and den, or poles and gain, or a, b and c, or family and cutoff, or cascade"
+    )]
+    EmptyFilter,
+    /// A filter that is not possible as written.
+    #[error(transparent)]
+    Filter(#[from] FilterProblem),
+}
+
+fn suggestion(nearest: &Option<&'static str>) -> String {
+    nearest.map(|key| format!(", did you mean \"{key}\"?")).unwrap_or_default()
+}
+
+impl SpecError {
+    /// A problem with the span of `text` that it is about.
+    pub(super) fn new(
+        file: &str,
+        text: &str,
+        span: Option<Range<usize>>,
+        path: String,
+        problem: SpecProblem,
+    ) -> Self {
+        let place = span.map(|span| Place::locate(text, span));
+        Self { inner: Box::new(Inner { file: file.to_owned(), path, place, problem }) }
+    }
+
+    /// The file name as it was given.
+    pub fn file(&self) -> &str {
+        &self.inner.file
+    }
+
+    /// The keys that lead to the place, such as `channel[1].filter.den`; empty for the whole file.
+    pub fn path(&self) -> &str {
+        &self.inner.path
+    }
+
+    /// Line and column.
+    pub fn place(&self) -> Option<&Place> {
+        self.inner.place.as_ref()
+    }
+
+    /// What is wrong.
+    pub fn problem(&self) -> &SpecProblem {
+        &self.inner.problem
+    }
+}
+
+impl std::error::Error for SpecError {}
+
+impl fmt::Display for SpecError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Inner { file, path, place, problem } = &*self.inner;
+        write!(f, "{file}:")?;
+        if let Some(place) = place {
+            write!(f, "{}:{}:", place.line, place.column)?;
+        }
+        if !path.is_empty() {
+            write!(f, " {path}:")?;
+        }
+        write!(f, " {problem}")?;
+        place.as_ref().map_or(Ok(()), |place| write!(f, "\n{place}"))
+    }
+}
+
+/// Longest part of a line that a message shows, in characters.
+const SHOWN_CHARACTERS: usize = 100;
+
+impl Place {
+    /// The line and column of the byte range `span` of `text`; a range that leaves the text is cut to it.
+    pub(crate) fn locate(text: &str, span: Range<usize>) -> Self {
+        let start = boundary(text, span.start);
+        let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
+        let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
+        let end = boundary(text, span.end).clamp(start, line_end);
+        Self {
+            line: text[..start].matches('\n').count() + 1,
+            column: text[line_start..start].chars().count() + 1,
+            width: text[start..end].chars().count().max(1),
+            text: text[line_start..line_end].trim_end_matches('\r').to_owned(),
+        }
+    }
+}
+
+/// The nearest character boundary at or below `index`.
+fn boundary(text: &str, index: usize) -> usize {
+    let index = index.min(text.len());
+    (0..=index).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0)
+}
+
+impl fmt::Display for Place {
+    /// The line with its number, and carets under the place; a long line is cut around it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let skipped = (self.column - 1).saturating_sub(SHOWN_CHARACTERS / 2);
+        // Tabs would put the carets elsewhere than the text.
+        let shown = |c: char| if c.is_control() { ' ' } else { c };
+        let line: String = self.text.chars().skip(skipped).take(SHOWN_CHARACTERS).map(shown).collect();
+        let number = self.line.to_string();
+        let margin = " ".repeat(number.len());
+        let indent = " ".repeat(self.column - 1 - skipped);
+        let carets = "^".repeat(self.width.min(SHOWN_CHARACTERS / 2));
+        write!(f, "{margin} |\n{number} | {line}\n{margin} | {indent}{carets}")
+    }
+}

@@ -1,0 +1,126 @@
+//! Ranges of the numbers in a spec, with reasons.
+
+use super::SpecProblem;
+
+/// Largest M. The designer factors dense matrices of M + N rows at every frequency; the largest
+/// interleaved converters have a few hundred.
+pub const MAX_RATIO: usize = 1024;
+
+/// Largest number of channels N; see [`MAX_RATIO`].
+pub const MAX_CHANNELS: usize = 1024;
+
+/// Most taps a channel, for every FIR method.
+pub const MAX_TAPS: usize = 65_536;
+
+/// Most taps of all channels together for the method `fir`: the Hessian of its solver is dense, 2 GiB at
+/// this size.
+pub const MAX_OPTIMISED_TAPS: usize = 16_384;
+
+/// Largest latency and largest delay in fast periods: each one costs a state in the blocked system.
+pub const MAX_LATENCY: usize = 65_536;
+
+/// How close to a whole number of fast periods a delay is taken to be whole, relative to its size (at
+/// least one period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; the spurious fraction would
+/// be a channel state of size 1e-16.
+const WHOLE_DELAY_TOLERANCE: f64 = 1e-13;
+
+/// D/h, exactly whole where it is whole up to rounding.
+pub fn delay_in_fast_periods(delay: f64, fast_period: f64) -> f64 {
+    let periods = delay / fast_period;
+    let whole = periods.round();
+    if (periods - whole).abs() <= WHOLE_DELAY_TOLERANCE * whole.max(1.0) { whole } else { periods }
+}
+
+fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> SpecProblem {
+    SpecProblem::Range { value, unit, rule: rule.into() }
+}
+
+/// h: positive, and so far from the ends of double precision that rates and squares exist.
+pub(crate) fn check_fast_period(h: f64) -> Result<(), SpecProblem> {
+    if (1e-100..=1e100).contains(&h) {
+        return Ok(());
+    }
+    Err(range(h, "s", "the fast period must be positive, between 1e-100 and 1e100 seconds"))
+}
+
+/// 1/h, by the same rule.
+pub(crate) fn check_fast_rate(rate: f64) -> Result<(), SpecProblem> {
+    if (1e-100..=1e100).contains(&rate) {
+        return Ok(());
+    }
+    Err(range(rate, "Hz", "the fast rate must be positive, between 1e-100 and 1e100 hertz"))
+}
+
+/// M.
+pub(crate) fn check_ratio(ratio: usize) -> Result<(), SpecProblem> {
+    if (1..=MAX_RATIO).contains(&ratio) {
+        return Ok(());
+    }
+    let rule = format!("ratio counts the fast samples for each slow one and must be 1 to {MAX_RATIO}");
+    Err(range(ratio as f64, "fast samples", rule))
+}
+
+/// m0.
+pub(crate) fn check_latency(latency: usize) -> Result<(), SpecProblem> {
+    if latency <= MAX_LATENCY {
+        return Ok(());
+    }
+    let rule = format!(
+        "latency is counted in fast samples and at most {MAX_LATENCY}; every one costs the designer a state"
+    );
+    Err(range(latency as f64, "fast samples", rule))
+}
+
+/// D_i in fast periods; `written` is the number the user knows, in `unit`.
+pub(crate) fn check_delay(periods: f64, written: f64, unit: &'static str) -> Result<(), SpecProblem> {
+    if periods < 0.0 {
+        return Err(range(
+            written,
+            unit,
+            "a delay cannot be negative; add the same amount to the delays of all channels and to the latency",
+        ));
+    }
+    // Written so that NaN is refused too.
+    if periods <= MAX_LATENCY as f64 {
+        return Ok(());
+    }
+    let rule =
+        format!("the delay is {periods:e} fast periods, at most {MAX_LATENCY} are supported; check its unit");
+    Err(range(written, unit, rule))
+}
+
+/// N.
+pub(crate) fn check_channel_count(count: usize) -> Result<(), SpecProblem> {
+    if (1..=MAX_CHANNELS).contains(&count) {
+        return Ok(());
+    }
+    Err(range(count as f64, "channels", format!("a bank has 1 to {MAX_CHANNELS} channels")))
+}
+
+/// Taps a channel.
+pub(crate) fn check_taps(taps: usize) -> Result<(), SpecProblem> {
+    if (1..=MAX_TAPS).contains(&taps) {
+        return Ok(());
+    }
+    Err(range(taps as f64, "taps", format!("a channel's filter has 1 to {MAX_TAPS} taps at the fast rate")))
+}
+
+/// Taps of all channels together, which only the optimising method limits.
+pub(crate) fn check_optimised_taps(taps: usize, channels: usize) -> Result<(), SpecProblem> {
+    let total = taps.saturating_mul(channels);
+    if total <= MAX_OPTIMISED_TAPS {
+        return Ok(());
+    }
+    let rule = format!(
+        "taps times channels is at most {MAX_OPTIMISED_TAPS} for the method fir; use fewer taps, or the method iir"
+    );
+    Err(range(total as f64, "taps in all", rule))
+}
+
+/// Relative excess over the optimal gamma.
+pub(crate) fn check_slack(slack: f64) -> Result<(), SpecProblem> {
+    if slack >= 0.0 && slack.is_finite() {
+        return Ok(());
+    }
+    Err(range(slack, "(relative)", "slack is the share by which gamma may exceed its optimum, zero or more"))
+}

@@ -1,0 +1,179 @@
+//! Typed access to a written document; every complaint carries its place.
+
+use std::ops::Range;
+
+use super::SpecProblem;
+use super::document::{Entry, Kind, Node};
+use super::nearest::nearest;
+
+/// A problem at a place.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fault {
+    pub(crate) path: String,
+    pub(crate) span: Option<Range<usize>>,
+    pub(crate) problem: SpecProblem,
+}
+
+/// A value and the path that led to it.
+#[derive(Debug, Clone)]
+pub(crate) struct Value<'a> {
+    node: &'a Node,
+    path: String,
+}
+
+/// A table of which every key is known.
+#[derive(Debug, Clone)]
+pub(crate) struct Fields<'a> {
+    entries: &'a [Entry],
+    whole: Value<'a>,
+}
+
+impl<'a> Value<'a> {
+    /// The whole document.
+    pub(crate) fn root(node: &'a Node) -> Self {
+        Self { node, path: String::new() }
+    }
+
+    /// A problem with this value.
+    pub(crate) fn fault(&self, problem: impl Into<SpecProblem>) -> Fault {
+        Fault { path: self.path.clone(), span: self.node.span.clone(), problem: problem.into() }
+    }
+
+    fn wrong_type(&self, expected: &'static str) -> Fault {
+        self.fault(SpecProblem::WrongType { expected, found: self.node.kind.name() })
+    }
+
+    /// Whether it is null.
+    pub(crate) fn is_null(&self) -> bool {
+        matches!(self.node.kind, Kind::Null)
+    }
+
+    /// The keys that lead here.
+    pub(crate) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// A finite number; whole numbers count.
+    pub(crate) fn number(&self) -> Result<f64, Fault> {
+        let value = match self.node.kind {
+            Kind::Number(x) => x,
+            Kind::Integer(i) => i as f64,
+            _ => return Err(self.wrong_type("a number")),
+        };
+        if value.is_finite() {
+            return Ok(value);
+        }
+        let rule = "every number must be finite and fit a double".into();
+        Err(self.fault(SpecProblem::Range { value, unit: "(read as a double)", rule }))
+    }
+
+    /// A whole number >= 0; `unit` says what it counts.
+    pub(crate) fn count(&self, unit: &'static str) -> Result<usize, Fault> {
+        let out_of_range =
+            |value, rule: &str| self.fault(SpecProblem::Range { value, unit, rule: rule.into() });
+        match self.node.kind {
+            Kind::Integer(i) => usize::try_from(i).map_err(|_| {
+                out_of_range(i as f64, "it must be a whole number, zero or more, that fits a machine word")
+            }),
+            Kind::Number(x) => {
+                Err(out_of_range(x, "it must be a whole number, written without point and exponent"))
+            }
+            _ => Err(self.wrong_type("a whole number")),
+        }
+    }
+
+    /// A text.
+    pub(crate) fn text(&self) -> Result<&'a str, Fault> {
+        match &self.node.kind {
+            Kind::Text(text) => Ok(text),
+            _ => Err(self.wrong_type("a text in quotes")),
+        }
+    }
+
+    /// A list, item by item; `expected` describes the whole list.
+    pub(crate) fn items(&self, expected: &'static str) -> Result<Vec<Value<'a>>, Fault> {
+        match &self.node.kind {
+            Kind::List(items) => Ok(items
+                .iter()
+                .enumerate()
+                .map(|(i, node)| Value { node, path: format!("{}[{i}]", self.path) })
+                .collect()),
+            _ => Err(self.wrong_type(expected)),
+        }
+    }
+
+    /// A list of numbers. Paths are only spelled out when something is wrong: tap lists are long.
+    pub(crate) fn numbers(&self) -> Result<Vec<f64>, Fault> {
+        let Kind::List(items) = &self.node.kind else { return Err(self.wrong_type("a list of numbers")) };
+        let number = |(i, node): (usize, &'a Node)| match node.kind {
+            Kind::Number(x) if x.is_finite() => Ok(x),
+            _ => Value { node, path: format!("{}[{i}]", self.path) }.number(),
+        };
+        items.iter().enumerate().map(number).collect()
+    }
+
+    /// A list of rows of numbers.
+    pub(crate) fn matrix(&self) -> Result<Vec<Vec<f64>>, Fault> {
+        self.items("a list of rows, [[..], [..]]")?.iter().map(Value::numbers).collect()
+    }
+
+    /// One of `known` names; `what` says what it names.
+    pub(crate) fn name<T: Copy>(&self, what: &'static str, known: &[(&'static str, T)]) -> Result<T, Fault> {
+        let text = self.text()?;
+        if let Some((_, value)) = known.iter().find(|(name, _)| *name == text) {
+            return Ok(*value);
+        }
+        let known: Vec<&'static str> = known.iter().map(|(name, _)| *name).collect();
+        let nearest = nearest(text, &known);
+        Err(self.fault(SpecProblem::UnknownName { what, name: text.to_owned(), nearest, known }))
+    }
+
+    /// A table with no other keys than `known`.
+    pub(crate) fn fields(&self, known: &[&'static str]) -> Result<Fields<'a>, Fault> {
+        let Kind::Table(entries) = &self.node.kind else {
+            return Err(self.wrong_type("a table of keys and values"));
+        };
+        match entries.iter().find(|entry| !known.contains(&entry.key.as_str())) {
+            Some(entry) => Err(Fault {
+                path: self.path.clone(),
+                span: entry.key_span.clone(),
+                problem: SpecProblem::UnknownKey {
+                    key: entry.key.clone(),
+                    nearest: nearest(&entry.key, known),
+                    known: known.to_vec(),
+                },
+            }),
+            None => Ok(Fields { entries, whole: self.clone() }),
+        }
+    }
+}
+
+impl<'a> Fields<'a> {
+    /// The table itself, for complaints about the whole of it.
+    pub(crate) fn whole(&self) -> &Value<'a> {
+        &self.whole
+    }
+
+    /// Whether `key` is there and not null.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.optional(key).is_some()
+    }
+
+    /// The value of `key`, unless it is absent or null.
+    pub(crate) fn optional(&self, key: &str) -> Option<Value<'a>> {
+        let entry = self.entries.iter().find(|entry| entry.key == key)?;
+        let prefix = &self.whole.path;
+        let path = if prefix.is_empty() { key.to_owned() } else { format!("{prefix}.{key}") };
+        Some(Value { node: &entry.value, path }).filter(|value| !value.is_null())
+    }
+
+    /// The value of `key`; `remedy` says what to write if it is absent.
+    pub(crate) fn required(&self, key: &'static str, remedy: &'static str) -> Result<Value<'a>, Fault> {
+        self.optional(key).ok_or_else(|| self.whole.fault(SpecProblem::MissingKey { key, remedy }))
+    }
+
+    /// `problem` at the value of `key`, or at the whole table without it.
+    pub(crate) fn fault_at(&self, key: Option<&str>, problem: impl Into<SpecProblem>) -> Fault {
+        key.and_then(|key| self.optional(key)).unwrap_or_else(|| self.whole.clone()).fault(problem)
+    }
+}
