@@ -94,11 +94,12 @@ fn raise_once<const ORDER: usize>(lower: [f64; ORDER], t: f64, order: usize) -> 
         return w;
     }
     let degree = (order - 1) as f64;
+    let share = 1.0 / degree;
     std::array::from_fn(|j| {
         let right = if j < ORDER { lower[j] } else { 0.0 };
         let left = if j > 0 { lower[j - 1] } else { 0.0 };
         // Knot j of the span: the spline to its left rises with t + degree - j, the other falls.
-        if j < order { ((t + degree - j as f64) * left + (1.0 + j as f64 - t) * right) / degree } else { 0.0 }
+        if j < order { ((t + degree - j as f64) * left + (1.0 + j as f64 - t) * right) * share } else { 0.0 }
     })
 }
 
