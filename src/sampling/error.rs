@@ -1,0 +1,58 @@
+//! What can be wrong with a request to the sampling core.
+
+/// Faults of sample sets, offsets and settings handed to the sampling core.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SamplingError {
+    /// The number of recurrent sample sets is not the period.
+    #[error(
+        "{offsets} sample sets recur with period {period}: a band-limited signal is determined by exactly one set a fast period; give {period} offsets"
+    )]
+    OffsetCount {
+        /// Offsets given.
+        offsets: usize,
+        /// Period in fast periods.
+        period: usize,
+    },
+    /// Two recurrent sets sample the same instants.
+    #[error(
+        "sample sets {first} and {second} lie {distance:e} fast periods apart modulo the period: two sets must not coincide; change one of the delays"
+    )]
+    Coinciding {
+        /// Index of one set.
+        first: usize,
+        /// Index of the other set.
+        second: usize,
+        /// Distance modulo the period, in fast periods.
+        distance: f64,
+    },
+    /// A number that has to be finite is not.
+    #[error("{name} {index} is {value}: every {name} must be a finite number")]
+    NotFinite {
+        /// What the number is.
+        name: &'static str,
+        /// Its place in the argument.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A setting lies outside its range.
+    #[error("{name} is {value}: it must be {rule}")]
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// Value given.
+        value: f64,
+        /// The range in words.
+        rule: &'static str,
+    },
+    /// The normal equations lost positive definiteness.
+    #[error(
+        "the normal equations are not positive definite at coefficient {column} (pivot {pivot:e}): no sample reaches it; give the first differences a positive weight tau"
+    )]
+    NotDefinite {
+        /// Column of the failing pivot.
+        column: usize,
+        /// The pivot.
+        pivot: f64,
+    },
+}

@@ -1,0 +1,228 @@
+//! Interpolation kernels: centred B-splines of any degree and the sinc, with their slopes.
+//!
+//! M. Unser, "Splines: a perfect fit for signal and image processing", IEEE Signal Processing
+//! Magazine 16(6), 1999. Unit spacing throughout: x is counted in knots.
+
+use std::f64::consts::PI;
+
+/// sin(pi x), with the argument reduced before the multiplication so that integers give exactly 0.
+pub fn sin_pi(x: f64) -> f64 {
+    let turns = x.round();
+    let sine = (PI * (x - turns)).sin();
+    if turns.rem_euclid(2.0) == 0.0 { sine } else { -sine }
+}
+
+/// The sinc kernel sin(pi x) / (pi x), 1 at x = 0.
+pub fn sinc(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { sin_pi(x) / (PI * x) }
+}
+
+/// The derivative of [`sinc`]: (cos(pi x) - sinc(x)) / x, 0 at x = 0.
+pub fn sinc_slope(x: f64) -> f64 {
+    // The difference cancels near 0; its series starts with -pi^2 x / 3 + pi^4 x^3 / 30.
+    if x.abs() < 1e-3 {
+        return -PI * PI * x / 3.0 * (1.0 - PI * PI * x * x / 10.0);
+    }
+    (sin_pi(x + 0.5) - sinc(x)) / x
+}
+
+/// The centred B-spline of degree ORDER - 1, as the weights of the ORDER knots that reach x.
+///
+/// `BSpline::<1>` is the box, `BSpline::<2>` the hat, `BSpline::<4>` the cubic.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct BSpline<const ORDER: usize>;
+
+impl<const ORDER: usize> BSpline<ORDER> {
+    /// The degree n = ORDER - 1.
+    pub const DEGREE: usize = ORDER - 1;
+
+    /// First knot k with beta(x - k) possibly nonzero, and x's place in the knot span, in \[0, 1).
+    #[inline]
+    pub fn locate(x: f64) -> (i64, f64) {
+        // Odd degrees have their breaks on the knots, even ones half-way between.
+        let shifted = x + if ORDER % 2 == 1 { 0.5 } else { 0.0 };
+        let floor = shifted.floor();
+        (floor as i64 - (Self::DEGREE / 2) as i64, shifted - floor)
+    }
+
+    /// First knot k0 and beta(x - k0 - j), j = 0..ORDER; the weights are >= 0 and sum to one.
+    #[inline]
+    pub fn weights(x: f64) -> (i64, [f64; ORDER]) {
+        let (first, t) = Self::locate(x);
+        (first, raise::<ORDER>(t, ORDER))
+    }
+
+    /// First knot k0 and the slopes beta'(x - k0 - j), j = 0..ORDER; they sum to zero.
+    ///
+    /// At a break of a hat the slope to the right is taken.
+    #[inline]
+    pub fn slopes(x: f64) -> (i64, [f64; ORDER]) {
+        let (first, t) = Self::locate(x);
+        (first, differences(raise::<ORDER>(t, Self::DEGREE)))
+    }
+
+    /// First knot, weights and slopes in one go.
+    #[inline]
+    pub fn weights_and_slopes(x: f64) -> (i64, [f64; ORDER], [f64; ORDER]) {
+        let (first, t) = Self::locate(x);
+        let lower = raise::<ORDER>(t, Self::DEGREE);
+        (first, raise_once(lower, t, ORDER), differences(lower))
+    }
+}
+
+/// Weights of the `order` B-splines of degree `order` - 1 alive at place t of a knot span (Cox-de Boor);
+/// `order` 0 gives zeros, the slope of the box.
+#[inline]
+fn raise<const ORDER: usize>(t: f64, order: usize) -> [f64; ORDER] {
+    let mut w = [0.0; ORDER];
+    if order == 0 {
+        return w;
+    }
+    w[0] = 1.0;
+    for step in 2..=order {
+        w = raise_once(w, t, step);
+    }
+    w
+}
+
+/// One step of the recursion: `order` - 1 weights become `order`.
+#[inline]
+fn raise_once<const ORDER: usize>(lower: [f64; ORDER], t: f64, order: usize) -> [f64; ORDER] {
+    if order == 1 {
+        let mut w = [0.0; ORDER];
+        w[0] = 1.0;
+        return w;
+    }
+    let degree = (order - 1) as f64;
+    let share = 1.0 / degree;
+    std::array::from_fn(|j| {
+        let right = if j < ORDER { lower[j] } else { 0.0 };
+        let left = if j > 0 { lower[j - 1] } else { 0.0 };
+        // Knot j of the span: the spline to its left rises with t + degree - j, the other falls.
+        if j < order { ((t + degree - j as f64) * left + (1.0 + j as f64 - t) * right) * share } else { 0.0 }
+    })
+}
+
+/// beta_n'(x) = beta_{n-1}(x + 1/2) - beta_{n-1}(x - 1/2), written for the weights of one span.
+#[inline]
+fn differences<const ORDER: usize>(lower: [f64; ORDER]) -> [f64; ORDER] {
+    std::array::from_fn(|j| {
+        let left = if j > 0 { lower[j - 1] } else { 0.0 };
+        let right = if j + 1 < ORDER { lower[j] } else { 0.0 };
+        left - right
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// beta_n by its definition: n+1 truncated powers, for n >= 1.
+    fn truncated_powers(n: usize, x: f64) -> f64 {
+        let half = (n + 1) as f64 / 2.0;
+        let mut binomial = 1.0;
+        let mut factorial = 1.0;
+        let mut sum = 0.0;
+        for k in 0..=n + 1 {
+            let base: f64 = x + half - k as f64;
+            let power = if base > 0.0 { base.powi(n as i32) } else { 0.0 };
+            sum += if k % 2 == 0 { binomial } else { -binomial } * power;
+            binomial *= (n + 1 - k) as f64 / (k + 1) as f64;
+        }
+        for k in 1..=n {
+            factorial *= k as f64;
+        }
+        sum / factorial
+    }
+
+    fn cubic(t: f64) -> f64 {
+        let a = t.abs();
+        if a < 1.0 {
+            2.0 / 3.0 - a * a + a * a * a / 2.0
+        } else if a < 2.0 {
+            (2.0 - a).powi(3) / 6.0
+        } else {
+            0.0
+        }
+    }
+
+    fn check_order<const ORDER: usize>(x: f64) {
+        let (first, w, slope) = BSpline::<ORDER>::weights_and_slopes(x);
+        assert_eq!((first, w), BSpline::<ORDER>::weights(x));
+        assert_eq!((first, slope), BSpline::<ORDER>::slopes(x));
+        assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+        assert!(slope.iter().sum::<f64>().abs() < 1e-14);
+        for j in 0..ORDER {
+            let t = x - (first + j as i64) as f64;
+            let exact = truncated_powers(ORDER - 1, t);
+            assert!((w[j] - exact).abs() < 1e-12, "order {ORDER} x={x} j={j}: {} {exact}", w[j]);
+            let h = 1e-6;
+            let numeric =
+                (truncated_powers(ORDER - 1, t + h) - truncated_powers(ORDER - 1, t - h)) / (2.0 * h);
+            assert!((slope[j] - numeric).abs() < 1e-5, "order {ORDER} x={x} j={j}");
+        }
+    }
+
+    #[test]
+    fn splines_are_the_truncated_powers() {
+        for step in -40..40 {
+            let x = step as f64 * 0.173 + 0.0313;
+            check_order::<2>(x);
+            check_order::<3>(x);
+            check_order::<4>(x);
+            check_order::<5>(x);
+            check_order::<6>(x);
+        }
+    }
+
+    #[test]
+    fn the_box_and_the_closed_forms() {
+        assert_eq!(BSpline::<1>::weights(2.3), (2, [1.0]));
+        assert_eq!(BSpline::<1>::weights(2.7), (3, [1.0]));
+        assert_eq!(BSpline::<1>::slopes(2.7), (3, [0.0]));
+        assert_eq!(BSpline::<2>::weights(2.25), (2, [0.75, 0.25]));
+        assert_eq!(BSpline::<2>::slopes(2.25), (2, [-1.0, 1.0]));
+        let (first, w) = BSpline::<4>::weights(-3.4);
+        assert_eq!(first, -5);
+        for (j, w) in w.iter().enumerate() {
+            assert!((w - cubic(-3.4 - (first + j as i64) as f64)).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn sine_and_sinc_at_integers_are_exact() {
+        for n in -1000..1000 {
+            assert_eq!(sin_pi(n as f64), 0.0);
+            assert_eq!(sinc(n as f64), f64::from(n == 0));
+        }
+        assert_eq!(sin_pi(0.5), 1.0);
+        assert_eq!(sin_pi(1.5), -1.0);
+        assert!((sinc(0.5) - 2.0 / PI).abs() < 1e-16);
+    }
+
+    #[test]
+    fn the_slope_of_the_sinc_is_its_derivative_also_near_zero() {
+        for x in [-2.7, -1.0, -0.3, -2e-3, -0.9e-3, 0.0, 1e-5, 1.1e-3, 0.4, 3.0] {
+            let h = 1e-5;
+            let numeric = (sinc(x + h) - sinc(x - h)) / (2.0 * h);
+            assert!((sinc_slope(x) - numeric).abs() < 1e-9, "{x}: {} {numeric}", sinc_slope(x));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+        #[test]
+        fn weights_shift_with_the_knots(x in -100.0..100.0_f64, k in -50_i64..50) {
+            let (first, w) = BSpline::<4>::weights(x);
+            let (moved, v) = BSpline::<4>::weights(x + k as f64);
+            // Rounding of x + k may carry a place of 1 - eps into the next span; then compare values.
+            let at = |first: i64, w: &[f64; 4], knot: i64| {
+                usize::try_from(knot - first).ok().and_then(|j| w.get(j).copied()).unwrap_or(0.0)
+            };
+            for knot in first - 1..first + 5 {
+                prop_assert!((at(first, &w, knot) - at(moved, &v, knot + k)).abs() < 1e-12);
+            }
+        }
+    }
+}

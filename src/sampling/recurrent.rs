@@ -1,0 +1,313 @@
+//! Recurrent nonuniform sampling: M interleaved sample sets of period M, each with its own offset.
+//!
+//! J. L. Yen, "On nonuniform sampling of bandwidth-limited signals", 1956; A. Papoulis,
+//! "Generalized sampling expansion", 1977. Time is counted in fast periods (Nyquist at pi), so
+//! that set i samples f at t_i + k M. With M distinct offsets
+//!
+//! ```text
+//! f(t) = sum_i sum_k f(t_i + k M) psi_i(t - t_i - k M)
+//! psi_i(u) = sinc(u / M) prod_{q /= i} sin(pi (u + t_i - t_q) / M) / sin(pi (t_i - t_q) / M)
+//! ```
+
+use super::error::SamplingError;
+use super::kernel::{sin_pi, sinc};
+
+/// Offsets closer than this (in fast periods, modulo the period) count as coinciding: the factor
+/// 1 / sin(pi d / M) would then amplify the rounding of the samples beyond the samples themselves.
+const CLOSEST_OFFSETS: f64 = 1e-9;
+
+/// M sample sets of period M with distinct offsets, and their interpolation functions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recurrent {
+    offsets: Vec<f64>,
+}
+
+impl Recurrent {
+    /// Sample sets at `offsets[i] + k * period`, all in fast periods.
+    ///
+    /// # Errors
+    /// [`SamplingError::OffsetCount`] unless there are `period >= 1` offsets,
+    /// [`SamplingError::NotFinite`] for an offset that is no number, and
+    /// [`SamplingError::Coinciding`] when two offsets agree modulo the period (to 1e-9).
+    pub fn new(offsets: &[f64], period: usize) -> Result<Self, SamplingError> {
+        if offsets.len() != period || period == 0 {
+            return Err(SamplingError::OffsetCount { offsets: offsets.len(), period });
+        }
+        if let Some(index) = offsets.iter().position(|t| !t.is_finite()) {
+            return Err(SamplingError::NotFinite { name: "offset", index, value: offsets[index] });
+        }
+        let sets = Self { offsets: offsets.to_vec() };
+        match sets.closest_pair() {
+            Some((first, second, distance)) if distance < CLOSEST_OFFSETS => {
+                Err(SamplingError::Coinciding { first, second, distance })
+            }
+            _ => Ok(sets),
+        }
+    }
+
+    /// The period M in fast periods, which is also the number of sets.
+    pub fn period(&self) -> usize {
+        self.offsets.len()
+    }
+
+    /// The offsets t_i in fast periods.
+    pub fn offsets(&self) -> &[f64] {
+        &self.offsets
+    }
+
+    /// The two sets that lie closest modulo the period, and their distance in fast periods.
+    pub fn closest_pair(&self) -> Option<(usize, usize, f64)> {
+        let period = self.period() as f64;
+        let pairs = (0..self.period()).flat_map(|i| (0..i).map(move |q| (q, i)));
+        pairs
+            .map(|(q, i)| {
+                let d = self.offsets[i] - self.offsets[q];
+                (q, i, (d - period * (d / period).round()).abs())
+            })
+            .min_by(|a, b| a.2.total_cmp(&b.2))
+    }
+
+    /// The interpolation function psi_i(u) of set `set`, `u` in fast periods from the sample.
+    ///
+    /// psi_i(0) = 1, and psi_i vanishes at every other instant of every set.
+    ///
+    /// # Panics
+    /// Unless `set < period`.
+    pub fn psi(&self, set: usize, u: f64) -> f64 {
+        let period = self.period() as f64;
+        let here = self.offsets[set];
+        let others = self.offsets.iter().enumerate().filter(|&(q, _)| q != set);
+        others.fold(sinc(u / period), |product, (_, &there)| {
+            let gap = (here - there) / period;
+            product * sin_pi(u / period + gap) / sin_pi(gap)
+        })
+    }
+
+    /// FIR taps at the fast rate for set `set`: `taps[n] = psi_i(n - latency - t_i)`, n = 0..length.
+    ///
+    /// With x_i\[k\] = f(k M + t_i) the synthesis y\[k M + p\] = sum_i sum_j taps_i\[p + j M\] x_i\[k - j\]
+    /// gives f(n - latency), up to what the truncation to `length` cuts off.
+    ///
+    /// # Panics
+    /// Unless `set < period`.
+    pub fn taps(&self, set: usize, latency: f64, length: usize) -> Vec<f64> {
+        (0..length).map(|n| self.psi(set, n as f64 - latency - self.offsets[set])).collect()
+    }
+
+    /// f(t) from finitely many samples, `samples[i][k] = f(t_i + (first + k) M)`; all others count as 0.
+    ///
+    /// # Panics
+    /// Unless there is one slice a set.
+    pub fn interpolate<S: AsRef<[f64]>>(&self, t: f64, samples: &[S], first: i64) -> f64 {
+        assert_eq!(samples.len(), self.period(), "one slice of samples a set");
+        let period = self.period() as f64;
+        let one_set = |set: usize, values: &[f64]| {
+            let start = t - self.offsets[set] - first as f64 * period;
+            values.iter().enumerate().map(|(k, v)| v * self.psi(set, start - k as f64 * period)).sum::<f64>()
+        };
+        samples.iter().enumerate().map(|(set, values)| one_set(set, values.as_ref())).sum()
+    }
+
+    /// Mean power gain for independent errors of unit variance on all samples.
+    ///
+    /// Equals (1/M) sum_i ||psi_i||^2: 1 for uniform offsets, the price of the comparison method
+    /// for all others. psi_i is sinc(u/M) times a trigonometric polynomial whose M lines lie just
+    /// far enough apart for the shifted boxes of the sinc to be disjoint, hence
+    /// ||psi_i||^2 = M sum of the squared line amplitudes.
+    pub fn noise_gain(&self) -> f64 {
+        (0..self.period()).map(|set| self.line_power(set)).sum()
+    }
+
+    /// Sum of the squared amplitudes of the spectral lines of prod_q sin(pi (u+d_q)/M) / sin(pi d_q/M).
+    fn line_power(&self, set: usize) -> f64 {
+        let period = self.period() as f64;
+        let mut lines = vec![(1.0, 0.0)];
+        for (q, there) in self.offsets.iter().enumerate() {
+            if q != set {
+                let gap = (self.offsets[set] - there) / period;
+                lines = times_sine(&lines, gap);
+            }
+        }
+        lines.iter().map(|(re, im)| re * re + im * im).sum()
+    }
+}
+
+/// Multiplies a polynomial in z = exp(2 j pi u / M) by (e^{ja} z - e^{-ja}) / (2 sin a), a = pi `gap`,
+/// which is sin(pi u / M + a) / sin a up to a factor of modulus one.
+fn times_sine(lines: &[(f64, f64)], gap: f64) -> Vec<(f64, f64)> {
+    let (s, c) = (sin_pi(gap), (std::f64::consts::PI * gap).cos());
+    let (re, im) = (c / (2.0 * s), 0.5);
+    let mut product = vec![(0.0, 0.0); lines.len() + 1];
+    for (k, &(x, y)) in lines.iter().enumerate() {
+        product[k + 1].0 += x * re - y * im;
+        product[k + 1].1 += x * im + y * re;
+        product[k].0 -= x * re + y * im;
+        product[k].1 -= y * re - x * im;
+    }
+    product
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    /// sum over |k| <= reach of one tone through all sets, tapered (Fejer) so that the slowly and
+    /// conditionally converging series can be compared with the tone itself.
+    fn tone_through(sets: &Recurrent, omega: f64, phase: f64, t: f64, reach: i64) -> f64 {
+        let m = sets.period() as f64;
+        let f = |t: f64| (omega * t + phase).cos();
+        (-reach..=reach)
+            .map(|k| {
+                let taper = 1.0 - (k.abs() as f64) / (reach + 1) as f64;
+                let terms = sets.offsets().iter().enumerate();
+                taper
+                    * terms
+                        .map(|(i, ti)| f(ti + k as f64 * m) * sets.psi(i, t - ti - k as f64 * m))
+                        .sum::<f64>()
+            })
+            .sum()
+    }
+
+    #[test]
+    fn uniform_offsets_give_the_sinc() {
+        for m in 1..=6 {
+            let offsets: Vec<f64> = (0..m).map(|i| i as f64).collect();
+            let sets = Recurrent::new(&offsets, m).unwrap();
+            for i in 0..m {
+                for step in -97..97 {
+                    let u = step as f64 * 0.137;
+                    assert!((sets.psi(i, u) - sinc(u)).abs() < 1e-13, "M={m} i={i} u={u}");
+                }
+            }
+            assert!((sets.noise_gain() - 1.0).abs() < 1e-12, "M={m}: {}", sets.noise_gain());
+        }
+    }
+
+    #[test]
+    fn every_function_is_one_at_its_sample_and_zero_at_all_others() {
+        let sets = Recurrent::new(&[-1.2, -0.6, 0.31, 1.9], 4).unwrap();
+        for i in 0..4 {
+            for q in 0..4 {
+                for k in -5..=5 {
+                    let u = sets.offsets()[q] + 4.0 * k as f64 - sets.offsets()[i];
+                    let expected = f64::from(q == i && k == 0);
+                    assert!((sets.psi(i, u) - expected).abs() < 1e-14, "i={i} q={q} k={k}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tones_below_nyquist_are_reproduced() {
+        for offsets in [vec![0.0, 0.6], vec![0.0, 0.9, 2.2], vec![-2.4, 0.2, 1.0, 2.7]] {
+            let sets = Recurrent::new(&offsets, offsets.len()).unwrap();
+            for omega in [0.0, 0.4, 1.3, 2.6] {
+                for t in [0.37, -1.9, 2.05] {
+                    let got = tone_through(&sets, omega, 0.8, t, 4000);
+                    let want = (omega * t + 0.8).cos();
+                    assert!((got - want).abs() < 2e-3, "{offsets:?} omega={omega} t={t}: {got} {want}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn coinciding_sets_tend_to_sampling_value_and_slope() {
+        // f(t) = sum_k [f(2k) + (t - 2k) f'(2k)] sinc^2((t - 2k)/2), the limit of M = 2.
+        let f = |t: f64| (sinc(0.37 * (t - 0.3))).powi(2);
+        let slope = |t: f64| (f(t + 1e-6) - f(t - 1e-6)) / 2e-6;
+        let sets = Recurrent::new(&[0.0, 1e-5], 2).unwrap();
+        let grid = |offset: f64| (-400..=400).map(|k| f(2.0 * k as f64 + offset)).collect::<Vec<_>>();
+        let samples = [grid(0.0), grid(1e-5)];
+        for t in [0.4, 1.1, -2.7] {
+            let hermite: f64 = (-400..=400)
+                .map(|k| t - 2.0 * k as f64)
+                .map(|u| (f(t - u) + u * slope(t - u)) * sinc(u / 2.0).powi(2))
+                .sum();
+            let close = sets.interpolate(t, &samples, -400);
+            assert!((close - hermite).abs() < 1e-4 && (close - f(t)).abs() < 1e-4, "{close} {hermite}");
+        }
+        assert!(sets.noise_gain() > 1e9);
+        assert!(matches!(
+            Recurrent::new(&[0.25, 2.25], 2),
+            Err(SamplingError::Coinciding { first: 0, second: 1, distance }) if distance < 1e-12
+        ));
+    }
+
+    #[test]
+    fn taps_reproduce_a_pulse_behind_the_latency() {
+        let sets = Recurrent::new(&[-1.2, -0.6], 2).unwrap();
+        let (latency, length) = (400.0, 801);
+        let f = |t: f64| sinc(0.35 * (t - 201.3)).powi(2);
+        let channel = |i: usize| (0..400).map(|k| f(2.0 * k as f64 + sets.offsets()[i])).collect::<Vec<_>>();
+        let x = [channel(0), channel(1)];
+        let taps = [sets.taps(0, latency, length), sets.taps(1, latency, length)];
+        for n in [590, 601, 602, 640] {
+            let (k, p) = (n / 2, n % 2);
+            let y: f64 = (0..2)
+                .map(|i| {
+                    (0..=k)
+                        .filter(|j| p + 2 * j < length && k - j < x[i].len())
+                        .map(|j| taps[i][p + 2 * j] * x[i][k - j])
+                        .sum::<f64>()
+                })
+                .sum();
+            assert!((y - f(n as f64 - latency)).abs() < 1e-4, "n={n}: {y}");
+        }
+    }
+
+    #[test]
+    fn the_noise_gain_is_the_energy_of_the_functions() {
+        let sets = Recurrent::new(&[0.0, 0.55, 2.1], 3).unwrap();
+        // psi^2 has bandwidth 2 pi, so its integral is the Riemann sum with any step below one.
+        let energy: f64 = (0..3)
+            .map(|i| (-40_000..40_000).map(|n| sets.psi(i, n as f64 * 0.5 + 0.1).powi(2) * 0.5).sum::<f64>())
+            .sum();
+        let gain = sets.noise_gain();
+        assert!((energy / 3.0 - gain).abs() < 2e-4 * gain, "{} {gain}", energy / 3.0);
+    }
+
+    #[test]
+    fn bad_offsets_are_named() {
+        assert_eq!(Recurrent::new(&[0.0], 2), Err(SamplingError::OffsetCount { offsets: 1, period: 2 }));
+        assert_eq!(Recurrent::new(&[], 0), Err(SamplingError::OffsetCount { offsets: 0, period: 0 }));
+        assert!(matches!(
+            Recurrent::new(&[0.0, f64::NAN], 2),
+            Err(SamplingError::NotFinite { name: "offset", index: 1, .. })
+        ));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+        #[test]
+        fn any_spread_offsets_reproduce_a_band_limited_pulse(
+            m in 1_usize..6, jitter in prop::collection::vec(-0.3..0.3_f64, 6), t in -3.0..3.0_f64
+        ) {
+            let offsets: Vec<f64> = (0..m).map(|i| i as f64 + jitter[i]).collect();
+            let sets = Recurrent::new(&offsets, m).unwrap();
+            let f = |t: f64| sinc(0.45 * (t - 0.2)).powi(2);
+            let grid: Vec<Vec<f64>> = offsets
+                .iter()
+                .map(|ti| (-500..=500).map(|k| f(ti + (k * m as i64) as f64)).collect())
+                .collect();
+            let got = sets.interpolate(t, &grid, -500);
+            prop_assert!((got - f(t)).abs() < 1e-5 * (1.0 + sets.noise_gain()), "{} {}", got, f(t));
+        }
+
+        #[test]
+        fn functions_do_not_depend_on_a_common_shift(shift in -50.0..50.0_f64, u in -9.0..9.0_f64) {
+            let near = Recurrent::new(&[0.0, 0.7, 2.2], 3).unwrap();
+            let far = Recurrent::new(&[shift, 0.7 + shift, 2.2 + shift], 3).unwrap();
+            prop_assert!((near.psi(1, u) - far.psi(1, u)).abs() < 1e-11);
+        }
+
+        #[test]
+        fn tone_phase_does_not_matter(phase in -PI..PI) {
+            let sets = Recurrent::new(&[0.0, 0.6], 2).unwrap();
+            let got = tone_through(&sets, 1.7, phase, 0.21, 2000);
+            prop_assert!((got - (1.7 * 0.21 + phase).cos()).abs() < 4e-3);
+        }
+    }
+}
