@@ -1,0 +1,89 @@
+//! The error system K = W - F H of a bank on a plant: what gamma is the norm of.
+
+use super::DesignError;
+use super::equivalence::BlockedPlant;
+use crate::bank::{BlockFilter, SynthesisFilters};
+use crate::linalg::Mat;
+use crate::lti::StateSpace;
+use crate::lti::peak::{Peak, hinf_norm};
+
+/// The synthesis filters as one block system: N slow samples in, M fast samples out, a tick.
+pub fn block_system(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, DesignError> {
+    match filters {
+        SynthesisFilters::Fir(taps) => Ok(shift_registers(taps, ratio)),
+        SynthesisFilters::StateSpace(block) => from_block(block, ratio),
+    }
+}
+
+/// K = W - F H, both driven by the plant's input.
+pub fn error_system(plant: &BlockedPlant, filters: &StateSpace) -> Result<StateSpace, DesignError> {
+    let (measured, wanted) = (plant.measured, plant.wanted);
+    let (w, h) =
+        (plant.system.select_outputs(measured..measured + wanted), plant.system.select_outputs(0..measured));
+    let (n, nf) = (plant.system.order(), filters.order());
+    let mut a = Mat::zeros(n + nf, n + nf);
+    a.view_mut((0, 0), (n, n)).copy_from(plant.system.a());
+    a.view_mut((n, 0), (nf, n)).copy_from(&(filters.b() * h.c()));
+    a.view_mut((n, n), (nf, nf)).copy_from(filters.a());
+    let mut b = Mat::zeros(n + nf, plant.system.inputs());
+    b.rows_mut(0, n).copy_from(plant.system.b());
+    b.rows_mut(n, nf).copy_from(&(filters.b() * h.d()));
+    let mut c = Mat::zeros(wanted, n + nf);
+    c.columns_mut(0, n).copy_from(&(w.c() - filters.d() * h.c()));
+    c.columns_mut(n, nf).copy_from(&-filters.c());
+    let d = w.d() - filters.d() * h.d();
+    Ok(StateSpace::new(a, b, c, d)?)
+}
+
+/// gamma = ||K|| with its peak frequency (radians a slow tick).
+pub fn gamma(plant: &BlockedPlant, filters: &StateSpace) -> Result<Peak, DesignError> {
+    Ok(hinf_norm(&error_system(plant, filters)?)?)
+}
+
+/// FIR filters in block form: the state holds, newest first, the last J - 1 samples of each channel.
+fn shift_registers(taps: &[Vec<f64>], ratio: usize) -> StateSpace {
+    let channels = taps.len();
+    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0);
+    let stored = lags.saturating_sub(1);
+    let tap = |i: usize, p: usize, j: usize| taps[i].get(p + j * ratio).copied().unwrap_or(0.0);
+    let order = channels * stored;
+    let mut a = Mat::zeros(order, order);
+    let mut b = Mat::zeros(order, channels);
+    let mut c = Mat::zeros(ratio, order);
+    for i in 0..channels {
+        for j in 0..stored {
+            if j == 0 {
+                b[(i * stored, i)] = 1.0;
+            } else {
+                a[(i * stored + j, i * stored + j - 1)] = 1.0;
+            }
+            for p in 0..ratio {
+                c[(p, i * stored + j)] = tap(i, p, j + 1);
+            }
+        }
+    }
+    let d = Mat::from_fn(ratio, channels, |p, i| tap(i, p, 0));
+    StateSpace::new(a, b, c, d).expect("shift registers fit by construction")
+}
+
+fn from_block(block: &BlockFilter, ratio: usize) -> Result<StateSpace, DesignError> {
+    let (n, channels) = (block.a.len(), block.d.first().map_or(0, Vec::len));
+    let matrix = |rows: &[Vec<f64>], r: usize, c: usize| -> Result<Mat, DesignError> {
+        if rows.len() != r || rows.iter().any(|row| row.len() != c) {
+            return Err(DesignError::RaggedStateSpace { rows: r, cols: c });
+        }
+        Ok(Mat::from_fn(r, c, |i, j| rows[i][j]))
+    };
+    Ok(StateSpace::new(
+        matrix(&block.a, n, n)?,
+        matrix(&block.b, n, channels)?,
+        matrix(&block.c, ratio, n)?,
+        matrix(&block.d, ratio, channels)?,
+    )?)
+}
+
+/// A block system as the lists of rows of a bank file.
+pub fn to_block(system: &StateSpace) -> BlockFilter {
+    let rows = |m: &Mat| m.row_iter().map(|row| row.iter().copied().collect()).collect();
+    BlockFilter { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
+}

@@ -1,0 +1,206 @@
+//! IIR design: the least achievable gamma by a-posteriori H-infinity filtering and gamma-iteration
+//! (thesis 5.3), and the mean-square optimal filter as its limit.
+
+use super::DesignError;
+use super::equivalence::BlockedPlant;
+use super::error_system;
+use super::filtering::{Filter, Innovations, Trial};
+use crate::lti::peak::unexplained_peak;
+
+/// Relative width of the interval [lower, upper] at which gamma-iteration ends.
+pub const GAMMA_ACCURACY: f64 = 5e-7;
+/// Gammas below this fraction of ||W|| are zero: the wanted samples are reproduced to rounding.
+const NEGLIGIBLE: f64 = 1e-12;
+/// The bracket halves (on the logarithmic scale) in each trial.
+const TRIAL_LIMIT: usize = 80;
+
+/// A state-space design.
+#[derive(Debug, Clone)]
+pub struct StateSpaceDesign {
+    /// N slow samples in, M fast samples out, a tick.
+    pub filters: Filter,
+    /// The exact norm of the error system with these filters.
+    pub upper: f64,
+    /// No causal filter reaches less.
+    pub lower: f64,
+    /// No filter at all, causal or not, reaches less.
+    pub noncausal: f64,
+    /// Where on the unit circle the worst case sits, radians a slow tick.
+    pub peak_frequency: f64,
+    /// Riccati equations solved.
+    pub trials: usize,
+}
+
+/// The bound that no latency can beat: the peak of what the slow samples leave unexplained.
+pub fn noncausal_bound(plant: &BlockedPlant) -> Result<f64, DesignError> {
+    Ok(unexplained_peak(&plant.system, plant.measured)?.gain)
+}
+
+/// The least gamma of any causal bank, within [`GAMMA_ACCURACY`]; with `slack` > 0 the central filter
+/// at (1 + slack) times the optimum instead, which is kinder to all other frequencies.
+pub fn design_iir(plant: &BlockedPlant, slack: f64) -> Result<StateSpaceDesign, DesignError> {
+    let mut search = Search::new(plant)?;
+    search.start_from_h2()?;
+    search.try_the_lower_bound()?;
+    search.bisect()?;
+    search.finish(slack)
+}
+
+/// The mean-square optimal bank.
+pub fn design_h2(plant: &BlockedPlant) -> Result<StateSpaceDesign, DesignError> {
+    let mut search = Search::new(plant)?;
+    search.start_from_h2()?;
+    search
+        .best
+        .map(|best| search.report.fill(best))
+        .ok_or(DesignError::RiccatiFailed { gamma: f64::INFINITY })
+}
+
+/// A filter with its verified norm.
+#[derive(Debug, Clone)]
+struct Verified {
+    filters: Filter,
+    norm: f64,
+    frequency: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Report {
+    lower: f64,
+    noncausal: f64,
+    trials: usize,
+}
+
+impl Report {
+    fn fill(self, best: Verified) -> StateSpaceDesign {
+        StateSpaceDesign {
+            filters: best.filters,
+            upper: best.norm,
+            lower: self.lower.min(best.norm),
+            noncausal: self.noncausal.min(best.norm),
+            peak_frequency: best.frequency,
+            trials: self.trials,
+        }
+    }
+}
+
+struct Search<'a> {
+    plant: &'a BlockedPlant,
+    innovations: Innovations,
+    best: Option<Verified>,
+    report: Report,
+    negligible: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(plant: &'a BlockedPlant) -> Result<Self, DesignError> {
+        let noncausal = noncausal_bound(plant)?;
+        let coarse = Innovations::new(plant, noncausal)?;
+        let lower = noncausal.max(coarse.fresh_error()?);
+        let innovations = if lower > noncausal { Innovations::new(plant, lower)? } else { coarse };
+        let negligible =
+            NEGLIGIBLE * (plant.system.c().norm() * plant.system.b().norm() + plant.system.d().norm());
+        Ok(Self {
+            plant,
+            innovations,
+            best: None,
+            report: Report { lower, noncausal, trials: 0 },
+            negligible,
+        })
+    }
+
+    fn verify(&self, filters: Filter) -> Result<Verified, DesignError> {
+        let peak = error_system::gamma(self.plant, &filters)?;
+        Ok(Verified { filters, norm: peak.gain, frequency: peak.frequency })
+    }
+
+    fn keep(&mut self, found: Verified) {
+        if self.best.as_ref().is_none_or(|best| found.norm < best.norm) {
+            self.best = Some(found);
+        }
+    }
+
+    fn start_from_h2(&mut self) -> Result<(), DesignError> {
+        self.report.trials += 1;
+        if let Some(filters) = self.innovations.h2() {
+            let found = self.verify(filters)?;
+            self.keep(found);
+        }
+        Ok(())
+    }
+
+    fn upper(&self) -> f64 {
+        self.best.as_ref().map_or(f64::INFINITY, |best| best.norm)
+    }
+
+    fn done(&self) -> bool {
+        let upper = self.upper();
+        upper <= self.report.lower * (1.0 + GAMMA_ACCURACY) || upper <= self.negligible
+    }
+
+    /// One gamma; only a filter whose exact norm keeps the promise counts.
+    fn attempt(&mut self, gamma: f64) -> Result<Trial, DesignError> {
+        self.report.trials += 1;
+        let trial = self.innovations.h_infinity(gamma);
+        if let Trial::Achieved(filters) = &trial {
+            let found = self.verify(filters.clone())?;
+            let kept_promise = found.norm <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
+            self.keep(found);
+            if !kept_promise {
+                return Ok(Trial::Unresolved);
+            }
+        }
+        Ok(trial)
+    }
+
+    /// In most problems the non-causal bound is reached: look there first.
+    fn try_the_lower_bound(&mut self) -> Result<(), DesignError> {
+        if !self.done() {
+            let gamma = self.report.lower * (1.0 + 0.8 * GAMMA_ACCURACY);
+            self.attempt(gamma)?;
+        }
+        Ok(())
+    }
+
+    fn bisect(&mut self) -> Result<(), DesignError> {
+        // `floor` is where trials failed for whatever reason; only proofs move the reported bound.
+        let mut floor = self.report.lower.max(self.negligible);
+        let mut ceiling = if self.upper().is_finite() { self.upper() } else { self.first_ceiling() };
+        for _ in 0..TRIAL_LIMIT {
+            if self.done() || ceiling <= floor * (1.0 + 0.5 * GAMMA_ACCURACY) {
+                break;
+            }
+            let gamma = (floor * ceiling).sqrt();
+            match self.attempt(gamma)? {
+                Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
+                Trial::Impossible => {
+                    floor = gamma;
+                    self.report.lower = self.report.lower.max(gamma);
+                }
+                Trial::Unresolved => floor = gamma,
+            }
+        }
+        Ok(())
+    }
+
+    /// ||W||, the gamma of the bank that outputs nothing, bounded by its Frobenius pieces.
+    fn first_ceiling(&self) -> f64 {
+        let (m, n) = (self.plant.measured, self.plant.wanted);
+        let silent = self.plant.system.select_outputs(m..m + n);
+        crate::lti::peak::hinf_norm(&silent).map_or(f64::MAX.sqrt(), |peak| peak.gain)
+    }
+
+    fn finish(mut self, slack: f64) -> Result<StateSpaceDesign, DesignError> {
+        let optimum = self.best.take().ok_or(DesignError::RiccatiFailed { gamma: self.first_ceiling() })?;
+        if slack > 0.0 && optimum.norm > self.negligible {
+            let cap = optimum.norm * (1.0 + slack);
+            if let Trial::Achieved(filters) = self.innovations.h_infinity(cap) {
+                let relaxed = self.verify(filters)?;
+                if relaxed.norm <= cap {
+                    return Ok(self.report.fill(relaxed));
+                }
+            }
+        }
+        Ok(self.report.fill(optimum))
+    }
+}

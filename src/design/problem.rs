@@ -1,0 +1,84 @@
+//! The design problem in normalised time: what is left of a spec when the units are gone.
+
+use super::DesignError;
+use crate::analog::StrictlyProper;
+use crate::spec::Spec;
+
+/// Front ends, delays and rates in units of the fast period (h = 1).
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// M.
+    pub ratio: usize,
+    /// m0, fast samples.
+    pub latency: usize,
+    /// The distinct analog filters. Channels with equal filters share one, and so its state.
+    pub front_ends: Vec<StrictlyProper>,
+    /// Index of Phi_0 in `front_ends`.
+    pub target: usize,
+    /// The slow channels.
+    pub channels: Vec<Channel>,
+}
+
+/// One slow channel of a [`Problem`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Channel {
+    /// Index of Phi_i in [`Problem::front_ends`].
+    pub front_end: usize,
+    /// D_i in fast periods.
+    pub delay: f64,
+}
+
+impl Problem {
+    /// Normalises `spec` with the given latency (fast samples).
+    pub fn new(spec: &Spec, latency: usize) -> Result<Self, DesignError> {
+        let mut front_ends = Vec::new();
+        let target = intern(&mut front_ends, StrictlyProper::new(&spec.target, spec.fast_period)?);
+        let mut channels = Vec::with_capacity(spec.channels.len());
+        for channel in &spec.channels {
+            let front_end = intern(&mut front_ends, StrictlyProper::new(&channel.filter, spec.fast_period)?);
+            channels.push(Channel { front_end, delay: channel.delay / spec.fast_period });
+        }
+        Ok(Self { ratio: spec.ratio, latency, front_ends, target, channels })
+    }
+
+    /// The same problem with `errors[i]` (fast periods) added to the delays.
+    pub fn with_delay_errors(&self, errors: &[f64]) -> Self {
+        let mut moved = self.clone();
+        for (channel, error) in moved.channels.iter_mut().zip(errors) {
+            channel.delay += error;
+        }
+        moved
+    }
+
+    /// The same problem with each group of indistinguishable channels (same filter, same delay)
+    /// replaced by its first member, and for each channel the index of its representative.
+    pub(super) fn without_duplicates(&self) -> (Self, Vec<usize>) {
+        let mut reduced = self.clone();
+        reduced.channels.clear();
+        let representative = self
+            .channels
+            .iter()
+            .map(|channel| match reduced.channels.iter().position(|seen| seen == channel) {
+                Some(known) => known,
+                None => {
+                    reduced.channels.push(*channel);
+                    reduced.channels.len() - 1
+                }
+            })
+            .collect();
+        (reduced, representative)
+    }
+
+    /// The largest delay, in fast periods.
+    pub fn longest_delay(&self) -> f64 {
+        self.channels.iter().map(|channel| channel.delay).fold(0.0, f64::max)
+    }
+}
+
+fn intern(front_ends: &mut Vec<StrictlyProper>, filter: StrictlyProper) -> usize {
+    if let Some(known) = front_ends.iter().position(|seen| *seen == filter) {
+        return known;
+    }
+    front_ends.push(filter);
+    front_ends.len() - 1
+}
