@@ -1,6 +1,24 @@
 //! The bank: synthesis filters with the facts needed to run and judge them, and its file format.
+//!
+//! [`Bank::from_json`] and [`Bank::to_json`] are the two ends of the file format `hybank-bank`, version 1.
+//! Every number reads back to the same bits. Unknown keys are refused by name; the one exception is
+//! `meta`, which may hold anything that other programs wish to keep in the file and is not read.
+
+mod check;
+mod error;
+mod read;
+mod write;
+
+pub use check::MAX_BANK_LATENCY;
+pub use error::{BankError, BankProblem};
 
 use crate::spec::{Method, Spec};
+
+/// `format` of a bank file.
+pub const FORMAT: &str = "hybank-bank";
+
+/// `version` of the bank files written and read.
+pub const VERSION: usize = 1;
 
 /// N synthesis filters for one spec, whole: what `design` makes and every other verb reads.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,4 +87,12 @@ impl Bank {
     pub fn slow_period(&self) -> f64 {
         self.fast_period * self.ratio as f64
     }
+
+    /// D_i / h of every channel, exactly whole where it is whole up to rounding.
+    pub fn delays_in_fast_periods(&self) -> Vec<f64> {
+        self.delays.iter().map(|&delay| crate::spec::delay_in_fast_periods(delay, self.fast_period)).collect()
+    }
 }
+
+#[cfg(test)]
+mod tests;

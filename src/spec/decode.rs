@@ -135,7 +135,7 @@ fn design(top: &Fields<'_>, overrides: DesignOverrides, channels: usize) -> Resu
 }
 
 /// Reads one filter in whichever form it is written.
-fn filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
+pub(super) fn filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
     let fields = value.fields(&FILTER_FORMS.concat())?;
     let filter = unchecked_filter(&fields)?;
     filter.check().map_err(|problem| fields.fault_at(problem.key(), problem))?;

@@ -40,7 +40,8 @@ impl Kind {
     /// What to call it in a message.
     pub(crate) fn name(&self) -> &'static str {
         match self {
-            Self::Null => "null",
+            // serde_json and others write it for what JSON cannot say.
+            Self::Null => "null (perhaps written for NaN or infinity)",
             Self::Boolean(_) => "true or false",
             Self::Integer(_) => "a whole number",
             Self::Number(_) => "a number",

@@ -3,7 +3,7 @@
 //! Everything here is plain data in SI units; [`crate::analog`] turns a [`FilterSpec`] into a
 //! checked realisation and [`crate::design`] turns a [`Spec`] into a bank.
 
-mod decode;
+pub(crate) mod decode;
 mod design;
 pub(crate) mod document;
 mod error;
@@ -11,6 +11,7 @@ mod filter;
 mod limits;
 mod nearest;
 pub(crate) mod reader;
+mod write;
 
 pub use design::DesignOverrides;
 pub use error::{Place, SpecError, SpecProblem};
@@ -20,18 +21,17 @@ pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_T
 use serde::{Deserialize, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+///
+/// Written with serde (or [`Spec::to_toml`]) it is a legal spec file again, in SI units.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Spec {
     /// Free text.
-    #[serde(default)]
     pub name: String,
     /// h, the period of the wanted fast samples, in seconds.
     pub fast_period: f64,
     /// M, fast samples for each slow one.
     pub ratio: usize,
     /// m0, the latency allowed, in fast samples; `None` lets the designer pick.
-    #[serde(default)]
     pub latency: Option<usize>,
     /// Phi_0, the filter of the ideal fast converter.
     pub target: FilterSpec,
@@ -42,8 +42,7 @@ pub struct Spec {
 }
 
 /// One slow converter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelSpec {
     /// D_i >= 0 in seconds.
     pub delay: f64,
@@ -52,8 +51,8 @@ pub struct ChannelSpec {
 }
 
 /// An analog filter as written down; not yet checked for stability.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum FilterSpec {
     /// Numerator over denominator in descending powers of s (rad/s).
     TransferFunction {
@@ -85,15 +84,15 @@ pub enum FilterSpec {
         /// Which one.
         family: Family,
         /// Number of poles.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         order: Option<usize>,
         /// Cutoff in hertz, with scipy.signal's meaning for the family.
         cutoff: f64,
         /// Pass-band ripple in decibels (Chebyshev 1, elliptic).
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         ripple_db: Option<f64>,
         /// Stop-band attenuation in decibels (Chebyshev 2, elliptic).
-        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[serde(skip_serializing_if = "Option::is_none")]
         attenuation_db: Option<f64>,
     },
     /// Filters one after the other, for example a ladder filter and the pole of the sampling switch.
@@ -139,16 +138,15 @@ pub enum Method {
 }
 
 /// The `[design]` table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignSpec {
     /// The method.
     pub method: Method,
     /// Taps a channel at the fast rate, for the methods that make FIR filters.
-    #[serde(default)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub taps: Option<usize>,
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
-    #[serde(default)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub slack: Option<f64>,
 }
 
@@ -177,6 +175,32 @@ impl Spec {
         })?;
         decode::spec(&reader::Value::root(&document), overrides)
             .map_err(|fault| SpecError::new(file_name, text, fault.span, fault.path, fault.problem))
+    }
+
+    /// The spec as a TOML file that reads back equal.
+    ///
+    /// # Errors
+    /// [`SpecProblem`] as [`Spec::check`]; above all for NaN and infinity, which a spec must not hold.
+    pub fn to_toml(&self) -> Result<String, SpecProblem> {
+        self.check()?;
+        toml::to_string(self).map_err(|error| SpecProblem::Syntax { message: error.to_string() })
+    }
+
+    /// Checks a spec that was put together in memory by the rules for spec files.
+    ///
+    /// # Errors
+    /// The first [`SpecProblem`] found.
+    pub fn check(&self) -> Result<(), SpecProblem> {
+        limits::check_fast_period(self.fast_period)?;
+        limits::check_ratio(self.ratio)?;
+        self.latency.map_or(Ok(()), limits::check_latency)?;
+        self.target.check()?;
+        limits::check_channel_count(self.channels.len())?;
+        for channel in &self.channels {
+            limits::check_delay(channel.delay / self.fast_period, channel.delay, "s")?;
+            channel.filter.check()?;
+        }
+        self.design.check(self.channels.len())
     }
 
     /// D_i / h of every channel, exactly whole where it is whole up to rounding.

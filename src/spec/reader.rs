@@ -128,6 +128,14 @@ impl<'a> Value<'a> {
         Err(self.fault(SpecProblem::UnknownName { what, name: text.to_owned(), nearest, known }))
     }
 
+    /// The value of `key` of a table that may hold anything else besides.
+    pub(crate) fn entry(&self, key: &'static str) -> Result<Value<'a>, Fault> {
+        let Kind::Table(entries) = &self.node.kind else {
+            return Err(self.wrong_type("a table of keys and values"));
+        };
+        Fields { entries, whole: self.clone() }.required(key, "every bank file starts with it")
+    }
+
     /// A table with no other keys than `known`.
     pub(crate) fn fields(&self, known: &[&'static str]) -> Result<Fields<'a>, Fault> {
         let Kind::Table(entries) = &self.node.kind else {

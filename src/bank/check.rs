@@ -1,0 +1,175 @@
+//! The invariants of a bank, wherever it comes from.
+
+use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem};
+
+use super::{Bank, BankError, BankProblem, BlockFilter, Gamma, SynthesisFilters};
+
+/// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96 kHz.
+pub const MAX_BANK_LATENCY: usize = 1 << 24;
+
+/// Relative difference between a number of the bank and its twin in the spec that is no more than rounding.
+const SPEC_TOLERANCE: f64 = 1e-9;
+
+type Checked = Result<(), BankError>;
+
+fn refuse(path: impl Into<String>, problem: impl Into<BankProblem>) -> Checked {
+    Err(BankError::new("", path.into(), problem))
+}
+
+fn out_of_range(path: impl Into<String>, value: f64, unit: &'static str, rule: impl Into<String>) -> Checked {
+    refuse(path, BankProblem::Range { value, unit, rule: rule.into() })
+}
+
+impl Bank {
+    /// Checks everything that can be checked without linear algebra: numbers finite and in range, lists and
+    /// matrices of matching sizes, filters that go with the method, a spec that says the same.
+    ///
+    /// Whether a state-space bank is stable is for the design side to check.
+    ///
+    /// # Errors
+    /// [`BankError`] with an empty file name and the JSON place of the first thing that is wrong.
+    pub fn check(&self) -> Result<(), BankError> {
+        self.check_scalars()?;
+        check_delays(&self.delays)?;
+        check_gamma(&self.gamma)?;
+        self.check_method()?;
+        match &self.filters {
+            SynthesisFilters::Fir(taps) => check_taps(taps, self.channel_count())?,
+            SynthesisFilters::StateSpace(block) => check_block(block, self.ratio, self.channel_count())?,
+        }
+        self.spec.as_ref().map_or(Ok(()), |spec| self.check_spec(spec))
+    }
+
+    fn check_scalars(&self) -> Checked {
+        if !(self.fast_period.is_normal() && self.fast_period > 0.0) {
+            let rule = "h must be a positive, finite number of seconds";
+            return out_of_range("fast_period", self.fast_period, "s", rule);
+        }
+        if !(1..=MAX_RATIO).contains(&self.ratio) {
+            let rule =
+                format!("ratio counts the fast samples for each slow one and must be 1 to {MAX_RATIO}");
+            return out_of_range("ratio", self.ratio as f64, "fast samples", rule);
+        }
+        if self.latency > MAX_BANK_LATENCY {
+            let rule = format!("latency must be 0 to {MAX_BANK_LATENCY}");
+            return out_of_range("latency", self.latency as f64, "fast samples", rule);
+        }
+        Ok(())
+    }
+
+    fn check_method(&self) -> Checked {
+        let fir = matches!(self.filters, SynthesisFilters::Fir(_));
+        if fir == self.method.has_taps() {
+            return Ok(());
+        }
+        let (found, expected) = if fir { ("taps", "state_space") } else { ("state_space", "taps") };
+        refuse("method", BankProblem::Filters { method: self.method.name(), expected, found })
+    }
+
+    fn check_spec(&self, spec: &Spec) -> Checked {
+        let inside = |problem: SpecProblem| BankError::new("", "spec".into(), problem);
+        spec.check().map_err(inside)?;
+        agree("spec.fast_period", self.fast_period, spec.fast_period, self.fast_period)?;
+        agree("spec.ratio", self.ratio as f64, spec.ratio as f64, 0.0)?;
+        if let Some(latency) = spec.latency {
+            agree("spec.latency", self.latency as f64, latency as f64, 0.0)?;
+        }
+        if spec.channels.len() != self.channel_count() {
+            let (found, expected) = (spec.channels.len(), self.channel_count());
+            let rule = "the spec must describe every channel of the bank";
+            return refuse("spec.channel", BankProblem::Length { found, expected, unit: "channels", rule });
+        }
+        for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
+            agree(format!("spec.channel[{i}].delay"), delay, channel.delay, self.fast_period + delay)?;
+        }
+        Ok(())
+    }
+}
+
+fn agree(path: impl Into<String>, bank: f64, spec: f64, size: f64) -> Checked {
+    if (bank - spec).abs() <= SPEC_TOLERANCE * size {
+        return Ok(());
+    }
+    refuse(path, BankProblem::SpecDiffers { bank, spec })
+}
+
+fn check_delays(delays: &[f64]) -> Checked {
+    if !(1..=MAX_CHANNELS).contains(&delays.len()) {
+        let rule = format!("a bank has 1 to {MAX_CHANNELS} channels");
+        return out_of_range("channels", delays.len() as f64, "channels", rule);
+    }
+    match delays.iter().position(|d| !(d.is_finite() && *d >= 0.0)) {
+        Some(i) => {
+            let rule = "a delay is zero or more, and finite";
+            out_of_range(format!("channels[{i}].delay"), delays[i], "s", rule)
+        }
+        None => Ok(()),
+    }
+}
+
+fn check_gamma(gamma: &Gamma) -> Checked {
+    for (key, value) in [("upper", gamma.upper), ("lower", gamma.lower), ("noncausal", gamma.noncausal)] {
+        if let Some(value) = value.filter(|x| !(x.is_finite() && *x >= 0.0)) {
+            let rule = "a norm is zero or more, and finite; null says that it is not known";
+            return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);
+        }
+    }
+    Ok(())
+}
+
+fn check_taps(taps: &[Vec<f64>], channels: usize) -> Checked {
+    if taps.len() != channels {
+        let (found, expected) = (taps.len(), channels);
+        let rule = "every channel has a filter";
+        return refuse("channels", BankProblem::Length { found, expected, unit: "tap lists", rule });
+    }
+    let expected = taps[0].len();
+    if expected == 0 {
+        return out_of_range("channels[0].taps", 0.0, "taps", "a filter has at least one tap");
+    }
+    for (i, list) in taps.iter().enumerate() {
+        let path = format!("channels[{i}].taps");
+        if list.len() != expected {
+            let rule = "all filters are as long as the first one; append zeros to the shorter ones";
+            return refuse(path, BankProblem::Length { found: list.len(), expected, unit: "taps", rule });
+        }
+        check_finite(&path, list)?;
+    }
+    Ok(())
+}
+
+fn check_finite(path: &str, values: &[f64]) -> Checked {
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(j) => refuse(format!("{path}[{j}]"), BankProblem::NotFinite { value: values[j] }),
+        None => Ok(()),
+    }
+}
+
+fn check_block(block: &BlockFilter, ratio: usize, channels: usize) -> Checked {
+    let n = block.a.len();
+    check_matrix("state_space.a", &block.a, n, n, "a is n x n, n the number of states")?;
+    check_matrix("state_space.b", &block.b, n, channels, "b is n x N, N the number of channels")?;
+    check_matrix("state_space.c", &block.c, ratio, n, "c is M x n, M the ratio")?;
+    check_matrix("state_space.d", &block.d, ratio, channels, "d is M x N, ratio by number of channels")
+}
+
+fn check_matrix(
+    path: &str,
+    rows: &[Vec<f64>],
+    expected: usize,
+    columns: usize,
+    rule: &'static str,
+) -> Checked {
+    if rows.len() != expected {
+        return refuse(path, BankProblem::Length { found: rows.len(), expected, unit: "rows", rule });
+    }
+    for (i, row) in rows.iter().enumerate() {
+        let path = format!("{path}[{i}]");
+        if row.len() != columns {
+            let (found, expected) = (row.len(), columns);
+            return refuse(path, BankProblem::Length { found, expected, unit: "columns", rule });
+        }
+        check_finite(&path, row)?;
+    }
+    Ok(())
+}

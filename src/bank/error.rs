@@ -1,0 +1,141 @@
+//! What can be wrong with a bank, and where.
+
+use std::fmt;
+
+use crate::spec::SpecProblem;
+
+use super::{FORMAT, VERSION};
+
+/// A bank that was refused: the file (empty for a bank in memory), the JSON place, the problem.
+///
+/// Displays as `file: place: problem`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BankError {
+    inner: Box<Inner>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Inner {
+    file: String,
+    path: String,
+    problem: BankProblem,
+}
+
+/// The rule that a bank breaks, with the offending value and the remedy.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BankProblem {
+    /// The text is not JSON.
+    #[error("{message}; is this a bank written by `hybank design`, and is it whole?")]
+    Syntax {
+        /// The parser's words, with line and column.
+        message: String,
+    },
+    /// The JSON is something else than a bank.
+    #[error(
+        "the file says format \"{found}\", a bank says \"{FORMAT}\"; give a file written by `hybank design`"
+    )]
+    Format {
+        /// What the file says.
+        found: String,
+    },
+    /// A bank of another version of the format.
+    #[error(
+        "the bank has version {found}, this program reads version {VERSION}; design it anew, or update the program"
+    )]
+    Version {
+        /// What the file says.
+        found: usize,
+    },
+    /// A key, a type or a number that is wrong as such.
+    #[error(transparent)]
+    Value(#[from] SpecProblem),
+    /// A NaN or an infinity.
+    #[error("{value} is not a finite number and has no JSON; the design that made it has failed")]
+    NotFinite {
+        /// The offending value.
+        value: f64,
+    },
+    /// A number out of its range.
+    #[error("{value} {unit} is out of range: {rule}")]
+    Range {
+        /// The offending value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+        /// The rule and the remedy.
+        rule: String,
+    },
+    /// A list of the wrong length.
+    #[error("{found} {unit}, but there must be {expected}: {rule}")]
+    Length {
+        /// Entries found.
+        found: usize,
+        /// Entries expected.
+        expected: usize,
+        /// What is counted.
+        unit: &'static str,
+        /// Why, and what to do.
+        rule: &'static str,
+    },
+    /// Taps where the method has none, or the reverse.
+    #[error("a bank of the method {method} holds {expected} and no {found}; change one or the other")]
+    Filters {
+        /// Name of the method.
+        method: &'static str,
+        /// "taps" or "state_space".
+        expected: &'static str,
+        /// The other one.
+        found: &'static str,
+    },
+    /// The bank and the spec in it say different things.
+    #[error(
+        "the bank says {bank}, its spec says {spec}; they must agree, design the bank anew or set spec to null"
+    )]
+    SpecDiffers {
+        /// The bank's number.
+        bank: f64,
+        /// The spec's number.
+        spec: f64,
+    },
+}
+
+impl BankError {
+    pub(super) fn new(file: &str, path: String, problem: impl Into<BankProblem>) -> Self {
+        Self { inner: Box::new(Inner { file: file.to_owned(), path, problem: problem.into() }) }
+    }
+
+    /// The same error, now that the file is known.
+    pub(super) fn in_file(mut self, file: &str) -> Self {
+        self.inner.file = file.to_owned();
+        self
+    }
+
+    /// The file name as it was given; empty for a bank in memory.
+    pub fn file(&self) -> &str {
+        &self.inner.file
+    }
+
+    /// The JSON place, such as `channels[1].taps[3]`; empty for the whole file.
+    pub fn path(&self) -> &str {
+        &self.inner.path
+    }
+
+    /// What is wrong.
+    pub fn problem(&self) -> &BankProblem {
+        &self.inner.problem
+    }
+}
+
+impl std::error::Error for BankError {}
+
+impl fmt::Display for BankError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Inner { file, path, problem } = &*self.inner;
+        for part in [file, path] {
+            if !part.is_empty() {
+                write!(f, "{part}: ")?;
+            }
+        }
+        write!(f, "{problem}")
+    }
+}

@@ -1,0 +1,115 @@
+//! From a [`Bank`] to JSON text.
+
+use std::io;
+
+use serde::Serialize;
+use serde_json::ser::Formatter;
+
+use crate::spec::{Method, Spec};
+
+use super::{Bank, BankError, BankProblem, BlockFilter, FORMAT, Gamma, SynthesisFilters, VERSION};
+
+/// The file, key by key.
+#[derive(Serialize)]
+struct Document<'a> {
+    format: &'static str,
+    version: usize,
+    spec: Option<&'a Spec>,
+    fast_period: f64,
+    ratio: usize,
+    latency: usize,
+    method: Method,
+    channels: Vec<Channel<'a>>,
+    state_space: Option<&'a BlockFilter>,
+    gamma: Gamma,
+}
+
+#[derive(Serialize)]
+struct Channel<'a> {
+    delay: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    taps: Option<&'a [f64]>,
+}
+
+impl Bank {
+    /// The text of the bank file: objects indented, lists on one line, numbers with as many digits as it
+    /// takes to read the same bits back.
+    ///
+    /// # Errors
+    /// [`BankError`] as [`Bank::check`]; above all for NaN and infinity, which JSON has not.
+    pub fn to_json(&self) -> Result<String, BankError> {
+        self.check()?;
+        let mut bytes = Vec::new();
+        let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, Indented::default());
+        let unwritable = |message: String| BankError::new("", String::new(), BankProblem::Syntax { message });
+        self.document().serialize(&mut serializer).map_err(|e| unwritable(e.to_string()))?;
+        bytes.push(b'\n');
+        String::from_utf8(bytes).map_err(|e| unwritable(e.to_string()))
+    }
+
+    fn document(&self) -> Document<'_> {
+        let (taps, state_space) = match &self.filters {
+            SynthesisFilters::Fir(taps) => (Some(taps), None),
+            SynthesisFilters::StateSpace(block) => (None, Some(block)),
+        };
+        let taps_of = |i: usize| taps.and_then(|lists| lists.get(i)).map(Vec::as_slice);
+        Document {
+            format: FORMAT,
+            version: VERSION,
+            spec: self.spec.as_ref(),
+            fast_period: self.fast_period,
+            ratio: self.ratio,
+            latency: self.latency,
+            method: self.method,
+            channels: self
+                .delays
+                .iter()
+                .enumerate()
+                .map(|(i, &delay)| Channel { delay, taps: taps_of(i) })
+                .collect(),
+            state_space,
+            gamma: self.gamma,
+        }
+    }
+}
+
+/// Objects over several lines, lists on one.
+#[derive(Default)]
+struct Indented {
+    depth: usize,
+}
+
+impl Indented {
+    fn new_line<W: ?Sized + io::Write>(&self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b"\n")?;
+        (0..self.depth).try_for_each(|_| writer.write_all(b"  "))
+    }
+}
+
+impl Formatter for Indented {
+    fn begin_array_value<W: ?Sized + io::Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        if first { Ok(()) } else { writer.write_all(b", ") }
+    }
+
+    fn begin_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        writer.write_all(b"{")
+    }
+
+    fn begin_object_key<W: ?Sized + io::Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        if !first {
+            writer.write_all(b",")?;
+        }
+        self.new_line(writer)
+    }
+
+    fn begin_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b": ")
+    }
+
+    fn end_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        self.new_line(writer)?;
+        writer.write_all(b"}")
+    }
+}

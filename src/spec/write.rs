@@ -1,0 +1,60 @@
+//! A spec as a document: the same keys in TOML and in the `spec` of a bank file.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::document::Node;
+use super::reader::{Fault, Value};
+use super::{ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, Spec, decode};
+
+/// The written form of a [`Spec`], units in seconds and nothing left out.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(skip_serializing_if = "str::is_empty")]
+    name: &'a str,
+    fast_period: f64,
+    ratio: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    latency: Option<usize>,
+    target: Target<'a>,
+    channel: &'a [ChannelSpec],
+    design: &'a DesignSpec,
+}
+
+#[derive(Serialize)]
+struct Target<'a> {
+    filter: &'a FilterSpec,
+}
+
+impl Serialize for Spec {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Document {
+            name: &self.name,
+            fast_period: self.fast_period,
+            ratio: self.ratio,
+            latency: self.latency,
+            target: Target { filter: &self.target },
+            channel: &self.channels,
+            design: &self.design,
+        }
+        .serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Spec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let node = Node::deserialize(deserializer)?;
+        decode::spec(&Value::root(&node), DesignOverrides::default()).map_err(custom)
+    }
+}
+
+impl<'de> Deserialize<'de> for FilterSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let node = Node::deserialize(deserializer)?;
+        decode::filter(&Value::root(&node)).map_err(custom)
+    }
+}
+
+fn custom<E: serde::de::Error>(fault: Fault) -> E {
+    let Fault { path, problem, .. } = fault;
+    E::custom(if path.is_empty() { problem.to_string() } else { format!("{path}: {problem}") })
+}
