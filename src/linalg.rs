@@ -5,6 +5,8 @@
 //! lines. The two share memory (both are column-major), so nothing is copied on the way in.
 //! Everything here is sequential and therefore gives the same bits on every run.
 
+pub mod blocks;
+
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{MatRef, Side};
 pub use nalgebra::Complex;
@@ -107,6 +109,16 @@ pub fn lq_factor_c(m: &CMat) -> CMat {
     owned(qr.thin_R()).adjoint()
 }
 
+/// Complex counterpart of [`lq`]: thin `(L, Q)` with `m = L Q`, `Q Q* = I`.
+pub fn lq_c(m: &CMat) -> (CMat, CMat) {
+    if m.is_empty() {
+        let k = m.nrows().min(m.ncols());
+        return (CMat::zeros(m.nrows(), k), CMat::zeros(k, m.ncols()));
+    }
+    let qr = view(&m.adjoint()).qr();
+    (owned(qr.thin_R()).adjoint(), owned(qr.compute_thin_Q().as_ref()).adjoint())
+}
+
 /// Lower Cholesky factor of a symmetric matrix; only the lower triangle is read.
 pub fn cholesky(m: &Mat) -> Result<Mat, LinalgError> {
     match view(m).llt(Side::Lower) {
@@ -124,6 +136,29 @@ pub fn solve_positive(m: &Mat, rhs: &Mat) -> Result<Mat, LinalgError> {
         Err(faer::linalg::solvers::LltError::NonPositivePivot { index }) => {
             Err(LinalgError::NotPositiveDefinite { pivot: index })
         }
+    }
+}
+
+/// Cholesky factorisation of a symmetric positive definite matrix, kept for many right-hand sides.
+#[derive(Debug, Clone)]
+pub struct PositiveFactor {
+    llt: faer::linalg::solvers::Llt<f64>,
+}
+
+impl PositiveFactor {
+    /// Factors `m`; only the lower triangle is read.
+    pub fn new(m: &Mat) -> Result<Self, LinalgError> {
+        match view(m).llt(Side::Lower) {
+            Ok(llt) => Ok(Self { llt }),
+            Err(faer::linalg::solvers::LltError::NonPositivePivot { index }) => {
+                Err(LinalgError::NotPositiveDefinite { pivot: index })
+            }
+        }
+    }
+
+    /// `m^{-1} rhs`.
+    pub fn solve(&self, rhs: &Mat) -> Mat {
+        owned(self.llt.solve(view(rhs)).as_ref())
     }
 }
 
@@ -167,6 +202,25 @@ pub fn svd(m: &Mat) -> Result<Svd, LinalgError> {
     let svd = view(m).thin_svd().map_err(|_| no_convergence("svd", m))?;
     let s = svd.S().column_vector().iter().copied().collect();
     Ok(Svd { u: owned(svd.U()), s, v: owned(svd.V()) })
+}
+
+/// Thin singular value decomposition `m = u diag(s) v*` of a complex matrix, s descending.
+#[derive(Debug, Clone)]
+pub struct SvdC {
+    /// Left vectors, rows x k.
+    pub u: CMat,
+    /// Singular values, descending.
+    pub s: Vec<f64>,
+    /// Right vectors, cols x k.
+    pub v: CMat,
+}
+
+/// Thin SVD of a complex matrix.
+pub fn svd_c(m: &CMat) -> Result<SvdC, LinalgError> {
+    check_finite_c("svd", m)?;
+    let svd = view(m).thin_svd().map_err(|_| no_convergence("svd", m))?;
+    let s = svd.S().column_vector().iter().map(|z| z.re).collect();
+    Ok(SvdC { u: owned(svd.U()), s, v: owned(svd.V()) })
 }
 
 /// Singular values of a real matrix, descending.

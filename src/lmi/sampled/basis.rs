@@ -1,0 +1,114 @@
+//! Orthonormal bases of what the taps can do, for least squares and for making dual matrices
+//! exactly orthogonal to every tap.
+
+use super::prepare::Reduced;
+use crate::linalg::blocks::Blocks;
+use crate::linalg::{self, LinalgError, Mat, Svd};
+
+/// The map from one row's taps to that row of `F(omega_l) h_l`, as a QR factorisation that serves all
+/// numbers of lags (columns are ordered by lag), with an SVD of each triangle in use.
+#[derive(Debug, Clone)]
+pub(super) struct Basis {
+    q: Mat,
+    triangles: Vec<(usize, Svd)>,
+    weights: Vec<f64>,
+}
+
+impl Basis {
+    /// `weights[l]` multiplies the row entries at point l.
+    pub(super) fn new(reduced: &Reduced, weights: Vec<f64>) -> Result<Self, LinalgError> {
+        let map = row_map(reduced, &weights);
+        let (l, q) = linalg::lq(&map.transpose());
+        let (q, r) = (q.transpose(), l.transpose());
+        let mut triangles: Vec<(usize, Svd)> = Vec::new();
+        for &lags in &reduced.layout.lags {
+            if triangles.iter().all(|(have, _)| *have != lags) {
+                let cols = reduced.layout.channels * lags;
+                let rows = cols.min(r.nrows());
+                triangles.push((lags, linalg::svd(&r.view((0, 0), (rows, cols)).into_owned())?));
+            }
+        }
+        Ok(Self { q, triangles, weights })
+    }
+
+    fn triangle(&self, lags: usize) -> (&Svd, usize) {
+        // Every number of lags of the layout was entered by `new`.
+        let svd = self.triangles.iter().find(|(have, _)| *have == lags).map(|(_, svd)| svd);
+        svd.map_or_else(|| (&self.triangles[0].1, 0), |svd| (svd, svd.s.len()))
+    }
+
+    /// Taps of all rows that minimise `sum_l weights_l^2 ||w_l - F h_l||_F^2`, least norm among
+    /// directions weaker than `cut` times the strongest.
+    pub(super) fn least_squares(&self, reduced: &Reduced, w: &Blocks, cut: f64) -> Vec<f64> {
+        let mut x = vec![0.0; reduced.layout.unknowns()];
+        for p in 0..reduced.layout.rows {
+            let (svd, rank) = self.triangle(reduced.layout.lags[p]);
+            let (u, kept) = (&svd.u, kept(svd, cut, rank));
+            let seen = self.q.columns(0, u.nrows()).tr_mul(&row_vector(w, p, &self.weights));
+            let mut c = u.columns(0, kept).tr_mul(&seen);
+            for (value, s) in c.iter_mut().zip(&svd.s) {
+                *value /= s;
+            }
+            let solution = svd.v.columns(0, kept) * c;
+            x[reduced.layout.range(p)].copy_from_slice(solution.as_slice());
+        }
+        x
+    }
+
+    /// Removes from each row of `y` what the taps of that row can reach, twice for the last digits.
+    /// Only meaningful for a basis with unit weights.
+    pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Blocks, cut: f64) {
+        for p in 0..reduced.layout.rows {
+            let (svd, rank) = self.triangle(reduced.layout.lags[p]);
+            let u = svd.u.columns(0, kept(svd, cut, rank));
+            let q = self.q.columns(0, svd.u.nrows());
+            let mut row = row_vector(y, p, &self.weights);
+            for _ in 0..2 {
+                let reach = u * u.tr_mul(&q.tr_mul(&row));
+                row -= q * reach;
+            }
+            set_row(y, p, &row);
+        }
+    }
+}
+
+fn kept(svd: &Svd, cut: f64, rank: usize) -> usize {
+    let floor = cut * svd.s.first().copied().unwrap_or(0.0);
+    svd.s.iter().take(rank).filter(|s| **s > floor).count()
+}
+
+/// Rows: real parts of all (point, input), then imaginary parts. Columns: lag by lag, channels inside.
+fn row_map(reduced: &Reduced, weights: &[f64]) -> Mat {
+    let (n, k, lags) = (reduced.layout.channels, reduced.h.cols(), reduced.phases.lags());
+    let half = k * reduced.count();
+    let mut map = Mat::zeros(2 * half, n * lags);
+    for a in 0..n * lags {
+        for r in 0..half {
+            let (l, c) = (r / k, r % k);
+            let z = reduced.phases.phase(l, a / n) * reduced.h.block(l).at(a % n, c) * weights[l];
+            map[(r, a)] = z.re;
+            map[(half + r, a)] = z.im;
+        }
+    }
+    map
+}
+
+fn row_vector(y: &Blocks, p: usize, weights: &[f64]) -> Mat {
+    let (k, half) = (y.cols(), y.cols() * y.count());
+    Mat::from_fn(2 * half, 1, |r, _| {
+        let (l, c) = ((r % half) / k, r % k);
+        let z = y.block(l).at(p, c) * weights[l];
+        if r < half { z.re } else { z.im }
+    })
+}
+
+fn set_row(y: &mut Blocks, p: usize, row: &Mat) {
+    let (m, k, half) = (y.rows(), y.cols(), y.cols() * y.count());
+    for l in 0..y.count() {
+        let block = y.block_mut(l);
+        for c in 0..k {
+            block.data[p + m * c].re = row[l * k + c];
+            block.data[p + m * c].im = row[half + l * k + c];
+        }
+    }
+}

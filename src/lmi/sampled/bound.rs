@@ -1,0 +1,179 @@
+//! A lower bound on the worst case that holds whatever the iteration did.
+//!
+//! For any matrices `Y_l` (M x q) and any taps F, by the duality of spectral and nuclear norm,
+//!
+//! ```text
+//! gamma(F) sum_l ||Y_l||_* >= sum_l Re <Y_l, K_l(F)> = sum_l Re <Y_l, W_l> - sum_a r_a F_a,
+//! r_{p,i,j} = sum_l Re <Y_l, e^{-i omega_l j} E_{p,i} H_l>.
+//! ```
+//!
+//! Dual matrices of an optimum have r = 0. What rounding leaves of it is charged for all taps
+//! within a stated radius.
+
+use super::SampledError;
+use super::basis::Basis;
+use super::prepare::Reduced;
+use super::problem::{Problem, Taps};
+use crate::linalg::blocks::Blocks;
+use crate::linalg::{self, CMat, Complex};
+
+/// Cuts tried for telling weak directions of tap space from rounding errors; the best bound counts.
+const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
+/// Taps up to this many times the size of the solution (or of unit gain) are covered by the bound.
+const RADIUS_FACTOR: f64 = 1e3;
+/// Rounding errors of the three sums, in units of the machine precision times the sum of moduli.
+const ROUNDING: f64 = 16.0;
+
+/// A proven lower bound.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowerBound {
+    /// `gamma(F) >= value` for all taps within the radius; never negative.
+    pub value: f64,
+    /// Norm of the residual r, each channel scaled by its strength.
+    pub residual: f64,
+    /// The taps covered: `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2) <= radius`, `s_i` the largest row norm of
+    /// channel i over the points.
+    pub radius: f64,
+}
+
+impl LowerBound {
+    /// The bound nobody can dispute.
+    pub(super) fn zero() -> Self {
+        Self { value: 0.0, residual: 0.0, radius: f64::INFINITY }
+    }
+}
+
+/// Proves a lower bound on the optimum of `problem` from any dual matrices, one for each point (each
+/// M x q), for all taps within `radius` (see [`LowerBound`]). Uses nothing but the data and the
+/// inequality in the module's text; sums are charged with their rounding errors.
+///
+/// Fails if the number or the size of the matrices does not fit.
+pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, SampledError> {
+    let points = problem.points();
+    if dual.len() != points.len() {
+        return Err(SampledError::Count { name: "dual matrices", given: dual.len(), points: points.len() });
+    }
+    let (mut value, mut nuclear, mut moduli) = (0.0, 0.0, 0.0);
+    for (l, (y, point)) in dual.iter().zip(points).enumerate() {
+        check_shape(problem, l, y)?;
+        nuclear += linalg::singular_values_c(y)?.iter().sum::<f64>();
+        for (a, b) in y.iter().zip(point.w.iter()) {
+            value += (a.conj() * b).re;
+            moduli += a.norm() * b.norm();
+        }
+    }
+    let residual = residual_norm(problem, dual);
+    let terms = (points.len() * problem.rows() * problem.inputs()) as f64;
+    let rounding = ROUNDING * f64::EPSILON * (moduli + nuclear * terms.sqrt() * f64::EPSILON);
+    let proven = (value - residual * radius - rounding) / (nuclear * (1.0 + ROUNDING * f64::EPSILON));
+    let value = if proven.is_finite() { proven.max(0.0) } else { 0.0 };
+    Ok(LowerBound { value, residual, radius })
+}
+
+fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError> {
+    let (rows, cols) = (problem.rows(), problem.inputs());
+    if y.shape() == (rows, cols) {
+        return Ok(());
+    }
+    let (have_rows, have_cols) = y.shape();
+    Err(SampledError::Size {
+        name: "the dual matrix",
+        point: l,
+        rows: have_rows,
+        cols: have_cols,
+        want_rows: rows,
+        want_cols: cols,
+    })
+}
+
+/// Norm of `r_{p,i,j} / s_i` plus what rounding may hide in it.
+fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
+    let strength = strengths(problem);
+    let (m, n) = (problem.rows(), problem.channels());
+    let products: Vec<CMat> = dual.iter().zip(problem.points()).map(|(y, p)| y * p.h.adjoint()).collect();
+    let mut square = 0.0;
+    let mut moduli = 0.0;
+    for j in 0..problem.max_lags() {
+        let mut r = CMat::zeros(m, n);
+        for (product, point) in products.iter().zip(problem.points()) {
+            r += product * Complex::from_polar(1.0, point.omega * j as f64);
+        }
+        for p in (0..m).filter(|&p| j < problem.lags()[p]) {
+            for i in (0..n).filter(|&i| strength[i] > 0.0) {
+                square += (r[(p, i)].re / strength[i]).powi(2);
+            }
+        }
+    }
+    for (y, point) in dual.iter().zip(problem.points()) {
+        let scaled =
+            (0..n).filter(|&i| strength[i] > 0.0).map(|i| (point.h.row(i).norm() / strength[i]).powi(2));
+        moduli += y.norm() * scaled.sum::<f64>().sqrt();
+    }
+    // Each r is a sum with relative errors of a few units in each term, phases included.
+    square.sqrt() + f64::EPSILON * moduli * (problem.max_lags() as f64).sqrt()
+}
+
+fn strengths(problem: &Problem) -> Vec<f64> {
+    let norms = |i: usize| problem.points().iter().map(move |p| p.h.row(i).norm());
+    (0..problem.channels()).map(|i| norms(i).fold(0.0, f64::max)).collect()
+}
+
+/// The radius that covers every bank worth having: far beyond the taps found and beyond unit gain.
+pub(super) fn radius(problem: &Problem, taps: &Taps) -> f64 {
+    let strength = strengths(problem);
+    let mut square = 0.0;
+    for f in taps {
+        for (i, s) in strength.iter().enumerate() {
+            square += (s * f.column(i).norm()).powi(2);
+        }
+    }
+    let wanted = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
+    RADIUS_FACTOR * square.sqrt().max(wanted)
+}
+
+/// The best bound that the dual iterate `z` (blocks of order M + k1) gives, with its matrices `Y_l`.
+///
+/// At an optimum `Z11` sits on the worst singular vectors, and `Y = [-Z12, Z11 W_rest]` in compressed
+/// inputs is `Z11 K / gamma`, a subgradient. Its first part is made orthogonal to all taps.
+pub(super) fn from_iterate(
+    problem: &Problem,
+    reduced: &Reduced,
+    basis: &Basis,
+    z: &Blocks,
+    radius: f64,
+) -> Result<(LowerBound, Vec<CMat>), SampledError> {
+    let mut best = (LowerBound::zero(), zero_dual(problem));
+    for cut in CUTS {
+        let dual = dual_matrices(reduced, basis, z, cut);
+        let bound = lower_bound(problem, &dual, radius)?;
+        if bound.value > best.0.value {
+            best = (bound, dual);
+        }
+    }
+    Ok(best)
+}
+
+/// Dual matrices that prove nothing.
+pub(super) fn zero_dual(problem: &Problem) -> Vec<CMat> {
+    vec![CMat::zeros(problem.rows(), problem.inputs()); problem.points().len()]
+}
+
+fn dual_matrices(reduced: &Reduced, basis: &Basis, z: &Blocks, cut: f64) -> Vec<CMat> {
+    let (m, k1, k2) = (reduced.layout.rows, reduced.h.cols(), reduced.w_rest.cols());
+    let mut reach = Blocks::zeros(z.count(), m, k1);
+    for l in 0..z.count() {
+        let (from, to) = (z.block(l), reach.block_mut(l).data);
+        (0..m * k1).for_each(|e| to[e] = -from.at(e % m, m + e / m));
+    }
+    basis.project_out(reduced, &mut reach, cut);
+    let mut rest = Blocks::zeros(1, m, k2);
+    let full = |l: usize| {
+        let weight = z.block(l).part(0, 0, m, m);
+        rest.block_mut(0).set_product(1.0, weight.plain(), reduced.w_rest.block(l).plain());
+        let mut y = CMat::zeros(m, k1 + k2);
+        y.columns_mut(0, k1).copy_from_slice(reach.block(l).data);
+        y.columns_mut(k1, k2).copy_from_slice(rest.as_slice());
+        y * &reduced.inputs[l]
+    };
+    (0..z.count()).map(full).collect()
+}

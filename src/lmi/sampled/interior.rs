@@ -1,0 +1,262 @@
+//! One primal-dual predictor-corrector iteration, shared by both objectives.
+//!
+//! minimise `t` (or the weighted mean square with t fixed) subject to `S_l(t, x) >= 0`. The slacks are
+//! functions of the unknowns, so the primal is feasible in every iteration; only the dual equality
+//! `c - A*(Z) = 0` starts out violated.
+
+use super::blocks::{Cone, SlackStep};
+use super::newton::{self, Newton, Seen};
+use super::prepare::Reduced;
+use super::{Settings, Step};
+use crate::linalg::Mat;
+use crate::linalg::blocks::Blocks;
+
+/// What is minimised over the LMIs.
+#[derive(Debug, Clone)]
+pub(super) enum Objective {
+    /// `t`, itself an unknown.
+    WorstCase,
+    /// `sum_l weights_l ||K_l||_F^2` with t fixed.
+    MeanSquare(Vec<f64>),
+}
+
+/// Why a step could not be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stall {
+    /// A slack lost positive definiteness to rounding.
+    Slack,
+    /// The Newton matrix could not be factored.
+    Newton,
+    /// The direction holds NaN or both step lengths vanish.
+    Step,
+}
+
+/// Steps shorter than this make no progress.
+const SHORTEST_STEP: f64 = 1e-7;
+
+/// The iterate and its work memory.
+#[derive(Debug)]
+pub(super) struct Engine<'a> {
+    reduced: &'a Reduced,
+    objective: Objective,
+    /// The unknown taps in reduced coordinates.
+    pub(super) x: Vec<f64>,
+    pub(super) cone: Cone,
+    curvature: Option<Mat>,
+    seen_x: Seen,
+    seen_z: Seen,
+    dz: Blocks,
+    corrector: Blocks,
+}
+
+/// A direction: taps, slack and dual matrices.
+struct Direction {
+    taps: Vec<f64>,
+    slack: SlackStep,
+}
+
+impl<'a> Engine<'a> {
+    /// Starts at the taps `x` with `t`, which must be above every `sigma_max(K_l)^2`. None if it is not.
+    pub(super) fn new(reduced: &'a Reduced, objective: Objective, x: Vec<f64>, t: f64) -> Option<Self> {
+        let (count, m, k1) = (reduced.count(), reduced.layout.rows, reduced.h.cols());
+        let (n, order) = (reduced.layout.channels, m + k1);
+        let mut cone = Cone::new(t, reduced.error(&x), reduced.g.clone());
+        if !cone.invert() {
+            return None;
+        }
+        let curvature = match &objective {
+            Objective::WorstCase => None,
+            Objective::MeanSquare(weights) => {
+                let mut q = Mat::zeros(reduced.layout.unknowns(), reduced.layout.unknowns());
+                newton::add_mean_square(&mut q, &reduced.layout, &reduced.phases, &reduced.h, weights);
+                Some(q)
+            }
+        };
+        let start = match &objective {
+            Objective::WorstCase => None,
+            // A gap of a tenth of the objective: near enough to the end, far enough from the boundary.
+            Objective::MeanSquare(weights) => {
+                Some(0.1 * weighted_square(&cone.k, weights).max(f64::MIN_POSITIVE) / cone.order() as f64)
+            }
+        };
+        cone.center(start);
+        Some(Self {
+            reduced,
+            objective,
+            x,
+            cone,
+            curvature,
+            seen_x: Seen::new(count, m, n, k1),
+            seen_z: Seen::new(count, m, n, k1),
+            dz: Blocks::zeros(count, order, order),
+            corrector: Blocks::zeros(count, order, order),
+        })
+    }
+
+    fn free_t(&self) -> bool {
+        matches!(self.objective, Objective::WorstCase)
+    }
+
+    /// The value being minimised.
+    pub(super) fn value(&self) -> f64 {
+        match &self.objective {
+            Objective::WorstCase => self.cone.t,
+            Objective::MeanSquare(weights) => weighted_square(&self.cone.k, weights),
+        }
+    }
+
+    /// Gradient of the objective in the taps, then in t if that is free.
+    fn cost(&self) -> Vec<f64> {
+        match &self.objective {
+            Objective::WorstCase => {
+                let mut c = vec![0.0; self.x.len()];
+                c.push(1.0);
+                c
+            }
+            Objective::MeanSquare(weights) => {
+                let mut weighted = self.cone.k.clone();
+                let size = weighted.rows() * weighted.cols();
+                for (i, z) in weighted.as_mut_slice().iter_mut().enumerate() {
+                    *z *= -weights[i / size];
+                }
+                self.reduced.adjoint(&weighted)
+            }
+        }
+    }
+
+    /// `A*(Y)`: derivative of `sum <S_l, Y_l>` in the unknowns.
+    fn adjoint(&self, y: &Blocks) -> Vec<f64> {
+        let (m, k1) = (self.cone.m, self.cone.k1);
+        let mut off = Blocks::zeros(y.count(), m, k1);
+        for l in 0..y.count() {
+            let block = y.block(l);
+            let to = off.block_mut(l).data;
+            (0..m * k1).for_each(|e| to[e] = -block.at(e % m, m + e / m));
+        }
+        let mut a = self.reduced.adjoint(&off);
+        if self.free_t() {
+            a.push(self.cone.trace(y));
+        }
+        a
+    }
+
+    /// `c - A*(Z)`.
+    pub(super) fn dual_residual(&self) -> Vec<f64> {
+        self.cost().iter().zip(self.adjoint(&self.cone.z)).map(|(c, a)| c - a).collect()
+    }
+
+    fn newton(&mut self) -> Option<Newton> {
+        let taps = self.x.len();
+        let order = taps + usize::from(self.free_t());
+        let mut matrix = match &self.curvature {
+            Some(q) => q.clone(),
+            None => Mat::zeros(order, order),
+        };
+        self.seen_x.look(&self.cone.x, &self.reduced.h);
+        self.seen_z.look(&self.cone.z, &self.reduced.h);
+        newton::add_taps(&mut matrix, &self.reduced.layout, &self.reduced.phases, &self.seen_x, &self.seen_z);
+        if self.free_t() {
+            let (row, corner) = newton::border(self.reduced, &self.seen_x, &self.seen_z);
+            row.iter().enumerate().for_each(|(a, v)| matrix[(taps, a)] = *v);
+            matrix[(taps, taps)] = corner;
+        }
+        Newton::new(matrix).ok()
+    }
+
+    fn direction(&self, newton: &Newton, rhs: &[f64]) -> Direction {
+        let mut taps = newton.solve(rhs);
+        let t = if self.free_t() { taps.pop().unwrap_or(0.0) } else { 0.0 };
+        let mut k = self.reduced.image(&taps);
+        k.as_mut_slice().iter_mut().for_each(|z| *z = -*z);
+        Direction { taps, slack: SlackStep { t, k } }
+    }
+
+    /// One step. The iterate changes only if all goes well.
+    pub(super) fn step(&mut self, settings: &Settings) -> Result<Step, Stall> {
+        let objective = self.value();
+        if !self.cone.invert() {
+            return Err(Stall::Slack);
+        }
+        let order = self.cone.order() as f64;
+        let gap = self.cone.gap();
+        let mu = gap / order;
+        let dual_residual = norm(&self.dual_residual());
+        let newton = self.newton().ok_or(Stall::Newton)?;
+        let cost = self.cost();
+        let mut dz = std::mem::replace(&mut self.dz, Blocks::zeros(0, 0, 0));
+        let mut corrector = std::mem::replace(&mut self.corrector, Blocks::zeros(0, 0, 0));
+
+        let minus_cost: Vec<f64> = cost.iter().map(|c| -c).collect();
+        let affine = self.direction(&newton, &minus_cost);
+        self.cone.dual_step(&affine.slack, 0.0, None, &mut dz);
+        let reach = self.reach(&affine, &dz, 1.0);
+        let sigma = centering(self.gap_after(gap, &affine, &dz, reach) / gap);
+
+        self.cone.corrector(&affine.slack, &dz, &mut corrector);
+        let (center, second) = (self.adjoint(&self.cone.x), self.adjoint(&corrector));
+        let rhs: Vec<f64> = (0..cost.len()).map(|a| sigma * mu * center[a] - second[a] - cost[a]).collect();
+        let full = self.direction(&newton, &rhs);
+        self.cone.dual_step(&full.slack, sigma * mu, Some(&corrector), &mut dz);
+        let fraction = settings.step_fraction.min(0.9 + 0.09 * reach.0.min(reach.1));
+        let reach = self.reach(&full, &dz, 1.0 / fraction);
+        let alpha = (fraction * reach.0, fraction * reach.1);
+
+        let done = self.advance(&full, &dz, alpha);
+        self.dz = dz;
+        self.corrector = corrector;
+        let step = Step {
+            objective,
+            mu,
+            dual_residual,
+            alpha_primal: alpha.0,
+            alpha_dual: alpha.1,
+            shift: newton.shift,
+        };
+        if done { Ok(step) } else { Err(Stall::Step) }
+    }
+
+    /// Primal and dual step lengths to the boundary. With a quadratic objective the dual residual
+    /// moves with the taps, so both take the shorter one.
+    fn reach(&mut self, d: &Direction, dz: &Blocks, most: f64) -> (f64, f64) {
+        let primal = self.cone.primal_reach(&d.slack, most);
+        let dual = self.cone.dual_reach(dz, most);
+        if self.free_t() { (primal, dual) } else { (primal.min(dual), primal.min(dual)) }
+    }
+
+    fn gap_after(&self, gap: f64, d: &Direction, dz: &Blocks, (primal, dual): (f64, f64)) -> f64 {
+        // <S, dZ> = <S, Z + dZ> - <S, Z>, and S itself is linear in (t, K) up to its constant part.
+        let slack_dz = self.cone.inner_slack(dz);
+        gap + primal * self.cone.inner(&d.slack, &self.cone.z)
+            + dual * slack_dz
+            + primal * dual * self.cone.inner(&d.slack, dz)
+    }
+
+    fn advance(&mut self, d: &Direction, dz: &Blocks, (primal, dual): (f64, f64)) -> bool {
+        let finite = d.taps.iter().all(|v| v.is_finite()) && d.slack.t.is_finite();
+        if !finite || primal.max(dual) < SHORTEST_STEP {
+            return false;
+        }
+        for (x, dx) in self.x.iter_mut().zip(&d.taps) {
+            *x += primal * dx;
+        }
+        self.cone.t += primal * d.slack.t;
+        // From the unknowns, not from the step: rounding errors do not pile up.
+        self.cone.k = self.reduced.error(&self.x);
+        self.cone.z.add_scaled(dual, dz);
+        true
+    }
+}
+
+/// Mehrotra's centering from the ratio of the predicted to the present gap.
+fn centering(ratio: f64) -> f64 {
+    ratio.clamp(0.0, 1.0).powi(3).clamp(1e-8, 0.9)
+}
+
+fn weighted_square(k: &Blocks, weights: &[f64]) -> f64 {
+    let square = |l: usize| k.block(l).data.iter().map(|z| z.norm_sqr()).sum::<f64>();
+    weights.iter().enumerate().map(|(l, w)| w * square(l)).sum()
+}
+
+pub(super) fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}

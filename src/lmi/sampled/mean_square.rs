@@ -1,0 +1,200 @@
+//! The second objective: least weighted mean square, free or under a cap on the worst case.
+//!
+//! Optimal worst-case taps are usually many; among all taps within a small slack of the optimum the
+//! ones of least mean square are good at every other frequency too.
+
+use super::basis::Basis;
+use super::interior::{Engine, Objective};
+use super::newton::{self, Newton};
+use super::prepare::Reduced;
+use super::problem::{Point, Problem, SampledError, Taps};
+use super::{Settings, Step};
+use crate::linalg::Mat;
+use crate::lmi::Stop;
+
+/// Steps without a better gap after which a run is over.
+const PATIENCE: usize = 6;
+
+/// Taps of least mean square under a cap.
+#[derive(Debug, Clone)]
+pub struct MeanSquare {
+    /// Why the iteration ended.
+    pub stop: Stop,
+    /// `F_j`, M x N for each lag.
+    pub taps: Taps,
+    /// `sum_l weights_l ||K_l||_F^2` of these taps.
+    pub mean_square: f64,
+    /// Lower bound on it for any taps under the cap, from the dual iterate (valid up to rounding).
+    pub lower: f64,
+    /// Worst `sigma_max(K_l)` of these taps over the points; not above the cap.
+    pub gamma: f64,
+    /// Index of the point where it is attained.
+    pub worst_point: usize,
+    /// Iteration record; the objective is relative to the start's.
+    pub steps: Vec<Step>,
+}
+
+/// Taps that minimise `sum_l weights_l ||K_l||_F^2`, by a QR factorisation (never by normal
+/// equations); least norm among directions weaker than `tol_rank` times the strongest.
+///
+/// Fails if the weights do not fit (one for each point, finite, not negative, not all zero).
+pub fn least_squares(problem: &Problem, weights: &[f64], tol_rank: f64) -> Result<Taps, SampledError> {
+    problem.check_weights(weights)?;
+    let reduced = Reduced::new(problem)?;
+    if reduced.layout.unknowns() == 0 {
+        return Ok(problem.zero_taps());
+    }
+    let basis = Basis::new(&reduced, weights.iter().map(|w| w.sqrt()).collect())?;
+    Ok(reduced.taps(&basis.least_squares(&reduced, &reduced.w, tol_rank)))
+}
+
+/// Minimises `sum_l weights_l ||K_l||_F^2` subject to `sigma_max(K_l) <= cap` at every point.
+///
+/// `start` must satisfy the cap strictly: the taps of [`super::minimise`] with a cap a little above
+/// their gamma. If the unconstrained least-squares taps satisfy the cap they are returned at once.
+/// The result is never worse than the start, and satisfies the cap, however the iteration ended.
+pub fn mean_square_under_cap(
+    problem: &Problem,
+    weights: &[f64],
+    cap: f64,
+    start: &Taps,
+    settings: &Settings,
+) -> Result<MeanSquare, SampledError> {
+    settings.check()?;
+    problem.check_taps(start)?;
+    let free = least_squares(problem, weights, settings.tol_rank)?;
+    let free_square = problem.mean_square(&free, weights);
+    let mut best = Best::new(problem, weights, cap, start)?;
+    best.offer(free)?;
+    if best.mean_square == free_square {
+        return Ok(best.finish(Stop::Solved, free_square, Vec::new()));
+    }
+    if best.gamma >= cap {
+        return Err(SampledError::Cap { cap, gamma: best.gamma });
+    }
+    // From the start, in units of the cap and of the start's own mean square.
+    let unit = best.mean_square / (cap * cap);
+    let scaled: Vec<f64> = weights.iter().map(|w| w / unit).collect();
+    let mut reduced = Reduced::new(&shifted(problem, start)?)?;
+    reduced.rescale(cap);
+    let run = Run { reduced: &reduced, start, weights: &scaled, cap, settings };
+    let (stop, gap, steps) = run.iterate(&mut best)?;
+    let lower = (best.mean_square - gap * best.mean_square_unit(unit)).max(free_square);
+    Ok(best.finish(stop, lower, steps))
+}
+
+/// The same points with the error of `start` in place of what is wanted.
+fn shifted(problem: &Problem, start: &Taps) -> Result<Problem, SampledError> {
+    let point = |l: usize| {
+        let p = &problem.points()[l];
+        Point { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
+    };
+    Problem::new((0..problem.points().len()).map(point).collect(), problem.lags().to_vec())
+}
+
+struct Best<'a> {
+    problem: &'a Problem,
+    weights: &'a [f64],
+    cap: f64,
+    taps: Taps,
+    mean_square: f64,
+    gamma: f64,
+    worst_point: usize,
+}
+
+impl<'a> Best<'a> {
+    fn new(problem: &'a Problem, weights: &'a [f64], cap: f64, start: &Taps) -> Result<Self, SampledError> {
+        let (gamma, worst_point) = problem.worst(start)?;
+        let mean_square = problem.mean_square(start, weights);
+        Ok(Self { problem, weights, cap, taps: start.clone(), mean_square, gamma, worst_point })
+    }
+
+    /// Takes the taps if they respect the cap and improve.
+    fn offer(&mut self, taps: Taps) -> Result<(), SampledError> {
+        let mean_square = self.problem.mean_square(&taps, self.weights);
+        let (gamma, worst_point) = self.problem.worst(&taps)?;
+        if gamma <= self.cap && (mean_square < self.mean_square || self.gamma > self.cap) {
+            (self.taps, self.mean_square) = (taps, mean_square);
+            (self.gamma, self.worst_point) = (gamma, worst_point);
+        }
+        Ok(())
+    }
+
+    fn mean_square_unit(&self, unit: f64) -> f64 {
+        unit * self.cap * self.cap
+    }
+
+    fn finish(self, stop: Stop, lower: f64, steps: Vec<Step>) -> MeanSquare {
+        let Self { taps, mean_square, gamma, worst_point, .. } = self;
+        MeanSquare { stop, taps, mean_square, lower: lower.min(mean_square), gamma, worst_point, steps }
+    }
+}
+
+struct Run<'a> {
+    reduced: &'a Reduced,
+    start: &'a Taps,
+    weights: &'a [f64],
+    cap: f64,
+    settings: &'a Settings,
+}
+
+impl Run<'_> {
+    /// Returns the stop, the gap in scaled units and the record.
+    fn iterate(&self, best: &mut Best<'_>) -> Result<(Stop, f64, Vec<Step>), SampledError> {
+        let mut steps = Vec::new();
+        let zero = vec![0.0; self.reduced.layout.unknowns()];
+        let objective = Objective::MeanSquare(self.weights.to_vec());
+        let Some(mut engine) = Engine::new(self.reduced, objective, zero, 1.0) else {
+            return Ok((Stop::NumericalTrouble, f64::INFINITY, steps));
+        };
+        let Some(curvature) = self.curvature() else {
+            return Ok((Stop::NumericalTrouble, f64::INFINITY, steps));
+        };
+        let (mut least, mut waited) = (f64::INFINITY, 0);
+        while steps.len() < self.settings.max_iterations {
+            let gap = duality_gap(&engine, &curvature) / engine.value().max(f64::MIN_POSITIVE);
+            waited = if gap < 0.9 * least { 0 } else { waited + 1 };
+            least = least.min(gap);
+            if gap <= self.settings.tol_gap_rel || waited > PATIENCE {
+                break;
+            }
+            match engine.step(self.settings) {
+                Ok(step) => steps.push(step),
+                Err(_) => break,
+            }
+        }
+        let gap = duality_gap(&engine, &curvature);
+        let relative = gap / engine.value().max(f64::MIN_POSITIVE);
+        best.offer(self.taps(&engine.x))?;
+        let stop = if relative <= self.settings.tol_gap_rel {
+            Stop::Solved
+        } else if relative <= self.settings.tol_gap_reduced {
+            Stop::SolvedInaccurate
+        } else if steps.len() >= self.settings.max_iterations {
+            Stop::IterationLimit
+        } else {
+            Stop::NumericalTrouble
+        };
+        Ok((stop, gap, steps))
+    }
+
+    fn curvature(&self) -> Option<Newton> {
+        let r = self.reduced;
+        let mut q = Mat::zeros(r.layout.unknowns(), r.layout.unknowns());
+        newton::add_mean_square(&mut q, &r.layout, &r.phases, &r.h, self.weights);
+        Newton::new(q).ok()
+    }
+
+    fn taps(&self, x: &[f64]) -> Taps {
+        let step = self.reduced.taps(x);
+        self.start.iter().zip(step).map(|(f, d)| f + d * self.cap).collect()
+    }
+}
+
+/// `<S, Z> + r' Q^{-1} r / 2` with the dual residual r: how far the Lagrangian's minimum lies below
+/// the objective, whether or not the dual equality holds.
+fn duality_gap(engine: &Engine<'_>, curvature: &Newton) -> f64 {
+    let r = engine.dual_residual();
+    let correction: f64 = curvature.solve(&r).iter().zip(&r).map(|(a, b)| a * b).sum();
+    engine.cone.gap() + 0.5 * correction.max(0.0)
+}

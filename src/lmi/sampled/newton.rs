@@ -1,0 +1,234 @@
+//! The Newton matrix of the taps: Toeplitz plus Hankel in the lags for each pair of taps.
+//!
+//! With `X_l = S_l^{-1}`, the dual `Z_l`, and `u` for a row of the taps and `v` for a channel (the
+//! LMI's second block mapped through `h_l`), the entry for the taps (p,i,j), (p',i',j') is
+//!
+//! ```text
+//! Re sum_l e^{-i w (j-j')} ( Xvv[i,i'] Zuu[p',p] + Xuu[p',p] Zvv[i,i'] )
+//!  + e^{-i w (j+j')} ( Xvu[i,p'] Zvu[i',p] + Xvu[i',p] Zvu[i,p'] ).
+//! ```
+
+use super::fourier::{Layout, Phases};
+use super::prepare::Reduced;
+use crate::linalg::blocks::{Block, Blocks, inner};
+use crate::linalg::{Complex, LinalgError, Mat, PositiveFactor};
+
+/// One Hermitian matrix family seen through the rows (u) and channels (v).
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    pub(super) uu: Blocks,
+    pub(super) vu: Blocks,
+    pub(super) vv: Blocks,
+    half: Blocks,
+}
+
+impl Seen {
+    pub(super) fn new(count: usize, m: usize, n: usize, k: usize) -> Self {
+        Self {
+            uu: Blocks::zeros(count, m, m),
+            vu: Blocks::zeros(count, n, m),
+            vv: Blocks::zeros(count, n, n),
+            half: Blocks::zeros(1, n, k),
+        }
+    }
+
+    /// Projects the blocks `x` of order m + k through the channels `h` (n x k).
+    pub(super) fn look(&mut self, x: &Blocks, h: &Blocks) {
+        let (m, k) = (self.uu.rows(), h.cols());
+        for l in 0..x.count() {
+            let (full, h) = (x.block(l), h.block(l));
+            copy(full.part(0, 0, m, m), self.uu.block_mut(l).data);
+            self.vu.block_mut(l).set_product(1.0, h.plain(), full.part(m, 0, k, m).plain());
+            self.half.block_mut(0).set_product(1.0, h.plain(), full.part(m, m, k, k).plain());
+            self.vv.block_mut(l).set_product(1.0, self.half.block(0).plain(), h.adjoint());
+        }
+    }
+}
+
+fn copy(from: Block<'_>, to: &mut [Complex<f64>]) {
+    for j in 0..from.cols {
+        for i in 0..from.rows {
+            to[i + j * from.rows] = from.at(i, j);
+        }
+    }
+}
+
+/// Adds the tap-tap part to the lower triangle of `matrix`.
+pub(super) fn add_taps(matrix: &mut Mat, layout: &Layout, phases: &Phases, x: &Seen, z: &Seen) {
+    let (n, count) = (layout.channels, x.uu.count());
+    let mut toeplitz = Mat::zeros(n * n, 2 * count);
+    let mut hankel = Mat::zeros(n * n, 2 * count);
+    for p in 0..layout.rows {
+        for p2 in 0..=p {
+            for l in 0..count {
+                let (xl, zl) = (SeenAt::new(x, l), SeenAt::new(z, l));
+                for i2 in 0..n {
+                    for i in 0..n {
+                        let t = xl.vv.at(i, i2) * zl.uu.at(p2, p) + xl.uu.at(p2, p) * zl.vv.at(i, i2);
+                        let h = xl.vu.at(i, p2) * zl.vu.at(i2, p) + xl.vu.at(i2, p) * zl.vu.at(i, p2);
+                        put(&mut toeplitz, i + n * i2, l, count, t);
+                        put(&mut hankel, i + n * i2, l, count, h);
+                    }
+                }
+            }
+            add_toeplitz(matrix, layout, phases, (p, p2), &toeplitz);
+            add_hankel(matrix, layout, phases, (p, p2), &hankel);
+        }
+    }
+}
+
+struct SeenAt<'a> {
+    uu: Block<'a>,
+    vu: Block<'a>,
+    vv: Block<'a>,
+}
+
+impl<'a> SeenAt<'a> {
+    fn new(s: &'a Seen, l: usize) -> Self {
+        Self { uu: s.uu.block(l), vu: s.vu.block(l), vv: s.vv.block(l) }
+    }
+}
+
+fn put(data: &mut Mat, r: usize, l: usize, count: usize, z: Complex<f64>) {
+    data[(r, l)] = z.re;
+    data[(r, count + l)] = z.im;
+}
+
+/// Row and corner of the unknown t: `-Re sum_l e^{-i w j} (Xvu Zuu + Zvu Xuu)_{i,p}` and `Re sum_l tr(Xuu Zuu)`.
+pub(super) fn border(reduced: &Reduced, x: &Seen, z: &Seen) -> (Vec<f64>, f64) {
+    let (n, m) = (reduced.layout.channels, reduced.layout.rows);
+    let mut mixed = Blocks::zeros(1, n, m);
+    let mut e = Blocks::zeros(reduced.count(), m, n);
+    let mut corner = 0.0;
+    for l in 0..reduced.count() {
+        let (xl, zl) = (SeenAt::new(x, l), SeenAt::new(z, l));
+        mixed.block_mut(0).set_product(-1.0, xl.vu.plain(), zl.uu.plain());
+        mixed.block_mut(0).add_product(-1.0, zl.vu.plain(), xl.uu.plain());
+        let to = e.block_mut(l).data;
+        (0..m * n).for_each(|a| to[a] = mixed.block(0).at(a / m, a % m).conj());
+        corner += inner(xl.uu.data, zl.uu.data);
+    }
+    (reduced.layout.gather(&reduced.phases.adjoint_sum(&e)), corner)
+}
+
+/// Adds `2 sum_l weights_l Re e^{-i w (j-j')} (h h*)_{i,i'}` within each row: the second derivative of
+/// the weighted mean square.
+pub(super) fn add_mean_square(
+    matrix: &mut Mat,
+    layout: &Layout,
+    phases: &Phases,
+    h: &Blocks,
+    weights: &[f64],
+) {
+    let (n, count) = (layout.channels, h.count());
+    let mut gram = Blocks::zeros(1, n, n);
+    let mut data = Mat::zeros(n * n, 2 * count);
+    for l in 0..count {
+        gram.block_mut(0).set_product(2.0 * weights[l], h.block(l).plain(), h.block(l).adjoint());
+        for (r, z) in gram.as_slice().iter().enumerate() {
+            put(&mut data, r, l, count, *z);
+        }
+    }
+    for p in 0..layout.rows {
+        add_toeplitz(matrix, layout, phases, (p, p), &data);
+    }
+}
+
+fn add_toeplitz(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (usize, usize), data: &Mat) {
+    let n = layout.channels;
+    let (jp, jp2) = (layout.lags[p], layout.lags[p2]);
+    let (even, odd) = phases.split_sum(data, jp.max(jp2));
+    each_pair(layout, (p, p2), |row, col, j, j2, r| {
+        let sum =
+            if j >= j2 { even[(r, j - j2)] + odd[(r, j - j2)] } else { even[(r, j2 - j)] - odd[(r, j2 - j)] };
+        matrix[(row, col)] += sum;
+    });
+    debug_assert_eq!(data.nrows(), n * n);
+}
+
+fn add_hankel(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (usize, usize), data: &Mat) {
+    let reach = (layout.lags[p] + layout.lags[p2]).max(1) - 1;
+    let sums = phases.sum(data, reach);
+    each_pair(layout, (p, p2), |row, col, j, j2, r| matrix[(row, col)] += sums[(r, j + j2)]);
+}
+
+/// All unknowns of row `p` against all of row `p2`; `r` is the entry i + n i' of the pair of channels.
+fn each_pair(
+    layout: &Layout,
+    (p, p2): (usize, usize),
+    mut visit: impl FnMut(usize, usize, usize, usize, usize),
+) {
+    let n = layout.channels;
+    for j2 in 0..layout.lags[p2] {
+        for i2 in 0..n {
+            let col = layout.index(p2, j2, i2);
+            for j in 0..layout.lags[p] {
+                for i in 0..n {
+                    visit(layout.index(p, j, i), col, j, j2, i + n * i2);
+                }
+            }
+        }
+    }
+}
+
+/// A factored Newton matrix, scaled to a unit diagonal, shifted only as far as it had to be.
+#[derive(Debug)]
+pub(super) struct Newton {
+    matrix: Mat,
+    scale: Vec<f64>,
+    factor: PositiveFactor,
+    /// The shift, relative to the unit diagonal.
+    pub(super) shift: f64,
+}
+
+/// First shift tried when the matrix is not definite to rounding, and the growth of the next ones.
+const SHIFT_FIRST: f64 = 1e-15;
+const SHIFT_GROWTH: f64 = 10.0;
+const SHIFT_LAST: f64 = 1e-6;
+/// Steps of iterative refinement against the matrix as it is.
+const REFINEMENTS: usize = 2;
+
+impl Newton {
+    /// Factors the symmetric `matrix` given by its lower triangle.
+    pub(super) fn new(mut matrix: Mat) -> Result<Self, LinalgError> {
+        matrix.fill_upper_triangle_with_lower_triangle();
+        let scale: Vec<f64> =
+            matrix.diagonal().iter().map(|d| if *d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }).collect();
+        for (j, mut column) in matrix.column_iter_mut().enumerate() {
+            for (i, value) in column.iter_mut().enumerate() {
+                *value *= scale[i] * scale[j];
+            }
+        }
+        let mut shift = 0.0;
+        loop {
+            match PositiveFactor::new(&shifted(&matrix, shift)) {
+                Ok(factor) => return Ok(Self { matrix, scale, factor, shift }),
+                Err(error) if shift >= SHIFT_LAST => return Err(error),
+                Err(_) => shift = (shift * SHIFT_GROWTH).max(SHIFT_FIRST),
+            }
+        }
+    }
+
+    /// Solves against the matrix as given, as far as the shift and refinement allow.
+    pub(super) fn solve(&self, rhs: &[f64]) -> Vec<f64> {
+        let scaled = Mat::from_fn(rhs.len(), 1, |i, _| rhs[i] * self.scale[i]);
+        let mut x = self.factor.solve(&scaled);
+        for _ in 0..REFINEMENTS {
+            let residual = &scaled - &self.matrix * &x;
+            let better = &x + self.factor.solve(&residual);
+            if (&scaled - &self.matrix * &better).norm() >= residual.norm() {
+                break;
+            }
+            x = better;
+        }
+        x.iter().zip(&self.scale).map(|(a, s)| a * s).collect()
+    }
+}
+
+fn shifted(matrix: &Mat, shift: f64) -> Mat {
+    let mut m = matrix.clone();
+    for i in 0..m.nrows() {
+        m[(i, i)] += shift;
+    }
+    m
+}

@@ -1,0 +1,151 @@
+//! From the problem as given to the one that is iterated on: inputs compressed at each point,
+//! channels mixed to equal, uncorrelated strength.
+
+use super::fourier::{Layout, Phases};
+use super::problem::{Problem, SampledError, Taps};
+use crate::linalg::blocks::Blocks;
+use crate::linalg::{self, CMat, Mat};
+
+/// Singular values of the row-normalised channels below this are no channel of their own: the
+/// directions they stand for cannot be told from rounding errors.
+const CHANNEL_RANK: f64 = 1e-14;
+
+/// The problem in coordinates fit for iterating.
+#[derive(Debug, Clone)]
+pub(super) struct Reduced {
+    /// Mixed channels, n x k1.
+    pub(super) h: Blocks,
+    /// What is wanted in the reachable inputs, M x k1.
+    pub(super) w: Blocks,
+    /// What no tap reaches, M x k2.
+    pub(super) w_rest: Blocks,
+    /// `w_rest w_rest*`, M x M.
+    pub(super) g: Blocks,
+    /// Orthonormal rows (k1 + k2) x q at each point: the original inputs of the compressed ones.
+    pub(super) inputs: Vec<CMat>,
+    /// n x N: `H_l Q_l* = ` original channels, mixed by `mix`; taps = reduced taps times `mix`.
+    pub(super) mix: Mat,
+    pub(super) layout: Layout,
+    pub(super) phases: Phases,
+}
+
+impl Reduced {
+    pub(super) fn new(problem: &Problem) -> Result<Self, SampledError> {
+        let (m, n, q) = (problem.rows(), problem.channels(), problem.inputs());
+        let count = problem.points().len();
+        let (k1, k) = (n.min(q), (m + n).min(q));
+        let mut channels = Blocks::zeros(count, n, k1);
+        let mut w = Blocks::zeros(count, m, k1);
+        let mut w_rest = Blocks::zeros(count, m, k - k1);
+        let mut inputs = Vec::with_capacity(count);
+        for (l, point) in problem.points().iter().enumerate() {
+            let (lower, basis) = linalg::lq_c(&stack(&point.h, &point.w));
+            channels.set(l, &lower.view((0, 0), (n, k1)).into_owned());
+            w.set(l, &lower.view((n, 0), (m, k1)).into_owned());
+            w_rest.set(l, &lower.view((n, k1), (m, k - k1)).into_owned());
+            inputs.push(basis);
+        }
+        let mix = mixing(&channels)?;
+        let h = mixed(&channels, &mix);
+        let g = gram(&w_rest);
+        let omega: Vec<f64> = problem.points().iter().map(|p| p.omega).collect();
+        let layout = Layout::new(mix.nrows(), problem.lags());
+        let phases = Phases::new(&omega, problem.max_lags());
+        Ok(Self { h, w, w_rest, g, inputs, mix, layout, phases })
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.h.count()
+    }
+
+    /// `k_l = w_l - F(omega_l) h_l` for the unknowns `x`.
+    pub(super) fn error(&self, x: &[f64]) -> Blocks {
+        let mut k = self.w.clone();
+        k.add_scaled(-1.0, &self.image(x));
+        k
+    }
+
+    /// `F(omega_l) h_l` for the unknowns `x`.
+    pub(super) fn image(&self, x: &[f64]) -> Blocks {
+        let mut f = Blocks::zeros(self.count(), self.layout.rows, self.layout.channels);
+        self.phases.response(&self.layout.scatter(x), &mut f);
+        let mut image = Blocks::zeros(self.count(), self.layout.rows, self.h.cols());
+        for l in 0..self.count() {
+            image.block_mut(l).set_product(1.0, f.block(l).plain(), self.h.block(l).plain());
+        }
+        image
+    }
+
+    /// `2 Re sum_l e^{i omega_l j} (y_l h_l*)_{p,i}` for all unknowns: the adjoint of [`Reduced::image`]
+    /// for the inner product `2 Re sum tr(y* k)`.
+    pub(super) fn adjoint(&self, y: &Blocks) -> Vec<f64> {
+        let mut e = Blocks::zeros(self.count(), self.layout.rows, self.layout.channels);
+        for l in 0..self.count() {
+            e.block_mut(l).set_product(2.0, y.block(l).plain(), self.h.block(l).adjoint());
+        }
+        self.layout.gather(&self.phases.adjoint_sum(&e))
+    }
+
+    /// The taps in the original channels.
+    pub(super) fn taps(&self, x: &[f64]) -> Taps {
+        let (m, n) = (self.layout.rows, self.layout.channels);
+        let c = self.layout.scatter(x);
+        c.column_iter().map(|col| Mat::from_column_slice(m, n, col.as_slice()) * &self.mix).collect()
+    }
+
+    /// Divides everything wanted by `scale`.
+    pub(super) fn rescale(&mut self, scale: f64) {
+        for (blocks, factor) in [
+            (&mut self.w, 1.0 / scale),
+            (&mut self.w_rest, 1.0 / scale),
+            (&mut self.g, 1.0 / (scale * scale)),
+        ] {
+            blocks.as_mut_slice().iter_mut().for_each(|z| *z *= factor);
+        }
+    }
+}
+
+fn stack(h: &CMat, w: &CMat) -> CMat {
+    let mut both = CMat::zeros(h.nrows() + w.nrows(), h.ncols());
+    both.rows_mut(0, h.nrows()).copy_from(h);
+    both.rows_mut(h.nrows(), w.nrows()).copy_from(w);
+    both
+}
+
+/// n x N real matrix after which the channels, summed over all points, have unit mean power each and
+/// no correlation. Equal channels collapse into one, silent ones disappear.
+fn mixing(channels: &Blocks) -> Result<Mat, SampledError> {
+    let (n, k, count) = (channels.rows(), channels.cols(), channels.count());
+    let half = k * count;
+    let mut all = Mat::from_fn(n, 2 * half, |i, c| {
+        let z = channels.as_slice()[i + n * (c % half)];
+        if c < half { z.re } else { z.im }
+    });
+    let strength: Vec<f64> = (0..n).map(|i| all.row(i).norm()).collect();
+    let unit: Vec<f64> = strength.iter().map(|s| if *s > 0.0 { 1.0 / s } else { 0.0 }).collect();
+    for i in 0..n {
+        all.row_mut(i).scale_mut(unit[i]);
+    }
+    let svd = linalg::svd(&linalg::lq_factor(&all))?;
+    let floor = CHANNEL_RANK * svd.s.first().copied().unwrap_or(0.0);
+    let rank = svd.s.iter().filter(|s| **s > floor).count();
+    let power = (count as f64).sqrt();
+    Ok(Mat::from_fn(rank, n, |r, i| power / svd.s[r] * svd.u[(i, r)] * unit[i]))
+}
+
+fn mixed(channels: &Blocks, mix: &Mat) -> Blocks {
+    let mix = linalg::to_complex(mix);
+    let mut h = Blocks::zeros(channels.count(), mix.nrows(), channels.cols());
+    for l in 0..channels.count() {
+        h.set(l, &(&mix * channels.to_matrix(l)));
+    }
+    h
+}
+
+fn gram(a: &Blocks) -> Blocks {
+    let mut g = Blocks::zeros(a.count(), a.rows(), a.rows());
+    for l in 0..a.count() {
+        g.block_mut(l).set_product(1.0, a.block(l).plain(), a.block(l).adjoint());
+    }
+    g
+}

@@ -1,0 +1,182 @@
+//! Taps of least worst-case norm over the points.
+
+use super::basis::Basis;
+use super::bound::{self, LowerBound};
+use super::interior::{Engine, Objective, norm};
+use super::prepare::Reduced;
+use super::problem::{Problem, SampledError, Taps};
+use super::{Settings, Step};
+use crate::linalg::{self, CMat};
+use crate::lmi::Stop;
+
+/// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
+/// the first Newton step.
+const START_MARGIN: f64 = 2.0;
+/// Steps without a better gap after which a run is over.
+const PATIENCE: usize = 6;
+
+/// Taps of least worst-case norm with the interval that the optimum lies in.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// Why the iteration ended.
+    pub stop: Stop,
+    /// `F_j`, M x N for each lag.
+    pub taps: Taps,
+    /// Worst `sigma_max(K_l)` of these very taps over the points.
+    pub gamma: f64,
+    /// Index of the point where it is attained.
+    pub worst_point: usize,
+    /// Proven lower bound on gamma for any taps of the same lags.
+    pub lower: LowerBound,
+    /// The matrices `Y_l` (M x q) that prove it through [`super::lower_bound`].
+    pub dual: Vec<CMat>,
+    /// Iteration record.
+    pub steps: Vec<Step>,
+}
+
+impl Solution {
+    /// `(gamma - lower) / gamma`, 0 when gamma is 0.
+    pub fn relative_gap(&self) -> f64 {
+        if self.gamma > 0.0 { (self.gamma - self.lower.value).max(0.0) / self.gamma } else { 0.0 }
+    }
+}
+
+/// Minimises the worst-case norm. See the module's text for the problem and the method.
+///
+/// Every well-formed problem has a solution: the result always holds the best taps found, their exact
+/// norm on the points and a proven lower bound; `stop` says whether the two met. Fails only on
+/// settings out of range or if a decomposition does not converge.
+pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, SampledError> {
+    settings.check()?;
+    let mut reduced = Reduced::new(problem)?;
+    if reduced.layout.unknowns() == 0 {
+        return fixed(problem);
+    }
+    let basis = Basis::new(&reduced, vec![1.0; reduced.count()])?;
+    let x = basis.least_squares(&reduced, &reduced.w, settings.tol_rank);
+    let mut best = Best::new(problem, reduced.taps(&x), settings)?;
+    if best.solved(settings.tol_gap_rel) {
+        return Ok(best.finish(Stop::Solved, Vec::new()));
+    }
+    // Shift and scale to the least-squares solution: what is left to do is of order one.
+    let scale = best.gamma;
+    reduced.w = reduced.error(&x);
+    reduced.rescale(scale);
+    let run = Run { problem, reduced: &reduced, basis: &basis, settings, start: x, scale };
+    let (stop, steps) = run.iterate(&mut best)?;
+    Ok(best.finish(stop, steps))
+}
+
+/// No taps to choose: the norm is what it is, and its own singular vectors prove it.
+fn fixed(problem: &Problem) -> Result<Solution, SampledError> {
+    let taps = problem.zero_taps();
+    let (gamma, worst_point) = problem.worst(&taps)?;
+    let mut dual = bound::zero_dual(problem);
+    let svd = linalg::svd_c(&problem.points()[worst_point].w)?;
+    dual[worst_point] = svd.u.column(0) * svd.v.column(0).adjoint();
+    let lower = bound::lower_bound(problem, &dual, bound::radius(problem, &taps))?;
+    Ok(Solution { stop: Stop::Solved, taps, gamma, worst_point, lower, dual, steps: Vec::new() })
+}
+
+struct Best<'a> {
+    problem: &'a Problem,
+    floor: f64,
+    taps: Taps,
+    gamma: f64,
+    worst_point: usize,
+    lower: LowerBound,
+    dual: Vec<CMat>,
+}
+
+impl<'a> Best<'a> {
+    fn new(problem: &'a Problem, taps: Taps, settings: &Settings) -> Result<Self, SampledError> {
+        let (gamma, worst_point) = problem.worst(&taps)?;
+        let floor = settings.tol_gap_abs * problem.worst(&problem.zero_taps())?.0;
+        let (lower, dual) = (LowerBound::zero(), bound::zero_dual(problem));
+        Ok(Self { problem, floor, taps, gamma, worst_point, lower, dual })
+    }
+
+    fn gap(&self) -> f64 {
+        (self.gamma - self.lower.value).max(0.0)
+    }
+
+    fn solved(&self, relative: f64) -> bool {
+        self.gap() <= (relative * self.gamma).max(self.floor)
+    }
+
+    fn offer_taps(&mut self, taps: Taps) -> Result<(), SampledError> {
+        let (gamma, worst_point) = self.problem.worst(&taps)?;
+        if gamma < self.gamma {
+            (self.taps, self.gamma, self.worst_point) = (taps, gamma, worst_point);
+        }
+        Ok(())
+    }
+
+    fn finish(self, stop: Stop, steps: Vec<Step>) -> Solution {
+        let Self { taps, gamma, worst_point, lower, dual, .. } = self;
+        Solution { stop, taps, gamma, worst_point, lower, dual, steps }
+    }
+}
+
+/// Everything that stays fixed while iterating.
+struct Run<'a> {
+    problem: &'a Problem,
+    reduced: &'a Reduced,
+    basis: &'a Basis,
+    settings: &'a Settings,
+    start: Vec<f64>,
+    scale: f64,
+}
+
+impl Run<'_> {
+    fn iterate(&self, best: &mut Best<'_>) -> Result<(Stop, Vec<Step>), SampledError> {
+        let mut steps = Vec::new();
+        let zero = vec![0.0; self.start.len()];
+        let Some(mut engine) = Engine::new(self.reduced, Objective::WorstCase, zero, START_MARGIN) else {
+            return Ok((Stop::NumericalTrouble, steps));
+        };
+        let (mut least, mut waited) = (f64::INFINITY, 0);
+        while steps.len() < self.settings.max_iterations {
+            let merit = engine.cone.gap() / engine.cone.t + norm(&engine.dual_residual());
+            if merit <= 4.0 * self.settings.tol_gap_rel {
+                self.judge(&engine, best)?;
+                if best.solved(self.settings.tol_gap_rel) {
+                    return Ok((Stop::Solved, steps));
+                }
+            }
+            waited = if merit < 0.9 * least { 0 } else { waited + 1 };
+            least = least.min(merit);
+            if waited > PATIENCE {
+                break;
+            }
+            match engine.step(self.settings) {
+                Ok(step) => steps.push(step),
+                Err(_) => break,
+            }
+        }
+        self.judge(&engine, best)?;
+        let stop = if best.solved(self.settings.tol_gap_rel) {
+            Stop::Solved
+        } else if best.solved(self.settings.tol_gap_reduced) {
+            Stop::SolvedInaccurate
+        } else if steps.len() >= self.settings.max_iterations {
+            Stop::IterationLimit
+        } else {
+            Stop::NumericalTrouble
+        };
+        Ok((stop, steps))
+    }
+
+    /// Exact norm of the taps and proven bound of the dual matrices of the iterate.
+    fn judge(&self, engine: &Engine<'_>, best: &mut Best<'_>) -> Result<(), SampledError> {
+        let x: Vec<f64> = self.start.iter().zip(&engine.x).map(|(a, b)| a + self.scale * b).collect();
+        best.offer_taps(self.reduced.taps(&x))?;
+        let radius = bound::radius(self.problem, &best.taps);
+        let (lower, dual) =
+            bound::from_iterate(self.problem, self.reduced, self.basis, &engine.cone.z, radius)?;
+        if lower.value > best.lower.value {
+            (best.lower, best.dual) = (lower, dual);
+        }
+        Ok(())
+    }
+}
