@@ -1,16 +1,24 @@
 //! From a spec to a bank: exact equivalence, blocking, IIR, H2 and FIR design, certificates.
 
+pub mod analysis;
+pub mod comparison;
+mod designer;
 pub mod equivalence;
 pub mod error_system;
 mod filtering;
+pub mod fir;
 pub mod iir;
 pub mod problem;
 
+pub use analysis::{Analysis, analyze};
+pub use designer::{Design, design};
 pub use problem::Problem;
 
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
+use crate::lmi::sampled::SampledError;
 use crate::lti::{LtiError, StateSpaceError};
+use crate::sampling::SamplingError;
 
 /// Why a bank could not be designed or judged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -27,6 +35,39 @@ pub enum DesignError {
     /// Matrices that do not belong together.
     #[error(transparent)]
     Shapes(#[from] StateSpaceError),
+    /// A sampled worst-case problem was not well formed.
+    #[error(transparent)]
+    Sampled(#[from] SampledError),
+    /// The interior-point method gave no taps at all.
+    #[error("no taps were found; please report the spec")]
+    NoTaps,
+    /// The sinc comparison needs as many samples as Nyquist asks for.
+    #[error(
+        "method = \"sinc\" needs as many channels as the ratio (N = M), got {channels} channels and ratio {ratio}: \
+         use \"fir\", \"iir\" or \"h2\""
+    )]
+    SincNeedsNyquist {
+        /// N.
+        channels: usize,
+        /// M.
+        ratio: usize,
+    },
+    /// Sample instants that do not determine a band-limited signal.
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    /// A bank made elsewhere says nothing about its front ends.
+    #[error(
+        "this bank carries no spec (\"spec\": null): its front ends are unknown, so its error cannot be computed"
+    )]
+    NoSpec,
+    /// One delay error a channel.
+    #[error("{given} delay errors were given for {channels} channels: give one for each channel, in seconds")]
+    DelayErrorCount {
+        /// Numbers given.
+        given: usize,
+        /// N.
+        channels: usize,
+    },
     /// A bank's state-space matrices have rows of unequal lengths.
     #[error("the bank's state-space matrices do not fit: expected {rows} rows of {cols} numbers")]
     RaggedStateSpace {

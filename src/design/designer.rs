@@ -1,0 +1,163 @@
+//! The way from a spec to a finished bank.
+
+use super::equivalence::BlockedPlant;
+use super::problem::Problem;
+use super::{DesignError, comparison, error_system, fir, iir};
+use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use crate::spec::{Method, Spec};
+
+/// A bank with the record of its design.
+#[derive(Debug, Clone)]
+pub struct Design {
+    /// The bank, whole.
+    pub bank: Bank,
+    /// The latency was left to the designer.
+    pub latency_chosen: bool,
+    /// Where the worst case sits, radians a slow tick.
+    pub peak_frequency: f64,
+    /// Riccati equations or interior-point iterations.
+    pub iterations: usize,
+}
+
+/// Designs the bank that `spec` asks for.
+///
+/// # Errors
+/// [`DesignError`]: front ends that are none, a comparison method that does not apply, numerics that gave no bank at
+/// all. A bank that is returned carries the exact norm of its very coefficients.
+pub fn design(spec: &Spec) -> Result<Design, DesignError> {
+    let latency = match spec.latency {
+        Some(latency) => latency,
+        None => choose_latency(spec)?,
+    };
+    let problem = Problem::new(spec, latency)?;
+    let (distinct, representative) = problem.without_duplicates();
+    let found = run_method(spec, &distinct)?;
+    let filters = share_among_duplicates(found.filters, &representative);
+    // The norm that counts is that of the coefficients as they are written, on all channels.
+    let block = error_system::block_system(&filters, spec.ratio)?;
+    let peak = error_system::gamma(&BlockedPlant::new(&problem), &block)?;
+    let gamma = Gamma {
+        upper: Some(peak.gain),
+        lower: Some(found.lower.min(peak.gain)),
+        noncausal: Some(found.noncausal.min(peak.gain)),
+    };
+    let mut complete = spec.clone();
+    complete.latency = Some(latency);
+    if complete.design.method.has_taps() {
+        complete.design.taps = Some(taps_of(spec));
+    }
+    let bank = Bank {
+        fast_period: spec.fast_period,
+        ratio: spec.ratio,
+        latency,
+        method: spec.design.method,
+        delays: spec.channels.iter().map(|channel| channel.delay).collect(),
+        filters,
+        gamma,
+        spec: Some(complete),
+    };
+    Ok(Design {
+        bank,
+        latency_chosen: spec.latency.is_none(),
+        peak_frequency: peak.frequency,
+        iterations: found.iterations,
+    })
+}
+
+struct Found {
+    filters: SynthesisFilters,
+    lower: f64,
+    noncausal: f64,
+    iterations: usize,
+}
+
+fn taps_of(spec: &Spec) -> usize {
+    spec.design.taps.unwrap_or_else(|| comparison::default_taps(spec.ratio))
+}
+
+fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
+    let plant = BlockedPlant::new(problem);
+    let slack = spec.design.slack.unwrap_or(0.0);
+    match spec.design.method {
+        Method::Fir => fir::design_fir(&plant, taps_of(spec), slack).map(from_fir),
+        Method::Iir => iir::design_iir(&plant, slack).map(from_state_space),
+        Method::H2 => iir::design_h2(&plant).map(from_state_space),
+        Method::Sinc => fixed(&plant, comparison::sinc_taps(problem, taps_of(spec))?),
+        Method::Separation => fixed(&plant, comparison::separation_taps(spec, problem, taps_of(spec))?),
+    }
+}
+
+fn from_fir(design: fir::FirDesign) -> Found {
+    Found {
+        filters: SynthesisFilters::Fir(design.taps),
+        lower: design.lower,
+        noncausal: design.noncausal,
+        iterations: design.iterations,
+    }
+}
+
+fn from_state_space(design: iir::StateSpaceDesign) -> Found {
+    Found {
+        filters: SynthesisFilters::StateSpace(error_system::to_block(&design.filters)),
+        lower: design.lower,
+        noncausal: design.noncausal,
+        iterations: design.trials,
+    }
+}
+
+/// A comparison method optimises nothing: what bounds every bank is all that is known below.
+fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError> {
+    let noncausal = iir::noncausal_bound(plant)?;
+    Ok(Found { filters: SynthesisFilters::Fir(taps), lower: noncausal, noncausal, iterations: 0 })
+}
+
+/// Channels that cannot be told apart get equal shares of their common filter: the same error, the least noise.
+fn share_among_duplicates(filters: SynthesisFilters, representative: &[usize]) -> SynthesisFilters {
+    let multiplicity = |r: usize| representative.iter().filter(|&&other| other == r).count() as f64;
+    let share =
+        |row: &[f64]| -> Vec<f64> { representative.iter().map(|&r| row[r] / multiplicity(r)).collect() };
+    match filters {
+        SynthesisFilters::Fir(taps) => SynthesisFilters::Fir(
+            representative
+                .iter()
+                .map(|&r| taps[r].iter().map(|tap| tap / multiplicity(r)).collect())
+                .collect(),
+        ),
+        SynthesisFilters::StateSpace(block) => SynthesisFilters::StateSpace(BlockFilter {
+            b: block.b.iter().map(|row| share(row)).collect(),
+            d: block.d.iter().map(|row| share(row)).collect(),
+            ..block
+        }),
+    }
+}
+
+/// Latencies tried beyond the longest delay, in slow ticks.
+const LATENCY_LADDER: [usize; 6] = [1, 2, 3, 4, 6, 8];
+/// A longer latency must lower gamma by this fraction to be worth it.
+const WORTHWHILE: f64 = 1e-3;
+
+/// The shortest latency of the ladder whose IIR optimum is within [`WORTHWHILE`] of the best; for FIR banks
+/// no later than the middle of their taps, so that the filters can look both ways.
+fn choose_latency(spec: &Spec) -> Result<usize, DesignError> {
+    let base = Problem::new(spec, 0)?.longest_delay().ceil() as usize;
+    let mut ladder = Vec::new();
+    for ticks in LATENCY_LADDER {
+        let latency = base + ticks * spec.ratio;
+        let (distinct, _) = Problem::new(spec, latency)?.without_duplicates();
+        let optimum = iir::design_iir(&BlockedPlant::new(&distinct), 0.0)?;
+        let settled = optimum.upper <= optimum.noncausal * (1.0 + WORTHWHILE);
+        ladder.push((latency, optimum.upper));
+        if settled {
+            break;
+        }
+    }
+    let best = ladder.iter().map(|&(_, gamma)| gamma).fold(f64::INFINITY, f64::min);
+    let enough = |&&(_, gamma): &&(usize, f64)| gamma <= best * (1.0 + WORTHWHILE);
+    let chosen = ladder.iter().find(enough).map_or(base, |&(latency, _)| latency);
+    Ok(if spec.design.method.has_taps() { chosen.max(centre(spec, base)) } else { chosen })
+}
+
+/// The latency at which FIR filters of the spec's length are centred on the sample they make.
+fn centre(spec: &Spec, longest_delay: usize) -> usize {
+    (taps_of(spec) / 2).max(longest_delay.min(taps_of(spec)))
+}
