@@ -7,9 +7,13 @@ mod atomic;
 mod error;
 mod frames;
 mod pcm;
+mod pcm_frames;
+mod recording;
 pub mod wav;
 
 pub use atomic::AtomicFile;
 pub use error::IoError;
 pub use frames::FrameReader;
 pub use pcm::{ParsePcmFormatError, PcmFormat};
+pub use pcm_frames::{PcmFrames, SampleLayout};
+pub use recording::{Recording, RecordingNote};

@@ -68,24 +68,21 @@ impl<T: Sample> FirPlan<T> {
     pub(crate) fn process(
         &self,
         state: &mut FirState<T>,
-        source: &impl TickSource,
+        source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
         let mut replaced = 0;
         let mut first = 0;
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(self.block);
-            replaced += self.gather(state, source, first, ticks);
+            state.window.make_room(ticks);
+            let (rows, stride) = state.window.room();
+            replaced += source.gather(first, ticks, rows, stride);
             self.filter(state, ticks);
             sink.scatter(first, ticks, self.ratio, &state.rows, self.out_stride());
             first += ticks;
         }
         replaced
-    }
-
-    fn gather(&self, state: &mut FirState<T>, source: &impl TickSource, first: usize, ticks: usize) -> u64 {
-        state.window.make_room(ticks);
-        (0..self.channels).map(|i| source.gather(i, first, state.window.row_mut(i, ticks))).sum()
     }
 
     fn filter(&self, state: &mut FirState<T>, ticks: usize) {

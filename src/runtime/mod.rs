@@ -17,4 +17,4 @@ mod window;
 pub use error::{BuildError, ProcessError};
 pub use reconstructor::{Options, Precision, Reconstructor};
 pub use simd::Isa;
-pub use ticks::{PcmChannel, PcmOutput, PcmTicks};
+pub use ticks::PcmOutput;

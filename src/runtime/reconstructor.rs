@@ -3,9 +3,10 @@
 use super::fir::{FirPlan, FirState};
 use super::simd::Isa;
 use super::state_space::{StateSpacePlan, StateSpaceState};
-use super::ticks::{FastSink, Interleaved, PcmOutput, PcmTicks, TickSource};
+use super::ticks::{FastSink, Interleaved, PcmOutput, TickSource};
 use super::{BuildError, ProcessError};
 use crate::bank::{Bank, SynthesisFilters};
+use crate::io::PcmFrames;
 use std::sync::Arc;
 
 /// Number type of the FIR kernels. State-space banks always run in f64.
@@ -185,12 +186,13 @@ impl Reconstructor {
         self.run(&source, output)
     }
 
-    /// As [`Reconstructor::process`], from and to samples as they lie in files and pipes. NaN and
-    /// infinity become 0 and are counted, outputs saturate and are counted.
+    /// As [`Reconstructor::process`], from and to samples as they lie in files and pipes: the
+    /// channels are those of all `input` recordings one after another, the ticks those that all of
+    /// them have. NaN and infinity become 0 and are counted, outputs saturate and are counted.
     ///
     /// # Errors
     /// As [`Reconstructor::process`].
-    pub fn process_pcm(&mut self, input: &PcmTicks<'_>, output: &mut PcmOutput<'_>) -> Result<usize, ProcessError> {
+    pub fn process_pcm(&mut self, input: &[PcmFrames<'_>], output: &mut PcmOutput<'_>) -> Result<usize, ProcessError> {
         self.run(input, output)
     }
 
@@ -204,7 +206,7 @@ impl Reconstructor {
 
     fn run(
         &mut self,
-        source: &impl TickSource,
+        source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> Result<usize, ProcessError> {
         if source.channels() != self.channels() {

@@ -61,16 +61,14 @@ impl StateSpacePlan {
     pub(crate) fn process(
         &self,
         state: &mut StateSpaceState,
-        source: &impl TickSource,
+        source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
         let mut replaced = 0;
         let mut first = 0;
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(BLOCK);
-            for (i, row) in state.input.chunks_exact_mut(BLOCK).enumerate() {
-                replaced += source.gather(i, first, &mut row[..ticks]);
-            }
+            replaced += source.gather(first, ticks, &mut state.input, BLOCK);
             (0..ticks).for_each(|k| self.tick(state, k));
             sink.scatter(first, ticks, self.ratio, &state.output, BLOCK);
             first += ticks;

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
-use crate::io::PcmFormat;
-use crate::io::wav::SampleLayout;
+use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::spec::Method;
 use proptest::prelude::*;
 
@@ -236,12 +235,12 @@ proptest! {
         let rows: Vec<Vec<u8>> = (0..n).map(|i| {
             bytes.chunks_exact(format.bytes()).skip(i).step_by(n).flatten().copied().collect()
         }).collect();
-        let planar: Vec<_> = rows.iter().map(|row| PcmChannel { layout, bytes: row }).collect();
-        for ticks in [PcmTicks::Interleaved { layout, channels: n, bytes: &bytes }, PcmTicks::Planar(&planar)] {
+        let planar: Vec<_> = rows.iter().map(|row| PcmFrames { layout, channels: 1, bytes: row }).collect();
+        for ticks in [&[PcmFrames { layout, channels: n, bytes: &bytes }][..], &planar] {
             let mut stream = Reconstructor::new(&bank).unwrap();
             let mut out = vec![0; want.len() * out_format.bytes()];
             let mut output = PcmOutput { format: out_format, bytes: &mut out, clipped: 0 };
-            prop_assert_eq!(stream.process_pcm(&ticks, &mut output).unwrap(), want.len());
+            prop_assert_eq!(stream.process_pcm(ticks, &mut output).unwrap(), want.len());
             let clipped = output.clipped;
             let mut expected = vec![0; out.len()];
             let clips = want.iter().zip(expected.chunks_exact_mut(out_format.bytes()))
@@ -297,7 +296,7 @@ fn bytes_that_are_not_finite_become_zero_and_are_counted() {
     let mut out = vec![0; 20];
     let layout = SampleLayout::packed(PcmFormat::F32Le);
     let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut out, clipped: 0 };
-    stream.process_pcm(&PcmTicks::Interleaved { layout, channels: 1, bytes: &bytes }, &mut output).unwrap();
+    stream.process_pcm(&[PcmFrames { layout, channels: 1, bytes: &bytes }], &mut output).unwrap();
     assert_eq!(stream.replaced(), 3);
     assert_eq!(out, [1f32, 0.0, 0.0, 0.0, 2.0].map(f32::to_le_bytes).concat());
 }
@@ -310,9 +309,8 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     assert_eq!(stream.process(&[0.0; 3], &mut out), Err(ProcessError::CutTick { samples: 3, channels: 2 }));
     assert_eq!(stream.process(&[0.0; 4], &mut out), Err(ProcessError::OutputTooShort { given: 3, wanted: 4 }));
     assert_eq!(stream.process(&[], &mut out), Ok(0));
-    let planar = PcmTicks::Planar(&[]);
     let mut output = PcmOutput { format: PcmFormat::S8, bytes: &mut [], clipped: 0 };
-    assert_eq!(stream.process_pcm(&planar, &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
+    assert_eq!(stream.process_pcm(&[], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
 
     let refused = |bank: Bank| Reconstructor::new(&bank).unwrap_err();
     assert_eq!(refused(Bank { ratio: 0, ..bank.clone() }), BuildError::NoRatio);

@@ -1,53 +1,7 @@
 //! Samples of a call, wherever and however they lie, to and from planar rows.
 
 use super::sample::Sample;
-use crate::io::PcmFormat;
-use crate::io::wav::SampleLayout;
-
-/// Samples of N channels in memory, as bytes.
-#[derive(Debug, Clone, Copy)]
-pub enum PcmTicks<'a> {
-    /// Frames of `channels` samples.
-    Interleaved {
-        /// How a frame lies in memory.
-        layout: SampleLayout,
-        /// Samples a frame.
-        channels: usize,
-        /// Whole frames.
-        bytes: &'a [u8],
-    },
-    /// One slice a channel, all with the same number of samples.
-    Planar(&'a [PcmChannel<'a>]),
-}
-
-/// One channel's samples.
-#[derive(Debug, Clone, Copy)]
-pub struct PcmChannel<'a> {
-    /// How the samples lie in memory.
-    pub layout: SampleLayout,
-    /// Whole samples.
-    pub bytes: &'a [u8],
-}
-
-impl PcmTicks<'_> {
-    /// N.
-    pub fn channels(&self) -> usize {
-        match self {
-            Self::Interleaved { channels, .. } => *channels,
-            Self::Planar(rows) => rows.len(),
-        }
-    }
-
-    /// Whole ticks.
-    pub fn ticks(&self) -> usize {
-        match self {
-            Self::Interleaved { layout, channels, bytes } => bytes.len() / (layout.container * channels).max(1),
-            Self::Planar(rows) => {
-                rows.iter().map(|row| row.bytes.len() / row.layout.container.max(1)).min().unwrap_or(0)
-            }
-        }
-    }
-}
+use crate::io::{PcmFormat, PcmFrames};
 
 /// Room for fast samples, and what was lost on the way in.
 #[derive(Debug)]
@@ -64,9 +18,9 @@ pub struct PcmOutput<'a> {
 pub(crate) trait TickSource {
     fn channels(&self) -> usize;
     fn ticks(&self) -> usize;
-    /// `row[k]` = sample of `channel` in tick `first + k`; returns how many were not finite and are
-    /// zero now.
-    fn gather<T: Sample>(&self, channel: usize, first: usize, row: &mut [T]) -> u64;
+    /// `rows[i * stride + k]` = sample of channel i in tick `first + k`, for `ticks` ticks; returns
+    /// how many were not finite and are zero now.
+    fn gather<T: Sample>(&self, first: usize, ticks: usize, rows: &mut [T], stride: usize) -> u64;
 }
 
 /// Takes planar rows.
@@ -92,10 +46,12 @@ impl<S: Sample> TickSource for Interleaved<'_, S> {
         self.samples.len() / self.channels
     }
 
-    fn gather<T: Sample>(&self, channel: usize, first: usize, row: &mut [T]) -> u64 {
-        let samples = self.samples[first * self.channels + channel..].iter().step_by(self.channels);
-        for (slot, &sample) in row.iter_mut().zip(samples) {
-            *slot = T::from_f64(sample.to_f64());
+    fn gather<T: Sample>(&self, first: usize, ticks: usize, rows: &mut [T], stride: usize) -> u64 {
+        let samples = &self.samples[first * self.channels..];
+        for (i, row) in rows.chunks_mut(stride).take(self.channels).enumerate() {
+            for (slot, &sample) in row[..ticks].iter_mut().zip(samples[i..].iter().step_by(self.channels)) {
+                *slot = T::from_f64(sample.to_f64());
+            }
         }
         0
     }
@@ -129,33 +85,37 @@ macro_rules! for_format {
     };
 }
 
-impl TickSource for PcmTicks<'_> {
+/// Several recordings side by side: their channels follow each other.
+impl TickSource for [PcmFrames<'_>] {
     fn channels(&self) -> usize {
-        PcmTicks::channels(self)
+        self.iter().map(|part| part.channels).sum()
     }
 
     fn ticks(&self) -> usize {
-        PcmTicks::ticks(self)
+        self.iter().map(PcmFrames::frames).min().unwrap_or(0)
     }
 
-    fn gather<T: Sample>(&self, channel: usize, first: usize, row: &mut [T]) -> u64 {
-        let (layout, step, bytes) = match self {
-            Self::Interleaved { layout, channels, bytes } => {
-                let step = layout.container * channels;
-                (*layout, step, &bytes[first * step + channel * layout.container..])
+    fn gather<T: Sample>(&self, first: usize, ticks: usize, rows: &mut [T], stride: usize) -> u64 {
+        let mut replaced = 0;
+        let mut rows = rows.chunks_mut(stride);
+        for part in self {
+            for (i, row) in rows.by_ref().take(part.channels).enumerate() {
+                replaced += gather_channel(part, i, first, &mut row[..ticks]);
             }
-            Self::Planar(rows) => {
-                let PcmChannel { layout, bytes } = rows[channel];
-                (layout, layout.container, &bytes[first * layout.container..])
-            }
-        };
-        for_format!(layout.format, FORMAT => {
-            for (slot, sample) in row.iter_mut().zip(bytes.chunks(step)) {
-                *slot = T::from_f64(FORMAT.decode(sample));
-            }
-        });
-        if layout.format.is_float() { replace_not_finite(row) } else { 0 }
+        }
+        replaced
     }
+}
+
+fn gather_channel<T: Sample>(part: &PcmFrames<'_>, channel: usize, first: usize, row: &mut [T]) -> u64 {
+    let step = part.frame_bytes();
+    let bytes = &part.bytes[first * step + channel * part.layout.container..];
+    for_format!(part.layout.format, FORMAT => {
+        for (slot, sample) in row.iter_mut().zip(bytes.chunks(step)) {
+            *slot = T::from_f64(FORMAT.decode(sample));
+        }
+    });
+    if part.layout.format.is_float() { replace_not_finite(row) } else { 0 }
 }
 
 /// Zeros in place of NaN and infinity, counted.

@@ -17,7 +17,6 @@ pub(crate) fn block_frames(rows: usize, history: usize) -> usize {
 #[derive(Debug, Clone)]
 pub(crate) struct Window<T: Sample> {
     samples: Aligned<T>,
-    rows: usize,
     stride: usize,
     history: usize,
     /// Where the next frame goes.
@@ -28,7 +27,7 @@ impl<T: Sample> Window<T> {
     /// N = `rows` rows of zeros for blocks of at most `block` frames.
     pub(crate) fn new(rows: usize, history: usize, block: usize) -> Self {
         let stride = Self::stride(history, block);
-        Self { samples: Aligned::new(rows * stride), rows, stride, history, next: history }
+        Self { samples: Aligned::new(rows * stride), stride, history, next: history }
     }
 
     /// Samples from row to row: a line more than a multiple of 256 bytes, so that the rows do not
@@ -54,10 +53,9 @@ impl<T: Sample> Window<T> {
         self.next = self.history;
     }
 
-    /// Row i from the next frame on.
-    pub(crate) fn row_mut(&mut self, i: usize, frames: usize) -> &mut [T] {
-        let first = i * self.stride + self.next;
-        &mut self.samples[first..first + frames]
+    /// All rows from the next frame on, and the samples from row to row.
+    pub(crate) fn room(&mut self) -> (&mut [T], usize) {
+        (&mut self.samples[self.next..], self.stride)
     }
 
     /// All rows, from `history` frames before the next frame on.
@@ -68,10 +66,5 @@ impl<T: Sample> Window<T> {
     /// The block that was written is past now.
     pub(crate) fn advance(&mut self, frames: usize) {
         self.next += frames;
-    }
-
-    /// N.
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
     }
 }

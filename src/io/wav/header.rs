@@ -1,28 +1,12 @@
 //! What a WAV header says about the samples.
 
 use super::chunks::{Chunk, Chunks, Family};
-use crate::io::{IoError, PcmFormat};
+use crate::io::{IoError, PcmFormat, SampleLayout};
 use std::io::Read;
 
 const TAG_PCM: u16 = 1;
 const TAG_FLOAT: u16 = 3;
 const TAG_EXTENSIBLE: u16 = 0xFFFE;
-
-/// How the samples of a frame lie in memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SampleLayout {
-    /// How the significant bytes are coded.
-    pub format: PcmFormat,
-    /// Bytes from one sample to the next in a frame, at least `format.bytes()`.
-    pub container: usize,
-}
-
-impl SampleLayout {
-    /// Samples that lie close together.
-    pub fn packed(format: PcmFormat) -> Self {
-        Self { format, container: format.bytes() }
-    }
-}
 
 /// A checked header.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -9,6 +9,6 @@ mod header;
 mod reader;
 mod writer;
 
-pub use header::{SampleLayout, WavHeader};
+pub use header::WavHeader;
 pub use reader::{WavNote, WavReader};
 pub use writer::{WavFile, stream_header};

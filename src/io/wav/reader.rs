@@ -1,8 +1,8 @@
 //! Frames out of a WAV file or stream.
 
 use super::chunks::Chunks;
-use super::header::{SampleLayout, WavHeader};
-use crate::io::{FrameReader, IoError, PcmFormat};
+use super::header::WavHeader;
+use crate::io::{FrameReader, IoError, PcmFormat, SampleLayout};
 use std::fmt;
 use std::io::{Chain, Cursor, Read};
 
@@ -70,6 +70,11 @@ impl<R: Read> WavReader<R> {
     /// The frames.
     pub fn frames(&mut self) -> &mut FrameReader<impl Read + use<R>> {
         &mut self.frames
+    }
+
+    /// True once the samples are used up.
+    pub fn ended(&self) -> bool {
+        self.frames.ended()
     }
 
     /// What had to be tolerated; complete when the frames have ended.
