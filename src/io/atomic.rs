@@ -44,8 +44,10 @@ impl AtomicFile {
     pub fn commit(mut self) -> Result<(), IoError> {
         // Closing before the rename reports a full disk on systems that write late.
         drop(self.file.take());
-        fs::rename(&self.beside, &self.target)
-            .map_err(IoError::system(&self.target.display().to_string(), "give the finished file its name"))?;
+        fs::rename(&self.beside, &self.target).map_err(IoError::system(
+            &self.target.display().to_string(),
+            "give the finished file its name",
+        ))?;
         // Nothing is left to remove.
         self.beside = PathBuf::new();
         Ok(())

@@ -4,16 +4,16 @@
 //! one of the [`PcmFormat`]s; integer formats are full scale = 1.0.
 
 mod atomic;
+mod capture;
 mod error;
 mod frames;
 mod pcm;
 mod pcm_frames;
-mod recording;
 pub mod wav;
 
 pub use atomic::AtomicFile;
+pub use capture::{Capture, CaptureNote};
 pub use error::IoError;
 pub use frames::FrameReader;
 pub use pcm::{ParsePcmFormatError, PcmFormat};
 pub use pcm_frames::{PcmFrames, SampleLayout};
-pub use recording::{Recording, RecordingNote};

@@ -37,7 +37,9 @@ pub enum PcmFormat {
 
 /// A format name that is not one of the twelve.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown sample format `{0}`; use one of s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be")]
+#[error(
+    "unknown sample format `{0}`; use one of s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be"
+)]
 pub struct ParsePcmFormatError(pub String);
 
 impl PcmFormat {
@@ -218,7 +220,8 @@ mod tests {
     #[test]
     fn long_formats_survive_at_the_edges() {
         for format in [PcmFormat::S24Le, PcmFormat::S24Be, PcmFormat::S32Le, PcmFormat::S32Be] {
-            for pattern in [[0x80, 0, 0, 0], [0x7f, 0xff, 0xff, 0xff], [0, 0, 0, 1], [0xff; 4], [1, 2, 3, 4]] {
+            for pattern in [[0x80, 0, 0, 0], [0x7f, 0xff, 0xff, 0xff], [0, 0, 0, 1], [0xff; 4], [1, 2, 3, 4]]
+            {
                 let bytes = &pattern[..format.bytes()];
                 assert_eq!(bytes_of(format, format.decode(bytes)), (bytes.to_vec(), false), "{format}");
             }

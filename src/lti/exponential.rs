@@ -118,7 +118,11 @@ mod tests {
     #[test]
     fn one_pole_has_its_closed_form_for_any_stiffness() {
         for pole in [1e-9, 1e-3, 1.0, 1e3, 1e9] {
-            let root = gramian_root(&Flow::new(vec![Mat::from_element(1, 1, -pole)]), &Mat::from_element(1, 1, 1.0), 1.0);
+            let root = gramian_root(
+                &Flow::new(vec![Mat::from_element(1, 1, -pole)]),
+                &Mat::from_element(1, 1, 1.0),
+                1.0,
+            );
             let exact = -(-2.0 * pole).exp_m1() / (2.0 * pole);
             assert!((root[0] * root[0] - exact).abs() < 1e-11 * exact, "pole {pole}");
         }
@@ -137,7 +141,8 @@ mod tests {
         let ours: f64 = (0..n).map(|i| root[(i, i)].abs().ln()).sum::<f64>() * 2.0;
         let factorial = |k: usize| (1..=k).map(|i| (i as f64).ln()).sum::<f64>();
         let hilbert = 4.0 * (1..n).map(factorial).sum::<f64>() - (1..2 * n).map(factorial).sum::<f64>();
-        let powers: f64 = (0..n).map(|i| (2 * (n - 1 - i) + 1) as f64 * t.ln() - 2.0 * factorial(n - 1 - i)).sum();
+        let powers: f64 =
+            (0..n).map(|i| (2 * (n - 1 - i) + 1) as f64 * t.ln() - 2.0 * factorial(n - 1 - i)).sum();
         assert!((ours - hilbert - powers).abs() < 1e-4, "{ours} {}", hilbert + powers);
     }
 }

@@ -133,9 +133,19 @@ impl<'a> Search<'a> {
             let w = next_abscissa(low, best, high, stalls);
             let tried = Peak { gain: self.gain(w)?, frequency: w };
             let gained = tried.gain - best.gain;
-            stalls = if gained.abs() <= 1e-14 * best.gain { 3 } else if gained < 1e-11 * best.gain { stalls + 1 } else { 0 };
+            stalls = if gained.abs() <= 1e-14 * best.gain {
+                3
+            } else if gained < 1e-11 * best.gain {
+                stalls + 1
+            } else {
+                0
+            };
             if gained > 0.0 {
-                if w < best.frequency { high = best } else { low = best }
+                if w < best.frequency {
+                    high = best
+                } else {
+                    low = best
+                }
                 best = tried;
             } else if w < best.frequency {
                 low = tried;
@@ -264,7 +274,8 @@ mod tests {
 
     fn siso(a: Mat, b: Vec<f64>, c: Vec<f64>, d: f64) -> StateSpace {
         let n = b.len();
-        StateSpace::new(a, Mat::from_vec(n, 1, b), Mat::from_vec(1, n, c), Mat::from_element(1, 1, d)).unwrap()
+        StateSpace::new(a, Mat::from_vec(n, 1, b), Mat::from_vec(1, n, c), Mat::from_element(1, 1, d))
+            .unwrap()
     }
 
     #[test]

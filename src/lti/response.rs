@@ -59,7 +59,11 @@ impl FrequencyResponse {
 /// (Q, H) with m = Q H Q'. nalgebra's reduction is finite (no iteration), so its trouble with
 /// delay lines does not arise; it refuses sizes below two.
 fn reduce(m: &Mat) -> (Mat, Mat) {
-    if m.nrows() < 2 { (Mat::identity(m.nrows(), m.nrows()), m.clone()) } else { Hessenberg::new(m.clone()).unpack() }
+    if m.nrows() < 2 {
+        (Mat::identity(m.nrows(), m.nrows()), m.clone())
+    } else {
+        Hessenberg::new(m.clone()).unpack()
+    }
 }
 
 fn eliminate_subdiagonal(t: &mut CMat, x: &mut CMat, k: usize) {

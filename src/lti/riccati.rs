@@ -114,7 +114,9 @@ mod tests {
     #[test]
     fn scalar_equation_has_its_quadratic_root() {
         // x = f^2 x / (1 + g x) + h, i.e. g x^2 + (1 - f^2 - g h) x - h = 0.
-        for (f, g, h) in [(0.9_f64, 1.0, 1.0), (1.7, 2.0, 0.3), (0.5, -0.1, 1.0), (0.99, 1e-6, 1e3), (40.0, 1.0, 1e-9)] {
+        for (f, g, h) in
+            [(0.9_f64, 1.0, 1.0), (1.7, 2.0, 0.3), (0.5, -0.1, 1.0), (0.99, 1e-6, 1e3), (40.0, 1.0, 1e-9)]
+        {
             let scalar = |x| Mat::from_element(1, 1, x);
             let x = solved(&scalar(f), &scalar(g), &scalar(h)).x[0];
             let b = 1.0 - f * f - g * h;

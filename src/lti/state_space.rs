@@ -125,8 +125,8 @@ mod tests {
 
     #[test]
     fn wrong_shapes_are_named() {
-        let error =
-            StateSpace::new(Mat::zeros(2, 2), Mat::zeros(3, 1), Mat::zeros(1, 2), Mat::zeros(1, 1)).unwrap_err();
+        let error = StateSpace::new(Mat::zeros(2, 2), Mat::zeros(3, 1), Mat::zeros(1, 2), Mat::zeros(1, 1))
+            .unwrap_err();
         assert!(error.to_string().contains("b 3x1"), "{error}");
     }
 

@@ -18,7 +18,9 @@ pub enum BuildError {
         filters: usize,
     },
     /// A matrix of the state-space form has the wrong shape.
-    #[error("matrix {name} of the state-space filters is {rows} x {cols}; {wanted_rows} x {wanted_cols} is needed (N = {channels} channels, M = {ratio})")]
+    #[error(
+        "matrix {name} of the state-space filters is {rows} x {cols}; {wanted_rows} x {wanted_cols} is needed (N = {channels} channels, M = {ratio})"
+    )]
     Shape {
         /// a, b, c or d.
         name: &'static str,
@@ -36,7 +38,9 @@ pub enum BuildError {
         ratio: usize,
     },
     /// A coefficient is NaN, infinite, or infinite once rounded to the kernel's precision.
-    #[error("coefficient {index} of {place} is {value}; coefficients must be finite in the precision of the kernel")]
+    #[error(
+        "coefficient {index} of {place} is {value}; coefficients must be finite in the precision of the kernel"
+    )]
     NotFinite {
         /// Which filter or matrix.
         place: String,
@@ -46,7 +50,9 @@ pub enum BuildError {
         value: f64,
     },
     /// The filters together are too long for 32-bit offsets.
-    #[error("the filters look back {history} ticks on {channels} channels, more than the runtime can address; shorten them")]
+    #[error(
+        "the filters look back {history} ticks on {channels} channels, more than the runtime can address; shorten them"
+    )]
     TooLong {
         /// Ticks of memory.
         history: usize,

@@ -45,10 +45,10 @@ impl<T: Sample> FirPlan<T> {
         if channels.saturating_mul(stride) > u32::MAX as usize {
             return Err(BuildError::TooLong { history, channels });
         }
-        let offsets = (0..channels * lags)
-            .map(|s| ((s / lags) * stride + history - s % lags) as u32)
-            .collect();
-        let groups = widths(ratio).map(|(first, width)| phase_group(taps, ratio, lags, first, width)).collect();
+        let offsets =
+            (0..channels * lags).map(|s| ((s / lags) * stride + history - s % lags) as u32).collect();
+        let groups =
+            widths(ratio).map(|(first, width)| phase_group(taps, ratio, lags, first, width)).collect();
         Ok(Self { channels, ratio, history, block, groups, offsets, kernel: T::fir_kernel(isa) })
     }
 
@@ -134,7 +134,8 @@ fn phase_group<T: Sample>(
     width: usize,
 ) -> PhaseGroup<T> {
     let mut coefficients = Aligned::new(taps.len() * lags * width);
-    let places = (0..taps.len()).flat_map(|i| (0..lags).flat_map(move |j| (0..width).map(move |p| (i, j, p))));
+    let places =
+        (0..taps.len()).flat_map(|i| (0..lags).flat_map(move |j| (0..width).map(move |p| (i, j, p))));
     for (slot, (i, j, p)) in coefficients.iter_mut().zip(places) {
         *slot = T::from_f64(taps[i].get(first + p + j * ratio).copied().unwrap_or(0.0));
     }

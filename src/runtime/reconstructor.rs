@@ -192,7 +192,11 @@ impl Reconstructor {
     ///
     /// # Errors
     /// As [`Reconstructor::process`].
-    pub fn process_pcm(&mut self, input: &[PcmFrames<'_>], output: &mut PcmOutput<'_>) -> Result<usize, ProcessError> {
+    pub fn process_pcm(
+        &mut self,
+        input: &[PcmFrames<'_>],
+        output: &mut PcmOutput<'_>,
+    ) -> Result<usize, ProcessError> {
         self.run(input, output)
     }
 

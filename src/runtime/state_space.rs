@@ -122,7 +122,15 @@ fn flatten(
     let wrong = rows.iter().find(|row| row.len() != wanted_cols);
     if rows.len() != wanted_rows || wrong.is_some() {
         let cols = wrong.map_or(wanted_cols, Vec::len);
-        return Err(BuildError::Shape { name, rows: rows.len(), cols, wanted_rows, wanted_cols, channels, ratio });
+        return Err(BuildError::Shape {
+            name,
+            rows: rows.len(),
+            cols,
+            wanted_rows,
+            wanted_cols,
+            channels,
+            ratio,
+        });
     }
     let flat = rows.concat();
     match flat.iter().position(|value| !value.is_finite()) {

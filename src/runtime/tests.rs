@@ -307,7 +307,10 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     let mut stream = Reconstructor::new(&bank).unwrap();
     let mut out = [0.0; 3];
     assert_eq!(stream.process(&[0.0; 3], &mut out), Err(ProcessError::CutTick { samples: 3, channels: 2 }));
-    assert_eq!(stream.process(&[0.0; 4], &mut out), Err(ProcessError::OutputTooShort { given: 3, wanted: 4 }));
+    assert_eq!(
+        stream.process(&[0.0; 4], &mut out),
+        Err(ProcessError::OutputTooShort { given: 3, wanted: 4 })
+    );
     assert_eq!(stream.process(&[], &mut out), Ok(0));
     let mut output = PcmOutput { format: PcmFormat::S8, bytes: &mut [], clipped: 0 };
     assert_eq!(stream.process_pcm(&[], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
@@ -325,7 +328,9 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     if let SynthesisFilters::StateSpace(filter) = &mut wrong.filters {
         filter.c.pop();
     }
-    assert!(refused(wrong).to_string().contains("matrix c of the state-space filters is 2 x 2; 3 x 2 is needed"));
+    assert!(
+        refused(wrong).to_string().contains("matrix c of the state-space filters is 2 x 2; 3 x 2 is needed")
+    );
 }
 
 #[test]

@@ -8,8 +8,8 @@ const W64_TAIL: [u8; 12] = [0xF3, 0xAC, 0xD3, 0x11, 0x8C, 0xD1, 0x00, 0xC0, 0x4F
 
 /// Names that may follow an odd chunk at once, where a writer forgot the pad byte.
 const KNOWN: [&[u8; 4]; 16] = [
-    b"data", b"fmt ", b"fact", b"LIST", b"JUNK", b"junk", b"PAD ", b"FLLR", b"bext", b"cue ", b"smpl", b"inst",
-    b"PEAK", b"id3 ", b"iXML", b"ds64",
+    b"data", b"fmt ", b"fact", b"LIST", b"JUNK", b"junk", b"PAD ", b"FLLR", b"bext", b"cue ", b"smpl",
+    b"inst", b"PEAK", b"id3 ", b"iXML", b"ds64",
 ];
 
 /// Which of the three families the file belongs to.

@@ -104,7 +104,12 @@ fn known_size_64(size: u64) -> Option<u64> {
 }
 
 fn no_fmt<R: Read>(chunks: &Chunks<'_, R>, data: Chunk) -> IoError {
-    chunks.bad("the data chunk", data.offset, data.size, "a fmt chunk must come before it; the file is damaged")
+    chunks.bad(
+        "the data chunk",
+        data.offset,
+        data.size,
+        "a fmt chunk must come before it; the file is damaged",
+    )
 }
 
 /// The true size of the data.

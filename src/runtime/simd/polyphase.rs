@@ -3,11 +3,11 @@
 //! out[p][k] = sum_s w[s][p] x[offset_s + k]: the steps s run over channels and taps, so one
 //! load of input serves P phases and one coefficient serves R vectors.
 
+#[cfg(target_arch = "x86_64")]
+use super::vector::{Avx2F32, Avx2F64, Avx512F32, Avx512F64};
 use super::vector::{Portable, Vector};
 use super::{Isa, OVERRUN};
 use crate::runtime::aligned::Aligned;
-#[cfg(target_arch = "x86_64")]
-use super::vector::{Avx2F32, Avx2F64, Avx512F32, Avx512F64};
 
 /// Up to four phases that are computed together, with their coefficients in the order of use.
 #[derive(Debug, Clone)]

@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// A fault that was tolerated, with the name of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RecordingNote {
+pub enum CaptureNote {
     /// The bytes are not all there.
     Wav {
         /// Name of the file.
@@ -28,13 +28,16 @@ pub enum RecordingNote {
     },
 }
 
-impl fmt::Display for RecordingNote {
+impl fmt::Display for CaptureNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Wav { file, note } => write!(f, "{file}: {note}"),
             Self::Left { file, frames, exact } => {
                 let at_least = if *exact { "" } else { "at least " };
-                write!(f, "{file}: longer than the shortest channel, {at_least}{frames} samples a channel were left")
+                write!(
+                    f,
+                    "{file}: longer than the shortest channel, {at_least}{frames} samples a channel were left"
+                )
             }
         }
     }
@@ -79,25 +82,26 @@ impl Part {
     }
 
     /// Faults, given the frames that were used.
-    fn notes(&self, used: u64) -> Vec<RecordingNote> {
+    fn notes(&self, used: u64) -> Vec<CaptureNote> {
         let header = self.reader.header();
         let promised = header.data_bytes.map(|bytes| bytes / header.frame_bytes() as u64);
         let ended = self.reader.ended();
         let total = if ended { self.frames } else { promised.unwrap_or(0).max(self.frames) };
         let file = || self.name.clone();
-        let left = RecordingNote::Left { file: file(), frames: total - used, exact: ended || promised.is_some() };
-        let faults = self.reader.notes().into_iter().map(|note| RecordingNote::Wav { file: file(), note });
+        let left =
+            CaptureNote::Left { file: file(), frames: total - used, exact: ended || promised.is_some() };
+        let faults = self.reader.notes().into_iter().map(|note| CaptureNote::Wav { file: file(), note });
         faults.chain((total > used).then_some(left)).collect()
     }
 }
 
 /// Recordings side by side: one N-channel file, N mono files, or any mixture in this order.
-pub struct Recording {
+pub struct Capture {
     parts: Vec<Part>,
     used: u64,
 }
 
-impl Recording {
+impl Capture {
     /// Opens the files; `-` is standard input.
     ///
     /// # Errors
@@ -136,7 +140,7 @@ impl Recording {
         Ok(common)
     }
 
-    /// What the last [`Recording::read`] brought, cut to the ticks that all files have.
+    /// What the last [`Capture::read`] brought, cut to the ticks that all files have.
     pub fn frames(&self) -> Vec<PcmFrames<'_>> {
         let parts = || self.parts.iter().map(Part::frames);
         let common = parts().map(|part| part.frames()).min().unwrap_or(0);
@@ -149,7 +153,7 @@ impl Recording {
     }
 
     /// What had to be tolerated; complete after the end.
-    pub fn notes(&self) -> Vec<RecordingNote> {
+    pub fn notes(&self) -> Vec<CaptureNote> {
         self.parts.iter().flat_map(|part| part.notes(self.used)).collect()
     }
 }
