@@ -1,6 +1,9 @@
 //! The command line: one file a verb; the only place that prints.
 
+mod bank_file;
 mod failure;
+mod fuse;
+mod output;
 
 use clap::{Parser, Subcommand};
 pub use failure::Failure;
@@ -15,7 +18,9 @@ pub struct Cli {
 }
 
 #[derive(Debug, Subcommand)]
-enum Verb {}
+enum Verb {
+    Fuse(fuse::Args),
+}
 
 /// Runs the verb that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
 /// 2 (wrong usage).
@@ -27,5 +32,7 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(verb: Verb) -> Result<(), Failure> {
-    match verb {}
+    match verb {
+        Verb::Fuse(args) => fuse::run(args),
+    }
 }

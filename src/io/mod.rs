@@ -1,1 +1,19 @@
 //! Samples in and out: WAV, raw PCM, whole-file writers.
+//!
+//! Words: a *frame* holds one sample of each channel of a file or stream; a sample is stored in
+//! one of the [`PcmFormat`]s; integer formats are full scale = 1.0.
+
+mod atomic;
+mod capture;
+mod error;
+mod frames;
+mod pcm;
+mod pcm_frames;
+pub mod wav;
+
+pub use atomic::AtomicFile;
+pub use capture::{Capture, CaptureNote};
+pub use error::IoError;
+pub use frames::FrameReader;
+pub use pcm::{ParsePcmFormatError, PcmFormat};
+pub use pcm_frames::{PcmFrames, SampleLayout};

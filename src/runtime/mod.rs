@@ -1,1 +1,20 @@
 //! Running a bank: kernels, reconstructor, pipeline. No allocation on the hot path, no design code.
+//!
+//! A *tick* is one slow period: N samples in, M samples out.
+
+mod aligned;
+mod error;
+mod fir;
+mod reconstructor;
+mod sample;
+mod simd;
+mod state_space;
+#[cfg(test)]
+mod tests;
+mod ticks;
+mod window;
+
+pub use error::{BuildError, ProcessError};
+pub use reconstructor::{Options, Precision, Reconstructor};
+pub use simd::Isa;
+pub use ticks::PcmOutput;

@@ -1,0 +1,93 @@
+//! Why samples could not be read or written.
+
+use std::io;
+
+/// A fault of a file or stream; every sentence names the file, the place, the rule and the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum IoError {
+    /// The operating system refused.
+    #[error("{file}: cannot {action}: {source}")]
+    System {
+        /// Name of the file or stream.
+        file: String,
+        /// What was tried, as a verb phrase.
+        action: &'static str,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The output exists and was not to be replaced.
+    #[error("{file}: the file exists; give another name or --force to replace it")]
+    Exists {
+        /// Name of the file.
+        file: String,
+    },
+    /// The first bytes are not those of a WAV file.
+    #[error(
+        "{file}: not a WAV file (byte 0 holds {found}, where RIFF, RF64, BW64 or a W64 header is expected); raw samples need a format name such as f32le"
+    )]
+    NotWav {
+        /// Name of the file.
+        file: String,
+        /// The bytes found, printable.
+        found: String,
+    },
+    /// The header ends before it is whole.
+    #[error(
+        "{file}: the header ends at byte {offset} inside {place}; the file is truncated, record or copy it again"
+    )]
+    TruncatedHeader {
+        /// Name of the file.
+        file: String,
+        /// Where the bytes ended.
+        offset: u64,
+        /// Which part was being read.
+        place: &'static str,
+    },
+    /// A header field holds a value that cannot be.
+    #[error("{file}: {field} at byte {offset} is {value}; {rule}")]
+    BadField {
+        /// Name of the file.
+        file: String,
+        /// The field's name.
+        field: &'static str,
+        /// Its place.
+        offset: u64,
+        /// What it holds.
+        value: u64,
+        /// What it may hold, and the remedy.
+        rule: &'static str,
+    },
+    /// The samples are coded in a way that is not plain PCM.
+    #[error(
+        "{file}: samples are coded as format tag {tag:#06x} with {bits} bits; convert to integer PCM or float first (for example: sox {file} -e float out.wav)"
+    )]
+    Encoding {
+        /// Name of the file.
+        file: String,
+        /// The WAV format tag.
+        tag: u16,
+        /// Bits a sample.
+        bits: u16,
+    },
+    /// There is no data chunk.
+    #[error("{file}: no data chunk after {offset} bytes of header; the file holds no samples")]
+    NoData {
+        /// Name of the file.
+        file: String,
+        /// Where the search ended.
+        offset: u64,
+    },
+}
+
+impl IoError {
+    /// Wraps the system's refusal; for use with `map_err`.
+    pub fn system(file: &str, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        let file = file.to_owned();
+        move |source| Self::System { file, action, source }
+    }
+
+    /// True if the reader of a pipe went away, which ends a stream quietly.
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::System { source, .. } if source.kind() == io::ErrorKind::BrokenPipe)
+    }
+}

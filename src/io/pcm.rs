@@ -1,0 +1,250 @@
+//! Sample formats: names as in ffmpeg, and the conversions between bytes and numbers.
+//!
+//! Integers of b bits map to x = i / 2^(b-1), so that full scale is 1.0; `u8` is offset by 128.
+//! Numbers map back by rounding to the nearest integer (ties to even) and saturating.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How one sample is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PcmFormat {
+    /// Signed 8 bit.
+    S8,
+    /// Unsigned 8 bit, 128 is zero.
+    U8,
+    /// Signed 16 bit, little endian.
+    S16Le,
+    /// Signed 16 bit, big endian.
+    S16Be,
+    /// Signed 24 bit in three bytes, little endian.
+    S24Le,
+    /// Signed 24 bit in three bytes, big endian.
+    S24Be,
+    /// Signed 32 bit, little endian.
+    S32Le,
+    /// Signed 32 bit, big endian.
+    S32Be,
+    /// 32-bit float, little endian.
+    F32Le,
+    /// 32-bit float, big endian.
+    F32Be,
+    /// 64-bit float, little endian.
+    F64Le,
+    /// 64-bit float, big endian.
+    F64Be,
+}
+
+/// A format name that is not one of the twelve.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "unknown sample format `{0}`; use one of s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be"
+)]
+pub struct ParsePcmFormatError(pub String);
+
+impl PcmFormat {
+    /// All formats, in the order of the contract.
+    pub const ALL: [Self; 12] = [
+        Self::S8,
+        Self::U8,
+        Self::S16Le,
+        Self::S16Be,
+        Self::S24Le,
+        Self::S24Be,
+        Self::S32Le,
+        Self::S32Be,
+        Self::F32Le,
+        Self::F32Be,
+        Self::F64Le,
+        Self::F64Be,
+    ];
+
+    /// The name, as in ffmpeg.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::S8 => "s8",
+            Self::U8 => "u8",
+            Self::S16Le => "s16le",
+            Self::S16Be => "s16be",
+            Self::S24Le => "s24le",
+            Self::S24Be => "s24be",
+            Self::S32Le => "s32le",
+            Self::S32Be => "s32be",
+            Self::F32Le => "f32le",
+            Self::F32Be => "f32be",
+            Self::F64Le => "f64le",
+            Self::F64Be => "f64be",
+        }
+    }
+
+    /// Bytes a sample.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::S8 | Self::U8 => 1,
+            Self::S16Le | Self::S16Be => 2,
+            Self::S24Le | Self::S24Be => 3,
+            Self::S32Le | Self::S32Be | Self::F32Le | Self::F32Be => 4,
+            Self::F64Le | Self::F64Be => 8,
+        }
+    }
+
+    /// True for the four float formats: they do not saturate, and they can hold NaN.
+    pub const fn is_float(self) -> bool {
+        matches!(self, Self::F32Le | Self::F32Be | Self::F64Le | Self::F64Be)
+    }
+
+    /// The number in the first [`Self::bytes`] bytes.
+    ///
+    /// # Panics
+    /// If `bytes` is shorter than one sample.
+    #[inline(always)]
+    pub fn decode(self, bytes: &[u8]) -> f64 {
+        let b = bytes;
+        match self {
+            Self::S8 => f64::from(b[0] as i8) / 128.0,
+            Self::U8 => (f64::from(b[0]) - 128.0) / 128.0,
+            Self::S16Le => f64::from(i16::from_le_bytes([b[0], b[1]])) / 32768.0,
+            Self::S16Be => f64::from(i16::from_be_bytes([b[0], b[1]])) / 32768.0,
+            Self::S24Le => f64::from(i32::from_le_bytes([0, b[0], b[1], b[2]])) / 2147483648.0,
+            Self::S24Be => f64::from(i32::from_be_bytes([b[0], b[1], b[2], 0])) / 2147483648.0,
+            Self::S32Le => f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]])) / 2147483648.0,
+            Self::S32Be => f64::from(i32::from_be_bytes([b[0], b[1], b[2], b[3]])) / 2147483648.0,
+            Self::F32Le => f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+            Self::F32Be => f64::from(f32::from_be_bytes([b[0], b[1], b[2], b[3]])),
+            Self::F64Le => f64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]),
+            Self::F64Be => f64::from_be_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]),
+        }
+    }
+
+    /// Writes one number into the first [`Self::bytes`] bytes; true if it had to be clipped.
+    ///
+    /// # Panics
+    /// If `bytes` is shorter than one sample.
+    #[inline(always)]
+    pub fn encode(self, value: f64, bytes: &mut [u8]) -> bool {
+        match self {
+            Self::S8 => put(bytes, quantise(value, 7), |i| (i as i8).to_le_bytes()),
+            Self::U8 => put(bytes, quantise(value, 7), |i| [(i + 128) as u8]),
+            Self::S16Le => put(bytes, quantise(value, 15), |i| (i as i16).to_le_bytes()),
+            Self::S16Be => put(bytes, quantise(value, 15), |i| (i as i16).to_be_bytes()),
+            Self::S24Le => put(bytes, quantise(value, 23), |i| low_three(i.to_le_bytes())),
+            Self::S24Be => put(bytes, quantise(value, 23), |i| high_three(i.to_be_bytes())),
+            Self::S32Le => put(bytes, quantise(value, 31), i32::to_le_bytes),
+            Self::S32Be => put(bytes, quantise(value, 31), i32::to_be_bytes),
+            Self::F32Le => store(bytes, (value as f32).to_le_bytes()),
+            Self::F32Be => store(bytes, (value as f32).to_be_bytes()),
+            Self::F64Le => store(bytes, value.to_le_bytes()),
+            Self::F64Be => store(bytes, value.to_be_bytes()),
+        }
+    }
+}
+
+impl fmt::Display for PcmFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for PcmFormat {
+    type Err = ParsePcmFormatError;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|format| format.name() == name)
+            .ok_or_else(|| ParsePcmFormatError(name.to_owned()))
+    }
+}
+
+/// Nearest integer of `value * 2^bits` and whether it had to be clipped to the range.
+#[inline(always)]
+fn quantise(value: f64, bits: u32) -> (i32, bool) {
+    let full = f64::from(1u32 << bits);
+    let scaled = (value * full).round_ties_even();
+    let clipped = scaled < -full || scaled > full - 1.0;
+    // NaN never comes out of a filter whose input is clean; the cast would make it 0.
+    (scaled.clamp(-full, full - 1.0) as i32, clipped)
+}
+
+#[inline(always)]
+fn put<const B: usize>(bytes: &mut [u8], (i, clipped): (i32, bool), pack: impl Fn(i32) -> [u8; B]) -> bool {
+    store(bytes, pack(i));
+    clipped
+}
+
+#[inline(always)]
+fn store<const B: usize>(bytes: &mut [u8], packed: [u8; B]) -> bool {
+    bytes[..B].copy_from_slice(&packed);
+    false
+}
+
+#[inline(always)]
+fn low_three([a, b, c, _]: [u8; 4]) -> [u8; 3] {
+    [a, b, c]
+}
+
+#[inline(always)]
+fn high_three([_, a, b, c]: [u8; 4]) -> [u8; 3] {
+    [a, b, c]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes_of(format: PcmFormat, value: f64) -> (Vec<u8>, bool) {
+        let mut bytes = vec![0; format.bytes()];
+        let clipped = format.encode(value, &mut bytes);
+        (bytes, clipped)
+    }
+
+    #[test]
+    fn names_go_both_ways_and_a_wrong_one_is_named() {
+        for format in PcmFormat::ALL {
+            assert_eq!(format.name().parse(), Ok(format));
+        }
+        let error = "s16".parse::<PcmFormat>().unwrap_err();
+        assert!(error.to_string().contains("`s16`") && error.to_string().contains("s16le"));
+    }
+
+    #[test]
+    fn every_integer_of_every_short_format_survives() {
+        for format in [PcmFormat::S8, PcmFormat::U8, PcmFormat::S16Le, PcmFormat::S16Be] {
+            for code in 0..1u32 << (8 * format.bytes()) {
+                let bytes = &code.to_le_bytes()[..format.bytes()];
+                assert_eq!(bytes_of(format, format.decode(bytes)), (bytes.to_vec(), false), "{format}");
+            }
+        }
+    }
+
+    #[test]
+    fn long_formats_survive_at_the_edges() {
+        for format in [PcmFormat::S24Le, PcmFormat::S24Be, PcmFormat::S32Le, PcmFormat::S32Be] {
+            for pattern in [[0x80, 0, 0, 0], [0x7f, 0xff, 0xff, 0xff], [0, 0, 0, 1], [0xff; 4], [1, 2, 3, 4]]
+            {
+                let bytes = &pattern[..format.bytes()];
+                assert_eq!(bytes_of(format, format.decode(bytes)), (bytes.to_vec(), false), "{format}");
+            }
+        }
+    }
+
+    #[test]
+    fn full_scale_is_one_and_beyond_it_saturates() {
+        assert_eq!(bytes_of(PcmFormat::S16Le, 1.0), (vec![0xff, 0x7f], true));
+        assert_eq!(bytes_of(PcmFormat::S16Le, -1.0), (vec![0, 0x80], false));
+        assert_eq!(bytes_of(PcmFormat::S24Be, -7.0), (vec![0x80, 0, 0], true));
+        assert_eq!(bytes_of(PcmFormat::U8, 0.0), (vec![128], false));
+        assert_eq!(bytes_of(PcmFormat::S32Le, 0.5), (vec![0, 0, 0, 0x40], false));
+        // 0.99999 rounds to 32768, which is beyond the range; 32767.4 is not.
+        assert_eq!(bytes_of(PcmFormat::S16Be, 32767.4 / 32768.0), (vec![0x7f, 0xff], false));
+        assert_eq!(bytes_of(PcmFormat::S16Be, 32767.6 / 32768.0), (vec![0x7f, 0xff], true));
+        assert_eq!(bytes_of(PcmFormat::F32Le, 3.0), (3f32.to_le_bytes().to_vec(), false));
+    }
+
+    #[test]
+    fn ties_go_to_even() {
+        assert_eq!(bytes_of(PcmFormat::S8, 0.5 / 128.0).0, vec![0]);
+        assert_eq!(bytes_of(PcmFormat::S8, 1.5 / 128.0).0, vec![2]);
+        assert_eq!(bytes_of(PcmFormat::S8, -2.5 / 128.0).0, vec![(-2i8) as u8]);
+    }
+}

@@ -1,0 +1,207 @@
+//! What a WAV header says about the samples.
+
+use super::chunks::{Chunk, Chunks, Family};
+use crate::io::{IoError, PcmFormat, SampleLayout};
+use std::io::Read;
+
+const TAG_PCM: u16 = 1;
+const TAG_FLOAT: u16 = 3;
+const TAG_EXTENSIBLE: u16 = 0xFFFE;
+
+/// A checked header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WavHeader {
+    /// How samples are stored.
+    pub layout: SampleLayout,
+    /// Samples a frame, at least 1.
+    pub channels: usize,
+    /// Frames a second, at least 1.
+    pub rate: u32,
+    /// Bytes of samples, `None` if they go on until the end.
+    pub data_bytes: Option<u64>,
+    /// Where the samples begin.
+    pub data_offset: u64,
+    /// 24 significant bits in 32: writers disagree whether they lie high or low.
+    pub(super) justification_open: bool,
+}
+
+/// The fmt chunk, as written.
+struct Fmt {
+    offset: u64,
+    tag: u16,
+    channels: u16,
+    rate: u32,
+    block_align: u16,
+    bits: u16,
+    /// Valid bits of an extensible header; 0 where there is none.
+    valid_bits: u16,
+}
+
+impl WavHeader {
+    /// Bytes a frame.
+    pub fn frame_bytes(&self) -> usize {
+        self.layout.container * self.channels
+    }
+
+    /// Reads up to the first sample.
+    pub(super) fn read<R: Read>(chunks: &mut Chunks<'_, R>) -> Result<Self, IoError> {
+        let mut fmt = None;
+        let mut true_size = None;
+        while let Some(chunk) = chunks.next()? {
+            match &chunk.id {
+                b"fmt " => fmt = Some(Fmt::read(chunks, chunk)?),
+                b"ds64" => true_size = Some(read_ds64(chunks, chunk)?),
+                b"data" => {
+                    let fmt = fmt.ok_or_else(|| no_fmt(chunks, chunk))?;
+                    return Self::assemble(chunks, &fmt, chunk, true_size);
+                }
+                _ => chunks.skip(chunk, 0)?,
+            }
+        }
+        Err(IoError::NoData { file: chunks.file().to_owned(), offset: chunks.offset() })
+    }
+
+    fn assemble<R: Read>(
+        chunks: &Chunks<'_, R>,
+        fmt: &Fmt,
+        data: Chunk,
+        true_size: Option<u64>,
+    ) -> Result<Self, IoError> {
+        let channels = usize::from(fmt.channels);
+        let layout = fmt.layout(chunks)?;
+        let frame = (layout.container * channels) as u64;
+        let data_bytes = match (chunks.family, true_size) {
+            (Family::Rf64, Some(size)) if data.size == u64::from(u32::MAX) => known_size_64(size),
+            (Family::W64, _) => known_size_64(data.size),
+            _ => known_size(data.size, frame, chunks.promised > data.offset && chunks.promised < 0x7FFF_0000),
+        };
+        Ok(Self {
+            layout,
+            channels,
+            rate: fmt.rate,
+            data_bytes,
+            data_offset: data.offset,
+            justification_open: layout.container == 4 && fmt.significant_bits() == 24,
+        })
+    }
+}
+
+/// The data size, unless it is one of the numbers by which streaming writers say "until the end".
+/// `empty_possible`: the outer size promises chunks after the data, so that 0 may mean no samples.
+fn known_size(size: u64, frame: u64, empty_possible: bool) -> Option<u64> {
+    // sox rounds its 0x7FFFF000 down to whole frames.
+    let streamed_by_sox = size <= 0x7FFF_F000 && size + frame > 0x7FFF_F000;
+    let streamed = streamed_by_sox
+        || (0x7FFF_FF00..=0x7FFF_FFFF).contains(&size)
+        || (0xFFFF_0000..=0xFFFF_FFFF).contains(&size)
+        || (size == 0 && !empty_possible);
+    (!streamed).then_some(size)
+}
+
+/// Where sizes have 64 bits, 0 or a number beyond any disk says that the writer did not know.
+fn known_size_64(size: u64) -> Option<u64> {
+    (size > 0 && size < 1 << 62).then_some(size)
+}
+
+fn no_fmt<R: Read>(chunks: &Chunks<'_, R>, data: Chunk) -> IoError {
+    chunks.bad(
+        "the data chunk",
+        data.offset,
+        data.size,
+        "a fmt chunk must come before it; the file is damaged",
+    )
+}
+
+/// The true size of the data.
+fn read_ds64<R: Read>(chunks: &mut Chunks<'_, R>, chunk: Chunk) -> Result<u64, IoError> {
+    let _riff_size: [u8; 8] = chunks.bytes("the ds64 chunk")?;
+    let size = u64::from_le_bytes(chunks.bytes("the ds64 chunk")?);
+    chunks.skip(chunk, 16)?;
+    Ok(size)
+}
+
+impl Fmt {
+    fn read<R: Read>(chunks: &mut Chunks<'_, R>, chunk: Chunk) -> Result<Self, IoError> {
+        if chunk.size < 16 {
+            let rule = "a fmt chunk has at least 16 bytes; the file is damaged";
+            return Err(chunks.bad("the fmt chunk's size", chunk.offset - 4, chunk.size, rule));
+        }
+        let mut bytes = [0u8; 40];
+        let used = chunk.size.min(40);
+        chunks.exact(&mut bytes[..used as usize], "the fmt chunk")?;
+        chunks.skip(chunk, used)?;
+        let fmt = Self::parse(&bytes, chunk.offset);
+        fmt.check(chunks)?;
+        Ok(fmt)
+    }
+
+    fn parse(bytes: &[u8; 40], offset: u64) -> Self {
+        let word = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let tag = word(0);
+        let extensible = tag == TAG_EXTENSIBLE;
+        Self {
+            offset,
+            // An extensible header cut short says nothing else, so PCM is the best guess.
+            tag: if extensible { word(24).max(TAG_PCM) } else { tag },
+            channels: word(2),
+            rate: u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]),
+            block_align: word(12),
+            bits: word(14),
+            valid_bits: if extensible { word(18) } else { 0 },
+        }
+    }
+
+    fn check<R: Read>(&self, chunks: &Chunks<'_, R>) -> Result<(), IoError> {
+        let at = |place: u64| self.offset + place;
+        if self.channels == 0 {
+            return Err(chunks.bad("the channel count", at(2), 0, "a file has at least one channel"));
+        }
+        if self.rate == 0 {
+            return Err(chunks.bad("the sample rate", at(4), 0, "a rate is at least 1 Hz"));
+        }
+        if self.block_align % self.channels != 0 {
+            let rule = "bytes a frame must be a multiple of the channel count";
+            return Err(chunks.bad("the frame size", at(12), self.block_align.into(), rule));
+        }
+        Ok(())
+    }
+
+    /// Bytes from sample to sample; writers that leave the frame size 0 mean packed samples.
+    fn container(&self) -> usize {
+        match self.block_align / self.channels {
+            0 => usize::from(self.bits).div_ceil(8),
+            bytes => usize::from(bytes),
+        }
+    }
+
+    /// Bits that count: the valid bits where given and possible, or else the container's.
+    fn significant_bits(&self) -> u16 {
+        if self.valid_bits == 0 || self.valid_bits > self.bits { self.bits } else { self.valid_bits }
+    }
+
+    /// Samples of fewer bits than their bytes hold lie in the high bits, so that reading the whole
+    /// container gives the right scale.
+    fn layout<R>(&self, chunks: &Chunks<'_, R>) -> Result<SampleLayout, IoError>
+    where
+        R: Read,
+    {
+        let container = self.container();
+        let fits = self.bits > 0 && usize::from(self.bits) <= 8 * container;
+        let format = match (self.tag, container) {
+            (TAG_PCM, 1) if fits => PcmFormat::U8,
+            (TAG_PCM, 2) if fits => PcmFormat::S16Le,
+            (TAG_PCM, 3) if fits => PcmFormat::S24Le,
+            (TAG_PCM, 4) if fits => PcmFormat::S32Le,
+            (TAG_FLOAT, 4) if self.bits == 32 => PcmFormat::F32Le,
+            (TAG_FLOAT, 8) if self.bits == 64 => PcmFormat::F64Le,
+            _ => {
+                return Err(IoError::Encoding {
+                    file: chunks.file().to_owned(),
+                    tag: self.tag,
+                    bits: self.bits,
+                });
+            }
+        };
+        Ok(SampleLayout { format, container })
+    }
+}

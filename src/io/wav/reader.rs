@@ -1,0 +1,105 @@
+//! Frames out of a WAV file or stream.
+
+use super::chunks::Chunks;
+use super::header::WavHeader;
+use crate::io::{FrameReader, IoError, PcmFormat, SampleLayout};
+use std::fmt;
+use std::io::{Chain, Cursor, Read};
+
+/// Samples looked at to tell 24 high bits of 32 from 24 low ones.
+const JUSTIFICATION_SAMPLES: usize = 16384;
+
+/// A fault that was tolerated; known when the samples have ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WavNote {
+    /// The file ends before the header's promise: bytes that are not there.
+    Truncated {
+        /// Promised bytes that did not come.
+        missing_bytes: u64,
+    },
+    /// The last frame was cut and left out.
+    CutFrame {
+        /// Its bytes that were there.
+        bytes: usize,
+    },
+}
+
+impl fmt::Display for WavNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { missing_bytes } => {
+                write!(f, "the file is truncated: {missing_bytes} bytes that its header promises are missing")
+            }
+            Self::CutFrame { bytes } => {
+                write!(f, "the last frame is cut ({bytes} bytes of it are there) and was left out")
+            }
+        }
+    }
+}
+
+/// A WAV source, placed behind its header.
+#[derive(Debug)]
+pub struct WavReader<R> {
+    header: WavHeader,
+    frames: FrameReader<Chain<Cursor<Vec<u8>>, R>>,
+}
+
+impl<R: Read> WavReader<R> {
+    /// Reads the header; `file` is the name for complaints.
+    ///
+    /// # Errors
+    /// [`IoError`] for anything that is not plain PCM in RIFF, RF64, BW64 or W64.
+    pub fn new(inner: R, file: &str) -> Result<Self, IoError> {
+        let mut chunks = Chunks::open(inner, file)?;
+        let mut header = WavHeader::read(&mut chunks)?;
+        let mut inner = chunks.into_inner();
+        let peeked = if header.justification_open { peek(&mut inner, &header, file)? } else { Vec::new() };
+        if header.justification_open && lies_low(&peeked) {
+            header.layout = SampleLayout { format: PcmFormat::S24Le, container: 4 };
+        }
+        let frames =
+            FrameReader::new(Cursor::new(peeked).chain(inner), header.frame_bytes(), header.data_bytes);
+        Ok(Self { header, frames })
+    }
+
+    /// What the header says.
+    pub fn header(&self) -> &WavHeader {
+        &self.header
+    }
+
+    /// The frames.
+    pub fn frames(&mut self) -> &mut FrameReader<impl Read + use<R>> {
+        &mut self.frames
+    }
+
+    /// True once the samples are used up.
+    pub fn ended(&self) -> bool {
+        self.frames.ended()
+    }
+
+    /// What had to be tolerated; complete when the frames have ended.
+    pub fn notes(&self) -> Vec<WavNote> {
+        let missing_bytes = self.frames.missing_bytes();
+        let bytes = self.frames.cut_bytes();
+        let truncated = (missing_bytes > 0).then_some(WavNote::Truncated { missing_bytes });
+        let cut = (bytes > 0).then_some(WavNote::CutFrame { bytes });
+        truncated.into_iter().chain(cut).collect()
+    }
+}
+
+/// The first samples, to be read again.
+fn peek<R: Read>(inner: &mut R, header: &WavHeader, file: &str) -> Result<Vec<u8>, IoError> {
+    let want = (4 * JUSTIFICATION_SAMPLES) as u64;
+    let mut bytes = Vec::new();
+    let mut some = inner.take(header.data_bytes.map_or(want, |size| size.min(want)));
+    some.read_to_end(&mut bytes).map_err(IoError::system(file, "read the samples"))?;
+    Ok(bytes)
+}
+
+/// The rule says that 24 bits in 32 lie high, with a zero byte below; some writers put them low,
+/// with the sign above. Low it is only if the zero byte is not zero and the sign fits everywhere.
+fn lies_low(bytes: &[u8]) -> bool {
+    let mut samples = bytes.chunks_exact(4);
+    let sign_above = samples.all(|b| b[3] == if b[2] & 0x80 == 0 { 0 } else { 0xFF });
+    sign_above && bytes.chunks_exact(4).any(|b| b[0] != 0)
+}

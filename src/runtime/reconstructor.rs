@@ -1,0 +1,266 @@
+//! A bank at work on one stream.
+
+use super::fir::{FirPlan, FirState};
+use super::simd::Isa;
+use super::state_space::{StateSpacePlan, StateSpaceState};
+use super::ticks::{FastSink, Interleaved, PcmOutput, TickSource};
+use super::{BuildError, ProcessError};
+use crate::bank::{Bank, SynthesisFilters};
+use crate::io::PcmFrames;
+use std::sync::Arc;
+
+/// Number type of the FIR kernels. State-space banks always run in f64.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// Coefficients and sums in f32: error about 1e-7 of full scale.
+    #[default]
+    Single,
+    /// Coefficients and sums in f64, at half the speed.
+    Double,
+}
+
+/// How a bank is made ready to run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Number type of the FIR kernels.
+    pub precision: Precision,
+    /// Instruction set; one that the processor does not have falls back to the portable kernels.
+    pub isa: Isa,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { precision: Precision::default(), isa: Isa::detect() }
+    }
+}
+
+/// Coefficients in the order of use, shared by any number of streams.
+#[derive(Debug)]
+enum Plan {
+    Single(FirPlan<f32>),
+    Double(FirPlan<f64>),
+    StateSpace(StateSpacePlan),
+}
+
+/// The state of one stream, of the plan's kind.
+#[derive(Debug, Clone)]
+enum State {
+    Single(FirState<f32>),
+    Double(FirState<f64>),
+    StateSpace(StateSpaceState),
+}
+
+/// Fuses the ticks of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0
+/// before the first tick.
+///
+/// The coefficients are shared: a clone is a second stream at the same place, and
+/// [`Reconstructor::fresh`] one at its beginning. [`Reconstructor::process`] allocates nothing and
+/// locks nothing, and the same ticks give the same bits however they are cut into calls.
+///
+/// ```
+/// # use hybank::bank::{Bank, Gamma, SynthesisFilters};
+/// # use hybank::spec::Method;
+/// use hybank::runtime::Reconstructor;
+/// # let bank = Bank {
+/// #     spec: None, fast_period: 1.0, ratio: 2, latency: 1, method: Method::Fir,
+/// #     delays: vec![0.0, 1.0], gamma: Gamma::default(),
+/// #     filters: SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0]]),
+/// # };
+/// let mut fuse = Reconstructor::new(&bank)?;
+/// let mut fast = vec![0.0; 2 * fuse.ratio()];
+/// for ticks in [[1.0, 10.0, 2.0, 20.0], [3.0, 30.0, 4.0, 40.0]] {
+///     let written = fuse.process(&ticks, &mut fast)?;
+///     println!("{:?}, {} samples late", &fast[..written], fuse.latency());
+/// }
+/// assert_eq!(fast, [3.0, 30.0, 4.0, 40.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Reconstructor {
+    plan: Arc<Plan>,
+    state: State,
+    latency: usize,
+    replaced: u64,
+}
+
+impl Reconstructor {
+    /// Makes a bank ready to run in f32 (FIR) or f64 (state space).
+    ///
+    /// # Errors
+    /// [`BuildError`] if the bank's parts do not fit together or hold values that are not finite.
+    pub fn new(bank: &Bank) -> Result<Self, BuildError> {
+        Self::with_options(bank, Options::default())
+    }
+
+    /// Makes a bank ready to run.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::new`].
+    pub fn with_options(bank: &Bank, options: Options) -> Result<Self, BuildError> {
+        let plan = Plan::new(bank, options)?;
+        let state = plan.state();
+        Ok(Self { plan: Arc::new(plan), state, latency: bank.latency, replaced: 0 })
+    }
+
+    /// N, samples a tick in.
+    pub fn channels(&self) -> usize {
+        match &*self.plan {
+            Plan::Single(plan) => plan.channels,
+            Plan::Double(plan) => plan.channels,
+            Plan::StateSpace(plan) => plan.channels,
+        }
+    }
+
+    /// M, samples a tick out.
+    pub fn ratio(&self) -> usize {
+        match &*self.plan {
+            Plan::Single(plan) => plan.ratio,
+            Plan::Double(plan) => plan.ratio,
+            Plan::StateSpace(plan) => plan.ratio,
+        }
+    }
+
+    /// m0: output sample n belongs to the time of fast sample n - m0.
+    pub fn latency(&self) -> usize {
+        self.latency
+    }
+
+    /// Ticks after which an input is forgotten; `None` for a recursion, which never forgets.
+    pub fn memory(&self) -> Option<usize> {
+        match &*self.plan {
+            Plan::Single(plan) => Some(plan.history),
+            Plan::Double(plan) => Some(plan.history),
+            Plan::StateSpace(_) => None,
+        }
+    }
+
+    /// Ticks of zeros that bring out the last m0 samples.
+    pub fn flush_ticks(&self) -> usize {
+        self.latency.div_ceil(self.ratio())
+    }
+
+    /// Samples in byte form that were NaN or infinite and became 0, since the beginning.
+    pub fn replaced(&self) -> u64 {
+        self.replaced
+    }
+
+    /// Times a recursion's state was not finite and began anew, since the beginning.
+    pub fn state_resets(&self) -> u64 {
+        match &self.state {
+            State::StateSpace(state) => state.resets,
+            _ => 0,
+        }
+    }
+
+    /// A stream of the same bank at its beginning.
+    pub fn fresh(&self) -> Self {
+        Self { plan: Arc::clone(&self.plan), state: self.plan.state(), latency: self.latency, replaced: 0 }
+    }
+
+    /// Back to the beginning; gives the same bits as a new one.
+    pub fn reset(&mut self) {
+        self.replaced = 0;
+        match &mut self.state {
+            State::Single(state) => state.reset(),
+            State::Double(state) => state.reset(),
+            State::StateSpace(state) => state.reset(),
+        }
+    }
+
+    /// Takes whole ticks (N samples each, interleaved) and writes M samples for each; returns the
+    /// samples written, `input.len() / N * M`. A NaN spoils the outputs that look back to it.
+    ///
+    /// # Errors
+    /// [`ProcessError`] if the slices do not fit; nothing is processed then.
+    pub fn process(&mut self, input: &[f32], output: &mut [f32]) -> Result<usize, ProcessError> {
+        let source = self.interleaved(input)?;
+        self.run(&source, output)
+    }
+
+    /// As [`Reconstructor::process`], for f64 samples (whatever the precision of the kernels).
+    ///
+    /// # Errors
+    /// As [`Reconstructor::process`].
+    pub fn process_f64(&mut self, input: &[f64], output: &mut [f64]) -> Result<usize, ProcessError> {
+        let source = self.interleaved(input)?;
+        self.run(&source, output)
+    }
+
+    /// As [`Reconstructor::process`], from and to samples as they lie in files and pipes: the
+    /// channels are those of all `input` recordings one after another, the ticks those that all of
+    /// them have. NaN and infinity become 0 and are counted, outputs saturate and are counted.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::process`].
+    pub fn process_pcm(
+        &mut self,
+        input: &[PcmFrames<'_>],
+        output: &mut PcmOutput<'_>,
+    ) -> Result<usize, ProcessError> {
+        self.run(input, output)
+    }
+
+    fn interleaved<'a, S>(&self, samples: &'a [S]) -> Result<Interleaved<'a, S>, ProcessError> {
+        let channels = self.channels();
+        if samples.len() % channels != 0 {
+            return Err(ProcessError::CutTick { samples: samples.len(), channels });
+        }
+        Ok(Interleaved { samples, channels })
+    }
+
+    fn run(
+        &mut self,
+        source: &(impl TickSource + ?Sized),
+        sink: &mut (impl FastSink + ?Sized),
+    ) -> Result<usize, ProcessError> {
+        if source.channels() != self.channels() {
+            return Err(ProcessError::Channels { given: source.channels(), wanted: self.channels() });
+        }
+        let wanted = source.ticks() * self.ratio();
+        if sink.capacity() < wanted {
+            return Err(ProcessError::OutputTooShort { given: sink.capacity(), wanted });
+        }
+        self.replaced += match (&*self.plan, &mut self.state) {
+            (Plan::Single(plan), State::Single(state)) => plan.process(state, source, sink),
+            (Plan::Double(plan), State::Double(state)) => plan.process(state, source, sink),
+            (Plan::StateSpace(plan), State::StateSpace(state)) => plan.process(state, source, sink),
+            // A state is only ever made by its plan.
+            _ => 0,
+        };
+        Ok(wanted)
+    }
+}
+
+impl Plan {
+    fn new(bank: &Bank, options: Options) -> Result<Self, BuildError> {
+        let (channels, ratio) = (bank.channel_count(), bank.ratio);
+        if ratio == 0 {
+            return Err(BuildError::NoRatio);
+        }
+        if channels == 0 {
+            return Err(BuildError::NoChannels);
+        }
+        match (&bank.filters, options.precision) {
+            (SynthesisFilters::Fir(taps), _) if taps.len() != channels => {
+                Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
+            }
+            (SynthesisFilters::Fir(taps), Precision::Single) => {
+                FirPlan::new(taps, ratio, options.isa).map(Self::Single)
+            }
+            (SynthesisFilters::Fir(taps), Precision::Double) => {
+                FirPlan::new(taps, ratio, options.isa).map(Self::Double)
+            }
+            (SynthesisFilters::StateSpace(filter), _) => {
+                StateSpacePlan::new(filter, channels, ratio).map(Self::StateSpace)
+            }
+        }
+    }
+
+    fn state(&self) -> State {
+        match self {
+            Self::Single(plan) => State::Single(plan.state()),
+            Self::Double(plan) => State::Double(plan.state()),
+            Self::StateSpace(plan) => State::StateSpace(plan.state()),
+        }
+    }
+}

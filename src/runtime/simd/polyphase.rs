@@ -1,0 +1,192 @@
+//! Direct polyphase FIR on planar windows: P phases times R vectors of frames in registers.
+//!
+//! out[p][k] = sum_s w[s][p] x[offset_s + k]: the steps s run over channels and taps, so one
+//! load of input serves P phases and one coefficient serves R vectors.
+
+#[cfg(target_arch = "x86_64")]
+use super::vector::{Avx2F32, Avx2F64, Avx512F32, Avx512F64};
+use super::vector::{Portable, Vector};
+use super::{Isa, OVERRUN};
+use crate::runtime::aligned::Aligned;
+
+/// Up to four phases that are computed together, with their coefficients in the order of use.
+#[derive(Debug, Clone)]
+pub(crate) struct PhaseGroup<T: Copy + Default> {
+    /// The first phase.
+    pub(crate) first: usize,
+    /// P, from 1 to 4.
+    pub(crate) width: usize,
+    /// w[s][p] at s * P + p.
+    pub(crate) coefficients: Aligned<T>,
+}
+
+/// One call of a kernel, checked.
+struct Job<T> {
+    x: *const T,
+    offsets: *const u32,
+    steps: usize,
+    coefficients: *const T,
+    out: *mut T,
+    out_stride: usize,
+    frames: usize,
+}
+
+type GroupFn<T> = unsafe fn(&Job<T>);
+
+/// The kernels of one sample type for P = 1..4.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FirKernel<T> {
+    by_width: [GroupFn<T>; 4],
+}
+
+impl<T: Copy + Default> FirKernel<T> {
+    /// out row p, frame k, for the phases of `group`: `x[offset + k]` for the step's `offset`.
+    /// Frames past `frames`, up to a multiple of [`OVERRUN`], are read and written too, with
+    /// values that mean nothing.
+    ///
+    /// # Panics
+    /// If the group, `x` or `out` is too short for that.
+    pub(crate) fn run(
+        &self,
+        group: &PhaseGroup<T>,
+        x: &[T],
+        offsets: &[u32],
+        frames: usize,
+        out: &mut [T],
+        out_stride: usize,
+    ) {
+        let padded = frames.next_multiple_of(OVERRUN);
+        let reach = offsets.iter().max().map_or(0, |&offset| offset as usize + padded);
+        assert!((1..=4).contains(&group.width) && group.coefficients.len() == group.width * offsets.len());
+        assert!(reach <= x.len() && (group.width - 1) * out_stride + padded <= out.len());
+        let job = Job {
+            x: x.as_ptr(),
+            offsets: offsets.as_ptr(),
+            steps: offsets.len(),
+            coefficients: group.coefficients.as_ptr(),
+            out: out.as_mut_ptr(),
+            out_stride,
+            frames,
+        };
+        // SAFETY: the kernel was chosen for an available instruction set (`Isa::is_available`), and
+        // all its loads and stores lie within the bounds asserted above.
+        unsafe { self.by_width[group.width - 1](&job) }
+    }
+}
+
+/// One tile: P phases, R vectors of frames from frame `first` on.
+#[inline(always)]
+unsafe fn tile<V: Vector, const P: usize, const R: usize>(job: &Job<V::Sample>, first: usize, zero: V) {
+    // The compiler is spared the tiles that no call asks for.
+    if const { P * R > V::REGISTERS } {
+        return;
+    }
+    // SAFETY: the caller's, see `FirKernel::run`.
+    unsafe {
+        let mut sums = [[zero; R]; P];
+        let x = job.x.add(first);
+        for s in 0..job.steps {
+            let at = x.add(*job.offsets.add(s) as usize);
+            let mut inputs = [zero; R];
+            for (r, input) in inputs.iter_mut().enumerate() {
+                *input = V::load(at.add(r * V::LANES));
+            }
+            for (p, row) in sums.iter_mut().enumerate() {
+                let coefficient = V::splat(*job.coefficients.add(s * P + p));
+                for (sum, input) in row.iter_mut().zip(inputs) {
+                    *sum = input.mul_add(coefficient, *sum);
+                }
+            }
+        }
+        for (p, row) in sums.into_iter().enumerate() {
+            for (r, sum) in row.into_iter().enumerate() {
+                sum.store(job.out.add(p * job.out_stride + first + r * V::LANES));
+            }
+        }
+    }
+}
+
+/// All frames of a job, in tiles of nearly equal size so that no small one is left over.
+#[inline(always)]
+unsafe fn group<V: Vector, const P: usize>(job: &Job<V::Sample>, zero: V) {
+    let vectors = job.frames.div_ceil(V::LANES);
+    let tiles = vectors.div_ceil((V::REGISTERS / P).min(12));
+    let mut done = 0;
+    for t in 0..tiles {
+        let count = (vectors - done).div_ceil(tiles - t);
+        let first = done * V::LANES;
+        // SAFETY: as for this function; `count` vectors from `first` on are within the job.
+        unsafe {
+            match count {
+                1 => tile::<V, P, 1>(job, first, zero),
+                2 => tile::<V, P, 2>(job, first, zero),
+                3 => tile::<V, P, 3>(job, first, zero),
+                4 => tile::<V, P, 4>(job, first, zero),
+                5 => tile::<V, P, 5>(job, first, zero),
+                6 => tile::<V, P, 6>(job, first, zero),
+                7 => tile::<V, P, 7>(job, first, zero),
+                8 => tile::<V, P, 8>(job, first, zero),
+                9 => tile::<V, P, 9>(job, first, zero),
+                10 => tile::<V, P, 10>(job, first, zero),
+                11 => tile::<V, P, 11>(job, first, zero),
+                _ => tile::<V, P, 12>(job, first, zero),
+            }
+        }
+        done += count;
+    }
+}
+
+/// The four widths of one instruction set.
+macro_rules! kernels {
+    ($module:ident, $vector:ty, $sample:ty $(, $features:literal)?) => {
+        mod $module {
+            use super::*;
+
+            $(#[target_feature(enable = $features)])?
+            unsafe fn width<const P: usize>(job: &Job<$sample>) {
+                // SAFETY: the caller's, see `FirKernel::run`; the zero needs no memory.
+                unsafe { group::<$vector, P>(job, <$vector>::splat(0.0)) }
+            }
+
+            pub(super) const KERNEL: FirKernel<$sample> =
+                FirKernel { by_width: [width::<1>, width::<2>, width::<3>, width::<4>] };
+        }
+    };
+}
+
+kernels!(portable_f32, Portable<f32>, f32);
+kernels!(portable_f64, Portable<f64>, f64);
+#[cfg(target_arch = "x86_64")]
+kernels!(avx2_f32, Avx2F32, f32, "avx2,fma");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx2_f64, Avx2F64, f64, "avx2,fma");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx512_f32, Avx512F32, f32, "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx512_f64, Avx512F64, f64, "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma");
+
+impl FirKernel<f32> {
+    /// The kernel for an instruction set; the portable one where the processor does not have it.
+    pub(crate) fn for_f32(isa: Isa) -> Self {
+        match isa {
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 if isa.is_available() => avx2_f32::KERNEL,
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 if isa.is_available() => avx512_f32::KERNEL,
+            _ => portable_f32::KERNEL,
+        }
+    }
+}
+
+impl FirKernel<f64> {
+    /// The kernel for an instruction set; the portable one where the processor does not have it.
+    pub(crate) fn for_f64(isa: Isa) -> Self {
+        match isa {
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 if isa.is_available() => avx2_f64::KERNEL,
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 if isa.is_available() => avx512_f64::KERNEL,
+            _ => portable_f64::KERNEL,
+        }
+    }
+}

@@ -1,0 +1,340 @@
+//! The reconstructor against the definition.
+
+use super::*;
+use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use crate::io::{PcmFormat, PcmFrames, SampleLayout};
+use crate::spec::Method;
+use proptest::prelude::*;
+
+/// A generator whose stream never changes (Knuth's MMIX).
+pub(super) struct Noise(pub(super) u64);
+
+impl Noise {
+    pub(super) fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    pub(super) fn samples(&mut self, count: usize) -> Vec<f32> {
+        (0..count).map(|_| self.next() as f32).collect()
+    }
+}
+
+pub(super) fn fir_bank(taps: Vec<Vec<f64>>, ratio: usize) -> Bank {
+    bank(taps.len(), ratio, SynthesisFilters::Fir(taps))
+}
+
+fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
+    Bank {
+        spec: None,
+        fast_period: 1.0,
+        ratio,
+        latency: 3,
+        method: Method::Fir,
+        delays: vec![0.0; channels],
+        filters,
+        gamma: Gamma::default(),
+    }
+}
+
+pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
+    (0..channels).map(|_| (0..taps).map(|_| noise.next()).collect()).collect()
+}
+
+/// The scalar twin: the same sums in the same order, fused if the kernels fuse.
+fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32> {
+    let n = taps.len();
+    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap();
+    let ticks = input.len() / n;
+    let mut out = Vec::new();
+    for k in 0..ticks {
+        for p in 0..ratio {
+            let mut sum = 0f32;
+            for (i, f) in taps.iter().enumerate() {
+                for j in 0..lags {
+                    let c = f.get(p + j * ratio).copied().unwrap_or(0.0) as f32;
+                    let x = if j <= k { input[(k - j) * n + i] } else { 0.0 };
+                    sum = if fused { x.mul_add(c, sum) } else { x * c + sum };
+                }
+            }
+            out.push(sum);
+        }
+    }
+    out
+}
+
+/// The definition in f64.
+fn definition(taps: &[Vec<f64>], ratio: usize, input: &[f32]) -> Vec<f64> {
+    let n = taps.len();
+    let mut out = vec![0.0; input.len() / n * ratio];
+    for (t, y) in out.iter_mut().enumerate() {
+        for (i, f) in taps.iter().enumerate() {
+            *y += (0..=t / ratio)
+                .filter_map(|k| f.get(t - k * ratio).map(|c| c * f64::from(input[k * n + i])))
+                .sum::<f64>();
+        }
+    }
+    out
+}
+
+fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
+    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let mut out = vec![0.0; input.len() / stream.channels() * stream.ratio()];
+    assert_eq!(stream.process(input, &mut out).unwrap(), out.len());
+    out
+}
+
+fn available() -> impl Iterator<Item = Isa> {
+    [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter(|isa| isa.is_available())
+}
+
+fn fuses(isa: Isa) -> bool {
+    isa != Isa::Portable || cfg!(any(target_arch = "aarch64", target_feature = "fma"))
+}
+
+#[test]
+fn every_small_shape_has_the_bits_of_the_scalar_twin() {
+    let mut noise = Noise(1);
+    for n in 1..=9 {
+        for m in 1..=17 {
+            let taps = random_taps(n, 1 + (7 * n + 5 * m) % 40, &mut noise);
+            let input = noise.samples(n * (100 + 13 * m));
+            for isa in available() {
+                let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
+                assert_eq!(got, twin(&taps, m, &input, fuses(isa)), "N {n} M {m} {isa}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_tap_count_and_length_has_the_bits_of_the_scalar_twin() {
+    let mut noise = Noise(2);
+    for count in 1..=70 {
+        let taps = random_taps(2, count, &mut noise);
+        let input = noise.samples(2 * count);
+        let got = run(&fir_bank(taps.clone(), 2), Options::default(), &input);
+        assert_eq!(got, twin(&taps, 2, &input, fuses(Isa::detect())), "{count} taps");
+    }
+}
+
+#[test]
+fn many_channels_and_many_phases_work() {
+    let mut noise = Noise(3);
+    for (n, m) in [(40, 3), (3, 40), (33, 33)] {
+        let taps = random_taps(n, 3 * m + 1, &mut noise);
+        let input = noise.samples(n * 300);
+        let got = run(&fir_bank(taps.clone(), m), Options::default(), &input);
+        assert_eq!(got, twin(&taps, m, &input, fuses(Isa::detect())));
+    }
+}
+
+#[test]
+fn double_precision_is_double() {
+    let mut noise = Noise(4);
+    let taps = random_taps(4, 64, &mut noise);
+    let input = noise.samples(4 * 1000);
+    let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
+    let options = Options { precision: Precision::Double, ..Options::default() };
+    let mut stream = Reconstructor::with_options(&fir_bank(taps.clone(), 4), options).unwrap();
+    let mut out = vec![0.0; wide.len()];
+    stream.process_f64(&wide, &mut out).unwrap();
+    let worst = definition(&taps, 4, &input).iter().zip(&out).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    // 64 products below 1 and their sums: 64 roundings of numbers below 64.
+    assert!(worst < 64.0 * 64.0 * f64::EPSILON / 8.0, "{worst:e}");
+}
+
+#[test]
+fn an_impulse_brings_out_the_taps() {
+    let taps = vec![(1..=11).map(f64::from).collect(), (1..=7).map(|i| -f64::from(i)).collect()];
+    let mut input = vec![0.0; 2 * 8];
+    input[2 * 2] = 1.0;
+    let out = run(&fir_bank(taps.clone(), 3), Options::default(), &input);
+    assert_eq!(out[..6], [0.0; 6]);
+    assert_eq!(out[6..17], (1..=11).map(|i| i as f32).collect::<Vec<_>>());
+    assert_eq!(out[17..], [0.0; 7]);
+}
+
+#[test]
+fn resets_and_fresh_streams_have_the_bits_of_a_new_one() {
+    let mut noise = Noise(5);
+    for bank in [fir_bank(random_taps(3, 50, &mut noise), 4), rotation_bank()] {
+        let n = bank.channel_count();
+        let input = noise.samples(n * 777);
+        let want = run(&bank, Options::default(), &input);
+        let mut stream = Reconstructor::new(&bank).unwrap();
+        let mut out = vec![0.0; want.len()];
+        stream.process(&noise.samples(n * 123), &mut out).unwrap();
+        stream.fresh().process(&input, &mut out).unwrap();
+        assert_eq!(out, want);
+        stream.reset();
+        stream.process(&input, &mut out).unwrap();
+        assert_eq!(out, want);
+    }
+}
+
+#[test]
+fn a_clone_goes_on_from_the_same_place() {
+    let mut noise = Noise(6);
+    let mut stream = Reconstructor::new(&fir_bank(random_taps(2, 24, &mut noise), 2)).unwrap();
+    let mut out = [vec![0.0; 200], vec![0.0; 200]];
+    stream.process(&noise.samples(200), &mut out[0]).unwrap();
+    let mut twin = stream.clone();
+    let input = noise.samples(200);
+    stream.process(&input, &mut out[0]).unwrap();
+    twin.process(&input, &mut out[1]).unwrap();
+    assert_eq!(out[0], out[1]);
+}
+
+#[test]
+fn streams_may_change_threads() {
+    fn check<T: Send + Sync>() {}
+    check::<Reconstructor>();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+
+    #[test]
+    fn cuts_do_not_change_a_bit(
+        n in 1usize..6, m in 1usize..7, count in 1usize..60, seed: u64,
+        cuts in prop::collection::vec(0usize..900, 1..12), double: bool,
+    ) {
+        let mut noise = Noise(seed);
+        let precision = if double { Precision::Double } else { Precision::Single };
+        let bank = fir_bank(random_taps(n, count, &mut noise), m);
+        let mut stream = Reconstructor::with_options(&bank, Options { precision, ..Options::default() }).unwrap();
+        let input = noise.samples(n * cuts.iter().sum::<usize>());
+        let mut whole = vec![0.0; input.len() / n * m];
+        stream.process(&input, &mut whole).unwrap();
+        stream.reset();
+        let mut pieces = vec![0.0; whole.len()];
+        let (mut from, mut to) = (&input[..], &mut pieces[..]);
+        for cut in cuts {
+            let (head, tail) = to.split_at_mut(cut * m);
+            prop_assert_eq!(stream.process(&from[..cut * n], head).unwrap(), cut * m);
+            (from, to) = (&from[cut * n..], tail);
+        }
+        prop_assert_eq!(pieces, whole);
+    }
+
+    #[test]
+    fn every_form_of_bytes_gives_the_same_samples(
+        n in 1usize..5, m in 1usize..5, which in 0usize..12, out_which in 0usize..12, seed: u64, ticks in 0usize..300,
+    ) {
+        let (format, out_format) = (PcmFormat::ALL[which], PcmFormat::ALL[out_which]);
+        let mut noise = Noise(seed);
+        let bank = fir_bank(random_taps(n, 13, &mut noise), m);
+        let mut bytes = vec![0; n * ticks * format.bytes()];
+        for slot in bytes.chunks_exact_mut(format.bytes()) {
+            format.encode(noise.next(), slot);
+        }
+        let input: Vec<f32> = bytes.chunks_exact(format.bytes()).map(|b| format.decode(b) as f32).collect();
+        let want = run(&bank, Options::default(), &input);
+        let layout = SampleLayout::packed(format);
+        let rows: Vec<Vec<u8>> = (0..n).map(|i| {
+            bytes.chunks_exact(format.bytes()).skip(i).step_by(n).flatten().copied().collect()
+        }).collect();
+        let planar: Vec<_> = rows.iter().map(|row| PcmFrames { layout, channels: 1, bytes: row }).collect();
+        for ticks in [&[PcmFrames { layout, channels: n, bytes: &bytes }][..], &planar] {
+            let mut stream = Reconstructor::new(&bank).unwrap();
+            let mut out = vec![0; want.len() * out_format.bytes()];
+            let mut output = PcmOutput { format: out_format, bytes: &mut out, clipped: 0 };
+            prop_assert_eq!(stream.process_pcm(ticks, &mut output).unwrap(), want.len());
+            let clipped = output.clipped;
+            let mut expected = vec![0; out.len()];
+            let clips = want.iter().zip(expected.chunks_exact_mut(out_format.bytes()))
+                .map(|(y, slot)| out_format.encode(f64::from(*y), slot)).filter(|&clipped| clipped).count();
+            prop_assert_eq!(&out, &expected);
+            prop_assert_eq!(clipped, clips as u64);
+        }
+    }
+}
+
+/// Two states that turn by one radian and shrink a little; c picks them, d passes input on.
+fn rotation_bank() -> Bank {
+    let (s, c) = 1f64.sin_cos();
+    let filter = BlockFilter {
+        a: vec![vec![0.9 * c, -0.9 * s], vec![0.9 * s, 0.9 * c]],
+        b: vec![vec![1.0], vec![0.0]],
+        c: vec![vec![1.0, 0.0], vec![0.0, 1.0], vec![1.0, 1.0]],
+        d: vec![vec![0.5], vec![0.0], vec![-1.0]],
+    };
+    bank(1, 3, SynthesisFilters::StateSpace(filter))
+}
+
+#[test]
+fn a_state_space_bank_has_the_response_of_its_matrices() {
+    let out = run(&rotation_bank(), Options::default(), &[1.0, 0.0, 0.0, 0.0]);
+    assert_eq!(out[..3], [0.5, 0.0, -1.0]);
+    for k in 1..4 {
+        let (s, c) = (k as f64 - 1.0).sin_cos();
+        let r = 0.9f64.powi(k as i32 - 1);
+        for (got, want) in out[3 * k..].iter().zip([r * c, r * s, r * (c + s)]) {
+            assert!((f64::from(*got) - want).abs() < 1e-7, "tick {k}: {got} for {want}");
+        }
+    }
+}
+
+#[test]
+fn a_recursion_survives_what_is_not_finite() {
+    let mut stream = Reconstructor::new(&rotation_bank()).unwrap();
+    let mut out = vec![0.0; 300];
+    stream.process(&[f32::NAN], &mut out).unwrap();
+    assert_eq!(stream.state_resets(), 1);
+    let input = Noise(7).samples(100);
+    stream.process(&input, &mut out).unwrap();
+    assert_eq!(out, run(&rotation_bank(), Options::default(), &input));
+}
+
+#[test]
+fn bytes_that_are_not_finite_become_zero_and_are_counted() {
+    let bank = fir_bank(vec![vec![1.0]], 1);
+    let bytes: Vec<u8> =
+        [1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 2.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let mut stream = Reconstructor::new(&bank).unwrap();
+    let mut out = vec![0; 20];
+    let layout = SampleLayout::packed(PcmFormat::F32Le);
+    let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut out, clipped: 0 };
+    stream.process_pcm(&[PcmFrames { layout, channels: 1, bytes: &bytes }], &mut output).unwrap();
+    assert_eq!(stream.replaced(), 3);
+    assert_eq!(out, [1f32, 0.0, 0.0, 0.0, 2.0].map(f32::to_le_bytes).concat());
+}
+
+#[test]
+fn calls_and_banks_that_do_not_fit_are_refused() {
+    let bank = fir_bank(vec![vec![1.0], vec![1.0]], 2);
+    let mut stream = Reconstructor::new(&bank).unwrap();
+    let mut out = [0.0; 3];
+    assert_eq!(stream.process(&[0.0; 3], &mut out), Err(ProcessError::CutTick { samples: 3, channels: 2 }));
+    assert_eq!(
+        stream.process(&[0.0; 4], &mut out),
+        Err(ProcessError::OutputTooShort { given: 3, wanted: 4 })
+    );
+    assert_eq!(stream.process(&[], &mut out), Ok(0));
+    let mut output = PcmOutput { format: PcmFormat::S8, bytes: &mut [], clipped: 0 };
+    assert_eq!(stream.process_pcm(&[], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
+
+    let refused = |bank: Bank| Reconstructor::new(&bank).unwrap_err();
+    assert_eq!(refused(Bank { ratio: 0, ..bank.clone() }), BuildError::NoRatio);
+    assert_eq!(refused(fir_bank(vec![], 2)), BuildError::NoChannels);
+    assert_eq!(
+        refused(Bank { delays: vec![0.0], ..bank.clone() }),
+        BuildError::FilterCount { delays: 1, filters: 2 }
+    );
+    // Finite in f64, infinite in f32.
+    assert!(matches!(refused(fir_bank(vec![vec![0.0, 1e300]], 2)), BuildError::NotFinite { index: 1, .. }));
+    let mut wrong = rotation_bank();
+    if let SynthesisFilters::StateSpace(filter) = &mut wrong.filters {
+        filter.c.pop();
+    }
+    assert!(
+        refused(wrong).to_string().contains("matrix c of the state-space filters is 2 x 2; 3 x 2 is needed")
+    );
+}
+
+#[test]
+fn empty_filters_give_silence() {
+    let out = run(&fir_bank(vec![vec![], vec![]], 2), Options::default(), &[1.0; 20]);
+    assert_eq!(out, [0.0; 20]);
+}
