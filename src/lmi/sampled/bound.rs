@@ -15,36 +15,48 @@ use super::basis::Basis;
 use super::prepare::Reduced;
 use super::problem::{Problem, Taps};
 use crate::linalg::blocks::Blocks;
-use crate::linalg::{self, CMat, Complex};
+use crate::linalg::{self, CMat, Complex, Mat};
 
 /// Cuts tried for telling weak directions of tap space from rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
-/// Taps up to this many times the size of the solution (or of unit gain) are covered by the bound.
+/// Where the data do not confine the taps: up to this many times the size of the solution (or of unit
+/// gain) they are covered by the bound.
 const RADIUS_FACTOR: f64 = 1e3;
+/// Safety on a radius that was computed in floating point from the data.
+const RADIUS_SAFETY: f64 = 1.01;
 /// Rounding errors of the three sums, in units of the machine precision times the sum of moduli.
 const ROUNDING: f64 = 16.0;
 
 /// A proven lower bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowerBound {
-    /// `gamma(F) >= value` for all taps within the radius; never negative.
+    /// `gamma(F) >= value` for all taps covered; never negative.
     pub value: f64,
     /// Norm of the residual r, each channel scaled by its strength.
     pub residual: f64,
-    /// The taps covered: `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2) <= radius`, `s_i` the largest row norm of
-    /// channel i over the points.
-    pub radius: f64,
+    /// The taps covered.
+    pub covered: Covered,
+}
+
+/// Which taps a lower bound speaks of. The size of taps is `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with
+/// `s_i` the largest row norm of channel i over the points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Covered {
+    /// All: larger taps have a larger worst case by themselves.
+    All,
+    /// Taps of at most this size.
+    Within(f64),
 }
 
 impl LowerBound {
     /// The bound nobody can dispute.
     pub(super) fn zero() -> Self {
-        Self { value: 0.0, residual: 0.0, radius: f64::INFINITY }
+        Self { value: 0.0, residual: 0.0, covered: Covered::All }
     }
 }
 
 /// Proves a lower bound on the optimum of `problem` from any dual matrices, one for each point (each
-/// M x q), for all taps within `radius` (see [`LowerBound`]). Uses nothing but the data and the
+/// M x q), for all taps within `radius` (see [`Covered`]). Uses nothing but the data and the
 /// inequality in the module's text; sums are charged with their rounding errors.
 ///
 /// Fails if the number or the size of the matrices does not fit.
@@ -67,7 +79,7 @@ pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<Lowe
     let rounding = ROUNDING * f64::EPSILON * (moduli + nuclear * terms.sqrt() * f64::EPSILON);
     let proven = (value - residual * radius - rounding) / (nuclear * (1.0 + ROUNDING * f64::EPSILON));
     let value = if proven.is_finite() { proven.max(0.0) } else { 0.0 };
-    Ok(LowerBound { value, residual, radius })
+    Ok(LowerBound { value, residual, covered: Covered::Within(radius) })
 }
 
 fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError> {
@@ -118,19 +130,41 @@ fn strengths(problem: &Problem) -> Vec<f64> {
     (0..problem.channels()).map(|i| norms(i).fold(0.0, f64::max)).collect()
 }
 
-/// The radius that covers every bank worth having: far beyond the taps found and beyond unit gain.
-pub(super) fn radius(problem: &Problem, taps: &Taps) -> f64 {
+/// Size of the taps, see [`Covered`].
+fn size(problem: &Problem, taps: &Taps) -> f64 {
     let strength = strengths(problem);
-    let mut square = 0.0;
-    for f in taps {
-        for (i, s) in strength.iter().enumerate() {
-            square += (s * f.column(i).norm()).powi(2);
-        }
-    }
-    let wanted = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
-    RADIUS_FACTOR * square.sqrt().max(wanted)
+    let square =
+        |f: &Mat| -> f64 { strength.iter().enumerate().map(|(i, s)| (s * f.column(i).norm()).powi(2)).sum() };
+    taps.iter().map(square).sum::<f64>().sqrt()
 }
 
+/// The radius to prove the bound for. Taps with a worst case below `gamma` satisfy
+/// `sum_l ||F H_l||_F^2 <= sum_l (||W_l||_F + sqrt(M) gamma)^2`, which confines them if the map from
+/// taps to responses is injective: then no others matter. Otherwise, or if that says little, far
+/// beyond the taps found and beyond unit gain.
+pub(super) fn cover(
+    problem: &Problem,
+    reduced: &Reduced,
+    basis: &Basis,
+    (taps, gamma): (&Taps, f64),
+) -> Result<(f64, Covered), SampledError> {
+    let wanted = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
+    let stated = RADIUS_FACTOR * size(problem, taps).max(wanted);
+    let spread = (problem.rows() as f64).sqrt() * gamma;
+    let image = problem.points().iter().map(|p| (p.w.norm() + spread).powi(2)).sum::<f64>().sqrt();
+    let confined = RADIUS_SAFETY * image * basis.inverse_norm() * mix_norm(problem, reduced)?;
+    Ok(if confined < stated { (confined, Covered::All) } else { (stated, Covered::Within(stated)) })
+}
+
+/// Largest growth from reduced taps to the size of taps; infinite if channels had to be dropped.
+fn mix_norm(problem: &Problem, reduced: &Reduced) -> Result<f64, SampledError> {
+    let strength = strengths(problem);
+    if reduced.mix.nrows() < strength.iter().filter(|s| **s > 0.0).count() {
+        return Ok(f64::INFINITY);
+    }
+    let scaled = Mat::from_fn(reduced.mix.nrows(), strength.len(), |r, i| reduced.mix[(r, i)] * strength[i]);
+    Ok(linalg::singular_values(&scaled)?.first().copied().unwrap_or(0.0))
+}
 /// The best bound that the dual iterate `z` (blocks of order M + k1) gives, with its matrices `Y_l`.
 ///
 /// At an optimum `Z11` sits on the worst singular vectors, and `Y = [-Z12, Z11 W_rest]` in compressed
@@ -140,14 +174,14 @@ pub(super) fn from_iterate(
     reduced: &Reduced,
     basis: &Basis,
     z: &Blocks,
-    radius: f64,
+    (radius, covered): (f64, Covered),
 ) -> Result<(LowerBound, Vec<CMat>), SampledError> {
     let mut best = (LowerBound::zero(), zero_dual(problem));
     for cut in CUTS {
         let dual = dual_matrices(reduced, basis, z, cut);
         let bound = lower_bound(problem, &dual, radius)?;
         if bound.value > best.0.value {
-            best = (bound, dual);
+            best = (LowerBound { covered, ..bound }, dual);
         }
     }
     Ok(best)
