@@ -24,7 +24,8 @@ const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
 const RADIUS_FACTOR: f64 = 1e3;
 /// Safety on a radius that was computed in floating point from the data.
 const RADIUS_SAFETY: f64 = 1.01;
-/// Rounding errors of the three sums, in units of the machine precision times the sum of moduli.
+/// Units of the machine precision charged for each operation of a sum besides its length: products,
+/// phases, singular values.
 const ROUNDING: f64 = 16.0;
 
 /// A proven lower bound.
@@ -65,21 +66,32 @@ pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<Lowe
     if dual.len() != points.len() {
         return Err(SampledError::Count { name: "dual matrices", given: dual.len(), points: points.len() });
     }
-    let (mut value, mut nuclear, mut moduli) = (0.0, 0.0, 0.0);
-    for (l, (y, point)) in dual.iter().zip(points).enumerate() {
+    let mut nuclear = 0.0;
+    for (l, y) in dual.iter().enumerate() {
         check_shape(problem, l, y)?;
         nuclear += linalg::singular_values_c(y)?.iter().sum::<f64>();
-        for (a, b) in y.iter().zip(point.w.iter()) {
-            value += (a.conj() * b).re;
-            moduli += a.norm() * b.norm();
-        }
     }
+    let value = pairwise(0..points.len(), &|l| re_inner(&dual[l], &points[l].w));
+    let moduli: f64 = dual.iter().zip(points).map(|(y, p)| y.norm() * p.w.norm()).sum();
+    let depth = ROUNDING + (problem.rows() * problem.inputs()) as f64 + (points.len() as f64).log2();
     let residual = residual_norm(problem, dual);
-    let terms = (points.len() * problem.rows() * problem.inputs()) as f64;
-    let rounding = ROUNDING * f64::EPSILON * (moduli + nuclear * terms.sqrt() * f64::EPSILON);
-    let proven = (value - residual * radius - rounding) / (nuclear * (1.0 + ROUNDING * f64::EPSILON));
+    let charged = value - residual * radius - depth * f64::EPSILON * moduli;
+    let proven = charged / (nuclear * (1.0 + (ROUNDING + points.len() as f64) * f64::EPSILON));
     let value = if proven.is_finite() { proven.max(0.0) } else { 0.0 };
     Ok(LowerBound { value, residual, covered: Covered::Within(radius) })
+}
+
+/// Sum by halves: its rounding error grows with the logarithm of the number of terms only.
+fn pairwise<T: std::ops::Add<Output = T>>(range: std::ops::Range<usize>, term: &impl Fn(usize) -> T) -> T {
+    let middle = range.start + range.len() / 2;
+    if middle == range.start {
+        return term(range.start);
+    }
+    pairwise(range.start..middle, term) + pairwise(middle..range.end, term)
+}
+
+fn re_inner(a: &CMat, b: &CMat) -> f64 {
+    a.iter().zip(b.iter()).map(|(x, y)| x.re * y.re + x.im * y.im).sum()
 }
 
 fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError> {
@@ -100,29 +112,35 @@ fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError
 
 /// Norm of `r_{p,i,j} / s_i` plus what rounding may hide in it.
 fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
-    let strength = strengths(problem);
-    let (m, n) = (problem.rows(), problem.channels());
-    let products: Vec<CMat> = dual.iter().zip(problem.points()).map(|(y, p)| y * p.h.adjoint()).collect();
-    let mut square = 0.0;
-    let mut moduli = 0.0;
-    for j in 0..problem.max_lags() {
-        let mut r = CMat::zeros(m, n);
-        for (product, point) in products.iter().zip(problem.points()) {
-            r += product * Complex::from_polar(1.0, point.omega * j as f64);
-        }
-        for p in (0..m).filter(|&p| j < problem.lags()[p]) {
-            for i in (0..n).filter(|&i| strength[i] > 0.0) {
-                square += (r[(p, i)].re / strength[i]).powi(2);
+    let (m, lags) = (problem.rows(), problem.max_lags());
+    if lags == 0 {
+        return 0.0;
+    }
+    let scaled: Vec<CMat> = strengths(problem)
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| **s > 0.0)
+        .fold(vec![Vec::new(); problem.points().len()], |mut rows, (i, s)| {
+            for (row, p) in rows.iter_mut().zip(problem.points()) {
+                row.push(p.h.row(i) / Complex::new(*s, 0.0));
             }
-        }
+            rows
+        })
+        .iter()
+        .map(|rows| if rows.is_empty() { CMat::zeros(0, problem.inputs()) } else { CMat::from_rows(rows) })
+        .collect();
+    let products: Vec<CMat> = dual.iter().zip(&scaled).map(|(y, h)| y * h.adjoint()).collect();
+    let mut square = 0.0;
+    for j in 0..lags {
+        let term = |l: usize| &products[l] * Complex::from_polar(1.0, problem.points()[l].omega * j as f64);
+        let r = pairwise(0..products.len(), &term);
+        let rows = (0..m).filter(|&p| j < problem.lags()[p]);
+        square += rows.map(|p| r.row(p).iter().map(|z| z.re * z.re).sum::<f64>()).sum::<f64>();
     }
-    for (y, point) in dual.iter().zip(problem.points()) {
-        let scaled =
-            (0..n).filter(|&i| strength[i] > 0.0).map(|i| (point.h.row(i).norm() / strength[i]).powi(2));
-        moduli += y.norm() * scaled.sum::<f64>().sqrt();
-    }
-    // Each r is a sum with relative errors of a few units in each term, phases included.
-    square.sqrt() + f64::EPSILON * moduli * (problem.max_lags() as f64).sqrt()
+    let moduli: f64 = dual.iter().zip(&scaled).map(|(y, h)| y.norm() * h.norm()).sum();
+    let angle = problem.points().iter().map(|p| p.omega.abs()).fold(0.0, f64::max) * lags as f64;
+    let depth = ROUNDING + problem.inputs() as f64 + (products.len() as f64).log2() + angle;
+    square.sqrt() + depth * f64::EPSILON * moduli * (lags as f64).sqrt()
 }
 
 fn strengths(problem: &Problem) -> Vec<f64> {

@@ -24,13 +24,14 @@ fn check(problem: &Problem, s: &Solution) {
 
 fn report(name: &str, problem: &Problem, s: &Solution, seconds: f64) {
     println!(
-        "{name}: {:?} gamma {:.10} lower {:.10} gap {:.1e} steps {} residual {:.1e} {} unknowns {} points {:.3} s",
+        "{name}: {:?} gamma {:.10} lower {:.10} gap {:.1e} steps {} residual {:.1e} {:?} {} unknowns {} points {:.3} s",
         s.stop,
         s.gamma,
         s.lower.value,
         s.relative_gap(),
         s.steps.len(),
         s.lower.residual,
+        s.lower.covered,
         problem.lags().iter().sum::<usize>() * problem.channels(),
         problem.points().len(),
         seconds
