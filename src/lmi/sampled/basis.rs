@@ -5,6 +5,9 @@ use super::prepare::Reduced;
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, LinalgError, Mat, Svd};
 
+/// Singular values below this, relative to the largest, cannot be told from zero.
+const INJECTIVE: f64 = 1e-12;
+
 /// The map from one row's taps to that row of `F(omega_l) h_l`, as a QR factorisation that serves all
 /// numbers of lags (columns are ordered by lag), with an SVD of each triangle in use.
 #[derive(Debug, Clone)]
@@ -21,7 +24,7 @@ impl Basis {
         let (l, q) = linalg::lq(&map.transpose());
         let (q, r) = (q.transpose(), l.transpose());
         let mut triangles: Vec<(usize, Svd)> = Vec::new();
-        for &lags in &reduced.layout.lags {
+        for &lags in reduced.layout.lags.iter().filter(|lags| **lags > 0) {
             if triangles.iter().all(|(have, _)| *have != lags) {
                 let cols = reduced.layout.channels * lags;
                 let rows = cols.min(r.nrows());
@@ -31,10 +34,22 @@ impl Basis {
         Ok(Self { q, triangles, weights })
     }
 
-    fn triangle(&self, lags: usize) -> (&Svd, usize) {
-        // Every number of lags of the layout was entered by `new`.
-        let svd = self.triangles.iter().find(|(have, _)| *have == lags).map(|(_, svd)| svd);
-        svd.map_or_else(|| (&self.triangles[0].1, 0), |svd| (svd, svd.s.len()))
+    /// The triangle for a number of lags; none for a row without taps.
+    fn triangle(&self, lags: usize) -> Option<&Svd> {
+        self.triangles.iter().find(|(have, _)| *have == lags).map(|(_, svd)| svd)
+    }
+
+    /// `1 / sigma_min` of the map from one row's taps to responses (the longest row counts: the others
+    /// are restrictions of it); infinite unless the map is injective beyond rounding errors.
+    pub(super) fn inverse_norm(&self) -> f64 {
+        let longest = self.triangles.iter().max_by_key(|(lags, _)| *lags).map(|(_, svd)| svd);
+        let Some(svd) = longest else { return 0.0 };
+        match (svd.s.first(), svd.s.last()) {
+            (Some(most), Some(least)) if svd.s.len() == svd.v.nrows() && *least > INJECTIVE * most => {
+                1.0 / least
+            }
+            _ => f64::INFINITY,
+        }
     }
 
     /// Taps of all rows that minimise `sum_l weights_l^2 ||w_l - F h_l||_F^2`, least norm among
@@ -42,8 +57,8 @@ impl Basis {
     pub(super) fn least_squares(&self, reduced: &Reduced, w: &Blocks, cut: f64) -> Vec<f64> {
         let mut x = vec![0.0; reduced.layout.unknowns()];
         for p in 0..reduced.layout.rows {
-            let (svd, rank) = self.triangle(reduced.layout.lags[p]);
-            let (u, kept) = (&svd.u, kept(svd, cut, rank));
+            let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
+            let (u, kept) = (&svd.u, kept(svd, cut));
             let seen = self.q.columns(0, u.nrows()).tr_mul(&row_vector(w, p, &self.weights));
             let mut c = u.columns(0, kept).tr_mul(&seen);
             for (value, s) in c.iter_mut().zip(&svd.s) {
@@ -59,8 +74,8 @@ impl Basis {
     /// Only meaningful for a basis with unit weights.
     pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Blocks, cut: f64) {
         for p in 0..reduced.layout.rows {
-            let (svd, rank) = self.triangle(reduced.layout.lags[p]);
-            let u = svd.u.columns(0, kept(svd, cut, rank));
+            let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
+            let u = svd.u.columns(0, kept(svd, cut));
             let q = self.q.columns(0, svd.u.nrows());
             let mut row = row_vector(y, p, &self.weights);
             for _ in 0..2 {
@@ -72,9 +87,9 @@ impl Basis {
     }
 }
 
-fn kept(svd: &Svd, cut: f64, rank: usize) -> usize {
+fn kept(svd: &Svd, cut: f64) -> usize {
     let floor = cut * svd.s.first().copied().unwrap_or(0.0);
-    svd.s.iter().take(rank).filter(|s| **s > floor).count()
+    svd.s.iter().filter(|s| **s > floor).count()
 }
 
 /// Rows: real parts of all (point, input), then imaginary parts. Columns: lag by lag, channels inside.

@@ -15,36 +15,49 @@ use super::basis::Basis;
 use super::prepare::Reduced;
 use super::problem::{Problem, Taps};
 use crate::linalg::blocks::Blocks;
-use crate::linalg::{self, CMat, Complex};
+use crate::linalg::{self, CMat, Complex, Mat};
 
 /// Cuts tried for telling weak directions of tap space from rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
-/// Taps up to this many times the size of the solution (or of unit gain) are covered by the bound.
+/// Where the data do not confine the taps: up to this many times the size of the solution (or of unit
+/// gain) they are covered by the bound.
 const RADIUS_FACTOR: f64 = 1e3;
-/// Rounding errors of the three sums, in units of the machine precision times the sum of moduli.
+/// Safety on a radius that was computed in floating point from the data.
+const RADIUS_SAFETY: f64 = 1.01;
+/// Units of the machine precision charged for each operation of a sum besides its length: products,
+/// phases, singular values.
 const ROUNDING: f64 = 16.0;
 
 /// A proven lower bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowerBound {
-    /// `gamma(F) >= value` for all taps within the radius; never negative.
+    /// `gamma(F) >= value` for all taps covered; never negative.
     pub value: f64,
     /// Norm of the residual r, each channel scaled by its strength.
     pub residual: f64,
-    /// The taps covered: `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2) <= radius`, `s_i` the largest row norm of
-    /// channel i over the points.
-    pub radius: f64,
+    /// The taps covered.
+    pub covered: Covered,
+}
+
+/// Which taps a lower bound speaks of. The size of taps is `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with
+/// `s_i` the largest row norm of channel i over the points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Covered {
+    /// All: larger taps have a larger worst case by themselves.
+    All,
+    /// Taps of at most this size.
+    Within(f64),
 }
 
 impl LowerBound {
     /// The bound nobody can dispute.
     pub(super) fn zero() -> Self {
-        Self { value: 0.0, residual: 0.0, radius: f64::INFINITY }
+        Self { value: 0.0, residual: 0.0, covered: Covered::All }
     }
 }
 
 /// Proves a lower bound on the optimum of `problem` from any dual matrices, one for each point (each
-/// M x q), for all taps within `radius` (see [`LowerBound`]). Uses nothing but the data and the
+/// M x q), for all taps within `radius` (see [`Covered`]). Uses nothing but the data and the
 /// inequality in the module's text; sums are charged with their rounding errors.
 ///
 /// Fails if the number or the size of the matrices does not fit.
@@ -53,21 +66,32 @@ pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<Lowe
     if dual.len() != points.len() {
         return Err(SampledError::Count { name: "dual matrices", given: dual.len(), points: points.len() });
     }
-    let (mut value, mut nuclear, mut moduli) = (0.0, 0.0, 0.0);
-    for (l, (y, point)) in dual.iter().zip(points).enumerate() {
+    let mut nuclear = 0.0;
+    for (l, y) in dual.iter().enumerate() {
         check_shape(problem, l, y)?;
         nuclear += linalg::singular_values_c(y)?.iter().sum::<f64>();
-        for (a, b) in y.iter().zip(point.w.iter()) {
-            value += (a.conj() * b).re;
-            moduli += a.norm() * b.norm();
-        }
     }
+    let value = pairwise(0..points.len(), &|l| re_inner(&dual[l], &points[l].w));
+    let moduli: f64 = dual.iter().zip(points).map(|(y, p)| y.norm() * p.w.norm()).sum();
+    let depth = ROUNDING + (problem.rows() * problem.inputs()) as f64 + (points.len() as f64).log2();
     let residual = residual_norm(problem, dual);
-    let terms = (points.len() * problem.rows() * problem.inputs()) as f64;
-    let rounding = ROUNDING * f64::EPSILON * (moduli + nuclear * terms.sqrt() * f64::EPSILON);
-    let proven = (value - residual * radius - rounding) / (nuclear * (1.0 + ROUNDING * f64::EPSILON));
+    let charged = value - residual * radius - depth * f64::EPSILON * moduli;
+    let proven = charged / (nuclear * (1.0 + (ROUNDING + points.len() as f64) * f64::EPSILON));
     let value = if proven.is_finite() { proven.max(0.0) } else { 0.0 };
-    Ok(LowerBound { value, residual, radius })
+    Ok(LowerBound { value, residual, covered: Covered::Within(radius) })
+}
+
+/// Sum by halves: its rounding error grows with the logarithm of the number of terms only.
+fn pairwise<T: std::ops::Add<Output = T>>(range: std::ops::Range<usize>, term: &impl Fn(usize) -> T) -> T {
+    let middle = range.start + range.len() / 2;
+    if middle == range.start {
+        return term(range.start);
+    }
+    pairwise(range.start..middle, term) + pairwise(middle..range.end, term)
+}
+
+fn re_inner(a: &CMat, b: &CMat) -> f64 {
+    a.iter().zip(b.iter()).map(|(x, y)| x.re * y.re + x.im * y.im).sum()
 }
 
 fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError> {
@@ -88,29 +112,35 @@ fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError
 
 /// Norm of `r_{p,i,j} / s_i` plus what rounding may hide in it.
 fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
-    let strength = strengths(problem);
-    let (m, n) = (problem.rows(), problem.channels());
-    let products: Vec<CMat> = dual.iter().zip(problem.points()).map(|(y, p)| y * p.h.adjoint()).collect();
-    let mut square = 0.0;
-    let mut moduli = 0.0;
-    for j in 0..problem.max_lags() {
-        let mut r = CMat::zeros(m, n);
-        for (product, point) in products.iter().zip(problem.points()) {
-            r += product * Complex::from_polar(1.0, point.omega * j as f64);
-        }
-        for p in (0..m).filter(|&p| j < problem.lags()[p]) {
-            for i in (0..n).filter(|&i| strength[i] > 0.0) {
-                square += (r[(p, i)].re / strength[i]).powi(2);
+    let (m, lags) = (problem.rows(), problem.max_lags());
+    if lags == 0 {
+        return 0.0;
+    }
+    let scaled: Vec<CMat> = strengths(problem)
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| **s > 0.0)
+        .fold(vec![Vec::new(); problem.points().len()], |mut rows, (i, s)| {
+            for (row, p) in rows.iter_mut().zip(problem.points()) {
+                row.push(p.h.row(i) / Complex::new(*s, 0.0));
             }
-        }
+            rows
+        })
+        .iter()
+        .map(|rows| if rows.is_empty() { CMat::zeros(0, problem.inputs()) } else { CMat::from_rows(rows) })
+        .collect();
+    let products: Vec<CMat> = dual.iter().zip(&scaled).map(|(y, h)| y * h.adjoint()).collect();
+    let mut square = 0.0;
+    for j in 0..lags {
+        let term = |l: usize| &products[l] * Complex::from_polar(1.0, problem.points()[l].omega * j as f64);
+        let r = pairwise(0..products.len(), &term);
+        let rows = (0..m).filter(|&p| j < problem.lags()[p]);
+        square += rows.map(|p| r.row(p).iter().map(|z| z.re * z.re).sum::<f64>()).sum::<f64>();
     }
-    for (y, point) in dual.iter().zip(problem.points()) {
-        let scaled =
-            (0..n).filter(|&i| strength[i] > 0.0).map(|i| (point.h.row(i).norm() / strength[i]).powi(2));
-        moduli += y.norm() * scaled.sum::<f64>().sqrt();
-    }
-    // Each r is a sum with relative errors of a few units in each term, phases included.
-    square.sqrt() + f64::EPSILON * moduli * (problem.max_lags() as f64).sqrt()
+    let moduli: f64 = dual.iter().zip(&scaled).map(|(y, h)| y.norm() * h.norm()).sum();
+    let angle = problem.points().iter().map(|p| p.omega.abs()).fold(0.0, f64::max) * lags as f64;
+    let depth = ROUNDING + problem.inputs() as f64 + (products.len() as f64).log2() + angle;
+    square.sqrt() + depth * f64::EPSILON * moduli * (lags as f64).sqrt()
 }
 
 fn strengths(problem: &Problem) -> Vec<f64> {
@@ -118,19 +148,41 @@ fn strengths(problem: &Problem) -> Vec<f64> {
     (0..problem.channels()).map(|i| norms(i).fold(0.0, f64::max)).collect()
 }
 
-/// The radius that covers every bank worth having: far beyond the taps found and beyond unit gain.
-pub(super) fn radius(problem: &Problem, taps: &Taps) -> f64 {
+/// Size of the taps, see [`Covered`].
+fn size(problem: &Problem, taps: &Taps) -> f64 {
     let strength = strengths(problem);
-    let mut square = 0.0;
-    for f in taps {
-        for (i, s) in strength.iter().enumerate() {
-            square += (s * f.column(i).norm()).powi(2);
-        }
-    }
-    let wanted = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
-    RADIUS_FACTOR * square.sqrt().max(wanted)
+    let square =
+        |f: &Mat| -> f64 { strength.iter().enumerate().map(|(i, s)| (s * f.column(i).norm()).powi(2)).sum() };
+    taps.iter().map(square).sum::<f64>().sqrt()
 }
 
+/// The radius to prove the bound for. Taps with a worst case below `gamma` satisfy
+/// `sum_l ||F H_l||_F^2 <= sum_l (||W_l||_F + sqrt(M) gamma)^2`, which confines them if the map from
+/// taps to responses is injective: then no others matter. Otherwise, or if that says little, far
+/// beyond the taps found and beyond unit gain.
+pub(super) fn cover(
+    problem: &Problem,
+    reduced: &Reduced,
+    basis: &Basis,
+    (taps, gamma): (&Taps, f64),
+) -> Result<(f64, Covered), SampledError> {
+    let wanted = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
+    let stated = RADIUS_FACTOR * size(problem, taps).max(wanted);
+    let spread = (problem.rows() as f64).sqrt() * gamma;
+    let image = problem.points().iter().map(|p| (p.w.norm() + spread).powi(2)).sum::<f64>().sqrt();
+    let confined = RADIUS_SAFETY * image * basis.inverse_norm() * mix_norm(problem, reduced)?;
+    Ok(if confined < stated { (confined, Covered::All) } else { (stated, Covered::Within(stated)) })
+}
+
+/// Largest growth from reduced taps to the size of taps; infinite if channels had to be dropped.
+fn mix_norm(problem: &Problem, reduced: &Reduced) -> Result<f64, SampledError> {
+    let strength = strengths(problem);
+    if reduced.mix.nrows() < strength.iter().filter(|s| **s > 0.0).count() {
+        return Ok(f64::INFINITY);
+    }
+    let scaled = Mat::from_fn(reduced.mix.nrows(), strength.len(), |r, i| reduced.mix[(r, i)] * strength[i]);
+    Ok(linalg::singular_values(&scaled)?.first().copied().unwrap_or(0.0))
+}
 /// The best bound that the dual iterate `z` (blocks of order M + k1) gives, with its matrices `Y_l`.
 ///
 /// At an optimum `Z11` sits on the worst singular vectors, and `Y = [-Z12, Z11 W_rest]` in compressed
@@ -140,14 +192,14 @@ pub(super) fn from_iterate(
     reduced: &Reduced,
     basis: &Basis,
     z: &Blocks,
-    radius: f64,
+    (radius, covered): (f64, Covered),
 ) -> Result<(LowerBound, Vec<CMat>), SampledError> {
     let mut best = (LowerBound::zero(), zero_dual(problem));
     for cut in CUTS {
         let dual = dual_matrices(reduced, basis, z, cut);
         let bound = lower_bound(problem, &dual, radius)?;
         if bound.value > best.0.value {
-            best = (bound, dual);
+            best = (LowerBound { covered, ..bound }, dual);
         }
     }
     Ok(best)

@@ -42,7 +42,7 @@ mod problem;
 mod tests;
 mod worst_case;
 
-pub use bound::{LowerBound, lower_bound};
+pub use bound::{Covered, LowerBound, lower_bound};
 pub use mean_square::{MeanSquare, least_squares, mean_square_under_cap};
 pub use problem::{Point, Problem, SampledError, Taps};
 pub use worst_case::{Solution, minimise};

@@ -1,7 +1,7 @@
 //! Taps of least worst-case norm over the points.
 
 use super::basis::Basis;
-use super::bound::{self, LowerBound};
+use super::bound::{self, Covered, LowerBound};
 use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::{Problem, SampledError, Taps};
@@ -74,7 +74,7 @@ fn fixed(problem: &Problem) -> Result<Solution, SampledError> {
     let mut dual = bound::zero_dual(problem);
     let svd = linalg::svd_c(&problem.points()[worst_point].w)?;
     dual[worst_point] = svd.u.column(0) * svd.v.column(0).adjoint();
-    let lower = bound::lower_bound(problem, &dual, bound::radius(problem, &taps))?;
+    let lower = LowerBound { covered: Covered::All, ..bound::lower_bound(problem, &dual, 0.0)? };
     Ok(Solution { stop: Stop::Solved, taps, gamma, worst_point, lower, dual, steps: Vec::new() })
 }
 
@@ -171,9 +171,9 @@ impl Run<'_> {
     fn judge(&self, engine: &Engine<'_>, best: &mut Best<'_>) -> Result<(), SampledError> {
         let x: Vec<f64> = self.start.iter().zip(&engine.x).map(|(a, b)| a + self.scale * b).collect();
         best.offer_taps(self.reduced.taps(&x))?;
-        let radius = bound::radius(self.problem, &best.taps);
+        let cover = bound::cover(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
         let (lower, dual) =
-            bound::from_iterate(self.problem, self.reduced, self.basis, &engine.cone.z, radius)?;
+            bound::from_iterate(self.problem, self.reduced, self.basis, &engine.cone.z, cover)?;
         if lower.value > best.lower.value {
             (best.lower, best.dual) = (lower, dual);
         }
