@@ -1,43 +1,64 @@
-//! Reading the bank that a verb works on.
+//! Reading specs and banks, writing text files.
 
 use super::Failure;
-use crate::bank::{Bank, Gamma, SynthesisFilters};
-use crate::spec::Method;
+use crate::bank::Bank;
+use crate::io::AtomicFile;
+use crate::spec::{DesignOverrides, Spec};
+use std::io::{Read, Write};
 use std::path::Path;
 
-/// Reads a bank file.
+/// Whether a path stands for standard input or output.
+pub(super) fn is_dash(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
-    let name = path.display();
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| Failure::Input(format!("{name}: cannot read the bank: {error}")))?;
-    parse(&text).map_err(|error| Failure::Input(format!("{name}: not a bank: {error}")))
+    Bank::from_json(&read_text(path)?, &name(path)).map_err(Failure::input)
 }
 
-#[derive(serde::Deserialize)]
-struct Form {
-    fast_period: f64,
-    ratio: usize,
-    latency: usize,
-    method: Method,
-    channels: Vec<Channel>,
-    state_space: Option<crate::bank::BlockFilter>,
-    gamma: Gamma,
+/// Reads a spec file; `-` is standard input.
+pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
+    Spec::from_toml_with(&read_text(path)?, &name(path), overrides).map_err(Failure::input)
 }
 
-#[derive(serde::Deserialize)]
-struct Channel {
-    delay: f64,
-    #[serde(default)]
-    taps: Vec<f64>,
+/// The spec of a spec file, or the one that a bank file carries (with the bank's latency).
+pub(super) fn load_spec_or_bank(path: &Path) -> Result<Spec, Failure> {
+    if path.extension().is_none_or(|extension| extension != "json") {
+        return load_spec(path, DesignOverrides::default());
+    }
+    let bank = load(path)?;
+    let latency = Some(bank.latency);
+    let spec = bank.spec.ok_or_else(|| {
+        Failure::Input(format!(
+            "{}: this bank carries no spec, so its front ends are unknown; give the spec file",
+            name(path)
+        ))
+    })?;
+    Ok(Spec { latency, ..spec })
 }
 
-fn parse(text: &str) -> serde_json::Result<Bank> {
-    let form: Form = serde_json::from_str(text)?;
-    let delays = form.channels.iter().map(|channel| channel.delay).collect();
-    let filters = match form.state_space {
-        Some(filter) => SynthesisFilters::StateSpace(filter),
-        None => SynthesisFilters::Fir(form.channels.into_iter().map(|channel| channel.taps).collect()),
+/// Writes a text file that appears when it is whole; `-` is standard output.
+pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Failure> {
+    if is_dash(path) {
+        return super::print(text);
+    }
+    let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
+    file.write_all(text.as_bytes())
+        .map_err(|error| Failure::Input(format!("{}: cannot write it: {error}", name(path))))?;
+    file.commit().map_err(Failure::input)
+}
+
+fn name(path: &Path) -> String {
+    if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+fn read_text(path: &Path) -> Result<String, Failure> {
+    let mut text = String::new();
+    let read = if is_dash(path) {
+        std::io::stdin().read_to_string(&mut text).map(|_| text)
+    } else {
+        std::fs::read_to_string(path)
     };
-    let Form { fast_period, ratio, latency, method, gamma, .. } = form;
-    Ok(Bank { spec: None, fast_period, ratio, latency, method, delays, filters, gamma })
+    read.map_err(|error| Failure::Input(format!("{}: cannot read it: {error}", name(path))))
 }

@@ -25,10 +25,7 @@ pub struct Design {
 /// [`DesignError`]: front ends that are none, a comparison method that does not apply, numerics that gave no bank at
 /// all. A bank that is returned carries the exact norm of its very coefficients.
 pub fn design(spec: &Spec) -> Result<Design, DesignError> {
-    let latency = match spec.latency {
-        Some(latency) => latency,
-        None => choose_latency(spec)?,
-    };
+    let latency = latency(spec)?;
     let problem = Problem::new(spec, latency)?;
     let (distinct, representative) = problem.without_duplicates();
     let found = run_method(spec, &distinct)?;
@@ -62,6 +59,11 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         peak_frequency: peak.frequency,
         iterations: found.iterations,
     })
+}
+
+/// m0 of a spec in fast samples: what it says, or the designer's choice.
+pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
+    spec.latency.map_or_else(|| choose_latency(spec), Ok)
 }
 
 struct Found {

@@ -11,7 +11,7 @@ pub mod iir;
 pub mod problem;
 
 pub use analysis::{Analysis, analyze};
-pub use designer::{Design, design};
+pub use designer::{Design, design, latency};
 pub use problem::Problem;
 
 use crate::analog::AnalogError;

@@ -3,10 +3,12 @@
 //! Analytic sources are answered by closed forms and matrix exponentials, recordings by exact Fourier
 //! synthesis; nothing is ever stepped on a coarse time grid.
 
+mod capture;
 mod recording;
 mod response;
 mod source;
 
+pub use capture::{Analog, Captured, capture, interleaved};
 pub use recording::Recording;
 pub use response::{Instants, sample};
-pub use source::{ParseSourceError, Source};
+pub use source::{ParseSourceError, Source, Tone};

@@ -59,6 +59,16 @@ impl Source {
         }
     }
 
+    /// When all has happened that happens once: the end of a chirp, the instant of a step.
+    pub fn duration(&self) -> Option<f64> {
+        match self {
+            Self::Chirp { length, .. } => Some(*length),
+            Self::Step { at, .. } => Some(*at),
+            Self::Sum(parts) => parts.iter().filter_map(Self::duration).reduce(f64::max),
+            Self::Tones(_) => None,
+        }
+    }
+
     /// f(t).
     pub fn value(&self, t: f64) -> f64 {
         match self {

@@ -1,0 +1,56 @@
+//! `hybank analyze`: how good a bank is, here or with other true delays.
+
+use super::Failure;
+use super::bank_file::load;
+use crate::design::{self, Analysis};
+use std::path::PathBuf;
+
+/// Computes the exact gamma of a bank, with its own delays or with others
+///
+/// Works on the coefficients in the file, not on what the designer promised: the error system is built anew from the
+/// spec inside the bank and its H-infinity norm computed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank analyze bank.json
+  hybank analyze bank.json --delay-error 1e-7,-1e-7
+  hybank analyze bank.json --json | jq .gamma")]
+pub(super) struct Args {
+    /// The bank (JSON); `-` is standard input
+    bank: PathBuf,
+    /// True delay minus the bank's, one for each channel, in seconds
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    delay_error: Vec<f64>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("delay errors are finite numbers, in seconds".to_owned()),
+    }
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] with the one message for the user.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let bank = load(&args.bank)?;
+    let analysis = design::analyze(&bank, &args.delay_error)
+        .map_err(|error| Failure::Input(format!("{}: {error}", args.bank.display())))?;
+    if args.json { super::print_json(&analysis) } else { super::print(&text(&analysis)) }
+}
+
+fn text(analysis: &Analysis) -> String {
+    format!(
+        "gamma        {:.9}   worst-case gain from the analog input to the error (h = 1)\n\
+         worst at     {:.6} Hz modulo the slow rate\n\
+         noncausal    {:.9}   no bank at all is better\n\
+         rms error    {:.9}   for white noise of unit density at the analog input\n\
+         noise gain   {:.6}      for independent noise on the slow samples\n",
+        analysis.gamma, analysis.peak_hertz, analysis.noncausal, analysis.rms_error, analysis.noise_gain
+    )
+}

@@ -1,0 +1,160 @@
+//! `hybank design`: from a spec file to a bank file.
+
+use super::Failure;
+use super::bank_file::{is_dash, load_spec, write_text};
+use crate::bank::SynthesisFilters;
+use crate::design::{self, Design};
+use crate::spec::{DesignOverrides, Method};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Designs the synthesis filters for a spec
+///
+/// The bank file holds the filters, the spec with all defaults filled in, and gamma: the exact worst-case gain from the
+/// analog input to the error (upper), a proven lower bound for any bank of that method and size (lower), and the
+/// bound that no latency can beat (noncausal), all in normalised time.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank design spec.toml -o bank.json
+  hybank design spec.toml -o iir.json --method iir
+  hybank design spec.toml -o - --taps 64 | hybank analyze -")]
+pub(super) struct Args {
+    /// The spec (TOML); `-` is standard input
+    spec: PathBuf,
+    /// The bank file (JSON); `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Another method than the spec's
+    #[arg(long, value_parser = parse_method)]
+    method: Option<Method>,
+    /// Another number of taps a channel than the spec's
+    #[arg(long)]
+    taps: Option<usize>,
+    /// Another latency than the spec's, in fast samples
+    #[arg(long)]
+    latency: Option<usize>,
+    /// Relative excess over the optimal gamma that may go into a smaller mean-square error
+    #[arg(long)]
+    slack: Option<f64>,
+    /// Replace an existing bank file
+    #[arg(long)]
+    force: bool,
+    /// Print a report as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_method(text: &str) -> Result<Method, String> {
+    let known = Method::ALL.map(Method::name).join(", ");
+    Method::ALL
+        .into_iter()
+        .find(|method| method.name() == text)
+        .ok_or_else(|| format!("the methods are {known}"))
+}
+
+#[derive(Debug, serde::Serialize)]
+struct Report<'a> {
+    bank: String,
+    method: Method,
+    channels: usize,
+    ratio: usize,
+    latency: usize,
+    latency_chosen: bool,
+    taps: Option<usize>,
+    states: Option<usize>,
+    gamma: &'a crate::bank::Gamma,
+    /// Hertz, at the slow rate to which all frequencies alias.
+    peak_hertz: f64,
+    iterations: usize,
+    seconds: f64,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] with the one message for the user.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    if args.json && is_dash(&args.output) {
+        return Err(Failure::Usage(
+            "--json and `-o -` both want standard output; write the bank to a file".into(),
+        ));
+    }
+    let overrides = DesignOverrides { method: args.method, taps: args.taps, slack: args.slack };
+    let mut spec = load_spec(&args.spec, overrides)?;
+    spec.latency = args.latency.or(spec.latency);
+    spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
+    let begin = Instant::now();
+    let found =
+        design::design(&spec).map_err(|error| Failure::Input(format!("{}: {error}", args.spec.display())))?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let text = found.bank.to_json().map_err(Failure::input)?;
+    write_text(&args.output, &text, args.force)?;
+    let report = Report::new(args, &found, seconds);
+    if args.json {
+        super::print_json(&report)
+    } else if is_dash(&args.output) {
+        eprint!("{}", report.text());
+        Ok(())
+    } else {
+        super::print(&report.text())
+    }
+}
+
+impl<'a> Report<'a> {
+    fn new(args: &Args, design: &'a Design, seconds: f64) -> Self {
+        let bank = &design.bank;
+        let (taps, states) = match &bank.filters {
+            SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
+            SynthesisFilters::StateSpace(block) => (None, Some(block.a.len())),
+        };
+        Self {
+            bank: args.output.display().to_string(),
+            method: bank.method,
+            channels: bank.channel_count(),
+            ratio: bank.ratio,
+            latency: bank.latency,
+            latency_chosen: design.latency_chosen,
+            taps,
+            states,
+            gamma: &bank.gamma,
+            peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
+            iterations: design.iterations,
+            seconds,
+        }
+    }
+
+    fn text(&self) -> String {
+        let size = match (self.taps, self.states) {
+            (Some(taps), _) => format!("{taps} taps a channel"),
+            (_, Some(states)) => format!("{states} states"),
+            _ => String::new(),
+        };
+        let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
+        format!(
+            "{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
+             gamma      {} (exact norm of this bank; worst at {:.4} Hz modulo the slow rate)\n\
+             lower      {} (no bank of this method and size is better)\n\
+             noncausal  {} (no latency is better)\n\
+             designed in {:.1} ms, {} iterations\n",
+            self.bank,
+            self.method.name(),
+            self.channels,
+            self.ratio,
+            self.latency,
+            number(self.gamma.upper),
+            self.peak_hertz,
+            number(self.gamma.lower),
+            number(self.gamma.noncausal),
+            self.seconds * 1e3,
+            self.iterations,
+        )
+    }
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(
+        || "unknown".to_owned(),
+        |v| if v >= 1e-4 { format!("{v:.9}") } else { format!("{v:.6e}") },
+    )
+}
