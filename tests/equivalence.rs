@@ -1,0 +1,137 @@
+//! The exact equivalent against brute force: a finely discretised continuous-time system.
+//!
+//! Inputs are sums of short pulses of unit energy over a finite stretch of time, outputs the error samples that the
+//! definition gives for them (analog step responses, sample instants, convolution with the taps). Fewer inputs and
+//! fewer outputs can only lower the largest gain, so it must approach the computed norm from below.
+
+use hybank::analog::StrictlyProper;
+use hybank::bank::SynthesisFilters;
+use hybank::design::equivalence::BlockedPlant;
+use hybank::design::problem::{Channel, Problem};
+use hybank::design::error_system;
+use hybank::linalg::{Mat, singular_values};
+use hybank::simulate::{Instants, Source, sample};
+use hybank::spec::{Family, FilterSpec};
+
+struct Case {
+    problem: Problem,
+    taps: Vec<Vec<f64>>,
+}
+
+fn filter(spec: &FilterSpec) -> StrictlyProper {
+    StrictlyProper::new(spec, 1.0).unwrap()
+}
+
+fn tf(num: &[f64], den: &[f64]) -> FilterSpec {
+    FilterSpec::TransferFunction { num: num.to_vec(), den: den.to_vec() }
+}
+
+fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(usize, f64)]) -> Case {
+    let problem = Problem {
+        ratio,
+        latency,
+        front_ends: front_ends.iter().map(filter).collect(),
+        target: 0,
+        channels: channels.iter().map(|&(front_end, delay)| Channel { front_end, delay }).collect(),
+    };
+    // Any taps will do: the equivalence does not care whether they are good.
+    let taps = (0..channels.len())
+        .map(|i| (0..3 * ratio + 1).map(|n| ((1 + i * 5 + n * 3) as f64).sin() * 0.6).collect())
+        .collect();
+    Case { problem, taps }
+}
+
+/// e[n] for each pulse, rows n = 0 .. ticks M, columns pulses of width 1 / fineness over the same time.
+fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
+    let Problem { ratio, latency, .. } = case.problem;
+    let width = 1.0 / fineness as f64;
+    let columns = ticks * ratio * fineness;
+    let scale = 1.0 / width.sqrt();
+    // (phi * pulse_c)(t) for t = k step + offset is a difference of step responses on a lattice of `width`.
+    let responses = |front_end: usize, offset: f64| -> Vec<f64> {
+        let step = Source::Step { at: 0.0, height: 1.0 };
+        let instants = Instants { first: offset - columns as f64 * width, step: width, count: 2 * columns + 2 };
+        sample(&case.problem.front_ends[front_end], &step, instants)
+    };
+    let pulse = |table: &[f64], steps: usize, c: usize| {
+        let at = columns + steps - c;
+        scale * (table[at] - table[at - 1])
+    };
+    let wanted = responses(case.problem.target, -(latency as f64));
+    let mut errors = Mat::from_fn(ticks * ratio, columns, |n, c| pulse(&wanted, n * fineness, c));
+    for (channel, taps) in case.problem.channels.iter().zip(&case.taps) {
+        let table = responses(channel.front_end, -channel.delay);
+        for n in 0..ticks * ratio {
+            for k in 0..=n / ratio {
+                let Some(tap) = taps.get(n - k * ratio) else { continue };
+                for c in 0..columns {
+                    errors[(n, c)] -= tap * pulse(&table, k * ratio * fineness, c);
+                }
+            }
+        }
+    }
+    errors
+}
+
+fn brute_force(case: &Case, ticks: usize, fineness: usize) -> f64 {
+    let errors = pulse_errors(case, ticks, fineness);
+    singular_values(&(&errors * errors.transpose())).unwrap()[0].sqrt()
+}
+
+fn computed(case: &Case) -> f64 {
+    let plant = BlockedPlant::new(&case.problem);
+    let filters = SynthesisFilters::Fir(case.taps.clone());
+    let block = error_system::block_system(&filters, case.problem.ratio).unwrap();
+    error_system::gamma(&plant, &block).unwrap().gain
+}
+
+fn check(name: &str, case: &Case) {
+    let norm = computed(case);
+    let ratio = case.problem.ratio;
+    let (coarse, fine) = (brute_force(case, 24 / ratio, 3), brute_force(case, 144 / ratio, 14));
+    assert!(coarse <= norm * (1.0 + 1e-9) && fine <= norm * (1.0 + 1e-9), "{name}: {coarse} {fine} above {norm}");
+    assert!(coarse < fine, "{name}: {coarse} {fine} do not grow");
+    assert!(fine > 0.985 * norm, "{name}: {fine} stays away from {norm}");
+}
+
+fn thesis() -> FilterSpec {
+    tf(&[0.25], &[1.0, 1.0, 0.25])
+}
+
+#[test]
+fn as_many_channels_as_the_ratio() {
+    check("N = M", &case(2, 3, &[thesis()], &[(0, 1.2), (0, 0.6)]));
+}
+
+#[test]
+fn oversampled_with_different_filters_and_equal_delays() {
+    let filters = [thesis(), tf(&[1.0], &[1.0, 1.0]), tf(&[0.36], &[1.0, 0.84, 0.36])];
+    check("N > M", &case(2, 0, &filters, &[(1, 0.2), (2, 0.2), (0, 1.6)]));
+}
+
+#[test]
+fn undersampled() {
+    check("N < M", &case(3, 2, &[thesis()], &[(0, 0.0), (0, 1.9)]));
+}
+
+#[test]
+fn delays_of_many_periods_and_whole_ones() {
+    check("long delays", &case(2, 1, &[thesis(), tf(&[2.0], &[1.0, 2.0])], &[(0, 5.3), (1, 2.0), (0, 0.0)]));
+}
+
+#[test]
+fn one_channel_that_only_resamples() {
+    check("N = M = 1", &case(1, 0, &[tf(&[2.0], &[1.0, 2.0])], &[(0, 0.37)]));
+}
+
+#[test]
+fn a_steep_front_end() {
+    let elliptic = FilterSpec::Family {
+        family: Family::Elliptic,
+        order: Some(5),
+        cutoff: 0.25,
+        ripple_db: Some(0.5),
+        attenuation_db: Some(40.0),
+    };
+    check("elliptic", &case(2, 2, &[elliptic], &[(0, 0.31), (0, 1.44)]));
+}
