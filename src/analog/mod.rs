@@ -20,6 +20,7 @@
 mod balance;
 mod error;
 pub mod families;
+mod pairing;
 mod rational;
 mod realise;
 mod roots;
@@ -41,3 +42,6 @@ pub const MIN_NORMALISED_POLE: f64 = 1e-9;
 
 /// Largest modulus of a pole in rad a fast period. A faster one has settled within 1e-9 of a sample.
 pub const MAX_NORMALISED_POLE: f64 = 1e9;
+
+#[cfg(test)]
+mod tests;

@@ -114,12 +114,16 @@ fn polynomial_roots(monic: &[f64]) -> Result<Vec<Complex<f64>>, AnalogError> {
     Ok(roots)
 }
 
-/// Roots of s^2 + b s + c without cancellation; an exact double root stays one.
+/// Roots of s^2 + b s + c without cancellation; a double root stays one.
 fn quadratic_roots(b: f64, c: f64) -> Vec<Complex<f64>> {
     let half = -0.5 * b;
     // b^2/4 - c with one rounding: the product's own rounding error is added back.
     let square = half * half;
     let discriminant = (square - c) + half.mul_add(half, -square);
+    // Within the rounding of the coefficients themselves two equal roots are meant, in any unit of time.
+    if discriminant.abs() <= 8.0 * f64::EPSILON * square {
+        return vec![half.into(); 2];
+    }
     if discriminant < 0.0 {
         let im = (-discriminant).sqrt();
         return vec![Complex::new(half, im), Complex::new(half, -im)];

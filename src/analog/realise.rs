@@ -6,9 +6,10 @@ use crate::linalg::{Complex, Mat, eigenvalues, solve_c, to_complex};
 use crate::spec::{Family, FilterSpec};
 
 use super::balance::equalised;
+use super::pairing::pair_sections;
 use super::rational::Rational;
 use super::roots::RootSet;
-use super::section::{Realisation, Section, pair_sections};
+use super::section::{Realisation, Section};
 use super::{AnalogError, Zpk, families};
 
 /// One link of a chain with one input and one output.

@@ -1,8 +1,8 @@
-//! First- and second-order sections: how zeros and poles are paired, ordered and realised.
+//! First- and second-order sections and their state equations.
 
 use crate::linalg::{Complex, Mat};
 
-use super::roots::{RootSet, Roots};
+use super::roots::Roots;
 
 /// `w^(p-z) prod(s - zeros) / prod(s - poles)` with one or two poles, at most as many zeros, and
 /// w the natural frequency of the poles: of size one in and below the band whatever the units.
@@ -35,9 +35,9 @@ impl Section {
 
     /// Real state equations of one or two states.
     ///
-    /// With poles (s - m1)(s - m2) + v^2 the states are w^2 / den and w (s - m1) / den: a
-    /// conjugate pair, two real poles and a double pole are one formula without a division
-    /// that could vanish.
+    /// With poles (s - m1)(s - m2) + v^2 the states are w k / den and w (s - m1) / den: a conjugate pair,
+    /// two real poles and a double pole are one formula without a division that could vanish. k is v for a
+    /// resonant pair, so that both off-diagonal entries are v itself and the pole is exact, and w otherwise.
     pub(super) fn realise(self) -> Realisation {
         let w = self.poles.natural_frequency();
         let (m1, m2, v) = match self.poles {
@@ -46,14 +46,15 @@ impl Section {
             Roots::Two(p1, p2) => (p1, p2, 0.0),
             Roots::Conjugate { re, im } => (re, re, im),
         };
+        let k = if v >= 0.5 * w { v } else { w };
         let (c, d) = match self.zeros {
-            Roots::None => ([1.0, 0.0], 0.0),
-            Roots::One(z) => ([(m1 - z) / w, 1.0], 0.0),
-            Roots::Two(z1, z2) => (biproper_row(m1, m2, v, z1, z2, 0.0, w), 1.0),
-            Roots::Conjugate { re, im } => (biproper_row(m1, m2, v, re, re, im, w), 1.0),
+            Roots::None => ([w / k, 0.0], 0.0),
+            Roots::One(z) => ([(m1 - z) / k, 1.0], 0.0),
+            Roots::Two(z1, z2) => (biproper_row([m1, m2, v], [z1, z2, 0.0], [k, w]), 1.0),
+            Roots::Conjugate { re, im } => (biproper_row([m1, m2, v], [re, re, im], [k, w]), 1.0),
         };
         Realisation {
-            a: Mat::from_row_slice(2, 2, &[m1, w, -v * (v / w), m2]),
+            a: Mat::from_row_slice(2, 2, &[m1, k, -v * (v / k), m2]),
             b: Mat::from_column_slice(2, 1, &[0.0, w]),
             c: Mat::from_row_slice(1, 2, &c),
             d,
@@ -72,10 +73,10 @@ fn first_order(p: f64, zeros: Roots) -> Realisation {
     Realisation { a: scalar(p), b: scalar(w), c: scalar(c), d }
 }
 
-/// Output row of ((s - z1)(s - z2) + y^2) / ((s - m1)(s - m2) + v^2) - 1. The difference of squares
-/// is factored, because zeros next to poles cancel there.
-fn biproper_row(m1: f64, m2: f64, v: f64, z1: f64, z2: f64, y: f64, w: f64) -> [f64; 2] {
-    let constant = ((m1 - z1) / w) * ((m1 - z2) / w) + ((y - v) / w) * ((y + v) / w);
+/// Output row of ((s - z1)(s - z2) + y^2) / ((s - m1)(s - m2) + v^2) - 1 for the states scaled by k and w.
+/// The difference of squares is factored, because zeros next to poles cancel there.
+fn biproper_row([m1, m2, v]: [f64; 3], [z1, z2, y]: [f64; 3], [k, w]: [f64; 2]) -> [f64; 2] {
+    let constant = ((m1 - z1) / k) * ((m1 - z2) / w) + ((y - v) / k) * ((y + v) / w);
     [constant, (m1 - z1) / w + (m2 - z2) / w]
 }
 
@@ -99,60 +100,5 @@ impl Realisation {
         c.view_mut((0, 0), (1, n)).copy_from(&(&self.c * next.d));
         c.view_mut((0, n), (1, k)).copy_from(&next.c);
         Self { a, b, c, d: self.d * next.d }
-    }
-}
-
-/// Pairs zeros with poles and orders the sections, low quality first.
-///
-/// The poles nearest to the imaginary axis choose first and take the nearest zeros, so that no
-/// section resonates more than it has to. Needs at most as many zeros as poles.
-pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
-    let mut sections = pole_groups(poles, zeros.upper.len());
-    let mut pairs: Vec<Roots> = zeros.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im }).collect();
-    for section in sections.iter_mut().filter(|s| s.poles.count() == 2) {
-        if let Some(pair) = take_nearest(section.poles, &mut pairs) {
-            section.zeros = pair;
-        }
-    }
-    for &z in &zeros.real {
-        attach_real_zero(&mut sections, z);
-    }
-    sections.reverse();
-    sections
-}
-
-/// Sections without zeros, highest quality first; real poles are joined in twos as far as conjugate
-/// zeros need them.
-fn pole_groups(poles: &RootSet, zero_pairs: usize) -> Vec<Section> {
-    let joined = 2 * zero_pairs.saturating_sub(poles.upper.len()).min(poles.real.len() / 2);
-    let conjugate = poles.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im });
-    let twos = poles.real[..joined].chunks_exact(2).map(|p| Roots::Two(p[0], p[1]));
-    let ones = poles.real[joined..].iter().map(|&p| Roots::One(p));
-    let mut sections: Vec<Section> =
-        conjugate.chain(twos).chain(ones).map(|poles| Section { poles, zeros: Roots::None }).collect();
-    sections.sort_by(|a, b| b.poles.quality().total_cmp(&a.poles.quality()));
-    sections
-}
-
-/// Removes and returns the pair of zeros with the natural frequency nearest to that of the poles.
-fn take_nearest(poles: Roots, pairs: &mut Vec<Roots>) -> Option<Roots> {
-    let w = poles.natural_frequency();
-    let distance = |z: &Roots| (z.natural_frequency() - w).abs();
-    let index = (0..pairs.len()).min_by(|&i, &j| distance(&pairs[i]).total_cmp(&distance(&pairs[j])))?;
-    Some(pairs.remove(index))
-}
-
-/// Gives the real zero `z` to the section with room whose natural frequency is nearest.
-fn attach_real_zero(sections: &mut [Section], z: f64) {
-    let distance = |s: &Section| (s.poles.natural_frequency() - z.abs()).abs();
-    let best = sections
-        .iter_mut()
-        .filter(|s| s.zeros.count() < s.poles.count())
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    if let Some(section) = best {
-        section.zeros = match section.zeros {
-            Roots::One(other) => Roots::Two(other, z),
-            _ => Roots::One(z),
-        };
     }
 }

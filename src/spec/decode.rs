@@ -27,9 +27,10 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
     let top = document.fields(&TOP_KEYS)?;
     let name = top.optional("name").map(|v| v.text()).transpose()?.unwrap_or_default().to_owned();
     let fast_period = fast_period(&top)?;
-    let ratio =
-        checked_count(&top.required("ratio", "give M, the fast samples for each slow one")?, check_ratio)?;
-    let latency = top.optional("latency").map(|v| checked_count(&v, check_latency)).transpose()?;
+    let ratio = top.required("ratio", "give M, the fast samples for each slow one")?;
+    let ratio = checked_count(&ratio, "fast samples", check_ratio)?;
+    let latency =
+        top.optional("latency").map(|v| checked_count(&v, "fast samples", check_latency)).transpose()?;
     let target = top
         .required(
             "target",
@@ -64,8 +65,12 @@ fn checked_number(value: &Value<'_>, check: fn(f64) -> Result<(), SpecProblem>) 
     Ok(number)
 }
 
-fn checked_count(value: &Value<'_>, check: fn(usize) -> Result<(), SpecProblem>) -> Result<usize, Fault> {
-    let count = value.count("(a count)")?;
+fn checked_count(
+    value: &Value<'_>,
+    unit: &'static str,
+    check: fn(usize) -> Result<(), SpecProblem>,
+) -> Result<usize, Fault> {
+    let count = value.count(unit)?;
     check(count).map_err(|problem| value.fault(problem))?;
     Ok(count)
 }
@@ -118,7 +123,7 @@ fn design(top: &Fields<'_>, overrides: DesignOverrides, channels: usize) -> Resu
     let get = |key| fields.as_ref().and_then(|fields| fields.optional(key));
     let written = WrittenDesign {
         method: get("method").map(|v| v.name("method", &Method::ALL.map(|m| (m.name(), m)))).transpose()?,
-        taps: get("taps").map(|v| checked_count(&v, check_taps)).transpose()?,
+        taps: get("taps").map(|v| checked_count(&v, "taps", check_taps)).transpose()?,
         slack: get("slack").map(|v| checked_number(&v, check_slack)).transpose()?,
     };
     let design = written.overridden(overrides).resolved();

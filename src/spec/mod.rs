@@ -210,39 +210,4 @@ impl Spec {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const THESIS: &str = r#"
-name = "thesis example, FIR"
-fast_period = 1.0
-ratio = 2
-latency = 10
-[target]
-filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
-[[channel]]
-delay = 1.2
-[[channel]]
-delay = 0.6
-filter = { zeros = [], poles = [[-0.5, 0.0], [-0.5, 0.0]], gain = 0.25 }
-[design]
-method = "fir"
-taps = 22
-"#;
-
-    #[test]
-    fn the_thesis_example_reads() {
-        let spec = Spec::from_toml(THESIS, "thesis.toml").unwrap();
-        assert_eq!((spec.ratio, spec.latency, spec.fast_period), (2, Some(10), 1.0));
-        assert_eq!(spec.channels[0].filter, spec.target);
-        assert_eq!(spec.channels[1].delay, 0.6);
-        assert_eq!(spec.design, DesignSpec { method: Method::Fir, taps: Some(22), slack: None });
-    }
-
-    #[test]
-    fn an_unknown_key_is_named_with_line_and_neighbour() {
-        let error = Spec::from_toml(&THESIS.replace("delay = 1.2", "dealy = 1.2"), "t.toml").unwrap_err();
-        assert_eq!(error.place().map(|p| (p.line, p.column)), Some((9, 1)));
-        assert!(error.to_string().contains("did you mean \"delay\"?"), "{error}");
-    }
-}
+mod tests;

@@ -53,3 +53,6 @@ fn product_of_negatives(roots: &[Complex<f64>]) -> f64 {
 fn excess_power(db: f64) -> f64 {
     (db * std::f64::consts::LN_10 / 10.0).exp_m1()
 }
+
+#[cfg(test)]
+mod tests;

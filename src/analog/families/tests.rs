@@ -1,0 +1,142 @@
+//! Prototypes against stored digits and against the properties that define them.
+
+use super::*;
+
+/// One line of `reference.txt` (made by `tools/analog_reference.py`).
+struct Reference {
+    label: String,
+    source: &'static str,
+    family: &'static str,
+    order: usize,
+    ripple_db: f64,
+    attenuation_db: f64,
+    expected: Zpk,
+}
+
+fn references() -> Vec<Reference> {
+    include_str!("reference.txt").lines().map(reference).collect()
+}
+
+fn reference(line: &'static str) -> Reference {
+    let words: Vec<&'static str> = line.split_whitespace().collect();
+    let number = |i: usize| words[i].parse::<f64>().unwrap();
+    let roots = |kind: &str| {
+        let upper = words[6..].chunks_exact(3).filter(|w| w[0] == kind);
+        let complex = upper.map(|w| Complex::new(w[1].parse().unwrap(), w[2].parse().unwrap()));
+        complex.flat_map(|r: Complex<f64>| if r.im == 0.0 { vec![r] } else { vec![r, r.conj()] }).collect()
+    };
+    Reference {
+        label: words[..5].join(" "),
+        source: words[0],
+        family: words[1],
+        order: words[2].parse().unwrap(),
+        ripple_db: number(3),
+        attenuation_db: number(4),
+        expected: Zpk { zeros: roots("z"), poles: roots("p"), gain: number(5) },
+    }
+}
+
+fn designed(r: &Reference) -> Zpk {
+    match r.family {
+        "butterworth" => butterworth(r.order),
+        "chebyshev1" => chebyshev1(r.order, r.ripple_db),
+        "chebyshev2" => chebyshev2(r.order, r.attenuation_db),
+        "elliptic" => elliptic(r.order, r.ripple_db, r.attenuation_db),
+        "bessel" => bessel(r.order).unwrap(),
+        other => panic!("unknown family {other}"),
+    }
+}
+
+/// Largest relative distance of a root to the nearest one of the other list.
+fn distance(found: &[Complex<f64>], expected: &[Complex<f64>]) -> f64 {
+    let nearest =
+        |x: &Complex<f64>| found.iter().map(|y| (x - y).norm() / x.norm()).fold(f64::INFINITY, f64::min);
+    expected.iter().map(nearest).fold(0.0, f64::max)
+}
+
+#[test]
+fn zeros_poles_and_gains_agree_with_scipy_and_with_sixty_digits() {
+    let references = references();
+    assert_eq!(references.len(), 217);
+    for r in &references {
+        // scipy's own elliptic iteration stops near 1e-12; mpmath's digits are all good.
+        let tolerance = if r.source == "scipy" { 1e-10 } else { 1e-13 };
+        let found = designed(r);
+        assert_eq!(found.poles.len(), r.expected.poles.len(), "{}", r.label);
+        assert_eq!(found.zeros.len(), r.expected.zeros.len(), "{}", r.label);
+        let poles = distance(&found.poles, &r.expected.poles);
+        let zeros = distance(&found.zeros, &r.expected.zeros);
+        let gain = (found.gain / r.expected.gain - 1.0).abs();
+        assert!(poles <= tolerance, "{}: poles off by {poles:e}", r.label);
+        assert!(zeros <= tolerance, "{}: zeros off by {zeros:e}", r.label);
+        assert!(gain <= 20.0 * tolerance, "{}: gain off by {gain:e}", r.label);
+    }
+}
+
+fn decibels(zpk: &Zpk, w: f64) -> f64 {
+    20.0 * zpk.response(Complex::new(0.0, w)).norm().log10()
+}
+
+#[test]
+fn the_cutoff_means_what_it_says() {
+    for order in 1..=32 {
+        assert!(
+            (decibels(&butterworth(order), 1.0) + 10.0 * 2f64.log10()).abs() < 1e-11,
+            "butterworth {order}"
+        );
+        assert!((decibels(&chebyshev1(order, 0.7), 1.0) + 0.7).abs() < 1e-10, "chebyshev1 {order}");
+        assert!((decibels(&chebyshev2(order, 35.0), 1.0) + 35.0).abs() < 1e-9, "chebyshev2 {order}");
+    }
+    for order in 1..=12 {
+        assert!((decibels(&elliptic(order, 0.7, 60.0), 1.0) + 0.7).abs() < 1e-10, "elliptic {order}");
+    }
+}
+
+#[test]
+fn equal_ripple_stays_within_its_band() {
+    for order in 2..=12 {
+        let filter = elliptic(order, 0.5, 45.0);
+        let zero = filter.zeros.iter().map(|z| z.im.abs()).fold(f64::INFINITY, f64::min);
+        for i in 0..2000 {
+            let w = f64::from(i) / 1999.0;
+            let pass = decibels(&filter, w);
+            assert!((-0.5 - 1e-9..=1e-9).contains(&pass), "order {order}: {pass} dB at {w}");
+            let stop = decibels(&filter, zero / (1.0 - w * 0.999));
+            assert!(stop <= -45.0 + 1e-8, "order {order}: {stop} dB in the stop band");
+        }
+    }
+}
+
+#[test]
+fn bessel_polynomials_of_low_order_are_the_known_ones() {
+    // theta_3 = s^3 + 6 s^2 + 15 s + 15, normalised by 15^(1/3).
+    let scale = 15f64.cbrt();
+    for s in bessel(3).unwrap().poles.iter().map(|p| p * scale) {
+        let theta = ((s + 6.0) * s + 15.0) * s + 15.0;
+        assert!(theta.norm() < 1e-13, "{theta}");
+    }
+}
+
+#[test]
+fn a_bessel_polynomial_beyond_double_precision_ends_in_an_error() {
+    assert!(matches!(bessel(400), Err(crate::analog::AnalogError::Numerical(_))));
+}
+
+#[test]
+fn bessel_delay_is_maximally_flat() {
+    // The group delay of theta_n(0)/theta_n(s) is 1 + O(w^2n); the phase norm stretches it by theta_n(0)^(1/n).
+    for order in 3..=32 {
+        let poles = bessel(order).unwrap().poles;
+        let delay =
+            |w: f64| poles.iter().map(|p| -p.re / (p.re * p.re + (w - p.im) * (w - p.im))).sum::<f64>();
+        let dc = delay(0.0);
+        assert!(
+            (delay(0.2) / dc - 1.0).abs() < 1e-3 && (delay(1e-3) / dc - 1.0).abs() < 1e-9,
+            "order {order}: {:e} {:e}",
+            delay(0.2) / dc - 1.0,
+            delay(1e-3) / dc - 1.0
+        );
+        let odd = (1..order).map(|k| (2.0 * k as f64 + 1.0).ln()).sum::<f64>();
+        assert!((dc / (odd / order as f64).exp() - 1.0).abs() < 1e-12, "order {order}: {dc}");
+    }
+}

@@ -1,0 +1,111 @@
+//! Which zeros go with which poles, and in what order the sections follow each other.
+
+use super::roots::{RootSet, Roots};
+use super::section::Section;
+
+/// Pairs zeros with poles and orders the sections, low quality first. Needs no more zeros than poles.
+///
+/// Always the closest of all pairs left, by ratio of frequencies, is joined: a section whose zeros are far
+/// from its poles passes one side of the spectrum at a tiny gain, which a later section has to make up for
+/// in vain where rounding has taken the digits.
+pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
+    let mut free = FreePoles { real: poles.real.clone(), upper: poles.upper.clone() };
+    let mut pairs: Vec<Roots> = zeros.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im }).collect();
+    let mut sections = Vec::new();
+    while let Some((pair, group)) = closest_pair(&pairs, &free) {
+        sections.push(Section { zeros: pairs.remove(pair), poles: free.take(group) });
+    }
+    sections.extend(free.rest());
+    let mut real_zeros = zeros.real.clone();
+    while let Some((zero, section)) = closest_section(&real_zeros, &sections) {
+        attach(&mut sections[section], real_zeros.remove(zero));
+    }
+    sections.sort_by(|a, b| a.poles.quality().total_cmp(&b.poles.quality()));
+    sections
+}
+
+/// Poles not yet in a section.
+struct FreePoles {
+    real: Vec<f64>,
+    upper: Vec<(f64, f64)>,
+}
+
+/// Two poles that could take a pair of zeros.
+#[derive(Debug, Clone, Copy)]
+enum Group {
+    /// A conjugate pair.
+    Upper(usize),
+    /// The real poles at this place and the next, neighbours in size.
+    Real(usize),
+}
+
+impl FreePoles {
+    fn groups(&self) -> impl Iterator<Item = Group> {
+        let upper = (0..self.upper.len()).map(Group::Upper);
+        upper.chain((1..self.real.len()).map(|i| Group::Real(i - 1)))
+    }
+
+    fn poles(&self, group: Group) -> Roots {
+        match group {
+            Group::Upper(i) => Roots::Conjugate { re: self.upper[i].0, im: self.upper[i].1 },
+            Group::Real(i) => Roots::Two(self.real[i], self.real[i + 1]),
+        }
+    }
+
+    fn take(&mut self, group: Group) -> Roots {
+        let poles = self.poles(group);
+        match group {
+            Group::Upper(i) => drop(self.upper.remove(i)),
+            Group::Real(i) => drop(self.real.drain(i..i + 2)),
+        }
+        poles
+    }
+
+    /// Sections without zeros for what is left.
+    fn rest(self) -> impl Iterator<Item = Section> {
+        let conjugate = self.upper.into_iter().map(|(re, im)| Roots::Conjugate { re, im });
+        let single = self.real.into_iter().map(Roots::One);
+        conjugate.chain(single).map(|poles| Section { poles, zeros: Roots::None })
+    }
+}
+
+/// How much worse it is for a zero to be slower than its pole by some ratio than to be faster. Faster, the
+/// section amplifies low frequencies by its states, which costs nothing; slower, its states have to cancel
+/// its direct term there.
+const SLOW_ZERO_PENALTY: f64 = 4.0;
+
+/// Distance of two frequencies on a logarithmic scale. A zero at the origin counts as a very slow one, so
+/// that it goes with the slowest pole.
+fn distance(zero: f64, pole: f64) -> f64 {
+    let ratio = (zero.abs().max(1e-3 * super::MIN_NORMALISED_POLE) / pole.abs()).ln();
+    if ratio < 0.0 { -SLOW_ZERO_PENALTY * ratio } else { ratio }
+}
+
+/// The larger distance of a pair of zeros to the two poles.
+fn pair_distance(zeros: Roots, poles: Roots) -> f64 {
+    let w = zeros.natural_frequency();
+    match poles {
+        Roots::Two(p1, p2) => distance(w, p1).max(distance(w, p2)),
+        _ => distance(w, poles.natural_frequency()),
+    }
+}
+
+fn closest_pair(pairs: &[Roots], free: &FreePoles) -> Option<(usize, Group)> {
+    let candidates = (0..pairs.len()).flat_map(|i| free.groups().map(move |group| (i, group)));
+    let cost = |&(i, group): &(usize, Group)| pair_distance(pairs[i], free.poles(group));
+    candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+}
+
+fn closest_section(zeros: &[f64], sections: &[Section]) -> Option<(usize, usize)> {
+    let open = (0..sections.len()).filter(|&k| sections[k].zeros.count() < sections[k].poles.count());
+    let candidates = open.flat_map(|k| (0..zeros.len()).map(move |i| (i, k)));
+    let cost = |&(i, k): &(usize, usize)| distance(zeros[i], sections[k].poles.natural_frequency());
+    candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+}
+
+fn attach(section: &mut Section, zero: f64) {
+    section.zeros = match section.zeros {
+        Roots::One(other) => Roots::Two(other, zero),
+        _ => Roots::One(zero),
+    };
+}
