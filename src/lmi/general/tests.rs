@@ -363,3 +363,20 @@ fn few_iterations_are_an_outcome() {
     let s = minimise(&theta(&[(0, 1)], 4), &settings).unwrap();
     assert_eq!((s.outcome, s.iterations), (Outcome::IterationLimit, 2));
 }
+
+/// Digits from cvxpy with Clarabel (tolerances 1e-11) on the same data: two matrix blocks, bounds and
+/// an equality.
+#[test]
+fn general_conic_solver_agrees() {
+    let eye = |n: usize, s: f64| Mat::identity(n, n) * s;
+    let terms = |n: usize, seed: f64, step: f64| {
+        (0..5).map(|k| (k, Coefficient::Dense(wavy(n, seed + step * k as f64)))).collect::<Vec<_>>()
+    };
+    let p = Problem::new((0..5).map(|k| (1.0 + 2.0 * k as f64).cos()).collect())
+        .and_then(|p| p.matrix_inequality(4, Coefficient::Dense(eye(4, 1.0)), terms(4, 0.3, 1.0)))
+        .and_then(|p| p.matrix_inequality(6, Coefficient::Dense(eye(6, 2.0) + wavy(6, 9.0)), terms(6, 5.5, -0.4)))
+        .and_then(|p| p.linear_inequalities(vec![4.0; 5], (0..5).map(|i| (i, i, -1.0)).collect()))
+        .and_then(|p| p.equalities(Mat::from_element(1, 5, 1.0), vec![0.25]))
+        .unwrap();
+    expect("Clarabel", &p, -6.19184220552, 1e-8);
+}
