@@ -1,5 +1,6 @@
 //! Interior-point methods for linear matrix inequalities. Knows no filter bank.
 
+pub mod general;
 pub mod sampled;
 #[cfg(test)]
 #[allow(unreachable_pub)]
