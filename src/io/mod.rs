@@ -15,5 +15,6 @@ pub use atomic::AtomicFile;
 pub use capture::{Capture, CaptureNote};
 pub use error::IoError;
 pub use frames::FrameReader;
+pub(crate) use pcm::for_pcm_format;
 pub use pcm::{ParsePcmFormatError, PcmFormat};
 pub use pcm_frames::{PcmFrames, SampleLayout};

@@ -1,12 +1,13 @@
 //! FIR banks: the direct polyphase form.
 //!
 //! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j]: for each phase p one sum over channels i and
-//! taps j, in that order.
+//! taps j, in that order. Every output is one such chain, wherever it stands in its block.
 
 use super::BuildError;
 use super::aligned::Aligned;
+use super::rows::{Fold, Rows, RowsMut};
 use super::sample::Sample;
-use super::simd::{FirKernel, Isa, PhaseGroup};
+use super::simd::{FirKernel, Isa, OVERRUN, PhaseGroup};
 use super::ticks::{FastSink, TickSource};
 use super::window::{Window, block_frames};
 
@@ -17,21 +18,31 @@ pub(crate) struct FirPlan<T: Sample> {
     pub(crate) ratio: usize,
     /// K - 1: ticks that the filters look back.
     pub(crate) history: usize,
-    /// Ticks a block.
-    pub(crate) block: usize,
+    /// T: ticks in a super-tick.
+    pub(crate) fold: usize,
+    /// Super-ticks that the filters look back, and in a block.
+    window: usize,
+    block: usize,
     groups: Vec<PhaseGroup<T>>,
-    /// For step (i, j): the place of x_i[k - j] in the window.
+    /// For each step the place of its input in the window.
     offsets: Vec<u32>,
     kernel: FirKernel<T>,
+    isa: Isa,
 }
 
 /// What a stream remembers.
 #[derive(Debug, Clone)]
 pub(crate) struct FirState<T: Sample> {
     window: Window<T>,
+    /// Ticks of the next super-tick that are in the window already.
+    lead: usize,
     /// One block of output, a row a phase.
     rows: Aligned<T>,
 }
+
+/// The input of a step: channel, and how many ticks it lies before the super-tick's first
+/// (negative: after it).
+type Step = (usize, isize);
 
 impl<T: Sample> FirPlan<T> {
     /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters.
@@ -39,29 +50,49 @@ impl<T: Sample> FirPlan<T> {
         check_finite::<T>(taps)?;
         let channels = taps.len();
         let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
-        let history = lags - 1;
-        let block = block_frames(channels, history);
-        let stride = Window::<T>::stride(history, block);
-        if channels.saturating_mul(stride) > u32::MAX as usize {
-            return Err(BuildError::TooLong { history, channels });
+        let fold = fold_for::<T>(ratio, isa);
+        let window = (lags - 1).div_ceil(fold);
+        let block = block_frames(channels * fold, window);
+        let stride = Window::<T>::stride(window, block);
+        if channels.saturating_mul(fold).saturating_mul(stride) > u32::MAX as usize {
+            return Err(BuildError::TooLong { history: lags - 1, channels });
         }
-        let offsets =
-            (0..channels * lags).map(|s| ((s / lags) * stride + history - s % lags) as u32).collect();
-        let groups =
-            widths(ratio).map(|(first, width)| phase_group(taps, ratio, lags, first, width)).collect();
-        Ok(Self { channels, ratio, history, block, groups, offsets, kernel: T::fir_kernel(isa) })
+        // Per channel the taps in rising order, for each of the T ticks of a super-tick.
+        let steps: Vec<Step> =
+            (0..channels).flat_map(|i| (1 - fold as isize..lags as isize).map(move |lag| (i, lag))).collect();
+        let offset = |&(i, lag): &Step| {
+            let row = (-lag).rem_euclid(fold as isize) as usize * channels + i;
+            let column = window as isize + (-lag).div_euclid(fold as isize);
+            (row * stride) as u32 + column as u32
+        };
+        let groups = widths(ratio * fold)
+            .map(|(first, width)| phase_group(taps, ratio, &steps, first, width))
+            .collect();
+        Ok(Self {
+            channels,
+            ratio,
+            history: lags - 1,
+            fold,
+            window,
+            block,
+            groups,
+            offsets: steps.iter().map(offset).collect(),
+            kernel: T::fir_kernel(isa),
+            isa,
+        })
     }
 
     /// A stream's state before its first tick.
     pub(crate) fn state(&self) -> FirState<T> {
         FirState {
-            window: Window::new(self.channels, self.history, self.block),
-            rows: Aligned::new(self.ratio * self.out_stride()),
+            window: Window::new(self.channels * self.fold, self.window, self.block),
+            lead: 0,
+            rows: Aligned::new(self.ratio * self.fold * self.out_stride()),
         }
     }
 
     fn out_stride(&self) -> usize {
-        self.block + 16
+        self.block + OVERRUN
     }
 
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
@@ -74,24 +105,34 @@ impl<T: Sample> FirPlan<T> {
         let mut replaced = 0;
         let mut first = 0;
         while first < source.ticks() {
-            let ticks = (source.ticks() - first).min(self.block);
-            state.window.make_room(ticks);
-            let (rows, stride) = state.window.room();
-            replaced += source.gather(first, ticks, rows, stride);
-            self.filter(state, ticks);
-            sink.scatter(first, ticks, self.ratio, &state.rows, self.out_stride());
+            let ticks = (source.ticks() - first).min(self.block * self.fold - state.lead);
+            let fold = Fold { ticks: self.fold, lead: state.lead };
+            state.window.make_room(fold.super_ticks(ticks));
+            let (samples, stride) = state.window.room();
+            let rows = RowsMut { samples, stride, channels: self.channels, fold, isa: self.isa };
+            replaced += source.gather(first, ticks, rows);
+            self.filter(state, fold.super_ticks(ticks));
+            let rows = Rows {
+                samples: &state.rows[..],
+                stride: self.out_stride(),
+                phases: self.ratio,
+                fold,
+                isa: self.isa,
+            };
+            sink.scatter(first, ticks, rows);
+            state.window.advance((state.lead + ticks) / self.fold);
+            state.lead = (state.lead + ticks) % self.fold;
             first += ticks;
         }
         replaced
     }
 
-    fn filter(&self, state: &mut FirState<T>, ticks: usize) {
+    fn filter(&self, state: &mut FirState<T>, super_ticks: usize) {
         let stride = self.out_stride();
         for group in &self.groups {
             let out = &mut state.rows[group.first * stride..];
-            self.kernel.run(group, state.window.view(), &self.offsets, ticks, out, stride);
+            self.kernel.run(group, state.window.view(), &self.offsets, super_ticks, out, stride);
         }
-        state.window.advance(ticks);
     }
 }
 
@@ -99,7 +140,14 @@ impl<T: Sample> FirState<T> {
     /// As new.
     pub(crate) fn reset(&mut self) {
         self.window.reset();
+        self.lead = 0;
     }
+}
+
+/// One phase alone would load a vector for every multiply-add, which no processor can: two ticks at a
+/// time are two phases.
+fn fold_for<T: Sample>(ratio: usize, isa: Isa) -> usize {
+    if ratio == 1 && T::BYTES == 4 && isa != Isa::Portable { 2 } else { 1 }
 }
 
 fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
@@ -126,18 +174,22 @@ fn widths(ratio: usize) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
+/// Phases first .. first + width of a super-tick: phase r M + p is phase p of its tick r, whose
+/// tap for the input `lag` ticks before the super-tick is p + (r + lag) M.
 fn phase_group<T: Sample>(
     taps: &[Vec<f64>],
     ratio: usize,
-    lags: usize,
+    steps: &[Step],
     first: usize,
     width: usize,
 ) -> PhaseGroup<T> {
-    let mut coefficients = Aligned::new(taps.len() * lags * width);
-    let places =
-        (0..taps.len()).flat_map(|i| (0..lags).flat_map(move |j| (0..width).map(move |p| (i, j, p))));
-    for (slot, (i, j, p)) in coefficients.iter_mut().zip(places) {
-        *slot = T::from_f64(taps[i].get(first + p + j * ratio).copied().unwrap_or(0.0));
+    let mut coefficients = Aligned::new(steps.len() * width);
+    let places = steps.iter().flat_map(|&step| (first..first + width).map(move |phase| (step, phase)));
+    for (slot, ((i, lag), phase)) in coefficients.iter_mut().zip(places) {
+        let tap = usize::try_from((phase / ratio) as isize + lag)
+            .ok()
+            .and_then(|j| taps[i].get(phase % ratio + j * ratio));
+        *slot = T::from_f64(tap.copied().unwrap_or(0.0));
     }
     PhaseGroup { first, width, coefficients }
 }

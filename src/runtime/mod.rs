@@ -6,6 +6,7 @@ mod aligned;
 mod error;
 mod fir;
 mod reconstructor;
+mod rows;
 mod sample;
 mod simd;
 mod state_space;

@@ -139,7 +139,7 @@ impl Reconstructor {
         self.latency.div_ceil(self.ratio())
     }
 
-    /// Samples in byte form that were NaN or infinite and became 0, since the beginning.
+    /// Input samples that were NaN or infinite and became 0, since the beginning.
     pub fn replaced(&self) -> u64 {
         self.replaced
     }
@@ -168,7 +168,8 @@ impl Reconstructor {
     }
 
     /// Takes whole ticks (N samples each, interleaved) and writes M samples for each; returns the
-    /// samples written, `input.len() / N * M`. A NaN spoils the outputs that look back to it.
+    /// samples written, `input.len() / N * M`. NaN and infinity in the input become 0 and are counted, see
+    /// [`Reconstructor::replaced`].
     ///
     /// # Errors
     /// [`ProcessError`] if the slices do not fit; nothing is processed then.
@@ -188,7 +189,7 @@ impl Reconstructor {
 
     /// As [`Reconstructor::process`], from and to samples as they lie in files and pipes: the
     /// channels are those of all `input` recordings one after another, the ticks those that all of
-    /// them have. NaN and infinity become 0 and are counted, outputs saturate and are counted.
+    /// them have. Outputs that do not fit an integer format saturate and are counted.
     ///
     /// # Errors
     /// As [`Reconstructor::process`].

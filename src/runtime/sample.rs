@@ -1,9 +1,12 @@
 //! The two number types that kernels run in.
 
-use super::simd::{FirKernel, Isa};
+use super::simd::{self, FirKernel, Isa, Progress};
+use crate::io::PcmFormat;
 
 /// f32 or f64.
 pub(crate) trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
+    /// Size in memory.
+    const BYTES: usize = size_of::<Self>();
     /// Rounds to the nearest.
     fn from_f64(value: f64) -> Self;
     /// Exact.
@@ -12,6 +15,29 @@ pub(crate) trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + 'stati
     fn finite(self) -> bool;
     /// The FIR kernels for this type.
     fn fir_kernel(isa: Isa) -> FirKernel<Self>;
+    /// Fast conversion of numbers to rows of this type, see [`simd::deinterleave_f32`].
+    fn deinterleave_numbers<S: Sample>(
+        isa: Isa,
+        samples: &[S],
+        n: usize,
+        frames: usize,
+        rows: &mut [Self],
+        stride: usize,
+    ) -> Progress;
+    /// Fast conversion of bytes to rows of this type, see [`simd::deinterleave`].
+    fn deinterleave_bytes(
+        isa: Isa,
+        format: PcmFormat,
+        bytes: &[u8],
+        n: usize,
+        frames: usize,
+        rows: &mut [Self],
+        stride: usize,
+    ) -> Progress;
+    /// Fast conversion of rows of this type to f32 frames, see [`simd::interleave`].
+    fn interleave(isa: Isa, rows: &[Self], stride: usize, m: usize, frames: usize, out: &mut [f32]) -> usize;
+    /// The samples themselves, if they are f32.
+    fn as_f32(samples: &[Self]) -> Option<&[f32]>;
 }
 
 impl Sample for f32 {
@@ -33,6 +59,39 @@ impl Sample for f32 {
     fn fir_kernel(isa: Isa) -> FirKernel<Self> {
         FirKernel::for_f32(isa)
     }
+
+    fn deinterleave_numbers<S: Sample>(
+        isa: Isa,
+        samples: &[S],
+        n: usize,
+        frames: usize,
+        rows: &mut [Self],
+        stride: usize,
+    ) -> Progress {
+        S::as_f32(samples)
+            .map(|samples| simd::deinterleave_f32(isa, samples, n, frames, rows, stride))
+            .unwrap_or_default()
+    }
+
+    fn deinterleave_bytes(
+        isa: Isa,
+        format: PcmFormat,
+        bytes: &[u8],
+        n: usize,
+        frames: usize,
+        rows: &mut [Self],
+        stride: usize,
+    ) -> Progress {
+        simd::deinterleave(isa, format, bytes, n, frames, rows, stride)
+    }
+
+    fn interleave(isa: Isa, rows: &[Self], stride: usize, m: usize, frames: usize, out: &mut [f32]) -> usize {
+        simd::interleave(isa, rows, stride, m, frames, out)
+    }
+
+    fn as_f32(samples: &[Self]) -> Option<&[f32]> {
+        Some(samples)
+    }
 }
 
 impl Sample for f64 {
@@ -53,5 +112,36 @@ impl Sample for f64 {
 
     fn fir_kernel(isa: Isa) -> FirKernel<Self> {
         FirKernel::for_f64(isa)
+    }
+
+    fn deinterleave_numbers<S: Sample>(
+        _: Isa,
+        _: &[S],
+        _: usize,
+        _: usize,
+        _: &mut [Self],
+        _: usize,
+    ) -> Progress {
+        Progress::default()
+    }
+
+    fn deinterleave_bytes(
+        _: Isa,
+        _: PcmFormat,
+        _: &[u8],
+        _: usize,
+        _: usize,
+        _: &mut [Self],
+        _: usize,
+    ) -> Progress {
+        Progress::default()
+    }
+
+    fn interleave(_: Isa, _: &[Self], _: usize, _: usize, _: usize, _: &mut [f32]) -> usize {
+        0
+    }
+
+    fn as_f32(_: &[Self]) -> Option<&[f32]> {
+        None
     }
 }

@@ -1,6 +1,8 @@
 //! State-space banks: x+ = a x + b u, y = c x + d u once a tick, in f64.
 
 use super::BuildError;
+use super::rows::{Fold, Rows, RowsMut};
+use super::simd::Isa;
 use super::ticks::{FastSink, TickSource};
 use crate::bank::BlockFilter;
 
@@ -68,9 +70,14 @@ impl StateSpacePlan {
         let mut first = 0;
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(BLOCK);
-            replaced += source.gather(first, ticks, &mut state.input, BLOCK);
+            let fold = Fold { ticks: 1, lead: 0 };
+            let isa = Isa::Portable;
+            let rows =
+                RowsMut { samples: &mut state.input[..], stride: BLOCK, channels: self.channels, fold, isa };
+            replaced += source.gather(first, ticks, rows);
             (0..ticks).for_each(|k| self.tick(state, k));
-            sink.scatter(first, ticks, self.ratio, &state.output, BLOCK);
+            let rows = Rows { samples: &state.output[..], stride: BLOCK, phases: self.ratio, fold, isa };
+            sink.scatter(first, ticks, rows);
             first += ticks;
         }
         replaced

@@ -48,7 +48,8 @@ impl<T: Sample> Window<T> {
             return;
         }
         for row in self.samples.chunks_exact_mut(self.stride) {
-            row.copy_within(self.next - self.history..self.next, 0);
+            // One more: the next frame may be a super-tick that is filled in part.
+            row.copy_within(self.next - self.history..self.next + 1, 0);
         }
         self.next = self.history;
     }

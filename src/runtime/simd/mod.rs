@@ -11,11 +11,15 @@
 //! a fused multiply-add in software is forty times slower.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+mod convert;
 mod isa;
+mod layout;
 mod polyphase;
 mod vector;
 
 pub use isa::Isa;
+pub(crate) use layout::{Progress, deinterleave, deinterleave_f32, encode, interleave};
 pub(crate) use polyphase::{FirKernel, PhaseGroup};
 
 /// Frames that a kernel may read and write past the last one asked for: its widest vector.
