@@ -3,14 +3,14 @@
 use std::f64::consts::TAU;
 
 use crate::linalg::{Complex, Mat, eigenvalues, solve_c, to_complex};
-use crate::spec::{Family, FilterSpec};
+use crate::spec::{Family, FilterProblem, FilterSpec};
 
 use super::balance::equalised;
 use super::pairing::pair_sections;
 use super::rational::Rational;
 use super::roots::RootSet;
 use super::section::{Realisation, Section};
-use super::{AnalogError, Zpk, families};
+use super::{AnalogError, MIN_DAMPING_RATIO, Zpk, families};
 
 /// One link of a chain with one input and one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,14 +125,21 @@ impl Chain {
 
 /// The family member with cutoff 1 rad/s.
 fn prototype(family: Family, order: usize, ripple_db: f64, attenuation_db: f64) -> Result<Zpk, AnalogError> {
-    Ok(match family {
+    let prototype = match family {
         Family::Butterworth => families::butterworth(order),
         Family::Chebyshev1 => families::chebyshev1(order, ripple_db),
         Family::Chebyshev2 => families::chebyshev2(order, attenuation_db),
         Family::Elliptic => families::elliptic(order, ripple_db, attenuation_db),
         Family::Bessel => families::bessel(order)?,
         Family::Rc => families::rc(),
-    })
+    };
+    if prototype.poles.iter().all(|p| -p.re >= MIN_DAMPING_RATIO * p.norm()) {
+        return Ok(prototype);
+    }
+    let rule = "with these ripples the edge of the pass band is sharper than 1e-9 of the cutoff, which no front end \
+                and no double can hold; lower the order or set the ripples further apart"
+        .into();
+    Err(FilterProblem::ParameterRange { key: "order", value: order as f64, unit: "", rule }.into())
 }
 
 fn in_written_unit(error: AnalogError, h: f64) -> AnalogError {

@@ -357,6 +357,19 @@ fn what_cannot_be_sampled_is_refused_with_reason_and_remedy() {
 }
 
 #[test]
+fn an_edge_sharper_than_a_double_is_refused_by_its_order() {
+    let filter = FilterSpec::Family {
+        family: Family::Elliptic,
+        order: Some(17),
+        cutoff: 1.0,
+        ripple_db: Some(11.0),
+        attenuation_db: Some(11.05),
+    };
+    let text = refused(&filter, 1.0).to_string();
+    assert!(text.contains("order = 17") && text.contains("lower the order"), "{text}");
+}
+
+#[test]
 fn direct_terms_are_refused_with_the_way_out() {
     for (kind, order) in [(Family::Chebyshev2, 4), (Family::Elliptic, 6)] {
         let error = refused(&family(kind, order, 1.0), 1e-3);

@@ -1,23 +1,18 @@
 //! Round trips to the bit, and every way in which a bank file can be wrong.
 
+use proptest::prelude::*;
+
 use super::*;
 
-fn thesis_like() -> Bank {
-    let spec = r#"
-fast_period = 1.0
-ratio = 2
-latency = 10
-[target]
-filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
-[[channel]]
-delay = 1.2
-[[channel]]
-delay = 0.6
-[design]
-taps = 3
-"#;
+fn spec() -> Spec {
+    let text = "fast_period = 1.0\nratio = 2\nlatency = 10\n[target]\nfilter = { num = [0.25], den = [1.0, 1.0, 0.25] }\n\
+                [[channel]]\ndelay = 1.2\n[[channel]]\ndelay = 0.6\n[design]\ntaps = 3\n";
+    Spec::from_toml(text, "t.toml").unwrap()
+}
+
+fn fir() -> Bank {
     Bank {
-        spec: Some(Spec::from_toml(spec, "t.toml").unwrap()),
+        spec: Some(spec()),
         fast_period: 1.0,
         ratio: 2,
         latency: 10,
@@ -28,13 +23,264 @@ taps = 3
     }
 }
 
+fn state_space() -> Bank {
+    let block = BlockFilter {
+        a: vec![vec![0.5, 0.1, 0.0], vec![0.0, -0.25, 1e-300], vec![1.0 / 7.0, 0.0, 0.0]],
+        b: vec![vec![1.0, 2.0], vec![3.0, 4.0], vec![5.0, 6.0]],
+        c: vec![vec![1.0, 0.0, 0.5], vec![0.0, 1.0, 0.5]],
+        d: vec![vec![0.0, 0.1], vec![0.2, 0.3]],
+    };
+    Bank { spec: None, method: Method::Iir, filters: SynthesisFilters::StateSpace(block), ..fir() }
+}
+
+const FIR_TEXT: &str = r#"{
+  "format": "hybank-bank",
+  "version": 1,
+  "spec": {
+    "fast_period": 1.0,
+    "ratio": 2,
+    "latency": 10,
+    "target": {
+      "filter": {
+        "num": [0.25],
+        "den": [1.0, 1.0, 0.25]
+      }
+    },
+    "channel": [{
+      "delay": 1.2,
+      "filter": {
+        "num": [0.25],
+        "den": [1.0, 1.0, 0.25]
+      }
+    }, {
+      "delay": 0.6,
+      "filter": {
+        "num": [0.25],
+        "den": [1.0, 1.0, 0.25]
+      }
+    }],
+    "design": {
+      "method": "fir",
+      "taps": 3
+    }
+  },
+  "fast_period": 1.0,
+  "ratio": 2,
+  "latency": 10,
+  "method": "fir",
+  "channels": [{
+    "delay": 1.2,
+    "taps": [0.1, -2.5e-9, 0.3333333333333333]
+  }, {
+    "delay": 0.6,
+    "taps": [5e-324, -0.0, 1.7e+308]
+  }],
+  "state_space": null,
+  "gamma": {
+    "upper": 0.039932,
+    "lower": null,
+    "noncausal": 0.03
+  }
+}
+"#;
+
+#[test]
+fn the_file_looks_as_the_format_says() {
+    assert_eq!(fir().to_json().unwrap(), FIR_TEXT);
+}
+
 #[test]
 fn reads_back_to_the_same_bits() {
-    let bank = thesis_like();
-    let text = bank.to_json().unwrap();
-    let back = Bank::from_json(&text, "b.json").unwrap();
-    assert_eq!(back, bank);
-    let SynthesisFilters::Fir(taps) = &back.filters else { panic!("taps expected") };
+    for bank in [fir(), state_space()] {
+        let text = bank.to_json().unwrap();
+        let back = Bank::from_json(&text, "b.json").unwrap();
+        assert_eq!(back, bank);
+        assert_eq!(back.to_json().unwrap(), text);
+    }
+    let SynthesisFilters::Fir(taps) = Bank::from_json(FIR_TEXT, "b.json").unwrap().filters else {
+        panic!("no taps")
+    };
     assert_eq!(taps[1][1].to_bits(), (-0.0_f64).to_bits());
-    assert_eq!(back.to_json().unwrap(), text);
+}
+
+#[test]
+fn a_bank_made_elsewhere_reads() {
+    let text = "\u{feff}{\"version\":1,\"format\":\"hybank-bank\",\"fast_period\":1,\"ratio\":3,\"latency\":0,\
+                \"method\":\"sinc\",\"channels\":[{\"delay\":0,\"taps\":[1,12345678901234567890]}],\
+                \"meta\":{\"made_by\":[\"anything\",null]}}";
+    let bank = Bank::from_json(text, "b.json").unwrap();
+    assert_eq!((bank.spec.is_none(), bank.gamma, bank.slow_period()), (true, Gamma::default(), 3.0));
+    assert_eq!(bank.filters, SynthesisFilters::Fir(vec![vec![1.0, 12345678901234567890.0]]));
+}
+
+#[test]
+fn a_static_block_has_no_states() {
+    let block = BlockFilter {
+        a: vec![],
+        b: vec![],
+        c: vec![vec![], vec![]],
+        d: vec![vec![1.0, 0.0], vec![0.0, 1.0]],
+    };
+    let bank = Bank { filters: SynthesisFilters::StateSpace(block), ..state_space() };
+    assert_eq!(Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap(), bank);
+}
+
+fn refused(text: &str) -> BankError {
+    match Bank::from_json(text, "b.json") {
+        Ok(bank) => panic!("this must not read: {text}\n{bank:?}"),
+        Err(error) => error,
+    }
+}
+
+#[test]
+fn every_mistake_names_its_json_place_and_the_remedy() {
+    let ss = state_space().to_json().unwrap();
+    let fir_with = |from: &str, to: &str| {
+        assert!(FIR_TEXT.contains(from), "{from}");
+        FIR_TEXT.replacen(from, to, 1)
+    };
+    // The last occurrence is the bank's own, where the spec has the same key.
+    let last = |from: &str, to: &str| {
+        let at = FIR_TEXT.rfind(from).unwrap();
+        format!("{}{to}{}", &FIR_TEXT[..at], &FIR_TEXT[at + from.len()..])
+    };
+    let ss_with = |from: &str, to: &str| {
+        assert!(ss.contains(from), "{from} in {ss}");
+        ss.replacen(from, to, 1)
+    };
+    for (text, path, words) in [
+        (String::new(), "", "EOF"),
+        ("[]".into(), "", "expected a table"),
+        (FIR_TEXT[..400].into(), "", "line"),
+        (fir_with("\"latency\": 10,", "\"latency\": 10, \"latency\": 10,"), "", "given twice"),
+        (fir_with("hybank-bank", "wavelets"), "format", "a bank says \"hybank-bank\""),
+        (fir_with("\"format\": \"hybank-bank\",", ""), "", "the key format is missing"),
+        (
+            fir_with("\"version\": 1", "\"version\": 2"),
+            "version",
+            "has version 2, this program reads version 1",
+        ),
+        (fir_with("\"version\": 1", "\"version\": \"1\""), "version", "expected a whole number"),
+        (fir_with("\"state_space\"", "\"statespace\""), "", "did you mean \"state_space\""),
+        (last("\"fast_period\": 1.0", "\"fast_period\": 0.0"), "fast_period", "must be a positive"),
+        (last("\"fast_period\": 1.0", "\"fast_period\": 1e999"), "", "out of range"),
+        (last("\"fast_period\": 1.0", "\"fast_period\": null"), "", "the key fast_period is missing"),
+        (
+            last("\"fast_period\": 1.0", "\"fast_period\": 2.0"),
+            "spec.fast_period",
+            "the bank says 2, its spec says 1",
+        ),
+        (last("\"ratio\": 2", "\"ratio\": 0"), "ratio", "must be 1 to 1024"),
+        (last("\"ratio\": 2", "\"ratio\": 2.5"), "ratio", "without point"),
+        (last("\"ratio\": 2", "\"ratio\": 3"), "spec.ratio", "the bank says 3, its spec says 2"),
+        (last("\"latency\": 10", "\"latency\": -1"), "latency", "zero or more"),
+        (last("\"latency\": 10", "\"latency\": 99999999"), "latency", "16777216"),
+        (last("\"latency\": 10", "\"latency\": 11"), "spec.latency", "must agree"),
+        (last("\"fir\"", "\"firr\""), "method", "did you mean \"fir\""),
+        (last("\"fir\"", "\"iir\""), "method", "a bank of the method iir holds state_space and no taps"),
+        (ss_with("\"iir\"", "\"sinc\""), "method", "a bank of the method sinc holds taps"),
+        (last("\"delay\": 0.6", "\"delay\": -0.6"), "channels[1].delay", "zero or more"),
+        (last("\"delay\": 0.6", "\"delay\": 0.61"), "spec.channel[1].delay", "the bank says 0.61"),
+        (last("\"delay\": 0.6", "\"dealy\": 0.6"), "channels[1]", "did you mean \"delay\""),
+        (last("0.3333333333333333", "null"), "channels[0].taps[2]", "perhaps written for NaN"),
+        (last("-0.0", "\"x\""), "channels[1].taps[1]", "expected a number, found a text"),
+        (last(", 1.7e+308", ""), "channels[1].taps", "2 taps, but there must be 3: all filters are as long"),
+        (
+            last("\"taps\": [5e-324, -0.0, 1.7e+308]", "\"taps\": null"),
+            "channels[1]",
+            "the key taps is missing",
+        ),
+        (
+            last("\"state_space\": null", "\"state_space\": {}"),
+            "channels[0].taps",
+            "both taps and state_space",
+        ),
+        (last("0.039932", "-0.1"), "gamma.upper", "zero or more"),
+        (last("\"noncausal\"", "\"non_causal\""), "gamma", "did you mean \"noncausal\""),
+        (fir_with("\"taps\": 3", "\"taps\": 0"), "spec.design.taps", "1 to 65536"),
+        (fir_with("[1.0, 1.0, 0.25]", "[1.0, 1.0, NaN]"), "", "line"),
+        (
+            fir_with("\"num\": [0.25],\n        \"den\": [1.0, 1.0, 0.25]", ""),
+            "spec.target.filter",
+            "the filter is empty",
+        ),
+        (
+            ss_with("[[0.5, 0.1, 0.0], ", "["),
+            "state_space.a[0]",
+            "3 columns, but there must be 2: a is n x n",
+        ),
+        (ss_with("[0.5, 0.1, 0.0]", "[0.5, 0.1]"), "state_space.a[0]", "2 columns, but there must be 3"),
+        (ss_with("[3.0, 4.0]", "[3.0]"), "state_space.b[1]", "b is n x N, N the number of channels"),
+        (ss_with(", [5.0, 6.0]", ""), "state_space.b", "2 rows, but there must be 3"),
+        (ss_with("[0.0, 1.0, 0.5]", "[0.0, 1.0]"), "state_space.c[1]", "c is M x n"),
+        (ss_with("[0.2, 0.3]", "[0.2, 0.3, 0.4]"), "state_space.d[1]", "d is M x N"),
+        (ss_with("\"d\": ", "\"e\": "), "state_space", "unknown key \"e\""),
+        (ss_with("\"ratio\": 2", "\"ratio\": 1"), "state_space.c", "2 rows, but there must be 1"),
+    ] {
+        let error = refused(&text);
+        assert_eq!(error.path(), path, "{error}");
+        assert!(error.to_string().contains(words), "expected {words:?} in: {error}");
+        assert!(error.to_string().starts_with("b.json: "), "{error}");
+    }
+    let none = Bank { spec: None, delays: vec![], filters: SynthesisFilters::Fir(vec![]), ..fir() };
+    assert_eq!(none.check().unwrap_err().path(), "channels");
+}
+
+#[test]
+fn what_json_cannot_say_is_not_written() {
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let tap = Bank { filters: SynthesisFilters::Fir(vec![vec![0.0; 3], vec![0.0, value, 0.0]]), ..fir() };
+        let error = tap.to_json().unwrap_err();
+        assert_eq!((error.path(), error.file()), ("channels[1].taps[1]", ""));
+        let gamma = Bank { gamma: Gamma { lower: Some(value), ..Gamma::default() }, ..fir() };
+        assert_eq!(gamma.to_json().unwrap_err().path(), "gamma.lower");
+        let delay = Bank { delays: vec![value, 0.6], ..fir() };
+        assert_eq!(delay.to_json().unwrap_err().path(), "channels[0].delay");
+        let mut block = state_space();
+        if let SynthesisFilters::StateSpace(filter) = &mut block.filters {
+            filter.c[1][2] = value;
+        }
+        assert_eq!(block.to_json().unwrap_err().path(), "state_space.c[1][2]");
+    }
+}
+
+#[test]
+fn deep_nesting_is_an_error() {
+    let text = format!("{{\"format\": {}1{}}}", "[".repeat(100_000), "]".repeat(100_000));
+    assert!(matches!(refused(&text).problem(), BankProblem::Syntax { .. }));
+}
+
+/// Every finite bit pattern.
+fn any_double() -> impl Strategy<Value = f64> {
+    any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |x| x.is_finite())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_bits_survive_the_file(
+        taps in prop::collection::vec(prop::collection::vec(any_double(), 17), 1..4),
+        gamma in prop::option::of(any_double().prop_map(f64::abs)),
+        fast_period in 1e-300..1e300f64,
+        latency in 0usize..1000,
+    ) {
+        let delays: Vec<f64> = taps.iter().map(|list| list[0].abs()).collect();
+        let gamma = Gamma { upper: gamma, ..Gamma::default() };
+        let bank = Bank { spec: None, fast_period, latency, delays, filters: SynthesisFilters::Fir(taps.clone()), gamma, ..fir() };
+        let back = Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap();
+        let SynthesisFilters::Fir(read) = &back.filters else { panic!("taps expected") };
+        let bits = |lists: &[Vec<f64>]| lists.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(bits(read), bits(&taps));
+        prop_assert_eq!(back, bank);
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_or_read_but_never_panics(at in 0usize..1200, cut in 0usize..20, put in "[ -~]{0,6}") {
+        let (start, end) = (at.min(FIR_TEXT.len()), (at + cut).min(FIR_TEXT.len()));
+        let damaged = format!("{}{put}{}", &FIR_TEXT[..start], &FIR_TEXT[end..]);
+        if let Err(error) = Bank::from_json(&damaged, "b.json") {
+            prop_assert!(error.to_string().starts_with("b.json: "));
+        }
+    }
 }

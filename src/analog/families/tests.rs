@@ -140,3 +140,28 @@ fn bessel_delay_is_maximally_flat() {
         assert!((dc / (odd / order as f64).exp() - 1.0).abs() < 1e-12, "order {order}: {dc}");
     }
 }
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig {
+        cases: 200, max_global_rejects: 4000, failure_persistence: None, ..Default::default()
+    })]
+
+    /// From ripples that are hardly there to 300 dB, and from nearly equal to far apart.
+    #[test]
+    fn any_legal_ripples_make_a_stable_filter(order in 1usize..=32, ripple in -6.0..1.5f64, excess in -3.0..2.4f64) {
+        let ripple_db = 10f64.powf(ripple);
+        let attenuation_db = (ripple_db + 10f64.powf(excess)).min(crate::spec::MAX_RIPPLE_DB);
+        // With ripples alike and a high order, the stop band begins within rounding of the cutoff.
+        let sharp = elliptic(order, ripple_db, attenuation_db);
+        let first_zero = sharp.zeros.iter().map(|z| z.im.abs()).fold(f64::INFINITY, f64::min);
+        proptest::prop_assume!(first_zero > 1.0 + 1e-5);
+        for filter in [chebyshev1(order, ripple_db), chebyshev2(order, attenuation_db), sharp.clone()] {
+            proptest::prop_assert_eq!(filter.poles.len(), order);
+            proptest::prop_assert!(filter.gain.is_finite() && filter.gain > 0.0, "{:?}", filter);
+            proptest::prop_assert!(filter.poles.iter().all(|p| p.re < 0.0 && p.im.is_finite()), "{:?}", filter);
+            proptest::prop_assert!(filter.zeros.iter().all(|z| z.im.is_finite() && z.im.abs() > 0.0), "{:?}", filter);
+        }
+        let edge = decibels(&sharp, 1.0);
+        proptest::prop_assert!((edge + ripple_db).abs() < 1e-6 * ripple_db.max(1e-3), "{} against {}", edge, ripple_db);
+    }
+}
