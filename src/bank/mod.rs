@@ -44,7 +44,7 @@ pub struct Bank {
 /// The synthesis filters in the form they run in.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SynthesisFilters {
-    /// `taps[i][n]` = f_i[n] at the fast rate.
+    /// `taps[i][n]` = `f_i[n]` at the fast rate.
     Fir(Vec<Vec<f64>>),
     /// One block for each slow tick.
     StateSpace(BlockFilter),

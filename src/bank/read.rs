@@ -35,7 +35,7 @@ impl Bank {
 
 impl From<Fault> for BankError {
     fn from(fault: Fault) -> Self {
-        Self::new("", fault.path, fault.problem)
+        Self::new("", fault.path, *fault.problem)
     }
 }
 

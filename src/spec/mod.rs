@@ -174,7 +174,7 @@ impl Spec {
             SpecError::new(file_name, text, error.span(), String::new(), problem)
         })?;
         decode::spec(&reader::Value::root(&document), overrides)
-            .map_err(|fault| SpecError::new(file_name, text, fault.span, fault.path, fault.problem))
+            .map_err(|fault| SpecError::new(file_name, text, fault.span, fault.path, *fault.problem))
     }
 
     /// The spec as a TOML file that reads back equal.

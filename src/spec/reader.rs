@@ -11,7 +11,8 @@ use super::nearest::nearest;
 pub(crate) struct Fault {
     pub(crate) path: String,
     pub(crate) span: Option<Range<usize>>,
-    pub(crate) problem: SpecProblem,
+    /// Boxed, since a fault travels through every small reading function.
+    pub(crate) problem: Box<SpecProblem>,
 }
 
 /// A value and the path that led to it.
@@ -36,7 +37,7 @@ impl<'a> Value<'a> {
 
     /// A problem with this value.
     pub(crate) fn fault(&self, problem: impl Into<SpecProblem>) -> Fault {
-        Fault { path: self.path.clone(), span: self.node.span.clone(), problem: problem.into() }
+        Fault { path: self.path.clone(), span: self.node.span.clone(), problem: Box::new(problem.into()) }
     }
 
     fn wrong_type(&self, expected: &'static str) -> Fault {
@@ -145,11 +146,11 @@ impl<'a> Value<'a> {
             Some(entry) => Err(Fault {
                 path: self.path.clone(),
                 span: entry.key_span.clone(),
-                problem: SpecProblem::UnknownKey {
+                problem: Box::new(SpecProblem::UnknownKey {
                     key: entry.key.clone(),
                     nearest: nearest(&entry.key, known),
                     known: known.to_vec(),
-                },
+                }),
             }),
             None => Ok(Fields { entries, whole: self.clone() }),
         }
