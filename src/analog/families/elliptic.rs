@@ -38,6 +38,6 @@ pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk {
         zeros.extend([zero, zero.conj()]);
         poles.extend([pole, pole.conj()]);
     }
-    let dc = if order % 2 == 0 { 1.0 / (1.0 + ripple).sqrt() } else { 1.0 };
+    let dc = if order.is_multiple_of(2) { 1.0 / (1.0 + ripple).sqrt() } else { 1.0 };
     Zpk { gain: dc * product_of_negatives(&poles) / product_of_negatives(&zeros), zeros, poles }
 }
