@@ -106,8 +106,15 @@ fn g4_the_optimum_settles_with_the_latency() {
     for latency in [2, 4, 6, 8, 14, 20] {
         check("G4", &thesis(latency, &[1.2, 0.6]), 0.0399320, printed(0.0399320));
     }
-    check("G4b, m0 = 0", &thesis(0, &[1.2, 0.6]), 0.187045, 2e-5);
-    check("G4b, m0 = 1", &thesis(1, &[1.2, 0.6]), 0.0694470, printed(0.0694470));
+    // Here the optimum lies above the non-causal bound: it is hit, but its proof is looser.
+    for (latency, golden) in [(0, 0.187045), (1, 0.0694470)] {
+        let gamma = design(&thesis(latency, &[1.2, 0.6])).unwrap().bank.gamma;
+        assert!(
+            (gamma.upper.unwrap() / golden - 1.0).abs() < printed(golden),
+            "G4b, m0 = {latency}: {gamma:?}"
+        );
+        assert!(gamma.lower.unwrap() > golden * (1.0 - 1e-3), "G4b, m0 = {latency}: {gamma:?}");
+    }
 }
 
 #[test]
@@ -173,13 +180,8 @@ fn g12c_g12d_larger_banks() {
     check("G12c, 32 taps", &with_taps(eight, 32), 0.0900756, printed(0.0900756));
 }
 
-/// 1,024 unknowns: minutes without optimisation, seconds with it.
 #[test]
-fn g12c_with_128_taps() {
-    if std::env::var_os("HYBANK_SLOW_TESTS").is_none() {
-        eprintln!("skipped: set HYBANK_SLOW_TESTS=1 to design the bank of 8 x 128 taps");
-        return;
-    }
+fn g12c_with_1024_unknowns() {
     let eight = alike(&butterworth(4, 1.8), 8, 40, &EIGHT_DELAYS);
     check("G12c, 128 taps", &with_taps(eight, 128), 0.0900756, printed(0.0900756));
 }
@@ -188,12 +190,9 @@ fn g12c_with_128_taps() {
 #[test]
 fn g13_jitter_of_the_optimal_bank() {
     let bank = design(&with_taps(thesis(10, &[1.2, 0.6]), 22)).unwrap().bank;
-    for (errors, golden) in [
-        ([0.1, 0.0], 0.0389583),
-        ([0.0, 0.1], 0.0439780),
-        ([0.1, 0.1], 0.0433790),
-        ([0.1, -0.1], 0.0392280),
-    ] {
+    for (errors, golden) in
+        [([0.1, 0.0], 0.0389583), ([0.0, 0.1], 0.0439780), ([0.1, 0.1], 0.0433790), ([0.1, -0.1], 0.0392280)]
+    {
         let gamma = analyze(&bank, &errors).unwrap().gamma;
         assert!((gamma / golden - 1.0).abs() < 0.02, "G13 at {errors:?}: {gamma}, golden {golden}");
     }

@@ -17,6 +17,7 @@ use crate::analog::StrictlyProper;
 use crate::linalg::Mat;
 use crate::lti::StateSpace;
 use crate::lti::exponential::{Flow, gramian_root};
+use std::ops::Range;
 
 /// Instants closer than this (fast periods) are one: far below what any converter resolves, far above
 /// the rounding of delay / period.
@@ -31,6 +32,9 @@ pub struct BlockedPlant {
     pub measured: usize,
     /// M.
     pub wanted: usize,
+    /// For each measured output the states of its delay chain, first link first; empty unless the channel is
+    /// whole ticks late. The output reads the last link, without feedthrough.
+    chains: Vec<Range<usize>>,
 }
 
 /// One output of the blocked plant: which front end is read, when, and how many ticks later it counts.
@@ -47,8 +51,14 @@ impl BlockedPlant {
     pub fn new(problem: &Problem) -> Self {
         let samples = schedule(problem);
         let (transition, input, rows) = follow_state(problem, &samples);
-        let system = append_chains(transition, input, rows, &samples);
-        Self { system, measured: problem.channels.len(), wanted: problem.ratio }
+        let (system, mut chains) = append_chains(transition, input, rows, &samples);
+        chains.truncate(problem.channels.len());
+        Self { system, measured: problem.channels.len(), wanted: problem.ratio, chains }
+    }
+
+    /// The states of the delay chain of a channel, empty unless it is whole ticks late.
+    pub(super) fn chain(&self, channel: usize) -> Range<usize> {
+        self.chains[channel].clone()
     }
 }
 
@@ -139,8 +149,13 @@ impl JointState {
     }
 }
 
-/// Adds a chain of slow delays for each sample that counts some ticks later.
-fn append_chains(transition: Mat, input: Mat, rows: Vec<Row>, samples: &[Sample]) -> StateSpace {
+/// Adds a chain of slow delays for each sample that counts some ticks later; also gives their states.
+fn append_chains(
+    transition: Mat,
+    input: Mat,
+    rows: Vec<Row>,
+    samples: &[Sample],
+) -> (StateSpace, Vec<Range<usize>>) {
     let (n, m, p) = (transition.nrows(), input.ncols(), rows.len());
     let order = n + samples.iter().map(|sample| sample.ticks_late).sum::<usize>();
     let mut a = Mat::zeros(order, order);
@@ -150,6 +165,7 @@ fn append_chains(transition: Mat, input: Mat, rows: Vec<Row>, samples: &[Sample]
     a.view_mut((0, 0), (n, n)).copy_from(&transition);
     b.rows_mut(0, n).copy_from(&input);
     let mut next = n;
+    let mut chains = vec![0..0; p];
     for (output, (row, sample)) in rows.iter().zip(samples).enumerate() {
         let known = row.input.ncols();
         if sample.ticks_late == 0 {
@@ -164,6 +180,8 @@ fn append_chains(transition: Mat, input: Mat, rows: Vec<Row>, samples: &[Sample]
         }
         next += sample.ticks_late;
         c[(output, next - 1)] = 1.0;
+        chains[output] = next - sample.ticks_late..next;
     }
-    StateSpace::new(a, b, c, d).expect("the chains fit by construction").compress_inputs()
+    let system = StateSpace::new(a, b, c, d).expect("the chains fit by construction").compress_inputs();
+    (system, chains)
 }

@@ -8,38 +8,62 @@ use crate::linalg::{self, Mat};
 use crate::lti::gramian::controllability_root;
 use crate::lti::riccati::{self, RiccatiOutcome, RiccatiSolution};
 use crate::lti::{LtiError, StateSpace};
+use std::ops::Range;
 
-/// A measurement whose fresh information is below this fraction of its size (a channel that is whole
-/// ticks late has none) gets white noise in the Riccati equation and nowhere else: gamma is always
-/// computed without it.
-const INNOVATION_FLOOR: f64 = 1e-9;
-/// That noise as a fraction of the gamma that is aimed at: noise sigma costs at most
-/// sqrt(gamma^2 + sigma^2 ||F||^2), 5e-9 relative for filters of gain one.
-const NOISE_TO_GAMMA: f64 = 1e-4;
-/// The least noise, as a fraction of the measurement: the weight 1 / noise^2 must stay invertible.
-const LEAST_NOISE: f64 = 1e-8;
-/// A verdict "impossible" is believed up to this relative residual of the Riccati equation.
+/// A fresh part below this fraction of its measurement is rounding: the channel says nothing new.
+const INNOVATION_FLOOR: f64 = 1e-12;
+/// A verdict "impossible" is believed up to this residual of the Riccati equation, in coordinates in which
+/// the mean-square covariance is the identity: the plant to which the verdict applies exactly is that close.
 const RESIDUAL_OF_PROOF: f64 = 1e-7;
-/// Eigenvalues of a semidefinite matrix may fall this far (relative) below zero by rounding.
-const ROUNDING: f64 = 1e-9;
+/// Directions with less than this share of the largest error variance are scaled as if they had it.
+const BALANCING_FLOOR: f64 = 1e-13;
+/// Eigenvalues of a semidefinite matrix do not fall this far (relative) below zero by rounding.
+const CLEARLY_NEGATIVE: f64 = 1e-5;
 
-/// The plant with the measured inputs taken out: with y = L (C2 x + u1) and yw = L^-1 y,
+/// The plant with the measured inputs taken out.
 ///
-/// x+ = F x + B1 yw + B2 u2,  yw = C2 x + u1,  z = C1 x + X yw + Y u2.
+/// Measurements are of two kinds. *Fresh* ones have a part that nothing before said: y_f = L (C_f x + u1)
+/// with L triangular. *Late* ones (channels whole ticks behind) are states of a delay chain, read without any
+/// noise: y_l = s C_l x with their size s. With yw = [L^-1 y_f; y_l / s],
+///
+/// x+ = F x + B1 L^-1 y_f + B2 u2,  yw = C2 x + [u1; 0],  z = C1 x + X L^-1 y_f + Y u2.
 ///
 /// The samples are nearly noise-free, so the square D2 D2' may be as ill-conditioned as 1e22; here it
 /// never appears, only its triangular root L.
+///
+/// Late measurements leave the weight R of the Riccati equation singular. Substituting P = P0 + Delta turns it
+/// into one for Delta with R + C P0 C' in place of R and F P0 F' + Q - P0 in place of Q. P0 is diagonal on the late
+/// chains, where the last link moves nowhere, so that no cross terms arise: the late measurements get
+/// unit noise, exactly undone in Q. It falls along the chain, which keeps Q positive at the last link (the doubling
+/// would break down on its first step otherwise).
 #[derive(Debug, Clone)]
 pub(super) struct Innovations {
     f: Mat,
     b1: Mat,
     b2: Mat,
     c1: Mat,
+    /// Fresh rows first, then the late ones.
     c2: Mat,
     x: Mat,
     y: Mat,
-    /// N x N lower triangular: y = root * yw.
+    /// Fresh x fresh, lower triangular.
     root: Mat,
+    /// P0: q, q - 1, .. 1 times the variance along a late chain of q links.
+    p0: Mat,
+    fresh: Vec<usize>,
+    late: Vec<Late>,
+    channels: usize,
+    /// Verdicts are not to be trusted: a channel was left out because its fresh part is rounding, or the
+    /// coordinates are not balanced.
+    incomplete: bool,
+}
+
+/// A channel read from the end of a delay chain.
+#[derive(Debug, Clone)]
+struct Late {
+    channel: usize,
+    chain: Range<usize>,
+    size: f64,
 }
 
 /// A filter xh+ = a xh + b y, zh = c xh + d y.
@@ -57,41 +81,79 @@ pub(super) enum Trial {
 }
 
 impl Innovations {
-    /// Separates fresh information (u1) from the rest (u2) by one LQ factorisation of [D2; D1].
-    /// `aim` is a lower bound of the gammas that will be tried.
-    pub(super) fn new(plant: &BlockedPlant, aim: f64) -> Result<Self, DesignError> {
-        let system = &plant.system;
-        let noise = stabilising_noise(plant, aim)?;
-        let (measured, wanted) = (plant.measured, plant.wanted);
-        let inputs = system.inputs();
-        let mut d = Mat::zeros(measured + wanted, inputs + measured);
-        d.columns_mut(0, inputs).copy_from(system.d());
-        let mut b = Mat::zeros(system.order(), inputs + measured);
-        b.columns_mut(0, inputs).copy_from(system.b());
-        for (i, sigma) in noise.into_iter().enumerate() {
-            d[(i, inputs + i)] = sigma;
+    /// Separates fresh information (u1) from the rest (u2) by one LQ factorisation.
+    pub(super) fn new(plant: &BlockedPlant) -> Result<Self, DesignError> {
+        let sizes = output_sizes(&plant.system)?;
+        let (mut fresh, mut late) = (Vec::new(), Vec::new());
+        for channel in 0..plant.measured {
+            match plant.chain(channel) {
+                chain if chain.is_empty() => fresh.push(channel),
+                chain => late.push(Late { channel, chain, size: sizes[channel] }),
+            }
         }
-        Ok(Self::separate(plant, &b, &d))
+        let known = fresh.len();
+        fresh = independent(plant, &fresh, &sizes);
+        let incomplete = fresh.len() < known;
+        Ok(Self::separate(plant, fresh, late, incomplete))
     }
 
-    fn separate(plant: &BlockedPlant, b: &Mat, d: &Mat) -> Self {
-        let (measured, wanted, n) = (plant.measured, plant.wanted, plant.system.order());
-        let (p, inputs) = (measured + wanted, d.ncols());
-        // [D; B] = L Q: in the rotated inputs D is lower triangular and B has at most p + n columns.
-        let mut stacked = Mat::zeros(p + n, inputs);
-        stacked.rows_mut(0, p).copy_from(d);
-        stacked.rows_mut(p, n).copy_from(b);
+    fn separate(plant: &BlockedPlant, fresh: Vec<usize>, late: Vec<Late>, incomplete: bool) -> Self {
+        let system = &plant.system;
+        let (known, wanted, n) = (fresh.len(), plant.wanted, system.order());
+        let wanted_rows: Vec<usize> = (plant.measured..plant.measured + wanted).collect();
+        // [D_f; D_z; B] = L Q: in the rotated inputs D is lower triangular.
+        let mut stacked = Mat::zeros(known + wanted + n, system.inputs());
+        stacked.rows_mut(0, known).copy_from(&system.d().select_rows(&fresh));
+        stacked.rows_mut(known, wanted).copy_from(&system.d().select_rows(&wanted_rows));
+        stacked.rows_mut(known + wanted, n).copy_from(system.b());
         let l = linalg::lq_factor(&stacked);
-        let rest = l.ncols() - measured;
-        let root = l.view((0, 0), (measured, measured)).into_owned();
-        let b1 = l.view((p, 0), (n, measured)).into_owned();
-        let b2 = l.view((p, measured), (n, rest)).into_owned();
-        let x = l.view((measured, 0), (wanted, measured)).into_owned();
-        let y = l.view((measured, measured), (wanted, rest)).into_owned();
-        let c2 = linalg::solve_lower(&root, &plant.system.c().rows(0, measured).into_owned());
-        let c1 = plant.system.c().rows(measured, wanted) - &x * &c2;
-        let f = plant.system.a() - &b1 * &c2;
-        Self { f, b1, b2, c1, c2, x, y, root }
+        let rest = l.ncols() - known;
+        let root = l.view((0, 0), (known, known)).into_owned();
+        let b1 = l.view((known + wanted, 0), (n, known)).into_owned();
+        let b2 = l.view((known + wanted, known), (n, rest)).into_owned();
+        let x = l.view((known, 0), (wanted, known)).into_owned();
+        let y = l.view((known, known), (wanted, rest)).into_owned();
+        let cf = linalg::solve_lower(&root, &system.c().select_rows(&fresh));
+        let c1 = system.c().select_rows(&wanted_rows) - &x * &cf;
+        let f = system.a() - &b1 * &cf;
+        let mut c2 = Mat::zeros(known + late.len(), n);
+        c2.rows_mut(0, known).copy_from(&cf);
+        for (row, channel) in late.iter().enumerate() {
+            c2[(known + row, channel.chain.end - 1)] = 1.0 / channel.size;
+        }
+        let p0 = late_variances(&late, n);
+        Self { f, b1, b2, c1, c2, x, y, root, p0, fresh, late, channels: plant.measured, incomplete }
+    }
+
+    /// F P0 F' - P0: what the substitution adds to Q.
+    fn shift_of_q(&self) -> Mat {
+        &self.f * &self.p0 * self.f.transpose() - &self.p0
+    }
+
+    /// The same problem in state coordinates in which the mean-square optimal prediction error is white.
+    /// States of smooth front ends differ by many decades and are nearly dependent; the covariances of all gammas are near
+    /// the mean-square one, so there they are near the identity.
+    pub(super) fn balanced(self) -> Self {
+        let unbalanced = |plain: Self| Self { incomplete: true, ..plain };
+        let Some(p) = self.mean_square_covariance() else { return unbalanced(self) };
+        let Ok((values, vectors)) = linalg::symmetric_eigen(&p) else { return unbalanced(self) };
+        let floor = BALANCING_FLOOR * values.iter().fold(0.0_f64, |m, v| m.max(*v));
+        if floor <= 0.0 || !floor.is_finite() {
+            return unbalanced(self);
+        }
+        let n = p.nrows();
+        let scale = |k: usize| values[k].max(0.0) + floor;
+        let forward = Mat::from_fn(n, n, |i, k| vectors[(i, k)] * scale(k).sqrt());
+        let back = Mat::from_fn(n, n, |k, i| vectors[(i, k)] / scale(k).sqrt());
+        Self {
+            f: &back * &self.f * &forward,
+            b1: &back * &self.b1,
+            b2: &back * &self.b2,
+            c1: &self.c1 * &forward,
+            c2: &self.c2 * &forward,
+            p0: linalg::symmetric_part(&(&back * &self.p0 * back.transpose())),
+            ..self
+        }
     }
 
     /// No causal filter beats the part of z that is fresh and unmeasured: sigma_max(Y).
@@ -104,28 +166,33 @@ impl Innovations {
 
     /// The mean-square optimal (Kalman) filter: gamma to infinity.
     pub(super) fn h2(&self) -> Option<Filter> {
+        self.filter(&self.mean_square_covariance()?)
+    }
+
+    /// The covariance of the mean-square optimal prediction error of the state.
+    fn mean_square_covariance(&self) -> Option<Mat> {
         let g = self.c2.transpose() * &self.c2;
-        let h = &self.b2 * self.b2.transpose();
+        let h = &self.b2 * self.b2.transpose() + self.shift_of_q();
         match riccati::solve_doubling(&self.f.transpose(), &g, &h) {
-            RiccatiOutcome::Solved(solution) => self.filter(&solution.x),
+            RiccatiOutcome::Solved(solution) => Some(solution.x + &self.p0),
             RiccatiOutcome::Unresolved { .. } => None,
         }
     }
 
     /// Tries one gamma.
     pub(super) fn h_infinity(&self, gamma: f64) -> Trial {
-        let Some((f, g, h, slack)) = self.weights(gamma) else {
-            return Trial::Impossible;
+        let Some((f, g, h)) = self.weights(gamma) else {
+            return if self.incomplete { Trial::Unresolved } else { Trial::Impossible };
         };
         match riccati::solve_doubling(&f.transpose(), &g, &h) {
-            RiccatiOutcome::Solved(solution) => self.judge(&solution, &slack),
+            RiccatiOutcome::Solved(solution) => self.judge(&solution),
             RiccatiOutcome::Unresolved { .. } => Trial::Unresolved,
         }
     }
 
-    /// (F, G, H) of the Riccati equation P = F P (I + G P)^-1 F' + H and E = gamma^2 I - Y Y' > 0;
-    /// `None` when E is not positive.
-    fn weights(&self, gamma: f64) -> Option<(Mat, Mat, Mat, Mat)> {
+    /// (F, G, H) of the Riccati equation Delta = F Delta (I + G Delta)^-1 F' + H; `None` unless
+    /// E = gamma^2 I - Y Y' > 0.
+    fn weights(&self, gamma: f64) -> Option<(Mat, Mat, Mat)> {
         let wanted = self.y.nrows();
         let slack = Mat::identity(wanted, wanted) * (gamma * gamma) - &self.y * self.y.transpose();
         linalg::cholesky(&slack).ok()?;
@@ -137,84 +204,103 @@ impl Innovations {
         let by = &self.b2 * self.y.transpose();
         let f = &self.f + &by * ec;
         let g = self.c2.transpose() * &self.c2 - self.c1.transpose() * ec;
-        let h = &self.b2 * self.b2.transpose() + &by * ey * self.b2.transpose();
-        Some((f, linalg::symmetric_part(&g), linalg::symmetric_part(&h), slack))
+        let h = &self.b2 * self.b2.transpose() + &by * ey * self.b2.transpose() + self.shift_of_q();
+        Some((f, linalg::symmetric_part(&g), linalg::symmetric_part(&h)))
     }
 
-    /// Achieved iff P >= 0 and C1 P+ C1' < E, P+ = P - P C2' Ry^-1 C2 P the a-posteriori covariance.
-    fn judge(&self, solution: &RiccatiSolution, slack: &Mat) -> Trial {
-        let p = &solution.x;
-        let refused =
-            if solution.residual < RESIDUAL_OF_PROOF { Trial::Impossible } else { Trial::Unresolved };
-        let Ok(eigenvalues) = linalg::symmetric_eigenvalues(p) else { return Trial::Unresolved };
+    /// gamma is achieved iff P >= 0 and C1 P+ C1' < E with the a-posteriori covariance P+. Where gamma falls
+    /// through the optimum that margin closes and an eigenvalue of P leaves through infinity to come back
+    /// negative: only such an eigenvalue is taken for a proof. That the filter keeps the promise is for the
+    /// caller to verify on the error system itself, which is worth more than the rounded margin.
+    fn judge(&self, solution: &RiccatiSolution) -> Trial {
+        let p = &solution.x + &self.p0;
+        let Ok(eigenvalues) = linalg::symmetric_eigenvalues(&p) else { return Trial::Unresolved };
         let largest = eigenvalues.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
-        if eigenvalues.first().is_some_and(|&least| least < -ROUNDING * largest) {
-            return refused;
+        if eigenvalues.first().is_some_and(|&least| least < -CLEARLY_NEGATIVE * largest) {
+            let proven = solution.residual < RESIDUAL_OF_PROOF && !self.incomplete;
+            return if proven { Trial::Impossible } else { Trial::Unresolved };
         }
-        let posterior = self.posterior(p);
-        let margin = slack - &self.c1 * posterior * self.c1.transpose();
-        if linalg::cholesky(&margin).is_err() {
-            return refused;
-        }
-        self.filter(p).map_or(Trial::Unresolved, Trial::Achieved)
+        self.filter(&p).map_or(Trial::Unresolved, Trial::Achieved)
     }
 
-    fn posterior(&self, p: &Mat) -> Mat {
-        let cp = &self.c2 * p;
-        match linalg::solve_positive(&self.innovation(p), &cp) {
-            Ok(gain) => p - cp.transpose() * gain,
-            Err(_) => p.clone(),
-        }
-    }
-
-    /// Ry = I + C2 P C2'.
+    /// Ry = diag(I, 0) + C2 P C2': the late measurements have no noise.
     fn innovation(&self, p: &Mat) -> Mat {
-        linalg::symmetric_part(&(&self.c2 * p * self.c2.transpose()))
-            + Mat::identity(self.c2.nrows(), self.c2.nrows())
+        let mut ry = linalg::symmetric_part(&(&self.c2 * p * self.c2.transpose()));
+        for i in 0..self.fresh.len() {
+            ry[(i, i)] += 1.0;
+        }
+        ry
     }
 
     /// The central filter of a covariance: gains K = F P C2' Ry^-1 and Df = C1 P C2' Ry^-1.
     fn filter(&self, p: &Mat) -> Option<Filter> {
         let pc = p * self.c2.transpose();
         let gain = linalg::solve_positive(&self.innovation(p), &pc.transpose()).ok()?.transpose();
-        let k = &self.f * &gain;
-        let df = &self.c1 * &gain;
+        let mut k = &self.f * &gain;
+        let mut df = &self.c1 * &gain;
         let a = &self.f - &k * &self.c2;
         let c = &self.c1 - &df * &self.c2;
-        let b = self.unwhiten(&(&self.b1 + k));
-        let d = self.unwhiten(&(&self.x + df));
+        let known = self.fresh.len();
+        k.columns_mut(0, known).zip_apply(&self.b1, |gain, direct| *gain += direct);
+        df.columns_mut(0, known).zip_apply(&self.x, |gain, direct| *gain += direct);
         if linalg::spectral_radius(&a).ok()? >= 1.0 {
             return None;
         }
-        StateSpace::new(a, b, c, d).ok()
+        StateSpace::new(a, self.on_channels(&k), c, self.on_channels(&df)).ok()
     }
 
-    /// m root^-1: from gains on yw to gains on y.
-    fn unwhiten(&self, m: &Mat) -> Mat {
-        let n = self.root.nrows();
-        let flipped = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(m.nrows() - 1 - i, j)]);
-        // root' x = m' is upper triangular: turn both upside down to use the lower solver.
-        let upper = Mat::from_fn(n, n, |i, j| self.root[(n - 1 - j, n - 1 - i)]);
-        flipped(&linalg::solve_lower(&upper, &flipped(&m.transpose()))).transpose()
+    /// From gains on yw to gains on the channels, zero for those left out.
+    fn on_channels(&self, gains: &Mat) -> Mat {
+        let known = self.fresh.len();
+        let fresh = unwhiten(&self.root, &gains.columns(0, known).into_owned());
+        let mut all = Mat::zeros(gains.nrows(), self.channels);
+        for (i, &channel) in self.fresh.iter().enumerate() {
+            all.set_column(channel, &fresh.column(i));
+        }
+        for (i, late) in self.late.iter().enumerate() {
+            all.set_column(late.channel, &(gains.column(known + i) / late.size));
+        }
+        all
     }
 }
 
-/// Standard deviation of the noise that each measurement needs before its fresh part can be inverted.
-fn stabilising_noise(plant: &BlockedPlant, aim: f64) -> Result<Vec<f64>, LtiError> {
-    let system = &plant.system;
-    let root = controllability_root(system.a(), system.b())?;
-    let history = system.c() * root;
-    let d2 = system.d().rows(0, plant.measured).into_owned();
-    let fresh = linalg::lq_factor(&d2);
-    Ok((0..plant.measured)
-        .map(|i| {
-            let size = history.row(i).norm().hypot(d2.row(i).norm());
-            let innovation = if i < fresh.ncols() { fresh[(i, i)].abs() } else { 0.0 };
-            if innovation < INNOVATION_FLOOR * size {
-                (NOISE_TO_GAMMA * aim).max(LEAST_NOISE * size)
-            } else {
-                0.0
-            }
-        })
-        .collect())
+fn late_variances(late: &[Late], n: usize) -> Mat {
+    let mut p0 = Mat::zeros(n, n);
+    for channel in late {
+        for (weight, state) in channel.chain.clone().rev().enumerate() {
+            p0[(state, state)] = (weight + 1) as f64 * channel.size * channel.size;
+        }
+    }
+    p0
+}
+
+/// m root^-1 for a lower triangular root.
+fn unwhiten(root: &Mat, m: &Mat) -> Mat {
+    let n = root.nrows();
+    let flipped = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(m.nrows() - 1 - i, j)]);
+    // root' x = m' is upper triangular: turn both upside down to use the lower solver.
+    let upper = Mat::from_fn(n, n, |i, j| root[(n - 1 - j, n - 1 - i)]);
+    flipped(&linalg::solve_lower(&upper, &flipped(&m.transpose()))).transpose()
+}
+
+/// The channels whose fresh part is more than rounding, given the channels before them.
+fn independent(plant: &BlockedPlant, fresh: &[usize], sizes: &[f64]) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::with_capacity(fresh.len());
+    for &channel in fresh {
+        kept.push(channel);
+        let l = linalg::lq_factor(&plant.system.d().select_rows(&kept));
+        let row = kept.len() - 1;
+        let innovation = if row < l.ncols() { l[(row, row)].abs() } else { 0.0 };
+        if innovation <= INNOVATION_FLOOR * sizes[channel] {
+            kept.pop();
+        }
+    }
+    kept
+}
+
+/// RMS of each output for white inputs.
+fn output_sizes(system: &StateSpace) -> Result<Vec<f64>, LtiError> {
+    let history = system.c() * controllability_root(system.a(), system.b())?;
+    let size = |i: usize| history.row(i).norm().hypot(system.d().row(i).norm());
+    Ok((0..system.outputs()).map(size).collect())
 }

@@ -95,9 +95,8 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(plant: &'a BlockedPlant) -> Result<Self, DesignError> {
         let noncausal = noncausal_bound(plant)?;
-        let coarse = Innovations::new(plant, noncausal)?;
-        let lower = noncausal.max(coarse.fresh_error()?);
-        let innovations = if lower > noncausal { Innovations::new(plant, lower)? } else { coarse };
+        let innovations = Innovations::new(plant)?.balanced();
+        let lower = noncausal.max(innovations.fresh_error()?);
         let negligible =
             NEGLIGIBLE * (plant.system.c().norm() * plant.system.b().norm() + plant.system.d().norm());
         Ok(Self {

@@ -34,9 +34,9 @@ impl Problem {
         let mut front_ends = Vec::new();
         let target = intern(&mut front_ends, StrictlyProper::new(&spec.target, spec.fast_period)?);
         let mut channels = Vec::with_capacity(spec.channels.len());
-        for channel in &spec.channels {
+        for (channel, delay) in spec.channels.iter().zip(spec.delays_in_fast_periods()) {
             let front_end = intern(&mut front_ends, StrictlyProper::new(&channel.filter, spec.fast_period)?);
-            channels.push(Channel { front_end, delay: channel.delay / spec.fast_period });
+            channels.push(Channel { front_end, delay });
         }
         Ok(Self { ratio: spec.ratio, latency, front_ends, target, channels })
     }

@@ -9,6 +9,8 @@ use crate::linalg::{self, Mat};
 /// The stabilising solution converges quadratically; near the edge of solvability by halves. Sixty
 /// doublings are 2^60 steps of the underlying recursion.
 const DOUBLING_LIMIT: usize = 60;
+/// Steps of the plain recursion after the doubling.
+const POLISHING_LIMIT: usize = 4;
 /// Relative change at which the doubling has converged.
 const CONVERGED: f64 = 1e-14;
 /// A relative residual above this is not a solution at all; below it the caller judges.
@@ -37,7 +39,7 @@ pub struct RiccatiSolution {
     pub closed_loop: Mat,
     /// Doublings done.
     pub steps: usize,
-    /// ||F' X (I + G X)^-1 F + H - X|| / ||X||.
+    /// ||F' X (I + G X)^-1 F + H - X||: X solves the equation exactly for an H that is off by this much.
     pub residual: f64,
 }
 
@@ -91,13 +93,43 @@ fn identity_plus(g: &Mat, x: &Mat) -> Mat {
 }
 
 fn verify(f: &Mat, g: &Mat, h: &Mat, x: Mat, steps: usize) -> RiccatiOutcome {
+    let (x, residual) = polish(f, g, h, x);
     let closed_loop = linalg::solve(&identity_plus(g, &x), f);
-    let residual = (f.transpose() * &x * &closed_loop + h - &x).norm() / x.norm().max(f64::MIN_POSITIVE);
     let stable = linalg::spectral_radius(&closed_loop).is_ok_and(|radius| radius < 1.0);
-    if (x.norm() == 0.0 || residual < RESIDUAL_LIMIT) && stable {
+    if residual <= RESIDUAL_LIMIT * x.norm() && stable {
         return RiccatiOutcome::Solved(RiccatiSolution { x, closed_loop, steps, residual });
     }
     RiccatiOutcome::Unresolved { steps, error: residual }
+}
+
+/// A few steps of the plain recursion, which contracts about its stabilising solution, as long as they help.
+/// Returns the solution and its residual.
+fn polish(f: &Mat, g: &Mat, h: &Mat, x: Mat) -> (Mat, f64) {
+    let step = |weight: Mat| linalg::symmetric_part(&(f.transpose() * weight * f + h));
+    let gap = |a: &Mat, b: &Mat| Some((a - b).norm()).filter(|gap| gap.is_finite()).unwrap_or(f64::INFINITY);
+    let (plain, inverse) = (step(plain_weight(g, &x)), step(inverse_weight(g, &x)));
+    let by_inverse = gap(&inverse, &x) < gap(&plain, &x);
+    let (mut best, mut next) = (x, if by_inverse { inverse } else { plain });
+    let mut residual = gap(&next, &best);
+    for _ in 0..POLISHING_LIMIT {
+        let after = step(if by_inverse { inverse_weight(g, &next) } else { plain_weight(g, &next) });
+        let change = gap(&after, &next);
+        if change >= residual {
+            break;
+        }
+        (best, next, residual) = (next, after, change);
+    }
+    (best, residual)
+}
+
+/// X (I + G X)^-1.
+fn plain_weight(g: &Mat, x: &Mat) -> Mat {
+    x * linalg::inverse(&identity_plus(g, x))
+}
+
+/// (X^-1 + G)^-1, the same for an invertible X: loses no digits where X is about to be infinite.
+fn inverse_weight(g: &Mat, x: &Mat) -> Mat {
+    linalg::inverse(&(linalg::inverse(x) + g))
 }
 
 #[cfg(test)]
