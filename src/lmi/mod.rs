@@ -1,7 +1,10 @@
 //! Interior-point methods for linear matrix inequalities. Knows no filter bank.
 
+mod factor;
 pub mod general;
+pub mod kyp;
 pub mod sampled;
+mod step;
 #[cfg(test)]
 #[allow(unreachable_pub)]
 mod testbank;
