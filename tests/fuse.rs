@@ -256,7 +256,10 @@ fn unequal_lengths_are_told_and_strict_refuses_them() {
     bench.refused(1, &[&args[..], &["--strict"]].concat(), &["a.wav", "30000 samples", "--strict"]);
     let output = bench.run(&args);
     assert!(output.status.success());
-    assert!(text(&output.stderr).contains("a.wav: longer than the shortest channel, 30000 samples"), "{output:?}");
+    assert!(
+        text(&output.stderr).contains("a.wav: longer than the shortest channel, 30000 samples"),
+        "{output:?}"
+    );
     assert_eq!(samples(&bench.path("out.wav")).1.len(), 40_000);
 }
 

@@ -46,8 +46,20 @@ impl Shifted {
         self.solve_many(&Mat::from_column_slice(rhs.len(), 1, rhs)).as_slice().to_vec()
     }
 
-    /// [`Shifted::solve`] for the columns of a matrix.
-    pub(super) fn solve_many(&self, rhs: &Mat) -> Mat {
+    /// `F^{-1} rhs` with the (shifted) matrix as `F F'`.
+    pub(super) fn half(&self, rhs: &Mat) -> Mat {
+        let scaled = Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)] * self.scale[i]);
+        self.factor.solve_half(&scaled)
+    }
+
+    /// `F'^{-1} rhs`, the other half.
+    pub(super) fn half_transposed(&self, rhs: &Mat) -> Mat {
+        let mut x = self.factor.solve_half_transposed(rhs);
+        x.row_iter_mut().zip(&self.scale).for_each(|(mut row, s)| row *= *s);
+        x
+    }
+
+    fn solve_many(&self, rhs: &Mat) -> Mat {
         let scaled = Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)] * self.scale[i]);
         let mut x = self.factor.solve(&scaled);
         for _ in 0..REFINEMENTS {

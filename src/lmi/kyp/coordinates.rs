@@ -42,7 +42,8 @@ mod tests {
 
     #[test]
     fn the_gramian_is_one_and_silent_states_are_gone_whatever_the_units() {
-        let a = Mat::from_row_slice(4, 4, &[0.9, 0.2, 0., 0., 0., 0.5, 0., 0., 0., 0., 0.3, 0., 0., 0., 1.0, 0.]);
+        let a =
+            Mat::from_row_slice(4, 4, &[0.9, 0.2, 0., 0., 0., 0.5, 0., 0., 0., 0., 0.3, 0., 0., 0., 1.0, 0.]);
         let b = Mat::from_row_slice(4, 1, &[0.0, 1.0, 0.0, 0.0]);
         for scale in [1e-9, 1.0, 1e9] {
             let units = Mat::from_diagonal(&nalgebra::dvector![1.0, scale, 1.0, 1.0]);

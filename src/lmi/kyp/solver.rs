@@ -13,8 +13,6 @@ use crate::lmi::step::reach;
 const START_DOUBLINGS: usize = 200;
 /// Steps shorter than this make no progress.
 const SHORTEST_STEP: f64 = 1e-7;
-/// Rounds of enforcing the dual equalities in each direction.
-const EQUALITY_ROUNDS: usize = 3;
 /// Steps without a better gap after which a run is over.
 const PATIENCE: usize = 6;
 
@@ -61,7 +59,7 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, KypE
     let reduced = Reduced::new(problem, settings.tol_rank)?;
     let n = reduced.coordinates.a.nrows();
     if reduced.scale <= settings.tol_gap_abs * reduced.size {
-        // The least-squares outputs vanish: nothing is left to minimise, and P = 0 proves it in the limit.
+        // The least-squares outputs vanish but for rounding errors, whose H2 norm stands for gamma.
         let x = reduced.unknowns(&[]);
         let (p, gamma) = (Mat::zeros(n, n), reduced.scale);
         let coordinates = reduced.coordinates;
@@ -164,12 +162,42 @@ struct Direction {
     z: Mat,
 }
 
-/// The factored Newton system of one iterate.
+/// The factored Newton system of one iterate, in the Nesterov-Todd scaling: `G'SG = G^-1 Z G^-T = diag(lambda)`.
+///
+/// Directions are formed in scaled coordinates, where rounding errors are small beside every eigenvalue; in
+/// the plain coordinates they would drown the small eigenvalues of S and Z near the optimum.
 struct Newton {
     factor: Shifted,
-    solved_border: Mat,
-    schur: Shifted,
-    inverse: Mat,
+    /// Border in half-solved coordinates: lower triangle of its Gram matrix and orthonormal columns.
+    triangle: Mat,
+    columns: Mat,
+    g: Mat,
+    g_inverse: Mat,
+    lambda: Vec<f64>,
+}
+
+impl Newton {
+    /// `H w + K x = image`, `K'w = wanted`, by an orthogonal projection in the coordinates where H is the
+    /// identity: the dual equalities hold to rounding however ill-conditioned H is.
+    fn solve(&self, image: &Mat, wanted: &Mat) -> (Mat, Mat) {
+        let half = self.factor.half(image);
+        let needed = linalg::solve_lower(&self.triangle, wanted);
+        let seen = self.columns.tr_mul(&half) - needed;
+        let x = linalg::solve_lower_transposed(&self.triangle, &seen);
+        (self.factor.half_transposed(&(half - &self.columns * seen)), x)
+    }
+
+    /// Mehrotra's target: `(lambda_i + lambda_j)/2 (dS~ + dZ~)_ij = sigma_mu I - Lambda^2 - sym(dS~ dZ~)`.
+    fn target(&self, sigma_mu: f64, affine: &Direction) -> Mat {
+        let s = self.g.tr_mul(&affine.s) * &self.g;
+        let z = &self.g_inverse * &affine.z * self.g_inverse.transpose();
+        let second = linalg::symmetric_part(&(s * z));
+        Mat::from_fn(self.lambda.len(), self.lambda.len(), |i, j| {
+            let (a, b) = (self.lambda[i], self.lambda[j]);
+            let first = if i == j { sigma_mu - a * a } else { 0.0 };
+            2.0 * (first - second[(i, j)]) / (a + b)
+        })
+    }
 }
 
 impl<'a> Iterate<'a> {
@@ -259,33 +287,34 @@ impl<'a> Iterate<'a> {
     }
 
     fn newton(&self) -> Result<Newton, LinalgError> {
-        let order = self.map.order();
-        let inverse = linalg::symmetric_part(&linalg::solve_positive(&self.z, &Mat::identity(order, order))?);
-        let factor = Shifted::new(self.map.newton(&inverse, &self.s))?;
-        let solved_border = factor.solve_many(&self.border);
-        let schur = Shifted::new(linalg::symmetric_part(&self.border.tr_mul(&solved_border)))?;
-        Ok(Newton { factor, solved_border, schur, inverse })
+        let (ls, lz) = (linalg::cholesky(&self.s)?, linalg::cholesky(&self.z)?);
+        let svd = linalg::svd(&ls.tr_mul(&lz))?;
+        let lambda = svd.s;
+        let root = |k: usize| 1.0 / lambda[k].sqrt();
+        let mut g = &lz * svd.v;
+        g.column_iter_mut().enumerate().for_each(|(k, mut column)| column *= root(k));
+        let mut g_inverse = (&ls * svd.u).transpose();
+        g_inverse.row_iter_mut().enumerate().for_each(|(k, mut row)| row *= root(k));
+        let weight = linalg::symmetric_part(&g_inverse.tr_mul(&g_inverse));
+        let factor = Shifted::new(self.map.newton(&weight, &weight))?;
+        let (triangle, rows) = linalg::lq(&factor.half(&self.border).transpose());
+        Ok(Newton { factor, triangle, columns: rows.transpose(), g, g_inverse, lambda })
     }
 
-    /// The direction towards `S + dS + sym(X dZ S) = target`, dual residual removed.
+    /// The direction with `dS~ + dZ~ = target` in scaled coordinates, dual residual removed.
     fn direction(&self, newton: &Newton, target: &Mat) -> Direction {
-        let rhs = target - &self.s;
-        let g = newton.factor.solve(&self.map.adjoint(&rhs));
-        let mut w = Mat::from_column_slice(g.len(), 1, &g);
+        let rhs = linalg::symmetric_part(&(newton.g_inverse.tr_mul(target) * &newton.g_inverse));
+        let image = self.map.adjoint(&rhs);
         let wanted = Mat::from_column_slice(self.x.len() + 1, 1, &self.dual_residual());
-        let mut x = Mat::zeros(self.x.len() + 1, 1);
-        // The second round removes what rounding left of the dual residual in the first.
-        for _ in 0..EQUALITY_ROUNDS {
-            let change = newton.schur.solve_many(&(&wanted - self.border.tr_mul(&w)));
-            w += &newton.solved_border * &change;
-            x -= change;
-        }
+        let (w, x) = newton.solve(&Mat::from_column_slice(image.len(), 1, &image), &wanted);
         let mut x = x.as_slice().to_vec();
         let z = self.map.expand(w.as_slice());
         let gamma = x.pop().unwrap_or(0.0);
-        let moved = linalg::symmetric_part(&(&newton.inverse * &z * &self.s));
         let n = self.map.n;
-        let p = self.map.lyapunov().adjoint(&(rhs - moved).view((0, 0), (n, n)).into_owned());
+        let scaled = target - &newton.g_inverse * &z * newton.g_inverse.transpose();
+        let slack = newton.g_inverse.tr_mul(&scaled) * &newton.g_inverse;
+        let states = linalg::symmetric_part(&slack.view((0, 0), (n, n)).into_owned());
+        let p = self.map.lyapunov().adjoint(&states);
         let s = self.slack(&p, &x, gamma, 0.0);
         Direction { p, x, gamma, s, w: w.as_slice().to_vec(), z }
     }
@@ -302,12 +331,12 @@ impl<'a> Iterate<'a> {
         let mu = self.s.dot(&self.z) / order as f64;
         let dual_residual = self.dual_residual().iter().map(|r| r * r).sum::<f64>().sqrt();
         let newton = self.newton()?;
-        let affine = self.direction(&newton, &Mat::zeros(order, order));
+        let lambda = Mat::from_diagonal(&newton.lambda.clone().into());
+        let affine = self.direction(&newton, &-&lambda);
         let (primal, dual) = self.reach(&affine)?;
         let after = (&self.s + &affine.s * primal.min(1.0)).dot(&(&self.z + &affine.z * dual.min(1.0)));
         let sigma = (after / (mu * order as f64)).clamp(0.0, 1.0).powi(3).clamp(1e-8, 0.9);
-        let second = linalg::symmetric_part(&(&newton.inverse * &affine.z * &affine.s));
-        let full = self.direction(&newton, &(&newton.inverse * (sigma * mu) - second));
+        let full = self.direction(&newton, &newton.target(sigma * mu, &affine));
         let (primal, dual) = self.reach(&full)?;
         let fraction = settings.step_fraction.min(0.9 + 0.09 * primal.min(dual).min(1.0));
         let alpha = ((fraction * primal).min(1.0), (fraction * dual).min(1.0));
