@@ -156,13 +156,8 @@ impl TestBank {
         e.view((n, n), (n, n)).transpose() * e.view((0, n), (n, n))
     }
 
-    /// `(omega, W, H)` of the blocked system at slow frequency `omega`. The inputs are the aliases
+    /// `(omega, W, H)` of the blocked system at each of the slow frequencies. The inputs are the aliases
     /// of the fast frequency axis, a unitary change from the blocked inputs.
-    pub fn sample(&self, omega: f64) -> (f64, CMat, CMat) {
-        self.samples(&[omega]).remove(0)
-    }
-
-    /// [`TestBank::sample`] at many frequencies.
     pub fn samples(&self, omegas: &[f64]) -> Vec<(f64, CMat, CMat)> {
         let (ad, bd, outputs, whole) = self.fast();
         let (ad, bd, outputs) = (complex(&ad), complex(&bd), complex(&outputs));

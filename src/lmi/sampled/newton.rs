@@ -123,8 +123,8 @@ pub(super) fn add_mean_square(
     let (n, count) = (layout.channels, h.count());
     let mut gram = Blocks::zeros(1, n, n);
     let mut data = Mat::zeros(n * n, 2 * count);
-    for l in 0..count {
-        gram.block_mut(0).set_product(2.0 * weights[l], h.block(l).plain(), h.block(l).adjoint());
+    for (l, weight) in weights.iter().enumerate() {
+        gram.block_mut(0).set_product(2.0 * weight, h.block(l).plain(), h.block(l).adjoint());
         for (r, z) in gram.as_slice().iter().enumerate() {
             put(&mut data, r, l, count, *z);
         }

@@ -195,7 +195,10 @@ fn changed(problem: &Problem, change: impl Fn(usize, &mut Point)) -> Problem {
     Problem::new(points, problem.lags().to_vec()).unwrap()
 }
 
-const SHAPES: [((usize, usize, usize), usize, &[usize]); 12] = [
+/// (M, N, q), points, lags.
+type Shape = ((usize, usize, usize), usize, &'static [usize]);
+
+const SHAPES: [Shape; 12] = [
     ((1, 1, 1), 1, &[1]),
     ((1, 1, 1), 40, &[3]),
     ((2, 2, 4), 1, &[3, 3]),
