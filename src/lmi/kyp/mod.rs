@@ -40,6 +40,7 @@ pub use certificate::{Certificate, Refusal, certificate, prove};
 pub use coordinates::{Coordinates, gramian_coordinates};
 pub use solver::{Solution, Step, minimise};
 
+use super::{SettingError, check_settings};
 use crate::linalg::{LinalgError, Mat};
 use crate::lti::LtiError;
 
@@ -72,6 +73,9 @@ pub enum KypError {
         /// Largest modulus of the eigenvalues of A.
         radius: f64,
     },
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A Gramian could not be computed.
     #[error(transparent)]
     Lti(#[from] LtiError),
@@ -165,5 +169,17 @@ impl Default for Settings {
             tol_rank: 1e-12,
             step_fraction: 0.98,
         }
+    }
+}
+
+impl Settings {
+    fn check(&self) -> Result<(), SettingError> {
+        check_settings(&[
+            ("tol_gap_rel", self.tol_gap_rel),
+            ("tol_gap_abs", self.tol_gap_abs),
+            ("tol_gap_reduced", self.tol_gap_reduced),
+            ("tol_rank", self.tol_rank),
+            ("step_fraction", self.step_fraction),
+        ])
     }
 }

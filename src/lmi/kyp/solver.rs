@@ -53,9 +53,10 @@ pub struct Solution {
 }
 
 /// Minimises gamma. Every problem has a solution (the norm is bounded below by 0 and A is stable); the
-/// result always holds the best unknowns found with honest bounds. Fails only if a decomposition
-/// does not converge.
+/// result always holds the best unknowns found with honest bounds. Fails only on settings out of range or
+/// if a decomposition does not converge.
 pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, KypError> {
+    settings.check()?;
     let reduced = Reduced::new(problem, settings.tol_rank)?;
     let n = reduced.coordinates.a.nrows();
     if reduced.scale <= settings.tol_gap_abs * reduced.size {

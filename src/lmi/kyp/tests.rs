@@ -221,6 +221,9 @@ fn what_is_no_problem_is_refused() {
     assert!(matches!(try_a(one(1.0)), Err(KypError::Unstable { .. })));
     assert!(matches!(try_a(one(f64::NAN)), Err(KypError::NotFinite { .. })));
     assert!(matches!(try_a(Mat::zeros(1, 2)), Err(KypError::Size { .. })));
+    let settings = Settings { tol_rank: 2.0, ..Settings::default() };
+    let refused = minimise(&try_a(one(0.5)).unwrap(), &settings);
+    assert!(matches!(refused, Err(KypError::Setting(SettingError { name: "tol_rank", .. }))));
     let term = vec![(Mat::zeros(2, 1), zero.clone())];
     let bad = Problem::new(one(0.5), one(1.0), one(1.0), zero.clone(), term);
     assert!(matches!(bad, Err(KypError::Size { rows: 2, want_rows: 1, .. })));
