@@ -7,7 +7,6 @@ use hybank::lmi::kyp;
 use hybank::lmi::sampled::{self, Point, Problem};
 use nalgebra::DMatrix;
 
-#[allow(dead_code)]
 #[path = "../src/lmi/testbank.rs"]
 mod testbank;
 

@@ -176,6 +176,15 @@ impl PositiveFactor {
     }
 }
 
+/// `a[:, columns]' b` without copying the transpose.
+///
+/// # Panics
+/// If the columns are not columns of `a` or the numbers of rows differ.
+pub fn transposed_product(a: &Mat, columns: std::ops::Range<usize>, b: &Mat) -> Mat {
+    let part = view(a).subcols(columns.start, columns.len());
+    owned((part.transpose() * view(b)).as_ref())
+}
+
 /// Solves the square system `m x = rhs` by LU with partial pivoting. A singular `m` gives
 /// infinities or NaN, which the caller has to look for.
 pub fn solve(m: &Mat, rhs: &Mat) -> Mat {

@@ -21,7 +21,6 @@ pub mod kyp;
 pub mod sampled;
 mod step;
 #[cfg(test)]
-#[allow(unreachable_pub)]
 mod testbank;
 
 /// A setting out of its range.

@@ -2,6 +2,8 @@
 //! optima. All channels share one analog filter; the fast period is 1. Uses nalgebra alone, so that
 //! it checks the solver without sharing its linear algebra.
 
+#![allow(unreachable_pub, dead_code)]
+
 use nalgebra::{Complex, DMatrix};
 
 type Mat = DMatrix<f64>;

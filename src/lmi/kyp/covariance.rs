@@ -128,7 +128,7 @@ impl Covariance {
             }
         }
         let rows = self.moving - columns.start;
-        let inner = self.states.columns(columns.start, rows).transpose() * packed;
+        let inner = linalg::transposed_product(&self.states, columns.start..self.moving, &packed);
         let mut part = h.view_mut((columns.start, columns.start), (rows, columns.len()));
         part += inner;
     }
