@@ -160,6 +160,29 @@ impl PositiveFactor {
     pub fn solve(&self, rhs: &Mat) -> Mat {
         owned(self.llt.solve(view(rhs)).as_ref())
     }
+
+    /// `L^{-1} rhs` with the lower factor L, `m = L L'`.
+    pub fn solve_half(&self, rhs: &Mat) -> Mat {
+        let mut x = faer::Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)]);
+        self.llt.L().solve_lower_triangular_in_place(x.as_mut());
+        owned(x.as_ref())
+    }
+
+    /// `L'^{-1} rhs`, the other half.
+    pub fn solve_half_transposed(&self, rhs: &Mat) -> Mat {
+        let mut x = faer::Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)]);
+        self.llt.L().transpose().solve_upper_triangular_in_place(x.as_mut());
+        owned(x.as_ref())
+    }
+}
+
+/// `a[:, columns]' b` without copying the transpose.
+///
+/// # Panics
+/// If the columns are not columns of `a` or the numbers of rows differ.
+pub fn transposed_product(a: &Mat, columns: std::ops::Range<usize>, b: &Mat) -> Mat {
+    let part = view(a).subcols(columns.start, columns.len());
+    owned((part.transpose() * view(b)).as_ref())
 }
 
 /// Solves the square system `m x = rhs` by LU with partial pivoting. A singular `m` gives
@@ -182,6 +205,13 @@ pub fn inverse(m: &Mat) -> Mat {
 pub fn solve_lower(l: &Mat, rhs: &Mat) -> Mat {
     let mut x = faer::Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)]);
     view(l).solve_lower_triangular_in_place(x.as_mut());
+    owned(x.as_ref())
+}
+
+/// Solves `l' x = rhs` with a lower triangular `l`.
+pub fn solve_lower_transposed(l: &Mat, rhs: &Mat) -> Mat {
+    let mut x = faer::Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)]);
+    view(l).transpose().solve_upper_triangular_in_place(x.as_mut());
     owned(x.as_ref())
 }
 

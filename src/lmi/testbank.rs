@@ -2,6 +2,8 @@
 //! optima. All channels share one analog filter; the fast period is 1. Uses nalgebra alone, so that
 //! it checks the solver without sharing its linear algebra.
 
+#![allow(unreachable_pub, dead_code)]
+
 use nalgebra::{Complex, DMatrix};
 
 type Mat = DMatrix<f64>;
@@ -59,7 +61,7 @@ pub fn butterworth(order: usize, cutoff: f64) -> Vec<f64> {
 
 impl TestBank {
     /// Fast system (Ad, Bd, rows of outputs: target, channels), delays split off as integers.
-    fn fast(&self) -> (Mat, Mat, Mat, Vec<usize>) {
+    pub fn fast(&self) -> (Mat, Mat, Mat, Vec<usize>) {
         let n = self.a.nrows();
         let whole: Vec<usize> = self.delays.iter().map(|d| d.floor() as usize).collect();
         let part: Vec<f64> = self.delays.iter().map(|d| d - d.floor()).collect();
@@ -84,6 +86,43 @@ impl TestBank {
         let e = gram.symmetric_eigen();
         let root = Mat::from_diagonal(&e.eigenvalues.map(|v| v.max(0.0).sqrt()));
         (ad, e.eigenvectors * root, outputs, whole)
+    }
+
+    /// The blocked system `(A, B, C_w, D_w, C_h, D_h)`: all delays as states, M fast periods a step.
+    pub fn blocked(&self) -> [Mat; 6] {
+        let (ad, bd, outputs, whole) = self.fast();
+        let (core, inputs, m, channels) = (ad.nrows(), bd.ncols(), self.ratio, self.delays.len());
+        let chains: Vec<usize> = std::iter::once(self.latency).chain(whole).collect();
+        let order = core + chains.iter().sum::<usize>();
+        let (mut a, mut b) = (Mat::zeros(order, order), Mat::zeros(order, inputs));
+        let mut c = Mat::zeros(1 + channels, order);
+        a.view_mut((0, 0), (core, core)).copy_from(&ad);
+        b.view_mut((0, 0), (core, inputs)).copy_from(&bd);
+        let mut first = core;
+        for (i, length) in chains.iter().enumerate() {
+            let row = outputs.row(i).into_owned();
+            if *length == 0 {
+                c.view_mut((i, 0), (1, core)).copy_from(&row);
+                continue;
+            }
+            a.view_mut((first, 0), (1, core)).copy_from(&row);
+            (1..*length).for_each(|k| a[(first + k, first + k - 1)] = 1.0);
+            c[(i, first + length - 1)] = 1.0;
+            first += length;
+        }
+        let powers: Vec<Mat> = (0..m).map(|k| a.pow(k as u32)).collect();
+        let mut big_b = Mat::zeros(order, m * inputs);
+        let (mut cw, mut dw) = (Mat::zeros(m, order), Mat::zeros(m, m * inputs));
+        for k in 0..m {
+            big_b.view_mut((0, k * inputs), (order, inputs)).copy_from(&(&powers[m - 1 - k] * &b));
+            cw.row_mut(k).copy_from(&(c.row(0) * &powers[k]));
+            for j in 0..k {
+                let markov = c.row(0) * &powers[k - 1 - j] * &b;
+                dw.view_mut((k, j * inputs), (1, inputs)).copy_from(&markov);
+            }
+        }
+        let ch = c.rows(1, channels).into_owned();
+        [a.pow(m as u32), big_b, cw, dw, ch, Mat::zeros(channels, m * inputs)]
     }
 
     /// Gram matrix of the one-period input operators.
@@ -119,13 +158,8 @@ impl TestBank {
         e.view((n, n), (n, n)).transpose() * e.view((0, n), (n, n))
     }
 
-    /// `(omega, W, H)` of the blocked system at slow frequency `omega`. The inputs are the aliases
+    /// `(omega, W, H)` of the blocked system at each of the slow frequencies. The inputs are the aliases
     /// of the fast frequency axis, a unitary change from the blocked inputs.
-    pub fn sample(&self, omega: f64) -> (f64, CMat, CMat) {
-        self.samples(&[omega]).remove(0)
-    }
-
-    /// [`TestBank::sample`] at many frequencies.
     pub fn samples(&self, omegas: &[f64]) -> Vec<(f64, CMat, CMat)> {
         let (ad, bd, outputs, whole) = self.fast();
         let (ad, bd, outputs) = (complex(&ad), complex(&bd), complex(&outputs));

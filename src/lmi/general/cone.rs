@@ -2,6 +2,7 @@
 
 use super::problem::{Problem, dot};
 use crate::linalg::{self, LinalgError, Mat};
+use crate::lmi::step;
 
 /// Slacks, dual variables or a direction of either.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,16 +110,7 @@ impl Element {
     pub(super) fn reach(&self, direction: &Self) -> Result<f64, LinalgError> {
         let mut reach = f64::INFINITY;
         for (m, d) in self.matrices.iter().zip(&direction.matrices) {
-            if m.is_empty() {
-                continue;
-            }
-            let l = linalg::cholesky(m)?;
-            let half = linalg::solve_lower(&l, d);
-            let scaled = linalg::symmetric_part(&linalg::solve_lower(&l, &half.transpose()));
-            let least = linalg::symmetric_eigenvalues(&scaled)?[0];
-            if least < 0.0 {
-                reach = reach.min(-1.0 / least);
-            }
+            reach = reach.min(step::reach(m, d)?);
         }
         for (v, d) in self.vectors.iter().flatten().zip(direction.vectors.iter().flatten()) {
             if *d < 0.0 {

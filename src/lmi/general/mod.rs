@@ -32,6 +32,7 @@ pub use coefficient::Coefficient;
 pub use problem::{GeneralError, Problem};
 pub use solver::{Residuals, minimise};
 
+use super::{SettingError, check_settings};
 use crate::linalg::Mat;
 
 /// Limits and tolerances of the general solver.
@@ -67,6 +68,19 @@ impl Default for Settings {
             step_fraction: 0.98,
             equilibrate_rounds: 8,
         }
+    }
+}
+
+impl Settings {
+    fn check(&self) -> Result<(), SettingError> {
+        check_settings(&[
+            ("tol_feasibility", self.tol_feasibility),
+            ("tol_gap_abs", self.tol_gap_abs),
+            ("tol_gap_rel", self.tol_gap_rel),
+            ("tol_infeasible", self.tol_infeasible),
+            ("tol_reduced", self.tol_reduced),
+            ("step_fraction", self.step_fraction),
+        ])
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::coefficient::Coefficient;
 use crate::linalg::{LinalgError, Mat};
+use crate::lmi::SettingError;
 
 /// What cannot be a problem.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -60,6 +61,9 @@ pub enum GeneralError {
         /// Unknowns.
         unknowns: usize,
     },
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),

@@ -46,9 +46,10 @@ impl Residuals {
     }
 }
 
-/// Solves the problem; see the module's text. Fails only on data that are no problem; infeasible,
-/// unbounded and numerically hopeless problems are outcomes.
+/// Solves the problem; see the module's text. Fails only on settings out of range; infeasible, unbounded
+/// and numerically hopeless problems are outcomes.
 pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, GeneralError> {
+    settings.check()?;
     let (scaling, scaled) = Scaling::new(problem, settings.equilibrate_rounds);
     let mut iterate = Iterate::new(&scaled);
     let mut best = judge(problem, &scaling, &iterate);

@@ -354,6 +354,9 @@ fn what_is_no_problem_is_refused() {
     let far = p().matrix_inequality(2, Coefficient::zero(), vec![(2, Coefficient::zero())]);
     assert!(matches!(far, Err(GeneralError::Unknown { unknown: 2, unknowns: 2, .. })));
     assert!(matches!(p().linear_inequalities(vec![0.0], vec![(1, 0, 1.0)]), Err(GeneralError::Shape { .. })));
+    let settings = Settings { tol_gap_rel: -1.0, ..Settings::default() };
+    let refused = minimise(&p(), &settings);
+    assert!(matches!(refused, Err(GeneralError::Setting(SettingError { name: "tol_gap_rel", .. }))));
     assert!(matches!(p().equalities(Mat::zeros(1, 3), vec![0.0]), Err(GeneralError::Equalities { .. })));
 }
 

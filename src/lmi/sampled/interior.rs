@@ -5,11 +5,12 @@
 //! `c - A*(Z) = 0` starts out violated.
 
 use super::blocks::{Cone, SlackStep};
-use super::newton::{self, Newton, Seen};
+use super::newton::{self, Seen};
 use super::prepare::Reduced;
 use super::{Settings, Step};
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
+use crate::lmi::factor::Shifted;
 
 /// What is minimised over the LMIs.
 #[derive(Debug, Clone)]
@@ -145,7 +146,7 @@ impl<'a> Engine<'a> {
         self.cost().iter().zip(self.adjoint(&self.cone.z)).map(|(c, a)| c - a).collect()
     }
 
-    fn newton(&mut self) -> Option<Newton> {
+    fn newton(&mut self) -> Option<Shifted> {
         let taps = self.x.len();
         let order = taps + usize::from(self.free_t());
         let mut matrix = match &self.curvature {
@@ -160,10 +161,10 @@ impl<'a> Engine<'a> {
             row.iter().enumerate().for_each(|(a, v)| matrix[(taps, a)] = *v);
             matrix[(taps, taps)] = corner;
         }
-        Newton::new(matrix).ok()
+        Shifted::new(matrix).ok()
     }
 
-    fn direction(&self, newton: &Newton, rhs: &[f64]) -> Direction {
+    fn direction(&self, newton: &Shifted, rhs: &[f64]) -> Direction {
         let mut taps = newton.solve(rhs);
         let t = if self.free_t() { taps.pop().unwrap_or(0.0) } else { 0.0 };
         let mut k = self.reduced.image(&taps);

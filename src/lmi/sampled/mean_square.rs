@@ -5,12 +5,13 @@
 
 use super::basis::Basis;
 use super::interior::{Engine, Objective};
-use super::newton::{self, Newton};
+use super::newton;
 use super::prepare::Reduced;
 use super::problem::{Point, Problem, SampledError, Taps};
 use super::{Settings, Step};
 use crate::linalg::Mat;
 use crate::lmi::Stop;
+use crate::lmi::factor::Shifted;
 
 /// Steps without a better gap after which a run is over.
 const PATIENCE: usize = 6;
@@ -178,11 +179,11 @@ impl Run<'_> {
         Ok((stop, gap, steps))
     }
 
-    fn curvature(&self) -> Option<Newton> {
+    fn curvature(&self) -> Option<Shifted> {
         let r = self.reduced;
         let mut q = Mat::zeros(r.layout.unknowns(), r.layout.unknowns());
         newton::add_mean_square(&mut q, &r.layout, &r.phases, &r.h, self.weights);
-        Newton::new(q).ok()
+        Shifted::new(q).ok()
     }
 
     fn taps(&self, x: &[f64]) -> Taps {
@@ -193,7 +194,7 @@ impl Run<'_> {
 
 /// `<S, Z> + r' Q^{-1} r / 2` with the dual residual r: how far the Lagrangian's minimum lies below
 /// the objective, whether or not the dual equality holds.
-fn duality_gap(engine: &Engine<'_>, curvature: &Newton) -> f64 {
+fn duality_gap(engine: &Engine<'_>, curvature: &Shifted) -> f64 {
     let r = engine.dual_residual();
     let correction: f64 = curvature.solve(&r).iter().zip(&r).map(|(a, b)| a * b).sum();
     engine.cone.gap() + 0.5 * correction.max(0.0)

@@ -47,6 +47,8 @@ pub use mean_square::{MeanSquare, least_squares, mean_square_under_cap};
 pub use problem::{Point, Problem, SampledError, Taps};
 pub use worst_case::{Solution, minimise};
 
+use super::{SettingError, check_settings};
+
 /// Limits and tolerances of the sampled solver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -79,20 +81,14 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Refuses values no iteration can work with.
-    pub(crate) fn check(&self) -> Result<(), SampledError> {
-        let positive = |name, value: f64, most: f64| {
-            if value > 0.0 && value < most {
-                Ok(())
-            } else {
-                Err(SampledError::Setting { name, value, most })
-            }
-        };
-        positive("tol_gap_rel", self.tol_gap_rel, 1.0)?;
-        positive("tol_gap_abs", self.tol_gap_abs, 1.0)?;
-        positive("tol_gap_reduced", self.tol_gap_reduced, 1.0)?;
-        positive("tol_rank", self.tol_rank, 1.0)?;
-        positive("step_fraction", self.step_fraction, 1.0)
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
+        check_settings(&[
+            ("tol_gap_rel", self.tol_gap_rel),
+            ("tol_gap_abs", self.tol_gap_abs),
+            ("tol_gap_reduced", self.tol_gap_reduced),
+            ("tol_rank", self.tol_rank),
+            ("step_fraction", self.step_fraction),
+        ])
     }
 }
 

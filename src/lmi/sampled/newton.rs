@@ -11,7 +11,7 @@
 use super::fourier::{Layout, Phases};
 use super::prepare::Reduced;
 use crate::linalg::blocks::{Block, Blocks, inner};
-use crate::linalg::{Complex, LinalgError, Mat, PositiveFactor};
+use crate::linalg::{Complex, Mat};
 
 /// One Hermitian matrix family seen through the rows (u) and channels (v).
 #[derive(Debug, Clone)]
@@ -123,8 +123,8 @@ pub(super) fn add_mean_square(
     let (n, count) = (layout.channels, h.count());
     let mut gram = Blocks::zeros(1, n, n);
     let mut data = Mat::zeros(n * n, 2 * count);
-    for l in 0..count {
-        gram.block_mut(0).set_product(2.0 * weights[l], h.block(l).plain(), h.block(l).adjoint());
+    for (l, weight) in weights.iter().enumerate() {
+        gram.block_mut(0).set_product(2.0 * weight, h.block(l).plain(), h.block(l).adjoint());
         for (r, z) in gram.as_slice().iter().enumerate() {
             put(&mut data, r, l, count, *z);
         }
@@ -169,66 +169,4 @@ fn each_pair(
             }
         }
     }
-}
-
-/// A factored Newton matrix, scaled to a unit diagonal, shifted only as far as it had to be.
-#[derive(Debug)]
-pub(super) struct Newton {
-    matrix: Mat,
-    scale: Vec<f64>,
-    factor: PositiveFactor,
-    /// The shift, relative to the unit diagonal.
-    pub(super) shift: f64,
-}
-
-/// First shift tried when the matrix is not definite to rounding, and the growth of the next ones.
-const SHIFT_FIRST: f64 = 1e-15;
-const SHIFT_GROWTH: f64 = 10.0;
-const SHIFT_LAST: f64 = 1e-6;
-/// Steps of iterative refinement against the matrix as it is.
-const REFINEMENTS: usize = 2;
-
-impl Newton {
-    /// Factors the symmetric `matrix` given by its lower triangle.
-    pub(super) fn new(mut matrix: Mat) -> Result<Self, LinalgError> {
-        matrix.fill_upper_triangle_with_lower_triangle();
-        let scale: Vec<f64> =
-            matrix.diagonal().iter().map(|d| if *d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }).collect();
-        for (j, mut column) in matrix.column_iter_mut().enumerate() {
-            for (i, value) in column.iter_mut().enumerate() {
-                *value *= scale[i] * scale[j];
-            }
-        }
-        let mut shift = 0.0;
-        loop {
-            match PositiveFactor::new(&shifted(&matrix, shift)) {
-                Ok(factor) => return Ok(Self { matrix, scale, factor, shift }),
-                Err(error) if shift >= SHIFT_LAST => return Err(error),
-                Err(_) => shift = (shift * SHIFT_GROWTH).max(SHIFT_FIRST),
-            }
-        }
-    }
-
-    /// Solves against the matrix as given, as far as the shift and refinement allow.
-    pub(super) fn solve(&self, rhs: &[f64]) -> Vec<f64> {
-        let scaled = Mat::from_fn(rhs.len(), 1, |i, _| rhs[i] * self.scale[i]);
-        let mut x = self.factor.solve(&scaled);
-        for _ in 0..REFINEMENTS {
-            let residual = &scaled - &self.matrix * &x;
-            let better = &x + self.factor.solve(&residual);
-            if (&scaled - &self.matrix * &better).norm() >= residual.norm() {
-                break;
-            }
-            x = better;
-        }
-        x.iter().zip(&self.scale).map(|(a, s)| a * s).collect()
-    }
-}
-
-fn shifted(matrix: &Mat, shift: f64) -> Mat {
-    let mut m = matrix.clone();
-    for i in 0..m.nrows() {
-        m[(i, i)] += shift;
-    }
-    m
 }

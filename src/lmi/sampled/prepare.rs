@@ -123,9 +123,7 @@ fn mixing(channels: &Blocks) -> Result<Mat, SampledError> {
     });
     let strength: Vec<f64> = (0..n).map(|i| all.row(i).norm()).collect();
     let unit: Vec<f64> = strength.iter().map(|s| if *s > 0.0 { 1.0 / s } else { 0.0 }).collect();
-    for i in 0..n {
-        all.row_mut(i).scale_mut(unit[i]);
-    }
+    all.row_iter_mut().zip(&unit).for_each(|(mut row, unit)| row *= *unit);
     let svd = linalg::svd(&linalg::lq_factor(&all))?;
     let floor = CHANNEL_RANK * svd.s.first().copied().unwrap_or(0.0);
     let rank = svd.s.iter().filter(|s| **s > floor).count();

@@ -1,6 +1,7 @@
 //! The data of a sampled problem, checked once.
 
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
+use crate::lmi::SettingError;
 
 /// Real taps: `F_j` is M x N, one matrix for each lag j. Entries beyond a row's own number of lags
 /// are zero.
@@ -95,15 +96,8 @@ pub enum SampledError {
         gamma: f64,
     },
     /// A setting is out of its range.
-    #[error("setting {name} = {value} must lie strictly between 0 and {most}")]
-    Setting {
-        /// Its name.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its exclusive upper limit.
-        most: f64,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),

@@ -195,7 +195,10 @@ fn changed(problem: &Problem, change: impl Fn(usize, &mut Point)) -> Problem {
     Problem::new(points, problem.lags().to_vec()).unwrap()
 }
 
-const SHAPES: [((usize, usize, usize), usize, &[usize]); 12] = [
+/// (M, N, q), points, lags.
+type Shape = ((usize, usize, usize), usize, &'static [usize]);
+
+const SHAPES: [Shape; 12] = [
     ((1, 1, 1), 1, &[1]),
     ((1, 1, 1), 40, &[3]),
     ((2, 2, 4), 1, &[3, 3]),
@@ -403,7 +406,10 @@ fn what_is_no_problem_is_refused() {
         Err(SampledError::Lags { given: 1, rows: 2 })
     ));
     let settings = Settings { step_fraction: 1.0, ..Settings::default() };
-    assert!(matches!(minimise(&good, &settings), Err(SampledError::Setting { name: "step_fraction", .. })));
+    assert!(matches!(
+        minimise(&good, &settings),
+        Err(SampledError::Setting(SettingError { name: "step_fraction", .. }))
+    ));
     let s = minimise(&good, &Settings::default()).unwrap();
     let capped =
         |weights: &[f64], cap, taps| mean_square_under_cap(&good, weights, cap, taps, &Settings::default());
@@ -416,4 +422,28 @@ fn what_is_no_problem_is_refused() {
         Err(SampledError::TapsShape { .. })
     ));
     assert!(matches!(lower_bound(&good, &[], 1.0), Err(SampledError::Count { .. })));
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::test_runner::Config { cases: 24, failure_persistence: None, ..Default::default() })]
+
+    /// Any shape, any strength of any channel: a proven gap, and a result in the problem's own units.
+    #[test]
+    fn any_problem_is_solved(
+        seed in 0u64..1000, m in 1usize..4, n in 1usize..4, q in 1usize..6, points in 1usize..25,
+        lags in 0usize..5, wanted in -9i32..9, channel in -9i32..9,
+    ) {
+        let plain = random_problem(seed, (m, n, q), points, &vec![lags; m]);
+        let (up, gain) = (10f64.powi(wanted), 10f64.powi(channel));
+        let problem = changed(&plain, |_, p| {
+            p.w *= Complex::new(up, 0.0);
+            p.h.row_mut(0).iter_mut().for_each(|z| *z *= gain);
+        });
+        let s = minimise(&problem, &Settings::default()).unwrap();
+        check(&problem, &s);
+        let zero = problem.worst(&problem.zero_taps()).unwrap().0;
+        proptest::prop_assert!(s.stop.is_solved(), "{:?}", s);
+        proptest::prop_assert!(s.gamma <= zero * (1.0 + 1e-12) && s.lower.value <= s.gamma * (1.0 + 1e-12));
+        proptest::prop_assert!(s.gamma - s.lower.value <= (1e-6 * s.gamma).max(1e-12 * zero), "{:?}", s);
+    }
 }

@@ -1,0 +1,104 @@
+//! How long does a FIR design's inner problem take, along a ladder of sizes?
+//!
+//! Run with `cargo bench --bench lmi`. Data: sampled hybrid filter banks, the same on every run.
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use hybank::lmi::kyp;
+use hybank::lmi::sampled::{self, Point, Problem};
+use nalgebra::DMatrix;
+
+#[path = "../src/lmi/testbank.rs"]
+mod testbank;
+
+use testbank::TestBank;
+
+fn problem(bank: &TestBank, taps: usize, points: usize) -> Problem {
+    let samples = bank.samples(&testbank::grid(points));
+    let points = samples.into_iter().map(|(omega, w, h)| Point { omega, w, h }).collect();
+    Problem::new(points, bank.lags(taps)).expect("the bank's own samples fit together")
+}
+
+/// Seconds to a proven gap of 1e-9.
+fn sampled_worst_case(c: &mut Criterion) {
+    let mut group = c.benchmark_group("sampled worst case");
+    group.sample_size(10);
+    let four = {
+        let (a, b, c) = testbank::low_pass(&testbank::butterworth(4, 1.2));
+        TestBank { a, b, c, delays: vec![0.0, 1.3, 2.1, 2.95], ratio: 4, latency: 12 }
+    };
+    let cases = [
+        ("N = M = 2, 22 taps, 65 points", testbank::thesis(), 22, 65),
+        ("N = M = 2, 22 taps, 129 points", testbank::thesis(), 22, 129),
+        ("N = M = 4, 24 taps, 129 points", four, 24, 129),
+        ("N = M = 8, 32 taps, 129 points", testbank::eight_channels(12), 32, 129),
+        ("N = M = 8, 128 taps, 257 points", testbank::eight_channels(40), 128, 257),
+        ("N = M = 8, 128 taps, 513 points", testbank::eight_channels(40), 128, 513),
+    ];
+    for (name, bank, taps, points) in &cases {
+        let problem = problem(bank, *taps, *points);
+        group.bench_with_input(BenchmarkId::from_parameter(name), &problem, |b, p| {
+            b.iter(|| sampled::minimise(p, &sampled::Settings::default()));
+        });
+    }
+    group.finish();
+}
+
+/// Seconds for the least mean square under a cap of 1.001 gamma, after the worst case is known.
+fn mean_square_under_cap(c: &mut Criterion) {
+    let mut group = c.benchmark_group("mean square under cap");
+    group.sample_size(10);
+    for (name, bank, taps, points) in [
+        ("N = M = 2, 10 taps, 129 points", testbank::thesis(), 10, 129),
+        ("N = M = 8, 32 taps, 129 points", testbank::eight_channels(12), 32, 129),
+    ] {
+        let problem = problem(&bank, taps, points);
+        let settings = sampled::Settings::default();
+        let best = sampled::minimise(&problem, &settings).expect("settings are the defaults");
+        let weights = vec![1.0; points];
+        group.bench_with_input(BenchmarkId::from_parameter(name), &problem, |b, p| {
+            b.iter(|| sampled::mean_square_under_cap(p, &weights, 1.001 * best.gamma, &best.taps, &settings));
+        });
+    }
+    group.finish();
+}
+
+/// The thesis's own form: bounded real lemma with P, 35 states and 44 taps.
+fn kyp_thesis(c: &mut Criterion) {
+    let problem = kyp_problem(&testbank::thesis(), 11);
+    let mut group = c.benchmark_group("KYP");
+    group.sample_size(10);
+    group
+        .bench_function("thesis, 22 taps", |b| b.iter(|| kyp::minimise(&problem, &kyp::Settings::default())));
+    group.finish();
+}
+
+/// Taps on a register of `lags` slow samples of all channels.
+fn kyp_problem(bank: &TestBank, lags: usize) -> kyp::Problem {
+    let [plant, drive, cw, dw, ch, dh] = bank.blocked();
+    let (n, q, channels, m) = (plant.nrows(), drive.ncols(), ch.nrows(), cw.nrows());
+    let order = n + channels * (lags - 1);
+    let mut a = DMatrix::zeros(order, order);
+    a.view_mut((0, 0), (n, n)).copy_from(&plant);
+    a.view_mut((n, 0), (channels, n)).copy_from(&ch);
+    (channels..order - n).for_each(|i| a[(n + i, n + i - channels)] = 1.0);
+    let mut b = DMatrix::zeros(order, q);
+    b.view_mut((0, 0), (n, q)).copy_from(&drive);
+    b.view_mut((n, 0), (channels, q)).copy_from(&dh);
+    let mut terms = Vec::new();
+    for (j, p, i) in (0..lags).flat_map(|j| (0..m).flat_map(move |p| (0..channels).map(move |i| (j, p, i)))) {
+        let (mut ck, mut dk) = (DMatrix::zeros(m, order), DMatrix::zeros(m, q));
+        if j == 0 {
+            ck.view_mut((p, 0), (1, n)).copy_from(&-ch.row(i));
+            dk.row_mut(p).copy_from(&-dh.row(i));
+        } else {
+            ck[(p, n + channels * (j - 1) + i)] = -1.0;
+        }
+        terms.push((ck, dk));
+    }
+    let mut c = DMatrix::zeros(m, order);
+    c.view_mut((0, 0), (m, n)).copy_from(&cw);
+    kyp::Problem::new(a, b, c, dw, terms).expect("a stable bank makes a problem")
+}
+
+criterion_group!(benches, sampled_worst_case, mean_square_under_cap, kyp_thesis);
+criterion_main!(benches);

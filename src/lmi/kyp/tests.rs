@@ -1,0 +1,255 @@
+use super::*;
+use crate::lmi::Stop;
+use crate::lmi::sampled;
+use crate::lmi::testbank::{self, TestBank};
+
+/// A random-looking FIR problem: plant (a, b), wanted w = cw x + dw u, measured h = ch x + dh u, taps F_j on
+/// h[k - j]. Returns the KYP problem and the sampled one on the given grid.
+struct Fir {
+    a: Mat,
+    b: Mat,
+    cw: Mat,
+    dw: Mat,
+    ch: Mat,
+    dh: Mat,
+    lags: usize,
+}
+
+fn wavy(rows: usize, cols: usize, seed: f64) -> Mat {
+    Mat::from_fn(rows, cols, |i, j| (seed + 1.7 * i as f64 + 2.9 * (j * (i + 1)) as f64).sin())
+}
+
+impl Fir {
+    fn new(n: usize, m: usize, q: usize, outputs: usize, lags: usize, radius: f64) -> Self {
+        let a = wavy(n, n, 0.3);
+        let a = &a * (radius / crate::linalg::spectral_radius(&a).unwrap());
+        let (b, cw, dw) = (wavy(n, q, 1.1), wavy(m, n, 2.3), wavy(m, q, 0.9) * 0.3);
+        Self { a, b, cw, dw, ch: wavy(outputs, n, 3.7), dh: wavy(outputs, q, 5.1) * 0.2, lags }
+    }
+
+    fn of_bank(bank: &TestBank, lags: usize) -> Self {
+        let [a, b, cw, dw, ch, dh] = bank.blocked();
+        Self { a, b, cw, dw, ch, dh, lags }
+    }
+
+    fn kyp(&self) -> Problem {
+        let (n, q, outputs, m) = (self.a.nrows(), self.b.ncols(), self.ch.nrows(), self.cw.nrows());
+        let order = n + outputs * (self.lags - 1);
+        let mut a = Mat::zeros(order, order);
+        let mut b = Mat::zeros(order, q);
+        a.view_mut((0, 0), (n, n)).copy_from(&self.a);
+        b.view_mut((0, 0), (n, q)).copy_from(&self.b);
+        if self.lags > 1 {
+            a.view_mut((n, 0), (outputs, n)).copy_from(&self.ch);
+            b.view_mut((n, 0), (outputs, q)).copy_from(&self.dh);
+        }
+        for i in outputs..order - n {
+            a[(n + i, n + i - outputs)] = 1.0;
+        }
+        let mut c = Mat::zeros(m, order);
+        c.view_mut((0, 0), (m, n)).copy_from(&self.cw);
+        let mut terms = Vec::new();
+        for j in 0..self.lags {
+            for p in 0..m {
+                for i in 0..outputs {
+                    let (mut ck, mut dk) = (Mat::zeros(m, order), Mat::zeros(m, q));
+                    if j == 0 {
+                        ck.view_mut((p, 0), (1, n)).copy_from(&-self.ch.row(i));
+                        dk.row_mut(p).copy_from(&-self.dh.row(i));
+                    } else {
+                        ck[(p, n + outputs * (j - 1) + i)] = -1.0;
+                    }
+                    terms.push((ck, dk));
+                }
+            }
+        }
+        Problem::new(a, b, c, self.dw.clone(), terms).unwrap()
+    }
+
+    fn sampled(&self, grid: &[f64]) -> sampled::Problem {
+        use crate::linalg::{CMat, Complex, solve_c, to_complex};
+        let n = self.a.nrows();
+        let point = |&omega: &f64| {
+            let z = CMat::identity(n, n) * Complex::from_polar(1.0, omega);
+            let state = solve_c(&(z - to_complex(&self.a)), &to_complex(&self.b));
+            sampled::Point {
+                omega,
+                w: to_complex(&self.cw) * &state + to_complex(&self.dw),
+                h: to_complex(&self.ch) * state + to_complex(&self.dh),
+            }
+        };
+        sampled::Problem::new(grid.iter().map(point).collect(), vec![self.lags; self.cw.nrows()]).unwrap()
+    }
+}
+
+fn report(name: &str, p: &Problem, s: &Solution, seconds: f64) {
+    println!(
+        "{name}: {:?} gamma {:.10} lower {:.10} gap {:.1e} steps {} states {} of {} unknowns {} in {seconds:.3} s",
+        s.stop,
+        s.gamma,
+        s.lower,
+        (s.gamma - s.lower) / s.gamma,
+        s.steps.len(),
+        s.coordinates.a.nrows(),
+        p.a.nrows(),
+        p.unknowns()
+    );
+}
+
+fn solve(name: &str, p: &Problem) -> Solution {
+    let start = std::time::Instant::now();
+    let s = minimise(p, &Settings::default()).unwrap();
+    report(name, p, &s, start.elapsed().as_secs_f64());
+    if s.stop != Stop::Solved {
+        for (i, step) in s.steps.iter().enumerate() {
+            println!("  {i} {step:?}");
+        }
+    }
+    s
+}
+
+#[test]
+fn kyp_and_sampled_forms_agree() {
+    for (n, m, q, outputs, lags, radius) in
+        [(3, 1, 1, 1, 3, 0.8), (4, 2, 2, 1, 3, 0.9), (4, 1, 3, 2, 4, 0.7), (5, 2, 4, 2, 5, 0.9)]
+    {
+        let fir = Fir::new(n, m, q, outputs, lags, radius);
+        let s = solve("fir", &fir.kyp());
+        let grid: Vec<f64> = (0..2001).map(|l| std::f64::consts::PI * l as f64 / 2000.0).collect();
+        let f = sampled::minimise(&fir.sampled(&grid), &sampled::Settings::default()).unwrap();
+        println!("sampled {} {}", f.gamma, f.lower.value);
+        assert_eq!(s.stop, Stop::Solved);
+        assert!(f.lower.value <= s.gamma * (1.0 + 1e-9));
+        assert!((f.gamma - s.gamma).abs() < 1e-5 * s.gamma);
+    }
+}
+
+#[test]
+fn the_thesis_bank_is_solved_in_kyp_form() {
+    let s = solve("thesis", &Fir::of_bank(&testbank::thesis(), 11).kyp());
+    assert_eq!(s.stop, Stop::Solved);
+    assert!((s.gamma - 0.03993204).abs() < 2e-8);
+    let early = TestBank { latency: 1, ..testbank::thesis() };
+    let s = solve("thesis, latency 1, 12 taps", &Fir::of_bank(&early, 6).kyp());
+    assert!((s.gamma - 0.069447031).abs() < 2e-8);
+}
+
+#[test]
+fn optima_are_certified_and_anything_below_is_refused() {
+    for fir in [Fir::new(4, 2, 2, 1, 3, 0.9), Fir::of_bank(&testbank::thesis(), 11)] {
+        let problem = fir.kyp();
+        let s = solve("bank", &problem);
+        let (c, d) = problem.outputs(&s.x);
+        let (a, b, c) = (&s.coordinates.a, &s.coordinates.b, c * &s.coordinates.basis);
+        let own = prove(a, b, &c, &d, &s.p, s.gamma).unwrap();
+        assert!(own.margin > 0.0 && own.charged < 1e-11, "{own:?}");
+        for slack in [1e-3, 1e-5, 1e-6, 1e-7] {
+            let proof = certificate(a, b, &c, &d, s.gamma * (1.0 + slack)).unwrap();
+            assert!(proof.margin > 0.0, "{slack}: {proof:?}");
+        }
+        let below = certificate(a, b, &c, &d, s.lower * (1.0 - 1e-6));
+        assert!(matches!(below, Err(Refusal::Riccati { .. } | Refusal::NotProven { .. })), "{below:?}");
+    }
+}
+
+/// No P can prove what is false, not even the one that proves the norm just above.
+#[test]
+fn false_statements_are_not_proven() {
+    let one = |v: f64| Mat::from_element(1, 1, v);
+    // 1 / (z - 0.5) has norm 2.
+    let (a, b, c, d) = (one(0.5), one(1.0), one(1.0), one(0.0));
+    let proof = certificate(&a, &b, &c, &d, 2.0 * (1.0 + 1e-8)).unwrap();
+    assert!(prove(&a, &b, &c, &d, &proof.p, 2.0 * (1.0 - 1e-9)).is_err());
+    for k in 0..200 {
+        assert!(prove(&a, &b, &c, &d, &one(0.05 * f64::from(k)), 1.9999).is_err());
+    }
+    assert!(matches!(certificate(&a, &b, &c, &one(5.0), 2.0), Err(Refusal::Feedthrough { .. })));
+    assert!(matches!(certificate(&a, &b, &c, &one(0.0), f64::NAN), Err(Refusal::Feedthrough { .. })));
+    assert!(matches!(certificate(&a, &b, &Mat::zeros(1, 2), &d, 3.0), Err(Refusal::Size { .. })));
+}
+
+/// A constant has no states, a problem without unknowns no choice, a reachable target no error.
+#[test]
+fn degenerate_problems_are_right() {
+    let none = Problem::new(
+        Mat::zeros(0, 0),
+        Mat::zeros(0, 2),
+        Mat::zeros(1, 0),
+        Mat::from_row_slice(1, 2, &[3.0, 4.0]),
+        vec![],
+    );
+    let s = solve("constant", &none.unwrap());
+    assert!((s.gamma - 5.0).abs() < 1e-6 && s.lower > 5.0 - 1e-6, "{s:?}");
+    let one = |v: f64| Mat::from_element(1, 1, v);
+    let fixed = Problem::new(one(0.5), one(1.0), one(1.0), one(0.0), vec![]).unwrap();
+    let s = solve("no unknowns", &fixed);
+    assert!((s.gamma - 2.0).abs() < 1e-6, "{s:?}");
+    let twice = vec![(one(1.0), one(0.0)), (one(1.0), one(0.0)), (one(0.0), one(0.0))];
+    let reachable = Problem::new(one(0.5), one(1.0), one(-7.0), one(0.0), twice).unwrap();
+    let s = solve("reachable", &reachable);
+    assert!(s.stop == Stop::Solved && s.gamma < 1e-12);
+    assert!((s.x[0] - 3.5).abs() < 1e-12 && (s.x[1] - 3.5).abs() < 1e-12 && s.x[2] == 0.0, "{:?}", s.x);
+}
+
+/// Uncontrollable and badly scaled states change nothing.
+#[test]
+fn units_and_silent_states_do_not_matter() {
+    let fir = Fir::new(3, 1, 1, 1, 3, 0.8);
+    let plain = fir.kyp();
+    let gamma = solve("plain", &plain).gamma;
+    let n = plain.a.nrows();
+    let units: Vec<f64> = (0..n).map(|i| 10f64.powi(6 * (i as i32 % 3 - 1))).collect();
+    let mut a = Mat::zeros(n + 1, n + 1);
+    let grow = |m: &Mat, rows: usize, cols: usize| m.clone().resize(rows, cols, 0.0);
+    a.view_mut((0, 0), (n, n)).copy_from(&Mat::from_fn(n, n, |i, j| units[i] * plain.a[(i, j)] / units[j]));
+    a[(n, n)] = 0.99;
+    a[(0, n)] = 3.0;
+    let b = grow(&Mat::from_fn(n, 1, |i, _| units[i] * plain.b[i]), n + 1, 1);
+    let c = |c: &Mat| grow(&Mat::from_fn(1, n, |_, j| c[j] / units[j]), 1, n + 1);
+    let terms = plain.terms.iter().map(|(ck, dk)| (c(ck), dk.clone())).collect();
+    let scaled = Problem::new(a, b, c(&plain.c), plain.d.clone(), terms).unwrap();
+    let s = solve("scaled", &scaled);
+    assert_eq!(s.coordinates.a.nrows(), n);
+    assert!((s.gamma - gamma).abs() < 1e-6 * gamma, "{} {gamma}", s.gamma);
+}
+
+#[test]
+fn what_is_no_problem_is_refused() {
+    let one = |v: f64| Mat::from_element(1, 1, v);
+    let zero = one(0.0);
+    let try_a = |a: Mat| Problem::new(a, one(1.0), one(1.0), zero.clone(), vec![]);
+    assert!(matches!(try_a(one(1.0)), Err(KypError::Unstable { .. })));
+    assert!(matches!(try_a(one(f64::NAN)), Err(KypError::NotFinite { .. })));
+    assert!(matches!(try_a(Mat::zeros(1, 2)), Err(KypError::Size { .. })));
+    let settings = Settings { tol_rank: 2.0, ..Settings::default() };
+    let refused = minimise(&try_a(one(0.5)).unwrap(), &settings);
+    assert!(matches!(refused, Err(KypError::Setting(SettingError { name: "tol_rank", .. }))));
+    let term = vec![(Mat::zeros(2, 1), zero.clone())];
+    let bad = Problem::new(one(0.5), one(1.0), one(1.0), zero.clone(), term);
+    assert!(matches!(bad, Err(KypError::Size { rows: 2, want_rows: 1, .. })));
+}
+
+#[test]
+fn an_exhausted_iteration_limit_keeps_honest_bounds() {
+    let problem = Fir::new(4, 2, 2, 1, 3, 0.9).kyp();
+    let full = minimise(&problem, &Settings::default()).unwrap();
+    for max_iterations in 0..8 {
+        let s = minimise(&problem, &Settings { max_iterations, ..Settings::default() }).unwrap();
+        assert!(s.stop == Stop::IterationLimit || s.stop == Stop::SolvedInaccurate);
+        assert!(s.lower <= full.gamma && s.gamma >= full.lower && s.steps.len() == max_iterations);
+        let (c, d) = problem.outputs(&s.x);
+        let c = c * &s.coordinates.basis;
+        assert!(prove(&s.coordinates.a, &s.coordinates.b, &c, &d, &s.p, s.gamma).is_ok());
+    }
+}
+
+/// n = 80 states with 448 unknowns and n = 160 with 1088; run with --ignored --release.
+#[test]
+#[ignore = "minutes long; a measurement"]
+fn large_problems_are_feasible() {
+    for lags in [7, 17] {
+        let problem = Fir::new(32, 8, 16, 8, lags, 0.9).kyp();
+        let s = solve("large", &problem);
+        assert!(s.stop.is_solved());
+    }
+}
