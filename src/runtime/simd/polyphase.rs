@@ -87,14 +87,24 @@ unsafe fn tile<V: Vector, const P: usize, const R: usize>(job: &Job<V::Sample>, 
         let x = job.x.add(first);
         for s in 0..job.steps {
             let at = x.add(*job.offsets.add(s) as usize);
-            let mut inputs = [zero; R];
-            for (r, input) in inputs.iter_mut().enumerate() {
-                *input = V::load(at.add(r * V::LANES));
-            }
-            for (p, row) in sums.iter_mut().enumerate() {
-                let coefficient = V::splat(*job.coefficients.add(s * P + p));
-                for (sum, input) in row.iter_mut().zip(inputs) {
-                    *sum = input.mul_add(coefficient, *sum);
+            let coefficients = job.coefficients.add(s * P);
+            // The smaller side waits in registers, the other one streams through a single one:
+            // together with the sums they just fit.
+            if const { P < R } {
+                let held: [V; P] = std::array::from_fn(|p| V::splat(*coefficients.add(p)));
+                for r in 0..R {
+                    let input = V::load(at.add(r * V::LANES));
+                    for p in 0..P {
+                        sums[p][r] = input.mul_add(held[p], sums[p][r]);
+                    }
+                }
+            } else {
+                let held: [V; R] = std::array::from_fn(|r| V::load(at.add(r * V::LANES)));
+                for p in 0..P {
+                    let coefficient = V::splat(*coefficients.add(p));
+                    for r in 0..R {
+                        sums[p][r] = held[r].mul_add(coefficient, sums[p][r]);
+                    }
                 }
             }
         }
