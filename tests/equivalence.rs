@@ -7,8 +7,8 @@
 use hybank::analog::StrictlyProper;
 use hybank::bank::SynthesisFilters;
 use hybank::design::equivalence::BlockedPlant;
-use hybank::design::problem::{Channel, Problem};
 use hybank::design::error_system;
+use hybank::design::problem::{Channel, Problem};
 use hybank::linalg::{Mat, singular_values};
 use hybank::simulate::{Instants, Source, sample};
 use hybank::spec::{Family, FilterSpec};
@@ -50,7 +50,8 @@ fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
     // (phi * pulse_c)(t) for t = k step + offset is a difference of step responses on a lattice of `width`.
     let responses = |front_end: usize, offset: f64| -> Vec<f64> {
         let step = Source::Step { at: 0.0, height: 1.0 };
-        let instants = Instants { first: offset - columns as f64 * width, step: width, count: 2 * columns + 2 };
+        let instants =
+            Instants { first: offset - columns as f64 * width, step: width, count: 2 * columns + 2 };
         sample(&case.problem.front_ends[front_end], &step, instants)
     };
     let pulse = |table: &[f64], steps: usize, c: usize| {
@@ -89,7 +90,10 @@ fn check(name: &str, case: &Case) {
     let norm = computed(case);
     let ratio = case.problem.ratio;
     let (coarse, fine) = (brute_force(case, 24 / ratio, 3), brute_force(case, 144 / ratio, 16));
-    assert!(coarse <= norm * (1.0 + 1e-9) && fine <= norm * (1.0 + 1e-9), "{name}: {coarse} {fine} above {norm}");
+    assert!(
+        coarse <= norm * (1.0 + 1e-9) && fine <= norm * (1.0 + 1e-9),
+        "{name}: {coarse} {fine} above {norm}"
+    );
     assert!(coarse < fine, "{name}: {coarse} {fine} do not grow");
     assert!(fine > 0.985 * norm, "{name}: {fine} stays away from {norm}");
 }

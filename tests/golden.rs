@@ -188,12 +188,9 @@ fn g12c_with_128_taps() {
 #[test]
 fn g13_jitter_of_the_optimal_bank() {
     let bank = design(&with_taps(thesis(10, &[1.2, 0.6]), 22)).unwrap().bank;
-    for (errors, golden) in [
-        ([0.1, 0.0], 0.0389583),
-        ([0.0, 0.1], 0.0439780),
-        ([0.1, 0.1], 0.0433790),
-        ([0.1, -0.1], 0.0392280),
-    ] {
+    for (errors, golden) in
+        [([0.1, 0.0], 0.0389583), ([0.0, 0.1], 0.0439780), ([0.1, 0.1], 0.0433790), ([0.1, -0.1], 0.0392280)]
+    {
         let gamma = analyze(&bank, &errors).unwrap().gamma;
         assert!((gamma / golden - 1.0).abs() < 0.02, "G13 at {errors:?}: {gamma}, golden {golden}");
     }

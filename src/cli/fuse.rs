@@ -1,8 +1,8 @@
 //! `hybank fuse`: slow recordings in, one fast recording out.
 
 use super::Failure;
-use super::bank_file;
 use super::output::{Bits, FastWriter};
+use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Capture, PcmFrames, SampleLayout};
 use crate::runtime::{Options, PcmOutput, Precision, Reconstructor};
@@ -82,9 +82,11 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
     let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
     let mut capture = Capture::open(&args.inputs).map_err(Failure::input)?;
-    check_channels(&bank, &capture, &args)?;
-    let slow_rate = check_rates(&bank, &capture)?;
-    let rate = fast_rate(&bank, slow_rate)?;
+    let channels = || capture.headers().map(|(name, header)| (name, header.channels));
+    match_bank::check_channels(&bank, &args.bank, channels())?;
+    let slow_rate =
+        match_bank::check_rates(&bank, capture.headers().map(|(name, header)| (name, header.rate)))?;
+    let rate = match_bank::fast_rate(&bank, slow_rate)?;
     let stream = args.reconstructor(&bank)?;
     let mut job = Job {
         progress: progress_bar(capture.promised_ticks()),
@@ -102,10 +104,7 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
 
 impl Args {
     fn check(&self) -> Result<(), Failure> {
-        let from_stdin = self.inputs.iter().filter(|path| path.as_os_str() == "-").count();
-        if from_stdin > 1 {
-            return Err(Failure::Usage("`-` is given twice; standard input can feed one input only".into()));
-        }
+        match_bank::check_stdin(&self.bank, &self.inputs)?;
         if self.json && self.output.as_os_str() == "-" {
             let message = "--json and `-o -` both want standard output; write the samples to a file";
             return Err(Failure::Usage(message.into()));
@@ -232,58 +231,6 @@ impl Job {
             warnings,
         }
     }
-}
-
-fn check_channels(bank: &Bank, capture: &Capture, args: &Args) -> Result<(), Failure> {
-    let (given, wanted) = (capture.channels(), bank.channel_count());
-    if given == wanted {
-        return Ok(());
-    }
-    let files: Vec<_> =
-        capture.headers().map(|(name, header)| format!("{name}: {}", header.channels)).collect();
-    Err(Failure::Input(format!(
-        "{} wants {wanted} channels, the input has {given} ({}); give one mono WAV file a channel or one {wanted}-channel file",
-        args.bank.display(),
-        files.join(", ")
-    )))
-}
-
-/// All inputs at the slow rate 1 / (M h), to the hertz that a WAV header can say; at any common
-/// rate for a bank in normalised time. Returns that rate.
-fn check_rates(bank: &Bank, capture: &Capture) -> Result<u32, Failure> {
-    let mut headers = capture.headers();
-    let Some((first, header)) = headers.next() else {
-        return Err(Failure::Usage("no input".into()));
-    };
-    let rate = header.rate;
-    if let Some((name, other)) = headers.find(|(_, other)| other.rate != rate) {
-        return Err(Failure::Input(format!(
-            "{name}: the sample rate is {} Hz, but {first} has {rate} Hz; all channels need the same rate",
-            other.rate
-        )));
-    }
-    let wanted = 1.0 / bank.slow_period();
-    if bank.fast_period != 1.0 && (f64::from(rate) - wanted).abs() > 0.5 {
-        return Err(Failure::Input(format!(
-            "{first}: the sample rate is {rate} Hz, but the bank is designed for slow channels of {wanted} Hz; \
-             record at that rate or design a bank for this one"
-        )));
-    }
-    Ok(rate)
-}
-
-fn fast_rate(bank: &Bank, slow_rate: u32) -> Result<u32, Failure> {
-    let rate = if bank.fast_period == 1.0 {
-        f64::from(slow_rate) * bank.ratio as f64
-    } else {
-        (1.0 / bank.fast_period).round().max(1.0)
-    };
-    if rate > f64::from(u32::MAX) {
-        return Err(Failure::Input(format!(
-            "the fast rate of {rate} Hz does not fit a WAV header; use stream"
-        )));
-    }
-    Ok(rate as u32)
 }
 
 /// Drawn on a terminal only.

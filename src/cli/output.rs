@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::io::wav::{WavFile, stream_header};
-use crate::io::{AtomicFile, IoError, PcmFormat};
+use crate::io::{AtomicFile, IoError, PcmFormat, stdout_file};
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 
@@ -44,14 +44,12 @@ impl Bits {
 }
 
 /// The open end.
-#[derive(Debug)]
 enum Target {
     File(WavFile<AtomicFile>),
-    Stdout(io::Stdout),
+    Stdout(Box<dyn Write>),
 }
 
 /// One channel of fast samples as WAV.
-#[derive(Debug)]
 pub(super) struct FastWriter {
     target: Target,
     name: String,
@@ -107,17 +105,22 @@ impl FastWriter {
     }
 }
 
-fn stdout_target(format: PcmFormat, rate: u32) -> io::Result<Target> {
-    let mut stdout = io::stdout();
-    if stdout.is_terminal() {
+/// Standard output for samples, which a terminal cannot show.
+pub(super) fn open_stdout() -> io::Result<Box<dyn Write>> {
+    if io::stdout().is_terminal() {
         return Err(io::Error::other("it is a terminal; redirect it to a file or a pipe"));
     }
+    Ok(Box::new(stdout_file()?))
+}
+
+fn stdout_target(format: PcmFormat, rate: u32) -> io::Result<Target> {
+    let mut stdout = open_stdout()?;
     stdout.write_all(&stream_header(format, 1, rate)?)?;
     Ok(Target::Stdout(stdout))
 }
 
 /// A reader that went away ends the run quietly; everything else is told.
-fn failure(name: &str, error: io::Error) -> Failure {
+pub(super) fn failure(name: &str, error: io::Error) -> Failure {
     match IoError::system(name, "write it")(error) {
         error if error.is_closed_pipe() => Failure::ClosedPipe,
         error => Failure::input(error),

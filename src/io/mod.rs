@@ -6,6 +6,7 @@
 mod atomic;
 mod capture;
 mod error;
+mod feed;
 mod frames;
 mod pcm;
 mod pcm_frames;
@@ -14,6 +15,7 @@ pub mod wav;
 pub use atomic::AtomicFile;
 pub use capture::{Capture, CaptureNote};
 pub use error::IoError;
+pub use feed::{Arrival, Coding, Feed, stdout_file};
 pub use frames::FrameReader;
 pub(crate) use pcm::for_pcm_format;
 pub use pcm::{ParsePcmFormatError, PcmFormat};

@@ -374,7 +374,9 @@ fn general_conic_solver_agrees() {
     };
     let p = Problem::new((0..5).map(|k| (1.0 + 2.0 * k as f64).cos()).collect())
         .and_then(|p| p.matrix_inequality(4, Coefficient::Dense(eye(4, 1.0)), terms(4, 0.3, 1.0)))
-        .and_then(|p| p.matrix_inequality(6, Coefficient::Dense(eye(6, 2.0) + wavy(6, 9.0)), terms(6, 5.5, -0.4)))
+        .and_then(|p| {
+            p.matrix_inequality(6, Coefficient::Dense(eye(6, 2.0) + wavy(6, 9.0)), terms(6, 5.5, -0.4))
+        })
         .and_then(|p| p.linear_inequalities(vec![4.0; 5], (0..5).map(|i| (i, i, -1.0)).collect()))
         .and_then(|p| p.equalities(Mat::from_element(1, 5, 1.0), vec![0.25]))
         .unwrap();
