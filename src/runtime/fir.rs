@@ -7,7 +7,7 @@ use super::BuildError;
 use super::aligned::Aligned;
 use super::rows::{Fold, Rows, RowsMut};
 use super::sample::Sample;
-use super::simd::{FirKernel, Isa, OVERRUN, PhaseGroup};
+use super::simd::{FirKernel, Isa, OVERRUN, PhaseGroup, Steps};
 use super::ticks::{FastSink, TickSource};
 use super::window::{Window, block_frames};
 
@@ -25,7 +25,7 @@ pub(crate) struct FirPlan<T: Sample> {
     block: usize,
     groups: Vec<PhaseGroup<T>>,
     /// For each step the place of its input in the window.
-    offsets: Vec<u32>,
+    steps: Steps,
     kernel: FirKernel<T>,
     isa: Isa,
 }
@@ -76,7 +76,7 @@ impl<T: Sample> FirPlan<T> {
             window,
             block,
             groups,
-            offsets: steps.iter().map(offset).collect(),
+            steps: Steps::new(steps.iter().map(offset).collect()),
             kernel: T::fir_kernel(isa),
             isa,
         })
@@ -131,7 +131,7 @@ impl<T: Sample> FirPlan<T> {
         let stride = self.out_stride();
         for group in &self.groups {
             let out = &mut state.rows[group.first * stride..];
-            self.kernel.run(group, state.window.view(), &self.offsets, super_ticks, out, stride);
+            self.kernel.run(group, state.window.view(), &self.steps, super_ticks, out, stride);
         }
     }
 }
