@@ -1,6 +1,7 @@
 //! `hybank fuse`: slow recordings in, one fast recording out.
 
 use super::Failure;
+use super::gaps::{GapArgs, GapReport, GapStage};
 use super::output::{Bits, FastWriter};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
@@ -27,10 +28,10 @@ Examples:
 pub(super) struct Args {
     /// The bank: what `hybank design` wrote
     bank: PathBuf,
-    /// One mono WAV file a channel, or one N-channel file; `-` is standard input
+    /// One mono WAV file or SigMF recording a channel, or one of N channels; `-` is standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// The fused WAV file; `-` is standard output
+    /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta); `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
     /// Samples of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
@@ -39,6 +40,8 @@ pub(super) struct Args {
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
+    #[command(flatten)]
+    gaps: GapArgs,
     /// Make every tolerated fault (unequal lengths, truncation, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
@@ -69,6 +72,9 @@ struct Report {
     replaced: u64,
     /// Times that a recursion's state was not finite and began anew.
     state_resets: u64,
+    /// Missing samples, if --gaps asked for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gaps: Option<GapReport>,
     seconds: f64,
     warnings: Vec<String>,
 }
@@ -94,6 +100,7 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
         skip: if args.keep_latency { 0 } else { stream.latency() as u64 },
         flush: !args.keep_latency,
         stream,
+        gaps: args.gaps.stage(&bank, args.force)?,
         clipped: 0,
         buffer: Vec::new(),
     };
@@ -135,6 +142,7 @@ impl Args {
             eprintln!("hybank: warning: {warning}");
         }
         job.writer.finish()?;
+        job.gaps.map_or(Ok(()), GapStage::close)?;
         if self.json {
             println!("{}", serde_json::to_string(report).map_err(Failure::input)?);
         }
@@ -145,6 +153,7 @@ impl Args {
 /// A run under way.
 struct Job {
     stream: Reconstructor,
+    gaps: Option<GapStage>,
     writer: FastWriter,
     progress: ProgressBar,
     /// Samples still to be dropped.
@@ -180,6 +189,8 @@ impl Job {
 
     /// Fuses a block and writes what is not to be dropped, at most `limit` samples.
     fn fuse(&mut self, frames: &[PcmFrames<'_>], limit: u64) -> Result<(), Failure> {
+        let filled = self.gaps.as_mut().map(|stage| [stage.fill(frames)]);
+        let frames = filled.as_ref().map_or(frames, |filled| &filled[..]);
         let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
         let format = self.writer.format();
         self.buffer.resize(ticks * self.stream.ratio() * format.bytes(), 0);
@@ -189,7 +200,11 @@ impl Job {
         let skip = self.skip.min(samples);
         self.skip -= skip;
         let end = samples.min(skip.saturating_add(limit));
-        self.writer.write(&self.buffer[skip as usize * format.bytes()..end as usize * format.bytes()])
+        let range = skip as usize..end as usize;
+        if let Some(stage) = &mut self.gaps {
+            stage.write_mask(range.clone())?;
+        }
+        self.writer.write(&self.buffer[range.start * format.bytes()..range.end * format.bytes()])
     }
 
     /// Zeros until there are M samples for each of `ticks` ticks.
@@ -207,7 +222,7 @@ impl Job {
         Ok(())
     }
 
-    fn report(&self, capture: &Capture, rate: u32, begin: Instant) -> Report {
+    fn report(&mut self, capture: &Capture, rate: u32, begin: Instant) -> Report {
         let mut warnings: Vec<String> = capture.notes().iter().map(ToString::to_string).collect();
         let mut warn = |count: u64, what: &str| {
             if count > 0 {
@@ -227,6 +242,7 @@ impl Job {
             clipped: self.clipped,
             replaced: self.stream.replaced(),
             state_resets: self.stream.state_resets(),
+            gaps: self.gaps.as_mut().map(GapStage::report),
             seconds: begin.elapsed().as_secs_f64(),
             warnings,
         }

@@ -7,6 +7,7 @@ mod demo;
 mod design;
 mod failure;
 mod fuse;
+mod gaps;
 mod match_bank;
 mod output;
 mod recordings;

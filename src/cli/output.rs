@@ -1,8 +1,8 @@
-//! Where fast samples go as WAV: a file that appears when whole, or standard output.
+//! Where fast samples go: a WAV file or SigMF recording that appears when whole, or standard output.
 
 use super::Failure;
 use crate::io::wav::{WavFile, stream_header};
-use crate::io::{AtomicFile, IoError, PcmFormat, stdout_file};
+use crate::io::{AtomicFile, IoError, PcmFormat, SigmfMeta, stdout_file};
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 
@@ -47,9 +47,15 @@ impl Bits {
 enum Target {
     File(WavFile<AtomicFile>),
     Stdout(Box<dyn Write>),
+    /// Raw samples, and the metadata beside them.
+    Sigmf {
+        data: AtomicFile,
+        meta: AtomicFile,
+        text: String,
+    },
 }
 
-/// One channel of fast samples as WAV.
+/// One channel of fast samples.
 pub(super) struct FastWriter {
     target: Target,
     name: String,
@@ -65,6 +71,8 @@ impl FastWriter {
             if path.as_os_str() == "-" { "standard output".into() } else { path.display().to_string() };
         let target = if path.as_os_str() == "-" {
             stdout_target(format, rate)
+        } else if path.extension().is_some_and(|extension| extension == "sigmf-meta") {
+            Ok(sigmf_target(path, format, rate, force)?)
         } else {
             let file = AtomicFile::create(path, force).map_err(Failure::input)?;
             WavFile::new(file, format, 1, rate).map(Target::File)
@@ -88,6 +96,7 @@ impl FastWriter {
         let written = match &mut self.target {
             Target::File(file) => file.write_bytes(bytes),
             Target::Stdout(stdout) => stdout.write_all(bytes),
+            Target::Sigmf { data, .. } => data.write_all(bytes),
         };
         self.bytes += bytes.len() as u64;
         written.map_err(|error| failure(&self.name, error))
@@ -101,8 +110,20 @@ impl FastWriter {
                 file.commit().map_err(Failure::input)
             }
             Target::Stdout(mut stdout) => stdout.flush().map_err(|error| failure(&self.name, error)),
+            Target::Sigmf { data, mut meta, text } => {
+                meta.write_all(text.as_bytes()).map_err(|error| failure(&self.name, error))?;
+                data.commit().map_err(Failure::input)?;
+                meta.commit().map_err(Failure::input)
+            }
         }
     }
+}
+
+fn sigmf_target(path: &Path, format: PcmFormat, rate: u32, force: bool) -> Result<Target, Failure> {
+    let meta = AtomicFile::create(path, force).map_err(Failure::input)?;
+    let data = AtomicFile::create(&path.with_extension("sigmf-data"), force).map_err(Failure::input)?;
+    let text = serde_json::to_string_pretty(&SigmfMeta::for_output(format, f64::from(rate)));
+    Ok(Target::Sigmf { data, meta, text: text.map_err(Failure::input)? + "\n" })
 }
 
 /// Standard output for samples, which a terminal cannot show.

@@ -1,5 +1,6 @@
 //! `hybank stream`: slow samples in and fast samples out, as they come.
 
+use super::gaps::{GapArgs, GapReport, GapStage};
 use super::output::{failure, open_stdout};
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
@@ -45,6 +46,8 @@ pub(super) struct Args {
     /// Bring out the last m0 samples at the end, with zeros for input
     #[arg(long)]
     flush: bool,
+    #[command(flatten)]
+    gaps: GapArgs,
     /// Make every tolerated fault (a cut frame, unequal lengths, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
@@ -74,6 +77,9 @@ struct Report {
     replaced: u64,
     state_resets: u64,
     interrupted: bool,
+    /// Missing samples, if --gaps asked for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gaps: Option<GapReport>,
     warnings: Vec<String>,
 }
 
@@ -185,6 +191,7 @@ enum Target {
 /// A stream under way.
 struct Job {
     stream: Reconstructor,
+    gaps: Option<GapStage>,
     target: Target,
     name: String,
     format: PcmFormat,
@@ -213,8 +220,9 @@ impl Job {
             "standard output".into()
         };
         let format = args.output_format();
+        let gaps = args.gaps.stage(bank, args.force)?;
         let mut job =
-            Self { stream, target, name, format, ticks: 0, samples: 0, clipped: 0, buffer: Vec::new() };
+            Self { stream, gaps, target, name, format, ticks: 0, samples: 0, clipped: 0, buffer: Vec::new() };
         if args.output_coding() == Coding::Wav {
             job.buffer = stream_header(format, 1, rate).map_err(|error| failure(&job.name, error))?;
             job.write()?;
@@ -238,11 +246,17 @@ impl Job {
     }
 
     fn fuse(&mut self, frames: &[PcmFrames<'_>]) -> Result<(), Failure> {
+        let filled = self.gaps.as_mut().map(|stage| [stage.fill(frames)]);
+        let frames = filled.as_ref().map_or(frames, |filled| &filled[..]);
         let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
         self.buffer.resize(ticks * self.stream.ratio() * self.format.bytes(), 0);
         let mut output = PcmOutput { format: self.format, bytes: &mut self.buffer, clipped: 0 };
-        self.samples += self.stream.process_pcm(frames, &mut output).map_err(Failure::input)? as u64;
+        let samples = self.stream.process_pcm(frames, &mut output).map_err(Failure::input)?;
+        self.samples += samples as u64;
         self.clipped += output.clipped;
+        if let Some(stage) = &mut self.gaps {
+            stage.write_mask(0..samples)?;
+        }
         self.write()
     }
 
@@ -270,12 +284,13 @@ impl Job {
 
     fn close(self) -> Result<(), Failure> {
         match self.target {
-            Target::Stdout(mut stdout) => stdout.flush().map_err(|error| failure(&self.name, error)),
-            Target::File(file) => file.commit().map_err(Failure::input),
+            Target::Stdout(mut stdout) => stdout.flush().map_err(|error| failure(&self.name, error))?,
+            Target::File(file) => file.commit().map_err(Failure::input)?,
         }
+        self.gaps.map_or(Ok(()), GapStage::close)
     }
 
-    fn report(&self, feed: &Feed, interrupted: bool) -> Report {
+    fn report(&mut self, feed: &Feed, interrupted: bool) -> Report {
         let mut warnings = feed.notes();
         let mut warn = |count: u64, what: &str| {
             if count > 0 {
@@ -294,6 +309,7 @@ impl Job {
             replaced: self.stream.replaced(),
             state_resets: self.stream.state_resets(),
             interrupted,
+            gaps: self.gaps.as_mut().map(GapStage::report),
             warnings,
         }
     }

@@ -10,6 +10,7 @@ mod feed;
 mod frames;
 mod pcm;
 mod pcm_frames;
+mod sigmf;
 pub mod wav;
 
 pub use atomic::AtomicFile;
@@ -20,3 +21,4 @@ pub use frames::FrameReader;
 pub(crate) use pcm::for_pcm_format;
 pub use pcm::{ParsePcmFormatError, PcmFormat};
 pub use pcm_frames::{PcmFrames, SampleLayout};
+pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta};
