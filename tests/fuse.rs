@@ -9,7 +9,7 @@ struct Bench {
     folder: tempfile::TempDir,
 }
 
-const TAPS: [&[f64]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0]];
+const TAPS: [&[f64]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 0.0]];
 
 impl Bench {
     fn new() -> Self {
@@ -345,4 +345,83 @@ fn speech_of_two_converters_opens() {
     bench.quietly(&["fuse", "bank.json", &file("ch1.wav"), &file("ch2.wav"), "-o", "out.wav"]);
     let slow = samples(&folder.join("ch1.wav")).1.len();
     assert_eq!(samples(&bench.path("out.wav")).1.len(), 2 * slow);
+}
+
+#[test]
+fn gaps_are_bridged_reported_and_masked() {
+    let bench = Bench::new();
+    let mut a: Vec<f32> = (0..40).map(|k| k as f32).collect();
+    let b = vec![1.0; 40];
+    let clean = a.clone();
+    a[10..13].fill(f32::NAN);
+    bench.wav("a.wav", 1, 24_000, &a);
+    bench.wav("b.wav", 1, 24_000, &b);
+    let args =
+        ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--force", "--json", "--mask", "mask"];
+    for (policy, value) in [("zero", 0.0), ("hold", 9.0), ("mask", 0.0)] {
+        let output = bench.run(&[&args[..], &["--gaps", policy]].concat());
+        assert!(output.status.success(), "{output:?}");
+        assert!(text(&output.stderr).contains("gap: channel 1, sample 10, 3 missing"), "{output:?}");
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["gaps"]["list"][0], serde_json::json!({ "channel": 1, "first": 10, "length": 3 }));
+        let mut filled = clean.clone();
+        filled[10..13].fill(value);
+        // Two ticks of zeros flush the last three samples.
+        let causal = |x: &[f32]| fused([&[x, &[0.0; 2]].concat(), &[&b[..], &[0.0; 2]].concat()], 42);
+        let got = samples(&bench.path("out.wav")).1;
+        assert_eq!(got, causal(&filled)[3..83]);
+        // The mask lines up with the output: outside of it nothing differs from the whole recording.
+        let mask = fs::read(bench.path("mask")).unwrap();
+        let want = &causal(&clean)[3..83];
+        assert_eq!(mask.len(), got.len());
+        assert_eq!(mask.iter().map(|&m| usize::from(m)).sum::<usize>(), 8);
+        for (t, (got, want)) in got.iter().zip(want).enumerate() {
+            assert_eq!(mask[t] == 0, got == want, "sample {t}");
+        }
+    }
+    bench.refused(2, &["fuse", "bank.json", "a.wav", "b.wav", "-o", "no.wav", "--gaps", "mask"], &["--mask"]);
+}
+
+#[test]
+fn sigmf_goes_in_and_out() {
+    let bench = Bench::new();
+    let (a, b) = ramps(20);
+    // Channel 1 starts two samples late and loses one after five; channel 2 is whole.
+    let meta = |captures: &str, datatype: &str| {
+        format!(
+            r#"{{ "global": {{ "core:datatype": "{datatype}", "core:sample_rate": 24000, "core:num_channels": 1,
+            "core:version": "1.0.0" }}, "captures": [{captures}], "annotations": [] }}"#
+        )
+    };
+    let captures = r#"{ "core:sample_start": 0, "core:global_index": 102 },
+        { "core:sample_start": 5, "core:global_index": 108 }"#;
+    fs::write(bench.path("a.sigmf-meta"), meta(captures, "rf32_be")).unwrap();
+    let start = r#"{ "core:sample_start": 0, "core:global_index": 100 }"#;
+    fs::write(bench.path("b.sigmf-meta"), meta(start, "ri16_le")).unwrap();
+    let there: Vec<u8> = a[2..7].iter().chain(&a[8..]).flat_map(|x| x.to_be_bytes()).collect();
+    fs::write(bench.path("a.sigmf-data"), there).unwrap();
+    let coded: Vec<u8> = b.iter().flat_map(|x| ((x * 4096.0) as i16).to_le_bytes()).collect();
+    fs::write(bench.path("b.sigmf-data"), coded).unwrap();
+    let args =
+        ["fuse", "bank.json", "a.sigmf-meta", "b.sigmf-data", "-o", "out.sigmf-meta", "--keep-latency"];
+    let output = bench.run(&[&args[..], &["--gaps", "zero", "--json"]].concat());
+    assert!(output.status.success(), "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((report["gaps"]["count"].as_u64(), report["gaps"]["missing"].as_u64()), (Some(2), Some(3)));
+    let got: Vec<f32> = fs::read(bench.path("out.sigmf-data"))
+        .unwrap()
+        .chunks_exact(4)
+        .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+        .collect();
+    let mut whole = a.clone();
+    [0, 1, 7].map(|k| whole[k] = 0.0);
+    let scaled: Vec<f32> = b.iter().map(|x| x / 8.0).collect();
+    assert_eq!(got, fused([&whole, &scaled], 20));
+    let written: serde_json::Value =
+        serde_json::from_slice(&fs::read(bench.path("out.sigmf-meta")).unwrap()).unwrap();
+    assert_eq!(written["global"]["core:datatype"], "rf32_le");
+    assert_eq!(written["global"]["core:sample_rate"], 48000.0);
+    bench.refused(1, &args, &["out.sigmf-meta", "--force"]);
+    fs::write(bench.path("a.sigmf-meta"), meta(start, "cf32_le")).unwrap();
+    bench.refused(1, &[&args[..], &["--force"]].concat(), &["a.sigmf-meta", "cf32_le"]);
 }

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::bank_file::load;
-use crate::design::{self, Analysis};
+use crate::design::{self, Analysis, Certified, DesignError};
 use std::path::PathBuf;
 
 /// Computes the exact gamma of a bank, with its own delays or with others
@@ -14,6 +14,7 @@ use std::path::PathBuf;
 Examples:
   hybank analyze bank.json
   hybank analyze bank.json --delay-error 1e-7,-1e-7
+  hybank analyze bank.json --certify
   hybank analyze bank.json --json | jq .gamma")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
@@ -21,6 +22,9 @@ pub(super) struct Args {
     /// True delay minus the bank's, one for each channel, in seconds
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     delay_error: Vec<f64>,
+    /// Also prove an upper bound of gamma in floating point (bounded-real LMI, Cholesky with all rounding errors charged)
+    #[arg(long)]
+    certify: bool,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -39,18 +43,40 @@ fn finite(text: &str) -> Result<f64, String> {
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let bank = load(&args.bank)?;
-    let analysis = design::analyze(&bank, &args.delay_error)
-        .map_err(|error| Failure::Input(format!("{}: {error}", args.bank.display())))?;
-    if args.json { super::print_json(&analysis) } else { super::print(&text(&analysis)) }
+    let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.bank.display()));
+    if args.certify && !args.delay_error.is_empty() {
+        let message = "--certify proves the bank with its own delays; leave out --delay-error";
+        return Err(Failure::Usage(message.into()));
+    }
+    let analysis = design::analyze(&bank, &args.delay_error).map_err(named)?;
+    let certified = if args.certify { Some(design::certify(&bank).map_err(named)?) } else { None };
+    let report = Report { analysis, certified };
+    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
 }
 
-fn text(analysis: &Analysis) -> String {
-    format!(
-        "gamma        {:.9}   worst-case gain from the analog input to the error (h = 1)\n\
-         worst at     {:.6} Hz modulo the slow rate\n\
-         noncausal    {:.9}   no bank at all is better\n\
-         rms error    {:.9}   for white noise of unit density at the analog input\n\
-         noise gain   {:.6}      for independent noise on the slow samples\n",
-        analysis.gamma, analysis.peak_hertz, analysis.noncausal, analysis.rms_error, analysis.noise_gain
-    )
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    #[serde(flatten)]
+    analysis: Analysis,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    certified: Option<Certified>,
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let Analysis { gamma, peak_hertz, noncausal, rms_error, noise_gain } = self.analysis;
+        let proof = self.certified.map_or_else(String::new, |proof| {
+            format!(
+                "certified    {:.9}   proved in floating point (P of order {}, margin {:.1e})\n",
+                proof.gamma, proof.states, proof.margin
+            )
+        });
+        format!(
+            "gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n{proof}\
+             worst at     {peak_hertz:.6} Hz modulo the slow rate\n\
+             noncausal    {noncausal:.9}   no bank at all is better\n\
+             rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
+             noise gain   {noise_gain:.6}      for independent noise on the slow samples\n"
+        )
+    }
 }

@@ -1,8 +1,9 @@
 //! `hybank fuse`: slow recordings in, one fast recording out.
 
 use super::Failure;
-use super::bank_file;
+use super::gaps::{GapArgs, GapReport, GapStage};
 use super::output::{Bits, FastWriter};
+use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Capture, PcmFrames, SampleLayout};
 use crate::runtime::{Options, PcmOutput, Precision, Reconstructor};
@@ -27,10 +28,10 @@ Examples:
 pub(super) struct Args {
     /// The bank: what `hybank design` wrote
     bank: PathBuf,
-    /// One mono WAV file a channel, or one N-channel file; `-` is standard input
+    /// One mono WAV file or SigMF recording a channel, or one of N channels; `-` is standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// The fused WAV file; `-` is standard output
+    /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta); `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
     /// Samples of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
@@ -39,6 +40,8 @@ pub(super) struct Args {
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
+    #[command(flatten)]
+    gaps: GapArgs,
     /// Make every tolerated fault (unequal lengths, truncation, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
@@ -69,6 +72,9 @@ struct Report {
     replaced: u64,
     /// Times that a recursion's state was not finite and began anew.
     state_resets: u64,
+    /// Missing samples, if --gaps asked for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gaps: Option<GapReport>,
     seconds: f64,
     warnings: Vec<String>,
 }
@@ -82,9 +88,11 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
     let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
     let mut capture = Capture::open(&args.inputs).map_err(Failure::input)?;
-    check_channels(&bank, &capture, &args)?;
-    let slow_rate = check_rates(&bank, &capture)?;
-    let rate = fast_rate(&bank, slow_rate)?;
+    let channels = || capture.headers().map(|(name, header)| (name, header.channels));
+    match_bank::check_channels(&bank, &args.bank, channels())?;
+    let slow_rate =
+        match_bank::check_rates(&bank, capture.headers().map(|(name, header)| (name, header.rate)))?;
+    let rate = match_bank::fast_rate(&bank, slow_rate)?;
     let stream = args.reconstructor(&bank)?;
     let mut job = Job {
         progress: progress_bar(capture.promised_ticks()),
@@ -92,6 +100,7 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
         skip: if args.keep_latency { 0 } else { stream.latency() as u64 },
         flush: !args.keep_latency,
         stream,
+        gaps: args.gaps.stage(&bank, args.force)?,
         clipped: 0,
         buffer: Vec::new(),
     };
@@ -102,10 +111,7 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
 
 impl Args {
     fn check(&self) -> Result<(), Failure> {
-        let from_stdin = self.inputs.iter().filter(|path| path.as_os_str() == "-").count();
-        if from_stdin > 1 {
-            return Err(Failure::Usage("`-` is given twice; standard input can feed one input only".into()));
-        }
+        match_bank::check_stdin(&self.bank, &self.inputs)?;
         if self.json && self.output.as_os_str() == "-" {
             let message = "--json and `-o -` both want standard output; write the samples to a file";
             return Err(Failure::Usage(message.into()));
@@ -136,6 +142,7 @@ impl Args {
             eprintln!("hybank: warning: {warning}");
         }
         job.writer.finish()?;
+        job.gaps.map_or(Ok(()), GapStage::close)?;
         if self.json {
             println!("{}", serde_json::to_string(report).map_err(Failure::input)?);
         }
@@ -146,6 +153,7 @@ impl Args {
 /// A run under way.
 struct Job {
     stream: Reconstructor,
+    gaps: Option<GapStage>,
     writer: FastWriter,
     progress: ProgressBar,
     /// Samples still to be dropped.
@@ -181,6 +189,8 @@ impl Job {
 
     /// Fuses a block and writes what is not to be dropped, at most `limit` samples.
     fn fuse(&mut self, frames: &[PcmFrames<'_>], limit: u64) -> Result<(), Failure> {
+        let filled = self.gaps.as_mut().map(|stage| [stage.fill(frames)]);
+        let frames = filled.as_ref().map_or(frames, |filled| &filled[..]);
         let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
         let format = self.writer.format();
         self.buffer.resize(ticks * self.stream.ratio() * format.bytes(), 0);
@@ -190,7 +200,11 @@ impl Job {
         let skip = self.skip.min(samples);
         self.skip -= skip;
         let end = samples.min(skip.saturating_add(limit));
-        self.writer.write(&self.buffer[skip as usize * format.bytes()..end as usize * format.bytes()])
+        let range = skip as usize..end as usize;
+        if let Some(stage) = &mut self.gaps {
+            stage.write_mask(range.clone())?;
+        }
+        self.writer.write(&self.buffer[range.start * format.bytes()..range.end * format.bytes()])
     }
 
     /// Zeros until there are M samples for each of `ticks` ticks.
@@ -208,7 +222,7 @@ impl Job {
         Ok(())
     }
 
-    fn report(&self, capture: &Capture, rate: u32, begin: Instant) -> Report {
+    fn report(&mut self, capture: &Capture, rate: u32, begin: Instant) -> Report {
         let mut warnings: Vec<String> = capture.notes().iter().map(ToString::to_string).collect();
         let mut warn = |count: u64, what: &str| {
             if count > 0 {
@@ -228,62 +242,11 @@ impl Job {
             clipped: self.clipped,
             replaced: self.stream.replaced(),
             state_resets: self.stream.state_resets(),
+            gaps: self.gaps.as_mut().map(GapStage::report),
             seconds: begin.elapsed().as_secs_f64(),
             warnings,
         }
     }
-}
-
-fn check_channels(bank: &Bank, capture: &Capture, args: &Args) -> Result<(), Failure> {
-    let (given, wanted) = (capture.channels(), bank.channel_count());
-    if given == wanted {
-        return Ok(());
-    }
-    let files: Vec<_> =
-        capture.headers().map(|(name, header)| format!("{name}: {}", header.channels)).collect();
-    Err(Failure::Input(format!(
-        "{} wants {wanted} channels, the input has {given} ({}); give one mono WAV file a channel or one {wanted}-channel file",
-        args.bank.display(),
-        files.join(", ")
-    )))
-}
-
-/// All inputs at the slow rate 1 / (M h), to the hertz that a WAV header can say; at any common
-/// rate for a bank in normalised time. Returns that rate.
-fn check_rates(bank: &Bank, capture: &Capture) -> Result<u32, Failure> {
-    let mut headers = capture.headers();
-    let Some((first, header)) = headers.next() else {
-        return Err(Failure::Usage("no input".into()));
-    };
-    let rate = header.rate;
-    if let Some((name, other)) = headers.find(|(_, other)| other.rate != rate) {
-        return Err(Failure::Input(format!(
-            "{name}: the sample rate is {} Hz, but {first} has {rate} Hz; all channels need the same rate",
-            other.rate
-        )));
-    }
-    let wanted = 1.0 / bank.slow_period();
-    if bank.fast_period != 1.0 && (f64::from(rate) - wanted).abs() > 0.5 {
-        return Err(Failure::Input(format!(
-            "{first}: the sample rate is {rate} Hz, but the bank is designed for slow channels of {wanted} Hz; \
-             record at that rate or design a bank for this one"
-        )));
-    }
-    Ok(rate)
-}
-
-fn fast_rate(bank: &Bank, slow_rate: u32) -> Result<u32, Failure> {
-    let rate = if bank.fast_period == 1.0 {
-        f64::from(slow_rate) * bank.ratio as f64
-    } else {
-        (1.0 / bank.fast_period).round().max(1.0)
-    };
-    if rate > f64::from(u32::MAX) {
-        return Err(Failure::Input(format!(
-            "the fast rate of {rate} Hz does not fit a WAV header; use stream"
-        )));
-    }
-    Ok(rate as u32)
 }
 
 /// Drawn on a terminal only.

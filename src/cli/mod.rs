@@ -7,9 +7,12 @@ mod demo;
 mod design;
 mod failure;
 mod fuse;
+mod gaps;
+mod match_bank;
 mod output;
 mod recordings;
 mod simulate;
+mod stream;
 
 use clap::{Parser, Subcommand};
 pub use failure::Failure;
@@ -44,6 +47,7 @@ enum Verb {
     Analyze(analyze::Args),
     Simulate(simulate::Args),
     Fuse(fuse::Args),
+    Stream(stream::Args),
     Demo(demo::Args),
     Completions(completions::Args),
 }
@@ -63,6 +67,7 @@ fn dispatch(verb: Verb) -> Result<(), Failure> {
         Verb::Analyze(args) => analyze::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Fuse(args) => fuse::run(args),
+        Verb::Stream(args) => stream::run(&args),
         Verb::Demo(args) => demo::run(&args),
         Verb::Completions(args) => completions::run(&args),
     }

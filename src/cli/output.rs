@@ -1,8 +1,8 @@
-//! Where fast samples go as WAV: a file that appears when whole, or standard output.
+//! Where fast samples go: a WAV file or SigMF recording that appears when whole, or standard output.
 
 use super::Failure;
 use crate::io::wav::{WavFile, stream_header};
-use crate::io::{AtomicFile, IoError, PcmFormat};
+use crate::io::{AtomicFile, IoError, PcmFormat, SigmfMeta, stdout_file};
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 
@@ -44,14 +44,18 @@ impl Bits {
 }
 
 /// The open end.
-#[derive(Debug)]
 enum Target {
     File(WavFile<AtomicFile>),
-    Stdout(io::Stdout),
+    Stdout(Box<dyn Write>),
+    /// Raw samples, and the metadata beside them.
+    Sigmf {
+        data: AtomicFile,
+        meta: AtomicFile,
+        text: String,
+    },
 }
 
-/// One channel of fast samples as WAV.
-#[derive(Debug)]
+/// One channel of fast samples.
 pub(super) struct FastWriter {
     target: Target,
     name: String,
@@ -67,6 +71,8 @@ impl FastWriter {
             if path.as_os_str() == "-" { "standard output".into() } else { path.display().to_string() };
         let target = if path.as_os_str() == "-" {
             stdout_target(format, rate)
+        } else if path.extension().is_some_and(|extension| extension == "sigmf-meta") {
+            Ok(sigmf_target(path, format, rate, force)?)
         } else {
             let file = AtomicFile::create(path, force).map_err(Failure::input)?;
             WavFile::new(file, format, 1, rate).map(Target::File)
@@ -90,6 +96,7 @@ impl FastWriter {
         let written = match &mut self.target {
             Target::File(file) => file.write_bytes(bytes),
             Target::Stdout(stdout) => stdout.write_all(bytes),
+            Target::Sigmf { data, .. } => data.write_all(bytes),
         };
         self.bytes += bytes.len() as u64;
         written.map_err(|error| failure(&self.name, error))
@@ -103,21 +110,38 @@ impl FastWriter {
                 file.commit().map_err(Failure::input)
             }
             Target::Stdout(mut stdout) => stdout.flush().map_err(|error| failure(&self.name, error)),
+            Target::Sigmf { data, mut meta, text } => {
+                meta.write_all(text.as_bytes()).map_err(|error| failure(&self.name, error))?;
+                data.commit().map_err(Failure::input)?;
+                meta.commit().map_err(Failure::input)
+            }
         }
     }
 }
 
-fn stdout_target(format: PcmFormat, rate: u32) -> io::Result<Target> {
-    let mut stdout = io::stdout();
-    if stdout.is_terminal() {
+fn sigmf_target(path: &Path, format: PcmFormat, rate: u32, force: bool) -> Result<Target, Failure> {
+    let meta = AtomicFile::create(path, force).map_err(Failure::input)?;
+    let data = AtomicFile::create(&path.with_extension("sigmf-data"), force).map_err(Failure::input)?;
+    let text = serde_json::to_string_pretty(&SigmfMeta::for_output(format, f64::from(rate)));
+    Ok(Target::Sigmf { data, meta, text: text.map_err(Failure::input)? + "\n" })
+}
+
+/// Standard output for samples, which a terminal cannot show.
+pub(super) fn open_stdout() -> io::Result<Box<dyn Write>> {
+    if io::stdout().is_terminal() {
         return Err(io::Error::other("it is a terminal; redirect it to a file or a pipe"));
     }
+    Ok(Box::new(stdout_file()?))
+}
+
+fn stdout_target(format: PcmFormat, rate: u32) -> io::Result<Target> {
+    let mut stdout = open_stdout()?;
     stdout.write_all(&stream_header(format, 1, rate)?)?;
     Ok(Target::Stdout(stdout))
 }
 
 /// A reader that went away ends the run quietly; everything else is told.
-fn failure(name: &str, error: io::Error) -> Failure {
+pub(super) fn failure(name: &str, error: io::Error) -> Failure {
     match IoError::system(name, "write it")(error) {
         error if error.is_closed_pipe() => Failure::ClosedPipe,
         error => Failure::input(error),

@@ -1,6 +1,7 @@
 //! From a spec to a bank: exact equivalence, blocking, IIR, H2 and FIR design, certificates.
 
 pub mod analysis;
+mod certify;
 pub mod comparison;
 mod designer;
 pub mod equivalence;
@@ -11,11 +12,13 @@ pub mod iir;
 pub mod problem;
 
 pub use analysis::{Analysis, analyze};
+pub use certify::{Certified, certify};
 pub use designer::{Design, design, latency};
 pub use problem::Problem;
 
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
+use crate::lmi::kyp::{KypError, Refusal};
 use crate::lmi::sampled::SampledError;
 use crate::lti::{LtiError, StateSpaceError};
 use crate::sampling::SamplingError;
@@ -38,6 +41,12 @@ pub enum DesignError {
     /// A sampled worst-case problem was not well formed.
     #[error(transparent)]
     Sampled(#[from] SampledError),
+    /// The bounded-real lemma could not be set up.
+    #[error(transparent)]
+    Kyp(#[from] KypError),
+    /// No proof in floating point was found, not even somewhat above the computed norm.
+    #[error("the computed gamma could not be proved in floating point: {0}")]
+    NotCertified(#[source] Refusal),
     /// The interior-point method gave no taps at all.
     #[error("no taps were found; please report the spec")]
     NoTaps,

@@ -1,7 +1,8 @@
-//! N channels of slow samples from one or several WAV files or streams.
+//! N channels of slow samples from one or several WAV files, WAV streams or SigMF recordings.
 
+use super::sigmf::{SigmfMeta, Timeline, file_pair, is_sigmf};
 use super::wav::{WavHeader, WavNote, WavReader};
-use super::{IoError, PcmFrames};
+use super::{IoError, PcmFormat, PcmFrames, SampleLayout};
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
@@ -54,6 +55,26 @@ struct Part {
 }
 
 impl Part {
+    /// A SigMF recording, its time counted from `origin`.
+    fn open_sigmf(path: &Path, origin: u64) -> Result<Self, IoError> {
+        let (meta_path, _) = file_pair(path, None);
+        let meta = SigmfMeta::read(&meta_path)?;
+        let (_, data_path) = file_pair(path, Some(&meta));
+        let name = data_path.display().to_string();
+        let format = meta.format(&meta_path.display().to_string())?;
+        let channels = meta.global.num_channels.unwrap_or(1).max(1);
+        let rate = meta.global.sample_rate.unwrap_or(0.0).round().clamp(0.0, f64::from(u32::MAX)) as u32;
+        let file = File::open(&data_path).map_err(IoError::system(&name, "open it"))?;
+        let timeline =
+            Timeline::new(file, &meta, format, channels, &meta_path.display().to_string(), origin)?;
+        let (inner, format): (Box<dyn Read + Send>, _) = match timeline {
+            Ok(timeline) => (Box::new(timeline), PcmFormat::F64Le),
+            Err(file) => (Box::new(file), format),
+        };
+        let reader = WavReader::headerless(inner, SampleLayout::packed(format), channels, rate);
+        Ok(Self { name, reader, bytes: Vec::new(), filled: 0, frames: 0 })
+    }
+
     fn open(path: &Path) -> Result<Self, IoError> {
         let from_stdin = path.as_os_str() == "-";
         let name = if from_stdin { "standard input".to_owned() } else { path.display().to_string() };
@@ -102,12 +123,20 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Opens the files; `-` is standard input.
+    /// Opens the files; `-` is standard input. A name that ends in sigmf-meta or sigmf-data is a
+    /// SigMF recording, everything else is WAV. The time of SigMF recordings counts from the earliest
+    /// of them: one that joins late begins with missing samples.
     ///
     /// # Errors
     /// [`IoError`] for a file that cannot be opened or is not plain PCM.
     pub fn open<P: AsRef<Path>>(paths: &[P]) -> Result<Self, IoError> {
-        let parts = paths.iter().map(|path| Part::open(path.as_ref())).collect::<Result<_, _>>()?;
+        let sigmf = paths.iter().map(AsRef::as_ref).filter(|path| is_sigmf(path));
+        let first = |path: &Path| Ok(SigmfMeta::read(&file_pair(path, None).0)?.first_index());
+        let origin = sigmf.map(first).collect::<Result<Vec<_>, IoError>>()?.into_iter().min().unwrap_or(0);
+        let open = |path: &Path| {
+            if is_sigmf(path) { Part::open_sigmf(path, origin) } else { Part::open(path) }
+        };
+        let parts = paths.iter().map(|path| open(path.as_ref())).collect::<Result<_, _>>()?;
         Ok(Self { parts, used: 0 })
     }
 

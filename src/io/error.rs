@@ -69,6 +69,14 @@ pub enum IoError {
         /// Bits a sample.
         bits: u16,
     },
+    /// A SigMF recording that is not one of plain real samples.
+    #[error("{file}: not a SigMF recording that can be read: {problem}")]
+    Sigmf {
+        /// Name of the metadata file.
+        file: String,
+        /// What is wrong, and the remedy.
+        problem: String,
+    },
     /// There is no data chunk.
     #[error("{file}: no data chunk after {offset} bytes of header; the file holds no samples")]
     NoData {

@@ -48,6 +48,11 @@ impl<R: Read> FrameReader<R> {
         Ok(filled)
     }
 
+    /// Bytes a frame.
+    pub fn frame_bytes(&self) -> usize {
+        self.frame
+    }
+
     /// Bytes of a last frame that was cut, known at the end.
     pub fn cut_bytes(&self) -> usize {
         if self.ended { self.carry.len() } else { 0 }

@@ -7,7 +7,7 @@ use super::BuildError;
 use super::aligned::Aligned;
 use super::rows::{Fold, Rows, RowsMut};
 use super::sample::Sample;
-use super::simd::{FirKernel, Isa, OVERRUN, PhaseGroup};
+use super::simd::{FirKernel, Isa, OVERRUN, PhaseGroup, Steps};
 use super::ticks::{FastSink, TickSource};
 use super::window::{Window, block_frames};
 
@@ -25,7 +25,7 @@ pub(crate) struct FirPlan<T: Sample> {
     block: usize,
     groups: Vec<PhaseGroup<T>>,
     /// For each step the place of its input in the window.
-    offsets: Vec<u32>,
+    steps: Steps,
     kernel: FirKernel<T>,
     isa: Isa,
 }
@@ -76,7 +76,7 @@ impl<T: Sample> FirPlan<T> {
             window,
             block,
             groups,
-            offsets: steps.iter().map(offset).collect(),
+            steps: Steps::new(steps.iter().map(offset).collect()),
             kernel: T::fir_kernel(isa),
             isa,
         })
@@ -131,7 +131,7 @@ impl<T: Sample> FirPlan<T> {
         let stride = self.out_stride();
         for group in &self.groups {
             let out = &mut state.rows[group.first * stride..];
-            self.kernel.run(group, state.window.view(), &self.offsets, super_ticks, out, stride);
+            self.kernel.run(group, state.window.view(), &self.steps, super_ticks, out, stride);
         }
     }
 }
@@ -160,14 +160,15 @@ fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
     Ok(())
 }
 
-/// M phases in groups of 4, and of 3 or 2 for the rest; 1 only if M is 1.
+/// M phases in groups of 3, and of 2 for the rest; 1 only if M is 1. Groups of 4 would need every one of
+/// AVX2's 16 registers in an order that the compiler does not find.
 fn widths(ratio: usize) -> impl Iterator<Item = (usize, usize)> {
     let mut first = 0;
     std::iter::from_fn(move || {
         let width = match ratio - first {
             0 => return None,
-            5 | 6 | 9 => 3,
-            left => left.min(4),
+            2 | 4 => 2,
+            left => left.min(3),
         };
         first += width;
         Some((first - width, width))
@@ -204,7 +205,7 @@ mod tests {
             let all: Vec<_> = widths(ratio).collect();
             let phases: Vec<usize> = all.iter().flat_map(|&(first, width)| first..first + width).collect();
             assert_eq!(phases, (0..ratio).collect::<Vec<_>>());
-            assert!(all.iter().all(|&(_, width)| (2..=4).contains(&width) || ratio == 1), "{ratio}: {all:?}");
+            assert!(all.iter().all(|&(_, width)| (2..=3).contains(&width) || ratio == 1), "{ratio}: {all:?}");
         }
     }
 }

@@ -5,6 +5,7 @@
 mod aligned;
 mod error;
 mod fir;
+mod gaps;
 mod reconstructor;
 mod rows;
 mod sample;
@@ -16,6 +17,7 @@ mod ticks;
 mod window;
 
 pub use error::{BuildError, ProcessError};
+pub use gaps::{Gap, GapFiller, GapPolicy};
 pub use reconstructor::{Options, Precision, Reconstructor};
-pub use simd::Isa;
+pub use simd::{Isa, multiply_add_chains};
 pub use ticks::PcmOutput;

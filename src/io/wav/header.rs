@@ -89,8 +89,8 @@ impl WavHeader {
 /// The data size, unless it is one of the numbers by which streaming writers say "until the end".
 /// `empty_possible`: the outer size promises chunks after the data, so that 0 may mean no samples.
 fn known_size(size: u64, frame: u64, empty_possible: bool) -> Option<u64> {
-    // sox rounds its 0x7FFFF000 down to whole frames.
-    let streamed_by_sox = size <= 0x7FFF_F000 && size + frame > 0x7FFF_F000;
+    // sox rounds its 0x7FFFF000 down to whole frames; others take the header off.
+    let streamed_by_sox = size <= 0x7FFF_F000 && size + frame.max(128) > 0x7FFF_F000;
     let streamed = streamed_by_sox
         || (0x7FFF_FF00..=0x7FFF_FFFF).contains(&size)
         || (0xFFFF_0000..=0xFFFF_FFFF).contains(&size)

@@ -7,6 +7,8 @@
 mod chunks;
 mod header;
 mod reader;
+#[cfg(test)]
+mod tests;
 mod writer;
 
 pub use header::WavHeader;

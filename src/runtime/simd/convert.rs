@@ -119,39 +119,53 @@ pub(super) unsafe fn deinterleave<L: Load>(
     rows: Rows,
 ) -> (usize, bool) {
     let frame_bytes = n * L::BYTES;
-    // Samples that a block reads from the start of its last frame on.
-    let reach = match n {
-        1 | 2 => n,
-        3 | 4 => 4,
-        _ => n.max(8),
-    } * L::BYTES;
-    let mut done = 0;
+    // Bytes that a block reads from the start of its last frame on.
+    let reach = reach(n) * L::BYTES;
+    let blocks = blocks(frames, bytes.len(), frame_bytes, reach);
+    // SAFETY: block b reads from `8 b frame_bytes` on and no further than `bytes`, see `blocks`.
     unsafe {
         let mut watch = Watch(_mm256_setzero_si256());
-        while done + 8 <= frames && (done + 7) * frame_bytes + reach <= bytes.len() {
-            let from = bytes.as_ptr().add(done * frame_bytes);
-            match n {
-                1 => {
-                    let a = L::load8(from);
+        let from = |b: usize| bytes.as_ptr().add(8 * b * frame_bytes);
+        match n {
+            1 => {
+                for b in 0..blocks {
+                    let a = L::load8(from(b));
                     watch.see(a);
-                    _mm256_storeu_ps(rows.at(0, done), a);
+                    _mm256_storeu_ps(rows.at(0, 8 * b), a);
                 }
-                2 => pairs::<L>(from, done, rows, &mut watch),
-                3 | 4 => fours::<L>(from, n, done, rows, &mut watch),
-                5..=8 => eights::<L>(from, frame_bytes, n, 0, done, rows, &mut watch),
-                _ => {
-                    let mut channel = 0;
-                    while channel < n {
-                        let first = channel.min(n - 8);
-                        eights::<L>(from, frame_bytes, 8, first, done, rows, &mut watch);
-                        channel += 8;
+            }
+            2 => (0..blocks).for_each(|b| pairs::<L>(from(b), 8 * b, rows, &mut watch)),
+            3 | 4 => (0..blocks).for_each(|b| fours::<L>(from(b), n, 8 * b, rows, &mut watch)),
+            _ => {
+                for channel in (0..n).step_by(8) {
+                    let first = channel.min(n.max(8) - 8);
+                    let count = n.min(8);
+                    for b in 0..blocks {
+                        eights::<L>(from(b), frame_bytes, count, first, 8 * b, rows, &mut watch);
                     }
                 }
             }
-            done += 8;
         }
-        (done, _mm256_movemask_epi8(watch.0) != 0)
+        (8 * blocks, _mm256_movemask_epi8(watch.0) != 0)
     }
+}
+
+/// Samples that the last frame of a block is read or written as.
+#[inline(always)]
+fn reach(n: usize) -> usize {
+    match n {
+        1 | 2 => n,
+        3 | 4 => 4,
+        _ => n.max(8),
+    }
+}
+
+/// Blocks of 8 frames of `size` units whose last frame, `reach` units long, ends within `len`.
+#[inline(always)]
+fn blocks(frames: usize, len: usize, size: usize, reach: usize) -> usize {
+    let whole = frames / 8;
+    let fits = |blocks: usize| blocks == 0 || (8 * blocks - 1) * size + reach <= len;
+    if fits(whole) { whole } else { whole - 1 }
 }
 
 #[inline(always)]
@@ -215,33 +229,25 @@ unsafe fn eights<L: Load>(
 /// AVX2; `out` has room for `frames` frames; each of the m rows has `frames` samples rounded up to 8.
 #[inline(always)]
 pub(super) unsafe fn interleave(rows: Rows, m: usize, frames: usize, out: &mut [f32]) -> usize {
-    // Samples that a block writes from the start of its last frame on.
-    let reach = match m {
-        1 | 2 => m,
-        3 | 4 => 4,
-        _ => m.max(8),
-    };
-    let mut done = 0;
+    let blocks = blocks(frames, out.len(), m, reach(m));
+    // SAFETY: block b writes from `8 b m` on and no further than `out`, see `blocks`.
     unsafe {
-        while done + 8 <= frames && (done + 7) * m + reach <= out.len() {
-            let to = out.as_mut_ptr().add(done * m);
-            match m {
-                1 => _mm256_storeu_ps(to, _mm256_loadu_ps(rows.at(0, done))),
-                2 => interleave_pairs(rows, done, to),
-                3 | 4 => interleave_fours(rows, m, done, to),
-                5..=8 => interleave_eights(rows, m, m, 0, done, to),
-                _ => {
-                    let mut phase = 0;
-                    while phase < m {
-                        interleave_eights(rows, m, 8, phase.min(m - 8), done, to);
-                        phase += 8;
-                    }
+        let out = out.as_mut_ptr();
+        let to = |b: usize| out.add(8 * b * m);
+        match m {
+            1 => (0..blocks).for_each(|b| _mm256_storeu_ps(to(b), _mm256_loadu_ps(rows.at(0, 8 * b)))),
+            2 => (0..blocks).for_each(|b| interleave_pairs(rows, 8 * b, to(b))),
+            3 | 4 => (0..blocks).for_each(|b| interleave_fours(rows, m, 8 * b, to(b))),
+            5..=8 => (0..blocks).for_each(|b| interleave_eights(rows, m, m, 0, 8 * b, to(b))),
+            _ => {
+                for phase in (0..m).step_by(8) {
+                    let first = phase.min(m - 8);
+                    (0..blocks).for_each(|b| interleave_eights(rows, m, 8, first, 8 * b, to(b)));
                 }
             }
-            done += 8;
         }
     }
-    done
+    8 * blocks
 }
 
 #[inline(always)]

@@ -15,12 +15,14 @@
 mod convert;
 mod isa;
 mod layout;
+mod peak;
 mod polyphase;
 mod vector;
 
 pub use isa::Isa;
 pub(crate) use layout::{Progress, deinterleave, deinterleave_f32, encode, interleave};
-pub(crate) use polyphase::{FirKernel, PhaseGroup};
+pub use peak::multiply_add_chains;
+pub(crate) use polyphase::{FirKernel, PhaseGroup, Steps};
 
 /// Frames that a kernel may read and write past the last one asked for: its widest vector.
 pub(crate) const OVERRUN: usize = 16;

@@ -20,6 +20,21 @@ pub(crate) struct PhaseGroup<T: Copy + Default> {
     pub(crate) coefficients: Aligned<T>,
 }
 
+/// Where each step of a kernel finds its input.
+#[derive(Debug, Clone)]
+pub(crate) struct Steps {
+    offsets: Vec<u32>,
+    /// The farthest offset.
+    reach: usize,
+}
+
+impl Steps {
+    pub(crate) fn new(offsets: Vec<u32>) -> Self {
+        let reach = offsets.iter().max().map_or(0, |&offset| offset as usize);
+        Self { offsets, reach }
+    }
+}
+
 /// One call of a kernel, checked.
 struct Job<T> {
     x: *const T,
@@ -50,15 +65,16 @@ impl<T: Copy + Default> FirKernel<T> {
         &self,
         group: &PhaseGroup<T>,
         x: &[T],
-        offsets: &[u32],
+        steps: &Steps,
         frames: usize,
         out: &mut [T],
         out_stride: usize,
     ) {
         let padded = frames.next_multiple_of(OVERRUN);
-        let reach = offsets.iter().max().map_or(0, |&offset| offset as usize + padded);
+        let offsets = &steps.offsets;
         assert!((1..=4).contains(&group.width) && group.coefficients.len() == group.width * offsets.len());
-        assert!(reach <= x.len() && (group.width - 1) * out_stride + padded <= out.len());
+        assert!(offsets.is_empty() || steps.reach + padded <= x.len());
+        assert!((group.width - 1) * out_stride + padded <= out.len());
         let job = Job {
             x: x.as_ptr(),
             offsets: offsets.as_ptr(),
@@ -74,6 +90,40 @@ impl<T: Copy + Default> FirKernel<T> {
     }
 }
 
+/// One step: an input for each of R vectors, a coefficient for each of P phases.
+#[inline(always)]
+unsafe fn step<V: Vector, const P: usize, const R: usize>(
+    job: &Job<V::Sample>,
+    x: *const V::Sample,
+    s: usize,
+    sums: &mut [[V; R]; P],
+) {
+    // SAFETY: the caller's, see `FirKernel::run`.
+    unsafe {
+        let at = x.add(*job.offsets.add(s) as usize);
+        let coefficients = job.coefficients.add(s * P);
+        // The smaller side waits in registers, the other one streams through a single one:
+        // together with the sums they just fit.
+        if const { P < R } {
+            let held: [V; P] = std::array::from_fn(|p| V::splat(*coefficients.add(p)));
+            for r in 0..R {
+                let input = V::load(at.add(r * V::LANES));
+                for p in 0..P {
+                    sums[p][r] = input.mul_add(held[p], sums[p][r]);
+                }
+            }
+        } else {
+            let held: [V; R] = std::array::from_fn(|r| V::load(at.add(r * V::LANES)));
+            for p in 0..P {
+                let coefficient = V::splat(*coefficients.add(p));
+                for r in 0..R {
+                    sums[p][r] = held[r].mul_add(coefficient, sums[p][r]);
+                }
+            }
+        }
+    }
+}
+
 /// One tile: P phases, R vectors of frames from frame `first` on.
 #[inline(always)]
 unsafe fn tile<V: Vector, const P: usize, const R: usize>(job: &Job<V::Sample>, first: usize, zero: V) {
@@ -85,18 +135,15 @@ unsafe fn tile<V: Vector, const P: usize, const R: usize>(job: &Job<V::Sample>, 
     unsafe {
         let mut sums = [[zero; R]; P];
         let x = job.x.add(first);
-        for s in 0..job.steps {
-            let at = x.add(*job.offsets.add(s) as usize);
-            let mut inputs = [zero; R];
-            for (r, input) in inputs.iter_mut().enumerate() {
-                *input = V::load(at.add(r * V::LANES));
-            }
-            for (p, row) in sums.iter_mut().enumerate() {
-                let coefficient = V::splat(*job.coefficients.add(s * P + p));
-                for (sum, input) in row.iter_mut().zip(inputs) {
-                    *sum = input.mul_add(coefficient, *sum);
-                }
-            }
+        // Two steps a turn: half the loop's own work.
+        let mut s = 0;
+        while s + 1 < job.steps {
+            step::<V, P, R>(job, x, s, &mut sums);
+            step::<V, P, R>(job, x, s + 1, &mut sums);
+            s += 2;
+        }
+        if s < job.steps {
+            step::<V, P, R>(job, x, s, &mut sums);
         }
         for (p, row) in sums.into_iter().enumerate() {
             for (r, sum) in row.into_iter().enumerate() {
@@ -106,33 +153,61 @@ unsafe fn tile<V: Vector, const P: usize, const R: usize>(job: &Job<V::Sample>, 
     }
 }
 
-/// All frames of a job, in tiles of nearly equal size so that no small one is left over.
+/// `count` tiles, one after another from frame `first` on.
+#[inline(always)]
+unsafe fn tiles<V: Vector, const P: usize, const R: usize>(
+    job: &Job<V::Sample>,
+    first: usize,
+    count: usize,
+    zero: V,
+) {
+    for t in 0..count {
+        // SAFETY: the caller's.
+        unsafe { tile::<V, P, R>(job, first + t * R * V::LANES, zero) }
+    }
+}
+
+/// All frames of a job, in tiles of nearly equal size so that no small one is left over: first
+/// those with one vector more, then the others.
 #[inline(always)]
 unsafe fn group<V: Vector, const P: usize>(job: &Job<V::Sample>, zero: V) {
     let vectors = job.frames.div_ceil(V::LANES);
-    let tiles = vectors.div_ceil((V::REGISTERS / P).min(12));
-    let mut done = 0;
-    for t in 0..tiles {
-        let count = (vectors - done).div_ceil(tiles - t);
-        let first = done * V::LANES;
-        // SAFETY: as for this function; `count` vectors from `first` on are within the job.
-        unsafe {
-            match count {
-                1 => tile::<V, P, 1>(job, first, zero),
-                2 => tile::<V, P, 2>(job, first, zero),
-                3 => tile::<V, P, 3>(job, first, zero),
-                4 => tile::<V, P, 4>(job, first, zero),
-                5 => tile::<V, P, 5>(job, first, zero),
-                6 => tile::<V, P, 6>(job, first, zero),
-                7 => tile::<V, P, 7>(job, first, zero),
-                8 => tile::<V, P, 8>(job, first, zero),
-                9 => tile::<V, P, 9>(job, first, zero),
-                10 => tile::<V, P, 10>(job, first, zero),
-                11 => tile::<V, P, 11>(job, first, zero),
-                _ => tile::<V, P, 12>(job, first, zero),
-            }
+    let count = vectors.div_ceil((V::REGISTERS / P).min(12)).max(1);
+    let (small, more) = (vectors / count, vectors % count);
+    let start = more * (small + 1) * V::LANES;
+    // SAFETY: as for this function; all `vectors` vectors are within the job.
+    unsafe {
+        tiles_of::<V, P>(job, small + 1, 0, more, zero);
+        tiles_of::<V, P>(job, small, start, count - more, zero);
+    }
+}
+
+/// `count` tiles of `vectors` vectors.
+#[inline(always)]
+unsafe fn tiles_of<V: Vector, const P: usize>(
+    job: &Job<V::Sample>,
+    vectors: usize,
+    first: usize,
+    count: usize,
+    zero: V,
+) {
+    // SAFETY: the caller's.
+    unsafe {
+        match vectors {
+            0 => {}
+            1 => tiles::<V, P, 1>(job, first, count, zero),
+            2 => tiles::<V, P, 2>(job, first, count, zero),
+            3 => tiles::<V, P, 3>(job, first, count, zero),
+            4 => tiles::<V, P, 4>(job, first, count, zero),
+            5 => tiles::<V, P, 5>(job, first, count, zero),
+            6 => tiles::<V, P, 6>(job, first, count, zero),
+            7 => tiles::<V, P, 7>(job, first, count, zero),
+            8 => tiles::<V, P, 8>(job, first, count, zero),
+            9 => tiles::<V, P, 9>(job, first, count, zero),
+            10 => tiles::<V, P, 10>(job, first, count, zero),
+            11 => tiles::<V, P, 11>(job, first, count, zero),
+            _ => tiles::<V, P, 12>(job, first, count, zero),
         }
-        done += count;
     }
 }
 

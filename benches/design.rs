@@ -1,0 +1,66 @@
+//! How long a design takes: the thesis example by all routes, a large IIR bank, speech.
+//!
+//! `cargo bench --bench design`
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use hybank::design::{analyze, certify, design};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use std::f64::consts::TAU;
+use std::hint::black_box;
+
+fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64], design: DesignSpec) -> Spec {
+    let channels = delays.iter().map(|&delay| ChannelSpec { delay, filter: filter.clone() }).collect();
+    Spec {
+        name: String::new(),
+        fast_period: 1.0,
+        ratio,
+        latency: Some(latency),
+        target: filter.clone(),
+        channels,
+        design,
+    }
+}
+
+fn thesis(method: Method, taps: Option<usize>) -> Spec {
+    let filter = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
+    alike(&filter, 2, 10, &[1.2, 0.6], DesignSpec { method, taps, slack: None })
+}
+
+fn butterworth(order: usize, omega: f64) -> FilterSpec {
+    let family = Family::Butterworth;
+    FilterSpec::Family {
+        family,
+        order: Some(order),
+        cutoff: omega / TAU,
+        ripple_db: None,
+        attenuation_db: None,
+    }
+}
+
+/// N = M = 8.
+fn eight(order: usize, omega: f64, latency: usize, method: Method, taps: Option<usize>) -> Spec {
+    let delays = [0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];
+    alike(&butterworth(order, omega), 8, latency, &delays, DesignSpec { method, taps, slack: None })
+}
+
+fn designs(c: &mut Criterion) {
+    let mut group = c.benchmark_group("design");
+    group.sample_size(20);
+    let mut one = |name: &str, spec: Spec| {
+        group.bench_function(name, |b| b.iter(|| design(black_box(&spec)).unwrap()));
+    };
+    one("iir, thesis example", thesis(Method::Iir, None));
+    one("h2, thesis example", thesis(Method::H2, None));
+    one("fir, thesis example, 22 taps", thesis(Method::Fir, Some(22)));
+    one("iir, 8 channels, Butterworth 6", eight(6, 1.2, 20, Method::Iir, None));
+    one("fir, 8 channels, Butterworth 4, 32 taps", eight(4, 1.8, 12, Method::Fir, Some(32)));
+    group.finish();
+    let bank = design(&thesis(Method::Fir, Some(22))).unwrap().bank;
+    c.bench_function("analyze, thesis example, 22 taps", |b| {
+        b.iter(|| analyze(black_box(&bank), &[]).unwrap())
+    });
+    c.bench_function("certify, thesis example, 22 taps", |b| b.iter(|| certify(black_box(&bank)).unwrap()));
+}
+
+criterion_group!(benches, designs);
+criterion_main!(benches);

@@ -1,0 +1,395 @@
+//! Headers as they are found in the wild, hound as the oracle for the tame ones.
+
+use super::*;
+use crate::io::{IoError, PcmFormat, SampleLayout};
+use proptest::prelude::*;
+use std::io::{self, Cursor, Seek, SeekFrom, Write};
+
+/// Header and samples as f64, as far as there are whole frames.
+fn read(bytes: &[u8]) -> Result<(WavHeader, Vec<f64>, Vec<WavNote>), IoError> {
+    let mut reader = WavReader::new(bytes, "test.wav")?;
+    let header = reader.header().clone();
+    let mut data = vec![0; bytes.len() + header.frame_bytes()];
+    let filled = reader.frames().fill(&mut data).unwrap();
+    let SampleLayout { format, container } = header.layout;
+    let samples = data[..filled].chunks_exact(container).map(|b| format.decode(b)).collect();
+    Ok((header, samples, reader.notes()))
+}
+
+fn chunk(id: &[u8; 4], content: &[u8]) -> Vec<u8> {
+    let mut bytes = id.to_vec();
+    bytes.extend((content.len() as u32).to_le_bytes());
+    bytes.extend(content);
+    bytes.extend(vec![0; content.len() % 2]);
+    bytes
+}
+
+fn fmt(tag: u16, channels: u16, container: u16, bits: u16) -> Vec<u8> {
+    let mut bytes = tag.to_le_bytes().to_vec();
+    bytes.extend(channels.to_le_bytes());
+    bytes.extend(8000u32.to_le_bytes());
+    bytes.extend((8000 * u32::from(container * channels)).to_le_bytes());
+    bytes.extend((container * channels).to_le_bytes());
+    bytes.extend(bits.to_le_bytes());
+    bytes
+}
+
+fn extensible(tag: u16, channels: u16, container: u16, bits: u16, valid: u16) -> Vec<u8> {
+    let mut bytes = fmt(0xFFFE, channels, container, bits);
+    bytes.extend(22u16.to_le_bytes());
+    bytes.extend(valid.to_le_bytes());
+    bytes.extend(0u32.to_le_bytes());
+    bytes.extend(tag.to_le_bytes());
+    bytes.extend([0, 0, 0, 0, 0x10, 0, 0x80, 0, 0, 0xAA, 0, 0x38, 0x9B, 0x71]);
+    bytes
+}
+
+fn riff(chunks: &[Vec<u8>]) -> Vec<u8> {
+    let body = chunks.concat();
+    let mut bytes = b"RIFF".to_vec();
+    bytes.extend((body.len() as u32 + 4).to_le_bytes());
+    bytes.extend(b"WAVE");
+    bytes.extend(body);
+    bytes
+}
+
+/// 16-bit mono samples 1, 2, 3, ...
+fn counting(count: i16) -> Vec<u8> {
+    (1..=count).flat_map(i16::to_le_bytes).collect()
+}
+
+fn integers(samples: &[f64]) -> Vec<i32> {
+    samples.iter().map(|x| (x * 32768.0) as i32).collect()
+}
+
+/// The samples must be 1, 2, .. count without a note.
+fn counts(bytes: &[u8], count: i32) {
+    let (_, samples, notes) = read(bytes).unwrap();
+    assert_eq!(integers(&samples), (1..=count).collect::<Vec<_>>());
+    assert_eq!(notes, []);
+}
+
+#[test]
+fn hound_writes_and_we_read_the_same() {
+    for (bits, sample_format) in [
+        (8, hound::SampleFormat::Int),
+        (16, hound::SampleFormat::Int),
+        (24, hound::SampleFormat::Int),
+        (32, hound::SampleFormat::Int),
+        (32, hound::SampleFormat::Float),
+    ] {
+        for channels in 1..6 {
+            let spec = hound::WavSpec { channels, sample_rate: 12_345, bits_per_sample: bits, sample_format };
+            let mut file = Cursor::new(Vec::new());
+            let mut writer = hound::WavWriter::new(&mut file, spec).unwrap();
+            let values: Vec<i32> = (0..60).map(|i| (i - 30) * 4).collect();
+            for &value in &values {
+                match sample_format {
+                    hound::SampleFormat::Int => writer.write_sample(value).unwrap(),
+                    hound::SampleFormat::Float => writer.write_sample(value as f32).unwrap(),
+                }
+            }
+            writer.finalize().unwrap();
+            let (header, samples, notes) = read(file.get_ref()).unwrap();
+            let full =
+                if sample_format == hound::SampleFormat::Int { 2f64.powi(i32::from(bits) - 1) } else { 1.0 };
+            assert_eq!(samples, values.iter().map(|&v| f64::from(v) / full).collect::<Vec<_>>());
+            assert_eq!((header.channels, header.rate, notes), (usize::from(channels), 12_345, vec![]));
+            // In this layout hound leaves nothing behind the data, so all bytes are accounted for.
+            assert_eq!(header.data_offset + header.data_bytes.unwrap(), file.get_ref().len() as u64);
+        }
+    }
+}
+
+#[test]
+fn we_write_and_hound_reads_the_same() {
+    for format in [PcmFormat::U8, PcmFormat::S16Le, PcmFormat::S24Le, PcmFormat::S32Le, PcmFormat::F32Le] {
+        for channels in [1, 2, 3, 8] {
+            // An odd number of bytes for 8 and 24 bits and odd channel counts: a pad byte is due.
+            let values: Vec<f64> = (0..5 * channels).map(|i| f64::from(i) / 64.0 - 0.25).collect();
+            let mut data = vec![0; values.len() * format.bytes()];
+            for (slot, &value) in data.chunks_exact_mut(format.bytes()).zip(&values) {
+                format.encode(value, slot);
+            }
+            let mut file = WavFile::new(Cursor::new(Vec::new()), format, channels as u16, 44_100).unwrap();
+            file.write_bytes(&data).unwrap();
+            let bytes = file.finish().unwrap().into_inner();
+            assert_eq!(bytes.len() % 2, 0);
+            assert_eq!(read(&bytes).unwrap().1, values);
+            let mut reader = hound::WavReader::new(&bytes[..]).unwrap();
+            let spec = reader.spec();
+            assert_eq!((i32::from(spec.channels), spec.sample_rate), (channels, 44_100));
+            let got: Vec<f64> = match format {
+                PcmFormat::F32Le => reader.samples::<f32>().map(|x| f64::from(x.unwrap())).collect(),
+                _ => {
+                    let full = 2f64.powi(8 * format.bytes() as i32 - 1);
+                    reader.samples::<i32>().map(|x| f64::from(x.unwrap()) / full).collect()
+                }
+            };
+            assert_eq!(got, values, "{format} x {channels}");
+        }
+    }
+    assert!(WavFile::new(Cursor::new(Vec::new()), PcmFormat::S16Be, 1, 8000).is_err());
+}
+
+#[test]
+fn streamed_headers_mean_until_the_end() {
+    for size in [0u32, 0x7FFF_F000, 0x7FFF_EFDC, 0x7FFF_FFFF, 0xFFFF_FFFF, 0xFFFF_FFFE, 0xFFFF_FFDB] {
+        for riff_size in [0, 36, 0x7FFF_F024, 0xFFFF_FFFF] {
+            let mut bytes = riff(&[chunk(b"fmt ", &fmt(1, 1, 2, 16)), chunk(b"data", &counting(50))]);
+            bytes[4..8].copy_from_slice(&u32::to_le_bytes(riff_size));
+            bytes[40..44].copy_from_slice(&size.to_le_bytes());
+            counts(&bytes, 50);
+        }
+    }
+    let mut streamed = stream_header(PcmFormat::S16Le, 1, 8000).unwrap();
+    streamed.extend(counting(50));
+    counts(&streamed, 50);
+}
+
+#[test]
+fn an_empty_data_chunk_before_others_is_empty() {
+    let bytes = riff(&[chunk(b"fmt ", &fmt(1, 1, 2, 16)), chunk(b"data", &[]), chunk(b"LIST", b"INFOabcd")]);
+    counts(&bytes, 0);
+}
+
+#[test]
+fn chunks_before_and_after_the_samples_are_passed_over() {
+    let odd = chunk(b"LIST", b"INFOx");
+    let unpadded = odd[..odd.len() - 1].to_vec();
+    for before in [vec![], odd, unpadded.clone(), [unpadded, chunk(b"JUNK", &[7; 1000])].concat()] {
+        let chunks = [
+            before.clone(),
+            chunk(b"fmt ", &fmt(1, 1, 2, 16)),
+            before,
+            chunk(b"data", &counting(9)),
+            chunk(b"LIST", b"INFOnot samples"),
+        ];
+        counts(&riff(&chunks), 9);
+    }
+}
+
+#[test]
+fn format_chunks_of_all_sizes_are_read() {
+    let mut eighteen = fmt(1, 1, 2, 16);
+    eighteen.extend([0, 0]);
+    for fmt in [fmt(1, 1, 2, 16), eighteen, extensible(1, 1, 2, 16, 16), extensible(1, 1, 2, 16, 0)] {
+        counts(&riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &counting(20))]), 20);
+    }
+    // A longer one, and one that leaves the frame size to the reader.
+    let mut long = extensible(1, 1, 2, 16, 99);
+    long.extend([1, 2, 3, 4]);
+    let mut no_frame_size = fmt(1, 1, 2, 16);
+    no_frame_size[12..14].fill(0);
+    for fmt in [long, no_frame_size] {
+        counts(&riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &counting(20))]), 20);
+    }
+}
+
+#[test]
+fn fewer_bits_than_bytes_lie_high() {
+    // 12 bits in 2 bytes: the number 0x123 is stored as 0x1230.
+    let bytes = riff(&[chunk(b"fmt ", &fmt(1, 1, 2, 12)), chunk(b"data", &0x1230u16.to_le_bytes())]);
+    assert_eq!(read(&bytes).unwrap().1, [f64::from(0x123) / 2048.0]);
+    let twenty = riff(&[chunk(b"fmt ", &extensible(1, 1, 3, 24, 20)), chunk(b"data", &[0xF0, 0xFF, 0xFF])]);
+    assert_eq!(read(&twenty).unwrap().1, [-1.0 / 524288.0]);
+}
+
+#[test]
+fn twenty_four_bits_in_four_bytes_are_found_high_or_low() {
+    let values: [i32; 6] = [0x123456, -0x123456, 1, -1, 0x7FFFFF, -0x800000];
+    let want: Vec<f64> = values.iter().map(|&v| f64::from(v) / 8388608.0).collect();
+    for fmt in [fmt(1, 1, 4, 24), extensible(1, 1, 4, 32, 24)] {
+        let high: Vec<u8> = values.iter().flat_map(|v| (v << 8).to_le_bytes()).collect();
+        let low: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        for data in [high, low] {
+            assert_eq!(read(&riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &data)])).unwrap().1, want);
+        }
+    }
+}
+
+#[test]
+fn rf64_and_bw64_tell_their_size_in_ds64() {
+    for id in [b"RF64", b"BW64"] {
+        let mut ds64 = 0u64.to_le_bytes().to_vec();
+        ds64.extend(20u64.to_le_bytes());
+        ds64.extend([0; 12]);
+        let mut bytes = riff(&[
+            chunk(b"ds64", &ds64),
+            chunk(b"fmt ", &fmt(1, 1, 2, 16)),
+            chunk(b"data", &counting(10)),
+            chunk(b"LIST", b"after"),
+        ]);
+        bytes[..4].copy_from_slice(id);
+        bytes[4..8].fill(0xFF);
+        bytes[12 + 36 + 24 + 4..][..4].fill(0xFF);
+        counts(&bytes, 10);
+    }
+}
+
+fn w64_chunk(id: &[u8; 4], content: &[u8], size: Option<u64>) -> Vec<u8> {
+    let tail: [u8; 12] = [0xF3, 0xAC, 0xD3, 0x11, 0x8C, 0xD1, 0x00, 0xC0, 0x4F, 0x8E, 0xDB, 0x8A];
+    let mut bytes = id.to_vec();
+    bytes.extend(tail);
+    bytes.extend(size.unwrap_or(content.len() as u64 + 24).to_le_bytes());
+    bytes.extend(content);
+    bytes.extend(vec![0; content.len().wrapping_neg() % 8]);
+    bytes
+}
+
+fn w64(data_size: Option<u64>) -> Vec<u8> {
+    let mut bytes = b"riff\x2E\x91\xCF\x11\xA5\xD6\x28\xDB\x04\xC1\x00\x00".to_vec();
+    bytes.extend(0u64.to_le_bytes());
+    bytes.extend(b"wave\xF3\xAC\xD3\x11\x8C\xD1\x00\xC0\x4F\x8E\xDB\x8A");
+    bytes.extend(w64_chunk(b"fact", &[1, 2, 3], None));
+    bytes.extend(w64_chunk(b"fmt ", &fmt(1, 1, 2, 16), None));
+    bytes.extend(w64_chunk(b"data", &counting(10), data_size));
+    bytes
+}
+
+#[test]
+fn wave64_is_read_with_and_without_its_length() {
+    // Ten samples, then four bytes of padding that only a known length can tell.
+    counts(&w64(None), 10);
+    let (_, samples, _) = read(&w64(Some(0))).unwrap();
+    assert_eq!(integers(&samples)[..10], (1..=10).collect::<Vec<_>>());
+}
+
+#[test]
+fn doubles_are_read() {
+    let data: Vec<u8> = [1.0f64, -1e-300, 0.1].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let bytes = riff(&[chunk(b"fmt ", &fmt(3, 1, 8, 64)), chunk(b"data", &data)]);
+    assert_eq!(read(&bytes).unwrap().1, [1.0, -1e-300, 0.1]);
+}
+
+#[test]
+fn what_is_not_pcm_is_refused_by_name() {
+    let refusal = |fmt: Vec<u8>| read(&riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &[0; 64])])).unwrap_err();
+    for (tag, container, bits) in
+        [(6, 1, 8), (2, 1, 4), (0x55, 1, 0), (3, 2, 16), (1, 8, 64), (1, 2, 17), (1, 2, 0)]
+    {
+        let error = refusal(fmt(tag, 1, container, bits));
+        assert!(matches!(error, IoError::Encoding { .. }), "{error}");
+        assert!(error.to_string().contains("test.wav"));
+    }
+    assert!(matches!(refusal(fmt(1, 0, 2, 16)), IoError::BadField { field: "the channel count", .. }));
+    let mut no_rate = fmt(1, 1, 2, 16);
+    no_rate[4..8].fill(0);
+    assert!(matches!(refusal(no_rate), IoError::BadField { field: "the sample rate", .. }));
+    let mut uneven = fmt(1, 3, 2, 16);
+    uneven[12] = 7;
+    assert!(matches!(refusal(uneven), IoError::BadField { field: "the frame size", .. }));
+    let no_fmt = read(&riff(&[chunk(b"data", &[0; 8])])).unwrap_err();
+    assert!(no_fmt.to_string().contains("fmt chunk must come before"), "{no_fmt}");
+    assert!(matches!(read(b"OggS1234"), Err(IoError::NotWav { .. })));
+    assert!(matches!(read(b"RIFF1234AVI "), Err(IoError::NotWav { .. })));
+    assert!(matches!(read(&riff(&[chunk(b"fmt ", &fmt(1, 1, 2, 16))])), Err(IoError::NoData { .. })));
+}
+
+#[test]
+fn a_file_cut_at_any_byte_gives_what_is_whole_or_says_why_not() {
+    let whole = [
+        riff(&[
+            chunk(b"LIST", b"INFOabc"),
+            chunk(b"fmt ", &extensible(1, 3, 2, 16, 16)),
+            chunk(b"data", &counting(30)),
+        ]),
+        riff(&[chunk(b"fmt ", &fmt(3, 1, 8, 64)), chunk(b"data", &[0; 80])]),
+        w64(None),
+    ];
+    for bytes in whole {
+        let (header, all, _) = read(&bytes).unwrap();
+        let data = header.data_offset as usize;
+        for cut in 0..bytes.len() {
+            match read(&bytes[..cut]) {
+                Ok((_, samples, notes)) => {
+                    let there = cut - data;
+                    let frame = header.frame_bytes();
+                    let promised = header.data_bytes.unwrap() as usize;
+                    assert_eq!(samples, all[..there.min(promised) / frame * header.channels]);
+                    let missing_bytes = promised.saturating_sub(there) as u64;
+                    let bytes = there.min(promised) % frame;
+                    let truncated = (missing_bytes > 0).then_some(WavNote::Truncated { missing_bytes });
+                    let cut_frame = (bytes > 0).then_some(WavNote::CutFrame { bytes });
+                    assert_eq!(notes, truncated.into_iter().chain(cut_frame).collect::<Vec<_>>());
+                }
+                Err(IoError::TruncatedHeader { offset, .. } | IoError::NoData { offset, .. }) => {
+                    assert!(cut <= data && offset <= cut as u64);
+                }
+                Err(other) => panic!("cut at {cut}: {other}"),
+            }
+        }
+    }
+}
+
+/// Keeps the first 4 KiB and forgets the rest.
+#[derive(Default)]
+struct Head {
+    bytes: Vec<u8>,
+    place: u64,
+}
+
+impl Write for Head {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        for (i, &byte) in bytes.iter().enumerate().take(4096usize.saturating_sub(self.place as usize)) {
+            let at = self.place as usize + i;
+            self.bytes.resize(self.bytes.len().max(at + 1), 0);
+            self.bytes[at] = byte;
+        }
+        self.place += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Head {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match to {
+            SeekFrom::Start(place) => self.place = place,
+            _ => return Err(io::ErrorKind::Unsupported.into()),
+        }
+        Ok(self.place)
+    }
+}
+
+#[test]
+fn past_four_gibibytes_a_file_becomes_rf64() {
+    let block = vec![1; 1 << 20];
+    for (mebibytes, id) in [(1, b"RIFF"), (4095, b"RIFF"), (4096, b"RF64"), (5000, b"RF64")] {
+        let mut file = WavFile::new(Head::default(), PcmFormat::F32Le, 2, 8000).unwrap();
+        (0..mebibytes).for_each(|_| file.write_bytes(&block).unwrap());
+        let head = file.finish().unwrap().bytes;
+        assert_eq!(&head[..4], id);
+        let reader = WavReader::new(&head[..], "head").unwrap();
+        assert_eq!(reader.header().data_bytes, Some(mebibytes << 20));
+        assert_eq!((reader.header().channels, reader.header().rate), (2, 8000));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
+
+    #[test]
+    fn no_bytes_make_the_reader_panic(
+        mut bytes in prop::collection::vec(any::<u8>(), 0..300), kind in 0usize..4,
+        flips in prop::collection::vec((0usize..80, any::<u8>()), 0..4),
+    ) {
+        let start = match kind {
+            0 => vec![],
+            1 => riff(&[chunk(b"fmt ", &fmt(1, 2, 2, 16)), chunk(b"data", &counting(10))]),
+            2 => w64(None),
+            _ => riff(&[chunk(b"ds64", &[9; 28]), chunk(b"fmt ", &extensible(1, 2, 4, 32, 24)), chunk(b"data", &counting(10))]),
+        };
+        let length = start.len().min(bytes.len());
+        bytes[..length].copy_from_slice(&start[..length]);
+        for (place, value) in flips {
+            if let Some(byte) = bytes.get_mut(place) {
+                *byte = value;
+            }
+        }
+        let _ = read(&bytes);
+    }
+}

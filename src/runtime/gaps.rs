@@ -1,0 +1,241 @@
+//! Samples that are missing: what stands in for them, where they were, and which outputs they
+//! touched.
+//!
+//! A missing sample is marked by NaN. An output of a FIR bank is touched if one of its taps falls
+//! on a missing sample, and it is exact again when the filters have forgotten the gap; a recursion
+//! never forgets.
+
+use super::BuildError;
+use crate::bank::{Bank, SynthesisFilters};
+use std::collections::VecDeque;
+
+/// Gaps that a report lists one by one; more are only counted, so that memory stays bounded.
+const LISTED: usize = 65_536;
+
+/// What stands in for a missing sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GapPolicy {
+    /// Zero.
+    Zero,
+    /// The channel's last good sample (zero before the first).
+    Hold,
+}
+
+/// A run of missing samples of one channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Gap {
+    /// The channel, from 1.
+    pub channel: usize,
+    /// Tick of its first sample, from 0.
+    pub first: u64,
+    /// Samples that are missing.
+    pub length: u64,
+}
+
+/// Fills gaps tick by tick.
+#[derive(Debug, Clone)]
+pub struct GapFiller {
+    policy: GapPolicy,
+    ratio: usize,
+    /// `touch[i][j]` lists the phases of tick k that x_i[k - j] enters; `None` for a recursion.
+    touch: Option<Vec<Vec<Vec<usize>>>>,
+    /// Per channel: the last good sample, and the gap that is open.
+    channels: Vec<(f64, Option<Gap>)>,
+    gaps: Vec<Gap>,
+    total: u64,
+    missing: u64,
+    tick: u64,
+    /// Ticks that still matter, the newest first: the channels that were missing.
+    recent: VecDeque<Vec<usize>>,
+}
+
+impl GapFiller {
+    /// For the channels and taps of a bank.
+    ///
+    /// # Errors
+    /// [`BuildError::NoRatio`] and [`BuildError::NoChannels`] for a bank without outputs or inputs.
+    pub fn new(bank: &Bank, policy: GapPolicy) -> Result<Self, BuildError> {
+        let (ratio, channels) = (bank.ratio, bank.channel_count());
+        if ratio == 0 {
+            return Err(BuildError::NoRatio);
+        }
+        if channels == 0 {
+            return Err(BuildError::NoChannels);
+        }
+        let touch = match &bank.filters {
+            SynthesisFilters::Fir(taps) => Some(taps.iter().map(|f| touched_phases(f, ratio)).collect()),
+            SynthesisFilters::StateSpace(_) => None,
+        };
+        Ok(Self {
+            policy,
+            ratio,
+            touch,
+            channels: vec![(0.0, None); channels],
+            gaps: Vec::new(),
+            total: 0,
+            missing: 0,
+            tick: 0,
+            recent: VecDeque::new(),
+        })
+    }
+
+    /// Replaces what is not finite in whole ticks of N samples, and sets `mask[k M + p]` to 1 where
+    /// output p of tick k is touched by a missing sample, to 0 elsewhere.
+    pub fn fill(&mut self, ticks: &mut [f64], mask: &mut Vec<u8>) {
+        mask.clear();
+        for tick in ticks.chunks_exact_mut(self.channels.len()) {
+            let missing = self.fill_tick(tick);
+            self.mark(missing, mask);
+            self.tick += 1;
+        }
+    }
+
+    /// Closes the gaps that are open at the end.
+    pub fn finish(&mut self) {
+        for i in 0..self.channels.len() {
+            self.close(i);
+        }
+    }
+
+    /// The gaps in the order of their ends, at most 65,536 of them.
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
+    }
+
+    /// How many gaps there were.
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// How many samples were missing.
+    pub fn missing(&self) -> u64 {
+        self.missing
+    }
+
+    /// Fills one tick; returns the channels that were missing.
+    fn fill_tick(&mut self, tick: &mut [f64]) -> Vec<usize> {
+        let mut missing = Vec::new();
+        for (i, sample) in tick.iter_mut().enumerate() {
+            if sample.is_finite() {
+                self.close(i);
+                self.channels[i].0 = *sample;
+                continue;
+            }
+            *sample = if self.policy == GapPolicy::Hold { self.channels[i].0 } else { 0.0 };
+            let fresh = Gap { channel: i + 1, first: self.tick, length: 0 };
+            self.channels[i].1.get_or_insert(fresh).length += 1;
+            self.missing += 1;
+            missing.push(i);
+        }
+        missing
+    }
+
+    fn close(&mut self, i: usize) {
+        if let Some(gap) = self.channels[i].1.take() {
+            self.total += 1;
+            if self.gaps.len() < LISTED {
+                self.gaps.push(gap);
+            }
+        }
+    }
+
+    /// The M mask bytes of a tick.
+    fn mark(&mut self, missing: Vec<usize>, mask: &mut Vec<u8>) {
+        let start = mask.len();
+        mask.resize(start + self.ratio, 0);
+        let Some(touch) = &self.touch else {
+            mask[start..].fill(u8::from(self.missing > 0));
+            return;
+        };
+        // Nothing is kept while nothing is missing.
+        if !self.recent.is_empty() || !missing.is_empty() {
+            self.recent.push_front(missing);
+        }
+        self.recent.truncate(touch.iter().map(Vec::len).max().unwrap_or(0));
+        for (j, channels) in self.recent.iter().enumerate() {
+            for phases in channels.iter().filter_map(|&i| touch[i].get(j)) {
+                phases.iter().for_each(|&p| mask[start + p] = 1);
+            }
+        }
+        while self.recent.back().is_some_and(Vec::is_empty) {
+            self.recent.pop_back();
+        }
+    }
+}
+
+/// For each lag j the phases p with f[p + jM] != 0.
+fn touched_phases(f: &[f64], ratio: usize) -> Vec<Vec<usize>> {
+    let used = |taps: &[f64]| (0..taps.len()).filter(|&p| taps[p] != 0.0).collect();
+    f.chunks(ratio).map(used).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Reconstructor;
+    use super::super::tests::{Noise, fir_bank, random_taps};
+    use super::*;
+
+    /// Ticks of N channels with a few runs of NaN.
+    fn with_gaps(n: usize, ticks: usize, noise: &mut Noise) -> Vec<f64> {
+        let mut samples: Vec<f64> = (0..n * ticks).map(|_| noise.next() + 2.0).collect();
+        for (channel, first, length) in [(0, 0, 3), (1, 40, 1), (0, 41, 20), (1, 190, 10)] {
+            (first..first + length).for_each(|k| samples[k * n + channel] = f64::NAN);
+        }
+        samples
+    }
+
+    fn run(bank: &crate::bank::Bank, ticks: &[f64]) -> Vec<f64> {
+        let mut stream = Reconstructor::new(bank).unwrap();
+        let mut out = vec![0.0; ticks.len() / bank.channel_count() * bank.ratio];
+        stream.process_f64(ticks, &mut out).unwrap();
+        out
+    }
+
+    #[test]
+    fn gaps_are_found_and_filled() {
+        let mut noise = Noise(11);
+        let bank = fir_bank(random_taps(2, 7, &mut noise), 3);
+        let samples = with_gaps(2, 200, &mut noise);
+        for policy in [GapPolicy::Zero, GapPolicy::Hold] {
+            let mut filler = GapFiller::new(&bank, policy).unwrap();
+            let mut filled = samples.clone();
+            // In pieces, so that a gap crosses a border.
+            filled.chunks_mut(2 * 45).for_each(|piece| filler.fill(piece, &mut Vec::new()));
+            filler.finish();
+            let gap = |channel, first, length| Gap { channel, first, length };
+            assert_eq!(filler.gaps(), [gap(1, 0, 3), gap(2, 40, 1), gap(1, 41, 20), gap(2, 190, 10)]);
+            assert_eq!((filler.total(), filler.missing()), (4, 34));
+            for (k, tick) in filled.chunks_exact(2).enumerate() {
+                for i in 0..2 {
+                    let last = (0..=k).rev().map(|k| samples[2 * k + i]).find(|x| x.is_finite());
+                    let held =
+                        if samples[2 * k + i].is_nan() && policy == GapPolicy::Zero { None } else { last };
+                    assert_eq!(tick[i], held.unwrap_or(0.0), "{policy:?} tick {k} channel {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_mask_marks_exactly_the_outputs_that_a_missing_sample_can_change() {
+        let mut noise = Noise(12);
+        for (taps, m) in [(24, 2), (7, 3), (1, 1), (64, 4), (5, 8)] {
+            let bank = fir_bank(random_taps(2, taps, &mut noise), m);
+            let samples = with_gaps(2, 200, &mut noise);
+            let variant = |value: f64| -> Vec<f64> {
+                samples.iter().map(|x| if x.is_finite() { *x } else { value }).collect()
+            };
+            // Two values for all missing samples: an output differs if and only if one of them enters
+            // it (random taps do not cancel).
+            let differs: Vec<u8> = run(&bank, &variant(100.0))
+                .iter()
+                .zip(run(&bank, &variant(-77.0)))
+                .map(|(a, b)| u8::from(*a != b))
+                .collect();
+            let mut mask = Vec::new();
+            let mut filled = samples.clone();
+            GapFiller::new(&bank, GapPolicy::Zero).unwrap().fill(&mut filled, &mut mask);
+            assert_eq!(mask, differs, "{taps} taps, M = {m}");
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! The verb stream, as a user runs it.
+#![cfg(unix)]
+
+use std::fs;
+use std::io::{Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// N = M = 2, f_1 = (1, 2, 3, 4), f_2 = (10, 20, 30), m0 = 3.
+const BANK: &str = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2,
+    "latency": 3, "method": "fir", "channels": [{ "delay": 0.0, "taps": [1, 2, 3, 4] },
+    { "delay": 0.0, "taps": [10, 20, 30, 0] }], "state_space": null,
+    "gamma": { "upper": null, "lower": null, "noncausal": null } }"#;
+
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("bank.json"), BANK).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn spawn(&self, args: &[&str]) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_hybank"))
+            .current_dir(self.folder.path())
+            .args(["stream", "bank.json"])
+            .args(args)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    }
+
+    fn run(&self, args: &[&str], input: &[u8]) -> Output {
+        let mut child = self.spawn(args);
+        let mut stdin = child.stdin.take().unwrap();
+        let input = input.to_vec();
+        let feeder = std::thread::spawn(move || stdin.write_all(&input));
+        let output = child.wait_with_output().unwrap();
+        // A refused run closes its input early.
+        let _ = feeder.join().unwrap();
+        output
+    }
+}
+
+/// Small integers, so that every sum is exact in any order and precision.
+fn ticks(count: usize) -> Vec<f32> {
+    (0..2 * count).map(|i| ((i * 7) % 23) as f32 - 11.0).collect()
+}
+
+fn bytes(samples: &[f32]) -> Vec<u8> {
+    samples.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+}
+
+/// The definition.
+fn fused(x: &[f32]) -> Vec<f32> {
+    let taps = [&[1.0f32, 2.0, 3.0, 4.0][..], &[10.0, 20.0, 30.0]];
+    let mut y = vec![0.0; x.len()];
+    for (t, y) in y.iter_mut().enumerate() {
+        for (i, f) in taps.iter().enumerate() {
+            *y += (0..=t / 2).filter_map(|k| Some(f.get(t - 2 * k)? * x[2 * k + i])).sum::<f32>();
+        }
+    }
+    y
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn interleaved_floats_are_the_default() {
+    let bench = Bench::new();
+    for count in [0, 1, 7, 100_000] {
+        let input = ticks(count);
+        let output = bench.run(&[], &bytes(&input));
+        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+        assert!(floats(&output.stdout) == fused(&input), "{count} ticks");
+    }
+}
+
+#[test]
+fn every_format_goes_in_and_out() {
+    let bench = Bench::new();
+    let input: Vec<f32> = ticks(50).iter().map(|x| x / 128.0).collect();
+    // Sums reach 70 * 11 / 128, so integers would clip: floats out.
+    let want = fused(&input);
+    for (name, encode) in [
+        ("s8", (|x| vec![(x * 128.0) as i8 as u8]) as fn(f32) -> Vec<u8>),
+        ("u8", |x| vec![(x * 128.0 + 128.0) as u8]),
+        ("s16le", |x| ((x * 32768.0) as i16).to_le_bytes().to_vec()),
+        ("s16be", |x| ((x * 32768.0) as i16).to_be_bytes().to_vec()),
+        ("s24le", |x| ((x * 8388608.0) as i32).to_le_bytes()[..3].to_vec()),
+        ("s24be", |x| ((x * 8388608.0) as i32).to_be_bytes()[1..].to_vec()),
+        ("s32le", |x| ((x * 2147483648.0) as i32).to_le_bytes().to_vec()),
+        ("s32be", |x| ((x * 2147483648.0) as i32).to_be_bytes().to_vec()),
+        ("f32le", |x| x.to_le_bytes().to_vec()),
+        ("f32be", |x| x.to_be_bytes().to_vec()),
+        ("f64le", |x| f64::from(x).to_le_bytes().to_vec()),
+        ("f64be", |x| f64::from(x).to_be_bytes().to_vec()),
+    ] {
+        let coded: Vec<u8> = input.iter().flat_map(|&x| encode(x)).collect();
+        let output = bench.run(&["--format", name, "--output-format", "f32le"], &coded);
+        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+        assert_eq!(floats(&output.stdout), want, "{name}");
+        // The same format out: floats keep the sums, integers saturate.
+        let same = bench.run(&["--format", name], &coded);
+        let held = |y: f32| if name.starts_with('f') { y } else { y.clamp(-1.0, 1.0) };
+        let (floor, ceiling) = (encode(-1.0), encode(1.0 - 1.0 / 128.0));
+        for (slot, y) in same.stdout.chunks_exact(floor.len()).zip(&want) {
+            // Every sum is a multiple of 1/128, so that even 8 bits hold it exactly.
+            match held(*y) {
+                y if y >= 1.0 && !name.starts_with('f') => {
+                    assert!(slot[..] != floor[..] && slot != encode(0.0))
+                }
+                y => assert_eq!(slot, encode(y), "{name} {y} {ceiling:?}"),
+            }
+        }
+        assert_eq!(same.stdout.len(), coded.len());
+    }
+}
+
+#[test]
+fn a_tick_comes_out_as_soon_as_it_is_in() {
+    let bench = Bench::new();
+    let mut child = bench.spawn(&[]);
+    let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+    let input = ticks(50);
+    let want = fused(&input);
+    let mut slowest = Duration::ZERO;
+    for (tick, want) in input.chunks_exact(2).zip(want.chunks_exact(2)) {
+        let begin = Instant::now();
+        // In two pieces, cut inside a sample.
+        let tick = bytes(tick);
+        stdin.write_all(&tick[..3]).unwrap();
+        stdin.write_all(&tick[3..]).unwrap();
+        let mut got = [0; 8];
+        stdout.read_exact(&mut got).unwrap();
+        slowest = slowest.max(begin.elapsed());
+        assert_eq!(floats(&got), want);
+    }
+    // A generous bound for a loaded machine; an output that waits for a block would never come.
+    assert!(slowest < Duration::from_secs(5), "{slowest:?}");
+    drop(stdin);
+    assert!(child.wait().unwrap().success());
+}
+
+#[test]
+fn one_fifo_a_channel_in_any_order_of_opening() {
+    let bench = Bench::new();
+    let input = ticks(20_000);
+    for name in ["a", "b"] {
+        assert!(Command::new("mkfifo").arg(bench.path(name)).status().unwrap().success());
+    }
+    let child = bench.spawn(&["--input", "a", "--input", "b"]);
+    let channel = |i: usize| bytes(&input.iter().skip(i).step_by(2).copied().collect::<Vec<_>>());
+    let writers = [("b", channel(1)), ("a", channel(0))].map(|(name, data)| {
+        let path = bench.path(name);
+        std::thread::spawn(move || fs::OpenOptions::new().write(true).open(path).unwrap().write_all(&data))
+    });
+    let output = child.wait_with_output().unwrap();
+    // Only a child that opened both lets the writers go.
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    writers.map(|writer| writer.join().unwrap().unwrap());
+    assert!(floats(&output.stdout) == fused(&input));
+}
+
+#[test]
+fn wav_goes_through_with_its_rate() {
+    let bench = Bench::new();
+    let input = ticks(300);
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: 24_000,
+        bits_per_sample: 32,
+        sample_format: hound::SampleFormat::Float,
+    };
+    let mut wav = std::io::Cursor::new(Vec::new());
+    let mut writer = hound::WavWriter::new(&mut wav, spec).unwrap();
+    input.iter().for_each(|&x| writer.write_sample(x).unwrap());
+    writer.finalize().unwrap();
+    let output = bench.run(&["--format", "wav"], wav.get_ref());
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    assert_eq!((&output.stdout[..4], &output.stdout[24..28]), (&b"RIFF"[..], &48_000u32.to_le_bytes()[..]));
+    assert_eq!(floats(&output.stdout[44..]), fused(&input));
+}
+
+#[test]
+fn flushing_brings_out_the_last_samples() {
+    let bench = Bench::new();
+    let mut input = ticks(40);
+    let output = bench.run(&["--flush"], &bytes(&input));
+    input.extend([0.0; 4]);
+    assert_eq!(floats(&output.stdout), fused(&input));
+}
+
+#[test]
+fn cut_frames_and_unequal_channels_are_told() {
+    let bench = Bench::new();
+    let input = ticks(10);
+    let mut cut = bytes(&input);
+    cut.extend([1, 2, 3, 4, 5]);
+    let output = bench.run(&[], &cut);
+    assert!(output.status.success());
+    assert_eq!(floats(&output.stdout), fused(&input));
+    assert!(text(&output.stderr).contains("the last frame is cut (5 bytes"), "{output:?}");
+    let strict = bench.run(&["--strict"], &cut);
+    assert_eq!(strict.status.code(), Some(1));
+    fs::write(bench.path("a"), bytes(&[1.0; 10])).unwrap();
+    fs::write(bench.path("b"), bytes(&[1.0; 7])).unwrap();
+    let output = bench.run(&["--input", "a", "--input", "b"], &[]);
+    assert_eq!(output.stdout.len(), 7 * 2 * 4);
+    assert!(text(&output.stderr).contains("a: another input ended first, at least 3 samples"), "{output:?}");
+}
+
+#[test]
+fn an_interrupt_ends_after_whole_ticks_and_reports() {
+    let bench = Bench::new();
+    let mut child = bench.spawn(&["-o", "out.raw", "--json"]);
+    let mut stdin = child.stdin.take().unwrap();
+    let input = ticks(100);
+    stdin.write_all(&bytes(&input)).unwrap();
+    stdin.flush().unwrap();
+    // The pipe stays open: only the signal can end this. Wait until the samples were taken.
+    std::thread::sleep(Duration::from_millis(500));
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    drop(stdin);
+    assert!(output.status.success(), "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((report["interrupted"].as_bool(), report["ticks"].as_u64()), (Some(true), Some(100)));
+    assert!(text(&output.stderr).contains("interrupted after 100 ticks, 200 samples written"), "{output:?}");
+    assert_eq!(floats(&fs::read(bench.path("out.raw")).unwrap()), fused(&input));
+}
+
+#[test]
+fn a_closed_pipe_ends_quietly() {
+    let bench = Bench::new();
+    let mut child = bench.spawn(&[]);
+    drop(child.stdout.take());
+    let mut stdin = child.stdin.take().unwrap();
+    let feeder = std::thread::spawn(move || while stdin.write_all(&[0; 65536]).is_ok() {});
+    let output = child.wait_with_output().unwrap();
+    feeder.join().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+}
+
+#[test]
+fn wrong_usage_and_missing_inputs_are_told() {
+    let bench = Bench::new();
+    fs::write(bench.path("there"), "old").unwrap();
+    for (code, args, part) in [
+        (2, &["--format", "f16"][..], "f16"),
+        (2, &["--json"], "--output"),
+        (2, &["--input", "a", "--input", "b", "--input", "c"], "2 times"),
+        (2, &["--input", "-", "--input", "-"], "twice"),
+        (1, &["--input", "none", "--input", "none"], "none: cannot open"),
+        (1, &["--format", "wav"], "standard input"),
+        (1, &["-o", "there"], "--force"),
+    ] {
+        let output = bench.run(args, b"");
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {output:?}");
+        assert!(text(&output.stderr).contains(part), "{args:?}: {output:?}");
+        assert!(output.stdout.is_empty());
+    }
+    assert_eq!(fs::read(bench.path("there")).unwrap(), b"old");
+}
