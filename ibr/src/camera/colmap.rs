@@ -1,0 +1,1 @@
+//! COLMAP text models.
