@@ -2,6 +2,8 @@
 
 pub mod atomic;
 pub mod camera;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod depth;
 pub mod image;
 pub mod interpolate;
@@ -11,6 +13,7 @@ pub mod partial;
 pub mod pipeline;
 pub mod propagate;
 pub mod sample;
+pub mod scene;
 pub mod segment;
 pub mod synthetic;
 pub mod uncalibrated;

@@ -99,6 +99,8 @@ pub struct UncalibratedRendering {
     pub region: Vec<bool>,
     /// The geometry behind it.
     pub geometry: GeometryReport,
+    /// The bit that ordered depth.
+    pub hand: Handedness,
 }
 
 /// Renders a view of `size` from images and `tracks[track][image]`.
@@ -269,7 +271,7 @@ fn render_with<const C: usize>(
     report.holes = HoleCount::of(&fit.mask);
     let image = finished(size.0, size.1, C, fit.values);
     let rendering = Rendering { image, mask: fit.mask, report };
-    Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone() })
+    Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
 }
 
 /// The features of one view with their chi; points that do not lie in front of it are left out.
