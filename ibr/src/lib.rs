@@ -1,4 +1,4 @@
-//! Image-based rendering on the sampling core.
+#![doc = include_str!("../README.md")]
 
 pub mod atomic;
 pub mod camera;

@@ -147,7 +147,7 @@ mod tests {
         let test = DepthTest::default();
         check(&[], &test);
         check(&[sample(1.0, 1.0, 1.0)], &test);
-        check(&vec![sample(1.0, 1.0, 1.0); 5], &test);
+        check(&[sample(1.0, 1.0, 1.0); 5], &test);
         check(&[sample(1.0, 1.0, 1.0), sample(1.0, 1.0, 2.0), sample(1e9, -1e9, 2.0)], &test);
     }
 

@@ -205,7 +205,7 @@ mod tests {
             Image::new(width, height, channels, (0..width * height * channels).map(value).collect()).unwrap();
         let disparity = |i: usize| match i % width {
             x if x > width / 3 && x < width / 2 => 9.0,
-            x if x == 2 => 0.0,
+            2 => 0.0,
             _ => 3.0 + (i / width) as f32 * 0.1,
         };
         let data = (0..width * height).map(disparity).collect();

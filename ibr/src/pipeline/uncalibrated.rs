@@ -5,7 +5,7 @@ use super::{RenderError, RenderSettings, Rendering, Report};
 use crate::camera::{Camera, Relative};
 use crate::image::Image;
 use crate::interpolate::HoleCount;
-use crate::interpolate::plane::PlaneProblem;
+use crate::interpolate::plane::{PlaneProblem, PlaneSettings};
 use crate::occlusion::{self, DepthTest};
 use crate::propagate::Frame;
 use crate::sample::{Dropped, Sample};
@@ -34,13 +34,18 @@ pub struct UncalibratedSettings {
     pub robust: RobustSettings,
     /// The bit that orders depth, if it is known; otherwise the metric guess decides.
     pub handedness: Option<Handedness>,
-    /// Depth threshold of the occlusion test as a share of the range of chi.
+    /// Depth threshold of the occlusion test as a share of the range of chi. The meshes of two views bridge
+    /// depth edges differently; a threshold below their disagreement removes samples that hide nothing.
     pub sigma_share: f64,
+    /// The plane fit. Places from a mesh miss by fractions of a pixel, differently in each view, which reads
+    /// like noise on the values: more bending than where depth is measured.
+    pub plane: PlaneSettings,
 }
 
 impl Default for UncalibratedSettings {
     fn default() -> Self {
-        Self { robust: RobustSettings::default(), handedness: None, sigma_share: 0.03 }
+        let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::default() };
+        Self { robust: RobustSettings::default(), handedness: None, sigma_share: 0.2, plane }
     }
 }
 
@@ -125,7 +130,7 @@ pub fn render(
     let scene = reconstruct(images, tracks, target, uncalibrated)?;
     let colour = images.iter().any(|i| i.channels() == 3);
     let render = if colour { render_with::<3> } else { render_with::<1> };
-    Ok(render(images, &scene, size, settings, uncalibrated.sigma_share)?)
+    Ok(render(images, &scene, size, settings, uncalibrated)?)
 }
 
 /// The scene in a projective frame: oriented cameras (the virtual one last) and points.
@@ -235,7 +240,7 @@ fn render_with<const C: usize>(
     scene: &Reconstruction,
     size: (usize, usize),
     settings: &RenderSettings,
-    sigma_share: f64,
+    special: &UncalibratedSettings,
 ) -> Result<UncalibratedRendering, RenderError> {
     let target_matrix = &scene.cameras[images.len()];
     let target = camera(target_matrix, || "the virtual camera".into())?;
@@ -256,13 +261,14 @@ fn render_with<const C: usize>(
     }
     let hull = hull_features(scene, images.len());
     let mut region: Vec<bool> = mesh::dense_chi(&hull, size).iter().map(|c| !c.is_nan()).collect();
-    let absolute = sigma_share * chi_range(&hull);
+    let absolute = special.sigma_share * chi_range(&hull);
     let test = DepthTest { relative: 0.0, absolute, ..*settings.depth_test() };
     test.check()?;
     report.occluded = occlusion::remove(&mut samples, &test);
     report.used = samples.len();
     let mut interpolation = settings.interpolation;
     interpolation.depth_test = test;
+    interpolation.plane = special.plane;
     let mut problem = PlaneProblem::<C>::new(size, &interpolation)?;
     problem.add(&samples)?;
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);

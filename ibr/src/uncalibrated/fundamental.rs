@@ -226,7 +226,7 @@ pub(crate) mod tests {
         }
         let settings = RobustSettings::default();
         let found = robust(&matches, &settings).unwrap();
-        let good = |i: &usize| i % 3 != 0;
+        let good = |i: &usize| !i.is_multiple_of(3);
         assert_eq!(found.inliers.iter().filter(|i| good(i)).count(), 80);
         assert!(found.inliers.iter().filter(|i| !good(i)).count() <= 3, "{:?}", found.inliers);
         assert_eq!(found, robust(&matches, &settings).unwrap());

@@ -30,7 +30,7 @@ impl Subsets {
 
     /// A number below n; the bias of the multiplication is below n / 2^32.
     fn below(&mut self, n: usize) -> usize {
-        (u64::from(self.generator.next_u32()) * n as u64 >> 32) as usize
+        ((u64::from(self.generator.next_u32()) * n as u64) >> 32) as usize
     }
 }
 

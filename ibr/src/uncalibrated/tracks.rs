@@ -113,6 +113,7 @@ impl Tracks {
 }
 
 type Words = Vec<Option<f64>>;
+type Rows = Vec<Vec<Option<Point>>>;
 
 /// Numbers, and `None` for each dash; the error is the word that is neither.
 fn words(line: &str) -> Result<Words, String> {
@@ -127,11 +128,8 @@ fn words(line: &str) -> Result<Words, String> {
 type Reading = fn(&[Option<f64>]) -> (usize, Option<Point>);
 
 /// Reads all lines in one way; the error is the line, its columns and those of the first line.
-fn columns(
-    lines: &[(usize, Words)],
-    read: Reading,
-) -> Result<Vec<Vec<Option<Point>>>, (usize, usize, usize)> {
-    let mut rows: Vec<Vec<Option<Point>>> = Vec::new();
+fn columns(lines: &[(usize, Words)], read: Reading) -> Result<Rows, (usize, usize, usize)> {
+    let mut rows = Rows::new();
     for (line, words) in lines {
         let (row, whole) = columns_of(words, read);
         let expected = rows.first().map_or(words.len().div_ceil(2), Vec::len);
@@ -183,7 +181,7 @@ mod tests {
 
     #[test]
     fn one_dash_or_two_for_what_is_not_seen() {
-        let want = vec![
+        let want = [
             vec![Some(Point::new(1.0, 2.0)), None, Some(Point::new(3.0, 4.5))],
             vec![None, None, Some(Point::new(5.0, 6.0))],
             vec![Some(Point::new(1.0, 1.0)), Some(Point::new(2.0, 2.0)), Some(Point::new(3.0, 3.0))],

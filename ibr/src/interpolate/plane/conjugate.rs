@@ -16,8 +16,9 @@ pub(super) fn solve<const C: usize>(
     let mut values = vec![0.0; rhs.len() * C];
     let mut ended = Convergence { reached: true, ..Convergence::default() };
     let mut work = Work::new(rhs.len());
+    let at = |p: usize, channel: usize| rhs[p][channel];
     for channel in 0..C {
-        let one = work.solve(stencil, |p| f64::from(rhs[p][channel]), settings);
+        let one = work.solve(stencil, |p: usize| f64::from(at(p, channel)), settings);
         ended.steps = ended.steps.max(one.steps);
         ended.residual = ended.residual.max(one.residual);
         ended.reached &= one.reached;

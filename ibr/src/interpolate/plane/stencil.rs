@@ -1,8 +1,9 @@
-//! The symmetric nine-point matrix of the plane fit, one half of it stored.
+//! The symmetric matrix of the plane fit, nine points and the four two steps away, one half of it stored.
 
 use rayon::prelude::*;
 
-/// Entries of one pixel: its diagonal and the couplings to the right, down, down-right and down-left.
+/// Entries of one pixel: its diagonal and the couplings to the right, down, down-right and down-left, and to
+/// the pixels two to the right and two down.
 ///
 /// f32 suffices: rounding an entry moves the fit by parts in 10^7 of a grey level's range, and the memory of
 /// the plane fit is mostly this. All arithmetic with it is f64.
@@ -13,6 +14,8 @@ struct Couplings {
     down: f32,
     down_right: f32,
     down_left: f32,
+    right_two: f32,
+    down_two: f32,
 }
 
 /// The matrix A = B^T B + edges over the pixels of one image.
@@ -103,6 +106,32 @@ impl Stencil {
         self.entries[p + self.width].own += g;
     }
 
+    /// Adds h (u_{p-1} - 2 u_p + u_{p+1})^2, p - 1 being `first`.
+    pub(super) fn add_bend_right(&mut self, first: usize, h: f32) {
+        self.add_bend(first, 1, h, |e| &mut e.right, |e| &mut e.right_two);
+    }
+
+    /// Adds h (u_{p-width} - 2 u_p + u_{p+width})^2, p - width being `first`.
+    pub(super) fn add_bend_down(&mut self, first: usize, h: f32) {
+        self.add_bend(first, self.width, h, |e| &mut e.down, |e| &mut e.down_two);
+    }
+
+    fn add_bend(
+        &mut self,
+        first: usize,
+        stride: usize,
+        h: f32,
+        one: fn(&mut Couplings) -> &mut f32,
+        two: fn(&mut Couplings) -> &mut f32,
+    ) {
+        for (k, share) in [1.0, 4.0, 1.0].into_iter().enumerate() {
+            self.entries[first + k * stride].own += share * h;
+        }
+        *one(&mut self.entries[first]) -= 2.0 * h;
+        *one(&mut self.entries[first + stride]) -= 2.0 * h;
+        *two(&mut self.entries[first]) += h;
+    }
+
     /// Keeps the row of a pixel without samples and edges solvable.
     pub(super) fn isolate(&mut self, p: usize) {
         self.entries[p].own += 1e-6;
@@ -142,6 +171,23 @@ impl Stencil {
         for x in 1..width {
             out[x - 1] += f64::from(e[x - 1].right) * here[x];
             out[x] += f64::from(e[x - 1].right) * here[x - 1];
+        }
+        for x in 2..width {
+            out[x - 2] += f64::from(e[x - 2].right_two) * here[x];
+            out[x] += f64::from(e[x - 2].right_two) * here[x - 2];
+        }
+        if y + 2 < self.height {
+            let below = &u[start + 2 * width..start + 3 * width];
+            for x in 0..width {
+                out[x] += f64::from(e[x].down_two) * below[x];
+            }
+        }
+        if y > 1 {
+            let above = &u[start - 2 * width..start - width];
+            let e = &self.entries[start - 2 * width..start - width];
+            for x in 0..width {
+                out[x] += f64::from(e[x].down_two) * above[x];
+            }
         }
         if y + 1 < self.height {
             let below = &u[start + width..start + 2 * width];
