@@ -43,7 +43,9 @@ fn rig() -> tempfile::TempDir {
         write_map(&rig_disparity(&depth, SIZE.0), &dir.path().join(format!("{name}.pfm")));
     }
     let view = |name: &str, position: f64| {
-        format!("[[view]]\nname = \"{name}\"\nimage = \"{name}.png\"\nposition = {position:?}\ndisparity = \"{name}.pfm\"\n")
+        format!(
+            "[[view]]\nname = \"{name}\"\nimage = \"{name}.png\"\nposition = {position:?}\ndisparity = \"{name}.pfm\"\n"
+        )
     };
     let scene = view("left", 0.0) + &view("right", 1.0) + "[virtual]\nposition = 0.5\n";
     std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
@@ -83,7 +85,13 @@ fn files_are_not_overwritten_and_appear_whole() {
     let forced = run(dir.path(), &["render", "scene.toml", "-o", "out.png", "--force"]);
     assert_eq!(code(&forced), 0, "{}", stderr(&forced));
     assert!(String::from_utf8(forced.stdout).unwrap().contains("coverage"));
-    assert!(std::fs::read_dir(dir.path()).unwrap().all(|e| !e.unwrap().file_name().to_string_lossy().ends_with(".part")));
+    assert!(
+        std::fs::read_dir(dir.path()).unwrap().all(|e| !e
+            .unwrap()
+            .file_name()
+            .to_string_lossy()
+            .ends_with(".part"))
+    );
 }
 
 #[test]
@@ -148,13 +156,19 @@ fn general_cameras_are_rendered() {
         save(&image, &dir.path().join(format!("{k}.png"))).unwrap();
         write_map(&depth, &dir.path().join(format!("{k}.pfm")));
         if k < 2 {
-            scene += &format!("[[view]]\nimage = \"{k}.png\"\ndepth = \"{k}.pfm\"\ncamera = {}\n", toml_rows(&matrix));
+            scene += &format!(
+                "[[view]]\nimage = \"{k}.png\"\ndepth = \"{k}.pfm\"\ncamera = {}\n",
+                toml_rows(&matrix)
+            );
         } else {
             scene += &format!("[virtual]\nsize = [120, 90]\ncamera = {}\n", toml_rows(&matrix));
         }
     }
     std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
-    let done = run(dir.path(), &["render", "scene.toml", "-o", "o.png", "--truth", "2.png", "--json", "--mask", "m.png"]);
+    let done = run(
+        dir.path(),
+        &["render", "scene.toml", "-o", "o.png", "--truth", "2.png", "--json", "--mask", "m.png"],
+    );
     let figures = json(&done);
     assert!(figures["psnr"].as_f64().unwrap() > 31.0, "{figures}");
     assert_eq!(figures["convergence"]["reached"], true);
@@ -167,18 +181,21 @@ fn images_and_tracks_alone_are_enough() {
     let dir = tempfile::tempdir().unwrap();
     let cameras = [0, 1, 2].map(|k| Camera::metric(turned(k), false).unwrap());
     let scene = SyntheticScene::default();
-    let (first, depth) = scene.view(&cameras[0], SIZE);
-    save(&first, &dir.path().join("0.png")).unwrap();
-    save(&scene.view(&cameras[1], SIZE).0, &dir.path().join("1.png")).unwrap();
-    save(&scene.view(&cameras[2], SIZE).0, &dir.path().join("2.png")).unwrap();
+    let depths: Vec<DepthMap> = (0..3)
+        .map(|k| {
+            let (image, depth) = scene.view(&cameras[k], SIZE);
+            save(&image, &dir.path().join(format!("{k}.png"))).unwrap();
+            depth
+        })
+        .collect();
     let mut tracks = String::new();
     for (x, y) in (3..87).step_by(4).flat_map(|y| (3..117).step_by(4).map(move |x| (x, y))) {
-        let point = cameras[0].unproject(x as f64, y as f64, f64::from(depth.row(y)[x]));
+        let point = cameras[0].unproject(x as f64, y as f64, f64::from(depths[0].row(y)[x]));
         let seen = |k: usize| {
             let (u, v, d) = cameras[k].project(&point);
             let inside = u >= 0.0 && v >= 0.0 && u <= 119.0 && v <= 89.0 && d > 0.0;
-            let (_, map) = scene.view(&cameras[k], SIZE);
-            let visible = inside && (f64::from(map.row(v.round() as usize)[u.round() as usize]) - d).abs() < 0.1;
+            let visible =
+                inside && (f64::from(depths[k].row(v.round() as usize)[u.round() as usize]) - d).abs() < 0.1;
             if visible { format!("{u:.3} {v:.3}") } else { "-".into() }
         };
         if (x + y) % 8 == 6 {
@@ -227,7 +244,7 @@ fn wrong_input_has_one_clear_message() {
         ("left.png", "small.png", &["30 x 20", "120 x 90"]),
         ("left.pfm", "nan.pfm", &["nan.pfm", "none of the 10800 values"]),
         ("position = 0.5", "position = 5000.0", &["no sample reaches the virtual image"]),
-        ("disparity =", "disparty =", &["disparty", "scene"]),
+        ("disparity =", "disparty =", &["disparty", "line 5", "expected one of"]),
         ("position = 0.5", "", &["[virtual] needs a `position`"]),
         ("image = \"left.png\"", "image = 7", &["line 3"]),
     ] {

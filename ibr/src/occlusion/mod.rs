@@ -30,10 +30,10 @@ pub struct DepthTest {
 }
 
 impl Default for DepthTest {
-    /// 5 % of the nearer depth within 0.9 px: the samples of one camera on a surface lie about a pixel apart, so
+    /// 5 % of the nearer depth within 0.7 px: the samples of one camera on a surface lie about a pixel apart, so
     /// that a hidden sample has a nearer one in its ball nearly always; below 1 px rows do not see each other.
     fn default() -> Self {
-        Self { epsilon: 0.9, relative: 0.05, absolute: 0.0 }
+        Self { epsilon: 0.7, relative: 0.05, absolute: 0.0 }
     }
 }
 
