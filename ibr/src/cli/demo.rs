@@ -41,11 +41,13 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     let (right, right_map) = view(1.0, arguments.size)?;
     let (exact, _) = view(0.5, arguments.size)?;
     progress.step("full depth");
-    let (full, full_summary) = render([(&left, &left_map), (&right, &right_map)], &exact, Instant::now())?;
+    let (full, full_summary) = render([(&left, &left_map), (&right, &right_map)], &exact)?;
     progress.step("partial depth");
     let start = Instant::now();
     let maps = (coarse(&left_map, &left)?, coarse(&right_map, &right)?);
-    let (partial, partial_summary) = render([(&left, &maps.0), (&right, &maps.1)], &exact, start)?;
+    let preparation = start.elapsed().as_secs_f64();
+    let (partial, mut partial_summary) = render([(&left, &maps.0), (&right, &maps.1)], &exact)?;
+    partial_summary.preparation_seconds = preparation;
     progress.step("writing");
     let gain = 4.0;
     let pictures = [
@@ -74,17 +76,14 @@ fn coarse(map: &DepthMap, image: &Image) -> Result<DepthMap, Failure> {
     densify(&sparse, STEP, image, &Densify::default()).map_err(Failure::input)
 }
 
-fn render(
-    views: [(&Image, &DepthMap); 2],
-    exact: &Image,
-    start: Instant,
-) -> Result<(Rendering, Summary), Failure> {
+fn render(views: [(&Image, &DepthMap); 2], exact: &Image) -> Result<(Rendering, Summary), Failure> {
     let position = [0.0, 1.0];
     let views: Vec<RectifiedView<'_>> = views
         .iter()
         .zip(position)
         .map(|((image, disparity), position)| RectifiedView { image, disparity, position })
         .collect();
+    let start = Instant::now();
     let rendering = rectified::render(&views, 0.5, &RenderSettings::default()).map_err(Failure::input)?;
     let mut summary = Summary::new(&rendering, start.elapsed().as_secs_f64(), 0);
     let quality = quality::compare(&rendering.image, exact, None).map_err(Failure::input)?;

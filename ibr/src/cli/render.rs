@@ -27,12 +27,15 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     check(arguments)?;
     let progress = Progress::new(4);
     progress.step("reading");
+    let start = Instant::now();
     let scene = read(arguments)?;
+    let preparation = start.elapsed().as_secs_f64();
     let truth = arguments.truth.as_deref().map(read_image).transpose().map_err(Failure::input)?;
     progress.step("rendering");
     let start = Instant::now();
     let done = render(&scene, arguments)?;
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
+    summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
     progress.step("comparing");
     if let (Some(truth), Some(path)) = (&truth, &arguments.truth) {

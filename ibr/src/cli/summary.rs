@@ -17,8 +17,10 @@ pub(super) struct Summary {
     pub(super) mae: Option<f64>,
     /// Share of all pixels that samples reach.
     pub(super) coverage: f64,
-    /// Time of the rendering without reading and writing.
+    /// Time of the rendering, without reading, making depth dense, comparing and writing.
     pub(super) seconds: f64,
+    /// Time of reading the files and making depth dense.
+    pub(super) preparation_seconds: f64,
     pub(super) samples: SampleCount,
     pub(super) holes: HoleCount,
     /// Unknown depths filled before propagation.
@@ -60,6 +62,7 @@ impl Summary {
             mae: None,
             coverage: rendering.coverage(),
             seconds,
+            preparation_seconds: 0.0,
             samples: SampleCount {
                 propagated: r.propagated,
                 occluded: r.occluded,
@@ -115,7 +118,10 @@ impl Summary {
                 g.inliers, g.matches, g.sampson_rms, g.resection_inliers, g.sightings, g.resection_rms
             ));
         }
-        lines.push(format!("time      {:.3} s", self.seconds));
+        lines.push(format!(
+            "time      {:.3} s, after {:.3} s of reading and making depth dense",
+            self.seconds, self.preparation_seconds
+        ));
         lines.join("\n") + "\n"
     }
 }

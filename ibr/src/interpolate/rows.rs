@@ -141,9 +141,13 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
 
 /// The pixels from `low` to `high`, both included.
 fn pixels(low: f64, high: f64, width: usize) -> std::ops::Range<usize> {
-    // Saturating casts: what lies outside the image is cut off.
-    let end = ((high.floor() + 1.0) as usize).min(width);
-    (low.ceil() as usize).min(end)..end
+    // Casts saturate and cut toward zero: what lies outside the image is cut off, and above -1 the
+    // floor of high + 1 is its integer part (rounding functions are library calls on baseline x86-64).
+    let end = ((high + 1.0) as usize).min(width);
+    let start = low.max(0.0);
+    let whole = start as usize;
+    let start = whole + usize::from((whole as f64) < start);
+    start.min(end)..end
 }
 
 /// Leaves holes black.
@@ -308,6 +312,21 @@ mod tests {
             interpolate(&[sample(1.0, 1.0, 1.0)], (4, 4), &bad),
             Err(InterpolationError::Setting { name: "lambda", .. })
         ));
+    }
+
+    #[test]
+    fn pixel_ranges_are_closed_and_cut_off() {
+        for (low, high, want) in [
+            (0.2, 2.7, 1..3),
+            (1.0, 2.0, 1..3),
+            (-5.0, -1.0, 0..0),
+            (-5.0, 0.0, 0..1),
+            (-0.5, -0.2, 0..0),
+            (3.2, 9.0, 4..5),
+            (7.0, 9.0, 5..5),
+        ] {
+            assert_eq!(pixels(low, high, 5), want, "{low} {high}");
+        }
     }
 
     #[test]
