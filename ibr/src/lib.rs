@@ -1,1 +1,19 @@
-//! Image-based rendering on the sampling core.
+#![doc = include_str!("../README.md")]
+
+pub mod atomic;
+pub mod camera;
+#[cfg(feature = "cli")]
+pub mod cli;
+pub mod depth;
+pub mod image;
+pub mod interpolate;
+mod linear;
+pub mod occlusion;
+pub mod partial;
+pub mod pipeline;
+pub mod propagate;
+pub mod sample;
+pub mod scene;
+pub mod segment;
+pub mod synthetic;
+pub mod uncalibrated;

@@ -1,2 +1,7 @@
 //! The `hybank-ibr` binary.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    hybank_ibr::cli::run()
+}

@@ -43,9 +43,10 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         fit
     }
 
-    /// An empty problem for x in \[0, last\] that holds every knot whose spline reaches the interval.
+    /// An empty problem with the knots -n .. last + n, n the degree: it takes every sample in
+    /// \[0, last\] and those up to one knot short of the kernel's reach outside.
     pub fn covering(last: usize) -> Self {
-        let reach = ORDER / 2;
+        let reach = ORDER - 1;
         Self::new(-(reach as i64), last + 1 + 2 * reach)
     }
 
@@ -174,6 +175,19 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
     /// The coefficients c_m, first knot first; meaningful after [`Fit::solve`].
     pub fn coefficients(&self) -> &[[f64; C]] {
         &self.rhs[..self.knots]
+    }
+
+    /// J at the knots `from`, `from` + 1, ..; the kernel is evaluated once for all of them.
+    pub fn knot_values(&self, from: i64) -> impl Iterator<Item = [f64; C]> + '_ {
+        let (first, w) = BSpline::<ORDER>::weights(0.0);
+        (from + first..).map_while(move |knot| {
+            let row = self.row_of(knot)?;
+            let mut sum = [0.0; C];
+            for (c, w) in self.rhs[row..row + ORDER].iter().zip(w) {
+                sum.iter_mut().zip(c).for_each(|(s, c)| *s += w * c);
+            }
+            Some(sum)
+        })
     }
 
     /// J(x), with the coefficients outside the range taken as 0.
@@ -311,6 +325,9 @@ mod tests {
             let numeric = (fit.value(x + 1e-6)[0] - fit.value(x - 1e-6)[0]) / 2e-6;
             assert!((fit.slope(x)[0] - numeric).abs() < 1e-8);
         }
+        let knots: Vec<f64> = fit.knot_values(0).take(9).map(|v| v[0]).collect();
+        assert_eq!(knots.len(), 9);
+        assert!(knots.iter().enumerate().all(|(j, v)| (v - fit.value(j as f64)[0]).abs() < 1e-14));
     }
 
     #[test]
@@ -338,7 +355,7 @@ mod tests {
     fn samples_outside_are_refused_and_change_nothing() {
         let mut fit = Fit::<4, 1>::covering(9);
         let empty = fit.clone();
-        for x in [-1.1, 10.1, 1e9, -1e9, 1e300, f64::NAN, f64::INFINITY] {
+        for x in [-2.1, 11.1, 1e9, -1e9, 1e300, f64::NAN, f64::INFINITY] {
             assert!(!fit.add(x, &[1.0], 1.0, 0.0), "{x}");
         }
         assert_eq!(fit.band, empty.band);

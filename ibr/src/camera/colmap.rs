@@ -1,0 +1,239 @@
+//! COLMAP text models as camera input: `cameras.txt` and `images.txt` of one folder.
+//!
+//! COLMAP puts pixel centres at half-integers; the principal point is moved by half a pixel on the way in.
+
+use super::{Camera, CameraError};
+use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Why a model could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ColmapError {
+    /// A file cannot be opened.
+    #[error("{}: {source}; a COLMAP text model has cameras.txt and images.txt (export with --output_type TXT)", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A line that is not what the format says.
+    #[error("{}:{line}: {reason}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A camera that cannot be used.
+    #[error("{}: image {name:?}: {source}", path.display())]
+    Camera {
+        /// The file.
+        path: PathBuf,
+        /// The image.
+        name: String,
+        /// What is wrong with it.
+        source: CameraError,
+    },
+}
+
+/// A camera of the model with the size of its image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModelCamera {
+    /// The metric camera, in pixels with centres at integers.
+    pub camera: Camera,
+    /// Width and height of the image in pixels.
+    pub size: (usize, usize),
+}
+
+/// The cameras of a model by the names of their images.
+pub type Model = BTreeMap<String, ModelCamera>;
+
+/// Reads the model in `folder`.
+///
+/// Pinhole models are read, and models with distortion if all of it is 0; others are refused, since the
+/// images would have to be undistorted first.
+///
+/// # Errors
+/// [`ColmapError`], with file and line.
+pub fn read_model(folder: &Path) -> Result<Model, ColmapError> {
+    let load = |name: &str| {
+        let path = folder.join(name);
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| ColmapError::Read { path: path.clone(), source })?;
+        Ok((path, text))
+    };
+    let (path, text) = load("cameras.txt")?;
+    let lenses = parse_cameras(&text).map_err(|(line, reason)| ColmapError::Line {
+        path: path.clone(),
+        line,
+        reason,
+    })?;
+    let (path, text) = load("images.txt")?;
+    let poses = parse_images(&text).map_err(|(line, reason)| ColmapError::Line {
+        path: path.clone(),
+        line,
+        reason,
+    })?;
+    let mut model = Model::new();
+    for (line, id, pose, name) in poses {
+        let lens = lenses.get(&id).ok_or_else(|| {
+            let reason = format!("image {name:?} has camera {id}, which cameras.txt does not list");
+            ColmapError::Line { path: path.clone(), line, reason }
+        })?;
+        let camera = Camera::metric(lens.k * pose, false).map_err(|source| ColmapError::Camera {
+            path: path.clone(),
+            name: name.clone(),
+            source,
+        })?;
+        model.insert(name, ModelCamera { camera, size: lens.size });
+    }
+    Ok(model)
+}
+
+struct Lens {
+    k: Matrix3<f64>,
+    size: (usize, usize),
+}
+
+/// Lines that say something, with their numbers.
+fn content(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(i, l)| (i + 1, l.trim())).filter(|(_, l)| !l.starts_with('#'))
+}
+
+fn number<T: std::str::FromStr>(word: Option<&str>, name: &str) -> Result<T, String> {
+    let word = word.ok_or_else(|| format!("the {name} is missing"))?;
+    word.parse().map_err(|_| format!("the {name} {word:?} is not a number"))
+}
+
+/// CAMERA_ID MODEL WIDTH HEIGHT PARAMS...
+fn parse_cameras(text: &str) -> Result<BTreeMap<u64, Lens>, (usize, String)> {
+    let lines = content(text).filter(|(_, l)| !l.is_empty());
+    lines.map(|(i, line)| parse_camera(line).map_err(|reason| (i, reason))).collect()
+}
+
+fn parse_camera(line: &str) -> Result<(u64, Lens), String> {
+    let mut words = line.split_whitespace();
+    let id = number(words.next(), "camera id")?;
+    let model = words.next().ok_or("the camera model is missing")?;
+    let size = (number(words.next(), "width")?, number(words.next(), "height")?);
+    let parameters =
+        words.map(|w| number(Some(w), "camera parameter")).collect::<Result<Vec<f64>, String>>()?;
+    // Focal lengths first (one or two), then the principal point, then distortion.
+    let focal = match model {
+        "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" => 1,
+        "PINHOLE" | "OPENCV" | "FULL_OPENCV" => 2,
+        other => return Err(format!("camera model {other} is not a pinhole; undistort the images first")),
+    };
+    let [f, .., cx, cy] = parameters.get(..focal + 2).ok_or("camera parameters are missing")? else {
+        return Err("camera parameters are missing".into());
+    };
+    if let Some(k) = parameters[focal + 2..].iter().find(|k| **k != 0.0) {
+        return Err(format!("the {model} camera has distortion ({k}); undistort the images first"));
+    }
+    let fy = parameters[focal - 1];
+    let k = Matrix3::new(*f, 0.0, cx - 0.5, 0.0, fy, cy - 0.5, 0.0, 0.0, 1.0);
+    Ok((id, Lens { k, size }))
+}
+
+type Pose = (usize, u64, Matrix3x4<f64>, String);
+
+/// Two lines an image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points, which are not needed.
+fn parse_images(text: &str) -> Result<Vec<Pose>, (usize, String)> {
+    let mut lines = content(text);
+    let mut poses = Vec::new();
+    while let Some((i, line)) = lines.next() {
+        if line.is_empty() {
+            continue;
+        }
+        let (id, pose, name) = parse_image(line).map_err(|reason| (i, reason))?;
+        poses.push((i, id, pose, name));
+        lines.next();
+    }
+    Ok(poses)
+}
+
+fn parse_image(line: &str) -> Result<(u64, Matrix3x4<f64>, String), String> {
+    let mut words = line.split_whitespace();
+    let _: u64 = number(words.next(), "image id")?;
+    let mut seven = [0.0; 7];
+    for (value, name) in seven.iter_mut().zip(["QW", "QX", "QY", "QZ", "TX", "TY", "TZ"]) {
+        *value = number(words.next(), name)?;
+    }
+    let id = number(words.next(), "camera id")?;
+    let name = words.collect::<Vec<_>>().join(" ");
+    if name.is_empty() {
+        return Err("the name of the image is missing".into());
+    }
+    let [w, x, y, z, t @ ..] = seven;
+    let q = Quaternion::new(w, x, y, z);
+    if q.norm() < 1e-9 {
+        return Err("the rotation quaternion is 0".into());
+    }
+    let mut pose = Matrix3x4::zeros();
+    let rotation = UnitQuaternion::from_quaternion(q).to_rotation_matrix();
+    pose.fixed_columns_mut::<3>(0).copy_from(rotation.matrix());
+    pose.set_column(3, &Vector3::from(t));
+    Ok((id, pose, name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(cameras: &str, images: &str) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("cameras.txt"), cameras).unwrap();
+        std::fs::write(dir.path().join("images.txt"), images).unwrap();
+        dir
+    }
+
+    #[test]
+    fn a_model_becomes_cameras() {
+        let dir = folder(
+            "# cameras\n1 PINHOLE 640 480 500 510 320.5 240.5\n2 SIMPLE_RADIAL 100 50 80 50 25 0\n",
+            "# images\n1 1 0 0 0 1 2 3 1 a b.png\n10 20 -1 30 40 7\n\
+             2 0.7071067811865476 0 0.7071067811865476 0 0 0 0 2 sub/c.jpg\n\n",
+        );
+        let model = read_model(dir.path()).unwrap();
+        assert_eq!(model.keys().collect::<Vec<_>>(), ["a b.png", "sub/c.jpg"]);
+        let a = &model["a b.png"];
+        assert_eq!(a.size, (640, 480));
+        let want = Matrix3x4::new(
+            500.0,
+            0.0,
+            320.0,
+            500.0 + 960.0,
+            0.0,
+            510.0,
+            240.0,
+            1020.0 + 720.0,
+            0.0,
+            0.0,
+            1.0,
+            3.0,
+        );
+        assert!((a.camera.matrix() - want).norm() < 1e-9);
+        // A quarter turn about y: the camera looks along -x.
+        let (_, _, depth) = model["sub/c.jpg"].camera.project(&Vector3::new(-2.0, 0.0, 0.0));
+        assert!((depth - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn faults_are_named_with_their_lines() {
+        let message =
+            |cameras: &str, images: &str| read_model(folder(cameras, images).path()).unwrap_err().to_string();
+        let fine = "1 SIMPLE_PINHOLE 10 10 5 5 5\n";
+        assert!(message("1 OPENCV 10 10 5 5 5 5 0.1 0 0 0\n", "").contains("distortion (0.1)"));
+        assert!(message("\n1 FOV 10 10 5 5 5 5 1\n", "").contains("cameras.txt:2: camera model FOV"));
+        assert!(message("1 PINHOLE 10 10 5\n", "").contains("missing"));
+        assert!(message(fine, "1 1 0 0 0 0 0 x 1 a.png\n\n").contains("images.txt:1: the TZ \"x\""));
+        assert!(message(fine, "1 1 0 0 0 0 0 0 9 a.png\n\n").contains("camera 9"));
+        assert!(message(fine, "1 0 0 0 0 0 0 0 1 a.png\n\n").contains("quaternion"));
+        let empty = tempfile::tempdir().unwrap();
+        assert!(read_model(empty.path()).unwrap_err().to_string().contains("cameras.txt"));
+    }
+}

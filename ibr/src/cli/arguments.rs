@@ -1,0 +1,253 @@
+//! What was typed.
+
+use crate::interpolate::{Degree, HoleFill};
+use crate::partial::{Densify, Segmentwise};
+use crate::pipeline::{Method, RenderSettings};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Image-based rendering with depth: new views from photographs.
+#[derive(Debug, Parser)]
+#[command(name = "hybank-ibr", version, about, after_help = EXAMPLES)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+const EXAMPLES: &str = "Examples:
+  hybank-ibr render scene.toml -o middle.png
+  hybank-ibr render scene.toml --view centre -o centre.png --truth centre-photo.png
+  hybank-ibr render scene.toml --depth-step 6 -o sparse.png --json
+  hybank-ibr demo -o demo.png
+
+Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Render the wanted view of a scene.
+    Render(RenderArguments),
+    /// Render a synthetic scene with exact depth, compare it with its exact view, write a contact sheet.
+    Demo(DemoArguments),
+}
+
+const RENDER_EXAMPLES: &str = "Examples:
+  hybank-ibr render scene.toml -o middle.png --truth photo.png
+      renders the view that [virtual] asks for and prints PSNR, SSIM, mean absolute error and coverage
+  hybank-ibr render scene.toml --view left -o left.png
+      leaves the view \"left\" out and renders it from the others
+  hybank-ibr render - -o - < scene.toml > middle.png
+      scene from standard input (paths relative to the working directory), PNG to standard output
+
+A scene of a rectified rig:
+  [[view]]
+  name = \"left\"
+  image = \"im2.png\"
+  position = 0.0
+  disparity = \"disp2.png\"
+  disparity_scale = 4.0
+  [[view]]
+  name = \"right\"
+  image = \"im6.png\"
+  position = 1.0
+  disparity = \"disp6.png\"
+  disparity_scale = 4.0
+  [virtual]
+  position = 0.5
+
+General cameras: camera = [[..4..],[..],[..]] and depth = \"d.pfm\" in place of position and
+disparity, or colmap = \"folder\"; [virtual] camera = .., size = [w, h]. No cameras: views with images
+only, matches = \"tracks.txt\" and [virtual] from_tracks = 3 (a column, from 1) or between = 0.5.";
+
+#[derive(Debug, Args)]
+#[command(after_help = RENDER_EXAMPLES)]
+pub(super) struct RenderArguments {
+    /// Scene file (TOML), - for standard input.
+    pub(super) scene: PathBuf,
+    /// Image to write (.png, .jpg, .ppm, .pgm, .pfm), - for PNG on standard output.
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Leave this view out and render it.
+    #[arg(long, value_name = "NAME")]
+    pub(super) view: Option<String>,
+    /// Use only every K-th value of full depth maps, in both directions.
+    #[arg(long, value_name = "K", default_value_t = 1)]
+    pub(super) depth_step: usize,
+    /// Photograph to compare with.
+    #[arg(long, value_name = "FILE")]
+    pub(super) truth: Option<PathBuf>,
+    /// Write the mask too: white seen, grey crack, black disocclusion.
+    #[arg(long, value_name = "FILE")]
+    pub(super) mask: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Registration offset added to every column, in pixels; overrides that of the scene.
+    #[arg(long, value_name = "PX", allow_hyphen_values = true)]
+    pub(super) offset: Option<f64>,
+    /// Interpolation of the samples.
+    #[arg(long, value_enum, default_value_t = MethodName::Auto)]
+    pub(super) method: MethodName,
+    /// What becomes of holes.
+    #[arg(long, value_enum, default_value_t = FillName::Background)]
+    pub(super) fill: FillName,
+    /// How coarse depth is made dense.
+    #[arg(long, value_enum, default_value_t = DensifyName::Segmentwise)]
+    pub(super) densify: DensifyName,
+    /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
+    #[arg(long)]
+    pub(super) drop_unknown: bool,
+    /// Degree of the row splines.
+    #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
+    pub(super) degree: DegreeName,
+    /// Weight of the slope penalty of the row fit, px^2.
+    #[arg(long, value_name = "L")]
+    pub(super) lambda: Option<f64>,
+    /// Weight of the differences of neighbouring coefficients of the row fit.
+    #[arg(long, value_name = "T")]
+    pub(super) tau: Option<f64>,
+    /// Radius of the depth test, px.
+    #[arg(long, value_name = "PX")]
+    pub(super) epsilon: Option<f64>,
+    /// Share of the nearer depth by which a hidden sample is deeper.
+    #[arg(long, value_name = "R")]
+    pub(super) relative_depth: Option<f64>,
+    /// Seed of the robust estimators (scenes without cameras).
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Order depth the other way round (scenes without cameras).
+    #[arg(long)]
+    pub(super) reverse_order: bool,
+    /// Number of threads; all cores if left out. The result does not depend on it.
+    #[arg(long, value_name = "N")]
+    pub(super) threads: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DemoArguments {
+    /// Contact sheet to write.
+    #[arg(short, long, value_name = "FILE", default_value = "hybank-ibr-demo.png")]
+    pub(super) output: PathBuf,
+    /// Width and height of the views.
+    #[arg(long, value_name = "WxH", default_value = "480x360", value_parser = size)]
+    pub(super) size: (usize, usize),
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Number of threads; all cores if left out.
+    #[arg(long, value_name = "N")]
+    pub(super) threads: Option<usize>,
+}
+
+/// Sides that the demo renders: enough for its shapes, and no more than a screen holds.
+const SIDES: std::ops::RangeInclusive<usize> = 64..=4096;
+
+fn size(text: &str) -> Result<(usize, usize), String> {
+    let (w, h) = text.split_once('x').ok_or("write it as WIDTHxHEIGHT, for example 480x360")?;
+    let side = |s: &str| match s.parse() {
+        Ok(n) if SIDES.contains(&n) => Ok(n),
+        _ => Err(format!("{s:?} is not a number from {} to {}", SIDES.start(), SIDES.end())),
+    };
+    Ok((side(w)?, side(h)?))
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum MethodName {
+    /// Rows for rectified rigs, the plane elsewhere.
+    Auto,
+    /// One spline a row (rectified rigs only).
+    Rows,
+    /// The whole image at once.
+    Plane,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum FillName {
+    /// The farther side is continued.
+    Background,
+    /// The fit bridges them.
+    Bridge,
+    /// They stay black.
+    Leave,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum DensifyName {
+    /// By segments of image and depth.
+    Segmentwise,
+    /// Bilinear everywhere.
+    Bilinear,
+    /// The nearest sample.
+    Nearest,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum DegreeName {
+    /// Hats.
+    Linear,
+    /// Cubic B-splines.
+    Cubic,
+}
+
+impl RenderArguments {
+    /// The settings that were typed over the defaults; `offset` is that of the scene.
+    pub(super) fn settings(&self, offset: f64) -> RenderSettings {
+        let mut settings = RenderSettings { offset: self.offset.unwrap_or(offset), ..Default::default() };
+        settings.method = match self.method {
+            MethodName::Auto => Method::Auto,
+            MethodName::Rows => Method::Rows,
+            MethodName::Plane => Method::Plane,
+        };
+        let stage = &mut settings.interpolation;
+        stage.holes.fill = match self.fill {
+            FillName::Background => HoleFill::Background,
+            FillName::Bridge => HoleFill::Bridge,
+            FillName::Leave => HoleFill::Leave,
+        };
+        stage.fit.degree = match self.degree {
+            DegreeName::Linear => Degree::Linear,
+            DegreeName::Cubic => Degree::Cubic,
+        };
+        let mut typed = |slot: fn(&mut crate::interpolate::Settings) -> &mut f64, value: Option<f64>| {
+            if let Some(value) = value {
+                *slot(stage) = value;
+            }
+        };
+        typed(|s| &mut s.fit.lambda, self.lambda);
+        typed(|s| &mut s.fit.tau, self.tau);
+        typed(|s| &mut s.depth_test.epsilon, self.epsilon);
+        typed(|s| &mut s.depth_test.relative, self.relative_depth);
+        settings
+    }
+
+    /// How coarse depth is made dense.
+    pub(super) fn densify(&self) -> Densify {
+        match self.densify {
+            DensifyName::Segmentwise => Densify::Segmentwise(Segmentwise::default()),
+            DensifyName::Bilinear => Densify::Bilinear,
+            DensifyName::Nearest => Densify::Nearest,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_are_checked() {
+        assert_eq!(size("640x480"), Ok((640, 480)));
+        assert!(size("640").is_err() && size("0x9").is_err() && size("9000x90").is_err());
+    }
+}

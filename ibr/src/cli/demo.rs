@@ -1,0 +1,110 @@
+//! `hybank-ibr demo`: a synthetic scene, rendered and compared with its exact view.
+
+use super::arguments::DemoArguments;
+use super::contact;
+use super::failure::Failure;
+use super::output;
+use super::progress::Progress;
+use super::summary::Summary;
+use crate::camera::Camera;
+use crate::depth::DepthMap;
+use crate::image::{Image, quality};
+use crate::partial::{Densify, densify};
+use crate::pipeline::{RenderSettings, Rendering, rectified};
+use crate::propagate::RectifiedView;
+use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+use serde::Serialize;
+use std::time::Instant;
+
+/// Step of the coarse depth in the second rendering.
+const STEP: usize = 6;
+
+#[derive(Debug, Serialize)]
+struct DemoSummary {
+    /// Every pixel has its exact depth.
+    full_depth: Summary,
+    /// One pixel in 6 x 6 has.
+    partial_depth: Summary,
+}
+
+pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
+    output::refuse_existing(&arguments.output, arguments.force)?;
+    output::refuse_format(&arguments.output)?;
+    if output::is_standard(&arguments.output) && arguments.json {
+        return Err(Failure::Usage(
+            "-o - and --json both want standard output; give the sheet a file".into(),
+        ));
+    }
+    let progress = Progress::new(4);
+    progress.step("drawing the scene");
+    let (left, left_map) = view(0.0, arguments.size)?;
+    let (right, right_map) = view(1.0, arguments.size)?;
+    let (exact, _) = view(0.5, arguments.size)?;
+    progress.step("full depth");
+    let (full, full_summary) = render([(&left, &left_map), (&right, &right_map)], &exact)?;
+    progress.step("partial depth");
+    let start = Instant::now();
+    let maps = (coarse(&left_map, &left)?, coarse(&right_map, &right)?);
+    let preparation = start.elapsed().as_secs_f64();
+    let (partial, mut partial_summary) = render([(&left, &maps.0), (&right, &maps.1)], &exact)?;
+    partial_summary.preparation_seconds = preparation;
+    progress.step("writing");
+    let gain = 4.0;
+    let pictures = [
+        left,
+        exact.clone(),
+        right,
+        full.image.clone(),
+        contact::difference(&full.image, &exact, gain),
+        contact::difference(&partial.image, &exact, gain),
+    ];
+    output::write_image(&contact::sheet(&pictures, 3), &arguments.output)?;
+    drop(progress);
+    report(&DemoSummary { full_depth: full_summary, partial_depth: partial_summary }, arguments)
+}
+
+fn view(position: f64, size: (usize, usize)) -> Result<(Image, DepthMap), Failure> {
+    let camera = Camera::metric(rig_camera(position, size), false).map_err(Failure::input)?;
+    let (image, depth) = SyntheticScene::default().view(&camera, size);
+    let disparity = rig_disparity(&depth, size.0);
+    // What a file would hold: 8 bits.
+    Ok((image.quantised(), disparity))
+}
+
+fn coarse(map: &DepthMap, image: &Image) -> Result<DepthMap, Failure> {
+    let sparse = map.decimated(STEP).map_err(Failure::input)?;
+    densify(&sparse, STEP, image, &Densify::default()).map_err(Failure::input)
+}
+
+fn render(views: [(&Image, &DepthMap); 2], exact: &Image) -> Result<(Rendering, Summary), Failure> {
+    let position = [0.0, 1.0];
+    let views: Vec<RectifiedView<'_>> = views
+        .iter()
+        .zip(position)
+        .map(|((image, disparity), position)| RectifiedView { image, disparity, position })
+        .collect();
+    let start = Instant::now();
+    let rendering = rectified::render(&views, 0.5, &RenderSettings::default()).map_err(Failure::input)?;
+    let mut summary = Summary::new(&rendering, start.elapsed().as_secs_f64(), 0);
+    let quality = quality::compare(&rendering.image, exact, None).map_err(Failure::input)?;
+    quality.iter().for_each(|q| summary.compare(q));
+    Ok((rendering, summary))
+}
+
+fn report(summary: &DemoSummary, arguments: &DemoArguments) -> Result<(), Failure> {
+    if arguments.json {
+        let json = serde_json::to_string(summary).map_err(Failure::input)?;
+        return output::print(&(json + "\n"));
+    }
+    let text = format!(
+        "exact depth at every pixel\n{}\nexact depth at one pixel in {STEP} x {STEP}\n{}\n{}: left, exact, right; rendered, its error and that of partial depth (times 4)\n",
+        summary.full_depth.text(),
+        summary.partial_depth.text(),
+        arguments.output.display()
+    );
+    if output::is_standard(&arguments.output) {
+        eprint!("{text}");
+        return Ok(());
+    }
+    output::print(&text)
+}

@@ -1,0 +1,44 @@
+//! How a verb fails: one message on stderr and an exit code.
+
+use std::process::ExitCode;
+
+/// A failure with the one message that the user sees.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Failure {
+    /// The input failed: exit code 1.
+    Input(String),
+    /// Wrong usage: exit code 2.
+    Usage(String),
+    /// The reader of our output went away: end without a word.
+    ClosedPipe,
+}
+
+impl Failure {
+    /// A failure of the input, from anything that can say what is wrong.
+    pub(super) fn input(message: impl ToString) -> Self {
+        Self::Input(message.to_string())
+    }
+
+    /// A failure to print.
+    pub(super) fn printing(error: &std::io::Error) -> Self {
+        match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Self::ClosedPipe,
+            _ => Self::Input(format!("standard output: {error}")),
+        }
+    }
+
+    /// Prints the message and gives the exit code.
+    pub(super) fn report(&self) -> ExitCode {
+        match self {
+            Self::Input(message) => {
+                eprintln!("hybank-ibr: {message}");
+                ExitCode::from(1)
+            }
+            Self::Usage(message) => {
+                eprintln!("hybank-ibr: {message}");
+                ExitCode::from(2)
+            }
+            Self::ClosedPipe => ExitCode::SUCCESS,
+        }
+    }
+}

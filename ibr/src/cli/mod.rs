@@ -1,0 +1,38 @@
+//! The command line of `hybank-ibr`, and the only place that prints.
+
+mod arguments;
+mod contact;
+mod demo;
+mod failure;
+mod output;
+mod progress;
+mod render;
+mod summary;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use failure::Failure;
+use std::process::ExitCode;
+
+/// Reads the arguments, runs the verb and maps its outcome to an exit code: 0 done, 1 the input failed, 2
+/// wrong usage.
+pub fn run() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Render(arguments) => in_pool(arguments.threads, || render::run(&arguments)),
+        Command::Demo(arguments) => in_pool(arguments.threads, || demo::run(&arguments)),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}
+
+/// Runs the work on the given number of threads, or on as many as there are.
+fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
+    let Some(threads) = threads else { return work() };
+    if threads == 0 {
+        return Err(Failure::Usage("--threads 0: at least one thread is needed".into()));
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::input)?;
+    pool.install(work)
+}

@@ -1,0 +1,203 @@
+//! `hybank-ibr render`: a scene file in, an image and its figures out.
+
+use super::arguments::RenderArguments;
+use super::failure::Failure;
+use super::output;
+use super::progress::Progress;
+use super::summary::{Figures, Summary};
+use crate::image::{Image, quality, read_image};
+use crate::interpolate::Cover;
+use crate::pipeline::uncalibrated::{UncalibratedRendering, UncalibratedSettings};
+use crate::pipeline::{RenderSettings, Rendering, calibrated, rectified, uncalibrated};
+use crate::propagate::{CalibratedView, RectifiedView};
+use crate::scene::{self, Kind, LoadOptions, Scene};
+use crate::uncalibrated::chirality::Handedness;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// A rendering with the region that counts, if it is not the whole image.
+struct Rendered {
+    rendering: Rendering,
+    hull: Option<Vec<bool>>,
+    geometry: Option<uncalibrated::GeometryReport>,
+}
+
+pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
+    check(arguments)?;
+    let progress = Progress::new(4);
+    progress.step("reading");
+    let start = Instant::now();
+    let scene = read(arguments)?;
+    let preparation = start.elapsed().as_secs_f64();
+    let truth = arguments.truth.as_deref().map(read_image).transpose().map_err(Failure::input)?;
+    progress.step("rendering");
+    let start = Instant::now();
+    let done = render(&scene, arguments)?;
+    let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
+    summary.preparation_seconds = preparation;
+    summary.geometry = done.geometry.clone();
+    progress.step("comparing");
+    if let (Some(truth), Some(path)) = (&truth, &arguments.truth) {
+        compare(&mut summary, &done, truth, path)?;
+    }
+    progress.step("writing");
+    if let Some(mask) = &arguments.mask {
+        output::write_image(&mask_image(&done.rendering), mask)?;
+    }
+    output::write_image(&done.rendering.image, &arguments.output)?;
+    drop(progress);
+    warn(&done);
+    report(&summary, arguments)
+}
+
+/// What can be said before any file is read.
+fn check(arguments: &RenderArguments) -> Result<(), Failure> {
+    let standard = output::is_standard(&arguments.output);
+    if standard && arguments.json {
+        return Err(Failure::Usage(
+            "-o - and --json both want standard output; give the image a file".into(),
+        ));
+    }
+    if arguments.depth_step == 0 {
+        return Err(Failure::Usage("--depth-step 0: the step must be at least 1".into()));
+    }
+    for path in [Some(&arguments.output), arguments.mask.as_ref()].into_iter().flatten() {
+        output::refuse_existing(path, arguments.force)?;
+        output::refuse_format(path)?;
+    }
+    Ok(())
+}
+
+fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
+    let (path, text) = if output::is_standard(&arguments.scene) {
+        let mut text = String::new();
+        std::io::stdin()
+            .read_to_string(&mut text)
+            .map_err(|e| Failure::Input(format!("standard input: {e}")))?;
+        (PathBuf::from("<stdin>"), text)
+    } else {
+        let path = arguments.scene.clone();
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| Failure::input(scene::SceneError::Read { path: path.clone(), source }))?;
+        (path, text)
+    };
+    let options = LoadOptions {
+        view: arguments.view.clone(),
+        depth_step: arguments.depth_step,
+        densify: arguments.densify(),
+        fill: !arguments.drop_unknown,
+    };
+    let spec = scene::parse(&text, &path).map_err(Failure::input)?;
+    scene::load(&spec, &path, &options).map_err(Failure::input)
+}
+
+fn render(scene: &Scene, arguments: &RenderArguments) -> Result<Rendered, Failure> {
+    let settings = arguments.settings(scene.offset);
+    let whole = |rendering| Rendered { rendering, hull: None, geometry: None };
+    match &scene.kind {
+        Kind::Rectified { views, position } => {
+            let views: Vec<RectifiedView<'_>> = views
+                .iter()
+                .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
+                .collect();
+            rectified::render(&views, *position, &settings).map(whole).map_err(Failure::input)
+        }
+        Kind::Calibrated { views, camera, size } => {
+            let views: Vec<CalibratedView<'_>> = views
+                .iter()
+                .map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera })
+                .collect();
+            calibrated::render(&views, camera, *size, &settings).map(whole).map_err(Failure::input)
+        }
+        Kind::Uncalibrated { .. } => render_uncalibrated(&scene.kind, &settings, arguments),
+    }
+}
+
+fn render_uncalibrated(
+    kind: &Kind,
+    settings: &RenderSettings,
+    arguments: &RenderArguments,
+) -> Result<Rendered, Failure> {
+    let Kind::Uncalibrated { images, tracks, target, size } = kind else {
+        return Err(Failure::input("the scene has calibrated views"));
+    };
+    let images: Vec<&Image> = images.iter().collect();
+    let mut special = UncalibratedSettings::default();
+    special.robust.seed = arguments.seed;
+    let run = |special: &UncalibratedSettings| {
+        uncalibrated::render(&images, tracks, target, *size, settings, special).map_err(Failure::input)
+    };
+    let mut done: UncalibratedRendering = run(&special)?;
+    if arguments.reverse_order {
+        special.handedness = Some(match done.hand {
+            Handedness::Kept => Handedness::Reversed,
+            Handedness::Reversed => Handedness::Kept,
+        });
+        done = run(&special)?;
+    }
+    let geometry = Some(done.geometry);
+    Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
+}
+
+/// Figures over the region that counts, and over the whole image if that is another one.
+fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -> Result<(), Failure> {
+    let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", path.display()));
+    let image = &done.rendering.image;
+    let whole = quality::compare(image, truth, None).map_err(|e| named(&e))?;
+    let Some(hull) = &done.hull else {
+        whole.iter().for_each(|q| summary.compare(q));
+        return Ok(());
+    };
+    summary.compared_on = "hull";
+    let within = quality::compare(image, truth, Some(hull)).map_err(|e| named(&e))?;
+    within.iter().for_each(|q| summary.compare(q));
+    summary.whole_image = whole.map(|q| Figures { psnr: q.psnr, ssim: q.ssim, mae: q.mae });
+    Ok(())
+}
+
+/// White seen, grey crack, black disocclusion.
+fn mask_image(rendering: &Rendering) -> Image {
+    let (width, height) = rendering.image.size();
+    let mut image = Image::filled(width, height, 1, 0.0);
+    for (pixel, cover) in image.data_mut().iter_mut().zip(&rendering.mask) {
+        *pixel = match cover {
+            Cover::Seen => 255.0,
+            Cover::Crack => 128.0,
+            Cover::Disocclusion => 0.0,
+        };
+    }
+    image
+}
+
+/// Says on stderr what the figures alone may hide.
+fn warn(done: &Rendered) {
+    let coverage = done.rendering.coverage();
+    if coverage < 0.5 && done.hull.is_none() {
+        eprintln!("hybank-ibr: warning: only {:.1} % of the image is covered by samples", 100.0 * coverage);
+    }
+    if let Some(c) = done.rendering.report.convergence.filter(|c| !c.reached) {
+        eprintln!(
+            "hybank-ibr: warning: the plane fit stopped after {} steps at a relative residual of {:.1e}",
+            c.steps, c.residual
+        );
+    }
+    if let Some(g) = done.geometry.as_ref().filter(|g| g.order_agreement < 0.75) {
+        eprintln!(
+            "hybank-ibr: warning: only {:.0} % of the metric guesses agree on the order of depth; if near things lie behind far ones, use --reverse-order",
+            100.0 * g.order_agreement
+        );
+    }
+}
+
+fn report(summary: &Summary, arguments: &RenderArguments) -> Result<(), Failure> {
+    if arguments.json {
+        let json = serde_json::to_string(summary).map_err(Failure::input)?;
+        return output::print(&(json + "\n"));
+    }
+    if output::is_standard(&arguments.output) {
+        eprint!("{}", summary.text());
+        return Ok(());
+    }
+    output::print(&summary.text())
+}

@@ -1,0 +1,127 @@
+//! What a rendering came to, for people and for programmes.
+
+use crate::image::quality::Quality;
+use crate::interpolate::HoleCount;
+use crate::interpolate::plane::Convergence;
+use crate::pipeline::Rendering;
+use crate::pipeline::uncalibrated::GeometryReport;
+use crate::sample::Dropped;
+use serde::Serialize;
+
+/// Everything `--json` prints. Figures of merit are null without a truth; an infinite PSNR (equal images)
+/// is null too, with mae 0.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    pub(super) psnr: Option<f64>,
+    pub(super) ssim: Option<f64>,
+    pub(super) mae: Option<f64>,
+    /// Share of all pixels that samples reach.
+    pub(super) coverage: f64,
+    /// Time of the rendering, without reading, making depth dense, comparing and writing.
+    pub(super) seconds: f64,
+    /// Time of reading the files and making depth dense.
+    pub(super) preparation_seconds: f64,
+    pub(super) samples: SampleCount,
+    pub(super) holes: HoleCount,
+    /// Unknown depths filled before propagation.
+    pub(super) filled_depths: usize,
+    pub(super) size: [usize; 2],
+    /// Where psnr, ssim and mae were taken: the whole "image", or the "hull" of the features.
+    pub(super) compared_on: &'static str,
+    /// Share of the pixels that the comparison saw.
+    pub(super) compared_share: Option<f64>,
+    /// The same figures over the whole image, where that is another region.
+    pub(super) whole_image: Option<Figures>,
+    pub(super) convergence: Option<Convergence>,
+    pub(super) geometry: Option<GeometryReport>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct SampleCount {
+    pub(super) propagated: usize,
+    pub(super) occluded: usize,
+    pub(super) used: usize,
+    pub(super) dropped: Dropped,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Figures {
+    pub(super) psnr: f64,
+    pub(super) ssim: f64,
+    pub(super) mae: f64,
+}
+
+impl Summary {
+    /// A summary without figures of merit.
+    pub(super) fn new(rendering: &Rendering, seconds: f64, filled_depths: usize) -> Self {
+        let r = &rendering.report;
+        let (width, height) = rendering.image.size();
+        Self {
+            psnr: None,
+            ssim: None,
+            mae: None,
+            coverage: rendering.coverage(),
+            seconds,
+            preparation_seconds: 0.0,
+            samples: SampleCount {
+                propagated: r.propagated,
+                occluded: r.occluded,
+                used: r.used,
+                dropped: r.dropped,
+            },
+            holes: r.holes,
+            filled_depths,
+            size: [width, height],
+            compared_on: "image",
+            compared_share: None,
+            whole_image: None,
+            convergence: r.convergence,
+            geometry: None,
+        }
+    }
+
+    /// Puts in the figures of a comparison.
+    pub(super) fn compare(&mut self, quality: &Quality) {
+        (self.psnr, self.ssim, self.mae) = (Some(quality.psnr), Some(quality.ssim), Some(quality.mae));
+        self.compared_share = Some(quality.pixels as f64 / (self.size[0] * self.size[1]) as f64);
+    }
+
+    /// A few lines for people.
+    pub(super) fn text(&self) -> String {
+        let mut lines = Vec::new();
+        if let (Some(psnr), Some(ssim), Some(mae)) = (self.psnr, self.ssim, self.mae) {
+            lines.push(format!(
+                "PSNR      {psnr:.2} dB   SSIM {ssim:.4}   MAE {mae:.3}   (on the {})",
+                self.compared_on
+            ));
+        }
+        let s = &self.samples;
+        let d = &s.dropped;
+        lines.push(format!("coverage  {:.2} %", 100.0 * self.coverage));
+        lines.push(format!(
+            "samples   {} propagated, {} occluded, {} used; dropped: {} unknown depth, {} behind, {} outside",
+            s.propagated, s.occluded, s.used, d.unknown, d.behind, d.outside
+        ));
+        lines.push(format!(
+            "holes     {} px cracks, {} px disocclusions",
+            self.holes.crack, self.holes.disocclusion
+        ));
+        if self.filled_depths > 0 {
+            lines.push(format!(
+                "depth     {} unknown values filled from the farther neighbour",
+                self.filled_depths
+            ));
+        }
+        if let Some(g) = &self.geometry {
+            lines.push(format!(
+                "geometry  {} of {} matches agree (RMS {:.3} px); virtual camera from {} of {} (RMS {:.3} px)",
+                g.inliers, g.matches, g.sampson_rms, g.resection_inliers, g.sightings, g.resection_rms
+            ));
+        }
+        lines.push(format!(
+            "time      {:.3} s, after {:.3} s of reading and making depth dense",
+            self.seconds, self.preparation_seconds
+        ));
+        lines.join("\n") + "\n"
+    }
+}

@@ -1,0 +1,220 @@
+//! Depth and disparity maps: one value a pixel, NaN where unknown.
+
+mod fill;
+
+pub use fill::fill_unknown;
+
+/// What the numbers of a map say about distance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Pixels of disparity for a baseline of one: larger is nearer.
+    Disparity,
+    /// Depth along the optical axis: smaller is nearer.
+    Depth,
+}
+
+impl Measure {
+    /// The farther of two values.
+    pub fn farther(self, a: f32, b: f32) -> f32 {
+        match self {
+            Self::Disparity => a.min(b),
+            Self::Depth => a.max(b),
+        }
+    }
+}
+
+/// Faults of depth maps.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DepthError {
+    /// The scale that turns stored numbers into depth is of no use.
+    #[error("the scale is {scale}: it must be a positive number (stored value / scale = depth or disparity)")]
+    Scale {
+        /// The scale given.
+        scale: f64,
+    },
+    /// A map does not fit its image.
+    #[error(
+        "the map has {map_width} x {map_height} values, the image {width} x {height} pixels; with step {step} the map must have {expected_width} x {expected_height}"
+    )]
+    Size {
+        /// Width of the map.
+        map_width: usize,
+        /// Height of the map.
+        map_height: usize,
+        /// Width of the image.
+        width: usize,
+        /// Height of the image.
+        height: usize,
+        /// Pixels from one value of the map to the next.
+        step: usize,
+        /// Width that would fit.
+        expected_width: usize,
+        /// Height that would fit.
+        expected_height: usize,
+    },
+    /// Not one value of the map is known.
+    #[error(
+        "none of the {values} values is a positive finite number: without any depth nothing can be rendered"
+    )]
+    AllUnknown {
+        /// Values in the map.
+        values: usize,
+    },
+    /// A step of zero.
+    #[error("the step between depth samples is 0: it must be at least 1 pixel")]
+    Step,
+}
+
+/// A map of depths or disparities with NaN for unknown; known values are positive and finite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthMap {
+    width: usize,
+    height: usize,
+    measure: Measure,
+    data: Vec<f32>,
+}
+
+impl DepthMap {
+    /// A map from stored numbers: value / scale, with 0, negative numbers, NaN and infinities unknown.
+    ///
+    /// # Errors
+    /// [`DepthError::Scale`], [`DepthError::Size`] when the numbers do not fill the map, and
+    /// [`DepthError::AllUnknown`] when none of them is known.
+    pub fn new(
+        (width, height): (usize, usize),
+        stored: Vec<f32>,
+        scale: f64,
+        measure: Measure,
+    ) -> Result<Self, DepthError> {
+        if !(scale.is_finite() && scale > 0.0) {
+            return Err(DepthError::Scale { scale });
+        }
+        if stored.len() != width.saturating_mul(height) {
+            let (map_width, map_height) = (stored.len(), 1);
+            let (expected_width, expected_height) = (width, height);
+            let step = 1;
+            return Err(DepthError::Size {
+                map_width,
+                map_height,
+                width,
+                height,
+                step,
+                expected_width,
+                expected_height,
+            });
+        }
+        let data: Vec<f32> = stored.into_iter().map(|v| known(v, scale)).collect();
+        if data.iter().all(|v| v.is_nan()) {
+            return Err(DepthError::AllUnknown { values: data.len() });
+        }
+        Ok(Self { width, height, measure, data })
+    }
+
+    /// Width in values.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in values.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Width and height in values.
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// What the numbers mean.
+    pub fn measure(&self) -> Measure {
+        self.measure
+    }
+
+    /// All values, row by row, NaN where unknown.
+    pub fn data(&self) -> &[f32] {
+        &self.data
+    }
+
+    /// One row.
+    pub fn row(&self, y: usize) -> &[f32] {
+        &self.data[y * self.width..(y + 1) * self.width]
+    }
+
+    /// Number of unknown values.
+    pub fn unknown(&self) -> usize {
+        self.data.iter().filter(|v| v.is_nan()).count()
+    }
+
+    /// Every `step`-th value in both directions, from the first: what a coarse sensor would give.
+    ///
+    /// # Errors
+    /// [`DepthError::Step`] for step 0, [`DepthError::AllUnknown`] when no known value is left.
+    pub fn decimated(&self, step: usize) -> Result<Self, DepthError> {
+        if step == 0 {
+            return Err(DepthError::Step);
+        }
+        let rows = (0..self.height).step_by(step);
+        let data: Vec<f32> = rows.flat_map(|y| self.row(y).iter().copied().step_by(step)).collect();
+        let size = (self.width.div_ceil(step), self.height.div_ceil(step));
+        Self::new(size, data, 1.0, self.measure)
+    }
+
+    /// Refuses a map that does not belong to an image of `size` with one value every `step` pixels.
+    ///
+    /// # Errors
+    /// [`DepthError::Step`] and [`DepthError::Size`].
+    pub fn fits(&self, (width, height): (usize, usize), step: usize) -> Result<(), DepthError> {
+        if step == 0 {
+            return Err(DepthError::Step);
+        }
+        let (expected_width, expected_height) = (width.div_ceil(step), height.div_ceil(step));
+        if self.size() == (expected_width, expected_height) {
+            return Ok(());
+        }
+        let (map_width, map_height) = self.size();
+        Err(DepthError::Size { map_width, map_height, width, height, step, expected_width, expected_height })
+    }
+
+    pub(crate) fn from_known((width, height): (usize, usize), data: Vec<f32>, measure: Measure) -> Self {
+        debug_assert_eq!(data.len(), width * height);
+        Self { width, height, measure, data }
+    }
+}
+
+fn known(stored: f32, scale: f64) -> f32 {
+    let value = (f64::from(stored) / scale) as f32;
+    if value.is_finite() && value > 0.0 { value } else { f32::NAN }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stored_numbers_become_disparities() {
+        let stored = vec![8.0, 0.0, f32::NAN, f32::INFINITY, -4.0, 1.0];
+        let map = DepthMap::new((3, 2), stored, 4.0, Measure::Disparity).unwrap();
+        assert_eq!((map.data()[0], map.data()[5], map.unknown()), (2.0, 0.25, 4));
+    }
+
+    #[test]
+    fn useless_maps_are_refused() {
+        let new = |data: Vec<f32>, scale| DepthMap::new((2, 1), data, scale, Measure::Depth);
+        assert_eq!(new(vec![0.0, f32::NAN], 1.0), Err(DepthError::AllUnknown { values: 2 }));
+        assert!(matches!(new(vec![1.0; 3], 1.0), Err(DepthError::Size { map_width: 3, .. })));
+        for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(new(vec![1.0; 2], scale), Err(DepthError::Scale { .. })));
+        }
+    }
+
+    #[test]
+    fn coarse_maps_must_fit_their_step() {
+        let data: Vec<f32> = (1..=35).map(|v| v as f32).collect();
+        let map = DepthMap::new((7, 5), data, 1.0, Measure::Depth).unwrap();
+        let coarse = map.decimated(3).unwrap();
+        assert_eq!((coarse.size(), coarse.data()), ((3, 2), &[1.0, 4.0, 7.0, 22.0, 25.0, 28.0][..]));
+        assert!(coarse.fits((7, 5), 3).is_ok() && coarse.fits((9, 6), 3).is_ok());
+        assert!(matches!(coarse.fits((10, 6), 3), Err(DepthError::Size { expected_width: 4, .. })));
+        assert_eq!(map.decimated(0), Err(DepthError::Step));
+    }
+}

@@ -1,0 +1,258 @@
+//! Images: intensities 0..255 as f32, one or three interleaved channels, pixel centres at integers.
+
+pub mod colour;
+pub mod pfm;
+pub mod quality;
+mod read;
+mod write;
+
+pub use read::{read_image, read_map};
+pub use write::{encode, save};
+
+use std::path::PathBuf;
+
+/// Faults of image files and of images that do not fit together.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file cannot be opened or read.
+    #[error("{}: {source}; check the path (paths in a scene are relative to the scene file)", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is no image of a known format, or a damaged one.
+    #[error("{}: {reason}; readable are PNG, JPEG, PPM, PGM and PFM", path.display())]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder met.
+        reason: String,
+    },
+    /// The file cannot be written.
+    #[error("{}: {reason}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        reason: String,
+    },
+    /// The name of the output ends in nothing that is a known format.
+    #[error("{}: the ending names no image format; use .png, .jpg, .ppm, .pgm or .pfm", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A depth or disparity map with colours.
+    #[error(
+        "{}: a depth or disparity map has one value a pixel, but pixel ({x}, {y}) has different red, green and blue; save it as grey",
+        path.display()
+    )]
+    ColouredMap {
+        /// The file.
+        path: PathBuf,
+        /// Column of the first coloured pixel.
+        x: usize,
+        /// Row of the first coloured pixel.
+        y: usize,
+    },
+    /// Two images that belong together differ in size.
+    #[error(
+        "{left} has {left_width} x {left_height} pixels and {right} has {right_width} x {right_height}: they must agree"
+    )]
+    Sizes {
+        /// What one image is.
+        left: String,
+        /// What the other image is.
+        right: String,
+        /// Width of the one.
+        left_width: usize,
+        /// Height of the one.
+        left_height: usize,
+        /// Width of the other.
+        right_width: usize,
+        /// Height of the other.
+        right_height: usize,
+    },
+    /// A buffer that does not hold width * height * channels values.
+    #[error("{width} x {height} pixels of {channels} channels need {expected} values, {given} were given")]
+    Buffer {
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Channels, 1 or 3.
+        channels: usize,
+        /// Values needed.
+        expected: usize,
+        /// Values given.
+        given: usize,
+    },
+}
+
+/// A grey or RGB image, rows from the top, channels interleaved; black is 0 and white 255.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    width: usize,
+    height: usize,
+    channels: usize,
+    data: Vec<f32>,
+}
+
+impl Image {
+    /// An image from its values.
+    ///
+    /// # Errors
+    /// [`ImageError::Buffer`] unless `channels` is 1 or 3, neither side is 0 and the sizes multiply.
+    pub fn new(width: usize, height: usize, channels: usize, data: Vec<f32>) -> Result<Self, ImageError> {
+        let expected = width.saturating_mul(height).saturating_mul(channels);
+        if expected == 0 || !(channels == 1 || channels == 3) || data.len() != expected {
+            return Err(ImageError::Buffer { width, height, channels, expected, given: data.len() });
+        }
+        Ok(Self { width, height, channels, data })
+    }
+
+    /// An image of one value, with sides of at least one pixel; `channels` 3 is RGB, all else grey.
+    pub fn filled(width: usize, height: usize, channels: usize, value: f32) -> Self {
+        let (width, height) = (width.max(1), height.max(1));
+        let channels = if channels == 3 { 3 } else { 1 };
+        Self { width, height, channels, data: vec![value; width * height * channels] }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// 1 for grey, 3 for RGB.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// All values, row by row, channels interleaved.
+    pub fn data(&self) -> &[f32] {
+        &self.data
+    }
+
+    /// All values, for writing.
+    pub fn data_mut(&mut self) -> &mut [f32] {
+        &mut self.data
+    }
+
+    /// One row, channels interleaved.
+    pub fn row(&self, y: usize) -> &[f32] {
+        let stride = self.width * self.channels;
+        &self.data[y * stride..(y + 1) * stride]
+    }
+
+    /// The value of a pixel in C channels: grey is repeated, RGB asked for as grey gives its first C.
+    #[inline]
+    pub fn pixel<const C: usize>(&self, index: usize) -> [f32; C] {
+        let start = index * self.channels;
+        std::array::from_fn(|c| self.data[start + c.min(self.channels - 1)])
+    }
+
+    /// The same image with three channels.
+    pub fn to_rgb(&self) -> Self {
+        if self.channels == 3 {
+            return self.clone();
+        }
+        let data = self.data.iter().flat_map(|v| [*v; 3]).collect();
+        Self { channels: 3, data, ..*self }
+    }
+
+    /// Luma with the weights of ITU-R BT.601; a grey image as it is.
+    pub fn to_grey(&self) -> Self {
+        if self.channels == 1 {
+            return self.clone();
+        }
+        let luma = |p: &[f32]| 0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2];
+        Self { channels: 1, data: self.data.chunks_exact(3).map(luma).collect(), ..*self }
+    }
+
+    /// Every value rounded half up to a whole number in 0..=255, as it would be in an 8-bit file.
+    pub fn quantised(&self) -> Self {
+        let data = self.data.iter().map(|v| f32::from(to_byte(*v))).collect();
+        Self { data, ..*self }
+    }
+
+    /// Values 0..=255, rounded half up.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.data.iter().map(|v| to_byte(*v)).collect()
+    }
+
+    /// Refuses a companion of another size; the names go into the message.
+    ///
+    /// # Errors
+    /// [`ImageError::Sizes`].
+    pub fn same_size(&self, name: &str, other: (usize, usize), other_name: &str) -> Result<(), ImageError> {
+        if self.size() == other {
+            return Ok(());
+        }
+        Err(ImageError::Sizes {
+            left: name.into(),
+            right: other_name.into(),
+            left_width: self.width,
+            left_height: self.height,
+            right_width: other.0,
+            right_height: other.1,
+        })
+    }
+}
+
+/// Rounds half up into 0..=255; NaN becomes 0.
+#[inline]
+pub(crate) fn to_byte(value: f32) -> u8 {
+    (value + 0.5).floor().clamp(0.0, 255.0) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_checked_once() {
+        assert!(Image::new(2, 2, 3, vec![0.0; 12]).is_ok());
+        assert!(matches!(
+            Image::new(2, 2, 3, vec![0.0; 11]),
+            Err(ImageError::Buffer { expected: 12, given: 11, .. })
+        ));
+        assert!(Image::new(0, 2, 1, vec![]).is_err());
+        assert!(Image::new(1, 1, 2, vec![0.0; 2]).is_err());
+    }
+
+    #[test]
+    fn bytes_round_half_up_and_saturate() {
+        for (value, byte) in
+            [(-3.0, 0), (0.49, 0), (0.5, 1), (1.5, 2), (254.5, 255), (300.0, 255), (f32::NAN, 0)]
+        {
+            assert_eq!(to_byte(value), byte, "{value}");
+        }
+    }
+
+    #[test]
+    fn grey_and_colour_convert_into_each_other() {
+        let grey = Image::new(2, 1, 1, vec![10.0, 20.0]).unwrap();
+        assert_eq!(grey.to_rgb().data(), [10.0, 10.0, 10.0, 20.0, 20.0, 20.0]);
+        let back = grey.to_rgb().to_grey();
+        assert!(back.data().iter().zip(grey.data()).all(|(a, b)| (a - b).abs() < 1e-4));
+        assert_eq!(grey.pixel::<3>(1), [20.0; 3]);
+    }
+
+    #[test]
+    fn different_sizes_are_named() {
+        let message = Image::filled(4, 3, 1, 0.0).same_size("left", (5, 3), "truth").unwrap_err().to_string();
+        assert_eq!(message, "left has 4 x 3 pixels and truth has 5 x 3: they must agree");
+    }
+}

@@ -1,0 +1,125 @@
+//! Reading images and depth maps from files.
+
+use super::{Image, ImageError, pfm};
+use image::DynamicImage;
+use std::path::Path;
+
+/// Reads a grey or RGB image; 16-bit values are scaled to 0..255, PFM values (white = 1) times 255.
+///
+/// An alpha channel is ignored.
+///
+/// # Errors
+/// [`ImageError::Read`] and [`ImageError::Decode`], naming the file.
+pub fn read_image(path: &Path) -> Result<Image, ImageError> {
+    match load(path)? {
+        Loaded::Float(map) => {
+            let data = map.data.iter().map(|v| v * 255.0).collect();
+            Image::new(map.width, map.height, map.channels, data)
+        }
+        Loaded::Whole(picture) => whole_image(&picture, 1.0),
+    }
+}
+
+/// Reads a map of one value a pixel, as stored: 0..255, 0..65535 or floats.
+///
+/// Returns width, height and the values, rows from the top.
+///
+/// # Errors
+/// [`ImageError::Read`], [`ImageError::Decode`], and [`ImageError::ColouredMap`] for an RGB file
+/// whose channels differ.
+pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), ImageError> {
+    let image = match load(path)? {
+        Loaded::Float(map) => Image::new(map.width, map.height, map.channels, map.data)?,
+        Loaded::Whole(picture) => {
+            // Back from 0..255 to the stored numbers: 65535 / 255 = 257 exactly.
+            let stored = if is_deep(&picture) { 257.0 } else { 1.0 };
+            whole_image(&picture, stored)?
+        }
+    };
+    single_channel(path, image)
+}
+
+fn single_channel(path: &Path, image: Image) -> Result<(usize, usize, Vec<f32>), ImageError> {
+    let (width, height) = image.size();
+    if image.channels() == 1 {
+        return Ok((width, height, image.data));
+    }
+    let coloured = |p: &[f32]| p[0].to_bits() != p[1].to_bits() || p[1].to_bits() != p[2].to_bits();
+    if let Some(i) = image.data.chunks_exact(3).position(coloured) {
+        return Err(ImageError::ColouredMap { path: path.into(), x: i % width, y: i / width });
+    }
+    Ok((width, height, image.data.iter().copied().step_by(3).collect()))
+}
+
+enum Loaded {
+    Float(pfm::FloatMap),
+    Whole(DynamicImage),
+}
+
+fn load(path: &Path) -> Result<Loaded, ImageError> {
+    let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
+    let decode = |reason: String| ImageError::Decode { path: path.into(), reason };
+    if bytes.starts_with(b"PF") || bytes.starts_with(b"Pf") {
+        return pfm::decode(&bytes).map(Loaded::Float).map_err(decode);
+    }
+    image::load_from_memory(&bytes).map(Loaded::Whole).map_err(|e| decode(e.to_string()))
+}
+
+fn is_deep(picture: &DynamicImage) -> bool {
+    use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgba16};
+    matches!(picture, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_))
+}
+
+/// Values on the scale 0..255, times `factor`.
+fn whole_image(picture: &DynamicImage, factor: f32) -> Result<Image, ImageError> {
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let shallow = |v: &u8| f32::from(*v) * factor;
+    // 257 / factor divides exactly for maps (factor 257) and rounds once for images.
+    let deep = |v: &u16| f32::from(*v) / (257.0 / factor);
+    let (channels, data) = match (picture.color().has_color(), is_deep(picture)) {
+        (false, false) => (1, picture.to_luma8().as_raw().iter().map(shallow).collect()),
+        (true, false) => (3, picture.to_rgb8().as_raw().iter().map(shallow).collect()),
+        (false, true) => (1, picture.to_luma16().as_raw().iter().map(deep).collect()),
+        (true, true) => (3, picture.to_rgb16().as_raw().iter().map(deep).collect()),
+    };
+    Image::new(width, height, channels, data)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn temporary(name: &str, bytes: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        (dir, path)
+    }
+
+    #[test]
+    fn sixteen_bits_read_as_stored_and_as_intensity() {
+        let (_dir, path) = temporary("d.pgm", b"P5 2 1 65535\n\x01\x00\xff\xff");
+        assert_eq!(read_map(&path).unwrap(), (2, 1, vec![256.0, 65535.0]));
+        let image = read_image(&path).unwrap();
+        assert_eq!(image.data()[1], 255.0);
+        assert!((image.data()[0] - 256.0 / 257.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn colour_is_no_depth() {
+        let (_dir, path) = temporary("d.ppm", b"P6 2 1 255\n\x05\x05\x05\x07\x08\x09");
+        let message = read_map(&path).unwrap_err().to_string();
+        assert!(message.contains("pixel (1, 0)") && message.contains("d.ppm"), "{message}");
+        let (_dir, path) = temporary("d.ppm", b"P6 2 1 255\n\x05\x05\x05\x07\x07\x07");
+        assert_eq!(read_map(&path).unwrap().2, [5.0, 7.0]);
+    }
+
+    #[test]
+    fn missing_and_damaged_files_are_named() {
+        let missing = read_image(Path::new("/nowhere/at all.png")).unwrap_err().to_string();
+        assert!(missing.contains("/nowhere/at all.png"), "{missing}");
+        let (_dir, path) = temporary("x.png", b"not an image");
+        let damaged = read_image(&path).unwrap_err();
+        assert!(matches!(damaged, ImageError::Decode { .. }), "{damaged}");
+    }
+}

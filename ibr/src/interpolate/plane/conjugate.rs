@@ -1,0 +1,109 @@
+//! Conjugate gradients with the diagonal as preconditioner, one channel after the other.
+
+use super::stencil::Stencil;
+use super::{Convergence, PlaneSettings};
+use rayon::prelude::*;
+
+/// Entries handled together; the partial sums of a dot product follow this cut, not the threads.
+const CHUNK: usize = 8192;
+
+/// Solves A u = rhs for every channel; returns the values interleaved.
+pub(super) fn solve<const C: usize>(
+    stencil: &Stencil,
+    rhs: &[[f32; C]],
+    settings: &PlaneSettings,
+) -> (Vec<f32>, Convergence) {
+    let mut values = vec![0.0; rhs.len() * C];
+    let mut ended = Convergence { reached: true, ..Convergence::default() };
+    let mut work = Work::new(rhs.len());
+    let at = |p: usize, channel: usize| rhs[p][channel];
+    for channel in 0..C {
+        let one = work.solve(stencil, |p: usize| f64::from(at(p, channel)), settings);
+        ended.steps = ended.steps.max(one.steps);
+        ended.residual = ended.residual.max(one.residual);
+        ended.reached &= one.reached;
+        values.iter_mut().skip(channel).step_by(C).zip(&work.u).for_each(|(v, u)| *v = *u as f32);
+    }
+    (values, ended)
+}
+
+/// The four vectors of the iteration.
+struct Work {
+    u: Vec<f64>,
+    residual: Vec<f64>,
+    direction: Vec<f64>,
+    image: Vec<f64>,
+    /// Partial sums of dot products: one an image row or one a chunk, never more than pixels.
+    partial: Vec<f64>,
+}
+
+impl Work {
+    fn new(n: usize) -> Self {
+        let zeros = || vec![0.0; n];
+        Self { u: zeros(), residual: zeros(), direction: zeros(), image: zeros(), partial: Vec::new() }
+    }
+
+    /// Starts from the splat image rhs / diag, which is right but for the smoothing.
+    fn solve(&mut self, a: &Stencil, rhs: impl Fn(usize) -> f64, settings: &PlaneSettings) -> Convergence {
+        let rows = self.u.len();
+        self.partial.resize(a.rows().max(rows.div_ceil(CHUNK)), 0.0);
+        (0..rows).for_each(|p| self.u[p] = rhs(p) / a.diagonal(p));
+        self.multiply_start(a);
+        (0..rows).for_each(|p| self.residual[p] = rhs(p) - self.image[p]);
+        (0..rows).for_each(|p| self.direction[p] = self.residual[p] / a.diagonal(p));
+        let scale: f64 =
+            (0..rows).map(|p| rhs(p) * rhs(p) / a.diagonal(p)).sum::<f64>().max(f64::MIN_POSITIVE);
+        let mut energy: f64 = (0..rows).map(|p| self.residual[p] * self.direction[p]).sum();
+        let mut steps = 0;
+        while steps < settings.iterations && energy > scale * settings.tolerance * settings.tolerance {
+            let curvature = a.multiply(&self.direction, &mut self.image, partials(&mut self.partial, a));
+            if !(curvature.is_finite() && curvature > 0.0) {
+                break;
+            }
+            let next = self.step(a, energy / curvature);
+            self.turn(a, next / energy);
+            energy = next;
+            steps += 1;
+        }
+        let residual = (energy / scale).sqrt();
+        Convergence { steps, residual, reached: residual <= settings.tolerance }
+    }
+
+    /// image = A u.
+    fn multiply_start(&mut self, a: &Stencil) {
+        a.multiply(&self.u, &mut self.image, partials(&mut self.partial, a));
+    }
+
+    /// Goes `length` along the direction; returns the new residual's energy r . D^{-1} r.
+    fn step(&mut self, a: &Stencil, length: f64) -> f64 {
+        let chunks = self.u.len().div_ceil(CHUNK);
+        let blocks = self.u.par_chunks_mut(CHUNK).zip(self.residual.par_chunks_mut(CHUNK));
+        let inputs = self.direction.par_chunks(CHUNK).zip(self.image.par_chunks(CHUNK));
+        blocks.zip(inputs).zip(self.partial[..chunks].par_iter_mut()).enumerate().for_each(
+            |(k, (((u, r), (p, q)), sum))| {
+                *sum = 0.0;
+                for i in 0..u.len() {
+                    u[i] += length * p[i];
+                    r[i] -= length * q[i];
+                    *sum += r[i] * r[i] / a.diagonal(k * CHUNK + i);
+                }
+            },
+        );
+        self.partial[..chunks].iter().sum()
+    }
+
+    /// direction = D^{-1} residual + factor direction.
+    fn turn(&mut self, a: &Stencil, factor: f64) {
+        let blocks = self.direction.par_chunks_mut(CHUNK).zip(self.residual.par_chunks(CHUNK));
+        blocks.enumerate().for_each(|(k, (p, r))| {
+            for i in 0..p.len() {
+                p[i] = r[i] / a.diagonal(k * CHUNK + i) + factor * p[i];
+            }
+        });
+    }
+}
+
+/// One partial sum a row of the image.
+fn partials<'a>(partial: &'a mut [f64], a: &Stencil) -> &'a mut [f64] {
+    &mut partial[..a.rows()]
+}

@@ -1,0 +1,407 @@
+//! The plane fit: the whole virtual image at once, samples anywhere (the row fit carried to two dimensions).
+//!
+//! With u the pixels, B_s the bilinear weights of sample s and g_pq the stiffness of the edge between
+//! neighbouring pixels p and q, minimise
+//!
+//! ```text
+//! sum_s (I_s - sum_p B_sp u_p)^2 + sum_pq g_pq (u_p - u_q)^2 + sum_pqr h_pqr (u_p - 2 u_q + u_r)^2,
+//! g_pq = stiffness / (1 + ((D_p - D_q) / k)^2) + edge_stiffness,   h_pqr = bending / (1 + (range D / k)^2)
+//! ```
+//!
+//! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in units
+//! of the depth test's sigma. The bending term smooths like a cubic spline: it leaves slopes alone and noise not.
+//! Thirteen unknowns meet in an equation; conjugate gradients with the diagonal as preconditioner solve it channel by channel.
+
+mod background;
+mod conjugate;
+mod stencil;
+
+use super::{Cover, HoleFill, InterpolationError, Settings};
+use crate::sample::Sample;
+use stencil::Stencil;
+
+/// Settings of the plane fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaneSettings {
+    /// Weight of the squared difference of neighbouring pixels on one surface.
+    pub stiffness: f64,
+    /// Weight of the squared second difference within one surface.
+    pub bending: f64,
+    /// The part of the stiffness that stays across depth edges.
+    pub edge_stiffness: f64,
+    /// Relative residual at which the conjugate gradients stop.
+    pub tolerance: f64,
+    /// Their greatest number of steps for a channel.
+    pub iterations: usize,
+}
+
+impl Default for PlaneSettings {
+    fn default() -> Self {
+        Self { stiffness: 0.12, bending: 0.02, edge_stiffness: 1e-3, tolerance: 1e-5, iterations: 500 }
+    }
+}
+
+/// How the conjugate gradients ended.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Convergence {
+    /// Steps taken, the most over the channels.
+    pub steps: usize,
+    /// Relative residual reached, the largest over the channels.
+    pub residual: f64,
+    /// Whether every channel reached the tolerance within the allowed steps.
+    pub reached: bool,
+}
+
+/// What the plane fit found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaneFit {
+    /// Values 0..255, `width * height * C`.
+    pub values: Vec<f32>,
+    /// How each pixel came to its value.
+    pub mask: Vec<Cover>,
+    /// How the solver ended.
+    pub convergence: Convergence,
+}
+
+/// Collects surviving samples, band by band if need be, and then fits the image.
+#[derive(Debug, Clone)]
+pub struct PlaneProblem<const C: usize> {
+    width: usize,
+    height: usize,
+    stencil: Stencil,
+    rhs: Vec<[f32; C]>,
+    /// Depth of the sample nearest to each pixel centre, NaN where none lies within half a gap.
+    depth: Vec<f32>,
+    /// Squared distance of that sample.
+    distance: Vec<f32>,
+    settings: Settings,
+    added: usize,
+}
+
+impl<const C: usize> PlaneProblem<C> {
+    /// An empty problem.
+    ///
+    /// # Errors
+    /// [`InterpolationError::Setting`].
+    pub fn new((width, height): (usize, usize), settings: &Settings) -> Result<Self, InterpolationError> {
+        settings.check()?;
+        let pixels = width * height;
+        Ok(Self {
+            width,
+            height,
+            stencil: Stencil::new(width, height),
+            rhs: vec![[0.0; C]; pixels],
+            depth: vec![f32::NAN; pixels],
+            distance: vec![f32::INFINITY; pixels],
+            settings: *settings,
+            added: 0,
+        })
+    }
+
+    /// Adds surviving samples. Those more than half a pixel outside the image are passed over; the
+    /// others there count as lying on its border.
+    ///
+    /// # Errors
+    /// [`InterpolationError::NotFinite`].
+    pub fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
+        super::check_samples(samples)?;
+        let (right, bottom) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
+        for s in samples {
+            let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
+            if inside {
+                self.register(s);
+                self.splat(s.x.clamp(0.0, right), s.y.clamp(0.0, bottom), &s.value);
+                self.added += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Samples that have been added.
+    pub fn samples(&self) -> usize {
+        self.added
+    }
+
+    /// Whether a sample lies within half a gap of each pixel.
+    pub fn seen(&self) -> impl Iterator<Item = bool> + '_ {
+        self.depth.iter().map(|d| !d.is_nan())
+    }
+
+    /// Adds a sample to both sides of the normal equations.
+    fn splat(&mut self, x: f64, y: f64, value: &[f32; C]) {
+        let (pixel, weights) = self.stencil.bilinear(x, y);
+        self.stencil.add_sample(pixel, &weights);
+        for (q, w) in self.stencil.corners(pixel, &weights) {
+            self.rhs[q].iter_mut().zip(value).for_each(|(r, v)| *r += w * v);
+        }
+    }
+
+    /// Notes the depth of the sample at the pixels within half a gap of it, unless a closer one did.
+    fn register(&mut self, s: &Sample<C>) {
+        let half = self.settings.holes.gap / 2.0;
+        let range = |centre: f64, length: usize| {
+            let end = ((centre + half).floor() + 1.0) as usize;
+            ((centre - half).ceil() as usize).min(length)..end.min(length)
+        };
+        for row in range(s.y, self.height) {
+            for column in range(s.x, self.width) {
+                let (dx, dy) = (s.x - column as f64, s.y - row as f64);
+                let squared = dx * dx + dy * dy;
+                let p = row * self.width + column;
+                if squared <= half * half && (squared as f32) < self.distance[p] {
+                    (self.distance[p], self.depth[p]) = (squared as f32, s.depth);
+                }
+            }
+        }
+    }
+
+    /// Fits the image. With `region`, only the pixels where it is true are filled and fitted together;
+    /// all others become black disocclusions.
+    ///
+    /// # Errors
+    /// [`InterpolationError::NoSamples`] when no sample was added.
+    pub fn solve(mut self, region: Option<&[bool]>) -> Result<PlaneFit, InterpolationError> {
+        let (width, height) = (self.width, self.height);
+        if self.added == 0 {
+            return Err(InterpolationError::NoSamples { width, height });
+        }
+        let inside = |p: usize| region.is_none_or(|r| r.get(p).copied().unwrap_or(false));
+        let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
+        self.distance = Vec::new();
+        if self.settings.holes.fill == HoleFill::Background {
+            self.fill_background(&mask, &inside);
+        }
+        self.connect(&inside);
+        let (mut values, convergence) = conjugate::solve(&self.stencil, &self.rhs, &self.settings.plane);
+        (0..width * height).filter(|p| !inside(*p)).for_each(|p| {
+            mask[p] = Cover::Disocclusion;
+            values[p * C..(p + 1) * C].fill(0.0);
+        });
+        if self.settings.holes.fill == HoleFill::Leave {
+            super::rows::blacken(&mask, &mut values, C);
+        }
+        values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
+        Ok(PlaneFit { values, mask, convergence })
+    }
+
+    /// Gives every hole pixel a sample with value and depth of the farthest surface around it.
+    fn fill_background(&mut self, mask: &[Cover], inside: &dyn Fn(usize) -> bool) {
+        let sources = background::farthest(&self.depth, self.width);
+        // The value of a seen pixel before the fit: its share of the right-hand side.
+        let seen: Vec<[f32; C]> = (0..self.rhs.len())
+            .map(|p| self.rhs[p].map(|r| r / self.stencil.sample_weight(p).max(f32::MIN_POSITIVE)))
+            .collect();
+        for p in (0..mask.len()).filter(|p| mask[*p] != Cover::Seen && inside(*p)) {
+            if let Some(source) = sources[p].map(|s| s as usize) {
+                self.depth[p] = self.depth[source];
+                self.splat((p % self.width) as f64, (p / self.width) as f64, &seen[source]);
+            }
+        }
+    }
+
+    /// Adds the edges between neighbouring pixels and the bends of triples.
+    fn connect(&mut self, inside: &dyn Fn(usize) -> bool) {
+        for p in 0..self.depth.len() {
+            if !inside(p) {
+                self.stencil.isolate(p);
+                continue;
+            }
+            for direction in [Direction::Right, Direction::Down] {
+                let Some(q) = self.next(p, direction).filter(|q| inside(*q)) else { continue };
+                self.add_edge(p, q, direction);
+                if let Some(r) = self.next(q, direction).filter(|r| inside(*r)) {
+                    self.add_bend([p, q, r], direction);
+                }
+            }
+        }
+    }
+
+    fn next(&self, p: usize, direction: Direction) -> Option<usize> {
+        match direction {
+            Direction::Right => (p % self.width + 1 < self.width).then_some(p + 1),
+            Direction::Down => (p + self.width < self.depth.len()).then_some(p + self.width),
+        }
+    }
+
+    fn add_edge(&mut self, p: usize, q: usize, direction: Direction) {
+        let plane = &self.settings.plane;
+        let steps = self.steps(&[p, q]);
+        let g = (plane.stiffness / (1.0 + steps * steps) + plane.edge_stiffness) as f32;
+        match direction {
+            Direction::Right => self.stencil.add_edge_right(p, g),
+            Direction::Down => self.stencil.add_edge_down(p, g),
+        }
+    }
+
+    fn add_bend(&mut self, triple: [usize; 3], direction: Direction) {
+        let steps = self.steps(&triple);
+        let h = (self.settings.plane.bending / (1.0 + steps * steps)) as f32;
+        match direction {
+            Direction::Right => self.stencil.add_bend_right(triple[0], h),
+            Direction::Down => self.stencil.add_bend_down(triple[0], h),
+        }
+    }
+
+    /// Range of the depths of some pixels in units of the depth test's sigma. Unknown depths (bridged holes)
+    /// count as lying on the surface of the others.
+    fn steps(&self, pixels: &[usize]) -> f64 {
+        let test = &self.settings.depth_test;
+        let depths = pixels.iter().map(|p| self.depth[*p]).filter(|d| !d.is_nan());
+        let (near, far) = depths.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), d| (a.min(d), b.max(d)));
+        if far <= near {
+            return 0.0;
+        }
+        f64::from(far - near) / (test.relative * f64::from(near) + test.absolute)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Direction {
+    Right,
+    Down,
+}
+
+/// The whole third stage for samples anywhere: a value for every pixel and the mask.
+///
+/// # Errors
+/// [`InterpolationError`]: settings, samples that are no numbers, and no sample at all.
+pub fn interpolate<const C: usize>(
+    samples: &[Sample<C>],
+    size: (usize, usize),
+    settings: &Settings,
+) -> Result<PlaneFit, InterpolationError> {
+    let mut problem = PlaneProblem::new(size, settings)?;
+    problem.add(samples)?;
+    problem.solve(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interpolate::HoleSettings;
+
+    fn sample(x: f64, y: f64, depth: f32, value: f32) -> Sample<1> {
+        Sample { x, y, depth, value: [value], ..Sample::BLANK }
+    }
+
+    /// Irregular samples of one depth with values f(x, y).
+    fn scattered(size: usize, f: impl Fn(f64, f64) -> f64) -> Vec<Sample<1>> {
+        (0..size * size * 2)
+            .map(|i| {
+                let place = |k: usize| ((i * k + 7) % 1009) as f64 / 1009.0 * (size as f64 - 1.0);
+                let (x, y) = (place(389), place(631));
+                sample(x, y, 1.0, f(x, y) as f32)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_constant_stays_constant() {
+        let fit = interpolate(&scattered(12, |_, _| 91.0), (12, 12), &Settings::default()).unwrap();
+        assert!(fit.values.iter().all(|v| (v - 91.0).abs() < 2e-2), "{:?}", fit.values);
+        assert!(fit.convergence.reached, "{:?}", fit.convergence);
+    }
+
+    /// The normal equations by their definition, dense, solved by elimination.
+    #[test]
+    fn equal_to_the_dense_solution() {
+        let size = 7;
+        let samples = scattered(size, |x, y| 128.0 + 60.0 * (x * 1.1).sin() * (y * 0.9).cos());
+        let mut settings = Settings::default();
+        settings.plane.tolerance = 1e-9;
+        settings.holes.fill = HoleFill::Bridge;
+        let fit = interpolate(&samples, (size, size), &settings).unwrap();
+        let n = size * size;
+        let mut a = vec![vec![0.0; n + 1]; n];
+        for s in &samples {
+            let weight = |p: usize| {
+                let hat = |t: f64| (1.0 - t.abs()).max(0.0);
+                hat(s.x - (p % size) as f64) * hat(s.y - (p / size) as f64)
+            };
+            for (p, row) in a.iter_mut().enumerate() {
+                (0..n).for_each(|q| row[q] += weight(p) * weight(q));
+                row[n] += weight(p) * f64::from(s.value[0]);
+            }
+        }
+        let g = settings.plane.stiffness + settings.plane.edge_stiffness;
+        for p in 0..n {
+            let right = (p % size + 1 < size).then_some(p + 1);
+            let down = (p + size < n).then_some(p + size);
+            for q in right.into_iter().chain(down) {
+                a[p][p] += g;
+                a[q][q] += g;
+                a[p][q] -= g;
+                a[q][p] -= g;
+            }
+            let bends = [(1, p % size + 2 < size), (size, p + 2 * size < n)];
+            for (stride, _) in bends.into_iter().filter(|b| b.1) {
+                let triple = [(p, 1.0), (p + stride, -2.0), (p + 2 * stride, 1.0)];
+                for (i, x) in triple {
+                    triple.iter().for_each(|(j, y)| a[i][*j] += settings.plane.bending * x * y);
+                }
+            }
+        }
+        for k in 0..n {
+            let top = a[k].clone();
+            for (i, row) in a.iter_mut().enumerate() {
+                if i != k {
+                    let factor = row[k] / top[k];
+                    row.iter_mut().zip(&top).for_each(|(x, t)| *x -= factor * t);
+                }
+            }
+        }
+        for (p, row) in a.iter().enumerate() {
+            let want = row[n] / row[p];
+            assert!((f64::from(fit.values[p]) - want).abs() < 2e-3, "{p}: {} {want}", fit.values[p]);
+        }
+    }
+
+    #[test]
+    fn disocclusions_take_the_farther_side() {
+        let mut samples = Vec::new();
+        for y in 0..12 {
+            for x in 0..30 {
+                match x {
+                    0..10 => samples.push(sample(x as f64, y as f64, 1.0, 200.0)),
+                    20.. => samples.push(sample(x as f64, y as f64, 4.0, 40.0)),
+                    _ => {}
+                }
+            }
+        }
+        let fit = interpolate(&samples, (30, 12), &Settings::default()).unwrap();
+        let row = &fit.values[150..180];
+        assert!(row[11..20].iter().all(|v| (v - 40.0).abs() < 5.0), "{row:?}");
+        assert!(row[9] > 190.0, "{row:?}");
+        assert!(fit.mask[160..170].iter().all(|c| *c == Cover::Disocclusion));
+        let holes = HoleSettings { fill: HoleFill::Leave, ..HoleSettings::default() };
+        let left = interpolate(&samples, (30, 12), &Settings { holes, ..Settings::default() }).unwrap();
+        assert!(left.values[160..170].iter().all(|v| *v == 0.0));
+    }
+
+    #[test]
+    fn outside_the_region_nothing_is_invented() {
+        let samples = scattered(10, |_, _| 80.0);
+        let mut problem = PlaneProblem::new((14, 10), &Settings::default()).unwrap();
+        problem.add(&samples).unwrap();
+        let region: Vec<bool> = (0..140).map(|p| p % 14 < 10).collect();
+        let fit = problem.solve(Some(&region)).unwrap();
+        for (p, inside) in region.iter().enumerate() {
+            let want = if *inside { 80.0 } else { 0.0 };
+            assert!((fit.values[p] - want).abs() < 0.1, "{p} {}", fit.values[p]);
+            assert!(*inside || fit.mask[p] == Cover::Disocclusion);
+        }
+    }
+
+    #[test]
+    fn bands_add_up_and_empty_problems_fail() {
+        let samples = scattered(9, |x, y| 10.0 * x + y);
+        let whole = interpolate(&samples, (9, 9), &Settings::default()).unwrap();
+        let mut problem = PlaneProblem::new((9, 9), &Settings::default()).unwrap();
+        let (a, b) = samples.split_at(50);
+        problem.add(a).unwrap();
+        problem.add(b).unwrap();
+        assert_eq!(problem.solve(None).unwrap(), whole);
+        let empty = PlaneProblem::<1>::new((4, 3), &Settings::default()).unwrap();
+        assert_eq!(empty.solve(None), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
+    }
+}

@@ -1,0 +1,337 @@
+//! The row fit: one regularised B-spline a row (thesis eq. 2.4 and 2.5).
+//!
+//! ```text
+//! J(x) = sum_m c_m beta(x - m),   f(c) = sum_s (I_s - J(x_s))^2 + lambda V_s J'(x_s)^2 + tau sum_m (c_m - c_{m-1})^2
+//! ```
+
+use super::{Cover, HoleFill, InterpolationError, Settings, Variation};
+use crate::sample::Sample;
+use hybank::sampling::Fit;
+
+/// Keeps the normal equations definite where lambda and tau are 0; far below any weight that counts.
+const RIDGE: f64 = 1e-9;
+
+/// Work memory of the row fit, reused from row to row.
+#[derive(Debug, Clone)]
+pub struct RowWork<const ORDER: usize, const C: usize> {
+    fit: Fit<ORDER, C>,
+    smoothing: Vec<f64>,
+    sums: Vec<(f64, f64)>,
+    width: usize,
+}
+
+impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
+    /// For rows of `width` >= 1 pixels.
+    pub fn new(width: usize) -> Self {
+        let fit = Fit::covering(width.max(1) - 1);
+        Self { fit, smoothing: Vec::new(), sums: Vec::new(), width }
+    }
+
+    /// How far outside the image samples still take part, in pixels.
+    pub const MARGIN: f64 = (ORDER - 2) as f64;
+
+    /// Interpolates one row from its surviving samples, sorted by column.
+    ///
+    /// Writes `width * C` values 0..255 and the mask, one entry a pixel. A row without samples is left
+    /// as it is, with every pixel a disocclusion, and false is returned.
+    ///
+    /// # Errors
+    /// What the solver says if tau is 0 and the holes are not filled.
+    pub fn interpolate(
+        &mut self,
+        samples: &[Sample<C>],
+        settings: &Settings,
+        values: &mut [f32],
+        mask: &mut [Cover],
+    ) -> Result<bool, hybank::sampling::SamplingError> {
+        mask.fill(Cover::Disocclusion);
+        let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Ok(false) };
+        self.fit.clear();
+        self.weigh(samples, settings);
+        for (s, mu) in samples.iter().zip(&self.smoothing) {
+            self.fit.add(s.x, &s.value.map(f64::from), 1.0, settings.fit.lambda * mu);
+        }
+        mark(samples, settings, mask);
+        if settings.holes.fill == HoleFill::Background {
+            self.continue_background(samples, settings);
+            let edge = self.width as f64 - 1.0;
+            self.replicate(first, -1.0, first.x, settings);
+            self.replicate(last, last.x, edge + 1.0, settings);
+        }
+        self.fit.regularise(settings.fit.tau, RIDGE);
+        self.fit.solve()?;
+        for (out, value) in values.as_chunks_mut::<C>().0.iter_mut().zip(self.fit.knot_values(0)) {
+            *out = value.map(|v| v.clamp(0.0, 255.0) as f32);
+        }
+        if settings.holes.fill == HoleFill::Leave {
+            blacken(mask, values, C);
+        }
+        Ok(true)
+    }
+
+    /// V_s of every sample, from the variance of the depth within max(epsilon, 1 px).
+    fn weigh(&mut self, samples: &[Sample<C>], settings: &Settings) {
+        self.smoothing.clear();
+        let Variation::Local { s0 } = settings.fit.variation else {
+            self.smoothing.resize(samples.len(), 1.0);
+            return;
+        };
+        let mean = samples.iter().map(|s| f64::from(s.depth)).sum::<f64>() / samples.len() as f64;
+        // Prefix sums of z and z^2; about the mean, so that their differences keep their digits.
+        self.sums.clear();
+        self.sums.push((0.0, 0.0));
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for s in samples {
+            let z = f64::from(s.depth) / mean - 1.0;
+            (sum, squares) = (sum + z, squares + z * z);
+            self.sums.push((sum, squares));
+        }
+        let radius = settings.depth_test.epsilon.max(1.0);
+        let (mut from, mut to) = (0, 0);
+        for s in samples {
+            while samples[from].x < s.x - radius {
+                from += 1;
+            }
+            while to < samples.len() && samples[to].x <= s.x + radius {
+                to += 1;
+            }
+            let (a, b, n) = (self.sums[from], self.sums[to], (to - from) as f64);
+            let mean = (b.0 - a.0) / n;
+            let variance = ((b.1 - a.1) / n - mean * mean).max(0.0);
+            self.smoothing.push(1.0 / (1.0 + variance / (s0 * s0)));
+        }
+    }
+
+    /// Fills the gaps between neighbours with copies of the farther one, about a pixel apart.
+    fn continue_background(&mut self, samples: &[Sample<C>], settings: &Settings) {
+        for pair in samples.windows(2) {
+            if pair[1].x - pair[0].x > settings.holes.gap {
+                let farther = if pair[1].depth > pair[0].depth { &pair[1] } else { &pair[0] };
+                self.replicate(farther, pair[0].x, pair[1].x, settings);
+            }
+        }
+    }
+
+    /// Puts copies of a sample between two places, the ends left out.
+    fn replicate(&mut self, sample: &Sample<C>, from: f64, to: f64, settings: &Settings) {
+        let parts = (to - from).round().max(1.0);
+        let value = sample.value.map(f64::from);
+        for k in 1..parts as usize {
+            let x = from + (to - from) * k as f64 / parts;
+            self.fit.add(x, &value, 1.0, settings.fit.lambda);
+        }
+    }
+}
+
+/// Marks the pixels near a sample as seen and those in gaps of one depth as cracks.
+fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [Cover]) {
+    let half = settings.holes.gap / 2.0;
+    for pair in samples.windows(2) {
+        let (near, far) = (pair[0].depth.min(pair[1].depth), pair[0].depth.max(pair[1].depth));
+        let gap = pair[1].x - pair[0].x;
+        let one_surface = !settings.depth_test.hides(f64::from(near), f64::from(far));
+        if gap > settings.holes.gap && one_surface {
+            pixels(pair[0].x, pair[1].x, mask.len()).for_each(|j| mask[j] = Cover::Crack);
+        }
+    }
+    for s in samples {
+        pixels(s.x - half, s.x + half, mask.len()).for_each(|j| mask[j] = Cover::Seen);
+    }
+}
+
+/// The pixels from `low` to `high`, both included.
+fn pixels(low: f64, high: f64, width: usize) -> std::ops::Range<usize> {
+    // Casts saturate and cut toward zero: what lies outside the image is cut off, and above -1 the
+    // floor of high + 1 is its integer part (rounding functions are library calls on baseline x86-64).
+    let end = ((high + 1.0) as usize).min(width);
+    let start = low.max(0.0);
+    let whole = start as usize;
+    let start = whole + usize::from((whole as f64) < start);
+    start.min(end)..end
+}
+
+/// Leaves holes black.
+pub(super) fn blacken(mask: &[Cover], values: &mut [f32], channels: usize) {
+    for (pixel, _) in values.chunks_exact_mut(channels).zip(mask).filter(|(_, c)| **c != Cover::Seen) {
+        pixel.fill(0.0);
+    }
+}
+
+/// Copies rows without any sample from the nearest row that has some; `filled` tells which have.
+pub fn fill_empty_rows(filled: &[bool], values: &mut [f32]) {
+    let full: Vec<usize> = (0..filled.len()).filter(|y| filled[*y]).collect();
+    let stride = values.len() / filled.len().max(1);
+    for y in (0..filled.len()).filter(|y| !filled[*y]) {
+        if let Some(&nearest) = full.iter().min_by_key(|other| other.abs_diff(y)) {
+            values.copy_within(nearest * stride..(nearest + 1) * stride, y * stride);
+        }
+    }
+}
+
+/// The whole third stage for samples on whole rows, in any order: a value for every pixel and the mask.
+///
+/// # Errors
+/// [`InterpolationError`]: settings, samples that are no numbers or lie between rows, and no sample at all.
+pub fn interpolate<const C: usize>(
+    samples: &[Sample<C>],
+    (width, height): (usize, usize),
+    settings: &Settings,
+) -> Result<(Vec<f32>, Vec<Cover>), InterpolationError> {
+    match settings.fit.degree {
+        super::Degree::Linear => interpolate_with::<2, C>(samples, (width, height), settings),
+        super::Degree::Cubic => interpolate_with::<4, C>(samples, (width, height), settings),
+    }
+}
+
+fn interpolate_with<const ORDER: usize, const C: usize>(
+    samples: &[Sample<C>],
+    (width, height): (usize, usize),
+    settings: &Settings,
+) -> Result<(Vec<f32>, Vec<Cover>), InterpolationError> {
+    settings.check()?;
+    super::check_samples(samples)?;
+    if let Some(index) = samples.iter().position(|s| s.y.fract() != 0.0) {
+        return Err(InterpolationError::BetweenRows { index, row: samples[index].y });
+    }
+    let mut rows: Vec<Vec<Sample<C>>> = vec![Vec::new(); height];
+    for s in samples.iter().filter(|s| s.y >= 0.0 && s.y < height as f64) {
+        rows[s.y as usize].push(*s);
+    }
+    let mut values = vec![0.0; width * height * C];
+    let mut mask = vec![Cover::Disocclusion; width * height];
+    let mut work = RowWork::<ORDER, C>::new(width);
+    let mut filled = vec![false; height];
+    let outputs = values.chunks_exact_mut(width * C).zip(mask.chunks_exact_mut(width));
+    for (y, (row, (out, mask))) in rows.iter_mut().zip(outputs).enumerate() {
+        row.sort_by(|a, b| a.x.total_cmp(&b.x));
+        filled[y] = work
+            .interpolate(row, settings, out, mask)
+            .map_err(|source| InterpolationError::Fit { row: y, source })?;
+    }
+    if !filled.contains(&true) {
+        return Err(InterpolationError::NoSamples { width, height });
+    }
+    if settings.holes.fill != HoleFill::Leave {
+        fill_empty_rows(&filled, &mut values);
+    }
+    Ok((values, mask))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interpolate::HoleSettings;
+
+    fn sample(x: f64, depth: f32, value: f32) -> Sample<1> {
+        Sample { x, depth, value: [value], ..Sample::BLANK }
+    }
+
+    fn run(samples: &[Sample<1>], width: usize, settings: &Settings) -> (Vec<f32>, Vec<Cover>) {
+        interpolate(samples, (width, 1), settings).unwrap()
+    }
+
+    fn filling(fill: HoleFill) -> Settings {
+        Settings { holes: HoleSettings { fill, ..HoleSettings::default() }, ..Settings::default() }
+    }
+
+    #[test]
+    fn a_constant_stays_constant() {
+        let samples: Vec<_> = (0..40).map(|i| sample(i as f64 * 0.53 - 0.4, 1.0, 77.0)).collect();
+        let (values, mask) = run(&samples, 20, &Settings::default());
+        assert!(values.iter().all(|v| (v - 77.0).abs() < 1e-4), "{values:?}");
+        assert!(mask.iter().all(|c| *c == Cover::Seen));
+    }
+
+    #[test]
+    fn disocclusions_take_the_farther_side() {
+        // Near and bright on the left, far and dark on the right, a hole of ten pixels between.
+        let mut samples: Vec<_> = (0..10).map(|i| sample(i as f64, 1.0, 200.0)).collect();
+        samples.extend((20..30).map(|i| sample(i as f64, 4.0, 40.0)));
+        let (values, mask) = run(&samples, 30, &Settings::default());
+        assert!(values[12..20].iter().all(|v| (v - 40.0).abs() < 6.0), "{values:?}");
+        assert!(mask[10..20].iter().all(|c| *c == Cover::Disocclusion), "{mask:?}");
+        assert!(mask[..10].iter().chain(&mask[20..]).all(|c| *c == Cover::Seen));
+        let (values, _) = run(&samples, 30, &filling(HoleFill::Leave));
+        assert!(values[10..20].iter().all(|v| *v == 0.0) && values[5] > 190.0);
+        let (values, _) = run(&samples, 30, &filling(HoleFill::Bridge));
+        assert!(values[10..19].windows(2).all(|w| w[0] > w[1]), "{values:?}");
+    }
+
+    #[test]
+    fn a_stretched_surface_is_a_crack() {
+        let samples: Vec<_> = [0.0, 1.0, 2.0, 5.0, 6.0, 7.0].map(|x| sample(x, 2.0, 10.0)).to_vec();
+        let (_, mask) = run(&samples, 10, &Settings::default());
+        assert_eq!(mask[3], Cover::Crack);
+        assert_eq!(mask[4], Cover::Crack);
+        assert_eq!(mask[8], Cover::Disocclusion, "the border is no crack");
+        assert_eq!(mask[6], Cover::Seen);
+    }
+
+    #[test]
+    fn smoothing_weakens_across_depth_edges() {
+        let edge = |variation| {
+            let settings = Settings {
+                fit: super::super::FitSettings { lambda: 1.0, variation, ..Default::default() },
+                ..Settings::default()
+            };
+            let mut samples: Vec<_> = (0..20).map(|i| sample(i as f64 * 0.5, 1.0, 0.0)).collect();
+            samples.extend((20..40).map(|i| sample(i as f64 * 0.5, 2.0, 200.0)));
+            let (v, _) = run(&samples, 20, &settings);
+            v[10] - v[9]
+        };
+        let (soft, sharp) = (edge(Variation::Uniform), edge(Variation::Local { s0: 0.02 }));
+        assert!(sharp > soft + 10.0, "{sharp} {soft}");
+    }
+
+    #[test]
+    fn rows_without_samples_are_copied_and_masked() {
+        let samples: Vec<_> = (0..8).map(|i| Sample { y: 1.0, ..sample(i as f64, 1.0, 50.0) }).collect();
+        let (values, mask) = interpolate(&samples, (8, 3), &Settings::default()).unwrap();
+        assert!(values.iter().all(|v| (v - 50.0).abs() < 1e-4));
+        assert_eq!(mask.iter().filter(|c| **c == Cover::Seen).count(), 8);
+    }
+
+    #[test]
+    fn what_cannot_be_fitted_is_refused() {
+        let settings = Settings::default();
+        let none = interpolate::<1>(&[], (4, 4), &settings);
+        assert_eq!(none, Err(InterpolationError::NoSamples { width: 4, height: 4 }));
+        let between = Sample { y: 0.5, ..sample(1.0, 1.0, 1.0) };
+        assert!(matches!(
+            interpolate(&[between], (4, 4), &settings),
+            Err(InterpolationError::BetweenRows { index: 0, row: 0.5 })
+        ));
+        let broken = sample(f64::NAN, 1.0, 1.0);
+        assert!(matches!(
+            interpolate(&[broken], (4, 4), &settings),
+            Err(InterpolationError::NotFinite { .. })
+        ));
+        let mut bad = settings;
+        bad.fit.lambda = -1.0;
+        assert!(matches!(
+            interpolate(&[sample(1.0, 1.0, 1.0)], (4, 4), &bad),
+            Err(InterpolationError::Setting { name: "lambda", .. })
+        ));
+    }
+
+    #[test]
+    fn pixel_ranges_are_closed_and_cut_off() {
+        for (low, high, want) in [
+            (0.2, 2.7, 1..3),
+            (1.0, 2.0, 1..3),
+            (-5.0, -1.0, 0..0),
+            (-5.0, 0.0, 0..1),
+            (-0.5, -0.2, 0..0),
+            (3.2, 9.0, 4..5),
+            (7.0, 9.0, 5..5),
+        ] {
+            assert_eq!(pixels(low, high, 5), want, "{low} {high}");
+        }
+    }
+
+    #[test]
+    fn one_pixel_is_enough() {
+        let (values, mask) = run(&[sample(0.2, 1.0, 99.0)], 1, &Settings::default());
+        assert!((values[0] - 99.0).abs() < 1.0 && mask[0] == Cover::Seen);
+    }
+}

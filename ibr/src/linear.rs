@@ -1,0 +1,117 @@
+//! The one place that asks the decomposition library: singular values of small and tall matrices.
+//!
+//! Matrices and vectors of fixed size are nalgebra's; the decompositions are faer's.
+
+use faer::Mat;
+use nalgebra::{Matrix3, SMatrix, SVector};
+
+/// The right singular vector of the least singular value, and all singular values from the largest.
+///
+/// `rows` is any number of rows of N entries; fewer than N rows count as filled up with zeros.
+/// `None` when an entry is not finite or the iteration does not converge.
+pub(crate) fn least_vector<const N: usize>(rows: &[[f64; N]]) -> Option<(SVector<f64, N>, [f64; N])> {
+    if rows.iter().flatten().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let tall = rows.len().max(N);
+    let matrix = Mat::from_fn(tall, N, |i, j| rows.get(i).map_or(0.0, |r| r[j]));
+    let svd = matrix.as_ref().thin_svd().ok()?;
+    let values = svd.S().column_vector();
+    let vector = SVector::from_fn(|j, _| svd.V()[(j, N - 1)]);
+    Some((vector, std::array::from_fn(|k| values[k])))
+}
+
+/// U, the singular values from the largest, and V of a 3 x 3 matrix: m = U diag(s) V^T.
+pub(crate) fn svd3(m: &Matrix3<f64>) -> Option<(Matrix3<f64>, [f64; 3], Matrix3<f64>)> {
+    if m.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let matrix = Mat::from_fn(3, 3, |i, j| m[(i, j)]);
+    let svd = matrix.as_ref().svd().ok()?;
+    let s = svd.S().column_vector();
+    let copy = |a: faer::MatRef<'_, f64>| Matrix3::from_fn(|i, j| a[(i, j)]);
+    Some((copy(svd.U()), [s[0], s[1], s[2]], copy(svd.V())))
+}
+
+/// The least-squares solution of `rows` x = `rhs`, `None` when the columns are dependent (to 1e-12).
+pub(crate) fn least_squares<const N: usize>(rows: &[[f64; N]], rhs: &[f64]) -> Option<SVector<f64, N>> {
+    if rows.len() < N || rows.iter().flatten().chain(rhs).any(|v| !v.is_finite()) {
+        return None;
+    }
+    let matrix = Mat::from_fn(rows.len(), N, |i, j| rows[i][j]);
+    let svd = matrix.as_ref().thin_svd().ok()?;
+    let s = svd.S().column_vector();
+    if s[N - 1] <= 1e-12 * s[0] {
+        return None;
+    }
+    let mut solution = SVector::zeros();
+    for k in 0..N {
+        let along: f64 = (0..rows.len()).map(|i| svd.U()[(i, k)] * rhs[i]).sum::<f64>() / s[k];
+        solution += SVector::from_fn(|j, _| svd.V()[(j, k)] * along);
+    }
+    Some(solution)
+}
+
+/// One step of Gauss-Newton: solves J^T J dx = J^T r by Cholesky (N is at most 11).
+pub(crate) fn normal_step<const N: usize>(
+    jtj: &SMatrix<f64, N, N>,
+    jtr: &SVector<f64, N>,
+) -> Option<SVector<f64, N>> {
+    let matrix = Mat::from_fn(N, N, |i, j| jtj[(i, j)]);
+    if jtj.iter().chain(jtr.iter()).any(|v| !v.is_finite()) {
+        return None;
+    }
+    let factor = matrix.as_ref().llt(faer::Side::Lower).ok()?;
+    let rhs = Mat::from_fn(N, 1, |i, _| jtr[i]);
+    let x = faer::linalg::solvers::Solve::solve(&factor, &rhs);
+    let step = SVector::<f64, N>::from_fn(|i, _| x[(i, 0)]);
+    step.iter().all(|v| v.is_finite()).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_vector_spans_the_null_space() {
+        let rows = [[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [1.0, 0.0, -1.0], [5.0, 5.0, 5.0]];
+        let (v, s) = least_vector(&rows).unwrap();
+        assert!(s[2] < 1e-14 && s[1] > 0.1);
+        for row in rows {
+            assert!(row.iter().zip(v.iter()).map(|(a, b)| a * b).sum::<f64>().abs() < 1e-14);
+        }
+        let (v, s) = least_vector(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).unwrap();
+        assert!((v[2].abs() - 1.0).abs() < 1e-15 && s[2] == 0.0);
+        assert!(least_vector(&[[f64::NAN, 0.0]]).is_none());
+    }
+
+    #[test]
+    fn rank_one_is_decomposed() {
+        let m = Matrix3::from_element(1.0);
+        let (u, s, v) = svd3(&m).unwrap();
+        assert!((s[0] - 3.0).abs() < 1e-14 && s[1] < 1e-14);
+        let back = u * Matrix3::from_diagonal(&s.into()) * v.transpose();
+        assert!((back - m).norm() < 1e-14);
+    }
+
+    #[test]
+    fn least_squares_has_an_orthogonal_residual() {
+        let rows = [[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0]];
+        let rhs = [1.0, 0.0, 2.0, 1.0];
+        let x = least_squares(&rows, &rhs).unwrap();
+        for column in 0..2 {
+            let dot: f64 =
+                rows.iter().zip(rhs).map(|(r, b)| r[column] * (r[0] * x[0] + r[1] * x[1] - b)).sum();
+            assert!(dot.abs() < 1e-13);
+        }
+        assert!(least_squares(&[[1.0, 1.0], [2.0, 2.0]], &[1.0, 2.0]).is_none());
+    }
+
+    #[test]
+    fn a_step_solves_the_normal_equations() {
+        let jtj = SMatrix::<f64, 2, 2>::new(4.0, 1.0, 1.0, 3.0);
+        let step = normal_step(&jtj, &SVector::<f64, 2>::new(1.0, 2.0)).unwrap();
+        assert!((jtj * step - SVector::<f64, 2>::new(1.0, 2.0)).norm() < 1e-14);
+        assert!(normal_step(&SMatrix::<f64, 2, 2>::zeros(), &SVector::zeros()).is_none());
+    }
+}

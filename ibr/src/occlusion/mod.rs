@@ -1,0 +1,126 @@
+//! Stage two: samples behind another one that falls on nearly the same place are removed (thesis 2.3.2).
+//!
+//! P being the propagated samples, x in P is removed if and only if there is y in P with
+//!
+//! ```text
+//! ||x - y||_2 <= epsilon   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
+//! ```
+//!
+//! Every test is against P and not against what is left of it, so the result does not depend on any order.
+//! sigma grows with d(y); hence, if any sample of the ball hides x, the nearest one does, and it is
+//! enough to look for the least depth (also in floating point, where both sides stay monotone).
+
+mod grid;
+mod row;
+
+pub use grid::remove;
+pub use row::{RowScratch, remove_in_row};
+
+use crate::sample::Sample;
+
+/// When one sample hides another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthTest {
+    /// Radius of the neighbourhood in virtual pixels.
+    pub epsilon: f64,
+    /// Share of the nearer depth that the difference must reach; needs positive depths.
+    pub relative: f64,
+    /// Difference that must be reached besides.
+    pub absolute: f64,
+}
+
+impl Default for DepthTest {
+    /// 5 % of the nearer depth within 0.7 px: the samples of one camera on a surface lie about a pixel apart, so
+    /// that a hidden sample has a nearer one in its ball nearly always; below 1 px rows do not see each other.
+    fn default() -> Self {
+        Self { epsilon: 0.7, relative: 0.05, absolute: 0.0 }
+    }
+}
+
+/// A depth test that would remove everything or that cannot be evaluated.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum DepthTestError {
+    /// The radius is no positive number.
+    #[error("epsilon is {epsilon} px: the radius of the depth test must be a positive finite number")]
+    Epsilon {
+        /// Value given.
+        epsilon: f64,
+    },
+    /// The thresholds are negative, not finite, or both zero.
+    #[error(
+        "sigma = {relative} depth + {absolute}: neither part may be negative and one must be positive, or every sample would hide itself"
+    )]
+    Sigma {
+        /// Relative part given.
+        relative: f64,
+        /// Absolute part given.
+        absolute: f64,
+    },
+}
+
+impl DepthTest {
+    /// Refuses settings that make no sense.
+    ///
+    /// # Errors
+    /// [`DepthTestError`].
+    pub fn check(&self) -> Result<(), DepthTestError> {
+        let Self { epsilon, relative, absolute } = *self;
+        if !(epsilon.is_finite() && epsilon > 0.0) {
+            return Err(DepthTestError::Epsilon { epsilon });
+        }
+        let sound = |v: f64| v.is_finite() && v >= 0.0;
+        if !(sound(relative) && sound(absolute) && relative + absolute > 0.0) {
+            return Err(DepthTestError::Sigma { relative, absolute });
+        }
+        Ok(())
+    }
+
+    /// Whether a sample of depth `near` hides one of depth `far` on the same place.
+    #[inline]
+    pub fn hides(&self, near: f64, far: f64) -> bool {
+        far - near >= self.relative * near + self.absolute
+    }
+
+    /// Whether two places are neighbours.
+    #[inline]
+    pub fn close(&self, dx: f64, dy: f64) -> bool {
+        dx * dx + dy * dy <= self.epsilon * self.epsilon
+    }
+
+    /// The definition, sample against sample: O(n^2). The oracle of the fast routines.
+    pub fn hidden_by_definition<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<bool> {
+        let hidden = |x: &Sample<C>| {
+            samples.iter().any(|y| {
+                self.close(x.x - y.x, x.y - y.y) && self.hides(f64::from(y.depth), f64::from(x.depth))
+            })
+        };
+        samples.iter().map(hidden).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn senseless_tests_are_refused() {
+        let test = DepthTest::default();
+        assert!(test.check().is_ok());
+        for epsilon in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let broken = DepthTest { epsilon, ..test };
+            assert!(matches!(broken.check(), Err(DepthTestError::Epsilon { .. })));
+        }
+        for (relative, absolute) in [(0.0, 0.0), (-0.1, 1.0), (0.1, -1.0), (f64::NAN, 1.0)] {
+            let broken = DepthTest { relative, absolute, ..test };
+            assert!(matches!(broken.check(), Err(DepthTestError::Sigma { .. })), "{relative} {absolute}");
+        }
+    }
+
+    #[test]
+    fn the_threshold_itself_hides() {
+        let test = DepthTest { epsilon: 1.0, relative: 0.5, absolute: 0.0 };
+        assert!(test.hides(2.0, 3.0) && !test.hides(2.0, 2.9999));
+        let test = DepthTest { epsilon: 1.0, relative: 0.0, absolute: 0.5 };
+        assert!(test.hides(-1.0, -0.5) && !test.hides(-1.0, -0.51));
+    }
+}

@@ -1,0 +1,163 @@
+//! A view from any number of calibrated cameras with depth.
+
+use super::rectified::finished;
+use super::{Method, RenderError, RenderSettings, Rendering, Report, check_counts};
+use crate::camera::Camera;
+use crate::interpolate::HoleCount;
+use crate::interpolate::InterpolationError;
+use crate::interpolate::plane::PlaneProblem;
+use crate::occlusion;
+use crate::propagate::{self, CalibratedView, Frame};
+
+/// Samples that are held in memory at a time; larger scenes are rendered in bands of rows.
+const SAMPLES_AT_A_TIME: usize = 1 << 20;
+
+/// Renders the view of `camera` with `width` x `height` pixels.
+///
+/// # Errors
+/// [`RenderError`], naming view, sizes and numbers.
+pub fn render(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    size: (usize, usize),
+    settings: &RenderSettings,
+) -> Result<Rendering, RenderError> {
+    check(views, settings)?;
+    if views.iter().any(|v| v.image.channels() == 3) {
+        render_with::<3>(views, camera, size, settings)
+    } else {
+        render_with::<1>(views, camera, size, settings)
+    }
+}
+
+fn check(views: &[CalibratedView<'_>], settings: &RenderSettings) -> Result<(), RenderError> {
+    let largest = views.iter().map(|v| v.image.width() * v.image.height()).max().unwrap_or(0);
+    check_counts(views.len(), largest)?;
+    settings.check()?;
+    if settings.method == Method::Rows {
+        let rule = "left at auto or plane for general cameras, whose samples lie between rows";
+        let name = "the row method";
+        return Err(InterpolationError::Setting { name, value: f64::NAN, rule }.into());
+    }
+    for (view, v) in views.iter().enumerate() {
+        let (expected_width, expected_height) = v.image.size();
+        let (width, height) = v.depth.size();
+        if (width, height) != (expected_width, expected_height) {
+            let what = "the depth map";
+            return Err(RenderError::Size { view, what, width, height, expected_width, expected_height });
+        }
+    }
+    Ok(())
+}
+
+fn render_with<const C: usize>(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    (width, height): (usize, usize),
+    settings: &RenderSettings,
+) -> Result<Rendering, RenderError> {
+    let pixels: usize = views.iter().map(|v| v.image.width() * v.image.height()).sum();
+    let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
+    let whole = Frame::whole(width, height, 0.5, settings.offset);
+    let (propagated, dropped) = propagate::survey(views, camera, &whole);
+    if propagated == 0 {
+        return Err(RenderError::NoOverlap { pixels, dropped });
+    }
+    let bands = propagated.div_ceil(SAMPLES_AT_A_TIME).min(height);
+    for band in 0..bands {
+        let rows = band * height / bands..(band + 1) * height / bands;
+        add_band(&mut problem, views, camera, &whole, rows, settings)?;
+    }
+    let used = problem.samples();
+    let mut report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
+    let fit = problem.solve(None)?;
+    report.holes = HoleCount::of(&fit.mask);
+    report.convergence = Some(fit.convergence);
+    Ok(Rendering { image: finished(width, height, C, fit.values), mask: fit.mask, report })
+}
+
+/// The first two stages for some rows of the virtual image. The band is widened by epsilon on both sides,
+/// so that what hides a sample of the band is there; only the band's own survivors are added.
+fn add_band<const C: usize>(
+    problem: &mut PlaneProblem<C>,
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    whole: &Frame,
+    rows: std::ops::Range<usize>,
+    settings: &RenderSettings,
+) -> Result<(), InterpolationError> {
+    let test = settings.depth_test();
+    let last = rows.end == whole.height;
+    let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
+    let bottom = if last { f64::MAX } else { rows.end as f64 };
+    // Twice epsilon: the distance test rounds.
+    let frame = whole.band(top - 2.0 * test.epsilon, bottom + 2.0 * test.epsilon);
+    let (mut samples, _) = propagate::calibrated::<C>(views, camera, &frame);
+    occlusion::remove(&mut samples, test);
+    samples.retain(|s| s.y >= top && (s.y < bottom || last));
+    problem.add(&samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::{DepthMap, Measure};
+    use crate::image::Image;
+    use crate::interpolate::plane;
+    use nalgebra::Matrix3x4;
+
+    fn camera(x: f64, turn: f64) -> Camera {
+        let r = nalgebra::Rotation3::from_euler_angles(0.0, turn, 0.02);
+        let k = nalgebra::Matrix3::new(40.0, 0.0, 19.5, 0.0, 40.0, 14.5, 0.0, 0.0, 1.0);
+        let mut rt = Matrix3x4::zeros();
+        rt.fixed_columns_mut::<3>(0).copy_from(r.matrix());
+        rt.set_column(3, &(-(r * nalgebra::Vector3::new(x, 0.1 * x, 0.0))));
+        Camera::metric(k * rt, false).unwrap()
+    }
+
+    fn scene() -> (Image, DepthMap) {
+        let image = Image::new(40, 30, 1, (0..1200).map(|i| ((i * 7) % 256) as f32).collect()).unwrap();
+        let depth = (0..1200).map(|i| if i % 40 > 25 { 3.0 } else { 5.0 + (i / 40) as f32 * 0.05 }).collect();
+        (image, DepthMap::new((40, 30), depth, 1.0, Measure::Depth).unwrap())
+    }
+
+    #[test]
+    fn equal_to_the_three_stages_also_in_bands() {
+        let (image, depth) = scene();
+        let view = |c| CalibratedView { image: &image, depth: &depth, camera: c };
+        let views = [view(camera(-0.3, 0.03)), view(camera(0.4, -0.04))];
+        let target = camera(0.05, 0.0);
+        let settings = RenderSettings::default();
+        let got = render(&views, &target, (40, 30), &settings).unwrap();
+        let frame = Frame::whole(40, 30, 0.5, 0.0);
+        let (mut samples, dropped) = propagate::calibrated::<1>(&views, &target, &frame);
+        assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
+        assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
+        assert!(got.report.occluded > 0);
+        let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
+        assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
+        // In bands the sums run in another order; everything else is the same.
+        let mut problem = PlaneProblem::<1>::new((40, 30), &settings.interpolation).unwrap();
+        for rows in [0..7, 7..8, 8..30] {
+            add_band(&mut problem, &views, &target, &frame, rows, &settings).unwrap();
+        }
+        assert_eq!(problem.samples(), samples.len());
+        let banded = problem.solve(None).unwrap();
+        assert_eq!(banded.mask, fit.mask);
+        let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
+        assert!(worst < 1e-2, "{worst}");
+    }
+
+    #[test]
+    fn views_that_see_nothing_are_an_error() {
+        let (image, depth) = scene();
+        let view = CalibratedView { image: &image, depth: &depth, camera: camera(0.0, 0.0) };
+        let away = camera(0.0, std::f64::consts::PI);
+        let error = render(&[view], &away, (40, 30), &RenderSettings::default()).unwrap_err();
+        assert!(matches!(error, RenderError::NoOverlap { dropped, .. } if dropped.behind == 1200), "{error}");
+        let other = DepthMap::new((4, 3), vec![1.0; 12], 1.0, Measure::Depth).unwrap();
+        let view = CalibratedView { depth: &other, ..view };
+        let error = render(&[view], &away, (40, 30), &RenderSettings::default()).unwrap_err();
+        assert!(error.to_string().contains("the depth map has 4 x 3"), "{error}");
+    }
+}

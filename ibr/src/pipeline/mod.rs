@@ -1,0 +1,163 @@
+//! Whole renderings: the three stages joined for each kind of input.
+
+pub mod calibrated;
+pub mod rectified;
+pub mod uncalibrated;
+
+use crate::image::Image;
+use crate::interpolate::plane::Convergence;
+use crate::interpolate::{Cover, HoleCount, InterpolationError, Settings};
+use crate::occlusion::{DepthTest, DepthTestError};
+use crate::sample::Dropped;
+
+/// Which third stage is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Rows where the samples lie on rows (rectified rigs), the plane elsewhere.
+    #[default]
+    Auto,
+    /// One spline a row; rectified rigs only.
+    Rows,
+    /// The whole image at once.
+    Plane,
+}
+
+/// Settings of a rendering. The defaults are the same for every scene.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RenderSettings {
+    /// The third stage used.
+    pub method: Method,
+    /// Fit, holes, and the depth test of the second stage.
+    pub interpolation: Settings,
+    /// Added to every column, in pixels: registration of the virtual image.
+    pub offset: f64,
+}
+
+impl RenderSettings {
+    /// The depth test.
+    pub fn depth_test(&self) -> &DepthTest {
+        &self.interpolation.depth_test
+    }
+
+    /// Refuses settings outside their range.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn check(&self) -> Result<(), RenderError> {
+        self.depth_test().check()?;
+        self.interpolation.check()?;
+        if self.offset.is_finite() { Ok(()) } else { Err(RenderError::Offset { offset: self.offset }) }
+    }
+}
+
+/// Why nothing could be rendered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RenderError {
+    /// No view was given.
+    #[error("there is no view to render from: give at least one")]
+    NoViews,
+    /// More views or pixels than the samples can number.
+    #[error("{views} views of up to {pixels} pixels: at most 65535 views of 2^32 - 1 pixels can be used")]
+    TooLarge {
+        /// Views given.
+        views: usize,
+        /// Pixels of the largest.
+        pixels: usize,
+    },
+    /// Views of different sizes in a rectified rig, or a map of another size than its image.
+    #[error(
+        "view {view}: {what} has {width} x {height} pixels instead of {expected_width} x {expected_height}"
+    )]
+    Size {
+        /// Index of the view.
+        view: usize,
+        /// The image or the map.
+        what: &'static str,
+        /// Its width.
+        width: usize,
+        /// Its height.
+        height: usize,
+        /// Width expected.
+        expected_width: usize,
+        /// Height expected.
+        expected_height: usize,
+    },
+    /// The place of a view or of the virtual camera is no number.
+    #[error("the position {position} is not a finite number")]
+    Position {
+        /// The position.
+        position: f64,
+    },
+    /// The offset is no number.
+    #[error("the offset {offset} px is not a finite number")]
+    Offset {
+        /// The offset.
+        offset: f64,
+    },
+    /// A camera of a projective frame cannot be used.
+    #[error(transparent)]
+    Projective(#[from] crate::uncalibrated::GeometryError),
+    /// The depth test cannot be used.
+    #[error(transparent)]
+    DepthTest(#[from] DepthTestError),
+    /// The interpolation failed.
+    #[error(transparent)]
+    Interpolation(#[from] InterpolationError),
+    /// No sample reached the virtual image.
+    #[error(
+        "no sample reaches the virtual image: of {pixels} pixels {} have no depth, {} lie behind the virtual camera and {} fall outside its image; check positions, cameras and the depth scale",
+        dropped.unknown, dropped.behind, dropped.outside
+    )]
+    NoOverlap {
+        /// Pixels of all views.
+        pixels: usize,
+        /// What became of them.
+        dropped: Dropped,
+    },
+}
+
+/// What happened to the samples of a rendering.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Report {
+    /// Samples that reached the virtual image.
+    pub propagated: usize,
+    /// Of these, removed as hidden.
+    pub occluded: usize,
+    /// Of these, used by the interpolation.
+    pub used: usize,
+    /// Pixels that did not become samples.
+    pub dropped: Dropped,
+    /// Pixels of the virtual image without a sample.
+    pub holes: HoleCount,
+    /// How the plane fit ended; `None` for the row fit.
+    pub convergence: Option<Convergence>,
+}
+
+/// A rendered view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rendering {
+    /// The image.
+    pub image: Image,
+    /// How each pixel came to its value.
+    pub mask: Vec<Cover>,
+    /// Counts.
+    pub report: Report,
+}
+
+impl Rendering {
+    /// Share of the pixels that samples reach.
+    pub fn coverage(&self) -> f64 {
+        1.0 - HoleCount::of(&self.mask).total() as f64 / self.mask.len() as f64
+    }
+}
+
+/// Refuses what the samples cannot number.
+fn check_counts(views: usize, pixels: usize) -> Result<(), RenderError> {
+    if views == 0 {
+        return Err(RenderError::NoViews);
+    }
+    if views > usize::from(u16::MAX) || pixels > u32::MAX as usize {
+        return Err(RenderError::TooLarge { views, pixels });
+    }
+    Ok(())
+}

@@ -1,0 +1,289 @@
+//! A view from a rectified rig: every row goes through the three stages by itself, rows in parallel.
+
+use super::{Method, RenderError, RenderSettings, Rendering, Report, check_counts};
+use crate::image::Image;
+use crate::interpolate::plane::PlaneProblem;
+use crate::interpolate::rows::{RowWork, fill_empty_rows};
+use crate::interpolate::{Cover, Degree, HoleCount, HoleFill, InterpolationError};
+use crate::occlusion::{self, RowScratch};
+use crate::propagate::{self, Frame, RectifiedView};
+use crate::sample::{Dropped, Sample};
+use rayon::prelude::*;
+
+/// Renders the view from `position` on the line of the cameras.
+///
+/// All views must have the size of the first, which is also that of the result; the result is RGB if
+/// any view is.
+///
+/// # Errors
+/// [`RenderError`], naming view, sizes and numbers.
+pub fn render(
+    views: &[RectifiedView<'_>],
+    position: f64,
+    settings: &RenderSettings,
+) -> Result<Rendering, RenderError> {
+    check(views, position)?;
+    settings.check()?;
+    let colour = views.iter().any(|v| v.image.channels() == 3);
+    match (settings.interpolation.fit.degree, colour) {
+        (Degree::Linear, false) => render_with::<2, 1>(views, position, settings),
+        (Degree::Linear, true) => render_with::<2, 3>(views, position, settings),
+        (Degree::Cubic, false) => render_with::<4, 1>(views, position, settings),
+        (Degree::Cubic, true) => render_with::<4, 3>(views, position, settings),
+    }
+}
+
+fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> {
+    let first = views.first().ok_or(RenderError::NoViews)?;
+    let (expected_width, expected_height) = first.image.size();
+    check_counts(views.len(), expected_width * expected_height)?;
+    for (view, v) in views.iter().enumerate() {
+        for (what, (width, height)) in
+            [("the image", v.image.size()), ("the disparity map", v.disparity.size())]
+        {
+            if (width, height) != (expected_width, expected_height) {
+                return Err(RenderError::Size { view, what, width, height, expected_width, expected_height });
+            }
+        }
+    }
+    match views.iter().map(|v| v.position).chain([position]).find(|p| !p.is_finite()) {
+        Some(position) => Err(RenderError::Position { position }),
+        None => Ok(()),
+    }
+}
+
+fn render_with<const ORDER: usize, const C: usize>(
+    views: &[RectifiedView<'_>],
+    position: f64,
+    settings: &RenderSettings,
+) -> Result<Rendering, RenderError> {
+    if settings.method == Method::Plane {
+        return render_plane::<C>(views, position, settings);
+    }
+    let (width, height) = views[0].image.size();
+    let frame = Frame::whole(width, height, RowWork::<ORDER, C>::MARGIN, settings.offset);
+    let mut values = vec![0.0; width * height * C];
+    let mut mask = vec![Cover::Disocclusion; width * height];
+    let mut counts = vec![RowCount::default(); height];
+    // Blocks of rows share work memory; where they are cut changes nothing in the result.
+    let block = height.div_ceil(4 * rayon::current_num_threads()).max(1);
+    let outputs = values
+        .par_chunks_mut(block * width * C)
+        .zip(mask.par_chunks_mut(block * width))
+        .zip(counts.par_chunks_mut(block));
+    outputs.enumerate().try_for_each(|(b, ((values, mask), counts))| {
+        let mut work = Strip::<ORDER, C>::new(width, views.len());
+        let rows = values.chunks_exact_mut(width * C).zip(mask.chunks_exact_mut(width)).zip(counts);
+        rows.enumerate().try_for_each(|(k, ((values, mask), count))| {
+            let y = b * block + k;
+            *count = work
+                .row(views, y, position, &frame, settings, values, mask)
+                .map_err(|source| InterpolationError::Fit { row: y, source })?;
+            Ok::<(), InterpolationError>(())
+        })
+    })?;
+    let report = total(&counts, &mask);
+    if report.used == 0 {
+        let pixels = views.len() * width * height;
+        return Err(RenderError::NoOverlap { pixels, dropped: report.dropped });
+    }
+    if settings.interpolation.holes.fill != HoleFill::Leave {
+        let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
+        fill_empty_rows(&filled, &mut values);
+    }
+    let image = finished(width, height, C, values);
+    Ok(Rendering { image, mask, report })
+}
+
+/// The image of values that fill it by construction.
+pub(super) fn finished(width: usize, height: usize, channels: usize, values: Vec<f32>) -> Image {
+    let mut image = Image::filled(width, height, channels, 0.0);
+    image.data_mut().copy_from_slice(&values);
+    image
+}
+
+/// What became of the samples of one row.
+#[derive(Debug, Clone, Copy, Default)]
+struct RowCount {
+    propagated: usize,
+    used: usize,
+    dropped: Dropped,
+}
+
+fn total(counts: &[RowCount], mask: &[Cover]) -> Report {
+    let mut report = Report { holes: HoleCount::of(mask), ..Report::default() };
+    for c in counts {
+        report.propagated += c.propagated;
+        report.used += c.used;
+        report.dropped += c.dropped;
+    }
+    report.occluded = report.propagated - report.used;
+    report
+}
+
+/// Work memory for one block of rows.
+struct Strip<const ORDER: usize, const C: usize> {
+    samples: Vec<Sample<C>>,
+    scratch: RowScratch<C>,
+    fit: RowWork<ORDER, C>,
+}
+
+impl<const ORDER: usize, const C: usize> Strip<ORDER, C> {
+    fn new(width: usize, views: usize) -> Self {
+        let samples = Vec::with_capacity(width * views);
+        Self { samples, scratch: RowScratch::default(), fit: RowWork::new(width) }
+    }
+
+    /// Propagates, removes what is hidden and interpolates one row.
+    #[expect(clippy::too_many_arguments, reason = "the three stages need all of them, and nothing else does")]
+    fn row(
+        &mut self,
+        views: &[RectifiedView<'_>],
+        y: usize,
+        position: f64,
+        frame: &Frame,
+        settings: &RenderSettings,
+        values: &mut [f32],
+        mask: &mut [Cover],
+    ) -> Result<RowCount, hybank::sampling::SamplingError> {
+        let mut count = RowCount::default();
+        self.samples.clear();
+        for (index, view) in views.iter().enumerate() {
+            count.dropped +=
+                propagate::rectified_row(view, index as u16, y, position, frame, &mut self.samples);
+        }
+        count.propagated = self.samples.len();
+        occlusion::remove_in_row(&mut self.samples, settings.depth_test(), &mut self.scratch);
+        count.used = self.samples.len();
+        self.fit.interpolate(&self.samples, &settings.interpolation, values, mask)?;
+        Ok(count)
+    }
+}
+
+/// The same with the plane fit as third stage; the second stage still goes by rows.
+fn render_plane<const C: usize>(
+    views: &[RectifiedView<'_>],
+    position: f64,
+    settings: &RenderSettings,
+) -> Result<Rendering, RenderError> {
+    let (width, height) = views[0].image.size();
+    let frame = Frame::whole(width, height, 0.5, settings.offset);
+    let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
+    let mut strip = Strip::<2, C>::new(width, views.len());
+    let mut report = Report::default();
+    for y in 0..height {
+        strip.samples.clear();
+        for (index, view) in views.iter().enumerate() {
+            report.dropped +=
+                propagate::rectified_row(view, index as u16, y, position, &frame, &mut strip.samples);
+        }
+        report.propagated += strip.samples.len();
+        occlusion::remove_in_row(&mut strip.samples, settings.depth_test(), &mut strip.scratch);
+        report.used += strip.samples.len();
+        problem.add(&strip.samples)?;
+    }
+    report.occluded = report.propagated - report.used;
+    if report.used == 0 {
+        let pixels = views.len() * width * height;
+        return Err(RenderError::NoOverlap { pixels, dropped: report.dropped });
+    }
+    let fit = problem.solve(None)?;
+    report.holes = HoleCount::of(&fit.mask);
+    report.convergence = Some(fit.convergence);
+    Ok(Rendering { image: finished(width, height, C, fit.values), mask: fit.mask, report })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::{DepthMap, Measure};
+    use crate::interpolate::rows;
+
+    fn scene(width: usize, height: usize, channels: usize) -> (Image, DepthMap) {
+        let value = |i: usize| 120.0 + 80.0 * ((i / channels % width) as f32 * 0.4).sin() + (i % 7) as f32;
+        let image =
+            Image::new(width, height, channels, (0..width * height * channels).map(value).collect()).unwrap();
+        let disparity = |i: usize| match i % width {
+            x if x > width / 3 && x < width / 2 => 9.0,
+            2 => 0.0,
+            _ => 3.0 + (i / width) as f32 * 0.1,
+        };
+        let data = (0..width * height).map(disparity).collect();
+        (image, DepthMap::new((width, height), data, 1.0, Measure::Disparity).unwrap())
+    }
+
+    fn views<'a>(parts: &'a [(Image, DepthMap)]) -> Vec<RectifiedView<'a>> {
+        let view = |(i, (image, disparity)): (usize, &'a (Image, DepthMap))| RectifiedView {
+            image,
+            disparity,
+            position: i as f64,
+        };
+        parts.iter().enumerate().map(view).collect()
+    }
+
+    /// The fused rows give what the three public stages give one after the other.
+    #[test]
+    fn equal_to_the_three_stages() {
+        let parts = [scene(40, 9, 3), scene(40, 9, 3)];
+        let settings = RenderSettings::default();
+        let got = render(&views(&parts), 0.4, &settings).unwrap();
+        let frame = Frame::whole(40, 9, 2.0, 0.0);
+        let (mut samples, dropped) = propagate::rectified::<3>(&views(&parts), 0.4, &frame);
+        let propagated = samples.len();
+        let occluded = occlusion::remove(&mut samples, settings.depth_test());
+        let (values, mask) = rows::interpolate(&samples, (40, 9), &settings.interpolation).unwrap();
+        assert_eq!(got.image.data(), values);
+        assert_eq!(got.mask, mask);
+        let report = got.report;
+        assert_eq!((report.propagated, report.occluded, report.dropped), (propagated, occluded, dropped));
+        assert_eq!(report.propagated + report.dropped.total(), 2 * 40 * 9);
+        assert!(report.occluded > 0 && report.dropped.unknown == 18 && report.holes.total() > 0);
+    }
+
+    #[test]
+    fn the_number_of_threads_changes_no_bit() {
+        let parts = [scene(64, 33, 3), scene(64, 33, 3)];
+        for method in [Method::Rows, Method::Plane] {
+            let settings = RenderSettings { method, ..RenderSettings::default() };
+            let run = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| render(&views(&parts), 0.3, &settings).unwrap())
+            };
+            let one = run(1);
+            assert_eq!(one, run(2));
+            assert_eq!(one, run(5));
+        }
+    }
+
+    #[test]
+    fn the_own_place_of_a_camera_gives_nearly_its_image() {
+        let mut parts = [scene(48, 6, 1)];
+        parts[0].1 = DepthMap::new((48, 6), vec![4.0; 288], 1.0, Measure::Disparity).unwrap();
+        let mut settings = RenderSettings::default();
+        settings.interpolation.fit.lambda = 0.0;
+        settings.interpolation.fit.tau = 1e-9;
+        let got = render(&views(&parts), 0.0, &settings).unwrap();
+        let worst =
+            got.image.data().iter().zip(parts[0].0.data()).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
+        assert!(worst < 1e-2, "{worst}");
+        assert_eq!(got.coverage(), 1.0);
+    }
+
+    #[test]
+    fn wrong_input_is_named() {
+        let (image, disparity) = scene(8, 8, 1);
+        let small = Image::filled(7, 8, 1, 0.0);
+        let view = |image, position| RectifiedView { image, disparity: &disparity, position };
+        let settings = RenderSettings::default();
+        assert_eq!(render(&[], 0.0, &settings), Err(RenderError::NoViews));
+        let sizes = render(&[view(&image, 0.0), view(&small, 1.0)], 0.5, &settings).unwrap_err();
+        assert_eq!(sizes.to_string(), "view 1: the image has 7 x 8 pixels instead of 8 x 8");
+        let nowhere = render(&[view(&image, f64::NAN)], 0.5, &settings).unwrap_err();
+        assert!(matches!(nowhere, RenderError::Position { .. }));
+        let far = render(&[view(&image, 0.0)], 500.0, &settings).unwrap_err();
+        assert!(matches!(far, RenderError::NoOverlap { pixels: 64, .. }), "{far}");
+        let mut settings = settings;
+        settings.interpolation.depth_test.relative = 0.0;
+        assert!(matches!(render(&[view(&image, 0.0)], 0.5, &settings), Err(RenderError::DepthTest(_))));
+    }
+}

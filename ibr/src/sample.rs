@@ -1,0 +1,52 @@
+//! The plain list that stands between the three stages: propagated samples.
+
+/// One pixel of an actual view, seen from the virtual camera; C = 1 (grey) or 3 (RGB).
+///
+/// Places are f64; depth and values are f32, which keeps the list at 40 bytes a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample<const C: usize> {
+    /// Column in the virtual image, in pixels.
+    pub x: f64,
+    /// Row in the virtual image, in pixels.
+    pub y: f64,
+    /// Depth key at the virtual camera: smaller is nearer. A depth, a reciprocal disparity (both
+    /// positive), or a signed chi of a projective camera.
+    pub depth: f32,
+    /// Intensity, 0..255.
+    pub value: [f32; C],
+    /// Index of the pixel in its actual view, row by row.
+    pub pixel: u32,
+    /// Index of the actual view.
+    pub view: u16,
+}
+
+impl<const C: usize> Sample<C> {
+    /// A sample at the origin with all fields 0, for work memory.
+    pub const BLANK: Self = Self { x: 0.0, y: 0.0, depth: 0.0, value: [0.0; C], pixel: 0, view: 0 };
+}
+
+/// Samples that the propagation did not pass on, by reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct Dropped {
+    /// The pixel has no depth.
+    pub unknown: usize,
+    /// The point lies behind the virtual camera or in its focal plane.
+    pub behind: usize,
+    /// The point projects farther outside the virtual image than the kernel reaches.
+    pub outside: usize,
+}
+
+impl Dropped {
+    /// All dropped samples.
+    pub fn total(&self) -> usize {
+        self.unknown + self.behind + self.outside
+    }
+}
+
+impl std::ops::AddAssign for Dropped {
+    fn add_assign(&mut self, other: Self) {
+        self.unknown += other.unknown;
+        self.behind += other.behind;
+        self.outside += other.outside;
+    }
+}

@@ -1,0 +1,441 @@
+//! Reading a scene: sort out its kind, read files in parallel, make maps dense.
+
+use super::spec::{SceneSpec, TargetSpec, ViewSpec};
+use super::{CalibratedSource, Kind, RectifiedSource, Scene, SceneError};
+use crate::camera::{Camera, colmap};
+use crate::depth::{DepthMap, Measure, fill_unknown};
+use crate::image::{Image, read_image, read_map};
+use crate::partial::{Densify, densify};
+use crate::pipeline::uncalibrated::Target;
+use crate::uncalibrated::Point;
+use crate::uncalibrated::tracks::Tracks;
+use nalgebra::Matrix3x4;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// How a scene is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadOptions {
+    /// Leave this view out and take its place as the wanted one.
+    pub view: Option<String>,
+    /// Use only every K-th value of full maps.
+    pub depth_step: usize,
+    /// How coarse maps are made dense.
+    pub densify: Densify,
+    /// Whether unknown depths are filled from the farther neighbour in their row.
+    pub fill: bool,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self { view: None, depth_step: 1, densify: Densify::default(), fill: true }
+    }
+}
+
+/// Parses the text of a scene file; `path` is for the messages.
+///
+/// # Errors
+/// [`SceneError::Parse`] with line, column and the keys that are known there.
+pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
+    toml::from_str(text)
+        .map_err(|e| SceneError::Parse { path: path.into(), reason: e.to_string().trim_end().to_string() })
+}
+
+/// Reads everything a scene names. `path` is the scene file; its folder is where relative paths start.
+///
+/// # Errors
+/// [`SceneError`], naming file, view and numbers.
+pub fn load(spec: &SceneSpec, path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
+    Loader { spec, path, folder: path.parent().unwrap_or(Path::new("")), options }.load()
+}
+
+struct Loader<'a> {
+    spec: &'a SceneSpec,
+    path: &'a Path,
+    folder: &'a Path,
+    options: &'a LoadOptions,
+}
+
+type Loaded<T> = Result<T, SceneError>;
+
+impl Loader<'_> {
+    fn load(&self) -> Loaded<Scene> {
+        let wanted = self.wanted()?;
+        let views: Vec<&ViewSpec> =
+            self.spec.view.iter().enumerate().filter(|(i, _)| Some(*i) != wanted).map(|(_, v)| v).collect();
+        if views.is_empty() {
+            return Err(self.incomplete("there is no view to render from; add [[view]] tables"));
+        }
+        let target = self.spec.target.clone().unwrap_or_default();
+        let left_out = wanted.map(|i| &self.spec.view[i]);
+        let (kind, filled) = if views.iter().any(|v| v.position.is_some()) {
+            self.rectified(&views, left_out, &target)?
+        } else if views.iter().any(|v| v.camera.is_some() || self.model_of(v).is_some()) {
+            self.calibrated(&views, left_out, &target)?
+        } else {
+            (self.uncalibrated(&views, left_out, &target)?, 0)
+        };
+        Ok(Scene { kind, offset: target.offset.unwrap_or(0.0), filled })
+    }
+
+    fn incomplete(&self, reason: impl Into<String>) -> SceneError {
+        SceneError::Incomplete { path: self.path.into(), reason: reason.into() }
+    }
+
+    /// Index of the view that is left out.
+    fn wanted(&self) -> Loaded<Option<usize>> {
+        let Some(name) = &self.options.view else { return Ok(None) };
+        let found = self.spec.view.iter().position(|v| v.label() == *name);
+        found.map(Some).ok_or_else(|| SceneError::NoSuchView {
+            path: self.path.into(),
+            name: name.clone(),
+            known: self.spec.view.iter().map(ViewSpec::label).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    fn file(&self, path: &Path) -> PathBuf {
+        self.folder.join(path)
+    }
+
+    fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {
+        let reason =
+            || format!("view {:?} has no `{key}`, which every view of a {kind} scene needs", view.label());
+        value.ok_or_else(|| self.incomplete(reason()))
+    }
+
+    fn rectified(
+        &self,
+        views: &[&ViewSpec],
+        left_out: Option<&ViewSpec>,
+        target: &TargetSpec,
+    ) -> Loaded<(Kind, usize)> {
+        let position = left_out.map_or(target.position, |v| v.position).ok_or_else(|| {
+            self.incomplete("[virtual] needs a `position` on the line of the rectified rig")
+        })?;
+        let one = |view: &&ViewSpec| {
+            let position = self.need(view.position, view, "position", "rectified")?;
+            let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
+            let (image, disparity, filled) =
+                self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
+            Ok((RectifiedSource { image, disparity, position }, filled))
+        };
+        let sources = in_order(views.par_iter().map(one).collect())?;
+        let first = sources[0].0.image.size();
+        for (view, (source, _)) in views.iter().zip(&sources) {
+            let (name, first_name) =
+                (format!("view {:?}", view.label()), format!("view {:?}", views[0].label()));
+            source.image.same_size(&name, first, &first_name)?;
+        }
+        let filled = sources.iter().map(|s| s.1).sum();
+        Ok((Kind::Rectified { views: sources.into_iter().map(|s| s.0).collect(), position }, filled))
+    }
+
+    fn calibrated(
+        &self,
+        views: &[&ViewSpec],
+        left_out: Option<&ViewSpec>,
+        target: &TargetSpec,
+    ) -> Loaded<(Kind, usize)> {
+        let one = |view: &&ViewSpec| {
+            let camera = self.camera_of(view)?;
+            let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
+            let (image, depth, filled) =
+                self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;
+            Ok((CalibratedSource { image, depth, camera }, filled))
+        };
+        let sources = in_order(views.par_iter().map(one).collect())?;
+        let first = sources[0].0.image.size();
+        let (camera, own) = match left_out {
+            Some(view) => (self.camera_of(view)?, Some(read_image(&self.file(&view.image))?.size())),
+            None => self.target_camera(target)?,
+        };
+        let size = self.size(target, own.unwrap_or(first))?;
+        let filled = sources.iter().map(|s| s.1).sum();
+        let views = sources.into_iter().map(|s| s.0).collect();
+        Ok((Kind::Calibrated { views, camera, size }, filled))
+    }
+
+    /// The size asked for, or the one that suggests itself.
+    fn size(&self, target: &TargetSpec, own: (usize, usize)) -> Loaded<(usize, usize)> {
+        match target.size {
+            Some([w, h]) if w == 0 || h == 0 || w.saturating_mul(h) > u32::MAX as usize => Err(self
+                .incomplete(format!("[virtual] size = [{w}, {h}]: both sides must be at least one pixel"))),
+            Some([w, h]) => Ok((w, h)),
+            None => Ok(own),
+        }
+    }
+
+    fn matrix(&self, rows: &[[f64; 4]; 3], which: &str) -> Loaded<Camera> {
+        let matrix = Matrix3x4::from_fn(|i, j| rows[i][j]);
+        Camera::metric(matrix, self.spec.mirrored).map_err(|source| SceneError::Camera {
+            path: self.path.into(),
+            which: which.into(),
+            source,
+        })
+    }
+
+    fn model_of(&self, view: &ViewSpec) -> Option<PathBuf> {
+        view.colmap.as_ref().or(self.spec.colmap.as_ref()).map(|folder| self.file(folder))
+    }
+
+    fn camera_of(&self, view: &ViewSpec) -> Loaded<Camera> {
+        match (&view.camera, self.model_of(view)) {
+            (Some(rows), _) => self.matrix(rows, &format!("view {:?}", view.label())),
+            (None, Some(folder)) => Ok(self.model_camera(&folder, &view.image.to_string_lossy())?.camera),
+            (None, None) => self.need(None, view, "camera", "calibrated"),
+        }
+    }
+
+    /// The camera of an image in a COLMAP model: by its path, or by the path's last part.
+    fn model_camera(&self, folder: &Path, image: &str) -> Loaded<colmap::ModelCamera> {
+        let model = colmap::read_model(folder)?;
+        let last = |name: &str| name.rsplit('/').next().unwrap_or(name).to_string();
+        let named = model
+            .get(image)
+            .or_else(|| model.iter().find(|(name, _)| last(name) == last(image)).map(|(_, camera)| camera));
+        named.copied().ok_or_else(|| {
+            let reason = format!("{}: the model has no image {image:?}", folder.display());
+            self.incomplete(reason)
+        })
+    }
+
+    fn target_camera(&self, target: &TargetSpec) -> Loaded<(Camera, Option<(usize, usize)>)> {
+        if let Some(rows) = &target.camera {
+            return Ok((self.matrix(rows, "[virtual]")?, None));
+        }
+        match (&target.colmap_image, &self.spec.colmap) {
+            (Some(image), Some(folder)) => {
+                let found = self.model_camera(&self.file(folder), image)?;
+                Ok((found.camera, Some(found.size)))
+            }
+            _ => Err(self.incomplete(
+                "[virtual] needs a `camera` (3 x 4), or `colmap_image` with a `colmap` folder at the top",
+            )),
+        }
+    }
+
+    /// Image and dense map of a view, and the number of unknown values that were filled.
+    fn image_with_map(
+        &self,
+        view: &ViewSpec,
+        map: &Path,
+        scale: f64,
+        measure: Measure,
+    ) -> Loaded<(Image, DepthMap, usize)> {
+        let path = self.file(map);
+        let image = read_image(&self.file(&view.image))?;
+        let (width, height, stored) = read_map(&path)?;
+        let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
+        let map = DepthMap::new((width, height), stored, scale, measure).map_err(depth_error)?;
+        let given = view.step.unwrap_or(1);
+        map.fits(image.size(), given).map_err(depth_error)?;
+        let step = if given == 1 { self.options.depth_step } else { given };
+        if step == 1 {
+            let mut map = map;
+            let filled = if self.options.fill { fill_unknown(&mut map) } else { 0 };
+            return Ok((image, map, filled));
+        }
+        let coarse = if given == 1 { map.decimated(step).map_err(depth_error)? } else { map };
+        let dense = densify(&coarse, step, &image, &self.options.densify)
+            .map_err(|source| SceneError::Partial { view: view.label(), path: path.clone(), source })?;
+        Ok((image, dense, coarse.unknown()))
+    }
+
+    fn uncalibrated(
+        &self,
+        views: &[&ViewSpec],
+        left_out: Option<&ViewSpec>,
+        target: &TargetSpec,
+    ) -> Loaded<Kind> {
+        let file = self.spec.matches.as_ref().or(target.matches.as_ref()).ok_or_else(|| {
+            self.incomplete(
+                "the views have neither `position` and `disparity`, nor `camera` and `depth`, and there is no `matches` file: say where the cameras are or give tracks",
+            )
+        })?;
+        if views.len() < 2 {
+            return Err(self.incomplete(format!("{} view with tracks: at least two are needed", views.len())));
+        }
+        let tracks = Tracks::read(&self.file(file))?;
+        let wanted = match left_out {
+            Some(view) => Some(self.column_in_order(view)?),
+            None => target.from_tracks,
+        };
+        let columns = self.columns(views, wanted, tracks.columns())?;
+        let images = in_order(
+            views.par_iter().map(|v| read_image(&self.file(&v.image)).map_err(SceneError::from)).collect(),
+        )?;
+        let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
+        let goal = match (wanted, target.between) {
+            (Some(column), _) => Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect()),
+            (None, Some(between)) => Target::Between(between),
+            (None, None) => {
+                let reason =
+                    "[virtual] needs `from_tracks` (a column of the tracks, from 1) or `between` (0 to 1)";
+                return Err(self.incomplete(reason));
+            }
+        };
+        let own = match left_out {
+            Some(view) => read_image(&self.file(&view.image))?.size(),
+            None => images[0].size(),
+        };
+        let size = self.size(target, own)?;
+        Ok(Kind::Uncalibrated {
+            images,
+            tracks: tracks.rows().iter().map(pick).collect(),
+            target: goal,
+            size,
+        })
+    }
+
+    /// Column of a view that is left out: its own, or its place among all views.
+    fn column_in_order(&self, view: &ViewSpec) -> Loaded<usize> {
+        let place = self.spec.view.iter().position(|v| v.label() == view.label());
+        view.column.or(place.map(|p| p + 1)).ok_or_else(|| self.incomplete("a view without a column"))
+    }
+
+    /// Columns of the views: as they say, or in order with the wanted column passed over.
+    fn columns(&self, views: &[&ViewSpec], wanted: Option<usize>, there: usize) -> Loaded<Vec<usize>> {
+        let mut free = (1..=there).filter(|c| Some(*c) != wanted);
+        let columns: Vec<Option<usize>> = views.iter().map(|v| v.column.or_else(|| free.next())).collect();
+        let all: Vec<usize> = columns.iter().flatten().copied().chain(wanted).collect();
+        let broken = all.iter().any(|c| *c == 0 || *c > there);
+        if broken || all.len() < views.len() + usize::from(wanted.is_some()) {
+            let reason = format!(
+                "the tracks have {there} columns, numbered from 1; {} views{} do not fit",
+                views.len(),
+                wanted.map_or(String::new(), |w| format!(" and the wanted column {w}"))
+            );
+            return Err(self.incomplete(reason));
+        }
+        Ok(columns.into_iter().flatten().collect())
+    }
+}
+
+/// The values, or the first error in the order of the views: the same one on every run.
+fn in_order<T>(results: Vec<Loaded<T>>) -> Loaded<Vec<T>> {
+    results.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
+        write("a.pgm", b"P5 4 2 255\n\x01\x02\x03\x04\x05\x06\x07\x08");
+        write("small.pgm", b"P5 2 1 255\n\x01\x02");
+        write("d.pgm", b"P5 4 2 255\n\x04\x04\x04\x00\x04\x04\x04\x04");
+        write("zero.pgm", b"P5 4 2 255\n\0\0\0\0\0\0\0\0");
+        write("t.txt", b"1 2 3 4 5 6\n1 2 - 5 6\n");
+        let path = dir.path().join("scene.toml");
+        std::fs::write(&path, text).unwrap();
+        (dir, path)
+    }
+
+    fn read(text: &str, options: &LoadOptions) -> Result<Scene, String> {
+        let (_dir, path) = scene(text);
+        let spec = parse(text, &path).map_err(|e| e.to_string())?;
+        load(&spec, &path, options).map_err(|e| e.to_string())
+    }
+
+    const RIG: &str = r#"
+        [[view]]
+        name = "left"
+        image = "a.pgm"
+        position = 0.0
+        disparity = "d.pgm"
+        disparity_scale = 4.0
+        [[view]]
+        name = "right"
+        image = "a.pgm"
+        position = 1.0
+        disparity = "d.pgm"
+        [virtual]
+        position = 0.5
+    "#;
+
+    #[test]
+    fn a_rectified_rig_is_read() {
+        let read_rig = read(RIG, &LoadOptions::default()).unwrap();
+        let Kind::Rectified { views, position } = read_rig.kind else { panic!("{read_rig:?}") };
+        assert_eq!((views.len(), position, read_rig.filled), (2, 0.5, 2));
+        assert_eq!((views[0].disparity.data()[3], views[1].disparity.data()[3]), (1.0, 4.0));
+        let without = LoadOptions { view: Some("right".into()), fill: false, ..LoadOptions::default() };
+        let Kind::Rectified { views, position } = read(RIG, &without).unwrap().kind else { panic!() };
+        assert_eq!((views.len(), position), (1, 1.0));
+        assert!(views[0].disparity.data()[3].is_nan());
+    }
+
+    #[test]
+    fn coarse_maps_are_made_dense() {
+        let coarse = LoadOptions { depth_step: 2, ..LoadOptions::default() };
+        let Kind::Rectified { views, .. } = read(RIG, &coarse).unwrap().kind else { panic!() };
+        assert_eq!(views[0].disparity.size(), (4, 2));
+        let text = RIG.replace("disparity = \"d.pgm\"", "disparity = \"small.pgm\"\nstep = 2");
+        let Kind::Rectified { views, .. } = read(&text, &LoadOptions::default()).unwrap().kind else {
+            panic!()
+        };
+        assert_eq!(views[1].disparity.data()[0], 1.0);
+    }
+
+    #[test]
+    fn tracks_and_columns() {
+        let text = r#"
+            matches = "t.txt"
+            [[view]]
+            image = "a.pgm"
+            [[view]]
+            image = "small.pgm"
+            [virtual]
+            from_tracks = 2
+        "#;
+        let Kind::Uncalibrated { tracks, target, size, .. } =
+            read(text, &LoadOptions::default()).unwrap().kind
+        else {
+            panic!()
+        };
+        assert_eq!(tracks[0], [Some(Point::new(1.0, 2.0)), Some(Point::new(5.0, 6.0))]);
+        assert_eq!(target, Target::Tracks(vec![Some(Point::new(3.0, 4.0)), None]));
+        assert_eq!(size, (4, 2));
+        let outside = text.replace("from_tracks = 2", "from_tracks = 7");
+        let message = read(&outside, &LoadOptions::default()).unwrap_err();
+        assert!(message.contains("3 columns, numbered from 1"), "{message}");
+    }
+
+    #[test]
+    fn cameras_and_sizes() {
+        let camera = "camera = [[5.0, 0.0, 1.5, 0.0], [0.0, 5.0, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0]]";
+        let text = format!(
+            "[[view]]\nimage = \"a.pgm\"\n{camera}\ndepth = \"d.pgm\"\n[virtual]\n{camera}\nsize = [6, 3]\n"
+        );
+        let Kind::Calibrated { views, size, .. } = read(&text, &LoadOptions::default()).unwrap().kind else {
+            panic!()
+        };
+        assert_eq!((views[0].depth.data()[0], size), (4.0, (6, 3)));
+        let singular = text.replace("[0.0, 0.0, 1.0, 0.0]", "[0.0, 0.0, 0.0, 1.0]");
+        let message = read(&singular, &LoadOptions::default()).unwrap_err();
+        assert!(message.contains("view \"a.pgm\"") && message.contains("singular"), "{message}");
+        let empty = text.replace("[6, 3]", "[0, 3]");
+        assert!(read(&empty, &LoadOptions::default()).unwrap_err().contains("at least one pixel"));
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let fails = |text: &str, words: &[&str]| {
+            let message = read(text, &LoadOptions::default()).unwrap_err();
+            assert!(words.iter().all(|w| message.contains(w)), "{message}");
+        };
+        fails(&RIG.replace("disparity_scale", "disparity_scal"), &["scene.toml", "disparity_scal", "line"]);
+        fails(&RIG.replacen("disparity = \"d.pgm\"", "", 1), &["\"left\"", "`disparity`"]);
+        fails(&RIG.replacen("a.pgm", "missing.pgm", 1), &["missing.pgm"]);
+        fails(&RIG.replacen("\"a.pgm\"", "\"small.pgm\"", 1), &["d.pgm", "4 x 2", "2 x 1"]);
+        fails(&RIG.replace("d.pgm", "zero.pgm"), &["zero.pgm", "none of the 8 values"]);
+        fails(&RIG.replace("4.0", "0.0"), &["the scale is 0"]);
+        fails(&RIG.replace("[virtual]\n        position = 0.5", ""), &["[virtual] needs a `position`"]);
+        fails("[[view]]\nimage = \"a.pgm\"\n[[view]]\nimage = \"a.pgm\"\n", &["`matches`"]);
+        fails("", &["[[view]]"]);
+        let options = LoadOptions { view: Some("middle".into()), ..LoadOptions::default() };
+        assert!(read(RIG, &options).unwrap_err().contains("the views are left, right"));
+    }
+}

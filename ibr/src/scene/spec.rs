@@ -1,0 +1,80 @@
+//! What a scene file says, word for word.
+
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// A scene file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// The views.
+    #[serde(default)]
+    pub view: Vec<ViewSpec>,
+    /// The wanted view; may be left out if one of the views is left out and rendered.
+    #[serde(rename = "virtual")]
+    pub target: Option<TargetSpec>,
+    /// File of tracks over the views (uncalibrated scenes).
+    pub matches: Option<PathBuf>,
+    /// Folder of a COLMAP text model that holds the cameras of all views.
+    pub colmap: Option<PathBuf>,
+    /// Whether the world frame of the cameras is left-handed.
+    #[serde(default)]
+    pub mirrored: bool,
+}
+
+/// A view.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViewSpec {
+    /// Name; that of the image file if left out.
+    pub name: Option<String>,
+    /// Image file.
+    pub image: PathBuf,
+    /// Place on the line of a rectified rig, in baselines.
+    pub position: Option<f64>,
+    /// Disparity map of a rectified rig.
+    pub disparity: Option<PathBuf>,
+    /// Stored value / scale = disparity in pixels for a baseline of one.
+    pub disparity_scale: Option<f64>,
+    /// 3 x 4 camera matrix, in pixels.
+    pub camera: Option<[[f64; 4]; 3]>,
+    /// Depth map of a general rig.
+    pub depth: Option<PathBuf>,
+    /// Stored value / scale = depth.
+    pub depth_scale: Option<f64>,
+    /// Folder of a COLMAP text model that holds the camera of this view.
+    pub colmap: Option<PathBuf>,
+    /// Pixels from one value of the map to the next, in both directions.
+    pub step: Option<usize>,
+    /// Column of this view in the tracks, from 1.
+    pub column: Option<usize>,
+}
+
+/// The wanted view.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TargetSpec {
+    /// Place on the line of a rectified rig, in baselines.
+    pub position: Option<f64>,
+    /// 3 x 4 camera matrix, in pixels.
+    pub camera: Option<[[f64; 4]; 3]>,
+    /// Name of an image of the COLMAP model whose camera is wanted.
+    pub colmap_image: Option<String>,
+    /// Width and height in pixels.
+    pub size: Option<[usize; 2]>,
+    /// Column of the tracks, from 1, that holds the places in the wanted view.
+    pub from_tracks: Option<usize>,
+    /// Place between the first two views, 0 to 1.
+    pub between: Option<f64>,
+    /// Added to every column, in pixels.
+    pub offset: Option<f64>,
+    /// File of tracks, if it is not given at the top.
+    pub matches: Option<PathBuf>,
+}
+
+impl ViewSpec {
+    /// The name, or that of the image.
+    pub fn label(&self) -> String {
+        self.name.clone().unwrap_or_else(|| self.image.display().to_string())
+    }
+}

@@ -1,0 +1,256 @@
+//! The fundamental matrix: normalised eight-point algorithm within RANSAC.
+//!
+//! R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd ed., chapter 11.
+
+use super::normalise::Normalisation;
+use super::random::{Subsets, trials_needed};
+use super::{GeometryError, Match, RobustSettings, homogeneous};
+use crate::linear;
+use nalgebra::Matrix3;
+
+/// Below this ratio of the second smallest to the largest singular value the matches leave F undetermined.
+const DEGENERATE: f64 = 1e-7;
+/// Share of the matches that a homography may explain before the scene counts as planar.
+const PLANAR_SHARE: f64 = 0.95;
+/// Rounds of refitting on the inliers.
+const ROUNDS: usize = 5;
+
+/// F with x'^T F x = 0, and the matches that agree with it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fundamental {
+    /// The matrix, of rank two and unit norm.
+    pub matrix: Matrix3<f64>,
+    /// Indices of the matches within the threshold, increasing.
+    pub inliers: Vec<usize>,
+    /// Root mean square Sampson distance of the inliers in pixels.
+    pub rms: f64,
+}
+
+/// Square of the Sampson distance of a match from F, in square pixels.
+pub fn sampson(f: &Matrix3<f64>, m: &Match) -> f64 {
+    let (x, y) = (homogeneous(&m.first), homogeneous(&m.second));
+    let (fx, fty) = (f * x, f.tr_mul(&y));
+    let slope = fx.xy().norm_squared() + fty.xy().norm_squared();
+    y.dot(&fx).powi(2) / slope
+}
+
+/// F of all the matches by the normalised eight-point algorithm.
+///
+/// # Errors
+/// [`GeometryError::TooFew`] below 8 matches, [`GeometryError::Degenerate`] when they leave F undetermined.
+pub fn eight_point(matches: &[Match]) -> Result<Matrix3<f64>, GeometryError> {
+    if matches.len() < 8 {
+        return Err(GeometryError::TooFew { what: "matches", found: matches.len(), needed: 8 });
+    }
+    let (s, t) = normalisations(matches);
+    let row = |m: &Match| {
+        let (a, b) = (s.apply(&m.first), t.apply(&m.second));
+        [b.x * a.x, b.x * a.y, b.x, b.y * a.x, b.y * a.y, b.y, a.x, a.y, 1.0]
+    };
+    let rows: Vec<[f64; 9]> = matches.iter().map(row).collect();
+    let failed = || GeometryError::Numerical { what: "fundamental matrix" };
+    let (f, values) = linear::least_vector(&rows).ok_or_else(failed)?;
+    let ratio = values[7] / values[0];
+    if ratio < DEGENERATE {
+        return Err(GeometryError::Degenerate { what: "fundamental matrix", ratio });
+    }
+    let f = Matrix3::from_row_slice(f.as_slice());
+    let (u, mut sigma, v) = linear::svd3(&f).ok_or_else(failed)?;
+    sigma[2] = 0.0;
+    let f = t.matrix().transpose() * u * Matrix3::from_diagonal(&sigma.into()) * v.transpose() * s.matrix();
+    Ok(f / f.norm())
+}
+
+fn normalisations(matches: &[Match]) -> (Normalisation, Normalisation) {
+    let first = Normalisation::of(matches.iter().map(|m| &m.first));
+    (first, Normalisation::of(matches.iter().map(|m| &m.second)))
+}
+
+fn inliers(f: &Matrix3<f64>, matches: &[Match], threshold: f64) -> Vec<usize> {
+    (0..matches.len()).filter(|i| sampson(f, &matches[*i]) < threshold * threshold).collect()
+}
+
+fn chosen(matches: &[Match], indices: &[usize]) -> Vec<Match> {
+    indices.iter().map(|i| matches[*i]).collect()
+}
+
+/// F by RANSAC over samples of eight, refitted on the inliers until their set is stable.
+///
+/// # Errors
+/// [`GeometryError`]: fewer than 8 matches or inliers, coordinates that are no numbers, planar matches.
+pub fn robust(matches: &[Match], settings: &RobustSettings) -> Result<Fundamental, GeometryError> {
+    if matches.len() < 8 {
+        return Err(GeometryError::TooFew { what: "matches", found: matches.len(), needed: 8 });
+    }
+    let finite = |m: &Match| m.first.iter().chain(m.second.iter()).all(|v| v.is_finite());
+    if let Some(index) = matches.iter().position(|m| !finite(m)) {
+        return Err(GeometryError::NotFinite { index });
+    }
+    let best = consensus(matches, settings);
+    let (threshold, total) = (settings.epipolar, matches.len());
+    if best.len() < 8 {
+        refuse_planes(matches, threshold)?;
+        let (what, inliers) = ("fundamental matrix", best.len());
+        return Err(GeometryError::NoConsensus { what, inliers, matches: total, threshold });
+    }
+    refuse_planes(&chosen(matches, &best), threshold)?;
+    refit(matches, best, threshold)
+}
+
+/// The largest set of matches that agrees with the F of some sample.
+fn consensus(matches: &[Match], settings: &RobustSettings) -> Vec<usize> {
+    let mut subsets = Subsets::new(settings.seed);
+    let mut best = Vec::new();
+    let mut trial = 0;
+    while trial < settings.trials {
+        let sample = chosen(matches, &subsets.draw::<8>(matches.len()));
+        if let Ok(f) = eight_point(&sample) {
+            let agreeing = inliers(&f, matches, settings.epipolar);
+            if agreeing.len() > best.len() {
+                best = agreeing;
+            }
+        }
+        trial += 1;
+        if trial as f64 >= trials_needed(best.len(), matches.len(), 8, settings.confidence) {
+            break;
+        }
+    }
+    best
+}
+
+fn refit(matches: &[Match], mut set: Vec<usize>, threshold: f64) -> Result<Fundamental, GeometryError> {
+    let mut matrix = eight_point(&chosen(matches, &set))?;
+    for _ in 0..ROUNDS {
+        let next = inliers(&matrix, matches, threshold);
+        if next == set || next.len() < 8 {
+            break;
+        }
+        set = next;
+        matrix = eight_point(&chosen(matches, &set))?;
+    }
+    let squares: f64 = set.iter().map(|i| sampson(&matrix, &matches[*i])).sum();
+    let rms = (squares / set.len() as f64).sqrt();
+    Ok(Fundamental { matrix, inliers: set, rms })
+}
+
+/// Refuses matches that one homography explains: a plane, or a camera that only turned.
+fn refuse_planes(matches: &[Match], threshold: f64) -> Result<(), GeometryError> {
+    let Some(h) = homography(matches) else { return Ok(()) };
+    let explained = matches.iter().filter(|m| transfer(&h, m) < threshold * threshold).count();
+    if explained as f64 >= PLANAR_SHARE * matches.len() as f64 {
+        return Err(GeometryError::Planar { explained, matches: matches.len(), threshold });
+    }
+    Ok(())
+}
+
+/// Square of the distance between H x and x', in square pixels.
+fn transfer(h: &Matrix3<f64>, m: &Match) -> f64 {
+    let p = h * homogeneous(&m.first);
+    (p.xy() / p.z - m.second).norm_squared()
+}
+
+/// The homography that maps all first points to the second ones best, by the normalised DLT.
+fn homography(matches: &[Match]) -> Option<Matrix3<f64>> {
+    let (s, t) = normalisations(matches);
+    let rows = matches.iter().flat_map(|m| {
+        let (a, b) = (s.apply(&m.first), t.apply(&m.second));
+        [
+            [a.x, a.y, 1.0, 0.0, 0.0, 0.0, -b.x * a.x, -b.x * a.y, -b.x],
+            [0.0, 0.0, 0.0, a.x, a.y, 1.0, -b.y * a.x, -b.y * a.y, -b.y],
+        ]
+    });
+    let (h, _) = linear::least_vector(&rows.collect::<Vec<_>>())?;
+    Some(t.inverse() * Matrix3::from_row_slice(h.as_slice()) * s.matrix())
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::uncalibrated::Point;
+    use nalgebra::{Matrix3x4, Rotation3, Vector3};
+
+    /// A metric pair, deterministic points in front of it, and their images.
+    pub(crate) struct Synthetic {
+        pub(crate) cameras: [Matrix3x4<f64>; 3],
+        pub(crate) points: Vec<Vector3<f64>>,
+    }
+
+    impl Synthetic {
+        pub(crate) fn new(count: usize, flat: bool) -> Self {
+            let k = Matrix3::new(800.0, 0.0, 320.0, 0.0, 800.0, 240.0, 0.0, 0.0, 1.0);
+            let camera = |turn: f64, c: [f64; 3]| {
+                let r = Rotation3::from_euler_angles(0.02, turn, -0.01);
+                let mut rt = Matrix3x4::zeros();
+                rt.fixed_columns_mut::<3>(0).copy_from(r.matrix());
+                rt.set_column(3, &(-(r * Vector3::from(c))));
+                k * rt
+            };
+            let cameras = [
+                camera(0.05, [-0.6, 0.0, 0.0]),
+                camera(-0.06, [0.7, 0.1, 0.1]),
+                camera(0.0, [0.05, -0.05, 0.05]),
+            ];
+            let point = |i: usize| {
+                let part = |k: usize| ((i * k + 3) % 997) as f64 / 997.0 - 0.5;
+                let (x, y) = (3.0 * part(389), 2.0 * part(631));
+                let depth = if flat { 6.0 + 0.3 * x - 0.2 * y } else { 6.0 + 2.5 * part(277) };
+                Vector3::new(x, y, depth)
+            };
+            Self { cameras, points: (0..count).map(point).collect() }
+        }
+
+        pub(crate) fn image(&self, camera: usize, point: usize) -> Point {
+            let p = self.cameras[camera] * self.points[point].push(1.0);
+            p.xy() / p.z
+        }
+
+        pub(crate) fn matches(&self) -> Vec<Match> {
+            let both = |j| Match { first: self.image(0, j), second: self.image(1, j) };
+            (0..self.points.len()).map(both).collect()
+        }
+    }
+
+    #[test]
+    fn exact_matches_give_the_exact_matrix() {
+        let matches = Synthetic::new(60, false).matches();
+        let f = eight_point(&matches).unwrap();
+        assert!(matches.iter().all(|m| sampson(&f, m).sqrt() < 1e-7));
+        assert!(f.determinant().abs() < 1e-12);
+    }
+
+    #[test]
+    fn outliers_are_found_and_the_seed_decides() {
+        let mut matches = Synthetic::new(120, false).matches();
+        for i in (0..120).step_by(3) {
+            matches[i].second += Point::new(20.0 + i as f64, 35.0 - 0.7 * i as f64);
+        }
+        let settings = RobustSettings::default();
+        let found = robust(&matches, &settings).unwrap();
+        let good = |i: &usize| !i.is_multiple_of(3);
+        assert_eq!(found.inliers.iter().filter(|i| good(i)).count(), 80);
+        assert!(found.inliers.iter().filter(|i| !good(i)).count() <= 3, "{:?}", found.inliers);
+        assert_eq!(found, robust(&matches, &settings).unwrap());
+    }
+
+    #[test]
+    fn planes_rotations_and_few_matches_are_refused() {
+        let settings = RobustSettings::default();
+        let scene = Synthetic::new(50, true);
+        assert!(matches!(robust(&scene.matches(), &settings), Err(GeometryError::Planar { .. })));
+        let mut noisy = scene.matches();
+        for (i, m) in noisy.iter_mut().enumerate() {
+            m.second += Point::new(0.2 * ((i % 5) as f64 - 2.0) / 2.0, 0.2 * ((i % 3) as f64 - 1.0));
+        }
+        assert!(matches!(robust(&noisy, &settings), Err(GeometryError::Planar { .. })));
+        let few = &Synthetic::new(7, false).matches();
+        assert_eq!(
+            robust(few, &settings),
+            Err(GeometryError::TooFew { what: "matches", found: 7, needed: 8 })
+        );
+        let mut broken = Synthetic::new(20, false).matches();
+        broken[4].first.x = f64::NAN;
+        assert_eq!(robust(&broken, &settings), Err(GeometryError::NotFinite { index: 4 }));
+        let same = vec![Match { first: Point::new(1.0, 2.0), second: Point::new(3.0, 4.0) }; 30];
+        assert!(robust(&same, &settings).is_err());
+    }
+}

@@ -1,0 +1,128 @@
+//! Rendering from images and correspondences alone (thesis 2.5): no camera is known.
+//!
+//! matches -> F (eight points, RANSAC) -> a pair of projective cameras -> points, chi and its order ->
+//! chi on a Delaunay triangulation in each view -> the virtual camera -> the view.
+//!
+//! All geometry happens in a projective frame X_p = H X with an unknown 4 x 4 matrix H. Depth is replaced by
+//! chi = -(X_p)_4 / (pi3_p . X_p), which along every viewing ray is an affine function of the true inverse depth.
+
+pub mod canonical;
+pub mod chirality;
+pub mod fundamental;
+pub mod mesh;
+pub mod metric;
+pub mod normalise;
+mod random;
+pub mod resection;
+pub mod tracks;
+pub mod triangulate;
+
+use crate::camera::CameraError;
+
+/// A place in an image, in pixels.
+pub type Point = nalgebra::Vector2<f64>;
+
+/// A correspondence: the same scene point in a first and a second image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Match {
+    /// Place in the first image.
+    pub first: Point,
+    /// Place in the second image.
+    pub second: Point,
+}
+
+/// Why the geometry of the views could not be found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GeometryError {
+    /// Not enough correspondences.
+    #[error("{found} {what} where at least {needed} are needed; give more tracks")]
+    TooFew {
+        /// What there is too little of.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// A coordinate that is no number.
+    #[error("match {index} has a coordinate that is not a finite number")]
+    NotFinite {
+        /// Index of the match.
+        index: usize,
+    },
+    /// All matches lie on one plane, or the camera only turned.
+    #[error(
+        "the matches are planar: one homography explains {explained} of {matches} of them within {threshold} px, so the fundamental matrix is not determined; add matches off the plane, or views with a baseline"
+    )]
+    Planar {
+        /// Matches that the homography explains.
+        explained: usize,
+        /// Matches considered.
+        matches: usize,
+        /// Threshold in pixels.
+        threshold: f64,
+    },
+    /// The matches do not determine the geometry.
+    #[error(
+        "the {what} is not determined by the matches (second smallest / largest singular value {ratio:e})"
+    )]
+    Degenerate {
+        /// What was to be found.
+        what: &'static str,
+        /// Ratio of singular values.
+        ratio: f64,
+    },
+    /// No model explains enough matches.
+    #[error(
+        "the best {what} explains only {inliers} of {matches} matches within {threshold} px; check the tracks"
+    )]
+    NoConsensus {
+        /// What was to be found.
+        what: &'static str,
+        /// Matches it explains.
+        inliers: usize,
+        /// All matches.
+        matches: usize,
+        /// Threshold in pixels.
+        threshold: f64,
+    },
+    /// A numerical routine failed.
+    #[error("the {what} could not be computed: the numbers are not finite or the iteration did not end")]
+    Numerical {
+        /// What was to be computed.
+        what: &'static str,
+    },
+    /// A camera of the projective frame is singular.
+    #[error("{which}: {source}")]
+    Camera {
+        /// Which camera.
+        which: String,
+        /// What is wrong with it.
+        source: CameraError,
+    },
+}
+
+/// Thresholds and seeds of the robust estimators.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobustSettings {
+    /// Seed of the random samples: the same seed gives the same bits.
+    pub seed: u64,
+    /// Sampson distance below which a match agrees with F, in pixels.
+    pub epipolar: f64,
+    /// Reprojection error below which a match agrees with a resected camera, in pixels.
+    pub reprojection: f64,
+    /// Probability with which a sample without outliers is to be drawn.
+    pub confidence: f64,
+    /// Greatest number of samples drawn.
+    pub trials: usize,
+}
+
+impl Default for RobustSettings {
+    fn default() -> Self {
+        Self { seed: 1, epipolar: 1.0, reprojection: 2.0, confidence: 0.999, trials: 5000 }
+    }
+}
+
+pub(crate) fn homogeneous(p: &Point) -> nalgebra::Vector3<f64> {
+    p.push(1.0)
+}

@@ -1,0 +1,66 @@
+//! Seeded random samples and the number of them that is enough.
+
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// Draws subsets of indices; the same seed gives the same subsets on every platform.
+pub(super) struct Subsets {
+    generator: Pcg64,
+}
+
+impl Subsets {
+    pub(super) fn new(seed: u64) -> Self {
+        Self { generator: Pcg64::seed_from_u64(seed) }
+    }
+
+    /// K different indices below n >= K.
+    pub(super) fn draw<const K: usize>(&mut self, n: usize) -> [usize; K] {
+        let mut chosen = [usize::MAX; K];
+        for k in 0..K {
+            loop {
+                let i = self.below(n);
+                if !chosen[..k].contains(&i) {
+                    chosen[k] = i;
+                    break;
+                }
+            }
+        }
+        chosen
+    }
+
+    /// A number below n; the bias of the multiplication is below n / 2^32.
+    fn below(&mut self, n: usize) -> usize {
+        ((u64::from(self.generator.next_u32()) * n as u64) >> 32) as usize
+    }
+}
+
+/// Samples of `size` needed to draw one without outliers with probability `confidence`:
+/// log(1 - p) / log(1 - w^size), w the share of inliers.
+pub(super) fn trials_needed(inliers: usize, total: usize, size: i32, confidence: f64) -> f64 {
+    let clean = (inliers as f64 / total as f64).powi(size);
+    if clean >= 1.0 { 1.0 } else { (1.0 - confidence).ln() / (-clean).ln_1p() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subsets_are_repeatable_and_without_repetition() {
+        let (mut a, mut b) = (Subsets::new(7), Subsets::new(7));
+        for n in 8..40 {
+            let drawn = a.draw::<8>(n);
+            assert_eq!(drawn, b.draw::<8>(n));
+            let mut sorted = drawn;
+            sorted.sort_unstable();
+            assert!(sorted.windows(2).all(|w| w[0] < w[1]) && sorted[7] < n);
+        }
+    }
+
+    #[test]
+    fn half_outliers_need_a_thousand_samples() {
+        assert_eq!(trials_needed(10, 10, 8, 0.999), 1.0);
+        assert!((trials_needed(50, 100, 8, 0.999) - 1764.9).abs() < 0.1);
+        assert!(trials_needed(0, 100, 8, 0.999) > 1e12);
+    }
+}

@@ -1,0 +1,218 @@
+//! A camera from points and their images: DLT on six, RANSAC, refinement of the reprojection error.
+
+use super::normalise::Normalisation;
+use super::random::{Subsets, trials_needed};
+use super::{GeometryError, Point, RobustSettings};
+use crate::linear;
+use nalgebra::{Matrix3x4, SMatrix, SVector, Vector4};
+
+/// A homogeneous point and where the wanted camera sees it, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighting {
+    /// The point in the projective frame.
+    pub point: Vector4<f64>,
+    /// Its image.
+    pub image: Point,
+}
+
+/// A resected camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resection {
+    /// The camera, in pixels, of unit norm.
+    pub camera: Matrix3x4<f64>,
+    /// Indices of the sightings within the threshold.
+    pub inliers: Vec<usize>,
+    /// Root mean square reprojection error of the inliers in pixels.
+    pub rms: f64,
+}
+
+const NEEDED: usize = 6;
+/// Below this ratio of singular values the sightings leave the camera undetermined (points on a plane).
+const DEGENERATE: f64 = 1e-9;
+/// Steps of the refinement.
+const STEPS: usize = 10;
+
+/// Finds the camera that sees the points where they were seen.
+///
+/// # Errors
+/// [`GeometryError`]: fewer than 6 sightings or inliers, points that leave the camera undetermined.
+pub fn resect(sightings: &[Sighting], settings: &RobustSettings) -> Result<Resection, GeometryError> {
+    let what = "matches of known points in the wanted view";
+    if sightings.len() < NEEDED {
+        return Err(GeometryError::TooFew { what, found: sightings.len(), needed: NEEDED });
+    }
+    let threshold = settings.reprojection;
+    let mut set = consensus(sightings, settings);
+    let mut camera = Matrix3x4::zeros();
+    for _ in 0..5 {
+        if set.len() < NEEDED {
+            let (what, inliers, matches) = ("virtual camera", set.len(), sightings.len());
+            return Err(GeometryError::NoConsensus { what, inliers, matches, threshold });
+        }
+        let chosen: Vec<Sighting> = set.iter().map(|i| sightings[*i]).collect();
+        camera = refined(&direct(&chosen)?, &chosen);
+        let next = inliers(&camera, sightings, threshold);
+        if next == set {
+            break;
+        }
+        set = next;
+    }
+    let squares: f64 = set.iter().map(|i| error(&camera, &sightings[*i])).sum();
+    let rms = (squares / set.len().max(1) as f64).sqrt();
+    Ok(Resection { camera: camera / camera.norm(), inliers: set, rms })
+}
+
+fn consensus(sightings: &[Sighting], settings: &RobustSettings) -> Vec<usize> {
+    let mut subsets = Subsets::new(settings.seed);
+    let mut best = Vec::new();
+    let mut trial = 0;
+    while trial < settings.trials {
+        let sample = subsets.draw::<NEEDED>(sightings.len()).map(|i| sightings[i]);
+        if let Ok(camera) = direct(&sample) {
+            let agreeing = inliers(&camera, sightings, settings.reprojection);
+            if agreeing.len() > best.len() {
+                best = agreeing;
+            }
+        }
+        trial += 1;
+        if trial as f64 >= trials_needed(best.len(), sightings.len(), 6, settings.confidence) {
+            break;
+        }
+    }
+    best
+}
+
+/// Square of the reprojection error in square pixels.
+fn error(camera: &Matrix3x4<f64>, s: &Sighting) -> f64 {
+    let p = camera * s.point;
+    let square = (p.xy() / p.z - s.image).norm_squared();
+    if square.is_finite() { square } else { f64::INFINITY }
+}
+
+fn inliers(camera: &Matrix3x4<f64>, sightings: &[Sighting], threshold: f64) -> Vec<usize> {
+    (0..sightings.len()).filter(|i| error(camera, &sightings[*i]) < threshold * threshold).collect()
+}
+
+/// The camera of least algebraic error, with normalised images and points of unit norm.
+fn direct(sightings: &[Sighting]) -> Result<Matrix3x4<f64>, GeometryError> {
+    let what = "virtual camera";
+    let t = Normalisation::of(sightings.iter().map(|s| &s.image));
+    let rows: Vec<[f64; 12]> = sightings
+        .iter()
+        .flat_map(|s| {
+            let (p, x) = (t.apply(&s.image), s.point / s.point.norm());
+            let row = |first: usize, v: f64| {
+                std::array::from_fn(|k| match k {
+                    8.. => -v * x[k - 8],
+                    _ if k / 4 == first => x[k % 4],
+                    _ => 0.0,
+                })
+            };
+            [row(0, p.x), row(1, p.y)]
+        })
+        .collect();
+    let (p, values) = linear::least_vector(&rows).ok_or(GeometryError::Numerical { what })?;
+    let ratio = values[10] / values[0];
+    if ratio < DEGENERATE {
+        return Err(GeometryError::Degenerate { what, ratio });
+    }
+    Ok(t.inverse() * Matrix3x4::from_row_slice(p.as_slice()))
+}
+
+/// Levenberg-Marquardt on the reprojection error in normalised images; never worse than the start.
+fn refined(start: &Matrix3x4<f64>, sightings: &[Sighting]) -> Matrix3x4<f64> {
+    let t = Normalisation::of(sightings.iter().map(|s| &s.image));
+    let normal: Vec<Sighting> = sightings
+        .iter()
+        .map(|s| Sighting { point: s.point / s.point.norm(), image: t.apply(&s.image) })
+        .collect();
+    let total = |c: &Matrix3x4<f64>| normal.iter().map(|s| error(c, s)).sum::<f64>();
+    let start = t.matrix() * start;
+    let mut camera = start / start.norm();
+    let (mut damping, mut least) = (1e-6, total(&camera));
+    for _ in 0..STEPS {
+        let Some(step) = step(&camera, &normal, damping) else { break };
+        let moved = camera + Matrix3x4::from_row_slice(step.as_slice());
+        let moved = moved / moved.norm();
+        let next = total(&moved);
+        if next < least {
+            (camera, least, damping) = (moved, next, damping * 0.1);
+        } else {
+            damping *= 10.0;
+        }
+    }
+    t.inverse() * camera
+}
+
+/// One damped step; the camera's own direction, a gauge, is pinned.
+fn step(camera: &Matrix3x4<f64>, sightings: &[Sighting], damping: f64) -> Option<SVector<f64, 12>> {
+    let own = SVector::<f64, 12>::from_fn(|k, _| camera[(k / 4, k % 4)]);
+    let mut jtj = own * own.transpose();
+    let mut jtr = SVector::<f64, 12>::zeros();
+    for s in sightings {
+        let p = camera * s.point;
+        let at = p.xy() / p.z;
+        let jacobian = SMatrix::<f64, 2, 12>::from_fn(|r, k| match k {
+            8.. => -at[r] * s.point[k - 8] / p.z,
+            _ if k / 4 == r => s.point[k % 4] / p.z,
+            _ => 0.0,
+        });
+        jtj += jacobian.transpose() * jacobian;
+        jtr += jacobian.transpose() * (s.image - at);
+    }
+    let diagonal = jtj.diagonal();
+    (0..12).for_each(|k| jtj[(k, k)] += damping * diagonal[k]);
+    linear::normal_step::<12>(&jtj, &jtr)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fundamental::tests::Synthetic;
+    use super::*;
+    use nalgebra::Matrix4;
+
+    fn sightings(scene: &Synthetic, h: &Matrix4<f64>) -> Vec<Sighting> {
+        (0..scene.points.len())
+            .map(|j| Sighting { point: h * scene.points[j].push(1.0), image: scene.image(2, j) })
+            .collect()
+    }
+
+    fn projective() -> Matrix4<f64> {
+        Matrix4::new(1.0, 0.2, -0.1, 0.3, 0.0, 0.9, 0.3, -0.2, 0.1, -0.3, 1.2, 0.4, 0.05, -0.02, 0.1, 0.8)
+    }
+
+    #[test]
+    fn the_camera_comes_back_in_any_frame() {
+        let scene = Synthetic::new(40, false);
+        let h = projective();
+        let found = resect(&sightings(&scene, &h), &RobustSettings::default()).unwrap();
+        assert_eq!(found.inliers.len(), 40);
+        assert!(found.rms < 1e-6, "{}", found.rms);
+        let want = scene.cameras[2] * h.try_inverse().unwrap();
+        let want = want / want.norm();
+        let sign = want.dot(&found.camera).signum();
+        assert!((found.camera * sign - want).norm() < 1e-8);
+    }
+
+    #[test]
+    fn outliers_do_not_move_it_and_noise_little() {
+        let scene = Synthetic::new(60, false);
+        let mut seen = sightings(&scene, &projective());
+        for (i, s) in seen.iter_mut().enumerate() {
+            let noise = Point::new(((i * 7) % 5) as f64 - 2.0, ((i * 3) % 5) as f64 - 2.0) * 0.1;
+            s.image += if i % 4 == 0 { Point::new(40.0, -25.0) } else { noise };
+        }
+        let found = resect(&seen, &RobustSettings::default()).unwrap();
+        assert_eq!(found.inliers.len(), 45);
+        assert!(found.rms < 0.25, "{}", found.rms);
+    }
+
+    #[test]
+    fn five_points_and_planes_are_not_enough() {
+        let settings = RobustSettings::default();
+        let few = sightings(&Synthetic::new(5, false), &projective());
+        assert!(matches!(resect(&few, &settings), Err(GeometryError::TooFew { found: 5, needed: 6, .. })));
+        let flat = sightings(&Synthetic::new(40, true), &projective());
+        assert!(resect(&flat, &settings).is_err());
+    }
+}

@@ -1,0 +1,205 @@
+//! Tracks: where scene points were seen, one line a point, one pair "x y" a view, "-" where not seen.
+
+use super::Point;
+use std::path::{Path, PathBuf};
+
+/// Why a track file could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum TrackError {
+    /// The file cannot be opened.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A word that is neither a number nor "-".
+    #[error("{}:{line}: {word:?} is neither a finite number nor \"-\"", path.display())]
+    Word {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// The word.
+        word: String,
+    },
+    /// A line with another number of columns.
+    #[error(
+        "{}:{line}: {found} columns where the file has {expected}; a track is \"x y\" for each view in order and \"-\" where the point is not seen",
+        path.display()
+    )]
+    Columns {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// Columns found.
+        found: usize,
+        /// Columns of the first track.
+        expected: usize,
+    },
+    /// No track at all.
+    #[error("{}: there is no track in the file", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// Tracks over a number of columns (views).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracks {
+    columns: usize,
+    rows: Vec<Vec<Option<Point>>>,
+}
+
+impl Tracks {
+    /// Reads a track file; empty lines and what follows a `#` are passed over. A point that is not seen is
+    /// one `-`, or one for each coordinate.
+    ///
+    /// # Errors
+    /// [`TrackError`], with file and line.
+    pub fn read(path: &Path) -> Result<Self, TrackError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| TrackError::Read { path: path.into(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// The same from text; `path` is for the messages.
+    ///
+    /// # Errors
+    /// [`TrackError`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, TrackError> {
+        let mut lines = Vec::new();
+        for (i, line) in text.lines().enumerate() {
+            let content = line.split('#').next().unwrap_or("");
+            let words =
+                words(content).map_err(|word| TrackError::Word { path: path.into(), line: i + 1, word })?;
+            if !words.is_empty() {
+                lines.push((i + 1, words));
+            }
+        }
+        // One dash a point unless only the other reading gives every line as many columns.
+        let single = columns(&lines, one_dash);
+        let rows = match columns(&lines, two_dashes) {
+            Ok(rows) if single.is_err() => rows,
+            _ => single.map_err(|(line, found, expected)| TrackError::Columns {
+                path: path.into(),
+                line,
+                found,
+                expected,
+            })?,
+        };
+        let columns = rows.first().map(Vec::len).ok_or(TrackError::Empty { path: path.into() })?;
+        Ok(Self { columns, rows })
+    }
+
+    /// Tracks from points, `rows[track][view]`; `None` unless all rows have the same length >= 1.
+    pub fn new(rows: Vec<Vec<Option<Point>>>) -> Option<Self> {
+        let columns = rows.first()?.len();
+        (columns > 0 && rows.iter().all(|r| r.len() == columns)).then_some(Self { columns, rows })
+    }
+
+    /// Number of views that the tracks run over.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// The tracks.
+    pub fn rows(&self) -> &[Vec<Option<Point>>] {
+        &self.rows
+    }
+}
+
+type Words = Vec<Option<f64>>;
+type Rows = Vec<Vec<Option<Point>>>;
+
+/// Numbers, and `None` for each dash; the error is the word that is neither.
+fn words(line: &str) -> Result<Words, String> {
+    let word = |w: &str| match w {
+        "-" => Ok(None),
+        w => w.parse().ok().filter(|v: &f64| v.is_finite()).map(Some).ok_or_else(|| w.to_string()),
+    };
+    line.split_whitespace().map(word).collect()
+}
+
+/// How many words the first column of a line takes, and the point if it is one.
+type Reading = fn(&[Option<f64>]) -> (usize, Option<Point>);
+
+/// Reads all lines in one way; the error is the line, its columns and those of the first line.
+fn columns(lines: &[(usize, Words)], read: Reading) -> Result<Rows, (usize, usize, usize)> {
+    let mut rows = Rows::new();
+    for (line, words) in lines {
+        let (row, whole) = columns_of(words, read);
+        let expected = rows.first().map_or(words.len().div_ceil(2), Vec::len);
+        if !whole || (!rows.is_empty() && row.len() != expected) {
+            return Err((*line, row.len(), expected));
+        }
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// The columns of a line, and whether it ended with a whole one and no number stood alone.
+fn columns_of(words: &[Option<f64>], read: Reading) -> (Vec<Option<Point>>, bool) {
+    let (mut row, mut rest) = (Vec::new(), words);
+    while !rest.is_empty() {
+        let (taken, point) = read(rest);
+        let column = &rest[..taken.min(rest.len())];
+        if column.len() < taken || (point.is_none() && column.iter().any(Option::is_some)) {
+            return (row, false);
+        }
+        row.push(point);
+        rest = &rest[taken..];
+    }
+    (row, true)
+}
+
+fn one_dash(words: &[Option<f64>]) -> (usize, Option<Point>) {
+    match words {
+        [None, ..] => (1, None),
+        [Some(x), Some(y), ..] => (2, Some(Point::new(*x, *y))),
+        _ => (2, None),
+    }
+}
+
+fn two_dashes(words: &[Option<f64>]) -> (usize, Option<Point>) {
+    match words {
+        [Some(x), Some(y), ..] => (2, Some(Point::new(*x, *y))),
+        _ => (2, None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Tracks, TrackError> {
+        Tracks::parse(text, Path::new("t.txt"))
+    }
+
+    #[test]
+    fn one_dash_or_two_for_what_is_not_seen() {
+        let want = [
+            vec![Some(Point::new(1.0, 2.0)), None, Some(Point::new(3.0, 4.5))],
+            vec![None, None, Some(Point::new(5.0, 6.0))],
+            vec![Some(Point::new(1.0, 1.0)), Some(Point::new(2.0, 2.0)), Some(Point::new(3.0, 3.0))],
+        ];
+        let one = parse("# tracks\n1 2 - 3 4.5\n\n- - 5 6 # far\n1 1 2 2 3 3\n").unwrap();
+        assert_eq!((one.columns(), one.rows()), (3, &want[..]));
+        let two = parse("1 2 - - 3 4.5\n- - - - 5 6\n1 1 2 2 3 3\n").unwrap();
+        assert_eq!(two, one);
+    }
+
+    #[test]
+    fn wrong_lines_are_named() {
+        let message = |text| parse(text).unwrap_err().to_string();
+        assert!(message("1 2 3 4\n1 2 3 x\n").starts_with("t.txt:2: \"x\" is neither"));
+        assert!(message("1 2 3 4\n1 2\n").starts_with("t.txt:2: 1 columns where the file has 2"));
+        assert!(message("1 2 3\n").starts_with("t.txt:1:"));
+        assert!(message("1 nan\n").contains("nan"));
+        assert!(message("# nothing\n").contains("no track"));
+        assert!(Tracks::read(Path::new("/nowhere")).unwrap_err().to_string().contains("/nowhere"));
+    }
+}

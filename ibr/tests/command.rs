@@ -1,0 +1,300 @@
+//! The binary, driven as a user would: exit codes, standard output and standard error apart.
+
+use hybank_ibr::camera::Camera;
+use hybank_ibr::depth::DepthMap;
+use hybank_ibr::image::{Image, pfm, read_image, save};
+use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+use nalgebra::Matrix3x4;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const SIZE: (usize, usize) = (120, 90);
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hybank-ibr")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn json(output: &Output) -> serde_json::Value {
+    assert_eq!(code(output), 0, "{}", stderr(output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn write_map(map: &DepthMap, path: &Path) {
+    let (width, height) = map.size();
+    let data = map.data().to_vec();
+    std::fs::write(path, pfm::encode(&pfm::FloatMap { width, height, channels: 1, data })).unwrap();
+}
+
+/// A rectified rig of the synthetic scene: left.png, right.png, middle.png and their disparities.
+fn rig() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, position) in [("left", 0.0), ("right", 1.0), ("middle", 0.5)] {
+        let camera = Camera::metric(rig_camera(position, SIZE), false).unwrap();
+        let (image, depth) = SyntheticScene::default().view(&camera, SIZE);
+        save(&image, &dir.path().join(format!("{name}.png"))).unwrap();
+        write_map(&rig_disparity(&depth, SIZE.0), &dir.path().join(format!("{name}.pfm")));
+    }
+    let view = |name: &str, position: f64| {
+        format!(
+            "[[view]]\nname = \"{name}\"\nimage = \"{name}.png\"\nposition = {position:?}\ndisparity = \"{name}.pfm\"\n"
+        )
+    };
+    let scene = view("left", 0.0) + &view("right", 1.0) + "[virtual]\nposition = 0.5\n";
+    std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
+    dir
+}
+
+#[test]
+fn a_rig_is_rendered_and_compared() {
+    let dir = rig();
+    let done = run(dir.path(), &["render", "scene.toml", "-o", "out.png", "--truth", "middle.png", "--json"]);
+    let figures = json(&done);
+    assert!(done.stderr.is_empty(), "{}", stderr(&done));
+    let number = |key: &str| figures[key].as_f64().unwrap();
+    assert!(number("psnr") > 33.0 && number("ssim") > 0.93 && number("mae") < 3.0, "{figures}");
+    assert!(number("coverage") > 0.95 && number("seconds") > 0.0, "{figures}");
+    let samples = &figures["samples"];
+    let count = |v: &serde_json::Value| v.as_u64().unwrap();
+    let dropped: u64 = ["unknown", "behind", "outside"].iter().map(|k| count(&samples["dropped"][k])).sum();
+    assert_eq!(count(&samples["propagated"]) + dropped, 2 * 120 * 90);
+    assert_eq!(count(&samples["propagated"]), count(&samples["occluded"]) + count(&samples["used"]));
+    assert!(figures["holes"]["crack"].is_u64() && figures["holes"]["disocclusion"].is_u64());
+    assert_eq!(read_image(&dir.path().join("out.png")).unwrap().size(), SIZE);
+}
+
+#[test]
+fn files_are_not_overwritten_and_appear_whole() {
+    let dir = rig();
+    let out = dir.path().join("out.png");
+    std::fs::write(&out, "precious").unwrap();
+    let refused = run(dir.path(), &["render", "scene.toml", "-o", "out.png"]);
+    assert_eq!(code(&refused), 1);
+    assert!(stderr(&refused).contains("out.png exists; --force overwrites it"), "{}", stderr(&refused));
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), "precious");
+    let failed = run(dir.path(), &["render", "scene.toml", "-o", "new.png", "--view", "nobody"]);
+    assert_eq!(code(&failed), 1);
+    assert!(!dir.path().join("new.png").exists());
+    let forced = run(dir.path(), &["render", "scene.toml", "-o", "out.png", "--force"]);
+    assert_eq!(code(&forced), 0, "{}", stderr(&forced));
+    assert!(String::from_utf8(forced.stdout).unwrap().contains("coverage"));
+    assert!(
+        std::fs::read_dir(dir.path()).unwrap().all(|e| !e
+            .unwrap()
+            .file_name()
+            .to_string_lossy()
+            .ends_with(".part"))
+    );
+}
+
+#[test]
+fn a_view_is_left_out_and_depth_may_be_coarse() {
+    let dir = rig();
+    let with_middle = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap().replace(
+        "[virtual]\nposition = 0.5\n",
+        "[[view]]\nname = \"middle\"\nimage = \"middle.png\"\nposition = 0.5\n",
+    );
+    std::fs::write(dir.path().join("three.toml"), with_middle).unwrap();
+    let arguments = ["render", "three.toml", "--view", "middle", "--truth", "middle.png", "--json", "-o"];
+    let full = json(&run(dir.path(), &[&arguments[..], &["a.png"]].concat()));
+    let coarse = json(&run(dir.path(), &[&arguments[..], &["b.png", "--depth-step", "6"]].concat()));
+    let direct = run(dir.path(), &["render", "scene.toml", "-o", "c.png"]);
+    assert_eq!(code(&direct), 0);
+    let bytes = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
+    assert_eq!(bytes("a.png"), bytes("c.png"), "the same view, asked for in two ways");
+    let psnr = |v: &serde_json::Value| v["psnr"].as_f64().unwrap();
+    assert!(psnr(&full) > 33.0 && psnr(&coarse) > 26.0 && psnr(&coarse) < psnr(&full), "{full} {coarse}");
+}
+
+#[test]
+fn threads_change_no_byte_and_streams_work() {
+    let dir = rig();
+    for (threads, name) in [("1", "a.png"), ("2", "b.png"), ("5", "c.png")] {
+        let done = run(dir.path(), &["render", "scene.toml", "-o", name, "--threads", threads]);
+        assert_eq!(code(&done), 0, "{}", stderr(&done));
+    }
+    let bytes = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
+    assert!(bytes("a.png") == bytes("b.png") && bytes("a.png") == bytes("c.png"));
+    let piped = run(dir.path(), &["render", "scene.toml", "-o", "-"]);
+    assert_eq!(piped.stdout, bytes("a.png"));
+    assert!(stderr(&piped).contains("coverage"));
+}
+
+fn toml_rows(m: &Matrix3x4<f64>) -> String {
+    let row = |i: usize| format!("[{:?}, {:?}, {:?}, {:?}]", m[(i, 0)], m[(i, 1)], m[(i, 2)], m[(i, 3)]);
+    format!("[{}, {}, {}]", row(0), row(1), row(2))
+}
+
+/// Three cameras that are turned and moved in all directions.
+fn turned(k: usize) -> Matrix3x4<f64> {
+    let place = [[-0.25, 0.05, 0.0], [0.2, -0.04, 0.1], [0.02, 0.03, 0.05]][k];
+    let turn = [[0.01, 0.03, 0.02], [-0.015, -0.03, -0.01], [0.0, 0.005, 0.0]][k];
+    let r = nalgebra::Rotation3::from_euler_angles(turn[0], turn[1], turn[2]);
+    let mut rt = Matrix3x4::zeros();
+    rt.fixed_columns_mut::<3>(0).copy_from(r.matrix());
+    rt.set_column(3, &-(r * nalgebra::Vector3::from(place)));
+    let rig = rig_camera(0.5, SIZE);
+    rig.fixed_columns::<3>(0) * rt
+}
+
+#[test]
+fn general_cameras_are_rendered() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut scene = String::new();
+    for k in 0..3 {
+        // Scale and sign of a camera matrix must not matter.
+        let matrix = turned(k) * [1.0, -2.5, 1.0][k];
+        let camera = Camera::metric(turned(k), false).unwrap();
+        let (image, depth) = SyntheticScene::default().view(&camera, SIZE);
+        save(&image, &dir.path().join(format!("{k}.png"))).unwrap();
+        write_map(&depth, &dir.path().join(format!("{k}.pfm")));
+        if k < 2 {
+            scene += &format!(
+                "[[view]]\nimage = \"{k}.png\"\ndepth = \"{k}.pfm\"\ncamera = {}\n",
+                toml_rows(&matrix)
+            );
+        } else {
+            scene += &format!("[virtual]\nsize = [120, 90]\ncamera = {}\n", toml_rows(&matrix));
+        }
+    }
+    std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
+    let done = run(
+        dir.path(),
+        &["render", "scene.toml", "-o", "o.png", "--truth", "2.png", "--json", "--mask", "m.png"],
+    );
+    let figures = json(&done);
+    assert!(figures["psnr"].as_f64().unwrap() > 31.0, "{figures}");
+    assert_eq!(figures["convergence"]["reached"], true);
+    assert_eq!(read_image(&dir.path().join("m.png")).unwrap().channels(), 1);
+}
+
+/// Tracks of points on the scene's surfaces over the three turned cameras, without any camera in the scene file.
+#[test]
+fn images_and_tracks_alone_are_enough() {
+    let dir = tempfile::tempdir().unwrap();
+    let cameras = [0, 1, 2].map(|k| Camera::metric(turned(k), false).unwrap());
+    let scene = SyntheticScene::default();
+    let depths: Vec<DepthMap> = (0..3)
+        .map(|k| {
+            let (image, depth) = scene.view(&cameras[k], SIZE);
+            save(&image, &dir.path().join(format!("{k}.png"))).unwrap();
+            depth
+        })
+        .collect();
+    let mut tracks = String::new();
+    for (x, y) in (3..87).step_by(4).flat_map(|y| (3..117).step_by(4).map(move |x| (x, y))) {
+        let point = cameras[0].unproject(x as f64, y as f64, f64::from(depths[0].row(y)[x]));
+        let seen = |k: usize| {
+            let (u, v, d) = cameras[k].project(&point);
+            let inside = u >= 0.0 && v >= 0.0 && u <= 119.0 && v <= 89.0 && d > 0.0;
+            let visible =
+                inside && (f64::from(depths[k].row(v.round() as usize)[u.round() as usize]) - d).abs() < 0.1;
+            if visible { format!("{u:.3} {v:.3}") } else { "-".into() }
+        };
+        if (x + y) % 8 == 6 {
+            tracks += &format!("{} {} {}\n", seen(0), seen(1), seen(2));
+        }
+    }
+    std::fs::write(dir.path().join("tracks.txt"), tracks).unwrap();
+    let views = "matches = \"tracks.txt\"\n[[view]]\nname = \"a\"\nimage = \"0.png\"\n[[view]]\nname = \"b\"\nimage = \"1.png\"\n";
+    std::fs::write(dir.path().join("s.toml"), format!("{views}[virtual]\nfrom_tracks = 3\n")).unwrap();
+    let done = run(dir.path(), &["render", "s.toml", "-o", "o.png", "--truth", "2.png", "--json"]);
+    let figures = json(&done);
+    assert!(figures["psnr"].as_f64().unwrap() > 23.0, "{figures}");
+    assert_eq!(figures["compared_on"], "hull");
+    assert!(figures["geometry"]["sampson_rms"].as_f64().unwrap() < 0.05, "{figures}");
+    std::fs::write(dir.path().join("b.toml"), format!("{views}[virtual]\nbetween = 0.5\n")).unwrap();
+    let between = json(&run(dir.path(), &["render", "b.toml", "-o", "p.png", "--json"]));
+    assert!(between["coverage"].as_f64().unwrap() > 0.5, "{between}");
+    // Seven tracks are too few, and tracks of a plane do not determine the geometry.
+    let few = "1 2 3 4 -\n".repeat(7);
+    std::fs::write(dir.path().join("tracks.txt"), few).unwrap();
+    let refused = run(dir.path(), &["render", "s.toml", "-o", "q.png"]);
+    assert_eq!(code(&refused), 1);
+    assert!(stderr(&refused).contains("7 matches where at least 8 are needed"), "{}", stderr(&refused));
+    let plane: String = (0..40)
+        .map(|i| {
+            let (x, y) = ((i * 37 % 100) as f64, (i * 53 % 80) as f64);
+            format!("{x} {y} {} {} -\n", 0.9 * x + 0.1 * y + 3.0, 1.05 * y - 0.02 * x + 1.0)
+        })
+        .collect();
+    std::fs::write(dir.path().join("tracks.txt"), plane).unwrap();
+    let refused = run(dir.path(), &["render", "s.toml", "-o", "q.png"]);
+    assert_eq!(code(&refused), 1);
+    assert!(stderr(&refused).contains("planar"), "{}", stderr(&refused));
+    assert!(!dir.path().join("q.png").exists());
+}
+
+#[test]
+fn wrong_input_has_one_clear_message() {
+    let dir = rig();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    save(&Image::filled(30, 20, 3, 9.0), &dir.path().join("small.png")).unwrap();
+    let nan = pfm::FloatMap { width: 120, height: 90, channels: 1, data: vec![f32::NAN; 120 * 90] };
+    std::fs::write(dir.path().join("nan.pfm"), pfm::encode(&nan)).unwrap();
+    for (from, to, words) in [
+        ("left.png", "nowhere.png", &["nowhere.png"][..]),
+        ("left.png", "small.png", &["30 x 20", "120 x 90"]),
+        ("left.pfm", "nan.pfm", &["nan.pfm", "none of the 10800 values"]),
+        ("position = 0.5", "position = 5000.0", &["no sample reaches the virtual image"]),
+        ("disparity =", "disparty =", &["disparty", "line 5", "expected one of"]),
+        ("position = 0.5", "", &["[virtual] needs a `position`"]),
+        ("image = \"left.png\"", "image = 7", &["line 3"]),
+    ] {
+        std::fs::write(dir.path().join("broken.toml"), scene.replace(from, to)).unwrap();
+        let refused = run(dir.path(), &["render", "broken.toml", "-o", "o.png"]);
+        let message = stderr(&refused);
+        assert_eq!(code(&refused), 1, "{to}: {message}");
+        assert!(refused.stdout.is_empty());
+        assert!(words.iter().all(|w| message.contains(w)), "{to}: {message}");
+        assert!(!message.contains("panicked") && !dir.path().join("o.png").exists());
+    }
+    let truth = run(dir.path(), &["render", "scene.toml", "-o", "o.png", "--truth", "small.png"]);
+    assert_eq!(code(&truth), 1);
+    assert!(stderr(&truth).contains("small.png") && stderr(&truth).contains("30 x 20"), "{}", stderr(&truth));
+    assert!(!dir.path().join("o.png").exists());
+}
+
+#[test]
+fn wrong_usage_is_two() {
+    let dir = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["render"][..],
+        &["render", "s.toml"],
+        &["paint"],
+        &["render", "s.toml", "-o", "o.png", "--depth-step", "0"],
+        &["render", "s.toml", "-o", "-", "--json"],
+        &["render", "s.toml", "-o", "o.png", "--threads", "0"],
+        &["demo", "--size", "9"],
+    ] {
+        assert_eq!(code(&run(dir.path(), arguments)), 2, "{arguments:?}");
+    }
+    let help = run(dir.path(), &["render", "--help"]);
+    assert_eq!(code(&help), 0);
+    assert!(String::from_utf8(help.stdout).unwrap().contains("Examples:"));
+    assert_eq!(code(&run(dir.path(), &["--version"])), 0);
+    let missing = run(dir.path(), &["render", "s.toml", "-o", "o.png"]);
+    assert_eq!(code(&missing), 1);
+    assert!(stderr(&missing).contains("s.toml"));
+    let format = run(dir.path(), &["render", "s.toml", "-o", "o.gif"]);
+    assert_eq!(code(&format), 1);
+    assert!(stderr(&format).contains(".png"));
+}
+
+#[test]
+fn the_demo_needs_no_data() {
+    let dir = tempfile::tempdir().unwrap();
+    let figures = json(&run(dir.path(), &["demo", "-o", "sheet.png", "--size", "160x120", "--json"]));
+    let psnr = |kind: &str| figures[kind]["psnr"].as_f64().unwrap();
+    assert!(psnr("full_depth") > 34.0 && psnr("partial_depth") > 27.0, "{figures}");
+    assert_eq!(read_image(&dir.path().join("sheet.png")).unwrap().size(), (3 * 166 + 6, 2 * 126 + 6));
+    let again = run(dir.path(), &["demo", "-o", "sheet.png"]);
+    assert_eq!(code(&again), 1);
+}
