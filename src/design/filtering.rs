@@ -84,17 +84,15 @@ impl Innovations {
     /// Separates fresh information (u1) from the rest (u2) by one LQ factorisation.
     pub(super) fn new(plant: &BlockedPlant) -> Result<Self, DesignError> {
         let sizes = output_sizes(&plant.system)?;
-        let (mut fresh, mut late) = (Vec::new(), Vec::new());
-        for channel in 0..plant.measured {
-            match plant.chain(channel) {
-                chain if chain.is_empty() => fresh.push(channel),
-                chain => late.push(Late { channel, chain, size: sizes[channel] }),
-            }
-        }
-        let known = fresh.len();
-        fresh = independent(plant, &fresh, &sizes);
-        let incomplete = fresh.len() < known;
-        Ok(Self::separate(plant, fresh, late, incomplete))
+        let (fresh, behind): (Vec<usize>, Vec<usize>) =
+            (0..plant.measured).partition(|&channel| plant.chain(channel).is_empty());
+        let late = behind
+            .into_iter()
+            .map(|channel| Late { channel, chain: plant.chain(channel), size: sizes[channel] })
+            .collect();
+        let telling = independent(plant, &fresh, &sizes);
+        let incomplete = telling.len() < fresh.len();
+        Ok(Self::separate(plant, telling, late, incomplete))
     }
 
     fn separate(plant: &BlockedPlant, fresh: Vec<usize>, late: Vec<Late>, incomplete: bool) -> Self {
