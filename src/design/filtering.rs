@@ -53,9 +53,10 @@ pub(super) struct Innovations {
     fresh: Vec<usize>,
     late: Vec<Late>,
     channels: usize,
-    /// Verdicts are not to be trusted: a channel was left out because its fresh part is rounding, or the
-    /// coordinates are not balanced.
+    /// A channel was left out because its fresh part is rounding.
     incomplete: bool,
+    /// The verdict "impossible" may be believed: the coordinates are balanced and no channel is left out.
+    conclusive: bool,
 }
 
 /// A channel read from the end of a delay chain.
@@ -120,7 +121,22 @@ impl Innovations {
             c2[(known + row, channel.chain.end - 1)] = 1.0 / channel.size;
         }
         let p0 = late_variances(&late, n);
-        Self { f, b1, b2, c1, c2, x, y, root, p0, fresh, late, channels: plant.measured, incomplete }
+        Self {
+            f,
+            b1,
+            b2,
+            c1,
+            c2,
+            x,
+            y,
+            root,
+            p0,
+            fresh,
+            late,
+            channels: plant.measured,
+            incomplete,
+            conclusive: false,
+        }
     }
 
     /// F P0 F' - P0: what the substitution adds to Q.
@@ -131,27 +147,29 @@ impl Innovations {
     /// The same problem in state coordinates in which the mean-square optimal prediction error is white.
     /// States of smooth front ends differ by many decades and are nearly dependent; the covariances of all gammas are near
     /// the mean-square one, so there they are near the identity.
-    pub(super) fn balanced(self) -> Self {
-        let unbalanced = |plain: Self| Self { incomplete: true, ..plain };
-        let Some(p) = self.mean_square_covariance() else { return unbalanced(self) };
-        let Ok((values, vectors)) = linalg::symmetric_eigen(&p) else { return unbalanced(self) };
+    ///
+    /// `None` where the mean-square problem has no usable solution.
+    pub(super) fn balanced(&self) -> Option<Self> {
+        let p = self.mean_square_covariance()?;
+        let (values, vectors) = linalg::symmetric_eigen(&p).ok()?;
         let floor = BALANCING_FLOOR * values.iter().fold(0.0_f64, |m, v| m.max(*v));
         if floor <= 0.0 || !floor.is_finite() {
-            return unbalanced(self);
+            return None;
         }
         let n = p.nrows();
         let scale = |k: usize| values[k].max(0.0) + floor;
         let forward = Mat::from_fn(n, n, |i, k| vectors[(i, k)] * scale(k).sqrt());
         let back = Mat::from_fn(n, n, |k, i| vectors[(i, k)] / scale(k).sqrt());
-        Self {
+        Some(Self {
             f: &back * &self.f * &forward,
             b1: &back * &self.b1,
             b2: &back * &self.b2,
             c1: &self.c1 * &forward,
             c2: &self.c2 * &forward,
             p0: linalg::symmetric_part(&(&back * &self.p0 * back.transpose())),
-            ..self
-        }
+            conclusive: !self.incomplete,
+            ..self.clone()
+        })
     }
 
     /// No causal filter beats the part of z that is fresh and unmeasured: sigma_max(Y).
@@ -180,7 +198,7 @@ impl Innovations {
     /// Tries one gamma.
     pub(super) fn h_infinity(&self, gamma: f64) -> Trial {
         let Some((f, g, h)) = self.weights(gamma) else {
-            return if self.incomplete { Trial::Unresolved } else { Trial::Impossible };
+            return if self.conclusive { Trial::Impossible } else { Trial::Unresolved };
         };
         match riccati::solve_doubling(&f.transpose(), &g, &h) {
             RiccatiOutcome::Solved(solution) => self.judge(&solution),
@@ -215,7 +233,7 @@ impl Innovations {
         let Ok(eigenvalues) = linalg::symmetric_eigenvalues(&p) else { return Trial::Unresolved };
         let largest = eigenvalues.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
         if eigenvalues.first().is_some_and(|&least| least < -CLEARLY_NEGATIVE * largest) {
-            let proven = solution.residual < RESIDUAL_OF_PROOF && !self.incomplete;
+            let proven = solution.residual < RESIDUAL_OF_PROOF && self.conclusive;
             return if proven { Trial::Impossible } else { Trial::Unresolved };
         }
         self.filter(&p).map_or(Trial::Unresolved, Trial::Achieved)

@@ -86,7 +86,9 @@ impl Report {
 
 struct Search<'a> {
     plant: &'a BlockedPlant,
-    innovations: Innovations,
+    /// The same problem in balanced coordinates, where they can be had, and in those of the plant: near the
+    /// edge of double precision now the one, now the other is solvable.
+    innovations: Vec<Innovations>,
     best: Option<Verified>,
     report: Report,
     negligible: f64,
@@ -95,8 +97,9 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(plant: &'a BlockedPlant) -> Result<Self, DesignError> {
         let noncausal = noncausal_bound(plant)?;
-        let innovations = Innovations::new(plant)?.balanced();
-        let lower = noncausal.max(innovations.fresh_error()?);
+        let plain = Innovations::new(plant)?;
+        let lower = noncausal.max(plain.fresh_error()?);
+        let innovations = plain.balanced().into_iter().chain([plain]).collect();
         let negligible =
             NEGLIGIBLE * (plant.system.c().norm() * plant.system.b().norm() + plant.system.d().norm());
         Ok(Self {
@@ -121,7 +124,7 @@ impl<'a> Search<'a> {
 
     fn start_from_h2(&mut self) -> Result<(), DesignError> {
         self.report.trials += 1;
-        if let Some(filters) = self.innovations.h2() {
+        if let Some(filters) = self.innovations.iter().find_map(Innovations::h2) {
             let found = self.verify(filters)?;
             self.keep(found);
         }
@@ -139,17 +142,22 @@ impl<'a> Search<'a> {
 
     /// One gamma; only a filter whose exact norm keeps the promise counts.
     fn attempt(&mut self, gamma: f64) -> Result<Trial, DesignError> {
-        self.report.trials += 1;
-        let trial = self.innovations.h_infinity(gamma);
-        if let Trial::Achieved(filters) = &trial {
-            let found = self.verify(filters.clone())?;
-            let kept_promise = found.norm <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
-            self.keep(found);
-            if !kept_promise {
-                return Ok(Trial::Unresolved);
+        for k in 0..self.innovations.len() {
+            self.report.trials += 1;
+            match self.innovations[k].h_infinity(gamma) {
+                Trial::Achieved(filters) => {
+                    let found = self.verify(filters.clone())?;
+                    let promise_kept = found.norm <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
+                    self.keep(found);
+                    if promise_kept {
+                        return Ok(Trial::Achieved(filters));
+                    }
+                }
+                Trial::Impossible => return Ok(Trial::Impossible),
+                Trial::Unresolved => {}
             }
         }
-        Ok(trial)
+        Ok(Trial::Unresolved)
     }
 
     /// In most problems the non-causal bound is reached: look there first.
@@ -193,7 +201,8 @@ impl<'a> Search<'a> {
         let optimum = self.best.take().ok_or(DesignError::RiccatiFailed { gamma: self.first_ceiling() })?;
         if slack > 0.0 && optimum.norm > self.negligible {
             let cap = optimum.norm * (1.0 + slack);
-            if let Trial::Achieved(filters) = self.innovations.h_infinity(cap) {
+            for innovations in &self.innovations {
+                let Trial::Achieved(filters) = innovations.h_infinity(cap) else { continue };
                 let relaxed = self.verify(filters)?;
                 if relaxed.norm <= cap {
                     return Ok(self.report.fill(relaxed));
