@@ -34,6 +34,19 @@ impl Default for Options {
     }
 }
 
+/// How a bank runs, for reports.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct PlanSummary {
+    /// `polyphase` (FIR), `modal` (block-diagonal state matrix) or `dense` (any state matrix).
+    pub form: &'static str,
+    /// Number type of the sums: `f32` or `f64`.
+    pub numbers: &'static str,
+    /// Instruction set of the kernels.
+    pub isa: String,
+    /// Ticks that one step of the kernel takes together.
+    pub fold: usize,
+}
+
 /// Coefficients in the order of use, shared by any number of streams.
 #[derive(Debug)]
 enum Plan {
@@ -80,6 +93,7 @@ pub struct Reconstructor {
     plan: Arc<Plan>,
     state: State,
     latency: usize,
+    isa: Isa,
     replaced: u64,
 }
 
@@ -99,7 +113,8 @@ impl Reconstructor {
     pub fn with_options(bank: &Bank, options: Options) -> Result<Self, BuildError> {
         let plan = Plan::new(bank, options)?;
         let state = plan.state();
-        Ok(Self { plan: Arc::new(plan), state, latency: bank.latency, replaced: 0 })
+        let isa = if options.isa.is_available() { options.isa } else { Isa::Portable };
+        Ok(Self { plan: Arc::new(plan), state, latency: bank.latency, isa, replaced: 0 })
     }
 
     /// N, samples a tick in.
@@ -139,6 +154,16 @@ impl Reconstructor {
         self.latency.div_ceil(self.ratio())
     }
 
+    /// How the bank runs.
+    pub fn plan(&self) -> PlanSummary {
+        let (form, numbers, fold) = match &*self.plan {
+            Plan::Single(plan) => ("polyphase", "f32", plan.fold),
+            Plan::Double(plan) => ("polyphase", "f64", plan.fold),
+            Plan::StateSpace(plan) => (if plan.is_modal() { "modal" } else { "dense" }, "f64", 1),
+        };
+        PlanSummary { form, numbers, isa: self.isa.to_string(), fold }
+    }
+
     /// Input samples that were NaN or infinite and became 0, since the beginning.
     pub fn replaced(&self) -> u64 {
         self.replaced
@@ -154,7 +179,7 @@ impl Reconstructor {
 
     /// A stream of the same bank at its beginning.
     pub fn fresh(&self) -> Self {
-        Self { plan: Arc::clone(&self.plan), state: self.plan.state(), latency: self.latency, replaced: 0 }
+        Self { plan: Arc::clone(&self.plan), state: self.plan.state(), replaced: 0, ..*self }
     }
 
     /// Back to the beginning; gives the same bits as a new one.
@@ -252,7 +277,7 @@ impl Plan {
                 FirPlan::new(taps, ratio, options.isa).map(Self::Double)
             }
             (SynthesisFilters::StateSpace(filter), _) => {
-                StateSpacePlan::new(filter, channels, ratio).map(Self::StateSpace)
+                StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::StateSpace)
             }
         }
     }

@@ -122,6 +122,38 @@ macro_rules! full_tile {
     };
 }
 
+/// Vectors whose neighbours 2l and 2l + 1 can change places.
+///
+/// # Safety
+/// As for [`Vector`].
+pub(super) trait Pairs: Vector<Sample = f64> {
+    unsafe fn swap_pairs(self) -> Self;
+}
+
+impl Pairs for Portable<f64> {
+    #[inline(always)]
+    unsafe fn swap_pairs(self) -> Self {
+        let Self([a, b, c, d]) = self;
+        Self([b, a, d, c])
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Pairs for Avx2F64 {
+    #[inline(always)]
+    unsafe fn swap_pairs(self) -> Self {
+        Self(unsafe { _mm256_permute_pd::<0b0101>(self.0) })
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Pairs for Avx512F64 {
+    #[inline(always)]
+    unsafe fn swap_pairs(self) -> Self {
+        Self(unsafe { _mm512_permute_pd::<0b0101_0101>(self.0) })
+    }
+}
+
 /// Arrays that the compiler turns into whatever vectors the architecture has.
 #[derive(Clone, Copy)]
 pub(super) struct Portable<T>([T; 4]);
