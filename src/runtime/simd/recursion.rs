@@ -65,6 +65,7 @@ pub(crate) fn run(
     ticks: usize,
 ) {
     columns.check(registers);
+    assert!(phases <= columns.outputs);
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor was asked; the sizes are checked above.
@@ -137,13 +138,12 @@ unsafe fn block<V: Pairs>(
         }
         // SAFETY: the sizes are checked by `run`.
         unsafe {
-            outputs::<V>(columns, registers);
+            outputs::<V>(columns, registers, phases);
             match &columns.modal {
                 Some([own, neighbour]) => modal::<V>(columns, own, neighbour, registers),
                 None => dense::<V>(columns, registers),
             }
         }
-        registers.z[..columns.states].copy_from_slice(&registers.next);
         for p in 0..phases {
             y[p * stride + k] = registers.output[p];
         }
@@ -152,17 +152,26 @@ unsafe fn block<V: Pairs>(
 
 /// y = C x + D u, in four partial sums.
 #[inline(always)]
-unsafe fn outputs<V: Pairs>(columns: &Columns, registers: &mut Registers) {
+unsafe fn outputs<V: Pairs>(columns: &Columns, registers: &mut Registers, phases: usize) {
     let count = columns.states + columns.inputs;
-    for first in (0..columns.outputs).step_by(V::LANES) {
+    for first in (0..phases).step_by(V::LANES) {
         // SAFETY: column j has `outputs` values, see `Columns::check`.
         unsafe {
             let zero = V::splat(0.0);
             let mut parts = [zero; PARTS];
-            for j in 0..count {
-                let column = V::load(columns.output.as_ptr().add(j * columns.outputs + first));
-                let part = &mut parts[j % PARTS];
-                *part = column.mul_add(V::splat(registers.z[j]), *part);
+            let z = registers.z.as_ptr();
+            let output = columns.output.as_ptr().add(first);
+            let column = |j: usize| V::load(output.add(j * columns.outputs));
+            let mut j = 0;
+            while j + PARTS <= count {
+                for (part, sum) in parts.iter_mut().enumerate() {
+                    *sum = column(j + part).mul_add(V::splat(*z.add(j + part)), *sum);
+                }
+                j += PARTS;
+            }
+            while j < count {
+                parts[0] = column(j).mul_add(V::splat(*z.add(j)), parts[0]);
+                j += 1;
             }
             let one = V::splat(1.0);
             let [a, b, c, d] = parts;
@@ -176,18 +185,20 @@ unsafe fn outputs<V: Pairs>(columns: &Columns, registers: &mut Registers) {
 #[inline(always)]
 unsafe fn modal<V: Pairs>(columns: &Columns, own: &[f64], neighbour: &[f64], registers: &mut Registers) {
     let s = columns.states;
+    // In place: a vector of states depends on itself and on the inputs alone.
+    let z = registers.z.as_mut_ptr();
+    let (next, own, neighbour) = (columns.next.as_ptr(), own.as_ptr(), neighbour.as_ptr());
     for first in (0..s).step_by(V::LANES) {
         // SAFETY: all columns have S values, see `Columns::check`.
         unsafe {
             let mut sum = V::splat(0.0);
             for i in 0..columns.inputs {
-                let column = V::load(columns.next.as_ptr().add(i * s + first));
-                sum = column.mul_add(V::splat(registers.z[s + i]), sum);
+                sum = V::load(next.add(i * s + first)).mul_add(V::splat(*z.add(s + i)), sum);
             }
-            let x = V::load(registers.z.as_ptr().add(first));
-            sum = x.swap_pairs().mul_add(V::load(neighbour.as_ptr().add(first)), sum);
-            sum = x.mul_add(V::load(own.as_ptr().add(first)), sum);
-            sum.store(registers.next.as_mut_ptr().add(first));
+            let x = V::load(z.add(first));
+            sum = x.swap_pairs().mul_add(V::load(neighbour.add(first)), sum);
+            sum = x.mul_add(V::load(own.add(first)), sum);
+            sum.store(z.add(first));
         }
     }
 }
@@ -196,15 +207,16 @@ unsafe fn modal<V: Pairs>(columns: &Columns, own: &[f64], neighbour: &[f64], reg
 #[inline(always)]
 unsafe fn dense<V: Pairs>(columns: &Columns, registers: &mut Registers) {
     let s = columns.states;
+    let (z, to, next) = (registers.z.as_ptr(), registers.next.as_mut_ptr(), columns.next.as_ptr());
     for first in (0..s).step_by(V::LANES) {
         // SAFETY: all columns have S values, see `Columns::check`.
         unsafe {
             let mut sum = V::splat(0.0);
             for j in 0..s + columns.inputs {
-                let column = V::load(columns.next.as_ptr().add(j * s + first));
-                sum = column.mul_add(V::splat(registers.z[j]), sum);
+                sum = V::load(next.add(j * s + first)).mul_add(V::splat(*z.add(j)), sum);
             }
-            sum.store(registers.next.as_mut_ptr().add(first));
+            sum.store(to.add(first));
         }
     }
+    registers.z[..s].copy_from_slice(&registers.next);
 }
