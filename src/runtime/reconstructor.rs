@@ -57,7 +57,7 @@ enum Plan {
 
 /// The state of one stream, of the plan's kind.
 #[derive(Debug, Clone)]
-enum State {
+enum StreamState {
     Single(FirState<f32>),
     Double(FirState<f64>),
     StateSpace(StateSpaceState),
@@ -91,7 +91,7 @@ enum State {
 #[derive(Debug, Clone)]
 pub struct Reconstructor {
     plan: Arc<Plan>,
-    state: State,
+    state: StreamState,
     latency: usize,
     isa: Isa,
     replaced: u64,
@@ -172,7 +172,7 @@ impl Reconstructor {
     /// Times a recursion's state was not finite and began anew, since the beginning.
     pub fn state_resets(&self) -> u64 {
         match &self.state {
-            State::StateSpace(state) => state.resets,
+            StreamState::StateSpace(state) => state.resets,
             _ => 0,
         }
     }
@@ -186,9 +186,9 @@ impl Reconstructor {
     pub fn reset(&mut self) {
         self.replaced = 0;
         match &mut self.state {
-            State::Single(state) => state.reset(),
-            State::Double(state) => state.reset(),
-            State::StateSpace(state) => state.reset(),
+            StreamState::Single(state) => state.reset(),
+            StreamState::Double(state) => state.reset(),
+            StreamState::StateSpace(state) => state.reset(),
         }
     }
 
@@ -228,7 +228,7 @@ impl Reconstructor {
 
     fn interleaved<'a, S>(&self, samples: &'a [S]) -> Result<Interleaved<'a, S>, ProcessError> {
         let channels = self.channels();
-        if samples.len() % channels != 0 {
+        if !samples.len().is_multiple_of(channels) {
             return Err(ProcessError::CutTick { samples: samples.len(), channels });
         }
         Ok(Interleaved { samples, channels })
@@ -247,9 +247,9 @@ impl Reconstructor {
             return Err(ProcessError::OutputTooShort { given: sink.capacity(), wanted });
         }
         self.replaced += match (&*self.plan, &mut self.state) {
-            (Plan::Single(plan), State::Single(state)) => plan.process(state, source, sink),
-            (Plan::Double(plan), State::Double(state)) => plan.process(state, source, sink),
-            (Plan::StateSpace(plan), State::StateSpace(state)) => plan.process(state, source, sink),
+            (Plan::Single(plan), StreamState::Single(state)) => plan.process(state, source, sink),
+            (Plan::Double(plan), StreamState::Double(state)) => plan.process(state, source, sink),
+            (Plan::StateSpace(plan), StreamState::StateSpace(state)) => plan.process(state, source, sink),
             // A state is only ever made by its plan.
             _ => 0,
         };
@@ -282,11 +282,11 @@ impl Plan {
         }
     }
 
-    fn state(&self) -> State {
+    fn state(&self) -> StreamState {
         match self {
-            Self::Single(plan) => State::Single(plan.state()),
-            Self::Double(plan) => State::Double(plan.state()),
-            Self::StateSpace(plan) => State::StateSpace(plan.state()),
+            Self::Single(plan) => StreamState::Single(plan.state()),
+            Self::Double(plan) => StreamState::Double(plan.state()),
+            Self::StateSpace(plan) => StreamState::StateSpace(plan.state()),
         }
     }
 }

@@ -88,7 +88,7 @@ impl StateSpacePlan {
                 RowsMut { samples, stride: BLOCK, channels: self.channels, fold, isa },
             );
             let (u, y) = (&state.input, &mut state.output);
-            run_recursion(self.isa, &self.columns, &mut state.registers, u, y, self.ratio, BLOCK, ticks);
+            run_recursion(self.isa, &self.columns, &mut state.registers, u, y, BLOCK, ticks);
             let rows = Rows { samples: &state.output[..], stride: BLOCK, phases: self.ratio, fold, isa };
             sink.scatter(first, ticks, rows);
             state.pass(ticks);
@@ -167,7 +167,7 @@ fn columns(filter: &BlockFilter, channels: usize, ratio: usize) -> Columns {
     for p in 0..ratio {
         (0..channels).for_each(|u| output[(states + u) * outputs + p] = filter.d[p][u]);
     }
-    Columns { states, inputs: channels, outputs, modal, next, output }
+    Columns { states, inputs: channels, phases: ratio, outputs, modal, next, output }
 }
 
 /// Factors of each state itself and of its neighbour.

@@ -91,6 +91,8 @@ impl<T: Copy + Default> FirKernel<T> {
 }
 
 /// One step: an input for each of R vectors, a coefficient for each of P phases.
+// Indices, because a step is a product of two index ranges.
+#[allow(clippy::needless_range_loop)]
 #[inline(always)]
 unsafe fn step<V: Vector, const P: usize, const R: usize>(
     job: &Job<V::Sample>,

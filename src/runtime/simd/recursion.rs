@@ -7,7 +7,7 @@
 use super::Isa;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2F64, Avx512F64};
-use super::vector::{Pairs, Portable, Vector};
+use super::vector::{Pairs, Portable};
 use crate::runtime::aligned::Aligned;
 
 /// States and phases are padded to whole vectors of every instruction set.
@@ -22,6 +22,8 @@ pub(crate) struct Columns {
     pub(crate) states: usize,
     /// N.
     pub(crate) inputs: usize,
+    /// M.
+    pub(crate) phases: usize,
     /// M after padding.
     pub(crate) outputs: usize,
     /// Modal form: factor of a state itself and of its neighbour.
@@ -60,23 +62,20 @@ pub(crate) fn run(
     registers: &mut Registers,
     u: &[f64],
     y: &mut [f64],
-    phases: usize,
     stride: usize,
     ticks: usize,
 ) {
     columns.check(registers);
-    assert!(phases <= columns.outputs);
+    assert!(columns.phases <= columns.outputs);
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor was asked; the sizes are checked above.
-        Isa::Avx2 if isa.is_available() => unsafe { avx2(columns, registers, u, y, phases, stride, ticks) },
+        Isa::Avx2 if isa.is_available() => unsafe { avx2(columns, registers, u, y, stride, ticks) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Isa::Avx512 if isa.is_available() => unsafe {
-            avx512(columns, registers, u, y, phases, stride, ticks)
-        },
+        Isa::Avx512 if isa.is_available() => unsafe { avx512(columns, registers, u, y, stride, ticks) },
         // SAFETY: the sizes are checked above.
-        _ => unsafe { block::<Portable<f64>>(columns, registers, u, y, phases, stride, ticks) },
+        _ => unsafe { block::<Portable<f64>>(columns, registers, u, y, stride, ticks) },
     }
 }
 
@@ -94,32 +93,16 @@ impl Columns {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn avx2(
-    c: &Columns,
-    r: &mut Registers,
-    u: &[f64],
-    y: &mut [f64],
-    phases: usize,
-    stride: usize,
-    ticks: usize,
-) {
+unsafe fn avx2(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], stride: usize, ticks: usize) {
     // SAFETY: the caller's.
-    unsafe { block::<Avx2F64>(c, r, u, y, phases, stride, ticks) }
+    unsafe { block::<Avx2F64>(c, r, u, y, stride, ticks) }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
-unsafe fn avx512(
-    c: &Columns,
-    r: &mut Registers,
-    u: &[f64],
-    y: &mut [f64],
-    phases: usize,
-    stride: usize,
-    ticks: usize,
-) {
+unsafe fn avx512(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], stride: usize, ticks: usize) {
     // SAFETY: the caller's.
-    unsafe { block::<Avx512F64>(c, r, u, y, phases, stride, ticks) }
+    unsafe { block::<Avx512F64>(c, r, u, y, stride, ticks) }
 }
 
 #[inline(always)]
@@ -128,7 +111,6 @@ unsafe fn block<V: Pairs>(
     registers: &mut Registers,
     u: &[f64],
     y: &mut [f64],
-    phases: usize,
     stride: usize,
     ticks: usize,
 ) {
@@ -138,13 +120,13 @@ unsafe fn block<V: Pairs>(
         }
         // SAFETY: the sizes are checked by `run`.
         unsafe {
-            outputs::<V>(columns, registers, phases);
+            outputs::<V>(columns, registers);
             match &columns.modal {
                 Some([own, neighbour]) => modal::<V>(columns, own, neighbour, registers),
                 None => dense::<V>(columns, registers),
             }
         }
-        for p in 0..phases {
+        for p in 0..columns.phases {
             y[p * stride + k] = registers.output[p];
         }
     }
@@ -152,9 +134,9 @@ unsafe fn block<V: Pairs>(
 
 /// y = C x + D u, in four partial sums.
 #[inline(always)]
-unsafe fn outputs<V: Pairs>(columns: &Columns, registers: &mut Registers, phases: usize) {
+unsafe fn outputs<V: Pairs>(columns: &Columns, registers: &mut Registers) {
     let count = columns.states + columns.inputs;
-    for first in (0..phases).step_by(V::LANES) {
+    for first in (0..columns.phases).step_by(V::LANES) {
         // SAFETY: column j has `outputs` values, see `Columns::check`.
         unsafe {
             let zero = V::splat(0.0);
