@@ -414,7 +414,9 @@ fn sigmf_goes_in_and_out() {
         .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
         .collect();
     let mut whole = a.clone();
-    [0, 1, 7].map(|k| whole[k] = 0.0);
+    for lost in [0, 1, 7] {
+        whole[lost] = 0.0;
+    }
     let scaled: Vec<f32> = b.iter().map(|x| x / 8.0).collect();
     assert_eq!(got, fused([&whole, &scaled], 20));
     let written: serde_json::Value =

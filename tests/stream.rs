@@ -174,7 +174,9 @@ fn one_fifo_a_channel_in_any_order_of_opening() {
     let output = child.wait_with_output().unwrap();
     // Only a child that opened both lets the writers go.
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-    writers.map(|writer| writer.join().unwrap().unwrap());
+    for writer in writers {
+        writer.join().unwrap().unwrap();
+    }
     assert!(floats(&output.stdout) == fused(&input));
 }
 

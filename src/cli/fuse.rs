@@ -6,7 +6,7 @@ use super::output::{Bits, FastWriter};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Capture, PcmFrames, SampleLayout};
-use crate::runtime::{Options, PcmOutput, Precision, Reconstructor};
+use crate::runtime::{Options, PcmOutput, PlanSummary, Precision, Reconstructor};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -56,6 +56,8 @@ pub(super) struct Args {
 /// What happened.
 #[derive(Debug, serde::Serialize)]
 struct Report {
+    /// How the bank ran.
+    plan: PlanSummary,
     channels: usize,
     ratio: usize,
     /// Samples a second of the output.
@@ -233,6 +235,7 @@ impl Job {
         warn(self.clipped, "output samples were clipped; --bits 32f keeps them");
         warn(self.stream.state_resets(), "times the filter state was not finite and began anew");
         Report {
+            plan: self.stream.plan(),
             channels: self.stream.channels(),
             ratio: self.stream.ratio(),
             rate,

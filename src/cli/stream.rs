@@ -6,7 +6,7 @@ use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::wav::stream_header;
 use crate::io::{Arrival, AtomicFile, Coding, Feed, PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::{Options, PcmOutput, Precision, Reconstructor};
+use crate::runtime::{Options, PcmOutput, PlanSummary, Precision, Reconstructor};
 use crossbeam_channel::{Receiver, bounded};
 use std::io::Write;
 use std::path::PathBuf;
@@ -69,6 +69,8 @@ fn parse_coding(name: &str) -> Result<Coding, String> {
 /// What happened.
 #[derive(Debug, serde::Serialize)]
 struct Report {
+    /// How the bank ran.
+    plan: PlanSummary,
     channels: usize,
     ratio: usize,
     ticks: u64,
@@ -301,6 +303,7 @@ impl Job {
         warn(self.clipped, "output samples were clipped; --output-format f32le keeps them");
         warn(self.stream.state_resets(), "times the filter state was not finite and began anew");
         Report {
+            plan: self.stream.plan(),
             channels: self.stream.channels(),
             ratio: self.stream.ratio(),
             ticks: self.ticks,

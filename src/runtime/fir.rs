@@ -160,15 +160,14 @@ fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
     Ok(())
 }
 
-/// M phases in groups of 3, and of 2 for the rest; 1 only if M is 1. Groups of 4 would need every one of
-/// AVX2's 16 registers in an order that the compiler does not find.
+/// M phases in groups of 4, and of 3 or 2 for the rest; 1 only if M is 1.
 fn widths(ratio: usize) -> impl Iterator<Item = (usize, usize)> {
     let mut first = 0;
     std::iter::from_fn(move || {
         let width = match ratio - first {
             0 => return None,
-            2 | 4 => 2,
-            left => left.min(3),
+            5 | 6 | 9 => 3,
+            left => left.min(4),
         };
         first += width;
         Some((first - width, width))
@@ -205,7 +204,7 @@ mod tests {
             let all: Vec<_> = widths(ratio).collect();
             let phases: Vec<usize> = all.iter().flat_map(|&(first, width)| first..first + width).collect();
             assert_eq!(phases, (0..ratio).collect::<Vec<_>>());
-            assert!(all.iter().all(|&(_, width)| (2..=3).contains(&width) || ratio == 1), "{ratio}: {all:?}");
+            assert!(all.iter().all(|&(_, width)| (2..=4).contains(&width) || ratio == 1), "{ratio}: {all:?}");
         }
     }
 }

@@ -18,6 +18,6 @@ mod window;
 
 pub use error::{BuildError, ProcessError};
 pub use gaps::{Gap, GapFiller, GapPolicy};
-pub use reconstructor::{Options, Precision, Reconstructor};
+pub use reconstructor::{Options, PlanSummary, Precision, Reconstructor};
 pub use simd::{Isa, multiply_add_chains};
 pub use ticks::PcmOutput;

@@ -34,6 +34,19 @@ impl Default for Options {
     }
 }
 
+/// How a bank runs, for reports.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct PlanSummary {
+    /// `polyphase` (FIR), `modal` (block-diagonal state matrix) or `dense` (any state matrix).
+    pub form: &'static str,
+    /// Number type of the sums: `f32` or `f64`.
+    pub numbers: &'static str,
+    /// Instruction set of the kernels.
+    pub isa: String,
+    /// Ticks that one step of the kernel takes together.
+    pub fold: usize,
+}
+
 /// Coefficients in the order of use, shared by any number of streams.
 #[derive(Debug)]
 enum Plan {
@@ -44,7 +57,7 @@ enum Plan {
 
 /// The state of one stream, of the plan's kind.
 #[derive(Debug, Clone)]
-enum State {
+enum StreamState {
     Single(FirState<f32>),
     Double(FirState<f64>),
     StateSpace(StateSpaceState),
@@ -78,8 +91,9 @@ enum State {
 #[derive(Debug, Clone)]
 pub struct Reconstructor {
     plan: Arc<Plan>,
-    state: State,
+    state: StreamState,
     latency: usize,
+    isa: Isa,
     replaced: u64,
 }
 
@@ -99,7 +113,8 @@ impl Reconstructor {
     pub fn with_options(bank: &Bank, options: Options) -> Result<Self, BuildError> {
         let plan = Plan::new(bank, options)?;
         let state = plan.state();
-        Ok(Self { plan: Arc::new(plan), state, latency: bank.latency, replaced: 0 })
+        let isa = if options.isa.is_available() { options.isa } else { Isa::Portable };
+        Ok(Self { plan: Arc::new(plan), state, latency: bank.latency, isa, replaced: 0 })
     }
 
     /// N, samples a tick in.
@@ -139,6 +154,16 @@ impl Reconstructor {
         self.latency.div_ceil(self.ratio())
     }
 
+    /// How the bank runs.
+    pub fn plan(&self) -> PlanSummary {
+        let (form, numbers, fold) = match &*self.plan {
+            Plan::Single(plan) => ("polyphase", "f32", plan.fold),
+            Plan::Double(plan) => ("polyphase", "f64", plan.fold),
+            Plan::StateSpace(plan) => (if plan.is_modal() { "modal" } else { "dense" }, "f64", 1),
+        };
+        PlanSummary { form, numbers, isa: self.isa.to_string(), fold }
+    }
+
     /// Input samples that were NaN or infinite and became 0, since the beginning.
     pub fn replaced(&self) -> u64 {
         self.replaced
@@ -147,23 +172,23 @@ impl Reconstructor {
     /// Times a recursion's state was not finite and began anew, since the beginning.
     pub fn state_resets(&self) -> u64 {
         match &self.state {
-            State::StateSpace(state) => state.resets,
+            StreamState::StateSpace(state) => state.resets,
             _ => 0,
         }
     }
 
     /// A stream of the same bank at its beginning.
     pub fn fresh(&self) -> Self {
-        Self { plan: Arc::clone(&self.plan), state: self.plan.state(), latency: self.latency, replaced: 0 }
+        Self { plan: Arc::clone(&self.plan), state: self.plan.state(), replaced: 0, ..*self }
     }
 
     /// Back to the beginning; gives the same bits as a new one.
     pub fn reset(&mut self) {
         self.replaced = 0;
         match &mut self.state {
-            State::Single(state) => state.reset(),
-            State::Double(state) => state.reset(),
-            State::StateSpace(state) => state.reset(),
+            StreamState::Single(state) => state.reset(),
+            StreamState::Double(state) => state.reset(),
+            StreamState::StateSpace(state) => state.reset(),
         }
     }
 
@@ -203,7 +228,7 @@ impl Reconstructor {
 
     fn interleaved<'a, S>(&self, samples: &'a [S]) -> Result<Interleaved<'a, S>, ProcessError> {
         let channels = self.channels();
-        if samples.len() % channels != 0 {
+        if !samples.len().is_multiple_of(channels) {
             return Err(ProcessError::CutTick { samples: samples.len(), channels });
         }
         Ok(Interleaved { samples, channels })
@@ -222,9 +247,9 @@ impl Reconstructor {
             return Err(ProcessError::OutputTooShort { given: sink.capacity(), wanted });
         }
         self.replaced += match (&*self.plan, &mut self.state) {
-            (Plan::Single(plan), State::Single(state)) => plan.process(state, source, sink),
-            (Plan::Double(plan), State::Double(state)) => plan.process(state, source, sink),
-            (Plan::StateSpace(plan), State::StateSpace(state)) => plan.process(state, source, sink),
+            (Plan::Single(plan), StreamState::Single(state)) => plan.process(state, source, sink),
+            (Plan::Double(plan), StreamState::Double(state)) => plan.process(state, source, sink),
+            (Plan::StateSpace(plan), StreamState::StateSpace(state)) => plan.process(state, source, sink),
             // A state is only ever made by its plan.
             _ => 0,
         };
@@ -252,16 +277,16 @@ impl Plan {
                 FirPlan::new(taps, ratio, options.isa).map(Self::Double)
             }
             (SynthesisFilters::StateSpace(filter), _) => {
-                StateSpacePlan::new(filter, channels, ratio).map(Self::StateSpace)
+                StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::StateSpace)
             }
         }
     }
 
-    fn state(&self) -> State {
+    fn state(&self) -> StreamState {
         match self {
-            Self::Single(plan) => State::Single(plan.state()),
-            Self::Double(plan) => State::Double(plan.state()),
-            Self::StateSpace(plan) => State::StateSpace(plan.state()),
+            Self::Single(plan) => StreamState::Single(plan.state()),
+            Self::Double(plan) => StreamState::Double(plan.state()),
+            Self::StateSpace(plan) => StreamState::StateSpace(plan.state()),
         }
     }
 }

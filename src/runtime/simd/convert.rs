@@ -268,6 +268,15 @@ unsafe fn interleave_fours(rows: Rows, m: usize, done: usize, to: *mut f32) {
             *row = _mm256_loadu_ps(rows.at(p, done));
         }
         let frames = transpose4(block);
+        if m == 4 {
+            // Two frames a store.
+            for half in 0..2 {
+                let (a, b) = (frames[2 * half], frames[2 * half + 1]);
+                _mm256_storeu_ps(to.add(8 * half), _mm256_permute2f128_ps::<0x20>(a, b));
+                _mm256_storeu_ps(to.add(16 + 8 * half), _mm256_permute2f128_ps::<0x31>(a, b));
+            }
+            return;
+        }
         for (f, frame) in frames.into_iter().enumerate() {
             _mm_storeu_ps(to.add(f * m), _mm256_castps256_ps128(frame));
         }

@@ -91,6 +91,8 @@ impl<T: Copy + Default> FirKernel<T> {
 }
 
 /// One step: an input for each of R vectors, a coefficient for each of P phases.
+// Indices, because a step is a product of two index ranges.
+#[allow(clippy::needless_range_loop)]
 #[inline(always)]
 unsafe fn step<V: Vector, const P: usize, const R: usize>(
     job: &Job<V::Sample>,
@@ -135,6 +137,12 @@ unsafe fn tile<V: Vector, const P: usize, const R: usize>(job: &Job<V::Sample>, 
     unsafe {
         let mut sums = [[zero; R]; P];
         let x = job.x.add(first);
+        if const { P == 4 && R == 3 }
+            && job.steps > 0
+            && V::full_tile(x, job.offsets, job.coefficients, job.steps, job.out.add(first), job.out_stride)
+        {
+            return;
+        }
         // Two steps a turn: half the loop's own work.
         let mut s = 0;
         while s + 1 < job.steps {
