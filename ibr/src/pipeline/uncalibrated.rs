@@ -18,6 +18,9 @@ use crate::uncalibrated::triangulate::triangulate;
 use crate::uncalibrated::{GeometryError, Match, Point, RobustSettings, metric};
 use nalgebra::{Matrix3x4, Vector4};
 
+/// Matches that a metric guess is made from: enough for one bit.
+const GUESS_MATCHES: usize = 150;
+
 /// Where the virtual camera is.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Target {
@@ -160,11 +163,16 @@ fn reconstruct(
     let pair = canonical_pair(&f.matrix, &agreeing)?;
     let (tracks_used, agreeing, mut points) = triangulated(&pair, &numbered, &f);
     let sizes = [images[0].size(), images[1].size()];
-    let guesses = metric::guesses(&f.matrix, &agreeing, sizes);
+    let few = |n: usize| n.div_ceil(GUESS_MATCHES).max(1);
+    let sample: Vec<Match> = agreeing.iter().copied().step_by(few(agreeing.len())).collect();
+    let guesses = metric::guesses(&f.matrix, &sample, sizes);
     let wanted: Vec<Option<Point>> = match target {
         Target::Tracks(places) => tracks_used.iter().map(|j| places.get(*j).copied().flatten()).collect(),
         Target::Between(between) if (0.0..=1.0).contains(between) => {
-            metric::images_between(&guesses, &agreeing, *between)
+            let guess = metric::best(&guesses)
+                .and_then(|g| metric::guess(&f.matrix, &agreeing, sizes, g.focal))
+                .ok_or(GeometryError::Numerical { what: "metric guess" })?;
+            metric::images_between(&guess, &agreeing, *between)
         }
         Target::Between(between) => return Err(UncalibratedError::Between { between: *between }),
     };
@@ -184,8 +192,11 @@ fn reconstruct(
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
     let (hand, order_agreement) = match settings.handedness {
         Some(hand) => (hand, 1.0),
-        None => metric::handedness(&guesses, &agreeing, &points, &cameras[0])
-            .ok_or(GeometryError::Numerical { what: "order of depth" })?,
+        None => {
+            let points: Vec<Vector4<f64>> = points.iter().copied().step_by(few(points.len())).collect();
+            metric::handedness(&guesses, &sample, &points, &cameras[0])
+                .ok_or(GeometryError::Numerical { what: "order of depth" })?
+        }
     };
     let geometry = GeometryReport {
         matches: matches.len(),
