@@ -134,8 +134,16 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
             pixels(pair[0].x, pair[1].x, mask.len()).for_each(|j| mask[j] = Cover::Crack);
         }
     }
-    for s in samples {
-        pixels(s.x - half, s.x + half, mask.len()).for_each(|j| mask[j] = Cover::Seen);
+    let mut next = 0;
+    for (j, cover) in mask.iter_mut().enumerate() {
+        let x = j as f64;
+        while next < samples.len() && samples[next].x < x {
+            next += 1;
+        }
+        let right = samples.get(next).is_some_and(|s| s.x - x <= half);
+        if right || (next > 0 && x - samples[next - 1].x <= half) {
+            *cover = Cover::Seen;
+        }
     }
 }
 

@@ -24,7 +24,7 @@ impl<const C: usize> RowScratch<C> {
     /// pixels, then insertion, which meets few samples a pixel.
     fn sort(&mut self, samples: &mut Vec<Sample<C>>) {
         let (low, high) = samples.iter().fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s.x), b.max(s.x)));
-        let cells = (high - low).floor() as usize + 1;
+        let cells = ((high - low).floor() as usize).saturating_add(1);
         if samples.len() < 2 {
             return;
         }
@@ -96,11 +96,11 @@ pub fn remove_in_row<const C: usize>(
             scratch.window.push(next as u32);
             next += 1;
         }
-        while !test.close(s.x - samples[scratch.window[head] as usize].x, 0.0) {
-            head += 1;
-        }
-        let nearest = samples[scratch.window[head] as usize].depth;
-        scratch.keep.push(!test.hides(f64::from(nearest), f64::from(s.depth)));
+        let close = |i: &u32| test.close(s.x - samples[*i as usize].x, 0.0);
+        head += scratch.window[head..].iter().position(close).unwrap_or(0);
+        // A place that is no number is close to nothing, not even to itself, and stays.
+        let nearest = scratch.window.get(head).filter(|i| close(i)).map(|i| samples[*i as usize].depth);
+        scratch.keep.push(nearest.is_none_or(|n| !test.hides(f64::from(n), f64::from(s.depth))));
     }
     let before = samples.len();
     let mut keep = scratch.keep.iter();
@@ -142,6 +142,19 @@ mod tests {
         let mut row = vec![sample(0.0, 1.0, 1), sample(0.9, 2.0, 2), sample(1.8, 3.0, 3)];
         assert_eq!(remove_in_row(&mut row, &test, &mut RowScratch::default()), 2);
         assert_eq!(row[0].pixel, 1);
+    }
+
+    #[test]
+    fn places_that_are_no_numbers_do_no_harm() {
+        let test = DepthTest::default();
+        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let mut row =
+                vec![sample(1.0, 1.0, 1), sample(x, 1.0, 2), sample(1.2, 5.0, 3), sample(x, 2.0, 4)];
+            remove_in_row(&mut row, &test, &mut RowScratch::default());
+            assert!(row.iter().any(|s| s.pixel == 1) && row.len() >= 2, "{row:?}");
+            let mut alone = vec![sample(x, 1.0, 1)];
+            assert_eq!(remove_in_row(&mut alone, &test, &mut RowScratch::default()), 0);
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::occlusion;
 use crate::propagate::{self, CalibratedView, Frame};
 
 /// Samples that are held in memory at a time; larger scenes are rendered in bands of rows.
-const SAMPLES_AT_A_TIME: usize = 1 << 20;
+const SAMPLES_AT_A_TIME: usize = 1 << 19;
 
 /// Renders the view of `camera` with `width` x `height` pixels.
 ///

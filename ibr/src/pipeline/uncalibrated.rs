@@ -13,10 +13,14 @@ use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::fundamental::{self, Fundamental};
 use crate::uncalibrated::mesh::{self, Feature};
+use crate::uncalibrated::metric::MetricGuess;
 use crate::uncalibrated::resection::{Resection, Sighting, resect};
 use crate::uncalibrated::triangulate::triangulate;
 use crate::uncalibrated::{GeometryError, Match, Point, RobustSettings, metric};
 use nalgebra::{Matrix3x4, Vector4};
+
+/// Matches that a metric guess is made from: enough for one bit.
+const GUESS_MATCHES: usize = 150;
 
 /// Where the virtual camera is.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,54 +153,105 @@ fn reconstruct(
     target: &Target,
     settings: &UncalibratedSettings,
 ) -> Result<Reconstruction, UncalibratedError> {
-    let numbered: Vec<(usize, Match)> = tracks
-        .iter()
-        .enumerate()
-        .filter_map(|(j, t)| Some((j, Match { first: (*t.first()?)?, second: (*t.get(1)?)? })))
-        .collect();
-    let matches: Vec<Match> = numbered.iter().map(|m| m.1).collect();
-    let f = fundamental::robust(&matches, &settings.robust)?;
-    let agreeing: Vec<Match> = f.inliers.iter().map(|i| matches[*i]).collect();
-    let pair = canonical_pair(&f.matrix, &agreeing)?;
-    let (tracks_used, agreeing, mut points) = triangulated(&pair, &numbered, &f);
-    let sizes = [images[0].size(), images[1].size()];
-    let guesses = metric::guesses(&f.matrix, &agreeing, sizes);
-    let wanted: Vec<Option<Point>> = match target {
-        Target::Tracks(places) => tracks_used.iter().map(|j| places.get(*j).copied().flatten()).collect(),
-        Target::Between(between) if (0.0..=1.0).contains(between) => {
-            metric::images_between(&guesses, &agreeing, *between)
-        }
-        Target::Between(between) => return Err(UncalibratedError::Between { between: *between }),
-    };
-    let mut seen: Vec<Vec<Option<Point>>> =
-        tracks_used.iter().map(|j| tracks[*j].iter().copied().chain([None]).collect()).collect();
+    let base = Base::new(images, tracks, settings)?;
+    let wanted = base.wanted(target)?;
     let last = images.len();
-    seen.iter_mut().zip(&wanted).for_each(|(s, w)| s[last] = *w);
-    let mut cameras = vec![pair.first.inverse() * pair.cameras[0], pair.second.inverse() * pair.cameras[1]];
-    let mut found = None;
+    let places =
+        |(j, wanted): (&usize, &Option<Point>)| tracks[*j].iter().copied().chain([*wanted]).collect();
+    let seen: Vec<Vec<Option<Point>>> = base.tracks.iter().zip(&wanted).map(places).collect();
+    let mut cameras = base.cameras.to_vec();
+    let mut resections = Vec::new();
     for column in 2..=last {
-        let resection = resected(&points, &seen, column, settings)?;
+        let resection = resected(&base.points, &seen, column, settings)?;
         cameras.push(resection.camera);
-        found = Some(resection);
+        resections.push(resection);
     }
-    let virtual_camera = found.ok_or(GeometryError::Numerical { what: "virtual camera" })?;
-    let sightings = seen.iter().filter(|s| s[last].is_some()).count();
+    let found = resections.last().ok_or(GeometryError::Numerical { what: "virtual camera" })?;
+    let mut points = base.points.clone();
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
-    let (hand, order_agreement) = match settings.handedness {
-        Some(hand) => (hand, 1.0),
-        None => metric::handedness(&guesses, &agreeing, &points, &cameras[0])
-            .ok_or(GeometryError::Numerical { what: "order of depth" })?,
-    };
+    let (hand, order_agreement) = base.handedness(&points, &cameras[0], settings)?;
     let geometry = GeometryReport {
-        matches: matches.len(),
-        inliers: f.inliers.len(),
-        sampson_rms: f.rms,
-        sightings,
-        resection_inliers: virtual_camera.inliers.len(),
-        resection_rms: virtual_camera.rms,
+        matches: base.given,
+        inliers: base.f.inliers.len(),
+        sampson_rms: base.f.rms,
+        sightings: wanted.iter().flatten().count(),
+        resection_inliers: found.inliers.len(),
+        resection_rms: found.rms,
         order_agreement,
     };
     Ok(Reconstruction { cameras, points, seen, hand, geometry })
+}
+
+/// The reconstruction of the first two views.
+struct Base {
+    /// Matches given.
+    given: usize,
+    f: Fundamental,
+    sizes: [(usize, usize); 2],
+    cameras: [Matrix3x4<f64>; 2],
+    /// Tracks that agree with F and could be triangulated, with their matches and points.
+    tracks: Vec<usize>,
+    matches: Vec<Match>,
+    points: Vec<Vector4<f64>>,
+    guesses: Vec<MetricGuess>,
+}
+
+impl Base {
+    fn new(
+        images: &[&Image],
+        tracks: &[Vec<Option<Point>>],
+        settings: &UncalibratedSettings,
+    ) -> Result<Self, GeometryError> {
+        let numbered: Vec<(usize, Match)> = tracks
+            .iter()
+            .enumerate()
+            .filter_map(|(j, t)| Some((j, Match { first: (*t.first()?)?, second: (*t.get(1)?)? })))
+            .collect();
+        let all: Vec<Match> = numbered.iter().map(|m| m.1).collect();
+        let f = fundamental::robust(&all, &settings.robust)?;
+        let agreeing: Vec<Match> = f.inliers.iter().map(|i| all[*i]).collect();
+        let pair = canonical_pair(&f.matrix, &agreeing)?;
+        let (tracks, matches, points) = triangulated(&pair, &numbered, &f);
+        let cameras = [pair.first.inverse() * pair.cameras[0], pair.second.inverse() * pair.cameras[1]];
+        let sizes = [images[0].size(), images[1].size()];
+        let guesses = metric::guesses(&f.matrix, &some(&matches), sizes);
+        Ok(Self { given: all.len(), f, sizes, cameras, tracks, matches, points, guesses })
+    }
+
+    /// Where the wanted view sees the points.
+    fn wanted(&self, target: &Target) -> Result<Vec<Option<Point>>, UncalibratedError> {
+        match target {
+            Target::Tracks(places) => {
+                Ok(self.tracks.iter().map(|j| places.get(*j).copied().flatten()).collect())
+            }
+            Target::Between(between) if (0.0..=1.0).contains(between) => {
+                let guess = metric::best(&self.guesses)
+                    .and_then(|g| metric::guess(&self.f.matrix, &self.matches, self.sizes, g.focal))
+                    .ok_or(GeometryError::Numerical { what: "metric guess" })?;
+                Ok(metric::images_between(&guess, &self.matches, *between))
+            }
+            Target::Between(between) => Err(UncalibratedError::Between { between: *between }),
+        }
+    }
+
+    /// The bit that orders depth, given or by the guesses, and how many of these agree on it.
+    fn handedness(
+        &self,
+        points: &[Vector4<f64>],
+        camera: &Matrix3x4<f64>,
+        settings: &UncalibratedSettings,
+    ) -> Result<(Handedness, f64), GeometryError> {
+        if let Some(hand) = settings.handedness {
+            return Ok((hand, 1.0));
+        }
+        metric::handedness(&self.guesses, &some(&self.matches), &some(points), camera)
+            .ok_or(GeometryError::Numerical { what: "order of depth" })
+    }
+}
+
+/// Evenly spaced elements, as many as a metric guess needs.
+fn some<T: Copy>(all: &[T]) -> Vec<T> {
+    all.iter().copied().step_by(all.len().div_ceil(GUESS_MATCHES).max(1)).collect()
 }
 
 /// Points of the inliers that can be triangulated, with their track numbers and matches.

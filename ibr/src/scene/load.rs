@@ -13,6 +13,9 @@ use nalgebra::Matrix3x4;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
+/// Most pixels of a view: 8192 x 8192, some gigabytes of work memory.
+const LARGEST_VIEW: usize = 1 << 26;
+
 /// How a scene is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadOptions {
@@ -158,8 +161,8 @@ impl Loader<'_> {
     /// The size asked for, or the one that suggests itself.
     fn size(&self, target: &TargetSpec, own: (usize, usize)) -> Loaded<(usize, usize)> {
         match target.size {
-            Some([w, h]) if w == 0 || h == 0 || w.saturating_mul(h) > u32::MAX as usize => Err(self
-                .incomplete(format!("[virtual] size = [{w}, {h}]: both sides must be at least one pixel"))),
+            Some([w, h]) if w == 0 || h == 0 || w.saturating_mul(h) > LARGEST_VIEW => Err(self
+                .incomplete(format!("[virtual] size = [{w}, {h}]: both sides must be at least one pixel, and it may have at most {LARGEST_VIEW} pixels"))),
             Some([w, h]) => Ok((w, h)),
             None => Ok(own),
         }

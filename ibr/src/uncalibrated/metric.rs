@@ -120,13 +120,15 @@ fn slope(
     linear::least_squares(&rows, &values).map(|fit| fit[0]).filter(|s| *s != 0.0)
 }
 
-/// Where a camera between the two views would see the matches: rotation and centre of the guess that fits F
-/// best are interpolated, and what the guess misses in the two views is blended in, so that `between` = 0
+/// The guess that fits F best.
+pub fn best(guesses: &[MetricGuess]) -> Option<&MetricGuess> {
+    guesses.iter().max_by(|a, b| a.fit.total_cmp(&b.fit))
+}
+
+/// Where a camera between the two views would see the matches that `guess` was made from: its rotation and
+/// centre are interpolated, and what the guess misses in the two views is blended in, so that `between` = 0
 /// and 1 are the views themselves.
-pub fn images_between(guesses: &[MetricGuess], matches: &[Match], between: f64) -> Vec<Option<Point>> {
-    let Some(guess) = guesses.iter().max_by(|a, b| a.fit.total_cmp(&b.fit)) else {
-        return vec![None; matches.len()];
-    };
+pub fn images_between(guess: &MetricGuess, matches: &[Match], between: f64) -> Vec<Option<Point>> {
     let turn = UnitQuaternion::from_rotation_matrix(&guess.r);
     let r = UnitQuaternion::identity().slerp(&turn, between);
     let centre = -(guess.r.inverse() * guess.t) * between;
@@ -189,8 +191,9 @@ mod tests {
         let scene = Synthetic::new(50, false);
         let matches = scene.matches();
         let all = guesses(&eight_point(&matches).unwrap(), &matches, SIZES);
-        let (start, end) = (images_between(&all, &matches, 0.0), images_between(&all, &matches, 1.0));
-        let middle = images_between(&all, &matches, 0.5);
+        let found = best(&all).unwrap();
+        let (start, end) = (images_between(found, &matches, 0.0), images_between(found, &matches, 1.0));
+        let middle = images_between(found, &matches, 0.5);
         for (j, m) in matches.iter().enumerate() {
             assert!((start[j].unwrap() - m.first).norm() < 1e-9);
             assert!((end[j].unwrap() - m.second).norm() < 1e-9);

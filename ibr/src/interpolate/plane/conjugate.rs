@@ -7,24 +7,22 @@ use rayon::prelude::*;
 /// Entries handled together; the partial sums of a dot product follow this cut, not the threads.
 const CHUNK: usize = 8192;
 
-/// Solves A u = rhs for every channel; returns the values interleaved.
+/// Solves A u = rhs for every channel; returns the values interleaved, in the memory of the right-hand sides.
 pub(super) fn solve<const C: usize>(
     stencil: &Stencil,
-    rhs: &[[f32; C]],
+    mut rhs: Vec<[f32; C]>,
     settings: &PlaneSettings,
 ) -> (Vec<f32>, Convergence) {
-    let mut values = vec![0.0; rhs.len() * C];
     let mut ended = Convergence { reached: true, ..Convergence::default() };
     let mut work = Work::new(rhs.len());
-    let at = |p: usize, channel: usize| rhs[p][channel];
     for channel in 0..C {
-        let one = work.solve(stencil, |p: usize| f64::from(at(p, channel)), settings);
+        let one = work.solve(stencil, |p| f64::from(rhs[p][channel]), settings);
         ended.steps = ended.steps.max(one.steps);
         ended.residual = ended.residual.max(one.residual);
         ended.reached &= one.reached;
-        values.iter_mut().skip(channel).step_by(C).zip(&work.u).for_each(|(v, u)| *v = *u as f32);
+        rhs.iter_mut().zip(&work.u).for_each(|(r, u)| r[channel] = *u as f32);
     }
-    (values, ended)
+    (rhs.into_flattened(), ended)
 }
 
 /// The four vectors of the iteration.

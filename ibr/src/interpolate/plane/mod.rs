@@ -172,7 +172,8 @@ impl<const C: usize> PlaneProblem<C> {
             self.fill_background(&mask, &inside);
         }
         self.connect(&inside);
-        let (mut values, convergence) = conjugate::solve(&self.stencil, &self.rhs, &self.settings.plane);
+        self.depth = Vec::new();
+        let (mut values, convergence) = conjugate::solve(&self.stencil, self.rhs, &self.settings.plane);
         (0..width * height).filter(|p| !inside(*p)).for_each(|p| {
             mask[p] = Cover::Disocclusion;
             values[p * C..(p + 1) * C].fill(0.0);
@@ -187,15 +188,14 @@ impl<const C: usize> PlaneProblem<C> {
     /// Gives every hole pixel a sample with value and depth of the farthest surface around it.
     fn fill_background(&mut self, mask: &[Cover], inside: &dyn Fn(usize) -> bool) {
         let sources = background::farthest(&self.depth, self.width);
-        // The value of a seen pixel before the fit: its share of the right-hand side.
-        let seen: Vec<[f32; C]> = (0..self.rhs.len())
-            .map(|p| self.rhs[p].map(|r| r / self.stencil.sample_weight(p).max(f32::MIN_POSITIVE)))
-            .collect();
         for p in (0..mask.len()).filter(|p| mask[*p] != Cover::Seen && inside(*p)) {
-            if let Some(source) = sources[p].map(|s| s as usize) {
-                self.depth[p] = self.depth[source];
-                self.splat((p % self.width) as f64, (p / self.width) as f64, &seen[source]);
-            }
+            let Some(source) = sources[p].map(|s| s as usize) else { continue };
+            self.depth[p] = self.depth[source];
+            // The value of a seen pixel before the fit: its share of the right-hand side. A sample on a pixel
+            // centre reaches that pixel only, so that no source changes on the way.
+            let weight = self.stencil.sample_weight(source).max(f32::MIN_POSITIVE);
+            let value = self.rhs[source].map(|r| r / weight);
+            self.splat((p % self.width) as f64, (p / self.width) as f64, &value);
         }
     }
 
