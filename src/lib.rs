@@ -1,8 +1,5 @@
-//! Hybrid multirate filter banks with fractional delays.
-//!
-//! Several slow converters see the same analog signal through different front ends and with
-//! different delays; hybank designs the digital synthesis filters that fuse them into one fast
-//! signal with the least worst-case error, proves how good they are, and runs them.
+#![cfg_attr(feature = "design", doc = include_str!("../README.md"))]
+#![cfg_attr(not(feature = "design"), doc = "Runs hybrid multirate filter banks with fractional delays.")]
 
 pub mod sampling;
 

@@ -32,7 +32,7 @@ const FINE: usize = 8;
 /// An FIR design.
 #[derive(Debug, Clone)]
 pub struct FirDesign {
-    /// `taps[i][n]` = f_i[n] at the fast rate.
+    /// `taps[i][n]` = `f_i[n]` at the fast rate.
     pub taps: Vec<Vec<f64>>,
     /// The exact norm of the error system with these taps.
     pub upper: f64,

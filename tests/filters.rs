@@ -1,0 +1,76 @@
+//! The ready specs and banks in `filters/`: each spec designs, each bank keeps its promise.
+
+use hybank::bank::Bank;
+use hybank::design::{analyze, certify, design};
+use hybank::spec::Spec;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("filters")
+}
+
+/// Every spec in the folder with the bank beside it.
+fn pairs() -> Vec<(String, Spec, Bank)> {
+    let mut specs: Vec<PathBuf> = fs::read_dir(folder())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .collect();
+    specs.sort();
+    assert!(specs.len() >= 6, "specs are missing: {specs:?}");
+    specs
+        .iter()
+        .map(|path| {
+            let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+            let spec = Spec::from_toml(&fs::read_to_string(path).unwrap(), &name).unwrap();
+            let text = fs::read_to_string(path.with_extension("json")).unwrap();
+            let bank = Bank::from_json(&text, &name).unwrap();
+            (name, spec, bank)
+        })
+        .collect()
+}
+
+#[test]
+fn each_bank_keeps_the_gamma_in_its_file() {
+    for (name, spec, bank) in pairs() {
+        let promised = bank.gamma.upper.unwrap();
+        let gamma = analyze(&bank, &[]).unwrap().gamma;
+        assert!((gamma / promised - 1.0).abs() < 1e-9, "{name}: {gamma} instead of {promised}");
+        let proved = certify(&bank).unwrap().gamma;
+        assert!(proved >= gamma && proved <= promised * (1.0 + 1e-6), "{name}: {proved}, {promised}");
+        // The bank is the spec's, whatever defaults were filled in.
+        let carried = bank.spec.as_ref().unwrap();
+        assert_eq!(carried.design, spec.design, "{name}");
+        assert_eq!(carried.channels, spec.channels, "{name}");
+        assert_eq!((bank.ratio, Some(bank.latency)), (spec.ratio, spec.latency), "{name}");
+    }
+}
+
+#[test]
+fn a_fresh_design_agrees() {
+    for (name, spec, bank) in pairs() {
+        let fresh = design(&spec).unwrap().bank.gamma;
+        let values = [
+            (fresh.upper, bank.gamma.upper),
+            (fresh.lower, bank.gamma.lower),
+            (fresh.noncausal, bank.gamma.noncausal),
+        ];
+        for (now, then) in values {
+            let (now, then) = (now.unwrap(), then.unwrap());
+            assert!((now / then - 1.0).abs() < 1e-6, "{name}: {now} instead of {then}");
+        }
+    }
+}
+
+#[test]
+fn each_spec_is_in_the_table() {
+    let table = fs::read_to_string(folder().join("README.md")).unwrap();
+    for (name, _, bank) in pairs() {
+        let row = table.lines().find(|line| line.starts_with(&format!("| `{name}`"))).unwrap_or_else(|| {
+            panic!("{name} is not in filters/README.md");
+        });
+        let gamma = format!("{:.6}", bank.gamma.upper.unwrap());
+        assert!(row.contains(&gamma), "{name}: {gamma} is not in `{row}`");
+    }
+}
