@@ -5,7 +5,7 @@ use super::bank_file::load_spec_or_bank;
 use super::recordings::{read_mono, write_mono};
 use crate::design::{self, Problem};
 use crate::io::PcmFormat;
-use crate::simulate::{Analog, Recording, Source, capture};
+use crate::simulate::{Analog, Captured, Recording, Source, capture, panels};
 use crate::spec::Spec;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,8 @@ const NORMALISED_RATE: f64 = 48_000.0;
 const DEFAULT_SAMPLES: f64 = 200.0;
 /// Most fast samples of a simulation: captures are made in memory.
 const MOST_SAMPLES: usize = 1 << 28;
+/// Most quadrature panels of a chirp for each converter: some ten seconds.
+const MOST_PANELS: f64 = 2e7;
 
 /// Simulates what the slow converters capture
 ///
@@ -86,10 +88,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let (signal, samples) = args.signal(&spec)?;
     let ticks = args.ticks(samples, spec.ratio)?;
+    args.check_work(&problem, &signal, ticks)?;
     let mut captured = capture(&problem, &signal, ticks);
-    let scale = |samples: &mut Vec<f64>| samples.iter_mut().for_each(|x| *x *= args.gain);
-    captured.channels.iter_mut().for_each(scale);
-    scale(&mut captured.target);
+    args.scale(&mut captured)?;
     let mut files = vec![];
     for (i, samples) in captured.channels.iter().enumerate() {
         files.push((format!("ch{}.wav", i + 1), samples, rates.slow));
@@ -122,6 +123,36 @@ impl Args {
         let length =
             source.duration().unwrap_or(0.0).ceil().clamp(DEFAULT_SAMPLES, MOST_SAMPLES as f64 + 1.0);
         Ok((Analog::Known(source), self.samples.unwrap_or(length as usize)))
+    }
+
+    /// A chirp, or a front end behind which one is captured, may be too fast for its quadrature.
+    fn check_work(&self, problem: &Problem, signal: &Analog, ticks: usize) -> Result<(), Failure> {
+        let Analog::Known(source) = signal else { return Ok(()) };
+        let span = ticks as f64 * problem.ratio as f64;
+        let work = problem.front_ends.iter().map(|filter| panels(filter, source, span)).fold(0.0, f64::max);
+        if work <= MOST_PANELS {
+            return Ok(());
+        }
+        Err(Failure::Input(format!(
+            "{}: the chirp or a front end is too fast for the fast rate: {work:.1e} integration steps, at most \
+             {MOST_PANELS:.0e} are made; check the units of frequencies and fast_period, or ask for fewer --samples",
+            self.source
+        )))
+    }
+
+    /// Applies the gain; what a 32-bit float cannot hold is refused, not written as infinity.
+    fn scale(&self, captured: &mut Captured) -> Result<(), Failure> {
+        let recordings = captured.channels.iter_mut().chain(std::iter::once(&mut captured.target));
+        for x in recordings.flatten() {
+            *x *= self.gain;
+            if !(x.abs() <= f64::from(f32::MAX)) {
+                return Err(Failure::Input(format!(
+                    "{}: a captured sample is {x:e}, more than a 32-bit float holds; use a smaller --gain",
+                    self.source
+                )));
+            }
+        }
+        Ok(())
     }
 
     fn ticks(&self, samples: usize, ratio: usize) -> Result<usize, Failure> {

@@ -28,7 +28,7 @@ pub struct Analysis {
 ///
 /// # Errors
 /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::DelayErrorCount`] unless there is one error a
-/// channel, [`DesignError::Lti`] for unstable filters.
+/// channel, [`DesignError::TooLate`] for delays out of all proportion, [`DesignError::Lti`] for unstable filters.
 pub fn analyze(bank: &Bank, delay_errors: &[f64]) -> Result<Analysis, DesignError> {
     let problem = bank_problem(bank)?;
     let count = problem.channels.len();
@@ -37,6 +37,7 @@ pub fn analyze(bank: &Bank, delay_errors: &[f64]) -> Result<Analysis, DesignErro
     }
     let normalised: Vec<f64> = delay_errors.iter().map(|error| error / bank.fast_period).collect();
     let moved = problem.with_delay_errors(&normalised);
+    moved.check_size()?;
     let plant = BlockedPlant::new(&moved);
     let filters = error_system::block_system(&bank.filters, bank.ratio)?;
     let error = error_system::error_system(&plant, &filters)?;

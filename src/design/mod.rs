@@ -77,6 +77,21 @@ pub enum DesignError {
         /// N.
         channels: usize,
     },
+    /// Latency and delays so far apart that the blocked system does not fit into a computer.
+    #[error(
+        "latency {latency} and delays up to {longest_delay} fast periods need delay chains of {states} states, at most \
+         {limit} are supported: check the unit of the delays (seconds), and bring latency and delays closer together"
+    )]
+    TooLate {
+        /// m0, fast samples.
+        latency: usize,
+        /// The largest delay, fast periods.
+        longest_delay: f64,
+        /// States of all delay chains.
+        states: f64,
+        /// Most states.
+        limit: usize,
+    },
     /// A bank's state-space matrices have rows of unequal lengths.
     #[error("the bank's state-space matrices do not fit: expected {rows} rows of {cols} numbers")]
     RaggedStateSpace {

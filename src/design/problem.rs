@@ -4,6 +4,10 @@ use super::DesignError;
 use crate::analog::StrictlyProper;
 use crate::spec::Spec;
 
+/// Most states of the delay chains of the blocked system. Its matrices are dense: at this size one of them takes
+/// 128 MiB, and a norm some of these and a cubic number of operations.
+pub const MAX_CHAIN_STATES: usize = 4096;
+
 /// Front ends, delays and rates in units of the fast period (h = 1).
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -38,7 +42,27 @@ impl Problem {
             let front_end = intern(&mut front_ends, StrictlyProper::new(&channel.filter, spec.fast_period)?);
             channels.push(Channel { front_end, delay });
         }
-        Ok(Self { ratio: spec.ratio, latency, front_ends, target, channels })
+        let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels };
+        problem.check_size()?;
+        Ok(problem)
+    }
+
+    /// Delay chains of bounded length.
+    ///
+    /// # Errors
+    /// [`DesignError::TooLate`] if latency and delays lie so far apart that the chains between them have more than
+    /// [`MAX_CHAIN_STATES`] states.
+    pub fn check_size(&self) -> Result<(), DesignError> {
+        let wanted = (0..self.ratio).map(|p| p as f64 - self.latency as f64);
+        let times: Vec<f64> = self.channels.iter().map(|channel| -channel.delay).chain(wanted).collect();
+        let latest = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let ticks = |time: f64| ((latest - time) / self.ratio as f64).floor();
+        let states: f64 = times.into_iter().map(ticks).sum();
+        if states <= MAX_CHAIN_STATES as f64 {
+            return Ok(());
+        }
+        let (latency, longest_delay) = (self.latency, self.longest_delay());
+        Err(DesignError::TooLate { latency, longest_delay, states, limit: MAX_CHAIN_STATES })
     }
 
     /// The same problem with `errors[i]` (fast periods) added to the delays.

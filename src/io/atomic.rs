@@ -18,7 +18,8 @@ impl AtomicFile {
     /// Starts a file that will be called `target`.
     ///
     /// # Errors
-    /// [`IoError::Exists`] if there is one already and `force` is not set, or the system's refusal.
+    /// [`IoError::Exists`] if there is one already and `force` is not set, [`IoError::System`] for what is no plain
+    /// file (a folder, device, pipe or socket), or the system's refusal.
     pub fn create(target: &Path, force: bool) -> Result<Self, IoError> {
         let name = target.display().to_string();
         if !force && target.symlink_metadata().is_ok() {
@@ -27,6 +28,12 @@ impl AtomicFile {
         if target.is_dir() {
             let source = io::Error::from(io::ErrorKind::IsADirectory);
             return Err(IoError::System { file: name, action: "create it", source });
+        }
+        // A rename would put a plain file in the place of /dev/full or of a pipe that somebody listens to.
+        if target.metadata().is_ok_and(|known| !known.is_file()) {
+            let source =
+                io::Error::other("it is a device, pipe or socket, not a file; write to `-` and redirect");
+            return Err(IoError::System { file: name, action: "replace it", source });
         }
         let (beside, file) = create_beside(target).map_err(IoError::system(&name, "create it"))?;
         Ok(Self { file: Some(file), beside, target: target.to_owned() })
@@ -137,6 +144,19 @@ mod tests {
         assert_eq!(fs::read(&target).unwrap(), b"old");
         AtomicFile::create(&target, true).unwrap().commit().unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_pipes_and_sockets_are_never_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&target).unwrap();
+        let error = AtomicFile::create(&target, true).unwrap_err().to_string();
+        assert!(error.contains("socket") && error.contains("redirect"), "{error}");
+        assert!(target.symlink_metadata().unwrap().file_type().is_socket());
+        assert_eq!(names(folder.path()), ["socket"]);
     }
 
     #[test]

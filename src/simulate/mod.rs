@@ -10,5 +10,5 @@ mod source;
 
 pub use capture::{Analog, Captured, capture, interleaved};
 pub use recording::Recording;
-pub use response::{Instants, sample};
+pub use response::{Instants, panels, sample};
 pub use source::{ParseSourceError, Source, Tone};

@@ -95,7 +95,7 @@ fn smooth(
     band: f64,
     instants: Instants,
 ) -> Vec<f64> {
-    let rate = (filter.a().norm() + std::f64::consts::TAU * band).max(f64::MIN_POSITIVE);
+    let rate = panel_rate(filter, band);
     let mut state = Mat::zeros(filter.order(), 1);
     let mut now = support.0.min(instants.first);
     let mut output = Vec::with_capacity(instants.count);
@@ -121,6 +121,21 @@ fn smooth(
     output
 }
 
+/// Panels of the quadrature for each fast period of a source whose highest frequency is `band` (cycles a fast period): what
+/// [`sample`] costs.
+fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
+    (filter.a().norm() + std::f64::consts::TAU * band).max(f64::MIN_POSITIVE)
+}
+
+/// Panels of the quadrature that [`sample`] needs over `span` fast periods; zero for sources answered in closed form.
+pub fn panels(filter: &StrictlyProper, source: &Source, span: f64) -> f64 {
+    match source {
+        Source::Chirp { start, end, .. } => span * panel_rate(filter, start.abs().max(end.abs())),
+        Source::Sum(parts) => parts.iter().map(|part| panels(filter, part, span)).sum(),
+        Source::Step { .. } | Source::Tones(_) => 0.0,
+    }
+}
+
 /// The quadrature of one stretch, cut into equal panels; reused for stretches of equal length.
 struct Panels {
     length: f64,
@@ -132,7 +147,7 @@ struct Panels {
 
 impl Panels {
     fn new(filter: &StrictlyProper, length: f64, rate: f64) -> Self {
-        // Bounded so that a filter or source a million times faster than the samples still ends.
+        // Bounded so that every call ends; `panels` tells beforehand where digits or patience would be lost.
         let count = (length * rate).ceil().clamp(1.0, 1e6) as usize;
         let panel = length / count as f64;
         let mirrored = HALF_NODES.iter().map(|&(x, w)| (1.0 - x, w));
