@@ -6,8 +6,12 @@ use std::path::{Path, PathBuf};
 /// Writes `bytes` into a file beside `path`, then renames it to `path`.
 ///
 /// # Errors
-/// The system's reason; nothing is left behind then.
+/// The system's reason, or that `path` is a device, pipe or socket, which a rename would put a plain file in the
+/// place of; nothing is left behind then.
 pub fn write(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    if path.metadata().is_ok_and(|known| !known.is_file()) {
+        return Err(std::io::Error::other("it is a folder, device, pipe or socket, not a file"));
+    }
     let beside = neighbour(path);
     let written = std::fs::File::create_new(&beside)
         .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))

@@ -1,7 +1,8 @@
 //! Reading specs and banks, writing text files.
 
 use super::Failure;
-use crate::bank::Bank;
+use crate::bank::{Bank, SynthesisFilters};
+use crate::design::error_system;
 use crate::io::AtomicFile;
 use crate::spec::{DesignOverrides, Spec};
 use std::io::{Read, Write};
@@ -14,7 +15,25 @@ pub(super) fn is_dash(path: &Path) -> bool {
 
 /// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
-    Bank::from_json(&read_text(path)?, &name(path)).map_err(Failure::input)
+    let bank = Bank::from_json(&read_text(path)?, &name(path)).map_err(Failure::input)?;
+    check_stable(&bank, path)?;
+    Ok(bank)
+}
+
+/// An unstable filter would run to infinity in silence.
+fn check_stable(bank: &Bank, path: &Path) -> Result<(), Failure> {
+    if let SynthesisFilters::StateSpace(_) = &bank.filters {
+        let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(path)));
+        let block = error_system::block_system(&bank.filters, bank.ratio).map_err(|error| named(&error))?;
+        let radius = block.spectral_radius().map_err(|error| named(&error))?;
+        if radius >= 1.0 {
+            return Err(named(&format!(
+                "state_space.a has spectral radius {radius}, so the bank is unstable and its output would grow \
+                 without bound; it must be below 1"
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Reads a spec file; `-` is standard input.

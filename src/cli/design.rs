@@ -134,7 +134,7 @@ impl<'a> Report<'a> {
         format!(
             "{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
              gamma      {} (exact norm of this bank; worst at {:.4} Hz modulo the slow rate)\n\
-             lower      {} (no bank of this method and size is better)\n\
+             lower      {} ({})\n\
              noncausal  {} (no latency is better)\n\
              designed in {:.1} ms, {} iterations\n",
             self.bank,
@@ -145,6 +145,12 @@ impl<'a> Report<'a> {
             number(self.gamma.upper),
             self.peak_hertz,
             number(self.gamma.lower),
+            match self.method {
+                Method::Fir => "no bank of this length is better",
+                Method::Iir => "no causal bank is better",
+                Method::H2 | Method::Sinc | Method::Separation =>
+                    "no bank at all is better; this method does not aim at gamma",
+            },
             number(self.gamma.noncausal),
             self.seconds * 1e3,
             self.iterations,

@@ -145,7 +145,7 @@ impl Args {
         let recordings = captured.channels.iter_mut().chain(std::iter::once(&mut captured.target));
         for x in recordings.flatten() {
             *x *= self.gain;
-            if !(x.abs() <= f64::from(f32::MAX)) {
+            if x.is_nan() || x.abs() > f64::from(f32::MAX) {
                 return Err(Failure::Input(format!(
                     "{}: a captured sample is {x:e}, more than a 32-bit float holds; use a smaller --gain",
                     self.source

@@ -27,8 +27,13 @@ use crate::sampling::SamplingError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// A filter of the spec is no front end.
-    #[error(transparent)]
-    Analog(#[from] AnalogError),
+    #[error("{place}: {source}")]
+    Analog {
+        /// Which filter: the target's or a channel's.
+        place: String,
+        /// What is wrong with it.
+        source: AnalogError,
+    },
     /// A property of a system could not be computed.
     #[error(transparent)]
     Lti(#[from] LtiError),

@@ -2,7 +2,7 @@
 
 use super::DesignError;
 use crate::analog::StrictlyProper;
-use crate::spec::Spec;
+use crate::spec::{FilterSpec, Spec};
 
 /// Most states of the delay chains of the blocked system. Its matrices are dense: at this size one of them takes
 /// 128 MiB, and a norm some of these and a cubic number of operations.
@@ -36,10 +36,15 @@ impl Problem {
     /// Normalises `spec` with the given latency (fast samples).
     pub fn new(spec: &Spec, latency: usize) -> Result<Self, DesignError> {
         let mut front_ends = Vec::new();
-        let target = intern(&mut front_ends, StrictlyProper::new(&spec.target, spec.fast_period)?);
+        let realise = |filter: &FilterSpec, place: &dyn Fn() -> String| {
+            StrictlyProper::new(filter, spec.fast_period)
+                .map_err(|source| DesignError::Analog { place: place(), source })
+        };
+        let target = intern(&mut front_ends, realise(&spec.target, &|| "target.filter".to_owned())?);
         let mut channels = Vec::with_capacity(spec.channels.len());
-        for (channel, delay) in spec.channels.iter().zip(spec.delays_in_fast_periods()) {
-            let front_end = intern(&mut front_ends, StrictlyProper::new(&channel.filter, spec.fast_period)?);
+        for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays_in_fast_periods()).enumerate() {
+            let filter = realise(&channel.filter, &|| format!("filter of channel {}", i + 1))?;
+            let front_end = intern(&mut front_ends, filter);
             channels.push(Channel { front_end, delay });
         }
         let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels };
