@@ -1,0 +1,52 @@
+//! How long `hybank fuse` takes for a recording on file: ten minutes of two 24 kHz channels of 32-bit floats through
+//! 24 taps. One hour is six times that.
+//!
+//! `cargo bench --bench fuse`; set TMPDIR to a folder in memory to leave the disk out.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use hybank::io::PcmFormat;
+use hybank::io::wav::WavFile;
+use std::fs::File;
+use std::path::Path;
+use std::process::Command;
+
+const RATE: u32 = 24_000;
+const SECONDS: usize = 600;
+
+fn write_channel(path: &Path, seed: u32) {
+    let mut state = seed;
+    let mut second = Vec::with_capacity(4 * RATE as usize);
+    for _ in 0..RATE {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let sample = state as f32 / u32::MAX as f32 - 0.5;
+        second.extend(sample.to_le_bytes());
+    }
+    let mut wav = WavFile::new(File::create(path).unwrap(), PcmFormat::F32Le, 1, RATE).unwrap();
+    (0..SECONDS).for_each(|_| wav.write_bytes(&second).unwrap());
+    wav.finish().unwrap();
+}
+
+fn fuse(c: &mut Criterion) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    write_channel(&path("ch1.wav"), 1);
+    write_channel(&path("ch2.wav"), 2);
+    let mut group = c.benchmark_group("fuse");
+    group.sample_size(10).throughput(Throughput::Elements(2 * u64::from(RATE) * SECONDS as u64));
+    group.bench_function("ten minutes of 2 x 24 kHz float WAV", |b| {
+        b.iter(|| {
+            let status = Command::new(env!("CARGO_BIN_EXE_hybank"))
+                .args(["fuse", concat!(env!("CARGO_MANIFEST_DIR"), "/filters/speech-2x.json")])
+                .args([path("ch1.wav"), path("ch2.wav")])
+                .args(["--force", "-o"])
+                .arg(path("fused.wav"))
+                .status()
+                .unwrap();
+            assert!(status.success());
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, fuse);
+criterion_main!(benches);
