@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::gaps::{GapArgs, GapReport, GapStage};
-use super::output::{Bits, FastWriter};
+use super::output::{Bits, FastWriter, run_warnings};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Capture, PcmFrames, SampleLayout};
@@ -226,14 +226,7 @@ impl Job {
 
     fn report(&mut self, capture: &Capture, rate: u32, begin: Instant) -> Report {
         let mut warnings: Vec<String> = capture.notes().iter().map(ToString::to_string).collect();
-        let mut warn = |count: u64, what: &str| {
-            if count > 0 {
-                warnings.push(format!("{count} {what}"));
-            }
-        };
-        warn(self.stream.replaced(), "input samples were NaN or infinite and were replaced by 0");
-        warn(self.clipped, "output samples were clipped; --bits 32f keeps them");
-        warn(self.stream.state_resets(), "times the filter state was not finite and began anew");
+        warnings.extend(run_warnings(&self.stream, self.clipped, "--bits 32f"));
         Report {
             plan: self.stream.plan(),
             channels: self.stream.channels(),

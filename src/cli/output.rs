@@ -3,6 +3,7 @@
 use super::Failure;
 use crate::io::wav::{WavFile, stream_header};
 use crate::io::{AtomicFile, IoError, PcmFormat, SigmfMeta, stdout_file};
+use crate::runtime::Reconstructor;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 
@@ -146,4 +147,17 @@ pub(super) fn failure(name: &str, error: io::Error) -> Failure {
         error if error.is_closed_pipe() => Failure::ClosedPipe,
         error => Failure::input(error),
     }
+}
+
+/// What a run had to tolerate, in words; `lossless` is the option that would have kept clipped samples.
+pub(super) fn run_warnings(stream: &Reconstructor, clipped: u64, lossless: &str) -> Vec<String> {
+    [
+        (stream.replaced(), "input samples were NaN or infinite and were replaced by 0".to_owned()),
+        (clipped, format!("output samples were clipped; {lossless} keeps them")),
+        (stream.state_resets(), "times the filter state was not finite and began anew".to_owned()),
+    ]
+    .into_iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, what)| format!("{count} {what}"))
+    .collect()
 }

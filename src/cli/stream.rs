@@ -1,7 +1,7 @@
 //! `hybank stream`: slow samples in and fast samples out, as they come.
 
 use super::gaps::{GapArgs, GapReport, GapStage};
-use super::output::{failure, open_stdout};
+use super::output::{failure, open_stdout, run_warnings};
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::wav::stream_header;
@@ -294,14 +294,7 @@ impl Job {
 
     fn report(&mut self, feed: &Feed, interrupted: bool) -> Report {
         let mut warnings = feed.notes();
-        let mut warn = |count: u64, what: &str| {
-            if count > 0 {
-                warnings.push(format!("{count} {what}"));
-            }
-        };
-        warn(self.stream.replaced(), "input samples were NaN or infinite and were replaced by 0");
-        warn(self.clipped, "output samples were clipped; --output-format f32le keeps them");
-        warn(self.stream.state_resets(), "times the filter state was not finite and began anew");
+        warnings.extend(run_warnings(&self.stream, self.clipped, "--output-format f32le"));
         Report {
             plan: self.stream.plan(),
             channels: self.stream.channels(),

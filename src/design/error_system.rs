@@ -4,13 +4,13 @@ use super::DesignError;
 use super::equivalence::BlockedPlant;
 use crate::bank::{BlockFilter, SynthesisFilters};
 use crate::linalg::Mat;
-use crate::lti::StateSpace;
 use crate::lti::peak::{Peak, hinf_norm};
+use crate::lti::{StateSpace, StateSpaceError};
 
 /// The synthesis filters as one block system: N slow samples in, M fast samples out, a tick.
 pub fn block_system(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, DesignError> {
     match filters {
-        SynthesisFilters::Fir(taps) => Ok(shift_registers(taps, ratio)),
+        SynthesisFilters::Fir(taps) => Ok(shift_registers(taps, ratio)?),
         SynthesisFilters::StateSpace(block) => from_block(block, ratio),
     }
 }
@@ -41,7 +41,7 @@ pub fn gamma(plant: &BlockedPlant, filters: &StateSpace) -> Result<Peak, DesignE
 }
 
 /// FIR filters in block form: the state holds, newest first, the last J - 1 samples of each channel.
-fn shift_registers(taps: &[Vec<f64>], ratio: usize) -> StateSpace {
+fn shift_registers(taps: &[Vec<f64>], ratio: usize) -> Result<StateSpace, StateSpaceError> {
     let channels = taps.len();
     let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0);
     let stored = lags.saturating_sub(1);
@@ -63,7 +63,7 @@ fn shift_registers(taps: &[Vec<f64>], ratio: usize) -> StateSpace {
         }
     }
     let d = Mat::from_fn(ratio, channels, |p, i| tap(i, p, 0));
-    StateSpace::new(a, b, c, d).expect("shift registers fit by construction")
+    StateSpace::new(a, b, c, d)
 }
 
 fn from_block(block: &BlockFilter, ratio: usize) -> Result<StateSpace, DesignError> {
