@@ -14,6 +14,6 @@ pub mod nonuniform;
 pub mod recurrent;
 
 pub use error::SamplingError;
-pub use fit::Fit;
+pub use fit::{Fit, FitSample};
 pub use kernel::{BSpline, sinc, sinc_slope};
 pub use recurrent::Recurrent;

@@ -6,7 +6,7 @@
 
 use super::{Cover, HoleFill, InterpolationError, Settings, Variation};
 use crate::sample::Sample;
-use hybank::sampling::Fit;
+use hybank::sampling::{Fit, FitSample};
 
 /// Keeps the normal equations definite where lambda and tau are 0; far below any weight that counts.
 const RIDGE: f64 = 1e-9;
@@ -48,9 +48,12 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Ok(false) };
         self.fit.clear();
         self.weigh(samples, settings);
-        for (s, mu) in samples.iter().zip(&self.smoothing) {
-            self.fit.add(s.x, &s.value.map(f64::from), 1.0, settings.fit.lambda * mu);
-        }
+        self.fit.add_all(samples.iter().zip(&self.smoothing).map(|(s, v)| FitSample {
+            x: s.x,
+            values: s.value.map(f64::from),
+            weight: 1.0,
+            slope_weight: settings.fit.lambda * v,
+        }));
         mark(samples, settings, mask);
         if settings.holes.fill == HoleFill::Background {
             self.continue_background(samples, settings);
@@ -78,17 +81,18 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         };
         let mean = samples.iter().map(|s| f64::from(s.depth)).sum::<f64>() / samples.len() as f64;
         // Prefix sums of z and z^2; about the mean, so that their differences keep their digits.
+        let share = 1.0 / mean;
         self.sums.clear();
         self.sums.push((0.0, 0.0));
         let (mut sum, mut squares) = (0.0, 0.0);
-        for s in samples {
-            let z = f64::from(s.depth) / mean - 1.0;
+        self.sums.extend(samples.iter().map(|s| {
+            let z = f64::from(s.depth) * share - 1.0;
             (sum, squares) = (sum + z, squares + z * z);
-            self.sums.push((sum, squares));
-        }
+            (sum, squares)
+        }));
         let radius = settings.depth_test.epsilon.max(1.0);
         let (mut from, mut to) = (0, 0);
-        for s in samples {
+        self.smoothing.extend(samples.iter().map(|s| {
             while samples[from].x < s.x - radius {
                 from += 1;
             }
@@ -96,10 +100,11 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
                 to += 1;
             }
             let (a, b, n) = (self.sums[from], self.sums[to], (to - from) as f64);
-            let mean = (b.0 - a.0) / n;
-            let variance = ((b.1 - a.1) / n - mean * mean).max(0.0);
-            self.smoothing.push(1.0 / (1.0 + variance / (s0 * s0)));
-        }
+            let (sum, squares) = (b.0 - a.0, b.1 - a.1);
+            // V = 1 / (1 + var / s0^2) with n^2 var = n sum z^2 - (sum z)^2, in a single division.
+            let (floor, spread) = (n * n * s0 * s0, (n * squares - sum * sum).max(0.0));
+            floor / (floor + spread)
+        }));
     }
 
     /// Fills the gaps between neighbours with copies of the farther one, about a pixel apart.
