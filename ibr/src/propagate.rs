@@ -142,7 +142,8 @@ fn fate(map: &Relative, x: f64, y: f64, depth: f32, frame: &Frame) -> Fate {
     }
     let (u, v, d) = map.map(x, y, f64::from(depth));
     let u = u + frame.offset;
-    if !(d > 0.0 && u.is_finite() && v.is_finite()) {
+    // NaN: out of the reach of a lens, or a depth so large that 0 * d is none.
+    if d <= 0.0 || u.is_infinite() || v.is_infinite() {
         Fate::Behind
     } else if frame.holds_column(u) && frame.holds_row(v) {
         Fate::Sample(u, v, d)

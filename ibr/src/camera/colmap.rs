@@ -2,7 +2,7 @@
 //!
 //! COLMAP puts pixel centres at half-integers; the principal point is moved by half a pixel on the way in.
 
-use super::{Camera, CameraError};
+use super::{Camera, CameraError, Lens};
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -54,49 +54,50 @@ pub type Model = BTreeMap<String, ModelCamera>;
 
 /// Reads the model in `folder`.
 ///
-/// Pinhole models are read, and models with distortion if all of it is 0; others are refused, since the
-/// images would have to be undistorted first.
+/// Pinhole models are read and those with up to two radial and two tangential coefficients ([`Lens`]); others
+/// are refused, since the images would have to be undistorted first.
 ///
 /// # Errors
 /// [`ColmapError`], with file and line.
 pub fn read_model(folder: &Path) -> Result<Model, ColmapError> {
     let load = |name: &str| {
         let path = folder.join(name);
-        let text = std::fs::read_to_string(&path)
-            .map_err(|source| ColmapError::Read { path: path.clone(), source })?;
-        Ok((path, text))
+        crate::files::read_text(&path).map_err(|source| ColmapError::Read { path, source })
     };
-    let (path, text) = load("cameras.txt")?;
-    let lenses = parse_cameras(&text).map_err(|(line, reason)| ColmapError::Line {
-        path: path.clone(),
-        line,
-        reason,
-    })?;
-    let (path, text) = load("images.txt")?;
-    let poses = parse_images(&text).map_err(|(line, reason)| ColmapError::Line {
-        path: path.clone(),
-        line,
-        reason,
-    })?;
+    parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
+}
+
+/// The same from the texts of the two files; `folder` is for the messages.
+///
+/// # Errors
+/// [`ColmapError`].
+pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<Model, ColmapError> {
+    let fault = |name: &str, (line, reason)| ColmapError::Line { path: folder.join(name), line, reason };
+    let inners = parse_cameras(cameras).map_err(|e| fault("cameras.txt", e))?;
+    let poses = parse_images(images).map_err(|e| fault("images.txt", e))?;
     let mut model = Model::new();
     for (line, id, pose, name) in poses {
-        let lens = lenses.get(&id).ok_or_else(|| {
+        let inner = inners.get(&id).ok_or_else(|| {
             let reason = format!("image {name:?} has camera {id}, which cameras.txt does not list");
-            ColmapError::Line { path: path.clone(), line, reason }
+            fault("images.txt", (line, reason))
         })?;
-        let camera = Camera::metric(lens.k * pose, false).map_err(|source| ColmapError::Camera {
-            path: path.clone(),
+        let path = folder.join("images.txt");
+        let camera = Camera::metric(inner.k * pose, false).map_err(|source| ColmapError::Camera {
+            path,
             name: name.clone(),
             source,
         })?;
-        model.insert(name, ModelCamera { camera, size: lens.size });
+        let camera = inner.lens.map_or(camera, |lens| camera.with_lens(lens));
+        model.insert(name, ModelCamera { camera, size: inner.size });
     }
     Ok(model)
 }
 
-struct Lens {
+/// A line of cameras.txt.
+struct Inner {
     k: Matrix3<f64>,
     size: (usize, usize),
+    lens: Option<Lens>,
 }
 
 /// Lines that say something, with their numbers.
@@ -110,12 +111,12 @@ fn number<T: std::str::FromStr>(word: Option<&str>, name: &str) -> Result<T, Str
 }
 
 /// CAMERA_ID MODEL WIDTH HEIGHT PARAMS...
-fn parse_cameras(text: &str) -> Result<BTreeMap<u64, Lens>, (usize, String)> {
+fn parse_cameras(text: &str) -> Result<BTreeMap<u64, Inner>, (usize, String)> {
     let lines = content(text).filter(|(_, l)| !l.is_empty());
     lines.map(|(i, line)| parse_camera(line).map_err(|reason| (i, reason))).collect()
 }
 
-fn parse_camera(line: &str) -> Result<(u64, Lens), String> {
+fn parse_camera(line: &str) -> Result<(u64, Inner), String> {
     let mut words = line.split_whitespace();
     let id = number(words.next(), "camera id")?;
     let model = words.next().ok_or("the camera model is missing")?;
@@ -123,20 +124,36 @@ fn parse_camera(line: &str) -> Result<(u64, Lens), String> {
     let parameters =
         words.map(|w| number(Some(w), "camera parameter")).collect::<Result<Vec<f64>, String>>()?;
     // Focal lengths first (one or two), then the principal point, then distortion.
-    let focal = match model {
-        "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" => 1,
-        "PINHOLE" | "OPENCV" | "FULL_OPENCV" => 2,
-        other => return Err(format!("camera model {other} is not a pinhole; undistort the images first")),
+    let (focal, most) = match model {
+        "SIMPLE_PINHOLE" => (1, 0),
+        "PINHOLE" => (2, 0),
+        "SIMPLE_RADIAL" => (1, 1),
+        "RADIAL" => (1, 2),
+        "OPENCV" | "FULL_OPENCV" => (2, 4),
+        other => {
+            return Err(format!(
+                "camera model {other} is not known here (SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and FULL_OPENCV without k3 to k6 are); undistort the images first"
+            ));
+        }
     };
-    let [f, .., cx, cy] = parameters.get(..focal + 2).ok_or("camera parameters are missing")? else {
+    let [fx, .., cx, cy] = parameters.get(..focal + 2).ok_or("camera parameters are missing")? else {
         return Err("camera parameters are missing".into());
     };
-    if let Some(k) = parameters[focal + 2..].iter().find(|k| **k != 0.0) {
-        return Err(format!("the {model} camera has distortion ({k}); undistort the images first"));
-    }
     let fy = parameters[focal - 1];
-    let k = Matrix3::new(*f, 0.0, cx - 0.5, 0.0, fy, cy - 0.5, 0.0, 0.0, 1.0);
-    Ok((id, Lens { k, size }))
+    let (cx, cy) = (cx - 0.5, cy - 0.5);
+    let k = Matrix3::new(*fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
+    let (bends, beyond) = parameters[focal + 2..].split_at(most.min(parameters.len() - focal - 2));
+    if let Some(value) = beyond.iter().find(|v| **v != 0.0) {
+        return Err(format!(
+            "the {model} camera has a coefficient too many ({value}); undistort the images first"
+        ));
+    }
+    let bend = |i: usize| bends.get(i).copied().unwrap_or(0.0);
+    let lens = bends
+        .iter()
+        .any(|b| *b != 0.0)
+        .then(|| Lens::new([*fx, fy], [cx, cy], [bend(0), bend(1)], [bend(2), bend(3)]));
+    Ok((id, Inner { k, size, lens }))
 }
 
 type Pose = (usize, u64, Matrix3x4<f64>, String);
@@ -223,11 +240,29 @@ mod tests {
     }
 
     #[test]
+    fn distortion_becomes_a_lens() {
+        let images = "1 1 0 0 0 0 0 0 1 a.png\n\n";
+        for (line, radial, tangential) in [
+            ("1 SIMPLE_RADIAL 64 48 50 32.5 24.5 0.1", [0.1, 0.0], [0.0; 2]),
+            ("1 RADIAL 64 48 50 32.5 24.5 0.1 -0.02", [0.1, -0.02], [0.0; 2]),
+            ("1 OPENCV 64 48 50 50 32.5 24.5 0.1 -0.02 0.003 0.004", [0.1, -0.02], [0.003, 0.004]),
+            ("1 FULL_OPENCV 64 48 50 50 32.5 24.5 0.1 0 0 0.004 0 0 0 0", [0.1, 0.0], [0.0, 0.004]),
+        ] {
+            let model = parse_model(line, images, Path::new("m")).unwrap();
+            let lens = Lens::new([50.0; 2], [32.0, 24.0], radial, tangential);
+            let want = lens.record(nalgebra::Vector2::new(32.0 + 10.0, 24.0 - 5.0)).unwrap();
+            let (x, y, _) = model["a.png"].camera.project(&Vector3::new(1.0, -0.5, 5.0));
+            assert!((x - want.x).abs() < 1e-12 && (y - want.y).abs() < 1e-12, "{line}: {x} {y} {want}");
+        }
+    }
+
+    #[test]
     fn faults_are_named_with_their_lines() {
         let message =
             |cameras: &str, images: &str| read_model(folder(cameras, images).path()).unwrap_err().to_string();
         let fine = "1 SIMPLE_PINHOLE 10 10 5 5 5\n";
-        assert!(message("1 OPENCV 10 10 5 5 5 5 0.1 0 0 0\n", "").contains("distortion (0.1)"));
+        assert!(message("1 FULL_OPENCV 10 10 5 5 5 5 0 0 0 0 0.1\n", "").contains("too many (0.1)"));
+        assert!(message("1 PINHOLE 10 10 5 5 5 5 0.2\n", "").contains("too many (0.2)"));
         assert!(message("\n1 FOV 10 10 5 5 5 5 1\n", "").contains("cameras.txt:2: camera model FOV"));
         assert!(message("1 PINHOLE 10 10 5\n", "").contains("missing"));
         assert!(message(fine, "1 1 0 0 0 0 0 x 1 a.png\n\n").contains("images.txt:1: the TZ \"x\""));

@@ -1,8 +1,11 @@
 //! Cameras: 3 x 4 matrices, d x~ = Pi X~ (thesis eq. 2.1), pixel centres at integers.
 
 pub mod colmap;
+mod lens;
 
-use nalgebra::{Matrix3, Matrix3x4, Vector3};
+pub use lens::Lens;
+
+use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 
 /// A 3 x 3 part whose determinant is this small against its norm cubed does not map rays to pixels.
 const SMALLEST_DETERMINANT: f64 = 1e-12;
@@ -32,11 +35,12 @@ pub enum CameraError {
     },
 }
 
-/// A camera Pi = \[M | m\] with non-singular M.
+/// A camera Pi = \[M | m\] with non-singular M, and the distortion of its lens if it has any.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     matrix: Matrix3x4<f64>,
     inverse: Matrix3<f64>,
+    lens: Option<Lens>,
 }
 
 impl Camera {
@@ -56,7 +60,7 @@ impl Camera {
         let volume = rows[0] * rows[1] * rows[2];
         match m.try_inverse() {
             Some(inverse) if determinant.abs() > SMALLEST_DETERMINANT * volume => {
-                Ok(Self { matrix, inverse })
+                Ok(Self { matrix, inverse, lens: None })
             }
             _ => Err(CameraError::Singular { determinant, norm }),
         }
@@ -73,6 +77,11 @@ impl Camera {
         let hand = if mirrored { -1.0 } else { 1.0 };
         let sign = given.determinant().signum() * hand;
         Self::projective(matrix * (sign / given.m().row(2).norm()))
+    }
+
+    /// The same camera behind a lens: its pixels are the recorded places, Pi maps to the ideal ones.
+    pub fn with_lens(self, lens: Lens) -> Self {
+        Self { lens: Some(lens), ..self }
     }
 
     /// Pi.
@@ -95,21 +104,40 @@ impl Camera {
         -self.inverse * self.matrix.column(3)
     }
 
-    /// The point at depth d on the ray of pixel (x, y): M^{-1} (d x~ - m) (eq. 2.2).
+    /// The point at depth d on the ray of pixel (x, y): M^{-1} (d x~ - m) (eq. 2.2); NaN where the lens records
+    /// nothing.
     pub fn unproject(&self, x: f64, y: f64, d: f64) -> Vector3<f64> {
+        let (x, y) = through(self.lens.as_ref(), x, y, Lens::ideal);
         self.inverse * (Vector3::new(x, y, 1.0) * d - self.matrix.column(3))
     }
 
-    /// Pixel and depth (x, y, d) of a point (eq. 2.3); d <= 0 means behind the camera.
+    /// Pixel and depth (x, y, d) of a point (eq. 2.3); d <= 0 means behind the camera, a NaN pixel out of the
+    /// reach of the lens.
     pub fn project(&self, point: &Vector3<f64>) -> (f64, f64, f64) {
         let p = self.matrix * point.push(1.0);
-        (p.x / p.z, p.y / p.z, p.z)
+        let (x, y) = through(self.lens.as_ref(), p.x / p.z, p.y / p.z, Lens::record);
+        (x, y, p.z)
     }
 
     /// The map of pixels with depth from this camera to another one.
     pub fn relative_to(&self, other: &Self) -> Relative {
         let a = other.m() * self.inverse;
-        Relative { a, b: other.matrix.column(3) - a * self.matrix.column(3) }
+        let b = other.matrix.column(3) - a * self.matrix.column(3);
+        Relative { a, b, from: self.lens, to: other.lens }
+    }
+}
+
+/// A place sent one way through a lens: as it is without one, NaN beyond its reach.
+#[inline]
+fn through(
+    lens: Option<&Lens>,
+    x: f64,
+    y: f64,
+    way: impl Fn(&Lens, Vector2<f64>) -> Option<Vector2<f64>>,
+) -> (f64, f64) {
+    match lens {
+        None => (x, y),
+        Some(lens) => way(lens, Vector2::new(x, y)).map_or((f64::NAN, f64::NAN), |p| (p.x, p.y)),
     }
 }
 
@@ -120,14 +148,18 @@ pub struct Relative {
     pub a: Matrix3<f64>,
     /// b = m_v - A m_i, the scaled epipole.
     pub b: Vector3<f64>,
+    from: Option<Lens>,
+    to: Option<Lens>,
 }
 
 impl Relative {
-    /// Pixel and depth at the other camera of pixel (x, y) with depth d.
+    /// Pixel and depth at the other camera of pixel (x, y) with depth d; a NaN pixel where a lens records nothing.
     #[inline]
     pub fn map(&self, x: f64, y: f64, d: f64) -> (f64, f64, f64) {
+        let (x, y) = through(self.from.as_ref(), x, y, Lens::ideal);
         let p = self.a * Vector3::new(x, y, 1.0) * d + self.b;
-        (p.x / p.z, p.y / p.z, p.z)
+        let (x, y) = through(self.to.as_ref(), p.x / p.z, p.y / p.z, Lens::record);
+        (x, y, p.z)
     }
 }
 
@@ -186,6 +218,21 @@ mod tests {
             let (u, v, e) = one.relative_to(&two).map(x, y, d);
             let (x2, y2, d2) = two.relative_to(&one).map(u, v, e);
             prop_assert!((x2 - x).abs() < 1e-7 && (y2 - y).abs() < 1e-7 && (d2 - d).abs() < 1e-9 * d);
+            let direct = two.project(&one.unproject(x, y, d));
+            prop_assert!((direct.0 - u).abs() < 1e-7 && (direct.2 - e).abs() < 1e-9 * d);
+        }
+
+        #[test]
+        fn lenses_are_undone_and_applied(
+            a in prop::array::uniform3(-0.2..0.2_f64), k in -0.1..0.1_f64,
+            x in 0.0..640.0_f64, y in 0.0..480.0_f64, d in 5.0..50.0_f64
+        ) {
+            let lens = |k| Lens::new([500.0, 510.0], [320.0, 240.0], [k, 0.01], [1e-3, -2e-3]);
+            let one = Camera::metric(camera([0.0; 3], [0.0; 3]), false).unwrap().with_lens(lens(k));
+            let two = Camera::metric(camera(a, [0.1, 0.2, 0.3]), false).unwrap().with_lens(lens(-k));
+            let (u, v, e) = one.relative_to(&two).map(x, y, d);
+            let (x2, y2, d2) = two.relative_to(&one).map(u, v, e);
+            prop_assert!((x2 - x).abs() < 1e-5 && (y2 - y).abs() < 1e-5 && (d2 - d).abs() < 1e-7 * d);
             let direct = two.project(&one.unproject(x, y, d));
             prop_assert!((direct.0 - u).abs() < 1e-7 && (direct.2 - e).abs() < 1e-9 * d);
         }
