@@ -8,6 +8,14 @@
 //! ```
 //!
 //! so that its order is right everywhere or reversed everywhere, while d_p passes through infinity.
+//!
+//! No change of frame is needed for this. Moving the plane at infinity off the scene by a linear programme would make
+//! all chi negative and all det M positive, but the sign of [`order_sign`] already holds in every frame, and where a
+//! pixel with chi goes does not depend on the frame at all; only a camera centre on the plane t = 0 (det M = 0) has no
+//! order, and is refused. The canonical pair stays away from that: its plane t = 0 is the one that fits the matches
+//! best, in the midst of the scene, far from any camera that sees it from the front. That plane also keeps chi small
+//! on the whole image, so that a share of its range is a threshold of depth, which it would not be in a frame where
+//! chi mostly follows the pixel.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector4};
 
@@ -178,6 +186,31 @@ mod tests {
             for j in 0..n {
                 let (near, far) = (chi(&f.cameras[2], &f.points[j]), chi(&f.cameras[2], &f.points[n + j]));
                 prop_assert!(s * near < s * far, "{} {}", s * near, s * far);
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+        /// Where a pixel with chi goes is the same in every frame: also where the plane t = 0 cuts the scene.
+        #[test]
+        fn places_do_not_depend_on_the_frame(entries in prop::collection::vec(-1.0..1.0_f64, 16), flips: u64) {
+            let Some(mut f) = frame(&entries, flips) else { return Ok(()) };
+            orient(&mut f.cameras, &mut f.points, |_, _| true);
+            for source in 0..2 {
+                let camera = |i: usize| crate::camera::Camera::projective(f.cameras[i]);
+                let (Ok(from), Ok(to)) = (camera(source), camera(2)) else { return Ok(()) };
+                let map = from.relative_to(&to);
+                for (j, point) in f.points.iter().enumerate() {
+                    let x = f.scene.image(source, j);
+                    let p = map.a * x.push(1.0) - map.b * chi(&f.cameras[source], point);
+                    let want = f.scene.image(2, j);
+                    prop_assert!((p.xy() / p.z - want).norm() < 1e-5 && p.z > 0.0, "{} {}", p, want);
+                    // And chi there, which orders the samples, is that of the point itself.
+                    let there = chi(&f.cameras[source], point) / p.z;
+                    let own = chi(&f.cameras[2], point);
+                    prop_assert!((there - own).abs() < 1e-7 * (1.0 + own.abs()), "{} {}", there, own);
+                }
             }
         }
     }
