@@ -5,6 +5,7 @@ pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod depth;
+mod files;
 pub mod image;
 pub mod interpolate;
 mod linear;

@@ -52,6 +52,23 @@ fn rig() -> tempfile::TempDir {
     dir
 }
 
+/// Every pixel of the views is accounted for, and so is every pixel of the result.
+fn assert_adds_up(figures: &serde_json::Value, pixels: u64) {
+    let count = |v: &serde_json::Value| v.as_u64().unwrap();
+    let (samples, holes) = (&figures["samples"], &figures["holes"]);
+    let dropped: u64 = ["unknown", "behind", "outside"].iter().map(|k| count(&samples["dropped"][k])).sum();
+    assert_eq!(samples["dropped"].as_object().unwrap().len(), 3, "{figures}");
+    assert_eq!(count(&samples["propagated"]) + dropped, pixels, "{figures}");
+    assert_eq!(
+        count(&samples["propagated"]),
+        count(&samples["occluded"]) + count(&samples["used"]),
+        "{figures}"
+    );
+    let size = count(&figures["size"][0]) * count(&figures["size"][1]);
+    let covered = 1.0 - (count(&holes["crack"]) + count(&holes["disocclusion"])) as f64 / size as f64;
+    assert!((figures["coverage"].as_f64().unwrap() - covered).abs() < 1e-9, "{figures}");
+}
+
 #[test]
 fn a_rig_is_rendered_and_compared() {
     let dir = rig();
@@ -61,12 +78,7 @@ fn a_rig_is_rendered_and_compared() {
     let number = |key: &str| figures[key].as_f64().unwrap();
     assert!(number("psnr") > 33.0 && number("ssim") > 0.93 && number("mae") < 3.0, "{figures}");
     assert!(number("coverage") > 0.95 && number("seconds") > 0.0, "{figures}");
-    let samples = &figures["samples"];
-    let count = |v: &serde_json::Value| v.as_u64().unwrap();
-    let dropped: u64 = ["unknown", "behind", "outside"].iter().map(|k| count(&samples["dropped"][k])).sum();
-    assert_eq!(count(&samples["propagated"]) + dropped, 2 * 120 * 90);
-    assert_eq!(count(&samples["propagated"]), count(&samples["occluded"]) + count(&samples["used"]));
-    assert!(figures["holes"]["crack"].is_u64() && figures["holes"]["disocclusion"].is_u64());
+    assert_adds_up(&figures, 2 * 120 * 90);
     assert_eq!(read_image(&dir.path().join("out.png")).unwrap().size(), SIZE);
 }
 
@@ -171,6 +183,7 @@ fn general_cameras_are_rendered() {
     );
     let figures = json(&done);
     assert!(figures["psnr"].as_f64().unwrap() > 31.0, "{figures}");
+    assert_adds_up(&figures, 2 * 120 * 90);
     assert_eq!(figures["convergence"]["reached"], true);
     assert_eq!(read_image(&dir.path().join("m.png")).unwrap().channels(), 1);
 }
@@ -208,6 +221,7 @@ fn images_and_tracks_alone_are_enough() {
     let done = run(dir.path(), &["render", "s.toml", "-o", "o.png", "--truth", "2.png", "--json"]);
     let figures = json(&done);
     assert!(figures["psnr"].as_f64().unwrap() > 23.0, "{figures}");
+    assert_adds_up(&figures, 2 * 120 * 90);
     assert_eq!(figures["compared_on"], "hull");
     assert!(figures["geometry"]["sampson_rms"].as_f64().unwrap() < 0.05, "{figures}");
     std::fs::write(dir.path().join("b.toml"), format!("{views}[virtual]\nbetween = 0.5\n")).unwrap();
@@ -260,6 +274,157 @@ fn wrong_input_has_one_clear_message() {
     assert_eq!(code(&truth), 1);
     assert!(stderr(&truth).contains("small.png") && stderr(&truth).contains("30 x 20"), "{}", stderr(&truth));
     assert!(!dir.path().join("o.png").exists());
+}
+
+/// Contradictions, numbers out of range and files that are no files: exit code 1 and one message with the words.
+#[test]
+fn hostile_scenes_are_refused_by_name() {
+    let dir = rig();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    let map = |name: &str, value: f32| {
+        let data = vec![value; 120 * 90];
+        let bytes = pfm::encode(&pfm::FloatMap { width: 120, height: 90, channels: 1, data });
+        std::fs::write(dir.path().join(name), bytes).unwrap();
+    };
+    map("tiny.pfm", 1e-42);
+    map("negative.pfm", -3.0);
+    std::fs::write(dir.path().join("huge.pfm"), "Pf\n100000 100000\n-1\n").unwrap();
+    std::fs::write(dir.path().join("huge.pgm"), "P5 100000 100000 255\n").unwrap();
+    std::fs::write(dir.path().join("empty.png"), "").unwrap();
+    let whole = std::fs::read(dir.path().join("left.png")).unwrap();
+    std::fs::write(dir.path().join("cut.png"), &whole[..whole.len() / 2]).unwrap();
+    for (from, to, words) in [
+        ("left.pfm\"", "tiny.pfm\"", &["tiny.pfm", "none of the 10800"][..]),
+        ("left.pfm\"", "negative.pfm\"", &["negative.pfm", "none of the 10800"]),
+        ("left.pfm\"", "huge.pfm\"", &["huge.pfm", "100000 x 100000"]),
+        ("left.pfm\"", "left.png\"", &["left.png", "different red, green and blue"]),
+        ("left.png\"", "huge.pgm\"", &["huge.pgm"]),
+        ("left.png\"", "empty.png\"", &["empty.png"]),
+        ("left.png\"", "cut.png\"", &["cut.png"]),
+        ("left.png\"", ".\"", &["directory"]),
+        ("left.pfm\"", "left.pfm\"\ndisparity_scale = 0.0", &["\"left\"", "the scale is 0"]),
+        ("left.pfm\"", "left.pfm\"\ndisparity_scale = -2.0", &["\"left\"", "the scale is -2"]),
+        ("left.pfm\"", "left.pfm\"\ndisparity_scale = nan", &["\"left\"", "the scale is NaN"]),
+        ("left.pfm\"", "left.pfm\"\ndisparity_scale = inf", &["\"left\"", "the scale is inf"]),
+        ("left.pfm\"", "left.pfm\"\nstep = 1000", &["\"left\"", "1 x 1"]),
+        ("left.pfm\"", "left.pfm\"\nstep = 0", &["\"left\"", "at least 1"]),
+        ("left.pfm\"", "left.pfm\"\nstep = -1", &["-1", "line"]),
+        ("left.pfm\"", "left.pfm\"\ndepth = \"left.pfm\"", &["\"left\"", "`depth`"]),
+        ("position = 1.0", "position = nan", &["\"right\"", "position = NaN"]),
+        ("position = 0.5", "position = inf", &["wanted view", "position = inf"]),
+        ("position = 0.5", "position = 1e300", &["broken.toml", "of 21600 pixels"]),
+        ("\"right\"", "\"left\"", &["two views are named \"left\""]),
+        ("disparity =", "disparty =", &["did you mean `disparity`?"]),
+    ] {
+        std::fs::write(dir.path().join("broken.toml"), scene.replacen(from, to, 1)).unwrap();
+        let refused = run(dir.path(), &["render", "broken.toml", "-o", "o.png"]);
+        let message = stderr(&refused);
+        assert_eq!(code(&refused), 1, "{to}: {message}");
+        assert!(words.iter().all(|w| message.contains(w)), "{to}: {message}");
+        assert!(
+            !message.contains("panicked") && refused.stdout.is_empty() && !dir.path().join("o.png").exists()
+        );
+    }
+}
+
+/// Settings that make no sense, and outputs that cannot be: one message each, with the right exit code.
+#[test]
+fn hostile_arguments_are_refused_by_name() {
+    let dir = rig();
+    std::fs::create_dir(dir.path().join("folder.png")).unwrap();
+    let render = |more: &[&str]| run(dir.path(), &[&["render", "scene.toml"], more].concat());
+    for (arguments, exit, words) in [
+        (&["-o", "o.png", "--lambda", "nan"][..], 1, "lambda is NaN"),
+        (&["-o", "o.png", "--lambda", "-1"], 1, "lambda is -1"),
+        (&["-o", "o.png", "--tau", "inf"], 1, "tau is inf"),
+        (&["-o", "o.png", "--epsilon", "0"], 1, "epsilon is 0"),
+        (&["-o", "o.png", "--relative-depth", "-0.1"], 1, "sigma = -0.1"),
+        (&["-o", "o.png", "--offset", "nan"], 1, "offset NaN"),
+        (&["-o", "o.png", "--offset", "1e9"], 1, "no sample reaches"),
+        (&["-o", "o.png", "--threads", "100000"], 2, "1 to 1024"),
+        (&["-o", "o.png", "--mask", "o.png"], 2, "both name o.png"),
+        (&["-o", "o.png", "--depth-step", "x"], 2, "depth-step"),
+        (&["-o", "folder.png"], 1, "folder.png exists"),
+        (&["-o", "folder.png", "--force"], 1, "folder.png: it is a folder"),
+        (&["-o", "nowhere/o.png"], 1, "nowhere/o.png"),
+        (&["-o", "o.png", "--view", "middle"], 1, "the views are left, right"),
+        (&["-o", "o.png", "--truth", "nowhere.png"], 1, "nowhere.png"),
+        (&["-o", "o"], 1, "use .png"),
+    ] {
+        let refused = render(arguments);
+        let message = stderr(&refused);
+        assert_eq!(code(&refused), exit, "{arguments:?}: {message}");
+        assert!(message.contains(words) && !message.contains("panicked"), "{arguments:?}: {message}");
+        assert!(!dir.path().join("o.png").exists(), "{arguments:?}");
+    }
+    // A step beyond the map leaves one value: a flat scene, but a right answer.
+    json(&render(&["-o", "flat.png", "--depth-step", "100000", "--json"]));
+}
+
+/// Grey with colour, deep with shallow, float in both byte orders, one pixel: all are images.
+#[test]
+fn odd_images_are_fine() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
+    write("grey.pgm", b"P5 2 1 255\n\x10\x20");
+    write("deep.pgm", b"P5 2 1 65535\n\x10\x10\x20\x20");
+    write("colour.ppm", b"P6 2 1 255\n\x10\x10\x10\x20\x20\x20");
+    save(&Image::new(2, 1, 3, vec![16.0, 16.0, 16.0, 32.0, 32.0, 32.0]).unwrap(), &dir.path().join("c.jpg"))
+        .unwrap();
+    write("little.pfm", b"Pf 2 1 -1\n\0\0\x80\x3f\0\0\x80\x3f");
+    write("big.pfm", b"Pf 2 1 1\n\x3f\x80\0\0\x3f\x80\0\0");
+    write("one.pgm", b"P5 1 1 255\n\x40");
+    let view = |name: usize, image: &str, map: &str| {
+        format!("[[view]]\nname = \"{name}\"\nimage = \"{image}\"\nposition = 0.0\ndisparity = \"{map}\"\n")
+    };
+    for (a, b, maps) in [
+        ("grey.pgm", "colour.ppm", ["little.pfm", "big.pfm"]),
+        ("deep.pgm", "c.jpg", ["big.pfm", "grey.pgm"]),
+        ("one.pgm", "one.pgm", ["one.pgm", "one.pgm"]),
+    ] {
+        let text = view(1, a, maps[0]) + &view(2, b, maps[1]) + "[virtual]\nposition = 0.0\n";
+        write("s.toml", text.as_bytes());
+        let figures = json(&run(dir.path(), &["render", "s.toml", "-o", "o.png", "--force", "--json"]));
+        assert_eq!(figures["coverage"], 1.0, "{a} {b}: {figures}");
+        let image = read_image(&dir.path().join("o.png")).unwrap();
+        let first = image.data()[0];
+        assert!((first - if a == "one.pgm" { 64.0 } else { 16.0 }).abs() <= 2.0, "{a} {b}: {first}");
+    }
+}
+
+/// A COLMAP model whose lenses bend: the photograph of the view that is left out is met through its own lens.
+#[test]
+fn colmap_lenses_are_used() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = SyntheticScene::default();
+    let mut images = String::new();
+    let mut toml = "colmap = \"model\"\n".to_string();
+    std::fs::create_dir(dir.path().join("model")).unwrap();
+    let (focal, cx, cy) = (108.0, 60.0, 45.0);
+    let write_cameras = |bend: &str| {
+        let line = format!("1 OPENCV 120 90 {focal} {focal} {cx} {cy} {bend}\n");
+        std::fs::write(dir.path().join("model/cameras.txt"), line).unwrap();
+    };
+    write_cameras("-0.25 0.08 0.004 -0.003");
+    for (k, x) in [-0.2, 0.2, 0.0].into_iter().enumerate() {
+        images += &format!("{k} 1 0 0 0 {} 0 0 1 {k}.png\n\n", -x);
+        toml += &format!("[[view]]\nname = \"{k}\"\nimage = \"{k}.png\"\ndepth = \"{k}.pfm\"\n");
+    }
+    std::fs::write(dir.path().join("model/images.txt"), images).unwrap();
+    std::fs::write(dir.path().join("s.toml"), toml).unwrap();
+    let model = hybank_ibr::camera::colmap::read_model(&dir.path().join("model")).unwrap();
+    for k in 0..3 {
+        let (image, depth) = scene.view(&model[&format!("{k}.png")].camera, SIZE);
+        save(&image, &dir.path().join(format!("{k}.png"))).unwrap();
+        write_map(&depth, &dir.path().join(format!("{k}.pfm")));
+    }
+    let arguments =
+        ["render", "s.toml", "--view", "2", "--truth", "2.png", "--json", "--force", "-o", "o.png"];
+    let psnr = || json(&run(dir.path(), &arguments))["psnr"].as_f64().unwrap();
+    let right = psnr();
+    write_cameras("0 0 0 0");
+    let wrong = psnr();
+    assert!(right > 31.0 && right > wrong + 3.0, "with the lens {right} dB, without {wrong} dB");
 }
 
 #[test]

@@ -103,16 +103,16 @@ pub(super) struct RenderArguments {
     #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
     pub(super) degree: DegreeName,
     /// Weight of the slope penalty of the row fit, px^2.
-    #[arg(long, value_name = "L")]
+    #[arg(long, value_name = "L", allow_negative_numbers = true)]
     pub(super) lambda: Option<f64>,
     /// Weight of the differences of neighbouring coefficients of the row fit.
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub(super) tau: Option<f64>,
     /// Radius of the depth test, px.
-    #[arg(long, value_name = "PX")]
+    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     pub(super) epsilon: Option<f64>,
     /// Share of the nearer depth by which a hidden sample is deeper.
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub(super) relative_depth: Option<f64>,
     /// Seed of the robust estimators (scenes without cameras).
     #[arg(long, default_value_t = 1)]

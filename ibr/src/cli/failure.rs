@@ -19,6 +19,14 @@ impl Failure {
         Self::Input(message.to_string())
     }
 
+    /// The same failure, said of a file.
+    pub(super) fn in_file(self, path: &std::path::Path) -> Self {
+        match self {
+            Self::Input(message) => Self::Input(format!("{}: {message}", path.display())),
+            other => other,
+        }
+    }
+
     /// A failure to print.
     pub(super) fn printing(error: &std::io::Error) -> Self {
         match error.kind() {

@@ -14,6 +14,9 @@ use clap::Parser;
 use failure::Failure;
 use std::process::ExitCode;
 
+/// More threads than any machine has cores only fill its memory with stacks.
+const MOST_THREADS: usize = 1024;
+
 /// Reads the arguments, runs the verb and maps its outcome to an exit code: 0 done, 1 the input failed, 2
 /// wrong usage.
 pub fn run() -> ExitCode {
@@ -30,8 +33,8 @@ pub fn run() -> ExitCode {
 /// Runs the work on the given number of threads, or on as many as there are.
 fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
     let Some(threads) = threads else { return work() };
-    if threads == 0 {
-        return Err(Failure::Usage("--threads 0: at least one thread is needed".into()));
+    if !(1..=MOST_THREADS).contains(&threads) {
+        return Err(Failure::Usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}")));
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::input)?;
     pool.install(work)

@@ -5,6 +5,7 @@ use super::failure::Failure;
 use super::output;
 use super::progress::Progress;
 use super::summary::{Figures, Summary};
+use crate::files;
 use crate::image::{Image, quality, read_image};
 use crate::interpolate::Cover;
 use crate::pipeline::uncalibrated::{UncalibratedRendering, UncalibratedSettings};
@@ -12,7 +13,6 @@ use crate::pipeline::{RenderSettings, Rendering, calibrated, rectified, uncalibr
 use crate::propagate::{CalibratedView, RectifiedView};
 use crate::scene::{self, Kind, LoadOptions, Scene};
 use crate::uncalibrated::chirality::Handedness;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let truth = arguments.truth.as_deref().map(read_image).transpose().map_err(Failure::input)?;
     progress.step("rendering");
     let start = Instant::now();
-    let done = render(&scene, arguments)?;
+    let done = render(&scene, arguments).map_err(|e| e.in_file(&arguments.scene))?;
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
@@ -62,6 +62,12 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     if arguments.depth_step == 0 {
         return Err(Failure::Usage("--depth-step 0: the step must be at least 1".into()));
     }
+    if arguments.mask.as_ref() == Some(&arguments.output) {
+        let path = arguments.output.display();
+        return Err(Failure::Usage(format!(
+            "-o and --mask both name {path}; give the mask a file of its own"
+        )));
+    }
     for path in [Some(&arguments.output), arguments.mask.as_ref()].into_iter().flatten() {
         output::refuse_existing(path, arguments.force)?;
         output::refuse_format(path)?;
@@ -71,14 +77,12 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
 
 fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
     let (path, text) = if output::is_standard(&arguments.scene) {
-        let mut text = String::new();
-        std::io::stdin()
-            .read_to_string(&mut text)
+        let text = files::text(std::io::stdin().lock())
             .map_err(|e| Failure::Input(format!("standard input: {e}")))?;
         (PathBuf::from("<stdin>"), text)
     } else {
         let path = arguments.scene.clone();
-        let text = std::fs::read_to_string(&path)
+        let text = files::read_text(&path)
             .map_err(|source| Failure::input(scene::SceneError::Read { path: path.clone(), source }))?;
         (path, text)
     };

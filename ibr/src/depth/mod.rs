@@ -75,7 +75,8 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
-    /// A map from stored numbers: value / scale, with 0, negative numbers, NaN and infinities unknown.
+    /// A map from stored numbers: value / scale, with 0, negative and subnormal numbers, NaN and infinities
+    /// unknown.
     ///
     /// # Errors
     /// [`DepthError::Scale`], [`DepthError::Size`] when the numbers do not fill the map, and
@@ -183,7 +184,8 @@ impl DepthMap {
 
 fn known(stored: f32, scale: f64) -> f32 {
     let value = (f64::from(stored) / scale) as f32;
-    if value.is_finite() && value > 0.0 { value } else { f32::NAN }
+    // A subnormal number is as good as 0: its reciprocal, the depth key of a disparity, overflows.
+    if value.is_normal() && value > 0.0 { value } else { f32::NAN }
 }
 
 #[cfg(test)]
@@ -192,9 +194,9 @@ mod tests {
 
     #[test]
     fn stored_numbers_become_disparities() {
-        let stored = vec![8.0, 0.0, f32::NAN, f32::INFINITY, -4.0, 1.0];
-        let map = DepthMap::new((3, 2), stored, 4.0, Measure::Disparity).unwrap();
-        assert_eq!((map.data()[0], map.data()[5], map.unknown()), (2.0, 0.25, 4));
+        let stored = vec![8.0, 0.0, f32::NAN, f32::INFINITY, -4.0, 1.0, 1e-42, -0.0];
+        let map = DepthMap::new((4, 2), stored, 4.0, Measure::Disparity).unwrap();
+        assert_eq!((map.data()[0], map.data()[5], map.unknown()), (2.0, 0.25, 6));
     }
 
     #[test]

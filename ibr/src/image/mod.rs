@@ -6,7 +6,7 @@ pub mod quality;
 mod read;
 mod write;
 
-pub use read::{read_image, read_map};
+pub use read::{MOST_PIXELS, read_image, read_map};
 pub use write::{encode, save};
 
 use std::path::PathBuf;
@@ -29,6 +29,18 @@ pub enum ImageError {
         path: PathBuf,
         /// What the decoder met.
         reason: String,
+    },
+    /// The file has more pixels than can be worked on.
+    #[error("{}: {width} x {height} pixels are more than the {most} that can be used; cut or shrink it", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Most pixels.
+        most: usize,
     },
     /// The file cannot be written.
     #[error("{}: {reason}", path.display())]
@@ -111,6 +123,12 @@ impl Image {
             return Err(ImageError::Buffer { width, height, channels, expected, given: data.len() });
         }
         Ok(Self { width, height, channels, data })
+    }
+
+    /// An image of values that fill it by construction.
+    pub(crate) fn from_values((width, height): (usize, usize), channels: usize, data: Vec<f32>) -> Self {
+        debug_assert_eq!(data.len(), width * height * channels);
+        Self { width, height, channels, data }
     }
 
     /// An image of one value, with sides of at least one pixel; `channels` 3 is RGB, all else grey.

@@ -1,8 +1,12 @@
 //! Reading images and depth maps from files.
 
 use super::{Image, ImageError, pfm};
+use crate::files;
 use image::DynamicImage;
 use std::path::Path;
+
+/// Most pixels of an image or map: 8192 x 8192, some gigabytes of work memory.
+pub const MOST_PIXELS: usize = 1 << 26;
 
 /// Reads a grey or RGB image; 16-bit values are scaled to 0..255, PFM values (white = 1) times 255.
 ///
@@ -57,12 +61,22 @@ enum Loaded {
 }
 
 fn load(path: &Path) -> Result<Loaded, ImageError> {
-    let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
+    let bytes = files::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
     let decode = |reason: String| ImageError::Decode { path: path.into(), reason };
     if bytes.starts_with(b"PF") || bytes.starts_with(b"Pf") {
-        return pfm::decode(&bytes).map(Loaded::Float).map_err(decode);
+        let map = pfm::decode(&bytes).map_err(decode)?;
+        return not_too_large(path, map.width, map.height).map(|()| Loaded::Float(map));
     }
-    image::load_from_memory(&bytes).map(Loaded::Whole).map_err(|e| decode(e.to_string()))
+    let picture = image::load_from_memory(&bytes).map_err(|e| decode(e.to_string()))?;
+    not_too_large(path, picture.width() as usize, picture.height() as usize)?;
+    Ok(Loaded::Whole(picture))
+}
+
+fn not_too_large(path: &Path, width: usize, height: usize) -> Result<(), ImageError> {
+    if width.saturating_mul(height) > MOST_PIXELS {
+        return Err(ImageError::TooLarge { path: path.into(), width, height, most: MOST_PIXELS });
+    }
+    Ok(())
 }
 
 fn is_deep(picture: &DynamicImage) -> bool {
@@ -112,6 +126,15 @@ mod tests {
         assert!(message.contains("pixel (1, 0)") && message.contains("d.ppm"), "{message}");
         let (_dir, path) = temporary("d.ppm", b"P6 2 1 255\n\x05\x05\x05\x07\x07\x07");
         assert_eq!(read_map(&path).unwrap().2, [5.0, 7.0]);
+    }
+
+    #[test]
+    fn what_is_too_large_is_refused_before_it_is_converted() {
+        let mut bytes = b"P5 67108865 1 255\n".to_vec();
+        bytes.resize(bytes.len() + MOST_PIXELS + 1, 7);
+        let (_dir, path) = temporary("wide.pgm", &bytes);
+        let message = read_image(&path).unwrap_err().to_string();
+        assert!(message.contains("67108865 x 1") && message.contains("67108864"), "{message}");
     }
 
     #[test]

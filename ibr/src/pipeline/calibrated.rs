@@ -1,8 +1,8 @@
 //! A view from any number of calibrated cameras with depth.
 
-use super::rectified::finished;
 use super::{Method, RenderError, RenderSettings, Rendering, Report, check_counts};
 use crate::camera::Camera;
+use crate::image::Image;
 use crate::interpolate::HoleCount;
 use crate::interpolate::InterpolationError;
 use crate::interpolate::plane::PlaneProblem;
@@ -35,9 +35,7 @@ fn check(views: &[CalibratedView<'_>], settings: &RenderSettings) -> Result<(), 
     check_counts(views.len(), largest)?;
     settings.check()?;
     if settings.method == Method::Rows {
-        let rule = "left at auto or plane for general cameras, whose samples lie between rows";
-        let name = "the row method";
-        return Err(InterpolationError::Setting { name, value: f64::NAN, rule }.into());
+        return Err(RenderError::RowsOfGeneralCameras);
     }
     for (view, v) in views.iter().enumerate() {
         let (expected_width, expected_height) = v.image.size();
@@ -73,7 +71,7 @@ fn render_with<const C: usize>(
     let fit = problem.solve(None)?;
     report.holes = HoleCount::of(&fit.mask);
     report.convergence = Some(fit.convergence);
-    Ok(Rendering { image: finished(width, height, C, fit.values), mask: fit.mask, report })
+    Ok(Rendering { image: Image::from_values((width, height), C, fit.values), mask: fit.mask, report })
 }
 
 /// The first two stages for some rows of the virtual image. The band is widened by epsilon on both sides,
@@ -102,7 +100,6 @@ fn add_band<const C: usize>(
 mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
-    use crate::image::Image;
     use crate::interpolate::plane;
     use nalgebra::Matrix3x4;
 

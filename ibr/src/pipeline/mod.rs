@@ -82,6 +82,11 @@ pub enum RenderError {
         /// Height expected.
         expected_height: usize,
     },
+    /// The row fit was asked for where samples lie between rows.
+    #[error(
+        "the row method needs a rectified rig: the samples of general cameras lie between rows; use the plane method"
+    )]
+    RowsOfGeneralCameras,
     /// The place of a view or of the virtual camera is no number.
     #[error("the position {position} is not a finite number")]
     Position {

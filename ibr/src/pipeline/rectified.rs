@@ -52,16 +52,32 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     }
 }
 
+/// What every row needs.
+struct Job<'a> {
+    views: &'a [RectifiedView<'a>],
+    position: f64,
+    frame: Frame,
+    settings: &'a RenderSettings,
+}
+
 fn render_with<const ORDER: usize, const C: usize>(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,
 ) -> Result<Rendering, RenderError> {
-    if settings.method == Method::Plane {
-        return render_plane::<C>(views, position, settings);
-    }
     let (width, height) = views[0].image.size();
-    let frame = Frame::whole(width, height, RowWork::<ORDER, C>::MARGIN, settings.offset);
+    let whole = |margin| {
+        let frame = Frame::whole(width, height, margin, settings.offset);
+        Job { views, position, frame, settings }
+    };
+    match settings.method {
+        Method::Plane => render_plane::<C>(&whole(0.5)),
+        Method::Auto | Method::Rows => render_rows::<ORDER, C>(&whole(RowWork::<ORDER, C>::MARGIN)),
+    }
+}
+
+fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
+    let Frame { width, height, .. } = job.frame;
     let mut values = vec![0.0; width * height * C];
     let mut mask = vec![Cover::Disocclusion; width * height];
     let mut counts = vec![RowCount::default(); height];
@@ -72,34 +88,43 @@ fn render_with<const ORDER: usize, const C: usize>(
         .zip(mask.par_chunks_mut(block * width))
         .zip(counts.par_chunks_mut(block));
     outputs.enumerate().try_for_each(|(b, ((values, mask), counts))| {
-        let mut work = Strip::<ORDER, C>::new(width, views.len());
+        let (mut strip, mut fit) = (Strip::<C>::new(job), RowWork::<ORDER, C>::new(width));
         let rows = values.chunks_exact_mut(width * C).zip(mask.chunks_exact_mut(width)).zip(counts);
         rows.enumerate().try_for_each(|(k, ((values, mask), count))| {
-            let y = b * block + k;
-            *count = work
-                .row(views, y, position, &frame, settings, values, mask)
-                .map_err(|source| InterpolationError::Fit { row: y, source })?;
-            Ok::<(), InterpolationError>(())
+            let row = b * block + k;
+            *count = strip.survivors_of_row(job, row);
+            fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
+                .map(|_| ())
+                .map_err(|source| InterpolationError::Fit { row, source })
         })
     })?;
-    let report = total(&counts, &mask);
-    if report.used == 0 {
-        let pixels = views.len() * width * height;
-        return Err(RenderError::NoOverlap { pixels, dropped: report.dropped });
-    }
-    if settings.interpolation.holes.fill != HoleFill::Leave {
+    let report = total(counts.iter(), HoleCount::of(&mask));
+    enough(job, &report)?;
+    if job.settings.interpolation.holes.fill != HoleFill::Leave {
         let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
         fill_empty_rows(&filled, &mut values);
     }
-    let image = finished(width, height, C, values);
+    let image = Image::from_values((width, height), C, values);
     Ok(Rendering { image, mask, report })
 }
 
-/// The image of values that fill it by construction.
-pub(super) fn finished(width: usize, height: usize, channels: usize, values: Vec<f32>) -> Image {
-    let mut image = Image::filled(width, height, channels, 0.0);
-    image.data_mut().copy_from_slice(&values);
-    image
+/// The same with the plane fit as third stage; the second stage still goes by rows.
+fn render_plane<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
+    let Frame { width, height, .. } = job.frame;
+    let mut problem = PlaneProblem::<C>::new((width, height), &job.settings.interpolation)?;
+    let mut strip = Strip::<C>::new(job);
+    let mut counts = Vec::with_capacity(height);
+    for row in 0..height {
+        counts.push(strip.survivors_of_row(job, row));
+        problem.add(&strip.samples)?;
+    }
+    let mut report = total(counts.iter(), HoleCount::default());
+    enough(job, &report)?;
+    let fit = problem.solve(None)?;
+    report.holes = HoleCount::of(&fit.mask);
+    report.convergence = Some(fit.convergence);
+    let image = Image::from_values((width, height), C, fit.values);
+    Ok(Rendering { image, mask: fit.mask, report })
 }
 
 /// What became of the samples of one row.
@@ -110,8 +135,8 @@ struct RowCount {
     dropped: Dropped,
 }
 
-fn total(counts: &[RowCount], mask: &[Cover]) -> Report {
-    let mut report = Report { holes: HoleCount::of(mask), ..Report::default() };
+fn total<'a>(counts: impl Iterator<Item = &'a RowCount>, holes: HoleCount) -> Report {
+    let mut report = Report { holes, ..Report::default() };
     for c in counts {
         report.propagated += c.propagated;
         report.used += c.used;
@@ -121,76 +146,41 @@ fn total(counts: &[RowCount], mask: &[Cover]) -> Report {
     report
 }
 
-/// Work memory for one block of rows.
-struct Strip<const ORDER: usize, const C: usize> {
+/// Refuses to make an image of nothing.
+fn enough(job: &Job<'_>, report: &Report) -> Result<(), RenderError> {
+    if report.used > 0 {
+        return Ok(());
+    }
+    let pixels = job.views.len() * job.frame.width * job.frame.height;
+    Err(RenderError::NoOverlap { pixels, dropped: report.dropped })
+}
+
+/// The samples of one row and the memory to find them in.
+struct Strip<const C: usize> {
     samples: Vec<Sample<C>>,
     scratch: RowScratch<C>,
-    fit: RowWork<ORDER, C>,
 }
 
-impl<const ORDER: usize, const C: usize> Strip<ORDER, C> {
-    fn new(width: usize, views: usize) -> Self {
-        let samples = Vec::with_capacity(width * views);
-        Self { samples, scratch: RowScratch::default(), fit: RowWork::new(width) }
+impl<const C: usize> Strip<C> {
+    fn new(job: &Job<'_>) -> Self {
+        let samples = Vec::with_capacity(job.frame.width * job.views.len());
+        Self { samples, scratch: RowScratch::default() }
     }
 
-    /// Propagates, removes what is hidden and interpolates one row.
-    #[expect(clippy::too_many_arguments, reason = "the three stages need all of them, and nothing else does")]
-    fn row(
-        &mut self,
-        views: &[RectifiedView<'_>],
-        y: usize,
-        position: f64,
-        frame: &Frame,
-        settings: &RenderSettings,
-        values: &mut [f32],
-        mask: &mut [Cover],
-    ) -> Result<RowCount, hybank::sampling::SamplingError> {
+    /// The first two stages for one row: propagates and removes what is hidden.
+    fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
         let mut count = RowCount::default();
         self.samples.clear();
-        for (index, view) in views.iter().enumerate() {
+        for (index, view) in job.views.iter().enumerate() {
+            let index = index as u16;
             count.dropped +=
-                propagate::rectified_row(view, index as u16, y, position, frame, &mut self.samples);
+                propagate::rectified_row(view, index, y, job.position, &job.frame, &mut self.samples);
         }
         count.propagated = self.samples.len();
-        occlusion::remove_in_row(&mut self.samples, settings.depth_test(), &mut self.scratch);
+        occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
         count.used = self.samples.len();
-        self.fit.interpolate(&self.samples, &settings.interpolation, values, mask)?;
-        Ok(count)
+        count
     }
-}
-
-/// The same with the plane fit as third stage; the second stage still goes by rows.
-fn render_plane<const C: usize>(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    settings: &RenderSettings,
-) -> Result<Rendering, RenderError> {
-    let (width, height) = views[0].image.size();
-    let frame = Frame::whole(width, height, 0.5, settings.offset);
-    let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
-    let mut strip = Strip::<2, C>::new(width, views.len());
-    let mut report = Report::default();
-    for y in 0..height {
-        strip.samples.clear();
-        for (index, view) in views.iter().enumerate() {
-            report.dropped +=
-                propagate::rectified_row(view, index as u16, y, position, &frame, &mut strip.samples);
-        }
-        report.propagated += strip.samples.len();
-        occlusion::remove_in_row(&mut strip.samples, settings.depth_test(), &mut strip.scratch);
-        report.used += strip.samples.len();
-        problem.add(&strip.samples)?;
-    }
-    report.occluded = report.propagated - report.used;
-    if report.used == 0 {
-        let pixels = views.len() * width * height;
-        return Err(RenderError::NoOverlap { pixels, dropped: report.dropped });
-    }
-    let fit = problem.solve(None)?;
-    report.holes = HoleCount::of(&fit.mask);
-    report.convergence = Some(fit.convergence);
-    Ok(Rendering { image: finished(width, height, C, fit.values), mask: fit.mask, report })
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! A view from images and tracks alone (thesis 2.5).
 
-use super::rectified::finished;
 use super::{RenderError, RenderSettings, Rendering, Report};
 use crate::camera::{Camera, Relative};
 use crate::image::Image;
@@ -330,7 +329,7 @@ fn render_with<const C: usize>(
     let fit = problem.solve(Some(&region))?;
     report.convergence = Some(fit.convergence);
     report.holes = HoleCount::of(&fit.mask);
-    let image = finished(size.0, size.1, C, fit.values);
+    let image = Image::from_values(size, C, fit.values);
     let rendering = Rendering { image, mask: fit.mask, report };
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
 }

@@ -4,7 +4,7 @@ use super::spec::{SceneSpec, TargetSpec, ViewSpec};
 use super::{CalibratedSource, Kind, RectifiedSource, Scene, SceneError};
 use crate::camera::{Camera, colmap};
 use crate::depth::{DepthMap, Measure, fill_unknown};
-use crate::image::{Image, read_image, read_map};
+use crate::image::{Image, MOST_PIXELS, read_image, read_map};
 use crate::partial::{Densify, densify};
 use crate::pipeline::uncalibrated::Target;
 use crate::uncalibrated::Point;
@@ -12,9 +12,6 @@ use crate::uncalibrated::tracks::Tracks;
 use nalgebra::Matrix3x4;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// Most pixels of a view: 8192 x 8192, some gigabytes of work memory.
-const LARGEST_VIEW: usize = 1 << 26;
 
 /// How a scene is read.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,8 +37,18 @@ impl Default for LoadOptions {
 /// # Errors
 /// [`SceneError::Parse`] with line, column and the keys that are known there.
 pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
-    toml::from_str(text)
-        .map_err(|e| SceneError::Parse { path: path.into(), reason: e.to_string().trim_end().to_string() })
+    toml::from_str(text).map_err(|e| {
+        let hint = nearest_key(e.message()).map_or(String::new(), |key| format!("\ndid you mean `{key}`?"));
+        SceneError::Parse { path: path.into(), reason: e.to_string().trim_end().to_string() + &hint }
+    })
+}
+
+/// The known key most like the unknown one that a parser's message quotes first, if any is much like it.
+fn nearest_key(message: &str) -> Option<&str> {
+    let mut quoted = message.strip_prefix("unknown field ")?.split('`').skip(1).step_by(2);
+    let unknown = quoted.next()?;
+    let likeness = |key: &str| strsim::jaro_winkler(unknown, key);
+    quoted.filter(|key| likeness(key) > 0.7).max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
 }
 
 /// Reads everything a scene names. `path` is the scene file; its folder is where relative paths start.
@@ -63,6 +70,7 @@ type Loaded<T> = Result<T, SceneError>;
 
 impl Loader<'_> {
     fn load(&self) -> Loaded<Scene> {
+        self.different_names()?;
         let wanted = self.wanted()?;
         let views: Vec<&ViewSpec> =
             self.spec.view.iter().enumerate().filter(|(i, _)| Some(*i) != wanted).map(|(_, v)| v).collect();
@@ -83,6 +91,35 @@ impl Loader<'_> {
 
     fn incomplete(&self, reason: impl Into<String>) -> SceneError {
         SceneError::Incomplete { path: self.path.into(), reason: reason.into() }
+    }
+
+    /// Refuses two views of one name; images without a name may be used twice.
+    fn different_names(&self) -> Loaded<()> {
+        let mut seen = std::collections::BTreeSet::new();
+        match self.spec.view.iter().filter_map(|v| v.name.as_ref()).find(|name| !seen.insert(*name)) {
+            Some(name) => {
+                Err(self.incomplete(format!("two views are named {name:?}; give each its own name")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses keys of another kind of scene, which would be passed over in silence.
+    fn no_other_kind(&self, view: &ViewSpec, kind: &str, others: &[(&str, bool)]) -> Loaded<()> {
+        match others.iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(self.incomplete(format!(
+                "view {:?} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind",
+                view.label()
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    fn finite(&self, value: f64, whose: &str) -> Loaded<f64> {
+        if value.is_finite() {
+            return Ok(value);
+        }
+        Err(self.incomplete(format!("{whose}: position = {value}: it must be a finite number")))
     }
 
     /// Index of the view that is left out.
@@ -115,8 +152,17 @@ impl Loader<'_> {
         let position = left_out.map_or(target.position, |v| v.position).ok_or_else(|| {
             self.incomplete("[virtual] needs a `position` on the line of the rectified rig")
         })?;
+        let position = self.finite(position, "the wanted view")?;
         let one = |view: &&ViewSpec| {
+            let others = [
+                ("camera", view.camera.is_some()),
+                ("depth", view.depth.is_some()),
+                ("depth_scale", view.depth_scale.is_some()),
+                ("colmap", view.colmap.is_some()),
+            ];
+            self.no_other_kind(view, "rectified", &others)?;
             let position = self.need(view.position, view, "position", "rectified")?;
+            let position = self.finite(position, &format!("view {:?}", view.label()))?;
             let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
             let (image, disparity, filled) =
                 self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
@@ -140,6 +186,11 @@ impl Loader<'_> {
         target: &TargetSpec,
     ) -> Loaded<(Kind, usize)> {
         let one = |view: &&ViewSpec| {
+            let others = [
+                ("disparity", view.disparity.is_some()),
+                ("disparity_scale", view.disparity_scale.is_some()),
+            ];
+            self.no_other_kind(view, "calibrated", &others)?;
             let camera = self.camera_of(view)?;
             let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
             let (image, depth, filled) =
@@ -161,8 +212,8 @@ impl Loader<'_> {
     /// The size asked for, or the one that suggests itself.
     fn size(&self, target: &TargetSpec, own: (usize, usize)) -> Loaded<(usize, usize)> {
         match target.size {
-            Some([w, h]) if w == 0 || h == 0 || w.saturating_mul(h) > LARGEST_VIEW => Err(self
-                .incomplete(format!("[virtual] size = [{w}, {h}]: both sides must be at least one pixel, and it may have at most {LARGEST_VIEW} pixels"))),
+            Some([w, h]) if w == 0 || h == 0 || w.saturating_mul(h) > MOST_PIXELS => Err(self
+                .incomplete(format!("[virtual] size = [{w}, {h}]: both sides must be at least one pixel, and it may have at most {MOST_PIXELS} pixels"))),
             Some([w, h]) => Ok((w, h)),
             None => Ok(own),
         }
@@ -257,6 +308,14 @@ impl Loader<'_> {
         })?;
         if views.len() < 2 {
             return Err(self.incomplete(format!("{} view with tracks: at least two are needed", views.len())));
+        }
+        for view in views {
+            let others = [
+                ("disparity", view.disparity.is_some()),
+                ("depth", view.depth.is_some()),
+                ("step", view.step.is_some()),
+            ];
+            self.no_other_kind(view, "matches-only", &others)?;
         }
         let tracks = Tracks::read(&self.file(file))?;
         let wanted = match left_out {
@@ -438,6 +497,11 @@ mod tests {
         fails(&RIG.replace("[virtual]\n        position = 0.5", ""), &["[virtual] needs a `position`"]);
         fails("[[view]]\nimage = \"a.pgm\"\n[[view]]\nimage = \"a.pgm\"\n", &["`matches`"]);
         fails("", &["[[view]]"]);
+        fails(&RIG.replace("disparity_scale", "disparty_scale"), &["did you mean `disparity_scale`?"]);
+        fails(&RIG.replace("\"right\"", "\"left\""), &["two views are named \"left\""]);
+        fails(&RIG.replace("position = 1.0", "position = 1.0\ndepth = \"d.pgm\""), &["\"right\"", "`depth`"]);
+        fails(&RIG.replace("position = 1.0", "position = nan"), &["\"right\"", "position = NaN"]);
+        fails(&RIG.replace("position = 0.5", "position = inf"), &["wanted view", "position = inf"]);
         let options = LoadOptions { view: Some("middle".into()), ..LoadOptions::default() };
         assert!(read(RIG, &options).unwrap_err().contains("the views are left, right"));
     }

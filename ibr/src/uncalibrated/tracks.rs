@@ -62,7 +62,7 @@ impl Tracks {
     /// [`TrackError`], with file and line.
     pub fn read(path: &Path) -> Result<Self, TrackError> {
         let text =
-            std::fs::read_to_string(path).map_err(|source| TrackError::Read { path: path.into(), source })?;
+            crate::files::read_text(path).map_err(|source| TrackError::Read { path: path.into(), source })?;
         Self::parse(&text, path)
     }
 
