@@ -1,0 +1,122 @@
+//! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and never
+//! panics. `fuzz/` looks deeper with the same checks.
+
+use hybank_ibr::camera::colmap::parse_model;
+use hybank_ibr::image::pfm;
+use hybank_ibr::scene::parse;
+use hybank_ibr::uncalibrated::tracks::Tracks;
+use std::path::Path;
+
+const ROUNDS: u64 = 3000;
+
+/// SplitMix64 (Steele, Lea and Flood, 2014): the same mutations on every machine.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() % n.max(1) as u64) as usize
+    }
+}
+
+/// What breaks number and structure readers.
+const NASTY: [&[u8]; 12] = [
+    b"",
+    b"-",
+    b"nan",
+    b"inf",
+    b"1e400",
+    b"-0",
+    b"99999999999999999999",
+    b"0",
+    b"\n",
+    b"\xff\xfe",
+    b"\0",
+    b"#",
+];
+
+/// A few bytes cut, doubled, flipped or replaced.
+fn mutated(seed: &[u8], round: u64) -> Vec<u8> {
+    let mut random = Random(round);
+    let mut bytes = seed.to_vec();
+    for _ in 0..1 + random.below(4) {
+        let at = random.below(bytes.len() + 1);
+        let end = (at + random.below(9)).min(bytes.len());
+        match random.below(5) {
+            0 => drop(bytes.drain(at..end)),
+            1 => bytes.truncate(at),
+            2 => bytes.splice(at..at, bytes[at..end].to_vec()).for_each(drop),
+            3 => bytes.splice(at..end, NASTY[random.below(NASTY.len())].iter().copied()).for_each(drop),
+            _ => bytes[at..end].iter_mut().for_each(|b| *b ^= 1 << (round % 8)),
+        }
+    }
+    bytes
+}
+
+/// Runs `check` on every mutation of the seeds; it says whether the input was accepted. Both must occur, or the
+/// mutations would test nothing.
+fn survive(seeds: &[&[u8]], check: impl Fn(&[u8]) -> bool) {
+    let accepted = (0..ROUNDS).filter(|r| check(&mutated(seeds[*r as usize % seeds.len()], *r))).count();
+    assert!(accepted > 0 && accepted < ROUNDS as usize, "{accepted} of {ROUNDS} were accepted");
+}
+
+/// Whether a result is a value; a message must say something.
+fn accepted<T>(result: Result<T, impl std::fmt::Display>) -> bool {
+    result.inspect_err(|e| assert!(!e.to_string().is_empty())).is_ok()
+}
+
+#[test]
+fn float_maps() {
+    let grey = pfm::FloatMap { width: 3, height: 2, channels: 1, data: vec![1.5; 6] };
+    let colour = pfm::FloatMap { width: 1, height: 2, channels: 3, data: vec![-0.5; 6] };
+    let big = b"Pf 2 1 1.0\n\x3f\x80\x00\x00\x3f\x80\x00\x00";
+    survive(&[&pfm::encode(&grey), &pfm::encode(&colour), big], |bytes| {
+        accepted(pfm::decode(bytes).inspect(|map| {
+            assert_eq!(map.data.len(), map.width * map.height * map.channels);
+        }))
+    });
+}
+
+#[test]
+fn tracks() {
+    let seeds: [&[u8]; 2] = [b"# a\n1 2 - 3.5 4\n- 1e2 7 5 6\n", b"1 2 - - 3 4\n- - 5 6 7 8 # far\n"];
+    survive(&seeds, |bytes| {
+        let read = Tracks::parse(&String::from_utf8_lossy(bytes), Path::new("t.txt"));
+        accepted(read.inspect(|t| {
+            assert!(t.columns() > 0 && t.rows().iter().all(|row| row.len() == t.columns()));
+            assert!(t.rows().iter().flatten().flatten().all(|p| p.x.is_finite() && p.y.is_finite()));
+        }))
+    });
+}
+
+#[test]
+fn colmap_models() {
+    let cameras = "# c\n1 PINHOLE 640 480 500 510 320 240\n2 SIMPLE_RADIAL 64 48 50 32 24 0.01\n";
+    let images = "1 0.9 0.1 0 0.2 1 2 3 1 a b.png\n1 2 -1\n2 1 0 0 0 0 0 0 2 c.png\n\n";
+    let folder = Path::new("model");
+    let finite = |model: &hybank_ibr::camera::colmap::Model| {
+        assert!(model.values().all(|c| c.camera.matrix().iter().all(|v| v.is_finite())));
+    };
+    survive(&[cameras.as_bytes()], |bytes| {
+        accepted(parse_model(&String::from_utf8_lossy(bytes), images, folder).inspect(finite))
+    });
+    survive(&[images.as_bytes()], |bytes| {
+        accepted(parse_model(cameras, &String::from_utf8_lossy(bytes), folder).inspect(finite))
+    });
+}
+
+#[test]
+fn scenes() {
+    let seeds: [&[u8]; 2] = [
+        b"[[view]]\nname = \"l\"\nimage = \"a.png\"\nposition = 0.0\ndisparity = \"d.pfm\"\nstep = 2\n[virtual]\nposition = 0.5\n",
+        b"matches = \"t\"\n[[view]]\nimage = \"a\"\ncamera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n[virtual]\nsize = [4, 3]\n",
+    ];
+    survive(&seeds, |bytes| accepted(parse(&String::from_utf8_lossy(bytes), Path::new("s.toml"))));
+}
