@@ -141,9 +141,7 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         let Some(rhs) = self.rhs[row..].first_chunk_mut::<ORDER>() else { return false };
         for k in 0..ORDER {
             let wk = s.weight * w[k];
-            for c in 0..C {
-                rhs[k][c] += wk * s.values[c];
-            }
+            rhs[k].iter_mut().zip(&s.values).for_each(|(r, v)| *r += wk * v);
         }
         true
     }

@@ -1,16 +1,14 @@
 //! Reading a scene: sort out its kind, read files in parallel, make maps dense.
 
+mod calibrated;
+mod rectified;
+mod uncalibrated;
+
 use super::spec::{SceneSpec, TargetSpec, ViewSpec};
-use super::{CalibratedSource, Kind, RectifiedSource, Scene, SceneError};
-use crate::camera::{Camera, colmap};
+use super::{Scene, SceneError};
 use crate::depth::{DepthMap, Measure, fill_unknown};
 use crate::image::{Image, MOST_PIXELS, read_image, read_map};
 use crate::partial::{Densify, densify};
-use crate::pipeline::uncalibrated::Target;
-use crate::uncalibrated::Point;
-use crate::uncalibrated::tracks::Tracks;
-use nalgebra::Matrix3x4;
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// How a scene is read.
@@ -143,72 +141,6 @@ impl Loader<'_> {
         value.ok_or_else(|| self.incomplete(reason()))
     }
 
-    fn rectified(
-        &self,
-        views: &[&ViewSpec],
-        left_out: Option<&ViewSpec>,
-        target: &TargetSpec,
-    ) -> Loaded<(Kind, usize)> {
-        let position = left_out.map_or(target.position, |v| v.position).ok_or_else(|| {
-            self.incomplete("[virtual] needs a `position` on the line of the rectified rig")
-        })?;
-        let position = self.finite(position, "the wanted view")?;
-        let one = |view: &&ViewSpec| {
-            let others = [
-                ("camera", view.camera.is_some()),
-                ("depth", view.depth.is_some()),
-                ("depth_scale", view.depth_scale.is_some()),
-                ("colmap", view.colmap.is_some()),
-            ];
-            self.no_other_kind(view, "rectified", &others)?;
-            let position = self.need(view.position, view, "position", "rectified")?;
-            let position = self.finite(position, &format!("view {:?}", view.label()))?;
-            let map = self.need(view.disparity.as_deref(), view, "disparity", "rectified")?;
-            let (image, disparity, filled) =
-                self.image_with_map(view, map, view.disparity_scale.unwrap_or(1.0), Measure::Disparity)?;
-            Ok((RectifiedSource { image, disparity, position }, filled))
-        };
-        let sources = in_order(views.par_iter().map(one).collect())?;
-        let first = sources[0].0.image.size();
-        for (view, (source, _)) in views.iter().zip(&sources) {
-            let (name, first_name) =
-                (format!("view {:?}", view.label()), format!("view {:?}", views[0].label()));
-            source.image.same_size(&name, first, &first_name)?;
-        }
-        let filled = sources.iter().map(|s| s.1).sum();
-        Ok((Kind::Rectified { views: sources.into_iter().map(|s| s.0).collect(), position }, filled))
-    }
-
-    fn calibrated(
-        &self,
-        views: &[&ViewSpec],
-        left_out: Option<&ViewSpec>,
-        target: &TargetSpec,
-    ) -> Loaded<(Kind, usize)> {
-        let one = |view: &&ViewSpec| {
-            let others = [
-                ("disparity", view.disparity.is_some()),
-                ("disparity_scale", view.disparity_scale.is_some()),
-            ];
-            self.no_other_kind(view, "calibrated", &others)?;
-            let camera = self.camera_of(view)?;
-            let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
-            let (image, depth, filled) =
-                self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;
-            Ok((CalibratedSource { image, depth, camera }, filled))
-        };
-        let sources = in_order(views.par_iter().map(one).collect())?;
-        let first = sources[0].0.image.size();
-        let (camera, own) = match left_out {
-            Some(view) => (self.camera_of(view)?, Some(read_image(&self.file(&view.image))?.size())),
-            None => self.target_camera(target)?,
-        };
-        let size = self.size(target, own.unwrap_or(first))?;
-        let filled = sources.iter().map(|s| s.1).sum();
-        let views = sources.into_iter().map(|s| s.0).collect();
-        Ok((Kind::Calibrated { views, camera, size }, filled))
-    }
-
     /// The size asked for, or the one that suggests itself.
     fn size(&self, target: &TargetSpec, own: (usize, usize)) -> Loaded<(usize, usize)> {
         match target.size {
@@ -216,55 +148,6 @@ impl Loader<'_> {
                 .incomplete(format!("[virtual] size = [{w}, {h}]: both sides must be at least one pixel, and it may have at most {MOST_PIXELS} pixels"))),
             Some([w, h]) => Ok((w, h)),
             None => Ok(own),
-        }
-    }
-
-    fn matrix(&self, rows: &[[f64; 4]; 3], which: &str) -> Loaded<Camera> {
-        let matrix = Matrix3x4::from_fn(|i, j| rows[i][j]);
-        Camera::metric(matrix, self.spec.mirrored).map_err(|source| SceneError::Camera {
-            path: self.path.into(),
-            which: which.into(),
-            source,
-        })
-    }
-
-    fn model_of(&self, view: &ViewSpec) -> Option<PathBuf> {
-        view.colmap.as_ref().or(self.spec.colmap.as_ref()).map(|folder| self.file(folder))
-    }
-
-    fn camera_of(&self, view: &ViewSpec) -> Loaded<Camera> {
-        match (&view.camera, self.model_of(view)) {
-            (Some(rows), _) => self.matrix(rows, &format!("view {:?}", view.label())),
-            (None, Some(folder)) => Ok(self.model_camera(&folder, &view.image.to_string_lossy())?.camera),
-            (None, None) => self.need(None, view, "camera", "calibrated"),
-        }
-    }
-
-    /// The camera of an image in a COLMAP model: by its path, or by the path's last part.
-    fn model_camera(&self, folder: &Path, image: &str) -> Loaded<colmap::ModelCamera> {
-        let model = colmap::read_model(folder)?;
-        let last = |name: &str| name.rsplit('/').next().unwrap_or(name).to_string();
-        let named = model
-            .get(image)
-            .or_else(|| model.iter().find(|(name, _)| last(name) == last(image)).map(|(_, camera)| camera));
-        named.copied().ok_or_else(|| {
-            let reason = format!("{}: the model has no image {image:?}", folder.display());
-            self.incomplete(reason)
-        })
-    }
-
-    fn target_camera(&self, target: &TargetSpec) -> Loaded<(Camera, Option<(usize, usize)>)> {
-        if let Some(rows) = &target.camera {
-            return Ok((self.matrix(rows, "[virtual]")?, None));
-        }
-        match (&target.colmap_image, &self.spec.colmap) {
-            (Some(image), Some(folder)) => {
-                let found = self.model_camera(&self.file(folder), image)?;
-                Ok((found.camera, Some(found.size)))
-            }
-            _ => Err(self.incomplete(
-                "[virtual] needs a `camera` (3 x 4), or `colmap_image` with a `colmap` folder at the top",
-            )),
         }
     }
 
@@ -294,83 +177,6 @@ impl Loader<'_> {
             .map_err(|source| SceneError::Partial { view: view.label(), path: path.clone(), source })?;
         Ok((image, dense, coarse.unknown()))
     }
-
-    fn uncalibrated(
-        &self,
-        views: &[&ViewSpec],
-        left_out: Option<&ViewSpec>,
-        target: &TargetSpec,
-    ) -> Loaded<Kind> {
-        let file = self.spec.matches.as_ref().or(target.matches.as_ref()).ok_or_else(|| {
-            self.incomplete(
-                "the views have neither `position` and `disparity`, nor `camera` and `depth`, and there is no `matches` file: say where the cameras are or give tracks",
-            )
-        })?;
-        if views.len() < 2 {
-            return Err(self.incomplete(format!("{} view with tracks: at least two are needed", views.len())));
-        }
-        for view in views {
-            let others = [
-                ("disparity", view.disparity.is_some()),
-                ("depth", view.depth.is_some()),
-                ("step", view.step.is_some()),
-            ];
-            self.no_other_kind(view, "matches-only", &others)?;
-        }
-        let tracks = Tracks::read(&self.file(file))?;
-        let wanted = match left_out {
-            Some(view) => Some(self.column_in_order(view)?),
-            None => target.from_tracks,
-        };
-        let columns = self.columns(views, wanted, tracks.columns())?;
-        let images = in_order(
-            views.par_iter().map(|v| read_image(&self.file(&v.image)).map_err(SceneError::from)).collect(),
-        )?;
-        let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
-        let goal = match (wanted, target.between) {
-            (Some(column), _) => Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect()),
-            (None, Some(between)) => Target::Between(between),
-            (None, None) => {
-                let reason =
-                    "[virtual] needs `from_tracks` (a column of the tracks, from 1) or `between` (0 to 1)";
-                return Err(self.incomplete(reason));
-            }
-        };
-        let own = match left_out {
-            Some(view) => read_image(&self.file(&view.image))?.size(),
-            None => images[0].size(),
-        };
-        let size = self.size(target, own)?;
-        Ok(Kind::Uncalibrated {
-            images,
-            tracks: tracks.rows().iter().map(pick).collect(),
-            target: goal,
-            size,
-        })
-    }
-
-    /// Column of a view that is left out: its own, or its place among all views.
-    fn column_in_order(&self, view: &ViewSpec) -> Loaded<usize> {
-        let place = self.spec.view.iter().position(|v| v.label() == view.label());
-        view.column.or(place.map(|p| p + 1)).ok_or_else(|| self.incomplete("a view without a column"))
-    }
-
-    /// Columns of the views: as they say, or in order with the wanted column passed over.
-    fn columns(&self, views: &[&ViewSpec], wanted: Option<usize>, there: usize) -> Loaded<Vec<usize>> {
-        let mut free = (1..=there).filter(|c| Some(*c) != wanted);
-        let columns: Vec<Option<usize>> = views.iter().map(|v| v.column.or_else(|| free.next())).collect();
-        let all: Vec<usize> = columns.iter().flatten().copied().chain(wanted).collect();
-        let broken = all.iter().any(|c| *c == 0 || *c > there);
-        if broken || all.len() < views.len() + usize::from(wanted.is_some()) {
-            let reason = format!(
-                "the tracks have {there} columns, numbered from 1; {} views{} do not fit",
-                views.len(),
-                wanted.map_or(String::new(), |w| format!(" and the wanted column {w}"))
-            );
-            return Err(self.incomplete(reason));
-        }
-        Ok(columns.into_iter().flatten().collect())
-    }
 }
 
 /// The values, or the first error in the order of the views: the same one on every run.
@@ -381,6 +187,9 @@ fn in_order<T>(results: Vec<Loaded<T>>) -> Loaded<Vec<T>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::uncalibrated::Target;
+    use crate::scene::Kind;
+    use crate::uncalibrated::Point;
 
     fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
         let dir = tempfile::tempdir().unwrap();
@@ -463,6 +272,18 @@ mod tests {
         let outside = text.replace("from_tracks = 2", "from_tracks = 7");
         let message = read(&outside, &LoadOptions::default()).unwrap_err();
         assert!(message.contains("3 columns, numbered from 1"), "{message}");
+        // A view takes no column that another one has said, and none may be said twice.
+        let said = text.replace("image = \"small.pgm\"", "image = \"small.pgm\"\ncolumn = 1");
+        let Kind::Uncalibrated { tracks, .. } = read(&said, &LoadOptions::default()).unwrap().kind else {
+            panic!()
+        };
+        assert_eq!(tracks[0], [Some(Point::new(5.0, 6.0)), Some(Point::new(1.0, 2.0))]);
+        for twice in
+            [said.replace("column = 1", "column = 2"), said.replace("from_tracks = 2", "from_tracks = 1")]
+        {
+            let message = read(&twice, &LoadOptions::default()).unwrap_err();
+            assert!(message.contains("a column of its own"), "{message}");
+        }
     }
 
     #[test]
