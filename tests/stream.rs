@@ -225,7 +225,10 @@ fn cut_frames_and_unequal_channels_are_told() {
     fs::write(bench.path("b"), bytes(&[1.0; 7])).unwrap();
     let output = bench.run(&["--input", "a", "--input", "b"], &[]);
     assert_eq!(output.stdout.len(), 7 * 2 * 4);
-    assert!(text(&output.stderr).contains("a: another input ended first, at least 3 samples"), "{output:?}");
+    assert!(
+        text(&output.stderr).contains("a: longer than the shortest channel, at least 3 samples"),
+        "{output:?}"
+    );
 }
 
 #[test]

@@ -7,6 +7,8 @@
 
 use super::BuildError;
 use crate::bank::{Bank, SynthesisFilters};
+use crate::io::{PcmFormat, PcmFrames, SampleLayout};
+use std::borrow::Cow;
 use std::collections::VecDeque;
 
 /// Gaps that a report lists one by one; more are only counted, so that memory stays bounded.
@@ -47,6 +49,9 @@ pub struct GapFiller {
     tick: u64,
     /// Ticks that still matter, the newest first: the channels that were missing.
     recent: VecDeque<Vec<usize>>,
+    /// A block as numbers and as bytes.
+    numbers: Vec<f64>,
+    bytes: Vec<u8>,
 }
 
 impl GapFiller {
@@ -76,6 +81,8 @@ impl GapFiller {
             missing: 0,
             tick: 0,
             recent: VecDeque::new(),
+            numbers: Vec::new(),
+            bytes: Vec::new(),
         })
     }
 
@@ -88,6 +95,29 @@ impl GapFiller {
             self.mark(missing, mask);
             self.tick += 1;
         }
+    }
+
+    /// As [`GapFiller::fill`], for samples as they lie in files and pipes: the channels are those of all
+    /// `frames` one after another. Frames without gaps are given back as they are.
+    pub fn fill_pcm<'a>(
+        &'a mut self,
+        frames: &'a [PcmFrames<'a>],
+        mask: &mut Vec<u8>,
+    ) -> Cow<'a, [PcmFrames<'a>]> {
+        let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
+        if self.is_at_rest() && frames.iter().all(|part| part.range(0..ticks).is_finite()) {
+            self.pass(frames, ticks, mask);
+            return Cow::Borrowed(frames);
+        }
+        let mut numbers = std::mem::take(&mut self.numbers);
+        numbers.clear();
+        (0..ticks).for_each(|k| decode_tick(frames, k, &mut numbers));
+        self.fill(&mut numbers, mask);
+        self.bytes.clear();
+        self.bytes.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
+        self.numbers = numbers;
+        let layout = SampleLayout::packed(PcmFormat::F64Le);
+        Cow::Owned(vec![PcmFrames { layout, channels: self.channels.len(), bytes: &self.bytes }])
     }
 
     /// Closes the gaps that are open at the end.
@@ -110,6 +140,24 @@ impl GapFiller {
     /// How many samples were missing.
     pub fn missing(&self) -> u64 {
         self.missing
+    }
+
+    /// True if no gap is open and none can touch another output, or every output is touched for ever.
+    fn is_at_rest(&self) -> bool {
+        self.recent.is_empty() && self.channels.iter().all(|(_, gap)| gap.is_none())
+    }
+
+    /// Ticks without a gap, while at rest: only the last samples matter.
+    fn pass(&mut self, frames: &[PcmFrames<'_>], ticks: usize, mask: &mut Vec<u8>) {
+        let touched = self.touch.is_none() && self.missing > 0;
+        mask.clear();
+        mask.resize(ticks * self.ratio, u8::from(touched));
+        self.tick += ticks as u64;
+        let mut last = std::mem::take(&mut self.numbers);
+        last.clear();
+        (ticks.saturating_sub(1)..ticks).for_each(|k| decode_tick(frames, k, &mut last));
+        self.channels.iter_mut().zip(&last).for_each(|(channel, &sample)| channel.0 = sample);
+        self.numbers = last;
     }
 
     /// Fills one tick; returns the channels that were missing.
@@ -160,6 +208,15 @@ impl GapFiller {
         while self.recent.back().is_some_and(Vec::is_empty) {
             self.recent.pop_back();
         }
+    }
+}
+
+/// Appends tick k of all parts.
+fn decode_tick(frames: &[PcmFrames<'_>], k: usize, numbers: &mut Vec<f64>) {
+    for part in frames {
+        let frame = part.range(k..k + 1).bytes;
+        let samples = frame.chunks_exact(part.layout.container);
+        numbers.extend(samples.map(|sample| part.layout.format.decode(sample)));
     }
 }
 
