@@ -8,6 +8,9 @@ use super::{IoError, PcmFormat};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// Interleaved channels that are read at most, as many as a WAV header can say.
+const MOST_CHANNELS: usize = 65_535;
+
 /// The part of a SigMF metadata file that matters here; other keys are passed over.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SigmfMeta {
@@ -100,7 +103,9 @@ impl SigmfMeta {
         meta.format(file)?;
         meta.sequence(file)?;
         match (meta.global.num_channels, meta.global.sample_rate) {
-            (Some(0), _) => Err(fault("core:num_channels is 0; a recording has at least one channel".into())),
+            (Some(count), _) if !(1..=MOST_CHANNELS).contains(&count) => {
+                Err(fault(format!("core:num_channels is {count}; it may be 1 to {MOST_CHANNELS}")))
+            }
             (_, Some(rate)) if !(rate.is_finite() && rate > 0.0) => {
                 Err(fault(format!("core:sample_rate is {rate}; a rate is greater than 0 Hz")))
             }
@@ -225,6 +230,11 @@ mod tests {
         recording.global.offset = 5;
         assert!(refused(recording.clone()).contains("before core:offset 5"));
         recording.captures[0].header_bytes = 16;
+        for (key, value) in [("num_channels", "0"), ("num_channels", "99999999"), ("sample_rate", "-1")] {
+            let text = format!(r#"{{"global":{{"core:datatype":"ri8","core:{key}":{value}}}}}"#);
+            let error = SigmfMeta::parse(&text, "test").unwrap_err().to_string();
+            assert!(error.starts_with("test: ") && error.contains(key), "{error}");
+        }
         assert!(refused(recording).contains("core:header_bytes"));
     }
 }

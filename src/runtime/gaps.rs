@@ -231,6 +231,7 @@ mod tests {
     use super::super::Reconstructor;
     use super::super::tests::{Noise, fir_bank, random_taps};
     use super::*;
+    use crate::bank::BlockFilter;
 
     /// Ticks of N channels with a few runs of NaN.
     fn with_gaps(n: usize, ticks: usize, noise: &mut Noise) -> Vec<f64> {
@@ -293,6 +294,44 @@ mod tests {
             let mut filled = samples.clone();
             GapFiller::new(&bank, GapPolicy::Zero).unwrap().fill(&mut filled, &mut mask);
             assert_eq!(mask, differs, "{taps} taps, M = {m}");
+        }
+    }
+
+    #[test]
+    fn stored_samples_pass_untouched_or_as_the_same_numbers() {
+        let mut noise = Noise(13);
+        let samples = with_gaps(2, 200, &mut noise);
+        let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_be_bytes()).collect();
+        let layout = SampleLayout::packed(PcmFormat::F64Be);
+        let numbers = |parts: &[PcmFrames<'_>]| {
+            let mut numbers = Vec::new();
+            (0..parts[0].frames()).for_each(|k| decode_tick(parts, k, &mut numbers));
+            numbers
+        };
+        let fir = fir_bank(random_taps(2, 7, &mut noise), 3);
+        let (a, b, c, d) = Default::default();
+        let filter = BlockFilter { a, b, c, d };
+        let recursion = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir.clone() };
+        for bank in [fir, recursion] {
+            let mut want = samples.clone();
+            let mut want_mask = Vec::new();
+            let mut plain = GapFiller::new(&bank, GapPolicy::Hold).unwrap();
+            plain.fill(&mut want, &mut want_mask);
+            for block in [1, 7, 45, 200] {
+                let mut filler = GapFiller::new(&bank, GapPolicy::Hold).unwrap();
+                let (mut got, mut got_mask, mut untouched) = (Vec::new(), Vec::new(), 0);
+                for piece in bytes.chunks(block * 16) {
+                    let frames = [PcmFrames { layout, channels: 2, bytes: piece }];
+                    let mut mask = Vec::new();
+                    let filled = filler.fill_pcm(&frames, &mut mask);
+                    untouched += usize::from(matches!(filled, Cow::Borrowed(_)));
+                    got.extend(numbers(&filled));
+                    got_mask.extend(mask);
+                }
+                assert_eq!((got, got_mask), (want.clone(), want_mask.clone()), "blocks of {block}");
+                assert_eq!(filler.gaps(), plain.gaps());
+                assert!(untouched > 0 || block == 200, "blocks of {block}");
+            }
         }
     }
 }
