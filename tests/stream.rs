@@ -201,6 +201,12 @@ fn wav_goes_through_with_its_rate() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     assert_eq!((&output.stdout[..4], &output.stdout[24..28]), (&b"RIFF"[..], &48_000u32.to_le_bytes()[..]));
     assert_eq!(floats(&output.stdout[44..]), fused(&input));
+    // A file knows its length.
+    let output = bench.run(&["--format", "wav", "-o", "out.wav"], wav.get_ref());
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    let mut file = hound::WavReader::open(bench.path("out.wav")).unwrap();
+    assert_eq!((file.spec().sample_rate, file.duration()), (48_000, 600));
+    assert!(file.samples::<f32>().map(Result::unwrap).eq(fused(&input)));
 }
 
 #[test]

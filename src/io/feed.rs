@@ -112,7 +112,7 @@ impl Feed {
         let inputs = paths.iter().map(spawn).collect();
         let mut feed = Self { inputs, stop, until: options.until, ready: 0, ticks: 0 };
         for i in 0..paths.len() {
-            if feed.wait_for(i)? == Arrival::Stopped {
+            if !feed.hear(i)? {
                 return Ok(None);
             }
         }
@@ -143,7 +143,7 @@ impl Feed {
     pub fn wait(&mut self) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
             while self.inputs[i].lane.waits() {
-                if self.wait_for(i)? == Arrival::Stopped {
+                if !self.hear(i)? {
                     return Ok(Arrival::Stopped);
                 }
             }
@@ -189,17 +189,17 @@ impl Feed {
         self.inputs.iter().flat_map(named).collect()
     }
 
-    /// Takes what input i has to say next.
-    fn wait_for(&mut self, i: usize) -> Result<Arrival, IoError> {
+    /// Waits for what input i has to say next; false if `stop` spoke first.
+    fn hear(&mut self, i: usize) -> Result<bool, IoError> {
         let input = &mut self.inputs[i];
         select! {
             recv(input.said) -> said => match said {
-                Ok(said) => input.hear(said?),
+                Ok(said) => input.take(said?),
                 Err(_) => input.lane.end(),
             },
-            recv(self.stop) -> _ => return Ok(Arrival::Stopped),
+            recv(self.stop) -> _ => return Ok(false),
         }
-        Ok(Arrival::Ticks(0))
+        Ok(true)
     }
 
     /// One time axis for all inputs.
@@ -224,7 +224,7 @@ impl Feed {
 }
 
 impl Input {
-    fn hear(&mut self, said: Said) {
+    fn take(&mut self, said: Said) {
         match said {
             Said::Shape { shape, sequence } => {
                 self.lane = Lane::new(shape);

@@ -72,11 +72,6 @@ impl<R: Read> WavReader<R> {
         &mut self.frames
     }
 
-    /// True once the samples are used up.
-    pub fn ended(&self) -> bool {
-        self.frames.ended()
-    }
-
     /// What had to be tolerated; complete when the frames have ended.
     pub fn notes(&self) -> Vec<WavNote> {
         let missing_bytes = self.frames.missing_bytes();
