@@ -200,6 +200,31 @@ fn a_closed_pipe_ends_quietly() {
     assert!(output.stderr.is_empty(), "{output:?}");
 }
 
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_nothing_behind() {
+    let bench = Bench::new();
+    bench.wav("both.wav", 2, 24_000, &[0.5; 200]);
+    let before = names(bench.folder.path());
+    let mut command = bench.command(&["fuse", "bank.json", "-", "-o", "out.wav"]);
+    let mut child =
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    // Less than the header promises, and the pipe stays open: only the signal can end this.
+    let wav = fs::read(bench.path("both.wav")).unwrap();
+    std::io::Write::write_all(&mut stdin, &wav[..wav.len() - 80]).unwrap();
+    while names(bench.folder.path()) == before {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    drop(stdin);
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("interrupted after") && told.contains("nothing was kept"), "{told}");
+    assert_eq!(names(bench.folder.path()), before);
+}
+
 #[test]
 fn integers_saturate_and_the_count_is_told() {
     let bench = Bench::new();

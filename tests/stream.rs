@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// N = M = 2, f_1 = (1, 2, 3, 4), f_2 = (10, 20, 30), m0 = 3.
 const BANK: &str = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2,
@@ -26,6 +26,13 @@ impl Bench {
 
     fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
+    }
+
+    /// Length of the output that has no name yet.
+    fn unfinished_bytes(&self) -> Option<u64> {
+        let mut files = fs::read_dir(self.folder.path()).unwrap().map(Result::unwrap);
+        let file = files.find(|file| file.file_name().to_string_lossy().ends_with(".part"))?;
+        Some(file.metadata().ok()?.len())
     }
 
     fn spawn(&self, args: &[&str]) -> Child {
@@ -140,20 +147,16 @@ fn a_tick_comes_out_as_soon_as_it_is_in() {
     let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
     let input = ticks(50);
     let want = fused(&input);
-    let mut slowest = Duration::ZERO;
     for (tick, want) in input.chunks_exact(2).zip(want.chunks_exact(2)) {
-        let begin = Instant::now();
         // In two pieces, cut inside a sample.
         let tick = bytes(tick);
         stdin.write_all(&tick[..3]).unwrap();
         stdin.write_all(&tick[3..]).unwrap();
         let mut got = [0; 8];
+        // An output that waits for a block would never come.
         stdout.read_exact(&mut got).unwrap();
-        slowest = slowest.max(begin.elapsed());
         assert_eq!(floats(&got), want);
     }
-    // A generous bound for a loaded machine; an output that waits for a block would never come.
-    assert!(slowest < Duration::from_secs(5), "{slowest:?}");
     drop(stdin);
     assert!(child.wait().unwrap().success());
 }
@@ -198,6 +201,12 @@ fn wav_goes_through_with_its_rate() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     assert_eq!((&output.stdout[..4], &output.stdout[24..28]), (&b"RIFF"[..], &48_000u32.to_le_bytes()[..]));
     assert_eq!(floats(&output.stdout[44..]), fused(&input));
+    // A file knows its length.
+    let output = bench.run(&["--format", "wav", "-o", "out.wav"], wav.get_ref());
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    let mut file = hound::WavReader::open(bench.path("out.wav")).unwrap();
+    assert_eq!((file.spec().sample_rate, file.duration()), (48_000, 600));
+    assert!(file.samples::<f32>().map(Result::unwrap).eq(fused(&input)));
 }
 
 #[test]
@@ -225,7 +234,10 @@ fn cut_frames_and_unequal_channels_are_told() {
     fs::write(bench.path("b"), bytes(&[1.0; 7])).unwrap();
     let output = bench.run(&["--input", "a", "--input", "b"], &[]);
     assert_eq!(output.stdout.len(), 7 * 2 * 4);
-    assert!(text(&output.stderr).contains("a: another input ended first, at least 3 samples"), "{output:?}");
+    assert!(
+        text(&output.stderr).contains("a: longer than the shortest channel, at least 3 samples"),
+        "{output:?}"
+    );
 }
 
 #[test]
@@ -236,8 +248,10 @@ fn an_interrupt_ends_after_whole_ticks_and_reports() {
     let input = ticks(100);
     stdin.write_all(&bytes(&input)).unwrap();
     stdin.flush().unwrap();
-    // The pipe stays open: only the signal can end this. Wait until the samples were taken.
-    std::thread::sleep(Duration::from_millis(500));
+    // The pipe stays open: only the signal can end this, once all samples are written.
+    while bench.unfinished_bytes() < Some(800) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
     let id = child.id().to_string();
     assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();

@@ -1,18 +1,17 @@
 //! `hybank fuse`: slow recordings in, one fast recording out.
 
 use super::Failure;
-use super::gaps::{GapArgs, GapReport, GapStage};
-use super::output::{Bits, FastWriter, run_warnings};
+use super::fusing::{Fusing, RunReport};
+use super::gaps::GapArgs;
+use super::interrupt::interrupts;
+use super::output::{Bits, Container, FastWriter, precision};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{Capture, PcmFrames, SampleLayout};
-use crate::runtime::{Options, PcmOutput, PlanSummary, Precision, Reconstructor};
+use crate::io::{Arrival, Feed, FeedOptions};
+use crate::runtime::{Options, Reconstructor};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::time::Instant;
-
-/// Bytes of a block's larger side: stays in the second-level cache.
-const BLOCK_BYTES: usize = 128 << 10;
 
 /// Fuses slow recordings into one fast recording
 ///
@@ -56,29 +55,15 @@ pub(super) struct Args {
 /// What happened.
 #[derive(Debug, serde::Serialize)]
 struct Report {
-    /// How the bank ran.
-    plan: PlanSummary,
-    channels: usize,
-    ratio: usize,
-    /// Samples a second of the output.
-    rate: u32,
+    #[serde(flatten)]
+    run: RunReport,
+    /// Hertz of the output, rounded.
+    rate: u64,
     /// Slow ticks read.
     ticks: u64,
-    /// Fast samples written.
-    samples: u64,
     /// Samples dropped at the beginning so that the output lines up with the inputs.
     latency_dropped: u64,
-    /// Output samples that saturated.
-    clipped: u64,
-    /// Input samples that were NaN or infinite and became 0.
-    replaced: u64,
-    /// Times that a recursion's state was not finite and began anew.
-    state_resets: u64,
-    /// Missing samples, if --gaps asked for them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    gaps: Option<GapReport>,
     seconds: f64,
-    warnings: Vec<String>,
 }
 
 /// Runs the verb.
@@ -89,26 +74,28 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
     args.check()?;
     let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
-    let mut capture = Capture::open(&args.inputs).map_err(Failure::input)?;
-    let channels = || capture.headers().map(|(name, header)| (name, header.channels));
+    let lost = args.gaps.lost()?;
+    let options = FeedOptions { lost: lost.as_ref(), until: args.gaps.until(), ..FeedOptions::files() };
+    let feed = Feed::start(&args.inputs, options, interrupts()?).map_err(Failure::input)?;
+    let mut feed = feed.ok_or_else(|| interrupted(0))?;
+    let channels = || feed.headers().map(|(name, channels, _)| (name, channels));
     match_bank::check_channels(&bank, &args.bank, channels())?;
-    let slow_rate =
-        match_bank::check_rates(&bank, capture.headers().map(|(name, header)| (name, header.rate)))?;
-    let rate = match_bank::fast_rate(&bank, slow_rate)?;
-    let stream = args.reconstructor(&bank)?;
-    let mut job = Job {
-        progress: progress_bar(capture.promised_ticks()),
-        writer: FastWriter::create(&args.output, args.bits, rate, args.force)?,
-        skip: if args.keep_latency { 0 } else { stream.latency() as u64 },
-        flush: !args.keep_latency,
-        stream,
-        gaps: args.gaps.stage(&bank, args.force)?,
-        clipped: 0,
-        buffer: Vec::new(),
+    let slow_rate = match_bank::check_rates(&bank, feed.headers().map(|(name, _, rate)| (name, rate)))?;
+    let rate = match_bank::fast_rate(&bank, slow_rate);
+    let mut fusing = args.fusing(&bank, rate)?;
+    let latency_dropped = fusing.skip;
+    pump(&mut fusing, &mut feed)?;
+    if !args.keep_latency {
+        fusing.flush(feed.ticks() * bank.ratio as u64)?;
+    }
+    let report = Report {
+        run: fusing.report(feed.notes(), "--bits 32f"),
+        rate: rate.round() as u64,
+        ticks: feed.ticks(),
+        latency_dropped,
+        seconds: begin.elapsed().as_secs_f64(),
     };
-    job.pump(&mut capture)?;
-    let report = job.report(&capture, rate, begin);
-    args.finish(job, &report)
+    args.finish(fusing, &report)
 }
 
 impl Args {
@@ -121,15 +108,20 @@ impl Args {
         Ok(())
     }
 
-    fn reconstructor(&self, bank: &Bank) -> Result<Reconstructor, Failure> {
-        let precision = if self.bits.needs_double() { Precision::Double } else { Precision::Single };
-        let options = Options { precision, ..Options::default() };
-        Reconstructor::with_options(bank, options)
-            .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+    /// The run at its beginning, with an output of `rate` hertz.
+    fn fusing(&self, bank: &Bank, rate: f64) -> Result<Fusing, Failure> {
+        let format = self.bits.format();
+        let options = Options { precision: precision(format), ..Options::default() };
+        let stream = Reconstructor::with_options(bank, options)
+            .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))?;
+        let gaps = self.gaps.stage(bank, self.force)?;
+        let writer = FastWriter::create(&self.output, Container::Wav, format, rate, self.force)?;
+        let skip = if self.keep_latency { 0 } else { bank.latency as u64 };
+        Ok(Fusing::new(stream, gaps, writer, skip))
     }
 
     /// Judges the run, then gives the output its name.
-    fn finish(&self, job: Job, report: &Report) -> Result<(), Failure> {
+    fn finish(&self, fusing: Fusing, report: &Report) -> Result<(), Failure> {
         if report.ticks == 0 {
             let names: Vec<_> = self.inputs.iter().map(|path| path.display().to_string()).collect();
             return Err(Failure::Input(format!(
@@ -137,112 +129,32 @@ impl Args {
                 names.join(", ")
             )));
         }
-        if let (true, Some(first)) = (self.strict, report.warnings.first()) {
-            return Err(Failure::Input(format!("{first} (an error because of --strict)")));
-        }
-        for warning in &report.warnings {
-            eprintln!("hybank: warning: {warning}");
-        }
-        job.writer.finish()?;
-        job.gaps.map_or(Ok(()), GapStage::close)?;
-        if self.json {
-            println!("{}", serde_json::to_string(report).map_err(Failure::input)?);
-        }
-        Ok(())
+        report.run.judge(self.strict)?;
+        fusing.finish()?;
+        if self.json { super::print_json(report) } else { Ok(()) }
     }
 }
 
-/// A run under way.
-struct Job {
-    stream: Reconstructor,
-    gaps: Option<GapStage>,
-    writer: FastWriter,
-    progress: ProgressBar,
-    /// Samples still to be dropped.
-    skip: u64,
-    flush: bool,
-    clipped: u64,
-    buffer: Vec<u8>,
-}
-
-impl Job {
-    fn pump(&mut self, capture: &mut Capture) -> Result<(), Failure> {
-        let block = self.block_ticks(capture);
-        loop {
-            let ticks = capture.read(block).map_err(Failure::input)?;
-            self.fuse(&capture.frames(), u64::MAX)?;
-            self.progress.inc(ticks as u64);
-            if ticks < block {
-                break;
+/// All ticks there are.
+fn pump(fusing: &mut Fusing, feed: &mut Feed) -> Result<(), Failure> {
+    let progress = progress_bar(feed.promised_ticks());
+    loop {
+        match feed.wait().map_err(Failure::input)? {
+            Arrival::Ticks(ticks) => {
+                fusing.fuse(&feed.frames(), u64::MAX)?;
+                feed.consume(ticks);
+                progress.inc(ticks as u64);
             }
+            Arrival::End => break,
+            Arrival::Stopped => return Err(interrupted(feed.ticks())),
         }
-        if self.flush {
-            self.flush(capture.ticks())?;
-        }
-        self.progress.finish_and_clear();
-        Ok(())
     }
+    progress.finish_and_clear();
+    Ok(())
+}
 
-    fn block_ticks(&self, capture: &Capture) -> usize {
-        let slow = capture.headers().map(|(_, header)| header.frame_bytes()).sum::<usize>();
-        let fast = self.stream.ratio() * self.writer.format().bytes();
-        (BLOCK_BYTES / slow.max(fast)).clamp(64, 1 << 16)
-    }
-
-    /// Fuses a block and writes what is not to be dropped, at most `limit` samples.
-    fn fuse(&mut self, frames: &[PcmFrames<'_>], limit: u64) -> Result<(), Failure> {
-        let filled = self.gaps.as_mut().map(|stage| [stage.fill(frames)]);
-        let frames = filled.as_ref().map_or(frames, |filled| &filled[..]);
-        let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
-        let format = self.writer.format();
-        self.buffer.resize(ticks * self.stream.ratio() * format.bytes(), 0);
-        let mut output = PcmOutput { format, bytes: &mut self.buffer, clipped: 0 };
-        let samples = self.stream.process_pcm(frames, &mut output).map_err(Failure::input)? as u64;
-        self.clipped += output.clipped;
-        let skip = self.skip.min(samples);
-        self.skip -= skip;
-        let end = samples.min(skip.saturating_add(limit));
-        let range = skip as usize..end as usize;
-        if let Some(stage) = &mut self.gaps {
-            stage.write_mask(range.clone())?;
-        }
-        self.writer.write(&self.buffer[range.start * format.bytes()..range.end * format.bytes()])
-    }
-
-    /// Zeros until there are M samples for each of `ticks` ticks.
-    fn flush(&mut self, ticks: u64) -> Result<(), Failure> {
-        let wanted = ticks * self.stream.ratio() as u64;
-        let layout = SampleLayout::packed(crate::io::PcmFormat::F32Le);
-        let zeros = vec![0; 1024 * self.stream.channels() * 4];
-        while self.writer.samples() < wanted {
-            let missing = wanted - self.writer.samples();
-            let needed = (missing + self.skip).div_ceil(self.stream.ratio() as u64).min(1024) as usize;
-            let channels = self.stream.channels();
-            let frames = PcmFrames { layout, channels, bytes: &zeros[..needed * channels * 4] };
-            self.fuse(&[frames], missing)?;
-        }
-        Ok(())
-    }
-
-    fn report(&mut self, capture: &Capture, rate: u32, begin: Instant) -> Report {
-        let mut warnings: Vec<String> = capture.notes().iter().map(ToString::to_string).collect();
-        warnings.extend(run_warnings(&self.stream, self.clipped, "--bits 32f"));
-        Report {
-            plan: self.stream.plan(),
-            channels: self.stream.channels(),
-            ratio: self.stream.ratio(),
-            rate,
-            ticks: capture.ticks(),
-            samples: self.writer.samples(),
-            latency_dropped: if self.flush { self.stream.latency() as u64 } else { 0 },
-            clipped: self.clipped,
-            replaced: self.stream.replaced(),
-            state_resets: self.stream.state_resets(),
-            gaps: self.gaps.as_mut().map(GapStage::report),
-            seconds: begin.elapsed().as_secs_f64(),
-            warnings,
-        }
-    }
+fn interrupted(ticks: u64) -> Failure {
+    Failure::Input(format!("interrupted after {ticks} ticks; nothing was kept, run it again"))
 }
 
 /// Drawn on a terminal only.

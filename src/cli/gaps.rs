@@ -3,8 +3,9 @@
 use super::Failure;
 use super::output::failure;
 use crate::bank::Bank;
-use crate::io::{AtomicFile, PcmFormat, PcmFrames, SampleLayout};
+use crate::io::{AtomicFile, LostSamples, PcmFrames, Until};
 use crate::runtime::{Gap, GapFiller, GapPolicy};
+use std::borrow::Cow;
 use std::io::Write;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -15,13 +16,20 @@ const TOLD: usize = 10;
 /// Options of the verbs that can bridge gaps.
 #[derive(Debug, clap::Args)]
 pub(super) struct GapArgs {
-    /// Bridge and report missing samples, which NaN marks: by the last good sample, by zero, or by
-    /// zero with a mask (which needs --mask)
+    /// Bridge and report missing samples, which NaN, SigMF captures or --lost tell: by the last good sample, by
+    /// zero, or by zero with a mask (which needs --mask)
     #[arg(long, value_enum, value_name = "POLICY")]
     gaps: Option<Policy>,
     /// Write one byte for each output sample: 1 if a missing sample touched it, 0 if not
     #[arg(long, value_name = "FILE", requires = "gaps")]
     mask: Option<PathBuf>,
+    /// Lines of JSON that tell which samples were left out, {"channel": 1, "sample_start": 5, "global_index": 8}, or
+    /// are void, {"channel": 2, "first": 40, "length": 3}
+    #[arg(long, value_name = "FILE", requires = "gaps")]
+    lost: Option<PathBuf>,
+    /// Go on until the last channel ends: what the others lack is missing, and not left out of the result
+    #[arg(long, requires = "gaps")]
+    longest: bool,
 }
 
 /// What stands in for a missing sample.
@@ -47,6 +55,16 @@ pub(super) struct GapReport {
 }
 
 impl GapArgs {
+    /// What is known of lost samples.
+    pub(super) fn lost(&self) -> Result<Option<LostSamples>, Failure> {
+        self.lost.as_deref().map(LostSamples::read).transpose().map_err(Failure::input)
+    }
+
+    /// Which input decides when the run ends.
+    pub(super) fn until(&self) -> Until {
+        if self.longest { Until::Longest } else { Until::Shortest }
+    }
+
     /// The stage between inputs and filters, if gaps are to be bridged.
     pub(super) fn stage(&self, bank: &Bank, force: bool) -> Result<Option<GapStage>, Failure> {
         let Some(policy) = self.gaps else { return Ok(None) };
@@ -56,13 +74,7 @@ impl GapArgs {
         let fill = if policy == Policy::Hold { GapPolicy::Hold } else { GapPolicy::Zero };
         let filler = GapFiller::new(bank, fill).map_err(Failure::input)?;
         let mask = self.mask.as_ref().map(|path| AtomicFile::create(path, force)).transpose();
-        Ok(Some(GapStage {
-            filler,
-            file: mask.map_err(Failure::input)?,
-            ticks: Vec::new(),
-            bytes: Vec::new(),
-            mask: Vec::new(),
-        }))
+        Ok(Some(GapStage { filler, file: mask.map_err(Failure::input)?, mask: Vec::new() }))
     }
 }
 
@@ -70,22 +82,14 @@ impl GapArgs {
 pub(super) struct GapStage {
     filler: GapFiller,
     file: Option<AtomicFile>,
-    /// The block as numbers, as bytes, and the marks of its outputs.
-    ticks: Vec<f64>,
-    bytes: Vec<u8>,
+    /// The marks of the block's outputs.
     mask: Vec<u8>,
 }
 
 impl GapStage {
     /// The same ticks without gaps.
-    pub(super) fn fill(&mut self, frames: &[PcmFrames<'_>]) -> PcmFrames<'_> {
-        let channels = frames.iter().map(|part| part.channels).sum();
-        decode(frames, &mut self.ticks);
-        self.filler.fill(&mut self.ticks, &mut self.mask);
-        self.bytes.clear();
-        self.bytes.extend(self.ticks.iter().flat_map(|x| x.to_le_bytes()));
-        let layout = SampleLayout::packed(PcmFormat::F64Le);
-        PcmFrames { layout, channels, bytes: &self.bytes }
+    pub(super) fn fill<'a>(&'a mut self, frames: &'a [PcmFrames<'a>]) -> Cow<'a, [PcmFrames<'a>]> {
+        self.filler.fill_pcm(frames, &mut self.mask)
     }
 
     /// Writes the marks of the block's outputs that are written themselves.
@@ -111,18 +115,5 @@ impl GapStage {
     /// Gives the mask file its name.
     pub(super) fn close(self) -> Result<(), Failure> {
         self.file.map_or(Ok(()), |file| file.commit().map_err(Failure::input))
-    }
-}
-
-/// Interleaved ticks of all parts.
-fn decode(frames: &[PcmFrames<'_>], ticks: &mut Vec<f64>) {
-    ticks.clear();
-    let count = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
-    for k in 0..count {
-        for part in frames {
-            let frame = &part.bytes[k * part.frame_bytes()..(k + 1) * part.frame_bytes()];
-            let samples = frame.chunks_exact(part.layout.container);
-            ticks.extend(samples.map(|sample| part.layout.format.decode(sample)));
-        }
     }
 }

@@ -32,41 +32,40 @@ pub(super) fn check_channels<'a>(
     )))
 }
 
-/// All inputs, with name and rate, at the slow rate 1 / (M h), to the hertz that a header can say; at
-/// any common rate for a bank in normalised time. Returns that rate.
+/// All inputs, with name and rate where they say it, at the slow rate 1 / (M h), to the hertz that a header
+/// can say; at any common rate for a bank in normalised time. Returns that rate.
 pub(super) fn check_rates<'a>(
     bank: &Bank,
-    mut inputs: impl Iterator<Item = (&'a str, u32)>,
-) -> Result<u32, Failure> {
+    inputs: impl Iterator<Item = (&'a str, Option<f64>)>,
+) -> Result<Option<f64>, Failure> {
+    let mut inputs = inputs.filter_map(|(name, rate)| Some((name, rate?)));
     let Some((first, rate)) = inputs.next() else {
-        return Err(Failure::Usage("no input".into()));
+        return Ok(None);
     };
-    if let Some((name, other)) = inputs.find(|&(_, other)| other != rate) {
+    if let Some((name, other)) = inputs.find(|&(_, other)| !same_rate(other, rate)) {
         return Err(Failure::Input(format!(
             "{name}: the sample rate is {other} Hz, but {first} has {rate} Hz; all channels need the same rate"
         )));
     }
     let wanted = 1.0 / bank.slow_period();
-    if bank.fast_period != 1.0 && (f64::from(rate) - wanted).abs() > 0.5 {
+    if bank.fast_period != 1.0 && !same_rate(rate, wanted) {
         return Err(Failure::Input(format!(
             "{first}: the sample rate is {rate} Hz, but the bank is designed for slow channels of {wanted} Hz; \
              record at that rate or design a bank for this one"
         )));
     }
-    Ok(rate)
+    Ok(Some(rate))
 }
 
-/// The rate of the output in hertz.
-pub(super) fn fast_rate(bank: &Bank, slow_rate: u32) -> Result<u32, Failure> {
-    let rate = if bank.fast_period == 1.0 {
-        f64::from(slow_rate) * bank.ratio as f64
-    } else {
-        (1.0 / bank.fast_period).round().max(1.0)
-    };
-    if rate > f64::from(u32::MAX) {
-        return Err(Failure::Input(format!(
-            "the fast rate of {rate} Hz does not fit a WAV header; write raw samples with `hybank stream`"
-        )));
+/// Equal to the hertz, or to nine digits.
+fn same_rate(a: f64, b: f64) -> bool {
+    (a - b).abs() <= f64::max(0.5, 1e-9 * b)
+}
+
+/// The rate of the output in hertz: the bank's own, or that of the inputs for a bank in normalised time.
+pub(super) fn fast_rate(bank: &Bank, slow_rate: Option<f64>) -> f64 {
+    match slow_rate {
+        Some(rate) if bank.fast_period == 1.0 => rate * bank.ratio as f64,
+        _ => 1.0 / bank.fast_period,
     }
-    Ok(rate as u32)
 }

@@ -2,37 +2,31 @@
 
 use super::Failure;
 use crate::io::wav::WavFile;
-use crate::io::{AtomicFile, Capture, PcmFormat};
+use crate::io::{Arrival, AtomicFile, Feed, FeedOptions, PcmFormat};
 use std::io;
 use std::path::Path;
 
-const BLOCK_TICKS: usize = 1 << 14;
-
-/// The samples and the rate (hertz) of a mono WAV file.
+/// The samples and the rate (hertz) of a mono WAV file or SigMF recording.
 pub(super) fn read_mono(path: &Path) -> Result<(Vec<f64>, u32), Failure> {
-    let mut capture = Capture::open(&[path]).map_err(Failure::input)?;
-    let rate = capture.headers().next().map_or(0, |(_, header)| header.rate);
-    if capture.channels() != 1 {
+    let feed = Feed::start(&[path.to_owned()], FeedOptions::files(), crossbeam_channel::never());
+    let mut feed = feed.map_err(Failure::input)?.ok_or_else(|| Failure::input("interrupted"))?;
+    if feed.channels() != 1 {
         return Err(Failure::Input(format!(
             "{}: {} channels, but a source is mono; extract one channel first",
             path.display(),
-            capture.channels()
+            feed.channels()
         )));
     }
+    let rate = feed.headers().find_map(|(_, _, rate)| rate).unwrap_or(0.0).round() as u32;
     let mut samples = Vec::new();
-    loop {
-        let ticks = capture.read(BLOCK_TICKS).map_err(Failure::input)?;
-        for frames in capture.frames() {
-            let layout = frames.layout;
-            samples.extend(
-                frames.bytes.chunks_exact(frames.frame_bytes()).map(|bytes| layout.format.decode(bytes)),
-            );
+    while let Arrival::Ticks(ticks) = feed.wait().map_err(Failure::input)? {
+        for frames in feed.frames() {
+            let format = frames.layout.format;
+            samples.extend(frames.bytes.chunks_exact(frames.frame_bytes()).map(|b| format.decode(b)));
         }
-        if ticks < BLOCK_TICKS {
-            break;
-        }
+        feed.consume(ticks);
     }
-    for note in capture.notes() {
+    for note in feed.notes() {
         eprintln!("hybank: warning: {note}");
     }
     refuse_useless(path, &samples)?;

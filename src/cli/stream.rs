@@ -1,21 +1,20 @@
 //! `hybank stream`: slow samples in and fast samples out, as they come.
 
-use super::gaps::{GapArgs, GapReport, GapStage};
-use super::output::{failure, open_stdout, run_warnings};
+use super::fusing::{Fusing, RunReport};
+use super::gaps::GapArgs;
+use super::interrupt::interrupts;
+use super::output::{Container, FastWriter, is_sigmf, precision};
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::wav::stream_header;
-use crate::io::{Arrival, AtomicFile, Coding, Feed, PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::{Options, PcmOutput, PlanSummary, Precision, Reconstructor};
-use crossbeam_channel::{Receiver, bounded};
-use std::io::Write;
+use crate::io::{Arrival, Coding, Feed, FeedOptions, PcmFormat};
+use crate::runtime::{Options, Reconstructor};
 use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Fuses slow samples as they arrive
 ///
 /// Reads interleaved ticks (one sample of each channel, in the order of the bank) from standard input,
-/// or one channel from each --input, and writes the M fast samples of a tick as soon as its inputs
+/// or from each --input what it holds, and writes the M fast samples of a tick as soon as its inputs
 /// are there. The output is causal: it is late by the bank's latency, and nothing is dropped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -25,6 +24,7 @@ Sample formats, as in ffmpeg:
 Examples:
   capture | hybank stream bank.json --format s16le > fast.raw
   hybank stream bank.json --input ch1.fifo --input ch2.fifo --format f32le | analyse
+  hybank stream bank.json --input ch1.sigmf-meta --input ch2.sigmf-meta -o fast.sigmf-meta
   sox both.flac -t wav - | hybank stream bank.json --format wav | play -t wav -
 
 An interrupt (Ctrl-C) ends the stream after whole ticks; a second one ends it at once.")]
@@ -37,10 +37,12 @@ pub(super) struct Args {
     /// How the output is stored, if not like the input
     #[arg(long, value_name = "FORMAT", value_parser = parse_coding)]
     output_format: Option<Coding>,
-    /// A FIFO or file with one channel; give it once a channel, or once for all interleaved
+    /// A FIFO or file with one channel, given once a channel, or with all of them, given once; a SigMF recording
+    /// (a name that ends in sigmf-meta) tells its own format and channels
     #[arg(long, value_name = "FILE")]
     input: Vec<PathBuf>,
-    /// Where the fast samples go: a file that appears when it is whole; standard output if left out
+    /// Where the fast samples go: a file that appears when it is whole (a SigMF recording, if its name ends in
+    /// sigmf-meta); standard output if left out
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
     /// Bring out the last m0 samples at the end, with zeros for input
@@ -69,20 +71,12 @@ fn parse_coding(name: &str) -> Result<Coding, String> {
 /// What happened.
 #[derive(Debug, serde::Serialize)]
 struct Report {
-    /// How the bank ran.
-    plan: PlanSummary,
-    channels: usize,
-    ratio: usize,
+    #[serde(flatten)]
+    run: RunReport,
+    /// Slow ticks read.
     ticks: u64,
-    samples: u64,
-    clipped: u64,
-    replaced: u64,
-    state_resets: u64,
+    /// True if a signal ended the stream.
     interrupted: bool,
-    /// Missing samples, if --gaps asked for them.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    gaps: Option<GapReport>,
-    warnings: Vec<String>,
 }
 
 /// Runs the verb.
@@ -96,36 +90,59 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Usage("--json needs --output: standard output carries the samples".into()));
     }
     let bank = bank_file::load(&args.bank)?;
-    let channels = bank.channel_count();
-    if inputs.len() != 1 && inputs.len() != channels {
-        return Err(Failure::Usage(format!(
-            "--input is given {} times; the bank has {channels} channels, so give it {channels} times, once, or not at all",
-            inputs.len()
-        )));
-    }
+    args.check_inputs(&inputs, bank.channel_count())?;
+    let lost = args.gaps.lost()?;
+    let options = FeedOptions {
+        coding: args.format,
+        channels: bank.channel_count(),
+        lost: lost.as_ref(),
+        until: args.gaps.until(),
+    };
     let stream = args.reconstructor(&bank)?;
-    let Some(mut feed) =
-        Feed::start(&inputs, args.format, channels, interrupts()?).map_err(Failure::input)?
-    else {
+    let Some(mut feed) = Feed::start(&inputs, options, interrupts()?).map_err(Failure::input)? else {
         return Ok(());
     };
-    match_bank::check_channels(
-        &bank,
-        &args.bank,
-        feed.headers().map(|(name, channels, _)| (name, channels)),
-    )?;
-    let mut job = Job::new(args, &bank, &feed, stream)?;
-    let interrupted = job.pump(&mut feed)?;
+    let channels = || feed.headers().map(|(name, channels, _)| (name, channels));
+    match_bank::check_channels(&bank, &args.bank, channels())?;
+    let mut fusing = args.fusing(&bank, &feed, stream)?;
+    let interrupted = pump(&mut fusing, &mut feed)?;
     if args.flush {
-        job.flush()?;
+        let samples = fusing.stream.flush_ticks() * bank.ratio;
+        fusing.flush(fusing.writer.samples() + samples as u64)?;
     }
-    let report = job.report(&feed, interrupted);
-    args.finish(job, &report)
+    let run = fusing.report(feed.notes(), "--output-format f32le");
+    args.finish(fusing, &Report { run, ticks: feed.ticks(), interrupted })
+}
+
+/// Until the input ends (false) or an interrupt comes (true).
+fn pump(fusing: &mut Fusing, feed: &mut Feed) -> Result<bool, Failure> {
+    loop {
+        match feed.wait().map_err(Failure::input)? {
+            Arrival::Ticks(ticks) => {
+                fusing.fuse(&feed.frames(), u64::MAX)?;
+                feed.consume(ticks);
+            }
+            Arrival::End => return Ok(false),
+            Arrival::Stopped => return Ok(true),
+        }
+    }
 }
 
 impl Args {
     fn inputs(&self) -> Vec<PathBuf> {
         if self.input.is_empty() { vec!["-".into()] } else { self.input.clone() }
+    }
+
+    /// Raw inputs are one interleaved or one a channel; others say themselves what they hold.
+    fn check_inputs(&self, inputs: &[PathBuf], channels: usize) -> Result<(), Failure> {
+        let raw = matches!(self.format, Coding::Raw(_)) && !inputs.iter().any(|path| is_sigmf(path));
+        if raw && inputs.len() != 1 && inputs.len() != channels {
+            return Err(Failure::Usage(format!(
+                "--input is given {} times; the bank has {channels} channels, so give it {channels} times, once, or not at all",
+                inputs.len()
+            )));
+        }
+        Ok(())
     }
 
     fn output_coding(&self) -> Coding {
@@ -141,172 +158,28 @@ impl Args {
     }
 
     fn reconstructor(&self, bank: &Bank) -> Result<Reconstructor, Failure> {
-        use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
-        let wide = matches!(self.output_format(), F64Be | F64Le | S32Be | S32Le);
-        let precision = if wide { Precision::Double } else { Precision::Single };
-        Reconstructor::with_options(bank, Options { precision, ..Options::default() })
+        let options = Options { precision: precision(self.output_format()), ..Options::default() };
+        Reconstructor::with_options(bank, options)
             .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
 
-    fn finish(&self, job: Job, report: &Report) -> Result<(), Failure> {
-        if let (true, Some(first)) = (self.strict, report.warnings.first()) {
-            return Err(Failure::Input(format!("{first} (an error because of --strict)")));
-        }
-        report.warnings.iter().for_each(|warning| eprintln!("hybank: warning: {warning}"));
+    /// The run at its beginning.
+    fn fusing(&self, bank: &Bank, feed: &Feed, stream: Reconstructor) -> Result<Fusing, Failure> {
+        let rates = feed.headers().map(|(name, _, rate)| (name, rate));
+        let rate = match_bank::fast_rate(bank, match_bank::check_rates(bank, rates)?);
+        let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };
+        let gaps = self.gaps.stage(bank, self.force)?;
+        let writer = FastWriter::create(&self.output, container, self.output_format(), rate, self.force)?;
+        Ok(Fusing::new(stream, gaps, writer, 0))
+    }
+
+    fn finish(&self, fusing: Fusing, report: &Report) -> Result<(), Failure> {
+        report.run.judge(self.strict)?;
         if report.interrupted {
-            eprintln!("hybank: interrupted after {} ticks, {} samples written", report.ticks, report.samples);
+            let (ticks, samples) = (report.ticks, report.run.samples);
+            eprintln!("hybank: interrupted after {ticks} ticks, {samples} samples written");
         }
-        job.close()?;
+        fusing.finish()?;
         if self.json { super::print_json(report) } else { Ok(()) }
-    }
-}
-
-/// A channel that speaks at the first interrupt; the second one ends the process.
-#[cfg(unix)]
-fn interrupts() -> Result<Receiver<()>, Failure> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    let (tell, stop) = bounded(1);
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).map_err(Failure::input)?;
-    std::thread::spawn(move || {
-        for (count, signal) in signals.forever().enumerate() {
-            if count > 0 {
-                std::process::exit(128 + signal);
-            }
-            // The receiver lives as long as the stream.
-            let _ = tell.send(());
-        }
-    });
-    Ok(stop)
-}
-
-#[cfg(not(unix))]
-fn interrupts() -> Result<Receiver<()>, Failure> {
-    Ok(crossbeam_channel::never())
-}
-
-/// Where the samples go.
-enum Target {
-    Stdout(Box<dyn Write>),
-    File(AtomicFile),
-}
-
-/// A stream under way.
-struct Job {
-    stream: Reconstructor,
-    gaps: Option<GapStage>,
-    target: Target,
-    name: String,
-    format: PcmFormat,
-    ticks: u64,
-    samples: u64,
-    clipped: u64,
-    buffer: Vec<u8>,
-}
-
-impl Job {
-    fn new(args: &Args, bank: &Bank, feed: &Feed, stream: Reconstructor) -> Result<Self, Failure> {
-        let rates = feed.headers().filter_map(|(name, _, rate)| Some((name, rate?)));
-        let rate = match args.format {
-            Coding::Wav => match_bank::fast_rate(bank, match_bank::check_rates(bank, rates)?)?,
-            // Raw samples carry no rate: the bank's own.
-            Coding::Raw(_) => (1.0 / bank.fast_period).round().clamp(1.0, f64::from(u32::MAX)) as u32,
-        };
-        let target = if args.output.as_os_str() == "-" {
-            Target::Stdout(open_stdout().map_err(|error| failure("standard output", error))?)
-        } else {
-            Target::File(AtomicFile::create(&args.output, args.force).map_err(Failure::input)?)
-        };
-        let name = if let Target::File(file) = &target {
-            file.target().display().to_string()
-        } else {
-            "standard output".into()
-        };
-        let format = args.output_format();
-        let gaps = args.gaps.stage(bank, args.force)?;
-        let mut job =
-            Self { stream, gaps, target, name, format, ticks: 0, samples: 0, clipped: 0, buffer: Vec::new() };
-        if args.output_coding() == Coding::Wav {
-            job.buffer = stream_header(format, 1, rate).map_err(|error| failure(&job.name, error))?;
-            job.write()?;
-        }
-        Ok(job)
-    }
-
-    /// Until the input ends (false) or an interrupt comes (true).
-    fn pump(&mut self, feed: &mut Feed) -> Result<bool, Failure> {
-        loop {
-            match feed.wait().map_err(Failure::input)? {
-                Arrival::Ticks(ticks) => {
-                    self.fuse(&feed.frames())?;
-                    feed.consume(ticks);
-                    self.ticks += ticks as u64;
-                }
-                Arrival::End => return Ok(false),
-                Arrival::Stopped => return Ok(true),
-            }
-        }
-    }
-
-    fn fuse(&mut self, frames: &[PcmFrames<'_>]) -> Result<(), Failure> {
-        let filled = self.gaps.as_mut().map(|stage| [stage.fill(frames)]);
-        let frames = filled.as_ref().map_or(frames, |filled| &filled[..]);
-        let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
-        self.buffer.resize(ticks * self.stream.ratio() * self.format.bytes(), 0);
-        let mut output = PcmOutput { format: self.format, bytes: &mut self.buffer, clipped: 0 };
-        let samples = self.stream.process_pcm(frames, &mut output).map_err(Failure::input)?;
-        self.samples += samples as u64;
-        self.clipped += output.clipped;
-        if let Some(stage) = &mut self.gaps {
-            stage.write_mask(0..samples)?;
-        }
-        self.write()
-    }
-
-    /// Zeros until the last m0 samples are out.
-    fn flush(&mut self) -> Result<(), Failure> {
-        let channels = self.stream.channels();
-        let layout = SampleLayout::packed(PcmFormat::F32Le);
-        let zeros = vec![0; 256 * channels * 4];
-        let mut left = self.stream.flush_ticks();
-        while left > 0 {
-            let ticks = left.min(256);
-            self.fuse(&[PcmFrames { layout, channels, bytes: &zeros[..ticks * channels * 4] }])?;
-            left -= ticks;
-        }
-        Ok(())
-    }
-
-    fn write(&mut self) -> Result<(), Failure> {
-        let written = match &mut self.target {
-            Target::Stdout(stdout) => stdout.write_all(&self.buffer),
-            Target::File(file) => file.write_all(&self.buffer),
-        };
-        written.map_err(|error| failure(&self.name, error))
-    }
-
-    fn close(self) -> Result<(), Failure> {
-        match self.target {
-            Target::Stdout(mut stdout) => stdout.flush().map_err(|error| failure(&self.name, error))?,
-            Target::File(file) => file.commit().map_err(Failure::input)?,
-        }
-        self.gaps.map_or(Ok(()), GapStage::close)
-    }
-
-    fn report(&mut self, feed: &Feed, interrupted: bool) -> Report {
-        let mut warnings = feed.notes();
-        warnings.extend(run_warnings(&self.stream, self.clipped, "--output-format f32le"));
-        Report {
-            plan: self.stream.plan(),
-            channels: self.stream.channels(),
-            ratio: self.stream.ratio(),
-            ticks: self.ticks,
-            samples: self.samples,
-            clipped: self.clipped,
-            replaced: self.stream.replaced(),
-            state_resets: self.stream.state_resets(),
-            interrupted,
-            gaps: self.gaps.as_mut().map(GapStage::report),
-            warnings,
-        }
     }
 }

@@ -77,6 +77,14 @@ pub enum IoError {
         /// What is wrong, and the remedy.
         problem: String,
     },
+    /// A file of lost samples that does not say what it should, or does not fit the inputs.
+    #[error("{file}: {problem}")]
+    Lost {
+        /// Name of the file.
+        file: String,
+        /// Line, reason and remedy.
+        problem: String,
+    },
     /// There is no data chunk.
     #[error("{file}: no data chunk after {offset} bytes of header; the file holds no samples")]
     NoData {

@@ -5,20 +5,20 @@
 //! consumer. A consumer that does not keep up stops the reading, and thereby the writers of the
 //! pipes.
 
-use super::wav::{WavHeader, WavReader};
-use super::{FrameReader, IoError, PcmFormat, PcmFrames, SampleLayout};
+use super::lane::{Block, Lane};
+use super::lost::{LostOfInput, LostSamples};
+use super::reader::{Opening, Said, read};
+use super::sequence::Sequence;
+use super::{IoError, PcmFormat, PcmFrames};
 use crossbeam_channel::{Receiver, Sender, bounded, select};
-use std::fs::File;
-use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::thread;
 
-/// Blocks that go round for each input, and their size.
+/// Blocks that go round for each input, and the most bytes of one.
 const BLOCKS: usize = 4;
 const BLOCK_BYTES: usize = 128 << 10;
-/// Pipes are widened to this where the system allows it; 64 KiB would halve the throughput
-/// between two processors.
-const PIPE_BYTES: usize = 1 << 20;
+/// All blocks of all inputs together, unless that would make them smaller than a page.
+const ALL_BYTES: usize = 16 << 20;
 
 /// How the bytes of the inputs are to be understood.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,22 +29,34 @@ pub enum Coding {
     Wav,
 }
 
-/// What an input's thread has to say.
-enum Message {
-    /// The header, always first.
-    Shape(Shape),
-    /// Whole frames.
-    Frames { bytes: Vec<u8>, filled: usize },
-    /// The end, with the faults that were tolerated.
-    End { notes: Vec<String> },
+/// Which input decides when the feed ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Until {
+    /// The first one to end; what the others have left is not used.
+    #[default]
+    Shortest,
+    /// The last one to end; samples of the others are lost from their end on.
+    Longest,
 }
 
-/// What the frames of an input are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Shape {
-    layout: SampleLayout,
-    channels: usize,
-    rate: Option<u32>,
+/// How inputs are read.
+#[derive(Debug, Clone, Copy)]
+pub struct FeedOptions<'a> {
+    /// Of all inputs but SigMF recordings.
+    pub coding: Coding,
+    /// Channels of a raw input, if it is the only one; several have one each.
+    pub channels: usize,
+    /// What is known of lost samples.
+    pub lost: Option<&'a LostSamples>,
+    /// Which input decides when the feed ends.
+    pub until: Until,
+}
+
+impl FeedOptions<'_> {
+    /// Files with headers, nothing lost.
+    pub fn files() -> Self {
+        Self { coding: Coding::Wav, channels: 1, lost: None, until: Until::Shortest }
+    }
 }
 
 /// What happened while waiting for ticks.
@@ -52,7 +64,7 @@ struct Shape {
 pub enum Arrival {
     /// So many ticks are there, at least 1.
     Ticks(usize),
-    /// One of the inputs has ended.
+    /// The inputs have ended.
     End,
     /// The stop channel spoke.
     Stopped,
@@ -61,12 +73,11 @@ pub enum Arrival {
 /// One input, seen from the consumer.
 struct Input {
     name: String,
-    shape: Shape,
-    full: Receiver<Result<Message, IoError>>,
+    lane: Lane,
+    said: Receiver<Result<Said, IoError>>,
     free: Sender<Vec<u8>>,
-    /// The block in use: bytes, how many are filled and how many are used up.
-    block: Option<(Vec<u8>, usize, usize)>,
-    ended: bool,
+    /// When its frames were taken, as far as the input itself knows.
+    sequence: Sequence,
     notes: Vec<String>,
 }
 
@@ -74,42 +85,55 @@ struct Input {
 pub struct Feed {
     inputs: Vec<Input>,
     stop: Receiver<()>,
+    until: Until,
+    /// Ticks at hand.
+    ready: usize,
+    ticks: u64,
 }
 
 impl Feed {
-    /// Starts reading. One path is an input with all `channels`, interleaved; several are one channel
-    /// each. `-` is standard input. With [`Coding::Wav`] this waits for the headers.
+    /// Starts reading and waits for the headers. `-` is standard input. A name that ends in sigmf-meta or
+    /// sigmf-data is a SigMF recording, everything else is as [`FeedOptions::coding`] says. Time counts from the
+    /// earliest sample whose number is known: inputs that join late begin with lost samples.
     ///
     /// # Errors
-    /// [`IoError`] for a header that is not plain PCM; `Ok(None)` if `stop` spoke first.
+    /// [`IoError`] for what cannot be read or is not plain PCM, and for lost samples that do not fit the inputs;
+    /// `Ok(None)` if `stop` spoke first.
     pub fn start(
         paths: &[PathBuf],
-        coding: Coding,
-        channels: usize,
+        options: FeedOptions<'_>,
         stop: Receiver<()>,
     ) -> Result<Option<Self>, IoError> {
-        let each = if paths.len() == 1 { channels } else { 1 };
-        let mut feed = Self { inputs: Vec::new(), stop };
+        let channels = if paths.len() == 1 { options.channels } else { 1 };
+        let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).clamp(4096, BLOCK_BYTES);
         // All threads first: opening a FIFO waits for its writer, in whatever order they come.
-        for path in paths {
-            feed.inputs.push(spawn(path, coding, each));
-        }
+        let spawn =
+            |path: &PathBuf| spawn(Opening { path: path.clone(), coding: options.coding, channels, block });
+        let inputs = paths.iter().map(spawn).collect();
+        let mut feed = Self { inputs, stop, until: options.until, ready: 0, ticks: 0 };
         for i in 0..paths.len() {
-            if feed.wait_for(i)? == Arrival::Stopped {
+            if !feed.hear(i)? {
                 return Ok(None);
             }
         }
+        feed.place_in_time(options.lost)?;
         Ok(Some(feed))
     }
 
     /// N, the channels of all inputs together.
     pub fn channels(&self) -> usize {
-        self.inputs.iter().map(|input| input.shape.channels).sum()
+        self.headers().map(|(_, channels, _)| channels).sum()
     }
 
-    /// Name, channels and sample rate (where a header says) of each input.
-    pub fn headers(&self) -> impl Iterator<Item = (&str, usize, Option<u32>)> {
-        self.inputs.iter().map(|input| (input.name.as_str(), input.shape.channels, input.shape.rate))
+    /// Name, channels and sample rate (hertz, where a header says) of each input.
+    pub fn headers(&self) -> impl Iterator<Item = (&str, usize, Option<f64>)> {
+        let shape = |input: &Input| input.lane.shape;
+        self.inputs.iter().map(move |input| (input.name.as_str(), shape(input).channels, shape(input).rate))
+    }
+
+    /// Ticks that the headers promise, if any of them says.
+    pub fn promised_ticks(&self) -> Option<u64> {
+        self.inputs.iter().filter_map(|input| input.lane.shape.promised).min()
     }
 
     /// Waits until every input has a tick.
@@ -118,200 +142,164 @@ impl Feed {
     /// The system's refusal to read one of them.
     pub fn wait(&mut self) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
-            while self.inputs[i].frames().frames() == 0 {
-                if self.inputs[i].ended {
-                    return Ok(Arrival::End);
-                }
-                if self.wait_for(i)? == Arrival::Stopped {
+            while self.inputs[i].lane.waits() {
+                if !self.hear(i)? {
                     return Ok(Arrival::Stopped);
                 }
             }
         }
-        Ok(Arrival::Ticks(self.inputs.iter().map(|input| input.frames().frames()).min().unwrap_or(0)))
+        let lanes = || self.inputs.iter().map(|input| &input.lane);
+        let over = lanes().filter(|lane| lane.is_over()).count();
+        let end = if self.until == Until::Shortest { over > 0 } else { over == self.inputs.len() };
+        if end {
+            self.ready = 0;
+            return Ok(Arrival::End);
+        }
+        self.ready = lanes().filter(|lane| !lane.is_over()).map(Lane::ready).min().unwrap_or(0);
+        self.inputs.iter_mut().for_each(|input| input.lane.prepare(self.ready));
+        Ok(Arrival::Ticks(self.ready))
     }
 
-    /// The ticks that are there, as many as [`Feed::wait`] said.
+    /// The ticks that are there, as many as [`Feed::wait`] said. Lost samples are NaN.
     pub fn frames(&self) -> Vec<PcmFrames<'_>> {
-        self.inputs.iter().map(Input::frames).collect()
+        self.inputs.iter().map(|input| input.lane.view(self.ready)).collect()
     }
 
-    /// Gives back the first `ticks` ticks.
+    /// Gives back the first `ticks` ticks, at most those that are there.
     pub fn consume(&mut self, ticks: usize) {
-        self.inputs.iter_mut().for_each(|input| input.consume(ticks));
+        let ticks = ticks.min(self.ready);
+        self.inputs.iter_mut().for_each(|input| input.advance(ticks));
+        self.ready = 0;
+        self.ticks += ticks as u64;
+    }
+
+    /// Ticks consumed.
+    pub fn ticks(&self) -> u64 {
+        self.ticks
     }
 
     /// What had to be tolerated so far.
     pub fn notes(&self) -> Vec<String> {
-        let named = |input: &Input, note: &str| format!("{}: {note}", input.name);
-        let faults =
-            self.inputs.iter().flat_map(|input| input.notes.iter().map(move |note| named(input, note)));
-        let left = self.inputs.iter().filter(|input| input.frames().frames() > 0).map(|input| {
-            let frames = input.frames().frames();
-            named(input, &format!("another input ended first, at least {frames} samples a channel were left"))
-        });
-        faults.chain(left).collect()
+        let one_ended = self.inputs.iter().any(|input| input.lane.is_over());
+        let named = |input: &Input| {
+            let name = input.name.clone();
+            let left = if one_ended { input.left() } else { None };
+            input.faults().chain(left).map(move |note| format!("{name}: {note}")).collect::<Vec<_>>()
+        };
+        self.inputs.iter().flat_map(named).collect()
     }
 
-    /// Takes one message of input i.
-    fn wait_for(&mut self, i: usize) -> Result<Arrival, IoError> {
+    /// Waits for what input i has to say next; false if `stop` spoke first.
+    fn hear(&mut self, i: usize) -> Result<bool, IoError> {
         let input = &mut self.inputs[i];
         select! {
-            recv(input.full) -> message => match message {
-                Ok(message) => input.take(message?),
-                Err(_) => input.ended = true,
+            recv(input.said) -> said => match said {
+                Ok(said) => input.take(said?),
+                Err(_) => input.lane.end(),
             },
-            recv(self.stop) -> _ => return Ok(Arrival::Stopped),
+            recv(self.stop) -> _ => return Ok(false),
         }
-        Ok(Arrival::Ticks(0))
-    }
-}
-
-impl Input {
-    fn frames(&self) -> PcmFrames<'_> {
-        let bytes = self.block.as_ref().map_or(&[][..], |(bytes, filled, used)| &bytes[*used..*filled]);
-        PcmFrames { layout: self.shape.layout, channels: self.shape.channels, bytes }
+        Ok(true)
     }
 
-    fn take(&mut self, message: Message) {
-        match message {
-            Message::Shape(shape) => self.shape = shape,
-            Message::Frames { bytes, filled } => self.block = Some((bytes, filled, 0)),
-            Message::End { notes } => {
-                self.ended = true;
-                self.notes = notes;
-            }
-        }
-    }
-
-    fn consume(&mut self, ticks: usize) {
-        let size = self.frames().frame_bytes();
-        if let Some((_, filled, used)) = &mut self.block {
-            *used += ticks * size;
-            if *used < *filled {
-                return;
-            }
-        }
-        if let Some((bytes, _, _)) = self.block.take() {
-            // A thread that has ended needs no blocks.
-            let _ = self.free.send(bytes);
-        }
-    }
-}
-
-fn spawn(path: &Path, coding: Coding, channels: usize) -> Input {
-    let (full_in, full) = bounded(BLOCKS + 2);
-    let (free, free_out) = bounded(BLOCKS);
-    let name = if path.as_os_str() == "-" { "standard input".into() } else { path.display().to_string() };
-    let format = if let Coding::Raw(format) = coding { format } else { PcmFormat::F32Le };
-    let shape = Shape { layout: SampleLayout::packed(format), channels, rate: None };
-    let reader = Reader { path: path.to_owned(), name: name.clone(), full: full_in, free: free_out };
-    (0..BLOCKS).for_each(|_| {
-        // The channel has room for all blocks.
-        let _ = free.send(Vec::new());
-    });
-    thread::spawn(move || reader.run(coding, shape));
-    Input { name, shape, full, free, block: None, ended: false, notes: Vec::new() }
-}
-
-/// The thread's side of an input.
-struct Reader {
-    path: PathBuf,
-    name: String,
-    full: Sender<Result<Message, IoError>>,
-    free: Receiver<Vec<u8>>,
-}
-
-impl Reader {
-    fn run(self, coding: Coding, shape: Shape) {
-        let end = match coding {
-            Coding::Raw(_) => self.read_raw(shape),
-            Coding::Wav => self.read_wav(),
+    /// One time axis for all inputs.
+    fn place_in_time(&mut self, told: Option<&LostSamples>) -> Result<(), IoError> {
+        let channels: Vec<_> = self.headers().map(|(_, channels, _)| channels).collect();
+        let lost = match told {
+            Some(told) => told.of_inputs(&channels)?,
+            None => vec![LostOfInput::default(); channels.len()],
         };
-        // If nobody listens any more there is nobody to tell.
-        let _ = self.full.send(end);
-    }
-
-    fn open(&self) -> Result<Box<dyn Read>, IoError> {
-        if self.path.as_os_str() == "-" {
-            return Ok(Box::new(stdin_file().map_err(IoError::system(&self.name, "open it"))?));
+        let mut inputs: Vec<_> = self.inputs.iter_mut().zip(lost).collect();
+        for (input, lost) in &mut inputs {
+            input.take_sequence(lost)?;
         }
-        let file = File::open(&self.path).map_err(IoError::system(&self.name, "open it"))?;
-        widen_pipe(&file);
-        Ok(Box::new(file))
-    }
-
-    fn read_raw(&self, shape: Shape) -> Result<Message, IoError> {
-        // Sent before opening, which may have to wait for a writer.
-        let _ = self.full.send(Ok(Message::Shape(shape)));
-        let mut frames = FrameReader::new(self.open()?, shape.layout.container * shape.channels, None);
-        self.pump(&mut frames)?;
-        let cut = frames.cut_bytes();
-        let note = format!("the last frame is cut ({cut} bytes of it are there) and was left out");
-        Ok(Message::End { notes: Vec::from_iter((cut > 0).then_some(note)) })
-    }
-
-    fn read_wav(&self) -> Result<Message, IoError> {
-        let mut reader = WavReader::new(self.open()?, &self.name)?;
-        let WavHeader { layout, channels, rate, .. } = *reader.header();
-        let _ = self.full.send(Ok(Message::Shape(Shape { layout, channels, rate: Some(rate) })));
-        self.pump(reader.frames())?;
-        Ok(Message::End { notes: reader.notes().iter().map(ToString::to_string).collect() })
-    }
-
-    /// Frames to the consumer until the end, or until the consumer is gone.
-    fn pump(&self, frames: &mut FrameReader<impl Read>) -> Result<(), IoError> {
-        while let Ok(mut bytes) = self.free.recv() {
-            bytes.resize(BLOCK_BYTES.max(frames.frame_bytes()), 0);
-            let filled =
-                frames.take_ready(&mut bytes).map_err(IoError::system(&self.name, "read the samples"))?;
-            if filled == 0 || self.full.send(Ok(Message::Frames { bytes, filled })).is_err() {
-                break;
-            }
+        let origin = inputs.iter().filter_map(|(_, lost)| lost.sequence.beginning()).min().unwrap_or(0);
+        for (input, lost) in inputs {
+            let stretches = lost.sequence.stretches(origin);
+            let stretches = stretches.map_err(|problem| input.out_of_time(problem))?;
+            input.lane.lose(stretches, lost);
         }
         Ok(())
     }
 }
 
-/// Standard input without the buffer that the library's handle shares between threads.
-#[cfg(unix)]
-fn stdin_file() -> io::Result<File> {
-    use std::os::fd::AsFd;
-    let file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
-    widen_pipe(&file);
-    Ok(file)
+impl Input {
+    fn take(&mut self, said: Said) {
+        match said {
+            Said::Shape { shape, sequence } => {
+                self.lane = Lane::new(shape);
+                self.sequence = sequence;
+            }
+            Said::Frames { bytes, filled } => {
+                let used = self.lane.refill(Block { bytes, filled });
+                self.give_back(used);
+            }
+            Said::End { notes } => {
+                self.lane.end();
+                self.notes = notes;
+            }
+        }
+    }
+
+    fn advance(&mut self, ticks: usize) {
+        self.lane.advance(ticks);
+        if let Some(used) = self.lane.take_used() {
+            self.give_back(used);
+        }
+    }
+
+    fn give_back(&self, block: Block) {
+        if !block.bytes.is_empty() {
+            // A thread that has ended needs no blocks.
+            let _ = self.free.send(block.bytes);
+        }
+    }
+
+    /// The input's own sequence goes with what is told beside it, but not against it.
+    fn take_sequence(&mut self, lost: &mut LostOfInput) -> Result<(), IoError> {
+        if self.sequence.is_empty() {
+            return Ok(());
+        }
+        if !lost.sequence.is_empty() {
+            return Err(
+                self.out_of_time("it has captures of its own; leave out the lines with sample_start".into())
+            );
+        }
+        lost.sequence = std::mem::take(&mut self.sequence);
+        Ok(())
+    }
+
+    fn out_of_time(&self, problem: String) -> IoError {
+        IoError::Lost { file: self.name.clone(), problem }
+    }
+
+    fn faults(&self) -> impl Iterator<Item = String> {
+        let ended = self.lane.is_over();
+        let unreached = "it ends before the last of the samples whose number is told";
+        let unreached = (ended && self.lane.has_unreached_stretches()).then(|| unreached.into());
+        self.notes.iter().cloned().chain(unreached)
+    }
+
+    /// Frames that nobody used.
+    fn left(&self) -> Option<String> {
+        let seen = self.lane.seen();
+        let promised = if self.lane.is_over() { None } else { self.lane.shape.promised };
+        let left = promised.unwrap_or(0).max(seen) - (seen - self.lane.left() as u64);
+        let at_least = if promised.is_some() || self.lane.ended() { "" } else { "at least " };
+        let what = "longer than the shortest channel";
+        (left > 0).then(|| format!("{what}, {at_least}{left} samples a channel were left"))
+    }
 }
 
-#[cfg(not(unix))]
-fn stdin_file() -> io::Result<io::Stdin> {
-    Ok(io::stdin())
+fn spawn(opening: Opening) -> Input {
+    let (say, said) = bounded(BLOCKS + 2);
+    let (free, free_out) = bounded(BLOCKS);
+    (0..BLOCKS).for_each(|_| {
+        // The channel has room for all blocks.
+        let _ = free.send(Vec::new());
+    });
+    let name = opening.name();
+    let lane = Lane::new(opening.raw_shape());
+    thread::spawn(move || read(opening, say, free_out));
+    Input { name, lane, said, free, sequence: Sequence::default(), notes: Vec::new() }
 }
-
-/// Standard output without line buffering.
-///
-/// # Errors
-/// The system's refusal to duplicate the descriptor.
-#[cfg(unix)]
-pub fn stdout_file() -> io::Result<File> {
-    use std::os::fd::AsFd;
-    let file = File::from(io::stdout().as_fd().try_clone_to_owned()?);
-    widen_pipe(&file);
-    Ok(file)
-}
-
-/// Standard output.
-///
-/// # Errors
-/// None here.
-#[cfg(not(unix))]
-pub fn stdout_file() -> io::Result<io::Stdout> {
-    Ok(io::stdout())
-}
-
-/// Files that are no pipes, and systems that refuse, stay as they are.
-#[cfg(target_os = "linux")]
-fn widen_pipe(file: &File) {
-    let _ = rustix::pipe::fcntl_setpipe_size(file, PIPE_BYTES);
-}
-
-#[cfg(not(target_os = "linux"))]
-fn widen_pipe(_: &File) {}

@@ -1,24 +1,30 @@
-//! Samples in and out: WAV, raw PCM, whole-file writers.
+//! Samples in and out: WAV, SigMF, raw PCM, what is known of lost samples, whole-file writers.
 //!
 //! Words: a *frame* holds one sample of each channel of a file or stream; a sample is stored in
 //! one of the [`PcmFormat`]s; integer formats are full scale = 1.0.
 
 mod atomic;
-mod capture;
 mod error;
 mod feed;
 mod frames;
+mod lane;
+mod lost;
 mod pcm;
 mod pcm_frames;
+mod pipe;
+mod reader;
+mod sequence;
 mod sigmf;
 pub mod wav;
 
 pub use atomic::AtomicFile;
-pub use capture::{Capture, CaptureNote};
 pub use error::IoError;
-pub use feed::{Arrival, Coding, Feed, stdout_file};
+pub use feed::{Arrival, Coding, Feed, FeedOptions, Until};
 pub use frames::FrameReader;
+pub use lost::LostSamples;
 pub(crate) use pcm::for_pcm_format;
 pub use pcm::{ParsePcmFormatError, PcmFormat};
 pub use pcm_frames::{PcmFrames, SampleLayout};
+pub use pipe::stdout_file;
+pub use sequence::MOST_LOST;
 pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta};

@@ -1,6 +1,7 @@
 //! Frames of PCM in memory.
 
 use super::PcmFormat;
+use std::ops::Range;
 
 /// How the samples of a frame lie in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,7 +30,7 @@ pub struct PcmFrames<'a> {
     pub bytes: &'a [u8],
 }
 
-impl PcmFrames<'_> {
+impl<'a> PcmFrames<'a> {
     /// Bytes a frame.
     pub fn frame_bytes(&self) -> usize {
         (self.layout.container * self.channels).max(1)
@@ -39,4 +40,30 @@ impl PcmFrames<'_> {
     pub fn frames(&self) -> usize {
         self.bytes.len() / self.frame_bytes()
     }
+
+    /// Some of the frames.
+    ///
+    /// # Panics
+    /// If the range goes beyond them.
+    pub fn range(&self, frames: Range<usize>) -> PcmFrames<'a> {
+        let size = self.frame_bytes();
+        PcmFrames { bytes: &self.bytes[frames.start * size..frames.end * size], ..*self }
+    }
+
+    /// True if no sample is NaN or infinite; integers never are.
+    pub fn is_finite(&self) -> bool {
+        match self.layout.format {
+            PcmFormat::F32Le => all_finite(self.bytes, |b| u32::from_le_bytes(b) << 1 < 0xFF00_0000),
+            PcmFormat::F32Be => all_finite(self.bytes, |b| u32::from_be_bytes(b) << 1 < 0xFF00_0000),
+            PcmFormat::F64Le => all_finite(self.bytes, |b| u64::from_le_bytes(b) << 1 < 0xFFE0 << 48),
+            PcmFormat::F64Be => all_finite(self.bytes, |b| u64::from_be_bytes(b) << 1 < 0xFFE0 << 48),
+            _ => true,
+        }
+    }
+}
+
+/// Samples that lie close together, in blocks without an early end, so that each becomes one vector loop.
+fn all_finite<const B: usize>(bytes: &[u8], finite: impl Fn([u8; B]) -> bool) -> bool {
+    let (samples, _) = bytes.as_chunks::<B>();
+    samples.chunks(1024).all(|block| block.iter().fold(true, |all, &sample| all & finite(sample)))
 }

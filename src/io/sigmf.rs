@@ -1,17 +1,15 @@
-//! SigMF recordings: a metadata file beside a file of raw samples.
+//! The metadata of SigMF recordings, which lies beside a file of raw samples.
 //!
 //! Real samples only, one or several interleaved channels. Captures whose `core:global_index` runs
-//! ahead of their `core:sample_start` tell of samples that were lost; they come out as NaN, so
-//! that the channels stay in step.
+//! ahead of their `core:sample_start` tell of samples that were lost.
 
-use super::{FrameReader, IoError, PcmFormat};
+use super::sequence::{Anchor, Sequence};
+use super::{IoError, PcmFormat};
 use serde::{Deserialize, Serialize};
-use std::collections::VecDeque;
-use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// Frames converted at a time where samples are missing.
-const BLOCK_FRAMES: usize = 1024;
+/// Interleaved channels that are read at most, as many as a WAV header can say.
+const MOST_CHANNELS: usize = 65_535;
 
 /// The part of a SigMF metadata file that matters here; other keys are passed over.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,6 +39,9 @@ pub struct SigmfGlobal {
     /// Name of the sample file, if it is not the metadata's own with the ending sigmf-data.
     #[serde(rename = "core:dataset", default, skip_serializing_if = "Option::is_none")]
     pub dataset: Option<String>,
+    /// Number of the file's first frame, where a recording was split into several files.
+    #[serde(rename = "core:offset", default, skip_serializing_if = "is_zero")]
+    pub offset: u64,
     /// Version of SigMF.
     #[serde(rename = "core:version", default)]
     pub version: String,
@@ -55,14 +56,13 @@ pub struct SigmfCapture {
     /// Its first frame counted at the converter, where lost ones count too.
     #[serde(rename = "core:global_index", default, skip_serializing_if = "Option::is_none")]
     pub global_index: Option<u64>,
+    /// Bytes before the capture's first frame that are not samples; only 0 is read.
+    #[serde(rename = "core:header_bytes", default, skip_serializing_if = "is_zero")]
+    pub header_bytes: u64,
 }
 
-/// Samples without a break, or a gap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Segment {
-    Missing(u64),
-    /// Until the next capture, or until the end.
-    Frames(Option<u64>),
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 impl SigmfMeta {
@@ -75,9 +75,10 @@ impl SigmfMeta {
                 sample_rate: Some(rate),
                 num_channels: Some(1),
                 dataset: None,
+                offset: 0,
                 version: "1.0.0".into(),
             },
-            captures: vec![SigmfCapture { sample_start: 0, global_index: None }],
+            captures: vec![SigmfCapture { sample_start: 0, global_index: None, header_bytes: 0 }],
             annotations: [],
         }
     }
@@ -89,7 +90,27 @@ impl SigmfMeta {
     pub fn read(path: &Path) -> Result<Self, IoError> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(IoError::system(&name, "read it"))?;
-        serde_json::from_str(&text).map_err(|error| IoError::Sigmf { file: name, problem: error.to_string() })
+        Self::parse(&text, &name)
+    }
+
+    /// As [`SigmfMeta::read`], from text; `file` is the name for complaints.
+    ///
+    /// # Errors
+    /// [`IoError::Sigmf`] if it is not what it should be, down to data type and captures.
+    pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
+        let fault = |problem| IoError::Sigmf { file: file.to_owned(), problem };
+        let meta: Self = serde_json::from_str(text).map_err(|error| fault(error.to_string()))?;
+        meta.format(file)?;
+        meta.sequence(file)?;
+        match (meta.global.num_channels, meta.global.sample_rate) {
+            (Some(count), _) if !(1..=MOST_CHANNELS).contains(&count) => {
+                Err(fault(format!("core:num_channels is {count}; it may be 1 to {MOST_CHANNELS}")))
+            }
+            (_, Some(rate)) if !(rate.is_finite() && rate > 0.0) => {
+                Err(fault(format!("core:sample_rate is {rate}; a rate is greater than 0 Hz")))
+            }
+            _ => Ok(meta),
+        }
     }
 
     /// The sample format of the data type.
@@ -109,34 +130,25 @@ impl SigmfMeta {
             })
     }
 
-    /// The converter's count of the first frame.
-    pub(super) fn first_index(&self) -> u64 {
-        self.captures.first().and_then(|capture| capture.global_index).unwrap_or(0)
-    }
-
-    /// Frames and gaps in their order, counted from `origin`.
-    fn segments(&self, file: &str, origin: u64) -> Result<VecDeque<Segment>, IoError> {
-        let mut segments = VecDeque::new();
-        let (mut in_file, mut in_time) = (0, origin);
-        for capture in &self.captures {
-            let disorder = || IoError::Sigmf {
-                file: file.to_owned(),
-                problem: format!(
-                    "the capture at core:sample_start {} lies before the end of the one before it; captures must be in order and must not overlap",
-                    capture.sample_start
-                ),
-            };
-            let frames = capture.sample_start.checked_sub(in_file).ok_or_else(disorder)?;
-            in_time += frames;
-            let missing =
-                capture.global_index.unwrap_or(in_time).checked_sub(in_time).ok_or_else(disorder)?;
-            in_time += missing;
-            in_file = capture.sample_start;
-            segments.extend((frames > 0).then_some(Segment::Frames(Some(frames))));
-            segments.extend((missing > 0).then_some(Segment::Missing(missing)));
+    /// When the frames of the sample file were taken.
+    pub(super) fn sequence(&self, file: &str) -> Result<Sequence, IoError> {
+        let fault = |problem| IoError::Sigmf { file: file.to_owned(), problem };
+        if !self.captures.is_sorted_by_key(|capture| capture.sample_start) {
+            return Err(fault("the captures are not in the order of their core:sample_start".into()));
         }
-        segments.push_back(Segment::Frames(None));
-        Ok(segments)
+        if self.captures.iter().any(|capture| capture.header_bytes > 0) {
+            return Err(fault(
+                "captures with core:header_bytes hold more than samples; convert the recording to a conforming one".into(),
+            ));
+        }
+        let offset = self.global.offset;
+        let anchors = self.captures.iter().filter_map(|capture| {
+            let frame = capture.sample_start.checked_sub(offset);
+            capture.global_index.map(|index| frame.map(|frame| Anchor { frame, index }))
+        });
+        let before = || fault(format!("a capture begins before core:offset {offset}"));
+        let anchors = anchors.collect::<Option<Vec<_>>>().ok_or_else(before)?;
+        Sequence::new(anchors).map_err(fault)
     }
 }
 
@@ -163,120 +175,16 @@ pub(super) fn is_sigmf(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "sigmf-meta" || extension == "sigmf-data")
 }
 
-/// The samples as f64le bytes, with NaN for each one that was lost.
-#[derive(Debug)]
-pub(super) struct Timeline<R> {
-    frames: FrameReader<R>,
-    format: PcmFormat,
-    channels: usize,
-    segments: VecDeque<Segment>,
-    raw: Vec<u8>,
-    /// Bytes that are ready, and how many of them were taken.
-    ready: Vec<u8>,
-    taken: usize,
-}
-
-impl<R: Read> Timeline<R> {
-    /// `Ok(Err(inner))` gives the source back if nothing is missing.
-    pub(super) fn new(
-        inner: R,
-        meta: &SigmfMeta,
-        format: PcmFormat,
-        channels: usize,
-        file: &str,
-        origin: u64,
-    ) -> Result<Result<Self, R>, IoError> {
-        let segments = meta.segments(file, origin)?;
-        if segments.iter().all(|segment| matches!(segment, Segment::Frames(_))) {
-            return Ok(Err(inner));
-        }
-        let frames = FrameReader::new(inner, format.bytes() * channels, None);
-        Ok(Ok(Self { frames, format, channels, segments, raw: Vec::new(), ready: Vec::new(), taken: 0 }))
-    }
-
-    /// Makes the next frames ready; leaves none at the end.
-    fn refill(&mut self) -> io::Result<()> {
-        self.ready.clear();
-        self.taken = 0;
-        while self.ready.is_empty() {
-            let Some(segment) = self.segments.pop_front() else { return Ok(()) };
-            match segment {
-                Segment::Missing(count) => {
-                    let frames = count.min(BLOCK_FRAMES as u64);
-                    self.put_back(Segment::Missing(count - frames), count > frames);
-                    let lost = std::iter::repeat_n(f64::NAN.to_le_bytes(), frames as usize * self.channels);
-                    self.ready.extend(lost.flatten());
-                }
-                Segment::Frames(count) => self.decode(count)?,
-            }
-        }
-        Ok(())
-    }
-
-    fn put_back(&mut self, segment: Segment, some_left: bool) {
-        if some_left {
-            self.segments.push_front(segment);
-        }
-    }
-
-    fn decode(&mut self, count: Option<u64>) -> io::Result<()> {
-        let want = count.map_or(BLOCK_FRAMES, |count| count.min(BLOCK_FRAMES as u64) as usize);
-        let size = self.format.bytes();
-        self.raw.resize(want * size * self.channels, 0);
-        let filled = self.frames.fill(&mut self.raw)?;
-        let got = filled / (size * self.channels);
-        let left = count.map(|count| count - got as u64);
-        // A file that ends before its last capture has no more of anything.
-        if got < want {
-            self.segments.clear();
-        } else {
-            self.put_back(Segment::Frames(left), left != Some(0));
-        }
-        let samples = self.raw[..filled].chunks_exact(size).map(|b| self.format.decode(b).to_le_bytes());
-        self.ready.extend(samples.flatten());
-        Ok(())
-    }
-}
-
-impl<R: Read> Read for Timeline<R> {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        if self.taken == self.ready.len() {
-            self.refill()?;
-        }
-        let count = bytes.len().min(self.ready.len() - self.taken);
-        bytes[..count].copy_from_slice(&self.ready[self.taken..self.taken + count]);
-        self.taken += count;
-        Ok(count)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn meta(datatype: &str, captures: &[(u64, Option<u64>)]) -> SigmfMeta {
-        let captures: Vec<_> = captures
-            .iter()
-            .map(|&(sample_start, global_index)| SigmfCapture { sample_start, global_index })
-            .collect();
+        let capture =
+            |&(sample_start, global_index): &_| SigmfCapture { sample_start, global_index, header_bytes: 0 };
         let mut meta = SigmfMeta::for_output(PcmFormat::F32Le, 1.0);
         meta.global.datatype = datatype.into();
-        SigmfMeta { captures, ..meta }
-    }
-
-    fn read(
-        meta: &SigmfMeta,
-        samples: std::ops::Range<i16>,
-        channels: usize,
-        origin: u64,
-    ) -> Vec<Option<i16>> {
-        let bytes: Vec<u8> = samples.flat_map(i16::to_be_bytes).collect();
-        let mut timeline =
-            Timeline::new(&bytes[..], meta, PcmFormat::S16Be, channels, "test", origin).unwrap().unwrap();
-        let mut out = Vec::new();
-        timeline.read_to_end(&mut out).unwrap();
-        let value = |b: &[u8]| PcmFormat::F64Le.decode(b);
-        out.chunks_exact(8).map(value).map(|x| x.is_finite().then_some((x * 32768.0) as i16)).collect()
+        SigmfMeta { captures: captures.iter().map(capture).collect(), ..meta }
     }
 
     #[test]
@@ -295,34 +203,38 @@ mod tests {
     }
 
     #[test]
-    fn lost_samples_come_out_as_nan() {
-        let meta = meta("ri16_be", &[(0, Some(100)), (3, Some(105)), (5, Some(3000))]);
-        let got = read(&meta, 0..14, 2, 98);
-        // Two frames late, two lost after three, then up to 3000.
-        let mut want = vec![None; 4];
-        want.extend((0..6).map(Some));
-        want.extend([None; 4]);
-        want.extend((6..10).map(Some));
-        want.extend(vec![None; 2 * (3000 - 107)]);
-        want.extend((10..14).map(Some));
-        assert_eq!(got, want);
+    fn captures_with_an_index_are_the_sequence() {
+        let anchor = |frame, index| Anchor { frame, index };
+        let mut recording = meta("ri8", &[(10, Some(100)), (12, None), (15, Some(107))]);
+        assert_eq!(
+            recording.sequence("test").unwrap(),
+            Sequence::new(vec![anchor(10, 100), anchor(15, 107)]).unwrap()
+        );
+        // Sample numbers of a recording that was split count from its offset.
+        recording.global.offset = 10;
+        assert_eq!(
+            recording.sequence("test").unwrap(),
+            Sequence::new(vec![anchor(0, 100), anchor(5, 107)]).unwrap()
+        );
+        assert!(meta("ri8", &[(0, None), (5, None)]).sequence("test").unwrap().is_empty());
     }
 
     #[test]
-    fn captures_without_a_break_change_nothing() {
-        for captures in [&[][..], &[(0, None)], &[(0, Some(7)), (4, None), (9, Some(16))]] {
-            let meta = meta("ri16_be", captures);
-            let whole = Timeline::new(&[1u8, 2][..], &meta, PcmFormat::S16Be, 1, "test", meta.first_index());
-            assert_eq!(whole.unwrap().unwrap_err(), [1, 2]);
+    fn captures_that_cannot_be_are_refused() {
+        let refused = |recording: SigmfMeta| recording.sequence("test").unwrap_err().to_string();
+        let overlap = refused(meta("ri8", &[(0, Some(5)), (4, Some(6))]));
+        assert!(overlap.contains("must not overlap"), "{overlap}");
+        let disorder = refused(meta("ri8", &[(4, None), (2, None)]));
+        assert!(disorder.contains("not in the order"), "{disorder}");
+        let mut recording = meta("ri8", &[(4, Some(9))]);
+        recording.global.offset = 5;
+        assert!(refused(recording.clone()).contains("before core:offset 5"));
+        recording.captures[0].header_bytes = 16;
+        for (key, value) in [("num_channels", "0"), ("num_channels", "99999999"), ("sample_rate", "-1")] {
+            let text = format!(r#"{{"global":{{"core:datatype":"ri8","core:{key}":{value}}}}}"#);
+            let error = SigmfMeta::parse(&text, "test").unwrap_err().to_string();
+            assert!(error.starts_with("test: ") && error.contains(key), "{error}");
         }
-    }
-
-    #[test]
-    fn captures_that_overlap_are_refused() {
-        for captures in [&[(0, Some(5)), (4, Some(6))][..], &[(4, None), (2, None)]] {
-            let refused =
-                Timeline::new(&[][..], &meta("ri8", captures), PcmFormat::S8, 1, "test", 0).unwrap_err();
-            assert!(refused.to_string().contains("must not overlap"), "{refused}");
-        }
+        assert!(refused(recording).contains("core:header_bytes"));
     }
 }

@@ -7,6 +7,8 @@
 
 use super::BuildError;
 use crate::bank::{Bank, SynthesisFilters};
+use crate::io::{PcmFormat, PcmFrames, SampleLayout};
+use std::borrow::Cow;
 use std::collections::VecDeque;
 
 /// Gaps that a report lists one by one; more are only counted, so that memory stays bounded.
@@ -47,6 +49,9 @@ pub struct GapFiller {
     tick: u64,
     /// Ticks that still matter, the newest first: the channels that were missing.
     recent: VecDeque<Vec<usize>>,
+    /// A block as numbers and as bytes.
+    numbers: Vec<f64>,
+    bytes: Vec<u8>,
 }
 
 impl GapFiller {
@@ -76,6 +81,8 @@ impl GapFiller {
             missing: 0,
             tick: 0,
             recent: VecDeque::new(),
+            numbers: Vec::new(),
+            bytes: Vec::new(),
         })
     }
 
@@ -88,6 +95,29 @@ impl GapFiller {
             self.mark(missing, mask);
             self.tick += 1;
         }
+    }
+
+    /// As [`GapFiller::fill`], for samples as they lie in files and pipes: the channels are those of all
+    /// `frames` one after another. Frames without gaps are given back as they are.
+    pub fn fill_pcm<'a>(
+        &'a mut self,
+        frames: &'a [PcmFrames<'a>],
+        mask: &mut Vec<u8>,
+    ) -> Cow<'a, [PcmFrames<'a>]> {
+        let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
+        if self.is_at_rest() && frames.iter().all(|part| part.range(0..ticks).is_finite()) {
+            self.pass(frames, ticks, mask);
+            return Cow::Borrowed(frames);
+        }
+        let mut numbers = std::mem::take(&mut self.numbers);
+        numbers.clear();
+        (0..ticks).for_each(|k| decode_tick(frames, k, &mut numbers));
+        self.fill(&mut numbers, mask);
+        self.bytes.clear();
+        self.bytes.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
+        self.numbers = numbers;
+        let layout = SampleLayout::packed(PcmFormat::F64Le);
+        Cow::Owned(vec![PcmFrames { layout, channels: self.channels.len(), bytes: &self.bytes }])
     }
 
     /// Closes the gaps that are open at the end.
@@ -110,6 +140,24 @@ impl GapFiller {
     /// How many samples were missing.
     pub fn missing(&self) -> u64 {
         self.missing
+    }
+
+    /// True if no gap is open and none can touch another output, or every output is touched for ever.
+    fn is_at_rest(&self) -> bool {
+        self.recent.is_empty() && self.channels.iter().all(|(_, gap)| gap.is_none())
+    }
+
+    /// Ticks without a gap, while at rest: only the last samples matter.
+    fn pass(&mut self, frames: &[PcmFrames<'_>], ticks: usize, mask: &mut Vec<u8>) {
+        let touched = self.touch.is_none() && self.missing > 0;
+        mask.clear();
+        mask.resize(ticks * self.ratio, u8::from(touched));
+        self.tick += ticks as u64;
+        let mut last = std::mem::take(&mut self.numbers);
+        last.clear();
+        (ticks.saturating_sub(1)..ticks).for_each(|k| decode_tick(frames, k, &mut last));
+        self.channels.iter_mut().zip(&last).for_each(|(channel, &sample)| channel.0 = sample);
+        self.numbers = last;
     }
 
     /// Fills one tick; returns the channels that were missing.
@@ -163,6 +211,15 @@ impl GapFiller {
     }
 }
 
+/// Appends tick k of all parts.
+fn decode_tick(frames: &[PcmFrames<'_>], k: usize, numbers: &mut Vec<f64>) {
+    for part in frames {
+        let frame = part.range(k..k + 1).bytes;
+        let samples = frame.chunks_exact(part.layout.container);
+        numbers.extend(samples.map(|sample| part.layout.format.decode(sample)));
+    }
+}
+
 /// For each lag j the phases p with f[p + jM] != 0.
 fn touched_phases(f: &[f64], ratio: usize) -> Vec<Vec<usize>> {
     let used = |taps: &[f64]| (0..taps.len()).filter(|&p| taps[p] != 0.0).collect();
@@ -174,6 +231,7 @@ mod tests {
     use super::super::Reconstructor;
     use super::super::tests::{Noise, fir_bank, random_taps};
     use super::*;
+    use crate::bank::BlockFilter;
 
     /// Ticks of N channels with a few runs of NaN.
     fn with_gaps(n: usize, ticks: usize, noise: &mut Noise) -> Vec<f64> {
@@ -236,6 +294,44 @@ mod tests {
             let mut filled = samples.clone();
             GapFiller::new(&bank, GapPolicy::Zero).unwrap().fill(&mut filled, &mut mask);
             assert_eq!(mask, differs, "{taps} taps, M = {m}");
+        }
+    }
+
+    #[test]
+    fn stored_samples_pass_untouched_or_as_the_same_numbers() {
+        let mut noise = Noise(13);
+        let samples = with_gaps(2, 200, &mut noise);
+        let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_be_bytes()).collect();
+        let layout = SampleLayout::packed(PcmFormat::F64Be);
+        let numbers = |parts: &[PcmFrames<'_>]| {
+            let mut numbers = Vec::new();
+            (0..parts[0].frames()).for_each(|k| decode_tick(parts, k, &mut numbers));
+            numbers
+        };
+        let fir = fir_bank(random_taps(2, 7, &mut noise), 3);
+        let (a, b, c, d) = Default::default();
+        let filter = BlockFilter { a, b, c, d };
+        let recursion = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir.clone() };
+        for bank in [fir, recursion] {
+            let mut want = samples.clone();
+            let mut want_mask = Vec::new();
+            let mut plain = GapFiller::new(&bank, GapPolicy::Hold).unwrap();
+            plain.fill(&mut want, &mut want_mask);
+            for block in [1, 7, 45, 200] {
+                let mut filler = GapFiller::new(&bank, GapPolicy::Hold).unwrap();
+                let (mut got, mut got_mask, mut untouched) = (Vec::new(), Vec::new(), 0);
+                for piece in bytes.chunks(block * 16) {
+                    let frames = [PcmFrames { layout, channels: 2, bytes: piece }];
+                    let mut mask = Vec::new();
+                    let filled = filler.fill_pcm(&frames, &mut mask);
+                    untouched += usize::from(matches!(filled, Cow::Borrowed(_)));
+                    got.extend(numbers(&filled));
+                    got_mask.extend(mask);
+                }
+                assert_eq!((got, got_mask), (want.clone(), want_mask.clone()), "blocks of {block}");
+                assert_eq!(filler.gaps(), plain.gaps());
+                assert!(untouched > 0 || block == 200, "blocks of {block}");
+            }
         }
     }
 }

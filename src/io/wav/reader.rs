@@ -62,14 +62,6 @@ impl<R: Read> WavReader<R> {
         Ok(Self { header, frames })
     }
 
-    /// Samples whose header was read elsewhere, until the end of `inner`.
-    pub(crate) fn headerless(inner: R, layout: SampleLayout, channels: usize, rate: u32) -> Self {
-        let header =
-            WavHeader { layout, channels, rate, data_bytes: None, data_offset: 0, justification_open: false };
-        let frames = FrameReader::new(Cursor::new(Vec::new()).chain(inner), header.frame_bytes(), None);
-        Self { header, frames }
-    }
-
     /// What the header says.
     pub fn header(&self) -> &WavHeader {
         &self.header
@@ -78,11 +70,6 @@ impl<R: Read> WavReader<R> {
     /// The frames.
     pub fn frames(&mut self) -> &mut FrameReader<impl Read + use<R>> {
         &mut self.frames
-    }
-
-    /// True once the samples are used up.
-    pub fn ended(&self) -> bool {
-        self.frames.ended()
     }
 
     /// What had to be tolerated; complete when the frames have ended.

@@ -1,0 +1,145 @@
+//! A run under way: ticks through gaps and filters into the output.
+
+use super::Failure;
+use super::gaps::{GapReport, GapStage};
+use super::output::FastWriter;
+use crate::io::{PcmFormat, PcmFrames, SampleLayout};
+use crate::runtime::{PcmOutput, PlanSummary, Reconstructor};
+
+/// Encoded output of one step at most.
+const STEP_BYTES: usize = 256 << 10;
+/// Ticks of zeros that flush at a time.
+const FLUSH_TICKS: usize = 256;
+
+/// What a run carries from block to block.
+pub(super) struct Fusing {
+    pub(super) stream: Reconstructor,
+    pub(super) gaps: Option<GapStage>,
+    pub(super) writer: FastWriter,
+    /// Output samples still to be dropped.
+    pub(super) skip: u64,
+    clipped: u64,
+    buffer: Vec<u8>,
+}
+
+/// What every verb that fuses reports.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct RunReport {
+    /// How the bank ran.
+    plan: PlanSummary,
+    channels: usize,
+    ratio: usize,
+    /// Fast samples written.
+    pub(super) samples: u64,
+    /// Output samples that saturated.
+    clipped: u64,
+    /// Input samples that were NaN or infinite and became 0.
+    replaced: u64,
+    /// Times that a recursion's state was not finite and began anew.
+    state_resets: u64,
+    /// Missing samples, if --gaps asked for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gaps: Option<GapReport>,
+    pub(super) warnings: Vec<String>,
+}
+
+impl Fusing {
+    /// Drops the first `skip` output samples.
+    pub(super) fn new(stream: Reconstructor, gaps: Option<GapStage>, writer: FastWriter, skip: u64) -> Self {
+        Self { stream, gaps, writer, skip, clipped: 0, buffer: Vec::new() }
+    }
+
+    /// Fuses ticks and writes what is not to be dropped, at most `limit` samples.
+    pub(super) fn fuse(&mut self, frames: &[PcmFrames<'_>], limit: u64) -> Result<(), Failure> {
+        let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
+        let step = (STEP_BYTES / self.stream.ratio() / self.writer.format().bytes()).max(1);
+        let mut limit = limit;
+        for first in (0..ticks).step_by(step) {
+            let count = step.min(ticks - first);
+            let some: Vec<_> = frames.iter().map(|part| part.range(first..first + count)).collect();
+            limit -= self.step(&some, limit)?;
+        }
+        Ok(())
+    }
+
+    /// One step; returns the samples written.
+    fn step(&mut self, frames: &[PcmFrames<'_>], limit: u64) -> Result<u64, Failure> {
+        let format = self.writer.format();
+        let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
+        self.buffer.resize(ticks * self.stream.ratio() * format.bytes(), 0);
+        let mut output = PcmOutput { format, bytes: &mut self.buffer, clipped: 0 };
+        let samples = match &mut self.gaps {
+            Some(stage) => self.stream.process_pcm(&stage.fill(frames), &mut output),
+            None => self.stream.process_pcm(frames, &mut output),
+        };
+        let samples = samples.map_err(Failure::input)? as u64;
+        self.clipped += output.clipped;
+        let skip = self.skip.min(samples);
+        self.skip -= skip;
+        let end = samples.min(skip.saturating_add(limit));
+        let range = skip as usize..end as usize;
+        if let Some(stage) = &mut self.gaps {
+            stage.write_mask(range.clone())?;
+        }
+        self.writer.write(&self.buffer[range.start * format.bytes()..range.end * format.bytes()])?;
+        Ok(end - skip)
+    }
+
+    /// Zeros until `samples` samples are written.
+    pub(super) fn flush(&mut self, samples: u64) -> Result<(), Failure> {
+        let layout = SampleLayout::packed(PcmFormat::F32Le);
+        let (channels, ratio) = (self.stream.channels(), self.stream.ratio() as u64);
+        let zeros = vec![0; FLUSH_TICKS * channels * 4];
+        while self.writer.samples() < samples {
+            let missing = samples - self.writer.samples();
+            let ticks = (missing + self.skip).div_ceil(ratio).min(FLUSH_TICKS as u64) as usize;
+            self.fuse(&[PcmFrames { layout, channels, bytes: &zeros[..ticks * channels * 4] }], missing)?;
+        }
+        Ok(())
+    }
+
+    /// What happened; `notes` are the faults of the inputs, and `lossless` is the option that would have kept
+    /// clipped samples. Gaps are also told on standard error.
+    pub(super) fn report(&mut self, notes: Vec<String>, lossless: &str) -> RunReport {
+        RunReport {
+            plan: self.stream.plan(),
+            channels: self.stream.channels(),
+            ratio: self.stream.ratio(),
+            samples: self.writer.samples(),
+            clipped: self.clipped,
+            replaced: self.stream.replaced(),
+            state_resets: self.stream.state_resets(),
+            gaps: self.gaps.as_mut().map(GapStage::report),
+            warnings: notes.into_iter().chain(self.tolerated(lossless)).collect(),
+        }
+    }
+
+    /// What the filters had to tolerate, in words.
+    fn tolerated(&self, lossless: &str) -> impl Iterator<Item = String> {
+        [
+            (self.stream.replaced(), "input samples were NaN or infinite and were replaced by 0".to_owned()),
+            (self.clipped, format!("output samples were clipped; {lossless} keeps them")),
+            (self.stream.state_resets(), "times the filter state was not finite and began anew".to_owned()),
+        ]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what}"))
+    }
+
+    /// Gives the outputs their names.
+    pub(super) fn finish(self) -> Result<(), Failure> {
+        self.writer.finish()?;
+        self.gaps.map_or(Ok(()), GapStage::close)
+    }
+}
+
+impl RunReport {
+    /// Tells the warnings, or makes the first of them an error.
+    pub(super) fn judge(&self, strict: bool) -> Result<(), Failure> {
+        if let (true, Some(first)) = (strict, self.warnings.first()) {
+            return Err(Failure::Input(format!("{first} (an error because of --strict)")));
+        }
+        self.warnings.iter().for_each(|warning| eprintln!("hybank: warning: {warning}"));
+        Ok(())
+    }
+}

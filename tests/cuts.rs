@@ -1,0 +1,156 @@
+//! The same bits however a stream is cut.
+
+mod support;
+
+use hybank::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
+use hybank::runtime::{Options, PcmOutput, Precision, Reconstructor};
+use hybank::spec::Method;
+use rand_cuts::Cuts;
+use std::io::{Read, Write};
+use support::{Desk, bytes, ticks};
+
+/// A generator whose stream never changes (Knuth's MMIX), and the pieces that it makes.
+mod rand_cuts {
+    pub struct Cuts(pub u64);
+
+    impl Cuts {
+        pub fn next(&mut self) -> u64 {
+            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            self.0 >> 33
+        }
+
+        /// Lengths that add up to `total`, short and long ones, with zeros among them.
+        pub fn of(&mut self, total: usize) -> Vec<usize> {
+            let mut cuts = Vec::new();
+            let mut left = total;
+            while left > 0 {
+                let longest = [1, 3, 40, total][self.next() as usize % 4];
+                let piece = (self.next() as usize % (longest + 1)).min(left);
+                cuts.push(piece);
+                left -= piece;
+            }
+            cuts
+        }
+    }
+}
+
+fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
+    Bank {
+        spec: None,
+        fast_period: 1.0,
+        ratio,
+        latency: 3,
+        method: Method::Fir,
+        delays: vec![0.0; channels],
+        filters,
+        gamma: Gamma::default(),
+    }
+}
+
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut cuts = Cuts(seed);
+    move || cuts.next() as f64 / (1u64 << 30) as f64 - 1.0
+}
+
+fn fir(channels: usize, ratio: usize, taps: usize) -> Bank {
+    let mut noise = noise(7);
+    let filter = |_| (0..taps).map(|_| noise()).collect();
+    bank(channels, ratio, SynthesisFilters::Fir((0..channels).map(filter).collect()))
+}
+
+fn recursion(channels: usize, ratio: usize, states: usize) -> Bank {
+    let mut noise = noise(8);
+    let mut matrix = |rows: usize, cols: usize, scale: f64| -> Vec<Vec<f64>> {
+        (0..rows).map(|_| (0..cols).map(|_| scale * noise()).collect()).collect()
+    };
+    let filter = BlockFilter {
+        // Rows that sum to less than 1 are stable.
+        a: matrix(states, states, 0.9 / states as f64),
+        b: matrix(states, channels, 1.0),
+        c: matrix(ratio, states, 1.0),
+        d: matrix(ratio, channels, 1.0),
+    };
+    bank(channels, ratio, SynthesisFilters::StateSpace(filter))
+}
+
+/// One stream as floats and as 16-bit integers, in pieces.
+fn run(stream: &mut Reconstructor, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u8> {
+    let (n, m) = (stream.channels(), stream.ratio());
+    let mut out = Vec::new();
+    let mut rest = input;
+    for &piece in pieces {
+        let (ticks, after) = rest.split_at(piece * n);
+        rest = after;
+        if pcm {
+            let coded: Vec<u8> = ticks.iter().flat_map(|x| ((x * 32767.0) as i16).to_le_bytes()).collect();
+            let layout = SampleLayout::packed(PcmFormat::S16Le);
+            let mut fast = vec![0; piece * m * 3];
+            let mut output = PcmOutput { format: PcmFormat::S24Be, bytes: &mut fast, clipped: 0 };
+            stream.process_pcm(&[PcmFrames { layout, channels: n, bytes: &coded }], &mut output).unwrap();
+            out.extend(fast);
+        } else {
+            let mut fast = vec![0.0; piece * m];
+            stream.process(ticks, &mut fast).unwrap();
+            out.extend(fast.iter().flat_map(|y| y.to_bits().to_le_bytes()));
+        }
+    }
+    out
+}
+
+#[test]
+fn ten_thousand_random_cuts_give_the_same_bits() {
+    const TICKS: usize = 300;
+    let banks =
+        [fir(2, 2, 24), fir(3, 4, 37), fir(1, 5, 9), fir(8, 8, 128), recursion(2, 2, 6), recursion(3, 2, 5)];
+    let mut cuts = Cuts(1);
+    let mut noise = noise(2);
+    let mut streams: Vec<_> = banks
+        .iter()
+        .flat_map(|bank| [Precision::Single, Precision::Double].map(|precision| (bank, precision)))
+        .map(|(bank, precision)| {
+            let mut stream =
+                Reconstructor::with_options(bank, Options { precision, ..Options::default() }).unwrap();
+            let input: Vec<f32> = (0..TICKS * bank.delays.len()).map(|_| noise() as f32).collect();
+            let whole = [false, true].map(|pcm| {
+                stream.reset();
+                run(&mut stream, &input, pcm, &[TICKS])
+            });
+            (stream, input, whole)
+        })
+        .collect();
+    for turn in 0..10_000 {
+        let count = streams.len();
+        let (stream, input, whole) = &mut streams[turn % count];
+        let pcm = turn / count % 4 == 3;
+        let pieces = cuts.of(TICKS);
+        stream.reset();
+        assert!(run(stream, input, pcm, &pieces) == whole[usize::from(pcm)], "turn {turn}: {pieces:?}");
+    }
+}
+
+#[test]
+fn pipes_that_drip_give_the_same_bytes() {
+    let desk = Desk::new();
+    let input = bytes(&ticks(700));
+    let whole = desk.run(&["stream", "bank.json"], &input).stdout;
+    let mut cuts = Cuts(3);
+    for turn in 0..30 {
+        let mut child = desk.spawn(&["stream", "bank.json"]);
+        let mut stdin = child.stdin.take().unwrap();
+        let (pieces, input) = (cuts.of(input.len()), input.clone());
+        let feeder = std::thread::spawn(move || {
+            let mut rest = &input[..];
+            for piece in pieces {
+                let (now, after) = rest.split_at(piece);
+                stdin.write_all(now).unwrap();
+                rest = after;
+            }
+        });
+        let mut out = Vec::new();
+        child.stdout.take().unwrap().read_to_end(&mut out).unwrap();
+        feeder.join().unwrap();
+        assert!(child.wait().unwrap().success());
+        assert!(out == whole, "turn {turn}");
+    }
+}

@@ -1,0 +1,278 @@
+//! Samples that were lost: what tells of them, what stands in for them, what they touch. As a user runs it.
+
+mod support;
+
+use hound::{SampleFormat, WavSpec, WavWriter};
+use serde_json::{Value, json};
+use support::{Desk, bytes, channel, floats, fused, ticks};
+
+const COUNT: usize = 3000;
+
+/// Channel 1 joins two ticks late and loses tick 7 and ticks 100..1500; channel 2 is whole.
+const SEQUENCE: &str = r#"
+{"channel": 1, "sample_start": 0, "global_index": 1002}
+{"channel": 1, "sample_start": 5, "global_index": 1008}
+
+{"channel": 1, "sample_start": 97, "global_index": 2500}
+{"channel": 2, "sample_start": 0, "global_index": 1000}
+"#;
+
+fn lost_ticks(tick: usize) -> bool {
+    tick < 2 || tick == 7 || (100..1500).contains(&tick)
+}
+
+fn gaps(list: &[(u64, u64, u64)]) -> Value {
+    let gap = |&(channel, first, length): &_| json!({ "channel": channel, "first": first, "length": length });
+    Value::Array(list.iter().map(gap).collect())
+}
+
+/// Ticks with channel 1 replaced by `stand_in(last good sample)` where it was lost.
+fn filled(whole: &[f32], stand_in: impl Fn(f32) -> f32) -> Vec<f32> {
+    let mut ticks = whole.to_vec();
+    let mut last = 0.0;
+    for (k, tick) in ticks.chunks_exact_mut(2).enumerate() {
+        if lost_ticks(k) {
+            tick[0] = stand_in(last);
+        } else {
+            last = tick[0];
+        }
+    }
+    ticks
+}
+
+fn kept(whole: &[f32]) -> Vec<f32> {
+    let kept = channel(whole, 0).into_iter().enumerate().filter(|(k, _)| !lost_ticks(*k));
+    kept.map(|(_, x)| x).collect()
+}
+
+/// The mask must be exact: what it leaves out is as if nothing had been lost, what it marks is not.
+fn check_mask(mask: &[u8], got: &[f32], whole: &[f32]) {
+    assert_eq!(mask.len(), got.len());
+    for (t, ((mask, got), want)) in mask.iter().zip(got).zip(whole).enumerate() {
+        // f_1 has no zero tap, and no lost sample of the test is replaced by itself.
+        assert_eq!(*mask == 0, got == want, "sample {t}");
+    }
+}
+
+/// Samples that are never what stands in for them.
+fn whole() -> Vec<f32> {
+    (0..2 * COUNT).map(|i| (1 + i % 1021) as f32).collect()
+}
+
+fn wav(desk: &Desk, name: &str, samples: &[f32]) {
+    let spec =
+        WavSpec { channels: 1, sample_rate: 24_000, bits_per_sample: 32, sample_format: SampleFormat::Float };
+    let mut writer = WavWriter::create(desk.path(name), spec).unwrap();
+    samples.iter().for_each(|&x| writer.write_sample(x).unwrap());
+    writer.finalize().unwrap();
+}
+
+#[test]
+fn samples_that_were_left_out_are_bridged_reported_and_masked() {
+    let desk = Desk::new();
+    let whole = whole();
+    desk.write("a", bytes(&kept(&whole)));
+    desk.write("b", bytes(&channel(&whole, 1)));
+    wav(&desk, "a.wav", &kept(&whole));
+    wav(&desk, "b.wav", &channel(&whole, 1));
+    desk.write("lost.jsonl", SEQUENCE);
+    let told = ["--lost", "lost.jsonl", "--mask", "mask"];
+    let stream = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out"];
+    let fuse = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"];
+    for (policy, hold) in [("zero", 0.0), ("mask", 0.0), ("hold", 1.0)] {
+        let want = fused(&filled(&whole, |last| hold * last));
+        for verb in [&stream[..], &fuse] {
+            let report = desk.report(&[verb, &told, &["--gaps", policy]].concat());
+            assert_eq!(report["gaps"]["list"], gaps(&[(1, 0, 2), (1, 7, 1), (1, 100, 1400)]));
+            assert_eq!(
+                (report["gaps"]["missing"].as_u64(), report["ticks"].as_u64()),
+                (Some(1403), Some(3000))
+            );
+            assert_eq!(report["replaced"], 0);
+            let got = match verb[0] {
+                "stream" => floats(&desk.read("out")),
+                _ => hound::WavReader::open(desk.path("out.wav"))
+                    .unwrap()
+                    .samples()
+                    .map(Result::unwrap)
+                    .collect(),
+            };
+            assert!(got == want, "{policy}");
+            check_mask(&desk.read("mask"), &got, &fused(&whole));
+        }
+    }
+}
+
+#[test]
+fn void_samples_of_an_interleaved_stream_are_told_by_the_report_of_another_run() {
+    let desk = Desk::new();
+    let clean = ticks(500);
+    let mut marked = clean.clone();
+    for (channel, range) in [(0, 0..1), (1, 40..43), (0, 41..300), (1, 499..500)] {
+        range.for_each(|k: usize| marked[2 * k + channel] = f32::NAN);
+    }
+    desk.write("marked", bytes(&marked));
+    let args = ["stream", "bank.json", "--gaps", "hold", "--mask", "mask", "-o", "out"];
+    let report = desk.report(&[&args[..], &["--input", "marked"]].concat());
+    let list = report["gaps"]["list"].as_array().unwrap();
+    assert_eq!(list.len(), 4);
+    let (out, mask) = (desk.read("out"), desk.read("mask"));
+    // The same gaps with anything else in their place, as integers that cannot say NaN.
+    let lines: Vec<_> = list.iter().map(Value::to_string).collect();
+    desk.write("void.jsonl", lines.join("\n"));
+    let coded: Vec<u8> = clean.iter().flat_map(|x| ((x * 1024.0) as i16).to_be_bytes()).collect();
+    desk.write("coded", coded);
+    let format =
+        ["--input", "coded", "--format", "s16be", "--output-format", "f32le", "--lost", "void.jsonl"];
+    let again = desk.report(&[&args[..], &format].concat());
+    assert_eq!(again["gaps"], report["gaps"]);
+    let scaled: Vec<f32> = floats(&out).iter().map(|y| y / 32.0).collect();
+    assert_eq!((floats(&desk.read("out")), desk.read("mask")), (scaled, mask));
+}
+
+#[test]
+fn channels_that_end_early_may_be_bridged_to_the_end_of_the_longest() {
+    let desk = Desk::new();
+    let whole = ticks(5000);
+    desk.write("a", bytes(&channel(&whole, 0)[..4000]));
+    desk.write("b", bytes(&channel(&whole, 1)));
+    let args = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out", "--gaps", "zero"];
+    let report = desk.report(&args);
+    assert_eq!((report["ticks"].as_u64(), report["gaps"]["count"].as_u64()), (Some(4000), Some(0)));
+    assert_eq!(report["warnings"].as_array().unwrap().len(), 1);
+    let report = desk.report(&[&args[..], &["--longest", "--strict"]].concat());
+    assert_eq!((report["ticks"].as_u64(), &report["warnings"]), (Some(5000), &json!([])));
+    assert_eq!(report["gaps"]["list"], gaps(&[(1, 4000, 1000)]));
+    let mut zeros = whole.clone();
+    zeros.chunks_exact_mut(2).skip(4000).for_each(|tick| tick[0] = 0.0);
+    assert!(floats(&desk.read("out")) == fused(&zeros));
+    desk.refused(2, &["stream", "bank.json", "--longest"], &["--gaps"]);
+}
+
+fn meta(datatype: &str, channels: usize, captures: &str) -> String {
+    format!(
+        r#"{{ "global": {{ "core:datatype": "{datatype}", "core:sample_rate": 24000.5, "core:num_channels": {channels},
+        "core:version": "1.0.0" }}, "captures": [{captures}], "annotations": [] }}"#
+    )
+}
+
+#[test]
+fn sigmf_goes_through_stream_in_every_type() {
+    let desk = Desk::new();
+    // Every sum is a multiple of 1/128 and below 1, so that even 8 bits hold it.
+    desk.write(
+        "small.json",
+        String::from_utf8(desk.read("bank.json")).unwrap().replace("[10, 20, 30, 0]", "[1, 0, 0, 2]"),
+    );
+    let input: Vec<f32> = ticks(300).iter().map(|x| x / 128.0).collect();
+    let want = desk.run(&["stream", "small.json"], &bytes(&input)).stdout;
+    let encode = |name: &str, x: f64| match name {
+        "ri8" => vec![(x * 128.0) as i8 as u8],
+        "ru8" => vec![(x * 128.0 + 128.0) as u8],
+        "ri16_le" => ((x * 32768.0) as i16).to_le_bytes().to_vec(),
+        "ri16_be" => ((x * 32768.0) as i16).to_be_bytes().to_vec(),
+        "ri24_le" => ((x * 8388608.0) as i32).to_le_bytes()[..3].to_vec(),
+        "ri24_be" => ((x * 8388608.0) as i32).to_be_bytes()[1..].to_vec(),
+        "ri32_le" => ((x * 2147483648.0) as i32).to_le_bytes().to_vec(),
+        "ri32_be" => ((x * 2147483648.0) as i32).to_be_bytes().to_vec(),
+        "rf32_le" => (x as f32).to_le_bytes().to_vec(),
+        "rf32_be" => (x as f32).to_be_bytes().to_vec(),
+        "rf64_le" => x.to_le_bytes().to_vec(),
+        _ => x.to_be_bytes().to_vec(),
+    };
+    let coded = |name: &str, samples: &[f32]| -> Vec<u8> {
+        samples.iter().flat_map(|&x| encode(name, f64::from(x))).collect()
+    };
+    for (name, pcm) in [
+        ("ri8", "s8"),
+        ("ru8", "u8"),
+        ("ri16_le", "s16le"),
+        ("ri16_be", "s16be"),
+        ("ri24_le", "s24le"),
+        ("ri24_be", "s24be"),
+        ("ri32_le", "s32le"),
+        ("ri32_be", "s32be"),
+        ("rf32_le", "f32le"),
+        ("rf32_be", "f32be"),
+        ("rf64_le", "f64le"),
+        ("rf64_be", "f64be"),
+    ] {
+        desk.write("both.sigmf-meta", meta(name, 2, ""));
+        desk.write("both.sigmf-data", coded(name, &input));
+        for i in 0..2 {
+            desk.write(&format!("{i}.sigmf-meta"), meta(name, 1, r#"{ "core:sample_start": 0 }"#));
+            desk.write(&format!("{i}.sigmf-data"), coded(name, &channel(&input, i)));
+        }
+        // One of two channels, and two of one; raw samples and a recording out.
+        let both = ["stream", "small.json", "--input", "both.sigmf-data", "--output-format", "f32le"];
+        let output = desk.run(&both, &[]);
+        assert!(
+            output.status.success() && output.stderr.is_empty() && output.stdout == want,
+            "{name}: {output:?}"
+        );
+        let apart = ["--input", "0.sigmf-meta", "--input", "1.sigmf-meta", "--output-format", pcm];
+        let report = desk.report(&[&["stream", "small.json", "-o", "out.sigmf-meta"], &apart[..]].concat());
+        assert_eq!((report["samples"].as_u64(), &report["warnings"]), (Some(600), &json!([])));
+        assert_eq!(desk.read("out.sigmf-data"), coded(name, &floats(&want)), "{name}");
+        let written: Value = serde_json::from_slice(&desk.read("out.sigmf-meta")).unwrap();
+        assert_eq!(written["global"]["core:datatype"], name);
+        assert_eq!(written["global"]["core:sample_rate"], 48001.0);
+    }
+}
+
+#[test]
+fn captures_tell_stream_what_was_lost() {
+    let desk = Desk::new();
+    let whole = whole();
+    let captures = r#"{ "core:sample_start": 10, "core:global_index": 1002 },
+        { "core:sample_start": 15, "core:global_index": 1008 }, { "core:sample_start": 50 },
+        { "core:sample_start": 107, "core:global_index": 2500 }"#;
+    // The recording is the second part of a longer one.
+    let offset = meta("rf32_le", 1, captures).replace("\"core:num", "\"core:offset\": 10, \"core:num");
+    desk.write("a.sigmf-meta", offset);
+    desk.write("a.sigmf-data", bytes(&kept(&whole)));
+    desk.write(
+        "b.sigmf-meta",
+        meta("rf32_le", 1, r#"{ "core:sample_start": 0, "core:global_index": 1000 }"#),
+    );
+    desk.write("b.sigmf-data", bytes(&channel(&whole, 1)));
+    let args = ["stream", "bank.json", "--input", "a.sigmf-meta", "--input", "b.sigmf-meta", "-o", "out"];
+    let report = desk.report(&[&args[..], &["--gaps", "hold", "--mask", "mask"]].concat());
+    assert_eq!(report["gaps"]["list"], gaps(&[(1, 0, 2), (1, 7, 1), (1, 100, 1400)]));
+    let got = floats(&desk.read("out"));
+    assert!(got == fused(&filled(&whole, |last| last)));
+    check_mask(&desk.read("mask"), &got, &fused(&whole));
+    // What is void is told beside the captures; what is left out only once.
+    desk.write("lost", r#"{"channel": 2, "first": 2990, "length": 3}"#);
+    let both = [&args[..], &["--gaps", "hold", "--lost", "lost"]].concat();
+    assert_eq!(desk.report(&both)["gaps"]["list"][3], gaps(&[(2, 2990, 3)])[0]);
+    desk.write("lost", r#"{"channel": 2, "sample_start": 0, "global_index": 3}"#);
+    desk.refused(1, &[&both[..], &["--force"]].concat(), &["b.sigmf-meta", "captures of its own"]);
+}
+
+#[test]
+fn faults_are_told_with_their_place() {
+    let desk = Desk::new();
+    desk.write("a", bytes(&[1.0; 20]));
+    let args = ["stream", "bank.json", "--input", "a", "--input", "a", "-o", "out"];
+    desk.refused(2, &[&args[..], &["--lost", "lost"]].concat(), &["--gaps"]);
+    let told = [&args[..], &["--gaps", "zero", "--lost", "lost"]].concat();
+    desk.refused(1, &told, &["lost: cannot read it"]);
+    for (line, parts) in [
+        ("{\"channel\": 1,\n", &["lost: line 1", "EOF"][..]),
+        ("\n{\"channel\": 3, \"first\": 0, \"length\": 1}", &["lost: channel 3", "there are 2"]),
+        ("{\"sample_start\": 4, \"global_index\": 3}", &["before 0"]),
+        (
+            r#"{"channel": 1, "sample_start": 0, "global_index": 999999999999}
+            {"channel": 2, "sample_start": 0, "global_index": 0}"#,
+            &["a: ", "mistake"],
+        ),
+    ] {
+        desk.write("lost", line);
+        desk.refused(1, &told, parts);
+    }
+    // Numbers beyond the end are told, and an error only if they are to be.
+    desk.write("lost", r#"{"channel": 1, "sample_start": 30, "global_index": 31}"#);
+    let report = desk.report(&told);
+    assert!(report["warnings"][0].as_str().unwrap().contains("ends before the last"), "{report}");
+}

@@ -1,0 +1,111 @@
+//! Damaged files, by the thousand: every parser gives an answer or a message that names the file, and never panics.
+//! The seeds are those of the fuzz targets, the damage is the same in every run.
+
+use hybank::bank::Bank;
+use hybank::io::wav::WavReader;
+use hybank::io::{LostSamples, SigmfMeta};
+use hybank::spec::Spec;
+use std::fs;
+use std::path::Path;
+
+/// Damaged copies of each seed.
+const COPIES: usize = 3000;
+
+/// A generator whose stream never changes (Knuth's MMIX).
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, count: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 33) as usize % count
+    }
+
+    /// One to four faults.
+    fn damage(&mut self, seed: &[u8]) -> Vec<u8> {
+        let mut bytes = seed.to_vec();
+        (0..=self.below(4)).for_each(|_| self.fault(&mut bytes));
+        bytes
+    }
+
+    fn fault(&mut self, bytes: &mut Vec<u8>) {
+        let place = self.below(bytes.len() + 1);
+        let length = (1 + self.below(8)).min(bytes.len() - place);
+        match self.below(6) {
+            0 => bytes.truncate(place),
+            1 => drop(bytes.drain(place..place + length)),
+            2 => bytes.splice(place..place, bytes[place..place + length].to_vec()).for_each(drop),
+            3 => bytes.insert(place, self.below(256) as u8),
+            4 => bytes[place..place + length].fill([0, 0xFF, 0x7F, 0x80, b'9', b'"'][self.below(6)]),
+            _ => bytes[place..place + length.min(1)].iter_mut().for_each(|byte| *byte ^= 1 << self.below(8)),
+        }
+    }
+}
+
+/// Damaged copies of all seeds of a fuzz target.
+fn damaged(target: &str, mut check: impl FnMut(&[u8])) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds").join(target);
+    let mut seeds: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    seeds.sort();
+    assert!(!seeds.is_empty());
+    let mut dice = Dice(1);
+    for seed in seeds.iter().map(|path| fs::read(path).unwrap()) {
+        check(&seed);
+        (0..COPIES).for_each(|_| check(&dice.damage(&seed)));
+    }
+}
+
+/// A message is one that names its file; gives whether there was an answer.
+fn answered<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
+    result.map_err(|error| assert!(error.to_string().starts_with("seed"), "{error}")).ok()
+}
+
+#[test]
+fn wav_headers() {
+    let (mut answers, mut refusals) = (0, 0);
+    damaged("wav", |bytes| match answered(WavReader::new(bytes, "seed")) {
+        None => refusals += 1,
+        Some(mut reader) => {
+            answers += 1;
+            let frame = reader.header().frame_bytes();
+            let mut samples = vec![0; (bytes.len() / frame + 1) * frame];
+            let filled = reader.frames().fill(&mut samples).unwrap();
+            assert!(filled <= bytes.len() && filled % frame == 0);
+        }
+    });
+    // Neither all nor nothing may come through.
+    assert!(answers > 1000 && refusals > 1000, "{answers} {refusals}");
+}
+
+#[test]
+fn sigmf_metadata() {
+    let mut answers = 0;
+    damaged("sigmf", |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        answers += usize::from(answered(SigmfMeta::parse(&text, "seed")).is_some());
+    });
+    assert!((20..COPIES).contains(&answers), "{answers}");
+}
+
+#[test]
+fn lost_samples() {
+    let mut answers = 0;
+    damaged("lost", |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        answers += usize::from(answered(LostSamples::parse(&text, "seed")).is_some());
+    });
+    assert!((20..COPIES).contains(&answers), "{answers}");
+}
+
+#[test]
+fn specs_and_banks() {
+    let mut answers = 0;
+    damaged("spec", |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        answers += usize::from(answered(Spec::from_toml(&text, "seed")).is_some());
+    });
+    damaged("bank", |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        answers += usize::from(answered(Bank::from_json(&text, "seed")).is_some());
+    });
+    assert!(answers > 20, "{answers}");
+}
