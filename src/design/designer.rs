@@ -4,6 +4,7 @@ use super::equivalence::BlockedPlant;
 use super::problem::Problem;
 use super::{DesignError, comparison, error_system, fir, iir};
 use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use crate::lti::peak::Peak;
 use crate::spec::{Method, Spec};
 
 /// A bank with the record of its design.
@@ -31,8 +32,10 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     let found = run_method(spec, &distinct)?;
     let filters = share_among_duplicates(found.filters, &representative);
     // The norm that counts is that of the coefficients as they are written, on all channels.
-    let block = error_system::block_system(&filters, spec.ratio)?;
-    let peak = error_system::gamma(&BlockedPlant::new(&problem), &block)?;
+    let peak = match found.peak {
+        Some(peak) if distinct.channels.len() == problem.channels.len() => peak,
+        _ => error_system::bank_gamma(&BlockedPlant::new(&problem), &filters)?,
+    };
     let gamma = Gamma {
         upper: Some(peak.gain),
         lower: Some(found.lower.min(peak.gain)),
@@ -68,6 +71,8 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
 
 struct Found {
     filters: SynthesisFilters,
+    /// Exact, of these very filters, where the method has computed it.
+    peak: Option<Peak>,
     lower: f64,
     noncausal: f64,
     iterations: usize,
@@ -92,6 +97,7 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
 fn from_fir(design: fir::FirDesign) -> Found {
     Found {
         filters: SynthesisFilters::Fir(design.taps),
+        peak: Some(design.peak),
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.iterations,
@@ -101,6 +107,7 @@ fn from_fir(design: fir::FirDesign) -> Found {
 fn from_state_space(design: iir::StateSpaceDesign) -> Found {
     Found {
         filters: SynthesisFilters::StateSpace(error_system::to_block(&design.filters)),
+        peak: None,
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.trials,
@@ -110,7 +117,7 @@ fn from_state_space(design: iir::StateSpaceDesign) -> Found {
 /// A comparison method optimises nothing: what bounds every bank is all that is known below.
 fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError> {
     let noncausal = iir::noncausal_bound(plant)?;
-    Ok(Found { filters: SynthesisFilters::Fir(taps), lower: noncausal, noncausal, iterations: 0 })
+    Ok(Found { filters: SynthesisFilters::Fir(taps), peak: None, lower: noncausal, noncausal, iterations: 0 })
 }
 
 /// Channels that cannot be told apart get equal shares of their common filter: the same error, the least noise.
