@@ -1,7 +1,7 @@
 //! The way from a spec to a finished bank.
 
 use super::equivalence::BlockedPlant;
-use super::problem::Problem;
+use super::problem::{Part, Problem};
 use super::{DesignError, comparison, error_system, fir, iir};
 use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
 use crate::lti::peak::Peak;
@@ -28,9 +28,9 @@ pub struct Design {
 pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     let latency = latency(spec)?;
     let problem = Problem::new(spec, latency)?;
-    let (distinct, representative) = problem.without_duplicates();
+    let (distinct, parts) = problem.without_duplicates();
     let found = run_method(spec, &distinct)?;
-    let filters = share_among_duplicates(found.filters, &representative);
+    let filters = share_among_duplicates(found.filters, &parts);
     // The norm that counts is that of the coefficients as they are written, on all channels.
     let peak = match found.peak {
         Some(peak) if distinct.channels.len() == problem.channels.len() => peak,
@@ -86,7 +86,10 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
     let plant = BlockedPlant::new(problem);
     let slack = spec.design.slack.unwrap_or(0.0);
     match spec.design.method {
-        Method::Fir => fir::design_fir(&plant, taps_of(spec), slack).map(from_fir),
+        Method::Fir => {
+            let second = fir::SecondObjective::new(&problem.noise, spec.design.slack);
+            fir::design_fir(&plant, taps_of(spec), second).map(from_fir)
+        }
         Method::Iir => iir::design_iir(&plant, slack).map(from_state_space),
         Method::H2 => iir::design_h2(&plant).map(from_state_space),
         Method::Sinc => fixed(&plant, comparison::sinc_taps(problem, taps_of(spec))?),
@@ -120,16 +123,16 @@ fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError
     Ok(Found { filters: SynthesisFilters::Fir(taps), peak: None, lower: noncausal, noncausal, iterations: 0 })
 }
 
-/// Channels that cannot be told apart get equal shares of their common filter: the same error, the least noise.
-fn share_among_duplicates(filters: SynthesisFilters, representative: &[usize]) -> SynthesisFilters {
-    let multiplicity = |r: usize| representative.iter().filter(|&&other| other == r).count() as f64;
-    let share =
-        |row: &[f64]| -> Vec<f64> { representative.iter().map(|&r| row[r] / multiplicity(r)).collect() };
+/// Channels that cannot be told apart share their common filter: the same error, the least noise.
+fn share_among_duplicates(filters: SynthesisFilters, parts: &[Part]) -> SynthesisFilters {
+    let share = |row: &[f64]| -> Vec<f64> {
+        parts.iter().map(|part| row[part.representative] * part.share).collect()
+    };
     match filters {
         SynthesisFilters::Fir(taps) => SynthesisFilters::Fir(
-            representative
+            parts
                 .iter()
-                .map(|&r| taps[r].iter().map(|tap| tap / multiplicity(r)).collect())
+                .map(|part| taps[part.representative].iter().map(|tap| tap * part.share).collect())
                 .collect(),
         ),
         SynthesisFilters::StateSpace(block) => SynthesisFilters::StateSpace(BlockFilter {

@@ -12,15 +12,17 @@ use super::equivalence::BlockedPlant;
 use super::error_system::{FirError, filter_response};
 use super::iir::noncausal_bound;
 use crate::linalg::{self, Mat};
-use crate::lmi::sampled::{self, Point, Settings, Taps};
+use crate::lmi::sampled::{self, Point, Settings, Square, Taps};
 use crate::lti::peak::Peak;
 use std::f64::consts::PI;
 
 /// Relative width of [lower, upper] at which the exchange of frequencies ends.
 pub const GAMMA_ACCURACY: f64 = 5e-7;
-/// Optimal banks are many: this much of gamma (relative) always goes into the mean-square error, which
+/// Optimal banks are many: this much of gamma (relative) always goes into the second objective, which
 /// decides among them.
 const LEAST_SLACK: f64 = 4e-7;
+/// Where the converters' noise is known, less of it is worth this much of gamma unless the spec says otherwise.
+const NOISY_SLACK: f64 = 1e-3;
 /// Rounds of exchange; each at least closes in on one peak, five are rarely needed.
 const ROUND_LIMIT: usize = 16;
 /// Times that the exact norm may find a peak that the estimates have missed.
@@ -49,18 +51,43 @@ pub struct FirDesign {
     pub iterations: usize,
 }
 
-/// The taps (a channel, at the fast rate) of least gamma within [`GAMMA_ACCURACY`]; `slack` is the
-/// relative excess over the optimum that may be spent on a smaller mean-square error.
-pub fn design_fir(plant: &BlockedPlant, taps: usize, slack: f64) -> Result<FirDesign, DesignError> {
-    let mut exchange = Exchange::new(plant, taps)?;
-    let mut best = exchange.optimise(slack.max(LEAST_SLACK))?;
+/// What decides among the banks of nearly least gamma: the power, a tick, of the error for white noise of unit density
+/// at the analog input, and of the converters' noise at the output, `||K||_2^2 + sum_i noise_i ||f_i||^2`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SecondObjective {
+    /// Power sigma_i^2 of the noise of each channel.
+    pub noise: Vec<f64>,
+    /// Relative excess over the least gamma that may be spent on it.
+    pub slack: f64,
+}
+
+impl SecondObjective {
+    /// With the slack asked for, else 1e-3 where there is noise, else next to none; never less than 4e-7.
+    pub fn new(noise: &[f64], slack: Option<f64>) -> Self {
+        let usual = if noise.iter().any(|power| *power > 0.0) { NOISY_SLACK } else { LEAST_SLACK };
+        Self { noise: noise.to_vec(), slack: slack.unwrap_or(usual).max(LEAST_SLACK) }
+    }
+}
+
+/// The taps (a channel, at the fast rate) of least gamma within [`GAMMA_ACCURACY`], and among them those of the
+/// least second objective.
+///
+/// # Errors
+/// [`DesignError::Sampled`] if there is not one noise power a channel; [`DesignError::Lti`] for unstable plants.
+pub fn design_fir(
+    plant: &BlockedPlant,
+    taps: usize,
+    second: SecondObjective,
+) -> Result<FirDesign, DesignError> {
+    let mut exchange = Exchange::new(plant, taps, second)?;
+    let mut best = exchange.optimise()?;
     for _ in 0..SURPRISE_LIMIT {
         if best.peak.gain <= best.estimate * (1.0 + GAMMA_ACCURACY)
             || !exchange.add(vec![best.peak.frequency])?
         {
             break;
         }
-        let other = exchange.optimise(slack.max(LEAST_SLACK))?;
+        let other = exchange.optimise()?;
         if other.peak.gain < best.peak.gain {
             best = other;
         }
@@ -74,8 +101,9 @@ struct Exchange<'a> {
     length: usize,
     fine: Vec<Point>,
     problem: sampled::Problem,
-    /// Mean-square weights of the first, uniform points; later ones have none.
-    weights: Vec<f64>,
+    /// Only the first, uniform points have a weight in it.
+    square: Square,
+    slack: f64,
     lower: f64,
     rounds: usize,
     iterations: usize,
@@ -99,7 +127,7 @@ struct Finished {
 }
 
 impl<'a> Exchange<'a> {
-    fn new(plant: &'a BlockedPlant, length: usize) -> Result<Self, DesignError> {
+    fn new(plant: &'a BlockedPlant, length: usize, second: SecondObjective) -> Result<Self, DesignError> {
         let lags: Vec<usize> =
             (0..plant.wanted).map(|p| length.saturating_sub(p).div_ceil(plant.wanted)).collect();
         let intervals = LEAST_POINTS.max(POINTS_PER_LAG * lags[0]);
@@ -111,13 +139,24 @@ impl<'a> Exchange<'a> {
         let mut weights = vec![1.0 / intervals as f64; intervals + 1];
         (weights[0], weights[intervals]) = (0.5 / intervals as f64, 0.5 / intervals as f64);
         let problem = sampled::Problem::new(grid, lags)?;
-        Ok(Self { plant, error, length, fine, problem, weights, lower: 0.0, rounds: 0, iterations: 0 })
+        Ok(Self {
+            plant,
+            error,
+            length,
+            fine,
+            problem,
+            square: Square { weights, noise: second.noise },
+            slack: second.slack,
+            lower: 0.0,
+            rounds: 0,
+            iterations: 0,
+        })
     }
 
     /// Least gamma, then least mean square, then the exact norm.
-    fn optimise(&mut self, slack: f64) -> Result<Finished, DesignError> {
+    fn optimise(&mut self) -> Result<Finished, DesignError> {
         let start = self.minimise_gamma()?;
-        let best = self.polish(start, slack)?;
+        let best = self.polish(start)?;
         let taps = self.impulse_responses(&best.taps);
         let hints: Vec<f64> = best.peaks.iter().map(|peak| peak.frequency).collect();
         let peak = self.error.gamma(&taps, &hints)?;
@@ -145,16 +184,16 @@ impl<'a> Exchange<'a> {
         best.ok_or(DesignError::NoTaps)
     }
 
-    /// Least mean-square error under (1 + slack) gamma, with frequencies added where the cap is broken; the start
+    /// The least second objective under (1 + slack) gamma, with frequencies added where the cap is broken; the start
     /// if that cannot be had.
-    fn polish(&mut self, start: Candidate, slack: f64) -> Result<Candidate, DesignError> {
-        let cap = start.estimate * (1.0 + slack);
+    fn polish(&mut self, start: Candidate) -> Result<Candidate, DesignError> {
+        let cap = start.estimate * (1.0 + self.slack);
         // Aim a little below, so that the peaks between the points fit under the cap as well.
-        let aim = start.estimate * (1.0 + 0.75 * slack);
+        let aim = start.estimate * (1.0 + 0.75 * self.slack);
         for _ in 0..ROUND_LIMIT {
             let found = sampled::mean_square_under_cap(
                 &self.problem,
-                &self.weights,
+                &self.square,
                 aim,
                 &start.taps,
                 &Settings::default(),
@@ -209,7 +248,7 @@ impl<'a> Exchange<'a> {
                 fresh.push(w);
             }
         }
-        self.weights.extend(std::iter::repeat_n(0.0, fresh.len()));
+        self.square.weights.extend(std::iter::repeat_n(0.0, fresh.len()));
         let points = fresh.iter().map(|&w| sample_point(&self.error, w));
         self.problem = self.problem.with_points(points)?;
         Ok(!fresh.is_empty())

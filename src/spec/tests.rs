@@ -49,7 +49,10 @@ fn the_example_of_the_manual_reads() {
         ratio: 2,
         latency: Some(10),
         target: thesis.clone(),
-        channels: vec![ChannelSpec { delay: 1.2, filter: thesis }, ChannelSpec { delay: 0.6, filter: zpk }],
+        channels: vec![
+            ChannelSpec { delay: 1.2, filter: thesis, noise: 0.0 },
+            ChannelSpec { delay: 0.6, filter: zpk, noise: 0.0 },
+        ],
         design: DesignSpec { method: Method::Fir, taps: Some(22), slack: None },
     };
     assert_eq!(spec, expected);
@@ -465,7 +468,7 @@ prop_compose! {
     ) -> Spec {
         Spec {
             name, fast_period, ratio, latency, target,
-            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: d * fast_period, filter }).collect(),
+            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: d * fast_period, filter, noise: 1e-4 * d.fract() }).collect(),
             design: DesignSpec {
                 method,
                 taps: method.has_taps().then_some(taps),
