@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64], design: DesignSpec) -> Spec {
-    let channels = delays.iter().map(|&delay| ChannelSpec { delay, filter: filter.clone() }).collect();
+    let channels =
+        delays.iter().map(|&delay| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 }).collect();
     Spec {
         name: String::new(),
         fast_period: 1.0,
@@ -43,6 +44,35 @@ fn eight(order: usize, omega: f64, latency: usize, method: Method, taps: Option<
     alike(&butterworth(order, omega), 8, latency, &delays, DesignSpec { method, taps, slack: None })
 }
 
+fn four() -> Spec {
+    let design = DesignSpec { method: Method::Fir, taps: Some(24), slack: None };
+    alike(&butterworth(4, 1.2), 4, 12, &[0.0, 1.3, 2.1, 2.95], design)
+}
+
+/// N = M channels behind Butterworth filters of order 6 at 0.2 of the fast rate, delays uneven, latency a fast-rate tick.
+fn many(channels: usize, taps: usize) -> Spec {
+    let delays: Vec<f64> = (0..channels).map(|i| 0.83 * i as f64 + 0.07 * ((i * i) % 5) as f64).collect();
+    let design = DesignSpec { method: Method::Fir, taps: Some(taps), slack: None };
+    alike(&butterworth(6, 0.2 * TAU), channels, channels, &delays, design)
+}
+
+/// Once each, with the proven gap: too long for a statistic.
+fn large() {
+    let cases = [
+        ("thesis example, 22 taps", thesis(Method::Fir, Some(22))),
+        ("4 channels, Butterworth 4, 24 taps", four()),
+        ("8 channels, Butterworth 6, 128 taps", many(8, 128)),
+        ("16 channels, Butterworth 6, 256 taps", many(16, 256)),
+    ];
+    for (name, spec) in cases {
+        let begin = std::time::Instant::now();
+        let gamma = design(&spec).unwrap().bank.gamma;
+        let (upper, lower) = (gamma.upper.unwrap(), gamma.lower.unwrap());
+        let (seconds, gap) = (begin.elapsed().as_secs_f64(), (upper - lower) / upper);
+        println!("once: fir, {name}: {seconds:.4} s, gamma {upper:.9}, proven gap {gap:.1e}");
+    }
+}
+
 fn designs(c: &mut Criterion) {
     let mut group = c.benchmark_group("design");
     group.sample_size(20);
@@ -53,8 +83,14 @@ fn designs(c: &mut Criterion) {
     one("h2, thesis example", thesis(Method::H2, None));
     one("fir, thesis example, 22 taps", thesis(Method::Fir, Some(22)));
     one("iir, 8 channels, Butterworth 6", eight(6, 1.2, 20, Method::Iir, None));
+    one("fir, 4 channels, Butterworth 4, 24 taps", four());
     one("fir, 8 channels, Butterworth 4, 32 taps", eight(4, 1.8, 12, Method::Fir, Some(32)));
+    group.sample_size(10);
+    group.bench_function("fir, 8 channels, Butterworth 6, 128 taps", |b| {
+        b.iter(|| design(&many(8, 128)).unwrap())
+    });
     group.finish();
+    large();
     let bank = design(&thesis(Method::Fir, Some(22))).unwrap().bank;
     c.bench_function("analyze, thesis example, 22 taps", |b| {
         b.iter(|| analyze(black_box(&bank), &[]).unwrap())

@@ -54,9 +54,9 @@ fn mean_square_under_cap(c: &mut Criterion) {
         let problem = problem(&bank, taps, points);
         let settings = sampled::Settings::default();
         let best = sampled::minimise(&problem, &settings).expect("settings are the defaults");
-        let weights = vec![1.0; points];
+        let square = sampled::Square::noiseless(vec![1.0; points], problem.channels());
         group.bench_with_input(BenchmarkId::from_parameter(name), &problem, |b, p| {
-            b.iter(|| sampled::mean_square_under_cap(p, &weights, 1.001 * best.gamma, &best.taps, &settings));
+            b.iter(|| sampled::mean_square_under_cap(p, &square, 1.001 * best.gamma, &best.taps, &settings));
         });
     }
     group.finish();

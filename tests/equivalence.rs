@@ -33,6 +33,7 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
         front_ends: front_ends.iter().map(filter).collect(),
         target: 0,
         channels: channels.iter().map(|&(front_end, delay)| Channel { front_end, delay }).collect(),
+        noise: vec![0.0; channels.len()],
     };
     // Any taps will do: the equivalence does not care whether they are good.
     let taps = (0..channels.len())

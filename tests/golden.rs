@@ -32,7 +32,8 @@ fn butterworth(order: usize, omega: f64) -> FilterSpec {
 
 /// All channels behind the target's filter, h = 1.
 fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> Spec {
-    let channels = delays.iter().map(|&delay| ChannelSpec { delay, filter: filter.clone() }).collect();
+    let channels =
+        delays.iter().map(|&delay| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 }).collect();
     Spec {
         name: String::new(),
         fast_period: 1.0,
@@ -232,5 +233,32 @@ fn g15_errors_on_the_thesis_inputs() {
         let square: f64 = (41..=200).map(|n| (fast[n] - captured.target[n]).powi(2)).sum();
         let rmse = (square / 160.0).sqrt();
         assert!((rmse / golden - 1.0).abs() < 0.1, "G15: {rmse}, golden {golden}");
+    }
+}
+
+/// The second objective: with noisy converters the output noise falls, the sum of both powers is least, and gamma stays under
+/// the slack.
+#[test]
+fn noise_of_the_converters_is_weighed_within_the_slack() {
+    let noisy = |sigma: [f64; 2], slack| {
+        let mut spec = with_taps(thesis(10, &[1.2, 0.6]), 22);
+        spec.channels.iter_mut().zip(sigma).for_each(|(channel, sigma)| channel.noise = sigma);
+        spec.design.slack = slack;
+        let bank = design(&spec).unwrap().bank;
+        let judged = |bank: &hybank::bank::Bank| {
+            let mean = analyze(bank, &[]).unwrap().mean;
+            mean.rms_error.powi(2) + mean.output_noise.powi(2)
+        };
+        let mut quiet = bank.clone();
+        quiet.filters = design(&with_taps(thesis(10, &[1.2, 0.6]), 22)).unwrap().bank.filters;
+        (bank.gamma.upper.unwrap(), judged(&bank), judged(&quiet))
+    };
+    let optimum = 0.03993204;
+    for sigma in [[1e-2, 1e-2], [1e-1, 1e-3], [0.3, 0.3]] {
+        let (gamma, power, quiet) = noisy(sigma, None);
+        assert!(gamma <= optimum * 1.001001 && gamma >= optimum * (1.0 - 1e-6), "{sigma:?}: {gamma}");
+        assert!(power < quiet * (1.0 - 1e-4), "{sigma:?}: {power} {quiet}");
+        let (wide, less, _) = noisy(sigma, Some(0.5));
+        assert!(wide <= optimum * 1.5001 && less <= power, "{sigma:?}: {wide} {less}");
     }
 }

@@ -30,7 +30,7 @@ fn family((family, order, omega): (Family, usize, f64)) -> FilterSpec {
 impl Case {
     fn spec(&self, method: Method) -> Spec {
         let filter = family(self.filter);
-        let channel = |&delay: &f64| ChannelSpec { delay, filter: filter.clone() };
+        let channel = |&delay: &f64| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 };
         Spec {
             name: self.name.to_owned(),
             fast_period: 1.0,

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::bank_file::load;
-use crate::design::{self, Analysis, Certified, DesignError};
+use crate::design::{self, Analysis, Certified, DesignError, MeanAnalysis};
 use std::path::PathBuf;
 
 /// Computes the exact gamma of a bank, with its own delays or with others
@@ -64,19 +64,21 @@ struct Report {
 
 impl Report {
     fn text(&self) -> String {
-        let Analysis { gamma, peak_hertz, noncausal, rms_error, noise_gain } = self.analysis;
+        let Analysis { gamma, peak_hertz, noncausal, mean } = self.analysis;
         let proof = self.certified.map_or_else(String::new, |proof| {
             format!(
                 "certified    {:.9}   proved in floating point (P of order {}, margin {:.1e})\n",
                 proof.gamma, proof.states, proof.margin
             )
         });
+        let MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
         format!(
             "gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n{proof}\
              worst at     {peak_hertz:.6} Hz modulo the slow rate\n\
              noncausal    {noncausal:.9}   no bank at all is better\n\
              rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
-             noise gain   {noise_gain:.6}      for independent noise on the slow samples\n"
+             noise gain   {noise_gain:.6}      for independent noise on the slow samples\n\
+             output noise {output_noise:.6e}  of full scale, for the converters' noise in the spec\n"
         )
     }
 }

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::bank_file::{is_dash, load_spec, write_text};
 use crate::bank::SynthesisFilters;
-use crate::design::{self, Design};
+use crate::design::{self, Design, DesignError, MeanAnalysis};
 use crate::spec::{DesignOverrides, Method};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -34,7 +34,7 @@ pub(super) struct Args {
     /// Another latency than the spec's, in fast samples
     #[arg(long)]
     latency: Option<usize>,
-    /// Relative excess over the optimal gamma that may go into a smaller mean-square error
+    /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
     #[arg(long)]
     slack: Option<f64>,
     /// Replace an existing bank file
@@ -64,6 +64,8 @@ struct Report<'a> {
     taps: Option<usize>,
     states: Option<usize>,
     gamma: &'a crate::bank::Gamma,
+    #[serde(flatten)]
+    mean: MeanAnalysis,
     /// Hertz, at the slow rate to which all frequencies alias.
     peak_hertz: f64,
     iterations: usize,
@@ -84,13 +86,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mut spec = load_spec(&args.spec, overrides)?;
     spec.latency = args.latency.or(spec.latency);
     spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
+    let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
     let begin = Instant::now();
-    let found =
-        design::design(&spec).map_err(|error| Failure::Input(format!("{}: {error}", args.spec.display())))?;
+    let found = design::design(&spec).map_err(named)?;
     let seconds = begin.elapsed().as_secs_f64();
+    let mean = design::analyze_mean(&found.bank).map_err(named)?;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    let report = Report::new(args, &found, seconds);
+    let report = Report::new(args, &found, mean, seconds);
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {
@@ -102,7 +105,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl<'a> Report<'a> {
-    fn new(args: &Args, design: &'a Design, seconds: f64) -> Self {
+    fn new(args: &Args, design: &'a Design, mean: MeanAnalysis, seconds: f64) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
@@ -118,6 +121,7 @@ impl<'a> Report<'a> {
             taps,
             states,
             gamma: &bank.gamma,
+            mean,
             peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
             iterations: design.iterations,
             seconds,
@@ -136,6 +140,8 @@ impl<'a> Report<'a> {
              gamma      {} (exact norm of this bank; worst at {:.4} Hz modulo the slow rate)\n\
              lower      {} ({})\n\
              noncausal  {} (no latency is better)\n\
+             H2 error   {} (rms, for white noise of unit density at the analog input)\n\
+             noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
              designed in {:.1} ms, {} iterations\n",
             self.bank,
             self.method.name(),
@@ -152,6 +158,9 @@ impl<'a> Report<'a> {
                     "no bank at all is better; this method does not aim at gamma",
             },
             number(self.gamma.noncausal),
+            number(Some(self.mean.rms_error)),
+            number(Some(self.mean.noise_gain)),
+            self.mean.output_noise,
             self.seconds * 1e3,
             self.iterations,
         )

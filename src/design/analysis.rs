@@ -6,6 +6,8 @@ use super::iir::noncausal_bound;
 use super::problem::Problem;
 use super::{DesignError, error_system};
 use crate::bank::Bank;
+use crate::linalg::Mat;
+use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
 
 /// What a bank does on given front ends and delays.
@@ -18,10 +20,21 @@ pub struct Analysis {
     pub peak_hertz: f64,
     /// No bank at all does better on these front ends and delays.
     pub noncausal: f64,
-    /// Root mean square of e for white noise f of unit density (h = 1).
+    /// What it does on average.
+    #[serde(flatten)]
+    pub mean: MeanAnalysis,
+}
+
+/// What a bank does on average over time and inputs.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct MeanAnalysis {
+    /// Root mean square of e for white noise f of unit density (h = 1): `||K||_2 / sqrt(M)`.
     pub rms_error: f64,
-    /// RMS of the output noise for independent noise of unit RMS on all slow samples.
+    /// RMS of the output noise for independent noise of unit RMS on all slow samples: `sqrt(sum_i ||f_i||^2 / M)`.
     pub noise_gain: f64,
+    /// RMS of the output noise for the noise of the converters as the spec gives it, relative to full scale:
+    /// `sqrt(sum_i sigma_i^2 ||f_i||^2 / M)`.
+    pub output_noise: f64,
 }
 
 /// Analyses `bank` with `delay_errors[i]` (seconds) added to its delays; an empty slice means none.
@@ -39,18 +52,44 @@ pub fn analyze(bank: &Bank, delay_errors: &[f64]) -> Result<Analysis, DesignErro
     let moved = problem.with_delay_errors(&normalised);
     moved.check_size()?;
     let plant = BlockedPlant::new(&moved);
-    let filters = error_system::block_system(&bank.filters, bank.ratio)?;
-    let error = error_system::error_system(&plant, &filters)?;
-    let peak = crate::lti::peak::hinf_norm(&error)?;
+    let peak = error_system::bank_gamma(&plant, &bank.filters)?;
     let distinct = BlockedPlant::new(&moved.without_duplicates().0);
-    let per_sample = (bank.ratio as f64).sqrt();
     Ok(Analysis {
         gamma: peak.gain,
         peak_hertz: peak.frequency / (std::f64::consts::TAU * bank.slow_period()),
         noncausal: noncausal_bound(&distinct)?.min(peak.gain),
+        mean: mean_of(bank, &plant, &moved.noise)?,
+    })
+}
+
+/// The averages alone, of a bank on its own front ends and delays: far less work than the norm of a large bank.
+///
+/// # Errors
+/// As [`analyze`].
+pub fn analyze_mean(bank: &Bank) -> Result<MeanAnalysis, DesignError> {
+    let problem = bank_problem(bank)?;
+    mean_of(bank, &BlockedPlant::new(&problem), &problem.noise)
+}
+
+fn mean_of(bank: &Bank, plant: &BlockedPlant, noise: &[f64]) -> Result<MeanAnalysis, DesignError> {
+    let filters = error_system::block_system(&bank.filters, bank.ratio)?;
+    let error = error_system::error_system(plant, &filters)?;
+    let per_sample = (bank.ratio as f64).sqrt();
+    Ok(MeanAnalysis {
         rms_error: h2_norm(&error)? / per_sample,
         noise_gain: h2_norm(&filters)? / per_sample,
+        output_noise: h2_norm(&behind_noise(&filters, noise)?)? / per_sample,
     })
+}
+
+/// The filters with independent noise of the given powers on their inputs.
+fn behind_noise(filters: &StateSpace, noise: &[f64]) -> Result<StateSpace, DesignError> {
+    let scaled = |matrix: &Mat| {
+        let mut scaled = matrix.clone();
+        scaled.column_iter_mut().zip(noise).for_each(|(mut column, power)| column *= power.sqrt());
+        scaled
+    };
+    Ok(StateSpace::new(filters.a().clone(), scaled(filters.b()), filters.c().clone(), scaled(filters.d()))?)
 }
 
 /// The problem that a bank solves.

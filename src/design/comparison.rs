@@ -2,7 +2,7 @@
 
 use super::DesignError;
 use super::equivalence::BlockedPlant;
-use super::fir::design_fir;
+use super::fir::{SecondObjective, design_fir};
 use super::problem::{Channel, Problem};
 use crate::sampling::Recurrent;
 use crate::spec::Spec;
@@ -38,7 +38,7 @@ pub fn separation_taps(spec: &Spec, problem: &Problem, length: usize) -> Result<
     for (channel, &delay) in on_grid.channels.iter_mut().zip(&grid) {
         channel.delay = delay as f64;
     }
-    let bank = design_fir(&BlockedPlant::new(&on_grid), split.bank_taps, 0.0)?.taps;
+    let bank = plain_fir(&on_grid, split.bank_taps)?;
     let at_slow_rate = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
     let (slow, _) = Problem::new(&at_slow_rate, split.ticks)?.without_duplicates();
     let mut taps = Vec::with_capacity(bank.len());
@@ -49,12 +49,19 @@ pub fn separation_taps(spec: &Spec, problem: &Problem, length: usize) -> Result<
             ratio: 1,
             target: channel.front_end,
             channels: vec![Channel { delay, ..channel }],
+            noise: vec![0.0],
             ..slow.clone()
         };
-        let fractional = design_fir(&BlockedPlant::new(&alone), split.delay_taps, 0.0)?.taps;
+        let fractional = plain_fir(&alone, split.delay_taps)?;
         taps.push(cascade(&fractional[0], synthesis, problem.ratio));
     }
     Ok(taps)
+}
+
+/// The taps of least gamma, without regard to noise.
+fn plain_fir(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError> {
+    let second = SecondObjective::new(&vec![0.0; problem.channels.len()], None);
+    Ok(design_fir(&BlockedPlant::new(problem), taps, second)?.taps)
 }
 
 /// How taps and latency are shared between the two steps.

@@ -1,9 +1,10 @@
 //! The way from a spec to a finished bank.
 
 use super::equivalence::BlockedPlant;
-use super::problem::Problem;
+use super::problem::{Part, Problem};
 use super::{DesignError, comparison, error_system, fir, iir};
 use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use crate::lti::peak::Peak;
 use crate::spec::{Method, Spec};
 
 /// A bank with the record of its design.
@@ -27,12 +28,14 @@ pub struct Design {
 pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     let latency = latency(spec)?;
     let problem = Problem::new(spec, latency)?;
-    let (distinct, representative) = problem.without_duplicates();
+    let (distinct, parts) = problem.without_duplicates();
     let found = run_method(spec, &distinct)?;
-    let filters = share_among_duplicates(found.filters, &representative);
+    let filters = share_among_duplicates(found.filters, &parts);
     // The norm that counts is that of the coefficients as they are written, on all channels.
-    let block = error_system::block_system(&filters, spec.ratio)?;
-    let peak = error_system::gamma(&BlockedPlant::new(&problem), &block)?;
+    let peak = match found.peak {
+        Some(peak) if distinct.channels.len() == problem.channels.len() => peak,
+        _ => error_system::bank_gamma(&BlockedPlant::new(&problem), &filters)?,
+    };
     let gamma = Gamma {
         upper: Some(peak.gain),
         lower: Some(found.lower.min(peak.gain)),
@@ -68,6 +71,8 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
 
 struct Found {
     filters: SynthesisFilters,
+    /// Exact, of these very filters, where the method has computed it.
+    peak: Option<Peak>,
     lower: f64,
     noncausal: f64,
     iterations: usize,
@@ -81,7 +86,10 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
     let plant = BlockedPlant::new(problem);
     let slack = spec.design.slack.unwrap_or(0.0);
     match spec.design.method {
-        Method::Fir => fir::design_fir(&plant, taps_of(spec), slack).map(from_fir),
+        Method::Fir => {
+            let second = fir::SecondObjective::new(&problem.noise, spec.design.slack);
+            fir::design_fir(&plant, taps_of(spec), second).map(from_fir)
+        }
         Method::Iir => iir::design_iir(&plant, slack).map(from_state_space),
         Method::H2 => iir::design_h2(&plant).map(from_state_space),
         Method::Sinc => fixed(&plant, comparison::sinc_taps(problem, taps_of(spec))?),
@@ -92,6 +100,7 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
 fn from_fir(design: fir::FirDesign) -> Found {
     Found {
         filters: SynthesisFilters::Fir(design.taps),
+        peak: Some(design.peak),
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.iterations,
@@ -101,6 +110,7 @@ fn from_fir(design: fir::FirDesign) -> Found {
 fn from_state_space(design: iir::StateSpaceDesign) -> Found {
     Found {
         filters: SynthesisFilters::StateSpace(error_system::to_block(&design.filters)),
+        peak: None,
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.trials,
@@ -110,19 +120,19 @@ fn from_state_space(design: iir::StateSpaceDesign) -> Found {
 /// A comparison method optimises nothing: what bounds every bank is all that is known below.
 fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError> {
     let noncausal = iir::noncausal_bound(plant)?;
-    Ok(Found { filters: SynthesisFilters::Fir(taps), lower: noncausal, noncausal, iterations: 0 })
+    Ok(Found { filters: SynthesisFilters::Fir(taps), peak: None, lower: noncausal, noncausal, iterations: 0 })
 }
 
-/// Channels that cannot be told apart get equal shares of their common filter: the same error, the least noise.
-fn share_among_duplicates(filters: SynthesisFilters, representative: &[usize]) -> SynthesisFilters {
-    let multiplicity = |r: usize| representative.iter().filter(|&&other| other == r).count() as f64;
-    let share =
-        |row: &[f64]| -> Vec<f64> { representative.iter().map(|&r| row[r] / multiplicity(r)).collect() };
+/// Channels that cannot be told apart share their common filter: the same error, the least noise.
+fn share_among_duplicates(filters: SynthesisFilters, parts: &[Part]) -> SynthesisFilters {
+    let share = |row: &[f64]| -> Vec<f64> {
+        parts.iter().map(|part| row[part.representative] * part.share).collect()
+    };
     match filters {
         SynthesisFilters::Fir(taps) => SynthesisFilters::Fir(
-            representative
+            parts
                 .iter()
-                .map(|&r| taps[r].iter().map(|tap| tap / multiplicity(r)).collect())
+                .map(|part| taps[part.representative].iter().map(|tap| tap * part.share).collect())
                 .collect(),
         ),
         SynthesisFilters::StateSpace(block) => SynthesisFilters::StateSpace(BlockFilter {

@@ -3,9 +3,9 @@
 use super::DesignError;
 use super::equivalence::BlockedPlant;
 use crate::bank::{BlockFilter, SynthesisFilters};
-use crate::linalg::Mat;
-use crate::lti::peak::{Peak, hinf_norm};
-use crate::lti::{StateSpace, StateSpaceError};
+use crate::linalg::{self, CMat, Complex, Mat};
+use crate::lti::peak::{Peak, hinf_norm, known_hinf_norm, resonances};
+use crate::lti::{FrequencyResponse, LtiError, StateSpace, StateSpaceError};
 
 /// The synthesis filters as one block system: N slow samples in, M fast samples out, a tick.
 pub fn block_system(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, DesignError> {
@@ -38,6 +38,82 @@ pub fn error_system(plant: &BlockedPlant, filters: &StateSpace) -> Result<StateS
 /// gamma = ||K|| with its peak frequency (radians a slow tick).
 pub fn gamma(plant: &BlockedPlant, filters: &StateSpace) -> Result<Peak, DesignError> {
     Ok(hinf_norm(&error_system(plant, filters)?)?)
+}
+
+/// gamma of a bank's very coefficients.
+pub fn bank_gamma(plant: &BlockedPlant, filters: &SynthesisFilters) -> Result<Peak, DesignError> {
+    match filters {
+        SynthesisFilters::Fir(taps) => FirError::new(plant)?.gamma(taps, &[]),
+        SynthesisFilters::StateSpace(block) => gamma(plant, &from_block(block, plant.wanted)?),
+    }
+}
+
+/// The error of FIR banks on one plant: the response of the plant is prepared once, that of the taps is a
+/// polynomial.
+#[derive(Debug, Clone)]
+pub struct FirError<'a> {
+    plant: &'a BlockedPlant,
+    response: FrequencyResponse,
+    resonances: Vec<f64>,
+}
+
+impl<'a> FirError<'a> {
+    /// Prepares `plant`, whose poles are those of all its error systems, but for poles at zero.
+    ///
+    /// # Errors
+    /// [`LtiError::Unstable`].
+    pub fn new(plant: &'a BlockedPlant) -> Result<Self, DesignError> {
+        let poles = linalg::eigenvalues(plant.system.a())?;
+        let radius = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+        if radius >= 1.0 {
+            return Err(LtiError::Unstable { radius }.into());
+        }
+        Ok(Self {
+            plant,
+            response: FrequencyResponse::new(&plant.system.compress_inputs()),
+            resonances: resonances(&poles),
+        })
+    }
+
+    /// The plant at w, its inputs compressed to at most N + M: (H, W), whose products with their adjoints are those of
+    /// the whole.
+    pub fn plant_at(&self, w: f64) -> (CMat, CMat) {
+        let g = linalg::lq_factor_c(&self.response.at_frequency(w));
+        let (n, m) = (self.plant.measured, self.plant.wanted);
+        (g.rows(0, n).into_owned(), g.rows(n, m).into_owned())
+    }
+
+    /// gamma = ||W - F H|| of the filters `taps[i]`, with its peak frequency; `hints` are frequencies where the peak may
+    /// be.
+    pub fn gamma(&self, taps: &[Vec<f64>], hints: &[f64]) -> Result<Peak, DesignError> {
+        let system = error_system(self.plant, &shift_registers(taps, self.plant.wanted)?)?;
+        let lags = by_lag(taps, self.plant.wanted);
+        let response = |w: f64| {
+            let g = self.response.at_frequency(w);
+            let (n, m) = (self.plant.measured, self.plant.wanted);
+            g.rows(n, m) - filter_response(&lags, w) * g.rows(0, n)
+        };
+        let hints = self.resonances.iter().chain(hints).copied().collect();
+        Ok(known_hinf_norm(&system, &response, hints)?)
+    }
+}
+
+/// F(w) = sum_j e^{-jw} F_j.
+pub fn filter_response(lags: &[Mat], w: f64) -> CMat {
+    let (rows, cols) = lags.first().map_or((0, 0), Mat::shape);
+    let mut filter = CMat::zeros(rows, cols);
+    for (j, lag) in lags.iter().enumerate() {
+        let rotation = Complex::from_polar(1.0, -w * j as f64);
+        filter.zip_apply(lag, |sum, tap| *sum += rotation * tap);
+    }
+    filter
+}
+
+/// `F_j[p, i] = f_i[p + j M]`, at least one lag.
+fn by_lag(taps: &[Vec<f64>], ratio: usize) -> Vec<Mat> {
+    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
+    let tap = |i: usize, n: usize| taps[i].get(n).copied().unwrap_or(0.0);
+    (0..lags).map(|j| Mat::from_fn(ratio, taps.len(), |p, i| tap(i, p + j * ratio))).collect()
 }
 
 /// FIR filters in block form: the state holds, newest first, the last J - 1 samples of each channel.

@@ -4,25 +4,29 @@
 //! min over taps of max over w of sigma_max(W(w) - F(w) H(w)). On finitely many frequencies it is solved with
 //! its dual by [`crate::lmi::sampled`]; the dual is a proven *lower* bound for all taps, since fewer
 //! frequencies are fewer constraints. The exact norm of the taps found is the *upper* bound. Frequencies
-//! are added at the peaks between the grid until the two meet.
+//! are added at the peaks between the grid until the two meet. While taps still change, their norm is only
+//! estimated, from the peaks between the points of a fine grid; the taps that are returned have the exact one.
 
 use super::DesignError;
 use super::equivalence::BlockedPlant;
-use super::error_system;
+use super::error_system::{FirError, filter_response};
 use super::iir::noncausal_bound;
-use crate::bank::SynthesisFilters;
-use crate::linalg::{self, CMat, Mat};
-use crate::lmi::sampled::{self, Point, Settings, Taps};
-use crate::lti::FrequencyResponse;
+use crate::linalg::{self, Mat};
+use crate::lmi::sampled::{self, Point, Settings, Square, Taps};
+use crate::lti::peak::Peak;
 use std::f64::consts::PI;
 
 /// Relative width of [lower, upper] at which the exchange of frequencies ends.
 pub const GAMMA_ACCURACY: f64 = 5e-7;
-/// Optimal banks are many: this much of gamma (relative) always goes into the mean-square error, which
+/// Optimal banks are many: this much of gamma (relative) always goes into the second objective, which
 /// decides among them.
 const LEAST_SLACK: f64 = 4e-7;
+/// Where the converters' noise is known, less of it is worth this much of gamma unless the spec says otherwise.
+const NOISY_SLACK: f64 = 1e-3;
 /// Rounds of exchange; each at least closes in on one peak, five are rarely needed.
 const ROUND_LIMIT: usize = 16;
+/// Times that the exact norm may find a peak that the estimates have missed.
+const SURPRISE_LIMIT: usize = 8;
 /// Grid intervals for each slow lag: enough for the mean square of a polynomial of that degree to be exact.
 const POINTS_PER_LAG: usize = 3;
 const LEAST_POINTS: usize = 24;
@@ -34,154 +38,209 @@ const FINE: usize = 8;
 pub struct FirDesign {
     /// `taps[i][n]` = `f_i[n]` at the fast rate.
     pub taps: Vec<Vec<f64>>,
-    /// The exact norm of the error system with these taps.
-    pub upper: f64,
+    /// The exact norm of the error system with these taps, and where on the unit circle (radians a slow tick) the
+    /// worst case sits.
+    pub peak: Peak,
     /// A proven lower bound for all taps of this length.
     pub lower: f64,
     /// The bound that no filter at all beats.
     pub noncausal: f64,
-    /// Where on the unit circle the worst case sits, radians a slow tick.
-    pub peak_frequency: f64,
     /// Rounds of exchange.
     pub rounds: usize,
     /// Interior-point iterations of all rounds.
     pub iterations: usize,
 }
 
-/// The taps (a channel, at the fast rate) of least gamma within [`GAMMA_ACCURACY`]; `slack` is the
-/// relative excess over the optimum that may be spent on a smaller mean-square error.
-pub fn design_fir(plant: &BlockedPlant, taps: usize, slack: f64) -> Result<FirDesign, DesignError> {
-    let mut exchange = Exchange::new(plant, taps)?;
-    exchange.minimise_gamma()?;
-    exchange.polish(slack.max(LEAST_SLACK))?;
-    exchange.finish(noncausal_bound(plant)?)
+/// What decides among the banks of nearly least gamma: the power, a tick, of the error for white noise of unit density
+/// at the analog input, and of the converters' noise at the output, `||K||_2^2 + sum_i noise_i ||f_i||^2`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SecondObjective {
+    /// Power sigma_i^2 of the noise of each channel.
+    pub noise: Vec<f64>,
+    /// Relative excess over the least gamma that may be spent on it.
+    pub slack: f64,
+}
+
+impl SecondObjective {
+    /// With the slack asked for, else 1e-3 where there is noise, else next to none; never less than 4e-7.
+    pub fn new(noise: &[f64], slack: Option<f64>) -> Self {
+        let usual = if noise.iter().any(|power| *power > 0.0) { NOISY_SLACK } else { LEAST_SLACK };
+        Self { noise: noise.to_vec(), slack: slack.unwrap_or(usual).max(LEAST_SLACK) }
+    }
+}
+
+/// The taps (a channel, at the fast rate) of least gamma within [`GAMMA_ACCURACY`], and among them those of the
+/// least second objective.
+///
+/// # Errors
+/// [`DesignError::Sampled`] if there is not one noise power a channel; [`DesignError::Lti`] for unstable plants.
+pub fn design_fir(
+    plant: &BlockedPlant,
+    taps: usize,
+    second: SecondObjective,
+) -> Result<FirDesign, DesignError> {
+    let mut exchange = Exchange::new(plant, taps, second)?;
+    let mut best = exchange.optimise()?;
+    for _ in 0..SURPRISE_LIMIT {
+        if best.peak.gain <= best.estimate * (1.0 + GAMMA_ACCURACY)
+            || !exchange.add(vec![best.peak.frequency])?
+        {
+            break;
+        }
+        let other = exchange.optimise()?;
+        if other.peak.gain < best.peak.gain {
+            best = other;
+        }
+    }
+    Ok(exchange.finish(best, noncausal_bound(plant)?))
 }
 
 struct Exchange<'a> {
     plant: &'a BlockedPlant,
+    error: FirError<'a>,
     length: usize,
     fine: Vec<Point>,
     problem: sampled::Problem,
-    /// Mean-square weights of the first, uniform points; later ones have none.
-    weights: Vec<f64>,
-    best: Option<Candidate>,
+    /// Only the first, uniform points have a weight in it.
+    square: Square,
+    slack: f64,
     lower: f64,
     rounds: usize,
     iterations: usize,
 }
 
+/// Taps with their norm as far as the fine grid tells.
 #[derive(Debug, Clone)]
 struct Candidate {
     taps: Taps,
-    norm: f64,
-    frequency: f64,
+    estimate: f64,
+    /// Local peaks between the points.
+    peaks: Vec<Peak>,
+}
+
+/// Taps with their exact norm.
+#[derive(Debug, Clone)]
+struct Finished {
+    taps: Vec<Vec<f64>>,
+    estimate: f64,
+    peak: Peak,
 }
 
 impl<'a> Exchange<'a> {
-    fn new(plant: &'a BlockedPlant, length: usize) -> Result<Self, DesignError> {
+    fn new(plant: &'a BlockedPlant, length: usize, second: SecondObjective) -> Result<Self, DesignError> {
         let lags: Vec<usize> =
             (0..plant.wanted).map(|p| length.saturating_sub(p).div_ceil(plant.wanted)).collect();
         let intervals = LEAST_POINTS.max(POINTS_PER_LAG * lags[0]);
-        let response = FrequencyResponse::new(&plant.system);
+        let error = FirError::new(plant)?;
         let fine: Vec<Point> = (0..=FINE * intervals)
-            .map(|k| sample_point(plant, &response, PI * k as f64 / (FINE * intervals) as f64))
+            .map(|k| sample_point(&error, PI * k as f64 / (FINE * intervals) as f64))
             .collect();
         let grid = fine.iter().step_by(FINE).cloned().collect();
         let mut weights = vec![1.0 / intervals as f64; intervals + 1];
         (weights[0], weights[intervals]) = (0.5 / intervals as f64, 0.5 / intervals as f64);
         let problem = sampled::Problem::new(grid, lags)?;
-        Ok(Self { plant, length, fine, problem, weights, best: None, lower: 0.0, rounds: 0, iterations: 0 })
+        Ok(Self {
+            plant,
+            error,
+            length,
+            fine,
+            problem,
+            square: Square { weights, noise: second.noise },
+            slack: second.slack,
+            lower: 0.0,
+            rounds: 0,
+            iterations: 0,
+        })
     }
 
-    fn minimise_gamma(&mut self) -> Result<(), DesignError> {
+    /// Least gamma, then least mean square, then the exact norm.
+    fn optimise(&mut self) -> Result<Finished, DesignError> {
+        let start = self.minimise_gamma()?;
+        let best = self.polish(start)?;
+        let taps = self.impulse_responses(&best.taps);
+        let hints: Vec<f64> = best.peaks.iter().map(|peak| peak.frequency).collect();
+        let peak = self.error.gamma(&taps, &hints)?;
+        Ok(Finished { taps, estimate: best.estimate, peak })
+    }
+
+    fn minimise_gamma(&mut self) -> Result<Candidate, DesignError> {
         let settings = Settings { tol_gap_rel: 0.1 * GAMMA_ACCURACY, ..Settings::default() };
+        let mut best: Option<Candidate> = None;
         for _ in 0..ROUND_LIMIT {
             let solution = sampled::minimise(&self.problem, &settings)?;
             self.rounds += 1;
             self.iterations += solution.steps.len();
             self.lower = self.lower.max(solution.lower.value);
             let candidate = self.judge(solution.taps)?;
-            let (norm, grid) = (candidate.norm, solution.gamma);
-            let peaks = self.peaks(&candidate, grid * (1.0 + 0.2 * GAMMA_ACCURACY))?;
-            self.keep(candidate);
-            if norm <= self.lower * (1.0 + GAMMA_ACCURACY) || peaks.is_empty() {
+            let peaks = candidate.above(solution.gamma * (1.0 + 0.2 * GAMMA_ACCURACY));
+            if best.as_ref().is_none_or(|best| candidate.estimate < best.estimate) {
+                best = Some(candidate);
+            }
+            let reached = best.as_ref().map_or(0.0, |best| best.estimate);
+            if reached <= self.lower * (1.0 + GAMMA_ACCURACY) || !self.add(peaks)? {
                 break;
             }
-            self.add(peaks)?;
         }
-        Ok(())
+        best.ok_or(DesignError::NoTaps)
     }
 
-    /// Least mean-square error under (1 + slack) gamma, with frequencies added where the cap is broken.
-    fn polish(&mut self, slack: f64) -> Result<(), DesignError> {
-        let Some(start) = self.best.clone() else { return Ok(()) };
-        let cap = start.norm * (1.0 + slack);
+    /// The least second objective under (1 + slack) gamma, with frequencies added where the cap is broken; the start
+    /// if that cannot be had.
+    fn polish(&mut self, start: Candidate) -> Result<Candidate, DesignError> {
+        let cap = start.estimate * (1.0 + self.slack);
+        // Aim a little below, so that the peaks between the points fit under the cap as well.
+        let aim = start.estimate * (1.0 + 0.75 * self.slack);
         for _ in 0..ROUND_LIMIT {
-            // Aim a little below, so that the peaks between the points fit under the cap as well.
-            let aim = start.norm * (1.0 + 0.75 * slack);
             let found = sampled::mean_square_under_cap(
                 &self.problem,
-                &self.weights,
+                &self.square,
                 aim,
                 &start.taps,
                 &Settings::default(),
             );
             // An optimum of zero or a stalled iteration leaves nothing to polish.
-            let Ok(found) = found else { return Ok(()) };
-            let candidate = self.judge(found.taps)?;
+            let Ok(found) = found else { break };
             self.rounds += 1;
             self.iterations += found.steps.len();
-            if candidate.norm <= cap {
-                self.best = Some(candidate);
-                return Ok(());
+            let candidate = self.judge(found.taps)?;
+            if candidate.estimate <= cap {
+                return Ok(candidate);
             }
-            let peaks = self.peaks(&candidate, aim)?;
-            if peaks.is_empty() {
-                return Ok(());
+            if !self.add(candidate.above(aim))? {
+                break;
             }
-            self.add(peaks)?;
         }
-        Ok(())
+        Ok(start)
     }
 
+    /// The peaks of the error with `taps`: at the points of the fine grid, and between them on the parabolas through
+    /// three neighbours.
     fn judge(&self, taps: Taps) -> Result<Candidate, DesignError> {
-        let filters = SynthesisFilters::Fir(self.impulse_responses(&taps));
-        let block = error_system::block_system(&filters, self.plant.wanted)?;
-        let peak = error_system::gamma(self.plant, &block)?;
-        Ok(Candidate { taps, norm: peak.gain, frequency: peak.frequency })
-    }
-
-    fn keep(&mut self, candidate: Candidate) {
-        if self.best.as_ref().is_none_or(|best| candidate.norm < best.norm) {
-            self.best = Some(candidate);
-        }
-    }
-
-    /// Local peaks of the error between the points that rise above `level`, and the exact worst one.
-    fn peaks(&self, candidate: &Candidate, level: f64) -> Result<Vec<f64>, DesignError> {
         let gains = self
             .fine
             .iter()
-            .map(|point| error_gain(point, &candidate.taps))
+            .map(|point| error_gain(point, &taps))
             .collect::<Result<Vec<f64>, DesignError>>()?;
+        let step = self.fine[1].omega;
+        // The gain is even about 0 and about pi.
+        let last = gains.len() - 1;
+        let at = |k: isize| gains[last - (last as isize - k.abs()).unsigned_abs()];
         let mut peaks = Vec::new();
-        for k in 1..gains.len() - 1 {
-            if gains[k] >= gains[k - 1] && gains[k] > gains[k + 1] {
-                let (shift, height) = parabola(gains[k - 1], gains[k], gains[k + 1]);
-                if height > level {
-                    peaks.push(self.fine[k].omega + shift * (self.fine[1].omega - self.fine[0].omega));
-                }
+        for k in 0..=last as isize {
+            if at(k) >= at(k - 1) && at(k) >= at(k + 1) {
+                let (shift, _) = parabola(at(k - 1), at(k), at(k + 1));
+                let frequency = ((k as f64 + shift) * step).clamp(0.0, PI);
+                let between = error_gain(&sample_point(&self.error, frequency), &taps)?;
+                let top = Peak { gain: at(k), frequency: k as f64 * step };
+                peaks.push(if between > top.gain { Peak { gain: between, frequency } } else { top });
             }
         }
-        if candidate.norm > level {
-            peaks.push(candidate.frequency);
-        }
-        Ok(peaks)
+        let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
+        Ok(Candidate { taps, estimate, peaks })
     }
 
-    /// Adds the frequencies that are not there yet.
-    fn add(&mut self, frequencies: Vec<f64>) -> Result<(), DesignError> {
-        let response = FrequencyResponse::new(&self.plant.system);
+    /// Adds the frequencies that are not there yet; whether there were any.
+    fn add(&mut self, frequencies: Vec<f64>) -> Result<bool, DesignError> {
         let mut fresh: Vec<f64> = Vec::new();
         for w in frequencies {
             let known = self.problem.points().iter().map(|point| point.omega).chain(fresh.iter().copied());
@@ -189,10 +248,10 @@ impl<'a> Exchange<'a> {
                 fresh.push(w);
             }
         }
-        self.weights.extend(std::iter::repeat_n(0.0, fresh.len()));
-        let points = fresh.into_iter().map(|w| sample_point(self.plant, &response, w));
+        self.square.weights.extend(std::iter::repeat_n(0.0, fresh.len()));
+        let points = fresh.iter().map(|&w| sample_point(&self.error, w));
         self.problem = self.problem.with_points(points)?;
-        Ok(())
+        Ok(!fresh.is_empty())
     }
 
     /// f_i[p + j M] = F_j[p, i].
@@ -203,34 +262,34 @@ impl<'a> Exchange<'a> {
             .collect()
     }
 
-    fn finish(self, noncausal: f64) -> Result<FirDesign, DesignError> {
-        let best = self.best.clone().ok_or(DesignError::NoTaps)?;
-        Ok(FirDesign {
-            taps: self.impulse_responses(&best.taps),
-            upper: best.norm,
-            lower: self.lower.max(noncausal).min(best.norm),
-            noncausal: noncausal.min(best.norm),
-            peak_frequency: best.frequency,
+    fn finish(self, best: Finished, noncausal: f64) -> FirDesign {
+        let upper = best.peak.gain;
+        FirDesign {
+            taps: best.taps,
+            peak: best.peak,
+            lower: self.lower.max(noncausal).min(upper),
+            noncausal: noncausal.min(upper),
             rounds: self.rounds,
             iterations: self.iterations,
-        })
+        }
     }
 }
 
-/// The plant at one frequency, its inputs compressed to N + M.
-fn sample_point(plant: &BlockedPlant, response: &FrequencyResponse, omega: f64) -> Point {
-    let g = linalg::lq_factor_c(&response.at_frequency(omega));
-    let (n, m) = (plant.measured, plant.wanted);
-    Point { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
+impl Candidate {
+    /// The frequencies of the peaks higher than `level`.
+    fn above(&self, level: f64) -> Vec<f64> {
+        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.frequency).collect()
+    }
+}
+
+fn sample_point(error: &FirError<'_>, omega: f64) -> Point {
+    let (h, w) = error.plant_at(omega);
+    Point { omega, h, w }
 }
 
 fn error_gain(point: &Point, taps: &[Mat]) -> Result<f64, DesignError> {
-    let mut filter = CMat::zeros(point.w.nrows(), point.h.nrows());
-    for (j, tap) in taps.iter().enumerate() {
-        let rotation = linalg::Complex::from_polar(1.0, -point.omega * j as f64);
-        filter.zip_apply(tap, |sum, tap| *sum += rotation * tap);
-    }
-    Ok(linalg::singular_values_c(&(&point.w - filter * &point.h))?[0])
+    let error = &point.w - filter_response(taps, point.omega) * &point.h;
+    Ok(linalg::largest_singular_value_c(&error)?)
 }
 
 /// Vertex of the parabola through (-1, a), (0, b), (1, c): abscissa and height.

@@ -11,7 +11,7 @@ pub mod fir;
 pub mod iir;
 pub mod problem;
 
-pub use analysis::{Analysis, analyze};
+pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use certify::{Certified, certify};
 pub use designer::{Design, design, latency};
 pub use problem::Problem;

@@ -21,6 +21,8 @@ pub struct Problem {
     pub target: usize,
     /// The slow channels.
     pub channels: Vec<Channel>,
+    /// Power sigma_i^2 of the noise that each channel adds to its samples.
+    pub noise: Vec<f64>,
 }
 
 /// One slow channel of a [`Problem`].
@@ -47,7 +49,8 @@ impl Problem {
             let front_end = intern(&mut front_ends, filter);
             channels.push(Channel { front_end, delay });
         }
-        let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels };
+        let noise = spec.channels.iter().map(|channel| channel.noise * channel.noise).collect();
+        let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels, noise };
         problem.check_size()?;
         Ok(problem)
     }
@@ -80,28 +83,49 @@ impl Problem {
     }
 
     /// The same problem with each group of indistinguishable channels (same filter, same delay)
-    /// replaced by its first member, and for each channel the index of its representative.
-    pub(super) fn without_duplicates(&self) -> (Self, Vec<usize>) {
+    /// replaced by one, their weighted mean, and the part that each channel has in it.
+    pub(super) fn without_duplicates(&self) -> (Self, Vec<Part>) {
         let mut reduced = self.clone();
         reduced.channels.clear();
-        let representative = self
-            .channels
-            .iter()
-            .map(|channel| match reduced.channels.iter().position(|seen| seen == channel) {
-                Some(known) => known,
-                None => {
-                    reduced.channels.push(*channel);
-                    reduced.channels.len() - 1
-                }
-            })
-            .collect();
-        (reduced, representative)
+        for channel in &self.channels {
+            if !reduced.channels.contains(channel) {
+                reduced.channels.push(*channel);
+            }
+        }
+        reduced.noise = vec![0.0; reduced.channels.len()];
+        let mut parts = vec![Part { representative: 0, share: 0.0 }; self.channels.len()];
+        for (representative, common) in reduced.channels.iter().enumerate() {
+            let group: Vec<usize> = (0..parts.len()).filter(|&i| self.channels[i] == *common).collect();
+            let noise: Vec<f64> = group.iter().map(|&i| self.noise[i]).collect();
+            for (&i, share) in group.iter().zip(least_noise_shares(&noise)) {
+                parts[i] = Part { representative, share };
+                reduced.noise[representative] += share * share * self.noise[i];
+            }
+        }
+        (reduced, parts)
     }
 
     /// The largest delay, in fast periods.
     pub fn longest_delay(&self) -> f64 {
         self.channels.iter().map(|channel| channel.delay).fold(0.0, f64::max)
     }
+}
+
+/// Which channel of a reduced problem a channel is part of, and its weight there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Part {
+    pub(super) representative: usize,
+    /// The shares of a group sum to 1.
+    pub(super) share: f64,
+}
+
+/// The weights, of sum 1, with which a mean of equal signals with noise of the given powers has the least noise: in
+/// inverse proportion to the powers; among the noiseless alone if there are any.
+fn least_noise_shares(noise: &[f64]) -> Vec<f64> {
+    let least = noise.iter().copied().fold(f64::INFINITY, f64::min);
+    let weight = |power: f64| if least == 0.0 { f64::from(u8::from(power == 0.0)) } else { least / power };
+    let total: f64 = noise.iter().map(|&power| weight(power)).sum();
+    noise.iter().map(|&power| weight(power) / total).collect()
 }
 
 fn intern(front_ends: &mut Vec<StrictlyProper>, filter: StrictlyProper) -> usize {

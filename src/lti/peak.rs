@@ -42,11 +42,30 @@ pub fn hinf_norm(system: &StateSpace) -> Result<Peak, LtiError> {
 /// combination of the measured outputs (the first `measured` rows) explains, causal or not:
 /// G_z (I - G_y* (G_y G_y*)^+ G_y).
 pub fn unexplained_peak(system: &StateSpace, measured: usize) -> Result<Peak, LtiError> {
-    let radius = system.spectral_radius()?;
+    let poles = linalg::eigenvalues(system.a())?;
+    let radius = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     if radius >= 1.0 {
         return Err(LtiError::Unstable { radius });
     }
-    Search::new(&system.compress_inputs(), measured)?.run()
+    let system = system.compress_inputs();
+    let response = FrequencyResponse::new(&system);
+    Search::new(&system, measured, &|w| response.at_frequency(w), resonances(&poles)).run()
+}
+
+/// The H-infinity norm of a system that is known to be stable and whose frequency response is cheaper to
+/// have elsewhere: `response(w)` has the singular values of G(e^{jw}), and `hints` are frequencies where it may be
+/// large (see [`resonances`]).
+pub fn known_hinf_norm(
+    system: &StateSpace,
+    response: &dyn Fn(f64) -> CMat,
+    hints: Vec<f64>,
+) -> Result<Peak, LtiError> {
+    Search::new(&system.compress_inputs(), 0, response, hints).run()
+}
+
+/// Angles of the poles that may make a peak.
+pub fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
+    poles.iter().filter(|p| p.im > 0.0 && p.norm() > 0.5).map(|p| p.arg()).collect()
 }
 
 /// The gain at one frequency: see [`unexplained_peak`].
@@ -56,36 +75,40 @@ pub fn unexplained_gain(response: &CMat, measured: usize) -> Result<f64, LtiErro
         return Ok(0.0);
     }
     if measured == 0 {
-        return Ok(linalg::singular_values_c(response)?[0]);
+        return Ok(linalg::largest_singular_value_c(response)?);
     }
     let l = linalg::lq_factor_c(response);
     if l.ncols() <= measured {
         return Ok(0.0);
     }
     let rest = l.view((measured, measured), (wanted, l.ncols() - measured)).into_owned();
-    Ok(linalg::singular_values_c(&rest)?[0])
+    Ok(linalg::largest_singular_value_c(&rest)?)
 }
 
 struct Search<'a> {
     system: &'a StateSpace,
     measured: usize,
-    response: FrequencyResponse,
-    poles: Vec<Complex<f64>>,
+    response: &'a dyn Fn(f64) -> CMat,
+    /// Frequencies looked at first, beside the uniform ones.
+    hints: Vec<f64>,
     /// The level set squares the gain: below sqrt(eps) of what cancels it sees rounding only, and the
     /// refined grid has to do.
     floor: f64,
 }
 
 impl<'a> Search<'a> {
-    fn new(system: &'a StateSpace, measured: usize) -> Result<Self, LtiError> {
-        let response = FrequencyResponse::new(system);
-        let poles = linalg::eigenvalues(system.a())?;
+    fn new(
+        system: &'a StateSpace,
+        measured: usize,
+        response: &'a dyn Fn(f64) -> CMat,
+        hints: Vec<f64>,
+    ) -> Self {
         let scale = system.d().norm() + system.c().norm() * system.b().norm();
-        Ok(Self { system, measured, response, poles, floor: f64::EPSILON.sqrt() * scale })
+        Self { system, measured, response, hints, floor: f64::EPSILON.sqrt() * scale }
     }
 
     fn gain(&self, w: f64) -> Result<f64, LtiError> {
-        unexplained_gain(&self.response.at_frequency(w), self.measured)
+        unexplained_gain(&(self.response)(w), self.measured)
     }
 
     fn run(&self) -> Result<Peak, LtiError> {
@@ -102,10 +125,10 @@ impl<'a> Search<'a> {
         Err(LtiError::IterationLimit { what: "the level set", limit: ROUND_LIMIT, change: PEAK_ACCURACY })
     }
 
-    /// Grid and pole angles, the best three refined.
+    /// Grid and hints, the best two tops refined.
     fn first_peak(&self) -> Result<Peak, LtiError> {
         let mut grid: Vec<f64> = (0..=FIRST_GRID).map(|k| PI * k as f64 / FIRST_GRID as f64).collect();
-        grid.extend(self.poles.iter().filter(|p| p.im > 0.0 && p.norm() > 0.5).map(|p| p.arg()));
+        grid.extend(&self.hints);
         grid.sort_by(f64::total_cmp);
         let gains = grid.iter().map(|&w| self.gain(w)).collect::<Result<Vec<_>, _>>()?;
         let mut tops: Vec<usize> = (0..grid.len()).filter(|&k| is_local_maximum(&gains, k)).collect();

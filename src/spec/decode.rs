@@ -2,16 +2,16 @@
 
 use super::design::{DesignOverrides, WrittenDesign};
 use super::limits::{
-    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_latency, check_ratio,
-    check_slack, check_taps,
+    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_latency, check_noise,
+    check_ratio, check_slack, check_taps,
 };
 use super::reader::{Fault, Fields, Value};
 use super::{ChannelSpec, Family, FilterSpec, Method, Spec, SpecProblem};
 
 const TOP_KEYS: [&str; 8] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
-const CHANNEL_KEYS: [&str; 3] = ["delay", "delay_samples", "filter"];
-const DESIGN_KEYS: [&str; 3] = ["method", "taps", "slack"];
+const CHANNEL_KEYS: [&str; 4] = ["delay", "delay_samples", "filter", "noise"];
+const DESIGN_KEYS: [&str; 4] = ["method", "taps", "slack", "noise"];
 
 /// The keys of each written form of a filter; the first one names the form.
 const FILTER_FORMS: [&[&str]; 5] = [
@@ -38,8 +38,10 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
         )?
         .fields(&["filter"])?;
     let target = filter(&target.required("filter", "give the target's analog filter")?)?;
-    let channels = channels(&top, fast_period, &target)?;
-    let design = design(&top, overrides, channels.len())?;
+    let table = top.optional("design").map(|table| table.fields(&DESIGN_KEYS)).transpose()?;
+    let common = Common { fast_period, target: &target, noise: noise(table.as_ref())?.unwrap_or(0.0) };
+    let channels = channels(&top, &common)?;
+    let design = design(table.as_ref(), &top, overrides, channels.len())?;
     Ok(Spec { name, fast_period, ratio, latency, target, channels, design })
 }
 
@@ -75,22 +77,36 @@ fn checked_count(
     Ok(count)
 }
 
-fn channels(top: &Fields<'_>, fast_period: f64, target: &FilterSpec) -> Result<Vec<ChannelSpec>, Fault> {
+/// What a channel has in common with the others unless it says otherwise.
+struct Common<'a> {
+    fast_period: f64,
+    target: &'a FilterSpec,
+    noise: f64,
+}
+
+/// sigma, of all channels in `[design]` or of one in its own table.
+fn noise(table: Option<&Fields<'_>>) -> Result<Option<f64>, Fault> {
+    table.and_then(|fields| fields.optional("noise")).map(|v| checked_number(&v, check_noise)).transpose()
+}
+
+fn channels(top: &Fields<'_>, common: &Common<'_>) -> Result<Vec<ChannelSpec>, Fault> {
     let list = top
         .required("channel", "describe every slow converter in a table of its own, [[channel]] delay = ..")?;
     let items = list.items("a list of tables, each headed [[channel]]")?;
     check_channel_count(items.len()).map_err(|problem| list.fault(problem))?;
-    items.iter().map(|item| channel(item, fast_period, target)).collect()
+    items.iter().map(|item| channel(item, common)).collect()
 }
 
-fn channel(item: &Value<'_>, fast_period: f64, target: &FilterSpec) -> Result<ChannelSpec, Fault> {
+fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<ChannelSpec, Fault> {
     let fields = item.fields(&CHANNEL_KEYS)?;
-    let delay = delay(&fields, fast_period)?;
+    let delay = delay(&fields, common.fast_period)?;
     let filter = match fields.optional("filter") {
         Some(value) => filter(&value)?,
-        None => target.clone(),
+        None => common.target.clone(),
     };
-    Ok(ChannelSpec { delay, filter })
+    // Noise of -0.0 is noise of 0.0.
+    let noise = noise(Some(&fields))?.unwrap_or(common.noise) + 0.0;
+    Ok(ChannelSpec { delay, filter, noise })
 }
 
 /// D_i in seconds, from one of its two spellings.
@@ -118,9 +134,13 @@ fn delay(fields: &Fields<'_>, fast_period: f64) -> Result<f64, Fault> {
     Ok(delay + 0.0)
 }
 
-fn design(top: &Fields<'_>, overrides: DesignOverrides, channels: usize) -> Result<super::DesignSpec, Fault> {
-    let fields = top.optional("design").map(|table| table.fields(&DESIGN_KEYS)).transpose()?;
-    let get = |key| fields.as_ref().and_then(|fields| fields.optional(key));
+fn design(
+    table: Option<&Fields<'_>>,
+    top: &Fields<'_>,
+    overrides: DesignOverrides,
+    channels: usize,
+) -> Result<super::DesignSpec, Fault> {
+    let get = |key| table.and_then(|fields| fields.optional(key));
     let written = WrittenDesign {
         method: get("method").map(|v| v.name("method", &Method::ALL.map(|m| (m.name(), m)))).transpose()?,
         taps: get("taps").map(|v| checked_count(&v, "taps", check_taps)).transpose()?,
@@ -133,7 +153,7 @@ fn design(top: &Fields<'_>, overrides: DesignOverrides, channels: usize) -> Resu
             SpecProblem::Range { .. } => Some("taps"),
             _ => None,
         };
-        fields.as_ref().unwrap_or(top).fault_at(key, problem)
+        table.unwrap_or(top).fault_at(key, problem)
     };
     design.check(channels).map_err(complain)?;
     Ok(design)

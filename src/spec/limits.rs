@@ -117,6 +117,18 @@ pub(crate) fn check_optimised_taps(taps: usize, channels: usize) -> Result<(), S
     Err(range(total as f64, "taps in all", rule))
 }
 
+/// sigma_i.
+pub(crate) fn check_noise(noise: f64) -> Result<(), SpecProblem> {
+    if (0.0..=1.0).contains(&noise) {
+        return Ok(());
+    }
+    Err(range(
+        noise,
+        "of full scale",
+        "noise is the rms of a converter's own noise relative to full scale, from 0 to 1; 1e-4 is 80 dB below",
+    ))
+}
+
 /// Relative excess over the optimal gamma.
 pub(crate) fn check_slack(slack: f64) -> Result<(), SpecProblem> {
     if slack >= 0.0 && slack.is_finite() {

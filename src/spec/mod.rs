@@ -48,6 +48,13 @@ pub struct ChannelSpec {
     pub delay: f64,
     /// Phi_i.
     pub filter: FilterSpec,
+    /// sigma_i: rms of the converter's own white noise, relative to full scale.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub noise: f64,
+}
+
+fn is_zero(noise: &f64) -> bool {
+    *noise == 0.0
 }
 
 /// An analog filter as written down; not yet checked for stability.
@@ -199,6 +206,7 @@ impl Spec {
         for channel in &self.channels {
             limits::check_delay(channel.delay / self.fast_period, channel.delay, "s")?;
             channel.filter.check()?;
+            limits::check_noise(channel.noise)?;
         }
         self.design.check(self.channels.len())
     }

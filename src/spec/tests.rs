@@ -49,7 +49,10 @@ fn the_example_of_the_manual_reads() {
         ratio: 2,
         latency: Some(10),
         target: thesis.clone(),
-        channels: vec![ChannelSpec { delay: 1.2, filter: thesis }, ChannelSpec { delay: 0.6, filter: zpk }],
+        channels: vec![
+            ChannelSpec { delay: 1.2, filter: thesis, noise: 0.0 },
+            ChannelSpec { delay: 0.6, filter: zpk, noise: 0.0 },
+        ],
         design: DesignSpec { method: Method::Fir, taps: Some(22), slack: None },
     };
     assert_eq!(spec, expected);
@@ -159,7 +162,7 @@ fn message(text: &str) -> String {
 fn an_unknown_key_is_named_with_line_neighbour_and_all_known_keys() {
     let text = message(&thesis_with("delay = 1.2", "dealy = 1.2"));
     let expected = "spec.toml:11:1: channel[0]: unknown key \"dealy\", did you mean \"delay\"?; the keys here are delay, \
-                    delay_samples, filter\n   |\n11 | dealy = 1.2\n   | ^^^^^";
+                    delay_samples, filter, noise\n   |\n11 | dealy = 1.2\n   | ^^^^^";
     assert_eq!(text, expected);
 }
 
@@ -465,7 +468,7 @@ prop_compose! {
     ) -> Spec {
         Spec {
             name, fast_period, ratio, latency, target,
-            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: d * fast_period, filter }).collect(),
+            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: d * fast_period, filter, noise: 1e-4 * d.fract() }).collect(),
             design: DesignSpec {
                 method,
                 taps: method.has_taps().then_some(taps),

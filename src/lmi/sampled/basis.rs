@@ -15,12 +15,24 @@ pub(super) struct Basis {
     q: Mat,
     triangles: Vec<(usize, Svd)>,
     weights: Vec<f64>,
+    /// Rows below the responses, where nothing is wanted.
+    silent: usize,
 }
 
 impl Basis {
     /// `weights[l]` multiplies the row entries at point l.
     pub(super) fn new(reduced: &Reduced, weights: Vec<f64>) -> Result<Self, LinalgError> {
-        let map = row_map(reduced, &weights);
+        Self::with_noise(reduced, weights, &[])
+    }
+
+    /// With the taps of original channel i, times `noise[i]`, as further entries that are wanted to be zero.
+    pub(super) fn with_noise(
+        reduced: &Reduced,
+        weights: Vec<f64>,
+        noise: &[f64],
+    ) -> Result<Self, LinalgError> {
+        let map = row_map(reduced, &weights, noise);
+        let silent = map.nrows() - 2 * reduced.h.cols() * reduced.count();
         let (l, q) = linalg::lq(&map.transpose());
         let (q, r) = (q.transpose(), l.transpose());
         let mut triangles: Vec<(usize, Svd)> = Vec::new();
@@ -31,7 +43,7 @@ impl Basis {
                 triangles.push((lags, linalg::svd(&r.view((0, 0), (rows, cols)).into_owned())?));
             }
         }
-        Ok(Self { q, triangles, weights })
+        Ok(Self { q, triangles, weights, silent })
     }
 
     /// The triangle for a number of lags; none for a row without taps.
@@ -59,7 +71,7 @@ impl Basis {
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
             let (u, kept) = (&svd.u, kept(svd, cut));
-            let seen = self.q.columns(0, u.nrows()).tr_mul(&row_vector(w, p, &self.weights));
+            let seen = self.q.columns(0, u.nrows()).tr_mul(&row_vector(w, p, &self.weights, self.silent));
             let mut c = u.columns(0, kept).tr_mul(&seen);
             for (value, s) in c.iter_mut().zip(&svd.s) {
                 *value /= s;
@@ -77,7 +89,7 @@ impl Basis {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
             let u = svd.u.columns(0, kept(svd, cut));
             let q = self.q.columns(0, svd.u.nrows());
-            let mut row = row_vector(y, p, &self.weights);
+            let mut row = row_vector(y, p, &self.weights, self.silent);
             for _ in 0..2 {
                 let reach = u * u.tr_mul(&q.tr_mul(&row));
                 row -= q * reach;
@@ -92,11 +104,13 @@ fn kept(svd: &Svd, cut: f64) -> usize {
     svd.s.iter().filter(|s| **s > floor).count()
 }
 
-/// Rows: real parts of all (point, input), then imaginary parts. Columns: lag by lag, channels inside.
-fn row_map(reduced: &Reduced, weights: &[f64]) -> Mat {
+/// Rows: real parts of all (point, input), then imaginary parts, then the noise of all (lag, channel with noise).
+/// Columns: lag by lag, channels inside.
+fn row_map(reduced: &Reduced, weights: &[f64], noise: &[f64]) -> Mat {
     let (n, k, lags) = (reduced.layout.channels, reduced.h.cols(), reduced.phases.lags());
     let half = k * reduced.count();
-    let mut map = Mat::zeros(2 * half, n * lags);
+    let noisy: Vec<usize> = (0..noise.len()).filter(|&i| noise[i] > 0.0).collect();
+    let mut map = Mat::zeros(2 * half + noisy.len() * lags, n * lags);
     for a in 0..n * lags {
         for r in 0..half {
             let (l, c) = (r / k, r % k);
@@ -104,13 +118,19 @@ fn row_map(reduced: &Reduced, weights: &[f64]) -> Mat {
             map[(r, a)] = z.re;
             map[(half + r, a)] = z.im;
         }
+        for (s, &i) in noisy.iter().enumerate() {
+            map[(2 * half + noisy.len() * (a / n) + s, a)] = noise[i] * reduced.mix[(a % n, i)];
+        }
     }
     map
 }
 
-fn row_vector(y: &Blocks, p: usize, weights: &[f64]) -> Mat {
+fn row_vector(y: &Blocks, p: usize, weights: &[f64], silent: usize) -> Mat {
     let (k, half) = (y.cols(), y.cols() * y.count());
-    Mat::from_fn(2 * half, 1, |r, _| {
+    Mat::from_fn(2 * half + silent, 1, |r, _| {
+        if r >= 2 * half {
+            return 0.0;
+        }
         let (l, c) = ((r % half) / k, r % k);
         let z = y.block(l).at(p, c) * weights[l];
         if r < half { z.re } else { z.im }

@@ -7,6 +7,7 @@
 use super::blocks::{Cone, SlackStep};
 use super::newton::{self, Seen};
 use super::prepare::Reduced;
+use super::quadratic::Quadratic;
 use super::{Settings, Step};
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
@@ -17,8 +18,8 @@ use crate::lmi::factor::Shifted;
 pub(super) enum Objective {
     /// `t`, itself an unknown.
     WorstCase,
-    /// `sum_l weights_l ||K_l||_F^2` with t fixed.
-    MeanSquare(Vec<f64>),
+    /// A quadratic function of the taps, with t fixed.
+    MeanSquare(Quadratic),
 }
 
 /// Why a step could not be made.
@@ -65,19 +66,12 @@ impl<'a> Engine<'a> {
         if !cone.invert() {
             return None;
         }
-        let curvature = match &objective {
-            Objective::WorstCase => None,
-            Objective::MeanSquare(weights) => {
-                let mut q = Mat::zeros(reduced.layout.unknowns(), reduced.layout.unknowns());
-                newton::add_mean_square(&mut q, &reduced.layout, &reduced.phases, &reduced.h, weights);
-                Some(q)
-            }
-        };
-        let start = match &objective {
-            Objective::WorstCase => None,
-            // A gap of a tenth of the objective: near enough to the end, far enough from the boundary.
-            Objective::MeanSquare(weights) => {
-                Some(0.1 * weighted_square(&cone.k, weights).max(f64::MIN_POSITIVE) / cone.order() as f64)
+        let (curvature, start) = match &objective {
+            Objective::WorstCase => (None, None),
+            Objective::MeanSquare(quadratic) => {
+                // A gap of a tenth of the objective: near enough to the end, far enough from the boundary.
+                let gap = 0.1 * quadratic.value(&cone.k, &x).max(f64::MIN_POSITIVE);
+                (Some(quadratic.curvature(reduced)), Some(gap / cone.order() as f64))
             }
         };
         cone.center(start);
@@ -102,7 +96,7 @@ impl<'a> Engine<'a> {
     pub(super) fn value(&self) -> f64 {
         match &self.objective {
             Objective::WorstCase => self.cone.t,
-            Objective::MeanSquare(weights) => weighted_square(&self.cone.k, weights),
+            Objective::MeanSquare(quadratic) => quadratic.value(&self.cone.k, &self.x),
         }
     }
 
@@ -114,14 +108,7 @@ impl<'a> Engine<'a> {
                 c.push(1.0);
                 c
             }
-            Objective::MeanSquare(weights) => {
-                let mut weighted = self.cone.k.clone();
-                let size = weighted.rows() * weighted.cols();
-                for (i, z) in weighted.as_mut_slice().iter_mut().enumerate() {
-                    *z *= -weights[i / size];
-                }
-                self.reduced.adjoint(&weighted)
-            }
+            Objective::MeanSquare(quadratic) => quadratic.gradient(self.reduced, &self.cone.k, &self.x),
         }
     }
 
@@ -251,11 +238,6 @@ impl<'a> Engine<'a> {
 /// Mehrotra's centering from the ratio of the predicted to the present gap.
 fn centering(ratio: f64) -> f64 {
     ratio.clamp(0.0, 1.0).powi(3).clamp(1e-8, 0.9)
-}
-
-fn weighted_square(k: &Blocks, weights: &[f64]) -> f64 {
-    let square = |l: usize| k.block(l).data.iter().map(|z| z.norm_sqr()).sum::<f64>();
-    weights.iter().enumerate().map(|(l, w)| w * square(l)).sum()
 }
 
 pub(super) fn norm(v: &[f64]) -> f64 {

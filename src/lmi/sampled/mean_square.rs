@@ -1,15 +1,15 @@
-//! The second objective: least weighted mean square, free or under a cap on the worst case.
+//! The second objective: least weighted mean square, with the noise of the channels, free or under a cap on the
+//! worst case.
 //!
 //! Optimal worst-case taps are usually many; among all taps within a small slack of the optimum the
 //! ones of least mean square are good at every other frequency too.
 
 use super::basis::Basis;
 use super::interior::{Engine, Objective};
-use super::newton;
 use super::prepare::Reduced;
-use super::problem::{Point, Problem, SampledError, Taps};
+use super::problem::{Point, Problem, SampledError, Square, Taps};
+use super::quadratic::Quadratic;
 use super::{Settings, Step};
-use crate::linalg::Mat;
 use crate::lmi::Stop;
 use crate::lmi::factor::Shifted;
 
@@ -23,7 +23,7 @@ pub struct MeanSquare {
     pub stop: Stop,
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
-    /// `sum_l weights_l ||K_l||_F^2` of these taps.
+    /// The second objective of these taps.
     pub mean_square: f64,
     /// Lower bound on it for any taps under the cap, from the dual iterate (valid up to rounding).
     pub lower: f64,
@@ -35,37 +35,38 @@ pub struct MeanSquare {
     pub steps: Vec<Step>,
 }
 
-/// Taps that minimise `sum_l weights_l ||K_l||_F^2`, by a QR factorisation (never by normal
-/// equations); least norm among directions weaker than `tol_rank` times the strongest.
+/// Taps that minimise the second objective, by a QR factorisation (never by normal equations); least norm among
+/// directions weaker than `tol_rank` times the strongest.
 ///
-/// Fails if the weights do not fit (one for each point, finite, not negative, not all zero).
-pub fn least_squares(problem: &Problem, weights: &[f64], tol_rank: f64) -> Result<Taps, SampledError> {
-    problem.check_weights(weights)?;
+/// Fails if weights or noise do not fit: see [`Square`].
+pub fn least_squares(problem: &Problem, square: &Square, tol_rank: f64) -> Result<Taps, SampledError> {
+    problem.check_square(square)?;
     let reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return Ok(problem.zero_taps());
     }
-    let basis = Basis::new(&reduced, weights.iter().map(|w| w.sqrt()).collect())?;
+    let roots = |powers: &[f64]| powers.iter().map(|power| power.sqrt()).collect::<Vec<f64>>();
+    let basis = Basis::with_noise(&reduced, roots(&square.weights), &roots(&square.noise))?;
     Ok(reduced.taps(&basis.least_squares(&reduced, &reduced.w, tol_rank)))
 }
 
-/// Minimises `sum_l weights_l ||K_l||_F^2` subject to `sigma_max(K_l) <= cap` at every point.
+/// Minimises the second objective subject to `sigma_max(K_l) <= cap` at every point.
 ///
 /// `start` must satisfy the cap strictly: the taps of [`super::minimise`] with a cap a little above
 /// their gamma. If the unconstrained least-squares taps satisfy the cap they are returned at once.
 /// The result is never worse than the start, and satisfies the cap, however the iteration ended.
 pub fn mean_square_under_cap(
     problem: &Problem,
-    weights: &[f64],
+    square: &Square,
     cap: f64,
     start: &Taps,
     settings: &Settings,
 ) -> Result<MeanSquare, SampledError> {
     settings.check()?;
     problem.check_taps(start)?;
-    let free = least_squares(problem, weights, settings.tol_rank)?;
-    let free_square = problem.mean_square(&free, weights);
-    let mut best = Best::new(problem, weights, cap, start)?;
+    let free = least_squares(problem, square, settings.tol_rank)?;
+    let free_square = problem.mean_square(&free, square);
+    let mut best = Best::new(problem, square, cap, start)?;
     best.offer(free)?;
     if best.mean_square == free_square {
         return Ok(best.finish(Stop::Solved, free_square, Vec::new()));
@@ -75,10 +76,10 @@ pub fn mean_square_under_cap(
     }
     // From the start, in units of the cap and of the start's own mean square.
     let unit = best.mean_square / (cap * cap);
-    let scaled: Vec<f64> = weights.iter().map(|w| w / unit).collect();
     let mut reduced = Reduced::new(&shifted(problem, start)?)?;
     reduced.rescale(cap);
-    let run = Run { reduced: &reduced, start, weights: &scaled, cap, settings };
+    let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
+    let run = Run { reduced: &reduced, start, quadratic, cap, settings };
     let (stop, gap, steps) = run.iterate(&mut best)?;
     let lower = (best.mean_square - gap * best.mean_square_unit(unit)).max(free_square);
     Ok(best.finish(stop, lower, steps))
@@ -95,7 +96,7 @@ fn shifted(problem: &Problem, start: &Taps) -> Result<Problem, SampledError> {
 
 struct Best<'a> {
     problem: &'a Problem,
-    weights: &'a [f64],
+    square: &'a Square,
     cap: f64,
     taps: Taps,
     mean_square: f64,
@@ -104,15 +105,15 @@ struct Best<'a> {
 }
 
 impl<'a> Best<'a> {
-    fn new(problem: &'a Problem, weights: &'a [f64], cap: f64, start: &Taps) -> Result<Self, SampledError> {
+    fn new(problem: &'a Problem, square: &'a Square, cap: f64, start: &Taps) -> Result<Self, SampledError> {
         let (gamma, worst_point) = problem.worst(start)?;
-        let mean_square = problem.mean_square(start, weights);
-        Ok(Self { problem, weights, cap, taps: start.clone(), mean_square, gamma, worst_point })
+        let mean_square = problem.mean_square(start, square);
+        Ok(Self { problem, square, cap, taps: start.clone(), mean_square, gamma, worst_point })
     }
 
     /// Takes the taps if they respect the cap and improve.
     fn offer(&mut self, taps: Taps) -> Result<(), SampledError> {
-        let mean_square = self.problem.mean_square(&taps, self.weights);
+        let mean_square = self.problem.mean_square(&taps, self.square);
         let (gamma, worst_point) = self.problem.worst(&taps)?;
         if gamma <= self.cap && (mean_square < self.mean_square || self.gamma > self.cap) {
             (self.taps, self.mean_square) = (taps, mean_square);
@@ -134,7 +135,7 @@ impl<'a> Best<'a> {
 struct Run<'a> {
     reduced: &'a Reduced,
     start: &'a Taps,
-    weights: &'a [f64],
+    quadratic: Quadratic,
     cap: f64,
     settings: &'a Settings,
 }
@@ -144,11 +145,11 @@ impl Run<'_> {
     fn iterate(&self, best: &mut Best<'_>) -> Result<(Stop, f64, Vec<Step>), SampledError> {
         let mut steps = Vec::new();
         let zero = vec![0.0; self.reduced.layout.unknowns()];
-        let objective = Objective::MeanSquare(self.weights.to_vec());
+        let objective = Objective::MeanSquare(self.quadratic.clone());
         let Some(mut engine) = Engine::new(self.reduced, objective, zero, 1.0) else {
             return Ok((Stop::NumericalTrouble, f64::INFINITY, steps));
         };
-        let Some(curvature) = self.curvature() else {
+        let Ok(curvature) = Shifted::new(self.quadratic.curvature(self.reduced)) else {
             return Ok((Stop::NumericalTrouble, f64::INFINITY, steps));
         };
         let (mut least, mut waited) = (f64::INFINITY, 0);
@@ -177,13 +178,6 @@ impl Run<'_> {
             Stop::NumericalTrouble
         };
         Ok((stop, gap, steps))
-    }
-
-    fn curvature(&self) -> Option<Shifted> {
-        let r = self.reduced;
-        let mut q = Mat::zeros(r.layout.unknowns(), r.layout.unknowns());
-        newton::add_mean_square(&mut q, &r.layout, &r.phases, &r.h, self.weights);
-        Shifted::new(q).ok()
     }
 
     fn taps(&self, x: &[f64]) -> Taps {

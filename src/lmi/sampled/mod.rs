@@ -38,13 +38,14 @@ mod mean_square;
 mod newton;
 mod prepare;
 mod problem;
+mod quadratic;
 #[cfg(test)]
 mod tests;
 mod worst_case;
 
 pub use bound::{Covered, LowerBound, lower_bound};
 pub use mean_square::{MeanSquare, least_squares, mean_square_under_cap};
-pub use problem::{Point, Problem, SampledError, Taps};
+pub use problem::{Point, Problem, SampledError, Square, Taps};
 pub use worst_case::{Solution, minimise};
 
 use super::{SettingError, check_settings};

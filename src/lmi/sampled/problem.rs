@@ -95,6 +95,22 @@ pub enum SampledError {
         /// Worst-case norm of the taps given.
         gamma: f64,
     },
+    /// The list of noise powers has the wrong length.
+    #[error("{given} noise powers were given for {channels} channels: give one for each channel")]
+    NoiseCount {
+        /// How many were given.
+        given: usize,
+        /// How many channels there are.
+        channels: usize,
+    },
+    /// A noise power is negative or not finite.
+    #[error("noise power {value} of channel {channel} is not allowed: powers are finite and not negative")]
+    Noise {
+        /// Index of the channel, from 0.
+        channel: usize,
+        /// The value.
+        value: f64,
+    },
     /// A setting is out of its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -112,6 +128,27 @@ pub struct Point {
     pub w: CMat,
     /// Measured responses, N x q.
     pub h: CMat,
+}
+
+/// The second objective: the weighted mean square of the error, and the power of the noise that the channels
+/// themselves add,
+///
+/// ```text
+/// sum_l weights_l ||K_l||_F^2 + sum_i noise_i sum_j |F_j e_i|^2.
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Square {
+    /// One for each point; finite, not negative, not all zero.
+    pub weights: Vec<f64>,
+    /// Power of the white noise of each channel, N of them; finite, not negative.
+    pub noise: Vec<f64>,
+}
+
+impl Square {
+    /// Noiseless channels.
+    pub fn noiseless(weights: Vec<f64>, channels: usize) -> Self {
+        Self { weights, noise: vec![0.0; channels] }
+    }
 }
 
 /// A sampled worst-case norm problem with consistent sizes and finite data.
@@ -190,7 +227,7 @@ impl Problem {
     pub fn worst(&self, taps: &Taps) -> Result<(f64, usize), SampledError> {
         let mut worst = (0.0, 0);
         for l in 0..self.points.len() {
-            let sigma = linalg::singular_values_c(&self.error_at(l, taps))?[0];
+            let sigma = linalg::largest_singular_value_c(&self.error_at(l, taps))?;
             if sigma > worst.0 {
                 worst = (sigma, l);
             }
@@ -198,10 +235,13 @@ impl Problem {
         Ok(worst)
     }
 
-    /// `sum_l weight_l ||K_l||_F^2`.
-    pub fn mean_square(&self, taps: &Taps, weights: &[f64]) -> f64 {
-        let square = |l: usize| self.error_at(l, taps).iter().map(|z| z.norm_sqr()).sum::<f64>();
-        weights.iter().enumerate().map(|(l, w)| w * square(l)).sum()
+    /// The second objective's value: see [`Square`].
+    pub fn mean_square(&self, taps: &Taps, square: &Square) -> f64 {
+        let error = |l: usize| self.error_at(l, taps).iter().map(|z| z.norm_sqr()).sum::<f64>();
+        let errors: f64 = square.weights.iter().enumerate().map(|(l, w)| w * error(l)).sum();
+        let noise =
+            |f: &Mat| f.column_iter().zip(&square.noise).map(|(c, n)| n * c.norm_squared()).sum::<f64>();
+        errors + taps.iter().map(noise).sum::<f64>()
     }
 
     /// Refuses taps of the wrong size or with entries beyond a row's number of lags.
@@ -222,7 +262,15 @@ impl Problem {
         Ok(())
     }
 
-    pub(crate) fn check_weights(&self, weights: &[f64]) -> Result<(), SampledError> {
+    pub(crate) fn check_square(&self, square: &Square) -> Result<(), SampledError> {
+        if square.noise.len() != self.channels() {
+            let (given, channels) = (square.noise.len(), self.channels());
+            return Err(SampledError::NoiseCount { given, channels });
+        }
+        if let Some(channel) = square.noise.iter().position(|n| !(n.is_finite() && *n >= 0.0)) {
+            return Err(SampledError::Noise { channel, value: square.noise[channel] });
+        }
+        let weights = &square.weights;
         if weights.len() != self.points.len() {
             let points = self.points.len();
             return Err(SampledError::Count { name: "weights", given: weights.len(), points });

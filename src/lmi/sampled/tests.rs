@@ -92,11 +92,12 @@ fn steep_front_ends_are_solved_to_a_proven_gap() {
         // Rounding errors of data of order one, beside a gamma of 2e-4 to 1e-2, set this limit.
         assert!(s.stop.is_solved() && s.relative_gap() < 1e-5, "{}", s.relative_gap());
         let cap = 1.01 * s.gamma;
-        let ms = mean_square_under_cap(&problem, &[1.0; 97], cap, &s.taps, &Settings::default()).unwrap();
+        let square = Square::noiseless(vec![1.0; 97], 8);
+        let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::default()).unwrap();
         println!(
             "{:?} {} -> {} >= {}, {} steps",
             ms.stop,
-            problem.mean_square(&s.taps, &[1.0; 97]),
+            problem.mean_square(&s.taps, &square),
             ms.mean_square,
             ms.lower,
             ms.steps.len()
@@ -181,15 +182,16 @@ fn general_conic_solver_agrees() {
         let s = solve(&format!("{sizes:?}"), &problem);
         // Clarabel itself ended some of these at reduced accuracy; our own proven gap is far below.
         assert!((s.gamma - gamma).abs() < 1e-7 * gamma, "{sizes:?}: {} instead of {gamma}", s.gamma);
-        let weights: Vec<f64> = (0..omegas.len()).map(|l| 0.5 + 0.1 * l as f64).collect();
+        let weights = (0..omegas.len()).map(|l| 0.5 + 0.1 * l as f64).collect();
+        let square = Square::noiseless(weights, problem.channels());
         let settings = Settings::default();
-        let ms = mean_square_under_cap(&problem, &weights, cap, &s.taps, &settings).unwrap();
+        let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &settings).unwrap();
         println!("{:?}", (ms.stop, ms.mean_square, ms.lower, ms.steps.len()));
         assert_eq!(ms.stop, Stop::Solved, "{sizes:?}");
         assert!((ms.mean_square - capped).abs() < 2e-7 * capped, "{sizes:?}: {}", ms.mean_square);
         assert!(ms.gamma <= cap && ms.lower <= ms.mean_square && ms.lower > capped * (1.0 - 2e-7));
-        let taps = least_squares(&problem, &weights, 1e-12).unwrap();
-        assert!((problem.mean_square(&taps, &weights) - free).abs() < 1e-8 * free);
+        let taps = least_squares(&problem, &square, 1e-12).unwrap();
+        assert!((problem.mean_square(&taps, &square) - free).abs() < 1e-8 * free);
     }
 }
 
@@ -374,11 +376,11 @@ fn mean_square_under_a_cap_is_never_worse_than_the_start() {
     for (seed, (sizes, points, lags)) in SHAPES.into_iter().enumerate() {
         let problem = random_problem(seed as u64, sizes, points, lags);
         let s = minimise(&problem, &Settings::default()).unwrap();
-        let weights = vec![1.0; points];
-        let mut last = problem.mean_square(&s.taps, &weights) * (1.0 + 1e-12);
+        let square = Square::noiseless(vec![1.0; points], problem.channels());
+        let mut last = problem.mean_square(&s.taps, &square) * (1.0 + 1e-12);
         for slack in [1e-6, 1e-3, 1e-1, 10.0] {
             let cap = s.gamma * (1.0 + slack);
-            let ms = mean_square_under_cap(&problem, &weights, cap, &s.taps, &Settings::default()).unwrap();
+            let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::default()).unwrap();
             println!(
                 "{sizes:?} slack {slack}: {:?} {} {} {}",
                 ms.stop,
@@ -390,8 +392,8 @@ fn mean_square_under_a_cap_is_never_worse_than_the_start() {
             assert!(ms.lower >= ms.mean_square * (1.0 - 1e-5), "{ms:?}");
             last = ms.mean_square;
         }
-        let free = least_squares(&problem, &weights, 1e-12).unwrap();
-        assert!((problem.mean_square(&free, &weights) - last).abs() <= 1e-9 * last);
+        let free = least_squares(&problem, &square, 1e-12).unwrap();
+        assert!((problem.mean_square(&free, &square) - last).abs() <= 1e-9 * last);
     }
 }
 
@@ -439,17 +441,65 @@ fn what_is_no_problem_is_refused() {
         Err(SampledError::Setting(SettingError { name: "step_fraction", .. }))
     ));
     let s = minimise(&good, &Settings::default()).unwrap();
+    let channels = good.channels();
+    let with = |weights: &[f64], noise: &[f64]| Square { weights: weights.to_vec(), noise: noise.to_vec() };
     let capped =
-        |weights: &[f64], cap, taps| mean_square_under_cap(&good, weights, cap, taps, &Settings::default());
-    let ones = [1.0; 3];
-    assert!(matches!(capped(&ones[..2], 1.0, &s.taps), Err(SampledError::Count { given: 2, points: 3, .. })));
-    assert!(matches!(capped(&[1.0, -1.0, 1.0], 1.0, &s.taps), Err(SampledError::Weight { point: 1, .. })));
+        |square: &Square, cap, taps| mean_square_under_cap(&good, square, cap, taps, &Settings::default());
+    let ones = Square::noiseless(vec![1.0; 3], channels);
+    let refused = |weights: &[f64], noise: &[f64]| capped(&with(weights, noise), 1.0, &s.taps).unwrap_err();
+    assert!(matches!(refused(&[1.0; 2], &ones.noise), SampledError::Count { given: 2, points: 3, .. }));
+    assert!(matches!(refused(&[1.0, -1.0, 1.0], &ones.noise), SampledError::Weight { point: 1, .. }));
+    assert!(matches!(refused(&[1.0; 3], &[]), SampledError::NoiseCount { given: 0, .. }));
+    let negative = vec![-1.0; channels];
+    assert!(matches!(refused(&[1.0; 3], &negative), SampledError::Noise { channel: 0, .. }));
     assert!(matches!(capped(&ones, 0.5 * s.gamma, &s.taps), Err(SampledError::Cap { .. })));
     assert!(matches!(
         capped(&ones, 1.0, &vec![crate::linalg::Mat::zeros(1, 1)]),
         Err(SampledError::TapsShape { .. })
     ));
     assert!(matches!(lower_bound(&good, &[], 1.0), Err(SampledError::Count { .. })));
+}
+
+/// Noise by another route: a full circle of points with nothing wanted and the noise as input, so weak that the cap does
+/// not see it and so heavy that the mean square does.
+#[test]
+fn noise_of_the_channels_is_like_points_of_its_own() {
+    let (m, n, q, lags) = (2, 2, 5, [3, 2]);
+    let problem = random_problem(11, (m, n, q), 9, &lags);
+    let s = minimise(&problem, &Settings::default()).unwrap();
+    for noise in [[0.3, 2.0], [0.0, 1.0], [1e-6, 1e3]] {
+        let square = Square { weights: vec![1.0; 9], noise: noise.to_vec() };
+        let (circle, faint) = (8, 1e-4);
+        let points = (0..circle).map(|l| {
+            let mut h = CMat::zeros(n, q);
+            (0..n).for_each(|i| h[(i, i)] = Complex::from(faint * noise[i].sqrt()));
+            Point { omega: std::f64::consts::TAU * l as f64 / circle as f64, w: CMat::zeros(m, q), h }
+        });
+        let mut weights = vec![1.0; 9];
+        weights.extend(vec![1.0 / (faint * faint * circle as f64); circle]);
+        let longer = problem.with_points(points).unwrap();
+        let alike = Square::noiseless(weights, n);
+        let value = problem.mean_square(&s.taps, &square);
+        assert!((longer.mean_square(&s.taps, &alike) - value).abs() < 1e-9 * value);
+        let free = problem.mean_square(&least_squares(&problem, &square, 1e-12).unwrap(), &square);
+        let other = longer.mean_square(&least_squares(&longer, &alike, 1e-12).unwrap(), &alike);
+        assert!((free - other).abs() < 1e-9 * free, "{noise:?}: {free} {other}");
+        for slack in [1e-3, 0.05, 0.5] {
+            let cap = (1.0 + slack) * s.gamma;
+            let capped = |p: &Problem, q: &Square| {
+                mean_square_under_cap(p, q, cap, &s.taps, &Settings::default()).unwrap()
+            };
+            let (a, b) = (capped(&problem, &square), capped(&longer, &alike));
+            assert!(a.stop.is_solved() && a.gamma <= cap && a.lower >= a.mean_square * (1.0 - 1e-6), "{a:?}");
+            let apart = (a.mean_square - b.mean_square).abs();
+            assert!(
+                apart < 1e-6 * a.mean_square,
+                "{noise:?} slack {slack}: {} {}",
+                a.mean_square,
+                b.mean_square
+            );
+        }
+    }
 }
 
 proptest::proptest! {
