@@ -46,6 +46,12 @@ pub enum BankProblem {
         /// What the file says.
         found: usize,
     },
+    /// A text that is no digest.
+    #[error("\"{found}\" is no digest, which is sha256: with 64 hexadecimal digits; leave it out")]
+    Digest {
+        /// What the file says.
+        found: String,
+    },
     /// A key, a type or a number that is wrong as such.
     #[error(transparent)]
     Value(#[from] SpecProblem),

@@ -20,6 +20,7 @@ fn fir() -> Bank {
         delays: vec![1.2, 0.6],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
         gamma: Gamma { upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
+        proof: None,
     }
 }
 

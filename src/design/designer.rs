@@ -51,6 +51,7 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         delays: spec.channels.iter().map(|channel| channel.delay).collect(),
         filters,
         gamma,
+        proof: None,
         spec: Some(complete),
     };
     Ok(Design {
