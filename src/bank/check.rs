@@ -196,7 +196,8 @@ fn check_certificate(certificate: &Certificate) -> Checked {
     for (i, row) in certificate.factor.iter().enumerate() {
         let path = format!("proof.upper.factor[{i}]");
         if row.len() != i + 1 {
-            let (found, expected, rule) = (row.len(), i + 1, "the factor is lower triangular, each row one longer");
+            let (found, expected, rule) =
+                (row.len(), i + 1, "the factor is lower triangular, each row one longer");
             return refuse(path, BankProblem::Length { found, expected, unit: "columns", rule });
         }
         check_finite(&path, row)?;

@@ -52,6 +52,11 @@ pub enum BankProblem {
         /// What the file says.
         found: String,
     },
+    /// A digest of another content.
+    #[error(
+        "it is not the digest of this content: something in the file was altered; take the original, or design the bank anew"
+    )]
+    Altered,
     /// A key, a type or a number that is wrong as such.
     #[error(transparent)]
     Value(#[from] SpecProblem),

@@ -5,7 +5,7 @@
 //! `meta`, which may hold anything that other programs wish to keep in the file and is not read.
 //!
 //! A file may carry a [`Proof`] of its gammas and a digest of its content. Reading does not look at the digest, so that a
-//! bank can be edited and run; [`digests`] compares it.
+//! bank can be edited and run; [`check_digest`] compares it.
 
 mod check;
 mod digest;
@@ -17,7 +17,7 @@ mod write;
 pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
 pub use proof::{Certificate, Proof, Tone};
-pub use read::{Digests, digests};
+pub use read::check_digest;
 
 use crate::spec::{Method, Spec};
 

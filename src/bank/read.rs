@@ -6,7 +6,8 @@ use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
 
 use super::digest::{digest, is_digest};
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, Certificate, FORMAT, Gamma, Proof, SynthesisFilters, Tone, VERSION,
+    Bank, BankError, BankProblem, BlockFilter, Certificate, FORMAT, Gamma, Proof, SynthesisFilters, Tone,
+    VERSION,
 };
 
 const KEYS: [&str; 13] = [
@@ -38,26 +39,20 @@ impl Bank {
     }
 }
 
-/// The digest that a bank file states and the one that its content has.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Digests {
-    /// `None` where the file has none.
-    pub stated: Option<String>,
-    /// Of the content as it is.
-    pub found: String,
-}
-
-/// Both digests of a bank file's text.
+/// Compares the digest of a bank file with its content; whether there is one at all.
 ///
 /// # Errors
-/// [`BankError`] if the text is not JSON or its digest is no digest.
-pub fn digests(text: &str, file_name: &str) -> Result<Digests, BankError> {
-    let both = parse(text).and_then(|document| {
+/// [`BankError`] if the text is not JSON, its digest is none, or the content is not the one that it was made of.
+pub fn check_digest(text: &str, file_name: &str) -> Result<bool, BankError> {
+    let checked = parse(text).and_then(|document| {
         let top = Value::root(&document).fields(&KEYS)?;
-        let stated = top.optional("digest").map(|value| stated_digest(&value)).transpose()?;
-        Ok(Digests { stated, found: digest(&document) })
+        let Some(value) = top.optional("digest") else { return Ok(false) };
+        if stated_digest(&value)? == digest(&document) {
+            return Ok(true);
+        }
+        Err(BankError::new("", value.path().to_owned(), BankProblem::Altered))
     });
-    both.map_err(|error| error.in_file(file_name))
+    checked.map_err(|error| error.in_file(file_name))
 }
 
 fn stated_digest(value: &Value<'_>) -> Result<String, BankError> {
@@ -185,5 +180,7 @@ fn pairs(value: &Value<'_>) -> Result<Vec<[f64; 2]>, Fault> {
 
 fn pair(value: &Value<'_>) -> Result<[f64; 2], Fault> {
     let numbers = value.numbers()?;
-    numbers.try_into().map_err(|_| value.fault(SpecProblem::WrongType { expected: "a pair of numbers", found: "a list" }))
+    numbers
+        .try_into()
+        .map_err(|_| value.fault(SpecProblem::WrongType { expected: "a pair of numbers", found: "a list" }))
 }

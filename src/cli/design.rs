@@ -5,6 +5,7 @@ use super::bank_file::{is_dash, load_spec, write_text};
 use crate::bank::SynthesisFilters;
 use crate::design::{self, Design};
 use crate::spec::{DesignOverrides, Method};
+use crate::verify::Verified;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -68,6 +69,44 @@ struct Report<'a> {
     peak_hertz: f64,
     iterations: usize,
     seconds: f64,
+    #[serde(flatten)]
+    proof: ProofReport,
+    proof_seconds: f64,
+}
+
+/// What `hybank verify` will say of the file.
+#[derive(Debug, Default, serde::Serialize)]
+struct ProofReport {
+    proven: Option<Verified>,
+    /// Why there is no proof in the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unproven: Option<String>,
+}
+
+/// Looks for a proof of the bank's gammas and puts it into the bank; a bank that cannot be proven is a bank all the same.
+fn attach_proof(design: &mut Design) -> ProofReport {
+    match design::prove(&design.bank, &design.dual) {
+        Ok((proof, proven)) => {
+            design.bank.proof = Some(proof);
+            ProofReport { proven: Some(proven), unproven: None }
+        }
+        Err(error) => ProofReport { proven: None, unproven: Some(error.to_string()) },
+    }
+}
+
+impl ProofReport {
+    fn text(&self, seconds: f64) -> String {
+        match (&self.proven, &self.unproven) {
+            (Some(proven), _) => format!(
+                "proven     [{}, {}] in {:.1} ms (see hybank verify)\n",
+                number(Some(proven.lower)),
+                number(Some(proven.upper)),
+                seconds * 1e3
+            ),
+            (_, Some(reason)) => format!("proven     no: {reason}\n"),
+            _ => String::new(),
+        }
+    }
 }
 
 /// Runs the verb.
@@ -85,12 +124,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     spec.latency = args.latency.or(spec.latency);
     spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
     let begin = Instant::now();
-    let found =
+    let mut found =
         design::design(&spec).map_err(|error| Failure::Input(format!("{}: {error}", args.spec.display())))?;
     let seconds = begin.elapsed().as_secs_f64();
+    let proof = attach_proof(&mut found);
+    let proof_seconds = begin.elapsed().as_secs_f64() - seconds;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    let report = Report::new(args, &found, seconds);
+    let report = Report { proof, proof_seconds, ..Report::new(args, &found, seconds) };
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {
@@ -121,6 +162,8 @@ impl<'a> Report<'a> {
             peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
             iterations: design.iterations,
             seconds,
+            proof: ProofReport::default(),
+            proof_seconds: 0.0,
         }
     }
 
@@ -136,7 +179,7 @@ impl<'a> Report<'a> {
              gamma      {} (exact norm of this bank; worst at {:.4} Hz modulo the slow rate)\n\
              lower      {} ({})\n\
              noncausal  {} (no latency is better)\n\
-             designed in {:.1} ms, {} iterations\n",
+             designed in {:.1} ms, {} iterations\n{}",
             self.bank,
             self.method.name(),
             self.channels,
@@ -154,6 +197,7 @@ impl<'a> Report<'a> {
             number(self.gamma.noncausal),
             self.seconds * 1e3,
             self.iterations,
+            self.proof.text(self.proof_seconds),
         )
     }
 }

@@ -13,6 +13,7 @@ mod output;
 mod recordings;
 mod simulate;
 mod stream;
+mod verify;
 
 use clap::{Parser, Subcommand};
 pub use failure::Failure;
@@ -31,6 +32,7 @@ use std::process::ExitCode;
 Examples:
   hybank demo
   hybank design spec.toml -o bank.json
+  hybank verify bank.json
   hybank simulate bank.json --source chirp:50Hz..8kHz@1s -o captures
   hybank fuse bank.json captures/ch1.wav captures/ch2.wav -o fused.wav
 
@@ -45,6 +47,7 @@ pub struct Cli {
 enum Verb {
     Design(design::Args),
     Analyze(analyze::Args),
+    Verify(verify::Args),
     Simulate(simulate::Args),
     Fuse(fuse::Args),
     Stream(stream::Args),
@@ -65,6 +68,7 @@ fn dispatch(verb: Verb) -> Result<(), Failure> {
     match verb {
         Verb::Design(args) => design::run(&args),
         Verb::Analyze(args) => analyze::run(&args),
+        Verb::Verify(args) => verify::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Fuse(args) => fuse::run(args),
         Verb::Stream(args) => stream::run(&args),

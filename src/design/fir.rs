@@ -46,6 +46,17 @@ pub struct FirDesign {
     pub rounds: usize,
     /// Interior-point iterations of all rounds.
     pub iterations: usize,
+    /// What the lower bound was read from.
+    pub dual: Vec<DualPoint>,
+}
+
+/// A frequency with the weights that the dual gives to the wanted samples there.
+#[derive(Debug, Clone)]
+pub struct DualPoint {
+    /// Radians a slow tick.
+    pub omega: f64,
+    /// M x q; what counts are its left singular vectors.
+    pub weight: CMat,
 }
 
 /// The taps (a channel, at the fast rate) of least gamma within [`GAMMA_ACCURACY`]; `slack` is the
@@ -66,6 +77,7 @@ struct Exchange<'a> {
     weights: Vec<f64>,
     best: Option<Candidate>,
     lower: f64,
+    dual: Vec<DualPoint>,
     rounds: usize,
     iterations: usize,
 }
@@ -90,7 +102,18 @@ impl<'a> Exchange<'a> {
         let mut weights = vec![1.0 / intervals as f64; intervals + 1];
         (weights[0], weights[intervals]) = (0.5 / intervals as f64, 0.5 / intervals as f64);
         let problem = sampled::Problem::new(grid, lags)?;
-        Ok(Self { plant, length, fine, problem, weights, best: None, lower: 0.0, rounds: 0, iterations: 0 })
+        Ok(Self {
+            plant,
+            length,
+            fine,
+            problem,
+            weights,
+            best: None,
+            lower: 0.0,
+            dual: Vec::new(),
+            rounds: 0,
+            iterations: 0,
+        })
     }
 
     fn minimise_gamma(&mut self) -> Result<(), DesignError> {
@@ -99,7 +122,11 @@ impl<'a> Exchange<'a> {
             let solution = sampled::minimise(&self.problem, &settings)?;
             self.rounds += 1;
             self.iterations += solution.steps.len();
-            self.lower = self.lower.max(solution.lower.value);
+            if solution.lower.value > self.lower {
+                self.lower = solution.lower.value;
+                let weights = self.problem.points().iter().zip(solution.dual);
+                self.dual = weights.map(|(point, weight)| DualPoint { omega: point.omega, weight }).collect();
+            }
             let candidate = self.judge(solution.taps)?;
             let (norm, grid) = (candidate.norm, solution.gamma);
             let peaks = self.peaks(&candidate, grid * (1.0 + 0.2 * GAMMA_ACCURACY))?;
@@ -213,6 +240,7 @@ impl<'a> Exchange<'a> {
             peak_frequency: best.frequency,
             rounds: self.rounds,
             iterations: self.iterations,
+            dual: self.dual,
         })
     }
 }

@@ -56,6 +56,14 @@ pub enum DesignError {
          the channels too nearly equal for double precision"
     )]
     NotCertified,
+    /// Too large for the search.
+    #[error("a proof is looked for up to {limit} states of the error system, this bank's has {states}")]
+    NotSearched {
+        /// Its states.
+        states: usize,
+        /// Most states.
+        limit: usize,
+    },
     /// What was found does not prove the gammas.
     #[error(transparent)]
     Verify(#[from] VerifyError),

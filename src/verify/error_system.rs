@@ -114,9 +114,14 @@ impl ErrorSystem {
         system.view_mut((0, 0), (n, n)).copy_from(&tick.transition);
         (0..n).for_each(|i| inputs[(i, i)] = Ball::from(1.0));
         // Each sample as rows over xi and u, at the tick in which it counts.
-        let (mut state_rows, mut input_rows) = (ball::zeros(tick.samples(), order), ball::zeros(tick.samples(), n + tick.samples()));
+        let (mut state_rows, mut input_rows) =
+            (ball::zeros(tick.samples(), order), ball::zeros(tick.samples(), n + tick.samples()));
         for (s, line) in layout.lines.iter().enumerate() {
-            let entry = if line.is_empty() { (&mut state_rows, &mut input_rows, s) } else { (&mut system, &mut inputs, line.start) };
+            let entry = if line.is_empty() {
+                (&mut state_rows, &mut input_rows, s)
+            } else {
+                (&mut system, &mut inputs, line.start)
+            };
             entry.0.view_mut((entry.2, 0), (1, n)).copy_from(&tick.readouts.row(s));
             entry.1[(entry.2, n + s)] = Ball::from(1.0);
             (line.start + 1..line.end).for_each(|link| system[(link, link - 1)] = Ball::from(1.0));

@@ -111,7 +111,10 @@ mod tests {
                 let (p, q) = (n - 1 - i, n - 1 - j);
                 let exact = t.powi((p + q + 1) as i32) / (factorial(p) * factorial(q) * (p + q + 1) as f64);
                 let g = flow.gramian[(i, j)];
-                assert!((g.nearest() - exact).abs() <= 1e-15 * exact && g.radius() < 1e-27, "{i} {j}: {g:?} {exact}");
+                assert!(
+                    (g.nearest() - exact).abs() <= 1e-15 * exact && g.radius() < 1e-27,
+                    "{i} {j}: {g:?} {exact}"
+                );
             }
         }
     }
@@ -127,8 +130,11 @@ mod tests {
             let first = enclosed(&a, &b, t);
             let joined = ball::product(&rest.transition, &first.transition);
             let gramian = ball::add(&rest.gramian, &ball::congruence(&rest.transition, &first.gramian));
-            let difference = |x: &Matrix, y: &Matrix| x.zip_map(y, |x, y| (x - y).nearest().abs() - (x - y).radius());
-            for gap in difference(&joined, &whole.transition).iter().chain(&difference(&gramian, &whole.gramian)) {
+            let difference =
+                |x: &Matrix, y: &Matrix| x.zip_map(y, |x, y| (x - y).nearest().abs() - (x - y).radius());
+            for gap in
+                difference(&joined, &whole.transition).iter().chain(&difference(&gramian, &whole.gramian))
+            {
                 assert!(*gap <= 0.0, "t = {t}: {gap}");
             }
             assert!(ball::radius_sum(&gramian) < 1e-25);

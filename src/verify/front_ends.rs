@@ -41,7 +41,10 @@ impl FrontEnds {
         let wanted = (0..bank.ratio).map(|p| Tap { filter: target, time: p as f64 - bank.latency as f64 });
         let mut taps: Vec<Tap> = wanted.collect();
         for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays_in_fast_periods()).enumerate() {
-            taps.push(Tap { filter: place(&channel.filter, format!("spec.channel[{i}].filter"))?, time: -delay });
+            taps.push(Tap {
+                filter: place(&channel.filter, format!("spec.channel[{i}].filter"))?,
+                time: -delay,
+            });
         }
         Ok((Self::side_by_side(filters), taps))
     }

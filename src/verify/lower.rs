@@ -71,7 +71,13 @@ fn least_eigenvalue(m: &Matrix) -> Option<f64> {
 }
 
 /// A bound for all FIR banks with `length` taps a channel, from `tones` that together see none of the taps.
-pub(super) fn of_length(tick: &Tick, ratio: usize, channels: &[usize], length: usize, tones: &[Tone]) -> Option<f64> {
+pub(super) fn of_length(
+    tick: &Tick,
+    ratio: usize,
+    channels: &[usize],
+    length: usize,
+    tones: &[Tone],
+) -> Option<f64> {
     let lags = length.div_ceil(ratio);
     let covariance = Covariance::new(tick)?;
     let seen = covariance.of_taps(tick, ratio, channels, lags);
@@ -80,7 +86,10 @@ pub(super) fn of_length(tick: &Tick, ratio: usize, channels: &[usize], length: u
     for tone in tones {
         let z = Complex::unit(tone.half);
         let gram = spectrum::gram(tick, &z);
-        let (a, b) = (Complex::column(&tone.wanted), Complex::column(&tone.wanted).above(&Complex::column(&tone.measured)));
+        let (a, b) = (
+            Complex::column(&tone.wanted),
+            Complex::column(&tone.wanted).above(&Complex::column(&tone.measured)),
+        );
         let image = gram.product(&b);
         value = value + a.inner(&image.rows(0, ratio));
         size = size + (a.square() * b.inner(&image)).sqrt();
@@ -102,8 +111,8 @@ pub(super) fn of_length(tick: &Tick, ratio: usize, channels: &[usize], length: u
     let added = (left / Ball::from(least_eigenvalue(&seen)?)).sqrt().upper();
     let wanted = covariance.of_wanted(tick, ratio).sqrt().upper();
     let reached = value.lower() - 1.001 * added * wanted;
-    let paid = (size.upper() + 1.001 * (ratio as f64).sqrt() * added) * (1.0 + 1e-15);
-    let bound = reached / paid * (1.0 - 1e-15);
+    let paid = (size.upper() + 1.001 * (ratio as f64).sqrt() * added) * (1.0 + 1e-14);
+    let bound = reached / paid * (1.0 - 1e-14);
     bound.is_finite().then(|| bound.max(0.0))
 }
 
@@ -140,7 +149,10 @@ impl Covariance {
         let (row_a, row_b) = (tick.readouts.rows(a, 1).into_owned(), tick.readouts.rows(b, 1).into_owned());
         let before = ball::product_transposed(&self.state, &row_b);
         let mut values = vec![ball::product(&row_a, &before)[(0, 0)] + tick.gram[(n + a, n + b)]];
-        let mut common = ball::add(&ball::product(&self.transition, &before), &tick.gram.view((0, n + b), (n, 1)).into_owned());
+        let mut common = ball::add(
+            &ball::product(&self.transition, &before),
+            &tick.gram.view((0, n + b), (n, 1)).into_owned(),
+        );
         for _ in 1..=lags {
             values.push(ball::product(&row_a, &common)[(0, 0)]);
             common = ball::product(&self.transition, &common);

@@ -48,6 +48,8 @@ pub const CLAIM_TOLERANCE: f64 = 1e-6;
 const ROUNDED: f64 = 1e-9;
 /// Most states of an error system that is proven: its matrices are dense.
 pub const MAX_STATES: usize = 2048;
+/// Most analog states of all distinct front ends together: every sample of a tick costs their square some hundred times.
+pub const MAX_ANALOG_STATES: usize = 192;
 
 /// What was proven of a bank; all numbers for h = 1.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -72,7 +74,9 @@ pub struct Verified {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum VerifyError {
     /// Nothing is known about the front ends.
-    #[error("spec: it is null, so the front ends are unknown and nothing can be proven; design the bank with its spec")]
+    #[error(
+        "spec: it is null, so the front ends are unknown and nothing can be proven; design the bank with its spec"
+    )]
     NoSpec,
     /// A filter of the spec is no front end.
     #[error("{place}: {source}")]
@@ -91,11 +95,22 @@ pub enum VerifyError {
         /// Its states.
         states: usize,
     },
+    /// Too many different filters.
+    #[error(
+        "spec: the distinct filters have {states} states together, at most {MAX_ANALOG_STATES} are proven; give channels that \
+         have the same filter the same text"
+    )]
+    TooManyFilters {
+        /// States of all distinct filters.
+        states: usize,
+    },
     /// The file carries no certificate.
     #[error("proof.upper: there is none; find one first")]
     NoCertificate,
     /// The certificate belongs to another system.
-    #[error("proof.upper.factor: it has {found} rows, but the error system of this bank has {states} states: the file was altered")]
+    #[error(
+        "proof.upper.factor: it has {found} rows, but the error system of this bank has {states} states: the file was altered"
+    )]
     CertificateSize {
         /// Rows given.
         found: usize,
@@ -112,7 +127,9 @@ pub enum VerifyError {
         gamma: f64,
     },
     /// A stated number is wrong.
-    #[error("{place}: it says {stated}, but {relation} {proven} is proven; the file was altered, design the bank anew")]
+    #[error(
+        "{place}: it says {stated}, but {relation} {proven} is proven; the file was altered, design the bank anew"
+    )]
     Disproved {
         /// Where it stands in the file.
         place: &'static str,
@@ -160,6 +177,9 @@ impl<'a> Subject<'a> {
     /// [`VerifyError::NoSpec`], [`VerifyError::FrontEnd`], [`VerifyError::TooLarge`].
     pub fn new(bank: &'a Bank) -> Result<Self, VerifyError> {
         let (front_ends, taps) = FrontEnds::new(bank)?;
+        if front_ends.order() > MAX_ANALOG_STATES {
+            return Err(VerifyError::TooManyFilters { states: front_ends.order() });
+        }
         let tick = Tick::new(&front_ends, &taps, bank.ratio);
         let filters = BlockForm::new(&bank.filters, bank.ratio);
         let states = error_system::order(&tick, &filters);
@@ -257,14 +277,25 @@ impl<'a> Subject<'a> {
         if found != states {
             return Err(VerifyError::CertificateSize { found, states });
         }
-        let attained = self.attains(&certificate.peak).ok_or(VerifyError::Void { place: "proof.upper.peak" })?;
+        let attained =
+            self.attains(&certificate.peak).ok_or(VerifyError::Void { place: "proof.upper.peak" })?;
         if let Some(stated) = self.bank.gamma.upper {
             let place = "gamma.upper";
             if stated < attained * (1.0 - ROUNDED) {
-                return Err(VerifyError::Disproved { place, stated, relation: "a norm of at least", proven: attained });
+                return Err(VerifyError::Disproved {
+                    place,
+                    stated,
+                    relation: "a norm of at least",
+                    proven: attained,
+                });
             }
             if stated > gamma * (1.0 + ROUNDED) {
-                return Err(VerifyError::Disproved { place, stated, relation: "a norm of at most", proven: gamma });
+                return Err(VerifyError::Disproved {
+                    place,
+                    stated,
+                    relation: "a norm of at most",
+                    proven: gamma,
+                });
             }
         }
         if self.keeps(&certificate.factor, gamma) {

@@ -69,7 +69,11 @@ impl Factor {
 fn scales(m: &Matrix) -> Vec<f64> {
     let power = |i: usize| {
         let diagonal = m[(i, i)].nearest();
-        if diagonal > 0.0 && diagonal.is_finite() { 2f64.powi((-0.5 * diagonal.log2()).round() as i32) } else { 1.0 }
+        if diagonal > 0.0 && diagonal.is_finite() {
+            2f64.powi((-0.5 * diagonal.log2()).round() as i32)
+        } else {
+            1.0
+        }
     };
     (0..m.nrows()).map(power).collect()
 }

@@ -102,7 +102,8 @@ impl Complex {
 
     /// Re <self, other> = Re tr(self* other).
     pub(super) fn inner(&self, other: &Self) -> Ball {
-        let part = |a: &Matrix, b: &Matrix| a.iter().zip(b.iter()).fold(Ball::ZERO, |sum, (&x, &y)| sum + x * y);
+        let part =
+            |a: &Matrix, b: &Matrix| a.iter().zip(b.iter()).fold(Ball::ZERO, |sum, (&x, &y)| sum + x * y);
         part(&self.re, &other.re) + part(&self.im, &other.im)
     }
 }
@@ -167,7 +168,9 @@ pub(super) fn filter_response(filters: &SynthesisFilters, ratio: usize, z: &Comp
             let back = z.adjoint();
             // Horner's rule in z^-1.
             (0..lags).rev().fold(Complex::zeros(ratio, taps.len()), |sum, lag| {
-                sum.times(&back).plus(&Complex::real(Matrix::from_fn(ratio, taps.len(), |p, i| Ball::from(tap(p, i, lag)))))
+                sum.times(&back).plus(&Complex::real(Matrix::from_fn(ratio, taps.len(), |p, i| {
+                    Ball::from(tap(p, i, lag))
+                })))
             })
         }
         SynthesisFilters::StateSpace(_) => {

@@ -101,10 +101,18 @@ impl Tick {
 }
 
 /// Fills the lower triangle beyond the states: each sample with all that is not earlier.
-fn correlate(gram: &mut Matrix, front_ends: &FrontEnds, timeline: &Timeline, since_start: &[Flow], rows: &[Matrix]) {
+fn correlate(
+    gram: &mut Matrix,
+    front_ends: &FrontEnds,
+    timeline: &Timeline,
+    since_start: &[Flow],
+    rows: &[Matrix],
+) {
     let (n, count) = (front_ends.order(), timeline.instants.len());
     let between: Vec<Matrix> = (1..count)
-        .map(|k| flow(&front_ends.a, &front_ends.b, timeline.instants[k] - timeline.instants[k - 1]).transition)
+        .map(|k| {
+            flow(&front_ends.a, &front_ends.b, timeline.instants[k] - timeline.instants[k - 1]).transition
+        })
         .collect();
     for (b, row) in rows.iter().enumerate() {
         // What the state at some later instant has in common with sample b.
