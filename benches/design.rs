@@ -3,8 +3,10 @@
 //! `cargo bench --bench design`
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use hybank::design::{analyze, certify, design};
+use hybank::bank::Bank;
+use hybank::design::{analyze, design, prove};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use hybank::verify::verify;
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
@@ -95,7 +97,10 @@ fn designs(c: &mut Criterion) {
     c.bench_function("analyze, thesis example, 22 taps", |b| {
         b.iter(|| analyze(black_box(&bank), &[]).unwrap())
     });
-    c.bench_function("certify, thesis example, 22 taps", |b| b.iter(|| certify(black_box(&bank)).unwrap()));
+    c.bench_function("prove, thesis example, 22 taps", |b| b.iter(|| prove(black_box(&bank), &[]).unwrap()));
+    let proof = Some(prove(&bank, &[]).unwrap().0);
+    let bank = Bank { proof, ..bank };
+    c.bench_function("verify, thesis example, 22 taps", |b| b.iter(|| verify(black_box(&bank)).unwrap()));
 }
 
 criterion_group!(benches, designs);

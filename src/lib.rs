@@ -24,6 +24,8 @@ pub mod lmi;
 pub mod lti;
 #[cfg(feature = "design")]
 pub mod simulate;
+#[cfg(feature = "design")]
+pub mod verify;
 
 #[cfg(feature = "plot")]
 pub mod plot;

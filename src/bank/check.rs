@@ -2,7 +2,7 @@
 
 use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem};
 
-use super::{Bank, BankError, BankProblem, BlockFilter, Gamma, SynthesisFilters};
+use super::{Bank, BankError, BankProblem, BlockFilter, Certificate, Gamma, SynthesisFilters, Tone};
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96 kHz.
 pub const MAX_BANK_LATENCY: usize = 1 << 24;
@@ -37,7 +37,21 @@ impl Bank {
             SynthesisFilters::Fir(taps) => check_taps(taps, self.channel_count())?,
             SynthesisFilters::StateSpace(block) => check_block(block, self.ratio, self.channel_count())?,
         }
+        self.check_proof()?;
         self.spec.as_ref().map_or(Ok(()), |spec| self.check_spec(spec))
+    }
+
+    fn check_proof(&self) -> Checked {
+        let Some(proof) = &self.proof else { return Ok(()) };
+        let check = |path: &str, tone: &Tone, measured| check_tone(path, tone, self.ratio, measured);
+        if let Some(certificate) = &proof.upper {
+            check_certificate(certificate)?;
+            check("proof.upper.peak", &certificate.peak, 0)?;
+        }
+        for (k, tone) in proof.lower.iter().enumerate() {
+            check(&format!("proof.lower[{k}]"), tone, self.channel_count())?;
+        }
+        proof.noncausal.as_ref().map_or(Ok(()), |tone| check("proof.noncausal", tone, 0))
     }
 
     fn check_scalars(&self) -> Checked {
@@ -170,6 +184,42 @@ fn check_matrix(
             return refuse(path, BankProblem::Length { found, expected, unit: "columns", rule });
         }
         check_finite(&path, row)?;
+    }
+    Ok(())
+}
+
+fn check_certificate(certificate: &Certificate) -> Checked {
+    if !(certificate.gamma.is_finite() && certificate.gamma >= 0.0) {
+        let rule = "a norm is zero or more, and finite";
+        return out_of_range("proof.upper.gamma", certificate.gamma, "(h = 1)", rule);
+    }
+    for (i, row) in certificate.factor.iter().enumerate() {
+        let path = format!("proof.upper.factor[{i}]");
+        if row.len() != i + 1 {
+            let (found, expected, rule) =
+                (row.len(), i + 1, "the factor is lower triangular, each row one longer");
+            return refuse(path, BankProblem::Length { found, expected, unit: "columns", rule });
+        }
+        check_finite(&path, row)?;
+    }
+    Ok(())
+}
+
+fn check_tone(path: &str, tone: &Tone, wanted: usize, measured: usize) -> Checked {
+    check_finite(&format!("{path}.half"), &tone.half)?;
+    if tone.half == [0.0; 2] {
+        let rule = "half is about cos(w/2), sin(w/2); both cannot be zero";
+        return out_of_range(format!("{path}.half"), 0.0, "", rule);
+    }
+    for (key, list, expected) in [("wanted", &tone.wanted, wanted), ("measured", &tone.measured, measured)] {
+        let path = format!("{path}.{key}");
+        if list.len() != expected {
+            let (found, rule) = (list.len(), "a tone has one weight for each sample of a tick");
+            return refuse(path, BankProblem::Length { found, expected, unit: "weights", rule });
+        }
+        for (i, pair) in list.iter().enumerate() {
+            check_finite(&format!("{path}[{i}]"), pair)?;
+        }
     }
     Ok(())
 }

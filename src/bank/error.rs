@@ -46,6 +46,17 @@ pub enum BankProblem {
         /// What the file says.
         found: usize,
     },
+    /// A text that is no digest.
+    #[error("\"{found}\" is no digest, which is sha256: with 64 hexadecimal digits; leave it out")]
+    Digest {
+        /// What the file says.
+        found: String,
+    },
+    /// A digest of another content.
+    #[error(
+        "it is not the digest of this content: something in the file was altered; take the original, or design the bank anew"
+    )]
+    Altered,
     /// A key, a type or a number that is wrong as such.
     #[error(transparent)]
     Value(#[from] SpecProblem),

@@ -3,14 +3,21 @@
 //! [`Bank::from_json`] and [`Bank::to_json`] are the two ends of the file format `hybank-bank`, version 1.
 //! Every number reads back to the same bits. Unknown keys are refused by name; the one exception is
 //! `meta`, which may hold anything that other programs wish to keep in the file and is not read.
+//!
+//! A file may carry a [`Proof`] of its gammas and a digest of its content. Reading does not look at the digest, so that a
+//! bank can be edited and run; [`check_digest`] compares it.
 
 mod check;
+mod digest;
 mod error;
+mod proof;
 mod read;
 mod write;
 
 pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
+pub use proof::{Certificate, Proof, Tone};
+pub use read::check_digest;
 
 use crate::spec::{Method, Spec};
 
@@ -39,6 +46,8 @@ pub struct Bank {
     pub filters: SynthesisFilters,
     /// How good it is.
     pub gamma: Gamma,
+    /// What proves it, where the file carries that.
+    pub proof: Option<Proof>,
 }
 
 /// The synthesis filters in the form they run in.

@@ -2,11 +2,15 @@
 
 use crate::spec::document::Node;
 use crate::spec::reader::{Fault, Fields, Value};
-use crate::spec::{DesignOverrides, Method, decode};
+use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
 
-use super::{Bank, BankError, BankProblem, BlockFilter, FORMAT, Gamma, SynthesisFilters, VERSION};
+use super::digest::{digest, is_digest};
+use super::{
+    Bank, BankError, BankProblem, BlockFilter, Certificate, FORMAT, Gamma, Proof, SynthesisFilters, Tone,
+    VERSION,
+};
 
-const KEYS: [&str; 11] = [
+const KEYS: [&str; 13] = [
     "format",
     "version",
     "spec",
@@ -17,6 +21,8 @@ const KEYS: [&str; 11] = [
     "channels",
     "state_space",
     "gamma",
+    "proof",
+    "digest",
     "meta",
 ];
 const REWRITE: &str = "a bank without it cannot be run; give a file written by `hybank design`";
@@ -33,13 +39,38 @@ impl Bank {
     }
 }
 
+/// Compares the digest of a bank file with its content; whether there is one at all.
+///
+/// # Errors
+/// [`BankError`] if the text is not JSON, its digest is none, or the content is not the one that it was made of.
+pub fn check_digest(text: &str, file_name: &str) -> Result<bool, BankError> {
+    let checked = parse(text).and_then(|document| {
+        let top = Value::root(&document).fields(&KEYS)?;
+        let Some(value) = top.optional("digest") else { return Ok(false) };
+        if stated_digest(&value)? == digest(&document) {
+            return Ok(true);
+        }
+        Err(BankError::new("", value.path().to_owned(), BankProblem::Altered))
+    });
+    checked.map_err(|error| error.in_file(file_name))
+}
+
+fn stated_digest(value: &Value<'_>) -> Result<String, BankError> {
+    let text = value.text()?;
+    if is_digest(text) {
+        return Ok(text.to_owned());
+    }
+    let found = text.chars().take(80).collect();
+    Err(BankError::new("", value.path().to_owned(), BankProblem::Digest { found }))
+}
+
 impl From<Fault> for BankError {
     fn from(fault: Fault) -> Self {
         Self::new("", fault.path, *fault.problem)
     }
 }
 
-fn parse(text: &str) -> Result<Node, BankError> {
+pub(super) fn parse(text: &str) -> Result<Node, BankError> {
     // Some editors put a byte-order mark in front.
     serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|error| {
         let problem = BankProblem::Syntax { message: error.to_string() };
@@ -50,6 +81,7 @@ fn parse(text: &str) -> Result<Node, BankError> {
 fn read(document: &Value<'_>) -> Result<Bank, BankError> {
     check_header(document)?;
     let top = document.fields(&KEYS)?;
+    top.optional("digest").map(|value| stated_digest(&value)).transpose()?;
     let spec = top.optional("spec").map(|v| decode::spec(&v, DesignOverrides::default())).transpose()?;
     let method = Method::ALL.map(|m| (m.name(), m));
     let channels = top.required("channels", REWRITE)?.items("a list of channels")?;
@@ -63,6 +95,7 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
         delays: channels.iter().map(|c| c.required("delay", REWRITE)?.number()).collect::<Result<_, _>>()?,
         filters: filters(&top, &channels)?,
         gamma: top.optional("gamma").map(|v| gamma(&v)).transpose()?.unwrap_or_default(),
+        proof: top.optional("proof").map(|v| proof(&v)).transpose()?,
     })
 }
 
@@ -91,7 +124,7 @@ fn filters(top: &Fields<'_>, channels: &[Fields<'_>]) -> Result<SynthesisFilters
     if let Some(taps) = channels.iter().find_map(|channel| channel.optional("taps")) {
         let remedy = "a bank runs by the one or the other, keep what goes with its method";
         return Err(taps
-            .fault(crate::spec::SpecProblem::Conflict { first: "taps", second: "state_space", remedy })
+            .fault(SpecProblem::Conflict { first: "taps", second: "state_space", remedy })
             .into());
     }
     let fields = block.fields(&["a", "b", "c", "d"])?;
@@ -108,4 +141,46 @@ fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {
     let fields = value.fields(&["upper", "lower", "noncausal"])?;
     let bound = |key| fields.optional(key).map(|v| v.number()).transpose();
     Ok(Gamma { upper: bound("upper")?, lower: bound("lower")?, noncausal: bound("noncausal")? })
+}
+
+const WITNESS: &str = "a proof without it proves nothing; leave the proof out, or take the whole of it";
+
+fn proof(value: &Value<'_>) -> Result<Proof, Fault> {
+    let fields = value.fields(&["upper", "lower", "noncausal"])?;
+    let lower = fields.optional("lower").map(|v| v.items("a list of tones")).transpose()?.unwrap_or_default();
+    Ok(Proof {
+        upper: fields.optional("upper").map(|v| certificate(&v)).transpose()?,
+        lower: lower.iter().map(tone).collect::<Result<_, _>>()?,
+        noncausal: fields.optional("noncausal").map(|v| tone(&v)).transpose()?,
+    })
+}
+
+fn certificate(value: &Value<'_>) -> Result<Certificate, Fault> {
+    let fields = value.fields(&["gamma", "peak", "factor"])?;
+    Ok(Certificate {
+        gamma: fields.required("gamma", WITNESS)?.number()?,
+        peak: tone(&fields.required("peak", WITNESS)?)?,
+        factor: fields.required("factor", WITNESS)?.matrix()?,
+    })
+}
+
+fn tone(value: &Value<'_>) -> Result<Tone, Fault> {
+    let fields = value.fields(&["half", "wanted", "measured"])?;
+    let measured = fields.optional("measured").map(|v| pairs(&v)).transpose()?;
+    Ok(Tone {
+        half: pair(&fields.required("half", WITNESS)?)?,
+        wanted: pairs(&fields.required("wanted", WITNESS)?)?,
+        measured: measured.unwrap_or_default(),
+    })
+}
+
+fn pairs(value: &Value<'_>) -> Result<Vec<[f64; 2]>, Fault> {
+    value.items("a list of pairs [re, im]")?.iter().map(pair).collect()
+}
+
+fn pair(value: &Value<'_>) -> Result<[f64; 2], Fault> {
+    let numbers = value.numbers()?;
+    numbers
+        .try_into()
+        .map_err(|_| value.fault(SpecProblem::WrongType { expected: "a pair of numbers", found: "a list" }))
 }

@@ -20,6 +20,7 @@ fn fir() -> Bank {
         delays: vec![1.2, 0.6],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
         gamma: Gamma { upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
+        proof: None,
     }
 }
 
@@ -33,6 +34,7 @@ fn state_space() -> Bank {
     Bank { spec: None, method: Method::Iir, filters: SynthesisFilters::StateSpace(block), ..fir() }
 }
 
+/// Its digest is that of `tools/bank_digest.py`.
 const FIR_TEXT: &str = r#"{
   "format": "hybank-bank",
   "version": 1,
@@ -80,7 +82,8 @@ const FIR_TEXT: &str = r#"{
     "upper": 0.039932,
     "lower": null,
     "noncausal": 0.03
-  }
+  },
+  "digest": "sha256:6fea3a4664a7b21ce5801b8927fcfab469c6d4d584da5c4eae8db338f824bd7b"
 }
 "#;
 
@@ -89,9 +92,62 @@ fn the_file_looks_as_the_format_says() {
     assert_eq!(fir().to_json().unwrap(), FIR_TEXT);
 }
 
+/// Proof parts of a bank with two channels and ratio 2.
+fn with_proof() -> Bank {
+    let tone = |measured: Vec<[f64; 2]>| Tone {
+        half: [0.8, -0.6],
+        wanted: vec![[1.0, 0.5], [-0.0, 0.25]],
+        measured,
+    };
+    let factor = vec![vec![0.1], vec![0.2, 1.0 / 3.0], vec![1e-9, -2.5, 7.0]];
+    let upper = Some(Certificate { gamma: 0.04, peak: tone(vec![]), factor });
+    let lower = vec![tone(vec![[0.5, 0.0], [1.5e-300, 2.0]])];
+    Bank { proof: Some(Proof { upper, lower, noncausal: Some(tone(vec![])) }), ..fir() }
+}
+
+#[test]
+fn the_digest_sees_the_content_and_not_the_layout() {
+    assert_eq!(check_digest(FIR_TEXT, "b.json"), Ok(true));
+    let flat = FIR_TEXT.replace("\n", " ").replace("\"fast_period\": 1.0", "\"fast_period\": 1");
+    assert_eq!(check_digest(&flat, "b.json"), Ok(true), "{flat}");
+    let noted = FIR_TEXT.replacen("{", "{\"meta\": [1, 2],", 1);
+    assert_eq!(check_digest(&noted, "b.json"), Ok(true));
+    for (from, to) in [
+        ("0.3333333333333333", "0.33333333333333337"),
+        ("-0.0", "0.0"),
+        ("\"lower\": null", "\"lower\": 0.01"),
+        ("1.2,", "1.3,"),
+    ] {
+        let error = check_digest(&FIR_TEXT.replacen(from, to, 1), "b.json").unwrap_err();
+        assert_eq!((error.path(), error.problem()), ("digest", &BankProblem::Altered), "{error}");
+    }
+    let at = FIR_TEXT.find(",\n  \"digest\"").unwrap();
+    assert_eq!(check_digest(&format!("{}}}", &FIR_TEXT[..at]), "b.json"), Ok(false));
+}
+
+#[test]
+fn every_mistake_in_a_proof_names_its_place() {
+    let text = with_proof().to_json().unwrap();
+    for (from, to, path, words) in [
+        ("[0.2, 0.3333333333333333]", "[0.2]", "proof.upper.factor[1]", "lower triangular"),
+        ("\"gamma\": 0.04", "\"gamma\": -0.04", "proof.upper.gamma", "zero or more"),
+        ("\"half\": [0.8, -0.6]", "\"half\": [0, 0]", "proof.upper.peak.half", "cannot be zero"),
+        ("\"half\": [0.8, -0.6]", "\"half\": [0.8]", "proof.upper.peak.half", "a pair of numbers"),
+        ("[[1.0, 0.5], [-0.0, 0.25]]", "[[1.0, 0.5]]", "proof.upper.peak.wanted", "1 weights"),
+        ("[1.5e-300, 2.0]", "[null, 2.0]", "proof.lower[0].measured[1][0]", "expected a number"),
+        ("\"factor\"", "\"faktor\"", "proof.upper", "did you mean \"factor\""),
+        ("\"digest\": \"sha256:", "\"digest\": \"sha1:", "digest", "64 hexadecimal digits"),
+    ] {
+        assert!(text.contains(from), "{from} in {text}");
+        let error = refused(&text.replacen(from, to, 1));
+        assert_eq!(error.path(), path, "{error}");
+        assert!(error.to_string().contains(words), "expected {words:?} in: {error}");
+    }
+}
+
 #[test]
 fn reads_back_to_the_same_bits() {
-    for bank in [fir(), state_space()] {
+    for bank in [fir(), state_space(), with_proof()] {
         let text = bank.to_json().unwrap();
         let back = Bank::from_json(&text, "b.json").unwrap();
         assert_eq!(back, bank);

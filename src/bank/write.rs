@@ -7,7 +7,9 @@ use serde_json::ser::Formatter;
 
 use crate::spec::{Method, Spec};
 
-use super::{Bank, BankError, BankProblem, BlockFilter, FORMAT, Gamma, SynthesisFilters, VERSION};
+use super::digest::digest;
+use super::read::parse;
+use super::{Bank, BankError, BankProblem, BlockFilter, FORMAT, Gamma, Proof, SynthesisFilters, VERSION};
 
 /// The file, key by key.
 #[derive(Serialize)]
@@ -22,6 +24,10 @@ struct Document<'a> {
     channels: Vec<Channel<'a>>,
     state_space: Option<&'a BlockFilter>,
     gamma: Gamma,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    proof: Option<&'a Proof>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    digest: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -32,22 +38,18 @@ struct Channel<'a> {
 }
 
 impl Bank {
-    /// The text of the bank file: objects indented, lists on one line, numbers with as many digits as it
-    /// takes to read the same bits back.
+    /// The text of the bank file with its digest: objects indented, lists on one line, numbers with as many digits as
+    /// it takes to read the same bits back.
     ///
     /// # Errors
     /// [`BankError`] as [`Bank::check`]; above all for NaN and infinity, which JSON has not.
     pub fn to_json(&self) -> Result<String, BankError> {
         self.check()?;
-        let mut bytes = Vec::new();
-        let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, Indented::default());
-        let unwritable = |message: String| BankError::new("", String::new(), BankProblem::Syntax { message });
-        self.document().serialize(&mut serializer).map_err(|e| unwritable(e.to_string()))?;
-        bytes.push(b'\n');
-        String::from_utf8(bytes).map_err(|e| unwritable(e.to_string()))
+        let bare = text(&self.document(None))?;
+        text(&self.document(Some(digest(&parse(&bare)?))))
     }
 
-    fn document(&self) -> Document<'_> {
+    fn document(&self, digest: Option<String>) -> Document<'_> {
         let (taps, state_space) = match &self.filters {
             SynthesisFilters::Fir(taps) => (Some(taps), None),
             SynthesisFilters::StateSpace(block) => (None, Some(block)),
@@ -69,8 +71,19 @@ impl Bank {
                 .collect(),
             state_space,
             gamma: self.gamma,
+            proof: self.proof.as_ref(),
+            digest,
         }
     }
+}
+
+fn text(document: &Document<'_>) -> Result<String, BankError> {
+    let mut bytes = Vec::new();
+    let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, Indented::default());
+    let unwritable = |message: String| BankError::new("", String::new(), BankProblem::Syntax { message });
+    document.serialize(&mut serializer).map_err(|e| unwritable(e.to_string()))?;
+    bytes.push(b'\n');
+    String::from_utf8(bytes).map_err(|e| unwritable(e.to_string()))
 }
 
 /// Objects over several lines, lists on one.

@@ -67,8 +67,8 @@ impl Report {
         let Analysis { gamma, peak_hertz, noncausal, mean } = self.analysis;
         let proof = self.certified.map_or_else(String::new, |proof| {
             format!(
-                "certified    {:.9}   proved in floating point (P of order {}, margin {:.1e})\n",
-                proof.gamma, proof.states, proof.margin
+                "certified    {:.9}   proven upper bound (P of order {}; at least {:.9} is proven as well)\n",
+                proof.gamma, proof.states, proof.attained
             )
         });
         let MeanAnalysis { rms_error, noise_gain, output_noise } = mean;

@@ -68,11 +68,13 @@ pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Fai
     file.commit().map_err(Failure::input)
 }
 
-fn name(path: &Path) -> String {
+/// A file as messages call it.
+pub(super) fn name(path: &Path) -> String {
     if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
 }
 
-fn read_text(path: &Path) -> Result<String, Failure> {
+/// The text of a file; `-` is standard input.
+pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
     let mut text = String::new();
     let read = if is_dash(path) {
         std::io::stdin().read_to_string(&mut text).map(|_| text)

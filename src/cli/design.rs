@@ -5,6 +5,7 @@ use super::bank_file::{is_dash, load_spec, write_text};
 use crate::bank::SynthesisFilters;
 use crate::design::{self, Design, DesignError, MeanAnalysis};
 use crate::spec::{DesignOverrides, Method};
+use crate::verify::Verified;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -70,6 +71,44 @@ struct Report<'a> {
     peak_hertz: f64,
     iterations: usize,
     seconds: f64,
+    #[serde(flatten)]
+    proof: ProofReport,
+    proof_seconds: f64,
+}
+
+/// What `hybank verify` will say of the file.
+#[derive(Debug, Default, serde::Serialize)]
+struct ProofReport {
+    proven: Option<Verified>,
+    /// Why there is no proof in the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unproven: Option<String>,
+}
+
+/// Looks for a proof of the bank's gammas and puts it into the bank; a bank that cannot be proven is a bank all the same.
+fn attach_proof(design: &mut Design) -> ProofReport {
+    match design::prove(&design.bank, &design.dual) {
+        Ok((proof, proven)) => {
+            design.bank.proof = Some(proof);
+            ProofReport { proven: Some(proven), unproven: None }
+        }
+        Err(error) => ProofReport { proven: None, unproven: Some(error.to_string()) },
+    }
+}
+
+impl ProofReport {
+    fn text(&self, seconds: f64) -> String {
+        match (&self.proven, &self.unproven) {
+            (Some(proven), _) => format!(
+                "proven     [{}, {}] in {:.1} ms (see hybank verify)\n",
+                number(Some(proven.lower)),
+                number(Some(proven.upper)),
+                seconds * 1e3
+            ),
+            (_, Some(reason)) => format!("proven     no: {reason}\n"),
+            _ => String::new(),
+        }
+    }
 }
 
 /// Runs the verb.
@@ -88,12 +127,15 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
     let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
     let begin = Instant::now();
-    let found = design::design(&spec).map_err(named)?;
+    let mut found = design::design(&spec).map_err(named)?;
     let seconds = begin.elapsed().as_secs_f64();
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
+    let proving = Instant::now();
+    let proof = attach_proof(&mut found);
+    let proof_seconds = proving.elapsed().as_secs_f64();
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    let report = Report::new(args, &found, mean, seconds);
+    let report = Report { proof, proof_seconds, ..Report::new(args, &found, mean, seconds) };
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {
@@ -125,6 +167,8 @@ impl<'a> Report<'a> {
             peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
             iterations: design.iterations,
             seconds,
+            proof: ProofReport::default(),
+            proof_seconds: 0.0,
         }
     }
 
@@ -142,7 +186,7 @@ impl<'a> Report<'a> {
              noncausal  {} (no latency is better)\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
-             designed in {:.1} ms, {} iterations\n",
+             designed in {:.1} ms, {} iterations\n{}",
             self.bank,
             self.method.name(),
             self.channels,
@@ -163,6 +207,7 @@ impl<'a> Report<'a> {
             self.mean.output_noise,
             self.seconds * 1e3,
             self.iterations,
+            self.proof.text(self.proof_seconds),
         )
     }
 }

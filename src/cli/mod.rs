@@ -15,6 +15,7 @@ mod output;
 mod recordings;
 mod simulate;
 mod stream;
+mod verify;
 
 use clap::{Parser, Subcommand};
 pub use failure::Failure;
@@ -33,6 +34,7 @@ use std::process::ExitCode;
 Examples:
   hybank demo
   hybank design spec.toml -o bank.json
+  hybank verify bank.json
   hybank simulate bank.json --source chirp:50Hz..8kHz@1s -o captures
   hybank fuse bank.json captures/ch1.wav captures/ch2.wav -o fused.wav
 
@@ -47,6 +49,7 @@ pub struct Cli {
 enum Verb {
     Design(design::Args),
     Analyze(analyze::Args),
+    Verify(verify::Args),
     Simulate(simulate::Args),
     Fuse(fuse::Args),
     Stream(stream::Args),
@@ -67,6 +70,7 @@ fn dispatch(verb: Verb) -> Result<(), Failure> {
     match verb {
         Verb::Design(args) => design::run(&args),
         Verb::Analyze(args) => analyze::run(&args),
+        Verb::Verify(args) => verify::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Fuse(args) => fuse::run(args),
         Verb::Stream(args) => stream::run(&args),

@@ -18,6 +18,8 @@ pub struct Design {
     pub peak_frequency: f64,
     /// Riccati equations or interior-point iterations.
     pub iterations: usize,
+    /// For FIR designs what their lower bound was read from; else empty.
+    pub dual: Vec<fir::DualPoint>,
 }
 
 /// Designs the bank that `spec` asks for.
@@ -54,6 +56,7 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         delays: spec.channels.iter().map(|channel| channel.delay).collect(),
         filters,
         gamma,
+        proof: None,
         spec: Some(complete),
     };
     Ok(Design {
@@ -61,6 +64,7 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         latency_chosen: spec.latency.is_none(),
         peak_frequency: peak.frequency,
         iterations: found.iterations,
+        dual: found.dual,
     })
 }
 
@@ -76,6 +80,7 @@ struct Found {
     lower: f64,
     noncausal: f64,
     iterations: usize,
+    dual: Vec<fir::DualPoint>,
 }
 
 fn taps_of(spec: &Spec) -> usize {
@@ -104,6 +109,7 @@ fn from_fir(design: fir::FirDesign) -> Found {
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.iterations,
+        dual: design.dual,
     }
 }
 
@@ -114,13 +120,21 @@ fn from_state_space(design: iir::StateSpaceDesign) -> Found {
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.trials,
+        dual: Vec::new(),
     }
 }
 
 /// A comparison method optimises nothing: what bounds every bank is all that is known below.
 fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError> {
     let noncausal = iir::noncausal_bound(plant)?;
-    Ok(Found { filters: SynthesisFilters::Fir(taps), peak: None, lower: noncausal, noncausal, iterations: 0 })
+    Ok(Found {
+        filters: SynthesisFilters::Fir(taps),
+        peak: None,
+        lower: noncausal,
+        noncausal,
+        iterations: 0,
+        dual: Vec::new(),
+    })
 }
 
 /// Channels that cannot be told apart share their common filter: the same error, the least noise.

@@ -11,7 +11,7 @@ use super::DesignError;
 use super::equivalence::BlockedPlant;
 use super::error_system::{FirError, filter_response};
 use super::iir::noncausal_bound;
-use crate::linalg::{self, Mat};
+use crate::linalg::{self, CMat, Mat};
 use crate::lmi::sampled::{self, Point, Settings, Square, Taps};
 use crate::lti::peak::Peak;
 use std::f64::consts::PI;
@@ -49,6 +49,17 @@ pub struct FirDesign {
     pub rounds: usize,
     /// Interior-point iterations of all rounds.
     pub iterations: usize,
+    /// What the lower bound was read from.
+    pub dual: Vec<DualPoint>,
+}
+
+/// A frequency with the weights that the dual gives to the wanted samples there.
+#[derive(Debug, Clone)]
+pub struct DualPoint {
+    /// Radians a slow tick.
+    pub omega: f64,
+    /// M x q; what counts are its left singular vectors.
+    pub weight: CMat,
 }
 
 /// What decides among the banks of nearly least gamma: the power, a tick, of the error for white noise of unit density
@@ -105,6 +116,7 @@ struct Exchange<'a> {
     square: Square,
     slack: f64,
     lower: f64,
+    dual: Vec<DualPoint>,
     rounds: usize,
     iterations: usize,
 }
@@ -148,6 +160,7 @@ impl<'a> Exchange<'a> {
             square: Square { weights, noise: second.noise },
             slack: second.slack,
             lower: 0.0,
+            dual: Vec::new(),
             rounds: 0,
             iterations: 0,
         })
@@ -170,7 +183,11 @@ impl<'a> Exchange<'a> {
             let solution = sampled::minimise(&self.problem, &settings)?;
             self.rounds += 1;
             self.iterations += solution.steps.len();
-            self.lower = self.lower.max(solution.lower.value);
+            if solution.lower.value > self.lower {
+                self.lower = solution.lower.value;
+                let weights = self.problem.points().iter().zip(solution.dual);
+                self.dual = weights.map(|(point, weight)| DualPoint { omega: point.omega, weight }).collect();
+            }
             let candidate = self.judge(solution.taps)?;
             let peaks = candidate.above(solution.gamma * (1.0 + 0.2 * GAMMA_ACCURACY));
             if best.as_ref().is_none_or(|best| candidate.estimate < best.estimate) {
@@ -271,6 +288,7 @@ impl<'a> Exchange<'a> {
             noncausal: noncausal.min(upper),
             rounds: self.rounds,
             iterations: self.iterations,
+            dual: self.dual,
         }
     }
 }

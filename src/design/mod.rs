@@ -1,7 +1,6 @@
 //! From a spec to a bank: exact equivalence, blocking, IIR, H2 and FIR design, certificates.
 
 pub mod analysis;
-mod certify;
 pub mod comparison;
 mod designer;
 pub mod equivalence;
@@ -10,18 +9,20 @@ mod filtering;
 pub mod fir;
 pub mod iir;
 pub mod problem;
+mod prove;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
-pub use certify::{Certified, certify};
 pub use designer::{Design, design, latency};
 pub use problem::Problem;
+pub use prove::{Certified, certify, prove};
 
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
-use crate::lmi::kyp::{KypError, Refusal};
+use crate::lmi::kyp::KypError;
 use crate::lmi::sampled::SampledError;
 use crate::lti::{LtiError, StateSpaceError};
 use crate::sampling::SamplingError;
+use crate::verify::VerifyError;
 
 /// Why a bank could not be designed or judged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -49,9 +50,23 @@ pub enum DesignError {
     /// The bounded-real lemma could not be set up.
     #[error(transparent)]
     Kyp(#[from] KypError),
-    /// No proof in floating point was found, not even somewhat above the computed norm.
-    #[error("the computed gamma could not be proved in floating point: {0}")]
-    NotCertified(#[source] Refusal),
+    /// No certificate was found, not even somewhat above the computed norm.
+    #[error(
+        "the computed gamma could not be proven: no certificate passes up to 0.1 % above it; the front ends are too stiff or \
+         the channels too nearly equal for double precision"
+    )]
+    NotCertified,
+    /// Too large for the search.
+    #[error("a proof is looked for up to {limit} states of the error system, this bank's has {states}")]
+    NotSearched {
+        /// Its states.
+        states: usize,
+        /// Most states.
+        limit: usize,
+    },
+    /// What was found does not prove the gammas.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
     /// The interior-point method gave no taps at all.
     #[error("no taps were found; please report the spec")]
     NoTaps,

@@ -88,7 +88,7 @@ pub fn certificate(a: &Mat, b: &Mat, c: &Mat, d: &Mat, gamma: f64) -> Result<Cer
     for slack in SLACKS {
         let inner = gamma * (1.0 - slack);
         for weight in STATE_WEIGHTS.iter().filter(|_| inner > feedthrough) {
-            let Some(p) = riccati(a, b, c, d, inner, weight * slack * gamma) else { continue };
+            let Some(p) = bounded_real_riccati(a, b, c, d, inner, weight * slack * gamma) else { continue };
             best = better(best, prove(a, b, c, d, &p, gamma));
         }
         if best.as_ref().is_ok_and(|proof| proof.margin > AMPLE * proof.charged) {
@@ -115,10 +115,11 @@ fn check_sizes(a: &Mat, b: &Mat, c: &Mat, d: &Mat) -> Result<(), Refusal> {
     Err(Refusal::Size { a: a.shape(), b: b.shape(), c: c.shape(), d: d.shape() })
 }
 
+/// The P of the bounded-real lemma at g with `weight` on all states, or nothing where no stabilising solution is found:
 /// `P = A'PA + C'C/g + weight I + (A'PB + C'D/g)(g I - D'D/g - B'PB)^-1 (..)'`, in the form
 /// `P = F'P (I + G P)^-1 F + H` with `R = g I - D'D/g`, `F = A + B R^-1 D'C/g`, `G = -B R^-1 B'`,
 /// `H = C'C/g + C'D R^-1 D'C/g^2 + weight I`.
-fn riccati(a: &Mat, b: &Mat, c: &Mat, d: &Mat, g: f64, weight: f64) -> Option<Mat> {
+pub(crate) fn bounded_real_riccati(a: &Mat, b: &Mat, c: &Mat, d: &Mat, g: f64, weight: f64) -> Option<Mat> {
     let m = b.ncols();
     let r = Mat::identity(m, m) * g - d.tr_mul(d) / g;
     let dc = d.tr_mul(c) / g;

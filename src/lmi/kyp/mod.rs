@@ -36,6 +36,7 @@ mod solver;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use certificate::bounded_real_riccati;
 pub use certificate::{Certificate, Refusal, certificate, prove};
 pub use coordinates::{Coordinates, gramian_coordinates};
 pub use solver::{Solution, Step, minimise};

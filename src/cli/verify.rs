@@ -1,0 +1,118 @@
+//! `hybank verify`: proves a bank's gammas from its file alone.
+
+use super::Failure;
+use super::bank_file::{name, read_text};
+use crate::bank::{Bank, SynthesisFilters, check_digest};
+use crate::design;
+use crate::spec::Method;
+use crate::verify::{Verified, verify};
+use std::path::PathBuf;
+
+/// Proves the gammas in a bank file, from the file alone
+///
+/// Rebuilds the error system from the spec and the coefficients in the file, by other means than the designer's and with every
+/// rounding error charged, and proves both ends of gamma with the certificate and the tones that the file carries. A file in
+/// which a coefficient, a gamma or a matrix was altered is refused: by its digest, or because the proof no longer fits. For a
+/// bank made elsewhere, without digest and certificate, a certificate is looked for first.
+///
+/// Taken for given are the state equations of the front ends, as realised in double precision from the spec.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank verify bank.json
+  hybank design spec.toml -o - | hybank verify -
+  hybank verify bank.json --json | jq '[.lower, .upper]'
+
+Exit codes: 0 proven; 1 the file is not what it says, with the place that does not fit.")]
+pub(super) struct Args {
+    /// The bank (JSON); `-` is standard input
+    bank: PathBuf,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    bank: String,
+    #[serde(flatten)]
+    verified: Verified,
+    /// The file has a digest, and it matches.
+    digest: bool,
+    /// The certificate came with the file; otherwise it was found now.
+    certificate_in_file: bool,
+    #[serde(skip)]
+    scope: String,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] with the one message for the user.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let report = report(args)?;
+    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
+}
+
+fn report(args: &Args) -> Result<Report, Failure> {
+    let file = name(&args.bank);
+    let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{file}: {error}"));
+    let text = read_text(&args.bank)?;
+    let bank = Bank::from_json(&text, &file).map_err(Failure::input)?;
+    let digest = check_digest(&text, &file).map_err(Failure::input)?;
+    let certificate_in_file = bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
+    let verified = if certificate_in_file {
+        verify(&bank).map_err(|error| named(&error))?
+    } else {
+        design::prove(&bank, &[]).map_err(|error| named(&error))?.1
+    };
+    Ok(Report { scope: scope(&bank), bank: file, verified, digest, certificate_in_file })
+}
+
+/// Of which banks the lower end speaks.
+fn scope(bank: &Bank) -> String {
+    match (&bank.filters, bank.method) {
+        (SynthesisFilters::Fir(taps), Method::Fir) => {
+            format!("no FIR bank of {} taps a channel is better", taps[0].len())
+        }
+        _ => "no bank at all is better".to_owned(),
+    }
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let Verified { lower, upper, attained, noncausal, states, .. } = self.verified;
+        let origin = if self.certificate_in_file { "from the file" } else { "found now, the file has none" };
+        let digest =
+            if self.digest { "matches" } else { "the file has none: only what breaks the proof shows" };
+        let width = if upper > 0.0 { (upper - lower) / upper } else { 0.0 };
+        format!(
+            "{}: proven, gamma in [{}, {}] (h = 1), relative width {width:.1e}\n\
+             upper      {}   bounded-real lemma, P of order {states} {origin}\n\
+             attained   {}   this bank's own gain at one tone\n\
+             lower      {}   {}{}\n\
+             noncausal  {}   no bank at all is better{}\n\
+             digest     {digest}\n",
+            self.bank,
+            number(lower),
+            number(upper),
+            number(upper),
+            number(attained),
+            number(lower),
+            self.scope,
+            stated(self.verified.lower_only_stated),
+            number(noncausal),
+            stated(self.verified.noncausal_only_stated),
+        )
+    }
+}
+
+/// What the file says beyond what was proven.
+fn stated(only: bool) -> &'static str {
+    if only { " (the file states more, which is not proven)" } else { "" }
+}
+
+/// All digits: rounding would move a bound.
+fn number(value: f64) -> String {
+    if value >= 1e-4 || value == 0.0 { format!("{value}") } else { format!("{value:e}") }
+}

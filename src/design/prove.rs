@@ -1,0 +1,281 @@
+//! The search for what proves a bank's gammas. [`crate::verify`] does the proving; whatever is found here is worth
+//! nothing until it has passed there.
+
+use super::equivalence::BlockedPlant;
+use super::fir::DualPoint;
+use super::{DesignError, analysis};
+use crate::bank::{Bank, Certificate, Proof, SynthesisFilters, Tone};
+use crate::linalg::{self, CMat, Complex, Mat};
+use crate::lmi::kyp;
+use crate::lti::peak::{hinf_norm, unexplained_peak};
+use crate::lti::{FrequencyResponse, StateSpace};
+use crate::spec::Method;
+use crate::verify::{CLAIM_TOLERANCE, Midpoint, Subject, Verified};
+
+/// Relative excesses over the computed norm at which a certificate is looked for, smallest first.
+const EXCESSES: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+/// Weights on all states, relative to the excess.
+const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
+/// Norms below this (relative to the system's matrices) are zero up to rounding: the excess is relative to it then.
+const FLOOR: f64 = 1e-10;
+/// Significant digits of the certificate's numbers in the file.
+const DIGITS: [usize; 3] = [7, 11, 17];
+/// Part of the dual's weight below which a tone does not matter.
+const NEGLIGIBLE: f64 = 1e-9;
+/// Most states of an error system for which a certificate is looked for: eigenvalues of matrices twice as large are needed.
+const MAX_SEARCHED: usize = 512;
+/// Tones at most.
+const MAX_TONES: usize = 64;
+/// Directions of tap space that matter less than this, relative to the strongest, are left alone.
+const RANK: f64 = 1e-13;
+/// Noise added to every state in the choice of coordinates, relative to gamma and the root of their number: no direction is
+/// unobservable then, and the norm rises by some 1e-9 only.
+const STATE_NOISE: f64 = 1e-5;
+/// What a bound may fall short of the designer's and still be taken for its proof.
+const SHORTFALL: f64 = 0.5 * CLAIM_TOLERANCE;
+
+/// A gamma that is proven, not only computed.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Certified {
+    /// ||K|| is less than this.
+    pub gamma: f64,
+    /// ||K|| is at least this.
+    pub attained: f64,
+    /// Order of P.
+    pub states: usize,
+}
+
+/// Proves the bank's norm from both sides; see [`crate::verify`] for how.
+///
+/// # Errors
+/// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
+pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
+    let subject = Subject::new(bank)?;
+    let upper = certificate(&subject, bank)?;
+    let (gamma, proof) = (upper.gamma, Proof { upper: Some(upper), ..Proof::default() });
+    let attained = subject.judge(&proof)?.attained;
+    Ok(Certified { gamma, attained, states: subject.states() })
+}
+
+/// The bank with all that can be proven of its gammas, and what that is.
+///
+/// `dual` is that of the design (FIR), from which the lower end is proven where the noncausal bound does not.
+///
+/// # Errors
+/// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
+pub fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), DesignError> {
+    let subject = Subject::new(bank)?;
+    let upper = Some(certificate(&subject, bank)?);
+    let gamma = &bank.gamma;
+    let enough = |proven: f64, stated: Option<f64>| stated.is_none_or(|x| proven >= x * (1.0 - SHORTFALL));
+    let tone = noncausal_tone(bank)?;
+    let unexplained = subject.unexplained(&tone);
+    let noncausal = unexplained.filter(|&proven| enough(proven, gamma.noncausal)).map(|_| tone);
+    let explained = unexplained.is_some_and(|proven| enough(proven, gamma.lower));
+    let lower = if bank.method != Method::Fir || explained { Vec::new() } else { binding_tones(bank, dual)? };
+    let reached = subject.out_of_reach(&lower).is_some_and(|proven| enough(proven, gamma.lower));
+    let lower = if reached { lower } else { Vec::new() };
+    let proof = Proof { upper, lower, noncausal };
+    let verified = subject.judge(&proof)?;
+    Ok((proof, verified))
+}
+
+/// The least gamma of the ladder for which a certificate passes.
+fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
+    if subject.states() > MAX_SEARCHED {
+        return Err(DesignError::NotSearched { states: subject.states(), limit: MAX_SEARCHED });
+    }
+    let middle = subject.midpoint().ok_or(DesignError::NotCertified)?;
+    let error = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
+    let peak = hinf_norm(&error)?;
+    // The file says the norm to its last digit; the one computed here may differ in the last few.
+    let norm = bank.gamma.upper.map_or(peak.gain, |stated| stated.max(peak.gain));
+    let response = error.response_at(Complex::from_polar(1.0, peak.frequency));
+    let tone = tone(peak.frequency, &leading_direction(&response)?);
+    let floor = FLOOR * (middle.c.norm() * middle.b.norm() + middle.d.norm());
+    let search = Search::new(middle, norm.max(floor))?;
+    let excesses = EXCESSES.iter().map(|excess| excess * norm.max(floor));
+    for (excess, weight) in excesses.flat_map(|excess| STATE_WEIGHTS.map(|weight| (excess, weight))) {
+        let gamma = norm + excess;
+        let Some(factor) = search.factor(norm + 0.5 * excess, weight * excess) else { continue };
+        if let Some(factor) = shortest(factor, |factor| subject.keeps(factor, gamma)) {
+            return Ok(Certificate { gamma, peak: tone, factor });
+        }
+    }
+    Err(DesignError::NotCertified)
+}
+
+/// The factor with as few digits as still prove, if it proves at all.
+fn shortest(factor: Vec<Vec<f64>>, proves: impl Fn(&[Vec<f64>]) -> bool) -> Option<Vec<Vec<f64>>> {
+    let rounded = |digits: usize| -> Vec<Vec<f64>> {
+        let round = |x: &f64| format!("{x:.digits$e}").parse().unwrap_or(*x);
+        factor.iter().map(|row| row.iter().map(round).collect()).collect()
+    };
+    DIGITS.iter().map(|&digits| rounded(digits - 1)).find(|short| proves(short))
+}
+
+/// The bounded-real Riccati equation of the transposed error system, in coordinates in which its controllability Gramian (the
+/// observability Gramian of the system) is the identity.
+struct Search {
+    a: Mat,
+    b: Mat,
+    c: Mat,
+    d: Mat,
+    /// From the states to the coordinates.
+    inverse: Mat,
+}
+
+impl Search {
+    fn new(middle: Midpoint, gamma: f64) -> Result<Self, DesignError> {
+        let Midpoint { a, b, c, d } = middle;
+        let (n, m) = (a.nrows(), c.nrows());
+        let mut inputs = Mat::zeros(n, m + n);
+        inputs.columns_mut(0, m).copy_from(&c.transpose());
+        inputs.columns_mut(m, n).fill_diagonal(STATE_NOISE * gamma / (n.max(1) as f64).sqrt());
+        let k = kyp::gramian_coordinates(&a.transpose(), &inputs, 0.0)?;
+        let heard = k.b.columns(0, m).into_owned();
+        Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: heard, d: d.transpose(), inverse: k.inverse })
+    }
+
+    /// Rows of R with P = R R' at `gamma`, with a weight on all states that keeps the inequality away from singular.
+    fn factor(&self, gamma: f64, weight: f64) -> Option<Vec<Vec<f64>>> {
+        let p = kyp::bounded_real_riccati(&self.a, &self.b, &self.c, &self.d, gamma, weight)?;
+        let half = linalg::cholesky(&p).ok()?;
+        let root = linalg::lq_factor(&(self.inverse.tr_mul(&half) * gamma.sqrt()));
+        Some((0..root.nrows()).map(|i| root.row(i).iter().take(i + 1).copied().collect()).collect())
+    }
+}
+
+/// A tone at which the samples leave most of the wanted ones unexplained.
+fn noncausal_tone(bank: &Bank) -> Result<Tone, DesignError> {
+    let problem = analysis::bank_problem(bank)?.without_duplicates().0;
+    let plant = BlockedPlant::new(&problem);
+    let (n, m) = (plant.measured, plant.wanted);
+    let frequency = unexplained_peak(&plant.system, n)?.frequency;
+    let l = linalg::lq_factor_c(&FrequencyResponse::new(&plant.system).at_frequency(frequency));
+    let rest = l.ncols().saturating_sub(n);
+    let part = if rest == 0 { CMat::zeros(m, 1) } else { l.view((n, n), (m, rest)).into_owned() };
+    Ok(tone(frequency, &leading_direction(&part)?))
+}
+
+/// The left singular vector of the largest singular value.
+fn leading_direction(response: &CMat) -> Result<CMat, DesignError> {
+    Ok(linalg::svd_c(response)?.u.columns(0, 1).into_owned())
+}
+
+fn tone(frequency: f64, wanted: &CMat) -> Tone {
+    let (s, c) = (0.5 * frequency).sin_cos();
+    Tone { half: [c, s], wanted: pairs(wanted), measured: Vec::new() }
+}
+
+fn pairs(column: &CMat) -> Vec<[f64; 2]> {
+    column.iter().map(|z| [z.re, z.im]).collect()
+}
+
+/// Tones with the directions and frequencies of the dual that no taps of the bank's length can serve all at once.
+///
+/// For given directions a the taps of least sum of ||a* K||^2 leave an error to which no change of the taps is of any use: the
+/// tones are that error's. Channels that cannot be told apart count once.
+fn binding_tones(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<Tone>, DesignError> {
+    let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
+    let (problem, representative) = analysis::bank_problem(bank)?.without_duplicates();
+    let plant = BlockedPlant::new(&problem);
+    let directions = directions(dual)?;
+    let mut served = Service::new(&plant, &directions, taps[0].len());
+    served.solve()?;
+    // The first channel of each group carries the group's weight.
+    let first = |i: usize| representative.iter().position(|&r| r == representative[i]) == Some(i);
+    let spread = |column: CMat| -> Vec<[f64; 2]> {
+        let weight = |i: usize| if first(i) { column[representative[i]] } else { Complex::new(0.0, 0.0) };
+        (0..representative.len()).map(|i| weight(i)).map(|z| [-z.re, -z.im]).collect()
+    };
+    let tones = directions.iter().enumerate();
+    Ok(tones
+        .map(|(t, (omega, a))| Tone { measured: spread(served.estimate(t)), ..tone(*omega, a) })
+        .collect())
+}
+
+/// The heaviest directions of a dual with their frequencies; the square of their length is their weight.
+fn directions(dual: &[DualPoint]) -> Result<Vec<(f64, CMat)>, DesignError> {
+    let mut all = Vec::new();
+    for point in dual {
+        let svd = linalg::svd_c(&point.weight)?;
+        let scaled = |k: usize| svd.u.columns(k, 1) * Complex::new(svd.s[k].sqrt(), 0.0);
+        all.extend((0..svd.s.len()).map(|k| (svd.s[k], point.omega, scaled(k))));
+    }
+    all.sort_by(|x, y| y.0.total_cmp(&x.0));
+    let total: f64 = all.iter().map(|(weight, ..)| weight).sum();
+    let heavy = all.into_iter().take(MAX_TONES).take_while(|(weight, ..)| *weight > NEGLIGIBLE * total);
+    Ok(heavy.map(|(_, omega, a)| (omega, a)).collect())
+}
+
+/// How FIR taps serve the wanted directions at some frequencies: min over taps of sum |a* (W - F H)|^2.
+struct Service<'a> {
+    directions: &'a [(f64, CMat)],
+    channels: usize,
+    ratio: usize,
+    length: usize,
+    /// For each direction the lower triangular root of the measured samples' Gram matrix, and a* W in its coordinates.
+    targets: Vec<(CMat, CMat)>,
+    taps: Vec<f64>,
+}
+
+impl<'a> Service<'a> {
+    fn new(plant: &BlockedPlant, directions: &'a [(f64, CMat)], length: usize) -> Self {
+        let response = FrequencyResponse::new(&plant.system);
+        let (n, m) = (plant.measured, plant.wanted);
+        let target = |(omega, a): &(f64, CMat)| {
+            let l = linalg::lq_factor_c(&response.at_frequency(*omega));
+            let k = n.min(l.ncols());
+            (l.view((0, 0), (n, k)).into_owned(), l.view((n, 0), (m, k)).ad_mul(a))
+        };
+        let targets = directions.iter().map(target).collect();
+        Self { directions, channels: n, ratio: m, length, targets, taps: Vec::new() }
+    }
+
+    /// What one unit of the tap of channel i at time n adds to F* a at a direction.
+    fn turn(&self, direction: usize, n: usize) -> Complex<f64> {
+        let (omega, a) = &self.directions[direction];
+        a[n % self.ratio] * Complex::from_polar(1.0, omega * (n / self.ratio) as f64)
+    }
+
+    /// F* a of the taps found.
+    fn estimate(&self, direction: usize) -> CMat {
+        let sum = |i: usize| {
+            (0..self.length).map(|n| self.turn(direction, n) * self.taps[i * self.length + n]).sum()
+        };
+        CMat::from_fn(self.channels, 1, |i, _| sum(i))
+    }
+
+    /// The taps of least sum and, among these, of least size.
+    fn solve(&mut self) -> Result<(), DesignError> {
+        let rows: usize = self.targets.iter().map(|(root, _)| 2 * root.ncols()).sum();
+        let mut map = Mat::zeros(rows, self.channels * self.length);
+        let mut right = Mat::zeros(rows, 1);
+        let mut row = 0;
+        for (t, (root, target)) in self.targets.iter().enumerate() {
+            for k in 0..root.ncols() {
+                (right[(row, 0)], right[(row + 1, 0)]) = (target[k].re, target[k].im);
+                for n in 0..self.length {
+                    let turn = self.turn(t, n);
+                    for i in 0..self.channels {
+                        let z = root[(i, k)].conj() * turn;
+                        (map[(row, i * self.length + n)], map[(row + 1, i * self.length + n)]) = (z.re, z.im);
+                    }
+                }
+                row += 2;
+            }
+        }
+        let svd = linalg::svd(&map)?;
+        let floor = RANK * svd.s.first().copied().unwrap_or(0.0);
+        let mut taps = Mat::zeros(map.ncols(), 1);
+        // The second pass takes away what rounding left of the first.
+        for _ in 0..2 {
+            let mut part = svd.u.tr_mul(&(&right - &map * &taps));
+            part.iter_mut().zip(&svd.s).for_each(|(x, &s)| *x = if s > floor { *x / s } else { 0.0 });
+            taps += &svd.v * part;
+        }
+        self.taps = taps.iter().copied().collect();
+        Ok(())
+    }
+}

@@ -1,0 +1,257 @@
+//! Numbers known to lie in an interval: a midpoint of 106 bits and a radius that every operation enlarges by its own
+//! rounding error. What is computed with them encloses the exact result for every choice of values in the operands.
+
+use super::double_word::{Double, ROUNDING};
+use nalgebra::DMatrix;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Makes up for the roundings of the radius itself, a dozen operations in double precision at most.
+const OUTWARD: f64 = 1.0 + 32.0 * f64::EPSILON;
+/// Covers results that underflow.
+const TINY: f64 = 1e-290;
+
+/// All numbers x with `|x - mid| <= radius`. A radius of infinity or NaN says that nothing is known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Ball {
+    mid: Double,
+    radius: f64,
+}
+
+/// Matrix of enclosed numbers.
+pub(super) type Matrix = DMatrix<Ball>;
+
+impl Ball {
+    pub(super) const ZERO: Self = Self { mid: Double::ZERO, radius: 0.0 };
+
+    pub(super) fn mid(self) -> Double {
+        self.mid
+    }
+
+    /// The nearest double to the midpoint.
+    pub(super) fn nearest(self) -> f64 {
+        self.mid.nearest()
+    }
+
+    #[cfg(test)]
+    pub(super) fn radius(self) -> f64 {
+        self.radius
+    }
+
+    /// Exactly `a - b`.
+    pub(super) fn difference(a: f64, b: f64) -> Self {
+        Self { mid: Double::difference(a, b), radius: 0.0 }
+    }
+
+    /// Exactly the midpoint given.
+    pub(super) fn exactly(mid: Double) -> Self {
+        Self { mid, radius: 0.0 }
+    }
+
+    /// The same midpoint, `by` further in both directions.
+    pub(super) fn widened(self, by: f64) -> Self {
+        Self { mid: self.mid, radius: (self.radius + by) * OUTWARD }
+    }
+
+    /// A bound on the modulus.
+    pub(super) fn magnitude(self) -> f64 {
+        (self.mid.nearest().abs() + self.radius) * OUTWARD
+    }
+
+    /// No value of the ball is less.
+    pub(super) fn lower(self) -> f64 {
+        let value = self.mid.nearest();
+        value - (self.radius + value.abs() * f64::EPSILON) * OUTWARD
+    }
+
+    /// No value of the ball is larger.
+    pub(super) fn upper(self) -> f64 {
+        -(-self).lower()
+    }
+
+    fn is_zero(self) -> bool {
+        self == Self::ZERO
+    }
+
+    fn rounded(mid: Double, inherited: f64) -> Self {
+        Self { mid, radius: (inherited + ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
+    }
+
+    /// Enclosure of the root; NaN where the ball holds negative numbers.
+    pub(super) fn sqrt(self) -> Self {
+        let least = self.lower();
+        if !(least >= 0.0) {
+            return Self { mid: Double::from(f64::NAN), radius: f64::NAN };
+        }
+        let root = self.mid.sqrt();
+        // |sqrt(x) - sqrt(m)| = |x - m| / (sqrt(x) + sqrt(m)).
+        let spread = if self.radius == 0.0 { 0.0 } else { self.radius / root.nearest() };
+        Self::rounded(root, spread)
+    }
+}
+
+impl From<f64> for Ball {
+    fn from(value: f64) -> Self {
+        Self { mid: value.into(), radius: 0.0 }
+    }
+}
+
+impl Neg for Ball {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { mid: -self.mid, radius: self.radius }
+    }
+}
+
+impl Add for Ball {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        match (self.is_zero(), other.is_zero()) {
+            (true, _) => other,
+            (_, true) => self,
+            _ => Self::rounded(self.mid + other.mid, self.radius + other.radius),
+        }
+    }
+}
+
+impl Sub for Ball {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for Ball {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        if self.is_zero() || other.is_zero() {
+            return Self::ZERO;
+        }
+        let (x, y) = (self.mid.nearest().abs(), other.mid.nearest().abs());
+        let spread = x * other.radius + y * self.radius + self.radius * other.radius;
+        Self::rounded(self.mid * other.mid, spread)
+    }
+}
+
+impl Div for Ball {
+    type Output = Self;
+    /// NaN where the divisor's ball holds zero.
+    fn div(self, other: Self) -> Self {
+        let least = other.mid.nearest().abs() * (1.0 - f64::EPSILON) - other.radius * OUTWARD;
+        if !(least > 0.0) {
+            return Self { mid: Double::from(f64::NAN), radius: f64::NAN };
+        }
+        let quotient = self.mid / other.mid;
+        // |x/y - m/n| <= (|x - m| + |m/n| |y - n|) / |y|.
+        let spread = (self.radius + quotient.nearest().abs() * OUTWARD * other.radius) / least;
+        Self::rounded(quotient, spread * OUTWARD)
+    }
+}
+
+/// The matrix of exactly these doubles.
+pub(super) fn exact(m: &DMatrix<f64>) -> Matrix {
+    m.map(Ball::from)
+}
+
+pub(super) fn zeros(rows: usize, columns: usize) -> Matrix {
+    Matrix::from_element(rows, columns, Ball::ZERO)
+}
+
+pub(super) fn identity(order: usize) -> Matrix {
+    Matrix::from_fn(order, order, |i, j| Ball::from(f64::from(u8::from(i == j))))
+}
+
+pub(super) fn add(a: &Matrix, b: &Matrix) -> Matrix {
+    a.zip_map(b, |x, y| x + y)
+}
+
+pub(super) fn subtract(a: &Matrix, b: &Matrix) -> Matrix {
+    a.zip_map(b, |x, y| x - y)
+}
+
+pub(super) fn scaled(a: &Matrix, by: Ball) -> Matrix {
+    a.map(|x| x * by)
+}
+
+/// a b. Entries of `a` that are exactly zero cost nothing: most of what occurs here is sparse.
+pub(super) fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    assert_eq!(a.ncols(), b.nrows(), "the matrices of a product fit each other");
+    let mut result = zeros(a.nrows(), b.ncols());
+    for i in 0..a.nrows() {
+        let row: Vec<(usize, Ball)> =
+            (0..a.ncols()).map(|k| (k, a[(i, k)])).filter(|(_, x)| !x.is_zero()).collect();
+        for j in 0..b.ncols() {
+            result[(i, j)] = row.iter().fold(Ball::ZERO, |sum, &(k, x)| sum + x * b[(k, j)]);
+        }
+    }
+    result
+}
+
+/// a b'.
+pub(super) fn product_transposed(a: &Matrix, b: &Matrix) -> Matrix {
+    product(a, &b.transpose())
+}
+
+/// a s a' for a symmetric s.
+pub(super) fn congruence(a: &Matrix, s: &Matrix) -> Matrix {
+    // The second product in the form (a (a s)')', so that the sparse factor stands on the left.
+    symmetric(&product(a, &product(a, s).transpose()))
+}
+
+/// The matrix again, made symmetric to the bit; for matrices that are symmetric by definition and whose two triangles
+/// both enclose the same numbers.
+pub(super) fn symmetric(m: &Matrix) -> Matrix {
+    Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i.max(j), i.min(j))])
+}
+
+/// A bound on the largest sum of moduli in a row.
+pub(super) fn row_sum(m: &Matrix) -> f64 {
+    let sum = |i: usize| m.row(i).iter().fold(0.0, |sum, x| (sum + x.magnitude()) * OUTWARD);
+    (0..m.nrows()).map(sum).fold(0.0, nan_max)
+}
+
+/// The same for radii only: a bound on the spectral norm of a symmetric matrix within the radii.
+pub(super) fn radius_sum(m: &Matrix) -> f64 {
+    let sum = |i: usize| m.row(i).iter().fold(0.0, |sum, x| (sum + x.radius) * OUTWARD);
+    (0..m.nrows()).map(sum).fold(0.0, nan_max)
+}
+
+/// The larger one, NaN if either is: an unknown bound stays unknown.
+pub(super) fn nan_max(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// The nearest doubles to the midpoints.
+pub(super) fn nearest(m: &Matrix) -> DMatrix<f64> {
+    m.map(Ball::nearest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Any values in the operands give a value in the result: tried with the ends, against 106 bits.
+        #[test]
+        fn results_hold_all_values(a in -1e3..1e3f64, b in -1e3..1e3f64, ra in 0.0..1.0f64, rb in 0.0..1.0f64, s in -1.0..1.0f64, t in -1.0..1.0f64) {
+            let (x, y) = (Ball::from(a).widened(ra), Ball::from(b).widened(rb));
+            let (u, v) = (Double::from(a) + Double::from(s * ra), Double::from(b) + Double::from(t * rb));
+            let holds = |ball: Ball, value: Double| ball.radius.is_nan() || (value - ball.mid).nearest().abs() <= ball.radius;
+            prop_assert!(holds(x + y, u + v) && holds(x - y, u - v) && holds(x * y, u * v));
+            prop_assert!(holds(x / y, u / v));
+            prop_assert!(holds(x.sqrt(), u.sqrt()));
+            prop_assert!(x.lower() <= u.nearest() && u.nearest() <= x.upper());
+        }
+    }
+
+    #[test]
+    fn what_is_unknown_stays_unknown() {
+        let zero = Ball::from(1e-9).widened(1e-8);
+        let unknown = Ball::from(1.0) / zero;
+        assert!(unknown.radius().is_nan() && (unknown + Ball::from(1.0)).radius().is_nan());
+        assert!(row_sum(&Matrix::from_element(1, 1, unknown)).is_nan());
+        assert!(Ball::from(-1.0).sqrt().radius().is_nan());
+    }
+}

@@ -1,0 +1,224 @@
+//! Frequency responses, enclosed. Points of the unit circle are rational: e^{i w} = (c + i s)^2 / (c^2 + s^2) for any two
+//! doubles c, s (about cos(w/2) and sin(w/2)), so that no transcendental function is needed.
+
+use super::ball::{self, Ball, Matrix};
+use super::error_system::BlockForm;
+use super::tick::Tick;
+use crate::bank::SynthesisFilters;
+use crate::linalg;
+
+/// A complex matrix.
+#[derive(Debug, Clone)]
+pub(super) struct Complex {
+    pub(super) re: Matrix,
+    pub(super) im: Matrix,
+}
+
+impl Complex {
+    pub(super) fn zeros(rows: usize, columns: usize) -> Self {
+        Self { re: ball::zeros(rows, columns), im: ball::zeros(rows, columns) }
+    }
+
+    fn real(re: Matrix) -> Self {
+        Self { im: ball::zeros(re.nrows(), re.ncols()), re }
+    }
+
+    /// A column of complex numbers.
+    pub(super) fn column(values: &[[f64; 2]]) -> Self {
+        let part = |k: usize| Matrix::from_fn(values.len(), 1, |i, _| Ball::from(values[i][k]));
+        Self { re: part(0), im: part(1) }
+    }
+
+    /// The point of the unit circle named by `half`.
+    pub(super) fn unit(half: [f64; 2]) -> Self {
+        let [c, s] = half.map(Ball::from);
+        let (cc, ss, cs) = (c * c, s * s, c * s);
+        let number = |x: Ball| Matrix::from_element(1, 1, x / (cc + ss));
+        Self { re: number(cc - ss), im: number(cs + cs) }
+    }
+
+    pub(super) fn product(&self, other: &Self) -> Self {
+        let of = ball::product;
+        Self {
+            re: ball::subtract(&of(&self.re, &other.re), &of(&self.im, &other.im)),
+            im: ball::add(&of(&self.re, &other.im), &of(&self.im, &other.re)),
+        }
+    }
+
+    /// Times a complex number (1 x 1).
+    pub(super) fn times(&self, z: &Self) -> Self {
+        let (c, s) = (z.re[(0, 0)], z.im[(0, 0)]);
+        Self {
+            re: self.re.zip_map(&self.im, |x, y| x * c - y * s),
+            im: self.re.zip_map(&self.im, |x, y| x * s + y * c),
+        }
+    }
+
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        Self { re: ball::add(&self.re, &other.re), im: ball::add(&self.im, &other.im) }
+    }
+
+    pub(super) fn minus(&self, other: &Self) -> Self {
+        Self { re: ball::subtract(&self.re, &other.re), im: ball::subtract(&self.im, &other.im) }
+    }
+
+    pub(super) fn adjoint(&self) -> Self {
+        Self { re: self.re.transpose(), im: self.im.transpose().map(|x| -x) }
+    }
+
+    pub(super) fn rows(&self, start: usize, count: usize) -> Self {
+        Self { re: self.re.rows(start, count).into_owned(), im: self.im.rows(start, count).into_owned() }
+    }
+
+    pub(super) fn above(&self, below: &Self) -> Self {
+        let stack = |a: &Matrix, b: &Matrix| {
+            Matrix::from_fn(a.nrows() + b.nrows(), a.ncols(), |i, j| {
+                if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] }
+            })
+        };
+        Self { re: stack(&self.re, &below.re), im: stack(&self.im, &below.im) }
+    }
+
+    pub(super) fn select(&self, rows: &[usize], columns: &[usize]) -> Self {
+        let part = |m: &Matrix| Matrix::from_fn(rows.len(), columns.len(), |i, j| m[(rows[i], columns[j])]);
+        Self { re: part(&self.re), im: part(&self.im) }
+    }
+
+    /// A Hermitian matrix as the real symmetric one of twice the order that acts on (re, im).
+    pub(super) fn realified(&self) -> Matrix {
+        let n = self.re.nrows();
+        Matrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
+            (true, true) => self.re[(i, j)],
+            (false, false) => self.re[(i - n, j - n)],
+            (false, true) => self.im[(i - n, j)],
+            (true, false) => -self.im[(i, j - n)],
+        })
+    }
+
+    /// sum |x|^2 over all entries.
+    pub(super) fn square(&self) -> Ball {
+        self.re.iter().chain(&self.im).fold(Ball::ZERO, |sum, &x| sum + x * x)
+    }
+
+    /// Re <self, other> = Re tr(self* other).
+    pub(super) fn inner(&self, other: &Self) -> Ball {
+        let part =
+            |a: &Matrix, b: &Matrix| a.iter().zip(b.iter()).fold(Ball::ZERO, |sum, (&x, &y)| sum + x * y);
+        part(&self.re, &other.re) + part(&self.im, &other.im)
+    }
+}
+
+/// z^-k on the unit circle.
+pub(super) fn delay(z: &Complex, ticks: usize) -> Complex {
+    let (mut power, mut square) = (Complex::real(ball::identity(1)), z.adjoint());
+    let mut rest = ticks;
+    while rest > 0 {
+        if rest & 1 == 1 {
+            power = power.product(&square);
+        }
+        square = square.product(&square);
+        rest >>= 1;
+    }
+    power
+}
+
+/// (z I - a)^-1. Any approximation R of the inverse will do: with q = ||I - B R|| < 1 it is wrong by at most
+/// ||R|| q / (1 - q). Two Newton steps take R from double to double-double precision.
+fn resolvent(a: &Matrix, z: &Complex) -> Complex {
+    let n = a.nrows();
+    let shifted = Complex {
+        re: ball::subtract(&ball::scaled(&ball::identity(n), z.re[(0, 0)]), a),
+        im: ball::scaled(&ball::identity(n), z.im[(0, 0)]),
+    }
+    .realified();
+    let mut inverse = ball::exact(&linalg::inverse(&ball::nearest(&shifted)));
+    let residual = |r: &Matrix| ball::subtract(&ball::identity(2 * n), &ball::product(&shifted, r));
+    for _ in 0..3 {
+        let step = ball::product(&inverse, &residual(&inverse));
+        inverse = ball::add(&inverse, &step).map(|x| Ball::exactly(x.mid()));
+    }
+    let q = ball::row_sum(&residual(&inverse).transpose());
+    // Column sums, so that the bound holds for each column of the inverse.
+    let error = if q < 0.5 { 1.01 * ball::row_sum(&inverse.transpose()) * q / (1.0 - q) } else { f64::NAN };
+    let part = |start: usize| inverse.view((start, 0), (n, n)).map(|x| x.widened(error));
+    Complex { re: part(0), im: part(n) }
+}
+
+/// Gram matrix of all samples of a tick at the point z of the unit circle: G G* of their responses G to the input.
+pub(super) fn gram(tick: &Tick, z: &Complex) -> Complex {
+    let (n, samples) = (tick.order(), tick.samples());
+    let from_state = Complex::real(tick.readouts.clone()).product(&resolvent(&tick.transition, z));
+    let mut rows = Complex::zeros(samples, n + samples);
+    for s in 0..samples {
+        let phase = delay(z, tick.ticks_late[s]);
+        let row = from_state.rows(s, 1).times(&phase);
+        rows.re.view_mut((s, 0), (1, n)).copy_from(&row.re);
+        rows.im.view_mut((s, 0), (1, n)).copy_from(&row.im);
+        (rows.re[(s, n + s)], rows.im[(s, n + s)]) = (phase.re[(0, 0)], phase.im[(0, 0)]);
+    }
+    rows.product(&Complex::real(tick.gram.clone())).product(&rows.adjoint())
+}
+
+/// F(z), M x N, of the bank's filters.
+pub(super) fn filter_response(filters: &SynthesisFilters, ratio: usize, z: &Complex) -> Complex {
+    match filters {
+        SynthesisFilters::Fir(taps) => {
+            let lags = taps[0].len().div_ceil(ratio);
+            let tap = |p: usize, i: usize, lag: usize| taps[i].get(p + lag * ratio).copied().unwrap_or(0.0);
+            let back = z.adjoint();
+            // Horner's rule in z^-1.
+            (0..lags).rev().fold(Complex::zeros(ratio, taps.len()), |sum, lag| {
+                sum.times(&back).plus(&Complex::real(Matrix::from_fn(ratio, taps.len(), |p, i| {
+                    Ball::from(tap(p, i, lag))
+                })))
+            })
+        }
+        SynthesisFilters::StateSpace(_) => {
+            let BlockForm { a, b, c, d } = BlockForm::new(filters, ratio);
+            let moving = Complex::real(c).product(&resolvent(&a, z)).product(&Complex::real(b));
+            Complex::real(d).plus(&moving)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_two_doubles_name_a_point_of_the_circle() {
+        for half in [[1.0, 0.0], [0.0, 1.0], [0.8, -0.6], [1e-200, 3e-200], [0.1, 7.0]] {
+            let z = Complex::unit(half);
+            let angle = 2.0 * f64::atan2(half[1], half[0]);
+            assert!((z.re[(0, 0)].nearest() - angle.cos()).abs() < 1e-15, "{half:?}");
+            assert!((z.im[(0, 0)].nearest() - angle.sin()).abs() < 1e-15, "{half:?}");
+            let square = z.square() - Ball::from(1.0);
+            assert!(half[0].abs() < 1e-100 || square.magnitude() < 1e-28, "{half:?} {square:?}");
+        }
+    }
+
+    #[test]
+    fn resolvents_invert() {
+        let a = Matrix::from_fn(4, 4, |i, j| Ball::from(0.3 * ((3 * i + 5 * j) as f64).sin()));
+        let z = Complex::unit([0.3, 0.9]);
+        let r = resolvent(&a, &z);
+        let shifted = Complex::real(ball::identity(4)).times(&z).minus(&Complex::real(a));
+        let rest = shifted.product(&r).minus(&Complex::real(ball::identity(4)));
+        assert!(rest.square().magnitude().sqrt() < 1e-27);
+        assert!(rest.re.iter().chain(&rest.im).all(|x| x.nearest().abs() <= x.radius()));
+        // A pole on the circle has none.
+        let one = Complex::real(ball::identity(1));
+        assert!(resolvent(&ball::identity(1), &one).re[(0, 0)].radius().is_nan());
+    }
+
+    #[test]
+    fn delays_are_powers() {
+        let z = Complex::unit([0.7, 0.2]);
+        let step = delay(&z, 1);
+        let mut power = delay(&z, 0);
+        for ticks in 0..20 {
+            assert!(power.minus(&delay(&z, ticks)).square().nearest() < 1e-56, "{ticks}");
+            power = power.product(&step);
+        }
+    }
+}

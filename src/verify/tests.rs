@@ -1,0 +1,277 @@
+//! The enclosed error system against the designer's, which shares no code with it; and what a proof must not accept.
+
+use super::spectrum::{self, Complex};
+use super::*;
+use crate::bank::{BlockFilter, Gamma};
+use crate::design::equivalence::BlockedPlant;
+use crate::design::{Problem, error_system};
+use crate::linalg::{CMat, symmetric_eigenvalues};
+use crate::lti::FrequencyResponse;
+use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Spec};
+use std::f64::consts::TAU;
+
+fn family(family: Family, order: usize, omega: f64) -> FilterSpec {
+    FilterSpec::Family {
+        family,
+        order: Some(order),
+        cutoff: omega / TAU,
+        ripple_db: family.has_ripple().then_some(0.5),
+        attenuation_db: family.has_attenuation().then_some(55.0),
+    }
+}
+
+fn thesis_filter() -> FilterSpec {
+    FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] }
+}
+
+/// A bank with made-up coefficients: what is compared does not ask whether it is any good.
+fn bank(
+    target: FilterSpec,
+    filters: Vec<FilterSpec>,
+    delays: &[f64],
+    ratio: usize,
+    latency: usize,
+    taps: usize,
+) -> Bank {
+    let made_up = |i: usize| (0..taps).map(|n| ((7 * n + 3 * i) % 11) as f64 / 11.0 - 0.4).collect();
+    let channel = |(filter, &delay)| ChannelSpec { delay, filter, noise: 0.0 };
+    let spec = Spec {
+        name: String::new(),
+        fast_period: 1.0,
+        ratio,
+        latency: Some(latency),
+        target,
+        channels: filters.into_iter().zip(delays).map(channel).collect(),
+        design: DesignSpec { method: Method::Fir, taps: Some(taps), slack: None },
+    };
+    Bank {
+        spec: Some(spec),
+        fast_period: 1.0,
+        ratio,
+        latency,
+        method: Method::Fir,
+        delays: delays.to_vec(),
+        filters: SynthesisFilters::Fir((0..delays.len()).map(made_up).collect()),
+        gamma: Gamma::default(),
+        proof: None,
+    }
+}
+
+fn alike(filter: &FilterSpec, delays: &[f64], ratio: usize, latency: usize, taps: usize) -> Bank {
+    bank(filter.clone(), vec![filter.clone(); delays.len()], delays, ratio, latency, taps)
+}
+
+fn cases() -> Vec<(&'static str, Bank)> {
+    let thesis = thesis_filter();
+    let eight = [0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];
+    let rc = |omega| family(Family::Rc, 1, omega);
+    let stiff = FilterSpec::Cascade { cascade: vec![rc(1e6), rc(0.5)] };
+    let mixed = vec![thesis.clone(), rc(1.0), family(Family::Elliptic, 5, 2.0)];
+    vec![
+        ("thesis", alike(&thesis, &[1.2, 0.6], 2, 10, 22)),
+        ("whole ticks late", alike(&thesis, &[0.2, 9.1], 2, 3, 7)),
+        ("exactly whole ticks", alike(&thesis, &[0.0, 4.0, 8.0], 4, 9, 9)),
+        ("samples as wanted", alike(&thesis, &[0.0, 1.0], 2, 10, 22)),
+        ("equal delays", alike(&thesis, &[0.6, 0.6], 2, 4, 8)),
+        ("delays almost equal", alike(&thesis, &[0.6, 0.6 + 1e-9], 2, 4, 8)),
+        ("a delay a hair from a tick", alike(&thesis, &[2.0 - 1e-7, 1.0], 2, 5, 8)),
+        ("one channel, no ratio", alike(&rc(2.0), &[0.25], 1, 1, 5)),
+        ("stiff", alike(&stiff, &[0.3, 1.7], 2, 6, 9)),
+        ("stiffer", alike(&rc(1e8), &[0.3, 1.7], 2, 6, 9)),
+        ("slow", alike(&rc(1e-4), &[0.3, 1.7], 2, 6, 9)),
+        ("mixed", bank(rc(0.7), mixed, &[0.25, 1.1, 2.6], 3, 6, 11)),
+        ("Butterworth 6, eight channels", alike(&family(Family::Butterworth, 6, 1.8), &eight, 8, 32, 48)),
+        ("low Butterworth 6", alike(&family(Family::Butterworth, 6, 0.4), &eight, 8, 20, 24)),
+        ("elliptic 7", alike(&family(Family::Elliptic, 7, 2.4), &[0.31, 1.22, 2.45, 2.9], 4, 10, 32)),
+        ("Bessel 8", alike(&family(Family::Bessel, 8, 0.9), &[0.1, 1.9], 3, 2, 6)),
+        ("few channels", alike(&thesis, &[0.2, 1.9], 3, 6, 18)),
+    ]
+}
+
+/// K(z) K(z)* by the designer's route.
+fn designers(bank: &Bank, omega: f64) -> CMat {
+    let problem = Problem::new(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
+    let filters = error_system::block_system(&bank.filters, bank.ratio).unwrap();
+    let error = error_system::error_system(&BlockedPlant::new(&problem), &filters).unwrap();
+    let k = FrequencyResponse::new(&error).at_frequency(omega);
+    &k * k.adjoint()
+}
+
+/// The same from the enclosed tick and the filters' response.
+fn enclosed(subject: &Subject<'_>, half: [f64; 2]) -> Complex {
+    let (bank, z) = (subject.bank, Complex::unit(half));
+    let through = spectrum::filter_response(&bank.filters, bank.ratio, &z);
+    let (m, n) = (bank.ratio, bank.channel_count());
+    let mut combine = Complex::zeros(m, m + n);
+    (0..m).for_each(|p| combine.re[(p, p)] = ball::Ball::from(1.0));
+    combine.re.columns_mut(m, n).copy_from(&through.re.map(|x| -x));
+    combine.im.columns_mut(m, n).copy_from(&through.im.map(|x| -x));
+    combine.product(&spectrum::gram(&subject.tick, &z)).product(&combine.adjoint())
+}
+
+#[test]
+fn the_error_system_is_the_designers() {
+    for (name, bank) in cases() {
+        let subject = Subject::new(&bank).unwrap();
+        for omega in [0.0, 1e-3, 0.4, 1.3, 2.9, std::f64::consts::PI] {
+            let (s, c) = (0.5 * omega).sin_cos();
+            let ours = enclosed(&subject, [c, s]);
+            let theirs = designers(&bank, omega);
+            let size = theirs.norm();
+            let gap = ours.re.zip_zip_map(&ours.im, &theirs, |re, im, z| {
+                (re.nearest() - z.re).hypot(im.nearest() - z.im) / size
+            });
+            assert!(gap.max() < 1e-10, "{name} at {omega}: {:e} of {size:e}", gap.max());
+            let radius = ours.re.iter().chain(&ours.im).map(|x| x.radius()).fold(0.0, f64::max);
+            assert!(radius < 1e-13 * size, "{name} at {omega}: radius {radius:e} of {size:e}");
+        }
+    }
+}
+
+/// The state-space form of the enclosure is the same system as its samples and filters.
+#[test]
+fn the_state_equations_have_the_same_response() {
+    for (name, bank) in cases() {
+        let subject = Subject::new(&bank).unwrap();
+        let Midpoint { a, b, c, d } = subject.midpoint().unwrap();
+        let system = crate::lti::StateSpace::new(a, b, c, d).unwrap();
+        for omega in [0.1, 1.3, 3.0] {
+            let k = FrequencyResponse::new(&system).at_frequency(omega);
+            let theirs = designers(&bank, omega);
+            let gap = (&k * k.adjoint() - &theirs).norm() / theirs.norm();
+            assert!(gap < 1e-9, "{name} at {omega}: {gap:e}");
+        }
+    }
+}
+
+#[test]
+fn gram_matrices_are_positive_and_tight() {
+    for (name, bank) in cases() {
+        let gram = Subject::new(&bank).unwrap().tick.gram;
+        let eigenvalues = symmetric_eigenvalues(&ball::nearest(&gram)).unwrap();
+        let largest = eigenvalues[eigenvalues.len() - 1];
+        assert!(eigenvalues[0] > -1e-14 * largest, "{name}: {eigenvalues:?}");
+        assert!(ball::radius_sum(&gram) < 1e-18 * largest, "{name}");
+    }
+}
+
+fn proven(bank: &Bank, dual: &[crate::design::fir::DualPoint]) -> (Bank, Verified) {
+    let (proof, verified) = crate::design::prove(bank, dual).unwrap();
+    (Bank { proof: Some(proof), ..bank.clone() }, verified)
+}
+
+fn designed(method: Method, latency: usize, taps: usize) -> (Bank, Verified) {
+    let mut spec = alike(&thesis_filter(), &[1.2, 0.6], 2, latency, 1).spec.unwrap();
+    spec.design = DesignSpec { method, taps: method.has_taps().then_some(taps), slack: None };
+    let design = crate::design::design(&spec).unwrap();
+    proven(&design.bank, &design.dual)
+}
+
+#[test]
+fn the_interval_of_the_thesis_example_is_known() {
+    for method in [Method::Fir, Method::Iir] {
+        let (bank, proven) = designed(method, 10, 22);
+        assert!(proven.lower <= 0.0399320395 && proven.upper >= 0.0399320394, "{proven:?}");
+        assert!((proven.upper - proven.lower) / proven.upper < 1e-6, "{proven:?}");
+        assert_eq!(verify(&bank).unwrap(), proven);
+    }
+}
+
+/// Ten taps are too few (G3): the bound comes from tones that bind the taps together, far above the noncausal one.
+#[test]
+fn short_filters_are_bound_by_several_tones() {
+    for (latency, taps, golden) in [(10, 10, 0.0934525), (1, 12, 0.069447031)] {
+        let (bank, proven) = designed(Method::Fir, latency, taps);
+        assert!((proven.lower / golden - 1.0).abs() < 1e-6, "{proven:?}");
+        assert!(proven.lower > 1.2 * proven.noncausal && !proven.lower_only_stated, "{proven:?}");
+        let tones = bank.proof.as_ref().unwrap().lower.clone();
+        // The same tones claim nothing of longer filters, for which they do not cancel.
+        let SynthesisFilters::Fir(lists) = &bank.filters else { panic!("taps") };
+        let longer = lists.iter().map(|list| [list.as_slice(), &[0.0; 12]].concat()).collect();
+        let longer = Bank { filters: SynthesisFilters::Fir(longer), ..bank.clone() };
+        let bound = Subject::new(&longer).unwrap().out_of_reach(&tones).unwrap();
+        assert!(bound < 0.9 * golden, "{bound}");
+    }
+}
+
+/// The lower bounds hold for banks that were not designed for them.
+#[test]
+fn no_bank_is_better_than_proven() {
+    let (bank, proven) = designed(Method::Fir, 1, 12);
+    let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("taps") };
+    for k in 0..10 {
+        let moved = |(n, x): (usize, &f64)| x + 1e-4 * ((n * k) as f64).sin();
+        let other = taps.iter().map(|list| list.iter().enumerate().map(moved).collect()).collect();
+        let other = Bank { filters: SynthesisFilters::Fir(other), ..bank.clone() };
+        assert!(crate::design::analyze(&other, &[]).unwrap().gamma >= proven.lower, "{k}");
+    }
+}
+
+#[test]
+fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
+    for method in [Method::Fir, Method::Iir] {
+        let (bank, proven) = designed(method, 10, 22);
+        let norm = crate::design::analyze(&bank, &[]).unwrap().gamma;
+        assert!(proven.lower <= norm && proven.attained <= norm * (1.0 + 1e-9) && norm <= proven.upper);
+        for factor in [1.0 - 1e-6, 1.0 + 1e-6] {
+            let gamma = Gamma { upper: Some(norm * factor), ..Gamma::default() };
+            let error = verify(&Bank { gamma, ..bank.clone() }).unwrap_err();
+            assert!(matches!(error, VerifyError::Disproved { place: "gamma.upper", .. }), "{error}");
+        }
+        // A certificate is good for its gamma and no lower one.
+        let certificate = bank.proof.as_ref().unwrap().upper.clone().unwrap();
+        let subject = Subject::new(&bank).unwrap();
+        assert!(subject.keeps(&certificate.factor, certificate.gamma));
+        assert!(!subject.keeps(&certificate.factor, norm * (1.0 - 1e-6)));
+        assert!(!subject.keeps(&certificate.factor, norm * (1.0 - 1e-12)));
+    }
+}
+
+/// Whatever P is tried: below the norm nothing may pass. Scaled, shifted and true certificates of other gammas.
+#[test]
+fn no_certificate_passes_below_the_norm() {
+    let (bank, proven) = designed(Method::Fir, 10, 22);
+    let subject = Subject::new(&bank).unwrap();
+    let factor = bank.proof.as_ref().unwrap().upper.as_ref().unwrap().factor.clone();
+    for scale in [0.5, 0.999999, 1.0, 1.000001, 1.5, 1e3] {
+        let scaled: Vec<Vec<f64>> =
+            factor.iter().map(|row| row.iter().map(|x| x * scale).collect()).collect();
+        assert!(!subject.keeps(&scaled, proven.attained), "{scale}");
+        assert!(!subject.keeps(&scaled, 0.9 * proven.attained), "{scale}");
+    }
+    let zero: Vec<Vec<f64>> = factor.iter().map(|row| vec![0.0; row.len()]).collect();
+    assert!(!subject.keeps(&zero, 1e9) && !subject.keeps(&factor[1..], 1e9));
+}
+
+#[test]
+fn an_unstable_bank_has_no_certificate() {
+    let (bank, _) = designed(Method::Iir, 10, 22);
+    let SynthesisFilters::StateSpace(block) = &bank.filters else { panic!("states") };
+    let grown = |rows: &[Vec<f64>]| rows.iter().map(|row| row.iter().map(|x| 3.0 * x).collect()).collect();
+    let unstable = BlockFilter { a: grown(&block.a), ..block.clone() };
+    let bank = Bank { filters: SynthesisFilters::StateSpace(unstable), gamma: Gamma::default(), ..bank };
+    assert!(matches!(verify(&bank), Err(VerifyError::NotProven { .. })));
+    assert!(crate::design::prove(&bank, &[]).is_err());
+}
+
+#[test]
+fn statements_that_contradict_the_proof_are_refused() {
+    let (bank, proven) = designed(Method::Fir, 1, 12);
+    let with = |gamma: Gamma| verify(&Bank { gamma, ..bank.clone() });
+    let good = bank.gamma;
+    assert!(with(good).is_ok());
+    let raised = |x: Option<f64>| x.map(|x| x * 1.00001);
+    for (gamma, at) in [
+        (Gamma { lower: raised(good.lower), upper: None, ..good }, "gamma.lower"),
+        (Gamma { noncausal: raised(good.noncausal), ..good }, "gamma.noncausal"),
+        (Gamma { noncausal: good.noncausal.map(|x| x * 0.99999), ..good }, "gamma.noncausal"),
+        (Gamma { noncausal: Some(2.0 * proven.upper), ..good }, "gamma.noncausal"),
+    ] {
+        let error = with(gamma).unwrap_err();
+        assert!(matches!(&error, VerifyError::Disproved { place, .. } if *place == at), "{error}");
+    }
+    let none = Bank { spec: None, ..bank.clone() };
+    assert_eq!(verify(&none), Err(VerifyError::NoSpec));
+    let bare = Bank { proof: None, ..bank };
+    assert_eq!(verify(&bare), Err(VerifyError::NoCertificate));
+}

@@ -1,0 +1,356 @@
+//! `hybank verify` as a user runs it, and random mutations of bank files: none may pass.
+//!
+//! A mutation is any change of the text after which it no longer says the same: another number, key, text or structure.
+//! Changes of layout, and of digits beyond the precision of a double, are none. `HYBANK_MUTATIONS=100000` runs that many.
+
+use hybank::bank::{Bank, Proof, check_digest};
+use hybank::design::{analyze, design, prove};
+use hybank::spec::Spec;
+use hybank::verify::verify;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SPEC: &str = "\
+fast_period = 1.0
+ratio = 2
+latency = 1
+[target]
+filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
+[[channel]]
+delay = 1.2
+[[channel]]
+delay = 0.6
+[design]
+method = \"fir\"
+taps = 12
+";
+
+fn designed(method: &str) -> Bank {
+    let text = match method {
+        "fir" => SPEC.to_owned(),
+        _ => SPEC.replace("\"fir\"\ntaps = 12", &format!("\"{method}\"")),
+    };
+    let design = design(&Spec::from_toml(&text, "spec.toml").unwrap()).unwrap();
+    let (proof, _) = prove(&design.bank, &design.dual).unwrap();
+    Bank { proof: Some(proof), ..design.bank }
+}
+
+/// Texts of bank files: two made here, and those of `filters/`.
+fn files() -> Vec<(String, String)> {
+    let made = ["fir", "iir"].map(|method| (method.to_owned(), designed(method).to_json().unwrap()));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("filters");
+    let mut ready: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    ready.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
+    ready.sort();
+    let named = |path: PathBuf| (path.display().to_string(), fs::read_to_string(&path).unwrap());
+    made.into_iter().chain(ready.into_iter().map(named)).collect()
+}
+
+/// What the verb does with a file that has a digest and a certificate.
+fn accepted(text: &str) -> Result<(), String> {
+    let bank = Bank::from_json(text, "b.json").map_err(|error| error.to_string())?;
+    match check_digest(text, "b.json") {
+        Ok(true) => {}
+        Ok(false) => return Err("no digest".into()),
+        Err(error) => return Err(error.to_string()),
+    }
+    verify(&bank).map(drop).map_err(|error| error.to_string())
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014): the same mutations on every machine.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, sides: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % sides as u64) as usize
+    }
+
+    fn of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
+        &list[self.below(list.len())]
+    }
+}
+
+/// Places of the numbers of a text: start and end.
+fn numbers(text: &str) -> Vec<(usize, usize)> {
+    let bytes = text.as_bytes();
+    let part = |i: usize| matches!(bytes[i], b'0'..=b'9' | b'.' | b'-' | b'+' | b'e');
+    let starts =
+        |i: usize| (bytes[i].is_ascii_digit() || bytes[i] == b'-') && matches!(bytes[i - 1], b' ' | b'[');
+    let end = |i: usize| (i..bytes.len()).find(|&k| !part(k)).unwrap_or(bytes.len());
+    (1..bytes.len()).filter(|&i| starts(i)).map(|i| (i, end(i))).collect()
+}
+
+fn replaced(text: &str, (start, end): (usize, usize), by: &str) -> String {
+    format!("{}{by}{}", &text[..start], &text[end..])
+}
+
+fn mutated(text: &str, dice: &mut Dice) -> String {
+    let numbers = numbers(text);
+    let at = *dice.of(&numbers);
+    let old = &text[at.0..at.1];
+    match dice.below(8) {
+        // One digit of one number.
+        0..=2 => {
+            let digits: Vec<usize> = (at.0..at.1).filter(|&i| text.as_bytes()[i].is_ascii_digit()).collect();
+            let place = *dice.of(&digits);
+            replaced(text, (place, place + 1), &dice.below(10).to_string())
+        }
+        // Another number, or none.
+        3 => {
+            let value: f64 = old.parse().unwrap();
+            let near =
+                [value * (1.0 + 1e-15), value * (1.0 - 1e-9), -value, value + 1e-12, 2.0 * value, 0.0, 1.0];
+            replaced(text, at, &format!("{:?}", dice.of(&near)))
+        }
+        4 => replaced(text, at, dice.of(&["null", "true", "\"x\"", "[]", "1e999", "-1"])),
+        // Two numbers exchanged.
+        5 => {
+            let other = *dice.of(&numbers);
+            let (first, second) = if at < other { (at, other) } else { (other, at) };
+            let later = replaced(text, second, &text[first.0..first.1]);
+            if first == second { later } else { replaced(&later, first, &text[second.0..second.1]) }
+        }
+        // A list loses or doubles an entry.
+        6 => match dice.below(2) {
+            0 => replaced(text, at, &format!("{old}, {old}")),
+            _ => replaced(text, (at.0, (at.1 + 2).min(text.len())), ""),
+        },
+        // Any character.
+        _ => {
+            let place = dice.below(text.len() - 1);
+            let put = ["", "0", "9", "-", ".", "a", "\"", "]", "}", ","];
+            replaced(text, (place, place + 1), dice.of(&put))
+        }
+    }
+}
+
+/// Whether two texts say the same, numbers compared as doubles to the bit.
+fn same(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Number(x), Value::Number(y)) => x.as_f64().map(f64::to_bits) == y.as_f64().map(f64::to_bits),
+        (Value::Array(x), Value::Array(y)) => x.len() == y.len() && x.iter().zip(y).all(|(x, y)| same(x, y)),
+        (Value::Object(x), Value::Object(y)) => {
+            x.len() == y.len()
+                && x.iter().all(|(key, value)| y.get(key).is_some_and(|other| same(value, other)))
+        }
+        _ => a == b,
+    }
+}
+
+fn says_the_same(original: &Value, text: &str) -> bool {
+    serde_json::from_str(text).is_ok_and(|other| same(original, &other))
+}
+
+#[test]
+fn every_mutation_of_a_bank_file_is_refused() {
+    let asked = std::env::var("HYBANK_MUTATIONS").ok().and_then(|count| count.parse().ok());
+    let count: usize = asked.unwrap_or_else(|| {
+        println!("2,000 mutations; HYBANK_MUTATIONS=100000 tries more");
+        2000
+    });
+    let files: Vec<(String, String, Value)> = files()
+        .into_iter()
+        .map(|(name, text)| {
+            accepted(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let value = serde_json::from_str(&text).unwrap();
+            (name, text, value)
+        })
+        .collect();
+    let mut dice = Dice(2026);
+    let (mut refused, mut unchanged) = (0, 0);
+    while refused < count {
+        let (name, text, value) = dice.of(&files);
+        let mutation = mutated(text, &mut dice);
+        match accepted(&mutation) {
+            Err(error) => {
+                assert!(error.len() > 10, "{error}");
+                refused += usize::from(!says_the_same(value, &mutation));
+            }
+            Ok(()) => {
+                assert!(says_the_same(value, &mutation), "{name}: a mutation passed:\n{mutation}");
+                unchanged += 1;
+            }
+        }
+    }
+    println!("{refused} mutations refused, {unchanged} changes that change nothing passed");
+}
+
+/// Without the digest the proof stands alone: what it lets pass must be true.
+#[test]
+fn what_the_proof_alone_lets_pass_is_true() {
+    let mut dice = Dice(7);
+    let (mut passed, mut refused) = (0, 0);
+    for method in ["fir", "iir"] {
+        let text = designed(method).to_json().unwrap();
+        let open = text.find("\"digest\"").unwrap();
+        let text = text[..open].trim_end().trim_end_matches(',').to_owned() + "\n}\n";
+        for _ in 0..300 {
+            let Ok(bank) = Bank::from_json(&mutated(&text, &mut dice), "b.json") else { continue };
+            match verify(&bank) {
+                Err(_) => refused += 1,
+                Ok(proven) => {
+                    passed += 1;
+                    let gamma = analyze(&bank, &[]).unwrap().gamma;
+                    let holds =
+                        proven.attained <= gamma * (1.0 + 1e-9) && gamma <= proven.upper * (1.0 + 1e-12);
+                    assert!(holds && proven.lower <= gamma * (1.0 + 1e-9), "{gamma} {proven:?}");
+                    let stated = bank.gamma.upper.unwrap_or(gamma);
+                    assert!((stated / gamma - 1.0).abs() < 1e-6, "{stated} {gamma}");
+                }
+            }
+        }
+    }
+    println!("by the proof alone: {refused} refused, {passed} passed and true");
+    assert!(refused > passed, "{refused} {passed}");
+}
+
+#[test]
+fn the_intervals_of_the_ready_banks_are_narrow_and_hold_their_gamma() {
+    for (name, text) in files() {
+        let bank = Bank::from_json(&text, &name).unwrap();
+        let proven = verify(&bank).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let gamma = analyze(&bank, &[]).unwrap().gamma;
+        assert!(proven.lower <= gamma && gamma <= proven.upper, "{name}: {gamma} {proven:?}");
+        // The IIR bank with hardly any latency: what is proven for any bank says little about causal ones.
+        let slack = if name == "iir" { 0.5 } else { 1e-6 };
+        assert!(proven.upper - proven.lower < slack * proven.upper, "{name}: {proven:?}");
+        assert_eq!(proven.lower_only_stated, name == "iir", "{name}: {proven:?}");
+    }
+}
+
+/// A bank without digest and proof is proven afresh, to the same ends.
+#[test]
+fn a_bank_made_elsewhere_is_proven_afresh() {
+    for (name, text) in files() {
+        let bank = Bank::from_json(&text, &name).unwrap();
+        let known = verify(&bank).unwrap();
+        let bare = Bank { proof: None, ..bank };
+        let (proof, fresh) = prove(&bare, &[]).unwrap();
+        assert!(
+            (fresh.upper / known.upper - 1.0).abs() < 1e-6 && fresh.noncausal == known.noncausal,
+            "{name}"
+        );
+        assert!(proof != Proof::default());
+    }
+}
+
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let desk = Self { folder: tempfile::tempdir().unwrap() };
+        fs::write(desk.path("spec.toml"), SPEC).unwrap();
+        assert!(desk.run(&["design", "spec.toml", "-o", "bank.json"]).status.success());
+        desk
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        let program = env!("CARGO_BIN_EXE_hybank");
+        Command::new(program).current_dir(self.folder.path()).args(args).output().unwrap()
+    }
+
+    fn good(&self, args: &[&str]) -> String {
+        let output = self.run(args);
+        assert!(output.status.success() && output.stderr.is_empty(), "{args:?}: {output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    fn refused(&self, text: &str, parts: &[&str]) {
+        fs::write(self.path("bad.json"), text).unwrap();
+        let output = self.run(&["verify", "bad.json"]);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{message}");
+        assert!(message.starts_with("hybank: bad.json: ") && message.lines().count() == 1, "{message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{parts:?} in {message}");
+    }
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+fn pretty(value: &Value) -> String {
+    serde_json::to_string_pretty(value).unwrap()
+}
+
+#[test]
+fn a_designed_bank_verifies() {
+    let desk = Desk::new();
+    let out = desk.good(&["verify", "bank.json"]);
+    for part in ["proven, gamma in [0.0694", "from the file", "no FIR bank of 12 taps", "digest     matches"]
+    {
+        assert!(out.contains(part), "{part} in {out}");
+    }
+    let report = json(&desk.good(&["verify", "bank.json", "--json"]));
+    let bank = json(&fs::read_to_string(desk.path("bank.json")).unwrap());
+    let upper = bank["gamma"]["upper"].as_f64().unwrap();
+    assert!(report["lower"].as_f64() <= Some(upper) && report["upper"].as_f64() >= Some(upper), "{report}");
+    assert_eq!((&report["digest"], &report["certificate_in_file"]), (&Value::Bool(true), &Value::Bool(true)));
+    assert!(desk.good(&["verify", "--help"]).contains("Examples:"));
+    // Another layout of the same content is the same bank.
+    fs::write(desk.path("loose.json"), pretty(&bank)).unwrap();
+    assert!(desk.good(&["verify", "loose.json"]).contains("digest     matches"));
+}
+
+#[test]
+fn altered_files_are_refused_with_the_place() {
+    let desk = Desk::new();
+    let bank = json(&fs::read_to_string(desk.path("bank.json")).unwrap());
+    let change = |pointer: &str, value: Value, digest: bool| {
+        let mut changed = bank.clone();
+        *changed.pointer_mut(pointer).unwrap() = value;
+        if !digest {
+            changed["digest"] = Value::Null;
+        }
+        pretty(&changed)
+    };
+    let tap = bank["channels"][0]["taps"][3].as_f64().unwrap();
+    let upper = bank["gamma"]["upper"].as_f64().unwrap();
+    let lower = bank["gamma"]["lower"].as_f64().unwrap();
+    desk.refused(&change("/channels/0/taps/3", (tap * (1.0 + 1e-15)).into(), true), &["digest: ", "altered"]);
+    desk.refused(&change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["gamma.upper: "]);
+    desk.refused(&change("/gamma/upper", (upper * (1.0 - 1e-6)).into(), false), &["gamma.upper: "]);
+    desk.refused(&change("/gamma/lower", (lower * 1.001).into(), false), &["gamma.lower: "]);
+    desk.refused(&change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["gamma.upper: "]);
+    desk.refused(
+        &change("/proof/upper/factor/2/1", 0.5.into(), false),
+        &["proof.upper: ", "design the bank anew"],
+    );
+    desk.refused(&change("/proof/upper/factor/2", Value::Array(vec![]), false), &["proof.upper.factor[2]: "]);
+    desk.refused(&change("/proof/upper/peak/half", json("[0.0, 0.0]"), false), &["proof.upper.peak.half: "]);
+    desk.refused(
+        &change("/proof/lower/0/measured", json("[[0.0, 1.0]]"), false),
+        &["proof.lower[0].measured: "],
+    );
+    desk.refused(&change("/digest", "sha256:12".into(), true), &["digest: ", "64 hexadecimal"]);
+    desk.refused(&change("/spec", Value::Null, false), &["spec: ", "null"]);
+    desk.refused("{", &["line 1"]);
+}
+
+#[test]
+fn a_bank_without_proof_is_proven_afresh_by_the_verb() {
+    let desk = Desk::new();
+    let mut bank = json(&fs::read_to_string(desk.path("bank.json")).unwrap());
+    (bank["proof"], bank["digest"], bank["gamma"]) = (Value::Null, Value::Null, Value::Null);
+    fs::write(desk.path("bare.json"), pretty(&bank)).unwrap();
+    let out = desk.good(&["verify", "bare.json"]);
+    assert!(out.contains("found now") && out.contains("the file has none"), "{out}");
+    let report = json(&desk.good(&["verify", "bare.json", "--json"]));
+    let known = json(&desk.good(&["verify", "bank.json", "--json"]));
+    let upper = |report: &Value| report["upper"].as_f64().unwrap();
+    assert!((upper(&report) / upper(&known) - 1.0).abs() < 1e-6, "{report} {known}");
+    // It runs and is analysed as before.
+    assert!(desk.good(&["analyze", "bare.json", "--certify"]).contains("proven upper bound"));
+}
