@@ -45,6 +45,7 @@ fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
         delays: vec![0.0; channels],
         filters,
         gamma: Gamma::default(),
+        proof: None,
     }
 }
 

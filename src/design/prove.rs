@@ -178,16 +178,17 @@ fn pairs(column: &CMat) -> Vec<[f64; 2]> {
 /// tones are that error's. Channels that cannot be told apart count once.
 fn binding_tones(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<Tone>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
-    let (problem, representative) = analysis::bank_problem(bank)?.without_duplicates();
+    let (problem, parts) = analysis::bank_problem(bank)?.without_duplicates();
     let plant = BlockedPlant::new(&problem);
     let directions = directions(dual)?;
     let mut served = Service::new(&plant, &directions, taps[0].len());
     served.solve()?;
     // The first channel of each group carries the group's weight.
-    let first = |i: usize| representative.iter().position(|&r| r == representative[i]) == Some(i);
+    let group = |i: usize| parts[i].representative;
+    let first = |i: usize| (0..i).all(|before| group(before) != group(i));
     let spread = |column: CMat| -> Vec<[f64; 2]> {
-        let weight = |i: usize| if first(i) { column[representative[i]] } else { Complex::new(0.0, 0.0) };
-        (0..representative.len()).map(|i| weight(i)).map(|z| [-z.re, -z.im]).collect()
+        let weight = |i: usize| if first(i) { column[group(i)] } else { Complex::new(0.0, 0.0) };
+        (0..parts.len()).map(|i| weight(i)).map(|z| [-z.re, -z.im]).collect()
     };
     let tones = directions.iter().enumerate();
     Ok(tones
