@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 
 /// N = M = 2, m0 = 3.
-pub const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 0.0]];
+pub(crate) const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 0.0]];
 
 const BANK: &str = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2,
     "latency": 3, "method": "fir", "channels": [{ "delay": 0.0, "taps": [1, 2, 3, 4] },
@@ -14,31 +14,31 @@ const BANK: &str = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fa
     "gamma": { "upper": null, "lower": null, "noncausal": null } }"#;
 
 /// A folder with `bank.json`, removed at the end.
-pub struct Desk {
+pub(crate) struct Desk {
     folder: tempfile::TempDir,
 }
 
 impl Desk {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let desk = Self { folder: tempfile::tempdir().unwrap() };
         desk.write("bank.json", BANK);
         desk
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
         fs::write(self.path(name), content).unwrap();
     }
 
-    pub fn read(&self, name: &str) -> Vec<u8> {
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
         fs::read(self.path(name)).unwrap()
     }
 
     /// hybank at work in the folder, with pipes.
-    pub fn spawn(&self, args: &[&str]) -> Child {
+    pub(crate) fn spawn(&self, args: &[&str]) -> Child {
         Command::new(env!("CARGO_BIN_EXE_hybank"))
             .current_dir(self.folder.path())
             .args(args)
@@ -49,7 +49,7 @@ impl Desk {
             .unwrap()
     }
 
-    pub fn run(&self, args: &[&str], input: &[u8]) -> Output {
+    pub(crate) fn run(&self, args: &[&str], input: &[u8]) -> Output {
         let mut child = self.spawn(args);
         let mut stdin = child.stdin.take().unwrap();
         let input = input.to_vec();
@@ -62,7 +62,7 @@ impl Desk {
 
     /// Runs and wants success; gives the report of `--json`.
     #[allow(dead_code)]
-    pub fn report(&self, args: &[&str]) -> serde_json::Value {
+    pub(crate) fn report(&self, args: &[&str]) -> serde_json::Value {
         let output = self.run(&[args, &["--json", "--force"]].concat(), &[]);
         assert!(output.status.success(), "{args:?}: {output:?}");
         serde_json::from_slice(&output.stdout).unwrap()
@@ -70,7 +70,7 @@ impl Desk {
 
     /// Runs and wants exit code `code` with one message that has all of `parts`, and no new file.
     #[allow(dead_code)]
-    pub fn refused(&self, code: i32, args: &[&str], parts: &[&str]) {
+    pub(crate) fn refused(&self, code: i32, args: &[&str], parts: &[&str]) {
         let names = || fs::read_dir(self.folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
         let before: Vec<_> = names().collect();
         let output = self.run(args, &[]);
@@ -85,27 +85,27 @@ impl Desk {
 }
 
 /// Small integers, so that every sum is exact in any order and precision.
-pub fn ticks(count: usize) -> Vec<f32> {
+pub(crate) fn ticks(count: usize) -> Vec<f32> {
     (0..2 * count).map(|i| ((i * 7) % 23) as f32 - 11.0).collect()
 }
 
 /// Channel i of interleaved ticks.
 #[allow(dead_code)]
-pub fn channel(ticks: &[f32], i: usize) -> Vec<f32> {
+pub(crate) fn channel(ticks: &[f32], i: usize) -> Vec<f32> {
     ticks.iter().skip(i).step_by(2).copied().collect()
 }
 
-pub fn bytes(samples: &[f32]) -> Vec<u8> {
+pub(crate) fn bytes(samples: &[f32]) -> Vec<u8> {
     samples.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-pub fn floats(bytes: &[u8]) -> Vec<f32> {
+pub(crate) fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
 /// The definition: y[2k + p] = sum_i sum_j f_i[p + 2j] x_i[k - j].
 #[allow(dead_code)]
-pub fn fused(x: &[f32]) -> Vec<f32> {
+pub(crate) fn fused(x: &[f32]) -> Vec<f32> {
     let mut y = vec![0.0; x.len()];
     for (t, y) in y.iter_mut().enumerate() {
         for (i, f) in TAPS.iter().enumerate() {
