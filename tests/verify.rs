@@ -71,8 +71,8 @@ impl Dice {
         ((z ^ (z >> 31)) % sides as u64) as usize
     }
 
-    fn of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
-        &list[self.below(list.len())]
+    fn of<T: Copy>(&mut self, list: &[T]) -> T {
+        list[self.below(list.len())]
     }
 }
 
@@ -92,13 +92,13 @@ fn replaced(text: &str, (start, end): (usize, usize), by: &str) -> String {
 
 fn mutated(text: &str, dice: &mut Dice) -> String {
     let numbers = numbers(text);
-    let at = *dice.of(&numbers);
+    let at = dice.of(&numbers);
     let old = &text[at.0..at.1];
     match dice.below(8) {
         // One digit of one number.
         0..=2 => {
             let digits: Vec<usize> = (at.0..at.1).filter(|&i| text.as_bytes()[i].is_ascii_digit()).collect();
-            let place = *dice.of(&digits);
+            let place = dice.of(&digits);
             replaced(text, (place, place + 1), &dice.below(10).to_string())
         }
         // Another number, or none.
@@ -111,7 +111,7 @@ fn mutated(text: &str, dice: &mut Dice) -> String {
         4 => replaced(text, at, dice.of(&["null", "true", "\"x\"", "[]", "1e999", "-1"])),
         // Two numbers exchanged.
         5 => {
-            let other = *dice.of(&numbers);
+            let other = dice.of(&numbers);
             let (first, second) = if at < other { (at, other) } else { (other, at) };
             let later = replaced(text, second, &text[first.0..first.1]);
             if first == second { later } else { replaced(&later, first, &text[second.0..second.1]) }
@@ -165,7 +165,7 @@ fn every_mutation_of_a_bank_file_is_refused() {
     let mut dice = Dice(2026);
     let (mut refused, mut unchanged) = (0, 0);
     while refused < count {
-        let (name, text, value) = dice.of(&files);
+        let (name, text, value) = &files[dice.below(files.len())];
         let mutation = mutated(text, &mut dice);
         match accepted(&mutation) {
             Err(error) => {

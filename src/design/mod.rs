@@ -52,7 +52,7 @@ pub enum DesignError {
     Kyp(#[from] KypError),
     /// No certificate was found, not even somewhat above the computed norm.
     #[error(
-        "the computed gamma could not be proven: no certificate passes up to 0.1 % above it; the front ends are too stiff or \
+        "the computed gamma could not be proven: no certificate passes up to 10 % above it; the front ends are too stiff or \
          the channels too nearly equal for double precision"
     )]
     NotCertified,

@@ -13,13 +13,15 @@ use crate::spec::Method;
 use crate::verify::{CLAIM_TOLERANCE, Midpoint, Subject, Verified};
 
 /// Relative excesses over the computed norm at which a certificate is looked for, smallest first.
-const EXCESSES: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+/// The same, in units of the floor, for norms that are zero up to rounding.
+const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
 /// Weights on all states, relative to the excess.
 const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
-/// Norms below this (relative to the system's matrices) are zero up to rounding: the excess is relative to it then.
+/// Norms below this, relative to the scale of what is wanted, are zero up to rounding.
 const FLOOR: f64 = 1e-10;
 /// Significant digits of the certificate's numbers in the file.
-const DIGITS: [usize; 3] = [7, 11, 17];
+const DIGITS: [usize; 4] = [9, 12, 15, 17];
 /// Part of the dual's weight below which a tone does not matter.
 const NEGLIGIBLE: f64 = 1e-9;
 /// Most states of an error system for which a certificate is looked for: eigenvalues of matrices twice as large are needed.
@@ -88,13 +90,15 @@ fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, Design
     let middle = subject.midpoint().ok_or(DesignError::NotCertified)?;
     let error = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
     let peak = hinf_norm(&error)?;
-    // The file says the norm to its last digit; the one computed here may differ in the last few.
-    let norm = bank.gamma.upper.map_or(peak.gain, |stated| stated.max(peak.gain));
+    // The norm in the file may differ from the one computed here in the last digits; if in more, it is not the norm.
+    let credible = bank.gamma.upper.filter(|&stated| stated <= peak.gain * (1.0 + CLAIM_TOLERANCE));
+    let norm = credible.unwrap_or(0.0).max(peak.gain);
     let response = error.response_at(Complex::from_polar(1.0, peak.frequency));
     let tone = tone(peak.frequency, &leading_direction(&response)?);
-    let floor = FLOOR * (middle.c.norm() * middle.b.norm() + middle.d.norm());
+    let floor = FLOOR * subject.scale();
     let search = Search::new(middle, norm.max(floor))?;
-    let excesses = EXCESSES.iter().map(|excess| excess * norm.max(floor));
+    let relative: &[f64] = if norm > floor { &EXCESSES } else { &FLOOR_EXCESSES };
+    let excesses = relative.iter().map(|excess| excess * norm.max(floor));
     for (excess, weight) in excesses.flat_map(|excess| STATE_WEIGHTS.map(|weight| (excess, weight))) {
         let gamma = norm + excess;
         let Some(factor) = search.factor(norm + 0.5 * excess, weight * excess) else { continue };
@@ -169,7 +173,8 @@ fn tone(frequency: f64, wanted: &CMat) -> Tone {
 }
 
 fn pairs(column: &CMat) -> Vec<[f64; 2]> {
-    column.iter().map(|z| [z.re, z.im]).collect()
+    // Without negative zeros, which only irritate in a file.
+    column.iter().map(|z| [z.re + 0.0, z.im + 0.0]).collect()
 }
 
 /// Tones with the directions and frequencies of the dual that no taps of the bank's length can serve all at once.

@@ -99,9 +99,13 @@ impl Layout {
     }
 }
 
-/// Number of states of the error system.
-pub(super) fn order(tick: &Tick, filters: &BlockForm) -> usize {
-    Layout::new(tick, filters.a.nrows()).filter.end
+/// Number of states of the error system of a bank, before anything of that size is built.
+pub(super) fn order(tick: &Tick, filters: &SynthesisFilters, ratio: usize) -> usize {
+    let own = match filters {
+        SynthesisFilters::Fir(taps) => taps.len() * (taps[0].len().div_ceil(ratio) - 1),
+        SynthesisFilters::StateSpace(block) => block.a.len(),
+    };
+    Layout::new(tick, own).filter.end
 }
 
 impl ErrorSystem {

@@ -45,11 +45,13 @@ use crate::spec::Method;
 /// Relative excess of a stated number over a proven one that counts as the same: the claim is six digits.
 pub const CLAIM_TOLERANCE: f64 = 1e-6;
 /// Rounding of a computed norm against a proven one.
-const ROUNDED: f64 = 1e-9;
+const ROUNDED: f64 = 1e-8;
 /// Most states of an error system that is proven: its matrices are dense.
 pub const MAX_STATES: usize = 2048;
-/// Most analog states of all distinct front ends together: every sample of a tick costs their square some hundred times.
-pub const MAX_ANALOG_STATES: usize = 192;
+/// Most analog states of all distinct front ends together.
+pub const MAX_ANALOG_STATES: usize = 128;
+/// Most samples of a tick times the cube of the analog states: a minute's work.
+const MAX_WORK: usize = 100_000_000;
 
 /// What was proven of a bank; all numbers for h = 1.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -97,12 +99,14 @@ pub enum VerifyError {
     },
     /// Too many different filters.
     #[error(
-        "spec: the distinct filters have {states} states together, at most {MAX_ANALOG_STATES} are proven; give channels that \
-         have the same filter the same text"
+        "spec: the distinct filters have {states} states together and a tick {samples} samples; at most {MAX_ANALOG_STATES} states, \
+         fewer with many samples, are proven; give channels that have the same filter the same text"
     )]
     TooManyFilters {
         /// States of all distinct filters.
         states: usize,
+        /// M + N.
+        samples: usize,
     },
     /// The file carries no certificate.
     #[error("proof.upper: there is none; find one first")]
@@ -177,15 +181,16 @@ impl<'a> Subject<'a> {
     /// [`VerifyError::NoSpec`], [`VerifyError::FrontEnd`], [`VerifyError::TooLarge`].
     pub fn new(bank: &'a Bank) -> Result<Self, VerifyError> {
         let (front_ends, taps) = FrontEnds::new(bank)?;
-        if front_ends.order() > MAX_ANALOG_STATES {
-            return Err(VerifyError::TooManyFilters { states: front_ends.order() });
+        let states = front_ends.order();
+        if states > MAX_ANALOG_STATES || taps.len() * states.pow(3) > MAX_WORK {
+            return Err(VerifyError::TooManyFilters { states, samples: taps.len() });
         }
         let tick = Tick::new(&front_ends, &taps, bank.ratio);
-        let filters = BlockForm::new(&bank.filters, bank.ratio);
-        let states = error_system::order(&tick, &filters);
+        let states = error_system::order(&tick, &bank.filters, bank.ratio);
         if states > MAX_STATES {
             return Err(VerifyError::TooLarge { states });
         }
+        let filters = BlockForm::new(&bank.filters, bank.ratio);
         let same = |i: usize, j: usize| taps[i].filter == taps[j].filter && taps[i].time == taps[j].time;
         let (m, count) = (bank.ratio, bank.channel_count());
         let distinct = (0..count).filter(|&i| (0..i).all(|j| !same(m + i, m + j))).collect();
@@ -195,6 +200,12 @@ impl<'a> Subject<'a> {
     /// Number of states of the error system, the order of P.
     pub fn states(&self) -> usize {
         self.error.order()
+    }
+
+    /// Root of the energy that the input of one tick brings into the wanted samples: the size against which a gamma is small.
+    pub fn scale(&self) -> f64 {
+        let n = self.tick.order();
+        (n..n + self.bank.ratio).map(|i| self.tick.gram[(i, i)].nearest()).sum::<f64>().sqrt()
     }
 
     /// Whether `factor` proves ||K|| <= `gamma`.

@@ -121,7 +121,8 @@ fn the_error_system_is_the_designers() {
             let gap = ours.re.zip_zip_map(&ours.im, &theirs, |re, im, z| {
                 (re.nearest() - z.re).hypot(im.nearest() - z.im) / size
             });
-            assert!(gap.max() < 1e-10, "{name} at {omega}: {:e} of {size:e}", gap.max());
+            // Of K K*: half as much, 1e-10, of K.
+            assert!(gap.max() < 2e-10, "{name} at {omega}: {:e} of {size:e}", gap.max());
             let radius = ours.re.iter().chain(&ours.im).map(|x| x.radius()).fold(0.0, f64::max);
             assert!(radius < 1e-13 * size, "{name} at {omega}: radius {radius:e} of {size:e}");
         }
@@ -247,8 +248,9 @@ fn no_certificate_passes_below_the_norm() {
 fn an_unstable_bank_has_no_certificate() {
     let (bank, _) = designed(Method::Iir, 10, 22);
     let SynthesisFilters::StateSpace(block) = &bank.filters else { panic!("states") };
-    let grown = |rows: &[Vec<f64>]| rows.iter().map(|row| row.iter().map(|x| 3.0 * x).collect()).collect();
-    let unstable = BlockFilter { a: grown(&block.a), ..block.clone() };
+    let n = block.a.len();
+    let grown = (0..n).map(|i| (0..n).map(|j| if i == j { 1.5 } else { block.a[i][j] }).collect()).collect();
+    let unstable = BlockFilter { a: grown, ..block.clone() };
     let bank = Bank { filters: SynthesisFilters::StateSpace(unstable), gamma: Gamma::default(), ..bank };
     assert!(matches!(verify(&bank), Err(VerifyError::NotProven { .. })));
     assert!(crate::design::prove(&bank, &[]).is_err());
