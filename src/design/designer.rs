@@ -3,7 +3,10 @@
 use super::equivalence::BlockedPlant;
 use super::problem::Problem;
 use super::{DesignError, comparison, error_system, fir, iir};
-use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use crate::bank::{Bank, Gamma, SynthesisFilters};
+use crate::linalg::Mat;
+use crate::lti::peak::Peak;
+use crate::lti::{StateSpace, TappedRecursion};
 use crate::spec::{Method, Spec};
 
 /// A bank with the record of its design.
@@ -29,10 +32,14 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     let problem = Problem::new(spec, latency)?;
     let (distinct, representative) = problem.without_duplicates();
     let found = run_method(spec, &distinct)?;
-    let filters = share_among_duplicates(found.filters, &representative);
+    let plant = BlockedPlant::new(&problem);
     // The norm that counts is that of the coefficients as they are written, on all channels.
-    let block = error_system::block_system(&filters, spec.ratio)?;
-    let peak = error_system::gamma(&BlockedPlant::new(&problem), &block)?;
+    let (filters, peak) = match found.filters {
+        Solution::Taps(taps) => judged(&plant, SynthesisFilters::Fir(shared_taps(&taps, &representative)))?,
+        Solution::System(system, norm) => {
+            written_form(&plant, &shared_inputs(&system, &representative)?, norm)?
+        }
+    };
     let gamma = Gamma {
         upper: Some(peak.gain),
         lower: Some(found.lower.min(peak.gain)),
@@ -66,8 +73,16 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     spec.latency.map_or_else(|| choose_latency(spec), Ok)
 }
 
+/// What a method comes up with.
+enum Solution {
+    /// FIR filters, one a channel.
+    Taps(Vec<Vec<f64>>),
+    /// One block for each slow tick, with the norm of its error system.
+    System(StateSpace, f64),
+}
+
 struct Found {
-    filters: SynthesisFilters,
+    filters: Solution,
     lower: f64,
     noncausal: f64,
     iterations: usize,
@@ -91,7 +106,7 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
 
 fn from_fir(design: fir::FirDesign) -> Found {
     Found {
-        filters: SynthesisFilters::Fir(design.taps),
+        filters: Solution::Taps(design.taps),
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.iterations,
@@ -100,7 +115,7 @@ fn from_fir(design: fir::FirDesign) -> Found {
 
 fn from_state_space(design: iir::StateSpaceDesign) -> Found {
     Found {
-        filters: SynthesisFilters::StateSpace(error_system::to_block(&design.filters)),
+        filters: Solution::System(design.filters, design.upper),
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.trials,
@@ -110,27 +125,54 @@ fn from_state_space(design: iir::StateSpaceDesign) -> Found {
 /// A comparison method optimises nothing: what bounds every bank is all that is known below.
 fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError> {
     let noncausal = iir::noncausal_bound(plant)?;
-    Ok(Found { filters: SynthesisFilters::Fir(taps), lower: noncausal, noncausal, iterations: 0 })
+    Ok(Found { filters: Solution::Taps(taps), lower: noncausal, noncausal, iterations: 0 })
+}
+
+/// A change of coordinates may cost this fraction of gamma.
+const FORM_ACCURACY: f64 = 1e-9;
+
+/// The filters in the cheapest form that keeps the norm `promised`: parallel sections at the end of a delay line, a
+/// triangle there, or else as they are.
+fn written_form(
+    plant: &BlockedPlant,
+    system: &StateSpace,
+    promised: f64,
+) -> Result<(SynthesisFilters, Peak), DesignError> {
+    let tapped = TappedRecursion::new(system)?;
+    let forms = [tapped.modal(), tapped.triangular().map(Some)];
+    for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {
+        let found = judged(plant, SynthesisFilters::StateSpace(error_system::to_block(&form.realise())))?;
+        if found.1.gain <= promised * (1.0 + FORM_ACCURACY) {
+            return Ok(found);
+        }
+    }
+    judged(plant, SynthesisFilters::StateSpace(error_system::to_block(system)))
+}
+
+fn judged(plant: &BlockedPlant, filters: SynthesisFilters) -> Result<(SynthesisFilters, Peak), DesignError> {
+    let block = error_system::block_system(&filters, plant.wanted)?;
+    let peak = error_system::gamma(plant, &block)?;
+    Ok((filters, peak))
 }
 
 /// Channels that cannot be told apart get equal shares of their common filter: the same error, the least noise.
-fn share_among_duplicates(filters: SynthesisFilters, representative: &[usize]) -> SynthesisFilters {
-    let multiplicity = |r: usize| representative.iter().filter(|&&other| other == r).count() as f64;
-    let share =
-        |row: &[f64]| -> Vec<f64> { representative.iter().map(|&r| row[r] / multiplicity(r)).collect() };
-    match filters {
-        SynthesisFilters::Fir(taps) => SynthesisFilters::Fir(
-            representative
-                .iter()
-                .map(|&r| taps[r].iter().map(|tap| tap / multiplicity(r)).collect())
-                .collect(),
-        ),
-        SynthesisFilters::StateSpace(block) => SynthesisFilters::StateSpace(BlockFilter {
-            b: block.b.iter().map(|row| share(row)).collect(),
-            d: block.d.iter().map(|row| share(row)).collect(),
-            ..block
-        }),
-    }
+fn shared_taps(taps: &[Vec<f64>], representative: &[usize]) -> Vec<Vec<f64>> {
+    let share = |&r: &usize| taps[r].iter().map(|tap| tap / multiplicity(representative, r)).collect();
+    representative.iter().map(share).collect()
+}
+
+/// As [`shared_taps`], for the inputs of a system.
+fn shared_inputs(system: &StateSpace, representative: &[usize]) -> Result<StateSpace, DesignError> {
+    let share = |m: &Mat| {
+        let entry =
+            |i: usize, j: usize| m[(i, representative[j])] / multiplicity(representative, representative[j]);
+        Mat::from_fn(m.nrows(), representative.len(), entry)
+    };
+    Ok(StateSpace::new(system.a().clone(), share(system.b()), system.c().clone(), share(system.d()))?)
+}
+
+fn multiplicity(representative: &[usize], r: usize) -> f64 {
+    representative.iter().filter(|&&other| other == r).count() as f64
 }
 
 /// Latencies tried beyond the longest delay, in slow ticks.

@@ -11,6 +11,7 @@ mod rows;
 mod sample;
 mod simd;
 mod state_space;
+mod structure;
 #[cfg(test)]
 mod tests;
 mod ticks;

@@ -1,10 +1,12 @@
 //! The two number types that kernels run in.
 
-use super::simd::{self, FirKernel, Isa, Progress};
+use super::simd::{self, FirKernel, Isa, Progress, RecursionKernel};
 use crate::io::PcmFormat;
 
 /// f32 or f64.
-pub(crate) trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
+pub(crate) trait Sample:
+    Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 'static
+{
     /// Size in memory.
     const BYTES: usize = size_of::<Self>();
     /// Rounds to the nearest.
@@ -15,6 +17,12 @@ pub(crate) trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + 'stati
     fn finite(self) -> bool;
     /// The FIR kernels for this type.
     fn fir_kernel(isa: Isa) -> FirKernel<Self>;
+    /// The kernel of recursions for this type.
+    fn recursion_kernel(isa: Isa) -> RecursionKernel<Self>;
+    /// Below this a state is as good as zero; above it all arithmetic is fast.
+    const NEGLIGIBLE: Self;
+    /// |x|.
+    fn magnitude(self) -> Self;
     /// Fast conversion of numbers to rows of this type, see [`simd::deinterleave_f32`].
     fn deinterleave_numbers<S: Sample>(
         isa: Isa,
@@ -58,6 +66,17 @@ impl Sample for f32 {
 
     fn fir_kernel(isa: Isa) -> FirKernel<Self> {
         FirKernel::for_f32(isa)
+    }
+
+    fn recursion_kernel(isa: Isa) -> RecursionKernel<Self> {
+        RecursionKernel::<f32>::new(isa)
+    }
+
+    const NEGLIGIBLE: Self = 1e-30;
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.abs()
     }
 
     fn deinterleave_numbers<S: Sample>(
@@ -112,6 +131,17 @@ impl Sample for f64 {
 
     fn fir_kernel(isa: Isa) -> FirKernel<Self> {
         FirKernel::for_f64(isa)
+    }
+
+    fn recursion_kernel(isa: Isa) -> RecursionKernel<Self> {
+        RecursionKernel::<f64>::new(isa)
+    }
+
+    const NEGLIGIBLE: Self = 1e-280;
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        self.abs()
     }
 
     fn deinterleave_numbers<S: Sample>(

@@ -1,42 +1,58 @@
-//! State-space banks: x+ = a x + b u, y = c x + d u once a tick, in f64.
+//! State-space banks: x+ = a x + b u, y = c x + d u once a tick.
+//!
+//! Delay lines are taken out of the states and become the history of a window, as with FIR banks; the other states run
+//! as a recursion whose values are further rows of that window. Then the output is one FIR filter over past
+//! inputs and states.
 
 use super::BuildError;
 use super::aligned::Aligned;
 use super::rows::{Fold, Rows, RowsMut};
-use super::simd::{Columns, Isa, RECURSION_LANES, Registers, run_recursion};
+use super::sample::Sample;
+use super::simd::{
+    ColumnTile, FirKernel, Form, Isa, OVERRUN, PhaseGroup, Recursion, RecursionKernel, Registers,
+    SectionVector, Steps,
+};
+use super::structure::{Past, Structure};
 use super::ticks::{FastSink, TickSource};
+use super::window::Window;
 use crate::bank::BlockFilter;
+use std::collections::BTreeMap;
 
-/// Ticks a block. Every so many ticks from the beginning of the stream, and not of a call, the state
-/// is looked after, so that cuts do not change a bit.
-const BLOCK: usize = 64;
+/// Ticks a block: whole tiles of the FIR kernels. Every so many ticks from the beginning of the stream, and not of a
+/// call, the state is looked after, so that cuts do not change a bit.
+pub(crate) const BLOCK: usize = 72;
 
-/// States below this are as good as zero, and above every number whose arithmetic is slow.
-const NEGLIGIBLE: f64 = 1e-280;
-
-/// The matrices in the order of use.
+/// The coefficients in the order of use.
 #[derive(Debug)]
-pub(crate) struct StateSpacePlan {
+pub(crate) struct StateSpacePlan<T: Sample> {
     pub(crate) channels: usize,
     pub(crate) ratio: usize,
-    columns: Columns,
+    /// Ticks that the delay lines look back.
+    history: usize,
+    recursion: Recursion<T>,
+    advance: RecursionKernel<T>,
+    outputs: Vec<(PhaseGroup<T>, Steps)>,
+    fir: FirKernel<T>,
     isa: Isa,
 }
 
 /// What a stream remembers.
 #[derive(Debug, Clone)]
-pub(crate) struct StateSpaceState {
-    registers: Registers,
-    states: usize,
-    input: Vec<f64>,
-    output: Vec<f64>,
+pub(crate) struct StateSpaceState<T: Sample> {
+    registers: Registers<T>,
+    /// Inputs with their past, and the states before each tick.
+    window: Window<T>,
+    output: Aligned<T>,
     /// Ticks since the state was looked after.
     since: usize,
     /// Times the state was not finite and began anew.
     pub(crate) resets: u64,
 }
 
-impl StateSpacePlan {
+/// Samples from output row to output row.
+const OUT_STRIDE: usize = BLOCK + OVERRUN;
+
+impl<T: Sample> StateSpacePlan<T> {
     pub(crate) fn new(
         filter: &BlockFilter,
         channels: usize,
@@ -44,25 +60,36 @@ impl StateSpacePlan {
         isa: Isa,
     ) -> Result<Self, BuildError> {
         let order = filter.a.len();
-        let check = |name, rows: &[Vec<f64>], wanted| check_matrix(name, rows, wanted, channels, ratio);
+        let check = |name, rows: &[Vec<f64>], wanted| check_matrix::<T>(name, rows, wanted, channels, ratio);
         check("a", &filter.a, (order, order))?;
         check("b", &filter.b, (order, channels))?;
         check("c", &filter.c, (ratio, order))?;
         check("d", &filter.d, (ratio, channels))?;
-        Ok(Self { channels, ratio, columns: columns(filter, channels, ratio), isa })
+        let structure = Structure::new(filter);
+        let advance = T::recursion_kernel(isa);
+        let layout = Layout::new(&structure, channels, advance.lanes)?;
+        Ok(Self {
+            channels,
+            ratio,
+            history: layout.history,
+            recursion: layout.recursion(&structure),
+            advance,
+            outputs: layout.outputs(&structure, ratio),
+            fir: T::fir_kernel(isa),
+            isa,
+        })
     }
 
-    /// True if the state matrix is block-diagonal and runs as such.
+    /// True if the states are parallel sections and run as such.
     pub(crate) fn is_modal(&self) -> bool {
-        self.columns.modal.is_some()
+        matches!(self.recursion.form, Form::Sections(_))
     }
 
-    pub(crate) fn state(&self) -> StateSpaceState {
+    pub(crate) fn state(&self) -> StateSpaceState<T> {
         StateSpaceState {
-            registers: Registers::new(&self.columns),
-            states: self.columns.states,
-            input: vec![0.0; self.channels * BLOCK],
-            output: vec![0.0; self.ratio * BLOCK],
+            registers: Registers::new(self.recursion.states, self.advance.lanes),
+            window: Window::new(self.channels + self.recursion.states, self.history, BLOCK),
+            output: Aligned::new(self.ratio * OUT_STRIDE),
             since: 0,
             resets: 0,
         }
@@ -71,117 +98,219 @@ impl StateSpacePlan {
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
     pub(crate) fn process(
         &self,
-        state: &mut StateSpaceState,
+        state: &mut StateSpaceState<T>,
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
-        let fold = Fold { ticks: 1, lead: 0 };
-        let isa = Isa::Portable;
+        let (fold, isa) = (Fold { ticks: 1, lead: 0 }, self.isa);
         let mut replaced = 0;
         let mut first = 0;
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(BLOCK - state.since);
-            let samples = &mut state.input[..];
-            replaced += source.gather(
-                first,
-                ticks,
-                RowsMut { samples, stride: BLOCK, channels: self.channels, fold, isa },
-            );
-            let (u, y) = (&state.input, &mut state.output);
-            run_recursion(self.isa, &self.columns, &mut state.registers, u, y, BLOCK, ticks);
-            let rows = Rows { samples: &state.output[..], stride: BLOCK, phases: self.ratio, fold, isa };
+            state.window.make_room(ticks);
+            let (samples, stride) = state.window.room();
+            replaced +=
+                source.gather(first, ticks, RowsMut { samples, stride, channels: self.channels, fold, isa });
+            self.filter(state, ticks);
+            let rows = Rows { samples: &state.output[..], stride: OUT_STRIDE, phases: self.ratio, fold, isa };
             sink.scatter(first, ticks, rows);
             state.pass(ticks);
             first += ticks;
         }
         replaced
     }
+
+    fn filter(&self, state: &mut StateSpaceState<T>, ticks: usize) {
+        self.advance.run(&self.recursion, &mut state.registers, state.window.view_mut(), ticks);
+        for (group, steps) in &self.outputs {
+            let out = &mut state.output[group.first * OUT_STRIDE..];
+            self.fir.run(group, state.window.view(), steps, ticks, out, OUT_STRIDE);
+        }
+    }
 }
 
-impl StateSpaceState {
+impl<T: Sample> StateSpaceState<T> {
     /// As new.
     pub(crate) fn reset(&mut self) {
-        self.registers.z.fill(0.0);
+        self.registers.state().fill(T::default());
+        self.window.reset();
         self.since = 0;
         self.resets = 0;
     }
 
     /// Counts ticks; at the end of a block the state is looked after.
     fn pass(&mut self, ticks: usize) {
+        self.window.advance(ticks);
         self.since = (self.since + ticks) % BLOCK;
         if self.since > 0 {
             return;
         }
-        let x = &mut self.registers.z[..self.states];
+        let x = self.registers.state();
         // A NaN never leaves a recursion by itself.
-        if !x.iter().all(|value| value.is_finite()) {
-            x.fill(0.0);
+        if !x.iter().all(|value| value.finite()) {
+            x.fill(T::default());
             self.resets += 1;
         }
         // Numbers that fade away become denormal in the end, and slow.
-        x.iter_mut().filter(|value| value.abs() < NEGLIGIBLE).for_each(|value| *value = 0.0);
-    }
-}
-
-/// The lane of each state such that every 2 x 2 block of a block-diagonal A is a pair of neighbours
-/// (2l, 2l + 1); `None` if A is not of that form.
-fn modal_lanes(a: &[Vec<f64>]) -> Option<Vec<usize>> {
-    let n = a.len();
-    let coupled = |i: usize, j: usize| a[i][j] != 0.0 || a[j][i] != 0.0;
-    if (0..n).any(|i| (i + 2..n).any(|j| coupled(i, j))) {
-        return None;
-    }
-    let mut lanes = Vec::with_capacity(n);
-    let mut lane = 0;
-    while lanes.len() < n {
-        let i = lanes.len();
-        let pair = i + 1 < n && coupled(i, i + 1);
-        if pair && i + 2 < n && coupled(i + 1, i + 2) {
-            return None;
-        }
-        lane += usize::from(pair && lane % 2 == 1);
-        lanes.extend(lane..lane + 1 + usize::from(pair));
-        lane += 1 + usize::from(pair);
-    }
-    Some(lanes)
-}
-
-fn columns(filter: &BlockFilter, channels: usize, ratio: usize) -> Columns {
-    let n = filter.a.len();
-    let modal = modal_lanes(&filter.a);
-    let lanes = modal.clone().unwrap_or_else(|| (0..n).collect());
-    let states = lanes.last().map_or(0, |lane| lane + 1).next_multiple_of(RECURSION_LANES);
-    let outputs = ratio.next_multiple_of(RECURSION_LANES);
-    let modal = modal.map(|_| modal_factors(&filter.a, &lanes, states));
-    // Columns before those of the inputs.
-    let before = if modal.is_some() { 0 } else { states };
-    let mut next = Aligned::new(states * (before + channels));
-    let mut output = Aligned::new(outputs * (states + channels));
-    for (i, &lane) in lanes.iter().enumerate() {
-        (0..channels).for_each(|u| next[(before + u) * states + lane] = filter.b[i][u]);
-        (0..ratio).for_each(|p| output[lane * outputs + p] = filter.c[p][i]);
-        if modal.is_none() {
-            (0..n).for_each(|j| next[lanes[j] * states + lane] = filter.a[i][j]);
+        for value in x.iter_mut().filter(|value| value.magnitude() < T::NEGLIGIBLE) {
+            *value = T::default();
         }
     }
-    for p in 0..ratio {
-        (0..channels).for_each(|u| output[(states + u) * outputs + p] = filter.d[p][u]);
-    }
-    Columns { states, inputs: channels, phases: ratio, outputs, modal, next, output }
 }
 
-/// Factors of each state itself and of its neighbour.
-fn modal_factors(a: &[Vec<f64>], lanes: &[usize], states: usize) -> [Aligned<f64>; 2] {
-    let [mut own, mut neighbour] = [Aligned::new(states), Aligned::new(states)];
-    for (i, &lane) in lanes.iter().enumerate() {
-        own[lane] = a[i][i];
-        let partner = lanes.iter().position(|&other| other == lane ^ 1);
-        neighbour[lane] = partner.map_or(0.0, |j| a[i][j]);
-    }
-    [own, neighbour]
+/// Where things lie in the window: a row for each channel, then one for each state.
+struct Layout {
+    lanes: usize,
+    channels: usize,
+    history: usize,
+    stride: usize,
+    /// S.
+    states: usize,
+    /// Row of each state among the states.
+    rows: Vec<usize>,
+    modal: bool,
 }
 
-fn check_matrix(
+impl Layout {
+    fn new(structure: &Structure, channels: usize, lanes: usize) -> Result<Self, BuildError> {
+        let order = structure.a.len();
+        let history = structure.history();
+        // A window holds f32 or f64 alike: its stride counts samples.
+        let stride = Window::<f64>::stride(history, BLOCK);
+        let sections = structure.sections();
+        let modal = sections.is_some();
+        let rows = sections.map_or_else(|| (0..order).collect(), |twos| section_rows(&twos, order, lanes));
+        let width = if modal { 2 * lanes } else { lanes };
+        let states = rows.iter().max().map_or(0, |row| row + 1).next_multiple_of(width);
+        if (channels + states).saturating_mul(stride) > u32::MAX as usize {
+            return Err(BuildError::TooLong { history, channels });
+        }
+        Ok(Self { lanes, channels, history, stride, states, rows, modal })
+    }
+
+    fn place(&self, (channel, ticks): Past) -> u32 {
+        (channel * self.stride + self.history - ticks) as u32
+    }
+
+    fn first_row(&self) -> usize {
+        self.channels * self.stride + self.history
+    }
+
+    fn recursion<T: Sample>(&self, structure: &Structure) -> Recursion<T> {
+        let form = if self.modal {
+            let vectors = (0..self.states).step_by(2 * self.lanes);
+            Form::Sections(vectors.map(|first| self.section_vector(structure, first)).collect())
+        } else {
+            Form::Dense(self.column_tiles(structure))
+        };
+        Recursion { states: self.states, first_row: self.first_row(), stride: self.stride, form }
+    }
+
+    /// The state that lies in a row; `None` for padding.
+    fn state_in(&self, row: usize) -> Option<usize> {
+        self.rows.iter().position(|&other| other == row)
+    }
+
+    /// Factors of `count` rows from `first` on, taken from one factor for each state.
+    fn column<T: Sample>(&self, factor: impl Fn(usize) -> f64, first: usize, count: usize) -> Vec<T> {
+        (first..first + count).map(|row| T::from_f64(self.state_in(row).map_or(0.0, &factor))).collect()
+    }
+
+    fn section_vector<T: Sample>(&self, structure: &Structure, first: usize) -> SectionVector<T> {
+        let lanes = self.lanes;
+        // a between the rows of a section, d rows apart.
+        let a = |first: usize, other: usize| -> Vec<T> {
+            let entry = |row: usize| {
+                let (i, j) = self.state_in(first + row).zip(self.state_in(other + row))?;
+                Some(structure.a[i][j])
+            };
+            (0..lanes).map(|row| T::from_f64(entry(row).unwrap_or(0.0))).collect()
+        };
+        let (p, q) = (first, first + lanes);
+        let mut coefficients = [a(p, p), a(p, q), a(q, p), a(q, q)].concat();
+        let mut inputs = Vec::new();
+        for (&past, factors) in &structure.b {
+            let column = self.column::<T>(|state| factors[state], first, 2 * lanes);
+            if column.iter().any(|factor| factor.to_f64() != 0.0) {
+                inputs.push(self.place(past));
+                coefficients.extend(column);
+            }
+        }
+        SectionVector { inputs, coefficients: Aligned::from_slice(&coefficients) }
+    }
+
+    fn column_tiles<T: Sample>(&self, structure: &Structure) -> Vec<ColumnTile<T>> {
+        let mut tiles = Vec::new();
+        let mut first = 0;
+        while first < self.states {
+            let left = (self.states - first) / self.lanes;
+            let vectors =
+                if left >= ColumnTile::<T>::WIDEST { ColumnTile::<T>::WIDEST } else { 1 << left.ilog2() };
+            tiles.push(self.column_tile(structure, first, vectors));
+            first += vectors * self.lanes;
+        }
+        tiles
+    }
+
+    fn column_tile<T: Sample>(&self, structure: &Structure, first: usize, vectors: usize) -> ColumnTile<T> {
+        let count = vectors * self.lanes;
+        let mut coefficients = Vec::new();
+        let mut keep = |factor: &dyn Fn(usize) -> f64| {
+            let column = self.column::<T>(factor, first, count);
+            let some = column.iter().any(|factor| factor.to_f64() != 0.0);
+            if some {
+                coefficients.extend(column);
+            }
+            some
+        };
+        let inputs = structure.b.iter().filter(|(_, factors)| keep(&|i| factors[i]));
+        let inputs = inputs.map(|(&past, _)| self.place(past)).collect();
+        let columns = (0..structure.a.len()).filter(|&j| keep(&|i| structure.a[i][j]));
+        let columns = columns.map(|j| self.rows[j] as u32).collect();
+        ColumnTile { first, vectors, inputs, columns, coefficients: Aligned::from_slice(&coefficients) }
+    }
+
+    /// Phases with the inputs and states that they take; those that take the same run together.
+    fn outputs<T: Sample>(&self, structure: &Structure, ratio: usize) -> Vec<(PhaseGroup<T>, Steps)> {
+        let taps = structure.taps.iter().map(|(&past, factors)| (self.place(past), factors));
+        let row = |state: usize| (self.first_row() + self.rows[state] * self.stride) as u32;
+        let states = structure.c.iter().enumerate().map(|(state, factors)| (row(state), factors));
+        let terms: Vec<(u32, &Vec<f64>)> = taps.chain(states).collect();
+        let support = |p: usize| terms.iter().map(move |(_, factors)| factors[p] != 0.0);
+        let alike = |p: &usize, q: &usize| support(*p).eq(support(*q));
+        let phases: Vec<usize> = (0..ratio).collect();
+        let groups =
+            phases.chunk_by(alike).flat_map(|like| like.chunks(like.len().div_ceil(like.len().div_ceil(4))));
+        groups.map(|group| output_group(&terms, group[0], group.len())).collect()
+    }
+}
+
+/// Phases `first..first + width`, which take the same terms.
+fn output_group<T: Sample>(terms: &[(u32, &Vec<f64>)], first: usize, width: usize) -> (PhaseGroup<T>, Steps) {
+    let taken = terms.iter().filter(|(_, factors)| factors[first] != 0.0);
+    let coefficients: Vec<T> = taken
+        .clone()
+        .flat_map(|(_, factors)| &factors[first..first + width])
+        .map(|&f| T::from_f64(f))
+        .collect();
+    let group = PhaseGroup { first, width, coefficients: Aligned::from_slice(&coefficients) };
+    (group, Steps::new(taken.map(|&(place, _)| place).collect()))
+}
+
+/// Rows of the states of sections: L first ones, their L partners, and so on.
+fn section_rows(sections: &[(usize, Option<usize>)], order: usize, lanes: usize) -> Vec<usize> {
+    let mut rows = vec![0; order];
+    for (s, &(one, other)) in sections.iter().enumerate() {
+        let row = s / lanes * 2 * lanes + s % lanes;
+        rows[one] = row;
+        if let Some(other) = other {
+            rows[other] = row + lanes;
+        }
+    }
+    rows
+}
+
+fn check_matrix<T: Sample>(
     name: &'static str,
     rows: &[Vec<f64>],
     (wanted_rows, wanted_cols): (usize, usize),
@@ -201,7 +330,7 @@ fn check_matrix(
             ratio,
         });
     }
-    match rows.iter().flatten().enumerate().find(|(_, value)| !value.is_finite()) {
+    match rows.iter().flatten().enumerate().find(|(_, value)| !T::from_f64(**value).finite()) {
         Some((index, &value)) => Err(BuildError::NotFinite {
             place: format!("matrix {name} of the state-space filters"),
             index,
@@ -237,7 +366,7 @@ mod tests {
         input: &[f64],
         cut: usize,
     ) -> (Vec<f64>, bool) {
-        let plan = StateSpacePlan::new(filter, n, m, isa).unwrap();
+        let plan = StateSpacePlan::<f64>::new(filter, n, m, isa).unwrap();
         let mut state = plan.state();
         let mut out = vec![0.0; input.len() / n * m];
         for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
@@ -291,7 +420,7 @@ mod tests {
     fn a_state_that_fades_away_becomes_zero() {
         let filter =
             BlockFilter { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
-        let plan = StateSpacePlan::new(&filter, 1, 1, Isa::detect()).unwrap();
+        let plan = StateSpacePlan::<f64>::new(&filter, 1, 1, Isa::detect()).unwrap();
         let mut state = plan.state();
         let mut input = vec![0.0; 1200];
         input[0] = 1.0;

@@ -298,10 +298,9 @@ fn a_recursion_that_overflows_begins_anew_and_says_so() {
         filter.a = vec![vec![1e200, 0.0], vec![0.0, 0.5]];
     }
     let mut stream = Reconstructor::new(&bank).unwrap();
-    // The state is looked after every 64 ticks.
-    let mut input = [0.0; 64];
+    let mut input = [0.0; state_space::BLOCK];
     input[0] = 1.0;
-    stream.process(&input, &mut [0.0; 3 * 64]).unwrap();
+    stream.process(&input, &mut [0.0; 3 * state_space::BLOCK]).unwrap();
     assert_eq!(stream.state_resets(), 1);
     let mut out = [0.0; 3];
     stream.process(&[2.0], &mut out).unwrap();

@@ -64,6 +64,11 @@ impl<T: Sample> Window<T> {
         &self.samples[self.next - self.history..]
     }
 
+    /// As [`Window::view`], to write to.
+    pub(crate) fn view_mut(&mut self) -> &mut [T] {
+        &mut self.samples[self.next - self.history..]
+    }
+
     /// The block that was written is past now.
     pub(crate) fn advance(&mut self, frames: usize) {
         self.next += frames;

@@ -24,7 +24,7 @@ pub use isa::Isa;
 pub(crate) use layout::{Progress, deinterleave, deinterleave_f32, encode, interleave};
 pub use peak::multiply_add_chains;
 pub(crate) use polyphase::{FirKernel, PhaseGroup, Steps};
-pub(crate) use recursion::{Columns, LANES as RECURSION_LANES, Registers, run as run_recursion};
+pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, Registers, SectionVector};
 
 /// Frames that a kernel may read and write past the last one asked for: its widest vector.
 pub(crate) const OVERRUN: usize = 16;

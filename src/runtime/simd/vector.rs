@@ -16,6 +16,15 @@ pub(super) trait Vector: Copy {
     /// fit the register file.
     const REGISTERS: usize;
     unsafe fn splat(value: Self::Sample) -> Self;
+    /// All zeros.
+    #[inline(always)]
+    unsafe fn zero() -> Self
+    where
+        Self::Sample: Default,
+    {
+        // SAFETY: the caller's.
+        unsafe { Self::splat(Self::Sample::default()) }
+    }
     unsafe fn load(at: *const Self::Sample) -> Self;
     unsafe fn store(self, at: *mut Self::Sample);
     /// self * factor + sum, rounded once.
@@ -122,35 +131,62 @@ macro_rules! full_tile {
     };
 }
 
-/// Vectors whose neighbours 2l and 2l + 1 can change places.
+/// Squares of samples, as many rows as a vector has lanes.
 ///
 /// # Safety
-/// As for [`Vector`].
-pub(super) trait Pairs: Vector<Sample = f64> {
-    unsafe fn swap_pairs(self) -> Self;
+/// As for [`Vector`]; `transpose` reads and writes `LANES` samples of `LANES` rows.
+pub(super) trait Transpose: Vector {
+    /// `to[l * to_stride + k] = from[k * from_stride + l]`.
+    unsafe fn transpose(
+        from: *const Self::Sample,
+        from_stride: usize,
+        to: *mut Self::Sample,
+        to_stride: usize,
+    );
 }
 
-impl Pairs for Portable<f64> {
+#[cfg(target_arch = "x86_64")]
+impl Transpose for Avx2F64 {
     #[inline(always)]
-    unsafe fn swap_pairs(self) -> Self {
-        let Self([a, b, c, d]) = self;
-        Self([b, a, d, c])
+    unsafe fn transpose(from: *const f64, from_stride: usize, to: *mut f64, to_stride: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            // Halves of rows k and k + 2 side by side, then pairs by unpacking.
+            let halves = |k: usize, half: usize| {
+                let at = |k: usize| _mm_loadu_pd(from.add(k * from_stride + 2 * half));
+                _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(at(k)), at(k + 2))
+            };
+            for half in 0..2 {
+                let (even, odd) = (halves(0, half), halves(1, half));
+                _mm256_storeu_pd(to.add(2 * half * to_stride), _mm256_unpacklo_pd(even, odd));
+                _mm256_storeu_pd(to.add((2 * half + 1) * to_stride), _mm256_unpackhi_pd(even, odd));
+            }
+        }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-impl Pairs for Avx2F64 {
+impl Transpose for Avx2F32 {
     #[inline(always)]
-    unsafe fn swap_pairs(self) -> Self {
-        Self(unsafe { _mm256_permute_pd::<0b0101>(self.0) })
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Pairs for Avx512F64 {
-    #[inline(always)]
-    unsafe fn swap_pairs(self) -> Self {
-        Self(unsafe { _mm512_permute_pd::<0b0101_0101>(self.0) })
+    unsafe fn transpose(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            // Halves of rows k and k + 4 side by side, then twice by unpacking.
+            let halves = |k: usize, half: usize| {
+                let at = |k: usize| _mm_loadu_ps(from.add(k * from_stride + 4 * half));
+                _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(at(k)), at(k + 4))
+            };
+            for half in 0..2 {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|k| halves(k, half));
+                let [p, q] = [_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d)];
+                let [r, s] = [_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d)];
+                let row = |l: usize| to.add((4 * half + l) * to_stride);
+                _mm256_storeu_ps(row(0), _mm256_shuffle_ps::<0b01_00_01_00>(p, q));
+                _mm256_storeu_ps(row(1), _mm256_shuffle_ps::<0b11_10_11_10>(p, q));
+                _mm256_storeu_ps(row(2), _mm256_shuffle_ps::<0b01_00_01_00>(r, s));
+                _mm256_storeu_ps(row(3), _mm256_shuffle_ps::<0b11_10_11_10>(r, s));
+            }
+        }
     }
 }
 
@@ -163,6 +199,23 @@ const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
 macro_rules! portable {
     ($sample:ty) => {
+        impl Transpose for Portable<$sample> {
+            #[inline(always)]
+            unsafe fn transpose(
+                from: *const $sample,
+                from_stride: usize,
+                to: *mut $sample,
+                to_stride: usize,
+            ) {
+                for l in 0..Self::LANES {
+                    for k in 0..Self::LANES {
+                        // SAFETY: the caller's.
+                        unsafe { *to.add(l * to_stride + k) = *from.add(k * from_stride + l) }
+                    }
+                }
+            }
+        }
+
         impl Vector for Portable<$sample> {
             type Sample = $sample;
             const LANES: usize = 4;
