@@ -1,37 +1,34 @@
 //! State-space banks: x+ = a x + b u, y = c x + d u once a tick.
 //!
-//! Delay lines are taken out of the states and become the history of a window, as with FIR banks; the other states run
-//! as a recursion whose values are further rows of that window. Then the output is one FIR filter over past
-//! inputs and states.
+//! Delay lines are taken out of the states and become the past of a window, as with FIR banks; the other states run
+//! as a recursion whose values are frames, one a tick. Then the output is the sum of two FIR filters, one over the
+//! inputs and one over the states.
 
 use super::BuildError;
 use super::aligned::Aligned;
-use super::rows::{Fold, Rows, RowsMut};
+use super::fir::{phase_group, replace_not_finite, widths};
 use super::sample::Sample;
 use super::simd::{
-    ColumnTile, FirKernel, Form, Isa, OVERRUN, PhaseGroup, Recursion, RecursionKernel, Registers,
-    SectionVector, Steps,
+    ColumnTile, Cut, FirKernel, Form, Isa, PhaseGroup, Recursion, RecursionKernel, SectionVector,
 };
 use super::structure::{Past, Structure};
 use super::ticks::{FastSink, TickSource};
 use super::window::Window;
 use crate::bank::BlockFilter;
-use std::collections::BTreeMap;
 
-/// Ticks a block: whole tiles of the FIR kernels. Every so many ticks from the beginning of the stream, and not of a
-/// call, the state is looked after, so that cuts do not change a bit.
-pub(crate) const BLOCK: usize = 72;
+/// Ticks a block. Every so many ticks from the beginning of the stream, and not of a call, the state is looked after,
+/// so that cuts do not change a bit.
+pub(crate) const BLOCK: usize = 64;
 
 /// The coefficients in the order of use.
 #[derive(Debug)]
 pub(crate) struct StateSpacePlan<T: Sample> {
     pub(crate) channels: usize,
     pub(crate) ratio: usize,
-    /// Ticks that the delay lines look back.
-    history: usize,
     recursion: Recursion<T>,
     advance: RecursionKernel<T>,
-    outputs: Vec<(PhaseGroup<T>, Steps)>,
+    from_inputs: Readout<T>,
+    from_states: Readout<T>,
     fir: FirKernel<T>,
     isa: Isa,
 }
@@ -39,18 +36,19 @@ pub(crate) struct StateSpacePlan<T: Sample> {
 /// What a stream remembers.
 #[derive(Debug, Clone)]
 pub(crate) struct StateSpaceState<T: Sample> {
-    registers: Registers<T>,
-    /// Inputs with their past, and the states before each tick.
     window: Window<T>,
+    /// The state before each tick of a block, and after the last one; the first row is the state.
+    rows: Aligned<T>,
+    /// S.
+    states: usize,
     output: Aligned<T>,
+    /// What the states add to it.
+    further: Aligned<T>,
     /// Ticks since the state was looked after.
     since: usize,
     /// Times the state was not finite and began anew.
     pub(crate) resets: u64,
 }
-
-/// Samples from output row to output row.
-const OUT_STRIDE: usize = BLOCK + OVERRUN;
 
 impl<T: Sample> StateSpacePlan<T> {
     pub(crate) fn new(
@@ -66,16 +64,16 @@ impl<T: Sample> StateSpacePlan<T> {
         check("c", &filter.c, (ratio, order))?;
         check("d", &filter.d, (ratio, channels))?;
         let structure = Structure::new(filter);
-        let advance = T::recursion_kernel(isa);
-        let layout = Layout::new(&structure, channels, advance.lanes)?;
+        let (advance, fir) = (T::recursion_kernel(isa), T::fir_kernel(isa));
+        let layout = Layout::new(&structure, channels, advance.lanes, fir.group())?;
         Ok(Self {
             channels,
             ratio,
-            history: layout.history,
             recursion: layout.recursion(&structure),
             advance,
-            outputs: layout.outputs(&structure, ratio),
-            fir: T::fir_kernel(isa),
+            from_inputs: layout.from_inputs(&structure, ratio),
+            from_states: layout.from_states(&structure, ratio),
+            fir,
             isa,
         })
     }
@@ -86,13 +84,25 @@ impl<T: Sample> StateSpacePlan<T> {
     }
 
     pub(crate) fn state(&self) -> StateSpaceState<T> {
+        let cut = self.from_inputs.cut;
+        let beyond = self.fir.vector_ticks(cut) * self.channels;
+        let states = self.recursion.states;
+        // A vector may read the rows of some more ticks, which mean nothing.
+        let rows = (BLOCK + self.fir.vector_ticks(self.from_states.cut)) * states;
         StateSpaceState {
-            registers: Registers::new(self.recursion.states, self.advance.lanes),
-            window: Window::new(self.channels + self.recursion.states, self.history, BLOCK),
-            output: Aligned::new(self.ratio * OUT_STRIDE),
+            window: Window::new(self.channels, 1, cut.past(), BLOCK * self.channels, beyond),
+            rows: Aligned::new(rows),
+            states,
+            output: Aligned::new(self.hop() * BLOCK),
+            further: Aligned::new(self.hop() * BLOCK),
             since: 0,
             resets: 0,
         }
+    }
+
+    /// Outputs of a tick, with padding.
+    fn hop(&self) -> usize {
+        self.from_inputs.phases
     }
 
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
@@ -102,18 +112,17 @@ impl<T: Sample> StateSpacePlan<T> {
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
-        let (fold, isa) = (Fold { ticks: 1, lead: 0 }, self.isa);
         let mut replaced = 0;
         let mut first = 0;
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(BLOCK - state.since);
-            state.window.make_room(ticks);
-            let (samples, stride) = state.window.room();
-            replaced +=
-                source.gather(first, ticks, RowsMut { samples, stride, channels: self.channels, fold, isa });
+            let input = state.window.room(ticks);
+            source.gather(self.isa, first, ticks, input);
+            if !T::all_finite(self.isa, input) {
+                replaced += replace_not_finite(input);
+            }
             self.filter(state, ticks);
-            let rows = Rows { samples: &state.output[..], stride: OUT_STRIDE, phases: self.ratio, fold, isa };
-            sink.scatter(first, ticks, rows);
+            sink.store(self.isa, first * self.ratio, &state.output[..ticks * self.ratio]);
             state.pass(ticks);
             first += ticks;
         }
@@ -121,10 +130,15 @@ impl<T: Sample> StateSpacePlan<T> {
     }
 
     fn filter(&self, state: &mut StateSpaceState<T>, ticks: usize) {
-        self.advance.run(&self.recursion, &mut state.registers, state.window.view_mut(), ticks);
-        for (group, steps) in &self.outputs {
-            let out = &mut state.output[group.first * OUT_STRIDE..];
-            self.fir.run(group, state.window.view(), steps, ticks, out, OUT_STRIDE);
+        let StateSpaceState { window, rows, output, further, .. } = state;
+        self.advance.run(&self.recursion, rows, window.view(), self.channels, ticks);
+        self.from_inputs.run(&self.fir, window.view(), ticks, output);
+        if self.recursion.states > 0 {
+            self.from_states.run(&self.fir, rows, ticks, further);
+            output.iter_mut().zip(&further[..ticks * self.hop()]).for_each(|(y, more)| *y = *y + *more);
+        }
+        if self.hop() > self.ratio {
+            (0..ticks).for_each(|t| output[t] = output[t * self.hop()]);
         }
     }
 }
@@ -132,182 +146,216 @@ impl<T: Sample> StateSpacePlan<T> {
 impl<T: Sample> StateSpaceState<T> {
     /// As new.
     pub(crate) fn reset(&mut self) {
-        self.registers.state().fill(T::default());
+        self.rows.fill(T::default());
         self.window.reset();
         self.since = 0;
         self.resets = 0;
     }
 
-    /// Counts ticks; at the end of a block the state is looked after.
+    /// The last row becomes the first; at the end of a block the state is looked after.
     fn pass(&mut self, ticks: usize) {
         self.window.advance(ticks);
+        self.rows.copy_within(ticks * self.states..(ticks + 1) * self.states, 0);
         self.since = (self.since + ticks) % BLOCK;
-        if self.since > 0 {
-            return;
+        if self.since == 0 {
+            self.look_after();
         }
-        let x = self.registers.state();
+    }
+
+    fn look_after(&mut self) {
+        let x = &mut self.rows[..self.states];
         // A NaN never leaves a recursion by itself.
         if !x.iter().all(|value| value.finite()) {
             x.fill(T::default());
             self.resets += 1;
         }
         // Numbers that fade away become denormal in the end, and slow.
-        for value in x.iter_mut().filter(|value| value.magnitude() < T::NEGLIGIBLE) {
-            *value = T::default();
+        let tiny = |value: &T| *value < T::NEGLIGIBLE && T::from_f64(-value.to_f64()) < T::NEGLIGIBLE;
+        x.iter_mut().filter(|value| tiny(value)).for_each(|value| *value = T::default());
+    }
+}
+
+/// An FIR filter from frames to phases.
+#[derive(Debug)]
+struct Readout<T: Sample> {
+    cut: Cut,
+    /// M, or 2 if M is 1: the kernels make at least two.
+    phases: usize,
+    groups: Vec<PhaseGroup<T>>,
+}
+
+impl<T: Sample> Readout<T> {
+    /// `factor(e, p)`: of the sample e before the last one of a frame, for phase p.
+    fn new(cut: Cut, ratio: usize, factor: impl Fn(usize, usize) -> f64) -> Self {
+        let phases = ratio.max(2);
+        let factor = |e: usize, p: usize| if p < ratio { factor(e, p) } else { 0.0 };
+        let groups = widths(phases).map(|(first, width)| phase_group(cut, first, width, &factor)).collect();
+        Self { cut, phases, groups }
+    }
+
+    fn run(&self, kernel: &FirKernel<T>, x: &[T], ticks: usize, out: &mut [T]) {
+        for group in &self.groups {
+            kernel.run(group, self.cut, x, ticks, &mut out[group.first..], self.phases);
         }
     }
 }
 
-/// Where things lie in the window: a row for each channel, then one for each state.
+/// Where things lie: in a window of frames of N inputs, and in rows of S states.
 struct Layout {
+    /// Of the recursion.
     lanes: usize,
     channels: usize,
-    history: usize,
-    stride: usize,
+    inputs: Cut,
     /// S.
     states: usize,
-    /// Row of each state among the states.
-    rows: Vec<usize>,
+    state_rows: Cut,
+    /// Place of each state among the S.
+    places: Vec<usize>,
     modal: bool,
 }
 
 impl Layout {
-    fn new(structure: &Structure, channels: usize, lanes: usize) -> Result<Self, BuildError> {
+    fn new(structure: &Structure, channels: usize, lanes: usize, group: usize) -> Result<Self, BuildError> {
         let order = structure.a.len();
         let history = structure.history();
-        // A window holds f32 or f64 alike: its stride counts samples.
-        let stride = Window::<f64>::stride(history, BLOCK);
+        let len = (history + 1)
+            .checked_mul(channels)
+            .filter(|&len| len <= u32::MAX as usize / 64)
+            .ok_or(BuildError::TooLong { history, channels })?;
         let sections = structure.sections();
         let modal = sections.is_some();
-        let rows = sections.map_or_else(|| (0..order).collect(), |twos| section_rows(&twos, order, lanes));
-        let width = if modal { 2 * lanes } else { lanes };
-        let states = rows.iter().max().map_or(0, |row| row + 1).next_multiple_of(width);
-        if (channels + states).saturating_mul(stride) > u32::MAX as usize {
-            return Err(BuildError::TooLong { history, channels });
-        }
-        Ok(Self { lanes, channels, history, stride, states, rows, modal })
+        let places =
+            sections.map_or_else(|| (0..order).collect(), |twos| section_places(&twos, order, lanes));
+        let states =
+            places.iter().max().map_or(0, |place| place + 1).next_multiple_of((2 * lanes).max(group));
+        // Where there is no state, the readout is not used.
+        let state_rows = Cut::new(states.max(group), states, group);
+        Ok(Self {
+            lanes,
+            channels,
+            inputs: Cut::new(channels, len, group),
+            states,
+            state_rows,
+            places,
+            modal,
+        })
     }
 
     fn place(&self, (channel, ticks): Past) -> u32 {
-        (channel * self.stride + self.history - ticks) as u32
+        (self.inputs.past() - ticks * self.channels + channel) as u32
     }
 
-    fn first_row(&self) -> usize {
-        self.channels * self.stride + self.history
+    /// The state at each place; `None` for padding.
+    fn occupants(&self) -> Vec<Option<usize>> {
+        let mut occupants = vec![None; self.states.max(self.state_rows.hop)];
+        self.places.iter().enumerate().for_each(|(state, &place)| occupants[place] = Some(state));
+        occupants
+    }
+
+    fn from_inputs<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+        let n = self.channels;
+        Readout::new(self.inputs, ratio, |e, p| {
+            structure.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |factors| factors[p])
+        })
+    }
+
+    fn from_states<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+        let occupants = self.occupants();
+        let last = occupants.len() - 1;
+        Readout::new(self.state_rows, ratio, |e, p| {
+            occupants[last - e].map_or(0.0, |state| structure.c[state][p])
+        })
     }
 
     fn recursion<T: Sample>(&self, structure: &Structure) -> Recursion<T> {
+        let columns = Columns { layout: self, structure, occupants: self.occupants() };
         let form = if self.modal {
             let vectors = (0..self.states).step_by(2 * self.lanes);
-            Form::Sections(vectors.map(|first| self.section_vector(structure, first)).collect())
+            Form::Sections(vectors.map(|first| columns.section_vector(first)).collect())
         } else {
-            Form::Dense(self.column_tiles(structure))
+            Form::Dense(columns.tiles())
         };
-        Recursion { states: self.states, first_row: self.first_row(), stride: self.stride, form }
+        Recursion { states: self.states, form }
     }
+}
 
-    /// The state that lies in a row; `None` for padding.
-    fn state_in(&self, row: usize) -> Option<usize> {
-        self.rows.iter().position(|&other| other == row)
-    }
+/// The columns of A and B, as the recursion takes them.
+struct Columns<'a> {
+    layout: &'a Layout,
+    structure: &'a Structure,
+    occupants: Vec<Option<usize>>,
+}
 
-    /// Factors of `count` rows from `first` on, taken from one factor for each state.
+impl Columns<'_> {
+    /// Factors of `count` places from `first` on, taken from one factor for each state.
     fn column<T: Sample>(&self, factor: impl Fn(usize) -> f64, first: usize, count: usize) -> Vec<T> {
-        (first..first + count).map(|row| T::from_f64(self.state_in(row).map_or(0.0, &factor))).collect()
+        let places = self.occupants[first..first + count].iter();
+        places.map(|state| T::from_f64(state.map_or(0.0, &factor))).collect()
     }
 
-    fn section_vector<T: Sample>(&self, structure: &Structure, first: usize) -> SectionVector<T> {
-        let lanes = self.lanes;
-        // a between the rows of a section, d rows apart.
-        let a = |first: usize, other: usize| -> Vec<T> {
-            let entry = |row: usize| {
-                let (i, j) = self.state_in(first + row).zip(self.state_in(other + row))?;
-                Some(structure.a[i][j])
-            };
-            (0..lanes).map(|row| T::from_f64(entry(row).unwrap_or(0.0))).collect()
+    fn section_vector<T: Sample>(&self, first: usize) -> SectionVector<T> {
+        let lanes = self.layout.lanes;
+        // What the states from `to` on take from those from `from` on, lane by lane.
+        let a = |to: usize, from: usize| {
+            let pairs = self.occupants[to..to + lanes].iter().zip(&self.occupants[from..from + lanes]);
+            pairs.map(|(i, j)| i.zip(*j).map_or(0.0, |(i, j)| self.structure.a[i][j])).map(T::from_f64)
         };
         let (p, q) = (first, first + lanes);
-        let mut coefficients = [a(p, p), a(p, q), a(q, p), a(q, q)].concat();
+        let mut coefficients: Vec<T> = a(p, p).chain(a(p, q)).chain(a(q, p)).chain(a(q, q)).collect();
         let mut inputs = Vec::new();
-        for (&past, factors) in &structure.b {
-            let column = self.column::<T>(|state| factors[state], first, 2 * lanes);
-            if column.iter().any(|factor| factor.to_f64() != 0.0) {
-                inputs.push(self.place(past));
+        for (&past, factors) in &self.structure.b {
+            let column: Vec<T> = self.column(|state| factors[state], first, 2 * lanes);
+            if column.iter().any(|&factor| factor != T::default()) {
+                inputs.push(self.layout.place(past));
                 coefficients.extend(column);
             }
         }
         SectionVector { inputs, coefficients: Aligned::from_slice(&coefficients) }
     }
 
-    fn column_tiles<T: Sample>(&self, structure: &Structure) -> Vec<ColumnTile<T>> {
+    fn tiles<T: Sample>(&self) -> Vec<ColumnTile<T>> {
         let mut tiles = Vec::new();
         let mut first = 0;
-        while first < self.states {
-            let left = (self.states - first) / self.lanes;
-            let vectors =
-                if left >= ColumnTile::<T>::WIDEST { ColumnTile::<T>::WIDEST } else { 1 << left.ilog2() };
-            tiles.push(self.column_tile(structure, first, vectors));
-            first += vectors * self.lanes;
+        while first < self.layout.states {
+            let left = (self.layout.states - first) / self.layout.lanes;
+            let vectors = (1 << left.ilog2()).min(ColumnTile::<T>::WIDEST);
+            tiles.push(self.tile(first, vectors));
+            first += vectors * self.layout.lanes;
         }
         tiles
     }
 
-    fn column_tile<T: Sample>(&self, structure: &Structure, first: usize, vectors: usize) -> ColumnTile<T> {
-        let count = vectors * self.lanes;
-        let mut coefficients = Vec::new();
-        let mut keep = |factor: &dyn Fn(usize) -> f64| {
-            let column = self.column::<T>(factor, first, count);
-            let some = column.iter().any(|factor| factor.to_f64() != 0.0);
-            if some {
+    /// Columns of zeros are left out, so that triangles and blocks cost less than full matrices.
+    fn tile<T: Sample>(&self, first: usize, vectors: usize) -> ColumnTile<T> {
+        let (mut inputs, mut columns, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
+        let mut keep = |list: &mut Vec<u32>, place: u32, column: Vec<T>| {
+            if column.iter().any(|&factor| factor != T::default()) {
+                list.push(place);
                 coefficients.extend(column);
             }
-            some
         };
-        let inputs = structure.b.iter().filter(|(_, factors)| keep(&|i| factors[i]));
-        let inputs = inputs.map(|(&past, _)| self.place(past)).collect();
-        let columns = (0..structure.a.len()).filter(|&j| keep(&|i| structure.a[i][j]));
-        let columns = columns.map(|j| self.rows[j] as u32).collect();
+        let count = vectors * self.layout.lanes;
+        for (&past, factors) in &self.structure.b {
+            keep(&mut inputs, self.layout.place(past), self.column(|i| factors[i], first, count));
+        }
+        for (j, &place) in self.layout.places.iter().enumerate() {
+            keep(&mut columns, place as u32, self.column(|i| self.structure.a[i][j], first, count));
+        }
         ColumnTile { first, vectors, inputs, columns, coefficients: Aligned::from_slice(&coefficients) }
     }
-
-    /// Phases with the inputs and states that they take; those that take the same run together.
-    fn outputs<T: Sample>(&self, structure: &Structure, ratio: usize) -> Vec<(PhaseGroup<T>, Steps)> {
-        let taps = structure.taps.iter().map(|(&past, factors)| (self.place(past), factors));
-        let row = |state: usize| (self.first_row() + self.rows[state] * self.stride) as u32;
-        let states = structure.c.iter().enumerate().map(|(state, factors)| (row(state), factors));
-        let terms: Vec<(u32, &Vec<f64>)> = taps.chain(states).collect();
-        let support = |p: usize| terms.iter().map(move |(_, factors)| factors[p] != 0.0);
-        let alike = |p: &usize, q: &usize| support(*p).eq(support(*q));
-        let phases: Vec<usize> = (0..ratio).collect();
-        let groups =
-            phases.chunk_by(alike).flat_map(|like| like.chunks(like.len().div_ceil(like.len().div_ceil(4))));
-        groups.map(|group| output_group(&terms, group[0], group.len())).collect()
-    }
 }
 
-/// Phases `first..first + width`, which take the same terms.
-fn output_group<T: Sample>(terms: &[(u32, &Vec<f64>)], first: usize, width: usize) -> (PhaseGroup<T>, Steps) {
-    let taken = terms.iter().filter(|(_, factors)| factors[first] != 0.0);
-    let coefficients: Vec<T> = taken
-        .clone()
-        .flat_map(|(_, factors)| &factors[first..first + width])
-        .map(|&f| T::from_f64(f))
-        .collect();
-    let group = PhaseGroup { first, width, coefficients: Aligned::from_slice(&coefficients) };
-    (group, Steps::new(taken.map(|&(place, _)| place).collect()))
-}
-
-/// Rows of the states of sections: L first ones, their L partners, and so on.
-fn section_rows(sections: &[(usize, Option<usize>)], order: usize, lanes: usize) -> Vec<usize> {
-    let mut rows = vec![0; order];
+/// Places of the states of sections: L first ones, their L partners, and so on.
+fn section_places(sections: &[(usize, Option<usize>)], order: usize, lanes: usize) -> Vec<usize> {
+    let mut places = vec![0; order];
     for (s, &(one, other)) in sections.iter().enumerate() {
-        let row = s / lanes * 2 * lanes + s % lanes;
-        rows[one] = row;
+        let place = s / lanes * 2 * lanes + s % lanes;
+        places[one] = place;
         if let Some(other) = other {
-            rows[other] = row + lanes;
+            places[other] = place + lanes;
         }
     }
-    rows
+    places
 }
 
 fn check_matrix<T: Sample>(

@@ -1,15 +1,15 @@
-//! State recursions x+ = A x + B u, states in lanes, a few ticks at a time.
+//! State recursions x+ = A x + B u, states in lanes.
 //!
-//! Inputs come from planar rows, and the states before each tick go to planar rows, as though they were channels: so
-//! the FIR kernels can read both. Sections (two states that depend on one another at most) are 2 + 2 multiply-adds and
-//! one for each input; any other A is a sum of its columns, one broadcast of a state serving all states.
+//! Inputs are frames as they lie; the states become frames of their own, one a tick, so that the FIR kernels can
+//! read both. Sections (two states that depend on one another at most) take 2 + 2 multiply-adds and two for each
+//! input; any other A is a sum of its columns, one broadcast of a state serving all states.
 //!
 //! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
 
 use super::Isa;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2F32, Avx2F64};
-use super::vector::{Portable, Transpose, Vector};
+use super::vector::{Portable, Vector};
 use crate::runtime::aligned::Aligned;
 
 /// Ticks of a section that are computed together.
@@ -20,9 +20,6 @@ const STEP: usize = 4;
 pub(crate) struct Recursion<T: Copy + Default> {
     /// S, states after padding to whole vectors.
     pub(crate) states: usize,
-    /// Where the row of the first state begins in the window, and samples from row to row.
-    pub(crate) first_row: usize,
-    pub(crate) stride: usize,
     pub(crate) form: Form<T>,
 }
 
@@ -62,73 +59,54 @@ impl<T: Copy + Default> ColumnTile<T> {
     pub(crate) const WIDEST: usize = 8;
 }
 
-/// The state of a stream, and those of the next few ticks while they are computed.
-#[derive(Debug, Clone)]
-pub(crate) struct Registers<T: Copy + Default> {
-    /// L + 1 rows of S states.
-    rows: Aligned<T>,
-    states: usize,
-}
-
-impl<T: Copy + Default> Registers<T> {
-    pub(crate) fn new(states: usize, lanes: usize) -> Self {
-        Self { rows: Aligned::new((lanes + 1) * states), states }
-    }
-
-    /// x.
-    pub(crate) fn state(&mut self) -> &mut [T] {
-        &mut self.rows[..self.states]
-    }
-}
-
 /// One call of a kernel, checked.
 struct Job<'a, T: Copy + Default> {
     recursion: &'a Recursion<T>,
     rows: *mut T,
-    window: *mut T,
+    window: *const T,
+    hop: usize,
     ticks: usize,
 }
 
 /// The recursion of one sample type on one instruction set.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RecursionKernel<T: Copy + Default> {
-    /// L.
+    /// L, lanes of a vector.
     pub(crate) lanes: usize,
     run: unsafe fn(&Job<'_, T>),
 }
 
 impl<T: Copy + Default> RecursionKernel<T> {
-    /// Goes on by `ticks` ticks. Input k is `window[place + k]` for the input's place; the row of each state becomes its
-    /// values before these ticks. Up to L - 1 values past `ticks` are written too and mean nothing.
+    /// Goes on by `ticks` ticks: row 0 of `rows` (rows of S states) is the state before them, row t + 1 becomes that
+    /// after tick t. An input of tick t is `window[place + t * hop]` for the input's place.
     ///
     /// # Panics
     /// If anything is too short for that.
     pub(crate) fn run(
         &self,
         recursion: &Recursion<T>,
-        registers: &mut Registers<T>,
-        window: &mut [T],
+        rows: &mut [T],
+        window: &[T],
+        hop: usize,
         ticks: usize,
     ) {
-        let padded = ticks.next_multiple_of(self.lanes);
-        assert!(registers.rows.len() == (self.lanes + 1) * recursion.states);
-        if recursion.states == 0 {
+        if recursion.states == 0 || ticks == 0 {
             return;
         }
-        let last_row = recursion.first_row + (recursion.states - 1) * recursion.stride;
-        assert!(last_row + padded <= window.len());
-        recursion.form.check(recursion.states, self.lanes, window.len() - padded);
-        let (rows, window) = (registers.rows.as_mut_ptr(), window.as_mut_ptr());
+        assert!((ticks + 1) * recursion.states <= rows.len());
+        assert!((ticks - 1) * hop < window.len());
+        recursion.form.check(recursion.states, self.lanes, window.len() - (ticks - 1) * hop);
+        let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
         // SAFETY: the kernel was chosen for an available instruction set (`Isa::is_available`), and all its loads and
         // stores lie within the bounds asserted above.
-        unsafe { (self.run)(&Job { recursion, rows, window, ticks }) }
+        unsafe { (self.run)(&Job { recursion, rows, window, hop, ticks }) }
     }
 }
 
 impl<T: Copy + Default> Form<T> {
-    /// Everything that the kernels rely on.
-    fn check(&self, states: usize, lanes: usize, reach: usize) {
-        let inside = |places: &[u32]| places.iter().all(|&place| place as usize <= reach);
+    /// Everything that the kernels rely on; places lie before `end`.
+    fn check(&self, states: usize, lanes: usize, end: usize) {
+        let inside = |places: &[u32]| places.iter().all(|&place| (place as usize) < end);
         match self {
             Self::Sections(vectors) => {
                 assert!(vectors.len() * 2 * lanes == states);
@@ -149,86 +127,75 @@ impl<T: Copy + Default> Form<T> {
 }
 
 #[inline(always)]
-unsafe fn run<V: Transpose>(job: &Job<'_, V::Sample>)
+unsafe fn run<V: Vector>(job: &Job<'_, V::Sample>)
 where
     V::Sample: Default,
 {
-    let states = job.recursion.states;
-    for first in (0..job.ticks).step_by(V::LANES) {
-        let ticks = V::LANES.min(job.ticks - first);
-        // SAFETY: the caller's, see `RecursionKernel::run`.
-        unsafe {
-            match &job.recursion.form {
-                Form::Sections(vectors) => {
-                    for (v, vector) in vectors.iter().enumerate() {
-                        sections::<V>(job, vector, 2 * v * V::LANES, first, ticks);
-                    }
-                }
-                Form::Dense(tiles) => (0..ticks).for_each(|t| dense::<V>(job, tiles, first, t)),
+    // SAFETY: the caller's, see `RecursionKernel::run`.
+    unsafe {
+        match &job.recursion.form {
+            Form::Sections(vectors) => {
+                let whole = job.ticks / STEP * STEP;
+                (0..whole).step_by(STEP).for_each(|t| sections::<V, STEP>(job, vectors, t));
+                (whole..job.ticks).for_each(|t| sections::<V, 1>(job, vectors, t));
             }
-            for state in (0..states).step_by(V::LANES) {
-                let row = job.recursion.first_row + state * job.recursion.stride + first;
-                V::transpose(job.rows.add(state), states, job.window.add(row), job.recursion.stride);
-            }
-            std::ptr::copy_nonoverlapping(job.rows.add(ticks * states), job.rows, states);
+            Form::Dense(tiles) => (0..job.ticks).for_each(|t| dense::<V>(job, tiles, t)),
         }
     }
 }
 
-/// The sections of one vector, whose states begin at `at`: ticks 0..`ticks` of the group that begins at tick `first`.
+/// T ticks from tick t on. One vector of sections after the other: while one waits for its own states, the next
+/// can begin.
 #[inline(always)]
-unsafe fn sections<V: Vector>(
+unsafe fn sections<V: Vector, const T: usize>(
     job: &Job<'_, V::Sample>,
-    vector: &SectionVector<V::Sample>,
-    at: usize,
-    first: usize,
-    ticks: usize,
+    vectors: &[SectionVector<V::Sample>],
+    t: usize,
 ) where
     V::Sample: Default,
 {
-    let mut t = 0;
-    // SAFETY: the caller's, see `RecursionKernel::run`.
-    unsafe {
-        while t + STEP <= ticks {
-            section_steps::<V, STEP>(job, vector, at, first, t);
-            t += STEP;
-        }
-        while t < ticks {
-            section_steps::<V, 1>(job, vector, at, first, t);
-            t += 1;
+    let states = job.recursion.states;
+    for (v, vector) in vectors.iter().enumerate() {
+        // SAFETY: the caller's, see `RecursionKernel::run`.
+        unsafe {
+            let row = job.rows.add(t * states + 2 * v * V::LANES);
+            section_vector::<V, T>(vector, row, states, job.window.add(t * job.hop), job.hop);
         }
     }
 }
 
 /// T ticks: the inputs of all of them first, which do not wait for the states.
 #[inline(always)]
-unsafe fn section_steps<V: Vector, const T: usize>(
-    job: &Job<'_, V::Sample>,
+unsafe fn section_vector<V: Vector, const T: usize>(
     vector: &SectionVector<V::Sample>,
-    at: usize,
-    first: usize,
-    t: usize,
+    mut row: *mut V::Sample,
+    states: usize,
+    window: *const V::Sample,
+    hop: usize,
 ) where
     V::Sample: Default,
 {
     // SAFETY: the caller's, see `RecursionKernel::run`.
     unsafe {
-        let coefficients = vector.coefficients.as_ptr();
-        let coefficient = |k: usize| V::load(coefficients.add(k * V::LANES));
-        let mut sums = [[V::zero(); 2]; T];
-        for (i, &place) in vector.inputs.iter().enumerate() {
-            let input = job.window.add(place as usize + first + t);
-            let b = [coefficient(4 + 2 * i), coefficient(5 + 2 * i)];
-            for (k, [p, q]) in sums.iter_mut().enumerate() {
-                let u = V::splat(*input.add(k));
-                *p = u.mul_add(b[0], *p);
-                *q = u.mul_add(b[1], *q);
+        let mut coefficients = vector.coefficients.as_ptr();
+        let [a11, a12] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+        coefficients = coefficients.add(2 * V::LANES);
+        let [a21, a22] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+        let zero = V::splat(V::Sample::default());
+        let mut sums = [[zero; 2]; T];
+        for &place in &vector.inputs {
+            let mut input = window.add(place as usize);
+            coefficients = coefficients.add(2 * V::LANES);
+            let [b1, b2] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+            for [p, q] in &mut sums {
+                let u = V::splat(*input);
+                *p = u.mul_add(b1, *p);
+                *q = u.mul_add(b2, *q);
+                // May leave the window after the last tick, where nothing is read.
+                input = input.wrapping_add(hop);
             }
         }
-        let states = job.recursion.states;
-        let mut row = job.rows.add(t * states + at);
         let (mut p, mut q) = (V::load(row), V::load(row.add(V::LANES)));
-        let [a11, a12, a21, a22] = [coefficient(0), coefficient(1), coefficient(2), coefficient(3)];
         for [b1u, b2u] in sums {
             (p, q) = (p.mul_add(a11, q.mul_add(a12, b1u)), q.mul_add(a22, p.mul_add(a21, b2u)));
             row = row.add(states);
@@ -238,9 +205,9 @@ unsafe fn section_steps<V: Vector, const T: usize>(
     }
 }
 
-/// Tick t of the group that begins at tick `first`, for any A.
+/// Tick t, for any A.
 #[inline(always)]
-unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Sample>], first: usize, t: usize)
+unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Sample>], t: usize)
 where
     V::Sample: Default,
 {
@@ -248,10 +215,10 @@ where
         // SAFETY: the caller's, see `RecursionKernel::run`.
         unsafe {
             match tile.vectors {
-                1 => column_tile::<V, 1>(job, tile, first, t),
-                2 => column_tile::<V, 2>(job, tile, first, t),
-                4 => column_tile::<V, 4>(job, tile, first, t),
-                _ => column_tile::<V, 8>(job, tile, first, t),
+                1 => column_tile::<V, 1>(job, tile, t),
+                2 => column_tile::<V, 2>(job, tile, t),
+                4 => column_tile::<V, 4>(job, tile, t),
+                _ => column_tile::<V, 8>(job, tile, t),
             }
         }
     }
@@ -261,7 +228,6 @@ where
 unsafe fn column_tile<V: Vector, const R: usize>(
     job: &Job<'_, V::Sample>,
     tile: &ColumnTile<V::Sample>,
-    first: usize,
     t: usize,
 ) where
     V::Sample: Default,
@@ -269,21 +235,29 @@ unsafe fn column_tile<V: Vector, const R: usize>(
     let states = job.recursion.states;
     // SAFETY: the caller's, see `RecursionKernel::run`.
     unsafe {
-        let mut sums = [V::zero(); R];
+        let mut sums = [V::splat(V::Sample::default()); R];
+        let (x, window) = (job.rows.add(t * states), job.window.add(t * job.hop));
         let mut column = tile.coefficients.as_ptr();
-        let mut add = |value: V::Sample| {
-            let value = V::splat(value);
-            for (r, sum) in sums.iter_mut().enumerate() {
-                *sum = value.mul_add(V::load(column.add(r * V::LANES)), *sum);
-            }
+        for &place in &tile.inputs {
+            add_column(&mut sums, V::splat(*window.add(place as usize)), column);
             column = column.add(R * V::LANES);
-        };
-        tile.inputs.iter().for_each(|&place| add(*job.window.add(place as usize + first + t)));
-        let x = job.rows.add(t * states);
-        tile.columns.iter().for_each(|&j| add(*x.add(j as usize)));
+        }
+        for &j in &tile.columns {
+            add_column(&mut sums, V::splat(*x.add(j as usize)), column);
+            column = column.add(R * V::LANES);
+        }
         for (r, sum) in sums.into_iter().enumerate() {
             sum.store(x.add(states + tile.first + r * V::LANES));
         }
+    }
+}
+
+/// sums <- sums + value times R vectors of a column.
+#[inline(always)]
+unsafe fn add_column<V: Vector, const R: usize>(sums: &mut [V; R], value: V, column: *const V::Sample) {
+    for (r, sum) in sums.iter_mut().enumerate() {
+        // SAFETY: the caller's, see `RecursionKernel::run`.
+        *sum = unsafe { value.mul_add(V::load(column.add(r * V::LANES)), *sum) };
     }
 }
 
