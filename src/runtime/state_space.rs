@@ -406,7 +406,7 @@ mod tests {
         out
     }
 
-    fn run(
+    fn run<T: Sample>(
         filter: &BlockFilter,
         n: usize,
         m: usize,
@@ -414,7 +414,7 @@ mod tests {
         input: &[f64],
         cut: usize,
     ) -> (Vec<f64>, bool) {
-        let plan = StateSpacePlan::<f64>::new(filter, n, m, isa).unwrap();
+        let plan = StateSpacePlan::<T>::new(filter, n, m, isa).unwrap();
         let mut state = plan.state();
         let mut out = vec![0.0; input.len() / n * m];
         for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
@@ -449,19 +449,101 @@ mod tests {
                 let filter = random(order, n, m, blocks, &mut noise);
                 let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
                 let want = definition(&filter, &input, n);
-                let (whole, is_modal) = run(&filter, n, m, Isa::detect(), &input, 300);
+                let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
                 // Small dense matrices are block-diagonal too.
                 assert!(is_modal || (blocks.is_none() && order > 2), "{order} {blocks:?}");
                 let worst = whole.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(worst < 1e-12, "order {order} N {n} M {m}: {worst:e}");
                 for cut in [1, 7, 63, 64, 65, 129] {
-                    assert_eq!(run(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+                    assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
                 }
-                let portable = run(&filter, n, m, Isa::Portable, &input, 300).0;
+                let portable = run::<f64>(&filter, n, m, Isa::Portable, &input, 300).0;
                 let apart = whole.iter().zip(&portable).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(apart < 1e-12, "{apart:e}");
             }
         }
+    }
+
+    fn worst(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// The same filter with its inputs `ticks` ticks late, in a delay line that the output reads too: the form of
+    /// designed banks.
+    fn behind(core: &BlockFilter, ticks: usize, noise: &mut Noise) -> BlockFilter {
+        let (states, n) = (core.a.len(), core.d[0].len());
+        let order = states + ticks * n;
+        let mut a = vec![vec![0.0; order]; order];
+        for (i, row) in a.iter_mut().enumerate() {
+            match core.a.get(i) {
+                Some(own) => {
+                    row[..states].copy_from_slice(own);
+                    row[states..states + n].copy_from_slice(&core.b[i]);
+                }
+                None if i + n < order => row[i + n] = 1.0,
+                None => {}
+            }
+        }
+        let newest = |i: usize, u: usize| f64::from(u8::from(i == order - n + u));
+        let b = (0..order).map(|i| (0..n).map(|u| newest(i, u)).collect()).collect();
+        let read = |row: &Vec<f64>| row.iter().copied().chain((0..ticks * n).map(|_| noise.next())).collect();
+        BlockFilter { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
+    }
+
+    #[test]
+    fn delay_lines_before_the_states_follow_the_definition() {
+        let mut noise = Noise(22);
+        for (order, blocks) in [(0, None), (2, Some(&[2][..])), (5, Some(&[2, 1, 2])), (4, None)] {
+            for (n, m, ticks) in [(1, 1, 3), (1, 3, 1), (2, 2, 5), (3, 2, 4), (4, 4, 17), (5, 9, 2)] {
+                let filter = behind(&random(order, n, m, blocks, &mut noise), ticks, &mut noise);
+                let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
+                let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+                assert!(is_modal || (blocks.is_none() && order > 2));
+                let error = worst(&whole, &definition(&filter, &input, n));
+                assert!(error < 1e-12, "order {order} N {n} M {m} behind {ticks}: {error:e}");
+                for cut in [1, 63, 65] {
+                    assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn in_single_precision_the_error_is_what_the_poles_make_of_rounding() {
+        let mut noise = Noise(23);
+        for radius in [0.5, 0.9, 0.99, 0.999] {
+            let mut filter = random(6, 2, 3, Some(&[2, 2, 2]), &mut noise);
+            for (k, pair) in filter.a.chunks_mut(2).enumerate() {
+                let (s, c) = (0.3 + k as f64).sin_cos();
+                (pair[0][2 * k], pair[0][2 * k + 1]) = (radius * c, radius * s);
+                (pair[1][2 * k], pair[1][2 * k + 1]) = (-radius * s, radius * c);
+            }
+            let input: Vec<f64> = (0..2 * 3000).map(|_| f64::from(noise.next() as f32)).collect();
+            let want = definition(&filter, &input, 2);
+            let single = run::<f32>(&filter, 2, 3, Isa::detect(), &input, 3000).0;
+            let size = want.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+            let error = worst(&single, &want) / size;
+            assert!(error > 1e-9, "this is not single precision: {error:e}");
+            assert!(error < 8.0 * f64::from(f32::EPSILON) / (1.0 - radius), "radius {radius}: {error:e}");
+            for cut in [1, 63, 65] {
+                assert_eq!(run::<f32>(&filter, 2, 3, Isa::detect(), &input, cut).0, single, "cut {cut}");
+            }
+        }
+    }
+
+    #[test]
+    fn zero_columns_of_triangles_are_not_multiplied() {
+        let mut noise = Noise(24);
+        let mut filter = random(24, 1, 2, None, &mut noise);
+        (0..24).for_each(|i| filter.a[i][..i].fill(0.0));
+        let plan = StateSpacePlan::<f64>::new(&filter, 1, 2, Isa::detect()).unwrap();
+        let Form::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
+        let columns: Vec<usize> = tiles.iter().map(|tile| tile.columns.len()).collect();
+        assert_eq!(columns[0], 24);
+        assert!(columns[1..].iter().all(|&count| count < 24), "{columns:?}");
+        let input: Vec<f64> = (0..300).map(|_| noise.next()).collect();
+        let got = run::<f64>(&filter, 1, 2, Isa::detect(), &input, 300).0;
+        assert!(worst(&got, &definition(&filter, &input, 1)) < 1e-12);
     }
 
     #[test]
