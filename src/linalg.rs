@@ -325,6 +325,42 @@ pub fn eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
 }
 
+/// Eigenvalues and eigenvectors (columns) of a general real matrix; the two of a conjugate pair are neighbours.
+pub fn eigen(m: &Mat) -> Result<(Vec<Complex<f64>>, CMat), LinalgError> {
+    check_finite("eigen", m)?;
+    if m.is_empty() {
+        return Ok((Vec::new(), CMat::zeros(0, 0)));
+    }
+    let e = view(m).eigen().map_err(|_| no_convergence("eigen", m))?;
+    Ok((e.S().column_vector().iter().copied().collect(), owned(e.U())))
+}
+
+/// Rotations a row after which a Schur iteration is given up; one or two are usual.
+const SCHUR_SWEEPS: usize = 100;
+
+/// Real Schur form `m = q t q'`: q orthogonal, t zero below its diagonal but for 2 x 2 blocks.
+///
+/// faer keeps its own private, so this one is nalgebra's, with a bound: it never ends on some delay lines.
+pub fn real_schur(m: &Mat) -> Result<(Mat, Mat), LinalgError> {
+    check_finite("Schur", m)?;
+    let n = m.nrows();
+    if n < 2 {
+        return Ok((Mat::identity(n, n), m.clone()));
+    }
+    let schur = nalgebra::linalg::Schur::try_new(m.clone(), f64::EPSILON, SCHUR_SWEEPS * n)
+        .ok_or_else(|| no_convergence("Schur", m))?;
+    let (q, mut t) = schur.unpack();
+    for j in 0..n {
+        for i in j + 1..n {
+            let negligible = t[(i, j)].abs() <= f64::EPSILON * (t[(j, j)].abs() + t[(i, i)].abs());
+            if i > j + 1 || negligible {
+                t[(i, j)] = 0.0;
+            }
+        }
+    }
+    Ok((q, t))
+}
+
 /// Largest modulus of the eigenvalues of a square matrix.
 pub fn spectral_radius(m: &Mat) -> Result<f64, LinalgError> {
     Ok(eigenvalues(m)?.iter().map(|z| z.norm()).fold(0.0, f64::max))

@@ -3,8 +3,10 @@
 use super::equivalence::BlockedPlant;
 use super::problem::{Part, Problem};
 use super::{DesignError, comparison, error_system, fir, iir};
-use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use crate::bank::{Bank, Gamma, SynthesisFilters};
+use crate::linalg::Mat;
 use crate::lti::peak::Peak;
+use crate::lti::{StateSpace, TappedRecursion};
 use crate::spec::{Method, Spec};
 
 /// A bank with the record of its design.
@@ -32,11 +34,14 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     let problem = Problem::new(spec, latency)?;
     let (distinct, parts) = problem.without_duplicates();
     let found = run_method(spec, &distinct)?;
-    let filters = share_among_duplicates(found.filters, &parts);
+    let plant = BlockedPlant::new(&problem);
     // The norm that counts is that of the coefficients as they are written, on all channels.
-    let peak = match found.peak {
-        Some(peak) if distinct.channels.len() == problem.channels.len() => peak,
-        _ => error_system::bank_gamma(&BlockedPlant::new(&problem), &filters)?,
+    let (filters, peak) = match found.filters {
+        Solution::Taps(taps, Some(peak)) if distinct.channels.len() == problem.channels.len() => {
+            (SynthesisFilters::Fir(taps), peak)
+        }
+        Solution::Taps(taps, _) => judged(&plant, SynthesisFilters::Fir(shared_taps(&taps, &parts)))?,
+        Solution::System(system, norm) => written_form(&plant, &shared_inputs(&system, &parts)?, norm)?,
     };
     let gamma = Gamma {
         upper: Some(peak.gain),
@@ -73,10 +78,16 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     spec.latency.map_or_else(|| choose_latency(spec), Ok)
 }
 
+/// What a method comes up with.
+enum Solution {
+    /// FIR filters, one a channel, with their exact norm where the method has computed it.
+    Taps(Vec<Vec<f64>>, Option<Peak>),
+    /// One block for each slow tick, with the norm of its error system.
+    System(StateSpace, f64),
+}
+
 struct Found {
-    filters: SynthesisFilters,
-    /// Exact, of these very filters, where the method has computed it.
-    peak: Option<Peak>,
+    filters: Solution,
     lower: f64,
     noncausal: f64,
     iterations: usize,
@@ -104,8 +115,7 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
 
 fn from_fir(design: fir::FirDesign) -> Found {
     Found {
-        filters: SynthesisFilters::Fir(design.taps),
-        peak: Some(design.peak),
+        filters: Solution::Taps(design.taps, Some(design.peak)),
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.iterations,
@@ -115,8 +125,7 @@ fn from_fir(design: fir::FirDesign) -> Found {
 
 fn from_state_space(design: iir::StateSpaceDesign) -> Found {
     Found {
-        filters: SynthesisFilters::StateSpace(error_system::to_block(&design.filters)),
-        peak: None,
+        filters: Solution::System(design.filters, design.upper),
         lower: design.lower,
         noncausal: design.noncausal,
         iterations: design.trials,
@@ -127,34 +136,48 @@ fn from_state_space(design: iir::StateSpaceDesign) -> Found {
 /// A comparison method optimises nothing: what bounds every bank is all that is known below.
 fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError> {
     let noncausal = iir::noncausal_bound(plant)?;
-    Ok(Found {
-        filters: SynthesisFilters::Fir(taps),
-        peak: None,
-        lower: noncausal,
-        noncausal,
-        iterations: 0,
-        dual: Vec::new(),
-    })
+    let filters = Solution::Taps(taps, None);
+    Ok(Found { filters, lower: noncausal, noncausal, iterations: 0, dual: Vec::new() })
+}
+
+/// A change of coordinates may cost this fraction of gamma.
+const FORM_ACCURACY: f64 = 1e-9;
+
+/// The filters in the cheapest form that keeps the norm `promised`: parallel sections at the end of a delay line, a
+/// triangle there, or else as they are.
+fn written_form(
+    plant: &BlockedPlant,
+    system: &StateSpace,
+    promised: f64,
+) -> Result<(SynthesisFilters, Peak), DesignError> {
+    let tapped = TappedRecursion::new(system)?;
+    let forms = [tapped.modal(), tapped.triangular().map(Some)];
+    for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {
+        let found = judged(plant, SynthesisFilters::StateSpace(error_system::to_block(&form.realise())))?;
+        if found.1.gain <= promised * (1.0 + FORM_ACCURACY) {
+            return Ok(found);
+        }
+    }
+    judged(plant, SynthesisFilters::StateSpace(error_system::to_block(system)))
+}
+
+fn judged(plant: &BlockedPlant, filters: SynthesisFilters) -> Result<(SynthesisFilters, Peak), DesignError> {
+    let peak = error_system::bank_gamma(plant, &filters)?;
+    Ok((filters, peak))
 }
 
 /// Channels that cannot be told apart share their common filter: the same error, the least noise.
-fn share_among_duplicates(filters: SynthesisFilters, parts: &[Part]) -> SynthesisFilters {
-    let share = |row: &[f64]| -> Vec<f64> {
-        parts.iter().map(|part| row[part.representative] * part.share).collect()
+fn shared_taps(taps: &[Vec<f64>], parts: &[Part]) -> Vec<Vec<f64>> {
+    let share = |part: &Part| taps[part.representative].iter().map(|tap| tap * part.share).collect();
+    parts.iter().map(share).collect()
+}
+
+/// As [`shared_taps`], for the inputs of a system.
+fn shared_inputs(system: &StateSpace, parts: &[Part]) -> Result<StateSpace, DesignError> {
+    let share = |m: &Mat| {
+        Mat::from_fn(m.nrows(), parts.len(), |i, j| m[(i, parts[j].representative)] * parts[j].share)
     };
-    match filters {
-        SynthesisFilters::Fir(taps) => SynthesisFilters::Fir(
-            parts
-                .iter()
-                .map(|part| taps[part.representative].iter().map(|tap| tap * part.share).collect())
-                .collect(),
-        ),
-        SynthesisFilters::StateSpace(block) => SynthesisFilters::StateSpace(BlockFilter {
-            b: block.b.iter().map(|row| share(row)).collect(),
-            d: block.d.iter().map(|row| share(row)).collect(),
-            ..block
-        }),
-    }
+    Ok(StateSpace::new(system.a().clone(), share(system.b()), system.c().clone(), share(system.d()))?)
 }
 
 /// Latencies tried beyond the longest delay, in slow ticks.

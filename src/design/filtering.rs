@@ -57,6 +57,20 @@ pub(super) struct Innovations {
     incomplete: bool,
     /// The verdict "impossible" may be believed: the coordinates are balanced and no channel is left out.
     conclusive: bool,
+    /// The same in the plant's own coordinates, unless these are they.
+    plant: Option<Box<PlantSide>>,
+}
+
+/// What a filter is made of, in the coordinates of the plant. There the delay chains are visible: their columns
+/// hold a single one and exact zeros.
+#[derive(Debug, Clone)]
+struct PlantSide {
+    /// From these coordinates to those of the plant.
+    forward: Mat,
+    f: Mat,
+    b1: Mat,
+    c1: Mat,
+    c2: Mat,
 }
 
 /// A channel read from the end of a delay chain.
@@ -136,6 +150,7 @@ impl Innovations {
             channels: plant.measured,
             incomplete,
             conclusive: false,
+            plant: None,
         }
     }
 
@@ -160,7 +175,9 @@ impl Innovations {
         let scale = |k: usize| values[k].max(0.0) + floor;
         let forward = Mat::from_fn(n, n, |i, k| vectors[(i, k)] * scale(k).sqrt());
         let back = Mat::from_fn(n, n, |k, i| vectors[(i, k)] / scale(k).sqrt());
+        let Self { f, b1, c1, c2, .. } = self.clone();
         Some(Self {
+            plant: Some(Box::new(PlantSide { forward: forward.clone(), f, b1, c1, c2 })),
             f: &back * &self.f * &forward,
             b1: &back * &self.b1,
             b2: &back * &self.b2,
@@ -248,20 +265,25 @@ impl Innovations {
         ry
     }
 
-    /// The central filter of a covariance: gains K = F P C2' Ry^-1 and Df = C1 P C2' Ry^-1.
+    /// The central filter of a covariance: gains K = F P C2' Ry^-1 and Df = C1 P C2' Ry^-1. Its states are
+    /// estimates of the plant's, whatever the coordinates of P.
     fn filter(&self, p: &Mat) -> Option<Filter> {
         let pc = p * self.c2.transpose();
         let gain = linalg::solve_positive(&self.innovation(p), &pc.transpose()).ok()?.transpose();
-        let mut k = &self.f * &gain;
-        let mut df = &self.c1 * &gain;
-        let a = &self.f - &k * &self.c2;
-        let c = &self.c1 - &df * &self.c2;
+        let filter = match self.plant.as_deref() {
+            None => self.with_gain(&gain, &self.f, &self.b1, &self.c1, &self.c2),
+            Some(PlantSide { forward, f, b1, c1, c2 }) => self.with_gain(&(forward * gain), f, b1, c1, c2),
+        }?;
+        (filter.spectral_radius().ok()? < 1.0).then_some(filter)
+    }
+
+    /// The filter that corrects its state by `gain` times the innovation.
+    fn with_gain(&self, gain: &Mat, f: &Mat, b1: &Mat, c1: &Mat, c2: &Mat) -> Option<Filter> {
+        let (mut k, mut df) = (f * gain, c1 * gain);
+        let (a, c) = (f - &k * c2, c1 - &df * c2);
         let known = self.fresh.len();
-        k.columns_mut(0, known).zip_apply(&self.b1, |gain, direct| *gain += direct);
+        k.columns_mut(0, known).zip_apply(b1, |gain, direct| *gain += direct);
         df.columns_mut(0, known).zip_apply(&self.x, |gain, direct| *gain += direct);
-        if linalg::spectral_radius(&a).ok()? >= 1.0 {
-            return None;
-        }
         StateSpace::new(a, self.on_channels(&k), c, self.on_channels(&df)).ok()
     }
 

@@ -3,13 +3,17 @@
 //! Knows no filter bank: a system has inputs, outputs and states, nothing else. Continuous-time
 //! helpers ([`exponential`]) serve exact discretisation.
 
+pub mod balanced;
+mod delay_line;
 pub mod exponential;
 pub mod gramian;
+pub mod modal;
 pub mod peak;
 mod response;
 pub mod riccati;
 mod state_space;
 
+pub use delay_line::TappedRecursion;
 pub use response::FrequencyResponse;
 pub use state_space::{StateSpace, StateSpaceError};
 

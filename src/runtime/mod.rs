@@ -7,10 +7,10 @@ mod error;
 mod fir;
 mod gaps;
 mod reconstructor;
-mod rows;
 mod sample;
 mod simd;
 mod state_space;
+mod structure;
 #[cfg(test)]
 mod tests;
 mod ticks;

@@ -9,7 +9,7 @@ use crate::bank::{Bank, SynthesisFilters};
 use crate::io::PcmFrames;
 use std::sync::Arc;
 
-/// Number type of the FIR kernels. State-space banks always run in f64.
+/// Number type of the kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Precision {
     /// Coefficients and sums in f32: error about 1e-7 of full scale.
@@ -24,20 +24,23 @@ pub enum Precision {
 pub struct Options {
     /// Number type of the FIR kernels.
     pub precision: Precision,
+    /// Number type of recursions, [`Precision::Double`] unless asked for otherwise: a recursion feeds its rounding
+    /// errors back, and in f32 the error is about 1e-7 of full scale divided by 1 - |pole|.
+    pub recursion: Precision,
     /// Instruction set; one that the processor does not have falls back to the portable kernels.
     pub isa: Isa,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { precision: Precision::default(), isa: Isa::detect() }
+        Self { precision: Precision::default(), recursion: Precision::Double, isa: Isa::detect() }
     }
 }
 
 /// How a bank runs, for reports.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct PlanSummary {
-    /// `polyphase` (FIR), `modal` (block-diagonal state matrix) or `dense` (any state matrix).
+    /// `polyphase` (FIR), `modal` (delay lines and parallel sections) or `dense` (delay lines and any other states).
     pub form: &'static str,
     /// Number type of the sums: `f32` or `f64`.
     pub numbers: &'static str,
@@ -52,7 +55,8 @@ pub struct PlanSummary {
 enum Plan {
     Single(FirPlan<f32>),
     Double(FirPlan<f64>),
-    StateSpace(StateSpacePlan),
+    RecursionSingle(StateSpacePlan<f32>),
+    RecursionDouble(StateSpacePlan<f64>),
 }
 
 /// The state of one stream, of the plan's kind.
@@ -60,7 +64,8 @@ enum Plan {
 enum StreamState {
     Single(FirState<f32>),
     Double(FirState<f64>),
-    StateSpace(StateSpaceState),
+    RecursionSingle(StateSpaceState<f32>),
+    RecursionDouble(StateSpaceState<f64>),
 }
 
 /// Fuses the ticks of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0
@@ -122,7 +127,8 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => plan.channels,
             Plan::Double(plan) => plan.channels,
-            Plan::StateSpace(plan) => plan.channels,
+            Plan::RecursionSingle(plan) => plan.channels,
+            Plan::RecursionDouble(plan) => plan.channels,
         }
     }
 
@@ -131,7 +137,8 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => plan.ratio,
             Plan::Double(plan) => plan.ratio,
-            Plan::StateSpace(plan) => plan.ratio,
+            Plan::RecursionSingle(plan) => plan.ratio,
+            Plan::RecursionDouble(plan) => plan.ratio,
         }
     }
 
@@ -145,7 +152,7 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => Some(plan.history),
             Plan::Double(plan) => Some(plan.history),
-            Plan::StateSpace(_) => None,
+            Plan::RecursionSingle(_) | Plan::RecursionDouble(_) => None,
         }
     }
 
@@ -159,7 +166,8 @@ impl Reconstructor {
         let (form, numbers, fold) = match &*self.plan {
             Plan::Single(plan) => ("polyphase", "f32", plan.fold),
             Plan::Double(plan) => ("polyphase", "f64", plan.fold),
-            Plan::StateSpace(plan) => (if plan.is_modal() { "modal" } else { "dense" }, "f64", 1),
+            Plan::RecursionSingle(plan) => (recursion_form(plan.is_modal()), "f32", 1),
+            Plan::RecursionDouble(plan) => (recursion_form(plan.is_modal()), "f64", 1),
         };
         PlanSummary { form, numbers, isa: self.isa.to_string(), fold }
     }
@@ -172,7 +180,8 @@ impl Reconstructor {
     /// Times a recursion's state was not finite and began anew, since the beginning.
     pub fn state_resets(&self) -> u64 {
         match &self.state {
-            StreamState::StateSpace(state) => state.resets,
+            StreamState::RecursionSingle(state) => state.resets,
+            StreamState::RecursionDouble(state) => state.resets,
             _ => 0,
         }
     }
@@ -188,7 +197,8 @@ impl Reconstructor {
         match &mut self.state {
             StreamState::Single(state) => state.reset(),
             StreamState::Double(state) => state.reset(),
-            StreamState::StateSpace(state) => state.reset(),
+            StreamState::RecursionSingle(state) => state.reset(),
+            StreamState::RecursionDouble(state) => state.reset(),
         }
     }
 
@@ -249,12 +259,21 @@ impl Reconstructor {
         self.replaced += match (&*self.plan, &mut self.state) {
             (Plan::Single(plan), StreamState::Single(state)) => plan.process(state, source, sink),
             (Plan::Double(plan), StreamState::Double(state)) => plan.process(state, source, sink),
-            (Plan::StateSpace(plan), StreamState::StateSpace(state)) => plan.process(state, source, sink),
+            (Plan::RecursionSingle(plan), StreamState::RecursionSingle(state)) => {
+                plan.process(state, source, sink)
+            }
+            (Plan::RecursionDouble(plan), StreamState::RecursionDouble(state)) => {
+                plan.process(state, source, sink)
+            }
             // A state is only ever made by its plan.
             _ => 0,
         };
         Ok(wanted)
     }
+}
+
+fn recursion_form(modal: bool) -> &'static str {
+    if modal { "modal" } else { "dense" }
 }
 
 impl Plan {
@@ -276,9 +295,14 @@ impl Plan {
             (SynthesisFilters::Fir(taps), Precision::Double) => {
                 FirPlan::new(taps, ratio, options.isa).map(Self::Double)
             }
-            (SynthesisFilters::StateSpace(filter), _) => {
-                StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::StateSpace)
-            }
+            (SynthesisFilters::StateSpace(filter), _) => match options.recursion {
+                Precision::Single => {
+                    StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::RecursionSingle)
+                }
+                Precision::Double => {
+                    StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::RecursionDouble)
+                }
+            },
         }
     }
 
@@ -286,7 +310,8 @@ impl Plan {
         match self {
             Self::Single(plan) => StreamState::Single(plan.state()),
             Self::Double(plan) => StreamState::Double(plan.state()),
-            Self::StateSpace(plan) => StreamState::StateSpace(plan.state()),
+            Self::RecursionSingle(plan) => StreamState::RecursionSingle(plan.state()),
+            Self::RecursionDouble(plan) => StreamState::RecursionDouble(plan.state()),
         }
     }
 }

@@ -1,42 +1,56 @@
-//! State-space banks: x+ = a x + b u, y = c x + d u once a tick, in f64.
+//! State-space banks: x+ = a x + b u, y = c x + d u once a tick.
+//!
+//! Delay lines are taken out of the states and become the past of a window, as with FIR banks; the other states run
+//! as a recursion whose values are frames, one a tick. Then the output is the sum of two FIR filters, one over the
+//! inputs and one over the states.
 
 use super::BuildError;
 use super::aligned::Aligned;
-use super::rows::{Fold, Rows, RowsMut};
-use super::simd::{Columns, Isa, RECURSION_LANES, Registers, run_recursion};
+use super::fir::{phase_group, replace_not_finite, widths};
+use super::sample::Sample;
+use super::simd::{
+    ColumnTile, Cut, FirKernel, Form, Isa, PhaseGroup, Recursion, RecursionKernel, SectionVector,
+};
+use super::structure::{Past, Structure};
 use super::ticks::{FastSink, TickSource};
+use super::window::Window;
 use crate::bank::BlockFilter;
 
-/// Ticks a block. Every so many ticks from the beginning of the stream, and not of a call, the state
-/// is looked after, so that cuts do not change a bit.
-const BLOCK: usize = 64;
+/// Ticks a block. Every so many ticks from the beginning of the stream, and not of a call, the state is looked after,
+/// so that cuts do not change a bit.
+pub(crate) const BLOCK: usize = 64;
 
-/// States below this are as good as zero, and above every number whose arithmetic is slow.
-const NEGLIGIBLE: f64 = 1e-280;
-
-/// The matrices in the order of use.
+/// The coefficients in the order of use.
 #[derive(Debug)]
-pub(crate) struct StateSpacePlan {
+pub(crate) struct StateSpacePlan<T: Sample> {
     pub(crate) channels: usize,
     pub(crate) ratio: usize,
-    columns: Columns,
+    recursion: Recursion<T>,
+    advance: RecursionKernel<T>,
+    from_inputs: Readout<T>,
+    from_states: Readout<T>,
+    fir: FirKernel<T>,
     isa: Isa,
 }
 
 /// What a stream remembers.
 #[derive(Debug, Clone)]
-pub(crate) struct StateSpaceState {
-    registers: Registers,
+pub(crate) struct StateSpaceState<T: Sample> {
+    window: Window<T>,
+    /// The state before each tick of a block, and after the last one; the first row is the state.
+    rows: Aligned<T>,
+    /// S.
     states: usize,
-    input: Vec<f64>,
-    output: Vec<f64>,
+    output: Aligned<T>,
+    /// What the states add to it.
+    further: Aligned<T>,
     /// Ticks since the state was looked after.
     since: usize,
     /// Times the state was not finite and began anew.
     pub(crate) resets: u64,
 }
 
-impl StateSpacePlan {
+impl<T: Sample> StateSpacePlan<T> {
     pub(crate) fn new(
         filter: &BlockFilter,
         channels: usize,
@@ -44,144 +58,307 @@ impl StateSpacePlan {
         isa: Isa,
     ) -> Result<Self, BuildError> {
         let order = filter.a.len();
-        let check = |name, rows: &[Vec<f64>], wanted| check_matrix(name, rows, wanted, channels, ratio);
+        let check = |name, rows: &[Vec<f64>], wanted| check_matrix::<T>(name, rows, wanted, channels, ratio);
         check("a", &filter.a, (order, order))?;
         check("b", &filter.b, (order, channels))?;
         check("c", &filter.c, (ratio, order))?;
         check("d", &filter.d, (ratio, channels))?;
-        Ok(Self { channels, ratio, columns: columns(filter, channels, ratio), isa })
+        let structure = Structure::new(filter);
+        let (advance, fir) = (T::recursion_kernel(isa), T::fir_kernel(isa));
+        let layout = Layout::new(&structure, channels, advance.lanes, fir.group())?;
+        Ok(Self {
+            channels,
+            ratio,
+            recursion: layout.recursion(&structure),
+            advance,
+            from_inputs: layout.from_inputs(&structure, ratio),
+            from_states: layout.from_states(&structure, ratio),
+            fir,
+            isa,
+        })
     }
 
-    /// True if the state matrix is block-diagonal and runs as such.
+    /// True if the states are parallel sections and run as such.
     pub(crate) fn is_modal(&self) -> bool {
-        self.columns.modal.is_some()
+        matches!(self.recursion.form, Form::Sections(_))
     }
 
-    pub(crate) fn state(&self) -> StateSpaceState {
+    pub(crate) fn state(&self) -> StateSpaceState<T> {
+        let cut = self.from_inputs.cut;
+        let beyond = self.fir.vector_ticks(cut) * self.channels;
+        let states = self.recursion.states;
+        // A vector may read the rows of some more ticks, which mean nothing.
+        let rows = (BLOCK + self.fir.vector_ticks(self.from_states.cut)) * states;
         StateSpaceState {
-            registers: Registers::new(&self.columns),
-            states: self.columns.states,
-            input: vec![0.0; self.channels * BLOCK],
-            output: vec![0.0; self.ratio * BLOCK],
+            window: Window::new(self.channels, 1, cut.past(), BLOCK * self.channels, beyond),
+            rows: Aligned::new(rows),
+            states,
+            output: Aligned::new(self.hop() * BLOCK),
+            further: Aligned::new(self.hop() * BLOCK),
             since: 0,
             resets: 0,
         }
     }
 
+    /// Outputs of a tick, with padding.
+    fn hop(&self) -> usize {
+        self.from_inputs.phases
+    }
+
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
     pub(crate) fn process(
         &self,
-        state: &mut StateSpaceState,
+        state: &mut StateSpaceState<T>,
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
-        let fold = Fold { ticks: 1, lead: 0 };
-        let isa = Isa::Portable;
         let mut replaced = 0;
         let mut first = 0;
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(BLOCK - state.since);
-            let samples = &mut state.input[..];
-            replaced += source.gather(
-                first,
-                ticks,
-                RowsMut { samples, stride: BLOCK, channels: self.channels, fold, isa },
-            );
-            let (u, y) = (&state.input, &mut state.output);
-            run_recursion(self.isa, &self.columns, &mut state.registers, u, y, BLOCK, ticks);
-            let rows = Rows { samples: &state.output[..], stride: BLOCK, phases: self.ratio, fold, isa };
-            sink.scatter(first, ticks, rows);
+            let input = state.window.room(ticks);
+            source.gather(self.isa, first, ticks, input);
+            if !T::all_finite(self.isa, input) {
+                replaced += replace_not_finite(input);
+            }
+            self.filter(state, ticks);
+            sink.store(self.isa, first * self.ratio, &state.output[..ticks * self.ratio]);
             state.pass(ticks);
             first += ticks;
         }
         replaced
     }
+
+    fn filter(&self, state: &mut StateSpaceState<T>, ticks: usize) {
+        let StateSpaceState { window, rows, output, further, .. } = state;
+        self.advance.run(&self.recursion, rows, window.view(), self.channels, ticks);
+        self.from_inputs.run(&self.fir, window.view(), ticks, output);
+        if self.recursion.states > 0 {
+            self.from_states.run(&self.fir, rows, ticks, further);
+            output.iter_mut().zip(&further[..ticks * self.hop()]).for_each(|(y, more)| *y = *y + *more);
+        }
+        if self.hop() > self.ratio {
+            (0..ticks).for_each(|t| output[t] = output[t * self.hop()]);
+        }
+    }
 }
 
-impl StateSpaceState {
+impl<T: Sample> StateSpaceState<T> {
     /// As new.
     pub(crate) fn reset(&mut self) {
-        self.registers.z.fill(0.0);
+        self.rows.fill(T::default());
+        self.window.reset();
         self.since = 0;
         self.resets = 0;
     }
 
-    /// Counts ticks; at the end of a block the state is looked after.
+    /// The last row becomes the first; at the end of a block the state is looked after.
     fn pass(&mut self, ticks: usize) {
+        self.window.advance(ticks);
+        self.rows.copy_within(ticks * self.states..(ticks + 1) * self.states, 0);
         self.since = (self.since + ticks) % BLOCK;
-        if self.since > 0 {
-            return;
+        if self.since == 0 {
+            self.look_after();
         }
-        let x = &mut self.registers.z[..self.states];
+    }
+
+    fn look_after(&mut self) {
+        let x = &mut self.rows[..self.states];
         // A NaN never leaves a recursion by itself.
-        if !x.iter().all(|value| value.is_finite()) {
-            x.fill(0.0);
+        if !x.iter().all(|value| value.finite()) {
+            x.fill(T::default());
             self.resets += 1;
         }
         // Numbers that fade away become denormal in the end, and slow.
-        x.iter_mut().filter(|value| value.abs() < NEGLIGIBLE).for_each(|value| *value = 0.0);
+        let tiny = |value: &T| *value < T::NEGLIGIBLE && T::from_f64(-value.to_f64()) < T::NEGLIGIBLE;
+        x.iter_mut().filter(|value| tiny(value)).for_each(|value| *value = T::default());
     }
 }
 
-/// The lane of each state such that every 2 x 2 block of a block-diagonal A is a pair of neighbours
-/// (2l, 2l + 1); `None` if A is not of that form.
-fn modal_lanes(a: &[Vec<f64>]) -> Option<Vec<usize>> {
-    let n = a.len();
-    let coupled = |i: usize, j: usize| a[i][j] != 0.0 || a[j][i] != 0.0;
-    if (0..n).any(|i| (i + 2..n).any(|j| coupled(i, j))) {
-        return None;
-    }
-    let mut lanes = Vec::with_capacity(n);
-    let mut lane = 0;
-    while lanes.len() < n {
-        let i = lanes.len();
-        let pair = i + 1 < n && coupled(i, i + 1);
-        if pair && i + 2 < n && coupled(i + 1, i + 2) {
-            return None;
-        }
-        lane += usize::from(pair && lane % 2 == 1);
-        lanes.extend(lane..lane + 1 + usize::from(pair));
-        lane += 1 + usize::from(pair);
-    }
-    Some(lanes)
+/// An FIR filter from frames to phases.
+#[derive(Debug)]
+struct Readout<T: Sample> {
+    cut: Cut,
+    /// M, or 2 if M is 1: the kernels make at least two.
+    phases: usize,
+    groups: Vec<PhaseGroup<T>>,
 }
 
-fn columns(filter: &BlockFilter, channels: usize, ratio: usize) -> Columns {
-    let n = filter.a.len();
-    let modal = modal_lanes(&filter.a);
-    let lanes = modal.clone().unwrap_or_else(|| (0..n).collect());
-    let states = lanes.last().map_or(0, |lane| lane + 1).next_multiple_of(RECURSION_LANES);
-    let outputs = ratio.next_multiple_of(RECURSION_LANES);
-    let modal = modal.map(|_| modal_factors(&filter.a, &lanes, states));
-    // Columns before those of the inputs.
-    let before = if modal.is_some() { 0 } else { states };
-    let mut next = Aligned::new(states * (before + channels));
-    let mut output = Aligned::new(outputs * (states + channels));
-    for (i, &lane) in lanes.iter().enumerate() {
-        (0..channels).for_each(|u| next[(before + u) * states + lane] = filter.b[i][u]);
-        (0..ratio).for_each(|p| output[lane * outputs + p] = filter.c[p][i]);
-        if modal.is_none() {
-            (0..n).for_each(|j| next[lanes[j] * states + lane] = filter.a[i][j]);
+impl<T: Sample> Readout<T> {
+    /// `factor(e, p)`: of the sample e before the last one of a frame, for phase p.
+    fn new(cut: Cut, ratio: usize, factor: impl Fn(usize, usize) -> f64) -> Self {
+        let phases = ratio.max(2);
+        let factor = |e: usize, p: usize| if p < ratio { factor(e, p) } else { 0.0 };
+        let groups = widths(phases).map(|(first, width)| phase_group(cut, first, width, &factor)).collect();
+        Self { cut, phases, groups }
+    }
+
+    fn run(&self, kernel: &FirKernel<T>, x: &[T], ticks: usize, out: &mut [T]) {
+        for group in &self.groups {
+            kernel.run(group, self.cut, x, ticks, &mut out[group.first..], self.phases);
         }
     }
-    for p in 0..ratio {
-        (0..channels).for_each(|u| output[(states + u) * outputs + p] = filter.d[p][u]);
-    }
-    Columns { states, inputs: channels, phases: ratio, outputs, modal, next, output }
 }
 
-/// Factors of each state itself and of its neighbour.
-fn modal_factors(a: &[Vec<f64>], lanes: &[usize], states: usize) -> [Aligned<f64>; 2] {
-    let [mut own, mut neighbour] = [Aligned::new(states), Aligned::new(states)];
-    for (i, &lane) in lanes.iter().enumerate() {
-        own[lane] = a[i][i];
-        let partner = lanes.iter().position(|&other| other == lane ^ 1);
-        neighbour[lane] = partner.map_or(0.0, |j| a[i][j]);
-    }
-    [own, neighbour]
+/// Where things lie: in a window of frames of N inputs, and in rows of S states.
+struct Layout {
+    /// Of the recursion.
+    lanes: usize,
+    channels: usize,
+    inputs: Cut,
+    /// S.
+    states: usize,
+    state_rows: Cut,
+    /// Place of each state among the S.
+    places: Vec<usize>,
+    modal: bool,
 }
 
-fn check_matrix(
+impl Layout {
+    fn new(structure: &Structure, channels: usize, lanes: usize, group: usize) -> Result<Self, BuildError> {
+        let order = structure.a.len();
+        let history = structure.history();
+        let len = (history + 1)
+            .checked_mul(channels)
+            .filter(|&len| len <= u32::MAX as usize / 64)
+            .ok_or(BuildError::TooLong { history, channels })?;
+        let sections = structure.sections();
+        let modal = sections.is_some();
+        let places =
+            sections.map_or_else(|| (0..order).collect(), |twos| section_places(&twos, order, lanes));
+        let states =
+            places.iter().max().map_or(0, |place| place + 1).next_multiple_of((2 * lanes).max(group));
+        // Where there is no state, the readout is not used.
+        let state_rows = Cut::new(states.max(group), states, group);
+        Ok(Self {
+            lanes,
+            channels,
+            inputs: Cut::new(channels, len, group),
+            states,
+            state_rows,
+            places,
+            modal,
+        })
+    }
+
+    fn place(&self, (channel, ticks): Past) -> u32 {
+        (self.inputs.past() - ticks * self.channels + channel) as u32
+    }
+
+    /// The state at each place; `None` for padding.
+    fn occupants(&self) -> Vec<Option<usize>> {
+        let mut occupants = vec![None; self.states.max(self.state_rows.hop)];
+        self.places.iter().enumerate().for_each(|(state, &place)| occupants[place] = Some(state));
+        occupants
+    }
+
+    fn from_inputs<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+        let n = self.channels;
+        Readout::new(self.inputs, ratio, |e, p| {
+            structure.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |factors| factors[p])
+        })
+    }
+
+    fn from_states<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+        let occupants = self.occupants();
+        let last = occupants.len() - 1;
+        Readout::new(self.state_rows, ratio, |e, p| {
+            occupants[last - e].map_or(0.0, |state| structure.c[state][p])
+        })
+    }
+
+    fn recursion<T: Sample>(&self, structure: &Structure) -> Recursion<T> {
+        let columns = Columns { layout: self, structure, occupants: self.occupants() };
+        let form = if self.modal {
+            let vectors = (0..self.states).step_by(2 * self.lanes);
+            Form::Sections(vectors.map(|first| columns.section_vector(first)).collect())
+        } else {
+            Form::Dense(columns.tiles())
+        };
+        Recursion { states: self.states, form }
+    }
+}
+
+/// The columns of A and B, as the recursion takes them.
+struct Columns<'a> {
+    layout: &'a Layout,
+    structure: &'a Structure,
+    occupants: Vec<Option<usize>>,
+}
+
+impl Columns<'_> {
+    /// Factors of `count` places from `first` on, taken from one factor for each state.
+    fn column<T: Sample>(&self, factor: impl Fn(usize) -> f64, first: usize, count: usize) -> Vec<T> {
+        let places = self.occupants[first..first + count].iter();
+        places.map(|state| T::from_f64(state.map_or(0.0, &factor))).collect()
+    }
+
+    fn section_vector<T: Sample>(&self, first: usize) -> SectionVector<T> {
+        let lanes = self.layout.lanes;
+        // What the states from `to` on take from those from `from` on, lane by lane.
+        let a = |to: usize, from: usize| {
+            let pairs = self.occupants[to..to + lanes].iter().zip(&self.occupants[from..from + lanes]);
+            pairs.map(|(i, j)| i.zip(*j).map_or(0.0, |(i, j)| self.structure.a[i][j])).map(T::from_f64)
+        };
+        let (p, q) = (first, first + lanes);
+        let mut coefficients: Vec<T> = a(p, p).chain(a(p, q)).chain(a(q, p)).chain(a(q, q)).collect();
+        let mut inputs = Vec::new();
+        for (&past, factors) in &self.structure.b {
+            let column: Vec<T> = self.column(|state| factors[state], first, 2 * lanes);
+            if column.iter().any(|&factor| factor != T::default()) {
+                inputs.push(self.layout.place(past));
+                coefficients.extend(column);
+            }
+        }
+        SectionVector { inputs, coefficients: Aligned::from_slice(&coefficients) }
+    }
+
+    fn tiles<T: Sample>(&self) -> Vec<ColumnTile<T>> {
+        let mut tiles = Vec::new();
+        let mut first = 0;
+        while first < self.layout.states {
+            let left = (self.layout.states - first) / self.layout.lanes;
+            let vectors = (1 << left.ilog2()).min(ColumnTile::<T>::WIDEST);
+            tiles.push(self.tile(first, vectors));
+            first += vectors * self.layout.lanes;
+        }
+        tiles
+    }
+
+    /// Columns of zeros are left out, so that triangles and blocks cost less than full matrices.
+    fn tile<T: Sample>(&self, first: usize, vectors: usize) -> ColumnTile<T> {
+        let (mut inputs, mut columns, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
+        let mut keep = |list: &mut Vec<u32>, place: u32, column: Vec<T>| {
+            if column.iter().any(|&factor| factor != T::default()) {
+                list.push(place);
+                coefficients.extend(column);
+            }
+        };
+        let count = vectors * self.layout.lanes;
+        for (&past, factors) in &self.structure.b {
+            keep(&mut inputs, self.layout.place(past), self.column(|i| factors[i], first, count));
+        }
+        for (j, &place) in self.layout.places.iter().enumerate() {
+            keep(&mut columns, place as u32, self.column(|i| self.structure.a[i][j], first, count));
+        }
+        ColumnTile { first, vectors, inputs, columns, coefficients: Aligned::from_slice(&coefficients) }
+    }
+}
+
+/// Places of the states of sections: L first ones, their L partners, and so on.
+fn section_places(sections: &[(usize, Option<usize>)], order: usize, lanes: usize) -> Vec<usize> {
+    let mut places = vec![0; order];
+    for (s, &(one, other)) in sections.iter().enumerate() {
+        let place = s / lanes * 2 * lanes + s % lanes;
+        places[one] = place;
+        if let Some(other) = other {
+            places[other] = place + lanes;
+        }
+    }
+    places
+}
+
+fn check_matrix<T: Sample>(
     name: &'static str,
     rows: &[Vec<f64>],
     (wanted_rows, wanted_cols): (usize, usize),
@@ -201,7 +378,7 @@ fn check_matrix(
             ratio,
         });
     }
-    match rows.iter().flatten().enumerate().find(|(_, value)| !value.is_finite()) {
+    match rows.iter().flatten().enumerate().find(|(_, value)| !T::from_f64(**value).finite()) {
         Some((index, &value)) => Err(BuildError::NotFinite {
             place: format!("matrix {name} of the state-space filters"),
             index,
@@ -229,7 +406,7 @@ mod tests {
         out
     }
 
-    fn run(
+    fn run<T: Sample>(
         filter: &BlockFilter,
         n: usize,
         m: usize,
@@ -237,7 +414,7 @@ mod tests {
         input: &[f64],
         cut: usize,
     ) -> (Vec<f64>, bool) {
-        let plan = StateSpacePlan::new(filter, n, m, isa).unwrap();
+        let plan = StateSpacePlan::<T>::new(filter, n, m, isa).unwrap();
         let mut state = plan.state();
         let mut out = vec![0.0; input.len() / n * m];
         for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
@@ -272,26 +449,108 @@ mod tests {
                 let filter = random(order, n, m, blocks, &mut noise);
                 let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
                 let want = definition(&filter, &input, n);
-                let (whole, is_modal) = run(&filter, n, m, Isa::detect(), &input, 300);
+                let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
                 // Small dense matrices are block-diagonal too.
                 assert!(is_modal || (blocks.is_none() && order > 2), "{order} {blocks:?}");
                 let worst = whole.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(worst < 1e-12, "order {order} N {n} M {m}: {worst:e}");
                 for cut in [1, 7, 63, 64, 65, 129] {
-                    assert_eq!(run(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+                    assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
                 }
-                let portable = run(&filter, n, m, Isa::Portable, &input, 300).0;
+                let portable = run::<f64>(&filter, n, m, Isa::Portable, &input, 300).0;
                 let apart = whole.iter().zip(&portable).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(apart < 1e-12, "{apart:e}");
             }
         }
     }
 
+    fn worst(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// The same filter with its inputs `ticks` ticks late, in a delay line that the output reads too: the form of
+    /// designed banks.
+    fn behind(core: &BlockFilter, ticks: usize, noise: &mut Noise) -> BlockFilter {
+        let (states, n) = (core.a.len(), core.d[0].len());
+        let order = states + ticks * n;
+        let mut a = vec![vec![0.0; order]; order];
+        for (i, row) in a.iter_mut().enumerate() {
+            match core.a.get(i) {
+                Some(own) => {
+                    row[..states].copy_from_slice(own);
+                    row[states..states + n].copy_from_slice(&core.b[i]);
+                }
+                None if i + n < order => row[i + n] = 1.0,
+                None => {}
+            }
+        }
+        let newest = |i: usize, u: usize| f64::from(u8::from(i == order - n + u));
+        let b = (0..order).map(|i| (0..n).map(|u| newest(i, u)).collect()).collect();
+        let read = |row: &Vec<f64>| row.iter().copied().chain((0..ticks * n).map(|_| noise.next())).collect();
+        BlockFilter { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
+    }
+
+    #[test]
+    fn delay_lines_before_the_states_follow_the_definition() {
+        let mut noise = Noise(22);
+        for (order, blocks) in [(0, None), (2, Some(&[2][..])), (5, Some(&[2, 1, 2])), (4, None)] {
+            for (n, m, ticks) in [(1, 1, 3), (1, 3, 1), (2, 2, 5), (3, 2, 4), (4, 4, 17), (5, 9, 2)] {
+                let filter = behind(&random(order, n, m, blocks, &mut noise), ticks, &mut noise);
+                let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
+                let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+                assert!(is_modal || (blocks.is_none() && order > 2));
+                let error = worst(&whole, &definition(&filter, &input, n));
+                assert!(error < 1e-12, "order {order} N {n} M {m} behind {ticks}: {error:e}");
+                for cut in [1, 63, 65] {
+                    assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn in_single_precision_the_error_is_what_the_poles_make_of_rounding() {
+        let mut noise = Noise(23);
+        for radius in [0.5, 0.9, 0.99, 0.999] {
+            let mut filter = random(6, 2, 3, Some(&[2, 2, 2]), &mut noise);
+            for (k, pair) in filter.a.chunks_mut(2).enumerate() {
+                let (s, c) = (0.3 + k as f64).sin_cos();
+                (pair[0][2 * k], pair[0][2 * k + 1]) = (radius * c, radius * s);
+                (pair[1][2 * k], pair[1][2 * k + 1]) = (-radius * s, radius * c);
+            }
+            let input: Vec<f64> = (0..2 * 3000).map(|_| f64::from(noise.next() as f32)).collect();
+            let want = definition(&filter, &input, 2);
+            let single = run::<f32>(&filter, 2, 3, Isa::detect(), &input, 3000).0;
+            let size = want.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+            let error = worst(&single, &want) / size;
+            assert!(error > 1e-9, "this is not single precision: {error:e}");
+            assert!(error < 8.0 * f64::from(f32::EPSILON) / (1.0 - radius), "radius {radius}: {error:e}");
+            for cut in [1, 63, 65] {
+                assert_eq!(run::<f32>(&filter, 2, 3, Isa::detect(), &input, cut).0, single, "cut {cut}");
+            }
+        }
+    }
+
+    #[test]
+    fn zero_columns_of_triangles_are_not_multiplied() {
+        let mut noise = Noise(24);
+        let mut filter = random(24, 1, 2, None, &mut noise);
+        (0..24).for_each(|i| filter.a[i][..i].fill(0.0));
+        let plan = StateSpacePlan::<f64>::new(&filter, 1, 2, Isa::detect()).unwrap();
+        let Form::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
+        let columns: Vec<usize> = tiles.iter().map(|tile| tile.columns.len()).collect();
+        assert_eq!(columns[0], 24);
+        assert!(columns[1..].iter().all(|&count| count < 24), "{columns:?}");
+        let input: Vec<f64> = (0..300).map(|_| noise.next()).collect();
+        let got = run::<f64>(&filter, 1, 2, Isa::detect(), &input, 300).0;
+        assert!(worst(&got, &definition(&filter, &input, 1)) < 1e-12);
+    }
+
     #[test]
     fn a_state_that_fades_away_becomes_zero() {
         let filter =
             BlockFilter { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
-        let plan = StateSpacePlan::new(&filter, 1, 1, Isa::detect()).unwrap();
+        let plan = StateSpacePlan::<f64>::new(&filter, 1, 1, Isa::detect()).unwrap();
         let mut state = plan.state();
         let mut input = vec![0.0; 1200];
         input[0] = 1.0;

@@ -42,26 +42,36 @@ pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Ve
     (0..channels).map(|_| (0..taps).map(|_| noise.next()).collect()).collect()
 }
 
-/// The scalar twin: the same sums in the same order, fused if the kernels fuse.
+/// The scalar twin: the same sums in the same order, fused if the kernels fuse. The window of a tick, or of two
+/// if they are taken together, is cut into steps of D samples, the newest first; each of D lanes sums its
+/// place of the steps, and the lanes are added as a tree.
 fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32> {
     let n = taps.len();
-    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap();
-    let ticks = input.len() / n;
-    let mut out = Vec::new();
-    for k in 0..ticks {
-        for p in 0..ratio {
-            let mut sum = 0f32;
-            for (i, f) in taps.iter().enumerate() {
-                for j in 0..lags {
-                    let c = f.get(p + j * ratio).copied().unwrap_or(0.0) as f32;
-                    let x = if j <= k { input[(k - j) * n + i] } else { 0.0 };
-                    sum = if fused { x.mul_add(c, sum) } else { x * c + sum };
-                }
+    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap().max(1);
+    let fold = if n == 1 || ratio == 1 { 2 } else { 1 };
+    let hop = n * fold;
+    let depth = if hop == 2 || hop == 4 { hop } else { 8 };
+    let steps = ((lags + fold - 1) * n).div_ceil(depth);
+    let output = |k: usize, p: usize| {
+        // The end of the super-tick, in samples; what is not there yet has coefficient 0.
+        let end = (k / fold + 1) * hop;
+        let mut lanes = [0f32; 8];
+        for s in 0..steps {
+            for d in 0..depth {
+                let Some(at) = end.checked_sub((s + 1) * depth - d) else { continue };
+                let tap = k.checked_sub(at / n).and_then(|lag| taps[at % n].get(p + lag * ratio));
+                let (x, c) = (input.get(at).copied().unwrap_or(0.0), tap.map_or(0.0, |&c| c as f32));
+                lanes[d] = if fused { x.mul_add(c, lanes[d]) } else { x * c + lanes[d] };
             }
-            out.push(sum);
         }
-    }
-    out
+        let four = |l: &[f32]| (l[0] + l[2]) + (l[1] + l[3]);
+        match depth {
+            2 => lanes[0] + lanes[1],
+            4 => four(&lanes),
+            _ => four(&lanes) + four(&lanes[4..]),
+        }
+    };
+    (0..input.len() / n).flat_map(|k| (0..ratio).map(move |p| (k, p))).map(|(k, p)| output(k, p)).collect()
 }
 
 /// The definition in f64.
@@ -299,10 +309,9 @@ fn a_recursion_that_overflows_begins_anew_and_says_so() {
         filter.a = vec![vec![1e200, 0.0], vec![0.0, 0.5]];
     }
     let mut stream = Reconstructor::new(&bank).unwrap();
-    // The state is looked after every 64 ticks.
-    let mut input = [0.0; 64];
+    let mut input = [0.0; state_space::BLOCK];
     input[0] = 1.0;
-    stream.process(&input, &mut [0.0; 3 * 64]).unwrap();
+    stream.process(&input, &mut [0.0; 3 * state_space::BLOCK]).unwrap();
     assert_eq!(stream.state_resets(), 1);
     let mut out = [0.0; 3];
     stream.process(&[2.0], &mut out).unwrap();

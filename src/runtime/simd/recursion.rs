@@ -1,204 +1,303 @@
-//! State-space filters tick by tick, states in lanes, in f64.
+//! State recursions x+ = A x + B u, states in lanes.
 //!
-//! x+ = A x + B u, y = C x + D u as sums of columns: one broadcast of a state or an input serves all
-//! states, or all phases, at once. A block-diagonal A (modal form: real poles alone, conjugate pairs
-//! as 2 x 2 blocks) needs two multiply-adds a vector of states instead of one for each state.
+//! Inputs are frames as they lie; the states become frames of their own, one a tick, so that the FIR kernels can
+//! read both. Sections (two states that depend on one another at most) take 2 + 2 multiply-adds and two for each
+//! input; any other A is a sum of its columns, one broadcast of a state serving all states.
+//!
+//! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
 
 use super::Isa;
 #[cfg(target_arch = "x86_64")]
-use super::vector::{Avx2F64, Avx512F64};
-use super::vector::{Pairs, Portable};
+use super::vector::{Avx2F32, Avx2F64};
+use super::vector::{Portable, Vector};
 use crate::runtime::aligned::Aligned;
 
-/// States and phases are padded to whole vectors of every instruction set.
-pub(crate) const LANES: usize = 8;
-/// Partial sums of an output, so that a sum need not wait for the one before.
-const PARTS: usize = 4;
+/// Ticks of a section that are computed together.
+const STEP: usize = 4;
 
-/// The coefficients, by columns of padded length.
+/// A in the form in which it runs, with B.
 #[derive(Debug)]
-pub(crate) struct Columns {
-    /// S, states after padding; neighbours 2l and 2l + 1 may be a pair.
+pub(crate) struct Recursion<T: Copy + Default> {
+    /// S, states after padding to whole vectors.
     pub(crate) states: usize,
-    /// N.
-    pub(crate) inputs: usize,
-    /// M.
-    pub(crate) phases: usize,
-    /// M after padding.
-    pub(crate) outputs: usize,
-    /// Modal form: factor of a state itself and of its neighbour.
-    pub(crate) modal: Option<[Aligned<f64>; 2]>,
-    /// S values for each input (modal), or for each state and then each input (dense).
-    pub(crate) next: Aligned<f64>,
-    /// M values (padded) for each state, then for each input.
-    pub(crate) output: Aligned<f64>,
+    pub(crate) form: Form<T>,
 }
 
-/// The state of a stream: z = (x, u) and room for x+ and y.
-#[derive(Debug, Clone)]
-pub(crate) struct Registers {
-    pub(crate) z: Aligned<f64>,
-    next: Aligned<f64>,
-    output: Aligned<f64>,
+/// How the states depend on one another.
+#[derive(Debug)]
+pub(crate) enum Form<T: Copy + Default> {
+    /// By twos: states 2 v L + l and 2 v L + L + l, L lanes a vector, belong to section v L + l.
+    Sections(Vec<SectionVector<T>>),
+    /// In any way.
+    Dense(Vec<ColumnTile<T>>),
 }
 
-impl Registers {
-    pub(crate) fn new(columns: &Columns) -> Self {
-        Self {
-            z: Aligned::new(columns.states + columns.inputs),
-            next: Aligned::new(columns.states),
-            output: Aligned::new(columns.outputs),
+/// L sections side by side: p+ = a11 p + a12 q + b1 u, q+ = a22 q + a21 p + b2 u.
+#[derive(Debug)]
+pub(crate) struct SectionVector<T: Copy + Default> {
+    /// Place in the window of each input that any of them has.
+    pub(crate) inputs: Vec<u32>,
+    /// Vectors a11, a12, a21, a22, then b1 and b2 for each input.
+    pub(crate) coefficients: Aligned<T>,
+}
+
+/// Up to [`ColumnTile::WIDEST`] vectors of states that are computed together.
+#[derive(Debug)]
+pub(crate) struct ColumnTile<T: Copy + Default> {
+    /// The first state, and how many vectors follow: 1, 2, 4 or 8.
+    pub(crate) first: usize,
+    pub(crate) vectors: usize,
+    /// Place in the window of each input, and index of each state, with a column that is not zero.
+    pub(crate) inputs: Vec<u32>,
+    pub(crate) columns: Vec<u32>,
+    /// The columns of all inputs, then of all states.
+    pub(crate) coefficients: Aligned<T>,
+}
+
+impl<T: Copy + Default> ColumnTile<T> {
+    /// Sums that keep two multiply-adds a cycle busy.
+    pub(crate) const WIDEST: usize = 8;
+}
+
+/// One call of a kernel, checked.
+struct Job<'a, T: Copy + Default> {
+    recursion: &'a Recursion<T>,
+    rows: *mut T,
+    window: *const T,
+    hop: usize,
+    ticks: usize,
+}
+
+/// The recursion of one sample type on one instruction set.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RecursionKernel<T: Copy + Default> {
+    /// L, lanes of a vector.
+    pub(crate) lanes: usize,
+    run: unsafe fn(&Job<'_, T>),
+}
+
+impl<T: Copy + Default> RecursionKernel<T> {
+    /// Goes on by `ticks` ticks: row 0 of `rows` (rows of S states) is the state before them, row t + 1 becomes that
+    /// after tick t. An input of tick t is `window[place + t * hop]` for the input's place.
+    ///
+    /// # Panics
+    /// If anything is too short for that.
+    pub(crate) fn run(
+        &self,
+        recursion: &Recursion<T>,
+        rows: &mut [T],
+        window: &[T],
+        hop: usize,
+        ticks: usize,
+    ) {
+        if recursion.states == 0 || ticks == 0 {
+            return;
+        }
+        assert!((ticks + 1) * recursion.states <= rows.len());
+        assert!((ticks - 1) * hop < window.len());
+        recursion.form.check(recursion.states, self.lanes, window.len() - (ticks - 1) * hop);
+        let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
+        // SAFETY: the kernel was chosen for an available instruction set (`Isa::is_available`), and all its loads and
+        // stores lie within the bounds asserted above.
+        unsafe { (self.run)(&Job { recursion, rows, window, hop, ticks }) }
+    }
+}
+
+impl<T: Copy + Default> Form<T> {
+    /// Everything that the kernels rely on; places lie before `end`.
+    fn check(&self, states: usize, lanes: usize, end: usize) {
+        let inside = |places: &[u32]| places.iter().all(|&place| (place as usize) < end);
+        match self {
+            Self::Sections(vectors) => {
+                assert!(vectors.len() * 2 * lanes == states);
+                assert!(vectors.iter().all(|v| {
+                    inside(&v.inputs) && v.coefficients.len() == (4 + 2 * v.inputs.len()) * lanes
+                }));
+            }
+            Self::Dense(tiles) => assert!(tiles.iter().all(|tile| {
+                let terms = tile.inputs.len() + tile.columns.len();
+                matches!(tile.vectors, 1 | 2 | 4 | 8)
+                    && tile.first + tile.vectors * lanes <= states
+                    && tile.columns.iter().all(|&j| (j as usize) < states)
+                    && inside(&tile.inputs)
+                    && tile.coefficients.len() == terms * tile.vectors * lanes
+            })),
         }
     }
-}
-
-/// Runs ticks `0..ticks`: input i of tick k is `u[i * stride + k]`, phase p becomes `y[p * stride + k]`.
-///
-/// # Panics
-/// If a slice is too short.
-pub(crate) fn run(
-    isa: Isa,
-    columns: &Columns,
-    registers: &mut Registers,
-    u: &[f64],
-    y: &mut [f64],
-    stride: usize,
-    ticks: usize,
-) {
-    columns.check(registers);
-    assert!(columns.phases <= columns.outputs);
-    match isa {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: the processor was asked; the sizes are checked above.
-        Isa::Avx2 if isa.is_available() => unsafe { avx2(columns, registers, u, y, stride, ticks) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Isa::Avx512 if isa.is_available() => unsafe { avx512(columns, registers, u, y, stride, ticks) },
-        // SAFETY: the sizes are checked above.
-        _ => unsafe { block::<Portable<f64>>(columns, registers, u, y, stride, ticks) },
-    }
-}
-
-impl Columns {
-    fn check(&self, registers: &Registers) {
-        let (s, n) = (self.states, self.inputs);
-        assert!(s.is_multiple_of(LANES) && self.outputs.is_multiple_of(LANES));
-        let feeding = if self.modal.is_some() { n } else { s + n };
-        assert!(self.next.len() == s * feeding && self.output.len() == self.outputs * (s + n));
-        assert!(self.modal.iter().flatten().all(|factors| factors.len() == s));
-        assert!(registers.z.len() == s + n && registers.next.len() == s);
-        assert!(registers.output.len() == self.outputs);
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn avx2(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], stride: usize, ticks: usize) {
-    // SAFETY: the caller's.
-    unsafe { block::<Avx2F64>(c, r, u, y, stride, ticks) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
-unsafe fn avx512(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], stride: usize, ticks: usize) {
-    // SAFETY: the caller's.
-    unsafe { block::<Avx512F64>(c, r, u, y, stride, ticks) }
 }
 
 #[inline(always)]
-unsafe fn block<V: Pairs>(
-    columns: &Columns,
-    registers: &mut Registers,
-    u: &[f64],
-    y: &mut [f64],
-    stride: usize,
-    ticks: usize,
-) {
-    for k in 0..ticks {
-        for (i, slot) in registers.z[columns.states..].iter_mut().enumerate() {
-            *slot = u[i * stride + k];
+unsafe fn run<V: Vector>(job: &Job<'_, V::Sample>)
+where
+    V::Sample: Default,
+{
+    // SAFETY: the caller's, see `RecursionKernel::run`.
+    unsafe {
+        match &job.recursion.form {
+            Form::Sections(vectors) => {
+                let whole = job.ticks / STEP * STEP;
+                (0..whole).step_by(STEP).for_each(|t| sections::<V, STEP>(job, vectors, t));
+                (whole..job.ticks).for_each(|t| sections::<V, 1>(job, vectors, t));
+            }
+            Form::Dense(tiles) => (0..job.ticks).for_each(|t| dense::<V>(job, tiles, t)),
         }
-        // SAFETY: the sizes are checked by `run`.
+    }
+}
+
+/// T ticks from tick t on. One vector of sections after the other: while one waits for its own states, the next
+/// can begin.
+#[inline(always)]
+unsafe fn sections<V: Vector, const T: usize>(
+    job: &Job<'_, V::Sample>,
+    vectors: &[SectionVector<V::Sample>],
+    t: usize,
+) where
+    V::Sample: Default,
+{
+    let states = job.recursion.states;
+    for (v, vector) in vectors.iter().enumerate() {
+        // SAFETY: the caller's, see `RecursionKernel::run`.
         unsafe {
-            outputs::<V>(columns, registers);
-            match &columns.modal {
-                Some([own, neighbour]) => modal::<V>(columns, own, neighbour, registers),
-                None => dense::<V>(columns, registers),
+            let row = job.rows.add(t * states + 2 * v * V::LANES);
+            section_vector::<V, T>(vector, row, states, job.window.add(t * job.hop), job.hop);
+        }
+    }
+}
+
+/// T ticks: the inputs of all of them first, which do not wait for the states.
+#[inline(always)]
+unsafe fn section_vector<V: Vector, const T: usize>(
+    vector: &SectionVector<V::Sample>,
+    mut row: *mut V::Sample,
+    states: usize,
+    window: *const V::Sample,
+    hop: usize,
+) where
+    V::Sample: Default,
+{
+    // SAFETY: the caller's, see `RecursionKernel::run`.
+    unsafe {
+        let mut coefficients = vector.coefficients.as_ptr();
+        let [a11, a12] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+        coefficients = coefficients.add(2 * V::LANES);
+        let [a21, a22] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+        let zero = V::splat(V::Sample::default());
+        let mut sums = [[zero; 2]; T];
+        for &place in &vector.inputs {
+            let mut input = window.add(place as usize);
+            coefficients = coefficients.add(2 * V::LANES);
+            let [b1, b2] = [V::load(coefficients), V::load(coefficients.add(V::LANES))];
+            for [p, q] in &mut sums {
+                let u = V::splat(*input);
+                *p = u.mul_add(b1, *p);
+                *q = u.mul_add(b2, *q);
+                // May leave the window after the last tick, where nothing is read.
+                input = input.wrapping_add(hop);
             }
         }
-        for p in 0..columns.phases {
-            y[p * stride + k] = registers.output[p];
+        let (mut p, mut q) = (V::load(row), V::load(row.add(V::LANES)));
+        for [b1u, b2u] in sums {
+            (p, q) = (p.mul_add(a11, q.mul_add(a12, b1u)), q.mul_add(a22, p.mul_add(a21, b2u)));
+            row = row.add(states);
+            p.store(row);
+            q.store(row.add(V::LANES));
         }
     }
 }
 
-/// y = C x + D u, in four partial sums.
+/// Tick t, for any A.
 #[inline(always)]
-unsafe fn outputs<V: Pairs>(columns: &Columns, registers: &mut Registers) {
-    let count = columns.states + columns.inputs;
-    for first in (0..columns.phases).step_by(V::LANES) {
-        // SAFETY: column j has `outputs` values, see `Columns::check`.
+unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Sample>], t: usize)
+where
+    V::Sample: Default,
+{
+    for tile in tiles {
+        // SAFETY: the caller's, see `RecursionKernel::run`.
         unsafe {
-            let zero = V::splat(0.0);
-            let mut parts = [zero; PARTS];
-            let z = registers.z.as_ptr();
-            let output = columns.output.as_ptr().add(first);
-            let column = |j: usize| V::load(output.add(j * columns.outputs));
-            let mut j = 0;
-            while j + PARTS <= count {
-                for (part, sum) in parts.iter_mut().enumerate() {
-                    *sum = column(j + part).mul_add(V::splat(*z.add(j + part)), *sum);
+            match tile.vectors {
+                1 => column_tile::<V, 1>(job, tile, t),
+                2 => column_tile::<V, 2>(job, tile, t),
+                4 => column_tile::<V, 4>(job, tile, t),
+                _ => column_tile::<V, 8>(job, tile, t),
+            }
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn column_tile<V: Vector, const R: usize>(
+    job: &Job<'_, V::Sample>,
+    tile: &ColumnTile<V::Sample>,
+    t: usize,
+) where
+    V::Sample: Default,
+{
+    let states = job.recursion.states;
+    // SAFETY: the caller's, see `RecursionKernel::run`.
+    unsafe {
+        let mut sums = [V::splat(V::Sample::default()); R];
+        let (x, window) = (job.rows.add(t * states), job.window.add(t * job.hop));
+        let mut column = tile.coefficients.as_ptr();
+        for &place in &tile.inputs {
+            add_column(&mut sums, V::splat(*window.add(place as usize)), column);
+            column = column.add(R * V::LANES);
+        }
+        for &j in &tile.columns {
+            add_column(&mut sums, V::splat(*x.add(j as usize)), column);
+            column = column.add(R * V::LANES);
+        }
+        for (r, sum) in sums.into_iter().enumerate() {
+            sum.store(x.add(states + tile.first + r * V::LANES));
+        }
+    }
+}
+
+/// sums <- sums + value times R vectors of a column.
+#[inline(always)]
+unsafe fn add_column<V: Vector, const R: usize>(sums: &mut [V; R], value: V, column: *const V::Sample) {
+    for (r, sum) in sums.iter_mut().enumerate() {
+        // SAFETY: the caller's, see `RecursionKernel::run`.
+        *sum = unsafe { value.mul_add(V::load(column.add(r * V::LANES)), *sum) };
+    }
+}
+
+macro_rules! kernel {
+    ($name:ident, $vector:ty, $sample:ty $(, $features:literal)?) => {
+        impl RecursionKernel<$sample> {
+            fn $name() -> Self {
+                $(#[target_feature(enable = $features)])?
+                unsafe fn compiled(job: &Job<'_, $sample>) {
+                    // SAFETY: the caller's, see `RecursionKernel::run`.
+                    unsafe { run::<$vector>(job) }
                 }
-                j += PARTS;
+                Self { lanes: <$vector>::LANES, run: compiled }
             }
-            while j < count {
-                parts[0] = column(j).mul_add(V::splat(*z.add(j)), parts[0]);
-                j += 1;
-            }
-            let one = V::splat(1.0);
-            let [a, b, c, d] = parts;
-            let sum = a.mul_add(one, b).mul_add(one, c.mul_add(one, d));
-            sum.store(registers.output.as_mut_ptr().add(first));
         }
-    }
+    };
 }
 
-/// x+ for a block-diagonal A: inputs first, which do not wait for the states.
-#[inline(always)]
-unsafe fn modal<V: Pairs>(columns: &Columns, own: &[f64], neighbour: &[f64], registers: &mut Registers) {
-    let s = columns.states;
-    // In place: a vector of states depends on itself and on the inputs alone.
-    let z = registers.z.as_mut_ptr();
-    let (next, own, neighbour) = (columns.next.as_ptr(), own.as_ptr(), neighbour.as_ptr());
-    for first in (0..s).step_by(V::LANES) {
-        // SAFETY: all columns have S values, see `Columns::check`.
-        unsafe {
-            let mut sum = V::splat(0.0);
-            for i in 0..columns.inputs {
-                sum = V::load(next.add(i * s + first)).mul_add(V::splat(*z.add(s + i)), sum);
+kernel!(portable, Portable<f32>, f32);
+kernel!(portable, Portable<f64>, f64);
+#[cfg(target_arch = "x86_64")]
+kernel!(avx2, Avx2F32, f32, "avx2,fma");
+#[cfg(target_arch = "x86_64")]
+kernel!(avx2, Avx2F64, f64, "avx2,fma");
+
+macro_rules! choose {
+    ($sample:ty) => {
+        impl RecursionKernel<$sample> {
+            /// The kernel for an instruction set; the portable one where the processor does not have it. With AVX-512 it
+            /// is that of AVX2: the few sections of a usual bank would leave wider vectors empty.
+            pub(crate) fn new(isa: Isa) -> Self {
+                match isa {
+                    #[cfg(target_arch = "x86_64")]
+                    Isa::Avx2 | Isa::Avx512 if isa.is_available() => Self::avx2(),
+                    _ => Self::portable(),
+                }
             }
-            let x = V::load(z.add(first));
-            sum = x.swap_pairs().mul_add(V::load(neighbour.add(first)), sum);
-            sum = x.mul_add(V::load(own.add(first)), sum);
-            sum.store(z.add(first));
         }
-    }
+    };
 }
 
-/// x+ for any A.
-#[inline(always)]
-unsafe fn dense<V: Pairs>(columns: &Columns, registers: &mut Registers) {
-    let s = columns.states;
-    let (z, to, next) = (registers.z.as_ptr(), registers.next.as_mut_ptr(), columns.next.as_ptr());
-    for first in (0..s).step_by(V::LANES) {
-        // SAFETY: all columns have S values, see `Columns::check`.
-        unsafe {
-            let mut sum = V::splat(0.0);
-            for j in 0..s + columns.inputs {
-                sum = V::load(next.add(j * s + first)).mul_add(V::splat(*z.add(j)), sum);
-            }
-            sum.store(to.add(first));
-        }
-    }
-    registers.z[..s].copy_from_slice(&registers.next);
-}
+choose!(f32);
+choose!(f64);

@@ -1,0 +1,164 @@
+//! What a state matrix is made of: states that are nothing but past inputs, and what is left.
+
+use crate::bank::BlockFilter;
+use std::collections::BTreeMap;
+
+/// An input some ticks ago: (channel, ticks).
+pub(crate) type Past = (usize, usize);
+
+/// A state-space filter with its delay lines taken out:
+/// y = sum taps u + sum c x, x+ = sum a x + sum b u, where u are inputs of this tick and of earlier ones.
+#[derive(Debug)]
+pub(crate) struct Structure {
+    /// For each past input that the output takes, its M factors.
+    pub(crate) taps: BTreeMap<Past, Vec<f64>>,
+    /// For each past input that the states take, a factor for each state.
+    pub(crate) b: BTreeMap<Past, Vec<f64>>,
+    /// Row by row.
+    pub(crate) a: Vec<Vec<f64>>,
+    /// One list of M factors for each state.
+    pub(crate) c: Vec<Vec<f64>>,
+}
+
+impl Structure {
+    /// The matrices have fitting shapes.
+    pub(crate) fn new(filter: &BlockFilter) -> Self {
+        let past = past_inputs(filter);
+        let core: Vec<usize> = (0..past.len()).filter(|&s| past[s].is_none()).collect();
+        let read = |s: usize| filter.c.iter().map(move |row| row[s]);
+        let mut structure = Self {
+            taps: BTreeMap::new(),
+            b: BTreeMap::new(),
+            a: core.iter().map(|&r| core.iter().map(|&s| filter.a[r][s]).collect()).collect(),
+            c: core.iter().map(|&s| read(s).collect()).collect(),
+        };
+        let channels = filter.d.first().map_or(0, Vec::len);
+        for i in 0..channels {
+            add(&mut structure.taps, (i, 0), filter.d.iter().map(|row| row[i]));
+            add(&mut structure.b, (i, 0), core.iter().map(|&r| filter.b[r][i]));
+        }
+        for (s, &place) in past.iter().enumerate() {
+            let Some(place) = place else { continue };
+            add(&mut structure.taps, place, read(s));
+            add(&mut structure.b, place, core.iter().map(|&r| filter.a[r][s]));
+        }
+        structure
+    }
+
+    /// Ticks that the delay lines look back.
+    pub(crate) fn history(&self) -> usize {
+        self.taps.keys().chain(self.b.keys()).map(|&(_, ticks)| ticks).max().unwrap_or(0)
+    }
+
+    /// The states by twos such that each depends on the other one of its two at most; one may be alone. `None` if
+    /// the states depend on one another in another way.
+    pub(crate) fn sections(&self) -> Option<Vec<(usize, Option<usize>)>> {
+        let n = self.a.len();
+        let coupled = |i: usize, j: usize| i != j && (self.a[i][j] != 0.0 || self.a[j][i] != 0.0);
+        let mut sections = Vec::new();
+        let mut single = None;
+        for i in 0..n {
+            let mut partners = (0..n).filter(|&j| coupled(i, j));
+            match (partners.next(), partners.next()) {
+                (_, Some(_)) => return None,
+                (Some(j), None) if i < j => sections.push((i, Some(j))),
+                (Some(_), None) => {}
+                (None, None) => match single.take() {
+                    None => single = Some(i),
+                    Some(other) => sections.push((other, Some(i))),
+                },
+            }
+        }
+        sections.extend(single.map(|i| (i, None)));
+        Some(sections)
+    }
+}
+
+fn add(terms: &mut BTreeMap<Past, Vec<f64>>, place: Past, factors: impl Iterator<Item = f64>) {
+    let factors: Vec<f64> = factors.collect();
+    if factors.iter().all(|&factor| factor == 0.0) {
+        return;
+    }
+    match terms.get_mut(&place) {
+        None => drop(terms.insert(place, factors)),
+        Some(known) => known.iter_mut().zip(factors).for_each(|(sum, factor)| *sum += factor),
+    }
+}
+
+/// Which states are inputs of earlier ticks: those that take over an input, or such a state, unchanged.
+fn past_inputs(filter: &BlockFilter) -> Vec<Option<Past>> {
+    let ones: Vec<(Option<usize>, Option<usize>)> =
+        filter.a.iter().zip(&filter.b).map(|(a, b)| (only_one(a), only_one(b))).collect();
+    let zero = |row: &[f64]| row.iter().all(|&x| x == 0.0);
+    let mut past = vec![None; filter.a.len()];
+    let mut followers = vec![Vec::new(); filter.a.len()];
+    let mut found = Vec::new();
+    for (s, &(from_state, from_input)) in ones.iter().enumerate() {
+        match (from_state, from_input) {
+            (None, Some(i)) if zero(&filter.a[s]) => found.push((s, (i, 1))),
+            (Some(r), None) if zero(&filter.b[s]) => followers[r].push(s),
+            _ => {}
+        }
+    }
+    while let Some((s, (i, ticks))) = found.pop() {
+        past[s] = Some((i, ticks));
+        found.extend(followers[s].iter().map(|&next| (next, (i, ticks + 1))));
+    }
+    past
+}
+
+/// The place of the one in a row of zeros and a one.
+fn only_one(row: &[f64]) -> Option<usize> {
+    let mut entries = row.iter().enumerate().filter(|(_, x)| **x != 0.0);
+    match (entries.next(), entries.next()) {
+        (Some((place, 1.0)), None) => Some(place),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn filter(a: &[&[f64]], b: &[&[f64]], c: &[&[f64]], d: &[&[f64]]) -> BlockFilter {
+        let rows = |m: &[&[f64]]| m.iter().map(|row| row.to_vec()).collect();
+        BlockFilter { a: rows(a), b: rows(b), c: rows(c), d: rows(d) }
+    }
+
+    #[test]
+    fn delay_lines_are_found_and_what_they_feed() {
+        // States: a pole fed by u[k - 2] and u[k]; u[k - 2]; u[k - 1].
+        let structure = Structure::new(&filter(
+            &[&[0.5, 3.0, 0.0], &[0.0, 0.0, 1.0], &[0.0, 0.0, 0.0]],
+            &[&[2.0], &[0.0], &[1.0]],
+            &[&[1.0, 7.0, 0.0]],
+            &[&[9.0]],
+        ));
+        assert_eq!(structure.a, [[0.5]]);
+        assert_eq!(structure.c, [[1.0]]);
+        assert_eq!(structure.b, BTreeMap::from([((0, 0), vec![2.0]), ((0, 2), vec![3.0])]));
+        assert_eq!(structure.taps, BTreeMap::from([((0, 0), vec![9.0]), ((0, 2), vec![7.0])]));
+        assert_eq!(structure.history(), 2);
+    }
+
+    #[test]
+    fn rings_and_states_with_a_factor_are_no_delay_lines() {
+        let ring = filter(&[&[0.0, 1.0], &[1.0, 0.0]], &[&[0.0], &[0.0]], &[&[1.0, 0.0]], &[&[0.0]]);
+        assert_eq!(Structure::new(&ring).a, [[0.0, 1.0], [1.0, 0.0]]);
+        let scaled = filter(&[&[0.0, 1.0], &[0.0, 0.0]], &[&[0.0], &[2.0]], &[&[1.0, 0.0]], &[&[0.0]]);
+        assert_eq!(Structure::new(&scaled).a.len(), 2);
+    }
+
+    #[test]
+    fn sections_pair_what_is_coupled_and_then_what_is_left() {
+        let with = |pairs: &[(usize, usize)]| {
+            let mut a = vec![vec![0.0; 5]; 5];
+            (0..5).for_each(|i| a[i][i] = 0.5);
+            pairs.iter().for_each(|&(i, j)| a[i][j] = 0.1);
+            Structure { taps: BTreeMap::new(), b: BTreeMap::new(), a, c: vec![vec![]; 5] }.sections()
+        };
+        assert_eq!(with(&[]), Some(vec![(0, Some(1)), (2, Some(3)), (4, None)]));
+        assert_eq!(with(&[(3, 1)]), Some(vec![(1, Some(3)), (0, Some(2)), (4, None)]));
+        assert_eq!(with(&[(0, 1), (1, 2)]), None);
+    }
+}
