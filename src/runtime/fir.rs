@@ -1,15 +1,23 @@
 //! FIR banks: the direct polyphase form.
 //!
-//! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j]: for each phase p one sum over channels i and
-//! taps j, in that order. Every output is one such chain, wherever it stands in its block.
+//! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], as one product of the tick's window (the last K frames as
+//! they lie) with a vector of coefficients for each phase p. The order of the sum is that of
+//! [`simd`](super::simd); it is the same wherever the tick stands in its call.
+//!
+//! With one channel or one phase there is too little to share between loads: then T = 2 successive ticks
+//! form one *super-tick* of N T inputs and M T outputs. A call may begin or end inside a super-tick.
 
 use super::BuildError;
 use super::aligned::Aligned;
-use super::rows::{Fold, Rows, RowsMut};
 use super::sample::Sample;
-use super::simd::{FirKernel, Isa, OVERRUN, PhaseGroup, Steps};
+use super::simd::{Cut, FirKernel, Isa, PhaseGroup};
 use super::ticks::{FastSink, TickSource};
-use super::window::{Window, block_frames};
+use super::window::Window;
+
+/// Samples of a block that should stay in the first-level cache beside coefficients and output.
+const CACHE_SAMPLES: usize = 4096;
+/// Super-ticks of a block are a multiple of this, and so of every tile.
+const BLOCK_UNIT: usize = 96;
 
 /// Coefficients in the order of use; shared by all streams of a bank.
 #[derive(Debug)]
@@ -20,12 +28,10 @@ pub(crate) struct FirPlan<T: Sample> {
     pub(crate) history: usize,
     /// T: ticks in a super-tick.
     pub(crate) fold: usize,
-    /// Super-ticks that the filters look back, and in a block.
-    window: usize,
+    cut: Cut,
+    /// Super-ticks in a block.
     block: usize,
     groups: Vec<PhaseGroup<T>>,
-    /// For each step the place of its input in the window.
-    steps: Steps,
     kernel: FirKernel<T>,
     isa: Isa,
 }
@@ -34,15 +40,19 @@ pub(crate) struct FirPlan<T: Sample> {
 #[derive(Debug, Clone)]
 pub(crate) struct FirState<T: Sample> {
     window: Window<T>,
-    /// Ticks of the next super-tick that are in the window already.
-    lead: usize,
-    /// One block of output, a row a phase.
-    rows: Aligned<T>,
+    /// One block of output, for those who take another type.
+    output: Aligned<T>,
 }
 
-/// The input of a step: channel, and how many ticks it lies before the super-tick's first
-/// (negative: after it).
-type Step = (usize, isize);
+/// Ticks of a call that are done together.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    /// The first tick, from the beginning of the call.
+    first: usize,
+    ticks: usize,
+    /// Ticks of its first super-tick that were there before.
+    lead: usize,
+}
 
 impl<T: Sample> FirPlan<T> {
     /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters.
@@ -50,49 +60,30 @@ impl<T: Sample> FirPlan<T> {
         check_finite::<T>(taps)?;
         let channels = taps.len();
         let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
-        let fold = fold_for::<T>(ratio, isa);
-        let window = (lags - 1).div_ceil(fold);
-        let block = block_frames(channels * fold, window);
-        let stride = Window::<T>::stride(window, block);
-        if channels.saturating_mul(fold).saturating_mul(stride) > u32::MAX as usize {
-            return Err(BuildError::TooLong { history: lags - 1, channels });
-        }
-        // Per channel the taps in rising order, for each of the T ticks of a super-tick.
-        let steps: Vec<Step> =
-            (0..channels).flat_map(|i| (1 - fold as isize..lags as isize).map(move |lag| (i, lag))).collect();
-        let offset = |&(i, lag): &Step| {
-            let row = (-lag).rem_euclid(fold as isize) as usize * channels + i;
-            let column = window as isize + (-lag).div_euclid(fold as isize);
-            (row * stride) as u32 + column as u32
-        };
-        let groups = widths(ratio * fold)
-            .map(|(first, width)| phase_group(taps, ratio, &steps, first, width))
-            .collect();
-        Ok(Self {
-            channels,
-            ratio,
-            history: lags - 1,
-            fold,
-            window,
-            block,
-            groups,
-            steps: Steps::new(steps.iter().map(offset).collect()),
-            kernel: T::fir_kernel(isa),
-            isa,
-        })
+        let fold = if channels == 1 || ratio == 1 { 2 } else { 1 };
+        let hop = channels * fold;
+        let kernel = T::fir_kernel(isa);
+        // Blocks, windows and coefficients are a few times this long; the sum must not overflow.
+        let len = (lags + fold - 1)
+            .checked_mul(channels)
+            .filter(|&len| len.saturating_mul(ratio * fold) <= isize::MAX as usize / 64)
+            .ok_or(BuildError::TooLong { history: lags - 1, channels })?;
+        let cut = Cut::new(hop, len, kernel.group());
+        let block = (CACHE_SAMPLES / hop).saturating_sub(lags).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT) / BLOCK_UNIT
+            * BLOCK_UNIT;
+        let coefficient = |element, phase| coefficient(taps, ratio, fold, element, phase);
+        let groups =
+            widths(ratio * fold).map(|(first, width)| phase_group(cut, first, width, coefficient)).collect();
+        Ok(Self { channels, ratio, history: lags - 1, fold, cut, block, groups, kernel, isa })
     }
 
     /// A stream's state before its first tick.
     pub(crate) fn state(&self) -> FirState<T> {
+        let beyond = self.kernel.vector_ticks(self.cut) * self.cut.hop;
         FirState {
-            window: Window::new(self.channels * self.fold, self.window, self.block),
-            lead: 0,
-            rows: Aligned::new(self.ratio * self.fold * self.out_stride()),
+            window: Window::new(self.channels, self.fold, self.cut.past(), self.block * self.cut.hop, beyond),
+            output: Aligned::new(self.ratio * self.fold * self.block),
         }
-    }
-
-    fn out_stride(&self) -> usize {
-        self.block + OVERRUN
     }
 
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
@@ -102,52 +93,123 @@ impl<T: Sample> FirPlan<T> {
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
+        let frames = source.frames::<T>();
         let mut replaced = 0;
-        let mut first = 0;
+        // Ticks of the call from which on the frames are known to be finite, and those in the window.
+        let (mut clean, mut held, mut first) = (0, 0, 0);
         while first < source.ticks() {
-            let ticks = (source.ticks() - first).min(self.block * self.fold - state.lead);
-            let fold = Fold { ticks: self.fold, lead: state.lead };
-            state.window.make_room(fold.super_ticks(ticks));
-            let (samples, stride) = state.window.room();
-            let rows = RowsMut { samples, stride, channels: self.channels, fold, isa: self.isa };
-            replaced += source.gather(first, ticks, rows);
-            self.filter(state, fold.super_ticks(ticks));
-            let rows = Rows {
-                samples: &state.rows[..],
-                stride: self.out_stride(),
-                phases: self.ratio,
-                fold,
-                isa: self.isa,
-            };
-            sink.scatter(first, ticks, rows);
-            state.window.advance((state.lead + ticks) / self.fold);
-            state.lead = (state.lead + ticks) % self.fold;
-            first += ticks;
+            let lead = if held == first { state.window.lead() } else { 0 };
+            let mut block = Block { first, ticks: self.block_ticks(source.ticks() - first, lead), lead };
+            let in_place = frames.and_then(|frames| self.in_place(frames, clean, &mut block));
+            if let Some(x) = in_place {
+                self.filter(x, block, &mut state.output, sink);
+            } else {
+                if let (true, Some(frames)) = (held < first, frames) {
+                    state.window.recall(&frames[..first * self.channels]);
+                }
+                let count = self.gather(state, source, block);
+                if count > 0 {
+                    (replaced, clean) = (replaced + count, first + block.ticks);
+                }
+                self.filter(state.window.view(), block, &mut state.output, sink);
+                state.window.advance(block.ticks);
+                held = first + block.ticks;
+            }
+            first += block.ticks;
+        }
+        if let (true, Some(frames)) = (held < first, frames) {
+            state.window.recall(&frames[..first * self.channels]);
         }
         replaced
     }
 
-    fn filter(&self, state: &mut FirState<T>, super_ticks: usize) {
-        let stride = self.out_stride();
+    /// A state before tick `first` of `source`, as if all ticks before it had been processed; `None` if they
+    /// do not reach back far enough, or if this is no beginning of a super-tick for a stream with `lead`
+    /// ticks before the source.
+    pub(crate) fn state_at(
+        &self,
+        source: &(impl TickSource + ?Sized),
+        first: usize,
+        lead: usize,
+    ) -> Option<FirState<T>> {
+        let ticks = self.cut.past().div_ceil(self.channels);
+        if ticks > first || !(lead + first).is_multiple_of(self.fold) {
+            return None;
+        }
+        let mut frames = vec![T::default(); ticks * self.channels];
+        source.gather(self.isa, first - ticks, ticks, &mut frames);
+        // They are counted where they are processed.
+        replace_not_finite(&mut frames);
+        let mut state = self.state();
+        state.window.recall(&frames);
+        Some(state)
+    }
+
+    /// At most a block, up to the end of a super-tick if there are so many.
+    fn block_ticks(&self, left: usize, lead: usize) -> usize {
+        left.min(self.block * self.fold - lead)
+    }
+
+    /// The block's frames with their past as they lie in the caller's memory, if they do, if they are finite
+    /// and fill whole vectors; a block that would is cut to this. Before there is enough past a
+    /// block is made short.
+    fn in_place<'a>(&self, frames: &'a [T], clean: usize, block: &mut Block) -> Option<&'a [T]> {
+        let (n, past) = (self.channels, self.cut.past());
+        let known = (block.first - clean) * n;
+        if known < past || block.lead > 0 {
+            let enough = (past.saturating_sub(known)).div_ceil(n).next_multiple_of(BLOCK_UNIT * self.fold);
+            block.ticks = block.ticks.min(enough.max(BLOCK_UNIT * self.fold) - block.lead);
+            return None;
+        }
+        let whole = block.ticks / (self.kernel.vector_ticks(self.cut) * self.fold)
+            * (self.kernel.vector_ticks(self.cut) * self.fold);
+        let fresh = &frames[block.first * n..(block.first + whole) * n];
+        if whole == 0 || !T::all_finite(self.isa, fresh) {
+            return None;
+        }
+        block.ticks = whole;
+        Some(&frames[block.first * n - past..(block.first + whole) * n])
+    }
+
+    /// The block's frames into the window; returns how many samples were not finite and are 0 now.
+    fn gather(&self, state: &mut FirState<T>, source: &(impl TickSource + ?Sized), block: Block) -> u64 {
+        let room = state.window.room(block.ticks);
+        source.gather(self.isa, block.first, block.ticks, room);
+        if T::all_finite(self.isa, room) { 0 } else { replace_not_finite(room) }
+    }
+
+    /// Filters a block whose first super-tick's past begins at `x`.
+    fn filter(&self, x: &[T], block: Block, output: &mut [T], sink: &mut (impl FastSink + ?Sized)) {
+        let m = self.ratio;
+        let super_ticks = (block.lead + block.ticks).div_ceil(self.fold);
+        if block.lead == 0 && block.ticks.is_multiple_of(self.fold) {
+            if let Some(slots) = sink.slots(block.first * m..(block.first + block.ticks) * m) {
+                self.run(x, super_ticks, slots);
+                return;
+            }
+        }
+        self.run(x, super_ticks, output);
+        let range = block.lead * m..(block.lead + block.ticks) * m;
+        sink.store(self.isa, block.first * m, &output[range]);
+    }
+
+    fn run(&self, x: &[T], super_ticks: usize, out: &mut [T]) {
         for group in &self.groups {
-            let out = &mut state.rows[group.first * stride..];
-            self.kernel.run(group, state.window.view(), &self.steps, super_ticks, out, stride);
+            self.kernel.run(group, self.cut, x, super_ticks, &mut out[group.first..], self.ratio * self.fold);
         }
     }
 }
 
 impl<T: Sample> FirState<T> {
+    /// Ticks of an unfinished super-tick.
+    pub(crate) fn lead(&self) -> usize {
+        self.window.lead()
+    }
+
     /// As new.
     pub(crate) fn reset(&mut self) {
         self.window.reset();
-        self.lead = 0;
     }
-}
-
-/// One phase alone would load a vector for every multiply-add, which no processor can: two ticks at a
-/// time are two phases.
-fn fold_for<T: Sample>(ratio: usize, isa: Isa) -> usize {
-    if ratio == 1 && T::BYTES == 4 && isa != Isa::Portable { 2 } else { 1 }
 }
 
 fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
@@ -160,11 +222,21 @@ fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
     Ok(())
 }
 
-/// M phases in groups of 4, and of 3 or 2 for the rest; 1 only if M is 1.
-fn widths(ratio: usize) -> impl Iterator<Item = (usize, usize)> {
+/// Zeros in place of NaN and infinity, counted.
+fn replace_not_finite<T: Sample>(samples: &mut [T]) -> u64 {
+    let mut count = 0;
+    for slot in samples.iter_mut().filter(|value| !value.finite()) {
+        *slot = T::default();
+        count += 1;
+    }
+    count
+}
+
+/// M phases in groups of 4, and of 3 or 2 for the rest; there are at least 2.
+fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
     let mut first = 0;
     std::iter::from_fn(move || {
-        let width = match ratio - first {
+        let width = match phases - first {
             0 => return None,
             5 | 6 | 9 => 3,
             left => left.min(4),
@@ -174,22 +246,31 @@ fn widths(ratio: usize) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// Phases first .. first + width of a super-tick: phase r M + p is phase p of its tick r, whose
-/// tap for the input `lag` ticks before the super-tick is p + (r + lag) M.
+/// Coefficient of the sample `element` samples before the last one of a super-tick, for phase r M + p:
+/// phase p of the super-tick's tick r.
+fn coefficient(taps: &[Vec<f64>], ratio: usize, fold: usize, element: usize, phase: usize) -> f64 {
+    let n = taps.len();
+    let (back, channel) = (element / n, n - 1 - element % n);
+    let later = fold - 1 - phase / ratio;
+    let tap = back.checked_sub(later).and_then(|lag| taps[channel].get(phase % ratio + lag * ratio));
+    tap.copied().unwrap_or(0.0)
+}
+
+/// Phases first .. first + width of a super-tick, in the order of use: the newest step first, in it the
+/// samples as they lie.
 fn phase_group<T: Sample>(
-    taps: &[Vec<f64>],
-    ratio: usize,
-    steps: &[Step],
+    cut: Cut,
     first: usize,
     width: usize,
+    coefficient: impl Fn(usize, usize) -> f64,
 ) -> PhaseGroup<T> {
-    let mut coefficients = Aligned::new(steps.len() * width);
-    let places = steps.iter().flat_map(|&step| (first..first + width).map(move |phase| (step, phase)));
-    for (slot, ((i, lag), phase)) in coefficients.iter_mut().zip(places) {
-        let tap = usize::try_from((phase / ratio) as isize + lag)
-            .ok()
-            .and_then(|j| taps[i].get(phase % ratio + j * ratio));
-        *slot = T::from_f64(tap.copied().unwrap_or(0.0));
+    let mut coefficients = Aligned::new(cut.steps * width * cut.depth);
+    for (s, step) in coefficients.chunks_exact_mut(width * cut.depth).enumerate() {
+        for (p, places) in step.chunks_exact_mut(cut.depth).enumerate() {
+            for (d, slot) in places.iter_mut().enumerate() {
+                *slot = T::from_f64(coefficient(s * cut.depth + cut.depth - 1 - d, first + p));
+            }
+        }
     }
     PhaseGroup { first, width, coefficients }
 }
@@ -200,11 +281,11 @@ mod tests {
 
     #[test]
     fn groups_cover_every_phase_once_and_are_never_narrow() {
-        for ratio in 1..100 {
-            let all: Vec<_> = widths(ratio).collect();
-            let phases: Vec<usize> = all.iter().flat_map(|&(first, width)| first..first + width).collect();
-            assert_eq!(phases, (0..ratio).collect::<Vec<_>>());
-            assert!(all.iter().all(|&(_, width)| (2..=4).contains(&width) || ratio == 1), "{ratio}: {all:?}");
+        for phases in 2..100 {
+            let all: Vec<_> = widths(phases).collect();
+            let covered: Vec<usize> = all.iter().flat_map(|&(first, width)| first..first + width).collect();
+            assert_eq!(covered, (0..phases).collect::<Vec<_>>());
+            assert!(all.iter().all(|&(_, width)| (2..=4).contains(&width)), "{phases}: {all:?}");
         }
     }
 }

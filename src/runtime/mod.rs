@@ -7,7 +7,6 @@ mod error;
 mod fir;
 mod gaps;
 mod reconstructor;
-mod rows;
 mod sample;
 mod simd;
 mod state_space;

@@ -2,7 +2,6 @@
 
 use super::BuildError;
 use super::aligned::Aligned;
-use super::rows::{Fold, Rows, RowsMut};
 use super::simd::{Columns, Isa, RECURSION_LANES, Registers, run_recursion};
 use super::ticks::{FastSink, TickSource};
 use crate::bank::BlockFilter;
@@ -75,22 +74,19 @@ impl StateSpacePlan {
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
-        let fold = Fold { ticks: 1, lead: 0 };
-        let isa = Isa::Portable;
         let mut replaced = 0;
         let mut first = 0;
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(BLOCK - state.since);
-            let samples = &mut state.input[..];
-            replaced += source.gather(
-                first,
-                ticks,
-                RowsMut { samples, stride: BLOCK, channels: self.channels, fold, isa },
-            );
-            let (u, y) = (&state.input, &mut state.output);
-            run_recursion(self.isa, &self.columns, &mut state.registers, u, y, BLOCK, ticks);
-            let rows = Rows { samples: &state.output[..], stride: BLOCK, phases: self.ratio, fold, isa };
-            sink.scatter(first, ticks, rows);
+            let input = &mut state.input[..ticks * self.channels];
+            source.gather(self.isa, first, ticks, input);
+            for slot in input.iter_mut().filter(|value| !value.is_finite()) {
+                *slot = 0.0;
+                replaced += 1;
+            }
+            let output = &mut state.output[..ticks * self.ratio];
+            run_recursion(self.isa, &self.columns, &mut state.registers, input, output, ticks);
+            sink.store(self.isa, first * self.ratio, output);
             state.pass(ticks);
             first += ticks;
         }

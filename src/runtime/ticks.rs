@@ -1,8 +1,7 @@
-//! Samples of a call, wherever and however they lie, to and from planar rows.
+//! Samples of a call, wherever and however they lie, to and from frames of the kernels' number type.
 
-use super::rows::{Rows, RowsMut};
 use super::sample::Sample;
-use super::simd::{Progress, encode};
+use super::simd::{Isa, decode, encode, interleave};
 use crate::io::{PcmFormat, PcmFrames, for_pcm_format};
 use std::ops::Range;
 
@@ -17,24 +16,31 @@ pub struct PcmOutput<'a> {
     pub clipped: u64,
 }
 
-/// Samples on their way through f32 to an integer format; stays in the first-level cache.
+/// Samples on their way between types; stays in the first-level cache.
 const SCRATCH: usize = 1024;
 
-/// Fills planar rows.
+/// Gives frames of N samples.
 pub(crate) trait TickSource {
     fn channels(&self) -> usize;
     fn ticks(&self) -> usize;
-    /// Rows from ticks `first..first + ticks`; returns how many samples were not finite and are zero
-    /// now.
-    fn gather<T: Sample>(&self, first: usize, ticks: usize, rows: RowsMut<'_, T>) -> u64;
+    /// All frames as they lie in memory, if they are of this type.
+    fn frames<T: Sample>(&self) -> Option<&[T]> {
+        None
+    }
+    /// Ticks `first..first + ticks` as frames; whether they are finite is not looked at.
+    fn gather<T: Sample>(&self, isa: Isa, first: usize, ticks: usize, frames: &mut [T]);
 }
 
-/// Takes planar rows.
+/// Takes fast samples.
 pub(crate) trait FastSink {
     /// Samples that fit.
     fn capacity(&self) -> usize;
-    /// Stores ticks `first..first + ticks` from rows.
-    fn scatter<T: Sample>(&mut self, first: usize, ticks: usize, rows: Rows<'_, T>);
+    /// Where these samples go, if they are of this type.
+    fn slots<T: Sample>(&mut self, _samples: Range<usize>) -> Option<&mut [T]> {
+        None
+    }
+    /// Stores samples from sample `first` on.
+    fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]);
 }
 
 /// Numbers in memory, frames of N.
@@ -52,13 +58,23 @@ impl<S: Sample> TickSource for Interleaved<'_, S> {
         self.samples.len() / self.channels
     }
 
-    fn gather<T: Sample>(&self, first: usize, ticks: usize, mut rows: RowsMut<'_, T>) -> u64 {
-        let samples = &self.samples[first * self.channels..(first + ticks) * self.channels];
-        let part = Part { offset: 0, channels: self.channels };
-        let fast = part.fast(&mut rows, ticks, |head, frames, n, rows, stride, isa| {
-            T::deinterleave_numbers(isa, &samples[head * part.channels..], n, frames, rows, stride)
-        });
-        fast.replaced + part.slow(&mut rows, &fast, ticks, |t, i| samples[t * part.channels + i].to_f64())
+    fn frames<T: Sample>(&self) -> Option<&[T]> {
+        T::same(self.samples)
+    }
+
+    fn gather<T: Sample>(&self, _: Isa, first: usize, ticks: usize, frames: &mut [T]) {
+        convert(&self.samples[first * self.channels..(first + ticks) * self.channels], frames);
+    }
+}
+
+/// The same numbers in another type.
+fn convert<S: Sample, T: Sample>(from: &[S], to: &mut [T]) {
+    if let Some(same) = T::same(from) {
+        to.copy_from_slice(same);
+        return;
+    }
+    for (slot, value) in to.iter_mut().zip(from) {
+        *slot = T::from_f64(value.to_f64());
     }
 }
 
@@ -72,161 +88,85 @@ impl TickSource for [PcmFrames<'_>] {
         self.iter().map(PcmFrames::frames).min().unwrap_or(0)
     }
 
-    fn gather<T: Sample>(&self, first: usize, ticks: usize, mut rows: RowsMut<'_, T>) -> u64 {
-        let mut replaced = 0;
-        let mut offset = 0;
-        for frames in self {
-            let part = Part { offset, channels: frames.channels };
-            replaced += gather_frames(part, frames, first, ticks, &mut rows);
-            offset += frames.channels;
+    fn gather<T: Sample>(&self, isa: Isa, first: usize, ticks: usize, frames: &mut [T]) {
+        if let [part] = self {
+            return gather_part(isa, part, first, frames);
         }
-        replaced
+        let n = self.channels();
+        let mono = self.iter().all(|part| part.channels == 1);
+        match T::as_f32_mut(frames) {
+            Some(frames) if mono && 8 * n <= SCRATCH => gather_mono(isa, self, first, ticks, frames),
+            _ => gather_each(self, first, frames),
+        }
     }
 }
 
-fn gather_frames<T: Sample>(
-    part: Part,
-    frames: &PcmFrames<'_>,
-    first: usize,
-    ticks: usize,
-    rows: &mut RowsMut<'_, T>,
-) -> u64 {
-    let size = frames.frame_bytes();
-    let container = frames.layout.container;
-    let format = frames.layout.format;
-    let bytes = &frames.bytes[first * size..(first + ticks) * size];
-    let fast = part.fast(rows, ticks, |head, count, n, rows, stride, isa| {
-        if container != format.bytes() {
-            return Progress::default();
+/// All channels from one recording.
+fn gather_part<T: Sample>(isa: Isa, part: &PcmFrames<'_>, first: usize, frames: &mut [T]) {
+    let packed = part.layout.container == part.layout.format.bytes();
+    let done = match T::as_f32_mut(frames) {
+        Some(frames) if packed => {
+            decode(isa, part.layout.format, &part.bytes[first * part.frame_bytes()..], frames)
         }
-        T::deinterleave_bytes(isa, format, &bytes[head * size..], n, count, rows, stride)
-    });
-    let slow = for_pcm_format!(format, FORMAT => {
-        part.slow(rows, &fast, ticks, |t, i| FORMAT.decode(&bytes[t * size + i * container..]))
-    });
-    fast.replaced + slow
+        _ => 0,
+    };
+    // Whole frames only; the rest one by one.
+    let done = done / part.channels;
+    gather_columns(part, first + done, part.channels, &mut frames[done * part.channels..]);
 }
 
-/// The channels of one recording among all N.
-#[derive(Debug, Clone, Copy)]
-struct Part {
-    offset: usize,
-    channels: usize,
-}
-
-/// What the fast conversion did.
-struct Fast {
-    ticks: Range<usize>,
-    replaced: u64,
-}
-
-impl Part {
-    /// Whole super-ticks, as far as `convert(first tick, super-ticks, rows, ..)` gets. The rows of a
-    /// folded part lie at equal distances only if it has all channels or one.
-    fn fast<T: Sample>(
-        self,
-        rows: &mut RowsMut<'_, T>,
-        ticks: usize,
-        convert: impl FnOnce(usize, usize, usize, &mut [T], usize, super::Isa) -> Progress,
-    ) -> Fast {
-        let fold = rows.fold;
-        let (head, whole) = fold.whole(ticks);
-        let distance = match () {
-            () if fold.ticks == 1 || self.channels == rows.channels => rows.stride,
-            () if self.channels == 1 => rows.stride * rows.channels,
-            () => return Fast { ticks: 0..0, replaced: 0 },
-        };
-        let column = fold.place(head).1;
-        let n = self.channels * fold.ticks;
-        let target = &mut rows.samples[self.offset * rows.stride + column..];
-        let progress = convert(head, whole, n, target, distance, rows.isa);
-        let replaced = if progress.suspect {
-            target
-                .chunks_mut(distance)
-                .take(n)
-                .map(|row| replace_not_finite(&mut row[..progress.frames]))
-                .sum()
-        } else {
-            0
-        };
-        Fast { ticks: head..head + progress.frames * fold.ticks, replaced }
+/// One channel from each recording: rows first, then frames from rows.
+fn gather_mono(isa: Isa, parts: &[PcmFrames<'_>], first: usize, ticks: usize, frames: &mut [f32]) {
+    let n = parts.len();
+    let mut rows = [0f32; SCRATCH];
+    let step = SCRATCH / n / 8 * 8;
+    for start in (0..ticks).step_by(step) {
+        let count = step.min(ticks - start);
+        for (row, part) in rows.chunks_exact_mut(step).zip(parts) {
+            gather_part(isa, part, first + start, &mut row[..count]);
+        }
+        let out = &mut frames[start * n..(start + count) * n];
+        for t in interleave(isa, &rows, step, n, count, out)..count {
+            (0..n).for_each(|i| out[t * n + i] = rows[i * step + t]);
+        }
     }
+}
 
-    /// All ticks that the fast conversion left, one by one.
-    #[inline(always)]
-    fn slow<T: Sample>(
-        self,
-        rows: &mut RowsMut<'_, T>,
-        fast: &Fast,
-        ticks: usize,
-        sample: impl Fn(usize, usize) -> f64,
-    ) -> u64 {
-        let mut replaced = 0;
-        for i in 0..self.channels {
-            for t in (0..fast.ticks.start).chain(fast.ticks.end..ticks) {
-                let value = sample(t, i);
-                replaced += u64::from(!value.is_finite());
-                *rows.slot(self.offset + i, t) = T::from_f64(if value.is_finite() { value } else { 0.0 });
+/// Any recordings, sample by sample.
+fn gather_each<T: Sample>(parts: &[PcmFrames<'_>], first: usize, frames: &mut [T]) {
+    let n = parts.iter().map(|part| part.channels).sum();
+    let mut offset = 0;
+    for part in parts {
+        gather_columns(part, first, n, &mut frames[offset..]);
+        offset += part.channels;
+    }
+}
+
+/// The channels of a recording to the first columns of frames of `n` samples (the last may be cut behind
+/// them).
+fn gather_columns<T: Sample>(part: &PcmFrames<'_>, first: usize, n: usize, frames: &mut [T]) {
+    let container = part.layout.container;
+    let bytes = part.bytes.chunks_exact(part.frame_bytes()).skip(first);
+    for_pcm_format!(part.layout.format, FORMAT => {
+        for (frame, bytes) in frames.chunks_mut(n).zip(bytes) {
+            for (slot, sample) in frame[..part.channels].iter_mut().zip(bytes.chunks_exact(container)) {
+                *slot = T::from_f64(FORMAT.decode(sample));
             }
         }
-        replaced
-    }
+    });
 }
 
-/// Zeros in place of NaN and infinity, counted.
-fn replace_not_finite<T: Sample>(row: &mut [T]) -> u64 {
-    let mut count = 0;
-    for slot in row.iter_mut().filter(|value| !value.finite()) {
-        *slot = T::default();
-        count += 1;
-    }
-    count
-}
-
-impl FastSink for [f32] {
+impl<S: Sample> FastSink for [S] {
     fn capacity(&self) -> usize {
         self.len()
     }
 
-    fn scatter<T: Sample>(&mut self, first: usize, ticks: usize, rows: Rows<'_, T>) {
-        let out = &mut self[first * rows.phases..(first + ticks) * rows.phases];
-        store_numbers(out, ticks, &rows);
-    }
-}
-
-impl FastSink for [f64] {
-    fn capacity(&self) -> usize {
-        self.len()
+    fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
+        T::same_mut(&mut self[samples])
     }
 
-    fn scatter<T: Sample>(&mut self, first: usize, ticks: usize, rows: Rows<'_, T>) {
-        let out = &mut self[first * rows.phases..(first + ticks) * rows.phases];
-        for (t, tick) in out.chunks_exact_mut(rows.phases).enumerate().take(ticks) {
-            for (p, slot) in tick.iter_mut().enumerate() {
-                *slot = rows.get(p, t).to_f64();
-            }
-        }
-    }
-}
-
-/// Ticks 0..ticks of the rows as f32.
-fn store_numbers<T: Sample>(out: &mut [f32], ticks: usize, rows: &Rows<'_, T>) {
-    let m = rows.phases;
-    let (head, whole) = rows.fold.whole(ticks);
-    let column = rows.fold.place(head).1;
-    let done = T::interleave(
-        rows.isa,
-        &rows.samples[column..],
-        rows.stride,
-        m * rows.fold.ticks,
-        whole,
-        &mut out[head * m..],
-    );
-    let fast = head..head + done * rows.fold.ticks;
-    for t in (0..fast.start).chain(fast.end..ticks) {
-        for (p, slot) in out[t * m..(t + 1) * m].iter_mut().enumerate() {
-            *slot = rows.get(p, t).to_f64() as f32;
-        }
+    fn store<T: Sample>(&mut self, _: Isa, first: usize, samples: &[T]) {
+        convert(samples, &mut self[first..first + samples.len()]);
     }
 }
 
@@ -235,47 +175,38 @@ impl FastSink for PcmOutput<'_> {
         self.bytes.len() / self.format.bytes()
     }
 
-    fn scatter<T: Sample>(&mut self, first: usize, ticks: usize, rows: Rows<'_, T>) {
-        let (m, size) = (rows.phases, self.format.bytes());
-        let out = &mut self.bytes[first * m * size..(first + ticks) * m * size];
-        let wide = self.format.bytes() == 8 || (T::BYTES == 8 && self.format.bytes() == 4);
-        self.clipped += if wide || m > SCRATCH {
-            store_each(self.format, out, &rows)
-        } else {
-            store_by_scratch(self.format, out, ticks, rows)
+    fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
+        let size = self.format.bytes();
+        let out = &mut self.bytes[first * size..(first + samples.len()) * size];
+        self.clipped += match T::as_f32(samples) {
+            Some(samples) => encode(isa, self.format, samples, out),
+            None if size < 4 => encode_by_scratch(isa, self.format, samples, out),
+            // Formats that hold more digits than f32.
+            None => encode_each(self.format, samples, out),
         };
     }
 }
 
-/// Formats that hold more digits than f32 are stored sample by sample.
-fn store_each<T: Sample>(format: PcmFormat, out: &mut [u8], rows: &Rows<'_, T>) -> u64 {
-    let mut clipped = 0;
-    for_pcm_format!(format, FORMAT => {
-        for (t, tick) in out.chunks_exact_mut(rows.phases * FORMAT.bytes()).enumerate() {
-            for (p, slot) in tick.chunks_exact_mut(FORMAT.bytes()).enumerate() {
-                clipped += u64::from(FORMAT.encode(rows.get(p, t).to_f64(), slot));
-            }
-        }
-    });
-    clipped
+/// Rounded to f32 first, which formats of few digits do not notice.
+fn encode_by_scratch<T: Sample>(isa: Isa, format: PcmFormat, samples: &[T], out: &mut [u8]) -> u64 {
+    let mut scratch = [0f32; SCRATCH];
+    let parts = samples.chunks(SCRATCH).zip(out.chunks_mut(SCRATCH * format.bytes()));
+    parts
+        .map(|(samples, out)| {
+            let scratch = &mut scratch[..samples.len()];
+            convert(samples, scratch);
+            encode(isa, format, scratch, out)
+        })
+        .sum()
 }
 
-/// Interleaved first, then encoded where they lie close together.
-fn store_by_scratch<T: Sample>(format: PcmFormat, out: &mut [u8], ticks: usize, rows: Rows<'_, T>) -> u64 {
-    let mut scratch = [0f32; SCRATCH];
-    let m = rows.phases;
-    let step = (SCRATCH / m / rows.fold.ticks * rows.fold.ticks).max(1);
+/// Sample by sample; returns how many were clipped.
+fn encode_each<T: Sample>(format: PcmFormat, samples: &[T], out: &mut [u8]) -> u64 {
     let mut clipped = 0;
-    let mut t = 0;
-    while t < ticks {
-        let count = step.min(ticks - t);
-        let (_, column) = rows.fold.place(t);
-        let fold = super::rows::Fold { lead: rows.fold.place(t).0, ..rows.fold };
-        let some = Rows { samples: &rows.samples[column..], fold, ..rows };
-        store_numbers(&mut scratch[..count * m], count, &some);
-        let bytes = &mut out[t * m * format.bytes()..(t + count) * m * format.bytes()];
-        clipped += encode(rows.isa, format, &scratch[..count * m], bytes);
-        t += count;
-    }
+    for_pcm_format!(format, FORMAT => {
+        for (slot, value) in out.chunks_exact_mut(FORMAT.bytes()).zip(samples) {
+            clipped += u64::from(FORMAT.encode(value.to_f64(), slot));
+        }
+    });
     clipped
 }

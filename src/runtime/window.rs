@@ -1,71 +1,71 @@
-//! The recent past of every channel, as far as the filters look back.
+//! The recent past of a stream, as far as the filters look back, in frames as they came.
 
 use super::aligned::Aligned;
 use super::sample::Sample;
-use super::simd::OVERRUN;
 
-/// Samples of a window that should stay in the first-level cache beside coefficients and output.
-const CACHE_SAMPLES: usize = 4096;
-
-/// Frames a block for `rows` rows with `history` frames of past; a multiple of every tile.
-pub(crate) fn block_frames(rows: usize, history: usize) -> usize {
-    (CACHE_SAMPLES / rows.max(1)).saturating_sub(history).clamp(96, 768) / 96 * 96
-}
-
-/// N rows, one a channel, each with the last `history` frames before the place of the next block.
-/// Small calls move along the rows; only when these are full is the history copied to the front.
+/// Frames in memory: the past, then the super-tick that is being filled, then room. Small calls move
+/// along; only when the room is used up is the past copied to the front.
 #[derive(Debug, Clone)]
 pub(crate) struct Window<T: Sample> {
     samples: Aligned<T>,
-    stride: usize,
-    history: usize,
-    /// Where the next frame goes.
+    /// N.
+    channels: usize,
+    /// T, ticks of a super-tick.
+    fold: usize,
+    /// Samples before a super-tick that must stay.
+    past: usize,
+    /// Samples that are read past the last frame.
+    beyond: usize,
+    /// Where the next super-tick begins.
     next: usize,
+    /// Ticks of it that are there already.
+    lead: usize,
 }
 
 impl<T: Sample> Window<T> {
-    /// N = `rows` rows of zeros for blocks of at most `block` frames.
-    pub(crate) fn new(rows: usize, history: usize, block: usize) -> Self {
-        let stride = Self::stride(history, block);
-        Self { samples: Aligned::new(rows * stride), stride, history, next: history }
-    }
-
-    /// Samples from row to row: a line more than a multiple of 256 bytes, so that the rows do not
-    /// fall on the same cache sets.
-    pub(crate) fn stride(history: usize, block: usize) -> usize {
-        (history + block + block / 4 + OVERRUN).next_multiple_of(64) + 16
+    /// Zeros, for blocks of at most `block` samples.
+    pub(crate) fn new(channels: usize, fold: usize, past: usize, block: usize, beyond: usize) -> Self {
+        let samples = Aligned::new(past + block + block / 4 + beyond);
+        Self { samples, channels, fold, past, beyond, next: past, lead: 0 }
     }
 
     /// All zeros, as new.
     pub(crate) fn reset(&mut self) {
         self.samples.fill(T::default());
-        self.next = self.history;
+        (self.next, self.lead) = (self.past, 0);
     }
 
-    /// Makes room for `frames` frames (at most a block).
-    pub(crate) fn make_room(&mut self, frames: usize) {
-        if self.next + frames + OVERRUN <= self.stride {
-            return;
+    /// Ticks of the next super-tick that are there already.
+    pub(crate) fn lead(&self) -> usize {
+        self.lead
+    }
+
+    /// Room for the next `ticks` ticks (at most a block, with those of the lead).
+    pub(crate) fn room(&mut self, ticks: usize) -> &mut [T] {
+        let super_ticks = (self.lead + ticks).div_ceil(self.fold);
+        let held = self.lead * self.channels;
+        if self.next + super_ticks * self.fold * self.channels + self.beyond > self.samples.len() {
+            self.samples.copy_within(self.next - self.past..self.next + held, 0);
+            self.next = self.past;
         }
-        for row in self.samples.chunks_exact_mut(self.stride) {
-            // One more: the next frame may be a super-tick that is filled in part.
-            row.copy_within(self.next - self.history..self.next + 1, 0);
-        }
-        self.next = self.history;
+        &mut self.samples[self.next + held..][..ticks * self.channels]
     }
 
-    /// All rows from the next frame on, and the samples from row to row.
-    pub(crate) fn room(&mut self) -> (&mut [T], usize) {
-        (&mut self.samples[self.next..], self.stride)
-    }
-
-    /// All rows, from `history` frames before the next frame on.
+    /// From the past of the next super-tick on.
     pub(crate) fn view(&self) -> &[T] {
-        &self.samples[self.next - self.history..]
+        &self.samples[self.next - self.past..]
     }
 
-    /// The block that was written is past now.
-    pub(crate) fn advance(&mut self, frames: usize) {
-        self.next += frames;
+    /// The `ticks` ticks that were written are there now.
+    pub(crate) fn advance(&mut self, ticks: usize) {
+        let there = self.lead + ticks;
+        self.next += there / self.fold * self.fold * self.channels;
+        self.lead = there % self.fold;
+    }
+
+    /// The past is the end of `frames`, whole super-ticks and at least as long.
+    pub(crate) fn recall(&mut self, frames: &[T]) {
+        self.samples[..self.past].copy_from_slice(&frames[frames.len() - self.past..]);
+        (self.next, self.lead) = (self.past, 0);
     }
 }

@@ -1,19 +1,16 @@
-//! Samples as they lie in memory to planar f32 rows and back, with AVX2.
+//! Bytes to f32 and back, and frames from rows, with AVX2.
 //!
-//! Frames of N samples become N rows by transposing 8 x 8 (or 4 x 4, or 2 x 8) blocks in registers;
-//! integers are converted in the load. For N that is no power of two a block reads past its
-//! frame into the next ones, and rows that mean nothing are not stored; on the way out a block
-//! writes past its frame, and the next frame overwrites what means nothing. The last frames,
-//! where that would leave the slice, are left to the caller.
+//! N rows become frames of N samples by transposing 8 x 8 (or 4 x 4, or 2 x 8) blocks in registers. For N
+//! that is no power of two a block writes past its frame, and the next frame overwrites what
+//! means nothing. The last frames, where that would leave the slice, are left to the caller.
 
 use std::arch::x86_64::*;
 
-/// Samples of a format, eight or four at a time.
+/// Samples of a format, eight at a time.
 pub(super) trait Load: Copy {
     /// Bytes a sample.
     const BYTES: usize;
     unsafe fn load8(at: *const u8) -> __m256;
-    unsafe fn load4(at: *const u8) -> __m128;
 }
 
 #[derive(Clone, Copy)]
@@ -30,11 +27,6 @@ impl Load for F32 {
     unsafe fn load8(at: *const u8) -> __m256 {
         unsafe { _mm256_loadu_ps(at.cast()) }
     }
-
-    #[inline(always)]
-    unsafe fn load4(at: *const u8) -> __m128 {
-        unsafe { _mm_loadu_ps(at.cast()) }
-    }
 }
 
 impl Load for S16 {
@@ -45,14 +37,6 @@ impl Load for S16 {
         unsafe {
             let wide = _mm256_cvtepi16_epi32(_mm_loadu_si128(at.cast()));
             _mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 32768.0))
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn load4(at: *const u8) -> __m128 {
-        unsafe {
-            let wide = _mm_cvtepi16_epi32(_mm_loadl_epi64(at.cast()));
-            _mm_mul_ps(_mm_cvtepi32_ps(wide), _mm_set1_ps(1.0 / 32768.0))
         }
     }
 }
@@ -67,90 +51,39 @@ impl Load for S32 {
             _mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 2147483648.0))
         }
     }
-
-    #[inline(always)]
-    unsafe fn load4(at: *const u8) -> __m128 {
-        unsafe {
-            let wide = _mm_loadu_si128(at.cast());
-            _mm_mul_ps(_mm_cvtepi32_ps(wide), _mm_set1_ps(1.0 / 2147483648.0))
-        }
-    }
 }
 
 /// Where rows lie: `stride` samples apart.
 #[derive(Clone, Copy)]
 pub(super) struct Rows {
-    pub(super) first: *mut f32,
+    pub(super) first: *const f32,
     pub(super) stride: usize,
 }
 
 impl Rows {
     #[inline(always)]
-    unsafe fn at(self, row: usize, frame: usize) -> *mut f32 {
+    unsafe fn at(self, row: usize, frame: usize) -> *const f32 {
         unsafe { self.first.add(row * self.stride + frame) }
     }
 }
 
-/// Notes which of the values were NaN or infinite.
-#[derive(Clone, Copy)]
-struct Watch(__m256i);
-
-impl Watch {
-    #[inline(always)]
-    unsafe fn see(&mut self, values: __m256) {
-        unsafe {
-            let exponent = _mm256_set1_epi32(0x7F80_0000);
-            let bits = _mm256_and_si256(_mm256_castps_si256(values), exponent);
-            self.0 = _mm256_or_si256(self.0, _mm256_cmpeq_epi32(bits, exponent));
-        }
-    }
-}
-
-/// Rows from interleaved frames of `n` samples; returns the frames done (the last few may be
-/// left) and whether there may be a value among them that is not finite.
+/// Decodes whole vectors; returns the samples done (a multiple of 8).
 ///
 /// # Safety
-/// AVX2; `bytes` holds `frames` frames; each of the n rows has room for `frames` samples rounded up to 8.
+/// AVX2.
 #[inline(always)]
-pub(super) unsafe fn deinterleave<L: Load>(
-    bytes: &[u8],
-    n: usize,
-    frames: usize,
-    rows: Rows,
-) -> (usize, bool) {
-    let frame_bytes = n * L::BYTES;
-    // Bytes that a block reads from the start of its last frame on.
-    let reach = reach(n) * L::BYTES;
-    let blocks = blocks(frames, bytes.len(), frame_bytes, reach);
-    // SAFETY: block b reads from `8 b frame_bytes` on and no further than `bytes`, see `blocks`.
-    unsafe {
-        let mut watch = Watch(_mm256_setzero_si256());
-        let from = |b: usize| bytes.as_ptr().add(8 * b * frame_bytes);
-        match n {
-            1 => {
-                for b in 0..blocks {
-                    let a = L::load8(from(b));
-                    watch.see(a);
-                    _mm256_storeu_ps(rows.at(0, 8 * b), a);
-                }
-            }
-            2 => (0..blocks).for_each(|b| pairs::<L>(from(b), 8 * b, rows, &mut watch)),
-            3 | 4 => (0..blocks).for_each(|b| fours::<L>(from(b), n, 8 * b, rows, &mut watch)),
-            _ => {
-                for channel in (0..n).step_by(8) {
-                    let first = channel.min(n.max(8) - 8);
-                    let count = n.min(8);
-                    for b in 0..blocks {
-                        eights::<L>(from(b), frame_bytes, count, first, 8 * b, rows, &mut watch);
-                    }
-                }
-            }
-        }
-        (8 * blocks, _mm256_movemask_epi8(watch.0) != 0)
+pub(super) unsafe fn decode<L: Load>(bytes: &[u8], out: &mut [f32]) -> usize {
+    let blocks = out.chunks_exact_mut(8).zip(bytes.chunks_exact(8 * L::BYTES));
+    let mut done = 0;
+    for (out, bytes) in blocks {
+        // SAFETY: the caller's; both slices hold eight samples.
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr(), L::load8(bytes.as_ptr())) };
+        done += 8;
     }
+    done
 }
 
-/// Samples that the last frame of a block is read or written as.
+/// Samples that the last frame of a block is written as.
 #[inline(always)]
 fn reach(n: usize) -> usize {
     match n {
@@ -166,61 +99,6 @@ fn blocks(frames: usize, len: usize, size: usize, reach: usize) -> usize {
     let whole = frames / 8;
     let fits = |blocks: usize| blocks == 0 || (8 * blocks - 1) * size + reach <= len;
     if fits(whole) { whole } else { whole - 1 }
-}
-
-#[inline(always)]
-unsafe fn pairs<L: Load>(from: *const u8, done: usize, rows: Rows, watch: &mut Watch) {
-    unsafe {
-        let (v, w) = (L::load8(from), L::load8(from.add(8 * L::BYTES)));
-        watch.see(v);
-        watch.see(w);
-        // a0 a1 a4 a5 a2 a3 a6 a7, then the middle pairs change places.
-        let a = _mm256_castps_pd(_mm256_shuffle_ps::<0x88>(v, w));
-        let b = _mm256_castps_pd(_mm256_shuffle_ps::<0xDD>(v, w));
-        _mm256_storeu_ps(rows.at(0, done), _mm256_castpd_ps(_mm256_permute4x64_pd::<0xD8>(a)));
-        _mm256_storeu_ps(rows.at(1, done), _mm256_castpd_ps(_mm256_permute4x64_pd::<0xD8>(b)));
-    }
-}
-
-#[inline(always)]
-unsafe fn fours<L: Load>(from: *const u8, n: usize, done: usize, rows: Rows, watch: &mut Watch) {
-    unsafe {
-        let step = n * L::BYTES;
-        let load = |f: usize| {
-            _mm256_insertf128_ps::<1>(
-                _mm256_castps128_ps256(L::load4(from.add(f * step))),
-                L::load4(from.add((f + 4) * step)),
-            )
-        };
-        let columns = transpose4([load(0), load(1), load(2), load(3)]);
-        for (i, column) in columns.into_iter().enumerate().take(n) {
-            watch.see(column);
-            _mm256_storeu_ps(rows.at(i, done), column);
-        }
-    }
-}
-
-#[inline(always)]
-unsafe fn eights<L: Load>(
-    from: *const u8,
-    frame_bytes: usize,
-    count: usize,
-    first: usize,
-    done: usize,
-    rows: Rows,
-    watch: &mut Watch,
-) {
-    unsafe {
-        let from = from.add(first * L::BYTES);
-        let mut block = [_mm256_setzero_ps(); 8];
-        for (f, row) in block.iter_mut().enumerate() {
-            *row = L::load8(from.add(f * frame_bytes));
-        }
-        for (i, column) in transpose8(block).into_iter().enumerate().take(count) {
-            watch.see(column);
-            _mm256_storeu_ps(rows.at(first + i, done), column);
-        }
-    }
 }
 
 /// Interleaved frames of `m` samples from rows; returns the frames done (the last few may be left).

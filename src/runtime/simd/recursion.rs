@@ -52,7 +52,7 @@ impl Registers {
     }
 }
 
-/// Runs ticks `0..ticks`: input i of tick k is `u[i * stride + k]`, phase p becomes `y[p * stride + k]`.
+/// Runs ticks `0..ticks`: input i of tick k is `u[k N + i]`, phase p becomes `y[k M + p]`.
 ///
 /// # Panics
 /// If a slice is too short.
@@ -62,7 +62,6 @@ pub(crate) fn run(
     registers: &mut Registers,
     u: &[f64],
     y: &mut [f64],
-    stride: usize,
     ticks: usize,
 ) {
     columns.check(registers);
@@ -70,12 +69,12 @@ pub(crate) fn run(
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor was asked; the sizes are checked above.
-        Isa::Avx2 if isa.is_available() => unsafe { avx2(columns, registers, u, y, stride, ticks) },
+        Isa::Avx2 if isa.is_available() => unsafe { avx2(columns, registers, u, y, ticks) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Isa::Avx512 if isa.is_available() => unsafe { avx512(columns, registers, u, y, stride, ticks) },
+        Isa::Avx512 if isa.is_available() => unsafe { avx512(columns, registers, u, y, ticks) },
         // SAFETY: the sizes are checked above.
-        _ => unsafe { block::<Portable<f64>>(columns, registers, u, y, stride, ticks) },
+        _ => unsafe { block::<Portable<f64>>(columns, registers, u, y, ticks) },
     }
 }
 
@@ -93,16 +92,16 @@ impl Columns {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn avx2(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], stride: usize, ticks: usize) {
+unsafe fn avx2(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], ticks: usize) {
     // SAFETY: the caller's.
-    unsafe { block::<Avx2F64>(c, r, u, y, stride, ticks) }
+    unsafe { block::<Avx2F64>(c, r, u, y, ticks) }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx2,fma")]
-unsafe fn avx512(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], stride: usize, ticks: usize) {
+unsafe fn avx512(c: &Columns, r: &mut Registers, u: &[f64], y: &mut [f64], ticks: usize) {
     // SAFETY: the caller's.
-    unsafe { block::<Avx512F64>(c, r, u, y, stride, ticks) }
+    unsafe { block::<Avx512F64>(c, r, u, y, ticks) }
 }
 
 #[inline(always)]
@@ -111,12 +110,11 @@ unsafe fn block<V: Pairs>(
     registers: &mut Registers,
     u: &[f64],
     y: &mut [f64],
-    stride: usize,
     ticks: usize,
 ) {
     for k in 0..ticks {
         for (i, slot) in registers.z[columns.states..].iter_mut().enumerate() {
-            *slot = u[i * stride + k];
+            *slot = u[k * columns.inputs + i];
         }
         // SAFETY: the sizes are checked by `run`.
         unsafe {
@@ -127,7 +125,7 @@ unsafe fn block<V: Pairs>(
             }
         }
         for p in 0..columns.phases {
-            y[p * stride + k] = registers.output[p];
+            y[k * columns.phases + p] = registers.output[p];
         }
     }
 }

@@ -1,0 +1,69 @@
+//! Whether samples are numbers.
+
+use super::Isa;
+
+/// Partial sums: eight vectors of eight, so that none waits for the one before.
+const SUMS: usize = 64;
+
+macro_rules! all_finite {
+    ($name:ident, $avx2:ident, $generic:ident, $sample:ty) => {
+        /// True only if all samples are finite; false at once also for sums past the largest number.
+        pub(crate) fn $name(isa: Isa, samples: &[$sample]) -> bool {
+            match isa {
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: the processor was asked.
+                Isa::Avx2 | Isa::Avx512 if isa.is_available() => unsafe { $avx2(samples) },
+                _ => $generic(samples),
+            }
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2,fma")]
+        fn $avx2(samples: &[$sample]) -> bool {
+            $generic(samples)
+        }
+
+        /// What is not finite stays so in a sum, and one addition a sample is cheap.
+        #[inline(always)]
+        fn $generic(samples: &[$sample]) -> bool {
+            let mut sums = [0.0; SUMS];
+            let (blocks, rest) = samples.as_chunks::<SUMS>();
+            for block in blocks {
+                for (sum, x) in sums.iter_mut().zip(block) {
+                    *sum += x;
+                }
+            }
+            sums.iter().chain(rest).all(|sum| sum.is_finite())
+        }
+    };
+}
+
+all_finite!(all_finite_f32, avx2_f32, generic_f32, f32);
+all_finite!(all_finite_f64, avx2_f64, generic_f64, f64);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_finite_is_noticed_wherever_it_is() {
+        for isa in [Isa::Portable, Isa::detect()] {
+            for len in [1, 7, 63, 64, 65, 200] {
+                let clean: Vec<f32> = (0..len).map(|i| i as f32 - 50.0).collect();
+                assert!(all_finite_f32(isa, &clean));
+                for place in 0..len {
+                    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                        let mut samples = clean.clone();
+                        samples[place] = bad;
+                        assert!(!all_finite_f32(isa, &samples), "{bad} at {place} of {len}");
+                        // Two infinities do not cancel.
+                        samples[(place + 64) % len] = -bad;
+                        assert!(!all_finite_f32(isa, &samples));
+                        let wide: Vec<f64> = samples.iter().map(|&x| f64::from(x)).collect();
+                        assert!(!all_finite_f64(isa, &wide));
+                    }
+                }
+            }
+        }
+    }
+}
