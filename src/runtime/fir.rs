@@ -182,11 +182,12 @@ impl<T: Sample> FirPlan<T> {
     fn filter(&self, x: &[T], block: Block, output: &mut [T], sink: &mut (impl FastSink + ?Sized)) {
         let m = self.ratio;
         let super_ticks = (block.lead + block.ticks).div_ceil(self.fold);
-        if block.lead == 0 && block.ticks.is_multiple_of(self.fold) {
-            if let Some(slots) = sink.slots(block.first * m..(block.first + block.ticks) * m) {
-                self.run(x, super_ticks, slots);
-                return;
-            }
+        if block.lead == 0
+            && block.ticks.is_multiple_of(self.fold)
+            && let Some(slots) = sink.slots(block.first * m..(block.first + block.ticks) * m)
+        {
+            self.run(x, super_ticks, slots);
+            return;
         }
         self.run(x, super_ticks, output);
         let range = block.lead * m..(block.lead + block.ticks) * m;

@@ -56,11 +56,11 @@ fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32>
         let end = (k / fold + 1) * hop;
         let mut lanes = [0f32; 8];
         for s in 0..steps {
-            for d in 0..depth {
+            for (d, lane) in lanes.iter_mut().enumerate().take(depth) {
                 let Some(at) = end.checked_sub((s + 1) * depth - d) else { continue };
                 let tap = k.checked_sub(at / n).and_then(|lag| taps[at % n].get(p + lag * ratio));
                 let (x, c) = (input.get(at).copied().unwrap_or(0.0), tap.map_or(0.0, |&c| c as f32));
-                lanes[d] = if fused { x.mul_add(c, lanes[d]) } else { x * c + lanes[d] };
+                *lane = if fused { x.mul_add(c, *lane) } else { x * c + *lane };
             }
         }
         let four = |l: &[f32]| (l[0] + l[2]) + (l[1] + l[3]);
