@@ -134,7 +134,10 @@ fn least_seconds(mut job: impl FnMut()) -> f64 {
 /// f32 multiply-adds a second.
 fn peak() -> f64 {
     let (count, _) = multiply_add_chains(Isa::detect(), 50_000);
-    count as f64 / least_seconds(|| drop(black_box(multiply_add_chains(Isa::detect(), black_box(50_000)))))
+    count as f64
+        / least_seconds(|| {
+            black_box(multiply_add_chains(Isa::detect(), black_box(50_000)));
+        })
 }
 
 fn measure(case: &Case, recursion: Precision, call: usize) {

@@ -1,17 +1,20 @@
 //! How many fast samples a second one core makes, and what share of its multiply-add peak that is.
 //!
-//! `cargo bench --bench runtime` prints criterion's throughput (elements are fast samples); the peak
-//! of the same run is its own group. Each fast sample takes N K multiply-adds, K = taps / M.
+//! `cargo bench --bench runtime` prints a table of the public [`Reconstructor`]; a word after `--` picks the rows
+//! that contain it. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
+//! of many repeats, and so is the peak, which is measured anew beside each row.
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hybank::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{Isa, Options, PcmOutput, Precision, Reconstructor, multiply_add_chains};
 use hybank::spec::Method;
 use std::hint::black_box;
+use std::time::{Duration, Instant};
 
 const TICKS: usize = 16_384;
 const CASES: [(&str, usize, usize, usize); 3] = [("A", 2, 2, 24), ("B", 4, 4, 64), ("C", 8, 8, 128)];
+/// Time for the repeats of a row.
+const ROW: Duration = Duration::from_millis(100);
 
 fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
     Bank {
@@ -55,86 +58,141 @@ fn recursion() -> Bank {
     )
 }
 
-fn input(n: usize) -> Vec<f32> {
-    (0..n * TICKS).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect()
+fn input(n: usize, ticks: usize) -> Vec<f32> {
+    (0..n * ticks).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect()
 }
 
-fn throughput(c: &mut Criterion, group: &str, name: &str, bank: &Bank, precision: Precision, call: usize) {
-    let options = Options { precision, ..Options::default() };
-    let mut stream = Reconstructor::with_options(bank, options).unwrap();
-    let (n, m) = (stream.channels(), stream.ratio());
-    let x = input(n);
-    let mut y = vec![0.0; m * TICKS];
-    let mut group = c.benchmark_group(group);
-    group.throughput(Throughput::Elements((m * TICKS) as u64));
-    group.bench_function(BenchmarkId::from_parameter(name), |b| {
-        b.iter(|| {
+/// Least seconds of one turn, and the peak of one core in multiply-adds a second of the same while.
+fn measure(mut turn: impl FnMut()) -> (f64, f64) {
+    let (mut best, mut peak) = (f64::MAX, 0f64);
+    let begin = Instant::now();
+    while begin.elapsed() < ROW {
+        let start = Instant::now();
+        turn();
+        best = best.min(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        let (count, sum) = multiply_add_chains(Isa::detect(), 10_000);
+        black_box(sum);
+        peak = peak.max(count as f64 / start.elapsed().as_secs_f64());
+    }
+    (best, peak)
+}
+
+/// The rows that were asked for.
+struct Table {
+    wanted: Option<String>,
+}
+
+impl Table {
+    /// One row: `samples` fast samples a turn of `products` multiply-adds each.
+    fn row(&self, name: &str, samples: usize, products: f64, turn: impl FnMut()) {
+        if self.wanted.as_ref().is_some_and(|word| !name.contains(word)) {
+            return;
+        }
+        let (seconds, peak) = measure(turn);
+        let rate = samples as f64 / seconds;
+        let macs = rate * products;
+        println!(
+            "| {name:<34} | {:>8.1} | {:>6.2} | {:>5.1} % |",
+            rate / 1e6,
+            macs / 1e9,
+            100.0 * macs / peak
+        );
+    }
+
+    fn fir(&self, name: &str, n: usize, m: usize, taps: usize, precision: Precision, call: usize) {
+        let options = Options { precision, ..Options::default() };
+        let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
+        let x = input(n, TICKS);
+        let mut y = vec![0.0; m * TICKS];
+        self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
             for (x, y) in x.chunks(call * n).zip(y.chunks_mut(call * m)) {
                 stream.process(black_box(x), y).unwrap();
             }
-        })
-    });
-}
-
-/// What the processor can do at most, f32.
-fn peak(c: &mut Criterion) {
-    const TURNS: u64 = 100_000;
-    let isa = Isa::detect();
-    let (count, _) = multiply_add_chains(isa, TURNS);
-    let mut group = c.benchmark_group("peak, elements are multiply-adds");
-    group.throughput(Throughput::Elements(count));
-    group.bench_function(isa.to_string(), |b| b.iter(|| multiply_add_chains(isa, black_box(TURNS))));
-}
-
-fn cases(c: &mut Criterion) {
-    for (name, n, m, taps) in CASES {
-        throughput(c, "f32", name, &fir(n, m, taps), Precision::Single, TICKS);
-        throughput(c, "f32, 64 ticks a call", name, &fir(n, m, taps), Precision::Single, 64);
-        throughput(c, "f64", name, &fir(n, m, taps), Precision::Double, TICKS);
+        });
     }
-    throughput(c, "state space", "32 states, N = M = 4", &recursion(), Precision::Double, TICKS);
-}
 
-fn ladder(c: &mut Criterion) {
-    for n in [1, 2, 3, 4, 8, 16] {
-        for m in [1, 2, 3, 4, 8, 16] {
-            throughput(
-                c,
-                "16 taps a phase",
-                &format!("N {n} M {m}"),
-                &fir(n, m, 16 * m),
-                Precision::Single,
-                TICKS,
-            );
+    fn cases(&self) {
+        for (name, n, m, taps) in CASES {
+            self.fir(&format!("{name}: f32"), n, m, taps, Precision::Single, TICKS);
+            self.fir(&format!("{name}: f32, 64 ticks a call"), n, m, taps, Precision::Single, 64);
+            self.doubles(&format!("{name}: f64"), n, m, taps);
+            self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
+            self.threads(&format!("{name}: f32, two threads"), n, m, taps);
         }
     }
-    for taps in [2, 8, 32, 128, 512, 2048] {
-        throughput(c, "taps, N = M = 2", &taps.to_string(), &fir(2, 2, taps), Precision::Single, TICKS);
+
+    /// In and out as f64; the peak in f64 is half the one printed.
+    fn doubles(&self, name: &str, n: usize, m: usize, taps: usize) {
+        let options = Options { precision: Precision::Double, ..Options::default() };
+        let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
+        let x: Vec<f64> = input(n, TICKS).into_iter().map(f64::from).collect();
+        let mut y = vec![0.0; m * TICKS];
+        self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
+            stream.process_f64(black_box(&x), &mut y).unwrap();
+        });
+    }
+
+    fn pcm(&self, name: &str, n: usize, m: usize, taps: usize) {
+        let mut stream = Reconstructor::new(&fir(n, m, taps)).unwrap();
+        let bytes: Vec<u8> = (0..2 * n * TICKS).map(|i| (i * 31) as u8).collect();
+        let mut out = vec![0; 2 * m * TICKS];
+        let layout = SampleLayout::packed(PcmFormat::S16Le);
+        self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
+            let frames = PcmFrames { layout, channels: n, bytes: black_box(&bytes) };
+            let mut output = PcmOutput { format: PcmFormat::S16Le, bytes: &mut out, clipped: 0 };
+            stream.process_pcm(&[frames], &mut output).unwrap();
+        });
+    }
+
+    /// A longer call, because threads are started for each.
+    fn threads(&self, name: &str, n: usize, m: usize, taps: usize) {
+        let mut stream = Reconstructor::new(&fir(n, m, taps)).unwrap();
+        let ticks = 16 * TICKS;
+        let x = input(n, ticks);
+        let mut y = vec![0.0; m * ticks];
+        self.row(name, m * ticks, (n * taps) as f64 / m as f64, || {
+            stream.process_parallel(black_box(&x), &mut y, 2).unwrap();
+        });
+    }
+
+    /// 16 taps a phase for every small N and M, then more and more taps.
+    fn ladder(&self) {
+        for n in 1..=16 {
+            for m in 1..=16 {
+                self.fir(
+                    &format!("ladder: N {n} M {m}, 16 taps a phase"),
+                    n,
+                    m,
+                    16 * m,
+                    Precision::Single,
+                    TICKS,
+                );
+            }
+        }
+        for taps in [2, 8, 32, 128, 512, 2048] {
+            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Precision::Single, TICKS);
+        }
+    }
+
+    /// Recursions have no peak to compare with: ticks are what counts.
+    fn recursions(&self) {
+        let mut stream = Reconstructor::new(&recursion()).unwrap();
+        let x = input(4, TICKS);
+        let mut y = vec![0.0; 4 * TICKS];
+        self.row("state space: 32 states, N 4 M 4", 4 * TICKS, 0.0, || {
+            stream.process(black_box(&x), &mut y).unwrap();
+        });
     }
 }
 
-fn integers(c: &mut Criterion) {
-    let mut stream = Reconstructor::new(&fir(2, 2, 24)).unwrap();
-    let bytes: Vec<u8> = (0..4 * TICKS).map(|i| (i * 31) as u8).collect();
-    let mut out = vec![0; 4 * TICKS];
-    let mut group = c.benchmark_group("s16le in and out");
-    group.throughput(Throughput::Elements((2 * TICKS) as u64));
-    group.bench_function("A", |b| {
-        b.iter(|| {
-            let layout = SampleLayout::packed(PcmFormat::S16Le);
-            let frames = PcmFrames { layout, channels: 2, bytes: black_box(&bytes) };
-            let mut output = PcmOutput { format: PcmFormat::S16Le, bytes: &mut out, clipped: 0 };
-            stream.process_pcm(&[frames], &mut output).unwrap()
-        })
-    });
+fn main() {
+    // The first word that is no option of cargo's.
+    let table = Table { wanted: std::env::args().skip(1).find(|word| !word.starts_with('-')) };
+    println!("{}, one core unless said otherwise", Isa::detect());
+    println!("| {:<34} | M outs/s | GMAC/s | of peak |", "case");
+    println!("|{:-<36}|----------|--------|---------|", "");
+    table.cases();
+    table.ladder();
+    table.recursions();
 }
-
-criterion_group! {
-    name = benches;
-    config = Criterion::default()
-        .sample_size(20)
-        .warm_up_time(std::time::Duration::from_millis(200))
-        .measurement_time(std::time::Duration::from_millis(600));
-    targets = peak, cases, ladder, integers
-}
-criterion_main!(benches);

@@ -123,6 +123,28 @@ impl<T: Sample> FirPlan<T> {
         replaced
     }
 
+    /// A state before tick `first` of `source`, as if all ticks before it had been processed; `None` if they
+    /// do not reach back far enough, or if this is no beginning of a super-tick for a stream with `lead`
+    /// ticks before the source.
+    pub(crate) fn state_at(
+        &self,
+        source: &(impl TickSource + ?Sized),
+        first: usize,
+        lead: usize,
+    ) -> Option<FirState<T>> {
+        let ticks = self.cut.past().div_ceil(self.channels);
+        if ticks > first || !(lead + first).is_multiple_of(self.fold) {
+            return None;
+        }
+        let mut frames = vec![T::default(); ticks * self.channels];
+        source.gather(self.isa, first - ticks, ticks, &mut frames);
+        // They are counted where they are processed.
+        replace_not_finite(&mut frames);
+        let mut state = self.state();
+        state.window.recall(&frames);
+        Some(state)
+    }
+
     /// At most a block, up to the end of a super-tick if there are so many.
     fn block_ticks(&self, left: usize, lead: usize) -> usize {
         left.min(self.block * self.fold - lead)
@@ -160,11 +182,12 @@ impl<T: Sample> FirPlan<T> {
     fn filter(&self, x: &[T], block: Block, output: &mut [T], sink: &mut (impl FastSink + ?Sized)) {
         let m = self.ratio;
         let super_ticks = (block.lead + block.ticks).div_ceil(self.fold);
-        if block.lead == 0 && block.ticks.is_multiple_of(self.fold) {
-            if let Some(slots) = sink.slots(block.first * m..(block.first + block.ticks) * m) {
-                self.run(x, super_ticks, slots);
-                return;
-            }
+        if block.lead == 0
+            && block.ticks.is_multiple_of(self.fold)
+            && let Some(slots) = sink.slots(block.first * m..(block.first + block.ticks) * m)
+        {
+            self.run(x, super_ticks, slots);
+            return;
         }
         self.run(x, super_ticks, output);
         let range = block.lead * m..(block.lead + block.ticks) * m;
@@ -179,6 +202,11 @@ impl<T: Sample> FirPlan<T> {
 }
 
 impl<T: Sample> FirState<T> {
+    /// Ticks of an unfinished super-tick.
+    pub(crate) fn lead(&self) -> usize {
+        self.window.lead()
+    }
+
     /// As new.
     pub(crate) fn reset(&mut self) {
         self.window.reset();

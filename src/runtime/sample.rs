@@ -6,8 +6,6 @@ use super::simd::{self, FirKernel, Isa, RecursionKernel};
 pub(crate) trait Sample:
     Copy + Default + PartialOrd + std::ops::Add<Output = Self> + Send + Sync + std::fmt::Debug + 'static
 {
-    /// Size in memory.
-    const BYTES: usize = size_of::<Self>();
     /// Below this a state is as good as zero; above it all arithmetic is fast.
     const NEGLIGIBLE: Self;
     /// Rounds to the nearest.

@@ -2,8 +2,8 @@
 
 use super::Isa;
 
-/// Partial sums: eight vectors of eight, so that none waits for the one before.
-const SUMS: usize = 64;
+/// Partial sums: four vectors of eight, so that none waits long for the one before.
+const SUMS: usize = 32;
 
 macro_rules! all_finite {
     ($name:ident, $avx2:ident, $generic:ident, $sample:ty) => {
@@ -33,7 +33,16 @@ macro_rules! all_finite {
                     *sum += x;
                 }
             }
-            sums.iter().chain(rest).all(|sum| sum.is_finite())
+            for (sum, x) in sums.iter_mut().zip(rest) {
+                *sum += x;
+            }
+            let mut half = SUMS / 2;
+            while half > 0 {
+                let (low, high) = sums.split_at_mut(half);
+                low.iter_mut().zip(&*high).for_each(|(low, high)| *low += high);
+                half /= 2;
+            }
+            sums[0].is_finite()
         }
     };
 }
