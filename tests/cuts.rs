@@ -12,16 +12,16 @@ use support::{Desk, bytes, ticks};
 
 /// A generator whose stream never changes (Knuth's MMIX), and the pieces that it makes.
 mod rand_cuts {
-    pub struct Cuts(pub u64);
+    pub(crate) struct Cuts(pub(crate) u64);
 
     impl Cuts {
-        pub fn next(&mut self) -> u64 {
+        pub(crate) fn next(&mut self) -> u64 {
             self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             self.0 >> 33
         }
 
         /// Lengths that add up to `total`, short and long ones, with zeros among them.
-        pub fn of(&mut self, total: usize) -> Vec<usize> {
+        pub(crate) fn of(&mut self, total: usize) -> Vec<usize> {
             let mut cuts = Vec::new();
             let mut left = total;
             while left > 0 {

@@ -1,4 +1,6 @@
 //! A folder with a small bank in it, and the definition of what that bank does.
+// Each test program uses a part of it.
+#![allow(dead_code)]
 
 use std::fs;
 use std::io::Write;
@@ -61,7 +63,6 @@ impl Desk {
     }
 
     /// Runs and wants success; gives the report of `--json`.
-    #[allow(dead_code)]
     pub(crate) fn report(&self, args: &[&str]) -> serde_json::Value {
         let output = self.run(&[args, &["--json", "--force"]].concat(), &[]);
         assert!(output.status.success(), "{args:?}: {output:?}");
@@ -69,7 +70,6 @@ impl Desk {
     }
 
     /// Runs and wants exit code `code` with one message that has all of `parts`, and no new file.
-    #[allow(dead_code)]
     pub(crate) fn refused(&self, code: i32, args: &[&str], parts: &[&str]) {
         let names = || fs::read_dir(self.folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
         let before: Vec<_> = names().collect();
@@ -90,7 +90,6 @@ pub(crate) fn ticks(count: usize) -> Vec<f32> {
 }
 
 /// Channel i of interleaved ticks.
-#[allow(dead_code)]
 pub(crate) fn channel(ticks: &[f32], i: usize) -> Vec<f32> {
     ticks.iter().skip(i).step_by(2).copied().collect()
 }
@@ -104,7 +103,6 @@ pub(crate) fn floats(bytes: &[u8]) -> Vec<f32> {
 }
 
 /// The definition: y[2k + p] = sum_i sum_j f_i[p + 2j] x_i[k - j].
-#[allow(dead_code)]
 pub(crate) fn fused(x: &[f32]) -> Vec<f32> {
     let mut y = vec![0.0; x.len()];
     for (t, y) in y.iter_mut().enumerate() {
