@@ -320,7 +320,7 @@ fn altered_files_are_refused_with_the_place() {
     let upper = bank["gamma"]["upper"].as_f64().unwrap();
     let lower = bank["gamma"]["lower"].as_f64().unwrap();
     desk.refused(&change("/channels/0/taps/3", (tap * (1.0 + 1e-15)).into(), true), &["digest: ", "altered"]);
-    desk.refused(&change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["gamma.upper: "]);
+    desk.refused(&change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["proof.upper: "]);
     desk.refused(&change("/gamma/upper", (upper * (1.0 - 1e-6)).into(), false), &["gamma.upper: "]);
     desk.refused(&change("/gamma/lower", (lower * 1.001).into(), false), &["gamma.lower: "]);
     desk.refused(&change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["gamma.upper: "]);

@@ -30,9 +30,9 @@ const MAX_SEARCHED: usize = 512;
 const MAX_TONES: usize = 64;
 /// Directions of tap space that matter less than this, relative to the strongest, are left alone.
 const RANK: f64 = 1e-13;
-/// Noise added to every state in the choice of coordinates, relative to gamma and the root of their number: no direction is
-/// unobservable then, and the norm rises by some 1e-9 only.
-const STATE_NOISE: f64 = 1e-5;
+/// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess (and of the number of
+/// states): no direction is unobservable then, and the norm would rise by a hundredth of the excess only.
+const STATE_NOISE: f64 = 0.1;
 /// What a bound may fall short of the designer's and still be taken for its proof.
 const SHORTFALL: f64 = 0.5 * CLAIM_TOLERANCE;
 
@@ -96,14 +96,15 @@ fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, Design
     let response = error.response_at(Complex::from_polar(1.0, peak.frequency));
     let tone = tone(peak.frequency, &leading_direction(&response)?);
     let floor = FLOOR * subject.scale();
-    let search = Search::new(middle, norm.max(floor))?;
     let relative: &[f64] = if norm > floor { &EXCESSES } else { &FLOOR_EXCESSES };
-    let excesses = relative.iter().map(|excess| excess * norm.max(floor));
-    for (excess, weight) in excesses.flat_map(|excess| STATE_WEIGHTS.map(|weight| (excess, weight))) {
+    for excess in relative.iter().map(|excess| excess * norm.max(floor)) {
         let gamma = norm + excess;
-        let Some(factor) = search.factor(norm + 0.5 * excess, weight * excess) else { continue };
-        if let Some(factor) = shortest(factor, |factor| subject.keeps(factor, gamma)) {
-            return Ok(Certificate { gamma, peak: tone, factor });
+        let Ok(search) = Search::new(&middle, STATE_NOISE * (excess * gamma).sqrt()) else { continue };
+        for weight in STATE_WEIGHTS {
+            let Some(factor) = search.factor(norm + 0.5 * excess, weight * excess) else { continue };
+            if let Some(factor) = shortest(factor, |factor| subject.keeps(factor, gamma)) {
+                return Ok(Certificate { gamma, peak: tone, factor });
+            }
         }
     }
     Err(DesignError::NotCertified)
@@ -130,12 +131,13 @@ struct Search {
 }
 
 impl Search {
-    fn new(middle: Midpoint, gamma: f64) -> Result<Self, DesignError> {
+    /// Coordinates with `noise` on the states altogether.
+    fn new(middle: &Midpoint, noise: f64) -> Result<Self, DesignError> {
         let Midpoint { a, b, c, d } = middle;
         let (n, m) = (a.nrows(), c.nrows());
         let mut inputs = Mat::zeros(n, m + n);
         inputs.columns_mut(0, m).copy_from(&c.transpose());
-        inputs.columns_mut(m, n).fill_diagonal(STATE_NOISE * gamma / (n.max(1) as f64).sqrt());
+        inputs.columns_mut(m, n).fill_diagonal(noise / (n.max(1) as f64).sqrt());
         let k = kyp::gramian_coordinates(&a.transpose(), &inputs, 0.0)?;
         let heard = k.b.columns(0, m).into_owned();
         Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: heard, d: d.transpose(), inverse: k.inverse })
@@ -193,7 +195,7 @@ fn binding_tones(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<Tone>, DesignErr
     let first = |i: usize| (0..i).all(|before| group(before) != group(i));
     let spread = |column: CMat| -> Vec<[f64; 2]> {
         let weight = |i: usize| if first(i) { column[group(i)] } else { Complex::new(0.0, 0.0) };
-        (0..parts.len()).map(|i| weight(i)).map(|z| [-z.re, -z.im]).collect()
+        (0..parts.len()).map(weight).map(|z| [-z.re, -z.im]).collect()
     };
     let tones = directions.iter().enumerate();
     Ok(tones

@@ -79,7 +79,7 @@ impl Ball {
     /// Enclosure of the root; NaN where the ball holds negative numbers.
     pub(super) fn sqrt(self) -> Self {
         let least = self.lower();
-        if !(least >= 0.0) {
+        if least.is_nan() || least < 0.0 {
             return Self { mid: Double::from(f64::NAN), radius: f64::NAN };
         }
         let root = self.mid.sqrt();
@@ -137,7 +137,7 @@ impl Div for Ball {
     /// NaN where the divisor's ball holds zero.
     fn div(self, other: Self) -> Self {
         let least = other.mid.nearest().abs() * (1.0 - f64::EPSILON) - other.radius * OUTWARD;
-        if !(least > 0.0) {
+        if least.is_nan() || least <= 0.0 {
             return Self { mid: Double::from(f64::NAN), radius: f64::NAN };
         }
         let quotient = self.mid / other.mid;

@@ -108,44 +108,67 @@ pub(super) fn order(tick: &Tick, filters: &SynthesisFilters, ratio: usize) -> us
     Layout::new(tick, own).filter.end
 }
 
+/// Linear maps from the state xi and the inputs u, row by row.
+struct Rows {
+    state: Matrix,
+    input: Matrix,
+}
+
+impl Rows {
+    fn zeros(count: usize, states: usize, inputs: usize) -> Self {
+        Self { state: ball::zeros(count, states), input: ball::zeros(count, inputs) }
+    }
+
+    /// Makes `row` the sample `s` of the tick, as it is taken.
+    fn take_sample(&mut self, row: usize, tick: &Tick, s: usize) {
+        self.state.view_mut((row, 0), (1, tick.order())).copy_from(&tick.readouts.row(s));
+        self.input[(row, tick.order() + s)] = Ball::from(1.0);
+    }
+
+    /// Takes `by` times the rows `range` of `other` from the rows from `start` on.
+    fn subtract(&mut self, start: usize, by: &Matrix, other: &Self, range: Range<usize>) {
+        for (to, from) in [(&mut self.state, &other.state), (&mut self.input, &other.input)] {
+            let part = ball::product(by, &from.rows(range.start, range.len()).into_owned());
+            let mut rows = to.rows_mut(start, by.nrows());
+            let difference = ball::subtract(&rows.clone_owned(), &part);
+            rows.copy_from(&difference);
+        }
+    }
+}
+
+/// Fills in the delay lines, and gives the samples at the tick in which they count.
+fn deliver(whole: &mut Rows, tick: &Tick, layout: &Layout) -> Rows {
+    let mut delivered = Rows::zeros(tick.samples(), whole.state.ncols(), whole.input.ncols());
+    for (s, line) in layout.lines.iter().enumerate() {
+        if line.is_empty() {
+            delivered.take_sample(s, tick, s);
+            continue;
+        }
+        whole.take_sample(line.start, tick, s);
+        (line.start + 1..line.end).for_each(|link| whole.state[(link, link - 1)] = Ball::from(1.0));
+        delivered.state[(s, line.end - 1)] = Ball::from(1.0);
+    }
+    delivered
+}
+
 impl ErrorSystem {
     pub(super) fn new(tick: &Tick, filters: &BlockForm) -> Self {
         let outputs = filters.d.nrows();
         let layout = Layout::new(tick, filters.a.nrows());
         let (n, order) = (tick.order(), layout.filter.end);
-        let mut system = ball::zeros(order + outputs, order);
-        let mut inputs = ball::zeros(order + outputs, n + tick.samples());
-        system.view_mut((0, 0), (n, n)).copy_from(&tick.transition);
-        (0..n).for_each(|i| inputs[(i, i)] = Ball::from(1.0));
-        // Each sample as rows over xi and u, at the tick in which it counts.
-        let (mut state_rows, mut input_rows) =
-            (ball::zeros(tick.samples(), order), ball::zeros(tick.samples(), n + tick.samples()));
-        for (s, line) in layout.lines.iter().enumerate() {
-            let entry = if line.is_empty() {
-                (&mut state_rows, &mut input_rows, s)
-            } else {
-                (&mut system, &mut inputs, line.start)
-            };
-            entry.0.view_mut((entry.2, 0), (1, n)).copy_from(&tick.readouts.row(s));
-            entry.1[(entry.2, n + s)] = Ball::from(1.0);
-            (line.start + 1..line.end).for_each(|link| system[(link, link - 1)] = Ball::from(1.0));
-            if !line.is_empty() {
-                state_rows[(s, line.end - 1)] = Ball::from(1.0);
-            }
-        }
-        let channels = tick.samples() - outputs;
-        let measured = |rows: &Matrix| rows.rows(outputs, channels).into_owned();
-        let wanted = |rows: &Matrix| rows.rows(0, outputs).into_owned();
-        let filter = layout.filter;
-        let own = filter.len();
-        for (from, to) in [(&state_rows, &mut system), (&input_rows, &mut inputs)] {
-            to.rows_mut(filter.start, own).copy_from(&ball::product(&filters.b, &measured(from)));
-            let error = ball::subtract(&wanted(from), &ball::product(&filters.d, &measured(from)));
-            to.rows_mut(order, outputs).copy_from(&error);
-        }
-        system.view_mut((filter.start, filter.start), (own, own)).copy_from(&filters.a);
-        system.view_mut((order, filter.start), (outputs, own)).copy_from(&filters.c.map(|x| -x));
-        Self { system, inputs, gram: tick.gram.clone(), outputs }
+        let mut whole = Rows::zeros(order + outputs, order, n + tick.samples());
+        whole.state.view_mut((0, 0), (n, n)).copy_from(&tick.transition);
+        (0..n).for_each(|i| whole.input[(i, i)] = Ball::from(1.0));
+        let delivered = deliver(&mut whole, tick, &layout);
+        let (wanted, measured) = (0..outputs, outputs..tick.samples());
+        let own = layout.filter;
+        whole.state.view_mut((own.start, own.start), (own.len(), own.len())).copy_from(&filters.a);
+        whole.subtract(own.start, &filters.b.map(|x| -x), &delivered, measured.clone());
+        // e = wanted - c eta - d measured.
+        whole.state.view_mut((order, own.start), (outputs, own.len())).copy_from(&filters.c.map(|x| -x));
+        whole.subtract(order, &ball::identity(outputs).map(|x| -x), &delivered, wanted);
+        whole.subtract(order, &filters.d, &delivered, measured);
+        Self { system: whole.state, inputs: whole.input, gram: tick.gram.clone(), outputs }
     }
 
     /// n, the number of states.

@@ -78,42 +78,62 @@ pub(super) fn of_length(
     length: usize,
     tones: &[Tone],
 ) -> Option<f64> {
-    let lags = length.div_ceil(ratio);
     let covariance = Covariance::new(tick)?;
-    let seen = covariance.of_taps(tick, ratio, channels, lags);
-    let (mut value, mut size) = (Ball::ZERO, Ball::ZERO);
-    let mut residual = ball::zeros(ratio * lags, channels.len());
-    for tone in tones {
-        let z = Complex::unit(tone.half);
-        let gram = spectrum::gram(tick, &z);
-        let (a, b) = (
-            Complex::column(&tone.wanted),
-            Complex::column(&tone.wanted).above(&Complex::column(&tone.measured)),
-        );
-        let image = gram.product(&b);
-        value = value + a.inner(&image.rows(0, ratio));
-        size = size + (a.square() * b.inner(&image)).sqrt();
-        let measured: Vec<usize> = channels.iter().map(|i| ratio + i).collect();
-        let heard = a.product(&image.select(&measured, &[0]).adjoint());
-        let (mut turned, back) = (heard, z.clone());
-        for lag in 0..lags {
-            // a conj((Gamma b)_h)' turned by z^lag is the conjugate of what r asks for; the real part is the same.
-            for p in (0..ratio).filter(|p| p + lag * ratio < length) {
-                for i in 0..channels.len() {
-                    let entry = &mut residual[(p * lags + lag, i)];
-                    *entry = *entry + turned.re[(p, i)];
-                }
-            }
-            turned = turned.times(&back);
-        }
-    }
-    let left = residual.iter().fold(Ball::ZERO, |sum, &x| sum + x * x);
-    let added = (left / Ball::from(least_eigenvalue(&seen)?)).sqrt().upper();
+    let seen = covariance.of_taps(tick, ratio, channels, length.div_ceil(ratio));
+    let mut tally = Tally::new(ratio, length, channels);
+    tones.iter().for_each(|tone| tally.add(tick, tone));
+    let added = (tally.seen() / Ball::from(least_eigenvalue(&seen)?)).sqrt().upper();
     let wanted = covariance.of_wanted(tick, ratio).sqrt().upper();
-    let reached = value.lower() - 1.001 * added * wanted;
-    let paid = (size.upper() + 1.001 * (ratio as f64).sqrt() * added) * (1.0 + 1e-14);
+    let reached = tally.value.lower() - 1.001 * added * wanted;
+    let paid = (tally.size.upper() + 1.001 * (ratio as f64).sqrt() * added) * (1.0 + 1e-14);
     let bound = reached / paid * (1.0 - 1e-14);
     bound.is_finite().then(|| bound.max(0.0))
+}
+
+/// Sums over tones.
+struct Tally {
+    ratio: usize,
+    length: usize,
+    /// Rows of the measured samples that can be told apart.
+    measured: Vec<usize>,
+    /// sum Re a* (Gamma b)_w.
+    value: Ball,
+    /// sum ||a|| ||b* G||.
+    size: Ball,
+    /// r, for each lag the M x N taps.
+    residual: Vec<Matrix>,
+}
+
+impl Tally {
+    fn new(ratio: usize, length: usize, channels: &[usize]) -> Self {
+        let measured: Vec<usize> = channels.iter().map(|i| ratio + i).collect();
+        let residual = vec![ball::zeros(ratio, measured.len()); length.div_ceil(ratio)];
+        Self { ratio, length, measured, value: Ball::ZERO, size: Ball::ZERO, residual }
+    }
+
+    fn add(&mut self, tick: &Tick, tone: &Tone) {
+        let z = Complex::unit(tone.half);
+        let a = Complex::column(&tone.wanted);
+        let b = a.above(&Complex::column(&tone.measured));
+        let image = spectrum::gram(tick, &z).product(&b);
+        self.value = self.value + a.inner(&image.rows(0, self.ratio));
+        self.size = self.size + (a.square() * b.inner(&image)).sqrt();
+        // a_p conj((Gamma b)_i) z^j is the conjugate of what r sums; its real part is the same.
+        let mut turned = a.product(&image.select(&self.measured, &[0]).adjoint());
+        for lag in &mut self.residual {
+            *lag = ball::add(lag, &turned.re);
+            turned = turned.times(&z);
+        }
+    }
+
+    /// |r|^2 over the taps that there are.
+    fn seen(&self) -> Ball {
+        let entries = self.residual.iter().enumerate().flat_map(|(lag, r)| {
+            let taps = self.length.saturating_sub(lag * self.ratio).min(self.ratio);
+            r.rows(0, taps).iter().copied().collect::<Vec<Ball>>()
+        });
+        entries.fold(Ball::ZERO, |sum, x| sum + x * x)
+    }
 }
 
 /// Second moments of the samples for white noise of unit density at the input.

@@ -1,7 +1,7 @@
 //! Proof of a bank's gammas from its file alone, in arithmetic whose every rounding is charged.
 //!
 //! This module shares no code with the designer: it neither searches nor optimises, it checks. What a proof needs is in the
-//! file ([`Proof`](crate::bank::Proof)); where that came from does not matter.
+//! file ([`Proof`]); where that came from does not matter.
 //!
 //! # What is proven
 //! For the error system K of the bank's own coefficients (thesis Props. 5.1-5.3), in normalised time (h = 1):
