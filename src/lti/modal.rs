@@ -24,7 +24,7 @@ pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
     if condition
         .first()
         .zip(condition.last())
-        .is_some_and(|(most, least)| !(*most <= CONDITION_LIMIT * least))
+        .is_some_and(|(most, least)| most.is_nan() || *most > CONDITION_LIMIT * least)
     {
         return Ok(None);
     }

@@ -27,8 +27,8 @@ pub(crate) struct StateSpacePlan<T: Sample> {
     pub(crate) ratio: usize,
     recursion: Recursion<T>,
     advance: RecursionKernel<T>,
-    from_inputs: Readout<T>,
-    from_states: Readout<T>,
+    inputs_readout: Readout<T>,
+    states_readout: Readout<T>,
     fir: FirKernel<T>,
     isa: Isa,
 }
@@ -71,8 +71,8 @@ impl<T: Sample> StateSpacePlan<T> {
             ratio,
             recursion: layout.recursion(&structure),
             advance,
-            from_inputs: layout.from_inputs(&structure, ratio),
-            from_states: layout.from_states(&structure, ratio),
+            inputs_readout: layout.inputs_readout(&structure, ratio),
+            states_readout: layout.states_readout(&structure, ratio),
             fir,
             isa,
         })
@@ -84,11 +84,11 @@ impl<T: Sample> StateSpacePlan<T> {
     }
 
     pub(crate) fn state(&self) -> StateSpaceState<T> {
-        let cut = self.from_inputs.cut;
+        let cut = self.inputs_readout.cut;
         let beyond = self.fir.vector_ticks(cut) * self.channels;
         let states = self.recursion.states;
         // A vector may read the rows of some more ticks, which mean nothing.
-        let rows = (BLOCK + self.fir.vector_ticks(self.from_states.cut)) * states;
+        let rows = (BLOCK + self.fir.vector_ticks(self.states_readout.cut)) * states;
         StateSpaceState {
             window: Window::new(self.channels, 1, cut.past(), BLOCK * self.channels, beyond),
             rows: Aligned::new(rows),
@@ -102,7 +102,7 @@ impl<T: Sample> StateSpacePlan<T> {
 
     /// Outputs of a tick, with padding.
     fn hop(&self) -> usize {
-        self.from_inputs.phases
+        self.inputs_readout.phases
     }
 
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
@@ -132,9 +132,9 @@ impl<T: Sample> StateSpacePlan<T> {
     fn filter(&self, state: &mut StateSpaceState<T>, ticks: usize) {
         let StateSpaceState { window, rows, output, further, .. } = state;
         self.advance.run(&self.recursion, rows, window.view(), self.channels, ticks);
-        self.from_inputs.run(&self.fir, window.view(), ticks, output);
+        self.inputs_readout.run(&self.fir, window.view(), ticks, output);
         if self.recursion.states > 0 {
-            self.from_states.run(&self.fir, rows, ticks, further);
+            self.states_readout.run(&self.fir, rows, ticks, further);
             output.iter_mut().zip(&further[..ticks * self.hop()]).for_each(|(y, more)| *y = *y + *more);
         }
         if self.hop() > self.ratio {
@@ -189,7 +189,7 @@ impl<T: Sample> Readout<T> {
     fn new(cut: Cut, ratio: usize, factor: impl Fn(usize, usize) -> f64) -> Self {
         let phases = ratio.max(2);
         let factor = |e: usize, p: usize| if p < ratio { factor(e, p) } else { 0.0 };
-        let groups = widths(phases).map(|(first, width)| phase_group(cut, first, width, &factor)).collect();
+        let groups = widths(phases).map(|(first, width)| phase_group(cut, first, width, factor)).collect();
         Self { cut, phases, groups }
     }
 
@@ -252,14 +252,14 @@ impl Layout {
         occupants
     }
 
-    fn from_inputs<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+    fn inputs_readout<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
         let n = self.channels;
         Readout::new(self.inputs, ratio, |e, p| {
             structure.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |factors| factors[p])
         })
     }
 
-    fn from_states<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+    fn states_readout<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
         let occupants = self.occupants();
         let last = occupants.len() - 1;
         Readout::new(self.state_rows, ratio, |e, p| {
