@@ -101,9 +101,12 @@ impl<T: Sample> FirPlan<T> {
             let lead = if held == first { state.window.lead() } else { 0 };
             let mut block = Block { first, ticks: self.block_ticks(source.ticks() - first, lead), lead };
             let in_place = frames.and_then(|frames| self.in_place(frames, clean, &mut block));
-            if let Some(x) = in_place {
+            // Filtered first and looked at afterwards, when the frames are in the cache.
+            let done = in_place.is_some_and(|x| {
                 self.filter(x, block, &mut state.output, sink);
-            } else {
+                T::all_finite(self.isa, &x[self.cut.past()..])
+            });
+            if !done {
                 if let (true, Some(frames)) = (held < first, frames) {
                     state.window.recall(&frames[..first * self.channels]);
                 }
@@ -150,9 +153,8 @@ impl<T: Sample> FirPlan<T> {
         left.min(self.block * self.fold - lead)
     }
 
-    /// The block's frames with their past as they lie in the caller's memory, if they do, if they are finite
-    /// and fill whole vectors; a block that would is cut to this. Before there is enough past a
-    /// block is made short.
+    /// The block's frames with their past as they lie in the caller's memory, if they fill vectors; the block is
+    /// cut to whole ones. Before there is enough past that is known to be finite a block is made short.
     fn in_place<'a>(&self, frames: &'a [T], clean: usize, block: &mut Block) -> Option<&'a [T]> {
         let (n, past) = (self.channels, self.cut.past());
         let known = (block.first - clean) * n;
@@ -161,10 +163,9 @@ impl<T: Sample> FirPlan<T> {
             block.ticks = block.ticks.min(enough.max(BLOCK_UNIT * self.fold) - block.lead);
             return None;
         }
-        let whole = block.ticks / (self.kernel.vector_ticks(self.cut) * self.fold)
-            * (self.kernel.vector_ticks(self.cut) * self.fold);
-        let fresh = &frames[block.first * n..(block.first + whole) * n];
-        if whole == 0 || !T::all_finite(self.isa, fresh) {
+        let unit = self.kernel.vector_ticks(self.cut) * self.fold;
+        let whole = block.ticks / unit * unit;
+        if whole == 0 {
             return None;
         }
         block.ticks = whole;

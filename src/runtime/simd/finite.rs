@@ -2,8 +2,8 @@
 
 use super::Isa;
 
-/// Partial sums: four vectors of eight, so that none waits long for the one before.
-const SUMS: usize = 32;
+/// Lanes of a partial sum; there are four of them, so that none waits long for the one before.
+const LANES: usize = 8;
 
 macro_rules! all_finite {
     ($name:ident, $avx2:ident, $generic:ident, $sample:ty) => {
@@ -26,23 +26,18 @@ macro_rules! all_finite {
         /// What is not finite stays so in a sum, and one addition a sample is cheap.
         #[inline(always)]
         fn $generic(samples: &[$sample]) -> bool {
-            let mut sums = [0.0; SUMS];
-            let (blocks, rest) = samples.as_chunks::<SUMS>();
-            for block in blocks {
-                for (sum, x) in sums.iter_mut().zip(block) {
-                    *sum += x;
+            let [mut a, mut b, mut c, mut d] = [[0.0; LANES]; 4];
+            let (blocks, rest) = samples.as_chunks::<{ 4 * LANES }>();
+            for x in blocks {
+                for l in 0..LANES {
+                    a[l] += x[l];
+                    b[l] += x[LANES + l];
+                    c[l] += x[2 * LANES + l];
+                    d[l] += x[3 * LANES + l];
                 }
             }
-            for (sum, x) in sums.iter_mut().zip(rest) {
-                *sum += x;
-            }
-            let mut half = SUMS / 2;
-            while half > 0 {
-                let (low, high) = sums.split_at_mut(half);
-                low.iter_mut().zip(&*high).for_each(|(low, high)| *low += high);
-                half /= 2;
-            }
-            sums[0].is_finite()
+            let sum = rest.iter().sum::<$sample>();
+            (0..LANES).fold(sum, |sum, l| sum + ((a[l] + b[l]) + (c[l] + d[l]))).is_finite()
         }
     };
 }
