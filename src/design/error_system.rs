@@ -6,6 +6,10 @@ use crate::bank::{BlockFilter, SynthesisFilters};
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lti::peak::{Peak, hinf_norm, known_hinf_norm, resonances};
 use crate::lti::{FrequencyResponse, LtiError, StateSpace, StateSpaceError};
+use std::f64::consts::PI;
+
+/// Frequencies that are looked at first for each lag of FIR filters.
+const LOOKS_PER_LAG: usize = 4;
 
 /// The synthesis filters as one block system: N slow samples in, M fast samples out, a tick.
 pub fn block_system(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, DesignError> {
@@ -43,7 +47,7 @@ pub fn gamma(plant: &BlockedPlant, filters: &StateSpace) -> Result<Peak, DesignE
 /// gamma of a bank's very coefficients.
 pub fn bank_gamma(plant: &BlockedPlant, filters: &SynthesisFilters) -> Result<Peak, DesignError> {
     match filters {
-        SynthesisFilters::Fir(taps) => FirError::new(plant)?.gamma(taps, &[]),
+        SynthesisFilters::Fir(taps) => FirError::new(plant)?.gamma(taps),
         SynthesisFilters::StateSpace(block) => gamma(plant, &from_block(block, plant.wanted)?),
     }
 }
@@ -83,9 +87,8 @@ impl<'a> FirError<'a> {
         (g.rows(0, n).into_owned(), g.rows(n, m).into_owned())
     }
 
-    /// gamma = ||W - F H|| of the filters `taps[i]`, with its peak frequency; `hints` are frequencies where the peak may
-    /// be.
-    pub fn gamma(&self, taps: &[Vec<f64>], hints: &[f64]) -> Result<Peak, DesignError> {
+    /// gamma = ||W - F H|| of the filters `taps[i]`, with its peak frequency.
+    pub fn gamma(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
         let system = error_system(self.plant, &shift_registers(taps, self.plant.wanted)?)?;
         let lags = by_lag(taps, self.plant.wanted);
         let response = |w: f64| {
@@ -93,7 +96,10 @@ impl<'a> FirError<'a> {
             let (n, m) = (self.plant.measured, self.plant.wanted);
             g.rows(n, m) - filter_response(&lags, w) * g.rows(0, n)
         };
-        let hints = self.resonances.iter().chain(hints).copied().collect();
+        // A polynomial in e^{-jw} has at most a peak for each of its lags between 0 and pi.
+        let grid = LOOKS_PER_LAG * lags.len();
+        let mut hints = self.resonances.clone();
+        hints.extend((1..grid).map(|k| PI * k as f64 / grid as f64));
         Ok(known_hinf_norm(&system, &response, hints)?)
     }
 }

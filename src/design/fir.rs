@@ -171,8 +171,7 @@ impl<'a> Exchange<'a> {
         let start = self.minimise_gamma()?;
         let best = self.polish(start)?;
         let taps = self.impulse_responses(&best.taps);
-        let hints: Vec<f64> = best.peaks.iter().map(|peak| peak.frequency).collect();
-        let peak = self.error.gamma(&taps, &hints)?;
+        let peak = self.error.gamma(&taps)?;
         Ok(Finished { taps, estimate: best.estimate, peak })
     }
 

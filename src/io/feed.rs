@@ -1,10 +1,12 @@
 //! Samples as they arrive: a thread for each input, whole ticks to the consumer as soon as every
-//! input has its part.
+//! input has its part. Raw standard input that is alone needs no thread.
 //!
 //! Memory is bounded: each input has a few blocks that go round between its thread and the
 //! consumer. A consumer that does not keep up stops the reading, and thereby the writers of the
 //! pipes.
 
+#[cfg(target_os = "linux")]
+use super::direct::Direct;
 use super::lane::{Block, Lane};
 use super::lost::{LostOfInput, LostSamples};
 use super::reader::{Opening, Said, read};
@@ -74,11 +76,19 @@ pub enum Arrival {
 struct Input {
     name: String,
     lane: Lane,
-    said: Receiver<Result<Said, IoError>>,
-    free: Sender<Vec<u8>>,
+    source: Source,
     /// When its frames were taken, as far as the input itself knows.
     sequence: Sequence,
     notes: Vec<String>,
+}
+
+/// Where an input's frames come from.
+enum Source {
+    /// Its thread, to which blocks go back.
+    Thread { said: Receiver<Result<Said, IoError>>, free: Sender<Vec<u8>> },
+    /// Standard input itself.
+    #[cfg(target_os = "linux")]
+    Direct(Direct),
 }
 
 /// The inputs of a stream.
@@ -107,12 +117,15 @@ impl Feed {
         let channels = if paths.len() == 1 { options.channels } else { 1 };
         let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).clamp(4096, BLOCK_BYTES);
         // All threads first: opening a FIFO waits for its writer, in whatever order they come.
-        let spawn =
-            |path: &PathBuf| spawn(Opening { path: path.clone(), coding: options.coding, channels, block });
-        let inputs = paths.iter().map(spawn).collect();
+        let opening =
+            |path: &PathBuf| Opening { path: path.clone(), coding: options.coding, channels, block };
+        let inputs = match paths {
+            [path] => vec![alone(opening(path))?],
+            _ => paths.iter().map(|path| spawn(opening(path))).collect(),
+        };
         let mut feed = Self { inputs, stop, until: options.until, ready: 0, ticks: 0 };
         for i in 0..paths.len() {
-            if !feed.hear(i)? {
+            if feed.inputs[i].has_header() && !feed.hear(i)? {
                 return Ok(None);
             }
         }
@@ -192,14 +205,18 @@ impl Feed {
     /// Waits for what input i has to say next; false if `stop` spoke first.
     fn hear(&mut self, i: usize) -> Result<bool, IoError> {
         let input = &mut self.inputs[i];
-        select! {
-            recv(input.said) -> said => match said {
-                Ok(said) => input.take(said?),
-                Err(_) => input.lane.end(),
+        let news = match &mut input.source {
+            Source::Thread { said, .. } => select! {
+                // A thread that says nothing more has come to its end.
+                recv(said) -> said => Some(said.unwrap_or_else(|_| Ok(Said::End { notes: Vec::new() }))?),
+                recv(self.stop) -> _ => None,
             },
-            recv(self.stop) -> _ => return Ok(false),
-        }
-        Ok(true)
+            #[cfg(target_os = "linux")]
+            Source::Direct(direct) => direct.hear(&self.stop)?,
+        };
+        let heard = news.is_some();
+        news.into_iter().for_each(|said| input.take(said));
+        Ok(heard)
     }
 
     /// One time axis for all inputs.
@@ -224,6 +241,11 @@ impl Feed {
 }
 
 impl Input {
+    /// Whether the first thing that its source says is what its frames are.
+    fn has_header(&self) -> bool {
+        matches!(self.source, Source::Thread { .. })
+    }
+
     fn take(&mut self, said: Said) {
         match said {
             Said::Shape { shape, sequence } => {
@@ -248,10 +270,15 @@ impl Input {
         }
     }
 
-    fn give_back(&self, block: Block) {
-        if !block.bytes.is_empty() {
+    fn give_back(&mut self, block: Block) {
+        if block.bytes.is_empty() {
+            return;
+        }
+        match &mut self.source {
             // A thread that has ended needs no blocks.
-            let _ = self.free.send(block.bytes);
+            Source::Thread { free, .. } => drop(free.send(block.bytes)),
+            #[cfg(target_os = "linux")]
+            Source::Direct(direct) => direct.give_back(block.bytes),
         }
     }
 
@@ -291,6 +318,24 @@ impl Input {
     }
 }
 
+/// The only input.
+#[cfg(target_os = "linux")]
+fn alone(opening: Opening) -> Result<Input, IoError> {
+    if !opening.is_stdin() || opening.coding == Coding::Wav {
+        return Ok(spawn(opening));
+    }
+    let (name, direct) = (opening.name(), Direct::new(&opening)?);
+    let lane = Lane::new(direct.shape);
+    let source = Source::Direct(direct);
+    Ok(Input { name, lane, source, sequence: Sequence::default(), notes: Vec::new() })
+}
+
+/// The only input.
+#[cfg(not(target_os = "linux"))]
+fn alone(opening: Opening) -> Result<Input, IoError> {
+    Ok(spawn(opening))
+}
+
 fn spawn(opening: Opening) -> Input {
     let (say, said) = bounded(BLOCKS + 2);
     let (free, free_out) = bounded(BLOCKS);
@@ -301,5 +346,6 @@ fn spawn(opening: Opening) -> Input {
     let name = opening.name();
     let lane = Lane::new(opening.raw_shape());
     thread::spawn(move || read(opening, say, free_out));
-    Input { name, lane, said, free, sequence: Sequence::default(), notes: Vec::new() }
+    let source = Source::Thread { said, free };
+    Input { name, lane, source, sequence: Sequence::default(), notes: Vec::new() }
 }

@@ -4,6 +4,8 @@
 //! one of the [`PcmFormat`]s; integer formats are full scale = 1.0.
 
 mod atomic;
+#[cfg(target_os = "linux")]
+mod direct;
 mod error;
 mod feed;
 mod frames;

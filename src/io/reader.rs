@@ -44,7 +44,7 @@ impl Opening {
         Shape { layout: SampleLayout::packed(format), channels: self.channels, rate: None, promised: None }
     }
 
-    fn is_stdin(&self) -> bool {
+    pub(super) fn is_stdin(&self) -> bool {
         self.path.as_os_str() == "-"
     }
 }
@@ -121,9 +121,7 @@ impl Reader {
     fn pump_raw(&self, source: impl Read, shape: Shape) -> Result<Said, IoError> {
         let mut frames = FrameReader::new(source, shape.frame_bytes(), None);
         self.pump(&mut frames)?;
-        let cut = frames.cut_bytes();
-        let note = format!("the last frame is cut ({cut} bytes of it are there) and was left out");
-        Ok(Said::End { notes: Vec::from_iter((cut > 0).then_some(note)) })
+        Ok(Said::End { notes: cut_note(frames.cut_bytes()) })
     }
 
     /// Frames to the consumer until the end, or until the consumer is gone.
@@ -138,6 +136,12 @@ impl Reader {
         }
         Ok(())
     }
+}
+
+/// What there is to say about the `cut` bytes of a last frame.
+pub(super) fn cut_note(cut: usize) -> Vec<String> {
+    let note = format!("the last frame is cut ({cut} bytes of it are there) and was left out");
+    Vec::from_iter((cut > 0).then_some(note))
 }
 
 fn open_file(path: &Path) -> Result<File, IoError> {
