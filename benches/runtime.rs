@@ -148,7 +148,7 @@ impl Table {
     /// A longer call, because threads are started for each.
     fn threads(&self, name: &str, n: usize, m: usize, taps: usize) {
         let mut stream = Reconstructor::new(&fir(n, m, taps)).unwrap();
-        let ticks = 16 * TICKS;
+        let ticks = 64 * TICKS;
         let x = input(n, ticks);
         let mut y = vec![0.0; m * ticks];
         self.row(name, m * ticks, (n * taps) as f64 / m as f64, || {
