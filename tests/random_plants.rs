@@ -1,0 +1,108 @@
+//! Random plants, from one channel to eight, steep and flat, delays down to equal: each ends as a bank with an interval that
+//! holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many.
+
+use hybank::design::{analyze, design};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use std::f64::consts::TAU;
+
+/// SplitMix64: small, seeded, good enough to choose cases.
+struct Dice(u64);
+
+impl Dice {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// From `least` to `most`.
+    fn count(&mut self, least: usize, most: usize) -> usize {
+        least + (self.next() % (most - least + 1) as u64) as usize
+    }
+
+    /// In [0, 1).
+    fn part(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A low-pass of order 1 to 6 with its cutoff between 0.03 and 3 radians a fast sample.
+fn front_end(dice: &mut Dice) -> FilterSpec {
+    let family = if dice.part() < 0.5 { Family::Butterworth } else { Family::Bessel };
+    FilterSpec::Family {
+        family,
+        order: Some(dice.count(1, 6)),
+        cutoff: 0.03 * 100f64.powf(dice.part()) / TAU,
+        ripple_db: None,
+        attenuation_db: None,
+    }
+}
+
+/// Equal, nearly equal, or anywhere within two ticks.
+fn delays(dice: &mut Dice, channels: usize, ratio: usize) -> Vec<f64> {
+    let (kind, first) = (dice.count(0, 3), 2.0 * ratio as f64 * dice.part());
+    let delay = |dice: &mut Dice| match kind {
+        0 => first,
+        1 => first + 1e-3 * dice.part(),
+        _ => 2.0 * ratio as f64 * dice.part(),
+    };
+    (0..channels).map(|_| delay(dice)).collect()
+}
+
+fn plant(seed: u64) -> Spec {
+    let mut dice = Dice(seed);
+    let (channels, ratio) = (dice.count(1, 8), dice.count(1, 8));
+    let target = front_end(&mut dice);
+    let alike = dice.part() < 0.5;
+    let channels = delays(&mut dice, channels, ratio)
+        .into_iter()
+        .map(|delay| {
+            let filter = if alike { target.clone() } else { front_end(&mut dice) };
+            ChannelSpec { delay, filter, noise: 0.0 }
+        })
+        .collect();
+    let taps = dice.count(1, 4) * ratio;
+    let method = if dice.part() < 0.7 { Method::Fir } else { Method::Iir };
+    let design = DesignSpec { method, taps: (method == Method::Fir).then_some(taps), slack: None };
+    Spec {
+        name: String::new(),
+        fast_period: 1.0,
+        ratio,
+        latency: Some(dice.count(0, 3 * ratio)),
+        target,
+        channels,
+        design,
+    }
+}
+
+/// Whether there is a bank.
+fn check(seed: u64) -> bool {
+    let spec = plant(seed);
+    let bank = match design(&spec) {
+        Ok(found) => found.bank,
+        Err(refusal) => {
+            println!("plant {seed}: {refusal}");
+            assert!(!refusal.to_string().is_empty());
+            return false;
+        }
+    };
+    let gamma = &bank.gamma;
+    let (upper, lower) = (gamma.upper.unwrap(), gamma.lower.unwrap());
+    assert!(
+        upper.is_finite() && gamma.noncausal.unwrap() <= upper && lower <= upper,
+        "plant {seed}: {gamma:?}"
+    );
+    let again = analyze(&bank, &[]).unwrap().gamma;
+    assert!((again - upper).abs() <= 1e-8 * upper + 1e-12, "plant {seed}: {again} {upper}");
+    true
+}
+
+#[test]
+fn every_plant_ends_as_a_bank_or_a_refusal() {
+    let wanted = std::env::var("HYBANK_PLANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(24);
+    let banks = (0..wanted).filter(|&seed| check(seed)).count();
+    println!("{banks} banks of {wanted} plants");
+    assert!(banks * 10 >= wanted as usize * 9, "{banks} banks of {wanted} plants");
+}
