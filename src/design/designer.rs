@@ -153,7 +153,7 @@ fn written_form(
     let tapped = TappedRecursion::new(system)?;
     let forms = [tapped.modal(), tapped.triangular().map(Some)];
     for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {
-        let found = judged(plant, SynthesisFilters::StateSpace(error_system::to_block(&form.realise())))?;
+        let found = judged(plant, SynthesisFilters::StateSpace(error_system::to_block(&form.realise()?)))?;
         if found.1.gain <= promised * (1.0 + FORM_ACCURACY) {
             return Ok(found);
         }

@@ -4,8 +4,8 @@ use super::DesignError;
 use super::equivalence::BlockedPlant;
 use crate::bank::{BlockFilter, SynthesisFilters};
 use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lti::peak::{Peak, hinf_norm, known_hinf_norm, resonances};
-use crate::lti::{FrequencyResponse, LtiError, StateSpace, StateSpaceError};
+use crate::lti::peak::{Peak, hinf_norm, known_hinf_norm, resonances, stable_poles};
+use crate::lti::{FrequencyResponse, StateSpace, StateSpaceError};
 use std::f64::consts::PI;
 
 /// Frequencies that are looked at first for each lag of FIR filters.
@@ -65,13 +65,9 @@ impl<'a> FirError<'a> {
     /// Prepares `plant`, whose poles are those of all its error systems, but for poles at zero.
     ///
     /// # Errors
-    /// [`LtiError::Unstable`].
+    /// [`DesignError::Lti`] if the plant is not stable.
     pub fn new(plant: &'a BlockedPlant) -> Result<Self, DesignError> {
-        let poles = linalg::eigenvalues(plant.system.a())?;
-        let radius = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
-        if radius >= 1.0 {
-            return Err(LtiError::Unstable { radius }.into());
-        }
+        let poles = stable_poles(&plant.system)?;
         Ok(Self {
             plant,
             response: FrequencyResponse::new(&plant.system.compress_inputs()),

@@ -22,13 +22,8 @@ pub fn balanced(system: &StateSpace, floor: f64) -> Result<StateSpace, LtiError>
     let right = Mat::from_fn(svd.v.nrows(), kept, |i, k| svd.v[(i, k)] / root(k));
     let left = Mat::from_fn(kept, svd.u.nrows(), |k, i| svd.u[(i, k)] / root(k));
     let (forward, back) = (reach * right, left * sight.transpose());
-    let reduced = StateSpace::new(
-        &back * system.a() * &forward,
-        back * system.b(),
-        system.c() * forward,
-        system.d().clone(),
-    );
-    Ok(reduced.expect("a change of coordinates keeps the shapes"))
+    let a = &back * system.a() * &forward;
+    Ok(StateSpace::new(a, back * system.b(), system.c() * forward, system.d().clone())?)
 }
 
 /// How many of the descending `sigma` must stay.

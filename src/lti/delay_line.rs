@@ -9,7 +9,7 @@
 use super::balanced::balanced;
 use super::gramian::h2_norm;
 use super::modal::{modal, triangular};
-use super::{LtiError, StateSpace};
+use super::{LtiError, StateSpace, StateSpaceError};
 use crate::linalg::Mat;
 
 /// States that change the response by less than this fraction of it, all together, are left out: less than a
@@ -45,8 +45,7 @@ impl TappedRecursion {
             system.b().select_rows(core),
             outlook.select_columns(core),
             Mat::zeros(system.outputs(), system.inputs()),
-        )
-        .expect("parts of a system fit");
+        )?;
         let energy = taps.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
         Ok(Self { taps, tail: balanced(&tail, NEGLIGIBLE * energy.sqrt())? })
     }
@@ -75,7 +74,10 @@ impl TappedRecursion {
 
     /// One system: the states of the recursion first, then the line from its oldest inputs to its newest. So `a` is block
     /// triangular, and as sparse as can be.
-    pub fn realise(&self) -> StateSpace {
+    ///
+    /// # Errors
+    /// [`StateSpaceError`] never for a recursion made by [`TappedRecursion::new`]: its parts fit.
+    pub fn realise(&self) -> Result<StateSpace, StateSpaceError> {
         let (q, m, n) = (self.ticks(), self.tail.inputs(), self.tail.order());
         let order = n + q * m;
         // Where u[k - j] lies, j = 1..q.
@@ -97,7 +99,7 @@ impl TappedRecursion {
                 a.view_mut((place(j), place(j - 1)), (m, m)).fill_with_identity();
             }
         }
-        StateSpace::new(a, b, c, self.taps[0].clone()).expect("the line fits by construction")
+        StateSpace::new(a, b, c, self.taps[0].clone())
     }
 }
 
@@ -183,7 +185,7 @@ mod tests {
             let modal = tapped.modal().unwrap().unwrap();
             let triangular = tapped.triangular().unwrap();
             for form in [tapped, modal, triangular] {
-                let made = form.realise();
+                let made = form.realise().unwrap();
                 assert_eq!(made.order(), 2 + 2 * long);
                 check_same(&system, &made, 1e-12);
             }
@@ -192,8 +194,15 @@ mod tests {
 
     #[test]
     fn the_matrix_has_nothing_but_its_section_and_the_line() {
-        let a =
-            TappedRecursion::new(&with_chains(3, 2)).unwrap().modal().unwrap().unwrap().realise().a().clone();
+        let a = TappedRecursion::new(&with_chains(3, 2))
+            .unwrap()
+            .modal()
+            .unwrap()
+            .unwrap()
+            .realise()
+            .unwrap()
+            .a()
+            .clone();
         assert!(a[(0, 0)] == a[(1, 1)] && a[(0, 1)] == -a[(1, 0)]);
         for i in 0..8 {
             for j in 0..8 {
@@ -213,7 +222,7 @@ mod tests {
         let system = StateSpace::new(a, b, c, Mat::zeros(2, 1)).unwrap();
         let tapped = TappedRecursion::new(&system).unwrap();
         assert_eq!((tapped.ticks(), tapped.tail.order()), (6, 0));
-        assert_eq!(impulse_responses(&system, 20), impulse_responses(&tapped.realise(), 20));
+        assert_eq!(impulse_responses(&system, 20), impulse_responses(&tapped.realise().unwrap(), 20));
     }
 
     #[test]
@@ -223,7 +232,7 @@ mod tests {
         let system = StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap();
         let tapped = TappedRecursion::new(&system).unwrap();
         assert_eq!((tapped.ticks(), tapped.tail.order()), (0, 3));
-        check_same(&system, &tapped.modal().unwrap().unwrap().realise(), 1e-13);
+        check_same(&system, &tapped.modal().unwrap().unwrap().realise().unwrap(), 1e-13);
     }
 
     #[test]

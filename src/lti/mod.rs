@@ -38,6 +38,9 @@ pub enum LtiError {
         /// How far it still moved.
         change: f64,
     },
+    /// Matrices that do not form a system.
+    #[error(transparent)]
+    Shapes(#[from] StateSpaceError),
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),

@@ -19,6 +19,10 @@ const CONDITION_LIMIT: f64 = 1e4;
 /// [`LtiError`] if the system is not stable or its eigenvectors cannot be had.
 pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
     let modes = modes(system.a())?;
+    // Poles of a real matrix come in pairs; should rounding have parted one, there is no real basis.
+    if modes.iter().map(Mode::order).sum::<usize>() != system.order() {
+        return Ok(None);
+    }
     let basis = basis(&modes, system.order());
     let condition = linalg::singular_values(&basis)?;
     if condition
@@ -39,8 +43,7 @@ pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
 /// [`LtiError`] if the iteration does not converge.
 pub fn triangular(system: &StateSpace) -> Result<StateSpace, LtiError> {
     let (q, t) = linalg::real_schur(system.a())?;
-    let rotated = StateSpace::new(t, q.transpose() * system.b(), system.c() * q, system.d().clone());
-    Ok(rotated.expect("a rotation keeps the shapes"))
+    Ok(StateSpace::new(t, q.transpose() * system.b(), system.c() * q, system.d().clone())?)
 }
 
 /// A real pole, or the one of a conjugate pair above the real axis, with its eigenvector.
@@ -97,7 +100,7 @@ fn sections(modes: &[Mode], mut b: Mat, mut c: Mat, d: Mat) -> Result<StateSpace
         a.view_mut((first, first), (order, order)).copy_from(&block);
         first += order;
     }
-    Ok(StateSpace::new(a, b, c, d).expect("sections keep the shapes"))
+    Ok(StateSpace::new(a, b, c, d)?)
 }
 
 /// The power of two by which to divide the states of a section for Gramians of equal trace.

@@ -42,11 +42,7 @@ pub fn hinf_norm(system: &StateSpace) -> Result<Peak, LtiError> {
 /// combination of the measured outputs (the first `measured` rows) explains, causal or not:
 /// G_z (I - G_y* (G_y G_y*)^+ G_y).
 pub fn unexplained_peak(system: &StateSpace, measured: usize) -> Result<Peak, LtiError> {
-    let poles = linalg::eigenvalues(system.a())?;
-    let radius = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
-    if radius >= 1.0 {
-        return Err(LtiError::Unstable { radius });
-    }
+    let poles = stable_poles(system)?;
     let system = system.compress_inputs();
     let response = FrequencyResponse::new(&system);
     Search::new(&system, measured, &|w| response.at_frequency(w), resonances(&poles)).run()
@@ -61,6 +57,16 @@ pub fn known_hinf_norm(
     hints: Vec<f64>,
 ) -> Result<Peak, LtiError> {
     Search::new(&system.compress_inputs(), 0, response, hints).run()
+}
+
+/// The poles of a stable system.
+///
+/// # Errors
+/// [`LtiError::Unstable`] if one of them is not inside the unit circle.
+pub fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, LtiError> {
+    let poles = linalg::eigenvalues(system.a())?;
+    let radius = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    if radius >= 1.0 { Err(LtiError::Unstable { radius }) } else { Ok(poles) }
 }
 
 /// Angles of the poles that may make a peak.

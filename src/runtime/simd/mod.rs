@@ -17,6 +17,8 @@ mod finite;
 mod fir;
 mod isa;
 mod lanes;
+#[cfg(target_arch = "x86_64")]
+mod lanes_x86;
 mod layout;
 mod peak;
 mod recursion;

@@ -1,0 +1,399 @@
+//! [`Lanes`] in the registers of AVX2 and AVX-512.
+
+use super::lanes::{Group, Lanes};
+use std::arch::x86_64::*;
+
+/// Hides where a value comes from, or else the compiler makes horizontal adds of two shuffles and an
+/// add, which processors split into four slow operations.
+macro_rules! opaque {
+    ($value:expr) => {{
+        let mut value = $value;
+        std::arch::asm!("/* {0} */", inout(ymm_reg) value, options(pure, nomem, nostack, preserves_flags));
+        value
+    }};
+}
+
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn neighbours_f32(a: __m256, b: __m256) -> __m256 {
+    // SAFETY: an empty instruction.
+    let mixed = unsafe { opaque!(_mm256_blend_ps::<0b1010_1010>(b, a)) };
+    _mm256_add_ps(_mm256_blend_ps::<0b1010_1010>(a, b), _mm256_permute_ps::<0b10_11_00_01>(mixed))
+}
+
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn neighbours_f64(a: __m256d, b: __m256d) -> __m256d {
+    // SAFETY: an empty instruction.
+    let mixed = unsafe { opaque!(_mm256_blend_pd::<0b1010>(b, a)) };
+    _mm256_add_pd(_mm256_blend_pd::<0b1010>(a, b), _mm256_permute_pd::<0b0101>(mixed))
+}
+
+impl Group for __m256 {
+    type Sample = f32;
+
+    #[inline(always)]
+    unsafe fn neighbours(a: Self, b: Self) -> Self {
+        unsafe { neighbours_f32(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn quads([a, b, c, d]: [Self; 4]) -> Self {
+        // Lanes two apart: a02 a13 c20 c31.
+        let far = |a, c| unsafe {
+            _mm256_add_ps(_mm256_blend_ps::<0b1100_1100>(a, c), _mm256_shuffle_ps::<0b01_00_11_10>(a, c))
+        };
+        unsafe { Self::neighbours(far(a, c), far(b, d)) }
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, at: *mut f32) {
+        unsafe { _mm256_storeu_ps(at, self) }
+    }
+}
+
+impl Group for __m256d {
+    type Sample = f64;
+
+    #[inline(always)]
+    unsafe fn neighbours(a: Self, b: Self) -> Self {
+        unsafe { neighbours_f64(a, b) }
+    }
+
+    #[inline(always)]
+    unsafe fn quads([a, b, c, d]: [Self; 4]) -> Self {
+        let far = |a, c| unsafe {
+            _mm256_add_pd(_mm256_blend_pd::<0b1100>(a, c), _mm256_permute2f128_pd::<0x21>(a, c))
+        };
+        unsafe { Self::neighbours(far(a, c), far(b, d)) }
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, at: *mut f64) {
+        unsafe { _mm256_storeu_pd(at, self) }
+    }
+}
+
+/// One step of a tile of 4 x 3.
+macro_rules! full_step {
+    ($load:literal, $spread:literal, $fma:literal, $bytes:literal) => {
+        concat!(
+            $load,
+            " {x0}, [{x}]\n",
+            $load,
+            " {x1}, [{x} + {stride}]\n",
+            $load,
+            " {x2}, [{x} + 2*{stride}]\n",
+            $spread,
+            " {k}, [{w}]\n",
+            $fma,
+            " {a0}, {x0}, {k}\n",
+            $fma,
+            " {a1}, {x1}, {k}\n",
+            $fma,
+            " {a2}, {x2}, {k}\n",
+            $spread,
+            " {k}, [{w} + ",
+            $bytes,
+            "]\n",
+            $fma,
+            " {b0}, {x0}, {k}\n",
+            $fma,
+            " {b1}, {x1}, {k}\n",
+            $fma,
+            " {b2}, {x2}, {k}\n",
+            $spread,
+            " {k}, [{w} + 2*",
+            $bytes,
+            "]\n",
+            $fma,
+            " {c0}, {x0}, {k}\n",
+            $fma,
+            " {c1}, {x1}, {k}\n",
+            $fma,
+            " {c2}, {x2}, {k}\n",
+            $spread,
+            " {k}, [{w} + 3*",
+            $bytes,
+            "]\n",
+            $fma,
+            " {d0}, {x0}, {k}\n",
+            $fma,
+            " {d1}, {x1}, {k}\n",
+            $fma,
+            " {d2}, {x2}, {k}\n",
+            "sub {x}, ",
+            $bytes,
+            "\n",
+            "add {w}, 4*",
+            $bytes,
+            "\n",
+        )
+    };
+}
+
+/// The loop of [`Lanes::full_tile`] for AVX2, two steps a turn. Twelve sums, three inputs and a
+/// coefficient are exactly its sixteen registers; the compiler's own order of instructions spills some.
+macro_rules! full_tile {
+    ($x:ident, $stride:ident, $w:ident, $steps:ident, $zero:expr, $size:literal, ($($form:literal),*)) => {{
+        let [mut a, mut b, mut c, mut d] = [[$zero; 3]; 4];
+        std::arch::asm!(
+            "test {steps}, 1",
+            "jz 3f",
+            full_step!($($form),*),
+            "3:",
+            "shr {steps}",
+            "jz 4f",
+            "2:",
+            full_step!($($form),*),
+            full_step!($($form),*),
+            "dec {steps}",
+            "jnz 2b",
+            "4:",
+            x = inout(reg) $x => _,
+            w = inout(reg) $w => _,
+            steps = inout(reg) $steps => _,
+            stride = in(reg) $stride * $size,
+            x0 = out(ymm_reg) _, x1 = out(ymm_reg) _, x2 = out(ymm_reg) _, k = out(ymm_reg) _,
+            a0 = inout(ymm_reg) a[0], a1 = inout(ymm_reg) a[1], a2 = inout(ymm_reg) a[2],
+            b0 = inout(ymm_reg) b[0], b1 = inout(ymm_reg) b[1], b2 = inout(ymm_reg) b[2],
+            c0 = inout(ymm_reg) c[0], c1 = inout(ymm_reg) c[1], c2 = inout(ymm_reg) c[2],
+            d0 = inout(ymm_reg) d[0], d1 = inout(ymm_reg) d[1], d2 = inout(ymm_reg) d[2],
+            options(nostack, readonly),
+        );
+        [a, b, c, d]
+    }};
+}
+
+/// # Safety
+/// As for [`Lanes::full_tile`].
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+unsafe fn full_tile_f32<const D: usize>(
+    x: *const f32,
+    stride: usize,
+    w: *const f32,
+    steps: usize,
+) -> [[__m256; 3]; 4] {
+    let zero = _mm256_setzero_ps();
+    // SAFETY: reads what the caller vouches for, writes registers only, ends after `steps` turns.
+    unsafe {
+        match D {
+            2 => full_tile!(x, stride, w, steps, zero, 4, ("vmovups", "vbroadcastsd", "vfmadd231ps", "8")),
+            4 => full_tile!(x, stride, w, steps, zero, 4, ("vmovups", "vbroadcastf128", "vfmadd231ps", "16")),
+            _ => full_tile!(x, stride, w, steps, zero, 4, ("vmovups", "vmovups", "vfmadd231ps", "32")),
+        }
+    }
+}
+
+/// # Safety
+/// As for [`Lanes::full_tile`].
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+unsafe fn full_tile_f64<const D: usize>(
+    x: *const f64,
+    stride: usize,
+    w: *const f64,
+    steps: usize,
+) -> [[__m256d; 3]; 4] {
+    let zero = _mm256_setzero_pd();
+    // SAFETY: as above.
+    unsafe {
+        match D {
+            2 => full_tile!(x, stride, w, steps, zero, 8, ("vmovupd", "vbroadcastf128", "vfmadd231pd", "16")),
+            _ => full_tile!(x, stride, w, steps, zero, 8, ("vmovupd", "vmovupd", "vfmadd231pd", "32")),
+        }
+    }
+}
+
+impl Lanes for __m256 {
+    type Sample = f32;
+    type Group = Self;
+    const GROUP: usize = 8;
+    const GROUPS: usize = 1;
+    const SUMS: usize = 12;
+
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        unsafe { _mm256_setzero_ps() }
+    }
+
+    #[inline(always)]
+    unsafe fn spread<const D: usize>(at: *const f32) -> Self {
+        unsafe {
+            match D {
+                2 => _mm256_castpd_ps(_mm256_set1_pd(at.cast::<f64>().read_unaligned())),
+                4 => {
+                    let quad = _mm_loadu_ps(at);
+                    _mm256_set_m128(quad, quad)
+                }
+                _ => _mm256_loadu_ps(at),
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn windows<const D: usize>(at: *const f32, _: usize) -> Self {
+        unsafe { _mm256_loadu_ps(at) }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_add(self, factor: Self, sum: Self) -> Self {
+        unsafe { _mm256_fmadd_ps(self, factor, sum) }
+    }
+
+    #[inline(always)]
+    unsafe fn group(self, _: usize) -> Self {
+        self
+    }
+
+    #[inline(always)]
+    unsafe fn full_tile<const D: usize>(
+        x: *const f32,
+        stride: usize,
+        coefficients: *const f32,
+        steps: usize,
+    ) -> Option<[[Self; 3]; 4]> {
+        Some(unsafe { full_tile_f32::<D>(x, stride, coefficients, steps) })
+    }
+}
+
+impl Lanes for __m256d {
+    type Sample = f64;
+    type Group = Self;
+    const GROUP: usize = 4;
+    const GROUPS: usize = 1;
+    const SUMS: usize = 12;
+
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        unsafe { _mm256_setzero_pd() }
+    }
+
+    #[inline(always)]
+    unsafe fn spread<const D: usize>(at: *const f64) -> Self {
+        unsafe {
+            match D {
+                2 => {
+                    let pair = _mm_loadu_pd(at);
+                    _mm256_set_m128d(pair, pair)
+                }
+                _ => _mm256_loadu_pd(at),
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn windows<const D: usize>(at: *const f64, _: usize) -> Self {
+        unsafe { _mm256_loadu_pd(at) }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_add(self, factor: Self, sum: Self) -> Self {
+        unsafe { _mm256_fmadd_pd(self, factor, sum) }
+    }
+
+    #[inline(always)]
+    unsafe fn group(self, _: usize) -> Self {
+        self
+    }
+
+    #[inline(always)]
+    unsafe fn full_tile<const D: usize>(
+        x: *const f64,
+        stride: usize,
+        coefficients: *const f64,
+        steps: usize,
+    ) -> Option<[[Self; 3]; 4]> {
+        Some(unsafe { full_tile_f64::<D>(x, stride, coefficients, steps) })
+    }
+}
+
+impl Lanes for __m512 {
+    type Sample = f32;
+    type Group = __m256;
+    const GROUP: usize = 8;
+    const GROUPS: usize = 2;
+    const SUMS: usize = 24;
+
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        unsafe { _mm512_setzero_ps() }
+    }
+
+    #[inline(always)]
+    unsafe fn spread<const D: usize>(at: *const f32) -> Self {
+        unsafe {
+            match D {
+                2 => _mm512_castpd_ps(_mm512_set1_pd(at.cast::<f64>().read_unaligned())),
+                4 => _mm512_broadcast_f32x4(_mm_loadu_ps(at)),
+                _ => _mm512_broadcast_f32x8(_mm256_loadu_ps(at)),
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn windows<const D: usize>(at: *const f32, hop: usize) -> Self {
+        unsafe {
+            if D < 8 {
+                return _mm512_loadu_ps(at);
+            }
+            let first = _mm512_castps256_ps512(_mm256_loadu_ps(at));
+            _mm512_insertf32x8::<1>(first, _mm256_loadu_ps(at.add(hop)))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_add(self, factor: Self, sum: Self) -> Self {
+        unsafe { _mm512_fmadd_ps(self, factor, sum) }
+    }
+
+    #[inline(always)]
+    unsafe fn group(self, index: usize) -> __m256 {
+        unsafe { if index == 0 { _mm512_castps512_ps256(self) } else { _mm512_extractf32x8_ps::<1>(self) } }
+    }
+}
+
+impl Lanes for __m512d {
+    type Sample = f64;
+    type Group = __m256d;
+    const GROUP: usize = 4;
+    const GROUPS: usize = 2;
+    const SUMS: usize = 24;
+
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        unsafe { _mm512_setzero_pd() }
+    }
+
+    #[inline(always)]
+    unsafe fn spread<const D: usize>(at: *const f64) -> Self {
+        unsafe {
+            match D {
+                2 => _mm512_broadcast_f64x2(_mm_loadu_pd(at)),
+                _ => _mm512_broadcast_f64x4(_mm256_loadu_pd(at)),
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn windows<const D: usize>(at: *const f64, hop: usize) -> Self {
+        unsafe {
+            if D < 4 {
+                return _mm512_loadu_pd(at);
+            }
+            let first = _mm512_castpd256_pd512(_mm256_loadu_pd(at));
+            _mm512_insertf64x4::<1>(first, _mm256_loadu_pd(at.add(hop)))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn mul_add(self, factor: Self, sum: Self) -> Self {
+        unsafe { _mm512_fmadd_pd(self, factor, sum) }
+    }
+
+    #[inline(always)]
+    unsafe fn group(self, index: usize) -> __m256d {
+        unsafe { if index == 0 { _mm512_castpd512_pd256(self) } else { _mm512_extractf64x4_pd::<1>(self) } }
+    }
+}

@@ -1,0 +1,196 @@
+//! Where things lie when a state-space bank runs, and its coefficients in that order.
+
+use crate::runtime::BuildError;
+use crate::runtime::aligned::Aligned;
+use crate::runtime::fir::{phase_group, widths};
+use crate::runtime::sample::Sample;
+use crate::runtime::simd::{ColumnTile, Cut, FirKernel, Form, PhaseGroup, Recursion, SectionVector};
+use crate::runtime::structure::{Past, Structure};
+
+/// An FIR filter from frames to phases.
+#[derive(Debug)]
+pub(super) struct Readout<T: Sample> {
+    pub(super) cut: Cut,
+    /// M, or 2 if M is 1: the kernels make at least two.
+    pub(super) phases: usize,
+    groups: Vec<PhaseGroup<T>>,
+}
+
+impl<T: Sample> Readout<T> {
+    /// `factor(e, p)`: of the sample e before the last one of a frame, for phase p.
+    fn new(cut: Cut, ratio: usize, factor: impl Fn(usize, usize) -> f64) -> Self {
+        let phases = ratio.max(2);
+        let factor = |e: usize, p: usize| if p < ratio { factor(e, p) } else { 0.0 };
+        let groups = widths(phases).map(|(first, width)| phase_group(cut, first, width, factor)).collect();
+        Self { cut, phases, groups }
+    }
+
+    pub(super) fn run(&self, kernel: &FirKernel<T>, x: &[T], ticks: usize, out: &mut [T]) {
+        for group in &self.groups {
+            kernel.run(group, self.cut, x, ticks, &mut out[group.first..], self.phases);
+        }
+    }
+}
+
+/// Where things lie: in a window of frames of N inputs, and in rows of S states.
+pub(super) struct Layout {
+    /// Of the recursion.
+    lanes: usize,
+    channels: usize,
+    inputs: Cut,
+    /// S.
+    states: usize,
+    state_rows: Cut,
+    /// Place of each state among the S.
+    places: Vec<usize>,
+    modal: bool,
+}
+
+impl Layout {
+    pub(super) fn new(
+        structure: &Structure,
+        channels: usize,
+        lanes: usize,
+        group: usize,
+    ) -> Result<Self, BuildError> {
+        let order = structure.a.len();
+        let history = structure.history();
+        let len = (history + 1)
+            .checked_mul(channels)
+            .filter(|&len| len <= u32::MAX as usize / 64)
+            .ok_or(BuildError::TooLong { history, channels })?;
+        let sections = structure.sections();
+        let modal = sections.is_some();
+        let places =
+            sections.map_or_else(|| (0..order).collect(), |twos| section_places(&twos, order, lanes));
+        let states =
+            places.iter().max().map_or(0, |place| place + 1).next_multiple_of((2 * lanes).max(group));
+        // Where there is no state, the readout is not used.
+        let state_rows = Cut::new(states.max(group), states, group);
+        Ok(Self {
+            lanes,
+            channels,
+            inputs: Cut::new(channels, len, group),
+            states,
+            state_rows,
+            places,
+            modal,
+        })
+    }
+
+    fn place(&self, (channel, ticks): Past) -> u32 {
+        (self.inputs.past() - ticks * self.channels + channel) as u32
+    }
+
+    /// The state at each place; `None` for padding.
+    fn occupants(&self) -> Vec<Option<usize>> {
+        let mut occupants = vec![None; self.states.max(self.state_rows.hop)];
+        self.places.iter().enumerate().for_each(|(state, &place)| occupants[place] = Some(state));
+        occupants
+    }
+
+    pub(super) fn inputs_readout<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+        let n = self.channels;
+        Readout::new(self.inputs, ratio, |e, p| {
+            structure.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |factors| factors[p])
+        })
+    }
+
+    pub(super) fn states_readout<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+        let occupants = self.occupants();
+        let last = occupants.len() - 1;
+        Readout::new(self.state_rows, ratio, |e, p| {
+            occupants[last - e].map_or(0.0, |state| structure.c[state][p])
+        })
+    }
+
+    pub(super) fn recursion<T: Sample>(&self, structure: &Structure) -> Recursion<T> {
+        let columns = Columns { layout: self, structure, occupants: self.occupants() };
+        let form = if self.modal {
+            let vectors = (0..self.states).step_by(2 * self.lanes);
+            Form::Sections(vectors.map(|first| columns.section_vector(first)).collect())
+        } else {
+            Form::Dense(columns.tiles())
+        };
+        Recursion { states: self.states, form }
+    }
+}
+
+/// The columns of A and B, as the recursion takes them.
+struct Columns<'a> {
+    layout: &'a Layout,
+    structure: &'a Structure,
+    occupants: Vec<Option<usize>>,
+}
+
+impl Columns<'_> {
+    /// Factors of `count` places from `first` on, taken from one factor for each state.
+    fn column<T: Sample>(&self, factor: impl Fn(usize) -> f64, first: usize, count: usize) -> Vec<T> {
+        let places = self.occupants[first..first + count].iter();
+        places.map(|state| T::from_f64(state.map_or(0.0, &factor))).collect()
+    }
+
+    fn section_vector<T: Sample>(&self, first: usize) -> SectionVector<T> {
+        let lanes = self.layout.lanes;
+        // What the states from `to` on take from those from `from` on, lane by lane.
+        let a = |to: usize, from: usize| {
+            let pairs = self.occupants[to..to + lanes].iter().zip(&self.occupants[from..from + lanes]);
+            pairs.map(|(i, j)| i.zip(*j).map_or(0.0, |(i, j)| self.structure.a[i][j])).map(T::from_f64)
+        };
+        let (p, q) = (first, first + lanes);
+        let mut coefficients: Vec<T> = a(p, p).chain(a(p, q)).chain(a(q, p)).chain(a(q, q)).collect();
+        let mut inputs = Vec::new();
+        for (&past, factors) in &self.structure.b {
+            let column: Vec<T> = self.column(|state| factors[state], first, 2 * lanes);
+            if column.iter().any(|&factor| factor != T::default()) {
+                inputs.push(self.layout.place(past));
+                coefficients.extend(column);
+            }
+        }
+        SectionVector { inputs, coefficients: Aligned::from_slice(&coefficients) }
+    }
+
+    fn tiles<T: Sample>(&self) -> Vec<ColumnTile<T>> {
+        let mut tiles = Vec::new();
+        let mut first = 0;
+        while first < self.layout.states {
+            let left = (self.layout.states - first) / self.layout.lanes;
+            let vectors = (1 << left.ilog2()).min(ColumnTile::<T>::WIDEST);
+            tiles.push(self.tile(first, vectors));
+            first += vectors * self.layout.lanes;
+        }
+        tiles
+    }
+
+    /// Columns of zeros are left out, so that triangles and blocks cost less than full matrices.
+    fn tile<T: Sample>(&self, first: usize, vectors: usize) -> ColumnTile<T> {
+        let (mut inputs, mut columns, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
+        let mut keep = |list: &mut Vec<u32>, place: u32, column: Vec<T>| {
+            if column.iter().any(|&factor| factor != T::default()) {
+                list.push(place);
+                coefficients.extend(column);
+            }
+        };
+        let count = vectors * self.layout.lanes;
+        for (&past, factors) in &self.structure.b {
+            keep(&mut inputs, self.layout.place(past), self.column(|i| factors[i], first, count));
+        }
+        for (j, &place) in self.layout.places.iter().enumerate() {
+            keep(&mut columns, place as u32, self.column(|i| self.structure.a[i][j], first, count));
+        }
+        ColumnTile { first, vectors, inputs, columns, coefficients: Aligned::from_slice(&coefficients) }
+    }
+}
+
+/// Places of the states of sections: L first ones, their L partners, and so on.
+fn section_places(sections: &[(usize, Option<usize>)], order: usize, lanes: usize) -> Vec<usize> {
+    let mut places = vec![0; order];
+    for (s, &(one, other)) in sections.iter().enumerate() {
+        let place = s / lanes * 2 * lanes + s % lanes;
+        places[one] = place;
+        if let Some(other) = other {
+            places[other] = place + lanes;
+        }
+    }
+    places
+}

@@ -1,0 +1,170 @@
+use super::*;
+use crate::runtime::tests::Noise;
+use crate::runtime::ticks::Interleaved;
+
+/// The definition, row by row.
+fn definition(filter: &BlockFilter, input: &[f64], channels: usize) -> Vec<f64> {
+    let dot = |row: &[f64], v: &[f64]| row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
+    let mut x = vec![0.0; filter.a.len()];
+    let mut out = Vec::new();
+    for u in input.chunks_exact(channels) {
+        out.extend(filter.c.iter().zip(&filter.d).map(|(c, d)| dot(c, &x) + dot(d, u)));
+        x = filter.a.iter().zip(&filter.b).map(|(a, b)| dot(a, &x) + dot(b, u)).collect();
+    }
+    out
+}
+
+fn run<T: Sample>(
+    filter: &BlockFilter,
+    n: usize,
+    m: usize,
+    isa: Isa,
+    input: &[f64],
+    cut: usize,
+) -> (Vec<f64>, bool) {
+    let plan = StateSpacePlan::<T>::new(filter, n, m, isa).unwrap();
+    let mut state = plan.state();
+    let mut out = vec![0.0; input.len() / n * m];
+    for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
+        plan.process(&mut state, &Interleaved { samples: x, channels: n }, y);
+    }
+    (out, plan.is_modal())
+}
+
+fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mut Noise) -> BlockFilter {
+    let mut matrix = |rows: usize, cols: usize, scale: f64| -> Vec<Vec<f64>> {
+        (0..rows).map(|_| (0..cols).map(|_| scale * noise.next()).collect()).collect()
+    };
+    let mut a = matrix(order, order, 0.9 / order.max(1) as f64);
+    if let Some(blocks) = blocks {
+        let mut owner = Vec::new();
+        blocks.iter().enumerate().for_each(|(b, &size)| owner.extend(vec![b; size]));
+        for (i, row) in a.iter_mut().enumerate() {
+            row.iter_mut().enumerate().filter(|(j, _)| owner[*j] != owner[i]).for_each(|(_, x)| *x = 0.0);
+        }
+    }
+    BlockFilter { a, b: matrix(order, n, 1.0), c: matrix(m, order, 1.0), d: matrix(m, n, 1.0) }
+}
+
+#[test]
+fn every_shape_follows_its_definition_with_the_same_bits_for_every_cut() {
+    let mut noise = Noise(21);
+    let modal: [&[usize]; 6] = [&[1], &[2], &[1, 2], &[2, 1, 1, 2], &[1, 1, 1, 2, 2, 1, 2, 2], &[2; 16]];
+    let dense = [0, 1, 3, 5, 8, 17].map(|order| (order, None));
+    let shapes = modal.map(|blocks| (blocks.iter().sum(), Some(blocks))).into_iter().chain(dense);
+    for (order, blocks) in shapes {
+        for (n, m) in [(1, 1), (2, 3), (4, 4), (3, 9)] {
+            let filter = random(order, n, m, blocks, &mut noise);
+            let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
+            let want = definition(&filter, &input, n);
+            let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+            // Small dense matrices are block-diagonal too.
+            assert!(is_modal || (blocks.is_none() && order > 2), "{order} {blocks:?}");
+            let worst = whole.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-12, "order {order} N {n} M {m}: {worst:e}");
+            for cut in [1, 7, 63, 64, 65, 129] {
+                assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+            }
+            let portable = run::<f64>(&filter, n, m, Isa::Portable, &input, 300).0;
+            let apart = whole.iter().zip(&portable).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-12, "{apart:e}");
+        }
+    }
+}
+
+fn worst(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// The same filter with its inputs `ticks` ticks late, in a delay line that the output reads too: the form of
+/// designed banks.
+fn behind(core: &BlockFilter, ticks: usize, noise: &mut Noise) -> BlockFilter {
+    let (states, n) = (core.a.len(), core.d[0].len());
+    let order = states + ticks * n;
+    let mut a = vec![vec![0.0; order]; order];
+    for (i, row) in a.iter_mut().enumerate() {
+        match core.a.get(i) {
+            Some(own) => {
+                row[..states].copy_from_slice(own);
+                row[states..states + n].copy_from_slice(&core.b[i]);
+            }
+            None if i + n < order => row[i + n] = 1.0,
+            None => {}
+        }
+    }
+    let newest = |i: usize, u: usize| f64::from(u8::from(i == order - n + u));
+    let b = (0..order).map(|i| (0..n).map(|u| newest(i, u)).collect()).collect();
+    let read = |row: &Vec<f64>| row.iter().copied().chain((0..ticks * n).map(|_| noise.next())).collect();
+    BlockFilter { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
+}
+
+#[test]
+fn delay_lines_before_the_states_follow_the_definition() {
+    let mut noise = Noise(22);
+    for (order, blocks) in [(0, None), (2, Some(&[2][..])), (5, Some(&[2, 1, 2])), (4, None)] {
+        for (n, m, ticks) in [(1, 1, 3), (1, 3, 1), (2, 2, 5), (3, 2, 4), (4, 4, 17), (5, 9, 2)] {
+            let filter = behind(&random(order, n, m, blocks, &mut noise), ticks, &mut noise);
+            let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
+            let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+            assert!(is_modal || (blocks.is_none() && order > 2));
+            let error = worst(&whole, &definition(&filter, &input, n));
+            assert!(error < 1e-12, "order {order} N {n} M {m} behind {ticks}: {error:e}");
+            for cut in [1, 63, 65] {
+                assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+            }
+        }
+    }
+}
+
+#[test]
+fn in_single_precision_the_error_is_what_the_poles_make_of_rounding() {
+    let mut noise = Noise(23);
+    for radius in [0.5, 0.9, 0.99, 0.999] {
+        let mut filter = random(6, 2, 3, Some(&[2, 2, 2]), &mut noise);
+        for (k, pair) in filter.a.chunks_mut(2).enumerate() {
+            let (s, c) = (0.3 + k as f64).sin_cos();
+            (pair[0][2 * k], pair[0][2 * k + 1]) = (radius * c, radius * s);
+            (pair[1][2 * k], pair[1][2 * k + 1]) = (-radius * s, radius * c);
+        }
+        let input: Vec<f64> = (0..2 * 3000).map(|_| f64::from(noise.next() as f32)).collect();
+        let want = definition(&filter, &input, 2);
+        let single = run::<f32>(&filter, 2, 3, Isa::detect(), &input, 3000).0;
+        let size = want.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+        let error = worst(&single, &want) / size;
+        assert!(error > 1e-9, "this is not single precision: {error:e}");
+        assert!(error < 8.0 * f64::from(f32::EPSILON) / (1.0 - radius), "radius {radius}: {error:e}");
+        for cut in [1, 63, 65] {
+            assert_eq!(run::<f32>(&filter, 2, 3, Isa::detect(), &input, cut).0, single, "cut {cut}");
+        }
+    }
+}
+
+#[test]
+fn zero_columns_of_triangles_are_not_multiplied() {
+    let mut noise = Noise(24);
+    let mut filter = random(24, 1, 2, None, &mut noise);
+    (0..24).for_each(|i| filter.a[i][..i].fill(0.0));
+    let plan = StateSpacePlan::<f64>::new(&filter, 1, 2, Isa::detect()).unwrap();
+    let Form::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
+    let columns: Vec<usize> = tiles.iter().map(|tile| tile.columns.len()).collect();
+    assert_eq!(columns[0], 24);
+    assert!(columns[1..].iter().all(|&count| count < 24), "{columns:?}");
+    let input: Vec<f64> = (0..300).map(|_| noise.next()).collect();
+    let got = run::<f64>(&filter, 1, 2, Isa::detect(), &input, 300).0;
+    assert!(worst(&got, &definition(&filter, &input, 1)) < 1e-12);
+}
+
+#[test]
+fn a_state_that_fades_away_becomes_zero() {
+    let filter =
+        BlockFilter { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
+    let plan = StateSpacePlan::<f64>::new(&filter, 1, 1, Isa::detect()).unwrap();
+    let mut state = plan.state();
+    let mut input = vec![0.0; 1200];
+    input[0] = 1.0;
+    let mut out = vec![0f64; 1200];
+    plan.process(&mut state, &Interleaved { samples: &input[..], channels: 1 }, &mut out[..]);
+    // 2^-900 is 1e-271, still there; 2^-960 is below the limit, and never denormal (2^-1022).
+    assert!(out[900] > 0.0 && out[1100] == 0.0);
+    assert!(out.iter().all(|y| *y == 0.0 || y.is_normal()));
+}
