@@ -1,25 +1,13 @@
 //! The verbs design, analyze, simulate, demo and completions, as a user runs them.
 
+mod support;
+
 use serde_json::Value;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-
-const SPEC: &str = "\
-fast_period = 1.0
-ratio = 2
-latency = 10
-[target]
-filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
-[[channel]]
-delay = 1.2
-[[channel]]
-delay = 0.6
-[design]
-method = \"fir\"
-taps = 22
-";
+use support::THESIS;
 
 /// A folder with spec.toml in it.
 struct Desk {
@@ -29,7 +17,7 @@ struct Desk {
 impl Desk {
     fn new() -> Self {
         let desk = Self { folder: tempfile::tempdir().unwrap() };
-        fs::write(desk.path("spec.toml"), SPEC).unwrap();
+        fs::write(desk.path("spec.toml"), THESIS).unwrap();
         desk
     }
 
@@ -83,8 +71,8 @@ impl Desk {
 
     /// Designs a changed spec and wants it refused.
     fn bad_spec(&self, from: &str, to: &str, parts: &[&str]) {
-        assert!(SPEC.contains(from));
-        fs::write(self.path("bad.toml"), SPEC.replacen(from, to, 1)).unwrap();
+        assert!(THESIS.contains(from));
+        fs::write(self.path("bad.toml"), THESIS.replacen(from, to, 1)).unwrap();
         self.refused(1, &["design", "bad.toml", "-o", "out.json"], parts);
     }
 }
@@ -163,7 +151,7 @@ fn the_command_line_overrides_the_spec() {
 #[test]
 fn the_latency_may_be_left_to_the_designer() {
     let desk = Desk::new();
-    fs::write(desk.path("open.toml"), SPEC.replace("latency = 10\n", "")).unwrap();
+    fs::write(desk.path("open.toml"), THESIS.replace("latency = 10\n", "")).unwrap();
     let report = desk.json(&["design", "open.toml", "-o", "bank.json", "--json"]);
     assert_eq!(report["latency_chosen"], true);
     assert!(number(&report, "/gamma/upper") < 0.04, "{report}");
@@ -192,7 +180,7 @@ fn banks_flow_through_pipes() {
 #[test]
 fn equal_delays_are_legal() {
     let desk = Desk::new();
-    fs::write(desk.path("equal.toml"), SPEC.replace("delay = 1.2", "delay = 0.6")).unwrap();
+    fs::write(desk.path("equal.toml"), THESIS.replace("delay = 1.2", "delay = 0.6")).unwrap();
     for method in ["fir", "iir"] {
         let taps: &[&str] = if method == "fir" { &["--taps", "22"] } else { &[] };
         let args = ["design", "equal.toml", "-o", "b.json", "--force", "--json", "--method", method];

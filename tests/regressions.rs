@@ -1,21 +1,9 @@
 //! What a tester found by abusing the binary: each stays as a test of its exit code and message.
 
-use std::process::{Command, Output};
+mod support;
 
-const SPEC: &str = r#"
-fast_period = 1.0
-ratio = 2
-latency = 10
-[target]
-filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
-[[channel]]
-delay = 1.2
-[[channel]]
-delay = 0.6
-[design]
-method = "fir"
-taps = 22
-"#;
+use std::process::{Command, Output};
+use support::THESIS;
 
 /// A folder of its own with the spec in it.
 struct Folder(tempfile::TempDir);
@@ -54,7 +42,7 @@ impl Folder {
 
 #[test]
 fn delay_errors_out_of_all_proportion_are_refused() {
-    let folder = Folder::new(SPEC);
+    let folder = Folder::new(THESIS);
     assert!(folder.run(&["design", "spec.toml", "-o", "bank.json"]).status.success());
     for error in ["1e300,0", "-1e300,0", "1e5,0", "0,-1e5"] {
         folder.refuses(&["analyze", "bank.json", "--delay-error", error], &["bank.json", "states", "unit"]);
@@ -63,7 +51,7 @@ fn delay_errors_out_of_all_proportion_are_refused() {
 
 #[test]
 fn a_latency_beyond_memory_is_refused() {
-    let folder = Folder::new(&SPEC.replace("latency = 10", "latency = 65536"));
+    let folder = Folder::new(&THESIS.replace("latency = 10", "latency = 65536"));
     for method in ["fir", "iir", "h2", "sinc"] {
         folder.refuses(
             &["design", "spec.toml", "-o", "bank.json", "--method", method],
@@ -74,14 +62,14 @@ fn a_latency_beyond_memory_is_refused() {
 
 #[test]
 fn a_chirp_too_fast_for_its_quadrature_is_refused() {
-    let folder = Folder::new(SPEC);
+    let folder = Folder::new(THESIS);
     let args = ["simulate", "spec.toml", "--source", "chirp:1Hz..1e9Hz@2s", "-o", "captures"];
     folder.refuses(&args, &["chirp:1Hz..1e9Hz@2s", "units"]);
 }
 
 #[test]
 fn captures_that_no_sample_can_hold_are_refused() {
-    let folder = Folder::new(SPEC);
+    let folder = Folder::new(THESIS);
     let args = ["simulate", "spec.toml", "--source", "step@1", "--gain", "1e300", "-o", "captures"];
     folder.refuses(&args, &["step@1", "--gain"]);
 }

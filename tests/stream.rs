@@ -1,87 +1,41 @@
 //! The verb stream, as a user runs it.
 #![cfg(unix)]
 
+mod support;
+
 use std::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Output};
 use std::time::Duration;
+use support::{Desk, bytes, floats, fused, ticks};
 
-/// N = M = 2, f_1 = (1, 2, 3, 4), f_2 = (10, 20, 30), m0 = 3.
-const BANK: &str = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2,
-    "latency": 3, "method": "fir", "channels": [{ "delay": 0.0, "taps": [1, 2, 3, 4] },
-    { "delay": 0.0, "taps": [10, 20, 30, 0] }], "state_space": null,
-    "gamma": { "upper": null, "lower": null, "noncausal": null } }"#;
-
-struct Bench {
-    folder: tempfile::TempDir,
-}
+/// A folder in which `hybank stream` works with its bank.
+struct Bench(Desk);
 
 impl Bench {
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("bank.json"), BANK).unwrap();
-        Self { folder }
+        Self(Desk::new())
     }
 
     fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.0.path(name)
     }
 
     /// Length of the output that has no name yet.
     fn unfinished_bytes(&self) -> Option<u64> {
-        let mut files = fs::read_dir(self.folder.path()).unwrap().map(Result::unwrap);
+        let mut files = fs::read_dir(self.path("")).unwrap().map(Result::unwrap);
         let file = files.find(|file| file.file_name().to_string_lossy().ends_with(".part"))?;
         Some(file.metadata().ok()?.len())
     }
 
     fn spawn(&self, args: &[&str]) -> Child {
-        Command::new(env!("CARGO_BIN_EXE_hybank"))
-            .current_dir(self.folder.path())
-            .args(["stream", "bank.json"])
-            .args(args)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
+        self.0.spawn(&[&["stream", "bank.json"], args].concat())
     }
 
     fn run(&self, args: &[&str], input: &[u8]) -> Output {
-        let mut child = self.spawn(args);
-        let mut stdin = child.stdin.take().unwrap();
-        let input = input.to_vec();
-        let feeder = std::thread::spawn(move || stdin.write_all(&input));
-        let output = child.wait_with_output().unwrap();
-        // A refused run closes its input early.
-        let _ = feeder.join().unwrap();
-        output
+        self.0.run(&[&["stream", "bank.json"], args].concat(), input)
     }
-}
-
-/// Small integers, so that every sum is exact in any order and precision.
-fn ticks(count: usize) -> Vec<f32> {
-    (0..2 * count).map(|i| ((i * 7) % 23) as f32 - 11.0).collect()
-}
-
-fn bytes(samples: &[f32]) -> Vec<u8> {
-    samples.iter().flat_map(|x| x.to_le_bytes()).collect()
-}
-
-fn floats(bytes: &[u8]) -> Vec<f32> {
-    bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
-}
-
-/// The definition.
-fn fused(x: &[f32]) -> Vec<f32> {
-    let taps = [&[1.0f32, 2.0, 3.0, 4.0][..], &[10.0, 20.0, 30.0]];
-    let mut y = vec![0.0; x.len()];
-    for (t, y) in y.iter_mut().enumerate() {
-        for (i, f) in taps.iter().enumerate() {
-            *y += (0..=t / 2).filter_map(|k| Some(f.get(t - 2 * k)? * x[2 * k + i])).sum::<f32>();
-        }
-    }
-    y
 }
 
 fn text(bytes: &[u8]) -> String {

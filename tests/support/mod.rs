@@ -1,4 +1,4 @@
-//! A folder with a small bank in it, and the definition of what that bank does.
+//! The thesis example; a folder with a small bank in it, and the definition of what that bank does.
 // Each test program uses a part of it.
 #![allow(dead_code)]
 
@@ -6,6 +6,22 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
+
+/// The thesis example as an FIR bank.
+pub(crate) const THESIS: &str = "\
+fast_period = 1.0
+ratio = 2
+latency = 10
+[target]
+filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
+[[channel]]
+delay = 1.2
+[[channel]]
+delay = 0.6
+[design]
+method = \"fir\"
+taps = 22
+";
 
 /// N = M = 2, m0 = 3.
 pub(crate) const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 0.0]];
