@@ -5,7 +5,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use hybank::bank::Bank;
 use hybank::design::{analyze, design, prove};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec, WordLengths};
 use hybank::verify::verify;
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -26,7 +26,7 @@ fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64], desi
 
 fn thesis(method: Method, taps: Option<usize>) -> Spec {
     let filter = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
-    alike(&filter, 2, 10, &[1.2, 0.6], DesignSpec { method, taps, slack: None })
+    alike(&filter, 2, 10, &[1.2, 0.6], DesignSpec::new(method, taps))
 }
 
 fn butterworth(order: usize, omega: f64) -> FilterSpec {
@@ -43,19 +43,25 @@ fn butterworth(order: usize, omega: f64) -> FilterSpec {
 /// N = M = 8.
 fn eight(order: usize, omega: f64, latency: usize, method: Method, taps: Option<usize>) -> Spec {
     let delays = [0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];
-    alike(&butterworth(order, omega), 8, latency, &delays, DesignSpec { method, taps, slack: None })
+    alike(&butterworth(order, omega), 8, latency, &delays, DesignSpec::new(method, taps))
 }
 
 fn four() -> Spec {
-    let design = DesignSpec { method: Method::Fir, taps: Some(24), slack: None };
+    let design = DesignSpec::new(Method::Fir, Some(24));
     alike(&butterworth(4, 1.2), 4, 12, &[0.0, 1.3, 2.1, 2.95], design)
 }
 
 /// N = M channels behind Butterworth filters of order 6 at 0.2 of the fast rate, delays uneven, latency a fast-rate tick.
 fn many(channels: usize, taps: usize) -> Spec {
     let delays: Vec<f64> = (0..channels).map(|i| 0.83 * i as f64 + 0.07 * ((i * i) % 5) as f64).collect();
-    let design = DesignSpec { method: Method::Fir, taps: Some(taps), slack: None };
+    let design = DesignSpec::new(Method::Fir, Some(taps));
     alike(&butterworth(6, 0.2 * TAU), channels, channels, &delays, design)
+}
+
+/// The same with integer taps; with it come studies of 2 bits more and fewer.
+fn with_bits(mut spec: Spec, bits: u32) -> Spec {
+    spec.design.bits = Some(WordLengths::Same(bits));
+    spec
 }
 
 /// Once each, with the proven gap: too long for a statistic.
@@ -64,6 +70,7 @@ fn large() {
         ("thesis example, 22 taps", thesis(Method::Fir, Some(22))),
         ("4 channels, Butterworth 4, 24 taps", four()),
         ("8 channels, Butterworth 6, 128 taps", many(8, 128)),
+        ("8 channels, Butterworth 6, 128 taps of 12 bits", with_bits(many(8, 128), 12)),
         ("16 channels, Butterworth 6, 256 taps", many(16, 256)),
     ];
     for (name, spec) in cases {

@@ -117,6 +117,7 @@ fn bank(filter: BlockFilter) -> Bank {
         filters: SynthesisFilters::StateSpace(filter),
         gamma: Gamma::default(),
         proof: None,
+        fixed_point: None,
     }
 }
 

@@ -149,6 +149,57 @@ fn the_command_line_overrides_the_spec() {
 }
 
 #[test]
+fn integer_taps_are_designed_proven_and_run() {
+    let desk = Desk::new();
+    let report = desk.json(&["design", "spec.toml", "-o", "bank.json", "--bits", "6", "--json"]);
+    let bank: Value = serde_json::from_str(&fs::read_to_string(desk.path("bank.json")).unwrap()).unwrap();
+    let step = (-number(&report, "/words/fraction_bits")).exp2();
+    for (channel, integers) in
+        bank["channels"].as_array().unwrap().iter().zip(bank["fixed_point"]["integers"].as_array().unwrap())
+    {
+        let (taps, integers) = (channel["taps"].as_array().unwrap(), integers.as_array().unwrap());
+        assert_eq!((taps.len(), integers.len()), (22, 22));
+        for (tap, integer) in taps.iter().zip(integers) {
+            let integer = integer.as_i64().unwrap();
+            assert!((-32..32).contains(&integer));
+            assert_eq!(tap.as_f64().unwrap(), integer as f64 * step);
+        }
+    }
+    // The golden gamma of the real taps is 0.0399320; rounding costs 1.6 dB.
+    assert!(number(&report, "/gamma/upper") < 0.0399320 * 1.001);
+    assert!((number(&report, "/gamma/lower") - 0.0399320).abs() < 1e-7);
+    let losses = report["words"]["words"].as_array().unwrap();
+    assert_eq!(losses.len(), 5);
+    assert!(number(&losses[2], "/rounded_loss_db") > 1.0 && number(&losses[2], "/loss_db") < 0.01);
+    let proven = desk.json(&["verify", "bank.json", "--json"]);
+    assert!(number(&proven, "/upper") <= number(&report, "/gamma/upper") * (1.0 + 1e-6));
+    assert!(desk.good(&["verify", "bank.json"]).contains("integers of 6 bits"));
+    assert!(desk.good(&["analyze", "bank.json"]).contains("gamma"));
+
+    // A list of bits, a scale, and a spec that says so.
+    let list = (0..22).map(|n| if n < 11 { "10" } else { "4" }).collect::<Vec<_>>().join(",");
+    desk.good(&["design", "spec.toml", "-o", "list.json", "--bits", &list, "--fraction-bits", "8"]);
+    let toml = THESIS.replace("taps = 22", "taps = 22\nbits = 10\nfraction_bits = 9");
+    fs::write(desk.path("fixed.toml"), toml).unwrap();
+    let report = desk.json(&["design", "fixed.toml", "-o", "fixed.json", "--json"]);
+    assert_eq!(number(&report, "/words/fraction_bits"), 9.0);
+    desk.good(&["verify", "fixed.json"]);
+    // Another method has no use for them.
+    desk.good(&["design", "fixed.toml", "-o", "iir.json", "--method", "iir"]);
+}
+
+#[test]
+fn bits_that_make_no_sense_are_refused() {
+    let desk = Desk::new();
+    let design = |more: &[&'static str]| [&["design", "spec.toml", "-o", "b.json"], more].concat();
+    desk.refused(1, &design(&["--bits", "1"]), &["2 to 32 bits"]);
+    desk.refused(1, &design(&["--bits", "8,8"]), &["22 taps"]);
+    desk.refused(1, &design(&["--fraction-bits", "4"]), &["bits is missing"]);
+    desk.refused(1, &design(&["--bits", "8", "--method", "h2"]), &["bits", "fir"]);
+    desk.refused(2, &design(&["--bits", "eight"]), &["eight"]);
+}
+
+#[test]
 fn the_latency_may_be_left_to_the_designer() {
     let desk = Desk::new();
     fs::write(desk.path("open.toml"), THESIS.replace("latency = 10\n", "")).unwrap();

@@ -2,7 +2,9 @@
 
 use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem};
 
-use super::{Bank, BankError, BankProblem, BlockFilter, Certificate, Gamma, SynthesisFilters, Tone};
+use super::{
+    Bank, BankError, BankProblem, BlockFilter, Certificate, FixedPoint, Gamma, SynthesisFilters, Tone,
+};
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96 kHz.
 pub const MAX_BANK_LATENCY: usize = 1 << 24;
@@ -37,8 +39,42 @@ impl Bank {
             SynthesisFilters::Fir(taps) => check_taps(taps, self.channel_count())?,
             SynthesisFilters::StateSpace(block) => check_block(block, self.ratio, self.channel_count())?,
         }
+        self.fixed_point.as_ref().map_or(Ok(()), |words| self.check_fixed_point(words))?;
         self.check_proof()?;
         self.spec.as_ref().map_or(Ok(()), |spec| self.check_spec(spec))
+    }
+
+    /// The taps are the integers, and each integer fits its bits.
+    fn check_fixed_point(&self, words: &FixedPoint) -> Checked {
+        let SynthesisFilters::Fir(taps) = &self.filters else {
+            let (method, expected, found) = (self.method.name(), "state_space", "fixed_point");
+            return refuse("fixed_point", BankProblem::Filters { method, expected, found });
+        };
+        let sizes = |found, expected, unit| {
+            let rule = "there is an integer for each tap";
+            refuse("fixed_point.integers", BankProblem::Length { found, expected, unit, rule })
+        };
+        if words.integers.len() != taps.len() {
+            return sizes(words.integers.len(), taps.len(), "lists of integers");
+        }
+        for (i, (integers, taps)) in words.integers.iter().zip(taps).enumerate() {
+            if integers.len() != taps.len() {
+                return sizes(integers.len(), taps.len(), "integers");
+            }
+            for (n, (&integer, &tap)) in integers.iter().zip(taps).enumerate() {
+                let (least, most) = words.bits.span(n);
+                if !(least..=most).contains(&integer) {
+                    let rule = format!("with {} bits it is from {least} to {most}", words.bits.bits(n));
+                    let path = format!("fixed_point.integers[{i}][{n}]");
+                    return out_of_range(path, integer as f64, "(integer tap)", rule);
+                }
+                if tap != integer as f64 * words.step() {
+                    let path = format!("channels[{i}].taps[{n}]");
+                    return refuse(path, BankProblem::NotTheInteger { tap, integer, step: words.step() });
+                }
+            }
+        }
+        Ok(())
     }
 
     fn check_proof(&self) -> Checked {
@@ -96,7 +132,13 @@ impl Bank {
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
             agree(format!("spec.channel[{i}].delay"), delay, channel.delay, self.fast_period + delay)?;
         }
-        Ok(())
+        match (&self.fixed_point, &spec.design.bits) {
+            (Some(FixedPoint { bits, .. }), Some(asked)) if bits != asked => refuse(
+                "spec.design.bits",
+                BankProblem::WordsDiffer { bank: bits.clone(), spec: asked.clone() },
+            ),
+            _ => Ok(()),
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::spec::SpecProblem;
+use crate::spec::{SpecProblem, WordLengths};
 
 use super::{FORMAT, VERSION};
 
@@ -87,6 +87,28 @@ pub enum BankProblem {
         unit: &'static str,
         /// Why, and what to do.
         rule: &'static str,
+    },
+    /// A tap that is not the integer that the file says.
+    #[error(
+        "the tap {tap:e} is not {integer} times {step:e}, as fixed_point says; take the original, or leave fixed_point out"
+    )]
+    NotTheInteger {
+        /// The tap.
+        tap: f64,
+        /// The integer.
+        integer: i64,
+        /// 2^-fraction_bits.
+        step: f64,
+    },
+    /// Integer taps of other bits than the spec asks for.
+    #[error(
+        "the bank's integers have {bank}, its spec asks for {spec}; design the bank anew, or set spec to null"
+    )]
+    WordsDiffer {
+        /// In the bank.
+        bank: WordLengths,
+        /// In the spec.
+        spec: WordLengths,
     },
     /// Taps where the method has none, or the reverse.
     #[error("a bank of the method {method} holds {expected} and no {found}; change one or the other")]

@@ -10,12 +10,14 @@
 mod check;
 mod digest;
 mod error;
+mod fixed_point;
 mod proof;
 mod read;
 mod write;
 
 pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
+pub use fixed_point::FixedPoint;
 pub use proof::{Certificate, Proof, Tone};
 pub use read::check_digest;
 
@@ -44,6 +46,8 @@ pub struct Bank {
     pub delays: Vec<f64>,
     /// F_1 .. F_N.
     pub filters: SynthesisFilters,
+    /// The integers that the taps stand for, where they were chosen among these.
+    pub fixed_point: Option<FixedPoint>,
     /// How good it is.
     pub gamma: Gamma,
     /// What proves it, where the file carries that.

@@ -6,11 +6,11 @@ use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
 
 use super::digest::{digest, is_digest};
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, Certificate, FORMAT, Gamma, Proof, SynthesisFilters, Tone,
-    VERSION,
+    Bank, BankError, BankProblem, BlockFilter, Certificate, FORMAT, FixedPoint, Gamma, Proof,
+    SynthesisFilters, Tone, VERSION,
 };
 
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "format",
     "version",
     "spec",
@@ -20,6 +20,7 @@ const KEYS: [&str; 13] = [
     "method",
     "channels",
     "state_space",
+    "fixed_point",
     "gamma",
     "proof",
     "digest",
@@ -94,6 +95,7 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
         method: top.required("method", REWRITE)?.name("method", &method)?,
         delays: channels.iter().map(|c| c.required("delay", REWRITE)?.number()).collect::<Result<_, _>>()?,
         filters: filters(&top, &channels)?,
+        fixed_point: top.optional("fixed_point").map(|v| fixed_point(&v)).transpose()?,
         gamma: top.optional("gamma").map(|v| gamma(&v)).transpose()?.unwrap_or_default(),
         proof: top.optional("proof").map(|v| proof(&v)).transpose()?,
     })
@@ -135,6 +137,20 @@ fn filters(top: &Fields<'_>, channels: &[Fields<'_>]) -> Result<SynthesisFilters
         c: matrix("c")?,
         d: matrix("d")?,
     }))
+}
+
+fn fixed_point(value: &Value<'_>) -> Result<FixedPoint, Fault> {
+    let fields = value.fields(&["bits", "fraction_bits", "integers"])?;
+    let required = |key| fields.required(key, "integer taps are known by bits, fraction_bits and integers");
+    // What does not fit is out of every span, too.
+    let integer = |v: &Value<'_>| v.integer("(integer tap)").map(|i| i64::try_from(i).unwrap_or(i64::MAX));
+    let list = |v: &Value<'_>| v.items("a list of integers")?.iter().map(integer).collect();
+    let lists = required("integers")?.items("a list of integers for each channel")?;
+    Ok(FixedPoint {
+        bits: decode::word_lengths(&required("bits")?)?,
+        fraction_bits: decode::fraction_bits(&required("fraction_bits")?)?,
+        integers: lists.iter().map(list).collect::<Result<_, _>>()?,
+    })
 }
 
 fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {

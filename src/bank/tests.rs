@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::spec::WordLengths;
 
 fn spec() -> Spec {
     let text = "fast_period = 1.0\nratio = 2\nlatency = 10\n[target]\nfilter = { num = [0.25], den = [1.0, 1.0, 0.25] }\n\
@@ -21,6 +22,7 @@ fn fir() -> Bank {
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
         gamma: Gamma { upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
         proof: None,
+        fixed_point: None,
     }
 }
 
@@ -179,6 +181,43 @@ fn a_static_block_has_no_states() {
     };
     let bank = Bank { filters: SynthesisFilters::StateSpace(block), ..state_space() };
     assert_eq!(Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap(), bank);
+}
+
+fn fixed_point() -> Bank {
+    let integers = vec![vec![-8, 0, 7], vec![1, -1, 3]];
+    let words = FixedPoint { bits: WordLengths::Same(4), fraction_bits: 3, integers };
+    Bank { filters: SynthesisFilters::Fir(words.taps()), fixed_point: Some(words), ..fir() }
+}
+
+#[test]
+fn integer_taps_read_back_and_are_checked_against_the_taps_and_their_bits() {
+    let bank = fixed_point();
+    let text = bank.to_json().unwrap();
+    assert!(text.contains("[-8, 0, 7]") && text.contains("[-1.0, 0.0, 0.875]"), "{text}");
+    assert_eq!(Bank::from_json(&text, "b.json").unwrap(), bank);
+    for (was, is, place, words) in [
+        ("[-8, 0, 7]", "[-8, 0, 8]", "fixed_point.integers[0][2]", "from -8 to 7"),
+        ("[-8, 0, 7]", "[-8, 0, 9223372036854775808]", "fixed_point.integers[0][2]", "from -8 to 7"),
+        ("[-8, 0, 7]", "[-8, 1, 7]", "channels[0].taps[1]", "is not 1 times"),
+        ("[-8, 0, 7]", "[-8, 0]", "fixed_point.integers", "an integer for each tap"),
+        ("[-8, 0, 7]", "[-8, 0.5, 7]", "fixed_point.integers[0][1]", "whole number"),
+        ("0.875", "0.8750000000000001", "channels[0].taps[2]", "is not 7 times"),
+        ("\"fraction_bits\": 3", "\"fraction_bits\": 4", "channels[0].taps[0]", "is not -8 times"),
+        ("\"fraction_bits\": 3", "\"fraction_bits\": 3000", "fixed_point.fraction_bits", "from -256"),
+        ("\"bits\": 4", "\"bits\": 3", "fixed_point.integers[0][0]", "from -4 to 3"),
+        ("\"bits\": 4", "\"bits\": [4, 0, 4]", "fixed_point.integers[1][1]", "from 0 to 0"),
+        ("\"bits\": 4", "\"bits\": 64", "fixed_point.bits", "2 to 32"),
+    ] {
+        let error = refused(&text.replacen(was, is, 1));
+        assert_eq!(error.path(), place, "{error}");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+    let states = Bank { fixed_point: bank.fixed_point.clone(), ..state_space() };
+    assert_eq!(states.check().unwrap_err().path(), "fixed_point");
+    let mut other = spec();
+    other.design.bits = Some(WordLengths::Same(5));
+    let differs = Bank { spec: Some(other), ..bank };
+    assert_eq!(differs.check().unwrap_err().path(), "spec.design.bits");
 }
 
 fn refused(text: &str) -> BankError {

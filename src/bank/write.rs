@@ -9,7 +9,9 @@ use crate::spec::{Method, Spec};
 
 use super::digest::digest;
 use super::read::parse;
-use super::{Bank, BankError, BankProblem, BlockFilter, FORMAT, Gamma, Proof, SynthesisFilters, VERSION};
+use super::{
+    Bank, BankError, BankProblem, BlockFilter, FORMAT, FixedPoint, Gamma, Proof, SynthesisFilters, VERSION,
+};
 
 /// The file, key by key.
 #[derive(Serialize)]
@@ -23,6 +25,8 @@ struct Document<'a> {
     method: Method,
     channels: Vec<Channel<'a>>,
     state_space: Option<&'a BlockFilter>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fixed_point: Option<&'a FixedPoint>,
     gamma: Gamma,
     #[serde(skip_serializing_if = "Option::is_none")]
     proof: Option<&'a Proof>,
@@ -70,6 +74,7 @@ impl Bank {
                 .map(|(i, &delay)| Channel { delay, taps: taps_of(i) })
                 .collect(),
             state_space,
+            fixed_point: self.fixed_point.as_ref(),
             gamma: self.gamma,
             proof: self.proof.as_ref(),
             digest,

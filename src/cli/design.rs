@@ -3,8 +3,9 @@
 use super::Failure;
 use super::bank_file::{is_dash, load_spec, write_text};
 use crate::bank::SynthesisFilters;
+use crate::design::quantise::WordStudy;
 use crate::design::{self, Design, DesignError, MeanAnalysis};
-use crate::spec::{DesignOverrides, Method};
+use crate::spec::{DesignOverrides, Method, WordLengths};
 use crate::verify::Verified;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -19,6 +20,7 @@ use std::time::Instant;
 Examples:
   hybank design spec.toml -o bank.json
   hybank design spec.toml -o iir.json --method iir
+  hybank design spec.toml -o fixed.json --taps 64 --bits 14
   hybank design spec.toml -o - --taps 64 | hybank analyze -")]
 pub(super) struct Args {
     /// The spec (TOML); `-` is standard input
@@ -38,6 +40,12 @@ pub(super) struct Args {
     /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
     #[arg(long)]
     slack: Option<f64>,
+    /// Integer taps of so many bits, sign included; or a list of bits, one for each tap (4,6,8,6,4)
+    #[arg(long)]
+    bits: Option<WordLengths>,
+    /// Integer taps times two to the minus this; chosen for the least gamma if left out
+    #[arg(long, allow_negative_numbers = true)]
+    fraction_bits: Option<i32>,
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
@@ -65,6 +73,9 @@ struct Report<'a> {
     taps: Option<usize>,
     states: Option<usize>,
     gamma: &'a crate::bank::Gamma,
+    /// For integer taps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    words: Option<Words<'a>>,
     #[serde(flatten)]
     mean: MeanAnalysis,
     /// Hertz, at the slow rate to which all frequencies alias.
@@ -74,6 +85,43 @@ struct Report<'a> {
     #[serde(flatten)]
     proof: ProofReport,
     proof_seconds: f64,
+}
+
+/// What integer taps cost.
+#[derive(Debug, serde::Serialize)]
+struct Words<'a> {
+    fraction_bits: i32,
+    /// gamma of these integers over that of the real taps, both exact, in decibels.
+    loss_db: f64,
+    #[serde(flatten)]
+    study: &'a WordStudy,
+}
+
+impl<'a> Words<'a> {
+    fn of(design: &'a Design) -> Option<Self> {
+        let (integers, study) = design.bank.fixed_point.as_ref().zip(design.words.as_ref())?;
+        let gamma = design.bank.gamma.upper?;
+        let loss_db = 20.0 * (gamma / study.real_gamma).log10();
+        Some(Self { fraction_bits: integers.fraction_bits, loss_db, study })
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "integers   times 2^{}; gamma is {:.4} dB above that of the real taps, {}\n",
+            -self.fraction_bits,
+            self.loss_db,
+            number(Some(self.study.real_gamma)),
+        );
+        for word in &self.study.words {
+            text += &format!(
+                "           {:>12}: {:8.4} dB lost (each tap rounded by itself: {:.4} dB)\n",
+                word.bits.to_string(),
+                word.loss_db,
+                word.rounded_loss_db,
+            );
+        }
+        text
+    }
 }
 
 /// What `hybank verify` will say of the file.
@@ -111,6 +159,16 @@ impl ProofReport {
     }
 }
 
+fn overrides(args: &Args) -> DesignOverrides {
+    DesignOverrides {
+        method: args.method,
+        taps: args.taps,
+        slack: args.slack,
+        bits: args.bits.clone(),
+        fraction_bits: args.fraction_bits,
+    }
+}
+
 /// Runs the verb.
 ///
 /// # Errors
@@ -121,8 +179,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             "--json and `-o -` both want standard output; write the bank to a file".into(),
         ));
     }
-    let overrides = DesignOverrides { method: args.method, taps: args.taps, slack: args.slack };
-    let mut spec = load_spec(&args.spec, overrides)?;
+    let mut spec = load_spec(&args.spec, overrides(args))?;
     spec.latency = args.latency.or(spec.latency);
     spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
     let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
@@ -163,6 +220,7 @@ impl<'a> Report<'a> {
             taps,
             states,
             gamma: &bank.gamma,
+            words: Words::of(design),
             mean,
             peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
             iterations: design.iterations,
@@ -186,7 +244,7 @@ impl<'a> Report<'a> {
              noncausal  {} (no latency is better)\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
-             designed in {:.1} ms, {} iterations\n{}",
+             {}designed in {:.1} ms, {} iterations\n{}",
             self.bank,
             self.method.name(),
             self.channels,
@@ -205,6 +263,7 @@ impl<'a> Report<'a> {
             number(Some(self.mean.rms_error)),
             number(Some(self.mean.noise_gain)),
             self.mean.output_noise,
+            self.words.as_ref().map(Words::text).unwrap_or_default(),
             self.seconds * 1e3,
             self.iterations,
             self.proof.text(self.proof_seconds),

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::bank_file::{name, read_text};
-use crate::bank::{Bank, SynthesisFilters, check_digest};
+use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
 use crate::spec::Method;
 use crate::verify::{Verified, verify};
@@ -43,6 +43,9 @@ struct Report {
     certificate_in_file: bool,
     #[serde(skip)]
     scope: String,
+    /// The taps are integers of so many bits.
+    #[serde(skip)]
+    words: String,
 }
 
 /// Runs the verb.
@@ -66,7 +69,7 @@ fn report(args: &Args) -> Result<Report, Failure> {
     } else {
         design::prove(&bank, &[]).map_err(|error| named(&error))?.1
     };
-    Ok(Report { scope: scope(&bank), bank: file, verified, digest, certificate_in_file })
+    Ok(Report { scope: scope(&bank), words: words(&bank), bank: file, verified, digest, certificate_in_file })
 }
 
 /// Of which banks the lower end speaks.
@@ -77,6 +80,14 @@ fn scope(bank: &Bank) -> String {
         }
         _ => "no bank at all is better".to_owned(),
     }
+}
+
+/// Of what the taps are made; that they are was checked on reading.
+fn words(bank: &Bank) -> String {
+    let line = |words: &FixedPoint| {
+        format!("taps       integers of {} times 2^{}\n", words.bits, -words.fraction_bits)
+    };
+    bank.fixed_point.as_ref().map(line).unwrap_or_default()
 }
 
 impl Report {
@@ -92,7 +103,7 @@ impl Report {
              attained   {}   this bank's own gain at one tone\n\
              lower      {}   {}{}\n\
              noncausal  {}   no bank at all is better{}\n\
-             digest     {digest}\n",
+             {}digest     {digest}\n",
             self.bank,
             number(lower),
             number(upper),
@@ -103,6 +114,7 @@ impl Report {
             stated(self.verified.lower_only_stated),
             number(noncausal),
             stated(self.verified.noncausal_only_stated),
+            self.words,
         )
     }
 }

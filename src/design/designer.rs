@@ -2,8 +2,9 @@
 
 use super::equivalence::BlockedPlant;
 use super::problem::{Part, Problem};
+use super::quantise::{WordStudy, quantise};
 use super::{DesignError, comparison, error_system, fir, iir};
-use crate::bank::{Bank, Gamma, SynthesisFilters};
+use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
 use crate::linalg::Mat;
 use crate::lti::peak::Peak;
 use crate::lti::{StateSpace, TappedRecursion};
@@ -20,6 +21,8 @@ pub struct Design {
     pub peak_frequency: f64,
     /// Riccati equations or interior-point iterations.
     pub iterations: usize,
+    /// For integer taps what they cost.
+    pub words: Option<WordStudy>,
     /// For FIR designs what their lower bound was read from; else empty.
     pub dual: Vec<fir::DualPoint>,
 }
@@ -43,6 +46,8 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         Solution::Taps(taps, _) => judged(&plant, SynthesisFilters::Fir(shared_taps(&taps, &parts)))?,
         Solution::System(system, norm) => written_form(&plant, &shared_inputs(&system, &parts)?, norm)?,
     };
+    let (filters, peak, integers) = with_integers(&plant, filters, peak, spec)?;
+    let (fixed_point, words) = integers.unzip();
     let gamma = Gamma {
         upper: Some(peak.gain),
         lower: Some(found.lower.min(peak.gain)),
@@ -62,6 +67,7 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         filters,
         gamma,
         proof: None,
+        fixed_point,
         spec: Some(complete),
     };
     Ok(Design {
@@ -69,8 +75,26 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         latency_chosen: spec.latency.is_none(),
         peak_frequency: peak.frequency,
         iterations: found.iterations,
+        words,
         dual: found.dual,
     })
+}
+
+/// The filters with integer taps where the spec asks for these.
+type WithIntegers = (SynthesisFilters, Peak, Option<(FixedPoint, WordStudy)>);
+
+fn with_integers(
+    plant: &BlockedPlant,
+    filters: SynthesisFilters,
+    peak: Peak,
+    spec: &Spec,
+) -> Result<WithIntegers, DesignError> {
+    let (SynthesisFilters::Fir(taps), Some(bits)) = (&filters, &spec.design.bits) else {
+        return Ok((filters, peak, None));
+    };
+    let (integers, words) = quantise(plant, taps, peak.gain, bits, spec.design.fraction_bits)?;
+    let (filters, peak) = judged(plant, SynthesisFilters::Fir(integers.taps()))?;
+    Ok((filters, peak, Some((integers, words))))
 }
 
 /// m0 of a spec in fast samples: what it says, or the designer's choice.

@@ -112,7 +112,7 @@ pub fn filter_response(lags: &[Mat], w: f64) -> CMat {
 }
 
 /// `F_j[p, i] = f_i[p + j M]`, at least one lag.
-fn by_lag(taps: &[Vec<f64>], ratio: usize) -> Vec<Mat> {
+pub fn by_lag(taps: &[Vec<f64>], ratio: usize) -> Vec<Mat> {
     let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
     let tap = |i: usize, n: usize| taps[i].get(n).copied().unwrap_or(0.0);
     (0..lags).map(|j| Mat::from_fn(ratio, taps.len(), |p, i| tap(i, p + j * ratio))).collect()

@@ -9,12 +9,11 @@
 
 use super::DesignError;
 use super::equivalence::BlockedPlant;
-use super::error_system::{FirError, filter_response};
+use super::error_grid::{ErrorGrid, Peaks};
 use super::iir::noncausal_bound;
-use crate::linalg::{self, CMat, Mat};
-use crate::lmi::sampled::{self, Point, Settings, Square, Taps};
+use crate::linalg::CMat;
+use crate::lmi::sampled::{self, Settings, Square, Taps};
 use crate::lti::peak::Peak;
-use std::f64::consts::PI;
 
 /// Relative width of [lower, upper] at which the exchange of frequencies ends.
 pub const GAMMA_ACCURACY: f64 = 5e-7;
@@ -27,12 +26,6 @@ const NOISY_SLACK: f64 = 1e-3;
 const ROUND_LIMIT: usize = 16;
 /// Times that the exact norm may find a peak that the estimates have missed.
 const SURPRISE_LIMIT: usize = 8;
-/// Grid intervals for each slow lag: enough for the mean square of a polynomial of that degree to be exact.
-const POINTS_PER_LAG: usize = 3;
-const LEAST_POINTS: usize = 24;
-/// Peaks are looked for on a grid this much finer.
-const FINE: usize = 8;
-
 /// An FIR design.
 #[derive(Debug, Clone)]
 pub struct FirDesign {
@@ -108,9 +101,8 @@ pub fn design_fir(
 
 struct Exchange<'a> {
     plant: &'a BlockedPlant,
-    error: FirError<'a>,
+    grid: ErrorGrid<'a>,
     length: usize,
-    fine: Vec<Point>,
     problem: sampled::Problem,
     /// Only the first, uniform points have a weight in it.
     square: Square,
@@ -125,9 +117,7 @@ struct Exchange<'a> {
 #[derive(Debug, Clone)]
 struct Candidate {
     taps: Taps,
-    estimate: f64,
-    /// Local peaks between the points.
-    peaks: Vec<Peak>,
+    peaks: Peaks,
 }
 
 /// Taps with their exact norm.
@@ -142,20 +132,13 @@ impl<'a> Exchange<'a> {
     fn new(plant: &'a BlockedPlant, length: usize, second: SecondObjective) -> Result<Self, DesignError> {
         let lags: Vec<usize> =
             (0..plant.wanted).map(|p| length.saturating_sub(p).div_ceil(plant.wanted)).collect();
-        let intervals = LEAST_POINTS.max(POINTS_PER_LAG * lags[0]);
-        let error = FirError::new(plant)?;
-        let fine: Vec<Point> = (0..=FINE * intervals)
-            .map(|k| sample_point(&error, PI * k as f64 / (FINE * intervals) as f64))
-            .collect();
-        let grid = fine.iter().step_by(FINE).cloned().collect();
-        let mut weights = vec![1.0 / intervals as f64; intervals + 1];
-        (weights[0], weights[intervals]) = (0.5 / intervals as f64, 0.5 / intervals as f64);
-        let problem = sampled::Problem::new(grid, lags)?;
+        let grid = ErrorGrid::new(plant, lags[0])?;
+        let (points, weights) = grid.coarse();
+        let problem = sampled::Problem::new(points, lags)?;
         Ok(Self {
             plant,
-            error,
+            grid,
             length,
-            fine,
             problem,
             square: Square { weights, noise: second.noise },
             slack: second.slack,
@@ -171,8 +154,8 @@ impl<'a> Exchange<'a> {
         let start = self.minimise_gamma()?;
         let best = self.polish(start)?;
         let taps = self.impulse_responses(&best.taps);
-        let peak = self.error.gamma(&taps)?;
-        Ok(Finished { taps, estimate: best.estimate, peak })
+        let peak = self.grid.gamma(&taps)?;
+        Ok(Finished { taps, estimate: best.peaks.estimate, peak })
     }
 
     fn minimise_gamma(&mut self) -> Result<Candidate, DesignError> {
@@ -188,11 +171,11 @@ impl<'a> Exchange<'a> {
                 self.dual = weights.map(|(point, weight)| DualPoint { omega: point.omega, weight }).collect();
             }
             let candidate = self.judge(solution.taps)?;
-            let peaks = candidate.above(solution.gamma * (1.0 + 0.2 * GAMMA_ACCURACY));
-            if best.as_ref().is_none_or(|best| candidate.estimate < best.estimate) {
+            let peaks = candidate.peaks.above(solution.gamma * (1.0 + 0.2 * GAMMA_ACCURACY));
+            if best.as_ref().is_none_or(|best| candidate.peaks.estimate < best.peaks.estimate) {
                 best = Some(candidate);
             }
-            let reached = best.as_ref().map_or(0.0, |best| best.estimate);
+            let reached = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
             if reached <= self.lower * (1.0 + GAMMA_ACCURACY) || !self.add(peaks)? {
                 break;
             }
@@ -203,9 +186,9 @@ impl<'a> Exchange<'a> {
     /// The least second objective under (1 + slack) gamma, with frequencies added where the cap is broken; the start
     /// if that cannot be had.
     fn polish(&mut self, start: Candidate) -> Result<Candidate, DesignError> {
-        let cap = start.estimate * (1.0 + self.slack);
+        let cap = start.peaks.estimate * (1.0 + self.slack);
         // Aim a little below, so that the peaks between the points fit under the cap as well.
-        let aim = start.estimate * (1.0 + 0.75 * self.slack);
+        let aim = start.peaks.estimate * (1.0 + 0.75 * self.slack);
         for _ in 0..ROUND_LIMIT {
             let found = sampled::mean_square_under_cap(
                 &self.problem,
@@ -219,40 +202,19 @@ impl<'a> Exchange<'a> {
             self.rounds += 1;
             self.iterations += found.steps.len();
             let candidate = self.judge(found.taps)?;
-            if candidate.estimate <= cap {
+            if candidate.peaks.estimate <= cap {
                 return Ok(candidate);
             }
-            if !self.add(candidate.above(aim))? {
+            if !self.add(candidate.peaks.above(aim))? {
                 break;
             }
         }
         Ok(start)
     }
 
-    /// The peaks of the error with `taps`: at the points of the fine grid, and between them on the parabolas through
-    /// three neighbours.
     fn judge(&self, taps: Taps) -> Result<Candidate, DesignError> {
-        let gains = self
-            .fine
-            .iter()
-            .map(|point| error_gain(point, &taps))
-            .collect::<Result<Vec<f64>, DesignError>>()?;
-        let step = self.fine[1].omega;
-        // The gain is even about 0 and about pi.
-        let last = gains.len() - 1;
-        let at = |k: isize| gains[last - (last as isize - k.abs()).unsigned_abs()];
-        let mut peaks = Vec::new();
-        for k in 0..=last as isize {
-            if at(k) >= at(k - 1) && at(k) >= at(k + 1) {
-                let (shift, _) = parabola(at(k - 1), at(k), at(k + 1));
-                let frequency = ((k as f64 + shift) * step).clamp(0.0, PI);
-                let between = error_gain(&sample_point(&self.error, frequency), &taps)?;
-                let top = Peak { gain: at(k), frequency: k as f64 * step };
-                peaks.push(if between > top.gain { Peak { gain: between, frequency } } else { top });
-            }
-        }
-        let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
-        Ok(Candidate { taps, estimate, peaks })
+        let peaks = self.grid.peaks(&taps)?;
+        Ok(Candidate { taps, peaks })
     }
 
     /// Adds the frequencies that are not there yet; whether there were any.
@@ -265,7 +227,7 @@ impl<'a> Exchange<'a> {
             }
         }
         self.square.weights.extend(std::iter::repeat_n(0.0, fresh.len()));
-        let points = fresh.iter().map(|&w| sample_point(&self.error, w));
+        let points = fresh.iter().map(|&w| self.grid.at(w));
         self.problem = self.problem.with_points(points)?;
         Ok(!fresh.is_empty())
     }
@@ -290,31 +252,4 @@ impl<'a> Exchange<'a> {
             dual: self.dual,
         }
     }
-}
-
-impl Candidate {
-    /// The frequencies of the peaks higher than `level`.
-    fn above(&self, level: f64) -> Vec<f64> {
-        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.frequency).collect()
-    }
-}
-
-fn sample_point(error: &FirError<'_>, omega: f64) -> Point {
-    let (h, w) = error.plant_at(omega);
-    Point { omega, h, w }
-}
-
-fn error_gain(point: &Point, taps: &[Mat]) -> Result<f64, DesignError> {
-    let error = &point.w - filter_response(taps, point.omega) * &point.h;
-    Ok(linalg::largest_singular_value_c(&error)?)
-}
-
-/// Vertex of the parabola through (-1, a), (0, b), (1, c): abscissa and height.
-fn parabola(a: f64, b: f64, c: f64) -> (f64, f64) {
-    let curvature = a - 2.0 * b + c;
-    if curvature >= 0.0 {
-        return (0.0, b);
-    }
-    let shift = (0.5 * (a - c) / curvature).clamp(-1.0, 1.0);
-    (shift, b - 0.25 * (a - c) * shift)
 }

@@ -4,12 +4,14 @@ pub mod analysis;
 pub mod comparison;
 mod designer;
 pub mod equivalence;
+mod error_grid;
 pub mod error_system;
 mod filtering;
 pub mod fir;
 pub mod iir;
 pub mod problem;
 mod prove;
+pub mod quantise;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use designer::{Design, design, latency};

@@ -82,7 +82,7 @@ enum StreamState {
 /// use hybank::runtime::Reconstructor;
 /// # let bank = Bank {
 /// #     spec: None, fast_period: 1.0, ratio: 2, latency: 1, method: Method::Fir,
-/// #     delays: vec![0.0, 1.0], gamma: Gamma::default(), proof: None,
+/// #     delays: vec![0.0, 1.0], gamma: Gamma::default(), proof: None, fixed_point: None,
 /// #     filters: SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0]]),
 /// # };
 /// let mut fuse = Reconstructor::new(&bank)?;

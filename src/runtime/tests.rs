@@ -35,6 +35,7 @@ fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
         filters,
         gamma: Gamma::default(),
         proof: None,
+        fixed_point: None,
     }
 }
 

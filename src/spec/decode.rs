@@ -1,17 +1,18 @@
 //! From a written document to a [`Spec`]: units resolved, omitted filters filled in, everything checked.
 
-use super::design::{DesignOverrides, WrittenDesign};
+use super::design::DesignOverrides;
 use super::limits::{
     check_channel_count, check_delay, check_fast_period, check_fast_rate, check_latency, check_noise,
     check_ratio, check_slack, check_taps,
 };
 use super::reader::{Fault, Fields, Value};
+use super::words::{WordLengths, check_fraction_bits};
 use super::{ChannelSpec, Family, FilterSpec, Method, Spec, SpecProblem};
 
 const TOP_KEYS: [&str; 8] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
 const CHANNEL_KEYS: [&str; 4] = ["delay", "delay_samples", "filter", "noise"];
-const DESIGN_KEYS: [&str; 4] = ["method", "taps", "slack", "noise"];
+const DESIGN_KEYS: [&str; 6] = ["method", "taps", "slack", "bits", "fraction_bits", "noise"];
 
 /// The keys of each written form of a filter; the first one names the form.
 const FILTER_FORMS: [&[&str]; 5] = [
@@ -141,15 +142,18 @@ fn design(
     channels: usize,
 ) -> Result<super::DesignSpec, Fault> {
     let get = |key| table.and_then(|fields| fields.optional(key));
-    let written = WrittenDesign {
+    let written = DesignOverrides {
         method: get("method").map(|v| v.name("method", &Method::ALL.map(|m| (m.name(), m)))).transpose()?,
         taps: get("taps").map(|v| checked_count(&v, "taps", check_taps)).transpose()?,
         slack: get("slack").map(|v| checked_number(&v, check_slack)).transpose()?,
+        bits: get("bits").map(|v| word_lengths(&v)).transpose()?,
+        fraction_bits: get("fraction_bits").map(|v| fraction_bits(&v)).transpose()?,
     };
-    let design = written.overridden(overrides).resolved();
+    let design = overrides.over(written).resolved();
     let complain = |problem: SpecProblem| {
         let key = match problem {
             SpecProblem::NeedlessKey { key, .. } => Some(key),
+            SpecProblem::Range { unit: "bits" | "entries", .. } => Some("bits"),
             SpecProblem::Range { .. } => Some("taps"),
             _ => None,
         };
@@ -157,6 +161,26 @@ fn design(
     };
     design.check(channels).map_err(complain)?;
     Ok(design)
+}
+
+/// One number of bits, or a list of them.
+pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
+    // What is out of range here is out of range there.
+    let bits = |v: &Value<'_>| v.count("bits").map(|bits| u32::try_from(bits).unwrap_or(u32::MAX));
+    let words = match value.items("a number of bits, or a list of them") {
+        Ok(items) => WordLengths::PerTap(items.iter().map(bits).collect::<Result<_, _>>()?),
+        Err(_) => WordLengths::Same(bits(value)?),
+    };
+    words.check(None).map_err(|problem| value.fault(problem))?;
+    Ok(words)
+}
+
+/// The exponent of the finest step.
+pub(crate) fn fraction_bits(value: &Value<'_>) -> Result<i32, Fault> {
+    let bits = value.integer("bits")?;
+    let bits = i32::try_from(bits).unwrap_or(if bits < 0 { i32::MIN } else { i32::MAX });
+    check_fraction_bits(bits).map_err(|problem| value.fault(problem))?;
+    Ok(bits)
 }
 
 /// Reads one filter in whichever form it is written.

@@ -1,25 +1,22 @@
 //! The `[design]` table: defaults, overrides from the command line, and which key goes with which method.
 
 use super::limits::{check_optimised_taps, check_slack, check_taps};
+use super::words::{WordLengths, check_fraction_bits};
 use super::{DesignSpec, Method, SpecProblem};
 
-/// What the command line says in place of the `[design]` table.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// A `[design]` table as far as it is written, in a file or on the command line.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct DesignOverrides {
-    /// Another method; taps and slack of the file are dropped where it has no use for them.
+    /// The method. On the command line another one than the file's drops what the file says and it has no use for.
     pub method: Option<Method>,
-    /// Another number of taps.
+    /// Taps a channel.
     pub taps: Option<usize>,
-    /// Another slack.
+    /// Relative excess over the optimal gamma.
     pub slack: Option<f64>,
-}
-
-/// The `[design]` table as written.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct WrittenDesign {
-    pub(super) method: Option<Method>,
-    pub(super) taps: Option<usize>,
-    pub(super) slack: Option<f64>,
+    /// Bits of the taps.
+    pub bits: Option<WordLengths>,
+    /// Taps are integers times two to the minus this.
+    pub fraction_bits: Option<i32>,
 }
 
 impl Method {
@@ -46,10 +43,20 @@ impl Method {
     pub const fn has_slack(self) -> bool {
         matches!(self, Self::Fir | Self::Iir)
     }
+
+    /// Whether the method chooses among integer taps and therefore reads `bits` and `fraction_bits`.
+    pub const fn has_bits(self) -> bool {
+        matches!(self, Self::Fir)
+    }
 }
 
 impl DesignSpec {
-    /// The same design by another method; taps and slack are dropped where it has no use for them.
+    /// A method, with taps if it makes FIR filters, and no other wishes.
+    pub const fn new(method: Method, taps: Option<usize>) -> Self {
+        Self { method, taps, slack: None, bits: None, fraction_bits: None }
+    }
+
+    /// The same design by another method; what that has no use for is dropped.
     ///
     /// # Errors
     /// [`SpecProblem`] if the method needs taps and there are none, or too many for `channels`.
@@ -66,26 +73,23 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let written = WrittenDesign { method: Some(self.method), taps: self.taps, slack: self.slack };
-        let design = written.overridden(overrides).resolved();
+        let Self { method, taps, slack, bits, fraction_bits } = self.clone();
+        let written = DesignOverrides { method: Some(method), taps, slack, bits, fraction_bits };
+        let design = overrides.over(written).resolved();
         design.check(channels)?;
         Ok(design)
     }
 
     /// Checks the numbers and that every key goes with the method.
     pub(super) fn check(&self, channels: usize) -> Result<(), SpecProblem> {
-        let method = self.method.name();
-        if let Some(taps) = self.taps {
-            check_taps(taps)?;
-            if !self.method.has_taps() {
-                return Err(SpecProblem::NeedlessKey { key: "taps", method, remedy: "fir" });
-            }
-        }
-        if let Some(slack) = self.slack {
-            check_slack(slack)?;
-            if !self.method.has_slack() {
-                return Err(SpecProblem::NeedlessKey { key: "slack", method, remedy: "fir or iir" });
-            }
+        self.check_keys()?;
+        self.taps.map_or(Ok(()), check_taps)?;
+        self.slack.map_or(Ok(()), check_slack)?;
+        self.fraction_bits.map_or(Ok(()), check_fraction_bits)?;
+        self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps))?;
+        if let (Some(_), None) = (self.fraction_bits, &self.bits) {
+            let remedy = "fraction_bits places the point of taps of so many bits, for example bits = 16";
+            return Err(SpecProblem::MissingKey { key: "bits", remedy });
         }
         match (self.method, self.taps) {
             (Method::Fir, None) => Err(SpecProblem::MissingKey {
@@ -96,22 +100,41 @@ impl DesignSpec {
             _ => Ok(()),
         }
     }
+
+    fn check_keys(&self) -> Result<(), SpecProblem> {
+        let keys = [
+            ("taps", self.taps.is_some(), self.method.has_taps(), "fir"),
+            ("slack", self.slack.is_some(), self.method.has_slack(), "fir or iir"),
+            ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
+            ("fraction_bits", self.fraction_bits.is_some(), self.method.has_bits(), "fir"),
+        ];
+        match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
+            Some((key, _, _, remedy)) => {
+                Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy })
+            }
+            None => Ok(()),
+        }
+    }
 }
 
-impl WrittenDesign {
+impl DesignOverrides {
     /// What the command line says counts; what the file says about the method that it replaces does not.
-    pub(super) fn overridden(self, overrides: DesignOverrides) -> Self {
-        let kept = |has: fn(Method) -> bool| overrides.method.is_none_or(has);
+    pub(super) fn over(self, file: Self) -> Self {
+        let replaced = self.method;
+        let kept = |has: fn(Method) -> bool| replaced.is_none_or(has);
         Self {
-            method: overrides.method.or(self.method),
-            taps: overrides.taps.or(self.taps.filter(|_| kept(Method::has_taps))),
-            slack: overrides.slack.or(self.slack.filter(|_| kept(Method::has_slack))),
+            method: self.method.or(file.method),
+            taps: self.taps.or(file.taps.filter(|_| kept(Method::has_taps))),
+            slack: self.slack.or(file.slack.filter(|_| kept(Method::has_slack))),
+            bits: self.bits.or(file.bits.filter(|_| kept(Method::has_bits))),
+            fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| kept(Method::has_bits))),
         }
     }
 
     /// Without a method: FIR if there are taps, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let default = if self.taps.is_some() { Method::Fir } else { Method::Iir };
-        DesignSpec { method: self.method.unwrap_or(default), taps: self.taps, slack: self.slack }
+        let Self { method, taps, slack, bits, fraction_bits } = self;
+        let default = if taps.is_some() { Method::Fir } else { Method::Iir };
+        DesignSpec { method: method.unwrap_or(default), taps, slack, bits, fraction_bits }
     }
 }

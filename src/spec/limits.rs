@@ -31,7 +31,7 @@ pub fn delay_in_fast_periods(delay: f64, fast_period: f64) -> f64 {
     if (periods - whole).abs() <= WHOLE_DELAY_TOLERANCE * whole.max(1.0) { whole } else { periods }
 }
 
-fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> SpecProblem {
+pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> SpecProblem {
     SpecProblem::Range { value, unit, rule: rule.into() }
 }
 

@@ -11,12 +11,14 @@ mod filter;
 mod limits;
 mod nearest;
 pub(crate) mod reader;
+mod words;
 mod write;
 
 pub use design::DesignOverrides;
 pub use error::{Place, SpecError, SpecProblem};
 pub use filter::{FilterProblem, MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
+pub use words::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use serde::{Deserialize, Serialize};
 
@@ -155,6 +157,12 @@ pub struct DesignSpec {
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slack: Option<f64>,
+    /// Bits of the taps, for integers in place of doubles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bits: Option<WordLengths>,
+    /// Taps are integers times two to the minus this; `None` lets the designer pick.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fraction_bits: Option<i32>,
 }
 
 impl Spec {

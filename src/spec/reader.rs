@@ -72,12 +72,19 @@ impl<'a> Value<'a> {
     pub(crate) fn count(&self, unit: &'static str) -> Result<usize, Fault> {
         let out_of_range =
             |value, rule: &str| self.fault(SpecProblem::Range { value, unit, rule: rule.into() });
+        let whole = self.integer(unit)?;
+        usize::try_from(whole).map_err(|_| {
+            out_of_range(whole as f64, "it must be a whole number, zero or more, that fits a machine word")
+        })
+    }
+
+    /// A whole number of either sign; `unit` says what it counts.
+    pub(crate) fn integer(&self, unit: &'static str) -> Result<i128, Fault> {
         match self.node.kind {
-            Kind::Integer(i) => usize::try_from(i).map_err(|_| {
-                out_of_range(i as f64, "it must be a whole number, zero or more, that fits a machine word")
-            }),
-            Kind::Number(x) => {
-                Err(out_of_range(x, "it must be a whole number, written without point and exponent"))
+            Kind::Integer(i) => Ok(i),
+            Kind::Number(value) => {
+                let rule = "it must be a whole number, written without point and exponent".into();
+                Err(self.fault(SpecProblem::Range { value, unit, rule }))
             }
             _ => Err(self.wrong_type("a whole number")),
         }

@@ -53,7 +53,7 @@ fn the_example_of_the_manual_reads() {
             ChannelSpec { delay: 1.2, filter: thesis, noise: 0.0 },
             ChannelSpec { delay: 0.6, filter: zpk, noise: 0.0 },
         ],
-        design: DesignSpec { method: Method::Fir, taps: Some(22), slack: None },
+        design: DesignSpec::new(Method::Fir, Some(22)),
     };
     assert_eq!(spec, expected);
 }
@@ -87,7 +87,7 @@ fn latency_name_and_design_may_be_left_out() {
     let end = THESIS.find("[design]").unwrap();
     let spec = read(&THESIS[..end].replace("latency = 10", "").replace("name = \"thesis example, FIR\"", ""));
     assert_eq!((spec.latency, spec.name.as_str()), (None, ""));
-    assert_eq!(spec.design, DesignSpec { method: Method::Iir, taps: None, slack: None });
+    assert_eq!(spec.design, DesignSpec::new(Method::Iir, None));
     assert_eq!(read(&thesis_with("method = \"fir\"", "")).design.method, Method::Fir);
 }
 
@@ -326,6 +326,18 @@ fn every_mistake_has_its_place_and_its_words() {
         (thesis_with("taps = 22", "taps = 65537"), 18, "1 to 65536 taps"),
         (thesis_with("taps = 22", "taps = 10_000"), 18, "taps times channels is at most 16384"),
         (thesis_with("taps = 22", "taps = 22\nslack = -0.1"), 19, "slack is the share"),
+        (thesis_with("taps = 22", "taps = 22\nbits = 1"), 19, "2 to 32 bits"),
+        (thesis_with("taps = 22", "taps = 22\nbits = 12.5"), 19, "whole number"),
+        (thesis_with("taps = 22", "taps = 22\nbits = 'many'"), 19, "whole number"),
+        (thesis_with("taps = 22", "taps = 22\nbits = [8, 8]"), 19, "each of the 22 taps"),
+        (thesis_with("taps = 22", "taps = 4\nbits = [1, 0, 1, 0]"), 19, "at least one tap needs 2 bits"),
+        (thesis_with("taps = 22", "taps = 22\nbits = 8\nfraction_bits = 300"), 20, "from -256 to 256"),
+        (thesis_with("taps = 22", "taps = 22\nfraction_bits = 7"), 16, "the key bits is missing"),
+        (
+            thesis_with("method = \"fir\"\ntaps = 22", "method = \"iir\"\nbits = 8"),
+            18,
+            "choose the method fir",
+        ),
         (thesis_with("method = \"fir\"", "method = \"iir\""), 18, "taps has no meaning for the method iir"),
         (thesis_with("taps = 22", "tap = 22"), 18, "did you mean \"taps\""),
         (thesis_with("[design]", "[[design]]"), 16, "expected a table"),
@@ -361,15 +373,12 @@ fn the_command_line_overrides_the_design() {
     let method = |method| DesignOverrides { method: Some(method), ..Default::default() };
     let no_taps = thesis_with("taps = 22", "");
     let taps = DesignOverrides { taps: Some(7), ..Default::default() };
-    assert_eq!(with(&no_taps, taps).unwrap().taps, Some(7));
+    assert_eq!(with(&no_taps, taps.clone()).unwrap().taps, Some(7));
     assert_eq!(with(THESIS, taps).unwrap().taps, Some(7));
     // The file's taps go with its method, not with another that has none.
-    assert_eq!(
-        with(THESIS, method(Method::H2)),
-        Ok(DesignSpec { method: Method::H2, taps: None, slack: None })
-    );
+    assert_eq!(with(THESIS, method(Method::H2)), Ok(DesignSpec::new(Method::H2, None)));
     assert_eq!(with(THESIS, method(Method::Sinc)).unwrap().taps, Some(22));
-    let both = DesignOverrides { method: Some(Method::Iir), taps: Some(5), slack: None };
+    let both = DesignOverrides { method: Some(Method::Iir), taps: Some(5), ..Default::default() };
     assert!(matches!(
         with(THESIS, both).unwrap_err().problem(),
         SpecProblem::NeedlessKey { key: "taps", .. }
@@ -377,10 +386,7 @@ fn the_command_line_overrides_the_design() {
 
     let design = read(THESIS).design;
     assert_eq!(design.with_method(Method::Iir, 2).unwrap().taps, None);
-    assert_eq!(
-        design.with_taps(9, 2).unwrap(),
-        DesignSpec { method: Method::Fir, taps: Some(9), slack: None }
-    );
+    assert_eq!(design.with_taps(9, 2).unwrap(), DesignSpec::new(Method::Fir, Some(9)));
     assert!(design.with_taps(0, 2).is_err());
     let iir = design.with_method(Method::Iir, 2).unwrap();
     assert!(iir.with_taps(9, 2).is_err() && iir.with_method(Method::Fir, 2).is_err());
@@ -465,6 +471,8 @@ prop_compose! {
         method in prop::sample::select(Method::ALL.to_vec()),
         taps in 1usize..100,
         slack in prop::option::of(0.0..0.1f64),
+        bits in prop::option::of((2..33u32).prop_map(WordLengths::Same)),
+        fraction_bits in prop::option::of(-256..257i32),
     ) -> Spec {
         Spec {
             name, fast_period, ratio, latency, target,
@@ -473,6 +481,8 @@ prop_compose! {
                 method,
                 taps: method.has_taps().then_some(taps),
                 slack: slack.filter(|_| method.has_slack()),
+                bits: bits.clone().filter(|_| method.has_bits()),
+                fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
             },
         }
     }

@@ -1,0 +1,30 @@
+//! Taps as integers: what a bank for fixed-point hardware says of its words.
+
+use serde::Serialize;
+
+use crate::spec::WordLengths;
+
+/// Taps that are integers times 2^-`fraction_bits`, `f_i[n] = integers[i][n] * 2^-fraction_bits`, each of so many bits in two's
+/// complement.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FixedPoint {
+    /// Bits of each tap.
+    pub bits: WordLengths,
+    /// Bits after the point.
+    pub fraction_bits: i32,
+    /// A list a channel.
+    pub integers: Vec<Vec<i64>>,
+}
+
+impl FixedPoint {
+    /// 2^-`fraction_bits`.
+    pub fn step(&self) -> f64 {
+        (-f64::from(self.fraction_bits)).exp2()
+    }
+
+    /// The taps that the integers stand for, exactly.
+    pub fn taps(&self) -> Vec<Vec<f64>> {
+        let tap = |&integer: &i64| integer as f64 * self.step();
+        self.integers.iter().map(|list| list.iter().map(tap).collect()).collect()
+    }
+}

@@ -1,0 +1,121 @@
+//! The error of FIR banks on a fine grid of frequencies: an estimate of gamma, cheap enough for taps that still change.
+
+use super::DesignError;
+use super::equivalence::BlockedPlant;
+use super::error_system::{FirError, filter_response};
+use crate::linalg::{self, CMat, Mat};
+use crate::lmi::sampled::Point;
+use crate::lti::peak::Peak;
+use std::f64::consts::PI;
+
+/// Grid intervals for each slow lag: enough for the mean square of a polynomial of that degree to be exact.
+const POINTS_PER_LAG: usize = 3;
+const LEAST_POINTS: usize = 24;
+/// Peaks are looked for on a grid this much finer.
+const FINE: usize = 8;
+
+/// A plant at equidistant frequencies from 0 to pi.
+pub(super) struct ErrorGrid<'a> {
+    error: FirError<'a>,
+    points: Vec<Point>,
+}
+
+/// What a grid tells about the error of a bank.
+#[derive(Debug, Clone)]
+pub(super) struct Peaks {
+    /// gamma, if no peak was missed.
+    pub(super) estimate: f64,
+    /// Local peaks, between the points too.
+    pub(super) peaks: Vec<Peak>,
+}
+
+impl<'a> ErrorGrid<'a> {
+    /// A grid for filters of `lags` slow lags.
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] if the plant is not stable.
+    pub(super) fn new(plant: &'a BlockedPlant, lags: usize) -> Result<Self, DesignError> {
+        let intervals = FINE * LEAST_POINTS.max(POINTS_PER_LAG * lags);
+        let mut grid = Self { error: FirError::new(plant)?, points: Vec::new() };
+        grid.points = (0..=intervals).map(|k| grid.at(PI * k as f64 / intervals as f64)).collect();
+        Ok(grid)
+    }
+
+    /// All points.
+    pub(super) fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Those that are enough for a mean square, with their trapezoidal weights.
+    pub(super) fn coarse(&self) -> (Vec<Point>, Vec<f64>) {
+        let points: Vec<Point> = self.points.iter().step_by(FINE).cloned().collect();
+        let last = points.len() - 1;
+        let mut weights = vec![1.0 / last as f64; points.len()];
+        (weights[0], weights[last]) = (0.5 / last as f64, 0.5 / last as f64);
+        (points, weights)
+    }
+
+    /// The plant at any frequency (radians a slow tick).
+    pub(super) fn at(&self, omega: f64) -> Point {
+        let (h, w) = self.error.plant_at(omega);
+        Point { omega, h, w }
+    }
+
+    /// The exact norm of the filters `taps[i]`.
+    pub(super) fn gamma(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
+        self.error.gamma(taps)
+    }
+
+    /// The gain of the error with `taps` at each point.
+    pub(super) fn gains(&self, taps: &[Mat]) -> Result<Vec<f64>, DesignError> {
+        self.points.iter().map(|point| gain(point, taps)).collect()
+    }
+
+    /// The peaks of the error with `taps`: at the points of the grid, and between them on the parabolas through three
+    /// neighbours.
+    pub(super) fn peaks(&self, taps: &[Mat]) -> Result<Peaks, DesignError> {
+        let gains = self.gains(taps)?;
+        let step = self.points[1].omega;
+        // The gain is even about 0 and about pi.
+        let last = gains.len() - 1;
+        let at = |k: isize| gains[last - (last as isize - k.abs()).unsigned_abs()];
+        let mut peaks = Vec::new();
+        for k in 0..=last as isize {
+            if at(k) >= at(k - 1) && at(k) >= at(k + 1) {
+                let (shift, _) = parabola(at(k - 1), at(k), at(k + 1));
+                let frequency = ((k as f64 + shift) * step).clamp(0.0, PI);
+                let between = gain(&self.at(frequency), taps)?;
+                let top = Peak { gain: at(k), frequency: k as f64 * step };
+                peaks.push(if between > top.gain { Peak { gain: between, frequency } } else { top });
+            }
+        }
+        let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
+        Ok(Peaks { estimate, peaks })
+    }
+}
+
+impl Peaks {
+    /// The frequencies of the peaks higher than `level`.
+    pub(super) fn above(&self, level: f64) -> Vec<f64> {
+        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.frequency).collect()
+    }
+}
+
+/// K = W - F H at a point.
+pub(super) fn error_at(point: &Point, taps: &[Mat]) -> CMat {
+    &point.w - filter_response(taps, point.omega) * &point.h
+}
+
+fn gain(point: &Point, taps: &[Mat]) -> Result<f64, DesignError> {
+    Ok(linalg::largest_singular_value_c(&error_at(point, taps))?)
+}
+
+/// Vertex of the parabola through (-1, a), (0, b), (1, c): abscissa and height.
+fn parabola(a: f64, b: f64, c: f64) -> (f64, f64) {
+    let curvature = a - 2.0 * b + c;
+    if curvature >= 0.0 {
+        return (0.0, b);
+    }
+    let shift = (0.5 * (a - c) / curvature).clamp(-1.0, 1.0);
+    (shift, b - 0.25 * (a - c) * shift)
+}

@@ -1,0 +1,76 @@
+//! Closest points of a lattice: integers near given reals in the sense of a quadratic form.
+//!
+//! Minimise `|L' (x - c)|^2` over integer x in a box. The unknowns are decided from the last to the first; each decision
+//! moves what is best for those that follow by what the form says about both (Babai's nearest plane), and the
+//! cheapest partial decisions are followed side by side (a breadth-first sphere decoder with a bounded list).
+//!
+//! Sources: Babai, Combinatorica 6 (1986); Anderson and Mohan, IEEE Trans. Commun. 32 (1984) for the list.
+
+use crate::linalg::Mat;
+
+/// Partial decisions that are followed.
+const LIST: usize = 32;
+
+/// Integers between two bounds, both included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    pub(super) least: f64,
+    pub(super) most: f64,
+}
+
+impl Span {
+    /// The integer of the span that is nearest to `value`.
+    pub(super) fn nearest(self, value: f64) -> f64 {
+        value.round_ties_even().clamp(self.least, self.most)
+    }
+
+    pub(super) fn contains(self, value: f64) -> bool {
+        (self.least..=self.most).contains(&value)
+    }
+}
+
+/// The unknowns decided so far, as deviations from the centre, with their share of the form.
+#[derive(Clone)]
+struct Partial {
+    deviations: Vec<f64>,
+    cost: f64,
+}
+
+/// An integer point near `centre` with a small `|L' (x - c)|^2`, L = `factor` lower triangular, x_i in `spans[i]`.
+/// It is the closest one for one unknown, and for a diagonal form; otherwise most often.
+pub(super) fn closest(factor: &Mat, centre: &[f64], spans: &[Span]) -> Vec<f64> {
+    let n = centre.len();
+    let mut list = vec![Partial { deviations: vec![0.0; n], cost: 0.0 }];
+    for i in (0..n).rev() {
+        let mut longer: Vec<Partial> =
+            list.iter().flat_map(|partial| decide(partial, i, factor, centre[i], spans[i])).collect();
+        longer.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        longer.truncate(LIST);
+        list = longer;
+    }
+    let best = &list[0].deviations;
+    best.iter().zip(centre).map(|(deviation, c)| (c + deviation).round()).collect()
+}
+
+/// Unknown i at the two integers nearest to what is best after the decisions made.
+fn decide<'a>(
+    partial: &'a Partial,
+    i: usize,
+    factor: &'a Mat,
+    centre: f64,
+    span: Span,
+) -> impl Iterator<Item = Partial> + 'a {
+    let column = factor.column(i);
+    let pull: f64 = (i + 1..partial.deviations.len()).map(|l| column[l] * partial.deviations[l]).sum();
+    let weight = column[i];
+    let wanted = centre - pull / weight;
+    let nearest = span.nearest(wanted);
+    let other = span.nearest(if wanted > nearest { nearest + 1.0 } else { nearest - 1.0 });
+    let count = if other == nearest { 1 } else { 2 };
+    [nearest, other].into_iter().take(count).map(move |x| {
+        let mut next = partial.clone();
+        next.deviations[i] = x - centre;
+        next.cost += (weight * (x - wanted)).powi(2);
+        next
+    })
+}

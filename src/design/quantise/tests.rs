@@ -1,0 +1,162 @@
+use super::*;
+use crate::bank::SynthesisFilters;
+use crate::design::error_system::bank_gamma;
+use crate::design::{Problem, design};
+use crate::spec::Spec;
+
+const THESIS: &str = r#"
+fast_period = 1.0
+ratio = 2
+latency = 3
+[target]
+filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
+[[channel]]
+delay = 1.2
+[[channel]]
+delay = 0.6
+[design]
+method = "fir"
+taps = 22
+"#;
+
+/// A plant with the taps of its optimal FIR bank.
+fn optimum(spec: &str) -> (BlockedPlant, Vec<Vec<f64>>) {
+    let spec = Spec::from_toml(spec, "spec.toml").unwrap();
+    let found = design(&spec).unwrap();
+    let SynthesisFilters::Fir(taps) = found.bank.filters else { unreachable!() };
+    (BlockedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()), taps)
+}
+
+/// The exact norm, by another route than the search's grid.
+fn exact(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> f64 {
+    bank_gamma(plant, &SynthesisFilters::Fir(taps)).unwrap().gain
+}
+
+/// Every integer point within `reach` of the rounded taps.
+fn brute_force(plant: &BlockedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
+    let cells: Vec<(usize, usize)> = rounded
+        .integers
+        .iter()
+        .enumerate()
+        .flat_map(|(i, list)| (0..list.len()).map(move |n| (i, n)))
+        .collect();
+    let side = 2 * reach + 1;
+    let count = side.pow(cells.len() as u32);
+    let mut best = f64::INFINITY;
+    for code in 0..count {
+        let mut point = rounded.clone();
+        let mut rest = code;
+        let mut inside = true;
+        for &(i, n) in &cells {
+            point.integers[i][n] += rest % side - reach;
+            rest /= side;
+            let (least, most) = point.bits.span(n);
+            inside &= (least..=most).contains(&point.integers[i][n]);
+        }
+        if inside {
+            let lags = by_lag(&point.taps(), plant.wanted);
+            best = best.min(ErrorGrid::new(plant, lags.len()).unwrap().peaks(&lags).unwrap().estimate);
+        }
+    }
+    best
+}
+
+#[test]
+fn small_banks_reach_what_trying_all_integers_reaches() {
+    let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 3"));
+    for bits in 3..8 {
+        let words = WordLengths::Same(bits);
+        let quantiser = Quantiser::new(&plant, &taps).unwrap();
+        let found = quantiser.quantise(&words, None).unwrap();
+        let scale = found.fixed_point.fraction_bits;
+        let search = Search::new(&quantiser, &words, scale);
+        let all = brute_force(&plant, &search.fixed_point(&search.rounded()), 1);
+        assert!(found.gamma <= all * 1.001, "{bits} bits: {} found, {all} is there", found.gamma);
+        assert!(found.gamma <= found.rounded);
+    }
+}
+
+#[test]
+fn the_estimates_are_those_of_the_exact_norm_and_integers_fit_their_bits() {
+    let (plant, taps) = optimum(THESIS);
+    let quantiser = Quantiser::new(&plant, &taps).unwrap();
+    for bits in [2, 4, 8, 16, 32] {
+        let words = WordLengths::Same(bits);
+        let found = quantiser.quantise(&words, None).unwrap();
+        let (least, most) = words.span(0);
+        assert!(found.fixed_point.integers.iter().flatten().all(|x| (least..=most).contains(x)));
+        let gamma = exact(&plant, found.fixed_point.taps());
+        assert!((gamma / found.gamma - 1.0).abs() < 1e-4, "{bits} bits: {gamma} is {}", found.gamma);
+    }
+}
+
+#[test]
+fn far_better_than_rounding_where_the_channels_carry_little() {
+    let (plant, taps) = optimum(THESIS);
+    let quantiser = Quantiser::new(&plant, &taps).unwrap();
+    let found = quantiser.quantise(&WordLengths::Same(5), None).unwrap();
+    assert!(found.rounded > 1.5 * found.gamma && found.gamma < 1.01 * quantiser.real, "{found:?}");
+}
+
+#[test]
+fn more_bits_cost_no_more_and_in_the_end_nothing() {
+    let (plant, taps) = optimum(THESIS);
+    let real = exact(&plant, taps.clone());
+    let (_, study) = quantise(&plant, &taps, real, &WordLengths::Same(6), None).unwrap();
+    let losses: Vec<f64> = study.words.iter().map(|word| word.loss_db).collect();
+    assert_eq!(losses.len(), 5);
+    assert!(losses.windows(2).all(|pair| pair[1] <= pair[0] + 0.01), "{losses:?}");
+    let (integers, _) = quantise(&plant, &taps, real, &WordLengths::Same(24), None).unwrap();
+    assert!(exact(&plant, integers.taps()) < real * (1.0 + 1e-5));
+}
+
+#[test]
+fn each_tap_may_have_bits_of_its_own_or_none() {
+    let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 8"));
+    let list = vec![6, 6, 8, 8, 8, 6, 2, 0];
+    let words = WordLengths::PerTap(list.clone());
+    let found = Quantiser::new(&plant, &taps).unwrap().quantise(&words, None).unwrap();
+    for integers in &found.fixed_point.integers {
+        for (n, x) in integers.iter().enumerate() {
+            let (least, most) = words.span(n);
+            assert!((least..=most).contains(x), "tap {n} of {list:?} is {x}");
+        }
+        assert_eq!(integers[7], 0);
+    }
+}
+
+#[test]
+fn a_scale_that_is_given_is_kept_even_where_taps_are_cut_off() {
+    let (plant, taps) = optimum(THESIS);
+    let quantiser = Quantiser::new(&plant, &taps).unwrap();
+    for scale in [-3, 0, 4, 12] {
+        let found = quantiser.quantise(&WordLengths::Same(6), Some(scale)).unwrap();
+        assert_eq!(found.fixed_point.fraction_bits, scale);
+    }
+}
+
+#[test]
+fn taps_of_any_size_find_their_scale() {
+    let (plant, taps) = optimum(THESIS);
+    let largest = taps.iter().flatten().fold(0.0f64, |most, tap| most.max(tap.abs()));
+    for exponent in [-60, -9, 0, 9, 60] {
+        let factor = f64::from(exponent).exp2();
+        let scaled: Vec<Vec<f64>> = taps.iter().map(|f| f.iter().map(|t| t * factor).collect()).collect();
+        let quantiser = Quantiser::new(&plant, &scaled).unwrap();
+        let finest = quantiser.finest_that_fits(&WordLengths::Same(8));
+        let top = largest * f64::from(exponent + finest).exp2();
+        assert!((63.0..128.0).contains(&top), "2^{exponent}: scale {finest}, largest integer {top}");
+    }
+    let zeros = vec![vec![0.0; 22]; 2];
+    let quantiser = Quantiser::new(&plant, &zeros).unwrap();
+    let found = quantiser.quantise(&WordLengths::Same(8), None).unwrap();
+    assert!(found.gamma.is_finite());
+}
+
+#[test]
+fn equal_channels_share_finer_steps_than_their_own() {
+    let twice = THESIS.replace("delay = 0.6", "delay = 0.6\n[[channel]]\ndelay = 0.6");
+    let (plant, taps) = optimum(&twice);
+    let found = Quantiser::new(&plant, &taps).unwrap().quantise(&WordLengths::Same(4), None).unwrap();
+    assert!(found.gamma <= found.rounded);
+}

@@ -1,0 +1,165 @@
+//! Word lengths of taps in two's complement.
+
+use serde::Serialize;
+
+use super::SpecProblem;
+use super::limits::range;
+
+/// Most bits of a tap: its integers are exact in a double, and far finer than any bank's own error.
+pub const MAX_BITS: u32 = 32;
+/// Largest magnitude of `fraction_bits`.
+pub const MAX_FRACTION_BITS: i32 = 256;
+
+/// Bits of the taps of a channel as they are stored, sign included.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum WordLengths {
+    /// The same for all taps, 2 or more.
+    Same(u32),
+    /// One for each tap, the same list for every channel. A tap of 0 bits is 0.
+    PerTap(Vec<u32>),
+}
+
+impl WordLengths {
+    /// Bits of tap `n`; 0 beyond the end of a list.
+    pub fn bits(&self, n: usize) -> u32 {
+        match self {
+            Self::Same(bits) => *bits,
+            Self::PerTap(list) => list.get(n).copied().unwrap_or(0),
+        }
+    }
+
+    /// The least and the largest integer of tap `n`: -2^(b-1) and 2^(b-1) - 1.
+    pub fn span(&self, n: usize) -> (i64, i64) {
+        match self.bits(n).min(MAX_BITS) {
+            0 => (0, 0),
+            bits => (-(1 << (bits - 1)), (1 << (bits - 1)) - 1),
+        }
+    }
+
+    /// The same with `more` bits a tap (fewer if negative), where that is legal.
+    #[must_use]
+    pub fn widened(&self, more: i32) -> Option<Self> {
+        let other = match self {
+            Self::Same(bits) => Self::Same(bits.checked_add_signed(more)?),
+            Self::PerTap(list) => Self::PerTap(
+                list.iter()
+                    .map(|&bits| if bits == 0 { Some(0) } else { bits.checked_add_signed(more) })
+                    .collect::<Option<_>>()?,
+            ),
+        };
+        other.check(None).is_ok().then_some(other)
+    }
+
+    /// Checks the numbers, and the length of a list against that of the filters where it is known.
+    pub(super) fn check(&self, taps: Option<usize>) -> Result<(), SpecProblem> {
+        let refuse = |bits: u32, rule: String| Err(range(f64::from(bits), "bits", rule));
+        match self {
+            Self::Same(bits) if !(2..=MAX_BITS).contains(bits) => {
+                refuse(*bits, format!("a tap has 2 to {MAX_BITS} bits, its sign among them"))
+            }
+            Self::Same(_) => Ok(()),
+            Self::PerTap(list) => {
+                if let Some(taps) = taps.filter(|&taps| taps != list.len()) {
+                    let rule =
+                        format!("a list of bits has one entry for each of the {taps} taps of a channel");
+                    return Err(range(list.len() as f64, "entries", rule));
+                }
+                if let Some(bits) = list.iter().find(|&&bits| bits > MAX_BITS) {
+                    return refuse(*bits, format!("a tap has at most {MAX_BITS} bits; 0 leaves it out"));
+                }
+                match list.iter().max() {
+                    Some(&most) if most >= 2 => Ok(()),
+                    most => refuse(
+                        most.copied().unwrap_or(0),
+                        "at least one tap needs 2 bits or more, its sign among them".into(),
+                    ),
+                }
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for WordLengths {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Same(bits) => write!(f, "{bits} bits"),
+            Self::PerTap(list) => {
+                let used = list.iter().filter(|&&bits| bits > 0);
+                let (least, most) = (used.clone().min(), used.max());
+                write!(f, "{} to {} bits", least.unwrap_or(&0), most.unwrap_or(&0))
+            }
+        }
+    }
+}
+
+impl std::str::FromStr for WordLengths {
+    type Err = String;
+
+    /// `12`, or a list for each tap, `4,6,8,8,6,4`. Ranges are checked with the spec.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| {
+            text.trim().parse::<u32>().map_err(|_| {
+                format!("\"{text}\" is no number of bits; give one number, or one for each tap with commas")
+            })
+        };
+        match text.contains(',') {
+            true => text.split(',').map(number).collect::<Result<_, _>>().map(Self::PerTap),
+            false => number(text).map(Self::Same),
+        }
+    }
+}
+
+/// The exponent of the finest step.
+pub(crate) fn check_fraction_bits(fraction_bits: i32) -> Result<(), SpecProblem> {
+    if (-MAX_FRACTION_BITS..=MAX_FRACTION_BITS).contains(&fraction_bits) {
+        return Ok(());
+    }
+    let rule = format!(
+        "fraction_bits is from -{MAX_FRACTION_BITS} to {MAX_FRACTION_BITS}: taps are integers times 2^-fraction_bits"
+    );
+    Err(range(f64::from(fraction_bits), "bits", rule))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_span_is_that_of_twos_complement() {
+        let words = WordLengths::PerTap(vec![0, 1, 2, 8, 32]);
+        let spans: Vec<_> = (0..6).map(|n| words.span(n)).collect();
+        let i32s = (i64::from(i32::MIN), i64::from(i32::MAX));
+        assert_eq!(spans, [(0, 0), (-1, 0), (-2, 1), (-128, 127), i32s, (0, 0)]);
+    }
+
+    #[test]
+    fn words_are_checked() {
+        let list = |list: &[u32]| WordLengths::PerTap(list.to_vec());
+        assert!(WordLengths::Same(2).check(None).is_ok() && list(&[0, 32, 1]).check(Some(3)).is_ok());
+        for bad in
+            [WordLengths::Same(1), WordLengths::Same(33), list(&[1, 0, 1]), list(&[33, 2, 2]), list(&[])]
+        {
+            assert!(bad.check(None).is_err(), "{bad:?}");
+        }
+        assert!(list(&[4, 4]).check(Some(3)).is_err());
+    }
+
+    #[test]
+    fn widening_keeps_left_out_taps_out_and_ends_at_the_limits() {
+        let words = WordLengths::PerTap(vec![0, 3, 5]);
+        assert_eq!(words.widened(-2), Some(WordLengths::PerTap(vec![0, 1, 3])));
+        assert_eq!(words.widened(-4), None);
+        assert_eq!(WordLengths::Same(31).widened(2), None);
+        assert_eq!(WordLengths::Same(3).widened(-1), Some(WordLengths::Same(2)));
+    }
+
+    #[test]
+    fn a_command_line_gives_one_number_or_a_list() {
+        assert_eq!("12".parse(), Ok(WordLengths::Same(12)));
+        assert_eq!("4, 6,0".parse(), Ok(WordLengths::PerTap(vec![4, 6, 0])));
+        for bad in ["", "x", "4,,5", "-3", "1e3"] {
+            assert!(bad.parse::<WordLengths>().is_err(), "{bad}");
+        }
+    }
+}
