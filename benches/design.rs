@@ -26,7 +26,7 @@ fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64], desi
 
 fn thesis(method: Method, taps: Option<usize>) -> Spec {
     let filter = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
-    alike(&filter, 2, 10, &[1.2, 0.6], DesignSpec { method, taps, slack: None })
+    alike(&filter, 2, 10, &[1.2, 0.6], DesignSpec::new(method, taps))
 }
 
 fn butterworth(order: usize, omega: f64) -> FilterSpec {
@@ -43,18 +43,18 @@ fn butterworth(order: usize, omega: f64) -> FilterSpec {
 /// N = M = 8.
 fn eight(order: usize, omega: f64, latency: usize, method: Method, taps: Option<usize>) -> Spec {
     let delays = [0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];
-    alike(&butterworth(order, omega), 8, latency, &delays, DesignSpec { method, taps, slack: None })
+    alike(&butterworth(order, omega), 8, latency, &delays, DesignSpec::new(method, taps))
 }
 
 fn four() -> Spec {
-    let design = DesignSpec { method: Method::Fir, taps: Some(24), slack: None };
+    let design = DesignSpec::new(Method::Fir, Some(24));
     alike(&butterworth(4, 1.2), 4, 12, &[0.0, 1.3, 2.1, 2.95], design)
 }
 
 /// N = M channels behind Butterworth filters of order 6 at 0.2 of the fast rate, delays uneven, latency a fast-rate tick.
 fn many(channels: usize, taps: usize) -> Spec {
     let delays: Vec<f64> = (0..channels).map(|i| 0.83 * i as f64 + 0.07 * ((i * i) % 5) as f64).collect();
-    let design = DesignSpec { method: Method::Fir, taps: Some(taps), slack: None };
+    let design = DesignSpec::new(Method::Fir, Some(taps));
     alike(&butterworth(6, 0.2 * TAU), channels, channels, &delays, design)
 }
 

@@ -41,7 +41,7 @@ fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> S
         latency: Some(latency),
         target: filter.clone(),
         channels,
-        design: DesignSpec { method: Method::Iir, taps: None, slack: None },
+        design: DesignSpec::new(Method::Iir, None),
     }
 }
 
@@ -73,7 +73,7 @@ fn g12() -> Spec {
 }
 
 fn with_taps(mut spec: Spec, taps: usize) -> Spec {
-    spec.design = DesignSpec { method: Method::Fir, taps: Some(taps), slack: None };
+    spec.design = DesignSpec::new(Method::Fir, Some(taps));
     spec
 }
 
@@ -133,7 +133,7 @@ fn g6_the_unit_of_time_does_not_matter() {
             let filter = tf(&[0.25 / (h * h)], &[1.0, 1.0 / h, 0.25 / (h * h)]);
             let mut spec = alike(&filter, 2, 10, &[1.2 * h, 0.6 * h]);
             spec.fast_period = h;
-            spec.design = DesignSpec { method, taps: (method == Method::Fir).then_some(22), slack: None };
+            spec.design = DesignSpec::new(method, (method == Method::Fir).then_some(22));
             design(&spec).unwrap().bank
         };
         let (scaled, unscaled) = (at_one(h), at_one(1.0));

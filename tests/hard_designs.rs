@@ -38,7 +38,7 @@ impl Case {
             latency: Some(self.latency),
             target: filter.clone(),
             channels: self.delays.iter().map(channel).collect(),
-            design: DesignSpec { method, taps: (method == Method::Fir).then_some(self.taps), slack: None },
+            design: DesignSpec::new(method, (method == Method::Fir).then_some(self.taps)),
         }
     }
 

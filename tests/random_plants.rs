@@ -65,7 +65,7 @@ fn plant(seed: u64) -> Spec {
         .collect();
     let taps = dice.count(1, 4) * ratio;
     let method = if dice.part() < 0.7 { Method::Fir } else { Method::Iir };
-    let design = DesignSpec { method, taps: (method == Method::Fir).then_some(taps), slack: None };
+    let design = DesignSpec::new(method, (method == Method::Fir).then_some(taps));
     Spec {
         name: String::new(),
         fast_period: 1.0,

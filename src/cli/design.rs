@@ -3,8 +3,8 @@
 use super::Failure;
 use super::bank_file::{is_dash, load_spec, write_text};
 use crate::bank::SynthesisFilters;
-use crate::design::{self, Design, DesignError, MeanAnalysis};
-use crate::spec::{DesignOverrides, Method};
+use crate::design::{self, Design, DesignError, MeanAnalysis, OrderReduction, OrderWorth};
+use crate::spec::{DesignOverrides, Method, Reduction};
 use crate::verify::Verified;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -19,6 +19,8 @@ use std::time::Instant;
 Examples:
   hybank design spec.toml -o bank.json
   hybank design spec.toml -o iir.json --method iir
+  hybank design spec.toml -o small.json --method iir --order 6
+  hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
   hybank design spec.toml -o - --taps 64 | hybank analyze -")]
 pub(super) struct Args {
     /// The spec (TOML); `-` is standard input
@@ -38,6 +40,12 @@ pub(super) struct Args {
     /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
     #[arg(long)]
     slack: Option<f64>,
+    /// At most so many states, with the least error that they allow (methods iir and h2)
+    #[arg(long)]
+    order: Option<usize>,
+    /// As few states as keep the error within so many decibels of the full bank's (methods iir and h2)
+    #[arg(long, value_name = "DB", conflicts_with = "order")]
+    reduction_loss_db: Option<f64>,
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
@@ -64,6 +72,8 @@ struct Report<'a> {
     latency_chosen: bool,
     taps: Option<usize>,
     states: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reduction: Option<&'a OrderReduction>,
     gamma: &'a crate::bank::Gamma,
     #[serde(flatten)]
     mean: MeanAnalysis,
@@ -121,7 +131,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             "--json and `-o -` both want standard output; write the bank to a file".into(),
         ));
     }
-    let overrides = DesignOverrides { method: args.method, taps: args.taps, slack: args.slack };
+    let reduction = args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss));
+    let overrides = DesignOverrides { method: args.method, taps: args.taps, slack: args.slack, reduction };
     let mut spec = load_spec(&args.spec, overrides)?;
     spec.latency = args.latency.or(spec.latency);
     spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
@@ -162,6 +173,7 @@ impl<'a> Report<'a> {
             latency_chosen: design.latency_chosen,
             taps,
             states,
+            reduction: design.reduction.as_ref(),
             gamma: &bank.gamma,
             mean,
             peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
@@ -186,7 +198,7 @@ impl<'a> Report<'a> {
              noncausal  {} (no latency is better)\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
-             designed in {:.1} ms, {} iterations\n{}",
+             {}designed in {:.1} ms, {} iterations\n{}",
             self.bank,
             self.method.name(),
             self.channels,
@@ -205,11 +217,39 @@ impl<'a> Report<'a> {
             number(Some(self.mean.rms_error)),
             number(Some(self.mean.noise_gain)),
             self.mean.output_noise,
+            self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.seconds * 1e3,
             self.iterations,
             self.proof.text(self.proof_seconds),
         )
     }
+}
+
+/// Rows of the table of orders; all of them are in the report of `--json`.
+const TABLE_ROWS: usize = 32;
+
+/// Full and reduced order, and what each state is worth.
+fn order_text(reduction: &OrderReduction, method: Method) -> String {
+    let OrderReduction { full, reduced, orders } = reduction;
+    let lost = if method == Method::H2 { "of H2 error" } else { "of gamma" };
+    let mut text = format!(
+        "order      {} of {} states: gamma {} instead of {}, {:.4} dB {lost} lost\n",
+        reduced.order,
+        full.order,
+        number(Some(reduced.figures.gamma)),
+        number(Some(full.figures.gamma)),
+        reduced.loss_db
+    );
+    let row = |worth: &OrderWorth| {
+        let OrderWorth { order, figures, loss_db } = worth;
+        let (gamma, rms) = (number(Some(figures.gamma)), number(Some(figures.rms_error)));
+        format!("{order:>10} {gamma:>14} {rms:>14} {loss_db:>10.4} dB\n")
+    };
+    if orders.len() <= TABLE_ROWS {
+        text += &format!("{:>10} {:>14} {:>14} {:>13}\n", "states", "gamma", "H2 error", "loss");
+        text.extend(orders.iter().map(row));
+    }
+    text
 }
 
 fn number(value: Option<f64>) -> String {

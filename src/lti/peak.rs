@@ -59,6 +59,14 @@ pub fn known_hinf_norm(
     Search::new(&system.compress_inputs(), 0, response, hints).run()
 }
 
+/// The peaks of a stable system that rise above `level`: at least one of each range of frequencies that does.
+pub fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiError> {
+    let poles = stable_poles(system)?;
+    let system = system.compress_inputs();
+    let response = FrequencyResponse::new(&system);
+    Search::new(&system, 0, &|w| response.at_frequency(w), resonances(&poles)).all_above(level)
+}
+
 /// The poles of a stable system.
 ///
 /// # Errors
@@ -199,6 +207,22 @@ impl<'a> Search<'a> {
         }
         let spread = 0.25 * PI / FIRST_GRID as f64;
         self.climb(best.frequency - spread, best, best.frequency + spread).map(Some)
+    }
+
+    fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
+        let mut edges = self.crossings(level)?;
+        edges.dedup();
+        let mut peaks = Vec::new();
+        for range in edges.windows(2) {
+            let middle = 0.5 * (range[0] + range[1]);
+            let start = Peak { gain: self.gain(middle)?, frequency: middle };
+            if start.gain > level {
+                let inside = self.climb(range[0], start, range[1])?;
+                let end = |w: f64| self.gain(w).map(|gain| Peak { gain, frequency: w });
+                peaks.push(higher(inside, higher(end(range[0])?, end(range[1])?)));
+            }
+        }
+        Ok(peaks)
     }
 
     /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`.

@@ -1,7 +1,7 @@
 //! The `[design]` table: defaults, overrides from the command line, and which key goes with which method.
 
-use super::limits::{check_optimised_taps, check_slack, check_taps};
-use super::{DesignSpec, Method, SpecProblem};
+use super::limits::{check_optimised_taps, check_order, check_reduction_loss, check_slack, check_taps};
+use super::{DesignSpec, Method, Reduction, SpecProblem};
 
 /// What the command line says in place of the `[design]` table.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -12,6 +12,8 @@ pub struct DesignOverrides {
     pub taps: Option<usize>,
     /// Another slack.
     pub slack: Option<f64>,
+    /// Another order, or loss by its reduction.
+    pub reduction: Option<Reduction>,
 }
 
 /// The `[design]` table as written.
@@ -20,6 +22,7 @@ pub(super) struct WrittenDesign {
     pub(super) method: Option<Method>,
     pub(super) taps: Option<usize>,
     pub(super) slack: Option<f64>,
+    pub(super) reduction: Option<Reduction>,
 }
 
 impl Method {
@@ -46,9 +49,36 @@ impl Method {
     pub const fn has_slack(self) -> bool {
         matches!(self, Self::Fir | Self::Iir)
     }
+
+    /// Whether the method makes recursive filters and therefore reads `order` and `reduction_loss_db`.
+    pub const fn has_states(self) -> bool {
+        matches!(self, Self::Iir | Self::H2)
+    }
+}
+
+impl Reduction {
+    /// The key that says it.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Order(_) => "order",
+            Self::Loss(_) => "reduction_loss_db",
+        }
+    }
+
+    fn check(self) -> Result<(), SpecProblem> {
+        match self {
+            Self::Order(order) => check_order(order),
+            Self::Loss(db) => check_reduction_loss(db),
+        }
+    }
 }
 
 impl DesignSpec {
+    /// A method, with taps if it makes FIR filters, and no other wishes.
+    pub const fn new(method: Method, taps: Option<usize>) -> Self {
+        Self { method, taps, slack: None, reduction: None }
+    }
+
     /// The same design by another method; taps and slack are dropped where it has no use for them.
     ///
     /// # Errors
@@ -66,7 +96,12 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let written = WrittenDesign { method: Some(self.method), taps: self.taps, slack: self.slack };
+        let written = WrittenDesign {
+            method: Some(self.method),
+            taps: self.taps,
+            slack: self.slack,
+            reduction: self.reduction,
+        };
         let design = written.overridden(overrides).resolved();
         design.check(channels)?;
         Ok(design)
@@ -85,6 +120,12 @@ impl DesignSpec {
             check_slack(slack)?;
             if !self.method.has_slack() {
                 return Err(SpecProblem::NeedlessKey { key: "slack", method, remedy: "fir or iir" });
+            }
+        }
+        if let Some(reduction) = self.reduction {
+            reduction.check()?;
+            if !self.method.has_states() {
+                return Err(SpecProblem::NeedlessKey { key: reduction.key(), method, remedy: "iir or h2" });
             }
         }
         match (self.method, self.taps) {
@@ -106,12 +147,14 @@ impl WrittenDesign {
             method: overrides.method.or(self.method),
             taps: overrides.taps.or(self.taps.filter(|_| kept(Method::has_taps))),
             slack: overrides.slack.or(self.slack.filter(|_| kept(Method::has_slack))),
+            reduction: overrides.reduction.or(self.reduction.filter(|_| kept(Method::has_states))),
         }
     }
 
     /// Without a method: FIR if there are taps, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
         let default = if self.taps.is_some() { Method::Fir } else { Method::Iir };
-        DesignSpec { method: self.method.unwrap_or(default), taps: self.taps, slack: self.slack }
+        let Self { method, taps, slack, reduction } = self;
+        DesignSpec { method: method.unwrap_or(default), taps, slack, reduction }
     }
 }

@@ -53,7 +53,7 @@ fn the_example_of_the_manual_reads() {
             ChannelSpec { delay: 1.2, filter: thesis, noise: 0.0 },
             ChannelSpec { delay: 0.6, filter: zpk, noise: 0.0 },
         ],
-        design: DesignSpec { method: Method::Fir, taps: Some(22), slack: None },
+        design: DesignSpec::new(Method::Fir, Some(22)),
     };
     assert_eq!(spec, expected);
 }
@@ -87,7 +87,7 @@ fn latency_name_and_design_may_be_left_out() {
     let end = THESIS.find("[design]").unwrap();
     let spec = read(&THESIS[..end].replace("latency = 10", "").replace("name = \"thesis example, FIR\"", ""));
     assert_eq!((spec.latency, spec.name.as_str()), (None, ""));
-    assert_eq!(spec.design, DesignSpec { method: Method::Iir, taps: None, slack: None });
+    assert_eq!(spec.design, DesignSpec::new(Method::Iir, None));
     assert_eq!(read(&thesis_with("method = \"fir\"", "")).design.method, Method::Fir);
 }
 
@@ -366,10 +366,10 @@ fn the_command_line_overrides_the_design() {
     // The file's taps go with its method, not with another that has none.
     assert_eq!(
         with(THESIS, method(Method::H2)),
-        Ok(DesignSpec { method: Method::H2, taps: None, slack: None })
+        Ok(DesignSpec::new(Method::H2, None))
     );
     assert_eq!(with(THESIS, method(Method::Sinc)).unwrap().taps, Some(22));
-    let both = DesignOverrides { method: Some(Method::Iir), taps: Some(5), slack: None };
+    let both = DesignOverrides { method: Some(Method::Iir), taps: Some(5), ..Default::default() };
     assert!(matches!(
         with(THESIS, both).unwrap_err().problem(),
         SpecProblem::NeedlessKey { key: "taps", .. }
@@ -379,7 +379,7 @@ fn the_command_line_overrides_the_design() {
     assert_eq!(design.with_method(Method::Iir, 2).unwrap().taps, None);
     assert_eq!(
         design.with_taps(9, 2).unwrap(),
-        DesignSpec { method: Method::Fir, taps: Some(9), slack: None }
+        DesignSpec::new(Method::Fir, Some(9))
     );
     assert!(design.with_taps(0, 2).is_err());
     let iir = design.with_method(Method::Iir, 2).unwrap();

@@ -42,7 +42,7 @@ fn bank(
         latency: Some(latency),
         target,
         channels: filters.into_iter().zip(delays).map(channel).collect(),
-        design: DesignSpec { method: Method::Fir, taps: Some(taps), slack: None },
+        design: DesignSpec::new(Method::Fir, Some(taps)),
     };
     Bank {
         spec: Some(spec),
@@ -163,7 +163,7 @@ fn proven(bank: &Bank, dual: &[crate::design::fir::DualPoint]) -> (Bank, Verifie
 
 fn designed(method: Method, latency: usize, taps: usize) -> (Bank, Verified) {
     let mut spec = alike(&thesis_filter(), &[1.2, 0.6], 2, latency, 1).spec.unwrap();
-    spec.design = DesignSpec { method, taps: method.has_taps().then_some(taps), slack: None };
+    spec.design = DesignSpec::new(method, method.has_taps().then_some(taps));
     let design = crate::design::design(&spec).unwrap();
     proven(&design.bank, &design.dual)
 }
