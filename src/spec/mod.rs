@@ -17,7 +17,7 @@ pub use design::DesignOverrides;
 pub use error::{Place, SpecError, SpecProblem};
 pub use filter::{FilterProblem, MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
-pub use limits::{MAX_STATES, MAX_REDUCTION_LOSS_DB};
+pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 
 use serde::{Deserialize, Serialize};
 

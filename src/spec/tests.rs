@@ -364,10 +364,7 @@ fn the_command_line_overrides_the_design() {
     assert_eq!(with(&no_taps, taps).unwrap().taps, Some(7));
     assert_eq!(with(THESIS, taps).unwrap().taps, Some(7));
     // The file's taps go with its method, not with another that has none.
-    assert_eq!(
-        with(THESIS, method(Method::H2)),
-        Ok(DesignSpec::new(Method::H2, None))
-    );
+    assert_eq!(with(THESIS, method(Method::H2)), Ok(DesignSpec::new(Method::H2, None)));
     assert_eq!(with(THESIS, method(Method::Sinc)).unwrap().taps, Some(22));
     let both = DesignOverrides { method: Some(Method::Iir), taps: Some(5), ..Default::default() };
     assert!(matches!(
@@ -375,12 +372,21 @@ fn the_command_line_overrides_the_design() {
         SpecProblem::NeedlessKey { key: "taps", .. }
     ));
 
+    let wanted = |reduction| DesignOverrides { reduction: Some(reduction), ..Default::default() };
+    let iir = thesis_with("method = \"fir\"", "method = \"iir\"\norder = 7").replace("taps = 22", "");
+    assert_eq!(with(&iir, DesignOverrides::default()).unwrap().reduction, Some(Reduction::Order(7)));
+    let loss = Reduction::Loss(0.5);
+    assert_eq!(with(&iir, wanted(loss)).unwrap().reduction, Some(loss));
+    assert_eq!(with(&iir, method(Method::H2)).unwrap().reduction, Some(Reduction::Order(7)));
+    assert_eq!(with(&iir, method(Method::Separation)).unwrap().reduction, None);
+    assert!(matches!(
+        with(THESIS, wanted(loss)).unwrap_err().problem(),
+        SpecProblem::NeedlessKey { key: "reduction_loss_db", .. }
+    ));
+
     let design = read(THESIS).design;
     assert_eq!(design.with_method(Method::Iir, 2).unwrap().taps, None);
-    assert_eq!(
-        design.with_taps(9, 2).unwrap(),
-        DesignSpec::new(Method::Fir, Some(9))
-    );
+    assert_eq!(design.with_taps(9, 2).unwrap(), DesignSpec::new(Method::Fir, Some(9)));
     assert!(design.with_taps(0, 2).is_err());
     let iir = design.with_method(Method::Iir, 2).unwrap();
     assert!(iir.with_taps(9, 2).is_err() && iir.with_method(Method::Fir, 2).is_err());
@@ -465,6 +471,9 @@ prop_compose! {
         method in prop::sample::select(Method::ALL.to_vec()),
         taps in 1usize..100,
         slack in prop::option::of(0.0..0.1f64),
+        reduction in prop::option::of(prop_oneof![
+            (0usize..99).prop_map(Reduction::Order), (0.0..9.0f64).prop_map(Reduction::Loss)
+        ]),
     ) -> Spec {
         Spec {
             name, fast_period, ratio, latency, target,
@@ -473,6 +482,7 @@ prop_compose! {
                 method,
                 taps: method.has_taps().then_some(taps),
                 slack: slack.filter(|_| method.has_slack()),
+                reduction: reduction.filter(|_| method.has_states()),
             },
         }
     }

@@ -129,7 +129,8 @@ mod tests {
         // max(|x - y|, |x + 2 y - 3|) + 1: the minimum 1 lies at (1, 1) where four pieces meet.
         let mut f = |x: &Mat| {
             let (a, b) = (x[0] - x[1], x[0] + 2.0 * x[1] - 3.0);
-            let g = if a.abs() > b.abs() { [a.signum(), -a.signum()] } else { [b.signum(), 2.0 * b.signum()] };
+            let g =
+                if a.abs() > b.abs() { [a.signum(), -a.signum()] } else { [b.signum(), 2.0 * b.signum()] };
             Some((1.0 + a.abs().max(b.abs()), Mat::from_column_slice(2, 1, &g)))
         };
         let end = from(&mut f, &[5.0, -3.0], 500);

@@ -13,7 +13,7 @@ use crate::lti::gramian::controllability_root;
 use crate::lti::{FrequencyResponse, StateSpace};
 
 /// Accuracy of gamma while the poles move.
-const ACCURACY: f64 = 1e-7;
+const ACCURACY: f64 = 1e-6;
 /// Poles are not moved closer to the unit circle than this, unless they have been.
 const MARGIN: f64 = 1e-3;
 

@@ -7,18 +7,22 @@ use crate::design::{DesignError, error_system};
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::{self, Point, Settings, Square};
 use crate::lti::gramian::controllability_root;
-use crate::lti::peak::{peaks_above, resonances, stable_poles};
+use crate::lti::peak::{Peak, peaks_above, resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace, TappedRecursion};
 use std::f64::consts::PI;
 
 /// Directions of the regressors below this share of the strongest are rounding.
 const RANK: f64 = 1e-12;
 /// Uniform frequencies at which the worst case is looked at first.
-const GRID: usize = 64;
+const GRID: usize = 32;
 /// Frequencies that halve from pi/GRID on towards 0, where slow front ends have all that happens.
-const TOWARDS_ZERO: usize = 12;
+const TOWARDS_ZERO: usize = 6;
+/// Relative accuracy of a gamma to choose by.
+const ROUGH: f64 = 1e-4;
 /// Rounds of exchange of frequencies.
 const ROUND_LIMIT: usize = 12;
+/// Times that the mean square may break the cap between the frequencies.
+const KINDER_LIMIT: usize = 4;
 /// Relative accuracy at which the exchange ends.
 const GAMMA_ACCURACY: f64 = 5e-7;
 /// This much of gamma (relative) always goes into the mean square, which decides among the many readouts of least gamma.
@@ -60,13 +64,16 @@ fn covariance_roots(plant: &BlockedPlant, dynamics: &Dynamics) -> Result<(Mat, M
 
 /// F of least ||z - F x||, and of these the least in units of the rows of x.
 fn projection(x: &Mat, z: &Mat) -> Result<Mat, DesignError> {
-    let scale: Vec<f64> = x.row_iter().map(|row| row.norm()).map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
+    let scale: Vec<f64> =
+        x.row_iter().map(|row| row.norm()).map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
     let mut unit = x.clone();
     unit.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row *= *s);
     let svd = linalg::svd(&unit)?;
     let floor = RANK * svd.s.first().copied().unwrap_or(0.0);
     let mut part = z * &svd.v;
-    part.column_iter_mut().zip(&svd.s).for_each(|(mut column, &s)| column *= if s > floor { 1.0 / s } else { 0.0 });
+    part.column_iter_mut()
+        .zip(&svd.s)
+        .for_each(|(mut column, &s)| column *= if s > floor { 1.0 / s } else { 0.0 });
     let mut readout = part * svd.u.transpose();
     readout.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column *= *s);
     Ok(readout)
@@ -156,6 +163,11 @@ impl<'a> Samples<'a> {
         Ok(WorstCase { readout: found.taps.swap_remove(0), gamma: found.gamma, dual: found.dual })
     }
 
+    /// The least gamma at the frequencies sampled, good enough to choose by.
+    pub(super) fn rough_gamma(&self, dynamics: &Dynamics) -> Result<f64, DesignError> {
+        self.worst_case(dynamics, ROUGH).map(|found| found.gamma)
+    }
+
     /// The bank of least gamma with these dynamics and, within `slack`, of least mean square. Frequencies at which its error
     /// rises between those sampled join them.
     pub(super) fn best_bank(
@@ -163,36 +175,71 @@ impl<'a> Samples<'a> {
         dynamics: &Dynamics,
         slack: f64,
     ) -> Result<TappedRecursion, DesignError> {
-        let slack = slack.max(LEAST_SLACK);
-        let mut best: Option<(TappedRecursion, f64)> = None;
+        let (mut least, mut cap) = self.exchanged(dynamics)?;
+        cap *= 1.0 + slack.max(LEAST_SLACK);
+        // Aim a little below, so that what rises between the frequencies fits under the cap as well.
+        let aim = cap * (1.0 - 0.25 * slack.max(LEAST_SLACK));
+        for _ in 0..KINDER_LIMIT {
+            let Some(readout) = self.kinder(dynamics, &least, aim)? else { break };
+            let (bank, peaks) = self.judged(dynamics, &readout, cap)?;
+            if peaks.is_empty() {
+                return Ok(bank);
+            }
+            if !self.add_all(&peaks) {
+                break;
+            }
+            least = self.worst_case(dynamics, 0.1 * GAMMA_ACCURACY)?;
+        }
+        dynamics.read_by(&least.readout)
+    }
+
+    /// The least gamma of any frequency, and the exact norm there.
+    fn exchanged(&mut self, dynamics: &Dynamics) -> Result<(WorstCase, f64), DesignError> {
+        let mut best: Option<(WorstCase, f64)> = None;
         for _ in 0..ROUND_LIMIT {
             let found = self.worst_case(dynamics, 0.1 * GAMMA_ACCURACY)?;
-            let bank = dynamics.read_by(&self.kinder(dynamics, &found, slack)?)?;
-            let error = error_system::error_system(self.plant, &bank.realise()?)?;
-            let aim = found.gamma * (1.0 + slack);
-            let peaks = peaks_above(&error, aim * (1.0 + GAMMA_ACCURACY))?;
-            let norm = peaks.iter().map(|peak| peak.gain).fold(aim, f64::max);
+            let level = found.gamma * (1.0 + GAMMA_ACCURACY);
+            let (_, peaks) = self.judged(dynamics, &found.readout, level)?;
+            let norm = peaks.iter().map(|peak| peak.gain).fold(found.gamma, f64::max);
             if best.as_ref().is_none_or(|(_, least)| norm < *least) {
-                best = Some((bank, norm));
+                best = Some((found, norm));
             }
-            let fresh = peaks.iter().filter(|peak| self.add(peak.frequency)).count();
-            if fresh == 0 {
+            if !self.add_all(&peaks) {
                 break;
             }
         }
-        best.map(|(bank, _)| bank).ok_or(DesignError::NoTaps)
+        best.ok_or(DesignError::NoTaps)
     }
 
-    fn kinder(&self, dynamics: &Dynamics, found: &WorstCase, slack: f64) -> Result<Mat, DesignError> {
+    /// The bank, and where its error rises above `level`.
+    fn judged(
+        &self,
+        dynamics: &Dynamics,
+        readout: &Mat,
+        level: f64,
+    ) -> Result<(TappedRecursion, Vec<Peak>), DesignError> {
+        let bank = dynamics.read_by(readout)?;
+        let error = error_system::error_system(self.plant, &bank.realise()?)?;
+        let peaks = peaks_above(&error, level)?;
+        Ok((bank, peaks))
+    }
+
+    /// Adds the frequencies of `peaks`; whether one was not there.
+    fn add_all(&mut self, peaks: &[Peak]) -> bool {
+        peaks.iter().filter(|peak| self.add(peak.frequency)).count() > 0
+    }
+
+    /// The readout of least mean square with gamma at most `cap` at the frequencies sampled.
+    fn kinder(&self, dynamics: &Dynamics, start: &WorstCase, cap: f64) -> Result<Option<Mat>, DesignError> {
         let mut weights = vec![0.0; self.points.len()];
         weights[..=GRID].fill(1.0 / GRID as f64);
         (weights[0], weights[GRID]) = (0.5 / GRID as f64, 0.5 / GRID as f64);
         let problem = self.problem(dynamics)?;
         let square = Square::noiseless(weights, problem.channels());
-        let (cap, start) = (found.gamma * (1.0 + slack), vec![found.readout.clone()]);
-        let kinder = sampled::mean_square_under_cap(&problem, &square, cap, &start, &Settings::default());
+        let start = vec![start.readout.clone()];
+        let found = sampled::mean_square_under_cap(&problem, &square, cap, &start, &Settings::default());
         // An optimum of zero or a stalled iteration leaves nothing to win.
-        Ok(kinder.map_or_else(|_| found.readout.clone(), |mut kinder| kinder.taps.swap_remove(0)))
+        Ok(found.ok().map(|mut found| found.taps.swap_remove(0)))
     }
 }
 

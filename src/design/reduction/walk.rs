@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 const LINES: usize = 8;
 /// Splits of the states whose gamma is computed, those of least mean-square error.
 const FINALISTS: usize = 3;
-/// A longer line is taken if gamma is worse by no more than this: lines run faster than recursions.
-const WORSE: f64 = 1e-6;
+/// A longer line is taken if gamma (as roughly known) is worse by no more than this: lines run faster than recursions.
+const WORSE: f64 = 1e-4;
 /// All orders are looked at while the squares of the unknowns of all of them are fewer than this.
 const CHEAP: f64 = 2e6;
 /// Evaluations of a descent: at most these, and fewer where each takes long.
@@ -29,10 +29,12 @@ const ZERO: f64 = 1e-12;
 
 /// A bank of some order.
 #[derive(Debug, Clone)]
-struct Found {
+struct Found<'a> {
     dynamics: Dynamics,
     bank: TappedRecursion,
     figures: Figures,
+    /// With the frequencies that matter to it.
+    samples: Samples<'a>,
 }
 
 pub(super) struct Walk<'a> {
@@ -41,7 +43,7 @@ pub(super) struct Walk<'a> {
     /// For each length of the line the whole recursion behind it, balanced.
     splits: Vec<Dynamics>,
     full: Figures,
-    found: BTreeMap<usize, Found>,
+    found: BTreeMap<usize, Found<'a>>,
     zero: f64,
 }
 
@@ -132,8 +134,8 @@ impl<'a> Walk<'a> {
     }
 
     /// The best bank found of at most `order` states; the smaller one where two are alike.
-    fn best(&self, order: usize) -> Option<&Found> {
-        let merit = |found: &Found| self.merit(&found.figures);
+    fn best(&self, order: usize) -> Option<&Found<'a>> {
+        let merit = |found: &Found<'_>| self.merit(&found.figures);
         self.found.range(..=order).map(|(_, found)| found).min_by(|a, b| merit(a).total_cmp(&merit(b)))
     }
 
@@ -142,20 +144,25 @@ impl<'a> Walk<'a> {
         if self.found.contains_key(&order) {
             return Ok(());
         }
-        let mut best: Option<Found> = None;
-        for dynamics in self.finalists(order)? {
-            let found = self.read(dynamics)?;
-            let worse = |best: &Found| self.merit(&found.figures) > self.merit(&best.figures) * (1.0 + WORSE);
-            if best.as_ref().is_none_or(|best| !worse(best)) {
-                best = Some(found);
+        let mut best: Option<(f64, Dynamics)> = None;
+        for (norm, dynamics) in self.finalists(order)? {
+            let rough = match self.subject.aim {
+                Aim::WorstCase => self.samples.rough_gamma(&dynamics)?,
+                Aim::MeanSquare => norm,
+            };
+            if best.as_ref().is_none_or(|(least, _)| rough <= least * (1.0 + WORSE)) {
+                best = Some((rough, dynamics));
             }
         }
-        self.found.extend(best.map(|found| (order, found)));
+        if let Some((_, dynamics)) = best {
+            let found = self.read(dynamics, &self.samples)?;
+            self.found.insert(order, found);
+        }
         Ok(())
     }
 
-    /// The splits of `order` states with the least mean-square error, short lines first.
-    fn finalists(&self, order: usize) -> Result<Vec<Dynamics>, DesignError> {
+    /// The splits of `order` states with the least mean-square error, that error first; short lines first.
+    fn finalists(&self, order: usize) -> Result<Vec<(f64, Dynamics)>, DesignError> {
         let mut tried = Vec::new();
         for split in &self.splits {
             let line = split.ticks * self.subject.width;
@@ -170,17 +177,18 @@ impl<'a> Walk<'a> {
         tried.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         tried.truncate(FINALISTS);
         tried.sort_by_key(|(_, dynamics)| dynamics.ticks);
-        Ok(tried.into_iter().map(|(_, dynamics)| dynamics).collect())
+        Ok(tried)
     }
 
     /// The best bank with these dynamics.
-    fn read(&mut self, dynamics: Dynamics) -> Result<Found, DesignError> {
+    fn read(&self, dynamics: Dynamics, samples: &Samples<'a>) -> Result<Found<'a>, DesignError> {
+        let mut samples = samples.clone();
         let bank = match self.subject.aim {
-            Aim::WorstCase => self.samples.best_bank(&dynamics, self.subject.slack)?,
+            Aim::WorstCase => samples.best_bank(&dynamics, self.subject.slack)?,
             Aim::MeanSquare => dynamics.read_by(&mean_square(self.subject.plant, &dynamics)?.0)?,
         };
         let figures = figures(self.subject, &bank)?;
-        Ok(Found { dynamics, bank, figures })
+        Ok(Found { dynamics, bank, figures, samples })
     }
 
     /// Improves the bank of `order` states by moving its poles.
@@ -190,8 +198,8 @@ impl<'a> Walk<'a> {
         if self.merit(&start.figures) <= self.merit(&self.full).max(self.zero) {
             return Ok(());
         }
-        let dynamics = moved(self.subject.aim, &self.samples, &start.dynamics, budget)?;
-        let found = self.read(dynamics)?;
+        let dynamics = moved(self.subject.aim, &start.samples, &start.dynamics, budget)?;
+        let found = self.read(dynamics, &start.samples)?;
         if self.merit(&found.figures) < self.merit(&self.found[&order].figures) {
             self.found.insert(order, found);
         }
@@ -206,7 +214,7 @@ impl<'a> Walk<'a> {
     pub(super) fn finish(&self, order: usize) -> (Option<TappedRecursion>, OrderReduction) {
         let full = self.worth(self.subject.order, self.full);
         let chosen = self.best(order).filter(|_| order < self.subject.order);
-        let states = |found: &Found| found.dynamics.tail() + found.dynamics.ticks * self.subject.width;
+        let states = |found: &Found<'_>| found.dynamics.tail() + found.dynamics.ticks * self.subject.width;
         let reduced = chosen.map_or(full, |found| self.worth(states(found), found.figures));
         let orders = self.found.keys().filter_map(|&k| Some(self.worth(k, self.best(k)?.figures)));
         let record = OrderReduction { full, reduced, orders: orders.chain([full]).collect() };
@@ -225,7 +233,8 @@ fn figures(subject: &Subject<'_>, bank: &TappedRecursion) -> Result<Figures, Des
 fn splits(subject: &Subject<'_>) -> Result<Vec<Dynamics>, DesignError> {
     let longest = TappedRecursion::new(subject.bank)?.ticks();
     let reach = super::readout::reach(subject.plant, subject.bank)?;
-    let mut lengths: Vec<usize> = (0..=LINES.min(longest)).map(|k| k * longest / LINES.min(longest).max(1)).collect();
+    let mut lengths: Vec<usize> =
+        (0..=LINES.min(longest)).map(|k| k * longest / LINES.min(longest).max(1)).collect();
     lengths.dedup();
     lengths.into_iter().map(|ticks| Dynamics::balanced(subject.bank, ticks, &reach)).collect()
 }
