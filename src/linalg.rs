@@ -325,6 +325,15 @@ pub fn eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
 }
 
+/// Eigenvalues of a general complex matrix.
+pub fn eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    check_finite_c("eigenvalues", m)?;
+    if m.is_empty() {
+        return Ok(Vec::new());
+    }
+    view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
+}
+
 /// Eigenvalues and eigenvectors (columns) of a general real matrix; the two of a conjugate pair are neighbours.
 pub fn eigen(m: &Mat) -> Result<(Vec<Complex<f64>>, CMat), LinalgError> {
     check_finite("eigen", m)?;

@@ -132,6 +132,75 @@ fn a_design_is_reported_and_analysed() {
 }
 
 #[test]
+fn the_order_is_reduced_reported_and_proven() {
+    let desk = Desk::new();
+    let iir = THESIS
+        .replace("latency = 10", "latency = 4")
+        .replace("method = \"fir\"\ntaps = 22", "method = \"iir\"");
+    fs::write(desk.path("iir.toml"), &iir).unwrap();
+    let report = desk.json(&["design", "iir.toml", "-o", "two.json", "--order", "2", "--json"]);
+    assert_eq!((&report["states"], &report["reduction"]["reduced"]["order"]), (&2.into(), &2.into()));
+    let (full, order) =
+        (number(&report, "/reduction/full/order"), number(&report, "/reduction/reduced/order"));
+    assert_eq!(report["reduction"]["orders"].as_array().unwrap().len() as f64, full + 1.0);
+    let ratio = number(&report, "/gamma/upper") / number(&report, "/reduction/full/gamma");
+    let loss = number(&report, "/reduction/reduced/loss_db");
+    assert!(order < full && (20.0 * ratio.log10() - loss).abs() < 1e-6, "{report}");
+    assert!(number(&report, "/proven/upper") >= number(&report, "/gamma/upper"), "{report}");
+    let proof = desk.json(&["verify", "two.json", "--json"]);
+    assert!((number(&proof, "/upper") / number(&report, "/gamma/upper") - 1.0).abs() < 1e-5, "{proof}");
+    let bank: Value = serde_json::from_str(&fs::read_to_string(desk.path("two.json")).unwrap()).unwrap();
+    assert_eq!(bank["spec"]["design"]["order"], 2);
+
+    // In the file, the loss; on the command line, something else in its place.
+    fs::write(desk.path("loss.toml"), format!("{iir}reduction_loss_db = 6\n")).unwrap();
+    let text = desk.good(&["design", "loss.toml", "-o", "loss.json"]);
+    assert!(text.contains("dB of gamma lost") && text.contains("states          gamma"), "{text}");
+    let report = desk.json(&["design", "loss.toml", "-o", "one.json", "--order", "1", "--json"]);
+    assert_eq!(report["states"], 1);
+    // A method without states drops it with the method that it belongs to.
+    desk.good(&["design", "loss.toml", "-o", "fir.json", "--method", "fir", "--taps", "8"]);
+}
+
+#[test]
+fn orders_that_mean_nothing_are_refused() {
+    let desk = Desk::new();
+    for (line, parts) in [
+        (
+            "order = 4",
+            [
+                "design.order",
+                "order has no meaning for the method fir; remove it or choose the method iir or h2",
+            ],
+        ),
+        ("reduction_loss_db = 1", ["design.reduction_loss_db", "has no meaning for the method fir"]),
+        ("order = -1", ["design.order", "zero or more"]),
+        ("order = 2.5", ["design.order", "whole number"]),
+        ("order = 100000", ["design.order", "0 to 65536"]),
+        ("reduction_loss_db = -0.5", ["design.reduction_loss_db", "0 to 400 dB"]),
+        ("reduction_loss_db = nan", ["design.reduction_loss_db", "finite"]),
+        (
+            "order = 4\nreduction_loss_db = 1",
+            ["both order and reduction_loss_db are given", "keep one of them"],
+        ),
+        ("ordre = 4", ["ordre", "did you mean \"order\"?"]),
+    ] {
+        desk.bad_spec("taps = 22", &format!("taps = 22\n{line}"), &parts);
+    }
+    let design = ["design", "spec.toml", "-o", "x.json"];
+    desk.refused(1, &[&design[..], &["--order", "3"]].concat(), &["order has no meaning for the method fir"]);
+    let iir = [&design[..], &["--method", "iir"]].concat();
+    desk.refused(1, &[&iir[..], &["--order", "100000"]].concat(), &["100000 states", "0 to 65536"]);
+    desk.refused(1, &[&iir[..], &["--reduction-loss-db=-1"]].concat(), &["-1 dB", "0 to 400 dB"]);
+    desk.refused(2, &[&iir[..], &["--order", "x"]].concat(), &["--order"]);
+    desk.refused(
+        2,
+        &[&iir[..], &["--order", "3", "--reduction-loss-db", "1"]].concat(),
+        &["cannot be used with"],
+    );
+}
+
+#[test]
 fn the_command_line_overrides_the_spec() {
     let desk = Desk::new();
     let report = desk.json(&["design", "spec.toml", "-o", "iir.json", "--method", "iir", "--json"]);

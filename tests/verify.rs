@@ -23,6 +23,7 @@ fn hurried() -> String {
 fn designed(method: &str) -> Bank {
     let text = match method {
         "fir" => hurried(),
+        "reduced" => hurried().replace("\"fir\"\ntaps = 12", "\"iir\"\norder = 1"),
         _ => hurried().replace("\"fir\"\ntaps = 12", &format!("\"{method}\"")),
     };
     let design = design(&Spec::from_toml(&text, "spec.toml").unwrap()).unwrap();
@@ -32,7 +33,8 @@ fn designed(method: &str) -> Bank {
 
 /// Texts of bank files: two made here, and those of `filters/`.
 fn files() -> Vec<(String, String)> {
-    let made = ["fir", "iir"].map(|method| (method.to_owned(), designed(method).to_json().unwrap()));
+    let made =
+        ["fir", "iir", "reduced"].map(|method| (method.to_owned(), designed(method).to_json().unwrap()));
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("filters");
     let mut ready: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     ready.retain(|path| path.extension().is_some_and(|extension| extension == "json"));

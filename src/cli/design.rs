@@ -4,8 +4,8 @@ use super::Failure;
 use super::bank_file::{is_dash, load_spec, write_text};
 use crate::bank::SynthesisFilters;
 use crate::design::quantise::WordStudy;
-use crate::design::{self, Design, DesignError, MeanAnalysis};
-use crate::spec::{DesignOverrides, Method, WordLengths};
+use crate::design::{self, Design, DesignError, MeanAnalysis, OrderReduction, OrderWorth};
+use crate::spec::{DesignOverrides, Method, Reduction, WordLengths};
 use crate::verify::Verified;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -21,6 +21,8 @@ Examples:
   hybank design spec.toml -o bank.json
   hybank design spec.toml -o iir.json --method iir
   hybank design spec.toml -o fixed.json --taps 64 --bits 14
+  hybank design spec.toml -o small.json --method iir --order 6
+  hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
   hybank design spec.toml -o - --taps 64 | hybank analyze -")]
 pub(super) struct Args {
     /// The spec (TOML); `-` is standard input
@@ -46,6 +48,12 @@ pub(super) struct Args {
     /// Integer taps times two to the minus this; chosen for the least gamma if left out
     #[arg(long, allow_negative_numbers = true)]
     fraction_bits: Option<i32>,
+    /// At most so many states, with the least error that they allow (methods iir and h2)
+    #[arg(long)]
+    order: Option<usize>,
+    /// As few states as keep the error within so many decibels of the full bank's (methods iir and h2)
+    #[arg(long, value_name = "DB", conflicts_with = "order")]
+    reduction_loss_db: Option<f64>,
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
@@ -72,6 +80,8 @@ struct Report<'a> {
     latency_chosen: bool,
     taps: Option<usize>,
     states: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reduction: Option<&'a OrderReduction>,
     gamma: &'a crate::bank::Gamma,
     /// For integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -166,6 +176,7 @@ fn overrides(args: &Args) -> DesignOverrides {
         slack: args.slack,
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
+        reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
     }
 }
 
@@ -219,6 +230,7 @@ impl<'a> Report<'a> {
             latency_chosen: design.latency_chosen,
             taps,
             states,
+            reduction: design.reduction.as_ref(),
             gamma: &bank.gamma,
             words: Words::of(design),
             mean,
@@ -244,7 +256,7 @@ impl<'a> Report<'a> {
              noncausal  {} (no latency is better)\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
-             {}designed in {:.1} ms, {} iterations\n{}",
+             {}{}designed in {:.1} ms, {} iterations\n{}",
             self.bank,
             self.method.name(),
             self.channels,
@@ -264,11 +276,39 @@ impl<'a> Report<'a> {
             number(Some(self.mean.noise_gain)),
             self.mean.output_noise,
             self.words.as_ref().map(Words::text).unwrap_or_default(),
+            self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.seconds * 1e3,
             self.iterations,
             self.proof.text(self.proof_seconds),
         )
     }
+}
+
+/// Rows of the table of orders; all of them are in the report of `--json`.
+const TABLE_ROWS: usize = 32;
+
+/// Full and reduced order, and what each state is worth.
+fn order_text(reduction: &OrderReduction, method: Method) -> String {
+    let OrderReduction { full, reduced, orders } = reduction;
+    let lost = if method == Method::H2 { "of H2 error" } else { "of gamma" };
+    let mut text = format!(
+        "order      {} of {} states: gamma {} instead of {}, {:.4} dB {lost} lost\n",
+        reduced.order,
+        full.order,
+        number(Some(reduced.figures.gamma)),
+        number(Some(full.figures.gamma)),
+        reduced.loss_db
+    );
+    let row = |worth: &OrderWorth| {
+        let OrderWorth { order, figures, loss_db } = worth;
+        let (gamma, rms) = (number(Some(figures.gamma)), number(Some(figures.rms_error)));
+        format!("{order:>10} {gamma:>14} {rms:>14} {loss_db:>10.4} dB\n")
+    };
+    if orders.len() <= TABLE_ROWS {
+        text += &format!("{:>10} {:>14} {:>14} {:>13}\n", "states", "gamma", "H2 error", "loss");
+        text.extend(orders.iter().map(row));
+    }
+    text
 }
 
 fn number(value: Option<f64>) -> String {

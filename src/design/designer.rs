@@ -3,6 +3,7 @@
 use super::equivalence::BlockedPlant;
 use super::problem::{Part, Problem};
 use super::quantise::{WordStudy, quantise};
+use super::reduction::{self, Aim, OrderReduction};
 use super::{DesignError, comparison, error_system, fir, iir};
 use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
 use crate::linalg::Mat;
@@ -25,6 +26,8 @@ pub struct Design {
     pub words: Option<WordStudy>,
     /// For FIR designs what their lower bound was read from; else empty.
     pub dual: Vec<fir::DualPoint>,
+    /// What became of the order, where the spec asks for fewer states.
+    pub reduction: Option<OrderReduction>,
 }
 
 /// Designs the bank that `spec` asks for.
@@ -39,12 +42,15 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     let found = run_method(spec, &distinct)?;
     let plant = BlockedPlant::new(&problem);
     // The norm that counts is that of the coefficients as they are written, on all channels.
-    let (filters, peak) = match found.filters {
+    let written = |(filters, peak)| Written { filters, peak, reduction: None };
+    let Written { filters, peak, reduction } = match found.filters {
         Solution::Taps(taps, Some(peak)) if distinct.channels.len() == problem.channels.len() => {
-            (SynthesisFilters::Fir(taps), peak)
+            written((SynthesisFilters::Fir(taps), peak))
         }
-        Solution::Taps(taps, _) => judged(&plant, SynthesisFilters::Fir(shared_taps(&taps, &parts)))?,
-        Solution::System(system, norm) => written_form(&plant, &shared_inputs(&system, &parts)?, norm)?,
+        Solution::Taps(taps, _) => {
+            written(judged(&plant, SynthesisFilters::Fir(shared_taps(&taps, &parts)))?)
+        }
+        Solution::System(system, norm) => recursive_form(spec, &plant, (&distinct, &parts), &system, norm)?,
     };
     let (filters, peak, integers) = with_integers(&plant, filters, peak, spec)?;
     let (fixed_point, words) = integers.unzip();
@@ -77,6 +83,7 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         iterations: found.iterations,
         words,
         dual: found.dual,
+        reduction,
     })
 }
 
@@ -108,6 +115,13 @@ enum Solution {
     Taps(Vec<Vec<f64>>, Option<Peak>),
     /// One block for each slow tick, with the norm of its error system.
     System(StateSpace, f64),
+}
+
+/// A bank's filters with their exact norm, and what became of their order.
+struct Written {
+    filters: SynthesisFilters,
+    peak: Peak,
+    reduction: Option<OrderReduction>,
 }
 
 struct Found {
@@ -175,14 +189,64 @@ fn written_form(
     promised: f64,
 ) -> Result<(SynthesisFilters, Peak), DesignError> {
     let tapped = TappedRecursion::new(system)?;
+    if let Some(found) = fast_form(plant, &tapped, promised)? {
+        return Ok(found);
+    }
+    judged(plant, block_filters(system))
+}
+
+/// The first of the fast forms that keeps the norm, if any does.
+fn fast_form(
+    plant: &BlockedPlant,
+    tapped: &TappedRecursion,
+    promised: f64,
+) -> Result<Option<(SynthesisFilters, Peak)>, DesignError> {
     let forms = [tapped.modal(), tapped.triangular().map(Some)];
     for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {
-        let found = judged(plant, SynthesisFilters::StateSpace(error_system::to_block(&form.realise()?)))?;
+        let found = judged(plant, block_filters(&form.realise()?))?;
         if found.1.gain <= promised * (1.0 + FORM_ACCURACY) {
-            return Ok(found);
+            return Ok(Some(found));
         }
     }
-    judged(plant, SynthesisFilters::StateSpace(error_system::to_block(system)))
+    Ok(None)
+}
+
+/// A recursive bank as it is written, of the order that the spec asks for.
+fn recursive_form(
+    spec: &Spec,
+    plant: &BlockedPlant,
+    (distinct, parts): (&Problem, &[Part]),
+    system: &StateSpace,
+    norm: f64,
+) -> Result<Written, DesignError> {
+    let (filters, peak) = written_form(plant, &shared_inputs(system, parts)?, norm)?;
+    let (Some(wanted), SynthesisFilters::StateSpace(block)) = (spec.design.reduction, &filters) else {
+        return Ok(Written { filters, peak, reduction: None });
+    };
+    let subject = reduction::Subject {
+        plant: &BlockedPlant::new(distinct),
+        bank: system,
+        order: block.a.len(),
+        width: parts.len(),
+        aim: if spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
+        slack: spec.design.slack.unwrap_or(0.0),
+    };
+    let (smaller, record) = reduction::reduce(&subject, wanted)?;
+    let (filters, peak) = match smaller {
+        None => (filters, peak),
+        Some(smaller) => {
+            let smaller = smaller.with_inputs(|m| shared(m, parts))?;
+            match fast_form(plant, &smaller, record.reduced.figures.gamma)? {
+                Some(found) => found,
+                None => judged(plant, block_filters(&smaller.realise()?))?,
+            }
+        }
+    };
+    Ok(Written { filters, peak, reduction: Some(record) })
+}
+
+fn block_filters(system: &StateSpace) -> SynthesisFilters {
+    SynthesisFilters::StateSpace(error_system::to_block(system))
 }
 
 fn judged(plant: &BlockedPlant, filters: SynthesisFilters) -> Result<(SynthesisFilters, Peak), DesignError> {
@@ -198,10 +262,13 @@ fn shared_taps(taps: &[Vec<f64>], parts: &[Part]) -> Vec<Vec<f64>> {
 
 /// As [`shared_taps`], for the inputs of a system.
 fn shared_inputs(system: &StateSpace, parts: &[Part]) -> Result<StateSpace, DesignError> {
-    let share = |m: &Mat| {
-        Mat::from_fn(m.nrows(), parts.len(), |i, j| m[(i, parts[j].representative)] * parts[j].share)
-    };
-    Ok(StateSpace::new(system.a().clone(), share(system.b()), system.c().clone(), share(system.d()))?)
+    let (b, d) = (shared(system.b(), parts), shared(system.d(), parts));
+    Ok(StateSpace::new(system.a().clone(), b, system.c().clone(), d)?)
+}
+
+/// The columns of a matrix of input weights, shared.
+fn shared(m: &Mat, parts: &[Part]) -> Mat {
+    Mat::from_fn(m.nrows(), parts.len(), |i, j| m[(i, parts[j].representative)] * parts[j].share)
 }
 
 /// Latencies tried beyond the longest delay, in slow ticks.

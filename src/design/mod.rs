@@ -12,11 +12,13 @@ pub mod iir;
 pub mod problem;
 mod prove;
 pub mod quantise;
+pub mod reduction;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use designer::{Design, design, latency};
 pub use problem::Problem;
 pub use prove::{Certified, certify, prove};
+pub use reduction::{OrderReduction, OrderWorth};
 
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;

@@ -14,9 +14,20 @@ use crate::linalg::{self, Mat};
 /// # Errors
 /// [`LtiError`] if the system is not stable.
 pub fn balanced(system: &StateSpace, floor: f64) -> Result<StateSpace, LtiError> {
-    let reach = controllability_root(system.a(), system.b())?;
+    balanced_when_driven(system, &controllability_root(system.a(), system.b())?, floor)
+}
+
+/// As [`balanced`] for a system in use: `reach` is a square root of the covariance of its states when it is driven by what
+/// drives it there, for example another system (Enns 1984). The leading states then matter most *there*.
+///
+/// With the output unweighted every leading part is stable, since the observability Gramian stays one of the whole. What is
+/// left out has no bound as simple as that of [`balanced`]: measure it.
+///
+/// # Errors
+/// [`LtiError`] if the system is not stable.
+pub fn balanced_when_driven(system: &StateSpace, reach: &Mat, floor: f64) -> Result<StateSpace, LtiError> {
     let sight = controllability_root(&system.a().transpose(), &system.c().transpose())?;
-    let svd = linalg::svd(&(sight.transpose() * &reach))?;
+    let svd = linalg::svd(&(sight.transpose() * reach))?;
     let kept = kept(&svd.s, floor);
     let root = |k: usize| svd.s[k].sqrt();
     let right = Mat::from_fn(svd.v.nrows(), kept, |i, k| svd.v[(i, k)] / root(k));

@@ -33,21 +33,59 @@ impl TappedRecursion {
     /// [`LtiError`] if the system is not stable.
     pub fn new(system: &StateSpace) -> Result<Self, LtiError> {
         let chains = Chains::new(system.a());
-        let mut taps = vec![system.d().clone()];
-        let mut outlook = system.c().clone();
-        for _ in 0..chains.longest {
-            taps.push(&outlook * system.b());
-            outlook *= system.a();
-        }
+        let Self { taps, tail } = Self::split(system, chains.longest)?;
         let core = &chains.core;
         let tail = StateSpace::new(
-            system.a().select_rows(core).select_columns(core),
-            system.b().select_rows(core),
-            outlook.select_columns(core),
-            Mat::zeros(system.outputs(), system.inputs()),
+            tail.a().select_rows(core).select_columns(core),
+            tail.b().select_rows(core),
+            tail.c().select_columns(core),
+            tail.d().clone(),
         )?;
         let energy = taps.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
         Ok(Self { taps, tail: balanced(&tail, NEGLIGIBLE * energy.sqrt())? })
+    }
+
+    /// The same transfer function with the first `ticks` samples of its response after the direct one as taps and all states
+    /// in the recursion: y[k] = sum h_j u[k - j] + c a^ticks x[k - ticks].
+    ///
+    /// # Errors
+    /// [`StateSpaceError`] never: the parts fit.
+    pub fn split(system: &StateSpace, ticks: usize) -> Result<Self, StateSpaceError> {
+        let mut taps = vec![system.d().clone()];
+        let mut outlook = system.c().clone();
+        for _ in 0..ticks {
+            taps.push(&outlook * system.b());
+            outlook *= system.a();
+        }
+        let silent = Mat::zeros(system.outputs(), system.inputs());
+        Ok(Self { taps, tail: StateSpace::new(system.a().clone(), system.b().clone(), outlook, silent)? })
+    }
+
+    /// The recursion x+ = a x + b u at the end of a line of `ticks` inputs, of which `readout` = [c h_q .. h_0] is read.
+    ///
+    /// # Errors
+    /// [`StateSpaceError`] if the shapes do not fit.
+    pub fn read_by(readout: &Mat, ticks: usize, a: &Mat, b: &Mat) -> Result<Self, StateSpaceError> {
+        let (p, n, m) = (readout.nrows(), a.nrows(), b.ncols());
+        let tap = |j: usize| readout.columns(n + (ticks - j) * m, m).into_owned();
+        let c = readout.columns(0, n).into_owned();
+        let tail = StateSpace::new(a.clone(), b.clone(), c, Mat::zeros(p, m))?;
+        Ok(Self { taps: (0..=ticks).map(tap).collect(), tail })
+    }
+
+    /// The same outputs for inputs u = `mix` v.
+    ///
+    /// # Errors
+    /// [`StateSpaceError`] if `mix` has not a row for each input.
+    pub fn with_inputs(&self, mix: impl Fn(&Mat) -> Mat) -> Result<Self, StateSpaceError> {
+        let Self { taps, tail } = self;
+        let tail = StateSpace::new(tail.a().clone(), mix(tail.b()), tail.c().clone(), mix(tail.d()))?;
+        Ok(Self { taps: taps.iter().map(mix).collect(), tail })
+    }
+
+    /// a, b, c of the recursion, with d = 0.
+    pub fn tail(&self) -> &StateSpace {
+        &self.tail
     }
 
     /// The recursion as parallel sections, see [`modal`].

@@ -12,6 +12,7 @@
 
 use super::{FrequencyResponse, LtiError, StateSpace};
 use crate::linalg::{self, CMat, Complex, Mat};
+use nalgebra::{ComplexField, DMatrix};
 use std::f64::consts::PI;
 
 /// Relative accuracy of the returned peak.
@@ -23,6 +24,11 @@ const FIRST_GRID: usize = 32;
 /// How far off the axis (relative) an eigenvalue may lie and still suggest a frequency. Generous: a
 /// false suggestion costs one evaluation, a missed one would cost the proof.
 const AXIS_TOLERANCE: f64 = 1e-5;
+
+/// A gain this near to the level (relative) is no good centre of the Cayley transform.
+const NEAR_LEVEL: f64 = 1e-2;
+/// Frequencies looked at for a better one.
+const CENTRES: usize = 16;
 
 /// A peak gain and where it is attained.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +63,14 @@ pub fn known_hinf_norm(
     hints: Vec<f64>,
 ) -> Result<Peak, LtiError> {
     Search::new(&system.compress_inputs(), 0, response, hints).run()
+}
+
+/// The peaks of a stable system that rise above `level`: at least one of each range of frequencies that does.
+pub fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiError> {
+    let poles = stable_poles(system)?;
+    let system = system.compress_inputs();
+    let response = FrequencyResponse::new(&system);
+    Search::new(&system, 0, &|w| response.at_frequency(w), resonances(&poles)).all_above(level)
 }
 
 /// The poles of a stable system.
@@ -201,57 +215,90 @@ impl<'a> Search<'a> {
         self.climb(best.frequency - spread, best, best.frequency + spread).map(Some)
     }
 
+    fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
+        let mut edges = self.crossings(level)?;
+        edges.dedup();
+        let mut peaks = Vec::new();
+        for range in edges.windows(2) {
+            let middle = 0.5 * (range[0] + range[1]);
+            let start = Peak { gain: self.gain(middle)?, frequency: middle };
+            if start.gain > level {
+                let inside = self.climb(range[0], start, range[1])?;
+                let end = |w: f64| self.gain(w).map(|gain| Peak { gain, frequency: w });
+                peaks.push(higher(inside, higher(end(range[0])?, end(range[1])?)));
+            }
+        }
+        Ok(peaks)
+    }
+
     /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`.
     ///
     /// Measured outputs that are copies of one another leave no Hamiltonian matrix; then nothing is
     /// suggested and the refined grid stands, still a value that is attained.
     fn crossings(&self, level: f64) -> Result<Vec<f64>, LtiError> {
         let mut crossings = vec![0.0, PI];
-        let eigenvalues = match linalg::eigenvalues(&self.hamiltonian(level)?) {
+        let centre = self.centre(level)?;
+        let real = centre == 0.0 || centre == PI;
+        let eigenvalues = if real {
+            linalg::eigenvalues(&self.hamiltonian(level, centre))
+        } else {
+            linalg::eigenvalues_c(&self.rotated_hamiltonian(level, centre))
+        };
+        let eigenvalues = match eigenvalues {
             Err(linalg::LinalgError::NotFinite { .. }) if self.measured > 0 => return Ok(crossings),
             other => other?,
         };
-        for lambda in eigenvalues {
+        // Of a conjugate pair one is enough.
+        for lambda in eigenvalues.into_iter().filter(|lambda| !real || lambda.im >= 0.0) {
             if lambda.re.abs() <= AXIS_TOLERANCE * (1.0 + lambda.norm()) {
-                crossings.push(2.0 * lambda.im.abs().atan());
+                let w = centre + PI + 2.0 * lambda.im.atan();
+                crossings.push(Peak { gain: level, frequency: w }.folded().frequency);
             }
-        }
-        if self.centre(level)? < 0.0 {
-            crossings.iter_mut().for_each(|w| *w = PI - *w);
         }
         crossings.sort_by(f64::total_cmp);
         Ok(crossings)
     }
 
-    /// The Cayley transform sends z = -centre to infinity, where the gain must not equal the level:
-    /// of -1 and 1 take the one whose gain is farther away.
+    /// The Cayley transform sends e^{j centre} to infinity, where the gain must not equal the level: of pi and 0 the one
+    /// whose gain is farther away or, where both are near (as in errors of many equal peaks), a frequency between them.
     fn centre(&self, level: f64) -> Result<f64, LtiError> {
         let distance = |w: f64| self.gain(w).map(|gain| (gain - level).abs());
-        Ok(if distance(PI)? >= distance(0.0)? { 1.0 } else { -1.0 })
+        let (low, high) = (distance(0.0)?, distance(PI)?);
+        let mut best = if high >= low { (high, PI) } else { (low, 0.0) };
+        if best.0 > NEAR_LEVEL * level {
+            return Ok(best.1);
+        }
+        for k in 1..CENTRES {
+            let w = PI * k as f64 / CENTRES as f64;
+            let away = distance(w)?;
+            if away > best.0 {
+                best = (away, w);
+            }
+        }
+        Ok(best.1)
     }
 
-    /// The Hamiltonian matrix whose eigenvalue j tan(w / 2) marks gain(w) = level (w counted from the
-    /// centre of the Cayley transform).
-    fn hamiltonian(&self, level: f64) -> Result<Mat, LtiError> {
-        let (a, b, c, d) = cayley(self.system, self.centre(level)?);
-        let mut r = &d * d.transpose();
-        for i in self.measured..r.nrows() {
-            r[(i, i)] -= level * level;
-        }
-        let s = &b * d.transpose();
-        let n = a.nrows();
-        let mut right = Mat::zeros(r.nrows(), 2 * n);
-        right.columns_mut(0, n).copy_from(&c);
-        right.columns_mut(n, n).copy_from(&s.transpose());
-        let solved = linalg::solve(&r, &right);
-        let (rc, rs) = (solved.columns(0, n), solved.columns(n, n));
-        let drift = &a - &s * rc;
-        let mut h = Mat::zeros(2 * n, 2 * n);
-        h.view_mut((0, 0), (n, n)).copy_from(&drift);
-        h.view_mut((0, n), (n, n)).copy_from(&(&b * b.transpose() - &s * rs));
-        h.view_mut((n, 0), (n, n)).copy_from(&(c.transpose() * rc));
-        h.view_mut((n, n), (n, n)).copy_from(&-drift.transpose());
-        Ok(h)
+    /// The Hamiltonian matrix whose eigenvalue j tan(w / 2) marks gain(w) = level, w counted from the point
+    /// opposite to the centre of the Cayley transform, which is 0 or pi.
+    fn hamiltonian(&self, level: f64, centre: f64) -> Mat {
+        let e = if centre == PI { 1.0 } else { -1.0 };
+        let system = self.system;
+        let parts = (system.a() * e, system.b() * e, system.c().clone(), system.d().clone());
+        hamiltonian(&cayley(parts, linalg::solve), self.measured, level, linalg::solve)
+    }
+
+    /// As [`Search::hamiltonian`] for any centre, which costs complex numbers.
+    fn rotated_hamiltonian(&self, level: f64, centre: f64) -> CMat {
+        let turn = -Complex::from_polar(1.0, -centre);
+        let complex = |m: &Mat| linalg::to_complex(m);
+        let system = self.system;
+        let parts = (
+            complex(system.a()) * turn,
+            complex(system.b()) * turn,
+            complex(system.c()),
+            complex(system.d()),
+        );
+        hamiltonian(&cayley(parts, linalg::solve_c), self.measured, level, linalg::solve_c)
     }
 }
 
@@ -284,17 +331,46 @@ fn is_local_maximum(gains: &[f64], k: usize) -> bool {
     (k == 0 || gains[k] >= gains[k - 1]) && (k + 1 == gains.len() || gains[k] >= gains[k + 1])
 }
 
-/// s = (z - e) / (z + e) for e = 1 or -1: the unit circle becomes the imaginary axis, z = -e infinity.
-/// With a e in place of a this is the standard map, since z = e z'.
-fn cayley(system: &StateSpace, e: f64) -> (Mat, Mat, Mat, Mat) {
-    let n = system.order();
-    let identity = Mat::identity(n, n);
-    let a = system.a() * e;
-    let inverse = linalg::inverse(&(&a + &identity));
-    let b = &inverse * system.b() * e;
-    let d = system.d() - system.c() * &b;
-    let root2 = std::f64::consts::SQRT_2;
-    (&inverse * (a - identity), b * root2, system.c() * inverse * root2, d)
+type Parts<T> = (DMatrix<T>, DMatrix<T>, DMatrix<T>, DMatrix<T>);
+type Solve<T> = fn(&DMatrix<T>, &DMatrix<T>) -> DMatrix<T>;
+
+/// s = (z - 1) / (z + 1): the unit circle becomes the imaginary axis, z = -1 infinity.
+fn cayley<T: ComplexField>((a, b, c, d): Parts<T>, solve: Solve<T>) -> Parts<T> {
+    let n = a.nrows();
+    let identity = DMatrix::<T>::identity(n, n);
+    let inverse = solve(&(&a + &identity), &identity);
+    let b = &inverse * b;
+    let d = d - &c * &b;
+    let root2 = nalgebra::convert::<f64, T>(std::f64::consts::SQRT_2);
+    (&inverse * (a - identity), b * root2.clone(), c * inverse * root2, d)
+}
+
+/// The Hamiltonian matrix of a continuous-time system whose eigenvalues on the imaginary axis mark gain = `level` of the
+/// outputs from `measured` on, as far as those before do not explain them.
+fn hamiltonian<T: ComplexField>(
+    (a, b, c, d): &Parts<T>,
+    measured: usize,
+    level: f64,
+    solve: Solve<T>,
+) -> DMatrix<T> {
+    let mut r = d * d.adjoint();
+    for i in measured..r.nrows() {
+        r[(i, i)] -= nalgebra::convert(level * level);
+    }
+    let s = b * d.adjoint();
+    let n = a.nrows();
+    let mut right = DMatrix::zeros(r.nrows(), 2 * n);
+    right.columns_mut(0, n).copy_from(c);
+    right.columns_mut(n, n).copy_from(&s.adjoint());
+    let solved = solve(&r, &right);
+    let (rc, rs) = (solved.columns(0, n), solved.columns(n, n));
+    let drift = a - &s * &rc;
+    let mut h = DMatrix::zeros(2 * n, 2 * n);
+    h.view_mut((0, 0), (n, n)).copy_from(&drift);
+    h.view_mut((0, n), (n, n)).copy_from(&(b * b.adjoint() - s * rs));
+    h.view_mut((n, 0), (n, n)).copy_from(&(c.adjoint() * rc));
+    h.view_mut((n, n), (n, n)).copy_from(&-drift.adjoint());
+    h
 }
 
 #[cfg(test)]
@@ -313,6 +389,25 @@ mod tests {
             let peak = hinf_norm(&siso(Mat::from_element(1, 1, pole), vec![1.0], vec![3.0], 0.0)).unwrap();
             let exact = 3.0 / (1.0 - pole.abs());
             assert!((peak.gain - exact).abs() < 1e-9 * exact, "{pole}: {peak:?}");
+        }
+    }
+
+    /// Gains within 1e-6 of one another at 0, at pi and at a peak between them that is the highest by a little: what a
+    /// minimax design looks like. Both real centres of the Cayley transform are all but singular then.
+    #[test]
+    fn the_highest_of_nearly_equal_peaks_is_found() {
+        // y_n = Chebyshev polynomial of cos w as a delay line: T_4(cos w) = cos 4w has gain 1 at 0, pi/4, pi/2 ..; a small
+        // cos 2w lifts pi/2 and lowers the rest: 1 - t at 0 and pi, 1 + t at pi/2 for cos 4w - t cos 2w.
+        for t in [0.0, 1e-9, 1e-7, 3e-5, 1e-3] {
+            let n = 8;
+            let a = Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)));
+            let mut b = vec![0.0; n];
+            b[0] = 1.0;
+            // e^{-4jw} (cos 4w - t cos 2w) = (1 - t e^{-2jw} - t e^{-6jw} + e^{-8jw}) / 2.
+            let mut c = vec![0.0; n];
+            (c[1], c[5], c[7]) = (-0.5 * t, -0.5 * t, 0.5);
+            let peak = hinf_norm(&siso(a, b, c, 0.5)).unwrap();
+            assert!((peak.gain - 1.0 - t).abs() < 2e-9, "{t}: {peak:?}");
         }
     }
 

@@ -3,16 +3,17 @@
 use super::design::DesignOverrides;
 use super::limits::{
     check_channel_count, check_delay, check_fast_period, check_fast_rate, check_latency, check_noise,
-    check_ratio, check_slack, check_taps,
+    check_order, check_ratio, check_reduction_loss, check_slack, check_taps,
 };
 use super::reader::{Fault, Fields, Value};
 use super::words::{WordLengths, check_fraction_bits};
-use super::{ChannelSpec, Family, FilterSpec, Method, Spec, SpecProblem};
+use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Spec, SpecProblem};
 
 const TOP_KEYS: [&str; 8] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
 const CHANNEL_KEYS: [&str; 4] = ["delay", "delay_samples", "filter", "noise"];
-const DESIGN_KEYS: [&str; 6] = ["method", "taps", "slack", "bits", "fraction_bits", "noise"];
+const DESIGN_KEYS: [&str; 8] =
+    ["method", "taps", "slack", "bits", "fraction_bits", "order", "reduction_loss_db", "noise"];
 
 /// The keys of each written form of a filter; the first one names the form.
 const FILTER_FORMS: [&[&str]; 5] = [
@@ -148,12 +149,15 @@ fn design(
         slack: get("slack").map(|v| checked_number(&v, check_slack)).transpose()?,
         bits: get("bits").map(|v| word_lengths(&v)).transpose()?,
         fraction_bits: get("fraction_bits").map(|v| fraction_bits(&v)).transpose()?,
+        reduction: reduction(get("order"), get("reduction_loss_db"))?,
     };
     let design = overrides.over(written).resolved();
     let complain = |problem: SpecProblem| {
         let key = match problem {
             SpecProblem::NeedlessKey { key, .. } => Some(key),
             SpecProblem::Range { unit: "bits" | "entries", .. } => Some("bits"),
+            SpecProblem::Range { unit: "states", .. } => Some("order"),
+            SpecProblem::Range { unit: "dB", .. } => Some("reduction_loss_db"),
             SpecProblem::Range { .. } => Some("taps"),
             _ => None,
         };
@@ -181,6 +185,21 @@ pub(crate) fn fraction_bits(value: &Value<'_>) -> Result<i32, Fault> {
     let bits = i32::try_from(bits).unwrap_or(if bits < 0 { i32::MIN } else { i32::MAX });
     check_fraction_bits(bits).map_err(|problem| value.fault(problem))?;
     Ok(bits)
+}
+
+/// The order or the loss, not both.
+fn reduction(order: Option<Value<'_>>, loss: Option<Value<'_>>) -> Result<Option<Reduction>, Fault> {
+    match (order, loss) {
+        (Some(_), Some(loss)) => {
+            let remedy = "the one follows from the other, keep one of them";
+            Err(loss.fault(SpecProblem::Conflict { first: "order", second: "reduction_loss_db", remedy }))
+        }
+        (Some(order), None) => checked_count(&order, "states", check_order).map(Reduction::Order).map(Some),
+        (None, Some(loss)) => {
+            checked_number(&loss, check_reduction_loss).map(|db| Some(Reduction::Loss(db + 0.0)))
+        }
+        (None, None) => Ok(None),
+    }
 }
 
 /// Reads one filter in whichever form it is written.

@@ -1,8 +1,8 @@
 //! The `[design]` table: defaults, overrides from the command line, and which key goes with which method.
 
-use super::limits::{check_optimised_taps, check_slack, check_taps};
+use super::limits::{check_optimised_taps, check_order, check_reduction_loss, check_slack, check_taps};
 use super::words::{WordLengths, check_fraction_bits};
-use super::{DesignSpec, Method, SpecProblem};
+use super::{DesignSpec, Method, Reduction, SpecProblem};
 
 /// A `[design]` table as far as it is written, in a file or on the command line.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,6 +17,8 @@ pub struct DesignOverrides {
     pub bits: Option<WordLengths>,
     /// Taps are integers times two to the minus this.
     pub fraction_bits: Option<i32>,
+    /// The order, or the loss by its reduction.
+    pub reduction: Option<Reduction>,
 }
 
 impl Method {
@@ -48,12 +50,34 @@ impl Method {
     pub const fn has_bits(self) -> bool {
         matches!(self, Self::Fir)
     }
+
+    /// Whether the method makes recursive filters and therefore reads `order` and `reduction_loss_db`.
+    pub const fn has_states(self) -> bool {
+        matches!(self, Self::Iir | Self::H2)
+    }
+}
+
+impl Reduction {
+    /// The key that says it.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Order(_) => "order",
+            Self::Loss(_) => "reduction_loss_db",
+        }
+    }
+
+    fn check(self) -> Result<(), SpecProblem> {
+        match self {
+            Self::Order(order) => check_order(order),
+            Self::Loss(db) => check_reduction_loss(db),
+        }
+    }
 }
 
 impl DesignSpec {
     /// A method, with taps if it makes FIR filters, and no other wishes.
     pub const fn new(method: Method, taps: Option<usize>) -> Self {
-        Self { method, taps, slack: None, bits: None, fraction_bits: None }
+        Self { method, taps, slack: None, bits: None, fraction_bits: None, reduction: None }
     }
 
     /// The same design by another method; what that has no use for is dropped.
@@ -73,8 +97,8 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let Self { method, taps, slack, bits, fraction_bits } = self.clone();
-        let written = DesignOverrides { method: Some(method), taps, slack, bits, fraction_bits };
+        let Self { method, taps, slack, bits, fraction_bits, reduction } = self.clone();
+        let written = DesignOverrides { method: Some(method), taps, slack, bits, fraction_bits, reduction };
         let design = overrides.over(written).resolved();
         design.check(channels)?;
         Ok(design)
@@ -85,6 +109,7 @@ impl DesignSpec {
         self.check_keys()?;
         self.taps.map_or(Ok(()), check_taps)?;
         self.slack.map_or(Ok(()), check_slack)?;
+        self.reduction.map_or(Ok(()), Reduction::check)?;
         self.fraction_bits.map_or(Ok(()), check_fraction_bits)?;
         self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps))?;
         if let (Some(_), None) = (self.fraction_bits, &self.bits) {
@@ -107,6 +132,12 @@ impl DesignSpec {
             ("slack", self.slack.is_some(), self.method.has_slack(), "fir or iir"),
             ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
             ("fraction_bits", self.fraction_bits.is_some(), self.method.has_bits(), "fir"),
+            (
+                self.reduction.map_or("order", Reduction::key),
+                self.reduction.is_some(),
+                self.method.has_states(),
+                "iir or h2",
+            ),
         ];
         match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
             Some((key, _, _, remedy)) => {
@@ -128,13 +159,14 @@ impl DesignOverrides {
             slack: self.slack.or(file.slack.filter(|_| kept(Method::has_slack))),
             bits: self.bits.or(file.bits.filter(|_| kept(Method::has_bits))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| kept(Method::has_bits))),
+            reduction: self.reduction.or(file.reduction.filter(|_| kept(Method::has_states))),
         }
     }
 
     /// Without a method: FIR if there are taps, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let Self { method, taps, slack, bits, fraction_bits } = self;
+        let Self { method, taps, slack, bits, fraction_bits, reduction } = self;
         let default = if taps.is_some() { Method::Fir } else { Method::Iir };
-        DesignSpec { method: method.unwrap_or(default), taps, slack, bits, fraction_bits }
+        DesignSpec { method: method.unwrap_or(default), taps, slack, bits, fraction_bits, reduction }
     }
 }

@@ -19,6 +19,12 @@ pub const MAX_OPTIMISED_TAPS: usize = 16_384;
 /// Largest latency and largest delay in fast periods: each one costs a state in the blocked system.
 pub const MAX_LATENCY: usize = 65_536;
 
+/// Largest order that may be asked for: no bank that the designer makes has as many states.
+pub const MAX_STATES: usize = 65_536;
+
+/// Largest loss by order reduction that may be asked for: beyond it no state at all is left.
+pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
+
 /// How close to a whole number of fast periods a delay is taken to be whole, relative to its size (at
 /// least one period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; the spurious fraction would
 /// be a channel state of size 1e-16.
@@ -127,6 +133,29 @@ pub(crate) fn check_noise(noise: f64) -> Result<(), SpecProblem> {
         "of full scale",
         "noise is the rms of a converter's own noise relative to full scale, from 0 to 1; 1e-4 is 80 dB below",
     ))
+}
+
+/// States of a recursive bank.
+pub(crate) fn check_order(order: usize) -> Result<(), SpecProblem> {
+    if order <= MAX_STATES {
+        return Ok(());
+    }
+    let rule = format!(
+        "order is the most states that the bank may have, 0 to {MAX_STATES}; leave it out for all that are of use"
+    );
+    Err(range(order as f64, "states", rule))
+}
+
+/// Decibels that may be lost by reducing the order.
+pub(crate) fn check_reduction_loss(db: f64) -> Result<(), SpecProblem> {
+    if (0.0..=MAX_REDUCTION_LOSS_DB).contains(&db) {
+        return Ok(());
+    }
+    let rule = format!(
+        "reduction_loss_db is how far above the full bank's the error of the reduced one may lie, 0 to {MAX_REDUCTION_LOSS_DB} dB; \
+         0 leaves out only states that are of no use"
+    );
+    Err(range(db, "dB", rule))
 }
 
 /// Relative excess over the optimal gamma.

@@ -18,6 +18,7 @@ pub use design::DesignOverrides;
 pub use error::{Place, SpecError, SpecProblem};
 pub use filter::{FilterProblem, MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
+pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub use words::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use serde::{Deserialize, Serialize};
@@ -163,6 +164,20 @@ pub struct DesignSpec {
     /// Taps are integers times two to the minus this; `None` lets the designer pick.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fraction_bits: Option<i32>,
+    /// Fewer states than the method would take, for the methods that make recursive filters.
+    #[serde(flatten)]
+    pub reduction: Option<Reduction>,
+}
+
+/// How far the order of a recursive bank is reduced.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum Reduction {
+    /// At most so many states, with the least error that they allow.
+    #[serde(rename = "order")]
+    Order(usize),
+    /// As few states as keep the error within so many decibels of the full bank's.
+    #[serde(rename = "reduction_loss_db")]
+    Loss(f64),
 }
 
 impl Spec {

@@ -384,6 +384,18 @@ fn the_command_line_overrides_the_design() {
         SpecProblem::NeedlessKey { key: "taps", .. }
     ));
 
+    let wanted = |reduction| DesignOverrides { reduction: Some(reduction), ..Default::default() };
+    let iir = thesis_with("method = \"fir\"", "method = \"iir\"\norder = 7").replace("taps = 22", "");
+    assert_eq!(with(&iir, DesignOverrides::default()).unwrap().reduction, Some(Reduction::Order(7)));
+    let loss = Reduction::Loss(0.5);
+    assert_eq!(with(&iir, wanted(loss)).unwrap().reduction, Some(loss));
+    assert_eq!(with(&iir, method(Method::H2)).unwrap().reduction, Some(Reduction::Order(7)));
+    assert_eq!(with(&iir, method(Method::Separation)).unwrap().reduction, None);
+    assert!(matches!(
+        with(THESIS, wanted(loss)).unwrap_err().problem(),
+        SpecProblem::NeedlessKey { key: "reduction_loss_db", .. }
+    ));
+
     let design = read(THESIS).design;
     assert_eq!(design.with_method(Method::Iir, 2).unwrap().taps, None);
     assert_eq!(design.with_taps(9, 2).unwrap(), DesignSpec::new(Method::Fir, Some(9)));
@@ -473,6 +485,9 @@ prop_compose! {
         slack in prop::option::of(0.0..0.1f64),
         bits in prop::option::of((2..33u32).prop_map(WordLengths::Same)),
         fraction_bits in prop::option::of(-256..257i32),
+        reduction in prop::option::of(prop_oneof![
+            (0usize..99).prop_map(Reduction::Order), (0.0..9.0f64).prop_map(Reduction::Loss)
+        ]),
     ) -> Spec {
         Spec {
             name, fast_period, ratio, latency, target,
@@ -483,6 +498,7 @@ prop_compose! {
                 slack: slack.filter(|_| method.has_slack()),
                 bits: bits.clone().filter(|_| method.has_bits()),
                 fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
+                reduction: reduction.filter(|_| method.has_states()),
             },
         }
     }

@@ -1,0 +1,190 @@
+use super::dynamics::Dynamics;
+use super::readout::{Samples, mean_square, reach};
+use super::*;
+use crate::design::iir::{design_h2, design_iir};
+use crate::design::{Problem, error_system};
+use crate::linalg::{self, Complex, Mat};
+use crate::lti::balanced::balanced;
+use crate::lti::gramian::h2_norm;
+use crate::lti::peak::hinf_norm;
+use crate::spec::Spec;
+
+/// The thesis example with other delays and latency.
+fn plant(latency: usize, delays: &str) -> BlockedPlant {
+    let text = format!(
+        "fast_period = 1.0\nratio = 2\nlatency = {latency}\n\
+         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
+         channel = [{delays}]\ndesign = {{ method = \"iir\" }}"
+    );
+    BlockedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap())
+}
+
+fn thesis(latency: usize) -> BlockedPlant {
+    plant(latency, "{ delay = 1.2 }, { delay = 0.6 }")
+}
+
+fn subject<'a>(plant: &'a BlockedPlant, bank: &'a StateSpace, aim: Aim) -> Subject<'a> {
+    let order = TappedRecursion::new(bank).unwrap().realise().unwrap().order();
+    Subject { plant, bank, order, width: plant.measured, aim, slack: 0.0 }
+}
+
+fn error(plant: &BlockedPlant, bank: &StateSpace) -> StateSpace {
+    error_system::error_system(plant, bank).unwrap()
+}
+
+/// Largest gain on a dense grid, by one LU factorisation a frequency: a lower bound that knows no level sets.
+fn dense_grid(error: &StateSpace) -> f64 {
+    let gain = |k: usize| {
+        let z = Complex::from_polar(1.0, std::f64::consts::PI * k as f64 / 4000.0);
+        linalg::singular_values_c(&error.response_at(z)).unwrap()[0]
+    };
+    (0..=4000).map(gain).fold(0.0, f64::max)
+}
+
+#[test]
+fn every_order_has_the_gamma_that_is_reported() {
+    let plant = thesis(10);
+    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    for order in [0, 3, 6] {
+        let (smaller, record) =
+            reduce(&subject(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
+        let smaller = smaller.unwrap().realise().unwrap();
+        assert!(smaller.order() <= order && record.reduced.order == smaller.order(), "{record:?}");
+        let (seen, told) = (dense_grid(&error(&plant, &smaller)), record.reduced.figures.gamma);
+        assert!(seen <= told * (1.0 + 1e-8) && seen > told * (1.0 - 1e-4), "{order}: {seen} {told}");
+        let rms = h2_norm(&error(&plant, &smaller)).unwrap() / 2f64.sqrt();
+        assert!((rms / record.reduced.figures.rms_error - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn more_states_are_never_worse_and_all_are_the_full_bank() {
+    let plant = thesis(10);
+    for (aim, bank) in [
+        (Aim::WorstCase, design_iir(&plant, 0.0).unwrap().filters),
+        (Aim::MeanSquare, design_h2(&plant).unwrap().filters),
+    ] {
+        let subject = subject(&plant, &bank, aim);
+        let (smaller, record) = reduce(&subject, Reduction::Order(subject.order)).unwrap();
+        assert!(smaller.is_none() && record.reduced == record.full && record.full.loss_db == 0.0);
+        assert_eq!(record.orders.len(), subject.order + 1);
+        for pair in record.orders.windows(2) {
+            assert!(pair[0].loss_db >= pair[1].loss_db - 1e-4, "{:?}", record.orders);
+        }
+        // Every one of these states but the last two is worth more than a decibel here.
+        assert!(record.orders[..8].windows(2).all(|pair| pair[0].loss_db > pair[1].loss_db + 0.5));
+    }
+}
+
+/// F with states that are of no use: never reached, never seen, and the same recursion thrice, of which two cancel.
+fn padded(bank: &StateSpace) -> StateSpace {
+    let (n, m, p) = (bank.order(), bank.inputs(), bank.outputs());
+    let extra = Mat::from_row_slice(3, 3, &[0.5, 0.3, 0.0, -0.3, 0.5, 0.0, 0.0, 0.1, 0.9]);
+    let blocks = [bank.a(), bank.a(), bank.a(), &extra, &extra];
+    let order = 3 * n + 6;
+    let (mut a, mut b, mut c) = (Mat::zeros(order, order), Mat::zeros(order, m), Mat::zeros(p, order));
+    let mut at = 0;
+    for (k, block) in blocks.into_iter().enumerate() {
+        let size = block.nrows();
+        a.view_mut((at, at), (size, size)).copy_from(block);
+        match k {
+            0..3 => {
+                b.rows_mut(at, size).copy_from(bank.b());
+                c.columns_mut(at, size).copy_from(&(bank.c() * [1.0, 0.75, -0.75][k]));
+            }
+            3 => b.rows_mut(at, size).fill(1.0),
+            _ => c.columns_mut(at, size).fill(1.0),
+        }
+        at += size;
+    }
+    StateSpace::new(a, b, c, bank.d().clone()).unwrap()
+}
+
+#[test]
+fn states_of_no_use_go_without_loss() {
+    let plant = thesis(3);
+    for (aim, bank) in [
+        (Aim::WorstCase, design_iir(&plant, 0.0).unwrap().filters),
+        (Aim::MeanSquare, design_h2(&plant).unwrap().filters),
+    ] {
+        let (_, bare) = reduce(&subject(&plant, &bank, aim), Reduction::Loss(0.0)).unwrap();
+        let padded = padded(&bank);
+        let subject = Subject { order: padded.order(), ..subject(&plant, &padded, aim) };
+        let (smaller, record) = reduce(&subject, Reduction::Loss(0.0)).unwrap();
+        assert_eq!(record.reduced.order, bare.reduced.order, "{record:?} {bare:?}");
+        assert!(record.reduced.loss_db.abs() < 1e-4 && record.reduced.order <= 4, "{record:?}");
+        let norm = hinf_norm(&error(&plant, &smaller.unwrap().realise().unwrap())).unwrap().gain;
+        assert!((norm / record.reduced.figures.gamma - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn it_beats_truncation_without_weight_and_readout() {
+    let plant = thesis(10);
+    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let plain = balanced(&bank, 0.0).unwrap();
+    for order in [2, 4, 7] {
+        let first = |m: &Mat, r: usize, c: usize| m.view((0, 0), (r, c)).into_owned();
+        let cut = StateSpace::new(
+            first(plain.a(), order, order),
+            first(plain.b(), order, 2),
+            first(plain.c(), 2, order),
+            plain.d().clone(),
+        );
+        let plain = hinf_norm(&error(&plant, &cut.unwrap())).unwrap().gain;
+        let (_, record) = reduce(&subject(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
+        println!("{order} states: truncated {plain}, here {}", record.reduced.figures.gamma);
+        assert!(record.reduced.figures.gamma < 0.9 * plain, "{order}: {record:?} {plain}");
+    }
+}
+
+/// Both readouts are optima of convex problems: no direction leads downhill. Judged by exact norms, which the optimisers
+/// do not use.
+#[test]
+fn no_other_readout_is_better() {
+    let plant = thesis(6);
+    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    for (ticks, order) in [(0, 0), (0, 3), (1, 2)] {
+        let whole = Dynamics::balanced(&bank, ticks, &reach(&plant, &bank).unwrap()).unwrap();
+        let dynamics = whole.truncated(order);
+        let (square, norm) = mean_square(&plant, &dynamics).unwrap();
+        let built = |readout: &Mat| error(&plant, &dynamics.read_by(readout).unwrap().realise().unwrap());
+        assert!((h2_norm(&built(&square)).unwrap() / norm - 1.0).abs() < 1e-9);
+        let best = Samples::new(&plant).unwrap().best_bank(&dynamics, 0.0).unwrap().realise().unwrap();
+        let mut worst = Mat::zeros(2, square.ncols());
+        worst.columns_mut(0, best.order()).copy_from(best.c());
+        worst.columns_mut(best.order(), 2).copy_from(best.d());
+        let gamma = hinf_norm(&built(&worst)).unwrap().gain;
+        for seed in 0..24 {
+            let direction =
+                Mat::from_fn(2, square.ncols(), |i, j| ((seed * 37 + i * 11 + j * 5) as f64).sin());
+            for step in [1e-2, -1e-2, 1e-4, -1e-4] {
+                let moved = |from: &Mat| built(&(from + &direction * step));
+                assert!(h2_norm(&moved(&square)).unwrap() > norm * (1.0 - 1e-12));
+                assert!(
+                    hinf_norm(&moved(&worst)).unwrap().gain > gamma * (1.0 - 2e-6),
+                    "{ticks} {order} {seed} {step}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bank_without_error_keeps_what_it_needs() {
+    // The samples are those wanted, ten fast samples late: gamma is zero up to rounding.
+    let plant = plant(10, "{ delay = 0.0 }, { delay = 1.0 }");
+    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let subject = subject(&plant, &bank, Aim::WorstCase);
+    let (_, record) = reduce(&subject, Reduction::Loss(0.0)).unwrap();
+    assert!(record.full.figures.gamma < 1e-11 && record.reduced.figures.gamma < 1e-11, "{record:?}");
+    assert!(record.reduced.loss_db < 1e-3 && record.reduced.order >= 9, "{record:?}");
+}
+
+#[test]
+fn the_same_bits_every_time() {
+    let plant = thesis(5);
+    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let once = || reduce(&subject(&plant, &bank, Aim::WorstCase), Reduction::Order(2)).unwrap();
+    assert_eq!(once(), once());
+}
