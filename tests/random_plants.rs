@@ -109,7 +109,10 @@ fn end_of(seed: u64) -> End {
                 proven.lower <= proven.upper && proven.attained <= proven.upper,
                 "plant {seed}: {proven:?}"
             );
-            assert!(proven.upper <= upper + slack || proven.upper <= 1.11 * upper, "plant {seed}: {proven:?}");
+            assert!(
+                proven.upper <= upper + slack || proven.upper <= 1.11 * upper,
+                "plant {seed}: {proven:?}"
+            );
             End::Proven
         }
         Err(refusal) => refused(seed, &refusal, End::Unproven),

@@ -82,18 +82,18 @@ pub fn quantise(
     fraction_bits: Option<i32>,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
     let quantiser = Quantiser::new(plant, taps)?;
-    let found = quantiser.quantise(bits, fraction_bits)?;
-    let mut words = Vec::new();
-    for more in NEIGHBOURS {
-        let Some(other) = bits.widened(more) else { continue };
-        let scale = fraction_bits.map(|fixed| (fixed + more).clamp(-MAX_FRACTION_BITS, MAX_FRACTION_BITS));
-        words.push(if more == 0 {
-            quantiser.loss(&found)
-        } else {
-            quantiser.loss(&quantiser.quantise(&other, scale)?)
-        });
-    }
-    Ok((found.fixed_point, WordStudy { real_gamma, words }))
+    let all: Vec<(WordLengths, Option<i32>)> = NEIGHBOURS
+        .into_iter()
+        .filter_map(|more| {
+            let scale =
+                fraction_bits.map(|fixed| (fixed + more).clamp(-MAX_FRACTION_BITS, MAX_FRACTION_BITS));
+            Some((bits.widened(more)?, scale))
+        })
+        .collect();
+    let found = quantiser.quantise_all(&all)?;
+    let words = found.iter().map(|found| quantiser.loss(found)).collect();
+    let asked = found.into_iter().find(|found| found.fixed_point.bits == *bits).ok_or(DesignError::NoTaps)?;
+    Ok((asked.fixed_point, WordStudy { real_gamma, words }))
 }
 
 /// The search for integers near the taps of one bank.
@@ -138,6 +138,19 @@ impl<'a> Quantiser<'a> {
             }
         }
         best.ok_or(DesignError::NoTaps)
+    }
+
+    /// [`Self::quantise`] for each of several, on as many threads.
+    fn quantise_all(&self, all: &[(WordLengths, Option<i32>)]) -> Result<Vec<Quantised>, DesignError> {
+        std::thread::scope(|scope| {
+            let search = |(bits, scale): &'_ (WordLengths, Option<i32>)| {
+                let (bits, scale) = (bits.clone(), *scale);
+                scope.spawn(move || self.quantise(&bits, scale))
+            };
+            let threads: Vec<_> = all.iter().map(search).collect();
+            let joined = threads.into_iter().map(|thread| thread.join());
+            joined.map(|result| result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        })
     }
 
     fn loss(&self, found: &Quantised) -> WordLoss {
