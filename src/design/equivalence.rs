@@ -56,14 +56,6 @@ impl BlockedPlant {
         Self { system, measured: problem.channels.len(), wanted: problem.ratio, chains }
     }
 
-    /// The same plant with all outputs, measured and wanted, counted in `unit`: the same filters do the same to it.
-    pub(super) fn in_unit(&self, unit: f64) -> Self {
-        let system = &self.system;
-        let (c, d) = (system.c() / unit, system.d() / unit);
-        let system = StateSpace::new(system.a().clone(), system.b().clone(), c, d);
-        Self { system: system.expect("the shapes are those of a system"), ..self.clone() }
-    }
-
     /// The states of the delay chain of a channel, empty unless it is whole ticks late.
     pub(super) fn chain(&self, channel: usize) -> Range<usize> {
         self.chains[channel].clone()

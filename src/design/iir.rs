@@ -5,7 +5,6 @@ use super::DesignError;
 use super::equivalence::BlockedPlant;
 use super::error_system;
 use super::filtering::{Filter, Innovations, Trial};
-use crate::lti::LtiError;
 use crate::lti::peak::unexplained_peak;
 
 /// Relative width of the interval [lower, upper] at which gamma-iteration ends.
@@ -40,50 +39,21 @@ pub fn noncausal_bound(plant: &BlockedPlant) -> Result<f64, DesignError> {
 /// The least gamma of any causal bank, within [`GAMMA_ACCURACY`]; with `slack` > 0 the central filter
 /// at (1 + slack) times the optimum instead, which is kinder to all other frequencies.
 pub fn design_iir(plant: &BlockedPlant, slack: f64) -> Result<StateSpaceDesign, DesignError> {
-    in_own_unit(plant, |plant| {
-        let mut search = Search::new(plant)?;
-        search.start_from_h2()?;
-        search.try_the_lower_bound()?;
-        search.bisect()?;
-        search.finish(slack)
-    })
+    let mut search = Search::new(plant)?;
+    search.start_from_h2()?;
+    search.try_the_lower_bound()?;
+    search.bisect()?;
+    search.finish(slack)
 }
 
 /// The mean-square optimal bank.
 pub fn design_h2(plant: &BlockedPlant) -> Result<StateSpaceDesign, DesignError> {
-    in_own_unit(plant, |plant| {
-        let mut search = Search::new(plant)?;
-        search.start_from_h2()?;
-        search
-            .best
-            .map(|best| search.report.fill(best))
-            .ok_or(DesignError::RiccatiFailed { gamma: f64::INFINITY })
-    })
-}
-
-/// Designs with the outputs in a unit of their own size, a power of two: neither the filters nor any digit depends on
-/// the unit in which the signals are given.
-fn in_own_unit(
-    plant: &BlockedPlant,
-    design: impl Fn(&BlockedPlant) -> Result<StateSpaceDesign, DesignError>,
-) -> Result<StateSpaceDesign, DesignError> {
-    let unit = Some(size(plant).log2().round().exp2()).filter(|unit| unit.is_normal()).unwrap_or(1.0);
-    match design(&plant.in_unit(unit)) {
-        Ok(found) => Ok(StateSpaceDesign {
-            upper: found.upper * unit,
-            lower: found.lower * unit,
-            noncausal: found.noncausal * unit,
-            ..found
-        }),
-        Err(DesignError::RiccatiFailed { gamma }) => Err(DesignError::RiccatiFailed { gamma: gamma * unit }),
-        Err(other) => Err(other),
-    }
-}
-
-/// What the gains of a plant are measured by.
-fn size(plant: &BlockedPlant) -> f64 {
-    let system = &plant.system;
-    system.c().norm() * system.b().norm() + system.d().norm()
+    let mut search = Search::new(plant)?;
+    search.start_from_h2()?;
+    search
+        .best
+        .map(|best| search.report.fill(best))
+        .ok_or(DesignError::RiccatiFailed { gamma: f64::INFINITY })
 }
 
 /// A filter with its verified norm.
@@ -130,22 +100,20 @@ impl<'a> Search<'a> {
         let plain = Innovations::new(plant)?;
         let lower = noncausal.max(plain.fresh_error()?);
         let innovations = plain.balanced().into_iter().chain([plain]).collect();
+        let negligible =
+            NEGLIGIBLE * (plant.system.c().norm() * plant.system.b().norm() + plant.system.d().norm());
         Ok(Self {
             plant,
             innovations,
             best: None,
             report: Report { lower, noncausal, trials: 0 },
-            negligible: NEGLIGIBLE * size(plant),
+            negligible,
         })
     }
 
-    /// `None` for filters that rounding has made unstable.
-    fn verify(&self, filters: Filter) -> Result<Option<Verified>, DesignError> {
-        match error_system::gamma(self.plant, &filters) {
-            Ok(peak) => Ok(Some(Verified { filters, norm: peak.gain, frequency: peak.frequency })),
-            Err(DesignError::Lti(LtiError::Unstable { .. })) => Ok(None),
-            Err(other) => Err(other),
-        }
+    fn verify(&self, filters: Filter) -> Result<Verified, DesignError> {
+        let peak = error_system::gamma(self.plant, &filters)?;
+        Ok(Verified { filters, norm: peak.gain, frequency: peak.frequency })
     }
 
     fn keep(&mut self, found: Verified) {
@@ -156,12 +124,9 @@ impl<'a> Search<'a> {
 
     fn start_from_h2(&mut self) -> Result<(), DesignError> {
         self.report.trials += 1;
-        let candidates: Vec<Filter> = self.innovations.iter().filter_map(Innovations::h2).collect();
-        for filters in candidates {
-            if let Some(found) = self.verify(filters)? {
-                self.keep(found);
-                break;
-            }
+        if let Some(filters) = self.innovations.iter().find_map(Innovations::h2) {
+            let found = self.verify(filters)?;
+            self.keep(found);
         }
         Ok(())
     }
@@ -181,7 +146,7 @@ impl<'a> Search<'a> {
             self.report.trials += 1;
             match self.innovations[k].h_infinity(gamma) {
                 Trial::Achieved(filters) => {
-                    let Some(found) = self.verify(filters.clone())? else { continue };
+                    let found = self.verify(filters.clone())?;
                     let promise_kept = found.norm <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
                     self.keep(found);
                     if promise_kept {
@@ -238,7 +203,7 @@ impl<'a> Search<'a> {
             let cap = optimum.norm * (1.0 + slack);
             for innovations in &self.innovations {
                 let Trial::Achieved(filters) = innovations.h_infinity(cap) else { continue };
-                let Some(relaxed) = self.verify(filters)? else { continue };
+                let relaxed = self.verify(filters)?;
                 if relaxed.norm <= cap {
                     return Ok(self.report.fill(relaxed));
                 }
