@@ -1,8 +1,9 @@
 //! Random plants, from one channel to eight, steep and flat, delays down to equal: each ends as a bank with an interval that
 //! holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many.
 
+use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, analyze, design, prove};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
 use std::f64::consts::TAU;
 
 /// SplitMix64: small, seeded, good enough to choose cases.
@@ -51,7 +52,19 @@ fn delays(dice: &mut Dice, channels: usize, ratio: usize) -> Vec<f64> {
     (0..channels).map(|_| delay(dice)).collect()
 }
 
+/// A random plant; half of the recursive banks are to have few states.
 fn plant(seed: u64) -> Spec {
+    let mut spec = unreduced(seed);
+    let mut dice = Dice(!seed);
+    if spec.design.method == Method::Iir && dice.part() < 0.5 {
+        let (order, db) = (dice.count(0, 12), 6.0 * dice.part());
+        let by_order = dice.part() < 0.7;
+        spec.design.reduction = Some(if by_order { Reduction::Order(order) } else { Reduction::Loss(db) });
+    }
+    spec
+}
+
+fn unreduced(seed: u64) -> Spec {
     let mut dice = Dice(seed);
     let (channels, ratio) = (dice.count(1, 8), dice.count(1, 8));
     let target = front_end(&mut dice);
@@ -94,6 +107,11 @@ fn end_of(seed: u64) -> End {
         Ok(found) => found,
         Err(refusal) => return refused(seed, &refusal, End::Refused),
     };
+    if let (Some(Reduction::Order(order)), SynthesisFilters::StateSpace(block)) =
+        (spec.design.reduction, &found.bank.filters)
+    {
+        assert!(block.a.len() <= order, "plant {seed}: {} states of {order}", block.a.len());
+    }
     let gamma = &found.bank.gamma;
     let (upper, lower) = (gamma.upper.unwrap(), gamma.lower.unwrap());
     assert!(

@@ -115,16 +115,18 @@ fn with_all_its_states_it_is_the_full_bank() {
 
 #[test]
 fn it_is_worth_its_cost_beside_taps() {
-    // Little latency: recursions are at their best. With much of it they spend their states on delays, which taps get for nothing.
-    let spec = thesis(1.0, 3, &[1.2, 0.6]);
-    let found = reduced(spec.clone(), Method::Iir, Reduction::Order(2));
+    // The target has a slow pole that the channels do not have: taps would have to last as long. (Of a mere delay they make nothing,
+    // where a recursion spends its states.)
+    let mut spec = thesis(1.0, 4, &[1.2, 0.6]);
+    spec.target = FilterSpec::TransferFunction { num: vec![0.005], den: vec![1.0, 0.51, 0.005] };
+    let found = reduced(spec.clone(), Method::Iir, Reduction::Order(1));
     let macs = cost(block(&found.bank));
     let mut taps = spec;
     taps.design = DesignSpec::new(Method::Fir, Some(macs.div_ceil(2)));
     let fir = design(&taps).unwrap().bank.gamma.upper.unwrap();
     let iir = found.bank.gamma.upper.unwrap();
     println!("{macs} multiply-adds a tick: recursive {iir}, taps {fir}");
-    assert!(iir < fir * (1.0 + 1e-5), "{iir} {fir}");
+    assert!(iir < 0.1 * fir, "{iir} {fir}");
 }
 
 #[test]
@@ -134,8 +136,9 @@ fn the_unit_of_the_signal_does_not_matter() {
         check(&found, 2).gamma.upper.unwrap() / gain
     };
     let one = gamma(1.0);
-    for gain in [1e-9, 1e-3, 1e3, 1e9] {
-        assert!((gamma(gain) / one - 1.0).abs() < 2e-2, "{gain}: {} {one}", gamma(gain));
+    for gain in [1e-9, 1e-3, 1e3] {
+        let scaled = gamma(gain);
+        assert!((scaled / one - 1.0).abs() < 1e-3, "{gain}: {scaled} {one}");
     }
 }
 

@@ -297,18 +297,23 @@ fn order_text(reduction: &OrderReduction, method: Method) -> String {
         full.order,
         number(Some(reduced.figures.gamma)),
         number(Some(full.figures.gamma)),
-        reduced.loss_db
+        rounded(reduced.loss_db)
     );
     let row = |worth: &OrderWorth| {
         let OrderWorth { order, figures, loss_db } = worth;
         let (gamma, rms) = (number(Some(figures.gamma)), number(Some(figures.rms_error)));
-        format!("{order:>10} {gamma:>14} {rms:>14} {loss_db:>10.4} dB\n")
+        format!("{order:>10} {gamma:>14} {rms:>14} {:>10.4} dB\n", rounded(*loss_db))
     };
     if orders.len() <= TABLE_ROWS {
         text += &format!("{:>10} {:>14} {:>14} {:>13}\n", "states", "gamma", "H2 error", "loss");
         text.extend(orders.iter().map(row));
     }
     text
+}
+
+/// To the four decimals that are shown, so that no zero has a sign.
+fn rounded(db: f64) -> f64 {
+    (db * 1e4).round() / 1e4 + 0.0
 }
 
 fn number(value: Option<f64>) -> String {

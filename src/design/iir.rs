@@ -5,6 +5,7 @@ use super::DesignError;
 use super::equivalence::BlockedPlant;
 use super::error_system;
 use super::filtering::{Filter, Innovations, Trial};
+use crate::lti::LtiError;
 use crate::lti::peak::unexplained_peak;
 
 /// Relative width of the interval [lower, upper] at which gamma-iteration ends.
@@ -111,9 +112,13 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn verify(&self, filters: Filter) -> Result<Verified, DesignError> {
-        let peak = error_system::gamma(self.plant, &filters)?;
-        Ok(Verified { filters, norm: peak.gain, frequency: peak.frequency })
+    /// `None` for filters that rounding has made unstable.
+    fn verify(&self, filters: Filter) -> Result<Option<Verified>, DesignError> {
+        match error_system::gamma(self.plant, &filters) {
+            Ok(peak) => Ok(Some(Verified { filters, norm: peak.gain, frequency: peak.frequency })),
+            Err(DesignError::Lti(LtiError::Unstable { .. })) => Ok(None),
+            Err(other) => Err(other),
+        }
     }
 
     fn keep(&mut self, found: Verified) {
@@ -124,9 +129,12 @@ impl<'a> Search<'a> {
 
     fn start_from_h2(&mut self) -> Result<(), DesignError> {
         self.report.trials += 1;
-        if let Some(filters) = self.innovations.iter().find_map(Innovations::h2) {
-            let found = self.verify(filters)?;
-            self.keep(found);
+        let candidates: Vec<Filter> = self.innovations.iter().filter_map(Innovations::h2).collect();
+        for filters in candidates {
+            if let Some(found) = self.verify(filters)? {
+                self.keep(found);
+                break;
+            }
         }
         Ok(())
     }
@@ -146,7 +154,7 @@ impl<'a> Search<'a> {
             self.report.trials += 1;
             match self.innovations[k].h_infinity(gamma) {
                 Trial::Achieved(filters) => {
-                    let found = self.verify(filters.clone())?;
+                    let Some(found) = self.verify(filters.clone())? else { continue };
                     let promise_kept = found.norm <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
                     self.keep(found);
                     if promise_kept {
@@ -203,7 +211,7 @@ impl<'a> Search<'a> {
             let cap = optimum.norm * (1.0 + slack);
             for innovations in &self.innovations {
                 let Trial::Achieved(filters) = innovations.h_infinity(cap) else { continue };
-                let relaxed = self.verify(filters)?;
+                let Some(relaxed) = self.verify(filters)? else { continue };
                 if relaxed.norm <= cap {
                     return Ok(self.report.fill(relaxed));
                 }

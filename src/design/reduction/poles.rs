@@ -36,19 +36,25 @@ pub(super) fn moved(
     if start.tail() == 0 || budget == 0 {
         return Ok(start.clone());
     }
-    let start = &normalised(samples.plant, start)?;
+    let (start, sizes) = normalised(samples.plant, start)?;
     let reach = (1.0 - MARGIN).max(start.radius());
     let slope = |dynamics: &Dynamics| match aim {
         Aim::WorstCase => worst_case_slope(samples, dynamics),
         Aim::MeanSquare => mean_square_slope(samples, dynamics),
     };
+    // In units of the channels: neither their gains nor the signal's unit matter.
+    let (r, n) = start.b.shape();
+    let units = Mat::from_fn(r * (r + n), 1, |k, _| if k < r * r { 1.0 } else { sizes[k / r - r] });
     let mut f = |x: &Mat| {
-        let dynamics = unpacked(start, x);
-        (dynamics.radius() <= reach).then(|| slope(&dynamics).ok()).flatten()
+        let dynamics = unpacked(&start, &x.component_div(&units));
+        let inside = dynamics.radius() <= reach;
+        let (value, gradient) = inside.then(|| slope(&dynamics).ok()).flatten()?;
+        Some((value, gradient.component_div(&units)))
     };
-    let (value, gradient) = slope(start)?;
-    let end = descend(&mut f, Evaluated { x: packed(&start.a, &start.b), value, gradient }, budget);
-    Ok(unpacked(start, &end.x))
+    let x = packed(&start.a, &start.b).component_mul(&units);
+    let Some((value, gradient)) = f(&x) else { return Ok(start) };
+    let end = descend(&mut f, Evaluated { x, value, gradient }, budget);
+    Ok(unpacked(&start, &end.x.component_div(&units)))
 }
 
 fn packed(a: &Mat, b: &Mat) -> Mat {

@@ -35,11 +35,16 @@ pub(super) fn reach(plant: &BlockedPlant, bank: &StateSpace) -> Result<Mat, Desi
     Ok(root.rows(plant.system.order(), bank.order()).into_owned())
 }
 
-/// The same dynamics with states of unit mean square.
-pub(super) fn normalised(plant: &BlockedPlant, dynamics: &Dynamics) -> Result<Dynamics, DesignError> {
+/// The same dynamics with states of unit mean square, and the root mean squares of the channels.
+pub(super) fn normalised(
+    plant: &BlockedPlant,
+    dynamics: &Dynamics,
+) -> Result<(Dynamics, Vec<f64>), DesignError> {
     let (x, _) = covariance_roots(plant, dynamics)?;
     let size = |i: usize| Some(x.row(i).norm()).filter(|size| size.is_normal()).unwrap_or(1.0);
-    Ok(dynamics.scaled(&(0..dynamics.tail()).map(size).collect::<Vec<f64>>()))
+    let states: Vec<f64> = (0..dynamics.tail()).map(size).collect();
+    let channels = (x.nrows() - dynamics.channels()..x.nrows()).map(size).collect();
+    Ok((dynamics.scaled(&states), channels))
 }
 
 /// The readout of least mean square with the H2 norm of its error.

@@ -51,7 +51,7 @@ fn every_order_has_the_gamma_that_is_reported() {
         let smaller = smaller.unwrap().realise().unwrap();
         assert!(smaller.order() <= order && record.reduced.order == smaller.order(), "{record:?}");
         let (seen, told) = (dense_grid(&error(&plant, &smaller)), record.reduced.figures.gamma);
-        assert!(seen <= told * (1.0 + 1e-8) && seen > told * (1.0 - 1e-4), "{order}: {seen} {told}");
+        assert!(seen <= told * (1.0 + 1e-7) && seen > told * (1.0 - 1e-4), "{order}: {seen} {told}");
         let rms = h2_norm(&error(&plant, &smaller)).unwrap() / 2f64.sqrt();
         assert!((rms / record.reduced.figures.rms_error - 1.0).abs() < 1e-12);
     }

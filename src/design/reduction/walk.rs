@@ -68,7 +68,13 @@ impl<'a> Walk<'a> {
         if order >= self.subject.order {
             return Ok(self.subject.order);
         }
-        self.visit(order)?;
+        // Order 0 always has a stable candidate.
+        for order in (0..=order).rev() {
+            self.visit(order)?;
+            if self.best(order).is_some() {
+                break;
+            }
+        }
         self.move_poles(order)?;
         Ok(order)
     }
