@@ -214,7 +214,7 @@ impl<T: Sample> FirState<T> {
     }
 }
 
-fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
+pub(super) fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
     for (i, f) in taps.iter().enumerate() {
         if let Some(index) = f.iter().position(|&value| !T::from_f64(value).finite()) {
             let place = format!("the filter of channel {}", i + 1);

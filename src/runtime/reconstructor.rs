@@ -1,6 +1,8 @@
 //! A bank at work on one stream.
 
 use super::fir::{FirPlan, FirState};
+use super::form::Form;
+use super::overlap_save::{OverlapSavePlan, OverlapSaveState};
 use super::sample::Sample;
 use super::simd::Isa;
 use super::state_space::{StateSpacePlan, StateSpaceState};
@@ -28,13 +30,20 @@ pub struct Options {
     /// Number type of recursions, [`Precision::Double`] unless asked for otherwise: a recursion feeds its rounding
     /// errors back, and in f32 the error is about 1e-7 of full scale divided by 1 - |pole|.
     pub recursion: Precision,
+    /// Form of FIR banks, [`Form::Direct`] unless asked for otherwise, because the others may be later.
+    pub form: Form,
     /// Instruction set; one that the processor does not have falls back to the portable kernels.
     pub isa: Isa,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { precision: Precision::default(), recursion: Precision::Double, isa: Isa::detect() }
+        Self {
+            precision: Precision::default(),
+            recursion: Precision::Double,
+            form: Form::default(),
+            isa: Isa::detect(),
+        }
     }
 }
 
@@ -56,6 +65,8 @@ pub struct PlanSummary {
 enum Plan {
     Single(FirPlan<f32>),
     Double(FirPlan<f64>),
+    BlocksSingle(OverlapSavePlan<f32>),
+    BlocksDouble(OverlapSavePlan<f64>),
     RecursionSingle(StateSpacePlan<f32>),
     RecursionDouble(StateSpacePlan<f64>),
 }
@@ -65,6 +76,8 @@ enum Plan {
 enum StreamState {
     Single(FirState<f32>),
     Double(FirState<f64>),
+    BlocksSingle(OverlapSaveState<f32>),
+    BlocksDouble(OverlapSaveState<f64>),
     RecursionSingle(StateSpaceState<f32>),
     RecursionDouble(StateSpaceState<f64>),
 }
@@ -120,7 +133,8 @@ impl Reconstructor {
         let plan = Plan::new(bank, options)?;
         let state = plan.state();
         let isa = if options.isa.is_available() { options.isa } else { Isa::Portable };
-        Ok(Self { plan: Arc::new(plan), state, latency: bank.latency, isa, replaced: 0 })
+        let latency = bank.latency + plan.delay() * bank.ratio;
+        Ok(Self { plan: Arc::new(plan), state, latency, isa, replaced: 0 })
     }
 
     /// N, samples a tick in.
@@ -128,6 +142,8 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => plan.channels,
             Plan::Double(plan) => plan.channels,
+            Plan::BlocksSingle(plan) => plan.shape.channels,
+            Plan::BlocksDouble(plan) => plan.shape.channels,
             Plan::RecursionSingle(plan) => plan.channels,
             Plan::RecursionDouble(plan) => plan.channels,
         }
@@ -138,6 +154,8 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => plan.ratio,
             Plan::Double(plan) => plan.ratio,
+            Plan::BlocksSingle(plan) => plan.shape.ratio,
+            Plan::BlocksDouble(plan) => plan.shape.ratio,
             Plan::RecursionSingle(plan) => plan.ratio,
             Plan::RecursionDouble(plan) => plan.ratio,
         }
@@ -153,6 +171,8 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => Some(plan.history),
             Plan::Double(plan) => Some(plan.history),
+            Plan::BlocksSingle(plan) => Some(plan.shape.history),
+            Plan::BlocksDouble(plan) => Some(plan.shape.history),
             Plan::RecursionSingle(_) | Plan::RecursionDouble(_) => None,
         }
     }
@@ -167,6 +187,8 @@ impl Reconstructor {
         let (form, numbers, fold) = match &*self.plan {
             Plan::Single(plan) => ("polyphase", "f32", plan.fold),
             Plan::Double(plan) => ("polyphase", "f64", plan.fold),
+            Plan::BlocksSingle(_) => ("overlap-save", "f32", 1),
+            Plan::BlocksDouble(_) => ("overlap-save", "f64", 1),
             Plan::RecursionSingle(plan) => (recursion_form(plan.is_modal()), "f32", 1),
             Plan::RecursionDouble(plan) => (recursion_form(plan.is_modal()), "f64", 1),
         };
@@ -198,6 +220,8 @@ impl Reconstructor {
         match &mut self.state {
             StreamState::Single(state) => state.reset(),
             StreamState::Double(state) => state.reset(),
+            StreamState::BlocksSingle(state) => state.reset(),
+            StreamState::BlocksDouble(state) => state.reset(),
             StreamState::RecursionSingle(state) => state.reset(),
             StreamState::RecursionDouble(state) => state.reset(),
         }
@@ -279,6 +303,8 @@ impl Reconstructor {
         self.replaced += match (&*self.plan, &mut self.state) {
             (Plan::Single(plan), StreamState::Single(state)) => plan.process(state, source, sink),
             (Plan::Double(plan), StreamState::Double(state)) => plan.process(state, source, sink),
+            (Plan::BlocksSingle(plan), StreamState::BlocksSingle(state)) => plan.process(state, source, sink),
+            (Plan::BlocksDouble(plan), StreamState::BlocksDouble(state)) => plan.process(state, source, sink),
             (Plan::RecursionSingle(plan), StreamState::RecursionSingle(state)) => {
                 plan.process(state, source, sink)
             }
@@ -368,11 +394,18 @@ impl Plan {
             (SynthesisFilters::Fir(taps), _) if taps.len() != channels => {
                 Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
             }
-            (SynthesisFilters::Fir(taps), Precision::Single) => {
-                FirPlan::new(taps, ratio, options.isa).map(Self::Single)
-            }
-            (SynthesisFilters::Fir(taps), Precision::Double) => {
-                FirPlan::new(taps, ratio, options.isa).map(Self::Double)
+            (SynthesisFilters::Fir(taps), precision) => {
+                let len = options.form.transform_len(taps, ratio, precision)?;
+                match (precision, len) {
+                    (Precision::Single, None) => FirPlan::new(taps, ratio, options.isa).map(Self::Single),
+                    (Precision::Double, None) => FirPlan::new(taps, ratio, options.isa).map(Self::Double),
+                    (Precision::Single, Some(len)) => {
+                        OverlapSavePlan::new(taps, ratio, len, options.isa).map(Self::BlocksSingle)
+                    }
+                    (Precision::Double, Some(len)) => {
+                        OverlapSavePlan::new(taps, ratio, len, options.isa).map(Self::BlocksDouble)
+                    }
+                }
             }
             (SynthesisFilters::StateSpace(filter), _) => match options.recursion {
                 Precision::Single => {
@@ -385,10 +418,21 @@ impl Plan {
         }
     }
 
+    /// Ticks by which outputs are later than their last input.
+    fn delay(&self) -> usize {
+        match self {
+            Self::BlocksSingle(plan) => plan.shape.delay(),
+            Self::BlocksDouble(plan) => plan.shape.delay(),
+            _ => 0,
+        }
+    }
+
     fn state(&self) -> StreamState {
         match self {
             Self::Single(plan) => StreamState::Single(plan.state()),
             Self::Double(plan) => StreamState::Double(plan.state()),
+            Self::BlocksSingle(plan) => StreamState::BlocksSingle(plan.state()),
+            Self::BlocksDouble(plan) => StreamState::BlocksDouble(plan.state()),
             Self::RecursionSingle(plan) => StreamState::RecursionSingle(plan.state()),
             Self::RecursionDouble(plan) => StreamState::RecursionDouble(plan.state()),
         }
