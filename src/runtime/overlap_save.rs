@@ -15,7 +15,7 @@ use super::BuildError;
 use super::aligned::Aligned;
 use super::fir::{check_finite, replace_not_finite};
 use super::sample::Sample;
-use super::simd::{Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples};
+use super::simd::{Frames, Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples};
 use super::ticks::{FastSink, TickSource};
 
 /// Samples of all spectra: more would take gigabytes.
@@ -99,9 +99,14 @@ pub(crate) struct OverlapSaveState<T: Sample> {
     filled: usize,
     /// Outputs of the batch before.
     output: Aligned<T>,
-    /// Work memory: rows of channels, rows of phases.
-    channel_rows: Aligned<T>,
-    phase_rows: Aligned<T>,
+    work: Work<T>,
+}
+
+/// Rows of channels and rows of phases.
+#[derive(Debug, Clone)]
+struct Work<T: Sample> {
+    channels: Aligned<T>,
+    phases: Aligned<T>,
 }
 
 impl<T: Sample> OverlapSavePlan<T> {
@@ -134,8 +139,10 @@ impl<T: Sample> OverlapSavePlan<T> {
             frames: Aligned::new((shape.history + shape.batch()) * shape.channels + beyond),
             filled: 0,
             output: Aligned::new(shape.batch() * shape.ratio + beyond),
-            channel_rows: Aligned::new(shape.inputs() * plane),
-            phase_rows: Aligned::new(shape.outputs() * plane),
+            work: Work {
+                channels: Aligned::new(shape.inputs() * plane),
+                phases: Aligned::new(shape.outputs() * plane),
+            },
         }
     }
 
@@ -146,23 +153,69 @@ impl<T: Sample> OverlapSavePlan<T> {
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
-        let (m, batch) = (self.shape.ratio, self.shape.batch());
+        let Shape { channels: n, ratio: m, .. } = self.shape;
+        let (batch, frames) = (self.shape.batch(), source.frames::<T>());
+        // Ticks of the call from which on the frames are known to be finite, those that the state knows, and
+        // those whose outputs are in the sink.
+        let (mut clean, mut known, mut written) = (0, 0, 0);
         let (mut replaced, mut first) = (0, 0);
         while first < source.ticks() {
             let ticks = (source.ticks() - first).min(batch - state.filled);
-            replaced += self.gather(state, source, first, ticks);
-            let complete = state.filled + ticks == batch;
+            let end = first + ticks;
+            let in_place = frames.and_then(|frames| self.in_place(frames, clean, first, ticks));
+            if in_place.is_none() {
+                if let (true, Some(frames)) = (known < first, frames) {
+                    state.recall(&frames[..first * n], self.shape.history * n);
+                }
+                let count = self.gather(state, source, first, ticks);
+                if count > 0 {
+                    (replaced, clean) = (replaced + count, end);
+                }
+                known = end;
+            }
             // The last tick of a batch already takes the first output of it, the others take the next ones.
-            let late = ticks - usize::from(complete);
-            sink.store(self.isa, first * m, &state.output[(state.filled + 1) * m..][..late * m]);
+            let complete = state.filled + ticks == batch;
+            let late = end - usize::from(complete);
+            let from = written.max(first);
+            if from < late {
+                let held = &state.output[(state.filled + 1 + from - first) * m..][..(late - from) * m];
+                sink.store(self.isa, from * m, held);
+            }
             state.filled += ticks;
             if complete {
-                self.batch(state);
-                sink.store(self.isa, (first + late) * m, &state.output[..m]);
+                // Whole lanes are written, so somewhat more than the batch must still be to come.
+                let slots = if late + batch + group_lanes::<T>() <= source.ticks() {
+                    sink.slots(late * m..(late + batch + group_lanes::<T>()) * m)
+                } else {
+                    None
+                };
+                if slots.is_some() {
+                    written = late + batch;
+                }
+                let held = slots.is_none();
+                self.batch(state, in_place, slots);
+                if held {
+                    sink.store(self.isa, late * m, &state.output[..m]);
+                }
             }
-            first += ticks;
+            first = end;
+        }
+        if let (true, Some(frames)) = (known < first, frames) {
+            state.recall(&frames[..first * n], self.shape.history * n);
         }
         replaced
+    }
+
+    /// The frames of a whole batch with their past as they lie in the caller's memory, if they are all there
+    /// and finite.
+    fn in_place<'a>(&self, frames: &'a [T], clean: usize, first: usize, ticks: usize) -> Option<&'a [T]> {
+        let Shape { channels, history, .. } = self.shape;
+        let from = first.checked_sub(history).filter(|&from| ticks == self.shape.batch() && from >= clean)?;
+        let x = &frames[from * channels..];
+        let len = (history + ticks) * channels;
+        // Frames are read as whole groups.
+        let fits = len + group_lanes::<T>() <= x.len();
+        (fits && T::all_finite(self.isa, &x[history * channels..len + group_lanes::<T>()])).then_some(x)
     }
 
     /// The next frames of the batch; returns how many samples were not finite and are 0 now.
@@ -179,62 +232,57 @@ impl<T: Sample> OverlapSavePlan<T> {
         if T::all_finite(self.isa, room) { 0 } else { replace_not_finite(room) }
     }
 
-    /// The outputs of a complete batch; its end becomes the past.
-    fn batch(&self, state: &mut OverlapSaveState<T>) {
-        let Shape { channels, history, .. } = self.shape;
-        self.filter(state);
-        if !T::all_finite(self.isa, &state.output) {
-            scale(&mut state.frames, 1.0 / SCALE);
-            self.filter(state);
-            scale(&mut state.output, SCALE);
-            scale(&mut state.frames, SCALE);
-        }
+    /// The outputs of a complete batch, whose frames are `outside` or in the state, to `slots` or the state.
+    fn batch(&self, state: &mut OverlapSaveState<T>, outside: Option<&[T]>, slots: Option<&mut [T]>) {
+        let OverlapSaveState { frames, output, work, filled } = state;
+        let Shape { channels, ratio, history, .. } = self.shape;
         let batch = self.shape.batch();
-        state.frames.copy_within(batch * channels..(batch + history) * channels, 0);
-        state.filled = 0;
+        let output = slots.unwrap_or(output);
+        self.filter(work, outside.unwrap_or(frames), output);
+        let wanted = &mut output[..batch * ratio];
+        if !T::all_finite(self.isa, wanted) {
+            if let Some(outside) = outside {
+                let len = frames.len();
+                frames.copy_from_slice(&outside[..len]);
+            }
+            scale(frames, 1.0 / SCALE);
+            self.filter(work, frames, output);
+            scale(&mut output[..batch * ratio], SCALE);
+            scale(frames, SCALE);
+        }
+        if outside.is_none() {
+            frames.copy_within(batch * channels..(batch + history) * channels, 0);
+        }
+        *filled = 0;
     }
 
-    fn filter(&self, state: &mut OverlapSaveState<T>) {
-        let Shape { channels, depth, len, .. } = self.shape;
+    /// From frames to the outputs of a batch, and to a group of lanes behind it.
+    fn filter(&self, work: &mut Work<T>, frames: &[T], output: &mut [T]) {
+        let Shape { channels, ratio, depth, len, .. } = self.shape;
         let plane = len * row_samples::<T>();
-        let hop = self.shape.block() * channels;
-        for (i, rows) in state.channel_rows.chunks_exact_mut(plane).enumerate() {
-            let frames = &state.frames[i * depth..];
+        let block = self.shape.block();
+        let hop = block * channels;
+        for (i, rows) in work.channels.chunks_exact_mut(plane).enumerate() {
+            let frames = &frames[i * depth..];
             let segments = Segments { parts: [frames, &frames[hop..]], stride: channels, hop: 2 * hop };
             self.kernel.forward(&self.transform, depth, segments, rows);
         }
         let spectra = Spectra { channels, rows: &self.spectra };
-        self.kernel.product(&self.transform, depth, spectra, &state.channel_rows, &mut state.phase_rows);
-        for rows in state.phase_rows.chunks_exact_mut(plane) {
+        self.kernel.product(&self.transform, depth, spectra, &work.channels, &mut work.phases);
+        for rows in work.phases.chunks_exact_mut(plane) {
             self.kernel.inverse(&self.transform, rows);
         }
-        match depth {
-            1 => self.scatter::<1>(state),
-            2 => self.scatter::<2>(state),
-            4 => self.scatter::<4>(state),
-            _ => self.scatter::<8>(state),
-        }
-    }
-
-    /// The last B rows of each block to the batch's outputs, tick by tick: the lanes that mean nothing are overwritten by
-    /// what comes behind them.
-    fn scatter<const D: usize>(&self, state: &mut OverlapSaveState<T>) {
-        let Shape { ratio, history, segments, len, .. } = self.shape;
-        let (row, group) = (row_samples::<T>(), group_lanes::<T>());
-        let mut tick = 0;
-        for lane in (0..segments).flat_map(|s| [s * D, group + s * D]) {
-            for t in history..len {
-                for (o, rows) in state.phase_rows.chunks_exact(len * row).enumerate() {
-                    let lanes = &rows[t * row + lane..][..D];
-                    state.output[tick * ratio + o * D..][..D].copy_from_slice(lanes);
-                }
-                tick += 1;
-            }
-        }
+        let to = Frames { samples: output, stride: ratio, count: block };
+        self.kernel.scatter(&self.transform, depth, &work.phases, to);
     }
 }
 
 impl<T: Sample> OverlapSaveState<T> {
+    /// The past is the end of `frames`, the first `past` samples of the state's.
+    fn recall(&mut self, frames: &[T], past: usize) {
+        self.frames[..past].copy_from_slice(&frames[frames.len() - past..]);
+    }
+
     /// As new.
     pub(crate) fn reset(&mut self) {
         self.frames.fill(T::default());

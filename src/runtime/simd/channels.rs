@@ -94,14 +94,14 @@ impl ChannelVector for Avx2F32 {
     #[inline(always)]
     unsafe fn gather<const D: usize>(at: *const f32, hop: usize, _: usize) -> Self {
         unsafe {
-            let pair = |s: usize| at.add(s * hop).cast::<f64>();
-            let pairs = |s: usize| _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(pair(s)), pair(s + 1)));
+            let s = |segment: usize| at.add(segment * hop);
             Self(match D {
-                1 => {
-                    let x: [f32; 8] = std::array::from_fn(|s| *at.add(s * hop));
-                    _mm256_loadu_ps(x.as_ptr())
+                1 => _mm256_setr_ps(*s(0), *s(1), *s(2), *s(3), *s(4), *s(5), *s(6), *s(7)),
+                2 => {
+                    let low = _mm_loadh_pd(_mm_load_sd(s(0).cast()), s(1).cast());
+                    let high = _mm_loadh_pd(_mm_load_sd(s(2).cast()), s(3).cast());
+                    _mm256_castpd_ps(_mm256_set_m128d(high, low))
                 }
-                2 => _mm256_set_m128(pairs(2), pairs(0)),
                 4 => _mm256_set_m128(_mm_loadu_ps(at.add(hop)), _mm_loadu_ps(at)),
                 _ => _mm256_loadu_ps(at),
             })
@@ -111,12 +111,11 @@ impl ChannelVector for Avx2F32 {
     #[inline(always)]
     unsafe fn spread<const D: usize>(row: *const f32, n: usize, _: usize) -> Self {
         unsafe {
-            let row_of = |control| _mm256_permutevar_ps(_mm256_loadu_ps(row), control);
             Self(match D {
                 1 => _mm256_loadu_ps(row),
                 2 if n == 0 => _mm256_moveldup_ps(_mm256_loadu_ps(row)),
                 2 => _mm256_movehdup_ps(_mm256_loadu_ps(row)),
-                4 => row_of(_mm256_set1_epi32(n as i32)),
+                4 => _mm256_permutevar_ps(_mm256_loadu_ps(row), _mm256_set1_epi32(n as i32)),
                 _ => _mm256_set1_ps(*row.add(n)),
             })
         }
@@ -148,9 +147,9 @@ impl ChannelVector for Avx2F64 {
     #[inline(always)]
     unsafe fn gather<const D: usize>(at: *const f64, hop: usize, _: usize) -> Self {
         unsafe {
-            let pairs = |s: usize| _mm_loadh_pd(_mm_load_sd(at.add(s * hop)), at.add((s + 1) * hop));
+            let s = |segment: usize| at.add(segment * hop);
             Self(match D {
-                1 => _mm256_set_m128d(pairs(2), pairs(0)),
+                1 => _mm256_setr_pd(*s(0), *s(1), *s(2), *s(3)),
                 2 => _mm256_set_m128d(_mm_loadu_pd(at.add(hop)), _mm_loadu_pd(at)),
                 _ => _mm256_loadu_pd(at),
             })

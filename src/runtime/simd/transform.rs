@@ -66,11 +66,6 @@ impl<T: Copy + Default> Transform<T> {
         Self { len, factors: Aligned::from_slice(&factors), pairs }
     }
 
-    /// F.
-    pub(crate) fn len(&self) -> usize {
-        self.len
-    }
-
     /// The row of each frequency 0 <= f <= F / 2.
     pub(crate) fn half_rows(&self) -> impl Iterator<Item = usize> {
         self.pairs.iter().map(|&[row, _]| row as usize)
@@ -102,6 +97,26 @@ pub(crate) struct Segments<'a, T> {
 pub(crate) struct Spectra<'a, T> {
     pub(crate) channels: usize,
     pub(crate) rows: &'a [T],
+}
+
+/// Where rows go: the last rows of each segment's real parts, then of its imaginary parts, segment after segment.
+#[derive(Debug)]
+pub(crate) struct Frames<'a, T> {
+    pub(crate) samples: &'a mut [T],
+    /// M, samples from frame to frame.
+    pub(crate) stride: usize,
+    /// B, the last rows that are wanted.
+    pub(crate) count: usize,
+}
+
+struct ScatterJob<T> {
+    rows: *const T,
+    /// Samples of the rows of one group of lanes, and groups.
+    plane: usize,
+    groups: usize,
+    out: *mut T,
+    stride: usize,
+    count: usize,
 }
 
 struct ForwardJob<T> {
@@ -139,6 +154,7 @@ pub(crate) struct TransformKernel<T: 'static> {
     forward: &'static [unsafe fn(&ForwardJob<T>)],
     product: &'static [unsafe fn(&ProductJob<'_, T>)],
     inverse: unsafe fn(&InverseJob<T>),
+    scatter: &'static [unsafe fn(&ScatterJob<T>)],
 }
 
 impl<T: Copy + Default + 'static> TransformKernel<T> {
@@ -175,6 +191,31 @@ impl<T: Copy + Default + 'static> TransformKernel<T> {
         let job = InverseJob { len: transform.len, factors, rows: rows.as_mut_ptr() };
         // SAFETY: as above.
         unsafe { (self.inverse)(&job) };
+    }
+
+    /// Brings rows to where they belong, `depth` lanes to a frame from each of its groups. Each frame is written as
+    /// whole lanes and what is too much overwritten by the next one, which also goes for what follows the
+    /// last one.
+    ///
+    /// # Panics
+    /// If slices do not fit: the last frame needs whole lanes.
+    pub(crate) fn scatter(&self, transform: &Transform<T>, depth: usize, rows: &[T], to: Frames<'_, T>) {
+        let plane = transform.len * row_samples::<T>();
+        let groups = rows.len() / plane;
+        assert!(depth.is_power_of_two() && depth <= group_lanes::<T>());
+        assert!(groups > 0 && rows.len() == groups * plane && (1..=transform.len).contains(&to.count));
+        let frames = 2 * group_lanes::<T>() / depth * to.count;
+        assert!((frames - 1) * to.stride + groups * depth <= to.samples.len());
+        let job = ScatterJob {
+            rows: rows[(transform.len - to.count) * row_samples::<T>()..].as_ptr(),
+            plane,
+            groups,
+            out: to.samples.as_mut_ptr(),
+            stride: to.stride,
+            count: to.count,
+        };
+        // SAFETY: as above.
+        unsafe { self.scatter[depth.ilog2() as usize](&job) };
     }
 
     /// Y(f) = H(f) X(f): from F rows for each `depth` channels to F rows for each group of phases.
@@ -282,111 +323,157 @@ impl<V: ChannelVector> Complex<V> {
     }
 }
 
-/// The transform of length 4.
+/// The transform of length 4, or four times its inverse.
 #[inline(always)]
-unsafe fn quarter<V: ChannelVector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
+unsafe fn quarter<V: ChannelVector, const BACK: bool>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
     unsafe {
         let (even, odd) = (a.add(c), b.add(d));
         let (even_far, odd_far) = (a.sub(c), b.sub(d));
-        [even.add(odd), even_far.sub_turned(odd_far), even.sub(odd), even_far.add_turned(odd_far)]
+        let (minus, plus) = (even_far.sub_turned(odd_far), even_far.add_turned(odd_far));
+        let (first, third) = if BACK { (plus, minus) } else { (minus, plus) };
+        [even.add(odd), first, even.sub(odd), third]
     }
 }
 
-/// Four times its inverse.
-#[inline(always)]
-unsafe fn quarter_back<V: ChannelVector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
-    unsafe {
-        let (even, odd) = (a.add(c), b.add(d));
-        let (even_far, odd_far) = (a.sub(c), b.sub(d));
-        [even.add(odd), even_far.add_turned(odd_far), even.sub(odd), even_far.sub_turned(odd_far)]
+/// Where a pass takes its rows from. No closure: what is not inlined is not compiled for the instruction set.
+///
+/// # Safety
+/// As for [`Vector`](super::vector::Vector), and the rows exist.
+trait Rows<V: ChannelVector> {
+    unsafe fn row(&self, row: usize) -> Complex<V>;
+
+    /// Four rows, `quarter` apart.
+    #[inline(always)]
+    unsafe fn four(&self, first: usize, quarter: usize) -> [Complex<V>; 4] {
+        unsafe {
+            [
+                self.row(first),
+                self.row(first + quarter),
+                self.row(first + 2 * quarter),
+                self.row(first + 3 * quarter),
+            ]
+        }
+    }
+}
+
+/// Frames where they lie, D lanes of each segment, from lane `part` on.
+struct Gathered<'a, V: ChannelVector, const D: usize> {
+    job: &'a ForwardJob<V::Sample>,
+    part: usize,
+}
+
+impl<V: ChannelVector, const D: usize> Rows<V> for Gathered<'_, V, D> {
+    #[inline(always)]
+    unsafe fn row(&self, row: usize) -> Complex<V> {
+        let ForwardJob { parts: [re, im], stride, hop, .. } = *self.job;
+        unsafe {
+            Complex {
+                re: V::gather::<D>(re.add(row * stride), hop, self.part),
+                im: V::gather::<D>(im.add(row * stride), hop, self.part),
+            }
+        }
     }
 }
 
 /// Some lanes of all rows.
+#[derive(Clone, Copy)]
 struct Work<V: ChannelVector> {
     rows: *mut V::Sample,
     len: usize,
 }
 
+impl<V: ChannelVector> Rows<V> for Work<V> {
+    #[inline(always)]
+    unsafe fn row(&self, row: usize) -> Complex<V> {
+        unsafe { Complex::load(self.at(row)) }
+    }
+}
+
 /// # Safety
-/// As for [`Vector`](super::vector::Vector), and all rows exist.
+/// As for [`Rows`].
 impl<V: ChannelVector> Work<V> {
     #[inline(always)]
     unsafe fn at(&self, row: usize) -> *mut V::Sample {
         unsafe { self.rows.add(row * row_samples::<V::Sample>()) }
     }
 
-    /// Four rows, `quarter` apart.
     #[inline(always)]
-    unsafe fn load(&self, first: usize, quarter: usize) -> [Complex<V>; 4] {
-        std::array::from_fn(|r| unsafe { Complex::load(self.at(first + r * quarter)) })
-    }
-
-    #[inline(always)]
-    unsafe fn store(&self, first: usize, quarter: usize, rows: [Complex<V>; 4]) {
-        for (r, row) in rows.into_iter().enumerate() {
-            unsafe { row.store(self.at(first + r * quarter)) };
+    unsafe fn store(&self, first: usize, quarter: usize, [a, b, c, d]: [Complex<V>; 4]) {
+        unsafe {
+            a.store(self.at(first));
+            b.store(self.at(first + quarter));
+            c.store(self.at(first + 2 * quarter));
+            d.store(self.at(first + 3 * quarter));
         }
     }
 
     /// The factors of place j >= 1 of a pass.
     #[inline(always)]
     unsafe fn turns(factors: *const V::Sample, j: usize) -> [Complex<V>; 3] {
-        std::array::from_fn(|r| unsafe { Complex::splat(factors.add(6 * (j - 1) + 2 * r)) })
+        unsafe {
+            let at = factors.add(6 * (j - 1));
+            [Complex::splat(at), Complex::splat(at.add(2)), Complex::splat(at.add(4))]
+        }
     }
 
-    /// One pass over `base .. base + span`, whose rows come from `load`.
+    /// One pass over `base .. base + span`.
     #[inline(always)]
-    unsafe fn forward_pass(
-        &self,
-        base: usize,
-        span: usize,
-        factors: *const V::Sample,
-        load: impl Fn(usize) -> [Complex<V>; 4],
-    ) {
+    unsafe fn forward_pass(&self, from: &impl Rows<V>, base: usize, span: usize, factors: *const V::Sample) {
+        let next = span / 4;
         unsafe {
-            self.store(base, span / 4, quarter(load(base)));
-            for j in 1..span / 4 {
-                let ([a, b, c, d], [w1, w2, w3]) = (quarter(load(base + j)), Self::turns(factors, j));
-                self.store(base + j, span / 4, [a, b.mul(w1), c.mul(w2), d.mul(w3)]);
+            self.store(base, next, quarter::<V, false>(from.four(base, next)));
+            for j in 1..next {
+                let [w1, w2, w3] = Self::turns(factors, j);
+                let [a, b, c, d] = quarter::<V, false>(from.four(base + j, next));
+                self.store(base + j, next, [a, b.mul(w1), c.mul(w2), d.mul(w3)]);
             }
         }
     }
 
-    /// What is left when the spans are 4 or 2 rows long; `four` is one way or the other.
     #[inline(always)]
-    unsafe fn short_spans(&self, span: usize, four: impl Fn([Complex<V>; 4]) -> [Complex<V>; 4]) {
+    unsafe fn inverse_pass(&self, base: usize, span: usize, factors: *const V::Sample) {
+        let next = span / 4;
+        unsafe {
+            self.store(base, next, quarter::<V, true>(self.four(base, next)));
+            for j in 1..next {
+                let [w1, w2, w3] = Self::turns(factors, j);
+                let [a, b, c, d] = self.four(base + j, next);
+                let turned = [a, b.mul_conjugate(w1), c.mul_conjugate(w2), d.mul_conjugate(w3)];
+                self.store(base + j, next, quarter::<V, true>(turned));
+            }
+        }
+    }
+
+    /// The pass over spans of 4 rows, or of 2.
+    #[inline(always)]
+    unsafe fn short_spans<const BACK: bool>(&self, span: usize) {
         for base in (0..self.len).step_by(4) {
             unsafe {
-                let rows = self.load(base, 1);
-                let [a, b, c, d] = rows;
-                let done = if span == 4 { four(rows) } else { [a.add(b), a.sub(b), c.add(d), c.sub(d)] };
+                let [a, b, c, d] = self.four(base, 1);
+                let done = if span == 4 {
+                    quarter::<V, BACK>([a, b, c, d])
+                } else {
+                    [a.add(b), a.sub(b), c.add(d), c.sub(d)]
+                };
                 self.store(base, 1, done);
             }
         }
     }
 
     #[inline(always)]
-    unsafe fn forward<const D: usize>(&self, job: &ForwardJob<V::Sample>, part: usize) {
+    unsafe fn forward(&self, from: &impl Rows<V>, mut factors: *const V::Sample) {
         unsafe {
-            let mut factors = job.factors;
+            self.forward_pass(from, 0, self.len, factors);
             let mut span = self.len / 4;
-            let frame = |row: usize, p: usize| V::gather::<D>(job.parts[p].add(row * job.stride), job.hop, part);
-            self.forward_pass(0, self.len, factors, |row| {
-                std::array::from_fn(|r| {
-                    let row = row + r * (self.len / 4);
-                    Complex { re: frame(row, 0), im: frame(row, 1) }
-                })
-            });
-            factors = factors.add(6 * (span - 1));
             while span > 4 {
+                // Those of the pass before, whose spans were four times as long.
+                factors = factors.add(6 * (span - 1));
                 for base in (0..self.len).step_by(span) {
-                    self.forward_pass(base, span, factors, |row| self.load(row, span / 4));
+                    self.forward_pass(self, base, span, factors);
                 }
-                factors = factors.add(6 * (span / 4 - 1));
                 span /= 4;
             }
-            self.short_spans(span, |rows| quarter(rows));
+            self.short_spans::<false>(span);
         }
     }
 
@@ -394,17 +481,11 @@ impl<V: ChannelVector> Work<V> {
     unsafe fn inverse(&self, mut factors: *const V::Sample) {
         unsafe {
             let mut span = if self.len.ilog2().is_multiple_of(2) { 4 } else { 2 };
-            self.short_spans(span, |rows| quarter_back(rows));
+            self.short_spans::<true>(span);
             while span < self.len {
                 (factors, span) = (factors.sub(6 * (span - 1)), 4 * span);
                 for base in (0..self.len).step_by(span) {
-                    self.store(base, span / 4, quarter_back(self.load(base, span / 4)));
-                    for j in 1..span / 4 {
-                        let ([a, b, c, d], [w1, w2, w3]) =
-                            (self.load(base + j, span / 4), Self::turns(factors, j));
-                        let turned = [a, b.mul_conjugate(w1), c.mul_conjugate(w2), d.mul_conjugate(w3)];
-                        self.store(base + j, span / 4, quarter_back(turned));
-                    }
+                    self.inverse_pass(base, span, factors);
                 }
             }
         }
@@ -415,7 +496,10 @@ impl<V: ChannelVector> Work<V> {
 unsafe fn forward<V: ChannelVector, const D: usize>(job: &ForwardJob<V::Sample>) {
     for part in (0..group_lanes::<V::Sample>()).step_by(V::LANES) {
         // SAFETY: the caller's.
-        unsafe { Work::<V> { rows: job.rows.add(part), len: job.len }.forward::<D>(job, part) };
+        unsafe {
+            let work = Work::<V> { rows: job.rows.add(part), len: job.len };
+            work.forward(&Gathered::<V, D> { job, part }, job.factors);
+        }
     }
 }
 
@@ -438,6 +522,31 @@ unsafe fn product<V: ChannelVector, const D: usize>(job: &ProductJob<'_, V::Samp
                 unsafe { product_at::<V, D>(job, pair, spectra, output, part) };
             }
             spectra = spectra.wrapping_add(job.channels * row);
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn scatter<V: ChannelVector, const D: usize>(job: &ScatterJob<V::Sample>) {
+    let (row, group) = (row_samples::<V::Sample>(), group_lanes::<V::Sample>());
+    let (mut out, count, stride) = (job.out, job.count, job.stride);
+    for part in 0..2 * group / D {
+        // Real and imaginary parts take turns.
+        let mut lanes = job.rows.wrapping_add(part % 2 * group + part / 2 * D);
+        for _ in 0..count {
+            // SAFETY: the caller's.
+            unsafe {
+                if D < group {
+                    out.cast::<[V::Sample; D]>().write_unaligned(lanes.cast::<[V::Sample; D]>().read_unaligned());
+                } else {
+                    for g in 0..job.groups {
+                        for l in (0..group).step_by(V::LANES) {
+                            V::load(lanes.add(g * job.plane + l)).store(out.add(g * group + l));
+                        }
+                    }
+                }
+            }
+            (lanes, out) = (lanes.wrapping_add(row), out.wrapping_add(stride));
         }
     }
 }
@@ -508,10 +617,17 @@ macro_rules! kernels {
                 unsafe { inverse::<$vector>(job) }
             }
 
+            $(#[target_feature(enable = $features)])?
+            unsafe fn run_scatter<const D: usize>(job: &ScatterJob<$sample>) {
+                // SAFETY: the caller's.
+                unsafe { scatter::<$vector, D>(job) }
+            }
+
             pub(super) const KERNEL: TransformKernel<$sample> = TransformKernel {
                 forward: &[$(run_forward::<$depth>),*],
                 product: &[$(run_product::<$depth>),*],
                 inverse: run_inverse,
+                scatter: &[$(run_scatter::<$depth>),*],
             };
         }
     };
