@@ -1,44 +1,77 @@
-//! proto
+//! From how many taps a phase on does overlap-save take less time than the direct form?
+//!
+//! `cargo bench --bench crossover` measures both along a ladder of K for several N and M, overlap-save with the four shortest
+//! transforms that hold a block of K ticks, in nanoseconds a tick (best of many repeats), and sets beside them
+//! what the plan chooses. The constants of the plan's cost model (`src/runtime/form.rs`) were fitted to this table. Words
+//! after `--`: `f64` for double precision.
+
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
-use hybank::runtime::{Form, Isa, Options, Reconstructor, multiply_add_chains};
+use hybank::runtime::{Form, Options, Precision, Reconstructor};
 use hybank::spec::Method;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+const TICKS: usize = 16_384;
+/// Time for the repeats of one figure.
+const EACH: Duration = Duration::from_millis(40);
+const SHAPES: [(usize, usize); 11] =
+    [(1, 1), (1, 4), (2, 2), (3, 3), (4, 1), (4, 4), (8, 2), (2, 8), (6, 6), (8, 8), (16, 16)];
+const LAGS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
+
 fn fir(n: usize, m: usize, taps: usize) -> Bank {
     let f = |i: usize| (0..taps).map(|t| ((t * 7 + i * 3) % 11) as f64 / 11.0 - 0.5).collect();
-    Bank { spec: None, fast_period: 1.0, ratio: m, latency: 0, method: Method::Fir, delays: vec![0.0; n],
-        filters: SynthesisFilters::Fir((0..n).map(f).collect()), gamma: Gamma::default(), proof: None }
+    Bank {
+        spec: None,
+        fast_period: 1.0,
+        ratio: m,
+        latency: 0,
+        method: Method::Fir,
+        delays: vec![0.0; n],
+        filters: SynthesisFilters::Fir((0..n).map(f).collect()),
+        gamma: Gamma::default(),
+        proof: None,
+    }
 }
-fn main() {
-    let args: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
-    let (n, m, k) = (args[0], args[1], args[2]);
-    let ticks = 65536;
-    let x: Vec<f32> = (0..n * ticks).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect();
-    let mut y = vec![0.0f32; m * ticks];
-    let mut want = vec![0.0f32; m * ticks];
-    let mut forms = vec![Form::Direct];
-    let mut f = (2 * k).next_power_of_two().max(16);
-    for _ in 0..5 { forms.push(Form::OverlapSave(Some(f))); f *= 2; }
-    for form in forms {
-        let mut s = Reconstructor::with_options(&fir(n, m, k * m), Options { form, ..Options::default() }).unwrap();
-        let (mut best, mut peak) = (f64::MAX, 0f64);
-        let begin = Instant::now();
-        while begin.elapsed() < Duration::from_millis(300) {
-            let t = Instant::now();
-            for (x, y) in x.chunks(16384 * n).zip(y.chunks_mut(16384 * m)) { s.process(black_box(x), y).unwrap(); }
-            best = best.min(t.elapsed().as_secs_f64());
-            let t = Instant::now();
-            let (c, sum) = multiply_add_chains(Isa::detect(), 10_000);
-            black_box(sum);
-            peak = peak.max(c as f64 / t.elapsed().as_secs_f64());
+
+/// Nanoseconds a tick, in numbers of the kernels' own type.
+fn measure(bank: &Bank, options: Options) -> f64 {
+    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let (n, m) = (stream.channels(), stream.ratio());
+    let x: Vec<f64> = (0..n * TICKS).map(|i| ((i * 7919) % 1000) as f64 / 1000.0 - 0.5).collect();
+    let narrow: Vec<f32> = x.iter().map(|&x| x as f32).collect();
+    let (mut y, mut narrow_y) = (vec![0.0; m * TICKS], vec![0.0; m * TICKS]);
+    let mut best = f64::MAX;
+    let begin = Instant::now();
+    while begin.elapsed() < EACH {
+        let start = Instant::now();
+        match options.precision {
+            Precision::Single => stream.process(black_box(&narrow), &mut narrow_y),
+            Precision::Double => stream.process_f64(black_box(&x), &mut y),
         }
-        s.reset();
-        let mut y2 = vec![0.0f32; m * ticks];
-        s.process(&x, &mut y2).unwrap();
-        if form == Form::Direct { want.copy_from_slice(&y2); }
-        let lat = s.latency();
-        let err = y2[lat..].iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0f32, f32::max);
-        println!("{form:?} {:.2} ns/tick, {:.0} % of peak, late {} , err {err:e}", best / ticks as f64 * 1e9, (n * m * k * ticks) as f64 / best / peak * 100.0, lat);
+        .unwrap();
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    best / TICKS as f64 * 1e9
+}
+
+fn main() {
+    let double = std::env::args().any(|word| word == "f64");
+    let precision = if double { Precision::Double } else { Precision::Single };
+    println!("| N | M | K | direct, ns a tick | overlap-save, F: ns a tick | the plan |");
+    println!("|---|---|---|---|---|---|");
+    for (n, m) in SHAPES {
+        for k in LAGS {
+            let bank = fir(n, m, k * m);
+            let options = |form| Options { precision, form, ..Options::default() };
+            let direct = measure(&bank, options(Form::Direct));
+            let shortest = (2 * k).next_power_of_two().max(16);
+            let lengths = (0..4).map(|i| shortest << i);
+            let others: Vec<_> = lengths
+                .map(|len| format!("{len}: {:.2}", measure(&bank, options(Form::OverlapSave(Some(len))))))
+                .collect();
+            let plan = Reconstructor::with_options(&bank, options(Form::Fastest)).unwrap().plan();
+            let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
+            println!("| {n} | {m} | {k} | {direct:.2} | {} | {}{length} |", others.join(", "), plan.form);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::fir::{FirPlan, FirState};
 use super::form::Form;
-use super::overlap_save::{OverlapSavePlan, OverlapSaveState};
+use super::overlap_save::{OverlapSavePlan, OverlapSaveState, Shape};
 use super::sample::Sample;
 use super::simd::Isa;
 use super::state_space::{StateSpacePlan, StateSpaceState};
@@ -48,9 +48,10 @@ impl Default for Options {
 }
 
 /// How a bank runs, for reports.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct PlanSummary {
-    /// `polyphase` (FIR), `modal` (delay lines and parallel sections) or `dense` (delay lines and any other states).
+    /// `direct` or `overlap-save` (FIR), `modal` (delay lines and parallel sections) or `dense` (delay lines and any
+    /// other states).
     pub form: &'static str,
     /// Number type of the sums: `f32` or `f64`.
     pub numbers: &'static str,
@@ -58,6 +59,17 @@ pub struct PlanSummary {
     pub isa: String,
     /// Ticks that one step of the kernel takes together.
     pub fold: usize,
+    /// F, ticks of a transform, if the form has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transform: Option<usize>,
+    /// B, ticks of a block, of which a transform makes the outputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block: Option<usize>,
+    /// Fast samples by which the form is later than the bank's own latency.
+    pub extra_latency: usize,
+    /// Multiply-adds for each fast sample; additions of a transform count as such. `None` for recursions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub multiply_adds: Option<f64>,
 }
 
 /// Coefficients in the order of use, shared by any number of streams.
@@ -161,9 +173,14 @@ impl Reconstructor {
         }
     }
 
-    /// m0: output sample n belongs to the time of fast sample n - m0.
+    /// m0 and what the form adds to it: output sample n belongs to the time of fast sample n - latency.
     pub fn latency(&self) -> usize {
         self.latency
+    }
+
+    /// The part of the latency that is due to the form: y\[n\] of the direct form comes as sample n + extra.
+    pub fn extra_latency(&self) -> usize {
+        self.plan.delay() * self.ratio()
     }
 
     /// Ticks after which an input is forgotten; `None` for a recursion, which never forgets.
@@ -177,22 +194,35 @@ impl Reconstructor {
         }
     }
 
-    /// Ticks of zeros that bring out the last m0 samples.
+    /// Ticks of zeros that bring out the last samples, as many as the latency.
     pub fn flush_ticks(&self) -> usize {
         self.latency.div_ceil(self.ratio())
     }
 
     /// How the bank runs.
     pub fn plan(&self) -> PlanSummary {
-        let (form, numbers, fold) = match &*self.plan {
-            Plan::Single(plan) => ("polyphase", "f32", plan.fold),
-            Plan::Double(plan) => ("polyphase", "f64", plan.fold),
-            Plan::BlocksSingle(_) => ("overlap-save", "f32", 1),
-            Plan::BlocksDouble(_) => ("overlap-save", "f64", 1),
-            Plan::RecursionSingle(plan) => (recursion_form(plan.is_modal()), "f32", 1),
-            Plan::RecursionDouble(plan) => (recursion_form(plan.is_modal()), "f64", 1),
-        };
-        PlanSummary { form, numbers, isa: self.isa.to_string(), fold }
+        match &*self.plan {
+            Plan::Single(plan) => self.summary("direct", "f32", plan.fold).with_multiply_adds(plan.multiply_adds()),
+            Plan::Double(plan) => self.summary("direct", "f64", plan.fold).with_multiply_adds(plan.multiply_adds()),
+            Plan::BlocksSingle(plan) => self.summary("overlap-save", "f32", 1).with_blocks(&plan.shape),
+            Plan::BlocksDouble(plan) => self.summary("overlap-save", "f64", 1).with_blocks(&plan.shape),
+            Plan::RecursionSingle(plan) => self.summary(recursion_form(plan.is_modal()), "f32", 1),
+            Plan::RecursionDouble(plan) => self.summary(recursion_form(plan.is_modal()), "f64", 1),
+        }
+    }
+
+    /// What every form reports.
+    fn summary(&self, form: &'static str, numbers: &'static str, fold: usize) -> PlanSummary {
+        PlanSummary {
+            form,
+            numbers,
+            isa: self.isa.to_string(),
+            fold,
+            transform: None,
+            block: None,
+            extra_latency: self.extra_latency(),
+            multiply_adds: None,
+        }
     }
 
     /// Input samples that were NaN or infinite and became 0, since the beginning.
@@ -375,6 +405,17 @@ fn spans<T: Sample>(
         *state = last;
     }
     replaced
+}
+
+impl PlanSummary {
+    fn with_multiply_adds(self, a_sample: f64) -> Self {
+        Self { multiply_adds: Some(a_sample), ..self }
+    }
+
+    fn with_blocks(self, shape: &Shape) -> Self {
+        let (transform, block) = (Some(shape.len), Some(shape.block()));
+        Self { transform, block, ..self.with_multiply_adds(shape.multiply_adds()) }
+    }
 }
 
 fn recursion_form(modal: bool) -> &'static str {
