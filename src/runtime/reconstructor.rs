@@ -202,8 +202,12 @@ impl Reconstructor {
     /// How the bank runs.
     pub fn plan(&self) -> PlanSummary {
         match &*self.plan {
-            Plan::Single(plan) => self.summary("direct", "f32", plan.fold).with_multiply_adds(plan.multiply_adds()),
-            Plan::Double(plan) => self.summary("direct", "f64", plan.fold).with_multiply_adds(plan.multiply_adds()),
+            Plan::Single(plan) => {
+                self.summary("direct", "f32", plan.fold).with_multiply_adds(plan.multiply_adds())
+            }
+            Plan::Double(plan) => {
+                self.summary("direct", "f64", plan.fold).with_multiply_adds(plan.multiply_adds())
+            }
             Plan::BlocksSingle(plan) => self.summary("overlap-save", "f32", 1).with_blocks(&plan.shape),
             Plan::BlocksDouble(plan) => self.summary("overlap-save", "f64", 1).with_blocks(&plan.shape),
             Plan::RecursionSingle(plan) => self.summary(recursion_form(plan.is_modal()), "f32", 1),
@@ -269,8 +273,8 @@ impl Reconstructor {
     }
 
     /// As [`Reconstructor::process`], on up to `threads` threads at once, with the same bits: each takes a span of
-    /// ticks and begins with the filter memory before it. Calls with less than 4096 ticks a thread, and
-    /// recursions, stay on this thread. Unlike `process` it allocates (the states of the spans) and
+    /// ticks and begins with the filter memory before it. Calls with less than 4096 ticks a thread,
+    /// recursions and overlap-save stay on this thread. Unlike `process` it allocates (the states of the spans) and
     /// starts threads; it pays from about a million multiply-adds a span on.
     ///
     /// # Errors
@@ -447,6 +451,9 @@ impl Plan {
                         OverlapSavePlan::new(taps, ratio, len, options.isa).map(Self::BlocksDouble)
                     }
                 }
+            }
+            (SynthesisFilters::StateSpace(_), _) if matches!(options.form, Form::OverlapSave(_)) => {
+                Err(BuildError::Recursive)
             }
             (SynthesisFilters::StateSpace(filter), _) => match options.recursion {
                 Precision::Single => {

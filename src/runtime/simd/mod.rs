@@ -32,4 +32,6 @@ pub use isa::Isa;
 pub(crate) use layout::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
-pub(crate) use transform::{Frames, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples};
+pub(crate) use transform::{
+    Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples,
+};

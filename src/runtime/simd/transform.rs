@@ -24,6 +24,9 @@ use super::vector::{Avx2F32, Avx2F64};
 use crate::runtime::aligned::Aligned;
 use std::f64::consts::TAU;
 
+/// The shortest transform: two passes of radix 4.
+pub(crate) const SHORTEST_TRANSFORM: usize = 16;
+
 /// Lanes of a group.
 pub(crate) const fn group_lanes<T>() -> usize {
     32 / size_of::<T>()
@@ -45,13 +48,10 @@ pub(crate) struct Transform<T: Copy + Default> {
 }
 
 impl<T: Copy + Default> Transform<T> {
-    /// The shortest one.
-    pub(crate) const SHORTEST: usize = 16;
-
     /// # Panics
-    /// If the length is no power of two from [`Self::SHORTEST`] on, or too large for 32-bit places.
+    /// If the length is no power of two from [`SHORTEST_TRANSFORM`] on, or too large for 32-bit places.
     pub(crate) fn new(len: usize, from_f64: impl Fn(f64) -> T) -> Self {
-        assert!(len.is_power_of_two() && len >= Self::SHORTEST && u32::try_from(len).is_ok());
+        assert!(len.is_power_of_two() && len >= SHORTEST_TRANSFORM && u32::try_from(len).is_ok());
         let mut factors = Vec::new();
         let mut span = len;
         while span > 4 {
@@ -163,7 +163,13 @@ impl<T: Copy + Default + 'static> TransformKernel<T> {
     /// # Panics
     /// If `depth` is no power of two up to a group, or a slice is too short: the last frame needs `depth`
     /// samples.
-    pub(crate) fn forward(&self, transform: &Transform<T>, depth: usize, from: Segments<'_, T>, rows: &mut [T]) {
+    pub(crate) fn forward(
+        &self,
+        transform: &Transform<T>,
+        depth: usize,
+        from: Segments<'_, T>,
+        rows: &mut [T],
+    ) {
         let Segments { parts, stride, hop } = from;
         assert!(depth.is_power_of_two() && depth <= group_lanes::<T>());
         let needed = (transform.len - 1) * stride + (group_lanes::<T>() / depth - 1) * hop + depth;
@@ -537,7 +543,8 @@ unsafe fn scatter<V: ChannelVector, const D: usize>(job: &ScatterJob<V::Sample>)
             // SAFETY: the caller's.
             unsafe {
                 if D < group {
-                    out.cast::<[V::Sample; D]>().write_unaligned(lanes.cast::<[V::Sample; D]>().read_unaligned());
+                    out.cast::<[V::Sample; D]>()
+                        .write_unaligned(lanes.cast::<[V::Sample; D]>().read_unaligned());
                 } else {
                     for g in 0..job.groups {
                         for l in (0..group).step_by(V::LANES) {

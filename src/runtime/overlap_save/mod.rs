@@ -11,15 +11,21 @@
 //! eps log2 F times the norm of its filters times that of the inputs of its two blocks, and not only of those in
 //! the filter memory.
 
-use super::BuildError;
-use super::aligned::Aligned;
-use super::fir::{check_finite, replace_not_finite};
-use super::sample::Sample;
-use super::simd::{Frames, Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples};
-use super::ticks::{FastSink, TickSource};
+#[cfg(test)]
+mod tests;
+
+use crate::runtime::BuildError;
+use crate::runtime::aligned::Aligned;
+use crate::runtime::fir::{check_finite, replace_not_finite};
+use crate::runtime::form::lags;
+use crate::runtime::sample::Sample;
+use crate::runtime::simd::{
+    Frames, Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples,
+};
+use crate::runtime::ticks::{FastSink, TickSource};
 
 /// Samples of all spectra: more would take gigabytes.
-const MOST_SPECTRA: usize = 1 << 28;
+const MOST_SPECTRA: f64 = (1u64 << 28) as f64;
 
 /// Input that makes a transform overflow is made smaller by this, and its output larger. In between only
 /// digits below 2^40 times the smallest number are lost.
@@ -82,10 +88,10 @@ impl Shape {
         lanes / (self.batch() * self.ratio) as f64
     }
 
-    /// Samples of all spectra, `None` if they are too many to count.
-    fn spectra_samples<T>(&self) -> Option<usize> {
-        let rows = (self.len / 2 + 1).checked_mul(self.outputs())?.checked_mul(self.channels)?;
-        rows.checked_mul(row_samples::<T>())
+    /// False if the spectra would take gigabytes.
+    pub(crate) fn spectra_fit(&self) -> bool {
+        let rows = (self.len / 2 + 1) as f64 * (self.outputs() * self.channels) as f64;
+        rows * (2 * self.depth * self.segments) as f64 <= MOST_SPECTRA
     }
 }
 
@@ -124,12 +130,11 @@ impl<T: Sample> OverlapSavePlan<T> {
     /// of two from 16 on that is longer than the filters' memory.
     pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, len: usize, isa: Isa) -> Result<Self, BuildError> {
         check_finite::<T>(taps)?;
-        let history = super::form::lags(taps, ratio) - 1;
+        let history = lags(taps, ratio) - 1;
         let shape = Shape::new(taps.len(), ratio, history, len, group_lanes::<T>());
-        shape
-            .spectra_samples::<T>()
-            .filter(|&samples| samples <= MOST_SPECTRA)
-            .ok_or(BuildError::TooLong { history, channels: taps.len() })?;
+        if !shape.spectra_fit() {
+            return Err(BuildError::Spectra { channels: taps.len(), ratio, len });
+        }
         Ok(Self {
             shape,
             transform: Transform::new(len, T::from_f64),
