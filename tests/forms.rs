@@ -115,6 +115,8 @@ fn masks_line_up_with_every_form() {
     let (blocks, report) = fuse(&desk, &[&gaps[..], &["--form", "overlap-save"]].concat());
     same(&blocks, &direct);
     assert_eq!((&desk.read("mask"), &report["gaps"]), (&mask, list));
+    // What is not touched has the very bits of a whole recording unless asked otherwise.
+    assert_eq!(fuse(&desk, &gaps).0, direct);
 
     let (_, report) = stream(&desk, &[&gaps[..], &["--flush"]].concat());
     let (mask, list) = (desk.read("mask"), &report["gaps"]);

@@ -36,7 +36,7 @@ pub(super) struct Args {
     /// Samples of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
     #[arg(long, value_enum, default_value_t = Bits::F32)]
     bits: Bits,
-    /// Form of FIR filters; auto: whichever is faster for the bank
+    /// Form of FIR filters; auto: whichever is faster for the bank, and direct with --gaps
     #[arg(long, value_enum, default_value_t = FormArg::Auto)]
     form: FormArg,
     /// Keep the bank's latency: the causal output, as `stream` gives it
@@ -113,7 +113,9 @@ impl Args {
     /// The run at its beginning, with an output of `rate` hertz.
     fn fusing(&self, bank: &Bank, rate: f64) -> Result<Fusing, Failure> {
         let format = self.bits.format();
-        let form = self.form.form(Form::Fastest);
+        // Outside of what a gap touched the output is to have the very bits of a whole recording.
+        let auto = if self.gaps.are_bridged() { Form::Direct } else { Form::Fastest };
+        let form = self.form.form(auto);
         let options = Options { precision: precision(format), form, ..Options::default() };
         let stream = Reconstructor::with_options(bank, options)
             .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))?;

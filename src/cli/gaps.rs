@@ -60,6 +60,11 @@ impl GapArgs {
         self.lost.as_deref().map(LostSamples::read).transpose().map_err(Failure::input)
     }
 
+    /// True if gaps are to be bridged.
+    pub(super) fn are_bridged(&self) -> bool {
+        self.gaps.is_some()
+    }
+
     /// Which input decides when the run ends.
     pub(super) fn until(&self) -> Until {
         if self.longest { Until::Longest } else { Until::Shortest }

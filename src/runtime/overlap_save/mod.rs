@@ -23,6 +23,7 @@ use crate::runtime::simd::{
     Frames, Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples,
 };
 use crate::runtime::ticks::{FastSink, TickSource};
+use std::ops::Range;
 
 /// Samples of all spectra: more would take gigabytes.
 const MOST_SPECTRA: f64 = (1u64 << 28) as f64;
@@ -118,6 +119,19 @@ pub(crate) struct OverlapSaveState<T: Sample> {
     work: Work<T>,
 }
 
+/// What is known of the ticks of a call.
+#[derive(Default)]
+struct Progress {
+    /// From here on, up to the next one, the caller's frames are finite.
+    clean: usize,
+    /// Up to here the state knows them.
+    known: usize,
+    /// Up to here outputs are in the sink.
+    written: usize,
+    /// Samples that were not finite.
+    replaced: u64,
+}
+
 /// Rows of channels and rows of phases.
 #[derive(Debug, Clone)]
 struct Work<T: Sample> {
@@ -168,66 +182,109 @@ impl<T: Sample> OverlapSavePlan<T> {
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
-        let Shape { channels: n, ratio: m, .. } = self.shape;
-        let (batch, frames) = (self.shape.batch(), source.frames::<T>());
-        // Ticks of the call from which on the frames are known to be finite, those that the state knows, and
-        // those whose outputs are in the sink.
-        let (mut clean, mut known, mut written) = (0, 0, 0);
-        let (mut replaced, mut first) = (0, 0);
+        let mut progress = Progress::default();
+        let mut first = 0;
         while first < source.ticks() {
-            let ticks = (source.ticks() - first).min(batch - state.filled);
-            let end = first + ticks;
-            let in_place = frames.and_then(|frames| self.in_place(frames, clean, first, ticks));
-            if in_place.is_none() {
-                if let (true, Some(frames)) = (known < first, frames) {
-                    state.recall(&frames[..first * n], self.shape.history * n);
-                }
-                let count = self.gather(state, source, first, ticks);
-                if count > 0 {
-                    (replaced, clean) = (replaced + count, end);
-                }
-                known = end;
-            }
+            let end = first + (source.ticks() - first).min(self.shape.batch() - state.filled);
+            let outside = self.take(state, source, first..end, &mut progress);
+            let complete = state.filled + end - first == self.shape.batch();
             // The last tick of a batch already takes the first output of it, the others take the next ones.
-            let complete = state.filled + ticks == batch;
             let late = end - usize::from(complete);
-            let from = written.max(first);
-            if from < late {
-                let held = &state.output[(state.filled + 1 + from - first) * m..][..(late - from) * m];
-                sink.store(self.isa, from * m, held);
-            }
-            state.filled += ticks;
+            self.pass_on(state, sink, first, progress.written.max(first)..late);
+            state.filled += end - first;
             if complete {
-                // Whole lanes are written, so somewhat more than the batch must still be to come.
-                let slots = if late + batch + group_lanes::<T>() <= source.ticks() {
-                    sink.slots(late * m..(late + batch + group_lanes::<T>()) * m)
-                } else {
-                    None
-                };
-                if slots.is_some() {
-                    written = late + batch;
-                }
-                let held = slots.is_none();
-                self.batch(state, in_place, slots);
-                if held {
-                    sink.store(self.isa, late * m, &state.output[..m]);
-                }
+                let behind = source.ticks() - late;
+                progress.written = self.complete(state, outside, sink, late, behind);
             }
             first = end;
         }
-        if let (true, Some(frames)) = (known < first, frames) {
-            state.recall(&frames[..first * n], self.shape.history * n);
+        self.recall(state, source, first, &progress);
+        progress.replaced
+    }
+
+    /// The next ticks of the batch: where they lie in the caller's memory (as a whole batch), or into the state.
+    fn take<'a>(
+        &self,
+        state: &mut OverlapSaveState<T>,
+        source: &'a (impl TickSource + ?Sized),
+        ticks: Range<usize>,
+        progress: &mut Progress,
+    ) -> Option<&'a [T]> {
+        let outside = source.frames::<T>().and_then(|frames| self.in_place(frames, progress.clean, &ticks));
+        if outside.is_none() {
+            self.recall(state, source, ticks.start, progress);
+            let count = self.gather(state, source, ticks.start, ticks.len());
+            if count > 0 {
+                progress.replaced += count;
+                progress.clean = ticks.end;
+            }
+            progress.known = ticks.end;
         }
-        replaced
+        outside
+    }
+
+    /// The state's past is that of tick `first` again, if the ticks before stayed in the caller's memory.
+    fn recall(
+        &self,
+        state: &mut OverlapSaveState<T>,
+        source: &(impl TickSource + ?Sized),
+        first: usize,
+        progress: &Progress,
+    ) {
+        let Shape { channels, history, .. } = self.shape;
+        if let (true, Some(frames)) = (progress.known < first, source.frames::<T>()) {
+            let past = &frames[(first - history) * channels..first * channels];
+            state.frames[..past.len()].copy_from_slice(past);
+        }
+    }
+
+    /// Outputs of the batch before to the ticks of a call of which `first` is the next one of the batch.
+    fn pass_on(
+        &self,
+        state: &OverlapSaveState<T>,
+        sink: &mut (impl FastSink + ?Sized),
+        first: usize,
+        ticks: Range<usize>,
+    ) {
+        let m = self.shape.ratio;
+        if !ticks.is_empty() {
+            let place = state.filled + 1 + ticks.start - first;
+            sink.store(self.isa, ticks.start * m, &state.output[place * m..][..ticks.len() * m]);
+        }
+    }
+
+    /// Makes the batch, whose first output belongs to tick `tick` of the call, `behind` ticks before its end. Returns the
+    /// tick up to which outputs are in the sink: all of them, if there is room.
+    fn complete(
+        &self,
+        state: &mut OverlapSaveState<T>,
+        outside: Option<&[T]>,
+        sink: &mut (impl FastSink + ?Sized),
+        tick: usize,
+        behind: usize,
+    ) -> usize {
+        let m = self.shape.ratio;
+        // Whole lanes are written: somewhat more than the batch, which is still to come.
+        let needed = self.shape.batch() + group_lanes::<T>();
+        if needed <= behind
+            && let Some(slots) = sink.slots(tick * m..(tick + needed) * m)
+        {
+            self.batch(state, outside, Some(slots));
+            return tick + self.shape.batch();
+        }
+        self.batch(state, outside, None);
+        sink.store(self.isa, tick * m, &state.output[..m]);
+        tick + 1
     }
 
     /// The frames of a whole batch with their past as they lie in the caller's memory, if they are all there
     /// and finite.
-    fn in_place<'a>(&self, frames: &'a [T], clean: usize, first: usize, ticks: usize) -> Option<&'a [T]> {
+    fn in_place<'a>(&self, frames: &'a [T], clean: usize, ticks: &Range<usize>) -> Option<&'a [T]> {
         let Shape { channels, history, .. } = self.shape;
-        let from = first.checked_sub(history).filter(|&from| ticks == self.shape.batch() && from >= clean)?;
+        let whole = ticks.len() == self.shape.batch();
+        let from = ticks.start.checked_sub(history).filter(|&from| whole && from >= clean)?;
         let x = &frames[from * channels..];
-        let len = (history + ticks) * channels;
+        let len = (history + ticks.len()) * channels;
         // Frames are read as whole groups.
         let fits = len + group_lanes::<T>() <= x.len();
         (fits && T::all_finite(self.isa, &x[history * channels..len + group_lanes::<T>()])).then_some(x)
@@ -293,11 +350,6 @@ impl<T: Sample> OverlapSavePlan<T> {
 }
 
 impl<T: Sample> OverlapSaveState<T> {
-    /// The past is the end of `frames`, the first `past` samples of the state's.
-    fn recall(&mut self, frames: &[T], past: usize) {
-        self.frames[..past].copy_from_slice(&frames[frames.len() - past..]);
-    }
-
     /// As new.
     pub(crate) fn reset(&mut self) {
         self.frames.fill(T::default());
