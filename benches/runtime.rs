@@ -6,7 +6,7 @@
 
 use hybank::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{Isa, Options, PcmOutput, Precision, Reconstructor, multiply_add_chains};
+use hybank::runtime::{Form, Isa, Options, PcmOutput, Precision, Reconstructor, multiply_add_chains};
 use hybank::spec::Method;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -120,6 +120,21 @@ impl Table {
             self.doubles(&format!("{name}: f64"), n, m, taps);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
             self.threads(&format!("{name}: f32, two threads"), n, m, taps);
+            self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
+        }
+    }
+
+    /// Overlap-save; the products are those of the direct form, so that the share of the peak may pass 100 %.
+    fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
+        for len in [None, Some(64), Some(128), Some(256)] {
+            let options = Options { form: Form::OverlapSave(len), ..Options::default() };
+            let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
+            let x = input(n, TICKS);
+            let mut y = vec![0.0; m * TICKS];
+            let name = format!("{name} {}", len.map_or("best".into(), |len| len.to_string()));
+            self.row(&name, m * TICKS, (n * taps) as f64 / m as f64, || {
+                stream.process(black_box(&x), &mut y).unwrap();
+            });
         }
     }
 

@@ -1,14 +1,14 @@
 //! `hybank fuse`: slow recordings in, one fast recording out.
 
 use super::Failure;
-use super::fusing::{Fusing, RunReport};
+use super::fusing::{FormArg, Fusing, RunReport};
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Bits, Container, FastWriter, precision};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Arrival, Feed, FeedOptions};
-use crate::runtime::{Options, Reconstructor};
+use crate::runtime::{Form, Options, Reconstructor};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -36,6 +36,9 @@ pub(super) struct Args {
     /// Samples of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
     #[arg(long, value_enum, default_value_t = Bits::F32)]
     bits: Bits,
+    /// Form of FIR filters; auto: whichever is faster for the bank, and direct with --gaps
+    #[arg(long, value_enum, default_value_t = FormArg::Auto)]
+    form: FormArg,
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
@@ -61,7 +64,8 @@ struct Report {
     rate: u64,
     /// Slow ticks read.
     ticks: u64,
-    /// Samples dropped at the beginning so that the output lines up with the inputs.
+    /// Samples dropped at the beginning so that the output lines up with the inputs; with --keep-latency only those that
+    /// are due to the form.
     latency_dropped: u64,
     seconds: f64,
 }
@@ -85,9 +89,7 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
     let mut fusing = args.fusing(&bank, rate)?;
     let latency_dropped = fusing.skip;
     pump(&mut fusing, &mut feed)?;
-    if !args.keep_latency {
-        fusing.flush(feed.ticks() * bank.ratio as u64)?;
-    }
+    fusing.flush(feed.ticks() * bank.ratio as u64)?;
     let report = Report {
         run: fusing.report(feed.notes(), "--bits 32f"),
         rate: rate.round() as u64,
@@ -111,13 +113,17 @@ impl Args {
     /// The run at its beginning, with an output of `rate` hertz.
     fn fusing(&self, bank: &Bank, rate: f64) -> Result<Fusing, Failure> {
         let format = self.bits.format();
-        let options = Options { precision: precision(format), ..Options::default() };
+        // Outside of what a gap touched the output is to have the very bits of a whole recording.
+        let auto = if self.gaps.are_bridged() { Form::Direct } else { Form::Fastest };
+        let form = self.form.form(auto);
+        let options = Options { precision: precision(format), form, ..Options::default() };
         let stream = Reconstructor::with_options(bank, options)
             .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))?;
-        let gaps = self.gaps.stage(bank, self.force)?;
+        let extra = stream.extra_latency();
+        let gaps = self.gaps.stage(bank, extra, self.force)?;
         let writer = FastWriter::create(&self.output, Container::Wav, format, rate, self.force)?;
-        let skip = if self.keep_latency { 0 } else { bank.latency as u64 };
-        Ok(Fusing::new(stream, gaps, writer, skip))
+        let skip = if self.keep_latency { extra } else { stream.latency() };
+        Ok(Fusing::new(stream, gaps, writer, skip as u64))
     }
 
     /// Judges the run, then gives the output its name.

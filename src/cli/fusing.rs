@@ -4,12 +4,34 @@ use super::Failure;
 use super::gaps::{GapReport, GapStage};
 use super::output::FastWriter;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::{PcmOutput, PlanSummary, Reconstructor};
+use crate::runtime::{Form, PcmOutput, PlanSummary, Reconstructor};
 
 /// Encoded output of one step at most.
 const STEP_BYTES: usize = 256 << 10;
 /// Ticks of zeros that flush at a time.
 const FLUSH_TICKS: usize = 256;
+
+/// In which form FIR filters run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum FormArg {
+    /// What suits the verb
+    Auto,
+    /// Every product; no later than the bank's latency
+    Direct,
+    /// Fourier transforms of blocks; faster for long filters, but later
+    OverlapSave,
+}
+
+impl FormArg {
+    /// `auto` is what leaving the choice to the verb means.
+    pub(super) fn form(self, auto: Form) -> Form {
+        match self {
+            Self::Auto => auto,
+            Self::Direct => Form::Direct,
+            Self::OverlapSave => Form::OverlapSave(None),
+        }
+    }
+}
 
 /// What a run carries from block to block.
 pub(super) struct Fusing {

@@ -60,13 +60,18 @@ impl GapArgs {
         self.lost.as_deref().map(LostSamples::read).transpose().map_err(Failure::input)
     }
 
+    /// True if gaps are to be bridged.
+    pub(super) fn are_bridged(&self) -> bool {
+        self.gaps.is_some()
+    }
+
     /// Which input decides when the run ends.
     pub(super) fn until(&self) -> Until {
         if self.longest { Until::Longest } else { Until::Shortest }
     }
 
-    /// The stage between inputs and filters, if gaps are to be bridged.
-    pub(super) fn stage(&self, bank: &Bank, force: bool) -> Result<Option<GapStage>, Failure> {
+    /// The stage between inputs and filters that are `late` samples late, if gaps are to be bridged.
+    pub(super) fn stage(&self, bank: &Bank, late: usize, force: bool) -> Result<Option<GapStage>, Failure> {
         let Some(policy) = self.gaps else { return Ok(None) };
         if policy == Policy::Mask && self.mask.is_none() {
             return Err(Failure::Usage("--gaps mask needs --mask FILE for the marks".into()));
@@ -74,7 +79,8 @@ impl GapArgs {
         let fill = if policy == Policy::Hold { GapPolicy::Hold } else { GapPolicy::Zero };
         let filler = GapFiller::new(bank, fill).map_err(Failure::input)?;
         let mask = self.mask.as_ref().map(|path| AtomicFile::create(path, force)).transpose();
-        Ok(Some(GapStage { filler, file: mask.map_err(Failure::input)?, mask: Vec::new() }))
+        let file = mask.map_err(Failure::input)?;
+        Ok(Some(GapStage { filler, file, fresh: Vec::new(), mask: vec![0; late] }))
     }
 }
 
@@ -82,20 +88,24 @@ impl GapArgs {
 pub(super) struct GapStage {
     filler: GapFiller,
     file: Option<AtomicFile>,
-    /// The marks of the block's outputs.
+    /// The marks of the block's ticks.
+    fresh: Vec<u8>,
+    /// The marks of the block's outputs, and of the later ones that are known already.
     mask: Vec<u8>,
 }
 
 impl GapStage {
     /// The same ticks without gaps.
     pub(super) fn fill<'a>(&'a mut self, frames: &'a [PcmFrames<'a>]) -> Cow<'a, [PcmFrames<'a>]> {
-        self.filler.fill_pcm(frames, &mut self.mask)
+        self.filler.fill_pcm(frames, &mut self.fresh)
     }
 
     /// Writes the marks of the block's outputs that are written themselves.
     pub(super) fn write_mask(&mut self, samples: Range<usize>) -> Result<(), Failure> {
         let Some(file) = &mut self.file else { return Ok(()) };
+        self.mask.extend_from_slice(&self.fresh);
         let written = file.write_all(&self.mask[samples]);
+        self.mask.drain(..self.fresh.len());
         written.map_err(|error| failure(&file.target().display().to_string(), error))
     }
 

@@ -1,13 +1,13 @@
 //! `hybank stream`: slow samples in and fast samples out, as they come.
 
-use super::fusing::{Fusing, RunReport};
+use super::fusing::{FormArg, Fusing, RunReport};
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Container, FastWriter, is_sigmf, precision};
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Arrival, Coding, Feed, FeedOptions, PcmFormat};
-use crate::runtime::{Options, Reconstructor};
+use crate::runtime::{Form, Options, Reconstructor};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -45,7 +45,10 @@ pub(super) struct Args {
     /// sigmf-meta); standard output if left out
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
-    /// Bring out the last m0 samples at the end, with zeros for input
+    /// Form of FIR filters; auto is direct, because overlap-save makes the output later (--json tells by how much)
+    #[arg(long, value_enum, default_value_t = FormArg::Auto)]
+    form: FormArg,
+    /// Bring out the last samples at the end, as many as the latency, with zeros for input
     #[arg(long)]
     flush: bool,
     #[command(flatten)]
@@ -158,7 +161,8 @@ impl Args {
     }
 
     fn reconstructor(&self, bank: &Bank) -> Result<Reconstructor, Failure> {
-        let options = Options { precision: precision(self.output_format()), ..Options::default() };
+        let form = self.form.form(Form::Direct);
+        let options = Options { precision: precision(self.output_format()), form, ..Options::default() };
         Reconstructor::with_options(bank, options)
             .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
@@ -168,7 +172,7 @@ impl Args {
         let rates = feed.headers().map(|(name, _, rate)| (name, rate));
         let rate = match_bank::fast_rate(bank, match_bank::check_rates(bank, rates)?);
         let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };
-        let gaps = self.gaps.stage(bank, self.force)?;
+        let gaps = self.gaps.stage(bank, stream.extra_latency(), self.force)?;
         let writer = FastWriter::create(&self.output, container, self.output_format(), rate, self.force)?;
         Ok(Fusing::new(stream, gaps, writer, 0))
     }

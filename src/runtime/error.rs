@@ -49,6 +49,33 @@ pub enum BuildError {
         /// The value.
         value: f64,
     },
+    /// No transform of this length holds the filters.
+    #[error(
+        "a transform of {len} ticks does not fit filters of {lags} ticks: overlap-save needs a power of two from {shortest} to 16777216 that is no shorter than the filters; choose another length or the direct form"
+    )]
+    Transform {
+        /// F.
+        len: usize,
+        /// K.
+        lags: usize,
+        /// The least F.
+        shortest: usize,
+    },
+    /// The spectra of the filters would take gigabytes.
+    #[error(
+        "the spectra of {channels} x {ratio} filters over {len} ticks are too large for overlap-save; choose a shorter transform or the direct form"
+    )]
+    Spectra {
+        /// N.
+        channels: usize,
+        /// M.
+        ratio: usize,
+        /// F.
+        len: usize,
+    },
+    /// Overlap-save was asked for, but the filters never forget.
+    #[error("overlap-save needs FIR filters, and this bank is recursive; leave the form to the plan")]
+    Recursive,
     /// The filters together are too long for 32-bit offsets.
     #[error(
         "the filters look back {history} ticks on {channels} channels, more than the runtime can address; shorten them"

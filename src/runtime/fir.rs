@@ -77,6 +77,11 @@ impl<T: Sample> FirPlan<T> {
         Ok(Self { channels, ratio, history: lags - 1, fold, cut, block, groups, kernel, isa })
     }
 
+    /// N K: multiply-adds for each fast sample, without those by padding.
+    pub(crate) fn multiply_adds(&self) -> f64 {
+        (self.channels * (self.history + 1)) as f64
+    }
+
     /// A stream's state before its first tick.
     pub(crate) fn state(&self) -> FirState<T> {
         let beyond = self.kernel.vector_ticks(self.cut) * self.cut.hop;
@@ -214,7 +219,7 @@ impl<T: Sample> FirState<T> {
     }
 }
 
-fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
+pub(super) fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
     for (i, f) in taps.iter().enumerate() {
         if let Some(index) = f.iter().position(|&value| !T::from_f64(value).finite()) {
             let place = format!("the filter of channel {}", i + 1);

@@ -5,7 +5,9 @@
 mod aligned;
 mod error;
 mod fir;
+mod form;
 mod gaps;
+mod overlap_save;
 mod reconstructor;
 mod sample;
 mod simd;
@@ -17,6 +19,7 @@ mod ticks;
 mod window;
 
 pub use error::{BuildError, ProcessError};
+pub use form::Form;
 pub use gaps::{Gap, GapFiller, GapPolicy};
 pub use reconstructor::{Options, PlanSummary, Precision, Reconstructor};
 pub use simd::{Isa, multiply_add_chains};

@@ -1,6 +1,8 @@
 //! A bank at work on one stream.
 
 use super::fir::{FirPlan, FirState};
+use super::form::Form;
+use super::overlap_save::{OverlapSavePlan, OverlapSaveState, Shape};
 use super::sample::Sample;
 use super::simd::Isa;
 use super::state_space::{StateSpacePlan, StateSpaceState};
@@ -28,20 +30,28 @@ pub struct Options {
     /// Number type of recursions, [`Precision::Double`] unless asked for otherwise: a recursion feeds its rounding
     /// errors back, and in f32 the error is about 1e-7 of full scale divided by 1 - |pole|.
     pub recursion: Precision,
+    /// Form of FIR banks, [`Form::Direct`] unless asked for otherwise, because the others may be later.
+    pub form: Form,
     /// Instruction set; one that the processor does not have falls back to the portable kernels.
     pub isa: Isa,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { precision: Precision::default(), recursion: Precision::Double, isa: Isa::detect() }
+        Self {
+            precision: Precision::default(),
+            recursion: Precision::Double,
+            form: Form::default(),
+            isa: Isa::detect(),
+        }
     }
 }
 
 /// How a bank runs, for reports.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct PlanSummary {
-    /// `polyphase` (FIR), `modal` (delay lines and parallel sections) or `dense` (delay lines and any other states).
+    /// `direct` or `overlap-save` (FIR), `modal` (delay lines and parallel sections) or `dense` (delay lines and any
+    /// other states).
     pub form: &'static str,
     /// Number type of the sums: `f32` or `f64`.
     pub numbers: &'static str,
@@ -49,6 +59,17 @@ pub struct PlanSummary {
     pub isa: String,
     /// Ticks that one step of the kernel takes together.
     pub fold: usize,
+    /// F, ticks of a transform, if the form has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transform: Option<usize>,
+    /// B, ticks of a block, of which a transform makes the outputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub block: Option<usize>,
+    /// Fast samples by which the form is later than the bank's own latency.
+    pub extra_latency: usize,
+    /// Multiply-adds for each fast sample; additions of a transform count as such. `None` for recursions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub multiply_adds: Option<f64>,
 }
 
 /// Coefficients in the order of use, shared by any number of streams.
@@ -56,6 +77,8 @@ pub struct PlanSummary {
 enum Plan {
     Single(FirPlan<f32>),
     Double(FirPlan<f64>),
+    BlocksSingle(OverlapSavePlan<f32>),
+    BlocksDouble(OverlapSavePlan<f64>),
     RecursionSingle(StateSpacePlan<f32>),
     RecursionDouble(StateSpacePlan<f64>),
 }
@@ -65,6 +88,8 @@ enum Plan {
 enum StreamState {
     Single(FirState<f32>),
     Double(FirState<f64>),
+    BlocksSingle(OverlapSaveState<f32>),
+    BlocksDouble(OverlapSaveState<f64>),
     RecursionSingle(StateSpaceState<f32>),
     RecursionDouble(StateSpaceState<f64>),
 }
@@ -120,7 +145,8 @@ impl Reconstructor {
         let plan = Plan::new(bank, options)?;
         let state = plan.state();
         let isa = if options.isa.is_available() { options.isa } else { Isa::Portable };
-        Ok(Self { plan: Arc::new(plan), state, latency: bank.latency, isa, replaced: 0 })
+        let latency = bank.latency + plan.delay() * bank.ratio;
+        Ok(Self { plan: Arc::new(plan), state, latency, isa, replaced: 0 })
     }
 
     /// N, samples a tick in.
@@ -128,6 +154,8 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => plan.channels,
             Plan::Double(plan) => plan.channels,
+            Plan::BlocksSingle(plan) => plan.shape.channels,
+            Plan::BlocksDouble(plan) => plan.shape.channels,
             Plan::RecursionSingle(plan) => plan.channels,
             Plan::RecursionDouble(plan) => plan.channels,
         }
@@ -138,14 +166,21 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => plan.ratio,
             Plan::Double(plan) => plan.ratio,
+            Plan::BlocksSingle(plan) => plan.shape.ratio,
+            Plan::BlocksDouble(plan) => plan.shape.ratio,
             Plan::RecursionSingle(plan) => plan.ratio,
             Plan::RecursionDouble(plan) => plan.ratio,
         }
     }
 
-    /// m0: output sample n belongs to the time of fast sample n - m0.
+    /// m0 and what the form adds to it: output sample n belongs to the time of fast sample n - latency.
     pub fn latency(&self) -> usize {
         self.latency
+    }
+
+    /// The part of the latency that is due to the form: y\[n\] of the direct form comes as sample n + extra.
+    pub fn extra_latency(&self) -> usize {
+        self.plan.delay() * self.ratio()
     }
 
     /// Ticks after which an input is forgotten; `None` for a recursion, which never forgets.
@@ -153,24 +188,45 @@ impl Reconstructor {
         match &*self.plan {
             Plan::Single(plan) => Some(plan.history),
             Plan::Double(plan) => Some(plan.history),
+            Plan::BlocksSingle(plan) => Some(plan.shape.history),
+            Plan::BlocksDouble(plan) => Some(plan.shape.history),
             Plan::RecursionSingle(_) | Plan::RecursionDouble(_) => None,
         }
     }
 
-    /// Ticks of zeros that bring out the last m0 samples.
+    /// Ticks of zeros that bring out the last samples, as many as the latency.
     pub fn flush_ticks(&self) -> usize {
         self.latency.div_ceil(self.ratio())
     }
 
     /// How the bank runs.
     pub fn plan(&self) -> PlanSummary {
-        let (form, numbers, fold) = match &*self.plan {
-            Plan::Single(plan) => ("polyphase", "f32", plan.fold),
-            Plan::Double(plan) => ("polyphase", "f64", plan.fold),
-            Plan::RecursionSingle(plan) => (recursion_form(plan.is_modal()), "f32", 1),
-            Plan::RecursionDouble(plan) => (recursion_form(plan.is_modal()), "f64", 1),
-        };
-        PlanSummary { form, numbers, isa: self.isa.to_string(), fold }
+        match &*self.plan {
+            Plan::Single(plan) => {
+                self.summary("direct", "f32", plan.fold).with_multiply_adds(plan.multiply_adds())
+            }
+            Plan::Double(plan) => {
+                self.summary("direct", "f64", plan.fold).with_multiply_adds(plan.multiply_adds())
+            }
+            Plan::BlocksSingle(plan) => self.summary("overlap-save", "f32", 1).with_blocks(&plan.shape),
+            Plan::BlocksDouble(plan) => self.summary("overlap-save", "f64", 1).with_blocks(&plan.shape),
+            Plan::RecursionSingle(plan) => self.summary(recursion_form(plan.is_modal()), "f32", 1),
+            Plan::RecursionDouble(plan) => self.summary(recursion_form(plan.is_modal()), "f64", 1),
+        }
+    }
+
+    /// What every form reports.
+    fn summary(&self, form: &'static str, numbers: &'static str, fold: usize) -> PlanSummary {
+        PlanSummary {
+            form,
+            numbers,
+            isa: self.isa.to_string(),
+            fold,
+            transform: None,
+            block: None,
+            extra_latency: self.extra_latency(),
+            multiply_adds: None,
+        }
     }
 
     /// Input samples that were NaN or infinite and became 0, since the beginning.
@@ -198,6 +254,8 @@ impl Reconstructor {
         match &mut self.state {
             StreamState::Single(state) => state.reset(),
             StreamState::Double(state) => state.reset(),
+            StreamState::BlocksSingle(state) => state.reset(),
+            StreamState::BlocksDouble(state) => state.reset(),
             StreamState::RecursionSingle(state) => state.reset(),
             StreamState::RecursionDouble(state) => state.reset(),
         }
@@ -215,8 +273,8 @@ impl Reconstructor {
     }
 
     /// As [`Reconstructor::process`], on up to `threads` threads at once, with the same bits: each takes a span of
-    /// ticks and begins with the filter memory before it. Calls with less than 4096 ticks a thread, and
-    /// recursions, stay on this thread. Unlike `process` it allocates (the states of the spans) and
+    /// ticks and begins with the filter memory before it. Calls with less than 4096 ticks a thread,
+    /// recursions and overlap-save stay on this thread. Unlike `process` it allocates (the states of the spans) and
     /// starts threads; it pays from about a million multiply-adds a span on.
     ///
     /// # Errors
@@ -279,6 +337,8 @@ impl Reconstructor {
         self.replaced += match (&*self.plan, &mut self.state) {
             (Plan::Single(plan), StreamState::Single(state)) => plan.process(state, source, sink),
             (Plan::Double(plan), StreamState::Double(state)) => plan.process(state, source, sink),
+            (Plan::BlocksSingle(plan), StreamState::BlocksSingle(state)) => plan.process(state, source, sink),
+            (Plan::BlocksDouble(plan), StreamState::BlocksDouble(state)) => plan.process(state, source, sink),
             (Plan::RecursionSingle(plan), StreamState::RecursionSingle(state)) => {
                 plan.process(state, source, sink)
             }
@@ -351,6 +411,17 @@ fn spans<T: Sample>(
     replaced
 }
 
+impl PlanSummary {
+    fn with_multiply_adds(self, a_sample: f64) -> Self {
+        Self { multiply_adds: Some(a_sample), ..self }
+    }
+
+    fn with_blocks(self, shape: &Shape) -> Self {
+        let (transform, block) = (Some(shape.len), Some(shape.block()));
+        Self { transform, block, ..self.with_multiply_adds(shape.multiply_adds()) }
+    }
+}
+
 fn recursion_form(modal: bool) -> &'static str {
     if modal { "modal" } else { "dense" }
 }
@@ -368,11 +439,21 @@ impl Plan {
             (SynthesisFilters::Fir(taps), _) if taps.len() != channels => {
                 Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
             }
-            (SynthesisFilters::Fir(taps), Precision::Single) => {
-                FirPlan::new(taps, ratio, options.isa).map(Self::Single)
+            (SynthesisFilters::Fir(taps), precision) => {
+                let len = options.form.transform_len(taps, ratio, precision)?;
+                match (precision, len) {
+                    (Precision::Single, None) => FirPlan::new(taps, ratio, options.isa).map(Self::Single),
+                    (Precision::Double, None) => FirPlan::new(taps, ratio, options.isa).map(Self::Double),
+                    (Precision::Single, Some(len)) => {
+                        OverlapSavePlan::new(taps, ratio, len, options.isa).map(Self::BlocksSingle)
+                    }
+                    (Precision::Double, Some(len)) => {
+                        OverlapSavePlan::new(taps, ratio, len, options.isa).map(Self::BlocksDouble)
+                    }
+                }
             }
-            (SynthesisFilters::Fir(taps), Precision::Double) => {
-                FirPlan::new(taps, ratio, options.isa).map(Self::Double)
+            (SynthesisFilters::StateSpace(_), _) if matches!(options.form, Form::OverlapSave(_)) => {
+                Err(BuildError::Recursive)
             }
             (SynthesisFilters::StateSpace(filter), _) => match options.recursion {
                 Precision::Single => {
@@ -385,10 +466,21 @@ impl Plan {
         }
     }
 
+    /// Ticks by which outputs are later than their last input.
+    fn delay(&self) -> usize {
+        match self {
+            Self::BlocksSingle(plan) => plan.shape.delay(),
+            Self::BlocksDouble(plan) => plan.shape.delay(),
+            _ => 0,
+        }
+    }
+
     fn state(&self) -> StreamState {
         match self {
             Self::Single(plan) => StreamState::Single(plan.state()),
             Self::Double(plan) => StreamState::Double(plan.state()),
+            Self::BlocksSingle(plan) => StreamState::BlocksSingle(plan.state()),
+            Self::BlocksDouble(plan) => StreamState::BlocksDouble(plan.state()),
             Self::RecursionSingle(plan) => StreamState::RecursionSingle(plan.state()),
             Self::RecursionDouble(plan) => StreamState::RecursionDouble(plan.state()),
         }

@@ -1,6 +1,6 @@
 //! The two number types that kernels run in.
 
-use super::simd::{self, FirKernel, Isa, RecursionKernel};
+use super::simd::{self, FirKernel, Isa, RecursionKernel, TransformKernel};
 
 /// f32 or f64.
 pub(crate) trait Sample:
@@ -18,6 +18,8 @@ pub(crate) trait Sample:
     fn fir_kernel(isa: Isa) -> FirKernel<Self>;
     /// The kernel of recursions for this type.
     fn recursion_kernel(isa: Isa) -> RecursionKernel<Self>;
+    /// The kernel of transforms for this type.
+    fn transform_kernel(isa: Isa) -> TransformKernel<Self>;
     /// True if surely all are finite, see [`simd::all_finite`].
     fn all_finite(isa: Isa, samples: &[Self]) -> bool;
     /// The samples themselves, if they are f32.
@@ -58,6 +60,10 @@ impl Sample for f32 {
 
     fn recursion_kernel(isa: Isa) -> RecursionKernel<Self> {
         RecursionKernel::<f32>::new(isa)
+    }
+
+    fn transform_kernel(isa: Isa) -> TransformKernel<Self> {
+        TransformKernel::for_f32(isa)
     }
 
     fn all_finite(isa: Isa, samples: &[Self]) -> bool {
@@ -113,6 +119,10 @@ impl Sample for f64 {
 
     fn recursion_kernel(isa: Isa) -> RecursionKernel<Self> {
         RecursionKernel::<f64>::new(isa)
+    }
+
+    fn transform_kernel(isa: Isa) -> TransformKernel<Self> {
+        TransformKernel::for_f64(isa)
     }
 
     fn all_finite(isa: Isa, samples: &[Self]) -> bool {

@@ -76,7 +76,7 @@ fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32>
 }
 
 /// The definition in f64.
-fn definition(taps: &[Vec<f64>], ratio: usize, input: &[f32]) -> Vec<f64> {
+pub(super) fn definition(taps: &[Vec<f64>], ratio: usize, input: &[f32]) -> Vec<f64> {
     let n = taps.len();
     let mut out = vec![0.0; input.len() / n * ratio];
     for (t, y) in out.iter_mut().enumerate() {
@@ -96,11 +96,11 @@ fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
     out
 }
 
-fn available() -> impl Iterator<Item = Isa> {
+pub(super) fn available() -> impl Iterator<Item = Isa> {
     [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter(|isa| isa.is_available())
 }
 
-fn fuses(isa: Isa) -> bool {
+pub(super) fn fuses(isa: Isa) -> bool {
     isa != Isa::Portable || cfg!(any(target_arch = "aarch64", target_feature = "fma"))
 }
 

@@ -11,6 +11,7 @@
 //! product as well, because a fused multiply-add in software is forty times slower.
 #![allow(unsafe_code)]
 
+mod channels;
 #[cfg(target_arch = "x86_64")]
 mod convert;
 mod finite;
@@ -22,6 +23,7 @@ mod lanes_x86;
 mod layout;
 mod peak;
 mod recursion;
+mod transform;
 mod vector;
 
 pub(crate) use finite::{all_finite_f32, all_finite_f64};
@@ -30,3 +32,6 @@ pub use isa::Isa;
 pub(crate) use layout::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
+pub(crate) use transform::{
+    Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples,
+};

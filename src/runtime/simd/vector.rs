@@ -10,7 +10,7 @@ use std::arch::x86_64::*;
 /// function compiled for it (or else they are calls instead of instructions). `load` and `store`
 /// touch `LANES` samples from `at`.
 pub(super) trait Vector: Copy {
-    type Sample: Copy;
+    type Sample: Copy + Default;
     const LANES: usize;
     unsafe fn splat(value: Self::Sample) -> Self;
     unsafe fn load(at: *const Self::Sample) -> Self;
@@ -21,10 +21,10 @@ pub(super) trait Vector: Copy {
 
 /// Arrays that the compiler turns into whatever vectors the architecture has.
 #[derive(Clone, Copy)]
-pub(super) struct Portable<T>([T; 4]);
+pub(super) struct Portable<T>(pub(super) [T; 4]);
 
 /// True where `mul_add` is an instruction of every processor of the target.
-const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
+pub(super) const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
 macro_rules! portable {
     ($sample:ty) => {
@@ -65,7 +65,7 @@ portable!(f64);
 macro_rules! x86 {
     ($name:ident, $register:ty, $sample:ty, $lanes:literal, $splat:ident, $load:ident, $store:ident, $fma:ident) => {
         #[derive(Clone, Copy)]
-        pub(super) struct $name($register);
+        pub(super) struct $name(pub(super) $register);
 
         impl Vector for $name {
             type Sample = $sample;

@@ -1,0 +1,83 @@
+//! From how many taps a phase on does overlap-save take less time than the direct form?
+//!
+//! `cargo bench --bench crossover` measures both along a ladder of K for several N and M, overlap-save with the four shortest
+//! transforms that hold a block of K ticks, in nanoseconds a tick (best of many repeats), and sets beside them
+//! what the plan chooses. The constants of the plan's cost model (`src/runtime/form.rs`) were fitted to this table. Words
+//! after `--`: `f64` for double precision.
+
+use hybank::bank::{Bank, Gamma, SynthesisFilters};
+use hybank::runtime::{Form, Options, Precision, Reconstructor};
+use hybank::spec::Method;
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+const TICKS: usize = 16_384;
+/// Batches of overlap-save that one figure takes at least.
+const BATCHES: usize = 4;
+/// Time for the repeats of one figure.
+const EACH: Duration = Duration::from_millis(40);
+const SHAPES: [(usize, usize); 11] =
+    [(1, 1), (1, 4), (2, 2), (3, 3), (4, 1), (4, 4), (8, 2), (2, 8), (6, 6), (8, 8), (16, 16)];
+const LAGS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
+
+fn fir(n: usize, m: usize, taps: usize) -> Bank {
+    let f = |i: usize| (0..taps).map(|t| ((t * 7 + i * 3) % 11) as f64 / 11.0 - 0.5).collect();
+    Bank {
+        spec: None,
+        fast_period: 1.0,
+        ratio: m,
+        latency: 0,
+        method: Method::Fir,
+        delays: vec![0.0; n],
+        filters: SynthesisFilters::Fir((0..n).map(f).collect()),
+        gamma: Gamma::default(),
+        proof: None,
+    }
+}
+
+/// Nanoseconds a tick, in numbers of the kernels' own type.
+fn measure(bank: &Bank, options: Options) -> f64 {
+    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let (n, m) = (stream.channels(), stream.ratio());
+    let x: Vec<f64> = (0..n * TICKS).map(|i| ((i * 7919) % 1000) as f64 / 1000.0 - 0.5).collect();
+    let narrow: Vec<f32> = x.iter().map(|&x| x as f32).collect();
+    let (mut y, mut narrow_y) = (vec![0.0; m * TICKS], vec![0.0; m * TICKS]);
+    // A batch is made by the call that completes it, and may be longer than a call.
+    let calls = (BATCHES * stream.extra_latency() / m).div_ceil(TICKS).max(1);
+    let mut best = f64::MAX;
+    let begin = Instant::now();
+    while begin.elapsed() < EACH {
+        let start = Instant::now();
+        for _ in 0..calls {
+            match options.precision {
+                Precision::Single => stream.process(black_box(&narrow), &mut narrow_y),
+                Precision::Double => stream.process_f64(black_box(&x), &mut y),
+            }
+            .unwrap();
+        }
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    best / (calls * TICKS) as f64 * 1e9
+}
+
+fn main() {
+    let double = std::env::args().any(|word| word == "f64");
+    let precision = if double { Precision::Double } else { Precision::Single };
+    println!("| N | M | K | direct, ns a tick | overlap-save, F: ns a tick | the plan |");
+    println!("|---|---|---|---|---|---|");
+    for (n, m) in SHAPES {
+        for k in LAGS {
+            let bank = fir(n, m, k * m);
+            let options = |form| Options { precision, form, ..Options::default() };
+            let direct = measure(&bank, options(Form::Direct));
+            let shortest = (2 * k).next_power_of_two().max(16);
+            let lengths = (0..4).map(|i| shortest << i);
+            let others: Vec<_> = lengths
+                .map(|len| format!("{len}: {:.2}", measure(&bank, options(Form::OverlapSave(Some(len))))))
+                .collect();
+            let plan = Reconstructor::with_options(&bank, options(Form::Fastest)).unwrap().plan();
+            let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
+            println!("| {n} | {m} | {k} | {direct:.2} | {} | {}{length} |", others.join(", "), plan.form);
+        }
+    }
+}

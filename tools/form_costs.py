@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+"""Fits the cost model of src/runtime/form.rs to the table of `cargo bench --bench crossover`.
+
+usage: form_costs.py LANES < table      (LANES of 32 bytes: 8 for f32, 4 for f64; needs numpy and scipy)
+
+Prints nanoseconds for each term of a tick, and quantiles of measured / fitted. Divided by the time of a vector of
+products and rounded they are the constants of the model.
+"""
+
+import sys
+from math import log2
+
+import numpy as np
+from scipy.optimize import nnls
+
+GROUP = int(sys.argv[1])
+
+
+def blocks(n, m, k, length):
+    """Terms of overlap-save: rows x levels, vectors of products, outputs, inputs, ticks."""
+    depth = min(1 << (max(n, m) - 1).bit_length(), GROUP)
+    batch = 2 * (GROUP // depth) * (length - k + 1)
+    inputs, outputs = -(-n // depth), -(-m // depth)
+    share = length / batch
+    return [share * (inputs + outputs) * log2(length), share * 4 * n * outputs, m, n, 1]
+
+
+def direct(n, m, k):
+    """Terms of the direct form: vectors of products, vectors of sums, outputs, ticks."""
+    fold = 2 if 1 in (n, m) else 1
+    hop = n * fold
+    depth = hop if hop < GROUP and hop & (hop - 1) == 0 else GROUP
+    steps = -(-(k + fold - 1) * n // depth)
+    return [steps * depth * m / GROUP, depth * m / GROUP, m, 1]
+
+
+def fit(name, rows):
+    """Non-negative least squares of the relative error; what a busy host delayed weighs less."""
+    terms, times = (np.array(column, float) for column in zip(*rows))
+    weights = 1 / times
+    for _ in range(30):
+        costs, _ = nnls(terms * weights[:, None], times * weights)
+        ratio = times / (terms @ costs)
+        weights = np.where(ratio > 1.15, 0.2, 1) / times
+    print(name, np.round(costs, 3), "measured / fitted:", np.round(np.percentile(ratio, [5, 50, 95]), 2))
+
+
+rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in sys.stdin]
+rows = [row for row in rows if len(row) == 6 and row[0].isdigit()]
+sizes = [tuple(map(int, row[:3])) for row in rows]
+fit("direct", [(direct(*size), float(row[3])) for size, row in zip(sizes, rows)])
+pairs = [(size, part.split(":")) for size, row in zip(sizes, rows) for part in row[4].split(",")]
+fit("overlap-save", [(blocks(*size, int(length)), float(time)) for size, (length, time) in pairs])
