@@ -32,6 +32,7 @@ fn fir(n: usize, m: usize, taps: usize) -> Bank {
         filters: SynthesisFilters::Fir((0..n).map(f).collect()),
         gamma: Gamma::default(),
         proof: None,
+        fixed_point: None,
     }
 }
 

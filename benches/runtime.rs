@@ -6,7 +6,9 @@
 
 use hybank::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{Form, Isa, Options, PcmOutput, Precision, Reconstructor, multiply_add_chains};
+use hybank::runtime::{
+    Form, Isa, Options, PcmOutput, Precision, Reconstructor, Workers, multiply_add_chains,
+};
 use hybank::spec::Method;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -161,14 +163,15 @@ impl Table {
         });
     }
 
-    /// A longer call, because threads are started for each.
+    /// A longer call, as for files; the threads wait for it.
     fn threads(&self, name: &str, n: usize, m: usize, taps: usize) {
         let mut stream = Reconstructor::new(&fir(n, m, taps)).unwrap();
+        let workers = Workers::new(2).unwrap();
         let ticks = 64 * TICKS;
         let x = input(n, ticks);
         let mut y = vec![0.0; m * ticks];
         self.row(name, m * ticks, (n * taps) as f64 / m as f64, || {
-            stream.process_parallel(black_box(&x), &mut y, 2).unwrap();
+            stream.process_parallel(black_box(&x), &mut y, &workers).unwrap();
         });
     }
 

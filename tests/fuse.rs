@@ -452,3 +452,36 @@ fn sigmf_goes_in_and_out() {
     fs::write(bench.path("a.sigmf-meta"), meta(start, "cf32_le")).unwrap();
     bench.refused(1, &[&args[..], &["--force"]].concat(), &["a.sigmf-meta", "cf32_le"]);
 }
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let bench = Bench::new();
+    // Long filters, so that even short recordings are shared out.
+    let taps = |i: usize| {
+        (0..512).map(|t| format!("{}", ((t * 7 + i) % 11) as f64 / 1e3)).collect::<Vec<_>>().join(", ")
+    };
+    let channel = |i: usize| format!(r#"{{ "delay": 0.0, "taps": [{}] }}"#, taps(i));
+    let text = format!(
+        r#"{{ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2, "latency": 3,
+        "method": "fir", "channels": [{}, {}], "state_space": null,
+        "gamma": {{ "upper": null, "lower": null, "noncausal": null }} }}"#,
+        channel(0),
+        channel(1)
+    );
+    fs::write(bench.path("long.json"), text).unwrap();
+    let samples: Vec<f32> = (0..2 * 60_000).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect();
+    bench.wav("both.wav", 2, 48_000, &samples);
+    let raw: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
+    fs::write(bench.path("both.raw"), raw).unwrap();
+    for threads in ["1", "2", "3", "0"] {
+        let out = format!("fused{threads}.wav");
+        bench.quietly(&["fuse", "long.json", "both.wav", "-o", &out, "--threads", threads]);
+        let live = format!("live{threads}.raw");
+        bench.quietly(&["stream", "long.json", "--input", "both.raw", "-o", &live, "--threads", threads]);
+        for (name, one) in [(out, "fused1.wav"), (live, "live1.raw")] {
+            assert!(fs::read(bench.path(&name)).unwrap() == fs::read(bench.path(one)).unwrap(), "{name}");
+        }
+    }
+    bench.refused(2, &["fuse", "long.json", "both.wav", "-o", "x.wav", "--threads", "1025"], &["--threads"]);
+    bench.refused(2, &["stream", "long.json", "--threads", "many"], &["--threads"]);
+}

@@ -1,13 +1,13 @@
 //! `hybank fuse`: slow recordings in, one fast recording out.
 
 use super::Failure;
-use super::fusing::{FormArg, Fusing, RunReport};
+use super::fusing::{FormArg, Fusing, RunReport, ThreadArgs};
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Bits, Container, FastWriter, precision};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{Arrival, Feed, FeedOptions};
+use crate::io::{Arrival, BLOCK_BYTES, Feed, FeedOptions};
 use crate::runtime::{Form, Options, Reconstructor};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
@@ -44,6 +44,8 @@ pub(super) struct Args {
     keep_latency: bool,
     #[command(flatten)]
     gaps: GapArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
     /// Make every tolerated fault (unequal lengths, truncation, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
@@ -79,7 +81,12 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
     let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
     let lost = args.gaps.lost()?;
-    let options = FeedOptions { lost: lost.as_ref(), until: args.gaps.until(), ..FeedOptions::files() };
+    let options = FeedOptions {
+        lost: lost.as_ref(),
+        until: args.gaps.until(),
+        block_bytes: args.threads.bytes(BLOCK_BYTES),
+        ..FeedOptions::files()
+    };
     let feed = Feed::start(&args.inputs, options, interrupts()?).map_err(Failure::input)?;
     let mut feed = feed.ok_or_else(|| interrupted(0))?;
     let channels = || feed.headers().map(|(name, channels, _)| (name, channels));
@@ -123,7 +130,7 @@ impl Args {
         let gaps = self.gaps.stage(bank, extra, self.force)?;
         let writer = FastWriter::create(&self.output, Container::Wav, format, rate, self.force)?;
         let skip = if self.keep_latency { extra } else { stream.latency() };
-        Ok(Fusing::new(stream, gaps, writer, skip as u64))
+        Fusing::new(stream, gaps, writer, skip as u64, self.threads)
     }
 
     /// Judges the run, then gives the output its name.

@@ -4,7 +4,7 @@ use super::Failure;
 use super::gaps::{GapReport, GapStage};
 use super::output::FastWriter;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::{Form, PcmOutput, PlanSummary, Reconstructor};
+use crate::runtime::{Form, PcmOutput, PlanSummary, Reconstructor, Workers};
 
 /// Encoded output of one step at most.
 const STEP_BYTES: usize = 256 << 10;
@@ -33,11 +33,40 @@ impl FormArg {
     }
 }
 
+/// Threads of the filters.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct ThreadArgs {
+    /// Threads that filter (FIR banks only), 0 for one a processor. The result has the same bits with any number. More than one
+    /// pays with many taps or channels; otherwise reading and writing take longer than filtering
+    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+}
+
+impl ThreadArgs {
+    /// `None` if the calling thread does all.
+    pub(super) fn workers(self) -> Result<Option<Workers>, Failure> {
+        if self.threads == 1 {
+            return Ok(None);
+        }
+        let workers = Workers::new(self.threads.into());
+        let told = |error| Failure::Input(format!("--threads {}: {error}; ask for fewer", self.threads));
+        workers.map(Some).map_err(told)
+    }
+
+    /// Bytes of each input that are read, and of output that are made, at a time, for `bytes` with one thread: enough
+    /// for all threads.
+    pub(super) fn bytes(self, bytes: usize) -> usize {
+        if self.threads == 1 { bytes } else { 8 * bytes }
+    }
+}
+
 /// What a run carries from block to block.
 pub(super) struct Fusing {
     pub(super) stream: Reconstructor,
     pub(super) gaps: Option<GapStage>,
     pub(super) writer: FastWriter,
+    workers: Option<Workers>,
+    step_bytes: usize,
     /// Output samples still to be dropped.
     pub(super) skip: u64,
     clipped: u64,
@@ -67,14 +96,21 @@ pub(super) struct RunReport {
 
 impl Fusing {
     /// Drops the first `skip` output samples.
-    pub(super) fn new(stream: Reconstructor, gaps: Option<GapStage>, writer: FastWriter, skip: u64) -> Self {
-        Self { stream, gaps, writer, skip, clipped: 0, buffer: Vec::new() }
+    pub(super) fn new(
+        stream: Reconstructor,
+        gaps: Option<GapStage>,
+        writer: FastWriter,
+        skip: u64,
+        threads: ThreadArgs,
+    ) -> Result<Self, Failure> {
+        let (workers, step_bytes) = (threads.workers()?, threads.bytes(STEP_BYTES));
+        Ok(Self { stream, gaps, writer, workers, step_bytes, skip, clipped: 0, buffer: Vec::new() })
     }
 
     /// Fuses ticks and writes what is not to be dropped, at most `limit` samples.
     pub(super) fn fuse(&mut self, frames: &[PcmFrames<'_>], limit: u64) -> Result<(), Failure> {
         let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
-        let step = (STEP_BYTES / self.stream.ratio() / self.writer.format().bytes()).max(1);
+        let step = (self.step_bytes / self.stream.ratio() / self.writer.format().bytes()).max(1);
         let mut limit = limit;
         for first in (0..ticks).step_by(step) {
             let count = step.min(ticks - first);
@@ -90,8 +126,10 @@ impl Fusing {
         let ticks = frames.iter().map(PcmFrames::frames).min().unwrap_or(0);
         self.buffer.resize(ticks * self.stream.ratio() * format.bytes(), 0);
         let mut output = PcmOutput { format, bytes: &mut self.buffer, clipped: 0 };
-        let samples = match &mut self.gaps {
-            Some(stage) => self.stream.process_pcm(&stage.fill(frames), &mut output),
+        let filled = self.gaps.as_mut().map(|stage| stage.fill(frames));
+        let frames = filled.as_deref().unwrap_or(frames);
+        let samples = match &self.workers {
+            Some(workers) => self.stream.process_pcm_parallel(frames, &mut output, workers),
             None => self.stream.process_pcm(frames, &mut output),
         };
         let samples = samples.map_err(Failure::input)? as u64;

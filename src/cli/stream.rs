@@ -1,12 +1,12 @@
 //! `hybank stream`: slow samples in and fast samples out, as they come.
 
-use super::fusing::{FormArg, Fusing, RunReport};
+use super::fusing::{FormArg, Fusing, RunReport, ThreadArgs};
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Container, FastWriter, is_sigmf, precision};
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{Arrival, Coding, Feed, FeedOptions, PcmFormat};
+use crate::io::{Arrival, BLOCK_BYTES, Coding, Feed, FeedOptions, PcmFormat};
 use crate::runtime::{Form, Options, Reconstructor};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -53,6 +53,8 @@ pub(super) struct Args {
     flush: bool,
     #[command(flatten)]
     gaps: GapArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
     /// Make every tolerated fault (a cut frame, unequal lengths, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
@@ -100,6 +102,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         channels: bank.channel_count(),
         lost: lost.as_ref(),
         until: args.gaps.until(),
+        block_bytes: args.threads.bytes(BLOCK_BYTES),
     };
     let stream = args.reconstructor(&bank)?;
     let Some(mut feed) = Feed::start(&inputs, options, interrupts()?).map_err(Failure::input)? else {
@@ -174,7 +177,7 @@ impl Args {
         let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };
         let gaps = self.gaps.stage(bank, stream.extra_latency(), self.force)?;
         let writer = FastWriter::create(&self.output, container, self.output_format(), rate, self.force)?;
-        Ok(Fusing::new(stream, gaps, writer, 0))
+        Fusing::new(stream, gaps, writer, 0, self.threads)
     }
 
     fn finish(&self, fusing: Fusing, report: &Report) -> Result<(), Failure> {

@@ -16,9 +16,10 @@ use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::path::PathBuf;
 use std::thread;
 
-/// Blocks that go round for each input, and the most bytes of one.
+/// Blocks that go round for each input.
 const BLOCKS: usize = 4;
-const BLOCK_BYTES: usize = 128 << 10;
+/// Bytes of a block that suit one thread.
+pub const BLOCK_BYTES: usize = 128 << 10;
 /// All blocks of all inputs together, unless that would make them smaller than a page.
 const ALL_BYTES: usize = 16 << 20;
 
@@ -52,12 +53,20 @@ pub struct FeedOptions<'a> {
     pub lost: Option<&'a LostSamples>,
     /// Which input decides when the feed ends.
     pub until: Until,
+    /// The most bytes of an input that are read at a time; less if there are many inputs.
+    pub block_bytes: usize,
 }
 
 impl FeedOptions<'_> {
     /// Files with headers, nothing lost.
     pub fn files() -> Self {
-        Self { coding: Coding::Wav, channels: 1, lost: None, until: Until::Shortest }
+        Self {
+            coding: Coding::Wav,
+            channels: 1,
+            lost: None,
+            until: Until::Shortest,
+            block_bytes: BLOCK_BYTES,
+        }
     }
 }
 
@@ -115,7 +124,7 @@ impl Feed {
         stop: Receiver<()>,
     ) -> Result<Option<Self>, IoError> {
         let channels = if paths.len() == 1 { options.channels } else { 1 };
-        let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).clamp(4096, BLOCK_BYTES);
+        let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).min(options.block_bytes).max(4096);
         // All threads first: opening a FIFO waits for its writer, in whatever order they come.
         let opening =
             |path: &PathBuf| Opening { path: path.clone(), coding: options.coding, channels, block };

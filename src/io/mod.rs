@@ -21,7 +21,7 @@ pub mod wav;
 
 pub use atomic::AtomicFile;
 pub use error::IoError;
-pub use feed::{Arrival, Coding, Feed, FeedOptions, Until};
+pub use feed::{Arrival, BLOCK_BYTES, Coding, Feed, FeedOptions, Until};
 pub use frames::FrameReader;
 pub use lost::LostSamples;
 pub(crate) use pcm::for_pcm_format;

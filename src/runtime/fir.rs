@@ -131,26 +131,27 @@ impl<T: Sample> FirPlan<T> {
         replaced
     }
 
-    /// A state before tick `first` of `source`, as if all ticks before it had been processed; `None` if they
-    /// do not reach back far enough, or if this is no beginning of a super-tick for a stream with `lead`
-    /// ticks before the source.
-    pub(crate) fn state_at(
-        &self,
-        source: &(impl TickSource + ?Sized),
-        first: usize,
-        lead: usize,
-    ) -> Option<FirState<T>> {
-        let ticks = self.cut.past().div_ceil(self.channels);
-        if ticks > first || !(lead + first).is_multiple_of(self.fold) {
-            return None;
-        }
+    /// Ticks that a state must know.
+    pub(crate) fn reach(&self) -> usize {
+        self.cut.past().div_ceil(self.channels)
+    }
+
+    /// The last beginning of a super-tick that is not after `tick`, of a call with `lead` ticks before it.
+    pub(crate) fn beginning(&self, tick: usize, lead: usize) -> usize {
+        tick - (lead + tick) % self.fold
+    }
+
+    /// A state before tick `first` of `source`, as if all ticks before it had been processed: at least
+    /// [`FirPlan::reach`] of them, and a super-tick begins there.
+    pub(crate) fn state_at(&self, source: &(impl TickSource + ?Sized), first: usize) -> FirState<T> {
+        let ticks = self.reach();
         let mut frames = vec![T::default(); ticks * self.channels];
         source.gather(self.isa, first - ticks, ticks, &mut frames);
         // They are counted where they are processed.
         replace_not_finite(&mut frames);
         let mut state = self.state();
         state.window.recall(&frames);
-        Some(state)
+        state
     }
 
     /// At most a block, up to the end of a super-tick if there are so many.

@@ -17,6 +17,7 @@ mod structure;
 mod tests;
 mod ticks;
 mod window;
+mod workers;
 
 pub use error::{BuildError, ProcessError};
 pub use form::Form;
@@ -24,3 +25,4 @@ pub use gaps::{Gap, GapFiller, GapPolicy};
 pub use reconstructor::{Options, PlanSummary, Precision, Reconstructor};
 pub use simd::{Isa, multiply_add_chains};
 pub use ticks::PcmOutput;
+pub use workers::Workers;

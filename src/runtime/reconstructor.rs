@@ -3,10 +3,10 @@
 use super::fir::{FirPlan, FirState};
 use super::form::Form;
 use super::overlap_save::{OverlapSavePlan, OverlapSaveState, Shape};
-use super::sample::Sample;
 use super::simd::Isa;
 use super::state_space::{StateSpacePlan, StateSpaceState};
 use super::ticks::{FastSink, Interleaved, PcmOutput, TickSource};
+use super::workers::{self, Workers};
 use super::{BuildError, ProcessError};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::io::PcmFrames;
@@ -272,10 +272,9 @@ impl Reconstructor {
         self.run(&source, output)
     }
 
-    /// As [`Reconstructor::process`], on up to `threads` threads at once, with the same bits: each takes a span of
-    /// ticks and begins with the filter memory before it. Calls with less than 4096 ticks a thread,
-    /// recursions and overlap-save stay on this thread. Unlike `process` it allocates (the states of the spans) and
-    /// starts threads; it pays from about a million multiply-adds a span on.
+    /// As [`Reconstructor::process`], on all `workers` at once, with the same bits: each takes spans of ticks and
+    /// begins with the filter memory before them. Recursions, overlap-save, and calls of less than some two million
+    /// multiply-adds stay on this thread. Unlike `process` it allocates (the states of the spans) and waits for the workers.
     ///
     /// # Errors
     /// As [`Reconstructor::process`].
@@ -283,18 +282,23 @@ impl Reconstructor {
         &mut self,
         input: &[f32],
         output: &mut [f32],
-        threads: usize,
+        workers: &Workers,
     ) -> Result<usize, ProcessError> {
         let source = self.interleaved(input)?;
-        let wanted = self.check(&source, output)?;
-        let output = &mut output[..wanted];
-        let replaced = match (&*self.plan, &mut self.state) {
-            (Plan::Single(plan), StreamState::Single(state)) => spans(plan, state, &source, output, threads),
-            (Plan::Double(plan), StreamState::Double(state)) => spans(plan, state, &source, output, threads),
-            _ => return self.run(&source, output),
-        };
-        self.replaced += replaced;
-        Ok(wanted)
+        self.share(&source, output, workers)
+    }
+
+    /// As [`Reconstructor::process_pcm`], on all `workers` at once; see [`Reconstructor::process_parallel`].
+    ///
+    /// # Errors
+    /// As [`Reconstructor::process`].
+    pub fn process_pcm_parallel(
+        &mut self,
+        input: &[PcmFrames<'_>],
+        output: &mut PcmOutput<'_>,
+        workers: &Workers,
+    ) -> Result<usize, ProcessError> {
+        self.share(input, output, workers)
     }
 
     /// As [`Reconstructor::process`], for f64 samples (whatever the precision of the kernels).
@@ -351,6 +355,25 @@ impl Reconstructor {
         Ok(wanted)
     }
 
+    fn share(
+        &mut self,
+        source: &(impl TickSource + ?Sized),
+        sink: &mut (impl FastSink + ?Sized),
+        workers: &Workers,
+    ) -> Result<usize, ProcessError> {
+        let wanted = self.check(source, sink)?;
+        self.replaced += match (&*self.plan, &mut self.state) {
+            (Plan::Single(plan), StreamState::Single(state)) => {
+                workers::process(plan, state, source, sink, workers)
+            }
+            (Plan::Double(plan), StreamState::Double(state)) => {
+                workers::process(plan, state, source, sink, workers)
+            }
+            _ => return self.run(source, sink),
+        };
+        Ok(wanted)
+    }
+
     /// The samples that will be written, if everything fits.
     fn check(
         &self,
@@ -366,49 +389,6 @@ impl Reconstructor {
         }
         Ok(wanted)
     }
-}
-
-/// Ticks of a span that are worth a thread.
-const SPAN: usize = 4096;
-
-/// Runs a call in spans of ticks, each on a thread of its own, and leaves the state after the last; returns
-/// how many samples were not finite.
-fn spans<T: Sample>(
-    plan: &FirPlan<T>,
-    state: &mut FirState<T>,
-    source: &Interleaved<'_, f32>,
-    output: &mut [f32],
-    threads: usize,
-) -> u64 {
-    let (n, m, ticks, lead) = (plan.channels, plan.ratio, source.ticks(), state.lead());
-    let count = threads.min(ticks / SPAN).max(1);
-    // Two ticks may be one super-tick, so spans begin at even distances from where the stream began one.
-    let span = (ticks / count).next_multiple_of(2);
-    let begin = |index: usize| if index == 0 { 0 } else { (index * span - lead % 2).min(ticks) };
-    let states: Option<Vec<_>> = (1..count).map(|index| plan.state_at(source, begin(index), lead)).collect();
-    let Some(mut states) = states.filter(|states| !states.is_empty()) else {
-        return plan.process(state, source, output);
-    };
-    let replaced = std::thread::scope(|scope| {
-        let mut rest = output;
-        let mut workers = Vec::with_capacity(count);
-        for (index, state) in std::iter::once(&mut *state).chain(&mut states).enumerate() {
-            let end = if index + 1 == count { ticks } else { begin(index + 1) };
-            let samples = &source.samples[begin(index) * n..end * n];
-            let (out, after) = std::mem::take(&mut rest).split_at_mut((end - begin(index)) * m);
-            rest = after;
-            workers
-                .push(scope.spawn(move || plan.process(state, &Interleaved { samples, channels: n }, out)));
-        }
-        workers
-            .into_iter()
-            .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .sum()
-    });
-    if let Some(last) = states.pop() {
-        *state = last;
-    }
-    replaced
 }
 
 impl PlanSummary {

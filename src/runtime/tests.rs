@@ -144,23 +144,76 @@ fn many_channels_and_many_phases_work() {
 #[test]
 fn threads_do_not_change_a_bit() {
     let mut noise = Noise(31);
-    for (n, m, taps) in [(1, 1, 33), (1, 4, 64), (2, 2, 24), (3, 1, 40), (5, 3, 50), (2, 2, 9000)] {
+    let workers: Vec<_> = [1, 2, 3].into_iter().map(|threads| Workers::new(threads).unwrap()).collect();
+    // Long enough for several spans of a million multiply-adds each.
+    for (n, m, taps, long) in [
+        (1, 1, 33, 90_000),
+        (1, 4, 64, 50_000),
+        (2, 2, 24, 100_001),
+        (3, 1, 40, 60_001),
+        (5, 3, 50, 20_000),
+        (2, 2, 9000, 40_000),
+        (3, 4, 1, 400_000),
+    ] {
         for precision in [Precision::Single, Precision::Double] {
             let bank = fir_bank(random_taps(n, taps, &mut noise), m);
-            let options = Options { precision, ..Options::default() };
-            let mut one = Reconstructor::with_options(&bank, options).unwrap();
-            let mut many = one.fresh();
-            for ticks in [1, 20_001, 4096, 8192, 3, 12_345] {
+            let mut one =
+                Reconstructor::with_options(&bank, Options { precision, ..Options::default() }).unwrap();
+            let mut many = vec![one.fresh(); workers.len()];
+            for ticks in [1, long, 4096, 2, long - 12_345] {
                 let mut input = noise.samples(n * ticks);
                 input[n * ticks / 2] = f32::NAN;
-                let mut out = [vec![0.0; m * ticks], vec![0.0; m * ticks]];
-                one.process(&input, &mut out[0]).unwrap();
-                assert_eq!(many.process_parallel(&input, &mut out[1], 3), Ok(m * ticks));
-                assert_eq!(out[0], out[1], "N {n} M {m} {taps} taps {ticks} ticks");
-                assert_eq!(one.replaced(), many.replaced());
+                let mut want = vec![0.0; m * ticks];
+                one.process(&input, &mut want).unwrap();
+                for (stream, workers) in many.iter_mut().zip(&workers) {
+                    let mut out = vec![0.0; m * ticks];
+                    assert_eq!(stream.process_parallel(&input, &mut out, workers), Ok(m * ticks));
+                    assert!(out == want, "N {n} M {m} {taps} taps {ticks} ticks {workers:?}");
+                    assert_eq!(one.replaced(), stream.replaced());
+                }
             }
         }
     }
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let mut noise = Noise(33);
+    let workers = Workers::new(3).unwrap();
+    for (n, m, format, out_format) in
+        [(2, 3, PcmFormat::S16Le, PcmFormat::S16Le), (3, 2, PcmFormat::S24Be, PcmFormat::F64Le)]
+    {
+        // Loud enough to clip.
+        let mut one = Reconstructor::new(&fir_bank(random_taps(n, 80, &mut noise), m)).unwrap();
+        let mut many = one.fresh();
+        let bytes: Vec<u8> =
+            (0..n * 70_001 * format.bytes()).map(|_| (128.0 * noise.next()) as i8 as u8).collect();
+        let layout = SampleLayout::packed(format);
+        let rows: Vec<Vec<u8>> = (0..n)
+            .map(|i| bytes.chunks_exact(format.bytes()).skip(i).step_by(n).flatten().copied().collect())
+            .collect();
+        let frames: Vec<_> = rows.iter().map(|row| PcmFrames { layout, channels: 1, bytes: row }).collect();
+        let mut out = [vec![0; 70_001 * m * out_format.bytes()], vec![0; 70_001 * m * out_format.bytes()]];
+        let [want, got] = &mut out;
+        let mut want = PcmOutput { format: out_format, bytes: want, clipped: 5 };
+        let mut got = PcmOutput { format: out_format, bytes: got, clipped: 5 };
+        one.process_pcm(&frames, &mut want).unwrap();
+        many.process_pcm_parallel(&frames, &mut got, &workers).unwrap();
+        assert_eq!(want.clipped, got.clipped);
+        assert!(want.clipped > 5 || out_format == PcmFormat::F64Le);
+        assert!(want.bytes == got.bytes, "{format} to {out_format}");
+    }
+}
+
+#[test]
+fn a_recursion_stays_on_its_thread() {
+    let mut noise = Noise(34);
+    let input = noise.samples(50_000);
+    let want = run(&rotation_bank(), Options::default(), &input);
+    let mut out = vec![0.0; want.len()];
+    let mut stream = Reconstructor::new(&rotation_bank()).unwrap();
+    stream.process_parallel(&input, &mut out, &Workers::new(2).unwrap()).unwrap();
+    assert_eq!(out, want);
 }
 
 #[test]

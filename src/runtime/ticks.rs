@@ -20,7 +20,7 @@ pub struct PcmOutput<'a> {
 const SCRATCH: usize = 1024;
 
 /// Gives frames of N samples.
-pub(crate) trait TickSource {
+pub(crate) trait TickSource: Sync {
     fn channels(&self) -> usize;
     fn ticks(&self) -> usize;
     /// All frames as they lie in memory, if they are of this type.
@@ -29,10 +29,16 @@ pub(crate) trait TickSource {
     }
     /// Ticks `first..first + ticks` as frames; whether they are finite is not looked at.
     fn gather<T: Sample>(&self, isa: Isa, first: usize, ticks: usize, frames: &mut [T]);
+    /// A range of the ticks as a source.
+    fn part<R>(&self, ticks: Range<usize>, with: impl FnOnce(&Self) -> R) -> R;
 }
 
 /// Takes fast samples.
-pub(crate) trait FastSink {
+pub(crate) trait FastSink: Send {
+    /// A part of the room.
+    type Half<'h>: FastSink + ?Sized
+    where
+        Self: 'h;
     /// Samples that fit.
     fn capacity(&self) -> usize;
     /// Where these samples go, if they are of this type.
@@ -41,6 +47,12 @@ pub(crate) trait FastSink {
     }
     /// Stores samples from sample `first` on.
     fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]);
+    /// The room for the first `samples` samples and that for the others, each as a sink.
+    fn halves<'h, R>(
+        &'h mut self,
+        samples: usize,
+        with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
+    ) -> R;
 }
 
 /// Numbers in memory, frames of N.
@@ -64,6 +76,11 @@ impl<S: Sample> TickSource for Interleaved<'_, S> {
 
     fn gather<T: Sample>(&self, _: Isa, first: usize, ticks: usize, frames: &mut [T]) {
         convert(&self.samples[first * self.channels..(first + ticks) * self.channels], frames);
+    }
+
+    fn part<R>(&self, ticks: Range<usize>, with: impl FnOnce(&Self) -> R) -> R {
+        let samples = &self.samples[ticks.start * self.channels..ticks.end * self.channels];
+        with(&Interleaved { samples, channels: self.channels })
     }
 }
 
@@ -98,6 +115,11 @@ impl TickSource for [PcmFrames<'_>] {
             Some(frames) if mono && 8 * n <= SCRATCH => gather_mono(isa, self, first, ticks, frames),
             _ => gather_each(self, first, frames),
         }
+    }
+
+    fn part<R>(&self, ticks: Range<usize>, with: impl FnOnce(&Self) -> R) -> R {
+        let parts: Vec<_> = self.iter().map(|part| part.range(ticks.clone())).collect();
+        with(&parts)
     }
 }
 
@@ -157,6 +179,8 @@ fn gather_columns<T: Sample>(part: &PcmFrames<'_>, first: usize, n: usize, frame
 }
 
 impl<S: Sample> FastSink for [S] {
+    type Half<'h> = [S];
+
     fn capacity(&self) -> usize {
         self.len()
     }
@@ -168,9 +192,23 @@ impl<S: Sample> FastSink for [S] {
     fn store<T: Sample>(&mut self, _: Isa, first: usize, samples: &[T]) {
         convert(samples, &mut self[first..first + samples.len()]);
     }
+
+    fn halves<'h, R>(
+        &'h mut self,
+        samples: usize,
+        with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
+    ) -> R {
+        let (earlier, later) = self.split_at_mut(samples);
+        with(earlier, later)
+    }
 }
 
 impl FastSink for PcmOutput<'_> {
+    type Half<'h>
+        = PcmOutput<'h>
+    where
+        Self: 'h;
+
     fn capacity(&self) -> usize {
         self.bytes.len() / self.format.bytes()
     }
@@ -184,6 +222,20 @@ impl FastSink for PcmOutput<'_> {
             // Formats that hold more digits than f32.
             None => encode_each(self.format, samples, out),
         };
+    }
+
+    fn halves<'h, R>(
+        &'h mut self,
+        samples: usize,
+        with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
+    ) -> R {
+        let Self { format, bytes, clipped } = self;
+        let (earlier, later) = bytes.split_at_mut(samples * format.bytes());
+        let half = |bytes| PcmOutput { format: *format, bytes, clipped: 0 };
+        let (mut earlier, mut later) = (half(earlier), half(later));
+        let result = with(&mut earlier, &mut later);
+        *clipped += earlier.clipped + later.clipped;
+        result
     }
 }
 

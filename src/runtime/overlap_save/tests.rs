@@ -340,7 +340,7 @@ fn threads_do_not_change_a_bit() {
     let input = noise.samples(2 * 20_000);
     let mut out = [vec![0.0; 2 * 20_000], vec![0.0; 2 * 20_000]];
     one.process(&input, &mut out[0]).unwrap();
-    many.process_parallel(&input, &mut out[1], 3).unwrap();
+    many.process_parallel(&input, &mut out[1], &crate::runtime::Workers::new(3).unwrap()).unwrap();
     assert_eq!(out[0], out[1]);
 }
 

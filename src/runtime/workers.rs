@@ -1,0 +1,105 @@
+//! Calls on several threads.
+//!
+//! A call is halved until the spans are short; each span has a state of its own, made from the filter memory before it,
+//! so its outputs have the bits that one thread would give them. There are more spans than threads: who is done first takes
+//! the next one, so that a thread that was held up does not hold up all.
+
+use super::fir::{FirPlan, FirState};
+use super::sample::Sample;
+use super::ticks::{FastSink, TickSource};
+use std::io;
+use std::ops::Range;
+
+/// Threads that wait for work; any number of streams may use them.
+#[derive(Debug)]
+pub struct Workers {
+    pool: rayon::ThreadPool,
+}
+
+impl Workers {
+    /// Starts `threads` threads, one for each processor if that is 0.
+    ///
+    /// # Errors
+    /// If the system starts no more threads.
+    pub fn new(threads: usize) -> io::Result<Self> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        Ok(Self { pool: pool.map_err(io::Error::other)? })
+    }
+
+    /// How many there are.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+}
+
+/// Multiply-adds that are worth a span: some tens of microseconds, many times what it costs to hand it over.
+const SPAN: usize = 1 << 20;
+
+/// Runs a call on all workers and leaves the state after its last tick; returns how many samples were not finite.
+pub(super) fn process<T: Sample>(
+    plan: &FirPlan<T>,
+    state: &mut FirState<T>,
+    source: &(impl TickSource + ?Sized),
+    sink: &mut (impl FastSink + ?Sized),
+    workers: &Workers,
+) -> u64 {
+    let ticks = source.ticks();
+    let products = plan.channels * plan.ratio * (plan.history + 1);
+    let span = SPAN.div_ceil(products).max(4 * plan.reach());
+    if workers.threads() == 1 || ticks < 2 * span {
+        return plan.process(state, source, sink);
+    }
+    let call = Call { plan, source, lead: state.lead(), span };
+    let (replaced, last) = workers.pool.install(|| call.spans(0..ticks, Some(state), sink));
+    if let Some(last) = last {
+        *state = last;
+    }
+    replaced
+}
+
+/// A call whose spans are shared out.
+struct Call<'a, T: Sample, S: ?Sized> {
+    plan: &'a FirPlan<T>,
+    source: &'a S,
+    /// Ticks of an unfinished super-tick before the call.
+    lead: usize,
+    /// Least ticks of a span.
+    span: usize,
+}
+
+impl<T: Sample, S: TickSource + ?Sized> Call<'_, T, S> {
+    /// The ticks of a range to a sink of their own. The first span has the stream's `state`, the others make theirs;
+    /// returns how many samples were not finite, and the state after the last span if it is not the stream's.
+    fn spans(
+        &self,
+        ticks: Range<usize>,
+        state: Option<&mut FirState<T>>,
+        sink: &mut (impl FastSink + ?Sized),
+    ) -> (u64, Option<FirState<T>>) {
+        if ticks.len() < 2 * self.span {
+            return self.span(ticks, state, sink);
+        }
+        let middle = self.plan.beginning(ticks.start + ticks.len() / 2, self.lead);
+        sink.halves((middle - ticks.start) * self.plan.ratio, |earlier, later| {
+            let ((some, _), (more, last)) = rayon::join(
+                || self.spans(ticks.start..middle, state, earlier),
+                || self.spans(middle..ticks.end, None, later),
+            );
+            (some + more, last)
+        })
+    }
+
+    fn span(
+        &self,
+        ticks: Range<usize>,
+        state: Option<&mut FirState<T>>,
+        sink: &mut (impl FastSink + ?Sized),
+    ) -> (u64, Option<FirState<T>>) {
+        let mut own = state.is_none().then(|| self.plan.state_at(self.source, ticks.start));
+        let replaced = self.source.part(ticks, |part| match state.or(own.as_mut()) {
+            Some(state) => self.plan.process(state, part, sink),
+            None => 0,
+        });
+        (replaced, own)
+    }
+}
