@@ -4,20 +4,7 @@ use crate::design::error_system::bank_gamma;
 use crate::design::{Problem, design};
 use crate::spec::Spec;
 
-const THESIS: &str = r#"
-fast_period = 1.0
-ratio = 2
-latency = 3
-[target]
-filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
-[[channel]]
-delay = 1.2
-[[channel]]
-delay = 0.6
-[design]
-method = "fir"
-taps = 22
-"#;
+const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
 
 /// A plant with the taps of its optimal FIR bank.
 fn optimum(spec: &str) -> (BlockedPlant, Vec<Vec<f64>>) {
@@ -155,7 +142,7 @@ fn taps_of_any_size_find_their_scale() {
 
 #[test]
 fn equal_channels_share_finer_steps_than_their_own() {
-    let twice = THESIS.replace("delay = 0.6", "delay = 0.6\n[[channel]]\ndelay = 0.6");
+    let twice = THESIS.replace("delay_samples = 0.6", "delay_samples = 0.6\n[[channel]]\ndelay_samples = 0.6");
     let (plant, taps) = optimum(&twice);
     let found = Quantiser::new(&plant, &taps).unwrap().quantise(&WordLengths::Same(4), None).unwrap();
     assert!(found.gamma <= found.rounded);
