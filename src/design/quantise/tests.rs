@@ -50,7 +50,8 @@ fn brute_force(plant: &BlockedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
 
 #[test]
 fn small_banks_reach_what_trying_all_integers_reaches() {
-    let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 3"));
+    let (plant, taps) =
+        optimum(&THESIS.replace("taps = 22", "taps = 3").replace("latency = 10", "latency = 3"));
     for bits in 3..8 {
         let words = WordLengths::Same(bits);
         let quantiser = Quantiser::new(&plant, &taps).unwrap();
@@ -142,7 +143,8 @@ fn taps_of_any_size_find_their_scale() {
 
 #[test]
 fn equal_channels_share_finer_steps_than_their_own() {
-    let twice = THESIS.replace("delay_samples = 0.6", "delay_samples = 0.6\n[[channel]]\ndelay_samples = 0.6");
+    let twice =
+        THESIS.replace("delay_samples = 0.6", "delay_samples = 0.6\n[[channel]]\ndelay_samples = 0.6");
     let (plant, taps) = optimum(&twice);
     let found = Quantiser::new(&plant, &taps).unwrap().quantise(&WordLengths::Same(4), None).unwrap();
     assert!(found.gamma <= found.rounded);
