@@ -124,9 +124,11 @@ impl<'a> Words<'a> {
         );
         for word in &self.study.words {
             text += &format!(
-                "           {:>12}: {:8.4} dB lost (each tap rounded by itself: {:.4} dB)\n",
+                "           {:>12} times 2^{}: {:.4} dB of gamma lost, {:.2} dB of mean square (each tap rounded: {:.4} dB of gamma)\n",
                 word.bits.to_string(),
+                -word.fraction_bits,
                 word.loss_db,
+                word.mean_square_loss_db,
                 word.rounded_loss_db,
             );
         }

@@ -2,7 +2,7 @@
 
 use super::equivalence::BlockedPlant;
 use super::problem::{Part, Problem};
-use super::quantise::{WordStudy, quantise};
+use super::quantise::{self, WordStudy, quantise};
 use super::reduction::{self, Aim, OrderReduction};
 use super::{DesignError, comparison, error_system, fir, iir};
 use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
@@ -52,7 +52,7 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         }
         Solution::System(system, norm) => recursive_form(spec, &plant, (&distinct, &parts), &system, norm)?,
     };
-    let (filters, peak, integers) = with_integers(&plant, filters, peak, spec)?;
+    let (filters, peak, integers) = with_integers(&plant, filters, peak, spec, &problem.noise)?;
     let (fixed_point, words) = integers.unzip();
     let gamma = Gamma {
         upper: Some(peak.gain),
@@ -95,11 +95,13 @@ fn with_integers(
     filters: SynthesisFilters,
     peak: Peak,
     spec: &Spec,
+    noise: &[f64],
 ) -> Result<WithIntegers, DesignError> {
     let (SynthesisFilters::Fir(taps), Some(bits)) = (&filters, &spec.design.bits) else {
         return Ok((filters, peak, None));
     };
-    let (integers, words) = quantise(plant, taps, peak.gain, bits, spec.design.fraction_bits)?;
+    let subject = quantise::Subject { plant, taps, noise, slack: spec.design.slack.unwrap_or(0.0) };
+    let (integers, words) = quantise(subject, peak.gain, bits, spec.design.fraction_bits)?;
     let (filters, peak) = judged(plant, SynthesisFilters::Fir(integers.taps()))?;
     Ok((filters, peak, Some((integers, words))))
 }

@@ -71,6 +71,14 @@ impl<'a> ErrorGrid<'a> {
         self.points.iter().map(|point| gain(point, taps)).collect()
     }
 
+    /// The mean square of the error a tick, for white noise of unit density at the analog input.
+    pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
+        let last = self.points.len() - 1;
+        let weight = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
+        let square = |(k, point)| weight(k) * error_at(point, taps).norm_squared();
+        self.points.iter().enumerate().map(square).sum::<f64>() / last as f64
+    }
+
     /// The peaks of the error with `taps`: at the points of the grid, and between them on the parabolas through three
     /// neighbours.
     pub(super) fn peaks(&self, taps: &[Mat]) -> Result<Peaks, DesignError> {

@@ -71,6 +71,16 @@ pub enum DesignError {
     /// What was found does not prove the gammas.
     #[error(transparent)]
     Verify(#[from] VerifyError),
+    /// Nothing is left of the taps at the scale that was asked for.
+    #[error(
+        "with fraction_bits = {fraction_bits} all integer taps are zero: the taps fit their bits up to fraction_bits = {fitting}; give about that, or leave it out"
+    )]
+    AllZero {
+        /// The scale.
+        fraction_bits: i32,
+        /// The finest one at which no tap is cut off.
+        fitting: i32,
+    },
     /// The interior-point method gave no taps at all.
     #[error("no taps were found; please report the spec")]
     NoTaps,

@@ -46,7 +46,7 @@ impl TappedRecursion {
     }
 
     /// The same transfer function with the first `ticks` samples of its response after the direct one as taps and all states
-    /// in the recursion: y[k] = sum h_j u[k - j] + c a^ticks x[k - ticks].
+    /// in the recursion: `y[k] = sum h_j u[k - j] + c a^ticks x[k - ticks]`.
     ///
     /// # Errors
     /// [`StateSpaceError`] never: the parts fit.

@@ -69,6 +69,13 @@ impl GapFiller {
         }
         let touch = match &bank.filters {
             SynthesisFilters::Fir(taps) => Some(taps.iter().map(|f| touched_phases(f, ratio)).collect()),
+            // Without states only the sample's own tick is touched.
+            SynthesisFilters::StateSpace(block) if block.a.is_empty() => {
+                let phases = |i: usize| {
+                    (0..block.d.len()).filter(|&p| block.d[p].get(i).is_some_and(|x| *x != 0.0)).collect()
+                };
+                Some((0..channels).map(|i| vec![phases(i)]).collect())
+            }
             SynthesisFilters::StateSpace(_) => None,
         };
         Ok(Self {
@@ -298,6 +305,18 @@ mod tests {
     }
 
     #[test]
+    fn a_bank_without_states_forgets_at_once() {
+        let fir = fir_bank(vec![vec![1.0; 2]; 2], 2);
+        let d = vec![vec![0.5, 0.0], vec![0.25, 1.0]];
+        let filter = BlockFilter { a: vec![], b: vec![], c: vec![vec![], vec![]], d };
+        let bank = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir };
+        let mut filler = GapFiller::new(&bank, GapPolicy::Zero).unwrap();
+        let mut mask = Vec::new();
+        filler.fill(&mut [1.0, 1.0, 1.0, f64::NAN, f64::NAN, 1.0, 1.0, 1.0], &mut mask);
+        assert_eq!(mask, [0, 0, 0, 1, 1, 1, 0, 0]);
+    }
+
+    #[test]
     fn stored_samples_pass_untouched_or_as_the_same_numbers() {
         let mut noise = Noise(13);
         let samples = with_gaps(2, 200, &mut noise);
@@ -309,8 +328,8 @@ mod tests {
             numbers
         };
         let fir = fir_bank(random_taps(2, 7, &mut noise), 3);
-        let (a, b, c, d) = Default::default();
-        let filter = BlockFilter { a, b, c, d };
+        let (b, c, d) = Default::default();
+        let filter = BlockFilter { a: vec![vec![0.5]], b, c, d };
         let recursion = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir.clone() };
         for bank in [fir, recursion] {
             let mut want = samples.clone();

@@ -11,8 +11,9 @@ use super::super::DesignError;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
 
-/// Added to the diagonal, relative to its mean: taps of channels that say the same are not determined.
-const RIDGE: f64 = 1e-13;
+/// Added to the diagonal, relative to each entry of it, since channels may differ by many decades: taps of channels that
+/// say the same are not determined.
+const RIDGE: f64 = 1e-12;
 
 /// A tap of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,8 +65,7 @@ impl Correlations {
     pub(super) fn factor(&self, taps: &[Tap]) -> Result<Mat, DesignError> {
         let n = taps.len();
         let mut form = Mat::from_fn(n, n, |r, c| self.between(taps[r], taps[c]));
-        let ridge = RIDGE * form.trace() / n as f64;
-        (0..n).for_each(|i| form[(i, i)] += ridge + f64::MIN_POSITIVE);
+        (0..n).for_each(|i| form[(i, i)] += RIDGE * form[(i, i)] + f64::MIN_POSITIVE);
         Ok(linalg::cholesky(&form)?)
     }
 

@@ -16,10 +16,10 @@ const FINALISTS: usize = 3;
 /// A longer line is taken if gamma (as roughly known) is worse by no more than this: lines run faster than recursions.
 const WORSE: f64 = 1e-4;
 /// All orders are looked at while the squares of the unknowns of all of them are fewer than this.
-const CHEAP: f64 = 2e6;
+const CHEAP: f64 = 1e5;
 /// Evaluations of a descent: at most these, and fewer where each takes long.
 const EVALUATIONS: f64 = 80.0;
-const EFFORT: f64 = 4e6;
+const EFFORT: f64 = 4e5;
 /// Poles of a reduced bank keep this distance from the unit circle.
 const MARGIN: f64 = 1e-9;
 /// Losses below this are rounding, decibels.
