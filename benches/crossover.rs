@@ -5,9 +5,8 @@
 //! what the plan chooses. The constants of the plan's cost model (`src/runtime/form.rs`) were fitted to this table. Words
 //! after `--`: `f64` for double precision.
 
-use hybank::bank::{Bank, Gamma, SynthesisFilters};
+use hybank::bank::{Bank, SynthesisFilters};
 use hybank::runtime::{Form, Options, Precision, Reconstructor};
-use hybank::spec::Method;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -22,18 +21,7 @@ const LAGS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 
 fn fir(n: usize, m: usize, taps: usize) -> Bank {
     let f = |i: usize| (0..taps).map(|t| ((t * 7 + i * 3) % 11) as f64 / 11.0 - 0.5).collect();
-    Bank {
-        spec: None,
-        fast_period: 1.0,
-        ratio: m,
-        latency: 0,
-        method: Method::Fir,
-        delays: vec![0.0; n],
-        filters: SynthesisFilters::Fir((0..n).map(f).collect()),
-        gamma: Gamma::default(),
-        proof: None,
-        fixed_point: None,
-    }
+    Bank::bare(SynthesisFilters::Fir((0..n).map(f).collect()), m)
 }
 
 /// Nanoseconds a tick, in numbers of the kernels' own type.

@@ -4,9 +4,8 @@
 //! multiply-adds, or 4 + 2 + 2 where it has one input and one output of its own; a biquad of the usual kind takes 5. So
 //! three rates stand side by side: sections, multiply-adds by five ("biquads"), and the share of the peak.
 
-use hybank::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::runtime::{Isa, Options, Precision, Reconstructor, multiply_add_chains};
-use hybank::spec::Method;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -106,19 +105,8 @@ fn designed(sections: usize, line: usize, n: usize, m: usize) -> Case {
 }
 
 fn bank(filter: BlockFilter) -> Bank {
-    let (ratio, channels) = (filter.d.len(), filter.d[0].len());
-    Bank {
-        spec: None,
-        fast_period: 1.0,
-        ratio,
-        latency: 0,
-        method: Method::Iir,
-        delays: vec![0.0; channels],
-        filters: SynthesisFilters::StateSpace(filter),
-        gamma: Gamma::default(),
-        proof: None,
-        fixed_point: None,
-    }
+    let ratio = filter.d.len();
+    Bank::bare(SynthesisFilters::StateSpace(filter), ratio)
 }
 
 /// The least of some repeats: what the machine does when nothing else runs.

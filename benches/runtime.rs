@@ -4,12 +4,11 @@
 //! that contain it. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
 //! of many repeats, and so is the peak, which is measured anew beside each row.
 
-use hybank::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{
     Form, Isa, Options, PcmOutput, Precision, Reconstructor, Workers, multiply_add_chains,
 };
-use hybank::spec::Method;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -18,24 +17,9 @@ const CASES: [(&str, usize, usize, usize); 3] = [("A", 2, 2, 24), ("B", 4, 4, 64
 /// Time for the repeats of a row.
 const ROW: Duration = Duration::from_millis(100);
 
-fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
-    Bank {
-        spec: None,
-        fast_period: 1.0,
-        ratio,
-        latency: 0,
-        method: Method::Fir,
-        delays: vec![0.0; channels],
-        filters,
-        gamma: Gamma::default(),
-        proof: None,
-        fixed_point: None,
-    }
-}
-
 fn fir(n: usize, m: usize, taps: usize) -> Bank {
     let f = |i: usize| (0..taps).map(|t| ((t * 7 + i * 3) % 11) as f64 / 11.0 - 0.5).collect();
-    bank(n, m, SynthesisFilters::Fir((0..n).map(f).collect()))
+    Bank::bare(SynthesisFilters::Fir((0..n).map(f).collect()), m)
 }
 
 /// 16 pairs of states in modal form, four channels.
@@ -54,10 +38,9 @@ fn recursion() -> Bank {
     };
     let matrix = |rows: usize, cols: usize| (0..rows).map(|i| vec![0.1 / (1 + i) as f64; cols]).collect();
     let a = (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect();
-    bank(
-        4,
-        4,
+    Bank::bare(
         SynthesisFilters::StateSpace(BlockFilter { a, b: matrix(n, 4), c: matrix(4, n), d: matrix(4, 4) }),
+        4,
     )
 }
 

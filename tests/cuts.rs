@@ -2,10 +2,9 @@
 
 mod support;
 
-use hybank::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{Options, PcmOutput, Precision, Reconstructor};
-use hybank::spec::Method;
 use rand_cuts::Cuts;
 use std::io::{Read, Write};
 use support::{Desk, bytes, ticks};
@@ -36,18 +35,7 @@ mod rand_cuts {
 }
 
 fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
-    Bank {
-        spec: None,
-        fast_period: 1.0,
-        ratio,
-        latency: 3,
-        method: Method::Fir,
-        delays: vec![0.0; channels],
-        filters,
-        gamma: Gamma::default(),
-        proof: None,
-        fixed_point: None,
-    }
+    Bank { latency: 3, delays: vec![0.0; channels], ..Bank::bare(filters, ratio) }
 }
 
 fn noise(seed: u64) -> impl FnMut() -> f64 {

@@ -91,6 +91,26 @@ pub struct Gamma {
 }
 
 impl Bank {
+    /// Filters made elsewhere as a bank: h = 1, no latency, no delays, and nothing known of front ends and gammas.
+    pub fn bare(filters: SynthesisFilters, ratio: usize) -> Self {
+        let (method, channels) = match &filters {
+            SynthesisFilters::Fir(taps) => (Method::Fir, taps.len()),
+            SynthesisFilters::StateSpace(block) => (Method::Iir, block.d.first().map_or(0, Vec::len)),
+        };
+        Self {
+            spec: None,
+            fast_period: 1.0,
+            ratio,
+            latency: 0,
+            method,
+            delays: vec![0.0; channels],
+            filters,
+            fixed_point: None,
+            gamma: Gamma::default(),
+            proof: None,
+        }
+    }
+
     /// N, the number of slow channels.
     pub fn channel_count(&self) -> usize {
         self.delays.len()

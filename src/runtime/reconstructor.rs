@@ -102,14 +102,10 @@ enum StreamState {
 /// locks nothing, and the same ticks give the same bits however they are cut into calls.
 ///
 /// ```
-/// # use hybank::bank::{Bank, Gamma, SynthesisFilters};
-/// # use hybank::spec::Method;
+/// # use hybank::bank::{Bank, SynthesisFilters};
 /// use hybank::runtime::Reconstructor;
-/// # let bank = Bank {
-/// #     spec: None, fast_period: 1.0, ratio: 2, latency: 1, method: Method::Fir,
-/// #     delays: vec![0.0, 1.0], gamma: Gamma::default(), proof: None, fixed_point: None,
-/// #     filters: SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0]]),
-/// # };
+/// # let taps = SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0]]);
+/// # let bank = Bank { latency: 1, delays: vec![0.0, 1.0], ..Bank::bare(taps, 2) };
 /// let mut fuse = Reconstructor::new(&bank)?;
 /// let mut fast = vec![0.0; 2 * fuse.ratio()];
 /// for ticks in [[1.0, 10.0, 2.0, 20.0], [3.0, 30.0, 4.0, 40.0]] {

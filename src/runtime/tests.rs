@@ -1,9 +1,8 @@
 //! The reconstructor against the definition.
 
 use super::*;
-use crate::bank::{Bank, BlockFilter, Gamma, SynthesisFilters};
+use crate::bank::{Bank, BlockFilter, SynthesisFilters};
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::spec::Method;
 use proptest::prelude::*;
 
 /// A generator whose stream never changes (Knuth's MMIX).
@@ -25,18 +24,7 @@ pub(super) fn fir_bank(taps: Vec<Vec<f64>>, ratio: usize) -> Bank {
 }
 
 fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
-    Bank {
-        spec: None,
-        fast_period: 1.0,
-        ratio,
-        latency: 3,
-        method: Method::Fir,
-        delays: vec![0.0; channels],
-        filters,
-        gamma: Gamma::default(),
-        proof: None,
-        fixed_point: None,
-    }
+    Bank { latency: 3, delays: vec![0.0; channels], ..Bank::bare(filters, ratio) }
 }
 
 pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Vec<Vec<f64>> {

@@ -95,11 +95,15 @@ impl<T: Sample, S: TickSource + ?Sized> Call<'_, T, S> {
         state: Option<&mut FirState<T>>,
         sink: &mut (impl FastSink + ?Sized),
     ) -> (u64, Option<FirState<T>>) {
-        let mut own = state.is_none().then(|| self.plan.state_at(self.source, ticks.start));
-        let replaced = self.source.part(ticks, |part| match state.or(own.as_mut()) {
-            Some(state) => self.plan.process(state, part, sink),
-            None => 0,
-        });
-        (replaced, own)
+        let mut run = |state: &mut FirState<T>| {
+            self.source.part(ticks.clone(), |part| self.plan.process(state, part, sink))
+        };
+        match state {
+            Some(state) => (run(state), None),
+            None => {
+                let mut own = self.plan.state_at(self.source, ticks.start);
+                (run(&mut own), Some(own))
+            }
+        }
     }
 }
