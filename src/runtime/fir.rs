@@ -3,9 +3,6 @@
 //! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], as one product of the tick's window (the last K frames as
 //! they lie) with a vector of coefficients for each phase p. The order of the sum is that of
 //! [`simd`](super::simd); it is the same wherever the tick stands in its call.
-//!
-//! With one channel or one phase there is too little to share between loads: then T = 2 successive ticks
-//! form one *super-tick* of N T inputs and M T outputs. A call may begin or end inside a super-tick.
 
 use super::BuildError;
 use super::aligned::Aligned;
@@ -13,11 +10,17 @@ use super::sample::Sample;
 use super::simd::{Cut, FirKernel, Isa, PhaseGroup};
 use super::ticks::{FastSink, TickSource};
 use super::window::Window;
+use std::ops::Range;
 
 /// Samples of a block that should stay in the first-level cache beside coefficients and output.
 const CACHE_SAMPLES: usize = 4096;
-/// Super-ticks of a block are a multiple of this, and so of every tile.
+/// Ticks of a block are a multiple of this, and so of every tile.
 const BLOCK_UNIT: usize = 96;
+/// A call is short if it has fewer ticks than so many times those that need the past: copying all of them is cheaper
+/// than a second call of the kernel.
+const SHORT_CALL: usize = 8;
+/// Blocks that are taken at once where each frame is read only once, so that the cache does not matter.
+const SPAN_BLOCKS: usize = 8;
 
 /// Coefficients in the order of use; shared by all streams of a bank.
 #[derive(Debug)]
@@ -26,10 +29,10 @@ pub(crate) struct FirPlan<T: Sample> {
     pub(crate) ratio: usize,
     /// K - 1: ticks that the filters look back.
     pub(crate) history: usize,
-    /// T: ticks in a super-tick.
-    pub(crate) fold: usize,
     cut: Cut,
-    /// Super-ticks in a block.
+    /// Ticks that a window reaches back.
+    reach: usize,
+    /// Ticks of a block.
     block: usize,
     groups: Vec<PhaseGroup<T>>,
     kernel: FirKernel<T>,
@@ -44,37 +47,27 @@ pub(crate) struct FirState<T: Sample> {
     output: Aligned<T>,
 }
 
-/// Ticks of a call that are done together.
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    /// The first tick, from the beginning of the call.
-    first: usize,
-    ticks: usize,
-    /// Ticks of its first super-tick that were there before.
-    lead: usize,
-}
-
 impl<T: Sample> FirPlan<T> {
     /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters.
     pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Self, BuildError> {
         check_finite::<T>(taps)?;
         let channels = taps.len();
         let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
-        let fold = if channels == 1 || ratio == 1 { 2 } else { 1 };
-        let hop = channels * fold;
         let kernel = T::fir_kernel(isa);
         // Blocks, windows and coefficients are a few times this long; the sum must not overflow.
-        let len = (lags + fold - 1)
+        let len = lags
             .checked_mul(channels)
-            .filter(|&len| len.saturating_mul(ratio * fold) <= isize::MAX as usize / 64)
+            .filter(|&len| len.saturating_mul(ratio) <= isize::MAX as usize / 64)
             .ok_or(BuildError::TooLong { history: lags - 1, channels })?;
-        let cut = Cut::new(hop, len, kernel.group());
-        let block = (CACHE_SAMPLES / hop).saturating_sub(lags).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT) / BLOCK_UNIT
+        let cut = kernel.cut(channels, len, ratio);
+        let block = (CACHE_SAMPLES / channels).saturating_sub(lags).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT)
+            / BLOCK_UNIT
             * BLOCK_UNIT;
-        let coefficient = |element, phase| coefficient(taps, ratio, fold, element, phase);
+        let coefficient = |element, phase| coefficient(taps, ratio, element, phase);
         let groups =
-            widths(ratio * fold).map(|(first, width)| phase_group(cut, first, width, coefficient)).collect();
-        Ok(Self { channels, ratio, history: lags - 1, fold, cut, block, groups, kernel, isa })
+            widths(ratio).map(|(first, width)| phase_group(&cut, first, width, coefficient)).collect();
+        let reach = cut.past.div_ceil(channels);
+        Ok(Self { channels, ratio, history: lags - 1, cut, reach, block, groups, kernel, isa })
     }
 
     /// N K: multiply-adds for each fast sample, without those by padding.
@@ -84,10 +77,10 @@ impl<T: Sample> FirPlan<T> {
 
     /// A stream's state before its first tick.
     pub(crate) fn state(&self) -> FirState<T> {
-        let beyond = self.kernel.vector_ticks(self.cut) * self.cut.hop;
+        let beyond = self.cut.vector * self.channels;
         FirState {
-            window: Window::new(self.channels, self.fold, self.cut.past(), self.block * self.cut.hop, beyond),
-            output: Aligned::new(self.ratio * self.fold * self.block),
+            window: Window::new(self.channels, self.cut.past, self.block * self.channels, beyond),
+            output: Aligned::new(self.ratio * self.block),
         }
     }
 
@@ -98,55 +91,67 @@ impl<T: Sample> FirPlan<T> {
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
-        let frames = source.frames::<T>();
-        let mut replaced = 0;
-        // Ticks of the call from which on the frames are known to be finite, and those in the window.
-        let (mut clean, mut held, mut first) = (0, 0, 0);
-        while first < source.ticks() {
-            let lead = if held == first { state.window.lead() } else { 0 };
-            let mut block = Block { first, ticks: self.block_ticks(source.ticks() - first, lead), lead };
-            let in_place = frames.and_then(|frames| self.in_place(frames, clean, &mut block));
-            // Filtered first and looked at afterwards, when the frames are in the cache.
-            let done = in_place.is_some_and(|x| {
-                self.filter(x, block, &mut state.output, sink);
-                T::all_finite(self.isa, &x[self.cut.past()..])
-            });
-            if !done {
-                if let (true, Some(frames)) = (held < first, frames) {
-                    state.window.recall(&frames[..first * self.channels]);
-                }
-                let count = self.gather(state, source, block);
-                if count > 0 {
-                    (replaced, clean) = (replaced + count, first + block.ticks);
-                }
-                self.filter(state.window.view(), block, &mut state.output, sink);
-                state.window.advance(block.ticks);
-                held = first + block.ticks;
-            }
-            first += block.ticks;
+        let ticks = source.ticks();
+        if let Some(frames) = source.frames::<T>()
+            && self.where_they_lie(state, frames, ticks, sink)
+        {
+            return 0;
         }
-        if let (true, Some(frames)) = (held < first, frames) {
-            state.window.recall(&frames[..first * self.channels]);
+        let mut replaced = 0;
+        for first in (0..ticks).step_by(self.block) {
+            replaced += self.through_window(state, source, first..ticks.min(first + self.block), sink);
         }
         replaced
     }
 
-    /// Ticks that a state must know.
-    pub(crate) fn reach(&self) -> usize {
-        self.cut.past().div_ceil(self.channels)
+    /// Filters frames in the caller's memory, but for those at the beginning, whose past lies elsewhere; false, with the
+    /// state as it was, if the beginning is too much of the call or something may not be finite.
+    ///
+    /// The beginning comes last: what was just copied cannot be loaded across the borders of its stores before these
+    /// have reached the cache, and short calls would wait for that.
+    fn where_they_lie(
+        &self,
+        state: &mut FirState<T>,
+        frames: &[T],
+        ticks: usize,
+        sink: &mut (impl FastSink + ?Sized),
+    ) -> bool {
+        let beginning = self.reach + (ticks.wrapping_sub(self.reach) & (self.cut.vector - 1));
+        if ticks < SHORT_CALL * beginning.max(1) || beginning > self.block {
+            return false;
+        }
+        let FirState { window, output } = state;
+        let n = self.channels;
+        let room = window.room(beginning);
+        room.copy_from_slice(&frames[..beginning * n]);
+        let once = self.groups.len() == 1 && sink.takes::<T>();
+        let span = if once { SPAN_BLOCKS * self.block } else { self.block };
+        let mut first = beginning;
+        while first < ticks {
+            let end = ticks.min(first + span);
+            let x = &frames[first * n - self.cut.past..end * n];
+            if !self.filter(x, first..end, output, sink) {
+                return false;
+            }
+            first = end;
+        }
+        if beginning > 0 && !self.filter(window.view(), 0..beginning, output, sink) {
+            return false;
+        }
+        window.recall(frames);
+        true
     }
 
-    /// The last beginning of a super-tick that is not after `tick`, of a call with `lead` ticks before it.
-    pub(crate) fn beginning(&self, tick: usize, lead: usize) -> usize {
-        tick - (lead + tick) % self.fold
+    /// Ticks that a state must know.
+    pub(crate) fn reach(&self) -> usize {
+        self.reach
     }
 
     /// A state before tick `first` of `source`, as if all ticks before it had been processed: at least
-    /// [`FirPlan::reach`] of them, and a super-tick begins there.
+    /// [`FirPlan::reach`] of them.
     pub(crate) fn state_at(&self, source: &(impl TickSource + ?Sized), first: usize) -> FirState<T> {
-        let ticks = self.reach();
-        let mut frames = vec![T::default(); ticks * self.channels];
-        source.gather(self.isa, first - ticks, ticks, &mut frames);
+        let mut frames = vec![T::default(); self.reach * self.channels];
+        source.gather(self.isa, first - self.reach, self.reach, &mut frames);
         // They are counted where they are processed.
         replace_not_finite(&mut frames);
         let mut state = self.state();
@@ -154,66 +159,56 @@ impl<T: Sample> FirPlan<T> {
         state
     }
 
-    /// At most a block, up to the end of a super-tick if there are so many.
-    fn block_ticks(&self, left: usize, lead: usize) -> usize {
-        left.min(self.block * self.fold - lead)
-    }
-
-    /// The block's frames with their past as they lie in the caller's memory, if they fill vectors; the block is
-    /// cut to whole ones. Before there is enough past that is known to be finite a block is made short.
-    fn in_place<'a>(&self, frames: &'a [T], clean: usize, block: &mut Block) -> Option<&'a [T]> {
-        let (n, past) = (self.channels, self.cut.past());
-        let known = (block.first - clean) * n;
-        if known < past || block.lead > 0 {
-            let enough = (past.saturating_sub(known)).div_ceil(n).next_multiple_of(BLOCK_UNIT * self.fold);
-            block.ticks = block.ticks.min(enough.max(BLOCK_UNIT * self.fold) - block.lead);
-            return None;
+    /// Filters at most a block; returns how many samples were not finite and were taken as 0.
+    fn through_window(
+        &self,
+        state: &mut FirState<T>,
+        source: &(impl TickSource + ?Sized),
+        ticks: Range<usize>,
+        sink: &mut (impl FastSink + ?Sized),
+    ) -> u64 {
+        let FirState { window, output } = state;
+        source.gather(self.isa, ticks.start, ticks.len(), window.room(ticks.len()));
+        let mut count = 0;
+        // Filtered first: hardly ever is there anything to replace.
+        if !self.filter(window.view(), ticks.clone(), output, sink) {
+            count = replace_not_finite(window.room(ticks.len()));
+            if count > 0 {
+                self.filter(window.view(), ticks.clone(), output, sink);
+            }
         }
-        let unit = self.kernel.vector_ticks(self.cut) * self.fold;
-        let whole = block.ticks / unit * unit;
-        if whole == 0 {
-            return None;
+        window.advance(ticks.len());
+        count
+    }
+
+    /// Filters ticks the first of whose past begins at `x`; false if something may not be finite.
+    fn filter(
+        &self,
+        x: &[T],
+        ticks: Range<usize>,
+        output: &mut [T],
+        sink: &mut (impl FastSink + ?Sized),
+    ) -> bool {
+        let samples = ticks.start * self.ratio..ticks.end * self.ratio;
+        if let Some(slots) = sink.slots(samples.clone()) {
+            return self.run(x, ticks.len(), slots);
         }
-        block.ticks = whole;
-        Some(&frames[block.first * n - past..(block.first + whole) * n])
+        let output = &mut output[..samples.len()];
+        let finite = self.run(x, ticks.len(), output);
+        sink.store(self.isa, samples.start, output);
+        finite
     }
 
-    /// The block's frames into the window; returns how many samples were not finite and are 0 now.
-    fn gather(&self, state: &mut FirState<T>, source: &(impl TickSource + ?Sized), block: Block) -> u64 {
-        let room = state.window.room(block.ticks);
-        source.gather(self.isa, block.first, block.ticks, room);
-        if T::all_finite(self.isa, room) { 0 } else { replace_not_finite(room) }
-    }
-
-    /// Filters a block whose first super-tick's past begins at `x`.
-    fn filter(&self, x: &[T], block: Block, output: &mut [T], sink: &mut (impl FastSink + ?Sized)) {
-        let m = self.ratio;
-        let super_ticks = (block.lead + block.ticks).div_ceil(self.fold);
-        if block.lead == 0
-            && block.ticks.is_multiple_of(self.fold)
-            && let Some(slots) = sink.slots(block.first * m..(block.first + block.ticks) * m)
-        {
-            self.run(x, super_ticks, slots);
-            return;
-        }
-        self.run(x, super_ticks, output);
-        let range = block.lead * m..(block.lead + block.ticks) * m;
-        sink.store(self.isa, block.first * m, &output[range]);
-    }
-
-    fn run(&self, x: &[T], super_ticks: usize, out: &mut [T]) {
+    fn run(&self, x: &[T], ticks: usize, out: &mut [T]) -> bool {
+        let mut finite = true;
         for group in &self.groups {
-            self.kernel.run(group, self.cut, x, super_ticks, &mut out[group.first..], self.ratio * self.fold);
+            finite &= self.kernel.run(group, &self.cut, x, ticks, &mut out[group.first..], self.ratio);
         }
+        finite
     }
 }
 
 impl<T: Sample> FirState<T> {
-    /// Ticks of an unfinished super-tick.
-    pub(crate) fn lead(&self) -> usize {
-        self.window.lead()
-    }
-
     /// As new.
     pub(crate) fn reset(&mut self) {
         self.window.reset();
@@ -240,13 +235,14 @@ pub(super) fn replace_not_finite<T: Sample>(samples: &mut [T]) -> u64 {
     count
 }
 
-/// M phases in groups of 4, and of 3 or 2 for the rest; there are at least 2.
+/// M phases in groups of 4, before them one of 3 if M is odd, behind them one of 2 if that is not enough; 1 only if M is 1. Those
+/// of 3 may write to the place behind them, and those behind them then write over it.
 pub(super) fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
     let mut first = 0;
     std::iter::from_fn(move || {
         let width = match phases - first {
             0 => return None,
-            5 | 6 | 9 => 3,
+            _ if first == 0 && phases > 1 && phases % 2 == 1 => 3,
             left => left.min(4),
         };
         first += width;
@@ -254,29 +250,26 @@ pub(super) fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// Coefficient of the sample `element` samples before the last one of a super-tick, for phase r M + p:
-/// phase p of the super-tick's tick r.
-fn coefficient(taps: &[Vec<f64>], ratio: usize, fold: usize, element: usize, phase: usize) -> f64 {
+/// Coefficient of the sample `element` samples before the last one of a tick.
+fn coefficient(taps: &[Vec<f64>], ratio: usize, element: usize, phase: usize) -> f64 {
     let n = taps.len();
-    let (back, channel) = (element / n, n - 1 - element % n);
-    let later = fold - 1 - phase / ratio;
-    let tap = back.checked_sub(later).and_then(|lag| taps[channel].get(phase % ratio + lag * ratio));
-    tap.copied().unwrap_or(0.0)
+    let (lag, channel) = (element / n, n - 1 - element % n);
+    taps[channel].get(phase + lag * ratio).copied().unwrap_or(0.0)
 }
 
-/// Phases first .. first + width of a super-tick, in the order of use: the newest step first, in it the
-/// samples as they lie.
+/// Phases first .. first + width in the order of use, in each step the samples as they lie.
 pub(super) fn phase_group<T: Sample>(
-    cut: Cut,
+    cut: &Cut,
     first: usize,
     width: usize,
     coefficient: impl Fn(usize, usize) -> f64,
 ) -> PhaseGroup<T> {
     let mut coefficients = Aligned::new(cut.steps * width * cut.depth);
-    for (s, step) in coefficients.chunks_exact_mut(width * cut.depth).enumerate() {
+    for (s, step) in cut.order(width).into_iter().zip(coefficients.chunks_exact_mut(width * cut.depth)) {
         for (p, places) in step.chunks_exact_mut(cut.depth).enumerate() {
             for (d, slot) in places.iter_mut().enumerate() {
-                *slot = T::from_f64(coefficient(s * cut.depth + cut.depth - 1 - d, first + p));
+                let phase = first + cut.phase(width, p, d);
+                *slot = T::from_f64(coefficient(s * cut.depth + cut.depth - 1 - d, phase));
             }
         }
     }
@@ -289,11 +282,14 @@ mod tests {
 
     #[test]
     fn groups_cover_every_phase_once_and_are_never_narrow() {
-        for phases in 2..100 {
+        for phases in 1..100 {
             let all: Vec<_> = widths(phases).collect();
             let covered: Vec<usize> = all.iter().flat_map(|&(first, width)| first..first + width).collect();
             assert_eq!(covered, (0..phases).collect::<Vec<_>>());
-            assert!(all.iter().all(|&(_, width)| (2..=4).contains(&width)), "{phases}: {all:?}");
+            assert!(
+                all.iter().all(|&(_, width)| (2..=4).contains(&width) || phases == 1),
+                "{phases}: {all:?}"
+            );
         }
     }
 }

@@ -101,11 +101,10 @@ impl Size {
 
     /// A tick in the direct form.
     fn direct(&self) -> f64 {
-        // Ticks are taken by twos if there is one channel or phase; windows are cut into whole groups, or whole hops.
-        let fold = if self.channels == 1 || self.ratio == 1 { 2 } else { 1 };
-        let hop = self.channels * fold;
-        let depth = if hop < self.group && hop.is_power_of_two() { hop } else { self.group };
-        let steps = ((self.lags + fold - 1) as f64 * self.channels as f64 / depth as f64).ceil();
+        // Windows are cut into whole groups, or whole frames.
+        let frame = self.channels;
+        let depth = if frame < self.group && frame.is_power_of_two() { frame } else { self.group };
+        let steps = (self.lags as f64 * frame as f64 / depth as f64).ceil();
         let vectors = (self.ratio * depth) as f64 / self.group as f64;
         vectors * (steps + DIRECT_SUM) + DIRECT_OUTPUT * self.ratio as f64
     }

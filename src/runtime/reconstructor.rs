@@ -57,8 +57,6 @@ pub struct PlanSummary {
     pub numbers: &'static str,
     /// Instruction set of the kernels.
     pub isa: String,
-    /// Ticks that one step of the kernel takes together.
-    pub fold: usize,
     /// F, ticks of a transform, if the form has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transform: Option<usize>,
@@ -198,26 +196,21 @@ impl Reconstructor {
     /// How the bank runs.
     pub fn plan(&self) -> PlanSummary {
         match &*self.plan {
-            Plan::Single(plan) => {
-                self.summary("direct", "f32", plan.fold).with_multiply_adds(plan.multiply_adds())
-            }
-            Plan::Double(plan) => {
-                self.summary("direct", "f64", plan.fold).with_multiply_adds(plan.multiply_adds())
-            }
-            Plan::BlocksSingle(plan) => self.summary("overlap-save", "f32", 1).with_blocks(&plan.shape),
-            Plan::BlocksDouble(plan) => self.summary("overlap-save", "f64", 1).with_blocks(&plan.shape),
-            Plan::RecursionSingle(plan) => self.summary(recursion_form(plan.is_modal()), "f32", 1),
-            Plan::RecursionDouble(plan) => self.summary(recursion_form(plan.is_modal()), "f64", 1),
+            Plan::Single(plan) => self.summary("direct", "f32").with_multiply_adds(plan.multiply_adds()),
+            Plan::Double(plan) => self.summary("direct", "f64").with_multiply_adds(plan.multiply_adds()),
+            Plan::BlocksSingle(plan) => self.summary("overlap-save", "f32").with_blocks(&plan.shape),
+            Plan::BlocksDouble(plan) => self.summary("overlap-save", "f64").with_blocks(&plan.shape),
+            Plan::RecursionSingle(plan) => self.summary(recursion_form(plan.is_modal()), "f32"),
+            Plan::RecursionDouble(plan) => self.summary(recursion_form(plan.is_modal()), "f64"),
         }
     }
 
     /// What every form reports.
-    fn summary(&self, form: &'static str, numbers: &'static str, fold: usize) -> PlanSummary {
+    fn summary(&self, form: &'static str, numbers: &'static str) -> PlanSummary {
         PlanSummary {
             form,
             numbers,
             isa: self.isa.to_string(),
-            fold,
             transform: None,
             block: None,
             extra_latency: self.extra_latency(),
@@ -322,10 +315,7 @@ impl Reconstructor {
 
     fn interleaved<'a, S>(&self, samples: &'a [S]) -> Result<Interleaved<'a, S>, ProcessError> {
         let channels = self.channels();
-        if !samples.len().is_multiple_of(channels) {
-            return Err(ProcessError::CutTick { samples: samples.len(), channels });
-        }
-        Ok(Interleaved { samples, channels })
+        Interleaved::new(samples, channels).ok_or(ProcessError::CutTick { samples: samples.len(), channels })
     }
 
     fn run(

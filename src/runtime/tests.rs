@@ -31,30 +31,43 @@ pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Ve
     (0..channels).map(|_| (0..taps).map(|_| noise.next()).collect()).collect()
 }
 
-/// The scalar twin: the same sums in the same order, fused if the kernels fuse. The window of a tick, or of two
-/// if they are taken together, is cut into steps of D samples, the newest first; each of D lanes sums its
-/// place of the steps, and the lanes are added as a tree.
+/// The steps of a window in the order of use. Phases beside each other take the newest first. A single phase takes
+/// pairs c apart, the older first, where c steps are a whole number of frames and of groups.
+fn order(n: usize, ratio: usize, depth: usize, steps: usize) -> Vec<usize> {
+    if ratio > 1 {
+        return (0..steps).collect();
+    }
+    let apart = (1..).find(|&c| [n, 8].iter().all(|&k| (c * depth).is_multiple_of(k))).unwrap();
+    let mut order = Vec::new();
+    for block in (0..steps).step_by(2 * apart) {
+        for s in block..(block + apart).min(steps) {
+            order.extend((s + apart < steps).then_some(s + apart).into_iter().chain([s]));
+        }
+    }
+    order
+}
+
+/// The scalar twin: the same sums in the same order, fused if the kernels fuse. The window of a tick
+/// is cut into steps of D samples; each of D lanes sums its place of the steps, and the lanes are added as a tree.
 fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32> {
     let n = taps.len();
     let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap().max(1);
-    let fold = if n == 1 || ratio == 1 { 2 } else { 1 };
-    let hop = n * fold;
-    let depth = if hop == 2 || hop == 4 { hop } else { 8 };
-    let steps = ((lags + fold - 1) * n).div_ceil(depth);
+    let depth = if [1, 2, 4].contains(&n) { n } else { 8 };
+    let order = order(n, ratio, depth, (lags * n).div_ceil(depth));
     let output = |k: usize, p: usize| {
-        // The end of the super-tick, in samples; what is not there yet has coefficient 0.
-        let end = (k / fold + 1) * hop;
+        let end = (k + 1) * n;
         let mut lanes = [0f32; 8];
-        for s in 0..steps {
+        for &s in &order {
             for (d, lane) in lanes.iter_mut().enumerate().take(depth) {
                 let Some(at) = end.checked_sub((s + 1) * depth - d) else { continue };
-                let tap = k.checked_sub(at / n).and_then(|lag| taps[at % n].get(p + lag * ratio));
-                let (x, c) = (input.get(at).copied().unwrap_or(0.0), tap.map_or(0.0, |&c| c as f32));
+                let (x, c) =
+                    (input[at], taps[at % n].get(p + (k - at / n) * ratio).map_or(0.0, |&c| c as f32));
                 *lane = if fused { x.mul_add(c, *lane) } else { x * c + *lane };
             }
         }
         let four = |l: &[f32]| (l[0] + l[2]) + (l[1] + l[3]);
         match depth {
+            1 => lanes[0],
             2 => lanes[0] + lanes[1],
             4 => four(&lanes),
             _ => four(&lanes) + four(&lanes[4..]),

@@ -41,6 +41,10 @@ pub(crate) trait FastSink: Send {
         Self: 'h;
     /// Samples that fit.
     fn capacity(&self) -> usize;
+    /// True if it has `slots` of this type.
+    fn takes<T: Sample>(&self) -> bool {
+        false
+    }
     /// Where these samples go, if they are of this type.
     fn slots<T: Sample>(&mut self, _samples: Range<usize>) -> Option<&mut [T]> {
         None
@@ -57,8 +61,18 @@ pub(crate) trait FastSink: Send {
 
 /// Numbers in memory, frames of N.
 pub(crate) struct Interleaved<'a, S> {
-    pub(crate) samples: &'a [S],
-    pub(crate) channels: usize,
+    samples: &'a [S],
+    channels: usize,
+    /// Divided once: short calls would notice.
+    ticks: usize,
+}
+
+impl<'a, S> Interleaved<'a, S> {
+    /// `None` if there is a part of a frame.
+    pub(crate) fn new(samples: &'a [S], channels: usize) -> Option<Self> {
+        let ticks = samples.len() / channels;
+        (ticks * channels == samples.len()).then_some(Self { samples, channels, ticks })
+    }
 }
 
 impl<S: Sample> TickSource for Interleaved<'_, S> {
@@ -67,7 +81,7 @@ impl<S: Sample> TickSource for Interleaved<'_, S> {
     }
 
     fn ticks(&self) -> usize {
-        self.samples.len() / self.channels
+        self.ticks
     }
 
     fn frames<T: Sample>(&self) -> Option<&[T]> {
@@ -80,7 +94,7 @@ impl<S: Sample> TickSource for Interleaved<'_, S> {
 
     fn part<R>(&self, ticks: Range<usize>, with: impl FnOnce(&Self) -> R) -> R {
         let samples = &self.samples[ticks.start * self.channels..ticks.end * self.channels];
-        with(&Interleaved { samples, channels: self.channels })
+        with(&Interleaved { samples, channels: self.channels, ticks: ticks.len() })
     }
 }
 
@@ -183,6 +197,10 @@ impl<S: Sample> FastSink for [S] {
 
     fn capacity(&self) -> usize {
         self.len()
+    }
+
+    fn takes<T: Sample>(&self) -> bool {
+        T::same(self).is_some()
     }
 
     fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {

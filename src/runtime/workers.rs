@@ -49,7 +49,7 @@ pub(super) fn process<T: Sample>(
     if workers.threads() == 1 || ticks < 2 * span {
         return plan.process(state, source, sink);
     }
-    let call = Call { plan, source, lead: state.lead(), span };
+    let call = Call { plan, source, span };
     let (replaced, last) = workers.pool.install(|| call.spans(0..ticks, Some(state), sink));
     if let Some(last) = last {
         *state = last;
@@ -61,8 +61,6 @@ pub(super) fn process<T: Sample>(
 struct Call<'a, T: Sample, S: ?Sized> {
     plan: &'a FirPlan<T>,
     source: &'a S,
-    /// Ticks of an unfinished super-tick before the call.
-    lead: usize,
     /// Least ticks of a span.
     span: usize,
 }
@@ -79,7 +77,7 @@ impl<T: Sample, S: TickSource + ?Sized> Call<'_, T, S> {
         if ticks.len() < 2 * self.span {
             return self.span(ticks, state, sink);
         }
-        let middle = self.plan.beginning(ticks.start + ticks.len() / 2, self.lead);
+        let middle = ticks.start + ticks.len() / 2;
         sink.halves((middle - ticks.start) * self.plan.ratio, |earlier, later| {
             let ((some, _), (more, last)) = rayon::join(
                 || self.spans(ticks.start..middle, state, earlier),

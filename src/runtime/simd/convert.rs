@@ -179,7 +179,7 @@ unsafe fn interleave_eights(rows: Rows, m: usize, count: usize, first: usize, do
 
 /// Four columns of two 4 x 4 blocks, one in each half.
 #[inline(always)]
-unsafe fn transpose4([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+pub(super) unsafe fn transpose4([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
     unsafe {
         let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
         let (cd_low, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));

@@ -4,123 +4,155 @@
 //! in this order with fused multiply-adds from 0, and at the end the D lanes of a tick are added as said in
 //! `lanes`: one input vector serves P phases, one vector of coefficients R vectors of input.
 //!
-//! The end of a tile is done in two parts, because its sums are ready all at once and a long
+//! Where a tick has eight lanes the end of a tile is done in two parts, because its sums are ready all at once and a long
 //! chain of shuffles and stores behind them would stop the multiply-adds: the first lanes are added in
 //! registers and go to scratch memory; from there they are brought into order after the next tile.
 
 use super::Isa;
 use super::lanes::{Group, Lanes, Plain};
+use super::single::{Pairing, Single};
 use crate::runtime::aligned::Aligned;
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{__m256, __m256d, __m512, __m512d};
 
-/// Two to four phases that are computed together, with their coefficients in the order of use.
+/// One to four phases that are computed together, with their coefficients in the order of use.
 #[derive(Debug, Clone)]
 pub(crate) struct PhaseGroup<T: Copy + Default> {
     /// The first phase.
     pub(crate) first: usize,
-    /// P, from 2 to 4.
+    /// P, from 1 to 4; 1 only where there is no other phase.
     pub(crate) width: usize,
-    /// Coefficient of place d in step s for phase p at (s P + p) D + d.
+    /// Coefficient of place d in the step that comes s-th for the p-th sum ([`Cut::phase`]) at (s P + p) D + d.
     pub(crate) coefficients: Aligned<T>,
 }
 
-/// How the window of a tick is cut.
+/// How the windows of all ticks are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Cut {
-    /// D, samples of a step.
+    /// D, samples of a step: a power of two.
     pub(crate) depth: usize,
     pub(crate) steps: usize,
     /// Samples from tick to tick; equal to D unless D fills a group.
     pub(crate) hop: usize,
+    /// Samples before a tick's frame that its window reaches back.
+    pub(crate) past: usize,
+    /// Ticks of a vector, a power of two: calls for a multiple of them read nothing past their last frame.
+    pub(crate) vector: usize,
+    /// Bit r: whether the outputs of vector r of each tile are looked at. Those of its last vector always are.
+    pub(super) watched: u32,
+    /// The order of steps for a single phase.
+    pub(super) pairing: Pairing,
 }
 
 impl Cut {
-    /// Windows of at least `len` samples (no less than a hop) for ticks of `hop` samples, in a group of
-    /// `group` lanes.
-    pub(crate) fn new(hop: usize, len: usize, group: usize) -> Self {
-        let depth = if hop < group && hop.is_power_of_two() && hop > 1 { hop } else { group };
-        Self { depth, steps: len.max(hop).div_ceil(depth), hop }
+    /// The phase that lane `place` of the p-th sum belongs to, in groups of `width` phases: along diagonals.
+    pub(crate) fn phase(&self, width: usize, p: usize, place: usize) -> usize {
+        match (width, self.depth) {
+            (1, _) | (_, 1) => p,
+            (3, 2) if p == 2 => p,
+            (_, 2) => p & 2 | (p + place) & 1,
+            (3, _) => p,
+            _ => (p + place) % width,
+        }
     }
 
-    /// Samples before a tick's frame that its window reaches back.
-    pub(crate) fn past(self) -> usize {
-        self.steps * self.depth - self.hop
+    /// The steps in the order of use for groups of `width` phases; step 0 is the newest.
+    pub(crate) fn order(&self, width: usize) -> Vec<usize> {
+        if width == 1 { self.pairing.order() } else { (0..self.steps).collect() }
     }
 }
 
 /// One call of a kernel, checked.
-struct Job<T> {
+pub(super) struct Job<'a, T> {
+    pub(super) cut: &'a Cut,
     /// The newest step of the first tick.
-    x: *const T,
-    hop: usize,
-    steps: usize,
-    coefficients: *const T,
-    out: *mut T,
-    out_hop: usize,
+    pub(super) x: *const T,
+    pub(super) coefficients: *const T,
+    pub(super) out: *mut T,
+    pub(super) out_hop: usize,
     /// Ticks, a multiple of those of a vector.
-    ticks: usize,
+    pub(super) ticks: usize,
     /// Room for the sums of a tile. It comes from outside, or else the compiler keeps it in registers, which
     /// brings back what it is to avoid.
-    scratch: *mut T,
+    pub(super) scratch: *mut T,
 }
 
-type PassFn<T> = unsafe fn(&Job<T>);
+/// Returns false if an output is not finite, or their sum.
+type PassFn<T> = unsafe fn(&Job<'_, T>) -> bool;
 
 /// The kernels of one sample type.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FirKernel<T: 'static> {
-    /// By depth (2, 4, 8) and width (2, 3, 4).
-    passes: &'static [[PassFn<T>; 3]],
+    /// By depth (1, 2, 4, 8) and width (1, 2, 3, 4).
+    passes: &'static [[PassFn<T>; 4]],
     /// Lanes of a group and of a vector.
     group: usize,
     lanes: usize,
 }
 
-/// Samples of the largest scratch: half the sums of the largest tile, in the largest vectors.
-const SCRATCH: usize = 192;
-/// Samples of the outputs of one vector: 8 ticks of 4 phases.
-const BOUNCE: usize = 32;
+/// Samples of the largest scratch: the sums of the largest tile, in the largest vectors.
+const SCRATCH: usize = 768;
+/// Samples of the outputs of one vector: 16 ticks of 4 phases.
+const BOUNCE: usize = 64;
 
 impl<T: Copy + Default + 'static> FirKernel<T> {
-    /// Lanes of a group, which decides how windows are cut.
+    /// Lanes of a group.
     pub(crate) fn group(&self) -> usize {
         self.group
     }
 
-    /// Ticks of a vector: calls for a multiple of them read nothing past their last frame.
-    pub(crate) fn vector_ticks(&self, cut: Cut) -> usize {
-        self.lanes / cut.depth
+    /// Windows of at least `len` samples (no less than a hop) for ticks of `hop` samples and groups out of `phases`
+    /// phases.
+    pub(crate) fn cut(&self, hop: usize, len: usize, phases: usize) -> Cut {
+        let depth = if hop < self.group && hop.is_power_of_two() { hop } else { self.group };
+        let steps = len.max(hop).div_ceil(depth);
+        let vector = if phases == 1 { self.group } else { self.lanes / depth };
+        Cut {
+            depth,
+            steps,
+            hop,
+            past: steps * depth - hop,
+            vector,
+            watched: watched(steps * depth / hop, vector),
+            pairing: Pairing::new(depth, hop, self.group, steps),
+        }
     }
 
-    /// Phase p of tick t goes to `out[t * out_hop + p]`, for the phases of `group`. The frame of tick t
-    /// begins at `x[cut.past() + t * cut.hop]`; frames past the last one, up to whole vectors, are
+    /// Phase p of tick t goes to `out[t * out_hop + p]`, for the phases of `group`; of three phases the place behind them
+    /// may be changed too, where it belongs to the same tick or to a later one of this call. The frame of tick t
+    /// begins at `x[cut.past + t * cut.hop]`; frames past the last one, up to whole vectors, are
     /// read too and mean nothing.
+    ///
+    /// Returns false if an input of these ticks is not finite: it makes all outputs of its tick so, whatever the
+    /// coefficients. It is false also where finite inputs led to an output, or to a sum of outputs, that is not.
     ///
     /// # Panics
     /// If the group, `x` or `out` is too short for that.
     pub(crate) fn run(
         &self,
         group: &PhaseGroup<T>,
-        cut: Cut,
+        cut: &Cut,
         x: &[T],
         ticks: usize,
         out: &mut [T],
         out_hop: usize,
-    ) {
-        let vector = self.vector_ticks(cut);
+    ) -> bool {
         let width = group.width;
+        // The last tick of three phases alone has no place behind it.
+        let whole =
+            (if width == 3 && out_hop == 3 { ticks.saturating_sub(1) } else { ticks }) & !(cut.vector - 1);
+        let padded = if whole < ticks { whole + cut.vector } else { whole };
         assert!(cut.depth == cut.hop || cut.depth == self.group);
         assert!(cut.steps > 0 && group.coefficients.len() == cut.steps * width * cut.depth);
-        assert!(cut.past() + ticks.next_multiple_of(vector) * cut.hop <= x.len());
-        assert!(ticks == 0 || width <= out_hop && (ticks - 1) * out_hop + width <= out.len());
-        let pass = self.passes[cut.depth.ilog2() as usize - 1][width - 2];
-        let whole = ticks / vector * vector;
+        assert!(cut.past + padded * cut.hop <= x.len());
+        let reach = if width == 3 && out_hop > 3 { 4 } else { width };
+        assert!(ticks == 0 || width <= out_hop && (ticks - 1) * out_hop + reach <= out.len());
+        assert!(width > 1 || out_hop == 1);
+        let pass = self.passes[cut.depth.trailing_zeros() as usize][width - 1];
         let mut scratch = std::mem::MaybeUninit::<[T; SCRATCH]>::uninit();
         let mut job = Job {
-            x: x[cut.past() + cut.hop - cut.depth..].as_ptr(),
-            hop: cut.hop,
-            steps: cut.steps,
+            cut,
+            x: x[cut.past + cut.hop - cut.depth..].as_ptr(),
             coefficients: group.coefficients.as_ptr(),
             out: out.as_mut_ptr(),
             out_hop,
@@ -129,47 +161,59 @@ impl<T: Copy + Default + 'static> FirKernel<T> {
         };
         // SAFETY: the kernel was chosen for an available instruction set (`Isa::is_available`), and
         // all its loads and stores lie within the bounds asserted above.
-        unsafe { pass(&job) };
+        let mut finite = unsafe { pass(&job) };
         if whole < ticks {
             let mut bounce = [T::default(); BOUNCE];
-            job.x = x[cut.past() + whole * cut.hop + cut.hop - cut.depth..].as_ptr();
-            (job.out, job.out_hop, job.ticks) = (bounce.as_mut_ptr(), width, vector);
-            // SAFETY: as above; a vector has at most 8 ticks, so the bounce buffer holds them.
-            unsafe { pass(&job) };
-            for (t, phases) in (whole..ticks).zip(bounce.chunks_exact(width)) {
-                out[t * out_hop..t * out_hop + width].copy_from_slice(phases);
+            job.x = x[cut.past + whole * cut.hop + cut.hop - cut.depth..].as_ptr();
+            let hop = width.next_power_of_two();
+            (job.out, job.out_hop, job.ticks) = (bounce.as_mut_ptr(), hop, cut.vector);
+            // SAFETY: as above; a vector has at most 16 ticks, so the bounce buffer holds them.
+            finite &= unsafe { pass(&job) };
+            for (t, phases) in (whole..ticks).zip(bounce.chunks_exact(hop)) {
+                out[t * out_hop..t * out_hop + width].copy_from_slice(&phases[..width]);
             }
         }
+        finite
     }
 }
 
 /// The work of one group of phases on all ticks of a job.
 struct Pass<'a, V: Lanes, const D: usize, const P: usize> {
-    job: &'a Job<V::Sample>,
+    job: &'a Job<'a, V::Sample>,
     /// The tile in scratch: its first tick and its vectors, 0 if there is none.
     first: usize,
     waiting: usize,
+    /// Of all outputs, lane by lane: not finite if one of them is not.
+    total: V::Group,
 }
 
 impl<V: Lanes, const D: usize, const P: usize> Pass<'_, V, D, P> {
     /// Ticks of a group.
     const TICKS: usize = V::GROUP / D;
 
-    /// All ticks, in tiles of nearly equal size so that no small one is left over.
+    /// Samples from vector to vector; a constant where D = hop does not fill a group.
     #[inline(always)]
-    unsafe fn run(&mut self) {
-        let vectors = self.job.ticks / (Self::TICKS * V::GROUPS);
-        let count = vectors.div_ceil(V::SUMS / P).max(1);
-        let (small, more) = (vectors / count, vectors % count);
+    fn stride(hop: usize) -> usize {
+        V::GROUPS * if D < V::GROUP { V::GROUP } else { hop }
+    }
+
+    /// All ticks, in the largest tiles; what is left is halved, so that no tile is small.
+    #[inline(always)]
+    unsafe fn run(&mut self) -> bool {
+        let mut left = self.job.ticks / (Self::TICKS * V::GROUPS);
         let mut first = 0;
-        for t in 0..count {
-            let vectors = small + usize::from(t < more);
+        while left > 0 {
+            let vectors = tile(left, V::SUMS / P);
             // SAFETY: the caller's; the tiles are all within the job.
             unsafe { self.tile_of(vectors, first) };
             first += vectors * Self::TICKS * V::GROUPS;
+            left -= vectors;
         }
         // SAFETY: the caller's.
-        unsafe { self.settle() };
+        unsafe {
+            self.settle();
+            self.total.finite()
+        }
     }
 
     #[inline(always)]
@@ -205,17 +249,54 @@ impl<V: Lanes, const D: usize, const P: usize> Pass<'_, V, D, P> {
         unsafe {
             let sums = self.sums::<R>(first);
             self.settle();
-            self.first = first;
-            self.waiting = R;
-            let in_order = P == D && self.job.out_hop == P;
-            let to = if in_order {
-                self.waiting = 0;
-                self.job.out.add(first * P)
-            } else {
-                self.job.scratch
-            };
+            if D < 8 {
+                // Where outputs follow each other the compiler is told so.
+                match self.job.out_hop {
+                    hop if hop == P => self.store(&sums, first, P),
+                    hop => self.store(&sums, first, hop),
+                }
+                return self.watch(&sums[0]);
+            }
+            self.watch(&sums[0]);
+            (self.first, self.waiting) = (first, R);
             for g in 0..V::GROUPS {
-                self.reduce(&sums, g, to);
+                self.reduce(&sums, g);
+            }
+        }
+    }
+
+    /// Remembers whether inputs are finite: they reach the sums of every phase, whatever the coefficients.
+    #[inline(always)]
+    unsafe fn watch<const R: usize>(&mut self, sums: &[V; R]) {
+        for (r, sum) in sums.iter().enumerate() {
+            if r + 1 == R || self.job.cut.watched >> r & 1 == 1 {
+                for g in 0..V::GROUPS {
+                    // SAFETY: the caller's.
+                    self.total = unsafe { self.total.add(sum.group(g)) };
+                }
+            }
+        }
+    }
+
+    /// The sums of a tile to their places in the output, in the order of ticks.
+    #[inline(always)]
+    unsafe fn store<const R: usize>(&self, sums: &[[V; R]; P], first: usize, hop: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            let out = self.job.out.add(first * hop);
+            let sum = |p: usize, r: usize, g: usize| sums[p.min(P - 1)][r].group(g);
+            for (r, g) in (0..R).flat_map(|r| (0..V::GROUPS).map(move |g| (r, g))) {
+                let at = |r: usize| out.add((r * V::GROUPS + g) * Self::TICKS * hop);
+                if P == 2 && D == 4 {
+                    let next = (r + 1).min(R - 1);
+                    if r % 2 == 0 {
+                        let halves = [sum(0, r, g), sum(1, r, g), sum(0, next, g), sum(1, next, g)];
+                        V::Group::store_halves(halves, [at(r), at(next)], hop);
+                    }
+                } else {
+                    let sums = [sum(0, r, g), sum(1, r, g), sum(2, r, g), sum(3, r, g)];
+                    V::Group::store_ticks::<P, D>(sums, at(r), hop);
+                }
             }
         }
     }
@@ -223,8 +304,8 @@ impl<V: Lanes, const D: usize, const P: usize> Pass<'_, V, D, P> {
     /// The multiply-adds of a tile.
     #[inline(always)]
     unsafe fn sums<const R: usize>(&self, first: usize) -> [[V; R]; P] {
-        let Job { hop, steps, .. } = *self.job;
-        let stride = Self::TICKS * V::GROUPS * hop;
+        let Cut { hop, steps, .. } = *self.job.cut;
+        let stride = Self::stride(hop);
         // SAFETY: the caller's.
         unsafe {
             let mut x = self.job.x.add(first * hop);
@@ -263,7 +344,7 @@ impl<V: Lanes, const D: usize, const P: usize> Pass<'_, V, D, P> {
         hop: usize,
         sums: &mut [[V; R]; P],
     ) {
-        let stride = Self::TICKS * V::GROUPS * hop;
+        let stride = Self::stride(hop);
         // SAFETY: the caller's.
         unsafe {
             // The smaller side waits in registers, the other one streams through a single one:
@@ -288,31 +369,23 @@ impl<V: Lanes, const D: usize, const P: usize> Pass<'_, V, D, P> {
         }
     }
 
-    /// Adds neighbouring lanes (D = 2) or quads (D >= 4) of all sums: group after group to `to`.
+    /// Adds the quads of all sums with D = 8, group after group, to scratch.
     #[inline(always)]
-    unsafe fn reduce<const R: usize>(&self, sums: &[[V; R]; P], g: usize, to: *mut V::Sample) {
+    unsafe fn reduce<const R: usize>(&self, sums: &[[V; R]; P], g: usize) {
         // SAFETY: the caller's.
         unsafe {
-            let sum = |p: usize, r: usize| if p < P { sums[p][r].group(g) } else { V::zero().group(0) };
-            for r in 0..R {
-                let place = |index: usize| to.add((index * V::GROUPS + g) * V::GROUP);
-                match (P, D) {
-                    (2, 2) => V::Group::neighbours(sum(0, r), sum(1, r)).store(place(r)),
-                    (2, _) if r % 2 == 1 => {}
-                    (2, _) => {
-                        let next = if r + 1 < R { r + 1 } else { r };
-                        let quads = [sum(0, r), sum(1, r), sum(0, next), sum(1, next)];
-                        V::Group::quads(quads).store(place(r / 2));
-                    }
-                    (_, 2) => {
-                        V::Group::neighbours(sum(0, r), sum(1, r)).store(place(2 * r));
-                        V::Group::neighbours(sum(2, r), sum(3, r)).store(place(2 * r + 1));
-                    }
-                    _ => {
-                        let quads = [sum(0, r), sum(1, r), sum(2, r), sum(3, r)];
-                        V::Group::quads(quads).store(place(r));
-                    }
+            let sum = |p: usize, r: usize| sums[p.min(P - 1)][r].group(g);
+            let place = |index: usize| self.job.scratch.add((index * V::GROUPS + g) * V::GROUP);
+            for r in (0..R).step_by(if P == 2 { 2 } else { 1 }) {
+                if P == 2 {
+                    let next = (r + 1).min(R - 1);
+                    let halves = [sum(0, r), sum(1, r), sum(0, next), sum(1, next)];
+                    V::Group::diagonal_halves(halves).store(place(r / 2));
+                    continue;
                 }
+                let quads = [sum(0, r), sum(1, r), sum(2, r), sum(3, r)];
+                let sums = if P == 3 { V::Group::quads(quads) } else { V::Group::diagonal_quads(quads) };
+                sums.store(place(r));
             }
         }
     }
@@ -322,60 +395,57 @@ impl<V: Lanes, const D: usize, const P: usize> Pass<'_, V, D, P> {
     unsafe fn settle(&mut self) {
         for index in 0..self.waiting * V::GROUPS {
             let (vector, g) = (index / V::GROUPS, index % V::GROUPS);
-            let tick = self.first + index * Self::TICKS;
+            let tick = self.first + index;
             // SAFETY: the caller's.
             unsafe {
-                match (P, D) {
-                    (2, 2) => self.settle_pairs(index, tick, 0, 2),
-                    (2, _) if vector % 2 == 1 => {}
-                    (2, _) => {
-                        let from = vector / 2 * V::GROUPS + g;
-                        self.settle_quads(from, tick, 0, 2);
-                        if vector + 1 < self.waiting {
-                            self.settle_quads(from, tick + V::GROUPS * Self::TICKS, 2, 2);
-                        }
+                if P > 2 {
+                    self.settle_quads(index, tick, 0, P);
+                } else if vector % 2 == 0 {
+                    let from = vector / 2 * V::GROUPS + g;
+                    self.settle_quads(from, tick, 0, 2);
+                    if vector + 1 < self.waiting {
+                        self.settle_quads(from, tick + V::GROUPS, 2, 2);
                     }
-                    (_, 2) => {
-                        self.settle_pairs(2 * vector * V::GROUPS + g, tick, 0, 2);
-                        self.settle_pairs((2 * vector + 1) * V::GROUPS + g, tick, 2, P - 2);
-                    }
-                    _ => self.settle_quads(index, tick, 0, P),
                 }
             }
         }
         self.waiting = 0;
     }
 
-    /// Two phases a tick, of which `count` go to phase `phase` and the next.
-    #[inline(always)]
-    unsafe fn settle_pairs(&self, group: usize, tick: usize, phase: usize, count: usize) {
-        // SAFETY: the caller's.
-        unsafe {
-            let from = self.job.scratch.add(group * V::GROUP);
-            for t in 0..Self::TICKS {
-                let to = self.job.out.add((tick + t) * self.job.out_hop + phase);
-                to.copy_from_nonoverlapping(from.add(2 * t), count);
-            }
-        }
-    }
-
-    /// Four sums a quad, of which `count` from `place` on go to the tick.
+    /// The tick's lanes are two quads; `count` of their sums from `place` on go to the output.
     #[inline(always)]
     unsafe fn settle_quads(&self, group: usize, tick: usize, place: usize, count: usize) {
         // SAFETY: the caller's.
         unsafe {
             let from = self.job.scratch.add(group * V::GROUP);
-            for t in 0..Self::TICKS {
-                let to = self.job.out.add((tick + t) * self.job.out_hop);
-                if D <= 4 {
-                    to.copy_from_nonoverlapping(from.add(4 * t + place), count);
-                } else {
-                    // The tick's lanes are both quads.
-                    let quad: [V::Sample; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
-                    to.copy_from_nonoverlapping(quad.as_ptr().add(place), count);
-                }
-            }
+            let to = self.job.out.add(tick * self.job.out_hop);
+            let quad: [V::Sample; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
+            to.copy_from_nonoverlapping(quad.as_ptr().add(place), count);
         }
+    }
+}
+
+/// The vectors of a tile that must be looked at, if an input that is not finite shows in all outputs of `reach` ticks and
+/// a vector holds `ticks` of them: every one, every second, every fourth ...
+fn watched(reach: usize, ticks: usize) -> u32 {
+    match (reach >> ticks.trailing_zeros()).checked_ilog2().unwrap_or(0) {
+        0 => !0,
+        1 => 0xAAAA_AAAA,
+        2 => 0x8888_8888,
+        3 => 0x8080_8080,
+        _ => 0x8000_8000,
+    }
+}
+
+/// Vectors of the next tile if `left` of them are left: the most, or half of what is less than two such tiles.
+#[inline(always)]
+pub(super) fn tile(left: usize, most: usize) -> usize {
+    if left >= 2 * most || left == most {
+        most
+    } else if left > most {
+        left.div_ceil(2)
+    } else {
+        left
     }
 }
 
@@ -386,13 +456,22 @@ macro_rules! kernels {
             use super::*;
 
             $(#[target_feature(enable = $features)])?
-            unsafe fn run<const D: usize, const P: usize>(job: &Job<$sample>) {
+            unsafe fn run<const D: usize, const P: usize>(job: &Job<'_, $sample>) -> bool {
                 // SAFETY: the caller's, see `FirKernel::run`.
-                unsafe { Pass::<$vector, D, P> { job, first: 0, waiting: 0 }.run() }
+                unsafe {
+                    let total = <$vector>::zero().group(0);
+                    Pass::<$vector, D, P> { job, first: 0, waiting: 0, total }.run()
+                }
+            }
+
+            $(#[target_feature(enable = $features)])?
+            unsafe fn single<const D: usize>(job: &Job<'_, $sample>) -> bool {
+                // SAFETY: the caller's, see `FirKernel::run`.
+                unsafe { Single::<<$vector as Lanes>::Group, D>::new(job).run() }
             }
 
             pub(super) const KERNEL: FirKernel<$sample> = FirKernel {
-                passes: &[$([run::<$depth, 2>, run::<$depth, 3>, run::<$depth, 4>]),*],
+                passes: &[$([single::<$depth>, run::<$depth, 2>, run::<$depth, 3>, run::<$depth, 4>]),*],
                 group: $group,
                 lanes: $lanes,
             };
@@ -400,16 +479,16 @@ macro_rules! kernels {
     };
 }
 
-kernels!(portable_f32, Plain<f32, 8>, f32, 8, 8, [2, 4, 8]);
-kernels!(portable_f64, Plain<f64, 4>, f64, 4, 4, [2, 4]);
+kernels!(portable_f32, Plain<f32, 8>, f32, 8, 8, [1, 2, 4, 8]);
+kernels!(portable_f64, Plain<f64, 4>, f64, 4, 4, [1, 2, 4]);
 #[cfg(target_arch = "x86_64")]
-kernels!(avx2_f32, __m256, f32, 8, 8, [2, 4, 8], "avx2,fma");
+kernels!(avx2_f32, __m256, f32, 8, 8, [1, 2, 4, 8], "avx2,fma");
 #[cfg(target_arch = "x86_64")]
-kernels!(avx2_f64, __m256d, f64, 4, 4, [2, 4], "avx2,fma");
+kernels!(avx2_f64, __m256d, f64, 4, 4, [1, 2, 4], "avx2,fma");
 #[cfg(target_arch = "x86_64")]
-kernels!(avx512_f32, __m512, f32, 8, 16, [2, 4, 8], "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma");
+kernels!(avx512_f32, __m512, f32, 8, 16, [1, 2, 4, 8], "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma");
 #[cfg(target_arch = "x86_64")]
-kernels!(avx512_f64, __m512d, f64, 4, 8, [2, 4], "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma");
+kernels!(avx512_f64, __m512d, f64, 4, 8, [1, 2, 4], "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma");
 
 impl FirKernel<f32> {
     /// The kernel for an instruction set; the portable one where the processor does not have it.

@@ -1,6 +1,8 @@
 //! [`Lanes`] in the registers of AVX2 and AVX-512.
 
+use super::convert::transpose4;
 use super::lanes::{Group, Lanes};
+use super::ticks_x86::{store_halves_f32, store_halves_f64, store_ticks_f32, store_ticks_f64};
 use std::arch::x86_64::*;
 
 /// Hides where a value comes from, or else the compiler makes horizontal adds of two shuffles and an
@@ -29,6 +31,34 @@ fn neighbours_f64(a: __m256d, b: __m256d) -> __m256d {
     _mm256_add_pd(_mm256_blend_pd::<0b1010>(a, b), _mm256_permute_pd::<0b0101>(mixed))
 }
 
+/// Lanes two apart: a02 a13 c20 c31 for each four.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn far_f32(a: __m256, c: __m256) -> __m256 {
+    _mm256_add_ps(_mm256_blend_ps::<0b1100_1100>(a, c), _mm256_shuffle_ps::<0b01_00_11_10>(a, c))
+}
+
+/// Lanes two apart: a02 a13 c20 c31.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn far_f64(a: __m256d, c: __m256d) -> __m256d {
+    _mm256_add_pd(_mm256_blend_pd::<0b1100>(a, c), _mm256_permute2f128_pd::<0x21>(a, c))
+}
+
+/// Both lower halves, both upper halves.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn halves_f32(a: __m256, b: __m256) -> [__m256; 2] {
+    [_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b)]
+}
+
+/// Both lower halves, both upper halves.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn halves_f64(a: __m256d, b: __m256d) -> [__m256d; 2] {
+    [_mm256_permute2f128_pd::<0x20>(a, b), _mm256_permute2f128_pd::<0x31>(a, b)]
+}
+
 impl Group for __m256 {
     type Sample = f32;
 
@@ -39,11 +69,94 @@ impl Group for __m256 {
 
     #[inline(always)]
     unsafe fn quads([a, b, c, d]: [Self; 4]) -> Self {
-        // Lanes two apart: a02 a13 c20 c31.
-        let far = |a, c| unsafe {
-            _mm256_add_ps(_mm256_blend_ps::<0b1100_1100>(a, c), _mm256_shuffle_ps::<0b01_00_11_10>(a, c))
-        };
-        unsafe { Self::neighbours(far(a, c), far(b, d)) }
+        unsafe { Self::neighbours(far_f32(a, c), far_f32(b, d)) }
+    }
+
+    #[inline(always)]
+    unsafe fn diagonal_pairs(a: Self, b: Self) -> Self {
+        unsafe { _mm256_add_ps(a, _mm256_permute_ps::<0b10_11_00_01>(b)) }
+    }
+
+    #[inline(always)]
+    unsafe fn diagonal_quads([a, b, c, d]: [Self; 4]) -> Self {
+        unsafe {
+            let two = |a, c| _mm256_add_ps(a, _mm256_permute_ps::<0b01_00_11_10>(c));
+            _mm256_add_ps(two(a, c), _mm256_permute_ps::<0b10_01_00_11>(two(b, d)))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn diagonal_halves([a, b, c, d]: [Self; 4]) -> Self {
+        unsafe { Self::diagonal_pairs(far_f32(a, c), far_f32(b, d)) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_ticks<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f32, hop: usize) {
+        unsafe { store_ticks_f32::<P, D>(sums, out, hop) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_halves(sums: [Self; 4], out: [*mut f32; 2], hop: usize) {
+        unsafe { store_halves_f32(sums, out, hop) }
+    }
+
+    #[inline(always)]
+    unsafe fn transpose(rows: [Self; 4]) -> [Self; 4] {
+        // Lanes 0 and 4, 1 and 5, 2 and 6, 3 and 7.
+        unsafe {
+            let [a, b, c, d] = transpose4(rows);
+            let ([first, third], [second, fourth]) = (halves_f32(a, b), halves_f32(c, d));
+            [first, second, third, fourth]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn ticks<const D: usize>(lanes: impl Fn(usize) -> Self) -> Self {
+        unsafe {
+            match D {
+                1 => lanes(0),
+                2 => {
+                    // Ticks 0 4 1 5 2 6 3 7.
+                    let mixed = Self::neighbours(lanes(0), lanes(1));
+                    _mm256_permutevar8x32_ps(mixed, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7))
+                }
+                4 => {
+                    // Ticks 0 2 4 6 1 3 5 7.
+                    let mixed = Self::quads([lanes(0), lanes(1), lanes(2), lanes(3)]);
+                    _mm256_permutevar8x32_ps(mixed, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7))
+                }
+                _ => {
+                    let first = Self::quads([lanes(0), lanes(1), lanes(2), lanes(3)]);
+                    let second = Self::quads([lanes(4), lanes(5), lanes(6), lanes(7)]);
+                    let [low, high] = halves_f32(first, second);
+                    _mm256_add_ps(low, high)
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn load(at: *const f32) -> Self {
+        unsafe { _mm256_loadu_ps(at) }
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        // An instruction that is none: or else the compiler adds always and chooses afterwards, which costs more than
+        // the branch around it.
+        unsafe {
+            std::arch::asm!("", options(nomem, nostack, preserves_flags));
+            _mm256_add_ps(self, other)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn finite(self) -> bool {
+        // What is not finite is not 0 after that.
+        unsafe {
+            let zero = _mm256_sub_ps(self, self);
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_NEQ_UQ>(zero, _mm256_setzero_ps())) == 0
+        }
     }
 
     #[inline(always)]
@@ -62,10 +175,80 @@ impl Group for __m256d {
 
     #[inline(always)]
     unsafe fn quads([a, b, c, d]: [Self; 4]) -> Self {
-        let far = |a, c| unsafe {
-            _mm256_add_pd(_mm256_blend_pd::<0b1100>(a, c), _mm256_permute2f128_pd::<0x21>(a, c))
-        };
-        unsafe { Self::neighbours(far(a, c), far(b, d)) }
+        unsafe { Self::neighbours(far_f64(a, c), far_f64(b, d)) }
+    }
+
+    #[inline(always)]
+    unsafe fn diagonal_pairs(a: Self, b: Self) -> Self {
+        unsafe { _mm256_add_pd(a, _mm256_permute_pd::<0b0101>(b)) }
+    }
+
+    #[inline(always)]
+    unsafe fn diagonal_quads([a, b, c, d]: [Self; 4]) -> Self {
+        unsafe {
+            let two = |a, c| _mm256_add_pd(a, _mm256_permute4x64_pd::<0b01_00_11_10>(c));
+            _mm256_add_pd(two(a, c), _mm256_permute4x64_pd::<0b10_01_00_11>(two(b, d)))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn diagonal_halves([a, b, c, d]: [Self; 4]) -> Self {
+        unsafe { Self::diagonal_pairs(far_f64(a, c), far_f64(b, d)) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_ticks<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f64, hop: usize) {
+        unsafe { store_ticks_f64::<P, D>(sums, out, hop) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_halves(sums: [Self; 4], out: [*mut f64; 2], _: usize) {
+        unsafe { store_halves_f64(sums, out) }
+    }
+
+    #[inline(always)]
+    unsafe fn transpose([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+        unsafe {
+            let [first, third] = halves_f64(_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+            let [second, fourth] = halves_f64(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+            [first, second, third, fourth]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn ticks<const D: usize>(lanes: impl Fn(usize) -> Self) -> Self {
+        unsafe {
+            match D {
+                1 => lanes(0),
+                // Ticks 0 2 1 3.
+                2 => _mm256_permute4x64_pd::<0b11_01_10_00>(Self::neighbours(lanes(0), lanes(1))),
+                _ => Self::quads([lanes(0), lanes(1), lanes(2), lanes(3)]),
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn load(at: *const f64) -> Self {
+        unsafe { _mm256_loadu_pd(at) }
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        // An instruction that is none: or else the compiler adds always and chooses afterwards, which costs more than
+        // the branch around it.
+        unsafe {
+            std::arch::asm!("", options(nomem, nostack, preserves_flags));
+            _mm256_add_pd(self, other)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn finite(self) -> bool {
+        // What is not finite is not 0 after that.
+        unsafe {
+            let zero = _mm256_sub_pd(self, self);
+            _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_NEQ_UQ>(zero, _mm256_setzero_pd())) == 0
+        }
     }
 
     #[inline(always)]
@@ -179,6 +362,7 @@ unsafe fn full_tile_f32<const D: usize>(
     // SAFETY: reads what the caller vouches for, writes registers only, ends after `steps` turns.
     unsafe {
         match D {
+            1 => full_tile!(x, stride, w, steps, zero, 4, ("vmovups", "vbroadcastss", "vfmadd231ps", "4")),
             2 => full_tile!(x, stride, w, steps, zero, 4, ("vmovups", "vbroadcastsd", "vfmadd231ps", "8")),
             4 => full_tile!(x, stride, w, steps, zero, 4, ("vmovups", "vbroadcastf128", "vfmadd231ps", "16")),
             _ => full_tile!(x, stride, w, steps, zero, 4, ("vmovups", "vmovups", "vfmadd231ps", "32")),
@@ -200,6 +384,7 @@ unsafe fn full_tile_f64<const D: usize>(
     // SAFETY: as above.
     unsafe {
         match D {
+            1 => full_tile!(x, stride, w, steps, zero, 8, ("vmovupd", "vbroadcastsd", "vfmadd231pd", "8")),
             2 => full_tile!(x, stride, w, steps, zero, 8, ("vmovupd", "vbroadcastf128", "vfmadd231pd", "16")),
             _ => full_tile!(x, stride, w, steps, zero, 8, ("vmovupd", "vmovupd", "vfmadd231pd", "32")),
         }
@@ -222,6 +407,7 @@ impl Lanes for __m256 {
     unsafe fn spread<const D: usize>(at: *const f32) -> Self {
         unsafe {
             match D {
+                1 => _mm256_set1_ps(*at),
                 2 => _mm256_castpd_ps(_mm256_set1_pd(at.cast::<f64>().read_unaligned())),
                 4 => {
                     let quad = _mm_loadu_ps(at);
@@ -274,6 +460,7 @@ impl Lanes for __m256d {
     unsafe fn spread<const D: usize>(at: *const f64) -> Self {
         unsafe {
             match D {
+                1 => _mm256_set1_pd(*at),
                 2 => {
                     let pair = _mm_loadu_pd(at);
                     _mm256_set_m128d(pair, pair)
@@ -325,6 +512,7 @@ impl Lanes for __m512 {
     unsafe fn spread<const D: usize>(at: *const f32) -> Self {
         unsafe {
             match D {
+                1 => _mm512_set1_ps(*at),
                 2 => _mm512_castpd_ps(_mm512_set1_pd(at.cast::<f64>().read_unaligned())),
                 4 => _mm512_broadcast_f32x4(_mm_loadu_ps(at)),
                 _ => _mm512_broadcast_f32x8(_mm256_loadu_ps(at)),
@@ -370,6 +558,7 @@ impl Lanes for __m512d {
     unsafe fn spread<const D: usize>(at: *const f64) -> Self {
         unsafe {
             match D {
+                1 => _mm512_set1_pd(*at),
                 2 => _mm512_broadcast_f64x2(_mm_loadu_pd(at)),
                 _ => _mm512_broadcast_f64x4(_mm256_loadu_pd(at)),
             }

@@ -23,6 +23,9 @@ mod lanes_x86;
 mod layout;
 mod peak;
 mod recursion;
+mod single;
+#[cfg(target_arch = "x86_64")]
+mod ticks_x86;
 mod transform;
 mod vector;
 

@@ -11,23 +11,21 @@ use crate::runtime::structure::{Past, Structure};
 #[derive(Debug)]
 pub(super) struct Readout<T: Sample> {
     pub(super) cut: Cut,
-    /// M, or 2 if M is 1: the kernels make at least two.
-    pub(super) phases: usize,
+    /// M.
+    ratio: usize,
     groups: Vec<PhaseGroup<T>>,
 }
 
 impl<T: Sample> Readout<T> {
     /// `factor(e, p)`: of the sample e before the last one of a frame, for phase p.
     fn new(cut: Cut, ratio: usize, factor: impl Fn(usize, usize) -> f64) -> Self {
-        let phases = ratio.max(2);
-        let factor = |e: usize, p: usize| if p < ratio { factor(e, p) } else { 0.0 };
-        let groups = widths(phases).map(|(first, width)| phase_group(cut, first, width, factor)).collect();
-        Self { cut, phases, groups }
+        let groups = widths(ratio).map(|(first, width)| phase_group(&cut, first, width, &factor)).collect();
+        Self { cut, ratio, groups }
     }
 
     pub(super) fn run(&self, kernel: &FirKernel<T>, x: &[T], ticks: usize, out: &mut [T]) {
         for group in &self.groups {
-            kernel.run(group, self.cut, x, ticks, &mut out[group.first..], self.phases);
+            kernel.run(group, &self.cut, x, ticks, &mut out[group.first..], self.ratio);
         }
     }
 }
@@ -47,11 +45,12 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    pub(super) fn new(
+    /// For N channels and M phases, and a recursion in vectors of `lanes`.
+    pub(super) fn new<T: Sample>(
         structure: &Structure,
-        channels: usize,
+        (channels, ratio): (usize, usize),
         lanes: usize,
-        group: usize,
+        kernel: &FirKernel<T>,
     ) -> Result<Self, BuildError> {
         let order = structure.a.len();
         let history = structure.history();
@@ -63,14 +62,17 @@ impl Layout {
         let modal = sections.is_some();
         let places =
             sections.map_or_else(|| (0..order).collect(), |twos| section_places(&twos, order, lanes));
-        let states =
-            places.iter().max().map_or(0, |place| place + 1).next_multiple_of((2 * lanes).max(group));
+        let states = places
+            .iter()
+            .max()
+            .map_or(0, |place| place + 1)
+            .next_multiple_of((2 * lanes).max(kernel.group()));
         // Where there is no state, the readout is not used.
-        let state_rows = Cut::new(states.max(group), states, group);
+        let state_rows = kernel.cut(states.max(kernel.group()), states, ratio);
         Ok(Self {
             lanes,
             channels,
-            inputs: Cut::new(channels, len, group),
+            inputs: kernel.cut(channels, len, ratio),
             states,
             state_rows,
             places,
@@ -79,7 +81,7 @@ impl Layout {
     }
 
     fn place(&self, (channel, ticks): Past) -> u32 {
-        (self.inputs.past() - ticks * self.channels + channel) as u32
+        (self.inputs.past - ticks * self.channels + channel) as u32
     }
 
     /// The state at each place; `None` for padding.

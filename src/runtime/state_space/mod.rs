@@ -68,7 +68,7 @@ impl<T: Sample> StateSpacePlan<T> {
         check("d", &filter.d, (ratio, channels))?;
         let structure = Structure::new(filter);
         let (advance, fir) = (T::recursion_kernel(isa), T::fir_kernel(isa));
-        let layout = Layout::new(&structure, channels, advance.lanes, fir.group())?;
+        let layout = Layout::new(&structure, (channels, ratio), advance.lanes, &fir)?;
         Ok(Self {
             channels,
             ratio,
@@ -88,24 +88,19 @@ impl<T: Sample> StateSpacePlan<T> {
 
     pub(crate) fn state(&self) -> StateSpaceState<T> {
         let cut = self.inputs_readout.cut;
-        let beyond = self.fir.vector_ticks(cut) * self.channels;
+        let beyond = cut.vector * self.channels;
         let states = self.recursion.states;
         // A vector may read the rows of some more ticks, which mean nothing.
-        let rows = (BLOCK + self.fir.vector_ticks(self.states_readout.cut)) * states;
+        let rows = (BLOCK + self.states_readout.cut.vector) * states;
         StateSpaceState {
-            window: Window::new(self.channels, 1, cut.past(), BLOCK * self.channels, beyond),
+            window: Window::new(self.channels, cut.past, BLOCK * self.channels, beyond),
             rows: Aligned::new(rows),
             states,
-            output: Aligned::new(self.hop() * BLOCK),
-            further: Aligned::new(self.hop() * BLOCK),
+            output: Aligned::new(self.ratio * BLOCK),
+            further: Aligned::new(self.ratio * BLOCK),
             since: 0,
             resets: 0,
         }
-    }
-
-    /// Outputs of a tick, with padding.
-    fn hop(&self) -> usize {
-        self.inputs_readout.phases
     }
 
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
@@ -138,10 +133,7 @@ impl<T: Sample> StateSpacePlan<T> {
         self.inputs_readout.run(&self.fir, window.view(), ticks, output);
         if self.recursion.states > 0 {
             self.states_readout.run(&self.fir, rows, ticks, further);
-            output.iter_mut().zip(&further[..ticks * self.hop()]).for_each(|(y, more)| *y = *y + *more);
-        }
-        if self.hop() > self.ratio {
-            (0..ticks).for_each(|t| output[t] = output[t * self.hop()]);
+            output.iter_mut().zip(&further[..ticks * self.ratio]).for_each(|(y, more)| *y = *y + *more);
         }
     }
 }

@@ -26,7 +26,7 @@ fn run<T: Sample>(
     let mut state = plan.state();
     let mut out = vec![0.0; input.len() / n * m];
     for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
-        plan.process(&mut state, &Interleaved { samples: x, channels: n }, y);
+        plan.process(&mut state, &Interleaved::new(x, n).unwrap(), y);
     }
     (out, plan.is_modal())
 }
@@ -163,7 +163,7 @@ fn a_state_that_fades_away_becomes_zero() {
     let mut input = vec![0.0; 1200];
     input[0] = 1.0;
     let mut out = vec![0f64; 1200];
-    plan.process(&mut state, &Interleaved { samples: &input[..], channels: 1 }, &mut out[..]);
+    plan.process(&mut state, &Interleaved::new(&input[..], 1).unwrap(), &mut out[..]);
     // 2^-900 is 1e-271, still there; 2^-960 is below the limit, and never denormal (2^-1022).
     assert!(out[900] > 0.0 && out[1100] == 0.0);
     assert!(out.iter().all(|y| *y == 0.0 || y.is_normal()));
