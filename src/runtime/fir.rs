@@ -84,11 +84,16 @@ impl<T: Sample> FirPlan<T> {
 
     /// A stream's state before its first tick.
     pub(crate) fn state(&self) -> FirState<T> {
-        let beyond = self.kernel.vector_ticks(self.cut) * self.cut.hop;
-        FirState {
-            window: Window::new(self.channels, self.fold, self.cut.past(), self.block * self.cut.hop, beyond),
-            output: Aligned::new(self.ratio * self.fold * self.block),
-        }
+        let output = Aligned::new(self.ratio * self.fold * self.block);
+        FirState { window: self.window(self.block, 0), output }
+    }
+
+    /// Zeros, for blocks of at most `block` super-ticks, and with `more` super-ticks of the past than the filters look
+    /// back.
+    pub(super) fn window(&self, block: usize, more: usize) -> Window<T> {
+        let Cut { hop, .. } = self.cut;
+        let beyond = self.kernel.vector_ticks(self.cut) * hop;
+        Window::new(self.channels, self.fold, self.cut.past() + more * hop, block * hop, beyond)
     }
 
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
@@ -201,7 +206,8 @@ impl<T: Sample> FirPlan<T> {
         sink.store(self.isa, block.first * m, &output[range]);
     }
 
-    fn run(&self, x: &[T], super_ticks: usize, out: &mut [T]) {
+    /// Filters super-ticks; the past of the first one begins at `x`.
+    pub(super) fn run(&self, x: &[T], super_ticks: usize, out: &mut [T]) {
         for group in &self.groups {
             self.kernel.run(group, self.cut, x, super_ticks, &mut out[group.first..], self.ratio * self.fold);
         }

@@ -56,6 +56,11 @@ impl<T: Sample> Window<T> {
         &self.samples[self.next - self.past..]
     }
 
+    /// Samples of the view before the next tick.
+    pub(crate) fn known(&self) -> usize {
+        self.past + self.lead * self.channels
+    }
+
     /// The `ticks` ticks that were written are there now.
     pub(crate) fn advance(&mut self, ticks: usize) {
         let there = self.lead + ticks;
