@@ -54,7 +54,9 @@ fn main() {
     let asked = |wanted: &str| std::env::args().any(|word| word == wanted);
     let (double, prompt) = (asked("f64"), asked("prompt"));
     let precision = if double { Precision::Double } else { Precision::Single };
-    println!("| N | M | K | direct, ns a tick | fast | overlap-save, F: ns a tick | the plan, not late | the plan |");
+    println!(
+        "| N | M | K | direct, ns a tick | fast | overlap-save, F: ns a tick | the plan, not late | the plan |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     for (n, m) in SHAPES {
         for k in LAGS {

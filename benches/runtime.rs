@@ -168,14 +168,7 @@ impl Table {
     fn ladder(&self) {
         for n in 1..=16 {
             for m in 1..=16 {
-                self.fir(
-                    &format!("ladder: N {n} M {m}, 16 taps a phase"),
-                    n,
-                    m,
-                    16 * m,
-                    Form::Direct,
-                    TICKS,
-                );
+                self.fir(&format!("ladder: N {n} M {m}, 16 taps a phase"), n, m, 16 * m, Form::Direct, TICKS);
             }
         }
         for taps in [2, 8, 32, 128, 512, 2048] {

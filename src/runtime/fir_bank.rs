@@ -39,12 +39,7 @@ pub(crate) struct FormSummary {
 }
 
 impl<T: Sample> FirBankPlan<T> {
-    pub(crate) fn new(
-        taps: &[Vec<f64>],
-        ratio: usize,
-        choice: Choice,
-        isa: Isa,
-    ) -> Result<Self, BuildError> {
+    pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, choice: Choice, isa: Isa) -> Result<Self, BuildError> {
         match choice {
             Choice::Direct => FirPlan::new(taps, ratio, isa).map(Self::Direct),
             Choice::Fast => FastFirPlan::new(taps, ratio, isa).map(Self::Fast),
@@ -79,8 +74,7 @@ impl<T: Sample> FirBankPlan<T> {
     }
 
     pub(crate) fn summary(&self) -> FormSummary {
-        let summary =
-            |name, fold, multiply_adds| FormSummary { name, fold, transform: None, multiply_adds };
+        let summary = |name, fold, multiply_adds| FormSummary { name, fold, transform: None, multiply_adds };
         match self {
             Self::Direct(plan) => summary("direct", plan.fold, plan.multiply_adds()),
             Self::Fast(plan) => summary("fast", plan.period(), plan.multiply_adds()),

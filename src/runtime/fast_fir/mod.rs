@@ -138,14 +138,16 @@ impl<T: Sample> FastFirPlan<T> {
 
     /// Multiply-adds for each fast sample, and the additions of means and products as such.
     pub(crate) fn multiply_adds(&self) -> f64 {
-        let filters = [&self.even, &self.odd, &self.mean].map(FirPlan::multiply_adds).iter().sum::<f64>() / 2.0;
+        let filters =
+            [&self.even, &self.odd, &self.mean].map(FirPlan::multiply_adds).iter().sum::<f64>() / 2.0;
         filters + self.channels as f64 / self.ratio as f64 + 2.0
     }
 
     /// A stream's state before its first tick.
     pub(crate) fn state(&self) -> FastFirState<T> {
         let (n, m) = (self.channels, self.ratio);
-        let [even, odd, mean] = [&self.even, &self.odd, &self.mean].map(|plan| HalfRate::new(plan, self.block / 2));
+        let [even, odd, mean] =
+            [&self.even, &self.odd, &self.mean].map(|plan| HalfRate::new(plan, self.block / 2));
         let (frames, outputs) = (Aligned::new(3 * n), Aligned::new(2 * m));
         FastFirState {
             pairs: Pairs { even, odd, mean, lead: 0, frames, outputs },
@@ -243,13 +245,13 @@ impl<T: Sample> FastFirPlan<T> {
         let Pairs { even, odd, mean, outputs, .. } = pairs;
         let a = even.filter(&self.even, parity.evens);
         let b = odd.filter(&self.odd, parity.odds);
-        let c = &mean.filter(&self.mean, parity.odds)[m..];
+        let c = &mut mean.filter(&self.mean, parity.odds)[m..];
         let (second, out) = out.split_at_mut(late);
         if !second.is_empty() {
-            T::join_pairs(self.isa, Products { even: a, odd: b, mean: c }, m, outputs);
+            T::join_pairs(self.isa, Products { even: &mut a[..m], odd: b, mean: c }, m, outputs);
             second.copy_from_slice(&outputs[m..]);
         }
-        let products = Products { even: &a[m..], odd: &b[late..], mean: &c[late..] };
+        let products = Products { even: &mut a[m..], odd: &b[late..], mean: &mut c[late..] };
         T::join_pairs(self.isa, products, m, out);
         let whole = out.len() / (2 * m) * m;
         let first = a[m + whole..].iter().zip(&b[late + whole..]);
@@ -362,7 +364,7 @@ impl<T: Sample> HalfRate<T> {
     }
 
     /// Products of the tick before and of the next `ticks` ones, whose frames are in the window's room.
-    fn filter(&mut self, plan: &FirPlan<T>, ticks: usize) -> &[T] {
+    fn filter(&mut self, plan: &FirPlan<T>, ticks: usize) -> &mut [T] {
         let (m, lead) = (plan.ratio, self.window.lead());
         if ticks > 0 {
             let super_ticks = (lead + ticks).div_ceil(plan.fold);

@@ -1,7 +1,8 @@
 //! Ticks by twos for the fast form: frames apart into those of even and of odd ticks, and products together again.
 //!
-//! Nothing but plain loops, compiled for each instruction set. Each number is made by the same few operations, none of
-//! which could be fused, so the bits are the same everywhere.
+//! Nothing but plain loops, compiled for each instruction set: arithmetic on numbers in a row, and copies of frames, which the
+//! compiler would turn into slow shuffles of single numbers if both were one loop. Each number is made by the same few
+//! operations, none of which could be fused, so the bits are the same everywhere.
 
 use super::Isa;
 
@@ -17,16 +18,18 @@ pub(crate) struct Halves<'a, T> {
 
 /// Products of the three filters for pairs of ticks.
 pub(crate) struct Products<'a, T> {
-    pub(crate) even: &'a [T],
+    /// These become the outputs of the first ticks.
+    pub(crate) even: &'a mut [T],
     /// Those of the pair before come first.
     pub(crate) odd: &'a [T],
-    pub(crate) mean: &'a [T],
+    /// These become the outputs of the second ticks.
+    pub(crate) mean: &'a mut [T],
 }
 
-/// Runs `$body` with N or M as a constant if it is small: then the loops have no ends of their own.
+/// Runs `$body` with N or M as a constant if it is small: then a frame is copied by an instruction or two.
 macro_rules! with_constant {
     ($count:expr, $COUNT:ident => $body:expr, $other:expr) => {
-        with_constant!($count, $COUNT => $body, $other, 1 2 3 4 5 6 7 8 12 16)
+        with_constant!($count, $COUNT => $body, $other, 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16)
     };
     ($count:expr, $COUNT:ident => $body:expr, $other:expr, $($small:literal)*) => {
         match $count {
@@ -79,66 +82,64 @@ macro_rules! pairs {
 
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma")]
-            pub(super) fn join_avx2(even: &Slice, odd: &Slice, mean: &Slice, m: usize, out: &mut Slice) {
+            pub(super) fn join_avx2(even: &mut Slice, odd: &Slice, mean: &mut Slice, m: usize, out: &mut Slice) {
                 join(even, odd, mean, m, out);
             }
 
             #[inline(always)]
             pub(super) fn split(x: &Slice, n: usize, even: &mut Slice, odd: &mut Slice, mean: &mut Slice) {
-                with_constant!(
-                    n,
-                    N => split_constant::<N>(x, even, odd, mean),
-                    for (pair, x) in x.chunks_exact(2 * n).enumerate() {
-                        let (frames, at) = (x.split_at(n), pair * n..(pair + 1) * n);
-                        even[at.clone()].copy_from_slice(frames.0);
-                        odd[at.clone()].copy_from_slice(frames.1);
-                        for ((slot, a), b) in mean[at].iter_mut().zip(frames.0).zip(frames.1) {
-                            *slot = 0.5 * a + 0.5 * b;
-                        }
-                    }
-                );
-            }
-
-            #[inline(always)]
-            fn split_constant<const N: usize>(x: &Slice, even: &mut Slice, odd: &mut Slice, mean: &mut Slice) {
-                let pairs = x.as_chunks::<N>().0.as_chunks::<2>().0;
-                let (even, odd) = (even.as_chunks_mut::<N>().0, odd.as_chunks_mut::<N>().0);
-                let halves = even.iter_mut().zip(odd).zip(mean.as_chunks_mut::<N>().0);
-                for ([a, b], ((even, odd), mean)) in pairs.iter().zip(halves) {
-                    (*even, *odd) = (*a, *b);
-                    *mean = std::array::from_fn(|i| 0.5 * a[i] + 0.5 * b[i]);
+                let len = x.len() / 2;
+                let (even, odd, mean) = (&mut even[..len], &mut odd[..len], &mut mean[..len]);
+                with_constant!(n, N => apart::<N>(x, even, odd), apart_any(x, n, even, odd));
+                for ((slot, a), b) in mean.iter_mut().zip(&*even).zip(&*odd) {
+                    *slot = 0.5 * a + 0.5 * b;
                 }
             }
 
             #[inline(always)]
-            pub(super) fn join(even: &Slice, odd: &Slice, mean: &Slice, m: usize, out: &mut Slice) {
-                with_constant!(
-                    m,
-                    M => join_constant::<M>(even, odd, mean, out),
-                    for (pair, out) in out.chunks_exact_mut(2 * m).enumerate() {
-                        let at = pair * m..(pair + 1) * m;
-                        let (a, c) = (&even[at.clone()], &mean[at.clone()]);
-                        let (before, b) = (&odd[at.clone()], &odd[m..][at]);
-                        let (first, second) = out.split_at_mut(m);
-                        for p in 0..m {
-                            first[p] = a[p] + before[p];
-                            second[p] = 4.0 * c[p] - a[p] - b[p];
-                        }
-                    }
-                );
+            pub(super) fn join(even: &mut Slice, odd: &Slice, mean: &mut Slice, m: usize, out: &mut Slice) {
+                let len = out.len() / (2 * m) * m;
+                let (even, mean) = (&mut even[..len], &mut mean[..len]);
+                let (before, odd) = (&odd[..len], &odd[m..][..len]);
+                for (((a, c), before), b) in even.iter_mut().zip(&mut *mean).zip(before).zip(odd) {
+                    (*a, *c) = (*a + before, 4.0 * *c - *a - b);
+                }
+                with_constant!(m, M => together::<M>(even, mean, out), together_any(even, mean, m, out));
             }
 
             #[inline(always)]
-            fn join_constant<const M: usize>(even: &Slice, odd: &Slice, mean: &Slice, out: &mut Slice) {
-                let (before, odd) = (odd.as_chunks::<M>().0, odd[M..].as_chunks::<M>().0);
-                let products = even.as_chunks::<M>().0.iter().zip(before).zip(odd).zip(mean.as_chunks::<M>().0);
-                for ([first, second], (((a, before), b), c)) in
-                    out.as_chunks_mut::<M>().0.as_chunks_mut::<2>().0.iter_mut().zip(products)
-                {
-                    for p in 0..M {
-                        first[p] = a[p] + before[p];
-                        second[p] = 4.0 * c[p] - a[p] - b[p];
-                    }
+            fn apart<const N: usize>(x: &Slice, even: &mut Slice, odd: &mut Slice) {
+                let pairs = x.as_chunks::<N>().0.as_chunks::<2>().0.iter();
+                let halves = even.as_chunks_mut::<N>().0.iter_mut().zip(odd.as_chunks_mut::<N>().0);
+                for ([first, second], (even, odd)) in pairs.zip(halves) {
+                    (*even, *odd) = (*first, *second);
+                }
+            }
+
+            #[inline(always)]
+            fn apart_any(x: &Slice, n: usize, even: &mut Slice, odd: &mut Slice) {
+                let halves = even.chunks_exact_mut(n).zip(odd.chunks_exact_mut(n));
+                for (pair, (even, odd)) in x.chunks_exact(2 * n).zip(halves) {
+                    even.copy_from_slice(&pair[..n]);
+                    odd.copy_from_slice(&pair[n..]);
+                }
+            }
+
+            #[inline(always)]
+            fn together<const M: usize>(even: &Slice, odd: &Slice, out: &mut Slice) {
+                let halves = even.as_chunks::<M>().0.iter().zip(odd.as_chunks::<M>().0);
+                let pairs = out.as_chunks_mut::<M>().0.as_chunks_mut::<2>().0.iter_mut();
+                for ([first, second], (even, odd)) in pairs.zip(halves) {
+                    (*first, *second) = (*even, *odd);
+                }
+            }
+
+            #[inline(always)]
+            fn together_any(even: &Slice, odd: &Slice, m: usize, out: &mut Slice) {
+                let halves = even.chunks_exact(m).zip(odd.chunks_exact(m));
+                for (pair, (even, odd)) in out.chunks_exact_mut(2 * m).zip(halves) {
+                    pair[..m].copy_from_slice(even);
+                    pair[m..].copy_from_slice(odd);
                 }
             }
         }
@@ -158,7 +159,9 @@ mod tests {
 
     #[test]
     fn halves_and_outputs_are_in_their_places() {
-        for (isa, count) in [Isa::Portable, Isa::detect()].into_iter().flat_map(|isa| (1..20).map(move |n| (isa, n))) {
+        for (isa, count) in
+            [Isa::Portable, Isa::detect()].into_iter().flat_map(|isa| (1..20).map(move |n| (isa, n)))
+        {
             for pairs in [0, 1, 2, 7, 33] {
                 let x = ramp(2 * pairs * count, 0.37);
                 let [mut even, mut odd, mut mean] = [(); 3].map(|()| vec![0.0; pairs * count]);
@@ -170,11 +173,12 @@ mod tests {
                 }
                 let odd = [ramp(count, 0.11), odd].concat();
                 let mut out = vec![0.0; x.len()];
-                join_f32(isa, Products { even: &even, odd: &odd, mean: &mean }, count, &mut out);
+                let (a, c) = (even.clone(), mean.clone());
+                join_f32(isa, Products { even: &mut even, odd: &odd, mean: &mut mean }, count, &mut out);
                 for (k, p) in (0..pairs).flat_map(|k| (0..count).map(move |p| (k, p))) {
                     let at = k * count + p;
-                    assert_eq!(out[2 * k * count + p], even[at] + odd[at]);
-                    assert_eq!(out[(2 * k + 1) * count + p], 4.0 * mean[at] - even[at] - odd[at + count]);
+                    assert_eq!(out[2 * k * count + p], a[at] + odd[at]);
+                    assert_eq!(out[(2 * k + 1) * count + p], 4.0 * c[at] - a[at] - odd[at + count]);
                 }
             }
         }
