@@ -49,9 +49,9 @@ const DIRECT_OUTPUT: f64 = 0.33;
 const ROW_LEVEL: f64 = 4.4;
 /// Each output of overlap-save: from rows to frames.
 const BLOCK_OUTPUT: f64 = 0.8;
-/// Each output of the fast form: from products to frames; each input: to halves and means.
-const PAIR_OUTPUT: f64 = 0.5;
-const PAIR_INPUT: f64 = 0.5;
+/// Each vector of outputs of the fast form: from products to frames; each vector of inputs: to halves and means.
+const PAIR_OUTPUTS: f64 = 12.0;
+const PAIR_INPUTS: f64 = 10.0;
 /// Each input of overlap-save, and each tick.
 const BLOCK_INPUT: f64 = 0.5;
 const BLOCK_TICK: f64 = 1.0;
@@ -149,7 +149,8 @@ impl Size {
     fn fast(&self) -> f64 {
         let (odd, even) = (self.lags / 2, self.lags.div_ceil(2));
         let filters = 2.0 * self.direct_with(even) + self.direct_with(odd);
-        filters / 2.0 + PAIR_OUTPUT * self.ratio as f64 + PAIR_INPUT * self.channels as f64
+        let pairs = PAIR_OUTPUTS * self.ratio as f64 + PAIR_INPUTS * self.channels as f64;
+        filters / 2.0 + pairs / self.group as f64
     }
 
     fn shape(&self, len: usize) -> Shape {
