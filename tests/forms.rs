@@ -161,7 +161,11 @@ fn forms_that_do_not_fit_are_refused() {
     desk.refused(2, &args("fourier"), &["--form", "overlap-save"]);
     let bank = std::fs::read_to_string(desk.path("long.json")).unwrap();
     let mut bank: Value = serde_json::from_str(&bank).unwrap();
-    bank["channels"].as_array_mut().unwrap().iter_mut().for_each(|channel| channel["taps"] = [1.0, 0.5].into());
+    bank["channels"]
+        .as_array_mut()
+        .unwrap()
+        .iter_mut()
+        .for_each(|channel| channel["taps"] = [1.0, 0.5].into());
     desk.write("short.json", bank.to_string());
     let short = ["fuse", "short.json", "a.wav", "b.wav", "-o", "new.wav", "--form", "fast"];
     desk.refused(1, &short, &["short.json", "at least 2 ticks, and these reach over 1", "direct form"]);

@@ -16,8 +16,8 @@ pub enum Form {
     Direct,
     /// Ticks by twos, through three filters of half the length in place of four (Karatsuba), for filters that reach over
     /// K >= 2 ticks: up to a quarter less work for long ones, and no sample is later. The error is relative to the norms
-    /// of the filters and of the inputs in their memory and not to each product; for noise it is 1.5 times that of the
-    /// direct form.
+    /// of each channel's filter and of the inputs in its memory and not to each product: a few eps, for white noise up to
+    /// 1.4 times that of the direct form.
     Fast,
     /// By Fourier transforms of F ticks, a power of two from 16 on that is at least K, or of the best such length:
     /// for long filters a fraction of the work, but later by

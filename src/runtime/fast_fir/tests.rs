@@ -166,9 +166,9 @@ fn the_error_is_within_the_stated_bound() {
 }
 
 #[test]
-fn the_error_of_noise_is_about_one_and_a_half_times_that_of_the_direct_form() {
+fn the_error_of_noise_is_hardly_more_than_that_of_the_direct_form() {
     let mut noise = Noise(54);
-    for (n, m, lags) in [(2, 2, 64), (4, 4, 16), (8, 8, 32)] {
+    for (n, m, lags) in [(1, 1, 16), (2, 2, 64), (4, 4, 16), (8, 8, 32)] {
         let taps = random_taps(n, m * lags, &mut noise);
         let taps: Vec<Vec<f64>> =
             taps.iter().map(|f| f.iter().map(|&tap| f64::from(tap as f32)).collect()).collect();
@@ -179,7 +179,7 @@ fn the_error_of_noise_is_about_one_and_a_half_times_that_of_the_direct_form() {
             norm(want.iter().zip(got).map(|(a, b)| a - f64::from(b)))
         };
         let ratio = error(Form::Fast) / error(Form::Direct);
-        assert!((1.0..2.2).contains(&ratio), "N {n} M {m} K {lags}: {ratio}");
+        assert!((0.9..1.5).contains(&ratio), "N {n} M {m} K {lags}: {ratio}");
     }
 }
 
