@@ -14,7 +14,7 @@ use super::workers::{self, Spans, Workers};
 #[derive(Debug)]
 pub(crate) enum FirBankPlan<T: Sample> {
     Direct(FirPlan<T>),
-    Fast(FastFirPlan<T>),
+    Fast(Box<FastFirPlan<T>>),
     OverlapSave(OverlapSavePlan<T>),
 }
 
@@ -22,7 +22,7 @@ pub(crate) enum FirBankPlan<T: Sample> {
 #[derive(Debug, Clone)]
 pub(crate) enum FirBankState<T: Sample> {
     Direct(FirState<T>),
-    Fast(FastFirState<T>),
+    Fast(Box<FastFirState<T>>),
     OverlapSave(OverlapSaveState<T>),
 }
 
@@ -42,7 +42,7 @@ impl<T: Sample> FirBankPlan<T> {
     pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, choice: Choice, isa: Isa) -> Result<Self, BuildError> {
         match choice {
             Choice::Direct => FirPlan::new(taps, ratio, isa).map(Self::Direct),
-            Choice::Fast => FastFirPlan::new(taps, ratio, isa).map(Self::Fast),
+            Choice::Fast => FastFirPlan::new(taps, ratio, isa).map(Box::new).map(Self::Fast),
             Choice::OverlapSave(len) => OverlapSavePlan::new(taps, ratio, len, isa).map(Self::OverlapSave),
         }
     }
@@ -51,7 +51,7 @@ impl<T: Sample> FirBankPlan<T> {
     pub(crate) fn state(&self) -> FirBankState<T> {
         match self {
             Self::Direct(plan) => FirBankState::Direct(plan.state()),
-            Self::Fast(plan) => FirBankState::Fast(plan.state()),
+            Self::Fast(plan) => FirBankState::Fast(Box::new(plan.state())),
             Self::OverlapSave(plan) => FirBankState::OverlapSave(plan.state()),
         }
     }
@@ -96,7 +96,7 @@ impl<T: Sample> FirBankPlan<T> {
     ) -> u64 {
         match (self, state) {
             (Self::Direct(plan), FirBankState::Direct(state)) => share(plan, state, source, sink, workers),
-            (Self::Fast(plan), FirBankState::Fast(state)) => share(plan, state, source, sink, workers),
+            (Self::Fast(plan), FirBankState::Fast(state)) => share(&**plan, state, source, sink, workers),
             (Self::OverlapSave(plan), FirBankState::OverlapSave(state)) => plan.process(state, source, sink),
             // A state is only ever made by its plan.
             _ => 0,
