@@ -1,9 +1,10 @@
-//! From how many taps a phase on does overlap-save take less time than the direct form?
+//! From how many taps a phase on do the fast form and overlap-save take less time than the direct form?
 //!
-//! `cargo bench --bench crossover` measures both along a ladder of K for several N and M, overlap-save with the four shortest
+//! `cargo bench --bench crossover` measures all three along a ladder of K for several N and M, overlap-save with the four shortest
 //! transforms that hold a block of K ticks, in nanoseconds a tick (best of many repeats), and sets beside them
-//! what the plan chooses. The constants of the plan's cost model (`src/runtime/form.rs`) were fitted to this table. Words
-//! after `--`: `f64` for double precision.
+//! what the plan chooses, first among the forms that are not late. The constants of the plan's cost model
+//! (`src/runtime/form.rs`) were fitted to this table. Words after `--`: `f64` for double precision, `prompt` without
+//! overlap-save.
 
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::runtime::{Form, Options, Precision, Reconstructor};
@@ -50,23 +51,32 @@ fn measure(bank: &Bank, options: Options) -> f64 {
 }
 
 fn main() {
-    let double = std::env::args().any(|word| word == "f64");
+    let asked = |wanted: &str| std::env::args().any(|word| word == wanted);
+    let (double, prompt) = (asked("f64"), asked("prompt"));
     let precision = if double { Precision::Double } else { Precision::Single };
-    println!("| N | M | K | direct, ns a tick | overlap-save, F: ns a tick | the plan |");
-    println!("|---|---|---|---|---|---|");
+    println!(
+        "| N | M | K | direct, ns a tick | fast | overlap-save, F: ns a tick | the plan, not late | the plan |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     for (n, m) in SHAPES {
         for k in LAGS {
             let bank = fir(n, m, k * m);
             let options = |form| Options { precision, form, ..Options::default() };
             let direct = measure(&bank, options(Form::Direct));
+            let fast = measure(&bank, options(Form::Fast));
             let shortest = (2 * k).next_power_of_two().max(16);
-            let lengths = (0..4).map(|i| shortest << i);
+            let lengths = (0..if prompt { 0 } else { 4 }).map(|i| shortest << i);
             let others: Vec<_> = lengths
                 .map(|len| format!("{len}: {:.2}", measure(&bank, options(Form::OverlapSave(Some(len))))))
                 .collect();
-            let plan = Reconstructor::with_options(&bank, options(Form::Fastest)).unwrap().plan();
+            let plan = |form| Reconstructor::with_options(&bank, options(form)).unwrap().plan();
+            let (not_late, plan) = (plan(Form::FastestPrompt).form, plan(Form::Fastest));
             let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
-            println!("| {n} | {m} | {k} | {direct:.2} | {} | {}{length} |", others.join(", "), plan.form);
+            println!(
+                "| {n} | {m} | {k} | {direct:.2} | {fast:.2} | {} | {not_late} | {}{length} |",
+                others.join(", "),
+                plan.form
+            );
         }
     }
 }

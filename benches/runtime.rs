@@ -86,8 +86,9 @@ impl Table {
         );
     }
 
-    fn fir(&self, name: &str, n: usize, m: usize, taps: usize, precision: Precision, call: usize) {
-        let options = Options { precision, ..Options::default() };
+    /// The products are those of the direct form, so that the share of the peak may pass 100 % in others.
+    fn fir(&self, name: &str, n: usize, m: usize, taps: usize, form: Form, call: usize) {
+        let options = Options { form, ..Options::default() };
         let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
         let x = input(n, TICKS);
         let mut y = vec![0.0; m * TICKS];
@@ -100,16 +101,20 @@ impl Table {
 
     fn cases(&self) {
         for (name, n, m, taps) in CASES {
-            self.fir(&format!("{name}: f32"), n, m, taps, Precision::Single, TICKS);
-            self.fir(&format!("{name}: f32, 64 ticks a call"), n, m, taps, Precision::Single, 64);
-            self.doubles(&format!("{name}: f64"), n, m, taps);
+            self.fir(&format!("{name}: f32"), n, m, taps, Form::Direct, TICKS);
+            self.fir(&format!("{name}: f32, 64 ticks a call"), n, m, taps, Form::Direct, 64);
+            self.fir(&format!("{name}: f32, fast"), n, m, taps, Form::Fast, TICKS);
+            self.fir(&format!("{name}: f32, fast, 64 ticks a call"), n, m, taps, Form::Fast, 64);
+            self.doubles(&format!("{name}: f64"), n, m, taps, Form::Direct);
+            self.doubles(&format!("{name}: f64, fast"), n, m, taps, Form::Fast);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
-            self.threads(&format!("{name}: f32, two threads"), n, m, taps);
+            self.threads(&format!("{name}: f32, two threads"), n, m, taps, Form::Direct);
+            self.threads(&format!("{name}: f32, fast, two threads"), n, m, taps, Form::Fast);
             self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
         }
     }
 
-    /// Overlap-save; the products are those of the direct form, so that the share of the peak may pass 100 %.
+    /// Overlap-save; the products are those of the direct form.
     fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
         for len in [None, Some(64), Some(128), Some(256)] {
             let options = Options { form: Form::OverlapSave(len), ..Options::default() };
@@ -124,8 +129,8 @@ impl Table {
     }
 
     /// In and out as f64; the peak in f64 is half the one printed.
-    fn doubles(&self, name: &str, n: usize, m: usize, taps: usize) {
-        let options = Options { precision: Precision::Double, ..Options::default() };
+    fn doubles(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
+        let options = Options { precision: Precision::Double, form, ..Options::default() };
         let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
         let x: Vec<f64> = input(n, TICKS).into_iter().map(f64::from).collect();
         let mut y = vec![0.0; m * TICKS];
@@ -147,8 +152,9 @@ impl Table {
     }
 
     /// A longer call, as for files; the threads wait for it.
-    fn threads(&self, name: &str, n: usize, m: usize, taps: usize) {
-        let mut stream = Reconstructor::new(&fir(n, m, taps)).unwrap();
+    fn threads(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
+        let options = Options { form, ..Options::default() };
+        let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
         let workers = Workers::new(2).unwrap();
         let ticks = 64 * TICKS;
         let x = input(n, ticks);
@@ -162,18 +168,15 @@ impl Table {
     fn ladder(&self) {
         for n in 1..=16 {
             for m in 1..=16 {
-                self.fir(
-                    &format!("ladder: N {n} M {m}, 16 taps a phase"),
-                    n,
-                    m,
-                    16 * m,
-                    Precision::Single,
-                    TICKS,
-                );
+                self.fir(&format!("ladder: N {n} M {m}, 16 taps a phase"), n, m, 16 * m, Form::Direct, TICKS);
             }
         }
         for taps in [2, 8, 32, 128, 512, 2048] {
-            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Precision::Single, TICKS);
+            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Form::Direct, TICKS);
+        }
+        for taps in [256, 512, 1024] {
+            self.fir(&format!("taps: N 8 M 8, {taps} taps"), 8, 8, taps, Form::Direct, TICKS);
+            self.fir(&format!("taps: N 8 M 8, {taps} taps, fast"), 8, 8, taps, Form::Fast, TICKS);
         }
     }
 

@@ -4,7 +4,7 @@ mod support;
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{Options, PcmOutput, Precision, Reconstructor};
+use hybank::runtime::{Form, Options, PcmOutput, Precision, Reconstructor};
 use rand_cuts::Cuts;
 use std::io::{Read, Write};
 use support::{Desk, bytes, ticks};
@@ -97,10 +97,17 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
     let mut noise = noise(2);
     let mut streams: Vec<_> = banks
         .iter()
-        .flat_map(|bank| [Precision::Single, Precision::Double].map(|precision| (bank, precision)))
-        .map(|(bank, precision)| {
-            let mut stream =
-                Reconstructor::with_options(bank, Options { precision, ..Options::default() }).unwrap();
+        .flat_map(|bank| {
+            let forms = if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
+                &[Form::Direct][..]
+            } else {
+                &[Form::Direct, Form::Fast]
+            };
+            let each = forms.iter().flat_map(|&form| [(form, Precision::Single), (form, Precision::Double)]);
+            each.map(move |(form, precision)| (bank, Options { form, precision, ..Options::default() }))
+        })
+        .map(|(bank, options)| {
+            let mut stream = Reconstructor::with_options(bank, options).unwrap();
             let input: Vec<f32> = (0..TICKS * bank.delays.len()).map(|_| noise() as f32).collect();
             let whole = [false, true].map(|pcm| {
                 stream.reset();

@@ -4,7 +4,7 @@
 usage: form_costs.py LANES < table      (LANES of 32 bytes: 8 for f32, 4 for f64; needs numpy and scipy)
 
 Prints nanoseconds for each term of a tick, and quantiles of measured / fitted. Divided by the time of a vector of
-products and rounded they are the constants of the model.
+products and rounded they are the constants of the model. Where overlap-save was not measured, its column is empty.
 """
 
 import sys
@@ -34,6 +34,12 @@ def direct(n, m, k):
     return [steps * depth * m / GROUP, depth * m / GROUP, m, 1]
 
 
+def halves(costs, n, m, k):
+    """Terms of the fast form: half a tick of each of three direct filters at their costs, vectors of outputs, of inputs."""
+    filters = [direct(n, m, -(-k // 2))] * 2 + [direct(n, m, k // 2)]
+    return [np.sum(filters, axis=0) @ costs / 2, m / GROUP, n / GROUP]
+
+
 def fit(name, rows):
     """Non-negative least squares of the relative error; what a busy host delayed weighs less."""
     terms, times = (np.array(column, float) for column in zip(*rows))
@@ -43,11 +49,14 @@ def fit(name, rows):
         ratio = times / (terms @ costs)
         weights = np.where(ratio > 1.15, 0.2, 1) / times
     print(name, np.round(costs, 3), "measured / fitted:", np.round(np.percentile(ratio, [5, 50, 95]), 2))
+    return costs
 
 
 rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in sys.stdin]
-rows = [row for row in rows if len(row) == 6 and row[0].isdigit()]
+rows = [row for row in rows if len(row) == 8 and row[0].isdigit()]
 sizes = [tuple(map(int, row[:3])) for row in rows]
-fit("direct", [(direct(*size), float(row[3])) for size, row in zip(sizes, rows)])
-pairs = [(size, part.split(":")) for size, row in zip(sizes, rows) for part in row[4].split(",")]
-fit("overlap-save", [(blocks(*size, int(length)), float(time)) for size, (length, time) in pairs])
+costs = fit("direct", [(direct(*size), float(row[3])) for size, row in zip(sizes, rows)])
+fit("fast", [(halves(costs, *size), float(row[4])) for size, row in zip(sizes, rows)])
+pairs = [(size, part.split(":")) for size, row in zip(sizes, rows) for part in row[5].split(",") if part]
+if pairs:
+    fit("overlap-save", [(blocks(*size, int(length)), float(time)) for size, (length, time) in pairs])

@@ -18,6 +18,8 @@ pub(super) enum FormArg {
     Auto,
     /// Every product; no later than the bank's latency
     Direct,
+    /// Ticks by twos, three products for four; up to a quarter faster for long filters, and no later
+    Fast,
     /// Fourier transforms of blocks; faster for long filters, but later
     OverlapSave,
 }
@@ -28,6 +30,7 @@ impl FormArg {
         match self {
             Self::Auto => auto,
             Self::Direct => Form::Direct,
+            Self::Fast => Form::Fast,
             Self::OverlapSave => Form::OverlapSave(None),
         }
     }

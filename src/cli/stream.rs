@@ -45,7 +45,8 @@ pub(super) struct Args {
     /// sigmf-meta); standard output if left out
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
-    /// Form of FIR filters; auto is direct, because overlap-save makes the output later (--json tells by how much)
+    /// Form of FIR filters; auto is the faster one of direct and fast, because overlap-save makes the output later (--json
+    /// tells by how much), and direct where gaps are bridged
     #[arg(long, value_enum, default_value_t = FormArg::Auto)]
     form: FormArg,
     /// Bring out the last samples at the end, as many as the latency, with zeros for input
@@ -164,7 +165,9 @@ impl Args {
     }
 
     fn reconstructor(&self, bank: &Bank) -> Result<Reconstructor, Failure> {
-        let form = self.form.form(Form::Direct);
+        // Outside of what a gap touched the output is to have the very bits of a whole recording.
+        let auto = if self.gaps.are_bridged() { Form::Direct } else { Form::FastestPrompt };
+        let form = self.form.form(auto);
         let options = Options { precision: precision(self.output_format()), form, ..Options::default() };
         Reconstructor::with_options(bank, options)
             .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))

@@ -73,9 +73,20 @@ pub enum BuildError {
         /// F.
         len: usize,
     },
-    /// Overlap-save was asked for, but the filters never forget.
-    #[error("overlap-save needs FIR filters, and this bank is recursive; leave the form to the plan")]
-    Recursive,
+    /// A form of FIR filters was asked for, but the filters never forget.
+    #[error("{form} needs FIR filters, and this bank is recursive; leave the form to the plan")]
+    Recursive {
+        /// The form.
+        form: &'static str,
+    },
+    /// The fast form was asked for, but the filters cannot be halved.
+    #[error(
+        "the fast form halves filters of at least 2 ticks, and these reach over {lags} (taps / M); choose the direct form"
+    )]
+    TooShort {
+        /// K.
+        lags: usize,
+    },
     /// The filters together are too long for 32-bit offsets.
     #[error(
         "the filters look back {history} ticks on {channels} channels, more than the runtime can address; shorten them"

@@ -77,11 +77,13 @@ impl<T: Sample> FirPlan<T> {
 
     /// A stream's state before its first tick.
     pub(crate) fn state(&self) -> FirState<T> {
-        let beyond = self.cut.vector * self.channels;
-        FirState {
-            window: Window::new(self.channels, self.cut.past, self.block * self.channels, beyond),
-            output: Aligned::new(self.ratio * self.block),
-        }
+        FirState { window: self.window(self.block, 0), output: Aligned::new(self.ratio * self.block) }
+    }
+
+    /// Zeros, for blocks of at most `block` ticks, and with `more` ticks of the past than the filters look back.
+    pub(super) fn window(&self, block: usize, more: usize) -> Window<T> {
+        let (n, Cut { past, vector, .. }) = (self.channels, self.cut);
+        Window::new(n, past + more * n, block * n, vector * n)
     }
 
     /// All ticks of `source` to `sink`; returns how many samples were not finite.
@@ -199,7 +201,8 @@ impl<T: Sample> FirPlan<T> {
         finite
     }
 
-    fn run(&self, x: &[T], ticks: usize, out: &mut [T]) -> bool {
+    /// Filters ticks the first of whose past begins at `x`; false if something may not be finite.
+    pub(super) fn run(&self, x: &[T], ticks: usize, out: &mut [T]) -> bool {
         let mut finite = true;
         for group in &self.groups {
             finite &= self.kernel.run(group, &self.cut, x, ticks, &mut out[group.first..], self.ratio);

@@ -4,7 +4,9 @@
 
 mod aligned;
 mod error;
+mod fast_fir;
 mod fir;
+mod fir_bank;
 mod form;
 mod gaps;
 mod overlap_save;

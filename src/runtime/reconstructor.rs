@@ -1,12 +1,12 @@
 //! A bank at work on one stream.
 
-use super::fir::{FirPlan, FirState};
+use super::fir_bank::{FirBankPlan, FirBankState};
 use super::form::Form;
-use super::overlap_save::{OverlapSavePlan, OverlapSaveState, Shape};
+use super::sample::Sample;
 use super::simd::Isa;
 use super::state_space::{StateSpacePlan, StateSpaceState};
 use super::ticks::{FastSink, Interleaved, PcmOutput, TickSource};
-use super::workers::{self, Workers};
+use super::workers::Workers;
 use super::{BuildError, ProcessError};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::io::PcmFrames;
@@ -30,7 +30,7 @@ pub struct Options {
     /// Number type of recursions, [`Precision::Double`] unless asked for otherwise: a recursion feeds its rounding
     /// errors back, and in f32 the error is about 1e-7 of full scale divided by 1 - |pole|.
     pub recursion: Precision,
-    /// Form of FIR banks, [`Form::Direct`] unless asked for otherwise, because the others may be later.
+    /// Form of FIR banks, [`Form::Direct`] unless asked for otherwise, because the others round otherwise or are later.
     pub form: Form,
     /// Instruction set; one that the processor does not have falls back to the portable kernels.
     pub isa: Isa,
@@ -50,7 +50,7 @@ impl Default for Options {
 /// How a bank runs, for reports.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct PlanSummary {
-    /// `direct` or `overlap-save` (FIR), `modal` (delay lines and parallel sections) or `dense` (delay lines and any
+    /// `direct`, `fast` or `overlap-save` (FIR), `modal` (delay lines and parallel sections) or `dense` (delay lines and any
     /// other states).
     pub form: &'static str,
     /// Number type of the sums: `f32` or `f64`.
@@ -65,7 +65,7 @@ pub struct PlanSummary {
     pub block: Option<usize>,
     /// Fast samples by which the form is later than the bank's own latency.
     pub extra_latency: usize,
-    /// Multiply-adds for each fast sample; additions of a transform count as such. `None` for recursions.
+    /// Multiply-adds for each fast sample; additions of the fast form and of transforms count as such. `None` for recursions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub multiply_adds: Option<f64>,
 }
@@ -73,10 +73,8 @@ pub struct PlanSummary {
 /// Coefficients in the order of use, shared by any number of streams.
 #[derive(Debug)]
 enum Plan {
-    Single(FirPlan<f32>),
-    Double(FirPlan<f64>),
-    BlocksSingle(OverlapSavePlan<f32>),
-    BlocksDouble(OverlapSavePlan<f64>),
+    FirSingle(FirBankPlan<f32>),
+    FirDouble(FirBankPlan<f64>),
     RecursionSingle(StateSpacePlan<f32>),
     RecursionDouble(StateSpacePlan<f64>),
 }
@@ -84,10 +82,8 @@ enum Plan {
 /// The state of one stream, of the plan's kind.
 #[derive(Debug, Clone)]
 enum StreamState {
-    Single(FirState<f32>),
-    Double(FirState<f64>),
-    BlocksSingle(OverlapSaveState<f32>),
-    BlocksDouble(OverlapSaveState<f64>),
+    FirSingle(FirBankState<f32>),
+    FirDouble(FirBankState<f64>),
     RecursionSingle(StateSpaceState<f32>),
     RecursionDouble(StateSpaceState<f64>),
 }
@@ -117,6 +113,8 @@ enum StreamState {
 pub struct Reconstructor {
     plan: Arc<Plan>,
     state: StreamState,
+    channels: usize,
+    ratio: usize,
     latency: usize,
     isa: Isa,
     replaced: u64,
@@ -140,31 +138,18 @@ impl Reconstructor {
         let state = plan.state();
         let isa = if options.isa.is_available() { options.isa } else { Isa::Portable };
         let latency = bank.latency + plan.delay() * bank.ratio;
-        Ok(Self { plan: Arc::new(plan), state, latency, isa, replaced: 0 })
+        let (channels, ratio) = (bank.channel_count(), bank.ratio);
+        Ok(Self { plan: Arc::new(plan), state, channels, ratio, latency, isa, replaced: 0 })
     }
 
     /// N, samples a tick in.
     pub fn channels(&self) -> usize {
-        match &*self.plan {
-            Plan::Single(plan) => plan.channels,
-            Plan::Double(plan) => plan.channels,
-            Plan::BlocksSingle(plan) => plan.shape.channels,
-            Plan::BlocksDouble(plan) => plan.shape.channels,
-            Plan::RecursionSingle(plan) => plan.channels,
-            Plan::RecursionDouble(plan) => plan.channels,
-        }
+        self.channels
     }
 
     /// M, samples a tick out.
     pub fn ratio(&self) -> usize {
-        match &*self.plan {
-            Plan::Single(plan) => plan.ratio,
-            Plan::Double(plan) => plan.ratio,
-            Plan::BlocksSingle(plan) => plan.shape.ratio,
-            Plan::BlocksDouble(plan) => plan.shape.ratio,
-            Plan::RecursionSingle(plan) => plan.ratio,
-            Plan::RecursionDouble(plan) => plan.ratio,
-        }
+        self.ratio
     }
 
     /// m0 and what the form adds to it: output sample n belongs to the time of fast sample n - latency.
@@ -180,10 +165,8 @@ impl Reconstructor {
     /// Ticks after which an input is forgotten; `None` for a recursion, which never forgets.
     pub fn memory(&self) -> Option<usize> {
         match &*self.plan {
-            Plan::Single(plan) => Some(plan.history),
-            Plan::Double(plan) => Some(plan.history),
-            Plan::BlocksSingle(plan) => Some(plan.shape.history),
-            Plan::BlocksDouble(plan) => Some(plan.shape.history),
+            Plan::FirSingle(plan) => Some(plan.memory()),
+            Plan::FirDouble(plan) => Some(plan.memory()),
             Plan::RecursionSingle(_) | Plan::RecursionDouble(_) => None,
         }
     }
@@ -196,10 +179,8 @@ impl Reconstructor {
     /// How the bank runs.
     pub fn plan(&self) -> PlanSummary {
         match &*self.plan {
-            Plan::Single(plan) => self.summary("direct", "f32").with_multiply_adds(plan.multiply_adds()),
-            Plan::Double(plan) => self.summary("direct", "f64").with_multiply_adds(plan.multiply_adds()),
-            Plan::BlocksSingle(plan) => self.summary("overlap-save", "f32").with_blocks(&plan.shape),
-            Plan::BlocksDouble(plan) => self.summary("overlap-save", "f64").with_blocks(&plan.shape),
+            Plan::FirSingle(plan) => self.fir_summary(plan, "f32"),
+            Plan::FirDouble(plan) => self.fir_summary(plan, "f64"),
             Plan::RecursionSingle(plan) => self.summary(recursion_form(plan.is_modal()), "f32"),
             Plan::RecursionDouble(plan) => self.summary(recursion_form(plan.is_modal()), "f64"),
         }
@@ -215,6 +196,16 @@ impl Reconstructor {
             block: None,
             extra_latency: self.extra_latency(),
             multiply_adds: None,
+        }
+    }
+
+    fn fir_summary<T: Sample>(&self, plan: &FirBankPlan<T>, numbers: &'static str) -> PlanSummary {
+        let form = plan.summary();
+        PlanSummary {
+            transform: form.transform.map(|(len, _)| len),
+            block: form.transform.map(|(_, block)| block),
+            multiply_adds: Some(form.multiply_adds),
+            ..self.summary(form.name, numbers)
         }
     }
 
@@ -241,10 +232,8 @@ impl Reconstructor {
     pub fn reset(&mut self) {
         self.replaced = 0;
         match &mut self.state {
-            StreamState::Single(state) => state.reset(),
-            StreamState::Double(state) => state.reset(),
-            StreamState::BlocksSingle(state) => state.reset(),
-            StreamState::BlocksDouble(state) => state.reset(),
+            StreamState::FirSingle(state) => state.reset(),
+            StreamState::FirDouble(state) => state.reset(),
             StreamState::RecursionSingle(state) => state.reset(),
             StreamState::RecursionDouble(state) => state.reset(),
         }
@@ -258,7 +247,7 @@ impl Reconstructor {
     /// [`ProcessError`] if the slices do not fit; nothing is processed then.
     pub fn process(&mut self, input: &[f32], output: &mut [f32]) -> Result<usize, ProcessError> {
         let source = self.interleaved(input)?;
-        self.run(&source, output)
+        self.run(&source, output, None)
     }
 
     /// As [`Reconstructor::process`], on all `workers` at once, with the same bits: each takes spans of ticks and
@@ -274,7 +263,7 @@ impl Reconstructor {
         workers: &Workers,
     ) -> Result<usize, ProcessError> {
         let source = self.interleaved(input)?;
-        self.share(&source, output, workers)
+        self.run(&source, output, Some(workers))
     }
 
     /// As [`Reconstructor::process_pcm`], on all `workers` at once; see [`Reconstructor::process_parallel`].
@@ -287,7 +276,7 @@ impl Reconstructor {
         output: &mut PcmOutput<'_>,
         workers: &Workers,
     ) -> Result<usize, ProcessError> {
-        self.share(input, output, workers)
+        self.run(input, output, Some(workers))
     }
 
     /// As [`Reconstructor::process`], for f64 samples (whatever the precision of the kernels).
@@ -296,7 +285,7 @@ impl Reconstructor {
     /// As [`Reconstructor::process`].
     pub fn process_f64(&mut self, input: &[f64], output: &mut [f64]) -> Result<usize, ProcessError> {
         let source = self.interleaved(input)?;
-        self.run(&source, output)
+        self.run(&source, output, None)
     }
 
     /// As [`Reconstructor::process`], from and to samples as they lie in files and pipes: the
@@ -310,7 +299,7 @@ impl Reconstructor {
         input: &[PcmFrames<'_>],
         output: &mut PcmOutput<'_>,
     ) -> Result<usize, ProcessError> {
-        self.run(input, output)
+        self.run(input, output, None)
     }
 
     fn interleaved<'a, S>(&self, samples: &'a [S]) -> Result<Interleaved<'a, S>, ProcessError> {
@@ -322,13 +311,16 @@ impl Reconstructor {
         &mut self,
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
+        workers: Option<&Workers>,
     ) -> Result<usize, ProcessError> {
         let wanted = self.check(source, sink)?;
         self.replaced += match (&*self.plan, &mut self.state) {
-            (Plan::Single(plan), StreamState::Single(state)) => plan.process(state, source, sink),
-            (Plan::Double(plan), StreamState::Double(state)) => plan.process(state, source, sink),
-            (Plan::BlocksSingle(plan), StreamState::BlocksSingle(state)) => plan.process(state, source, sink),
-            (Plan::BlocksDouble(plan), StreamState::BlocksDouble(state)) => plan.process(state, source, sink),
+            (Plan::FirSingle(plan), StreamState::FirSingle(state)) => {
+                plan.process(state, source, sink, workers)
+            }
+            (Plan::FirDouble(plan), StreamState::FirDouble(state)) => {
+                plan.process(state, source, sink, workers)
+            }
             (Plan::RecursionSingle(plan), StreamState::RecursionSingle(state)) => {
                 plan.process(state, source, sink)
             }
@@ -337,25 +329,6 @@ impl Reconstructor {
             }
             // A state is only ever made by its plan.
             _ => 0,
-        };
-        Ok(wanted)
-    }
-
-    fn share(
-        &mut self,
-        source: &(impl TickSource + ?Sized),
-        sink: &mut (impl FastSink + ?Sized),
-        workers: &Workers,
-    ) -> Result<usize, ProcessError> {
-        let wanted = self.check(source, sink)?;
-        self.replaced += match (&*self.plan, &mut self.state) {
-            (Plan::Single(plan), StreamState::Single(state)) => {
-                workers::process(plan, state, source, sink, workers)
-            }
-            (Plan::Double(plan), StreamState::Double(state)) => {
-                workers::process(plan, state, source, sink, workers)
-            }
-            _ => return self.run(source, sink),
         };
         Ok(wanted)
     }
@@ -377,17 +350,6 @@ impl Reconstructor {
     }
 }
 
-impl PlanSummary {
-    fn with_multiply_adds(self, a_sample: f64) -> Self {
-        Self { multiply_adds: Some(a_sample), ..self }
-    }
-
-    fn with_blocks(self, shape: &Shape) -> Self {
-        let (transform, block) = (Some(shape.len), Some(shape.block()));
-        Self { transform, block, ..self.with_multiply_adds(shape.multiply_adds()) }
-    }
-}
-
 fn recursion_form(modal: bool) -> &'static str {
     if modal { "modal" } else { "dense" }
 }
@@ -406,47 +368,43 @@ impl Plan {
                 Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
             }
             (SynthesisFilters::Fir(taps), precision) => {
-                let len = options.form.transform_len(taps, ratio, precision)?;
-                match (precision, len) {
-                    (Precision::Single, None) => FirPlan::new(taps, ratio, options.isa).map(Self::Single),
-                    (Precision::Double, None) => FirPlan::new(taps, ratio, options.isa).map(Self::Double),
-                    (Precision::Single, Some(len)) => {
-                        OverlapSavePlan::new(taps, ratio, len, options.isa).map(Self::BlocksSingle)
+                let choice = options.form.choose(taps, ratio, precision)?;
+                match precision {
+                    Precision::Single => {
+                        FirBankPlan::new(taps, ratio, choice, options.isa).map(Self::FirSingle)
                     }
-                    (Precision::Double, Some(len)) => {
-                        OverlapSavePlan::new(taps, ratio, len, options.isa).map(Self::BlocksDouble)
+                    Precision::Double => {
+                        FirBankPlan::new(taps, ratio, choice, options.isa).map(Self::FirDouble)
                     }
                 }
             }
-            (SynthesisFilters::StateSpace(_), _) if matches!(options.form, Form::OverlapSave(_)) => {
-                Err(BuildError::Recursive)
+            (SynthesisFilters::StateSpace(filter), _) => {
+                options.form.check_recursive()?;
+                match options.recursion {
+                    Precision::Single => {
+                        StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::RecursionSingle)
+                    }
+                    Precision::Double => {
+                        StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::RecursionDouble)
+                    }
+                }
             }
-            (SynthesisFilters::StateSpace(filter), _) => match options.recursion {
-                Precision::Single => {
-                    StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::RecursionSingle)
-                }
-                Precision::Double => {
-                    StateSpacePlan::new(filter, channels, ratio, options.isa).map(Self::RecursionDouble)
-                }
-            },
         }
     }
 
     /// Ticks by which outputs are later than their last input.
     fn delay(&self) -> usize {
         match self {
-            Self::BlocksSingle(plan) => plan.shape.delay(),
-            Self::BlocksDouble(plan) => plan.shape.delay(),
-            _ => 0,
+            Self::FirSingle(plan) => plan.delay(),
+            Self::FirDouble(plan) => plan.delay(),
+            Self::RecursionSingle(_) | Self::RecursionDouble(_) => 0,
         }
     }
 
     fn state(&self) -> StreamState {
         match self {
-            Self::Single(plan) => StreamState::Single(plan.state()),
-            Self::Double(plan) => StreamState::Double(plan.state()),
-            Self::BlocksSingle(plan) => StreamState::BlocksSingle(plan.state()),
-            Self::BlocksDouble(plan) => StreamState::BlocksDouble(plan.state()),
+            Self::FirSingle(plan) => StreamState::FirSingle(plan.state()),
+            Self::FirDouble(plan) => StreamState::FirDouble(plan.state()),
             Self::RecursionSingle(plan) => StreamState::RecursionSingle(plan.state()),
             Self::RecursionDouble(plan) => StreamState::RecursionDouble(plan.state()),
         }

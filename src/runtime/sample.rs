@@ -1,6 +1,6 @@
 //! The two number types that kernels run in.
 
-use super::simd::{self, FirKernel, Isa, RecursionKernel, TransformKernel};
+use super::simd::{self, FirKernel, Halves, Isa, Products, RecursionKernel, TransformKernel};
 
 /// f32 or f64.
 pub(crate) trait Sample:
@@ -22,6 +22,10 @@ pub(crate) trait Sample:
     fn transform_kernel(isa: Isa) -> TransformKernel<Self>;
     /// True if surely all are finite, see [`simd::all_finite`].
     fn all_finite(isa: Isa, samples: &[Self]) -> bool;
+    /// Pairs of frames apart, see [`simd::split_f32`].
+    fn split_pairs(isa: Isa, frames: &[Self], n: usize, to: Halves<'_, Self>);
+    /// Products of pairs together, see [`simd::join_f32`].
+    fn join_pairs(isa: Isa, from: Products<'_, Self>, m: usize, out: &mut [Self]);
     /// The samples themselves, if they are f32.
     fn as_f32(samples: &[Self]) -> Option<&[f32]>;
     /// The samples themselves, if they are f32.
@@ -68,6 +72,14 @@ impl Sample for f32 {
 
     fn all_finite(isa: Isa, samples: &[Self]) -> bool {
         simd::all_finite_f32(isa, samples)
+    }
+
+    fn split_pairs(isa: Isa, frames: &[Self], n: usize, to: Halves<'_, Self>) {
+        simd::split_f32(isa, frames, n, to);
+    }
+
+    fn join_pairs(isa: Isa, from: Products<'_, Self>, m: usize, out: &mut [Self]) {
+        simd::join_f32(isa, from, m, out);
     }
 
     fn as_f32(samples: &[Self]) -> Option<&[f32]> {
@@ -127,6 +139,14 @@ impl Sample for f64 {
 
     fn all_finite(isa: Isa, samples: &[Self]) -> bool {
         simd::all_finite_f64(isa, samples)
+    }
+
+    fn split_pairs(isa: Isa, frames: &[Self], n: usize, to: Halves<'_, Self>) {
+        simd::split_f64(isa, frames, n, to);
+    }
+
+    fn join_pairs(isa: Isa, from: Products<'_, Self>, m: usize, out: &mut [Self]) {
+        simd::join_f64(isa, from, m, out);
     }
 
     fn as_f32(_: &[Self]) -> Option<&[f32]> {

@@ -46,6 +46,11 @@ impl<T: Sample> Window<T> {
         &self.samples[self.next - self.past..]
     }
 
+    /// Samples of the view before the next tick.
+    pub(crate) fn known(&self) -> usize {
+        self.past
+    }
+
     /// The `ticks` ticks that were written are there now.
     pub(crate) fn advance(&mut self, ticks: usize) {
         self.next += ticks * self.channels;

@@ -4,8 +4,6 @@
 //! so its outputs have the bits that one thread would give them. There are more spans than threads: who is done first takes
 //! the next one, so that a thread that was held up does not hold up all.
 
-use super::fir::{FirPlan, FirState};
-use super::sample::Sample;
 use super::ticks::{FastSink, TickSource};
 use std::io;
 use std::ops::Range;
@@ -35,21 +33,44 @@ impl Workers {
 /// Multiply-adds that are worth a span: some tens of microseconds, many times what it costs to hand it over.
 const SPAN: usize = 1 << 20;
 
+/// A plan whose calls can be cut into spans.
+pub(super) trait Spans: Sync {
+    type State: Send;
+    /// Ticks from one where a span may begin to the next.
+    const PERIOD: usize;
+    /// Multiply-adds of a tick.
+    fn products(&self) -> usize;
+    /// M.
+    fn ratio(&self) -> usize;
+    /// Ticks that a state must know.
+    fn reach(&self) -> usize;
+    /// Ticks since a span could have begun, for a stream in this state.
+    fn lead(state: &Self::State) -> usize;
+    /// All ticks; returns how many samples were not finite.
+    fn process(
+        &self,
+        state: &mut Self::State,
+        source: &(impl TickSource + ?Sized),
+        sink: &mut (impl FastSink + ?Sized),
+    ) -> u64;
+    /// A state before tick `first`, which has so many ticks before it and at which a span may begin.
+    fn state_at(&self, source: &(impl TickSource + ?Sized), first: usize) -> Self::State;
+}
+
 /// Runs a call on all workers and leaves the state after its last tick; returns how many samples were not finite.
-pub(super) fn process<T: Sample>(
-    plan: &FirPlan<T>,
-    state: &mut FirState<T>,
+pub(super) fn process<P: Spans>(
+    plan: &P,
+    state: &mut P::State,
     source: &(impl TickSource + ?Sized),
     sink: &mut (impl FastSink + ?Sized),
     workers: &Workers,
 ) -> u64 {
     let ticks = source.ticks();
-    let products = plan.channels * plan.ratio * (plan.history + 1);
-    let span = SPAN.div_ceil(products).max(4 * plan.reach());
+    let span = SPAN.div_ceil(plan.products()).max(4 * plan.reach());
     if workers.threads() == 1 || ticks < 2 * span {
         return plan.process(state, source, sink);
     }
-    let call = Call { plan, source, span };
+    let call = Call { plan, source, lead: P::lead(state), span };
     let (replaced, last) = workers.pool.install(|| call.spans(0..ticks, Some(state), sink));
     if let Some(last) = last {
         *state = last;
@@ -58,27 +79,30 @@ pub(super) fn process<T: Sample>(
 }
 
 /// A call whose spans are shared out.
-struct Call<'a, T: Sample, S: ?Sized> {
-    plan: &'a FirPlan<T>,
+struct Call<'a, P, S: ?Sized> {
+    plan: &'a P,
     source: &'a S,
+    /// Ticks since a span could have begun, before the call.
+    lead: usize,
     /// Least ticks of a span.
     span: usize,
 }
 
-impl<T: Sample, S: TickSource + ?Sized> Call<'_, T, S> {
+impl<P: Spans, S: TickSource + ?Sized> Call<'_, P, S> {
     /// The ticks of a range to a sink of their own. The first span has the stream's `state`, the others make theirs;
     /// returns how many samples were not finite, and the state after the last span if it is not the stream's.
     fn spans(
         &self,
         ticks: Range<usize>,
-        state: Option<&mut FirState<T>>,
+        state: Option<&mut P::State>,
         sink: &mut (impl FastSink + ?Sized),
-    ) -> (u64, Option<FirState<T>>) {
+    ) -> (u64, Option<P::State>) {
         if ticks.len() < 2 * self.span {
             return self.span(ticks, state, sink);
         }
         let middle = ticks.start + ticks.len() / 2;
-        sink.halves((middle - ticks.start) * self.plan.ratio, |earlier, later| {
+        let middle = middle - (self.lead + middle) % P::PERIOD;
+        sink.halves((middle - ticks.start) * self.plan.ratio(), |earlier, later| {
             let ((some, _), (more, last)) = rayon::join(
                 || self.spans(ticks.start..middle, state, earlier),
                 || self.spans(middle..ticks.end, None, later),
@@ -90,10 +114,10 @@ impl<T: Sample, S: TickSource + ?Sized> Call<'_, T, S> {
     fn span(
         &self,
         ticks: Range<usize>,
-        state: Option<&mut FirState<T>>,
+        state: Option<&mut P::State>,
         sink: &mut (impl FastSink + ?Sized),
-    ) -> (u64, Option<FirState<T>>) {
-        let mut run = |state: &mut FirState<T>| {
+    ) -> (u64, Option<P::State>) {
+        let mut run = |state: &mut P::State| {
             self.source.part(ticks.clone(), |part| self.plan.process(state, part, sink))
         };
         match state {

@@ -350,7 +350,7 @@ fn recursive_banks_have_no_transforms() {
     let filters = crate::bank::SynthesisFilters::StateSpace(filter);
     let bank = Bank { filters, ..fir_bank(vec![vec![1.0]], 1) };
     let refused = |form| Reconstructor::with_options(&bank, Options { form, ..Options::default() }).err();
-    assert_eq!(refused(Form::OverlapSave(None)), Some(BuildError::Recursive));
+    assert_eq!(refused(Form::OverlapSave(None)), Some(BuildError::Recursive { form: "overlap-save" }));
     assert_eq!(refused(Form::Fastest), None);
 }
 

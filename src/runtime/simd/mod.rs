@@ -21,6 +21,7 @@ mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod lanes_x86;
 mod layout;
+mod pairs;
 mod peak;
 mod recursion;
 mod single;
@@ -33,6 +34,7 @@ pub(crate) use finite::{all_finite_f32, all_finite_f64};
 pub(crate) use fir::{Cut, FirKernel, PhaseGroup};
 pub use isa::Isa;
 pub(crate) use layout::{decode, encode, interleave};
+pub(crate) use pairs::{Halves, Products, join_f32, join_f64, split_f32, split_f64};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
 pub(crate) use transform::{
