@@ -220,6 +220,26 @@ fn integer_taps_read_back_and_are_checked_against_the_taps_and_their_bits() {
     assert_eq!(differs.check().unwrap_err().path(), "spec.design.bits");
 }
 
+#[test]
+fn integer_taps_that_could_not_be_read_back_are_not_written() {
+    let words = |bits: WordLengths, fraction_bits| FixedPoint {
+        bits,
+        fraction_bits,
+        integers: vec![vec![1, 0, -1]; 2],
+    };
+    for (words, place) in [
+        (words(WordLengths::Same(4), -257), "fixed_point.fraction_bits"),
+        (words(WordLengths::Same(4), 257), "fixed_point.fraction_bits"),
+        (words(WordLengths::Same(33), 3), "fixed_point.bits"),
+        (words(WordLengths::PerTap(vec![]), 3), "fixed_point.bits"),
+    ] {
+        let filters = SynthesisFilters::Fir(words.taps());
+        let bank = Bank { filters, fixed_point: Some(words), ..fir() };
+        assert_eq!(bank.check().unwrap_err().path(), place);
+        assert!(bank.to_json().is_err());
+    }
+}
+
 fn refused(text: &str) -> BankError {
     match Bank::from_json(text, "b.json") {
         Ok(bank) => panic!("this must not read: {text}\n{bank:?}"),

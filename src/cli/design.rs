@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::bank_file::{is_dash, load_spec, write_text};
-use crate::bank::SynthesisFilters;
+use crate::bank::{FixedPoint, SynthesisFilters};
 use crate::design::quantise::WordStudy;
 use crate::design::{self, Design, DesignError, MeanAnalysis, OrderReduction, OrderWorth};
 use crate::spec::{DesignOverrides, Method, Reduction, WordLengths};
@@ -110,8 +110,7 @@ struct Words<'a> {
 impl<'a> Words<'a> {
     fn of(design: &'a Design) -> Option<Self> {
         let (integers, study) = design.bank.fixed_point.as_ref().zip(design.words.as_ref())?;
-        let gamma = design.bank.gamma.upper?;
-        let loss_db = 20.0 * (gamma / study.real_gamma).log10();
+        let loss_db = study.loss_db(design.bank.gamma.upper?);
         Some(Self { fraction_bits: integers.fraction_bits, loss_db, study })
     }
 
@@ -182,6 +181,10 @@ fn overrides(args: &Args) -> DesignOverrides {
     }
 }
 
+/// What is said of a bank of zeros.
+const SILENT: &str = "all integer taps are zero, the bank's output is silence: no integers of these bits were found that do \
+                      better; give more bits or another fraction_bits";
+
 /// Runs the verb.
 ///
 /// # Errors
@@ -205,6 +208,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let proof_seconds = proving.elapsed().as_secs_f64();
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
+    if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_silent) {
+        eprintln!("hybank: warning: {SILENT}");
+    }
     let report = Report { proof, proof_seconds, ..Report::new(args, &found, mean, seconds) };
     if args.json {
         super::print_json(&report)

@@ -19,6 +19,7 @@ pub use error::{Place, SpecError, SpecProblem};
 pub use filter::{FilterProblem, MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
+pub(crate) use words::check_fraction_bits;
 pub use words::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use serde::{Deserialize, Serialize};

@@ -52,7 +52,7 @@ impl WordLengths {
     }
 
     /// Checks the numbers, and the length of a list against that of the filters where it is known.
-    pub(super) fn check(&self, taps: Option<usize>) -> Result<(), SpecProblem> {
+    pub(crate) fn check(&self, taps: Option<usize>) -> Result<(), SpecProblem> {
         let refuse = |bits: u32, rule: String| Err(range(f64::from(bits), "bits", rule));
         match self {
             Self::Same(bits) if !(2..=MAX_BITS).contains(bits) => {
