@@ -269,6 +269,39 @@ fn bits_that_make_no_sense_are_refused() {
 }
 
 #[test]
+fn integer_taps_that_are_all_zero_are_warned_of() {
+    let desk = Desk::new();
+    let design = ["design", "spec.toml", "-o", "b.json", "--taps", "4", "--bits", "1,1,1,2"];
+    let output = desk.run(&design);
+    let (told, bank) = (text(&output.stderr), fs::read_to_string(desk.path("b.json")).unwrap());
+    assert!(output.status.success(), "{told}");
+    assert!(bank.contains("[[0, 0, 0, 0], [0, 0, 0, 0]]"), "{bank}");
+    assert!(told.starts_with("hybank: warning: ") && told.contains("all integer taps are zero"), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    // A scale that was asked for is a mistake.
+    desk.refused(
+        1,
+        &[&design[..], &["--force", "--fraction-bits", "-2"]].concat(),
+        &["all integer taps are zero"],
+    );
+}
+
+#[test]
+fn a_bank_without_any_error_loses_nothing_by_integers() {
+    let desk = Desk::new();
+    let exact = "fast_period = 1.0\nratio = 1\nlatency = 0\nchannel = [{ delay = 0 }]\n\
+                 target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
+                 design = { method = \"fir\", taps = 1, bits = 4 }\n";
+    fs::write(desk.path("exact.toml"), exact).unwrap();
+    let report = desk.json(&["design", "exact.toml", "-o", "b.json", "--json"]);
+    assert_eq!(number(&report, "/gamma/upper"), 0.0);
+    assert_eq!(number(&report, "/words/loss_db"), 0.0);
+    assert!(
+        desk.good(&["design", "exact.toml", "-o", "b.json", "--force"]).contains("gamma is 0.0000 dB above")
+    );
+}
+
+#[test]
 fn the_latency_may_be_left_to_the_designer() {
     let desk = Desk::new();
     fs::write(desk.path("open.toml"), THESIS.replace("latency = 10\n", "")).unwrap();

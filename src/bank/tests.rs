@@ -206,6 +206,7 @@ fn integer_taps_read_back_and_are_checked_against_the_taps_and_their_bits() {
         ("\"fraction_bits\": 3", "\"fraction_bits\": 3000", "fixed_point.fraction_bits", "from -256"),
         ("\"bits\": 4", "\"bits\": 3", "fixed_point.integers[0][0]", "from -4 to 3"),
         ("\"bits\": 4", "\"bits\": [4, 0, 4]", "fixed_point.integers[1][1]", "from 0 to 0"),
+        ("\"bits\": 4", "\"bits\": []", "fixed_point.bits", "list of bits is empty"),
         ("\"bits\": 4", "\"bits\": 64", "fixed_point.bits", "2 to 32"),
     ] {
         let error = refused(&text.replacen(was, is, 1));

@@ -167,7 +167,7 @@ fn design(
     Ok(design)
 }
 
-/// One number of bits, or a list of them.
+/// One number of bits, or a list of them, whose length is for those to check who know the filters'.
 pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
     // What is out of range here is out of range there.
     let bits = |v: &Value<'_>| v.count("bits").map(|bits| u32::try_from(bits).unwrap_or(u32::MAX));
@@ -175,7 +175,7 @@ pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
         Ok(items) => WordLengths::PerTap(items.iter().map(bits).collect::<Result<_, _>>()?),
         Err(_) => WordLengths::Same(bits(value)?),
     };
-    words.check(None).map_err(|problem| value.fault(problem))?;
+    words.check_numbers().map_err(|problem| value.fault(problem))?;
     Ok(words)
 }
 
