@@ -194,7 +194,8 @@ impl Spec {
     /// without taps is complete when the command line gives them.
     ///
     /// # Errors
-    /// As [`Spec::from_toml`].
+    /// As [`Spec::from_toml`]; [`SpecError::overridden`] tells what is wrong with `overrides` from what is wrong with the
+    /// file.
     pub fn from_toml_with(
         text: &str,
         file_name: &str,
@@ -205,7 +206,7 @@ impl Spec {
             SpecError::new(file_name, text, error.span(), String::new(), problem)
         })?;
         decode::spec(&reader::Value::root(&document), overrides)
-            .map_err(|fault| SpecError::new(file_name, text, fault.span, fault.path, *fault.problem))
+            .map_err(|fault| SpecError::of(file_name, text, fault))
     }
 
     /// The spec as a TOML file that reads back equal.

@@ -3,7 +3,7 @@
 mod report;
 
 use super::Failure;
-use super::bank_file::{is_dash, load_spec, write_text};
+use super::bank_file::{bad_flag, is_dash, load_spec, write_text};
 use crate::bank::FixedPoint;
 use crate::design::{self, Design, DesignError};
 use crate::spec::{DesignOverrides, Method, Reduction, WordLengths};
@@ -112,7 +112,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let mut spec = load_spec(&args.spec, overrides(args))?;
     spec.latency = args.latency.or(spec.latency);
-    spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
+    // Everything else was checked on reading.
+    spec.check().map_err(|problem| bad_flag("latency", &problem))?;
     let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
     let begin = Instant::now();
     let mut found = design::design(&spec).map_err(named)?;
