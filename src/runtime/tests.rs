@@ -31,6 +31,23 @@ pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Ve
     (0..channels).map(|_| (0..taps).map(|_| noise.next()).collect()).collect()
 }
 
+/// The outputs of a stream that gets `input` in pieces of so many ticks, for N inputs and M outputs a tick.
+pub(super) fn in_pieces(
+    stream: &mut Reconstructor,
+    [n, m]: [usize; 2],
+    input: &[f32],
+    cuts: &[usize],
+) -> Vec<f32> {
+    let mut pieces = vec![0.0; input.len() / n * m];
+    let (mut from, mut to) = (input, &mut pieces[..]);
+    for cut in cuts {
+        let (head, tail) = to.split_at_mut(cut * m);
+        assert_eq!(stream.process(&from[..cut * n], head).unwrap(), cut * m);
+        (from, to) = (&from[cut * n..], tail);
+    }
+    pieces
+}
+
 /// The scalar twin: the same sums in the same order, fused if the kernels fuse. The window of a tick, or of two
 /// if they are taken together, is cut into steps of D samples, the newest first; each of D lanes sums its
 /// place of the steps, and the lanes are added as a tree.
@@ -300,13 +317,7 @@ proptest! {
         let mut whole = vec![0.0; input.len() / n * m];
         stream.process(&input, &mut whole).unwrap();
         stream.reset();
-        let mut pieces = vec![0.0; whole.len()];
-        let (mut from, mut to) = (&input[..], &mut pieces[..]);
-        for cut in cuts {
-            let (head, tail) = to.split_at_mut(cut * m);
-            prop_assert_eq!(stream.process(&from[..cut * n], head).unwrap(), cut * m);
-            (from, to) = (&from[cut * n..], tail);
-        }
+        let pieces = in_pieces(&mut stream, [n, m], &input, &cuts);
         prop_assert_eq!(pieces.iter().zip(&whole).position(|(a, b)| a != b), None);
     }
 
