@@ -303,7 +303,7 @@ fn what_is_wrong_with_a_flag_names_the_flag() {
     // What is wrong with the file is shown there all the same.
     fs::write(desk.path("slack.toml"), THESIS.replace("taps = 22", "taps = 22\nslack = -1")).unwrap();
     let args = ["design", "slack.toml", "-o", "b.json", "--bits", "8"];
-    desk.refused(1, &args, &["slack.toml:15:9: design.slack: -1", "zero or more"]);
+    desk.refused(1, &args, &["slack.toml:13:9: design.slack: -1", "zero or more"]);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use hybank::design::{Problem, analyze, design, error_system};
 use hybank::lti::FrequencyResponse;
 use hybank::spec::{DesignSpec, Method, Spec};
 use specs::{alike, butterworth, tf, thesis, thesis_filter, with_taps};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 fn g8() -> Spec {
     alike(&tf(&[2.0], &[1.0, 2.0]), 2, 4, &[0.3, 1.7])
