@@ -7,7 +7,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use support::THESIS;
+use support::{THESIS, names, text};
 
 /// A folder with spec.toml in it.
 struct Desk {
@@ -75,19 +75,6 @@ impl Desk {
         fs::write(self.path("bad.toml"), THESIS.replacen(from, to, 1)).unwrap();
         self.refused(1, &["design", "bad.toml", "-o", "out.json"], parts);
     }
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 fn wav(path: &Path) -> (u32, Vec<f64>) {

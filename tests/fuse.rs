@@ -1,8 +1,11 @@
 //! The verb fuse, as a user runs it.
 
+mod support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use support::{names, text};
 
 /// A folder with a bank in it: N = M = 2, f_1 = (1, 2, 3, 4), f_2 = (10, 20, 30), m0 = 3.
 struct Bench {
@@ -82,19 +85,6 @@ impl Bench {
         }
         assert_eq!(names(self.folder.path()), before, "{args:?}");
     }
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 fn samples(path: &Path) -> (hound::WavSpec, Vec<f32>) {
