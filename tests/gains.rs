@@ -8,7 +8,7 @@ use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::{analyze, design, prove};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
-use specs::{amplified, butterworth, thesis, with_taps};
+use specs::{alike, amplified, amplify, butterworth, tf, thesis, with_taps};
 
 /// gamma of the thesis example, and of its optimal bank of 22 taps.
 const GAMMA: f64 = 0.03993204;
@@ -18,13 +18,6 @@ fn example(method: Method) -> Spec {
     match method {
         Method::Fir => with_taps(thesis(10, &[1.2, 0.6]), 22),
         _ => Spec { design: DesignSpec::new(method, None), ..thesis(10, &[1.2, 0.6]) },
-    }
-}
-
-fn amplify(filter: &mut FilterSpec, gain: f64) {
-    match filter {
-        FilterSpec::TransferFunction { num, .. } => num.iter_mut().for_each(|x| *x *= gain),
-        _ => panic!("no transfer function"),
     }
 }
 
@@ -100,12 +93,11 @@ fn taps_follow_the_gains() {
 fn steep_front_ends_of_much_gain_are_designed() {
     for gain in [1e-9, 1e9] {
         // An amplifier without feedback to speak of, before a Butterworth filter.
-        let amplifier = specs::tf(&[gain], &[0.1, 1.0]);
+        let amplifier = tf(&[gain], &[0.1, 1.0]);
         let filter = FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), amplifier.clone()] };
-        let unity =
-            FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), specs::tf(&[1.0], &[0.1, 1.0])] };
+        let unity = FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), tf(&[1.0], &[0.1, 1.0])] };
         let gamma = |filter| {
-            let spec = specs::alike(filter, 4, 12, &[0.0, 1.3, 2.1, 2.95]);
+            let spec = alike(filter, 4, 12, &[0.0, 1.3, 2.1, 2.95]);
             design(&spec).unwrap().bank.gamma.upper.unwrap()
         };
         let (amplified, plain) = (gamma(&filter), gamma(&unity));

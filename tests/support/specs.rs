@@ -55,12 +55,15 @@ pub(crate) fn with_taps(spec: Spec, taps: usize) -> Spec {
     Spec { design: DesignSpec::new(Method::Fir, Some(taps)), ..spec }
 }
 
+/// A transfer function times `gain`.
+pub(crate) fn amplify(filter: &mut FilterSpec, gain: f64) {
+    let FilterSpec::TransferFunction { num, .. } = filter else { panic!("no transfer function") };
+    num.iter_mut().for_each(|x| *x *= gain);
+}
+
 /// Every front end and the target times `gain`.
 pub(crate) fn amplified(mut spec: Spec, gain: f64) -> Spec {
-    let filters = spec.channels.iter_mut().map(|channel| &mut channel.filter);
-    for filter in filters.chain([&mut spec.target]) {
-        let FilterSpec::TransferFunction { num, .. } = filter else { panic!("no transfer function") };
-        num.iter_mut().for_each(|x| *x *= gain);
-    }
+    spec.channels.iter_mut().for_each(|channel| amplify(&mut channel.filter, gain));
+    amplify(&mut spec.target, gain);
     spec
 }
