@@ -332,6 +332,24 @@ pub fn eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
     eigenvalues_of_blocks(m, |block| view(block).eigenvalues().ok())
 }
 
+/// Eigenvalues of a real matrix as it stands: where entries are rounding errors of others, balancing may make them count.
+pub fn raw_eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    check_finite("eigenvalues", m)?;
+    if m.is_empty() {
+        return Ok(Vec::new());
+    }
+    view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
+}
+
+/// As [`raw_eigenvalues`], complex.
+pub fn raw_eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    check_finite_c("eigenvalues", m)?;
+    if m.is_empty() {
+        return Ok(Vec::new());
+    }
+    view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
+}
+
 /// The eigenvalues of the balanced blocks of `m`, each by `of_block`.
 fn eigenvalues_of_blocks<T: nalgebra::ComplexField<RealField = f64>>(
     m: &DMatrix<T>,
