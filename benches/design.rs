@@ -2,60 +2,40 @@
 //!
 //! `cargo bench --bench design`
 
+#[path = "../tests/support/specs.rs"]
+mod specs;
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use hybank::bank::Bank;
 use hybank::design::{analyze, design, prove};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec, WordLengths};
+use hybank::spec::{DesignSpec, Method, Spec, WordLengths};
 use hybank::verify::verify;
+use specs::{alike, butterworth, thesis, with_taps};
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64], design: DesignSpec) -> Spec {
-    let channels =
-        delays.iter().map(|&delay| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 }).collect();
-    Spec {
-        name: String::new(),
-        fast_period: 1.0,
-        ratio,
-        latency: Some(latency),
-        target: filter.clone(),
-        channels,
-        design,
-    }
+fn by(method: Method, taps: Option<usize>, spec: Spec) -> Spec {
+    Spec { design: DesignSpec::new(method, taps), ..spec }
 }
 
-fn thesis(method: Method, taps: Option<usize>) -> Spec {
-    let filter = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
-    alike(&filter, 2, 10, &[1.2, 0.6], DesignSpec::new(method, taps))
-}
-
-fn butterworth(order: usize, omega: f64) -> FilterSpec {
-    let family = Family::Butterworth;
-    FilterSpec::Family {
-        family,
-        order: Some(order),
-        cutoff: omega / TAU,
-        ripple_db: None,
-        attenuation_db: None,
-    }
+fn thesis_by(method: Method, taps: Option<usize>) -> Spec {
+    by(method, taps, thesis(10, &[1.2, 0.6]))
 }
 
 /// N = M = 8.
 fn eight(order: usize, omega: f64, latency: usize, method: Method, taps: Option<usize>) -> Spec {
     let delays = [0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];
-    alike(&butterworth(order, omega), 8, latency, &delays, DesignSpec::new(method, taps))
+    by(method, taps, alike(&butterworth(order, omega), 8, latency, &delays))
 }
 
 fn four() -> Spec {
-    let design = DesignSpec::new(Method::Fir, Some(24));
-    alike(&butterworth(4, 1.2), 4, 12, &[0.0, 1.3, 2.1, 2.95], design)
+    with_taps(alike(&butterworth(4, 1.2), 4, 12, &[0.0, 1.3, 2.1, 2.95]), 24)
 }
 
 /// N = M channels behind Butterworth filters of order 6 at 0.2 of the fast rate, delays uneven, latency a fast-rate tick.
 fn many(channels: usize, taps: usize) -> Spec {
     let delays: Vec<f64> = (0..channels).map(|i| 0.83 * i as f64 + 0.07 * ((i * i) % 5) as f64).collect();
-    let design = DesignSpec::new(Method::Fir, Some(taps));
-    alike(&butterworth(6, 0.2 * TAU), channels, channels, &delays, design)
+    with_taps(alike(&butterworth(6, 0.2 * TAU), channels, channels, &delays), taps)
 }
 
 /// The same with integer taps; with it come studies of 2 bits more and fewer.
@@ -67,7 +47,7 @@ fn with_bits(mut spec: Spec, bits: u32) -> Spec {
 /// Once each, with the proven gap: too long for a statistic.
 fn large() {
     let cases = [
-        ("thesis example, 22 taps", thesis(Method::Fir, Some(22))),
+        ("thesis example, 22 taps", thesis_by(Method::Fir, Some(22))),
         ("4 channels, Butterworth 4, 24 taps", four()),
         ("8 channels, Butterworth 6, 128 taps", many(8, 128)),
         ("8 channels, Butterworth 6, 128 taps of 12 bits", with_bits(many(8, 128), 12)),
@@ -88,9 +68,9 @@ fn designs(c: &mut Criterion) {
     let mut one = |name: &str, spec: Spec| {
         group.bench_function(name, |b| b.iter(|| design(black_box(&spec)).unwrap()));
     };
-    one("iir, thesis example", thesis(Method::Iir, None));
-    one("h2, thesis example", thesis(Method::H2, None));
-    one("fir, thesis example, 22 taps", thesis(Method::Fir, Some(22)));
+    one("iir, thesis example", thesis_by(Method::Iir, None));
+    one("h2, thesis example", thesis_by(Method::H2, None));
+    one("fir, thesis example, 22 taps", thesis_by(Method::Fir, Some(22)));
     one("iir, 8 channels, Butterworth 6", eight(6, 1.2, 20, Method::Iir, None));
     one("fir, 4 channels, Butterworth 4, 24 taps", four());
     one("fir, 8 channels, Butterworth 4, 32 taps", eight(4, 1.8, 12, Method::Fir, Some(32)));
@@ -100,7 +80,7 @@ fn designs(c: &mut Criterion) {
     });
     group.finish();
     large();
-    let bank = design(&thesis(Method::Fir, Some(22))).unwrap().bank;
+    let bank = design(&thesis_by(Method::Fir, Some(22))).unwrap().bank;
     c.bench_function("analyze, thesis example, 22 taps", |b| {
         b.iter(|| analyze(black_box(&bank), &[]).unwrap())
     });

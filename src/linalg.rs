@@ -5,7 +5,10 @@
 //! lines. The two share memory (both are column-major), so nothing is copied on the way in.
 //! Everything here is sequential and therefore gives the same bits on every run.
 
+mod balance;
 pub mod blocks;
+
+pub use balance::power_of_two;
 
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{MatRef, Side};
@@ -316,8 +319,21 @@ pub fn hermitian_eigenvalues(m: &CMat) -> Result<Vec<f64>, LinalgError> {
     view(m).self_adjoint_eigenvalues(Side::Lower).map_err(|_| no_convergence("hermitian eigenvalues", m))
 }
 
-/// Eigenvalues of a general real matrix.
+/// Eigenvalues of a general real matrix, which is balanced first: units of the states and gains from one part to
+/// another do not matter.
 pub fn eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    check_finite("eigenvalues", m)?;
+    eigenvalues_of_blocks(m, |block| view(block).eigenvalues().ok())
+}
+
+/// Eigenvalues of a general complex matrix, balanced first.
+pub fn eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    check_finite_c("eigenvalues", m)?;
+    eigenvalues_of_blocks(m, |block| view(block).eigenvalues().ok())
+}
+
+/// Eigenvalues of a real matrix as it stands: where entries are rounding errors of others, balancing may make them count.
+pub fn raw_eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite("eigenvalues", m)?;
     if m.is_empty() {
         return Ok(Vec::new());
@@ -325,13 +341,23 @@ pub fn eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
 }
 
-/// Eigenvalues of a general complex matrix.
-pub fn eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
+/// As [`raw_eigenvalues`], complex.
+pub fn raw_eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite_c("eigenvalues", m)?;
     if m.is_empty() {
         return Ok(Vec::new());
     }
     view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
+}
+
+/// The eigenvalues of the balanced blocks of `m`, each by `of_block`.
+fn eigenvalues_of_blocks<T: nalgebra::ComplexField<RealField = f64>>(
+    m: &DMatrix<T>,
+    of_block: impl Fn(&DMatrix<T>) -> Option<Vec<Complex<f64>>>,
+) -> Result<Vec<Complex<f64>>, LinalgError> {
+    let blocks = balance::balanced_blocks(m).into_iter();
+    let values = blocks.map(|block| of_block(&block).ok_or_else(|| no_convergence("eigenvalues", m)));
+    Ok(values.collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 /// Eigenvalues and eigenvectors (columns) of a general real matrix; the two of a conjugate pair are neighbours.

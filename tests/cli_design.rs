@@ -7,7 +7,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use support::THESIS;
+use support::{THESIS, names, text};
 
 /// A folder with spec.toml in it.
 struct Desk {
@@ -75,19 +75,6 @@ impl Desk {
         fs::write(self.path("bad.toml"), THESIS.replacen(from, to, 1)).unwrap();
         self.refused(1, &["design", "bad.toml", "-o", "out.json"], parts);
     }
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 fn wav(path: &Path) -> (u32, Vec<f64>) {
@@ -266,6 +253,77 @@ fn bits_that_make_no_sense_are_refused() {
     desk.refused(1, &design(&["--fraction-bits", "4"]), &["bits is missing"]);
     desk.refused(1, &design(&["--bits", "8", "--method", "h2"]), &["bits", "fir"]);
     desk.refused(2, &design(&["--bits", "eight"]), &["eight"]);
+}
+
+#[test]
+fn what_is_wrong_with_a_flag_names_the_flag() {
+    let desk = Desk::new();
+    fs::write(desk.path("list.toml"), THESIS.replace("taps = 22", "taps = 2\nbits = [8, 8]")).unwrap();
+    fs::write(desk.path("iir.toml"), THESIS.replace("\"fir\"\ntaps = 22", "\"iir\"")).unwrap();
+    for (spec, flags, starts, says) in [
+        ("spec.toml", &["--taps", "0"][..], "--taps: 0 taps", "1 to 65536"),
+        ("spec.toml", &["--taps", "16000"], "--taps: 32000 taps in all", "at most 16384"),
+        ("iir.toml", &["--taps", "8"], "--taps: taps has no meaning for the method iir", "fir"),
+        ("spec.toml", &["--slack=-1"], "--slack: -1", "zero or more"),
+        ("spec.toml", &["--bits", "1"], "--bits: 1 bits", "2 to 32"),
+        ("spec.toml", &["--bits", "8,8"], "--bits: 2 entries", "each of the 22 taps"),
+        ("list.toml", &["--taps", "3"], "--taps: 2 entries", "each of the 3 taps"),
+        ("spec.toml", &["--bits", "8", "--fraction-bits=-300"], "--fraction-bits: -300 bits", "-256 to 256"),
+        ("spec.toml", &["--fraction-bits", "4"], "--fraction-bits: the key bits is missing", "bits = 16"),
+        (
+            "spec.toml",
+            &["--bits", "8", "--method", "h2"],
+            "--bits: bits has no meaning for the method h2",
+            "fir",
+        ),
+        ("iir.toml", &["--method", "fir"], "--method: the key taps is missing", "taps = 22"),
+        ("iir.toml", &["--order", "100000"], "--order: 100000 states", "0 to 65536"),
+        ("iir.toml", &["--reduction-loss-db=-1"], "--reduction-loss-db: -1 dB", "0 to 400 dB"),
+        ("spec.toml", &["--latency", "100000"], "--latency: 100000 fast samples", "at most 65536"),
+    ] {
+        let args = [&["design", spec, "-o", "b.json"], flags].concat();
+        desk.refused(1, &args, &[says]);
+        let message = text(&desk.run(&args).stderr);
+        assert!(message.starts_with(&format!("hybank: {starts}")), "{message}");
+        assert!(!message.contains(".toml"), "the file is not to blame: {message}");
+    }
+    // What is wrong with the file is shown there all the same.
+    fs::write(desk.path("slack.toml"), THESIS.replace("taps = 22", "taps = 22\nslack = -1")).unwrap();
+    let args = ["design", "slack.toml", "-o", "b.json", "--bits", "8"];
+    desk.refused(1, &args, &["slack.toml:13:9: design.slack: -1", "zero or more"]);
+}
+
+#[test]
+fn integer_taps_that_are_all_zero_are_warned_of() {
+    let desk = Desk::new();
+    let design = ["design", "spec.toml", "-o", "b.json", "--taps", "4", "--bits", "1,1,1,2"];
+    let output = desk.run(&design);
+    let (told, bank) = (text(&output.stderr), fs::read_to_string(desk.path("b.json")).unwrap());
+    assert!(output.status.success(), "{told}");
+    assert!(bank.contains("[[0, 0, 0, 0], [0, 0, 0, 0]]"), "{bank}");
+    assert!(told.starts_with("hybank: warning: ") && told.contains("all integer taps are zero"), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    // A scale that was asked for is a mistake.
+    desk.refused(
+        1,
+        &[&design[..], &["--force", "--fraction-bits", "-2"]].concat(),
+        &["all integer taps are zero"],
+    );
+}
+
+#[test]
+fn a_bank_without_any_error_loses_nothing_by_integers() {
+    let desk = Desk::new();
+    let exact = "fast_period = 1.0\nratio = 1\nlatency = 0\nchannel = [{ delay = 0 }]\n\
+                 target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
+                 design = { method = \"fir\", taps = 1, bits = 4 }\n";
+    fs::write(desk.path("exact.toml"), exact).unwrap();
+    let report = desk.json(&["design", "exact.toml", "-o", "b.json", "--json"]);
+    assert_eq!(number(&report, "/gamma/upper"), 0.0);
+    assert_eq!(number(&report, "/words/loss_db"), 0.0);
+    assert!(
+        desk.good(&["design", "exact.toml", "-o", "b.json", "--force"]).contains("gamma is 0.0000 dB above")
+    );
 }
 
 #[test]

@@ -1,8 +1,11 @@
 //! The verb fuse, as a user runs it.
 
+mod support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use support::{names, text};
 
 /// A folder with a bank in it: N = M = 2, f_1 = (1, 2, 3, 4), f_2 = (10, 20, 30), m0 = 3.
 struct Bench {
@@ -82,19 +85,6 @@ impl Bench {
         }
         assert_eq!(names(self.folder.path()), before, "{args:?}");
     }
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 fn samples(path: &Path) -> (hound::WavSpec, Vec<f32>) {
@@ -318,7 +308,6 @@ fn faults_have_one_clear_message_and_leave_nothing() {
     let bench = Bench::new();
     bench.wav("a.wav", 1, 24_000, &[0.0; 9]);
     bench.wav("b.wav", 2, 24_000, &[0.0; 18]);
-    bench.wav("empty.wav", 1, 24_000, &[]);
     fs::write(bench.path("text.wav"), "hello, world").unwrap();
     fs::write(bench.path("half.wav"), &fs::read(bench.path("a.wav")).unwrap()[..30]).unwrap();
     fs::write(bench.path("bad.json"), "{ \"ratio\": }").unwrap();
@@ -331,7 +320,6 @@ fn faults_have_one_clear_message_and_leave_nothing() {
     refused(fuse("bank.json", "a.wav", "b.wav", "no.wav"), &["2 channels", "3", "b.wav: 2"]);
     refused(fuse("bank.json", "a.wav", "text.wav", "no.wav"), &["text.wav", "not a WAV file", "hell"]);
     refused(fuse("bank.json", "a.wav", "half.wav", "no.wav"), &["half.wav", "byte 30", "truncated"]);
-    refused(fuse("bank.json", "empty.wav", "empty.wav", "no.wav"), &["empty.wav", "length is zero"]);
     refused(fuse("bank.json", "a.wav", "a.wav", "there.wav"), &["there.wav", "--force"]);
     refused(fuse("bank.json", "a.wav", "a.wav", "no/such/o.wav"), &["no/such/o.wav"]);
     refused(fuse("bank.json", "a.wav", "a.wav", "."), &[".: "]);
@@ -339,6 +327,25 @@ fn faults_have_one_clear_message_and_leave_nothing() {
     bench.refused(2, &["fuse", "bank.json", "-", "-", "-o", "no.wav"], &["twice"]);
     bench.refused(2, &["fuse", "bank.json", "a.wav", "a.wav", "-o", "-", "--json"], &["--json"]);
     bench.refused(2, &["fuse", "bank.json", "a.wav", "a.wav"], &["--output"]);
+}
+
+#[test]
+fn empty_recordings_give_an_empty_one_with_a_warning() {
+    let bench = Bench::new();
+    bench.wav("empty.wav", 1, 24_000, &[]);
+    for more in [&[][..], &["--keep-latency"], &["--form", "overlap-save"], &["--gaps", "zero"]] {
+        let args =
+            [&["fuse", "bank.json", "empty.wav", "empty.wav", "-o", "out.wav", "--force"], more].concat();
+        let output = bench.run(&args);
+        let told = text(&output.stderr);
+        assert!(output.status.success() && output.stdout.is_empty(), "{args:?}: {told}");
+        assert!(told.starts_with("hybank: warning: empty.wav") && told.contains("length is zero"), "{told}");
+        assert_eq!(told.trim_end().lines().count(), 1, "{told}");
+        let (spec, samples) = samples(&bench.path("out.wav"));
+        assert_eq!((spec.sample_rate, spec.channels, samples.len()), (48_000, 1, 0), "{args:?}");
+    }
+    let strict = ["fuse", "bank.json", "empty.wav", "empty.wav", "-o", "no.wav", "--strict"];
+    bench.refused(1, &strict, &["empty.wav", "length is zero", "--strict"]);
 }
 
 #[test]

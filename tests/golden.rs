@@ -4,50 +4,15 @@
 //! independently of this code (general conic solver on the bounded-real LMI, dense frequency grids) and are good to
 //! 1e-6 relative unless more digits stand here.
 
+#[path = "support/specs.rs"]
+mod specs;
+
 use hybank::design::equivalence::BlockedPlant;
 use hybank::design::{Problem, analyze, design, error_system};
 use hybank::lti::FrequencyResponse;
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
-use std::f64::consts::{PI, TAU};
-
-/// The thesis's wc^2 / (s + wc)^2, wc = 1/2.
-fn thesis_filter() -> FilterSpec {
-    tf(&[0.25], &[1.0, 1.0, 0.25])
-}
-
-fn tf(num: &[f64], den: &[f64]) -> FilterSpec {
-    FilterSpec::TransferFunction { num: num.to_vec(), den: den.to_vec() }
-}
-
-/// Butterworth low-pass with its cutoff in rad/s.
-fn butterworth(order: usize, omega: f64) -> FilterSpec {
-    FilterSpec::Family {
-        family: Family::Butterworth,
-        order: Some(order),
-        cutoff: omega / TAU,
-        ripple_db: None,
-        attenuation_db: None,
-    }
-}
-
-/// All channels behind the target's filter, h = 1.
-fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> Spec {
-    let channels =
-        delays.iter().map(|&delay| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 }).collect();
-    Spec {
-        name: String::new(),
-        fast_period: 1.0,
-        ratio,
-        latency: Some(latency),
-        target: filter.clone(),
-        channels,
-        design: DesignSpec::new(Method::Iir, None),
-    }
-}
-
-fn thesis(latency: usize, delays: &[f64]) -> Spec {
-    alike(&thesis_filter(), 2, latency, delays)
-}
+use hybank::spec::{DesignSpec, Method, Spec};
+use specs::{alike, butterworth, tf, thesis, thesis_filter, with_taps};
+use std::f64::consts::PI;
 
 fn g8() -> Spec {
     alike(&tf(&[2.0], &[1.0, 2.0]), 2, 4, &[0.3, 1.7])
@@ -70,11 +35,6 @@ fn g11() -> Spec {
 
 fn g12() -> Spec {
     alike(&thesis_filter(), 2, 6, &[0.2, 0.9, 1.6])
-}
-
-fn with_taps(mut spec: Spec, taps: usize) -> Spec {
-    spec.design = DesignSpec::new(Method::Fir, Some(taps));
-    spec
 }
 
 /// Designs and compares; the reported interval must close and hold the golden number.

@@ -2,9 +2,12 @@
 //! solver, say about one another. A state-space bank can do all that an FIR bank can, so its gamma must not be larger;
 //! and no lower bound may exceed what any bank of the kind achieves.
 
+#[path = "support/specs.rs"]
+mod specs;
+
 use hybank::design::{analyze, certify, design};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
-use std::f64::consts::TAU;
+use hybank::spec::{DesignSpec, Family, Method, Spec};
+use specs::{alike, low_pass};
 
 struct Case {
     name: &'static str,
@@ -17,28 +20,14 @@ struct Case {
     accuracy: f64,
 }
 
-fn family((family, order, omega): (Family, usize, f64)) -> FilterSpec {
-    FilterSpec::Family {
-        family,
-        order: Some(order),
-        cutoff: omega / TAU,
-        ripple_db: family.has_ripple().then_some(0.5),
-        attenuation_db: family.has_attenuation().then_some(55.0),
-    }
-}
-
 impl Case {
     fn spec(&self, method: Method) -> Spec {
-        let filter = family(self.filter);
-        let channel = |&delay: &f64| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 };
+        let (family, order, omega) = self.filter;
+        let filter = low_pass(family, order, omega);
         Spec {
             name: self.name.to_owned(),
-            fast_period: 1.0,
-            ratio: self.ratio,
-            latency: Some(self.latency),
-            target: filter.clone(),
-            channels: self.delays.iter().map(channel).collect(),
             design: DesignSpec::new(method, (method == Method::Fir).then_some(self.taps)),
+            ..alike(&filter, self.ratio, self.latency, &self.delays)
         }
     }
 

@@ -1,39 +1,13 @@
 //! Order reduction as a user meets it: banks of few states, proven, beside FIR banks of the same cost.
 
+#[path = "support/specs.rs"]
+mod specs;
+
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::design::{Design, analyze, design, prove};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
+use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
-use std::f64::consts::TAU;
-
-/// gain / (s + 1/2)^2 for all, h = 1, M = 2.
-fn thesis(gain: f64, latency: usize, delays: &[f64]) -> Spec {
-    let filter = FilterSpec::TransferFunction { num: vec![0.25 * gain], den: vec![1.0, 1.0, 0.25] };
-    alike(&filter, 2, latency, delays)
-}
-
-fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> Spec {
-    let channel = |&delay| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 };
-    Spec {
-        name: String::new(),
-        fast_period: 1.0,
-        ratio,
-        latency: Some(latency),
-        target: filter.clone(),
-        channels: delays.iter().map(channel).collect(),
-        design: DesignSpec::new(Method::Iir, None),
-    }
-}
-
-fn butterworth(order: usize, omega: f64) -> FilterSpec {
-    FilterSpec::Family {
-        family: Family::Butterworth,
-        order: Some(order),
-        cutoff: omega / TAU,
-        ripple_db: None,
-        attenuation_db: None,
-    }
-}
+use specs::{alike, amplified, butterworth, thesis};
 
 fn reduced(mut spec: Spec, method: Method, reduction: Reduction) -> Design {
     spec.design = DesignSpec { reduction: Some(reduction), ..DesignSpec::new(method, None) };
@@ -81,7 +55,7 @@ fn few_states_of_the_thesis_example_are_proven() {
         (Method::Iir, 5, 0.068_2),
         (Method::H2, 4, 0.147),
     ] {
-        let found = reduced(thesis(1.0, 10, &[1.2, 0.6]), method, Reduction::Order(order));
+        let found = reduced(thesis(10, &[1.2, 0.6]), method, Reduction::Order(order));
         let bank = check(&found, order);
         let upper = bank.gamma.upper.unwrap();
         assert!(upper < gamma * 1.01, "{} {order}: {upper}", method.name());
@@ -92,7 +66,7 @@ fn few_states_of_the_thesis_example_are_proven() {
 #[test]
 fn a_loss_allowed_is_kept() {
     for (method, db) in [(Method::Iir, 0.0), (Method::Iir, 3.0), (Method::H2, 1.5)] {
-        let found = reduced(thesis(1.0, 10, &[1.2, 0.6]), method, Reduction::Loss(db));
+        let found = reduced(thesis(10, &[1.2, 0.6]), method, Reduction::Loss(db));
         let record = found.reduction.clone().unwrap();
         check(&found, record.full.order);
         assert!(record.reduced.order < record.full.order, "{record:?}");
@@ -104,7 +78,7 @@ fn a_loss_allowed_is_kept() {
 
 #[test]
 fn with_all_its_states_it_is_the_full_bank() {
-    let spec = thesis(1.0, 6, &[1.2, 0.6]);
+    let spec = thesis(6, &[1.2, 0.6]);
     let full = design(&spec).unwrap();
     assert!(full.reduction.is_none());
     for order in [block(&full.bank).a.len(), 1000] {
@@ -117,7 +91,7 @@ fn with_all_its_states_it_is_the_full_bank() {
 fn it_is_worth_its_cost_beside_taps() {
     // The target has a slow pole that the channels do not have: taps would have to last as long. (Of a mere delay they make nothing,
     // where a recursion spends its states.)
-    let mut spec = thesis(1.0, 4, &[1.2, 0.6]);
+    let mut spec = thesis(4, &[1.2, 0.6]);
     spec.target = FilterSpec::TransferFunction { num: vec![0.005], den: vec![1.0, 0.51, 0.005] };
     let found = reduced(spec.clone(), Method::Iir, Reduction::Order(1));
     let macs = cost(block(&found.bank));
@@ -132,7 +106,7 @@ fn it_is_worth_its_cost_beside_taps() {
 #[test]
 fn the_unit_of_the_signal_does_not_matter() {
     let gamma = |gain: f64| {
-        let found = reduced(thesis(gain, 4, &[1.2, 0.6]), Method::Iir, Reduction::Order(2));
+        let found = reduced(amplified(thesis(4, &[1.2, 0.6]), gain), Method::Iir, Reduction::Order(2));
         check(&found, 2).gamma.upper.unwrap() / gain
     };
     let one = gamma(1.0);
@@ -146,16 +120,16 @@ fn the_unit_of_the_signal_does_not_matter() {
 fn nasty_front_ends_end_as_banks_of_that_order() {
     let cases = [
         // Channels that cannot be told apart, and nearly so.
-        thesis(1.0, 5, &[0.7, 0.7]),
-        thesis(1.0, 5, &[0.7, 0.7, 1.3]),
-        thesis(1.0, 5, &[0.7, 0.7001]),
+        thesis(5, &[0.7, 0.7]),
+        thesis(5, &[0.7, 0.7, 1.3]),
+        thesis(5, &[0.7, 0.7001]),
         // One channel alone, more channels than needed, fewer.
-        thesis(1.0, 5, &[0.4]),
+        thesis(5, &[0.4]),
         alike(&butterworth(3, 1.5), 2, 6, &[0.2, 0.9, 1.6]),
         alike(&butterworth(4, 1.2), 3, 6, &[0.2, 1.9]),
         // No latency, whole ticks of delay, a slow front end.
-        thesis(1.0, 0, &[1.2, 0.6]),
-        thesis(1.0, 8, &[4.0, 7.0]),
+        thesis(0, &[1.2, 0.6]),
+        thesis(8, &[4.0, 7.0]),
         alike(&butterworth(2, 0.05), 2, 4, &[0.3, 1.1]),
     ];
     for spec in cases {

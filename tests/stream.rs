@@ -8,7 +8,7 @@ use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output};
 use std::time::Duration;
-use support::{Desk, bytes, floats, fused, ticks};
+use support::{Desk, bytes, floats, fused, text, ticks};
 
 /// A folder in which `hybank stream` works with its bank.
 struct Bench(Desk);
@@ -36,10 +36,6 @@ impl Bench {
     fn run(&self, args: &[&str], input: &[u8]) -> Output {
         self.0.run(&[&["stream", "bank.json"], args].concat(), input)
     }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 #[test]

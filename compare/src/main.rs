@@ -15,9 +15,10 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
 use hybank::design::equivalence::BlockedPlant;
 use hybank::design::error_system::FirError;
-use hybank::design::{Problem, design};
+use hybank::design::{DesignError, Problem, design};
 use hybank::spec::Spec;
 use nalgebra::{Complex, DMatrix};
+use std::error::Error;
 use std::f64::consts::{PI, SQRT_2};
 use std::time::Instant;
 
@@ -105,9 +106,9 @@ fn real_triangle(z: &CMat) -> Vec<f64> {
 }
 
 /// One LMI a frequency; unknown 0 is t, the taps f_i[n] follow.
-fn cones(plant: &BlockedPlant, taps: usize) -> Cones {
+fn cones(plant: &BlockedPlant, taps: usize) -> Result<Cones, DesignError> {
     let (channels, ratio) = (plant.measured, plant.wanted);
-    let error = FirError::new(plant).expect("front ends are stable");
+    let error = FirError::new(plant)?;
     let intervals = POINTS_PER_LAG * taps.div_ceil(ratio).max(8);
     let mut cones =
         Cones { columns: vec![Vec::new(); 1 + channels * taps], right: Vec::new(), orders: Vec::new() };
@@ -137,14 +138,15 @@ fn cones(plant: &BlockedPlant, taps: usize) -> Cones {
         }
         cones.require(&constant, &parts);
     }
-    cones
+    Ok(cones)
 }
 
 /// The least gamma on the grid, and seconds.
-fn clarabel(spec: &Spec) -> (f64, f64) {
-    let latency = spec.latency.expect("given");
-    let plant = BlockedPlant::new(&Problem::new(spec, latency).expect("front ends"));
-    let cones = cones(&plant, spec.design.taps.expect("given"));
+fn clarabel(spec: &Spec) -> Result<(f64, f64), Box<dyn Error>> {
+    let latency = spec.latency.ok_or("the spec gives no latency")?;
+    let taps = spec.design.taps.ok_or("the spec gives no taps")?;
+    let plant = BlockedPlant::new(&Problem::new(spec, latency)?);
+    let cones = cones(&plant, taps)?;
     let a = cones.matrix();
     let unknowns = a.n;
     let mut cost = vec![0.0; unknowns];
@@ -159,25 +161,25 @@ fn clarabel(spec: &Spec) -> (f64, f64) {
         &cones.right,
         &kinds,
         settings,
-    )
-    .expect("the shapes fit");
+    )?;
     solver.solve();
     let seconds = begin.elapsed().as_secs_f64();
     println!("  Clarabel: {:?}, {} iterations", solver.solution.status, solver.solution.iterations);
-    (solver.solution.obj_val.max(0.0).sqrt(), seconds)
+    Ok((solver.solution.obj_val.max(0.0).sqrt(), seconds))
 }
 
-/// The best of three whole designs.
-fn hybank(spec: &Spec) -> (f64, f64) {
-    let time = |_| {
+/// The exact gamma, and seconds: the least of three whole designs.
+fn hybank(spec: &Spec) -> Result<(f64, f64), Box<dyn Error>> {
+    let (mut gamma, mut seconds) = (f64::NAN, f64::INFINITY);
+    for _ in 0..3 {
         let begin = Instant::now();
-        let gamma = design(spec).expect("a bank").bank.gamma.upper.expect("its norm");
-        (gamma, begin.elapsed().as_secs_f64())
-    };
-    (0..3).map(time).min_by(|a, b| a.1.total_cmp(&b.1)).expect("three of them")
+        let found = design(spec)?.bank.gamma.upper.ok_or("the design has no norm")?;
+        (gamma, seconds) = (found, seconds.min(begin.elapsed().as_secs_f64()));
+    }
+    Ok((gamma, seconds))
 }
 
-fn main() {
+fn main() -> Result<(), Box<dyn Error>> {
     let cases = [
         ("thesis example, 22 taps (44 unknowns)", THESIS.to_owned()),
         ("4 channels, Butterworth 4, 24 taps (96 unknowns)", FOUR.to_owned()),
@@ -185,12 +187,13 @@ fn main() {
     ];
     for (name, text) in cases {
         println!("{name}");
-        let spec = Spec::from_toml(&text, name).expect("a spec");
-        let ((ours, own), (theirs, general)) = (hybank(&spec), clarabel(&spec));
+        let spec = Spec::from_toml(&text, name)?;
+        let ((ours, own), (theirs, general)) = (hybank(&spec)?, clarabel(&spec)?);
         println!("  hybank   {own:9.4} s, gamma {ours:.9} (exact, all frequencies)");
         println!(
             "  Clarabel {general:9.4} s, gamma {theirs:.9} (on the grid), {:.0} times as long",
             general / own
         );
     }
+    Ok(())
 }

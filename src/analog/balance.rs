@@ -1,54 +1,11 @@
 //! Scaling by powers of two: no rounding, only better-sized numbers.
 
-use crate::linalg::{Mat, inverse};
+use crate::linalg::{Mat, inverse, power_of_two};
 
 use super::section::Realisation;
 
-/// Sweeps over the rows of a matrix before [`equalised`] gives up improving it.
-const MAX_SWEEPS: usize = 100;
 /// Doublings of [`input_energy`]: covers pole spreads up to 2^60.
 const MAX_DOUBLINGS: usize = 60;
-
-/// The power of two near to `x` on a logarithmic scale; 1 for zero, NaN and infinity. Halves and roots of
-/// halves are common, so the border between two powers is put where no tidy number falls: otherwise
-/// rounding would decide, and the time unit with it.
-fn power_of_two(x: f64) -> f64 {
-    if x > 0.0 && x.is_finite() { (x.log2() + 0.2).round().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
-}
-
-/// `T^-1 m T` with a diagonal T of powers of two that makes off-diagonal rows and columns of the
-/// same index alike in 1-norm (Osborne 1960; Parlett and Reinsch 1969). Eigenvalues are kept
-/// exactly, and an eigenvalue routine finds them more accurately.
-pub(super) fn equalised(m: &Mat) -> Mat {
-    let mut m = m.clone();
-    for _ in 0..MAX_SWEEPS {
-        let mut changed = false;
-        for i in 0..m.nrows() {
-            changed |= equalise_index(&mut m, i);
-        }
-        if !changed {
-            break;
-        }
-    }
-    m
-}
-
-/// One step of [`equalised`]; false if index `i` is already well scaled.
-fn equalise_index(m: &mut Mat, i: usize) -> bool {
-    let off_diagonal = |k: usize| k != i;
-    let row: f64 = (0..m.ncols()).filter(|&k| off_diagonal(k)).map(|k| m[(i, k)].abs()).sum();
-    let column: f64 = (0..m.nrows()).filter(|&k| off_diagonal(k)).map(|k| m[(k, i)].abs()).sum();
-    if row == 0.0 || column == 0.0 {
-        return false;
-    }
-    let factor = power_of_two((row / column).sqrt());
-    if column * factor + row / factor >= 0.95 * (column + row) {
-        return false;
-    }
-    m.column_mut(i).scale_mut(factor);
-    m.row_mut(i).scale_mut(1.0 / factor);
-    true
-}
 
 /// Scales every state by a power of two to unit input energy: the diagonal of the controllability
 /// Gramian lies between 0.37 and 1.6 afterwards. States that the input does not reach stay as they are.

@@ -4,7 +4,6 @@
 use crate::linalg::{Complex, Mat, eigenvalues};
 
 use super::AnalogError;
-use super::balance::equalised;
 use super::roots::RootSet;
 use super::section::Realisation;
 use super::zpk::{Zpk, times_power};
@@ -142,7 +141,7 @@ fn companion_roots(monic: &[f64]) -> Result<Vec<Complex<f64>>, AnalogError> {
         _ if j + 1 == i => 1.0,
         _ => 0.0,
     });
-    Ok(eigenvalues(&equalised(&companion))?.into_iter().map(|z| z * w).collect())
+    Ok(eigenvalues(&companion)?.into_iter().map(|z| z * w).collect())
 }
 
 /// Whether the product of (s - roots) has the given coefficients, each to a relative error.

@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use crate::linalg::{Complex, Mat, eigenvalues, solve_c, to_complex};
 use crate::spec::{Family, FilterProblem, FilterSpec};
 
-use super::balance::equalised;
 use super::pairing::pair_sections;
 use super::rational::Rational;
 use super::roots::RootSet;
@@ -51,7 +50,7 @@ impl Block {
         match self {
             Self::Section(section) => Ok(section.poles.list()),
             Self::Rational(rational) => rational.poles(),
-            Self::State(state) => Ok(eigenvalues(&equalised(&state.a))?),
+            Self::State(state) => Ok(eigenvalues(&state.a)?),
         }
     }
 }

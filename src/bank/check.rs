@@ -1,6 +1,6 @@
 //! The invariants of a bank, wherever it comes from.
 
-use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem};
+use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits};
 
 use super::{
     Bank, BankError, BankProblem, BlockFilter, Certificate, FixedPoint, Gamma, SynthesisFilters, Tone,
@@ -50,6 +50,9 @@ impl Bank {
             let (method, expected, found) = (self.method.name(), "state_space", "fixed_point");
             return refuse("fixed_point", BankProblem::Filters { method, expected, found });
         };
+        let inside = |key: &str, problem| BankError::new("", format!("fixed_point.{key}"), problem);
+        words.bits.check(None).map_err(|problem: SpecProblem| inside("bits", problem))?;
+        check_fraction_bits(words.fraction_bits).map_err(|problem| inside("fraction_bits", problem))?;
         let sizes = |found, expected, unit| {
             let rule = "there is an integer for each tap";
             refuse("fixed_point.integers", BankProblem::Length { found, expected, unit, rule })

@@ -22,6 +22,11 @@ impl FixedPoint {
         (-f64::from(self.fraction_bits)).exp2()
     }
 
+    /// Whether all integers are zero.
+    pub fn is_silent(&self) -> bool {
+        self.integers.iter().flatten().all(|&integer| integer == 0)
+    }
+
     /// The taps that the integers stand for, exactly.
     pub fn taps(&self) -> Vec<Vec<f64>> {
         let tap = |&integer: &i64| integer as f64 * self.step();

@@ -206,6 +206,7 @@ fn integer_taps_read_back_and_are_checked_against_the_taps_and_their_bits() {
         ("\"fraction_bits\": 3", "\"fraction_bits\": 3000", "fixed_point.fraction_bits", "from -256"),
         ("\"bits\": 4", "\"bits\": 3", "fixed_point.integers[0][0]", "from -4 to 3"),
         ("\"bits\": 4", "\"bits\": [4, 0, 4]", "fixed_point.integers[1][1]", "from 0 to 0"),
+        ("\"bits\": 4", "\"bits\": []", "fixed_point.bits", "list of bits is empty"),
         ("\"bits\": 4", "\"bits\": 64", "fixed_point.bits", "2 to 32"),
     ] {
         let error = refused(&text.replacen(was, is, 1));
@@ -218,6 +219,26 @@ fn integer_taps_read_back_and_are_checked_against_the_taps_and_their_bits() {
     other.design.bits = Some(WordLengths::Same(5));
     let differs = Bank { spec: Some(other), ..bank };
     assert_eq!(differs.check().unwrap_err().path(), "spec.design.bits");
+}
+
+#[test]
+fn integer_taps_that_could_not_be_read_back_are_not_written() {
+    let words = |bits: WordLengths, fraction_bits| FixedPoint {
+        bits,
+        fraction_bits,
+        integers: vec![vec![1, 0, -1]; 2],
+    };
+    for (words, place) in [
+        (words(WordLengths::Same(4), -257), "fixed_point.fraction_bits"),
+        (words(WordLengths::Same(4), 257), "fixed_point.fraction_bits"),
+        (words(WordLengths::Same(33), 3), "fixed_point.bits"),
+        (words(WordLengths::PerTap(vec![]), 3), "fixed_point.bits"),
+    ] {
+        let filters = SynthesisFilters::Fir(words.taps());
+        let bank = Bank { filters, fixed_point: Some(words), ..fir() };
+        assert_eq!(bank.check().unwrap_err().path(), place);
+        assert!(bank.to_json().is_err());
+    }
 }
 
 fn refused(text: &str) -> BankError {

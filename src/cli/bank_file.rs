@@ -4,7 +4,7 @@ use super::Failure;
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::error_system;
 use crate::io::AtomicFile;
-use crate::spec::{DesignOverrides, Spec};
+use crate::spec::{DesignOverrides, Spec, SpecProblem};
 use std::io::{Read, Write};
 use std::path::Path;
 
@@ -38,7 +38,17 @@ fn check_stable(bank: &Bank, path: &Path) -> Result<(), Failure> {
 
 /// Reads a spec file; `-` is standard input.
 pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
-    Spec::from_toml_with(&read_text(path)?, &name(path), overrides).map_err(Failure::input)
+    Spec::from_toml_with(&read_text(path)?, &name(path), overrides).map_err(|error| {
+        match error.overridden() {
+            Some(key) => bad_flag(key, error.problem()),
+            None => Failure::input(error),
+        }
+    })
+}
+
+/// A value of the command line that was given in place of the spec's `key`.
+pub(super) fn bad_flag(key: &str, problem: &SpecProblem) -> Failure {
+    Failure::Input(format!("--{}: {problem}", key.replace('_', "-")))
 }
 
 /// The spec of a spec file, or the one that a bank file carries (with the bank's latency).

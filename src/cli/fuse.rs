@@ -97,8 +97,10 @@ pub(super) fn run(args: Args) -> Result<(), Failure> {
     let latency_dropped = fusing.skip;
     pump(&mut fusing, &mut feed)?;
     fusing.flush(feed.ticks() * bank.ratio as u64)?;
+    let mut notes = feed.notes();
+    notes.extend((feed.ticks() == 0).then(|| args.nothing_to_fuse()));
     let report = Report {
-        run: fusing.report(feed.notes(), "--bits 32f"),
+        run: fusing.report(notes, "--bits 32f"),
         rate: rate.round() as u64,
         ticks: feed.ticks(),
         latency_dropped,
@@ -133,15 +135,14 @@ impl Args {
         Fusing::new(stream, gaps, writer, skip as u64, self.threads)
     }
 
+    /// What is said of recordings without a tick: the output is as empty as they are.
+    fn nothing_to_fuse(&self) -> String {
+        let names: Vec<_> = self.inputs.iter().map(|path| path.display().to_string()).collect();
+        format!("{}: no samples to fuse (the length is zero), so the output has none", names.join(", "))
+    }
+
     /// Judges the run, then gives the output its name.
     fn finish(&self, fusing: Fusing, report: &Report) -> Result<(), Failure> {
-        if report.ticks == 0 {
-            let names: Vec<_> = self.inputs.iter().map(|path| path.display().to_string()).collect();
-            return Err(Failure::Input(format!(
-                "{}: no samples to fuse (the length is zero)",
-                names.join(", ")
-            )));
-        }
         report.run.judge(self.strict)?;
         fusing.finish()?;
         if self.json { super::print_json(report) } else { Ok(()) }

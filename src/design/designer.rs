@@ -38,33 +38,28 @@ pub struct Design {
 pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     let latency = latency(spec)?;
     let problem = Problem::new(spec, latency)?;
-    let (distinct, parts) = problem.without_duplicates();
-    let found = run_method(spec, &distinct)?;
+    let distinct = Distinct::of(&problem);
+    let Found { solution, bounds, iterations, dual } = run_method(spec, &distinct.problem)?;
     let plant = BlockedPlant::new(&problem);
-    // The norm that counts is that of the coefficients as they are written, on all channels.
-    let written = |(filters, peak)| Written { filters, peak, reduction: None };
-    let Written { filters, peak, reduction } = match found.filters {
-        Solution::Taps(taps, Some(peak)) if distinct.channels.len() == problem.channels.len() => {
-            written((SynthesisFilters::Fir(taps), peak))
-        }
-        Solution::Taps(taps, _) => {
-            written(judged(&plant, SynthesisFilters::Fir(shared_taps(&taps, &parts)))?)
-        }
-        Solution::System(system, norm) => recursive_form(spec, &plant, (&distinct, &parts), &system, norm)?,
-    };
-    let (filters, peak, integers) = with_integers(&plant, filters, peak, spec, &problem.noise)?;
+    let written = write_filters(spec, &plant, &distinct, solution)?;
+    let Written { judged: Judged { filters, peak }, reduction, integers } =
+        with_integers(spec, &plant, &problem.noise, written)?;
     let (fixed_point, words) = integers.unzip();
-    let gamma = Gamma {
-        upper: Some(peak.gain),
-        lower: Some(found.lower.min(peak.gain)),
-        noncausal: Some(found.noncausal.min(peak.gain)),
-    };
-    let mut complete = spec.clone();
-    complete.latency = Some(latency);
-    if complete.design.method.has_taps() {
-        complete.design.taps = Some(taps_of(spec));
-    }
-    let bank = Bank {
+    let bank = Bank { fixed_point, ..bank_of(spec, latency, filters, bounds.below(peak.gain)) };
+    Ok(Design {
+        bank,
+        latency_chosen: spec.latency.is_none(),
+        peak_frequency: peak.frequency,
+        iterations,
+        words,
+        dual,
+        reduction,
+    })
+}
+
+/// The bank with the whole of its spec.
+fn bank_of(spec: &Spec, latency: usize, filters: SynthesisFilters, gamma: Gamma) -> Bank {
+    Bank {
         fast_period: spec.fast_period,
         ratio: spec.ratio,
         latency,
@@ -73,42 +68,42 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
         filters,
         gamma,
         proof: None,
-        fixed_point,
-        spec: Some(complete),
-    };
-    Ok(Design {
-        bank,
-        latency_chosen: spec.latency.is_none(),
-        peak_frequency: peak.frequency,
-        iterations: found.iterations,
-        words,
-        dual: found.dual,
-        reduction,
-    })
+        fixed_point: None,
+        spec: Some(completed(spec, latency)),
+    }
 }
 
-/// The filters with integer taps where the spec asks for these.
-type WithIntegers = (SynthesisFilters, Peak, Option<(FixedPoint, WordStudy)>);
-
-fn with_integers(
-    plant: &BlockedPlant,
-    filters: SynthesisFilters,
-    peak: Peak,
-    spec: &Spec,
-    noise: &[f64],
-) -> Result<WithIntegers, DesignError> {
-    let (SynthesisFilters::Fir(taps), Some(bits)) = (&filters, &spec.design.bits) else {
-        return Ok((filters, peak, None));
-    };
-    let subject = quantise::Subject { plant, taps, noise, slack: spec.design.slack.unwrap_or(0.0) };
-    let (integers, words) = quantise(subject, peak.gain, bits, spec.design.fraction_bits)?;
-    let (filters, peak) = judged(plant, SynthesisFilters::Fir(integers.taps()))?;
-    Ok((filters, peak, Some((integers, words))))
+/// The spec with what the designer chose filled in.
+fn completed(spec: &Spec, latency: usize) -> Spec {
+    let mut complete = spec.clone();
+    complete.latency = Some(latency);
+    if complete.design.method.has_taps() {
+        complete.design.taps = Some(taps_of(spec));
+    }
+    complete
 }
 
 /// m0 of a spec in fast samples: what it says, or the designer's choice.
 pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     spec.latency.map_or_else(|| choose_latency(spec), Ok)
+}
+
+/// The problem with each channel once, and how the channels as they are share these.
+struct Distinct {
+    problem: Problem,
+    parts: Vec<Part>,
+}
+
+impl Distinct {
+    fn of(problem: &Problem) -> Self {
+        let (problem, parts) = problem.without_duplicates();
+        Self { problem, parts }
+    }
+
+    /// No channel shares a filter with another.
+    fn are_all(&self) -> bool {
+        self.problem.channels.len() == self.parts.len()
+    }
 }
 
 /// What a method comes up with.
@@ -119,19 +114,48 @@ enum Solution {
     System(StateSpace, f64),
 }
 
-/// A bank's filters with their exact norm, and what became of their order.
-struct Written {
-    filters: SynthesisFilters,
-    peak: Peak,
-    reduction: Option<OrderReduction>,
-}
-
-struct Found {
-    filters: Solution,
+/// What is known below gamma.
+struct Bounds {
     lower: f64,
     noncausal: f64,
+}
+
+impl Bounds {
+    /// With the norm of the bank, above which no bound stays whatever the rounding.
+    fn below(&self, norm: f64) -> Gamma {
+        Gamma {
+            upper: Some(norm),
+            lower: Some(self.lower.min(norm)),
+            noncausal: Some(self.noncausal.min(norm)),
+        }
+    }
+}
+
+/// A solution on the distinct channels, with the record of the search.
+struct Found {
+    solution: Solution,
+    bounds: Bounds,
     iterations: usize,
     dual: Vec<fir::DualPoint>,
+}
+
+/// A bank's filters with their exact norm.
+struct Judged {
+    filters: SynthesisFilters,
+    peak: Peak,
+}
+
+/// A bank's filters as they go into the file, with what became of their order and of their taps.
+struct Written {
+    judged: Judged,
+    reduction: Option<OrderReduction>,
+    integers: Option<(FixedPoint, WordStudy)>,
+}
+
+impl From<Judged> for Written {
+    fn from(judged: Judged) -> Self {
+        Self { judged, reduction: None, integers: None }
+    }
 }
 
 fn taps_of(spec: &Spec) -> usize {
@@ -155,9 +179,8 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
 
 fn from_fir(design: fir::FirDesign) -> Found {
     Found {
-        filters: Solution::Taps(design.taps, Some(design.peak)),
-        lower: design.lower,
-        noncausal: design.noncausal,
+        solution: Solution::Taps(design.taps, Some(design.peak)),
+        bounds: Bounds { lower: design.lower, noncausal: design.noncausal },
         iterations: design.iterations,
         dual: design.dual,
     }
@@ -165,9 +188,8 @@ fn from_fir(design: fir::FirDesign) -> Found {
 
 fn from_state_space(design: iir::StateSpaceDesign) -> Found {
     Found {
-        filters: Solution::System(design.filters, design.upper),
-        lower: design.lower,
-        noncausal: design.noncausal,
+        solution: Solution::System(design.filters, design.upper),
+        bounds: Bounds { lower: design.lower, noncausal: design.noncausal },
         iterations: design.trials,
         dual: Vec::new(),
     }
@@ -176,8 +198,44 @@ fn from_state_space(design: iir::StateSpaceDesign) -> Found {
 /// A comparison method optimises nothing: what bounds every bank is all that is known below.
 fn fixed(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> Result<Found, DesignError> {
     let noncausal = iir::noncausal_bound(plant)?;
-    let filters = Solution::Taps(taps, None);
-    Ok(Found { filters, lower: noncausal, noncausal, iterations: 0, dual: Vec::new() })
+    let bounds = Bounds { lower: noncausal, noncausal };
+    Ok(Found { solution: Solution::Taps(taps, None), bounds, iterations: 0, dual: Vec::new() })
+}
+
+/// The filters of all channels in the form in which they are written. The norm that counts is that of these coefficients,
+/// on all channels.
+fn write_filters(
+    spec: &Spec,
+    plant: &BlockedPlant,
+    distinct: &Distinct,
+    solution: Solution,
+) -> Result<Written, DesignError> {
+    match solution {
+        Solution::Taps(taps, Some(peak)) if distinct.are_all() => {
+            Ok(Judged { filters: SynthesisFilters::Fir(taps), peak }.into())
+        }
+        Solution::Taps(taps, _) => {
+            judged(plant, SynthesisFilters::Fir(shared_taps(&taps, &distinct.parts))).map(Written::from)
+        }
+        Solution::System(system, norm) => recursive_form(spec, plant, distinct, &system, norm),
+    }
+}
+
+/// The filters with integer taps where the spec asks for these.
+fn with_integers(
+    spec: &Spec,
+    plant: &BlockedPlant,
+    noise: &[f64],
+    written: Written,
+) -> Result<Written, DesignError> {
+    let Judged { filters, peak } = &written.judged;
+    let (SynthesisFilters::Fir(taps), Some(bits)) = (filters, &spec.design.bits) else {
+        return Ok(written);
+    };
+    let subject = quantise::Subject { plant, taps, noise, slack: spec.design.slack.unwrap_or(0.0) };
+    let (integers, study) = quantise(subject, peak.gain, bits, spec.design.fraction_bits)?;
+    let judged = judged(plant, SynthesisFilters::Fir(integers.taps()))?;
+    Ok(Written { judged, integers: Some((integers, study)), ..written })
 }
 
 /// A change of coordinates may cost this fraction of gamma.
@@ -185,16 +243,11 @@ const FORM_ACCURACY: f64 = 1e-9;
 
 /// The filters in the cheapest form that keeps the norm `promised`: parallel sections at the end of a delay line, a
 /// triangle there, or else as they are.
-fn written_form(
-    plant: &BlockedPlant,
-    system: &StateSpace,
-    promised: f64,
-) -> Result<(SynthesisFilters, Peak), DesignError> {
-    let tapped = TappedRecursion::new(system)?;
-    if let Some(found) = fast_form(plant, &tapped, promised)? {
-        return Ok(found);
+fn written_form(plant: &BlockedPlant, system: &StateSpace, promised: f64) -> Result<Judged, DesignError> {
+    match fast_form(plant, &TappedRecursion::new(system)?, promised)? {
+        Some(found) => Ok(found),
+        None => judged(plant, block_filters(system)),
     }
-    judged(plant, block_filters(system))
 }
 
 /// The first of the fast forms that keeps the norm, if any does.
@@ -202,11 +255,11 @@ fn fast_form(
     plant: &BlockedPlant,
     tapped: &TappedRecursion,
     promised: f64,
-) -> Result<Option<(SynthesisFilters, Peak)>, DesignError> {
+) -> Result<Option<Judged>, DesignError> {
     let forms = [tapped.modal(), tapped.triangular().map(Some)];
     for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {
         let found = judged(plant, block_filters(&form.realise()?))?;
-        if found.1.gain <= promised * (1.0 + FORM_ACCURACY) {
+        if found.peak.gain <= promised * (1.0 + FORM_ACCURACY) {
             return Ok(Some(found));
         }
     }
@@ -217,43 +270,51 @@ fn fast_form(
 fn recursive_form(
     spec: &Spec,
     plant: &BlockedPlant,
-    (distinct, parts): (&Problem, &[Part]),
+    distinct: &Distinct,
     system: &StateSpace,
     norm: f64,
 ) -> Result<Written, DesignError> {
-    let (filters, peak) = written_form(plant, &shared_inputs(system, parts)?, norm)?;
-    let (Some(wanted), SynthesisFilters::StateSpace(block)) = (spec.design.reduction, &filters) else {
-        return Ok(Written { filters, peak, reduction: None });
+    let full = written_form(plant, &shared_inputs(system, &distinct.parts)?, norm)?;
+    let (Some(wanted), SynthesisFilters::StateSpace(block)) = (spec.design.reduction, &full.filters) else {
+        return Ok(full.into());
     };
     let subject = reduction::Subject {
-        plant: &BlockedPlant::new(distinct),
+        plant: &BlockedPlant::new(&distinct.problem),
         bank: system,
         order: block.a.len(),
-        width: parts.len(),
+        width: distinct.parts.len(),
         aim: if spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
         slack: spec.design.slack.unwrap_or(0.0),
     };
     let (smaller, record) = reduction::reduce(&subject, wanted)?;
-    let (filters, peak) = match smaller {
-        None => (filters, peak),
-        Some(smaller) => {
-            let smaller = smaller.with_inputs(|m| shared(m, parts))?;
-            match fast_form(plant, &smaller, record.reduced.figures.gamma)? {
-                Some(found) => found,
-                None => judged(plant, block_filters(&smaller.realise()?))?,
-            }
-        }
+    let judged = match smaller {
+        None => full,
+        Some(smaller) => reduced_form(plant, &distinct.parts, smaller, record.reduced.figures.gamma)?,
     };
-    Ok(Written { filters, peak, reduction: Some(record) })
+    Ok(Written { judged, reduction: Some(record), integers: None })
+}
+
+/// A reduced bank for all channels, in a fast form if one keeps the norm `promised`.
+fn reduced_form(
+    plant: &BlockedPlant,
+    parts: &[Part],
+    reduced: TappedRecursion,
+    promised: f64,
+) -> Result<Judged, DesignError> {
+    let whole = reduced.with_inputs(|m| shared(m, parts))?;
+    match fast_form(plant, &whole, promised)? {
+        Some(found) => Ok(found),
+        None => judged(plant, block_filters(&whole.realise()?)),
+    }
 }
 
 fn block_filters(system: &StateSpace) -> SynthesisFilters {
     SynthesisFilters::StateSpace(error_system::to_block(system))
 }
 
-fn judged(plant: &BlockedPlant, filters: SynthesisFilters) -> Result<(SynthesisFilters, Peak), DesignError> {
+fn judged(plant: &BlockedPlant, filters: SynthesisFilters) -> Result<Judged, DesignError> {
     let peak = error_system::bank_gamma(plant, &filters)?;
-    Ok((filters, peak))
+    Ok(Judged { filters, peak })
 }
 
 /// Channels that cannot be told apart share their common filter: the same error, the least noise.

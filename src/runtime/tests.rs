@@ -31,6 +31,23 @@ pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Ve
     (0..channels).map(|_| (0..taps).map(|_| noise.next()).collect()).collect()
 }
 
+/// The outputs of a stream that gets `input` in pieces of so many ticks, for N inputs and M outputs a tick.
+pub(super) fn in_pieces(
+    stream: &mut Reconstructor,
+    [n, m]: [usize; 2],
+    input: &[f32],
+    cuts: &[usize],
+) -> Vec<f32> {
+    let mut pieces = vec![0.0; input.len() / n * m];
+    let (mut from, mut to) = (input, &mut pieces[..]);
+    for cut in cuts {
+        let (head, tail) = to.split_at_mut(cut * m);
+        assert_eq!(stream.process(&from[..cut * n], head).unwrap(), cut * m);
+        (from, to) = (&from[cut * n..], tail);
+    }
+    pieces
+}
+
 /// The steps of a window in the order of use. Phases beside each other take the newest first. A single phase takes
 /// pairs c apart, the older first, where c steps are a whole number of frames and of groups.
 fn order(n: usize, ratio: usize, depth: usize, steps: usize) -> Vec<usize> {
@@ -313,13 +330,7 @@ proptest! {
         let mut whole = vec![0.0; input.len() / n * m];
         stream.process(&input, &mut whole).unwrap();
         stream.reset();
-        let mut pieces = vec![0.0; whole.len()];
-        let (mut from, mut to) = (&input[..], &mut pieces[..]);
-        for cut in cuts {
-            let (head, tail) = to.split_at_mut(cut * m);
-            prop_assert_eq!(stream.process(&from[..cut * n], head).unwrap(), cut * m);
-            (from, to) = (&from[cut * n..], tail);
-        }
+        let pieces = in_pieces(&mut stream, [n, m], &input, &cuts);
         prop_assert_eq!(pieces.iter().zip(&whole).position(|(a, b)| a != b), None);
     }
 

@@ -1,6 +1,7 @@
 //! From a written document to a [`Spec`]: units resolved, omitted filters filled in, everything checked.
 
 use super::design::DesignOverrides;
+use super::design::KeyProblem;
 use super::limits::{
     check_channel_count, check_delay, check_fast_period, check_fast_rate, check_latency, check_noise,
     check_order, check_ratio, check_reduction_loss, check_slack, check_taps,
@@ -151,23 +152,28 @@ fn design(
         fraction_bits: get("fraction_bits").map(|v| fraction_bits(&v)).transpose()?,
         reduction: reduction(get("order"), get("reduction_loss_db"))?,
     };
-    let design = overrides.over(written).resolved();
-    let complain = |problem: SpecProblem| {
-        let key = match problem {
-            SpecProblem::NeedlessKey { key, .. } => Some(key),
-            SpecProblem::Range { unit: "bits" | "entries", .. } => Some("bits"),
-            SpecProblem::Range { unit: "states", .. } => Some("order"),
-            SpecProblem::Range { unit: "dB", .. } => Some("reduction_loss_db"),
-            SpecProblem::Range { .. } => Some("taps"),
-            _ => None,
-        };
-        table.unwrap_or(top).fault_at(key, problem)
-    };
-    design.check(channels).map_err(complain)?;
-    Ok(design)
+    let design = overrides.clone().over(written).resolved();
+    match design.check_by_key(channels) {
+        Ok(()) => Ok(design),
+        Err(KeyProblem { key, problem }) => {
+            let fields = table.unwrap_or(top);
+            Err(match blamed(&overrides, key, &problem) {
+                Some(given) => Fault::overriding(given, problem),
+                None if matches!(problem, SpecProblem::MissingKey { .. }) => fields.whole().fault(problem),
+                None => fields.fault_at(Some(key), problem),
+            })
+        }
+    }
 }
 
-/// One number of bits, or a list of them.
+/// The key of `overrides` that a problem with `key` comes from, if it is one of these.
+fn blamed(overrides: &DesignOverrides, key: &'static str, problem: &SpecProblem) -> Option<&'static str> {
+    let other_length = key == "bits" && matches!(problem, SpecProblem::Range { unit: "entries", .. });
+    let cause = if other_length && !overrides.gives(key) { "taps" } else { key };
+    overrides.gives(cause).then_some(cause)
+}
+
+/// One number of bits, or a list of them, whose length is for those to check who know the filters'.
 pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
     // What is out of range here is out of range there.
     let bits = |v: &Value<'_>| v.count("bits").map(|bits| u32::try_from(bits).unwrap_or(u32::MAX));
@@ -175,7 +181,7 @@ pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
         Ok(items) => WordLengths::PerTap(items.iter().map(bits).collect::<Result<_, _>>()?),
         Err(_) => WordLengths::Same(bits(value)?),
     };
-    words.check(None).map_err(|problem| value.fault(problem))?;
+    words.check_numbers().map_err(|problem| value.fault(problem))?;
     Ok(words)
 }
 

@@ -106,27 +106,34 @@ impl DesignSpec {
 
     /// Checks the numbers and that every key goes with the method.
     pub(super) fn check(&self, channels: usize) -> Result<(), SpecProblem> {
+        self.check_by_key(channels).map_err(|KeyProblem { problem, .. }| problem)
+    }
+
+    /// As [`Self::check`], with the key whose value is to be blamed.
+    pub(super) fn check_by_key(&self, channels: usize) -> Result<(), KeyProblem> {
         self.check_keys()?;
-        self.taps.map_or(Ok(()), check_taps)?;
-        self.slack.map_or(Ok(()), check_slack)?;
-        self.reduction.map_or(Ok(()), Reduction::check)?;
-        self.fraction_bits.map_or(Ok(()), check_fraction_bits)?;
-        self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps))?;
+        blame("taps", self.taps.map_or(Ok(()), check_taps))?;
+        blame("slack", self.slack.map_or(Ok(()), check_slack))?;
+        if let Some(reduction) = self.reduction {
+            blame(reduction.key(), reduction.check())?;
+        }
+        blame("fraction_bits", self.fraction_bits.map_or(Ok(()), check_fraction_bits))?;
+        blame("bits", self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)))?;
         if let (Some(_), None) = (self.fraction_bits, &self.bits) {
             let remedy = "fraction_bits places the point of taps of so many bits, for example bits = 16";
-            return Err(SpecProblem::MissingKey { key: "bits", remedy });
+            return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
         }
         match (self.method, self.taps) {
-            (Method::Fir, None) => Err(SpecProblem::MissingKey {
-                key: "taps",
-                remedy: "the method fir needs the number of taps a channel at the fast rate, for example taps = 22",
-            }),
-            (Method::Fir, Some(taps)) => check_optimised_taps(taps, channels),
+            (Method::Fir, None) => {
+                let remedy = "the method fir needs the number of taps a channel at the fast rate, for example taps = 22";
+                blame("method", Err(SpecProblem::MissingKey { key: "taps", remedy }))
+            }
+            (Method::Fir, Some(taps)) => blame("taps", check_optimised_taps(taps, channels)),
             _ => Ok(()),
         }
     }
 
-    fn check_keys(&self) -> Result<(), SpecProblem> {
+    fn check_keys(&self) -> Result<(), KeyProblem> {
         let keys = [
             ("taps", self.taps.is_some(), self.method.has_taps(), "fir"),
             ("slack", self.slack.is_some(), self.method.has_slack(), "fir or iir"),
@@ -141,14 +148,37 @@ impl DesignSpec {
         ];
         match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
             Some((key, _, _, remedy)) => {
-                Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy })
+                blame(key, Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy }))
             }
             None => Ok(()),
         }
     }
 }
 
+/// What is wrong with a table, and by which of its keys.
+#[derive(Debug)]
+pub(super) struct KeyProblem {
+    pub(super) key: &'static str,
+    pub(super) problem: SpecProblem,
+}
+
+fn blame(key: &'static str, checked: Result<(), SpecProblem>) -> Result<(), KeyProblem> {
+    checked.map_err(|problem| KeyProblem { key, problem })
+}
+
 impl DesignOverrides {
+    /// Whether it has a value for `key`.
+    pub(super) fn gives(&self, key: &str) -> bool {
+        match key {
+            "method" => self.method.is_some(),
+            "taps" => self.taps.is_some(),
+            "slack" => self.slack.is_some(),
+            "bits" => self.bits.is_some(),
+            "fraction_bits" => self.fraction_bits.is_some(),
+            _ => self.reduction.is_some_and(|reduction| reduction.key() == key),
+        }
+    }
+
     /// What the command line says counts; what the file says about the method that it replaces does not.
     pub(super) fn over(self, file: Self) -> Self {
         let replaced = self.method;

@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use super::FilterProblem;
+use super::reader::Fault;
 
 /// A spec that was refused: the file, the place in it, and the problem.
 ///
@@ -19,6 +20,7 @@ struct Inner {
     path: String,
     place: Option<Place>,
     problem: SpecProblem,
+    overridden: bool,
 }
 
 /// A place in a text file.
@@ -134,8 +136,20 @@ impl SpecError {
         path: String,
         problem: SpecProblem,
     ) -> Self {
+        let fault = Fault { path, span, problem: Box::new(problem), overridden: false };
+        Self::of(file, text, fault)
+    }
+
+    /// A fault that was found in `text`.
+    pub(super) fn of(file: &str, text: &str, fault: Fault) -> Self {
+        let Fault { path, span, problem, overridden } = fault;
         let place = span.map(|span| Place::locate(text, span));
-        Self { inner: Box::new(Inner { file: file.to_owned(), path, place, problem }) }
+        Self { inner: Box::new(Inner { file: file.to_owned(), path, place, problem: *problem, overridden }) }
+    }
+
+    /// The key, such as `fraction_bits`, if the problem is with a value that was given in place of the file's.
+    pub fn overridden(&self) -> Option<&str> {
+        self.inner.overridden.then_some(self.inner.path.as_str())
     }
 
     /// The file name as it was given.
@@ -163,7 +177,10 @@ impl std::error::Error for SpecError {}
 
 impl fmt::Display for SpecError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Inner { file, path, place, problem } = &*self.inner;
+        let Inner { file, path, place, problem, overridden } = &*self.inner;
+        if *overridden {
+            return write!(f, "{file}: the {path} given in place of the file's: {problem}");
+        }
         write!(f, "{file}:")?;
         if let Some(place) = place {
             write!(f, "{}:{}:", place.line, place.column)?;

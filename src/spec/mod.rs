@@ -19,6 +19,7 @@ pub use error::{Place, SpecError, SpecProblem};
 pub use filter::{FilterProblem, MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
+pub(crate) use words::check_fraction_bits;
 pub use words::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use serde::{Deserialize, Serialize};
@@ -193,7 +194,8 @@ impl Spec {
     /// without taps is complete when the command line gives them.
     ///
     /// # Errors
-    /// As [`Spec::from_toml`].
+    /// As [`Spec::from_toml`]; [`SpecError::overridden`] tells what is wrong with `overrides` from what is wrong with the
+    /// file.
     pub fn from_toml_with(
         text: &str,
         file_name: &str,
@@ -204,7 +206,7 @@ impl Spec {
             SpecError::new(file_name, text, error.span(), String::new(), problem)
         })?;
         decode::spec(&reader::Value::root(&document), overrides)
-            .map_err(|fault| SpecError::new(file_name, text, fault.span, fault.path, *fault.problem))
+            .map_err(|fault| SpecError::of(file_name, text, fault))
     }
 
     /// The spec as a TOML file that reads back equal.

@@ -13,6 +13,15 @@ pub(crate) struct Fault {
     pub(crate) span: Option<Range<usize>>,
     /// Boxed, since a fault travels through every small reading function.
     pub(crate) problem: Box<SpecProblem>,
+    /// The value is not the document's: `path` is the key that was given in its place.
+    pub(crate) overridden: bool,
+}
+
+impl Fault {
+    /// A problem with the value that was given for `key` in place of the document's.
+    pub(crate) fn overriding(key: &'static str, problem: SpecProblem) -> Self {
+        Self { path: key.to_owned(), span: None, problem: Box::new(problem), overridden: true }
+    }
 }
 
 /// A value and the path that led to it.
@@ -37,7 +46,12 @@ impl<'a> Value<'a> {
 
     /// A problem with this value.
     pub(crate) fn fault(&self, problem: impl Into<SpecProblem>) -> Fault {
-        Fault { path: self.path.clone(), span: self.node.span.clone(), problem: Box::new(problem.into()) }
+        Fault {
+            path: self.path.clone(),
+            span: self.node.span.clone(),
+            problem: Box::new(problem.into()),
+            overridden: false,
+        }
     }
 
     fn wrong_type(&self, expected: &'static str) -> Fault {
@@ -158,6 +172,7 @@ impl<'a> Value<'a> {
                     nearest: nearest(&entry.key, known),
                     known: known.to_vec(),
                 }),
+                overridden: false,
             }),
             None => Ok(Fields { entries, whole: self.clone() }),
         }

@@ -330,6 +330,11 @@ fn every_mistake_has_its_place_and_its_words() {
         (thesis_with("taps = 22", "taps = 22\nbits = 12.5"), 19, "whole number"),
         (thesis_with("taps = 22", "taps = 22\nbits = 'many'"), 19, "whole number"),
         (thesis_with("taps = 22", "taps = 22\nbits = [8, 8]"), 19, "each of the 22 taps"),
+        (
+            thesis_with("taps = 22", "taps = 22\nbits = []"),
+            19,
+            "list of bits is empty; give one entry for each of the 22",
+        ),
         (thesis_with("taps = 22", "taps = 4\nbits = [1, 0, 1, 0]"), 19, "at least one tap needs 2 bits"),
         (thesis_with("taps = 22", "taps = 22\nbits = 8\nfraction_bits = 300"), 20, "from -256 to 256"),
         (thesis_with("taps = 22", "taps = 22\nfraction_bits = 7"), 16, "the key bits is missing"),

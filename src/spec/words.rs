@@ -52,31 +52,48 @@ impl WordLengths {
     }
 
     /// Checks the numbers, and the length of a list against that of the filters where it is known.
-    pub(super) fn check(&self, taps: Option<usize>) -> Result<(), SpecProblem> {
+    pub(crate) fn check(&self, taps: Option<usize>) -> Result<(), SpecProblem> {
+        if let Self::PerTap(list) = self {
+            check_length(list.len(), taps)?;
+        }
+        self.check_numbers()
+    }
+
+    /// Checks the numbers alone; an empty list has none that is wrong.
+    pub(super) fn check_numbers(&self) -> Result<(), SpecProblem> {
         let refuse = |bits: u32, rule: String| Err(range(f64::from(bits), "bits", rule));
         match self {
             Self::Same(bits) if !(2..=MAX_BITS).contains(bits) => {
                 refuse(*bits, format!("a tap has 2 to {MAX_BITS} bits, its sign among them"))
             }
             Self::Same(_) => Ok(()),
-            Self::PerTap(list) => {
-                if let Some(taps) = taps.filter(|&taps| taps != list.len()) {
-                    let rule =
-                        format!("a list of bits has one entry for each of the {taps} taps of a channel");
-                    return Err(range(list.len() as f64, "entries", rule));
+            Self::PerTap(list) => match list.iter().max() {
+                Some(&most) if most > MAX_BITS => {
+                    refuse(most, format!("a tap has at most {MAX_BITS} bits; 0 leaves it out"))
                 }
-                if let Some(bits) = list.iter().find(|&&bits| bits > MAX_BITS) {
-                    return refuse(*bits, format!("a tap has at most {MAX_BITS} bits; 0 leaves it out"));
+                Some(&most) if most < 2 => {
+                    refuse(most, "at least one tap needs 2 bits or more, its sign among them".into())
                 }
-                match list.iter().max() {
-                    Some(&most) if most >= 2 => Ok(()),
-                    most => refuse(
-                        most.copied().unwrap_or(0),
-                        "at least one tap needs 2 bits or more, its sign among them".into(),
-                    ),
-                }
-            }
+                _ => Ok(()),
+            },
         }
+    }
+}
+
+/// The length of a list of bits.
+fn check_length(entries: usize, taps: Option<usize>) -> Result<(), SpecProblem> {
+    let refuse = |rule: String| Err(range(entries as f64, "entries", rule));
+    let each = taps.map_or("each tap".to_owned(), |taps| format!("each of the {taps} taps"));
+    if entries == 0 {
+        return refuse(format!(
+            "the list of bits is empty; give one entry for {each} of a channel, or one number for all"
+        ));
+    }
+    match taps {
+        Some(taps) if taps != entries => {
+            refuse(format!("a list of bits has one entry for {each} of a channel"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -86,8 +103,10 @@ impl std::fmt::Display for WordLengths {
             Self::Same(bits) => write!(f, "{bits} bits"),
             Self::PerTap(list) => {
                 let used = list.iter().filter(|&&bits| bits > 0);
-                let (least, most) = (used.clone().min(), used.max());
-                write!(f, "{} to {} bits", least.unwrap_or(&0), most.unwrap_or(&0))
+                match (used.clone().min(), used.max()) {
+                    (Some(least), Some(most)) if least < most => write!(f, "{least} to {most} bits"),
+                    (_, most) => write!(f, "{} bits", most.unwrap_or(&0)),
+                }
             }
         }
     }
@@ -143,6 +162,27 @@ mod tests {
             assert!(bad.check(None).is_err(), "{bad:?}");
         }
         assert!(list(&[4, 4]).check(Some(3)).is_err());
+    }
+
+    #[test]
+    fn an_empty_list_is_told_how_many_are_wanted() {
+        let problem = |taps| WordLengths::PerTap(vec![]).check(taps).unwrap_err().to_string();
+        let (known, open) = (problem(Some(22)), problem(None));
+        assert!(
+            known.contains("the list of bits is empty") && known.contains("each of the 22 taps"),
+            "{known}"
+        );
+        assert!(open.contains("the list of bits is empty") && open.contains("each tap"), "{open}");
+    }
+
+    #[test]
+    fn bits_are_told_as_one_number_or_a_range() {
+        let text = |list: &[u32]| WordLengths::PerTap(list.to_vec()).to_string();
+        assert_eq!(WordLengths::Same(8).to_string(), "8 bits");
+        assert_eq!(text(&[8, 8]), "8 bits");
+        assert_eq!(text(&[0, 8, 8]), "8 bits");
+        assert_eq!(text(&[0, 4, 8]), "4 to 8 bits");
+        assert_eq!(text(&[]), "0 bits");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 /// The thesis example as an FIR bank.
@@ -87,17 +87,31 @@ impl Desk {
 
     /// Runs and wants exit code `code` with one message that has all of `parts`, and no new file.
     pub(crate) fn refused(&self, code: i32, args: &[&str], parts: &[&str]) {
-        let names = || fs::read_dir(self.folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
-        let before: Vec<_> = names().collect();
+        let before = names(self.folder.path());
         let output = self.run(args, &[]);
-        let message = String::from_utf8(output.stderr).unwrap();
+        let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(code), "{args:?}: {message}");
         assert!(output.stdout.is_empty(), "{args:?}");
         for part in parts {
             assert!(message.contains(part), "`{part}` is missing in: {message}");
         }
-        assert!(names().all(|name| before.contains(&name)), "{args:?}");
+        assert_eq!(names(self.folder.path()), before, "{args:?}");
     }
+}
+
+/// What lies in a folder, in order.
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// What a program printed.
+pub(crate) fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
 }
 
 /// Small integers, so that every sum is exact in any order and precision.

@@ -7,6 +7,7 @@
 //! Sources: Babai, Combinatorica 6 (1986); Anderson and Mohan, IEEE Trans. Commun. 32 (1984) for the list.
 
 use crate::linalg::Mat;
+use crate::spec::WordLengths;
 
 /// Partial decisions that are followed.
 const LIST: usize = 32;
@@ -19,9 +20,20 @@ pub(super) struct Span {
 }
 
 impl Span {
+    /// What tap `n` may be.
+    pub(super) fn of(bits: &WordLengths, n: usize) -> Self {
+        let (least, most) = bits.span(n);
+        Self { least: least as f64, most: most as f64 }
+    }
+
     /// The integer of the span that is nearest to `value`.
     pub(super) fn nearest(self, value: f64) -> f64 {
         value.round_ties_even().clamp(self.least, self.most)
+    }
+
+    /// Whether it holds an integer other than zero on the side of `value`.
+    pub(super) fn reaches(self, value: f64) -> bool {
+        if value < 0.0 { self.least < 0.0 } else { self.most > 0.0 && value > 0.0 }
     }
 
     pub(super) fn contains(self, value: f64) -> bool {

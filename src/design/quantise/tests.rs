@@ -1,8 +1,12 @@
+use super::quantiser::INDIFFERENT;
+use super::search::Search;
 use super::*;
 use crate::bank::SynthesisFilters;
+use crate::design::error_grid::ErrorGrid;
 use crate::design::error_system::bank_gamma;
+use crate::design::error_system::by_lag;
 use crate::design::{Problem, design};
-use crate::spec::Spec;
+use crate::spec::{MAX_FRACTION_BITS, Spec};
 
 const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
 
@@ -200,4 +204,49 @@ fn a_scale_at_which_nothing_is_left_is_refused() {
     let (plant, taps) = optimum(THESIS);
     let refused = quantise(subject(&plant, &taps), 1.0, &WordLengths::Same(6), Some(-9));
     assert!(matches!(refused, Err(DesignError::AllZero { fraction_bits: -9, .. })), "{refused:?}");
+}
+
+#[test]
+fn taps_that_can_only_be_zero_do_not_decide_the_scale() {
+    let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 8"));
+    let size = |n: usize| taps.iter().map(|filter| filter[n].abs()).fold(0.0, f64::max);
+    let mut by_size: Vec<usize> = (0..8).collect();
+    by_size.sort_by(|&a, &b| size(a).total_cmp(&size(b)));
+    let large = &by_size[3..];
+    // No bits at all, and one bit, which is -1 or 0.
+    for none in [0, 1] {
+        let words = WordLengths::PerTap((0..8).map(|n| if large.contains(&n) { none } else { 6 }).collect());
+        let silent = |n: usize, tap: f64| large.contains(&n) && (none == 0 || tap > 0.0);
+        let silenced = |filter: &Vec<f64>| {
+            filter.iter().enumerate().map(|(n, &tap)| if silent(n, tap) { 0.0 } else { tap }).collect()
+        };
+        let silenced: Vec<Vec<f64>> = taps.iter().map(silenced).collect();
+        let finest = |taps: &[Vec<f64>]| quantiser(&plant, taps).unwrap().finest_that_fits(&words);
+        assert_eq!(finest(&taps), finest(&silenced), "{none} bits");
+    }
+}
+
+#[test]
+fn a_scale_beyond_the_limits_is_not_chosen() {
+    let (plant, taps) = optimum(THESIS);
+    for exponent in [-400, -260, 258, 263, 270, 400] {
+        let factor = f64::from(exponent).exp2();
+        let scaled: Vec<Vec<f64>> = taps.iter().map(|f| f.iter().map(|t| t * factor).collect()).collect();
+        let quantiser = quantiser(&plant, &scaled).unwrap();
+        for bits in [2, 8, 32] {
+            let finest = quantiser.finest_that_fits(&WordLengths::Same(bits));
+            assert!(
+                (-MAX_FRACTION_BITS..=MAX_FRACTION_BITS).contains(&finest),
+                "2^{exponent}, {bits} bits: scale {finest}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_loss_over_nothing_is_a_number() {
+    let study = |real_gamma| WordStudy { real_gamma, words: Vec::new() };
+    assert_eq!(study(0.0).loss_db(0.0), 0.0);
+    assert_eq!(study(0.0).loss_db(1e-17), f64::INFINITY);
+    assert!((study(0.5).loss_db(5.0) - 20.0).abs() < 1e-12);
 }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::bank::Bank;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::tests::{Noise, available, definition, fir_bank, fuses, random_taps};
+use crate::runtime::tests::{Noise, available, definition, fir_bank, fuses, in_pieces, random_taps};
 use crate::runtime::{Form, Options, PcmOutput, Precision, Reconstructor};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -396,13 +396,7 @@ proptest! {
         let replaced = stream.replaced();
         prop_assert_eq!(replaced as usize, input.iter().filter(|x| x.is_nan()).count());
         stream.reset();
-        let mut pieces = vec![0.0; whole.len()];
-        let (mut from, mut to) = (&input[..], &mut pieces[..]);
-        for cut in cuts {
-            let (head, tail) = to.split_at_mut(cut * m);
-            prop_assert_eq!(stream.process(&from[..cut * n], head).unwrap(), cut * m);
-            (from, to) = (&from[cut * n..], tail);
-        }
+        let pieces = in_pieces(&mut stream, [n, m], &input, &cuts);
         prop_assert_eq!(pieces.iter().zip(&whole).position(|(a, b)| a != b), None);
         prop_assert_eq!(stream.replaced(), replaced);
     }

@@ -1,16 +1,19 @@
 //! The search for what proves a bank's gammas. [`crate::verify`] does the proving; whatever is found here is worth
 //! nothing until it has passed there.
 
+mod units;
+
 use super::equivalence::BlockedPlant;
 use super::fir::DualPoint;
 use super::{DesignError, analysis};
 use crate::bank::{Bank, Certificate, Proof, SynthesisFilters, Tone};
-use crate::linalg::{self, CMat, Complex, Mat};
+use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
 use crate::lmi::kyp;
 use crate::lti::peak::{hinf_norm, unexplained_peak};
 use crate::lti::{FrequencyResponse, StateSpace};
 use crate::spec::Method;
 use crate::verify::{CLAIM_TOLERANCE, Midpoint, Subject, Verified};
+use units::Units;
 
 /// Relative excesses over the computed norm at which a certificate is looked for, smallest first.
 const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
@@ -87,22 +90,27 @@ fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, Design
     if subject.states() > MAX_SEARCHED {
         return Err(DesignError::NotSearched { states: subject.states(), limit: MAX_SEARCHED });
     }
-    let middle = subject.midpoint().ok_or(DesignError::NotCertified)?;
+    let raw = subject.midpoint().ok_or(DesignError::NotCertified)?;
+    let units = Units::of(&raw, subject.scale())?;
+    let middle = units.of_one(&raw);
     let error = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
     let peak = hinf_norm(&error)?;
     // The norm in the file may differ from the one computed here in the last digits; if in more, it is not the norm.
-    let credible = bank.gamma.upper.filter(|&stated| stated <= peak.gain * (1.0 + CLAIM_TOLERANCE));
+    let stated = bank.gamma.upper.map(|stated| stated / units.wanted);
+    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + CLAIM_TOLERANCE));
     let norm = credible.unwrap_or(0.0).max(peak.gain);
     let response = error.response_at(Complex::from_polar(1.0, peak.frequency));
     let tone = tone(peak.frequency, &leading_direction(&response)?);
-    let floor = FLOOR * subject.scale();
+    let floor = FLOOR * subject.scale() / units.wanted;
     let relative: &[f64] = if norm > floor { &EXCESSES } else { &FLOOR_EXCESSES };
     for excess in relative.iter().map(|excess| excess * norm.max(floor)) {
-        let gamma = norm + excess;
-        let Ok(search) = Search::new(&middle, STATE_NOISE * (excess * gamma).sqrt()) else { continue };
+        let gamma = (norm + excess) * units.wanted;
+        let Ok(search) = Search::new(&middle, STATE_NOISE * (excess * (norm + excess)).sqrt()) else {
+            continue;
+        };
         for weight in STATE_WEIGHTS {
             let Some(factor) = search.factor(norm + 0.5 * excess, weight * excess) else { continue };
-            if let Some(factor) = shortest(factor, |factor| subject.keeps(factor, gamma)) {
+            if let Some(factor) = shortest(units.factor(factor), |factor| subject.keeps(factor, gamma)) {
                 return Ok(Certificate { gamma, peak: tone, factor });
             }
         }
@@ -274,6 +282,9 @@ impl<'a> Service<'a> {
                 row += 2;
             }
         }
+        // Each channel in a unit of its own, so that none is too weak to matter.
+        let units = self.units(&map);
+        map.column_iter_mut().zip(&units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
         let svd = linalg::svd(&map)?;
         let floor = RANK * svd.s.first().copied().unwrap_or(0.0);
         let mut taps = Mat::zeros(map.ncols(), 1);
@@ -283,7 +294,13 @@ impl<'a> Service<'a> {
             part.iter_mut().zip(&svd.s).for_each(|(x, &s)| *x = if s > floor { *x / s } else { 0.0 });
             taps += &svd.v * part;
         }
-        self.taps = taps.iter().copied().collect();
+        self.taps = taps.iter().zip(&units).map(|(tap, unit)| tap / unit).collect();
         Ok(())
+    }
+
+    /// For each tap the power of two near to the largest effect of its channel's taps.
+    fn units(&self, map: &Mat) -> Vec<f64> {
+        let channel = |i: usize| map.columns(i * self.length, self.length).amax();
+        (0..self.channels).flat_map(|i| vec![power_of_two(channel(i)); self.length]).collect()
     }
 }

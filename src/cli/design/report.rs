@@ -1,77 +1,14 @@
-//! `hybank design`: from a spec file to a bank file.
+//! What `hybank design` says of a finished bank, as text and as JSON.
 
-use super::Failure;
-use super::bank_file::{is_dash, load_spec, write_text};
-use crate::bank::SynthesisFilters;
+use crate::bank::{Gamma, SynthesisFilters};
 use crate::design::quantise::WordStudy;
-use crate::design::{self, Design, DesignError, MeanAnalysis, OrderReduction, OrderWorth};
-use crate::spec::{DesignOverrides, Method, Reduction, WordLengths};
+use crate::design::{Design, MeanAnalysis, OrderReduction, OrderWorth};
+use crate::spec::Method;
 use crate::verify::Verified;
-use std::path::PathBuf;
-use std::time::Instant;
 
-/// Designs the synthesis filters for a spec
-///
-/// The bank file holds the filters, the spec with all defaults filled in, and gamma: the exact worst-case gain from the
-/// analog input to the error (upper), a proven lower bound for any bank of that method and size (lower), and the
-/// bound that no latency can beat (noncausal), all in normalised time.
-#[derive(Debug, clap::Args)]
-#[command(after_help = "\
-Examples:
-  hybank design spec.toml -o bank.json
-  hybank design spec.toml -o iir.json --method iir
-  hybank design spec.toml -o fixed.json --taps 64 --bits 14
-  hybank design spec.toml -o small.json --method iir --order 6
-  hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
-  hybank design spec.toml -o - --taps 64 | hybank analyze -")]
-pub(super) struct Args {
-    /// The spec (TOML); `-` is standard input
-    spec: PathBuf,
-    /// The bank file (JSON); `-` is standard output
-    #[arg(short, long)]
-    output: PathBuf,
-    /// Another method than the spec's
-    #[arg(long, value_parser = parse_method)]
-    method: Option<Method>,
-    /// Another number of taps a channel than the spec's
-    #[arg(long)]
-    taps: Option<usize>,
-    /// Another latency than the spec's, in fast samples
-    #[arg(long)]
-    latency: Option<usize>,
-    /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
-    #[arg(long)]
-    slack: Option<f64>,
-    /// Integer taps of so many bits, sign included; or a list of bits, one for each tap (4,6,8,6,4)
-    #[arg(long)]
-    bits: Option<WordLengths>,
-    /// Integer taps times two to the minus this; chosen for the least gamma if left out
-    #[arg(long, allow_negative_numbers = true)]
-    fraction_bits: Option<i32>,
-    /// At most so many states, with the least error that they allow (methods iir and h2)
-    #[arg(long)]
-    order: Option<usize>,
-    /// As few states as keep the error within so many decibels of the full bank's (methods iir and h2)
-    #[arg(long, value_name = "DB", conflicts_with = "order")]
-    reduction_loss_db: Option<f64>,
-    /// Replace an existing bank file
-    #[arg(long)]
-    force: bool,
-    /// Print a report as one JSON object on standard output
-    #[arg(long)]
-    json: bool,
-}
-
-fn parse_method(text: &str) -> Result<Method, String> {
-    let known = Method::ALL.map(Method::name).join(", ");
-    Method::ALL
-        .into_iter()
-        .find(|method| method.name() == text)
-        .ok_or_else(|| format!("the methods are {known}"))
-}
-
+/// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
-struct Report<'a> {
+pub(super) struct Report<'a> {
     bank: String,
     method: Method,
     channels: usize,
@@ -82,7 +19,7 @@ struct Report<'a> {
     states: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     reduction: Option<&'a OrderReduction>,
-    gamma: &'a crate::bank::Gamma,
+    gamma: &'a Gamma,
     /// For integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
     words: Option<Words<'a>>,
@@ -93,8 +30,7 @@ struct Report<'a> {
     iterations: usize,
     seconds: f64,
     #[serde(flatten)]
-    proof: ProofReport,
-    proof_seconds: f64,
+    proof: &'a ProofReport,
 }
 
 /// What integer taps cost.
@@ -110,8 +46,7 @@ struct Words<'a> {
 impl<'a> Words<'a> {
     fn of(design: &'a Design) -> Option<Self> {
         let (integers, study) = design.bank.fixed_point.as_ref().zip(design.words.as_ref())?;
-        let gamma = design.bank.gamma.upper?;
-        let loss_db = 20.0 * (gamma / study.real_gamma).log10();
+        let loss_db = study.loss_db(design.bank.gamma.upper?);
         Some(Self { fraction_bits: integers.fraction_bits, loss_db, study })
     }
 
@@ -137,33 +72,24 @@ impl<'a> Words<'a> {
 }
 
 /// What `hybank verify` will say of the file.
-#[derive(Debug, Default, serde::Serialize)]
-struct ProofReport {
-    proven: Option<Verified>,
+#[derive(Debug, serde::Serialize)]
+pub(super) struct ProofReport {
+    pub(super) proven: Option<Verified>,
     /// Why there is no proof in the file.
     #[serde(skip_serializing_if = "Option::is_none")]
-    unproven: Option<String>,
-}
-
-/// Looks for a proof of the bank's gammas and puts it into the bank; a bank that cannot be proven is a bank all the same.
-fn attach_proof(design: &mut Design) -> ProofReport {
-    match design::prove(&design.bank, &design.dual) {
-        Ok((proof, proven)) => {
-            design.bank.proof = Some(proof);
-            ProofReport { proven: Some(proven), unproven: None }
-        }
-        Err(error) => ProofReport { proven: None, unproven: Some(error.to_string()) },
-    }
+    pub(super) unproven: Option<String>,
+    #[serde(rename = "proof_seconds")]
+    pub(super) seconds: f64,
 }
 
 impl ProofReport {
-    fn text(&self, seconds: f64) -> String {
+    fn text(&self) -> String {
         match (&self.proven, &self.unproven) {
             (Some(proven), _) => format!(
                 "proven     [{}, {}] in {:.1} ms (see hybank verify)\n",
                 number(Some(proven.lower)),
                 number(Some(proven.upper)),
-                seconds * 1e3
+                self.seconds * 1e3
             ),
             (_, Some(reason)) => format!("proven     no: {reason}\n"),
             _ => String::new(),
@@ -171,60 +97,22 @@ impl ProofReport {
     }
 }
 
-fn overrides(args: &Args) -> DesignOverrides {
-    DesignOverrides {
-        method: args.method,
-        taps: args.taps,
-        slack: args.slack,
-        bits: args.bits.clone(),
-        fraction_bits: args.fraction_bits,
-        reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
-    }
-}
-
-/// Runs the verb.
-///
-/// # Errors
-/// [`Failure`] with the one message for the user.
-pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    if args.json && is_dash(&args.output) {
-        return Err(Failure::Usage(
-            "--json and `-o -` both want standard output; write the bank to a file".into(),
-        ));
-    }
-    let mut spec = load_spec(&args.spec, overrides(args))?;
-    spec.latency = args.latency.or(spec.latency);
-    spec.check().map_err(|problem| Failure::Input(format!("{}: {problem}", args.spec.display())))?;
-    let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
-    let begin = Instant::now();
-    let mut found = design::design(&spec).map_err(named)?;
-    let seconds = begin.elapsed().as_secs_f64();
-    let mean = design::analyze_mean(&found.bank).map_err(named)?;
-    let proving = Instant::now();
-    let proof = attach_proof(&mut found);
-    let proof_seconds = proving.elapsed().as_secs_f64();
-    let text = found.bank.to_json().map_err(Failure::input)?;
-    write_text(&args.output, &text, args.force)?;
-    let report = Report { proof, proof_seconds, ..Report::new(args, &found, mean, seconds) };
-    if args.json {
-        super::print_json(&report)
-    } else if is_dash(&args.output) {
-        eprint!("{}", report.text());
-        Ok(())
-    } else {
-        super::print(&report.text())
-    }
-}
-
 impl<'a> Report<'a> {
-    fn new(args: &Args, design: &'a Design, mean: MeanAnalysis, seconds: f64) -> Self {
+    /// Of a bank written to `output`, designed in so many seconds.
+    pub(super) fn new(
+        output: String,
+        design: &'a Design,
+        mean: MeanAnalysis,
+        seconds: f64,
+        proof: &'a ProofReport,
+    ) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
             SynthesisFilters::StateSpace(block) => (None, Some(block.a.len())),
         };
         Self {
-            bank: args.output.display().to_string(),
+            bank: output,
             method: bank.method,
             channels: bank.channel_count(),
             ratio: bank.ratio,
@@ -239,12 +127,11 @@ impl<'a> Report<'a> {
             peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
             iterations: design.iterations,
             seconds,
-            proof: ProofReport::default(),
-            proof_seconds: 0.0,
+            proof,
         }
     }
 
-    fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let size = match (self.taps, self.states) {
             (Some(taps), _) => format!("{taps} taps a channel"),
             (_, Some(states)) => format!("{states} states"),
@@ -281,7 +168,7 @@ impl<'a> Report<'a> {
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.seconds * 1e3,
             self.iterations,
-            self.proof.text(self.proof_seconds),
+            self.proof.text(),
         )
     }
 }

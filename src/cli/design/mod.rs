@@ -1,0 +1,137 @@
+//! `hybank design`: from a spec file to a bank file.
+
+mod report;
+
+use super::Failure;
+use super::bank_file::{bad_flag, is_dash, load_spec, write_text};
+use crate::bank::FixedPoint;
+use crate::design::{self, Design, DesignError};
+use crate::spec::{DesignOverrides, Method, Reduction, WordLengths};
+use report::{ProofReport, Report};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Designs the synthesis filters for a spec
+///
+/// The bank file holds the filters, the spec with all defaults filled in, and gamma: the exact worst-case gain from the
+/// analog input to the error (upper), a proven lower bound for any bank of that method and size (lower), and the
+/// bound that no latency can beat (noncausal), all in normalised time.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank design spec.toml -o bank.json
+  hybank design spec.toml -o iir.json --method iir
+  hybank design spec.toml -o fixed.json --taps 64 --bits 14
+  hybank design spec.toml -o small.json --method iir --order 6
+  hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
+  hybank design spec.toml -o - --taps 64 | hybank analyze -")]
+pub(super) struct Args {
+    /// The spec (TOML); `-` is standard input
+    spec: PathBuf,
+    /// The bank file (JSON); `-` is standard output
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Another method than the spec's
+    #[arg(long, value_parser = parse_method)]
+    method: Option<Method>,
+    /// Another number of taps a channel than the spec's
+    #[arg(long)]
+    taps: Option<usize>,
+    /// Another latency than the spec's, in fast samples
+    #[arg(long)]
+    latency: Option<usize>,
+    /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
+    #[arg(long)]
+    slack: Option<f64>,
+    /// Integer taps of so many bits, sign included; or a list of bits, one for each tap (4,6,8,6,4)
+    #[arg(long)]
+    bits: Option<WordLengths>,
+    /// Integer taps times two to the minus this; chosen for the least gamma if left out
+    #[arg(long, allow_negative_numbers = true)]
+    fraction_bits: Option<i32>,
+    /// At most so many states, with the least error that they allow (methods iir and h2)
+    #[arg(long)]
+    order: Option<usize>,
+    /// As few states as keep the error within so many decibels of the full bank's (methods iir and h2)
+    #[arg(long, value_name = "DB", conflicts_with = "order")]
+    reduction_loss_db: Option<f64>,
+    /// Replace an existing bank file
+    #[arg(long)]
+    force: bool,
+    /// Print a report as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_method(text: &str) -> Result<Method, String> {
+    let known = Method::ALL.map(Method::name).join(", ");
+    Method::ALL
+        .into_iter()
+        .find(|method| method.name() == text)
+        .ok_or_else(|| format!("the methods are {known}"))
+}
+
+/// Looks for a proof of the bank's gammas and puts it into the bank; a bank that cannot be proven is a bank all the same.
+fn attach_proof(design: &mut Design) -> ProofReport {
+    let begin = Instant::now();
+    let found = design::prove(&design.bank, &design.dual);
+    let seconds = begin.elapsed().as_secs_f64();
+    match found {
+        Ok((proof, proven)) => {
+            design.bank.proof = Some(proof);
+            ProofReport { proven: Some(proven), unproven: None, seconds }
+        }
+        Err(error) => ProofReport { proven: None, unproven: Some(error.to_string()), seconds },
+    }
+}
+
+fn overrides(args: &Args) -> DesignOverrides {
+    DesignOverrides {
+        method: args.method,
+        taps: args.taps,
+        slack: args.slack,
+        bits: args.bits.clone(),
+        fraction_bits: args.fraction_bits,
+        reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
+    }
+}
+
+/// What is said of a bank of zeros.
+const SILENT: &str = "all integer taps are zero, the bank's output is silence: no integers of these bits were found that do \
+                      better; give more bits or another fraction_bits";
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] with the one message for the user.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    if args.json && is_dash(&args.output) {
+        return Err(Failure::Usage(
+            "--json and `-o -` both want standard output; write the bank to a file".into(),
+        ));
+    }
+    let mut spec = load_spec(&args.spec, overrides(args))?;
+    spec.latency = args.latency.or(spec.latency);
+    // Everything else was checked on reading.
+    spec.check().map_err(|problem| bad_flag("latency", &problem))?;
+    let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
+    let begin = Instant::now();
+    let mut found = design::design(&spec).map_err(named)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let mean = design::analyze_mean(&found.bank).map_err(named)?;
+    let proof = attach_proof(&mut found);
+    let text = found.bank.to_json().map_err(Failure::input)?;
+    write_text(&args.output, &text, args.force)?;
+    if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_silent) {
+        eprintln!("hybank: warning: {SILENT}");
+    }
+    let report = Report::new(args.output.display().to_string(), &found, mean, seconds, &proof);
+    if args.json {
+        super::print_json(&report)
+    } else if is_dash(&args.output) {
+        eprint!("{}", report.text());
+        Ok(())
+    } else {
+        super::print(&report.text())
+    }
+}

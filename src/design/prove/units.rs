@@ -1,0 +1,48 @@
+//! Units in which the search for a certificate is done, so that gains of the front ends do not matter to it.
+//!
+//! With xi = T eta, T diagonal, and e counted in units of s, a P that proves ||K|| <= gamma for [A, J; C, L] is T Q T' where
+//! Q proves ||K|| / s <= gamma / s for [T^-1 A T, T^-1 J; C T / s, L / s].
+
+use crate::linalg::{Mat, power_of_two};
+use crate::lti::LtiError;
+use crate::lti::gramian::controllability_root;
+use crate::verify::Midpoint;
+
+/// Powers of two, so that changing them rounds nothing.
+pub(super) struct Units {
+    states: Vec<f64>,
+    /// Of the wanted samples, and so of gamma.
+    pub(super) wanted: f64,
+}
+
+impl Units {
+    /// Units near to the standard deviations of the states and to the size `scale` of the wanted samples.
+    ///
+    /// # Errors
+    /// [`LtiError::IterationLimit`] if the system is not stable.
+    pub(super) fn of(system: &Midpoint, scale: f64) -> Result<Self, LtiError> {
+        let root = controllability_root(&system.a, &system.b)?;
+        let states = root.row_iter().map(|row| power_of_two(row.norm())).collect();
+        Ok(Self { states, wanted: power_of_two(scale) })
+    }
+
+    /// The system in these units.
+    pub(super) fn of_one(&self, system: &Midpoint) -> Midpoint {
+        let entry = |m: &Mat, row: &dyn Fn(usize) -> f64, column: &dyn Fn(usize) -> f64| {
+            Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / row(i) * column(j))
+        };
+        let (state, wanted, input) = (|i: usize| self.states[i], |_: usize| self.wanted, |_: usize| 1.0);
+        Midpoint {
+            a: entry(&system.a, &state, &state),
+            b: entry(&system.b, &state, &input),
+            c: entry(&system.c, &wanted, &state),
+            d: entry(&system.d, &wanted, &input),
+        }
+    }
+
+    /// Rows of R in the units of the file from those in these.
+    pub(super) fn factor(&self, rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        let scaled = |(row, unit): (Vec<f64>, &f64)| row.into_iter().map(|x| x * unit).collect();
+        rows.into_iter().zip(&self.states).map(scaled).collect()
+    }
+}

@@ -1,0 +1,139 @@
+//! Integers at one scale: closest lattice points that follow the worst frequencies, then a descent.
+
+use super::super::DesignError;
+use super::super::error_system::by_lag;
+use super::descent::Descent;
+use super::forms::Tap;
+use super::lattice::{Span, closest};
+use super::quantiser::Quantiser;
+use crate::bank::FixedPoint;
+use crate::spec::WordLengths;
+
+/// Rounds in which the weights follow the worst frequencies.
+const ROUNDS: usize = 12;
+/// Part of the weights that a round replaces.
+const PACE: f64 = 0.2;
+/// Weight of the worst frequency, relative to the even weights of the beginning.
+const EMPHASIS: f64 = 3.0;
+/// Relative excess over the gamma of the real taps that is as good as none: 0.0002 dB.
+const NEGLIGIBLE: f64 = 2e-5;
+/// Integers as doubles, a list a channel.
+type Integers = Vec<Vec<f64>>;
+
+/// Integers that were looked at.
+pub(super) struct Candidate {
+    pub(super) fixed_point: FixedPoint,
+    /// gamma, estimated.
+    pub(super) gamma: f64,
+    /// The mean square of the error and of the converters' noise at the output, a tick.
+    pub(super) mean_square: f64,
+}
+
+/// The search at one scale.
+pub(super) struct Search<'a> {
+    quantiser: &'a Quantiser<'a>,
+    bits: &'a WordLengths,
+    fraction_bits: i32,
+    /// The taps in steps.
+    centre: Integers,
+    spans: Vec<Span>,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(quantiser: &'a Quantiser<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
+        let factor = f64::from(fraction_bits).exp2();
+        let centre: Integers = quantiser
+            .subject
+            .taps
+            .iter()
+            .map(|filter| filter.iter().map(|tap| tap * factor).collect())
+            .collect();
+        let spans = (0..centre[0].len()).map(|n| Span::of(bits, n)).collect();
+        Self { quantiser, bits, fraction_bits, centre, spans }
+    }
+
+    /// All candidates: the rounded taps, those of the rounds, and what a descent makes of the best of these.
+    pub(super) fn run(&self) -> Result<Vec<Candidate>, DesignError> {
+        let mut found = vec![self.quantiser.candidate(self.rounded())?];
+        self.follow_the_peaks(&mut found)?;
+        let start = found.iter().min_by(|a, b| a.gamma.total_cmp(&b.gamma)).ok_or(DesignError::NoTaps)?;
+        found.push(self.quantiser.candidate(self.descended(&start.fixed_point)?)?);
+        Ok(found)
+    }
+
+    fn descended(&self, start: &FixedPoint) -> Result<FixedPoint, DesignError> {
+        let points = self.quantiser.grid.points();
+        let integers = start.integers.iter().map(|list| list.iter().map(|&x| x as f64).collect()).collect();
+        let lags = by_lag(&start.taps(), self.quantiser.ratio);
+        let real = self.quantiser.real;
+        let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
+        Ok(self.fixed_point(&descent.run(NEGLIGIBLE)?))
+    }
+
+    /// The taps rounded one by one, cut off where they leave their bits.
+    pub(super) fn rounded(&self) -> FixedPoint {
+        let round = |filter: &Vec<f64>| {
+            filter.iter().zip(&self.spans).map(|(tap, span)| span.nearest(*tap)).collect()
+        };
+        self.fixed_point(&self.centre.iter().map(round).collect())
+    }
+
+    /// Closest lattice points with weights that grow where the last one was worst.
+    fn follow_the_peaks(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
+        let real = self.quantiser.real;
+        let mut weights = vec![1.0; self.quantiser.grid.points().len()];
+        for _ in 0..ROUNDS {
+            let candidate = self.quantiser.candidate(self.fixed_point(&self.closest(&weights)?))?;
+            let lags = by_lag(&candidate.fixed_point.taps(), self.quantiser.ratio);
+            let room = candidate.gamma - real;
+            found.push(candidate);
+            if room <= NEGLIGIBLE * real {
+                break;
+            }
+            for (weight, gain) in weights.iter_mut().zip(self.quantiser.grid.gains(&lags)?) {
+                let excess = ((gain - real) / room).max(0.0);
+                *weight = (1.0 - PACE) * *weight + PACE * EMPHASIS * excess * excess;
+            }
+        }
+        Ok(())
+    }
+
+    /// The closest integers in the mean-square sense with these weights, phase by phase.
+    fn closest(&self, weights: &[f64]) -> Result<Integers, DesignError> {
+        let ratio = self.quantiser.ratio;
+        let lags = self.spans.len().div_ceil(ratio);
+        let correlations = self.quantiser.forms.correlations(weights, lags);
+        let mut integers = self.centre.clone();
+        for phase in 0..ratio.min(self.spans.len()) {
+            let taps = self.taps_of(phase);
+            let at = |tap: &Tap| phase + tap.lag * ratio;
+            let centre: Vec<f64> = taps.iter().map(|tap| self.centre[tap.channel][at(tap)]).collect();
+            let spans: Vec<Span> = taps.iter().map(|tap| self.spans[at(tap)]).collect();
+            let found = closest(&correlations.factor(&taps)?, &centre, &spans);
+            for (tap, integer) in taps.iter().zip(found) {
+                integers[tap.channel][at(tap)] = integer;
+            }
+        }
+        Ok(integers)
+    }
+
+    /// The taps of a phase, in the order of time; those with few bits last, where they are decided first and the others
+    /// can make up for what they cannot do.
+    fn taps_of(&self, phase: usize) -> Vec<Tap> {
+        let ratio = self.quantiser.ratio;
+        let lags = (self.spans.len() - phase).div_ceil(ratio);
+        let mut taps: Vec<Tap> = (0..lags)
+            .flat_map(|lag| (0..self.centre.len()).map(move |channel| Tap { channel, lag }))
+            .collect();
+        taps.sort_by_key(|tap| std::cmp::Reverse(self.bits.bits(phase + tap.lag * ratio)));
+        taps
+    }
+
+    fn fixed_point(&self, integers: &Integers) -> FixedPoint {
+        FixedPoint {
+            bits: self.bits.clone(),
+            fraction_bits: self.fraction_bits,
+            integers: integers.iter().map(|list| list.iter().map(|&x| x as i64).collect()).collect(),
+        }
+    }
+}

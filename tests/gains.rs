@@ -1,0 +1,120 @@
+//! The unit of a signal does not matter: K = W - F H is linear in the target's gain, and a channel's gain is undone by its
+//! filter. Designed, proven and read back over 18 decades.
+
+#[path = "support/specs.rs"]
+mod specs;
+
+use hybank::bank::{Bank, SynthesisFilters};
+use hybank::design::{analyze, design, prove};
+use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
+use hybank::verify::verify;
+use specs::{alike, amplified, amplify, butterworth, tf, thesis, with_taps};
+
+/// gamma of the thesis example, and of its optimal bank of 22 taps.
+const GAMMA: f64 = 0.03993204;
+const GAINS: [f64; 8] = [1e-9, 1e-6, 1e-3, 0.7, 1e3, 1e6, 1e8, 1e9];
+
+fn example(method: Method) -> Spec {
+    match method {
+        Method::Fir => with_taps(thesis(10, &[1.2, 0.6]), 22),
+        _ => Spec { design: DesignSpec::new(method, None), ..thesis(10, &[1.2, 0.6]) },
+    }
+}
+
+/// Designs and proves; gamma is `wanted` up to what the design leaves open, computed, proven and read back.
+fn check(what: &str, spec: &Spec, wanted: f64) -> Bank {
+    let found = design(spec).unwrap_or_else(|error| panic!("{what}: {error}"));
+    let gamma = &found.bank.gamma;
+    let upper = gamma.upper.unwrap();
+    assert!((upper / wanted - 1.0).abs() < 1e-6, "{what}: {gamma:?}, wanted {wanted:e}");
+    let (lower, noncausal) = (gamma.lower.unwrap(), gamma.noncausal.unwrap());
+    assert!(lower > wanted * (1.0 - 2e-6) && noncausal > wanted * (1.0 - 2e-6), "{what}: {gamma:?}");
+    let again = analyze(&found.bank, &[]).unwrap().gamma;
+    assert!((again / upper - 1.0).abs() < 1e-8, "{what}: {again:e}, {upper:e}");
+    let (proof, _) = prove(&found.bank, &found.dual).unwrap_or_else(|error| panic!("{what}: {error}"));
+    let bank = Bank { proof: Some(proof), ..found.bank };
+    let read = Bank::from_json(&bank.to_json().unwrap(), "bank.json").unwrap();
+    let proven = verify(&read).unwrap_or_else(|error| panic!("{what}: {error}"));
+    assert!(proven.upper <= wanted * (1.0 + 2e-6) && proven.upper >= upper, "{what}: {proven:?}");
+    assert!(!proven.lower_only_stated && !proven.noncausal_only_stated, "{what}: {proven:?}");
+    bank
+}
+
+#[test]
+fn a_gain_of_all_front_ends_is_one_of_gamma() {
+    for method in [Method::Fir, Method::Iir, Method::H2] {
+        for gain in GAINS {
+            check(&format!("{method:?}, all {gain:e}"), &amplified(example(method), gain), GAMMA * gain);
+        }
+    }
+}
+
+#[test]
+fn a_gain_of_the_target_is_one_of_gamma() {
+    for method in [Method::Fir, Method::Iir, Method::H2] {
+        for gain in GAINS {
+            let mut spec = example(method);
+            amplify(&mut spec.target, gain);
+            check(&format!("{method:?}, target {gain:e}"), &spec, GAMMA * gain);
+        }
+    }
+}
+
+#[test]
+fn a_gain_of_a_channel_is_undone_by_its_filter() {
+    for method in [Method::Fir, Method::Iir, Method::H2] {
+        for gain in GAINS {
+            let mut spec = example(method);
+            amplify(&mut spec.channels[0].filter, gain);
+            check(&format!("{method:?}, channel 1 {gain:e}"), &spec, GAMMA);
+        }
+    }
+}
+
+#[test]
+fn taps_follow_the_gains() {
+    let taps = |bank: Bank| match bank.filters {
+        SynthesisFilters::Fir(taps) => taps,
+        SynthesisFilters::StateSpace(_) => panic!("states"),
+    };
+    let plain = taps(check("plain", &example(Method::Fir), GAMMA));
+    // Powers of two change no digit of the problem.
+    for exponent in [-30, 30] {
+        let gain = f64::from(exponent).exp2();
+        let all = taps(check("all", &amplified(example(Method::Fir), gain), GAMMA * gain));
+        let size = plain.iter().flatten().fold(0.0f64, |most, tap| most.max(tap.abs()));
+        for (a, b) in all.iter().flatten().zip(plain.iter().flatten()) {
+            assert!((a - b).abs() < 1e-6 * size, "2^{exponent}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn steep_front_ends_of_much_gain_are_designed() {
+    for gain in [1e-9, 1e9] {
+        // An amplifier without feedback to speak of, before a Butterworth filter.
+        let amplifier = tf(&[gain], &[0.1, 1.0]);
+        let filter = FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), amplifier.clone()] };
+        let unity = FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), tf(&[1.0], &[0.1, 1.0])] };
+        let gamma = |filter| {
+            let spec = alike(filter, 4, 12, &[0.0, 1.3, 2.1, 2.95]);
+            design(&spec).unwrap().bank.gamma.upper.unwrap()
+        };
+        let (amplified, plain) = (gamma(&filter), gamma(&unity));
+        assert!((amplified / (gain * plain) - 1.0).abs() < 1e-6, "{amplified:e} {plain}");
+    }
+}
+
+#[test]
+fn orders_are_reduced_alike() {
+    let reduced = |gain: f64| {
+        let mut spec = amplified(example(Method::Iir), gain);
+        spec.design.reduction = Some(Reduction::Order(4));
+        let found = design(&spec).unwrap();
+        found.bank.gamma.upper.unwrap() / gain
+    };
+    let plain = reduced(1.0);
+    for gain in [1e-9, 1e9] {
+        assert!((reduced(gain) / plain - 1.0).abs() < 1e-3, "{gain:e}: {} {plain}", reduced(gain));
+    }
+}
