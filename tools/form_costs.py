@@ -27,10 +27,8 @@ def blocks(n, m, k, length):
 
 def direct(n, m, k):
     """Terms of the direct form: vectors of products, vectors of sums, outputs, ticks."""
-    fold = 2 if 1 in (n, m) else 1
-    hop = n * fold
-    depth = hop if hop < GROUP and hop & (hop - 1) == 0 else GROUP
-    steps = -(-(k + fold - 1) * n // depth)
+    depth = n if n < GROUP and n & (n - 1) == 0 else GROUP
+    steps = -(-k * n // depth)
     return [steps * depth * m / GROUP, depth * m / GROUP, m, 1]
 
 

@@ -252,6 +252,36 @@ fn samples_that_are_not_finite_do_not_spread_in_long_calls() {
 }
 
 #[test]
+fn what_is_not_finite_is_found_wherever_it_is() {
+    let mut noise = Noise(77);
+    for (n, m) in (1..=9).flat_map(|n| (1..=5).map(move |m| (n, m))) {
+        for lags in [1, 2, 3, 7, 20] {
+            // Every second filter is silent: what it is not to multiply must be found all the same.
+            let mut taps = random_taps(n, lags * m, &mut noise);
+            taps.iter_mut().step_by(2).for_each(|f| f.fill(0.0));
+            let bank = fir_bank(taps, m);
+            let mut input = noise.samples(n * 420);
+            let place = (noise.0 >> 33) as usize % input.len();
+            input[place] = 0.0;
+            let want = run(&bank, Options::default(), &input);
+            input[place] = if lags % 2 == 0 { f32::NAN } else { f32::NEG_INFINITY };
+            for call in [420, 60, 7] {
+                let mut stream = Reconstructor::new(&bank).unwrap();
+                let mut out = vec![0.0; want.len()];
+                for (x, y) in input.chunks(call * n).zip(out.chunks_mut(call * m)) {
+                    stream.process(x, y).unwrap();
+                }
+                assert_eq!(
+                    (&out, stream.replaced()),
+                    (&want, 1),
+                    "N {n} M {m} K {lags}, sample {place}, {call}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn double_precision_is_double() {
     let mut noise = Noise(4);
     let taps = random_taps(4, 64, &mut noise);

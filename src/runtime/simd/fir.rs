@@ -38,7 +38,7 @@ pub(crate) struct Cut {
     pub(crate) past: usize,
     /// Ticks of a vector, a power of two: calls for a multiple of them read nothing past their last frame.
     pub(crate) vector: usize,
-    /// Bit r: whether the outputs of vector r of each tile are looked at. Those of its last vector always are.
+    /// Bit r: whether the sums of vector r of each tile are looked at. Those of its last vector always are.
     pub(super) watched: u32,
     /// The order of steps for a single phase.
     pub(super) pairing: Pairing,
@@ -77,7 +77,7 @@ pub(super) struct Job<'a, T> {
     pub(super) scratch: *mut T,
 }
 
-/// Returns false if an output is not finite, or their sum.
+/// Returns false if a sum that is looked at is not finite, or the total of those that are.
 type PassFn<T> = unsafe fn(&Job<'_, T>) -> bool;
 
 /// The kernels of one sample type.
@@ -124,7 +124,7 @@ impl<T: Copy + Default + 'static> FirKernel<T> {
     /// read too and mean nothing.
     ///
     /// Returns false if an input of these ticks is not finite: it makes all outputs of its tick so, whatever the
-    /// coefficients. It is false also where finite inputs led to an output, or to a sum of outputs, that is not.
+    /// coefficients. It is false also where finite inputs led to sums, or to a total of sums, that are not.
     ///
     /// # Panics
     /// If the group, `x` or `out` is too short for that.
@@ -183,7 +183,7 @@ struct Pass<'a, V: Lanes, const D: usize, const P: usize> {
     /// The tile in scratch: its first tick and its vectors, 0 if there is none.
     first: usize,
     waiting: usize,
-    /// Of all outputs, lane by lane: not finite if one of them is not.
+    /// Of the sums that are looked at, lane by lane: not finite if one of them is not.
     total: V::Group,
 }
 
