@@ -21,9 +21,21 @@ pub const PEAK_ACCURACY: f64 = 1e-9;
 const ROUND_LIMIT: usize = 60;
 /// Uniform frequencies looked at first.
 const FIRST_GRID: usize = 32;
-/// How far off the axis (relative) an eigenvalue may lie and still suggest a frequency. Generous: a
-/// false suggestion costs one evaluation, a missed one would cost the proof.
-const AXIS_TOLERANCE: f64 = 1e-5;
+/// Relative differences of gains below this are no reason to go on climbing.
+const FLAT: f64 = 1e-11;
+/// At least so many uniform frequencies a state: |G|^2 has at most a peak for each state between 0 and pi.
+const LOOKS_PER_STATE: usize = 2;
+/// Frequencies nearer than this are looked at once.
+const SAME_FREQUENCY: f64 = 1e-9;
+/// How far off the axis (relative) an eigenvalue may lie and still count as a crossing.
+const ON_AXIS: f64 = 1e-5;
+/// As [`ON_AXIS`] where a frequency is only suggested. Where the level all but touches a peak, two eigenvalues meet on the axis,
+/// and what rounding does to the matrix moves them by its square root: errors of 1e-4 are common where the gain is small
+/// against the parts that cancel. A false suggestion costs one evaluation, a missed one a peak.
+const NEAR_AXIS: f64 = 1e-2;
+
+/// Distances from the angle of a pole, in those of the pole from the unit circle.
+const WIDTHS: [f64; 5] = [-1.5, -0.5, 0.0, 0.5, 1.5];
 
 /// A gain this near to the level (relative) is no good centre of the Cayley transform.
 const NEAR_LEVEL: f64 = 1e-2;
@@ -83,9 +95,12 @@ pub fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, LtiError> 
     if radius >= 1.0 { Err(LtiError::Unstable { radius }) } else { Ok(poles) }
 }
 
-/// Angles of the poles that may make a peak.
+/// Angles of the poles that may make a peak, and angles about them at distances of what they miss of the unit circle: the
+/// width of what they do to the gain.
 pub fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
-    poles.iter().filter(|p| p.im > 0.0 && p.norm() > 0.5).map(|p| p.arg()).collect()
+    let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > 0.5);
+    let about = |p: &Complex<f64>| WIDTHS.map(|width| p.arg() + width * (1.0 - p.norm()));
+    near.flat_map(about).filter(|w| (0.0..=PI).contains(w)).collect()
 }
 
 /// The gain at one frequency: see [`unexplained_peak`].
@@ -145,44 +160,48 @@ impl<'a> Search<'a> {
         Err(LtiError::IterationLimit { what: "the level set", limit: ROUND_LIMIT, change: PEAK_ACCURACY })
     }
 
-    /// Grid and hints, the best two tops refined.
+    /// The highest of the tops on the grid, each refined that may be it. Minimax designs have many peaks that differ by less
+    /// than any level set tells apart, so that none can be left to it.
     fn first_peak(&self) -> Result<Peak, LtiError> {
-        let mut grid: Vec<f64> = (0..=FIRST_GRID).map(|k| PI * k as f64 / FIRST_GRID as f64).collect();
-        grid.extend(&self.hints);
-        grid.sort_by(f64::total_cmp);
-        let gains = grid.iter().map(|&w| self.gain(w)).collect::<Result<Vec<_>, _>>()?;
-        let mut tops: Vec<usize> = (0..grid.len()).filter(|&k| is_local_maximum(&gains, k)).collect();
-        tops.sort_by(|&i, &j| gains[j].total_cmp(&gains[i]));
-        let mut best = Peak { gain: 0.0, frequency: 0.0 };
-        for &k in tops.iter().take(2) {
-            // The gain is even about 0 and about pi, so the neighbours there are mirror images.
-            let left = if k == 0 { -grid[1] } else { grid[k - 1] };
-            let right = if k + 1 == grid.len() { 2.0 * PI - grid[k - 1] } else { grid[k + 1] };
-            let start = Peak { gain: gains[k], frequency: grid[k] };
-            best = higher(best, self.climb(left, start, right)?);
+        let looks = self.looks()?;
+        let mut tops = tops(&looks);
+        tops.sort_by(|a, b| b[1].gain.total_cmp(&a[1].gain));
+        let mut best = tops.first().map_or(Peak { gain: 0.0, frequency: 0.0 }, |top| top[1].folded());
+        for [low, top, high] in tops {
+            if summit(low, top, high) > best.gain {
+                best = higher(best, self.climb(low, top, high)?);
+            }
         }
         Ok(best)
     }
 
-    /// Climbs to the top between `left` and `right` by parabolas through the last three points, falling
+    /// The gains at the first frequencies, ascending from 0 to pi.
+    fn looks(&self) -> Result<Vec<Peak>, LtiError> {
+        let intervals = FIRST_GRID.max(LOOKS_PER_STATE * self.system.order());
+        let mut grid: Vec<f64> = (0..=intervals).map(|k| PI * k as f64 / intervals as f64).collect();
+        grid.extend(&self.hints);
+        grid.sort_by(f64::total_cmp);
+        grid.dedup_by(|b, a| *b - *a < SAME_FREQUENCY);
+        grid.into_iter().map(|w| self.look(w)).collect()
+    }
+
+    fn look(&self, frequency: f64) -> Result<Peak, LtiError> {
+        Ok(Peak { gain: self.gain(frequency)?, frequency })
+    }
+
+    /// Climbs to the top between `low` and `high` by parabolas through the last three points, falling
     /// back on golden sections. The gain is flat at the top: its value converges twice as fast as the
     /// frequency.
-    fn climb(&self, left: f64, start: Peak, right: f64) -> Result<Peak, LtiError> {
-        let mut low = Peak { gain: self.gain(left)?, frequency: left };
-        let mut high = Peak { gain: self.gain(right)?, frequency: right };
+    fn climb(&self, mut low: Peak, start: Peak, mut high: Peak) -> Result<Peak, LtiError> {
         let mut best = start;
-        let mut stalls = 0;
-        while high.frequency - low.frequency > 1e-9 && stalls < 3 {
+        let (mut stalls, mut flats) = (0, 0);
+        while high.frequency - low.frequency > 1e-9 && flats < 2 {
             let w = next_abscissa(low, best, high, stalls);
-            let tried = Peak { gain: self.gain(w)?, frequency: w };
+            let tried = self.look(w)?;
             let gained = tried.gain - best.gain;
-            stalls = if gained.abs() <= 1e-14 * best.gain {
-                3
-            } else if gained < 1e-11 * best.gain {
-                stalls + 1
-            } else {
-                0
-            };
+            stalls = if gained < FLAT * best.gain { stalls + 1 } else { 0 };
+            // A try far below the best one says that the step was poor, not that the top is reached.
+            flats = if gained.abs() <= FLAT * best.gain { flats + 1 } else { 0 };
             if gained > 0.0 {
                 if w < best.frequency {
                     high = best
@@ -201,44 +220,44 @@ impl<'a> Search<'a> {
 
     /// A frequency with a gain above `level`, refined, if there is one.
     fn above(&self, level: f64) -> Result<Option<Peak>, LtiError> {
-        let crossings = self.crossings(level)?;
+        let crossings = self.crossings(level, NEAR_AXIS)?;
         let mut candidates = crossings.clone();
         candidates.extend(crossings.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
         let mut best = Peak { gain: level, frequency: f64::NAN };
         for w in candidates {
-            best = higher(best, Peak { gain: self.gain(w)?, frequency: w });
+            best = higher(best, self.look(w)?);
         }
         if best.frequency.is_nan() {
             return Ok(None);
         }
         let spread = 0.25 * PI / FIRST_GRID as f64;
-        self.climb(best.frequency - spread, best, best.frequency + spread).map(Some)
+        let (low, high) = (self.look(best.frequency - spread)?, self.look(best.frequency + spread)?);
+        self.climb(low, best, high).map(Some)
     }
 
     fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
-        let mut edges = self.crossings(level)?;
+        let mut edges = self.crossings(level, ON_AXIS)?;
         edges.dedup();
         let mut peaks = Vec::new();
         for range in edges.windows(2) {
-            let middle = 0.5 * (range[0] + range[1]);
-            let start = Peak { gain: self.gain(middle)?, frequency: middle };
+            let start = self.look(0.5 * (range[0] + range[1]))?;
             if start.gain > level {
-                let inside = self.climb(range[0], start, range[1])?;
-                let end = |w: f64| self.gain(w).map(|gain| Peak { gain, frequency: w });
-                peaks.push(higher(inside, higher(end(range[0])?, end(range[1])?)));
+                let (low, high) = (self.look(range[0])?, self.look(range[1])?);
+                peaks.push(higher(self.climb(low, start, high)?, higher(low, high)));
             }
         }
         Ok(peaks)
     }
 
-    /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`.
+    /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`: those of eigenvalues that
+    /// lie off the axis by at most `tolerance` (relative).
     ///
     /// The Hamiltonian matrix is asked twice, balanced and as it stands: gains of many decades want the one, its smallest
     /// entries, which are rounding errors, the other.
     ///
     /// Measured outputs that are copies of one another leave no Hamiltonian matrix; then nothing is
     /// suggested and the refined grid stands, still a value that is attained.
-    fn crossings(&self, level: f64) -> Result<Vec<f64>, LtiError> {
+    fn crossings(&self, level: f64, tolerance: f64) -> Result<Vec<f64>, LtiError> {
         let mut crossings = vec![0.0, PI];
         let centre = self.centre(level)?;
         let real = centre == 0.0 || centre == PI;
@@ -256,7 +275,7 @@ impl<'a> Search<'a> {
         };
         // Of a conjugate pair one is enough.
         for lambda in eigenvalues.into_iter().filter(|lambda| !real || lambda.im >= 0.0) {
-            if lambda.re.abs() <= AXIS_TOLERANCE * (1.0 + lambda.norm()) {
+            if lambda.re.abs() <= tolerance * (1.0 + lambda.norm()) {
                 let w = centre + PI + 2.0 * lambda.im.atan();
                 crossings.push(Peak { gain: level, frequency: w }.folded().frequency);
             }
@@ -323,7 +342,7 @@ fn next_abscissa(low: Peak, best: Peak, high: Peak, stalls: usize) -> f64 {
     let (left, right) = ((m - a) * (best.gain - high.gain), (b - m) * (best.gain - low.gain));
     let vertex = m - 0.5 * ((m - a) * left - (b - m) * right) / (left + right);
     let room = 1e-3 * (b - a).min(1e-5);
-    if stalls < 2 && vertex > a + room && vertex < b - room && (vertex - m).abs() > 1e-12 {
+    if stalls % 3 < 2 && vertex > a + room && vertex < b - room && (vertex - m).abs() > 1e-12 {
         return vertex;
     }
     if m - a > b - m { m - GOLDEN * (m - a) } else { m + GOLDEN * (b - m) }
@@ -333,8 +352,26 @@ fn higher(a: Peak, b: Peak) -> Peak {
     if b.gain > a.gain { b } else { a }
 }
 
-fn is_local_maximum(gains: &[f64], k: usize) -> bool {
-    (k == 0 || gains[k] >= gains[k - 1]) && (k + 1 == gains.len() || gains[k] >= gains[k + 1])
+/// The local maxima between their neighbours. The gain is even about 0 and about pi, so the neighbours there are mirror images.
+fn tops(looks: &[Peak]) -> Vec<[Peak; 3]> {
+    let last = looks.len() - 1;
+    let neighbours = |k: usize| {
+        let mirror = |about: f64, peak: Peak| Peak { frequency: 2.0 * about - peak.frequency, ..peak };
+        let low = if k == 0 { mirror(0.0, looks[1]) } else { looks[k - 1] };
+        let high = if k == last { mirror(PI, looks[last - 1]) } else { looks[k + 1] };
+        [low, looks[k], high]
+    };
+    let is_top = |[low, top, high]: &[Peak; 3]| top.gain >= low.gain.max(high.gain);
+    (0..=last).map(neighbours).filter(is_top).collect()
+}
+
+/// How high the gain may rise between `low` and `high`, of which `top` is the highest that was looked at: a gain that is
+/// concave there lies below the chords on either side of `top`, extended to the other.
+fn summit(low: Peak, top: Peak, high: Peak) -> f64 {
+    let (left, right) = (top.frequency - low.frequency, high.frequency - top.frequency);
+    let beyond_left = (top.gain - low.gain) * right / left;
+    let beyond_right = (top.gain - high.gain) * left / right;
+    top.gain + beyond_left.max(beyond_right)
 }
 
 type Parts<T> = (DMatrix<T>, DMatrix<T>, DMatrix<T>, DMatrix<T>);
