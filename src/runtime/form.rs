@@ -42,11 +42,11 @@ pub(crate) enum Choice {
 const LONGEST_TRANSFORM: usize = 1 << 24;
 
 /// Each pair of a phase and a vector of products: adding its lanes.
-const DIRECT_SUM: f64 = 2.0;
+const DIRECT_SUM: f64 = 1.2;
 /// Each output of the direct form.
-const DIRECT_OUTPUT: f64 = 0.33;
+const DIRECT_OUTPUT: f64 = 0.3;
 /// A row in one level of radix 2 of a transform: 3 multiply-adds, 4 additions, loads and stores.
-const ROW_LEVEL: f64 = 4.4;
+const ROW_LEVEL: f64 = 4.2;
 /// Each output of overlap-save: from rows to frames.
 const BLOCK_OUTPUT: f64 = 0.8;
 /// Each vector of outputs of the fast form: from products to frames; each vector of inputs: to halves and means.

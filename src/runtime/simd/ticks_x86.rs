@@ -125,6 +125,7 @@ pub(super) unsafe fn store_ticks_f64<const P: usize, const D: usize>(
                 let quads = Group::transpose([a, b, c, d]);
                 quads.into_iter().enumerate().for_each(|(t, q)| _mm256_storeu_pd(out.add(t * hop), q));
             }
+            (2, 2) if hop == 2 => _mm256_storeu_pd(out, Group::diagonal_pairs(a, b)),
             (2, 2) => store_both_f64(Group::diagonal_pairs(a, b), [out, out.add(hop)]),
             (_, 2) => {
                 let first: __m256d = Group::diagonal_pairs(a, b);
