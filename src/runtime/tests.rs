@@ -159,6 +159,31 @@ fn many_channels_and_many_phases_work() {
     }
 }
 
+/// Calls of one thread and of several have the same bits, about calls of `long` ticks, and count the same.
+pub(super) fn spans_agree(
+    bank: &Bank,
+    options: Options,
+    workers: &[Workers],
+    long: usize,
+    noise: &mut Noise,
+) {
+    let mut one = Reconstructor::with_options(bank, options).unwrap();
+    let (n, m) = (one.channels(), one.ratio());
+    let mut many = vec![one.fresh(); workers.len()];
+    for ticks in [1, long, 4096, 2, long - 12_345] {
+        let mut input = noise.samples(n * ticks);
+        input[n * ticks / 2] = f32::NAN;
+        let mut want = vec![0.0; m * ticks];
+        one.process(&input, &mut want).unwrap();
+        for (stream, workers) in many.iter_mut().zip(workers) {
+            let mut out = vec![0.0; m * ticks];
+            assert_eq!(stream.process_parallel(&input, &mut out, workers), Ok(m * ticks));
+            assert!(out == want, "N {n} M {m} {:?} {ticks} ticks {workers:?}", stream.memory());
+            assert_eq!(one.replaced(), stream.replaced());
+        }
+    }
+}
+
 #[test]
 fn threads_do_not_change_a_bit() {
     let mut noise = Noise(31);
@@ -175,21 +200,7 @@ fn threads_do_not_change_a_bit() {
     ] {
         for precision in [Precision::Single, Precision::Double] {
             let bank = fir_bank(random_taps(n, taps, &mut noise), m);
-            let mut one =
-                Reconstructor::with_options(&bank, Options { precision, ..Options::default() }).unwrap();
-            let mut many = vec![one.fresh(); workers.len()];
-            for ticks in [1, long, 4096, 2, long - 12_345] {
-                let mut input = noise.samples(n * ticks);
-                input[n * ticks / 2] = f32::NAN;
-                let mut want = vec![0.0; m * ticks];
-                one.process(&input, &mut want).unwrap();
-                for (stream, workers) in many.iter_mut().zip(&workers) {
-                    let mut out = vec![0.0; m * ticks];
-                    assert_eq!(stream.process_parallel(&input, &mut out, workers), Ok(m * ticks));
-                    assert!(out == want, "N {n} M {m} {taps} taps {ticks} ticks {workers:?}");
-                    assert_eq!(one.replaced(), stream.replaced());
-                }
-            }
+            spans_agree(&bank, Options { precision, ..Options::default() }, &workers, long, &mut noise);
         }
     }
 }

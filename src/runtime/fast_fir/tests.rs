@@ -3,7 +3,7 @@
 use super::*;
 use crate::bank::{Bank, BlockFilter, SynthesisFilters};
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::tests::{Noise, available, definition, fir_bank, random_taps};
+use crate::runtime::tests::{Noise, available, definition, fir_bank, in_pieces, random_taps, spans_agree};
 use crate::runtime::{Form, Options, PcmOutput, Precision, Reconstructor, Workers};
 use proptest::prelude::*;
 
@@ -322,20 +322,7 @@ fn threads_do_not_change_a_bit() {
     ] {
         for precision in [Precision::Single, Precision::Double] {
             let bank = fir_bank(random_taps(n, taps, &mut noise), m);
-            let mut one = fast(&bank, precision);
-            let mut many = vec![one.fresh(); workers.len()];
-            for ticks in [1, long, 4096, 2, long - 12_345] {
-                let mut input = noise.samples(n * ticks);
-                input[n * ticks / 2] = f32::NAN;
-                let mut want = vec![0.0; m * ticks];
-                one.process(&input, &mut want).unwrap();
-                for (stream, workers) in many.iter_mut().zip(&workers) {
-                    let mut out = vec![0.0; m * ticks];
-                    assert_eq!(stream.process_parallel(&input, &mut out, workers), Ok(m * ticks));
-                    assert!(out == want, "N {n} M {m} {taps} taps {ticks} ticks {workers:?}");
-                    assert_eq!(one.replaced(), stream.replaced());
-                }
-            }
+            spans_agree(&bank, options(precision), &workers, long, &mut noise);
         }
     }
 }
@@ -409,13 +396,7 @@ proptest! {
         let replaced = stream.replaced();
         prop_assert_eq!(replaced as usize, input.iter().filter(|x| x.is_nan()).count());
         stream.reset();
-        let mut pieces = vec![0.0; whole.len()];
-        let (mut from, mut to) = (&input[..], &mut pieces[..]);
-        for cut in cuts {
-            let (head, tail) = to.split_at_mut(cut * m);
-            prop_assert_eq!(stream.process(&from[..cut * n], head).unwrap(), cut * m);
-            (from, to) = (&from[cut * n..], tail);
-        }
+        let pieces = in_pieces(&mut stream, [n, m], &input, &cuts);
         prop_assert_eq!(pieces.iter().zip(&whole).position(|(a, b)| a != b), None);
         prop_assert_eq!(stream.replaced(), replaced);
     }

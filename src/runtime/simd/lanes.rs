@@ -34,8 +34,6 @@ pub(super) trait Group: Copy {
     );
     /// The same for P = 2, D = 4 and the two sums of one vector, then those of another.
     unsafe fn store_halves(sums: [Self; 4], out: [*mut Self::Sample; 2], hop: usize);
-    /// a0, b0, c0, d0, a1, b1 ...
-    unsafe fn transpose(rows: [Self; 4]) -> [Self; 4];
     /// Ticks of D lanes each, one after the other in D groups: the sum of each tick.
     unsafe fn ticks<const D: usize>(groups: impl Fn(usize) -> Self) -> Self;
     unsafe fn load(at: *const Self::Sample) -> Self;
@@ -151,7 +149,13 @@ macro_rules! plain {
                 };
                 unsafe {
                     match (P, D) {
-                        (_, 1) => put(&Self::transpose([a, b, c, d]), 4),
+                        (_, 1) => put(
+                            &std::array::from_fn::<_, 4, _>(|quarter| {
+                                let rows = [a, b, c, d];
+                                Self(std::array::from_fn(|l| rows[l % 4].0[quarter * $lanes / 4 + l / 4]))
+                            }),
+                            4,
+                        ),
                         (2, _) => put(&[Self::diagonal_pairs(a, b)], 2),
                         (_, 2) => {
                             let last = Self::diagonal_pairs(c, if P == 3 { c } else { d }).0;
@@ -175,13 +179,6 @@ macro_rules! plain {
                 for (l, value) in pairs.into_iter().enumerate() {
                     unsafe { *out[l / 2 % 2].add(l / 4 * hop + l % 2) = value };
                 }
-            }
-
-            #[inline(always)]
-            unsafe fn transpose(rows: [Self; 4]) -> [Self; 4] {
-                std::array::from_fn(|quarter| {
-                    Self(std::array::from_fn(|l| rows[l % 4].0[quarter * $lanes / 4 + l / 4]))
-                })
             }
 
             #[inline(always)]

@@ -1,6 +1,5 @@
 //! [`Lanes`] in the registers of AVX2 and AVX-512.
 
-use super::convert::transpose4;
 use super::lanes::{Group, Lanes};
 use super::ticks_x86::{store_halves_f32, store_halves_f64, store_ticks_f32, store_ticks_f64};
 use std::arch::x86_64::*;
@@ -52,13 +51,6 @@ fn halves_f32(a: __m256, b: __m256) -> [__m256; 2] {
     [_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b)]
 }
 
-/// Both lower halves, both upper halves.
-#[target_feature(enable = "avx2,fma")]
-#[inline]
-fn halves_f64(a: __m256d, b: __m256d) -> [__m256d; 2] {
-    [_mm256_permute2f128_pd::<0x20>(a, b), _mm256_permute2f128_pd::<0x31>(a, b)]
-}
-
 impl Group for __m256 {
     type Sample = f32;
 
@@ -98,16 +90,6 @@ impl Group for __m256 {
     #[inline(always)]
     unsafe fn store_halves(sums: [Self; 4], out: [*mut f32; 2], hop: usize) {
         unsafe { store_halves_f32(sums, out, hop) }
-    }
-
-    #[inline(always)]
-    unsafe fn transpose(rows: [Self; 4]) -> [Self; 4] {
-        // Lanes 0 and 4, 1 and 5, 2 and 6, 3 and 7.
-        unsafe {
-            let [a, b, c, d] = transpose4(rows);
-            let ([first, third], [second, fourth]) = (halves_f32(a, b), halves_f32(c, d));
-            [first, second, third, fourth]
-        }
     }
 
     #[inline(always)]
@@ -204,15 +186,6 @@ impl Group for __m256d {
     #[inline(always)]
     unsafe fn store_halves(sums: [Self; 4], out: [*mut f64; 2], _: usize) {
         unsafe { store_halves_f64(sums, out) }
-    }
-
-    #[inline(always)]
-    unsafe fn transpose([a, b, c, d]: [Self; 4]) -> [Self; 4] {
-        unsafe {
-            let [first, third] = halves_f64(_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
-            let [second, fourth] = halves_f64(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
-            [first, second, third, fourth]
-        }
     }
 
     #[inline(always)]

@@ -122,16 +122,21 @@ pub(super) unsafe fn store_ticks_f64<const P: usize, const D: usize>(
                 store_both_f64(odd, [out.add(hop), out.add(3 * hop)]);
             }
             (_, 1) => {
-                let quads = Group::transpose([a, b, c, d]);
-                quads.into_iter().enumerate().for_each(|(t, q)| _mm256_storeu_pd(out.add(t * hop), q));
+                // Ticks 0 and 2, 1 and 3 of each two phases; in order, because of the place behind three.
+                let even = quads_f64(_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+                let odd = quads_f64(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+                for (t, quad) in [even[0], odd[0], even[1], odd[1]].into_iter().enumerate() {
+                    _mm256_storeu_pd(out.add(t * hop), quad);
+                }
             }
             (2, 2) if hop == 2 => _mm256_storeu_pd(out, Group::diagonal_pairs(a, b)),
             (2, 2) => store_both_f64(Group::diagonal_pairs(a, b), [out, out.add(hop)]),
             (_, 2) => {
                 let first: __m256d = Group::diagonal_pairs(a, b);
                 let last = Group::diagonal_pairs(c, if P == 3 { c } else { d });
-                _mm256_storeu_pd(out, _mm256_permute2f128_pd::<0x20>(first, last));
-                _mm256_storeu_pd(out.add(hop), _mm256_permute2f128_pd::<0x31>(first, last));
+                for (t, quad) in quads_f64(first, last).into_iter().enumerate() {
+                    _mm256_storeu_pd(out.add(t * hop), quad);
+                }
             }
             (3, _) => _mm256_storeu_pd(out, Group::quads([a, b, c, c])),
             _ => _mm256_storeu_pd(out, Group::diagonal_quads([a, b, c, d])),
@@ -145,6 +150,13 @@ pub(super) unsafe fn store_ticks_f64<const P: usize, const D: usize>(
 pub(super) unsafe fn store_halves_f64(sums: [__m256d; 4], out: [*mut f64; 2]) {
     // SAFETY: the caller's.
     unsafe { store_both_f64(Group::diagonal_halves(sums), out) }
+}
+
+/// Two ticks, from their first two and their last two phases with a tick in each half.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn quads_f64(first: __m256d, last: __m256d) -> [__m256d; 2] {
+    [_mm256_permute2f128_pd::<0x20>(first, last), _mm256_permute2f128_pd::<0x31>(first, last)]
 }
 
 /// Each half to a place of its own.
