@@ -19,10 +19,13 @@ mod fir;
 mod isa;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
-mod lanes_x86;
+mod lanes_avx2;
+#[cfg(target_arch = "x86_64")]
+mod lanes_avx512;
 mod layout;
 mod pairs;
 mod peak;
+mod phases;
 mod recursion;
 mod single;
 #[cfg(target_arch = "x86_64")]
