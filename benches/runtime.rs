@@ -70,10 +70,11 @@ struct Table {
 }
 
 impl Table {
-    /// One row: `samples` fast samples a turn of `products` multiply-adds each.
-    fn row(&self, name: &str, samples: usize, products: f64, turn: impl FnMut()) {
+    /// One row: `samples` fast samples a turn of `products` multiply-adds each. Returns the seconds of a turn, if the row
+    /// was asked for.
+    fn row(&self, name: &str, samples: usize, products: f64, turn: impl FnMut()) -> Option<f64> {
         if self.wanted.as_ref().is_some_and(|word| !name.contains(word)) {
-            return;
+            return None;
         }
         let (seconds, peak) = measure(turn);
         let rate = samples as f64 / seconds;
@@ -84,6 +85,7 @@ impl Table {
             macs / 1e9,
             100.0 * macs / peak
         );
+        Some(seconds)
     }
 
     /// The products are those of the direct form, so that the share of the peak may pass 100 % in others.
@@ -108,8 +110,8 @@ impl Table {
             self.doubles(&format!("{name}: f64"), n, m, taps, Form::Direct);
             self.doubles(&format!("{name}: f64, fast"), n, m, taps, Form::Fast);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
-            self.threads(&format!("{name}: f32, two threads"), n, m, taps, Form::Direct);
-            self.threads(&format!("{name}: f32, fast, two threads"), n, m, taps, Form::Fast);
+            self.threads(&format!("{name}: f32, long"), n, m, taps, Form::Direct);
+            self.threads(&format!("{name}: f32, fast, long"), n, m, taps, Form::Fast);
             self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
         }
     }
@@ -151,17 +153,24 @@ impl Table {
         });
     }
 
-    /// A longer call, as for files; the threads wait for it.
+    /// Longer calls, as for files, by one thread and by two that wait for them.
     fn threads(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
         let options = Options { form, ..Options::default() };
         let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
         let workers = Workers::new(2).unwrap();
-        let ticks = 64 * TICKS;
+        let ticks = 16 * TICKS;
         let x = input(n, ticks);
         let mut y = vec![0.0; m * ticks];
-        self.row(name, m * ticks, (n * taps) as f64 / m as f64, || {
+        let products = (n * taps) as f64 / m as f64;
+        let one = self.row(&format!("{name}, one thread"), m * ticks, products, || {
+            stream.process(black_box(&x), &mut y).unwrap();
+        });
+        let two = self.row(&format!("{name}, two threads"), m * ticks, products, || {
             stream.process_parallel(black_box(&x), &mut y, &workers).unwrap();
         });
+        if let (Some(one), Some(two)) = (one, two) {
+            println!("| {name:<27} {:.2} times one |          |        |         |", one / two);
+        }
     }
 
     /// 16 taps a phase for every small N and M, then more and more taps.

@@ -7,7 +7,7 @@
 use super::BuildError;
 use super::aligned::Aligned;
 use super::sample::Sample;
-use super::simd::{Cut, FirKernel, Isa, PhaseGroup};
+use super::simd::{Cut, Isa, Polyphase, Stretch};
 use super::ticks::{FastSink, TickSource};
 use super::window::Window;
 use std::ops::Range;
@@ -16,9 +16,8 @@ use std::ops::Range;
 const CACHE_SAMPLES: usize = 4096;
 /// Ticks of a block are a multiple of this, and so of every tile.
 const BLOCK_UNIT: usize = 96;
-/// A call is short if it has fewer ticks than so many times those that need the past: copying all of them is cheaper
-/// than a second call of the kernel.
-const SHORT_CALL: usize = 8;
+/// Copying all frames of a call of fewer samples is cheaper than one more tile of the kernel.
+const SHORT_CALL: usize = 256;
 /// Blocks that are taken at once where each frame is read only once, so that the cache does not matter.
 const SPAN_BLOCKS: usize = 8;
 
@@ -29,13 +28,11 @@ pub(crate) struct FirPlan<T: Sample> {
     pub(crate) ratio: usize,
     /// K - 1: ticks that the filters look back.
     pub(crate) history: usize,
-    cut: Cut,
     /// Ticks that a window reaches back.
     reach: usize,
     /// Ticks of a block.
     block: usize,
-    groups: Vec<PhaseGroup<T>>,
-    kernel: FirKernel<T>,
+    filters: Polyphase<T>,
     isa: Isa,
 }
 
@@ -63,11 +60,10 @@ impl<T: Sample> FirPlan<T> {
         let block = (CACHE_SAMPLES / channels).saturating_sub(lags).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT)
             / BLOCK_UNIT
             * BLOCK_UNIT;
-        let coefficient = |element, phase| coefficient(taps, ratio, element, phase);
-        let groups =
-            widths(ratio).map(|(first, width)| phase_group(&cut, first, width, coefficient)).collect();
+        let coefficient = |element, phase| T::from_f64(coefficient(taps, ratio, element, phase));
+        let filters = Polyphase::new(&kernel, cut, ratio, coefficient);
         let reach = cut.past.div_ceil(channels);
-        Ok(Self { channels, ratio, history: lags - 1, cut, reach, block, groups, kernel, isa })
+        Ok(Self { channels, ratio, history: lags - 1, reach, block, filters, isa })
     }
 
     /// N K: multiply-adds for each fast sample, without those by padding.
@@ -82,7 +78,7 @@ impl<T: Sample> FirPlan<T> {
 
     /// Zeros, for blocks of at most `block` ticks, and with `more` ticks of the past than the filters look back.
     pub(super) fn window(&self, block: usize, more: usize) -> Window<T> {
-        let (n, Cut { past, vector, .. }) = (self.channels, self.cut);
+        let (n, &Cut { past, vector, .. }) = (self.channels, self.filters.cut());
         Window::new(n, past + more * n, block * n, vector * n)
     }
 
@@ -118,30 +114,32 @@ impl<T: Sample> FirPlan<T> {
         ticks: usize,
         sink: &mut (impl FastSink + ?Sized),
     ) -> bool {
-        let beginning = self.reach + (ticks.wrapping_sub(self.reach) & (self.cut.vector - 1));
-        if ticks < SHORT_CALL * beginning.max(1) || beginning > self.block {
+        let &Cut { past, vector, .. } = self.filters.cut();
+        let beginning = self.reach + (ticks.wrapping_sub(self.reach) & (vector - 1));
+        if frames.len() < SHORT_CALL || ticks < 2 * beginning || beginning > self.block {
             return false;
         }
         let FirState { window, output } = state;
         let n = self.channels;
-        let room = window.room(beginning);
-        room.copy_from_slice(&frames[..beginning * n]);
-        let once = self.groups.len() == 1 && sink.takes::<T>();
+        window.room(beginning).copy_from_slice(&frames[..beginning * n]);
+        let begin = Stretch { x: window.view(), first: 0, ticks: beginning };
+        let once = self.filters.reads_once() && sink.takes::<T>();
         let span = if once { SPAN_BLOCKS * self.block } else { self.block };
-        let mut first = beginning;
-        while first < ticks {
-            let end = ticks.min(first + span);
-            let x = &frames[first * n - self.cut.past..end * n];
-            if !self.filter(x, first..end, output, sink) {
-                return false;
-            }
-            first = end;
+        // Whole vectors, as all that follows has then.
+        let mut done = ticks.min(beginning + ((span - beginning) & !(vector - 1)));
+        let x = &frames[beginning * n - past..done * n];
+        let rest = Stretch { x, first: beginning, ticks: done - beginning };
+        let mut finite = self.filter(&[rest, begin], 0..done, output, sink);
+        while finite && done < ticks {
+            let next = done..ticks.min(done + span);
+            let x = &frames[next.start * n - past..next.end * n];
+            finite = self.filter(&[Stretch { x, first: 0, ticks: next.len() }], next.clone(), output, sink);
+            done = next.end;
         }
-        if beginning > 0 && !self.filter(window.view(), 0..beginning, output, sink) {
-            return false;
+        if finite {
+            window.recall(frames);
         }
-        window.recall(frames);
-        true
+        finite
     }
 
     /// Ticks that a state must know.
@@ -173,41 +171,41 @@ impl<T: Sample> FirPlan<T> {
         source.gather(self.isa, ticks.start, ticks.len(), window.room(ticks.len()));
         let mut count = 0;
         // Filtered first: hardly ever is there anything to replace.
-        if !self.filter(window.view(), ticks.clone(), output, sink) {
+        let stretch = Stretch { x: window.view(), first: 0, ticks: ticks.len() };
+        if !self.filter(&[stretch], ticks.clone(), output, sink) {
             count = replace_not_finite(window.room(ticks.len()));
             if count > 0 {
-                self.filter(window.view(), ticks.clone(), output, sink);
+                let stretch = Stretch { x: window.view(), first: 0, ticks: ticks.len() };
+                self.filter(&[stretch], ticks.clone(), output, sink);
             }
         }
         window.advance(ticks.len());
         count
     }
 
-    /// Filters ticks the first of whose past begins at `x`; false if something may not be finite.
+    /// Filters `ticks`, whose stretches count from the first of them; false if something may not be finite.
+    #[inline]
     fn filter(
         &self,
-        x: &[T],
+        stretches: &[Stretch<'_, T>],
         ticks: Range<usize>,
         output: &mut [T],
         sink: &mut (impl FastSink + ?Sized),
     ) -> bool {
         let samples = ticks.start * self.ratio..ticks.end * self.ratio;
         if let Some(slots) = sink.slots(samples.clone()) {
-            return self.run(x, ticks.len(), slots);
+            return self.run(stretches, slots);
         }
         let output = &mut output[..samples.len()];
-        let finite = self.run(x, ticks.len(), output);
+        let finite = self.run(stretches, output);
         sink.store(self.isa, samples.start, output);
         finite
     }
 
-    /// Filters ticks the first of whose past begins at `x`; false if something may not be finite.
-    pub(super) fn run(&self, x: &[T], ticks: usize, out: &mut [T]) -> bool {
-        let mut finite = true;
-        for group in &self.groups {
-            finite &= self.kernel.run(group, &self.cut, x, ticks, &mut out[group.first..], self.ratio);
-        }
-        finite
+    /// Filters stretches; false if something may not be finite.
+    #[inline]
+    pub(super) fn run(&self, stretches: &[Stretch<'_, T>], out: &mut [T]) -> bool {
+        self.filters.run(stretches, out)
     }
 }
 
@@ -238,61 +236,9 @@ pub(super) fn replace_not_finite<T: Sample>(samples: &mut [T]) -> u64 {
     count
 }
 
-/// M phases in groups of 4, before them one of 3 if M is odd, behind them one of 2 if that is not enough; 1 only if M is 1. Those
-/// of 3 may write to the place behind them, and those behind them then write over it.
-pub(super) fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
-    let mut first = 0;
-    std::iter::from_fn(move || {
-        let width = match phases - first {
-            0 => return None,
-            _ if first == 0 && phases > 1 && phases % 2 == 1 => 3,
-            left => left.min(4),
-        };
-        first += width;
-        Some((first - width, width))
-    })
-}
-
 /// Coefficient of the sample `element` samples before the last one of a tick.
 fn coefficient(taps: &[Vec<f64>], ratio: usize, element: usize, phase: usize) -> f64 {
     let n = taps.len();
     let (lag, channel) = (element / n, n - 1 - element % n);
     taps[channel].get(phase + lag * ratio).copied().unwrap_or(0.0)
-}
-
-/// Phases first .. first + width in the order of use, in each step the samples as they lie.
-pub(super) fn phase_group<T: Sample>(
-    cut: &Cut,
-    first: usize,
-    width: usize,
-    coefficient: impl Fn(usize, usize) -> f64,
-) -> PhaseGroup<T> {
-    let mut coefficients = Aligned::new(cut.steps * width * cut.depth);
-    for (s, step) in cut.order(width).into_iter().zip(coefficients.chunks_exact_mut(width * cut.depth)) {
-        for (p, places) in step.chunks_exact_mut(cut.depth).enumerate() {
-            for (d, slot) in places.iter_mut().enumerate() {
-                let phase = first + cut.phase(width, p, d);
-                *slot = T::from_f64(coefficient(s * cut.depth + cut.depth - 1 - d, phase));
-            }
-        }
-    }
-    PhaseGroup { first, width, coefficients }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn groups_cover_every_phase_once_and_are_never_narrow() {
-        for phases in 1..100 {
-            let all: Vec<_> = widths(phases).collect();
-            let covered: Vec<usize> = all.iter().flat_map(|&(first, width)| first..first + width).collect();
-            assert_eq!(covered, (0..phases).collect::<Vec<_>>());
-            assert!(
-                all.iter().all(|&(_, width)| (2..=4).contains(&width) || phases == 1),
-                "{phases}: {all:?}"
-            );
-        }
-    }
 }

@@ -32,6 +32,7 @@ impl<T: Sample> Window<T> {
     }
 
     /// Room for the next `ticks` ticks, at most a block.
+    #[inline]
     pub(crate) fn room(&mut self, ticks: usize) -> &mut [T] {
         let len = ticks * self.channels;
         if self.next + len + self.beyond > self.samples.len() {

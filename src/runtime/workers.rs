@@ -33,6 +33,9 @@ impl Workers {
 /// Multiply-adds that are worth a span: some tens of microseconds, many times what it costs to hand it over.
 const SPAN: usize = 1 << 20;
 
+/// Spans of a long call for each thread: enough for those that are faster to help out, and each long against making its state.
+const SPANS: usize = 8;
+
 /// A plan whose calls can be cut into spans.
 pub(super) trait Spans: Sync {
     type State: Send;
@@ -66,10 +69,11 @@ pub(super) fn process<P: Spans>(
     workers: &Workers,
 ) -> u64 {
     let ticks = source.ticks();
-    let span = SPAN.div_ceil(plan.products()).max(4 * plan.reach());
-    if workers.threads() == 1 || ticks < 2 * span {
+    let least = SPAN.div_ceil(plan.products()).max(4 * plan.reach());
+    if workers.threads() == 1 || ticks < 2 * least {
         return plan.process(state, source, sink);
     }
+    let span = least.max(ticks / (SPANS * workers.threads()));
     let call = Call { plan, source, lead: P::lead(state), span };
     let (replaced, last) = workers.pool.install(|| call.spans(0..ticks, Some(state), sink));
     if let Some(last) = last {

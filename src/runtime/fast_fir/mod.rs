@@ -29,7 +29,7 @@ use super::aligned::Aligned;
 use super::fir::{FirPlan, check_finite, replace_not_finite};
 use super::form::lags;
 use super::sample::Sample;
-use super::simd::{Halves, Isa, Products};
+use super::simd::{Halves, Isa, Products, Stretch};
 use super::ticks::{FastSink, Interleaved, TickSource};
 use super::window::Window;
 
@@ -363,7 +363,8 @@ impl<T: Sample> HalfRate<T> {
         let products = &mut self.products[..(1 + ticks) * m];
         if ticks > 0 {
             // Whether they are finite is asked of the outputs.
-            plan.run(&self.window.view()[MORE * plan.channels..], ticks, &mut products[m..]);
+            let x = &self.window.view()[MORE * plan.channels..];
+            plan.run(&[Stretch { x, first: 0, ticks }], &mut products[m..]);
         }
         products[..m].copy_from_slice(&self.last);
         self.last.copy_from_slice(&products[ticks * m..]);

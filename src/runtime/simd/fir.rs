@@ -1,4 +1,4 @@
-//! Direct polyphase FIR on frames as they lie: how windows are cut, and the checked calls of the kernels.
+//! Direct polyphase FIR on frames as they lie: how windows are cut, and the kernels of each instruction set.
 //!
 //! A tick's window is cut into steps of D samples. Each lane sums one place of the steps with fused multiply-adds from 0,
 //! and at the end the D lanes of a tick are added as said in `lanes`. Two to four phases are the work of `phases`, a single
@@ -8,20 +8,8 @@ use super::Isa;
 use super::lanes::{Lanes, Plain};
 use super::phases::Phases;
 use super::single::{Pairing, Single};
-use crate::runtime::aligned::Aligned;
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{__m256, __m256d, __m512, __m512d};
-
-/// One to four phases that are computed together, with their coefficients in the order of use.
-#[derive(Debug, Clone)]
-pub(crate) struct PhaseGroup<T: Copy + Default> {
-    /// The first phase.
-    pub(crate) first: usize,
-    /// P, from 1 to 4; 1 only where there is no other phase.
-    pub(crate) width: usize,
-    /// Coefficient of place d in the step that comes s-th for the p-th sum ([`Cut::phase`]) at (s P + p) D + d.
-    pub(crate) coefficients: Aligned<T>,
-}
 
 /// How the windows of all ticks are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,23 +47,37 @@ impl Cut {
     }
 }
 
-/// One call of a kernel, checked.
-pub(super) struct Job<'a, T> {
-    pub(super) cut: &'a Cut,
+/// A stretch, checked, as far as it fills vectors.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part<T> {
     /// The newest step of the first tick.
     pub(super) x: *const T,
-    pub(super) coefficients: *const T,
+    /// The outputs of the first tick.
     pub(super) out: *mut T,
-    pub(super) out_hop: usize,
-    /// Ticks, a multiple of those of a vector.
+    /// A multiple of those of a vector.
     pub(super) ticks: usize,
+}
+
+impl<T> Part<T> {
+    pub(super) const NONE: Self = Self { x: std::ptr::null(), out: std::ptr::null_mut(), ticks: 0 };
+}
+
+/// One call of a kernel, checked.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Job<'a, T> {
+    pub(super) cut: &'a Cut,
+    pub(super) coefficients: *const T,
+    pub(super) parts: &'a [Part<T>],
+    /// The first phase.
+    pub(super) first: usize,
+    pub(super) out_hop: usize,
     /// Room for the sums of a tile. It comes from outside, or else the compiler keeps it in registers, which
     /// brings back what it is to avoid.
     pub(super) scratch: *mut T,
 }
 
 /// Returns false if a sum that is looked at is not finite, or the total of those that are.
-type PassFn<T> = unsafe fn(&Job<'_, T>) -> bool;
+pub(super) type PassFn<T> = unsafe fn(&Job<'_, T>) -> bool;
 
 /// The kernels of one sample type.
 #[derive(Debug, Clone, Copy)]
@@ -86,11 +88,6 @@ pub(crate) struct FirKernel<T: 'static> {
     group: usize,
     lanes: usize,
 }
-
-/// Samples of the largest scratch: the sums of the largest tile, in the largest vectors.
-const SCRATCH: usize = 768;
-/// Samples of the outputs of one vector: 16 ticks of 4 phases.
-const BOUNCE: usize = 64;
 
 impl<T: Copy + Default + 'static> FirKernel<T> {
     /// Lanes of a group.
@@ -115,62 +112,9 @@ impl<T: Copy + Default + 'static> FirKernel<T> {
         }
     }
 
-    /// Phase p of tick t goes to `out[t * out_hop + p]`, for the phases of `group`; of three phases the place behind them
-    /// may be changed too, where it belongs to the same tick or to a later one of this call. The frame of tick t
-    /// begins at `x[cut.past + t * cut.hop]`; frames past the last one, up to whole vectors, are
-    /// read too and mean nothing.
-    ///
-    /// Returns false if an input of these ticks is not finite: it makes all outputs of its tick so, whatever the
-    /// coefficients. It is false also where finite inputs led to sums, or to a total of sums, that are not.
-    ///
-    /// # Panics
-    /// If the group, `x` or `out` is too short for that.
-    pub(crate) fn run(
-        &self,
-        group: &PhaseGroup<T>,
-        cut: &Cut,
-        x: &[T],
-        ticks: usize,
-        out: &mut [T],
-        out_hop: usize,
-    ) -> bool {
-        let width = group.width;
-        // The last tick of three phases alone has no place behind it.
-        let whole =
-            (if width == 3 && out_hop == 3 { ticks.saturating_sub(1) } else { ticks }) & !(cut.vector - 1);
-        let padded = if whole < ticks { whole + cut.vector } else { whole };
-        assert!(cut.depth == cut.hop || cut.depth == self.group);
-        assert!(cut.steps > 0 && group.coefficients.len() == cut.steps * width * cut.depth);
-        assert!(cut.past + padded * cut.hop <= x.len());
-        let reach = if width == 3 && out_hop > 3 { 4 } else { width };
-        assert!(ticks == 0 || width <= out_hop && (ticks - 1) * out_hop + reach <= out.len());
-        assert!(width > 1 || out_hop == 1);
-        let pass = self.passes[cut.depth.trailing_zeros() as usize][width - 1];
-        let mut scratch = std::mem::MaybeUninit::<[T; SCRATCH]>::uninit();
-        let mut job = Job {
-            cut,
-            x: x[cut.past + cut.hop - cut.depth..].as_ptr(),
-            coefficients: group.coefficients.as_ptr(),
-            out: out.as_mut_ptr(),
-            out_hop,
-            ticks: whole,
-            scratch: scratch.as_mut_ptr().cast(),
-        };
-        // SAFETY: the kernel was chosen for an available instruction set (`Isa::is_available`), and
-        // all its loads and stores lie within the bounds asserted above.
-        let mut finite = unsafe { pass(&job) };
-        if whole < ticks {
-            let mut bounce = [T::default(); BOUNCE];
-            job.x = x[cut.past + whole * cut.hop + cut.hop - cut.depth..].as_ptr();
-            let hop = width.next_power_of_two();
-            (job.out, job.out_hop, job.ticks) = (bounce.as_mut_ptr(), hop, cut.vector);
-            // SAFETY: as above; a vector has at most 16 ticks, so the bounce buffer holds them.
-            finite &= unsafe { pass(&job) };
-            for (t, phases) in (whole..ticks).zip(bounce.chunks_exact(hop)) {
-                out[t * out_hop..t * out_hop + width].copy_from_slice(&phases[..width]);
-            }
-        }
-        finite
+    /// The kernel for D = `depth` and P = `width`, 1 to 4.
+    pub(super) fn pass(&self, depth: usize, width: usize) -> PassFn<T> {
+        self.passes[depth.trailing_zeros() as usize][width - 1]
     }
 }
 
@@ -206,7 +150,7 @@ macro_rules! kernels {
 
             $(#[target_feature(enable = $features)])?
             unsafe fn run<const D: usize, const P: usize>(job: &Job<'_, $sample>) -> bool {
-                // SAFETY: the caller's, see `FirKernel::run`.
+                // SAFETY: the caller's, see `Polyphase::run`.
                 unsafe {
                     let total = <$vector>::zero().group(0);
                     Phases::<$vector, D, P>::new(job, total).run()
@@ -215,7 +159,7 @@ macro_rules! kernels {
 
             $(#[target_feature(enable = $features)])?
             unsafe fn single<const D: usize>(job: &Job<'_, $sample>) -> bool {
-                // SAFETY: the caller's, see `FirKernel::run`.
+                // SAFETY: the caller's, see `Polyphase::run`.
                 unsafe { Single::<<$vector as Lanes>::Group, D>::new(job).run() }
             }
 

@@ -300,6 +300,7 @@ macro_rules! full_tile {
             "3:",
             "shr {steps}",
             "jz 4f",
+            ".p2align 6",
             "2:",
             full_step!($($form),*),
             full_step!($($form),*),

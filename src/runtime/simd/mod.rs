@@ -26,6 +26,7 @@ mod layout;
 mod pairs;
 mod peak;
 mod phases;
+mod polyphase;
 mod recursion;
 mod single;
 #[cfg(target_arch = "x86_64")]
@@ -34,11 +35,12 @@ mod transform;
 mod vector;
 
 pub(crate) use finite::{all_finite_f32, all_finite_f64};
-pub(crate) use fir::{Cut, FirKernel, PhaseGroup};
+pub(crate) use fir::{Cut, FirKernel};
 pub use isa::Isa;
 pub(crate) use layout::{decode, encode, interleave};
 pub(crate) use pairs::{Halves, Products, join_f32, join_f64, split_f32, split_f64};
 pub use peak::multiply_add_chains;
+pub(crate) use polyphase::{Polyphase, Stretch};
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
 pub(crate) use transform::{
     Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples,

@@ -6,12 +6,13 @@
 //! chain of shuffles and stores behind them would stop the multiply-adds: the first lanes are added in
 //! registers and go to scratch memory; from there they are brought into order after the next tile.
 
-use super::fir::{Cut, Job, tile};
+use super::fir::{Cut, Job, Part, tile};
 use super::lanes::{Group, Lanes};
 
 /// The work of one group of phases on all ticks of a job.
 pub(super) struct Phases<'a, V: Lanes, const D: usize, const P: usize> {
     job: &'a Job<'a, V::Sample>,
+    part: Part<V::Sample>,
     /// The tile in scratch: its first tick and its vectors, 0 if there is none.
     first: usize,
     waiting: usize,
@@ -32,16 +33,28 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// `zero`: what sums begin with.
     #[inline(always)]
     pub(super) fn new(job: &'a Job<'a, V::Sample>, zero: V::Group) -> Self {
-        Self { job, first: 0, waiting: 0, total: zero }
+        Self { job, part: Part::NONE, first: 0, waiting: 0, total: zero }
     }
 
-    /// All ticks, in the largest tiles; what is left is halved, so that no tile is small.
+    /// All ticks.
     ///
     /// # Safety
     /// As for [`Lanes`]; the job's memory is there.
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
-        let mut left = self.job.ticks / (Self::TICKS * V::GROUPS);
+        for &Part { x, out, ticks } in self.job.parts {
+            self.part = Part { x, out: out.wrapping_add(self.job.first), ticks };
+            // SAFETY: the caller's.
+            unsafe { self.part() };
+        }
+        // SAFETY: the caller's.
+        unsafe { self.total.finite() }
+    }
+
+    /// In the largest tiles; what is left is halved, so that no tile is small.
+    #[inline(always)]
+    unsafe fn part(&mut self) {
+        let mut left = self.part.ticks / (Self::TICKS * V::GROUPS);
         let mut first = 0;
         while left > 0 {
             let vectors = tile(left, V::SUMS / P);
@@ -51,10 +64,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
             left -= vectors;
         }
         // SAFETY: the caller's.
-        unsafe {
-            self.settle();
-            self.total.finite()
-        }
+        unsafe { self.settle() };
     }
 
     #[inline(always)]
@@ -109,13 +119,25 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// Remembers whether inputs are finite: they reach the sums of every phase, whatever the coefficients.
     #[inline(always)]
     unsafe fn watch<const R: usize>(&mut self, sums: &[V; R]) {
-        for (r, sum) in sums.iter().enumerate() {
-            if r + 1 == R || self.job.cut.watched >> r & 1 == 1 {
-                for g in 0..V::GROUPS {
+        let watched = self.job.cut.watched;
+        // Long filters are asked once a tile.
+        if watched & const { (1 << (R - 1)) - 1 } != 0 {
+            for (r, sum) in sums.iter().enumerate() {
+                if r + 1 < R && watched >> r & 1 == 1 {
                     // SAFETY: the caller's.
-                    self.total = unsafe { self.total.add(sum.group(g)) };
+                    unsafe { self.note(*sum) };
                 }
             }
+        }
+        // SAFETY: the caller's.
+        unsafe { self.note(sums[R - 1]) };
+    }
+
+    #[inline(always)]
+    unsafe fn note(&mut self, sum: V) {
+        for g in 0..V::GROUPS {
+            // SAFETY: the caller's.
+            self.total = unsafe { self.total.add(sum.group(g)) };
         }
     }
 
@@ -124,7 +146,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
     unsafe fn store<const R: usize>(&self, sums: &[[V; R]; P], first: usize, hop: usize) {
         // SAFETY: the caller's.
         unsafe {
-            let out = self.job.out.add(first * hop);
+            let out = self.part.out.add(first * hop);
             let sum = |p: usize, r: usize, g: usize| sums[p.min(P - 1)][r].group(g);
             for (r, g) in (0..R).flat_map(|r| (0..V::GROUPS).map(move |g| (r, g))) {
                 let at = |r: usize| out.add((r * V::GROUPS + g) * Self::TICKS * hop);
@@ -149,7 +171,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
         let stride = Self::stride(hop);
         // SAFETY: the caller's.
         unsafe {
-            let mut x = self.job.x.add(first * hop);
+            let mut x = self.part.x.add(first * hop);
             let mut w = self.job.coefficients;
             let mut sums = [[V::zero(); R]; P];
             if const { P == 4 && R == 3 }
@@ -259,7 +281,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
         // SAFETY: the caller's.
         unsafe {
             let from = self.job.scratch.add(group * V::GROUP);
-            let to = self.job.out.add(tick * self.job.out_hop);
+            let to = self.part.out.add(tick * self.job.out_hop);
             let quad: [V::Sample; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
             to.copy_from_nonoverlapping(quad.as_ptr().add(place), count);
         }

@@ -64,13 +64,25 @@ impl<'a, V: Lanes<Group = V> + Group<Sample = <V as Lanes>::Sample>, const D: us
         Self { job, total: unsafe { V::zero() } }
     }
 
-    /// Units of as many ticks as a group has lanes: their sums are added together.
+    /// All ticks.
     ///
     /// # Safety
     /// As for [`Lanes`]; the job's memory is there.
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
-        let Job { cut, ticks, scratch, out, .. } = *self.job;
+        // SAFETY: the caller's.
+        unsafe {
+            for part in self.job.parts {
+                self.part(part.x, part.out, part.ticks);
+            }
+            self.total.finite()
+        }
+    }
+
+    /// Units of as many ticks as a group has lanes: their sums are added together.
+    #[inline(always)]
+    unsafe fn part(&mut self, x: *const <V as Lanes>::Sample, out: *mut <V as Lanes>::Sample, ticks: usize) {
+        let Job { cut, scratch, .. } = *self.job;
         let pairing = cut.pairing;
         // Vectors of a unit in each of the tiles, and units at once: three units of 8 are two tiles of 12.
         let vectors = if D < V::GROUP { D } else { V::GROUP / pairing.tiles };
@@ -78,10 +90,10 @@ impl<'a, V: Lanes<Group = V> + Group<Sample = <V as Lanes>::Sample>, const D: us
         let (mut first, mut left) = (0, ticks / V::GROUP);
         while left > 0 {
             let units = tile(left, most);
-            // SAFETY: the caller's; the tiles are all within the job, and their sums within the scratch.
+            // SAFETY: the caller's; the tiles are all within the part, and their sums within the scratch.
             unsafe {
                 for q in 0..pairing.tiles {
-                    let x = self.job.x.add((first + q) * cut.hop);
+                    let x = x.add((first + q) * cut.hop);
                     let to = if D < V::GROUP { out.add(first) } else { scratch.add(q * D) };
                     self.tiles(units * vectors, x, to);
                 }
@@ -96,8 +108,6 @@ impl<'a, V: Lanes<Group = V> + Group<Sample = <V as Lanes>::Sample>, const D: us
             first += units * V::GROUP;
             left -= units;
         }
-        // SAFETY: the caller's.
-        unsafe { self.total.finite() }
     }
 
     /// Samples from vector to vector; a constant where D does not fill a group.

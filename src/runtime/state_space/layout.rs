@@ -2,33 +2,9 @@
 
 use crate::runtime::BuildError;
 use crate::runtime::aligned::Aligned;
-use crate::runtime::fir::{phase_group, widths};
 use crate::runtime::sample::Sample;
-use crate::runtime::simd::{ColumnTile, Cut, FirKernel, Form, PhaseGroup, Recursion, SectionVector};
+use crate::runtime::simd::{ColumnTile, Cut, FirKernel, Form, Polyphase, Recursion, SectionVector};
 use crate::runtime::structure::{Past, Structure};
-
-/// An FIR filter from frames to phases.
-#[derive(Debug)]
-pub(super) struct Readout<T: Sample> {
-    pub(super) cut: Cut,
-    /// M.
-    ratio: usize,
-    groups: Vec<PhaseGroup<T>>,
-}
-
-impl<T: Sample> Readout<T> {
-    /// `factor(e, p)`: of the sample e before the last one of a frame, for phase p.
-    fn new(cut: Cut, ratio: usize, factor: impl Fn(usize, usize) -> f64) -> Self {
-        let groups = widths(ratio).map(|(first, width)| phase_group(&cut, first, width, &factor)).collect();
-        Self { cut, ratio, groups }
-    }
-
-    pub(super) fn run(&self, kernel: &FirKernel<T>, x: &[T], ticks: usize, out: &mut [T]) {
-        for group in &self.groups {
-            kernel.run(group, &self.cut, x, ticks, &mut out[group.first..], self.ratio);
-        }
-    }
-}
 
 /// Where things lie: in a window of frames of N inputs, and in rows of S states.
 pub(super) struct Layout {
@@ -91,19 +67,28 @@ impl Layout {
         occupants
     }
 
-    pub(super) fn inputs_readout<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+    pub(super) fn inputs_readout<T: Sample>(
+        &self,
+        structure: &Structure,
+        ratio: usize,
+        kernel: &FirKernel<T>,
+    ) -> Polyphase<T> {
         let n = self.channels;
-        Readout::new(self.inputs, ratio, |e, p| {
-            structure.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |factors| factors[p])
-        })
+        let tap =
+            |e: usize, p: usize| structure.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |taps| taps[p]);
+        Polyphase::new(kernel, self.inputs, ratio, |e, p| T::from_f64(tap(e, p)))
     }
 
-    pub(super) fn states_readout<T: Sample>(&self, structure: &Structure, ratio: usize) -> Readout<T> {
+    pub(super) fn states_readout<T: Sample>(
+        &self,
+        structure: &Structure,
+        ratio: usize,
+        kernel: &FirKernel<T>,
+    ) -> Polyphase<T> {
         let occupants = self.occupants();
         let last = occupants.len() - 1;
-        Readout::new(self.state_rows, ratio, |e, p| {
-            occupants[last - e].map_or(0.0, |state| structure.c[state][p])
-        })
+        let factor = |e: usize, p: usize| occupants[last - e].map_or(0.0, |state| structure.c[state][p]);
+        Polyphase::new(kernel, self.state_rows, ratio, |e, p| T::from_f64(factor(e, p)))
     }
 
     pub(super) fn recursion<T: Sample>(&self, structure: &Structure) -> Recursion<T> {

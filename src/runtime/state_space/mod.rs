@@ -8,12 +8,12 @@ mod layout;
 #[cfg(test)]
 mod tests;
 
-use self::layout::{Layout, Readout};
+use self::layout::Layout;
 use super::BuildError;
 use super::aligned::Aligned;
 use super::fir::replace_not_finite;
 use super::sample::Sample;
-use super::simd::{FirKernel, Form, Isa, Recursion, RecursionKernel};
+use super::simd::{Form, Isa, Polyphase, Recursion, RecursionKernel, Stretch};
 use super::structure::Structure;
 use super::ticks::{FastSink, TickSource};
 use super::window::Window;
@@ -30,9 +30,8 @@ pub(crate) struct StateSpacePlan<T: Sample> {
     pub(crate) ratio: usize,
     recursion: Recursion<T>,
     advance: RecursionKernel<T>,
-    inputs_readout: Readout<T>,
-    states_readout: Readout<T>,
-    fir: FirKernel<T>,
+    inputs_readout: Polyphase<T>,
+    states_readout: Polyphase<T>,
     isa: Isa,
 }
 
@@ -74,9 +73,8 @@ impl<T: Sample> StateSpacePlan<T> {
             ratio,
             recursion: layout.recursion(&structure),
             advance,
-            inputs_readout: layout.inputs_readout(&structure, ratio),
-            states_readout: layout.states_readout(&structure, ratio),
-            fir,
+            inputs_readout: layout.inputs_readout(&structure, ratio, &fir),
+            states_readout: layout.states_readout(&structure, ratio, &fir),
             isa,
         })
     }
@@ -87,11 +85,11 @@ impl<T: Sample> StateSpacePlan<T> {
     }
 
     pub(crate) fn state(&self) -> StateSpaceState<T> {
-        let cut = self.inputs_readout.cut;
+        let cut = self.inputs_readout.cut();
         let beyond = cut.vector * self.channels;
         let states = self.recursion.states;
         // A vector may read the rows of some more ticks, which mean nothing.
-        let rows = (BLOCK + self.states_readout.cut.vector) * states;
+        let rows = (BLOCK + self.states_readout.cut().vector) * states;
         StateSpaceState {
             window: Window::new(self.channels, cut.past, BLOCK * self.channels, beyond),
             rows: Aligned::new(rows),
@@ -130,9 +128,9 @@ impl<T: Sample> StateSpacePlan<T> {
     fn filter(&self, state: &mut StateSpaceState<T>, ticks: usize) {
         let StateSpaceState { window, rows, output, further, .. } = state;
         self.advance.run(&self.recursion, rows, window.view(), self.channels, ticks);
-        self.inputs_readout.run(&self.fir, window.view(), ticks, output);
+        self.inputs_readout.run(&[Stretch { x: window.view(), first: 0, ticks }], output);
         if self.recursion.states > 0 {
-            self.states_readout.run(&self.fir, rows, ticks, further);
+            self.states_readout.run(&[Stretch { x: rows, first: 0, ticks }], further);
             output.iter_mut().zip(&further[..ticks * self.ratio]).for_each(|(y, more)| *y = *y + *more);
         }
     }
