@@ -98,7 +98,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
         }
         // SAFETY: the caller's.
         unsafe {
-            let sums = self.sums::<R>(first);
+            let sums = self.multiply::<R>(first);
             self.settle();
             if D < 8 {
                 // Where outputs follow each other the compiler is told so.
@@ -166,7 +166,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
 
     /// The multiply-adds of a tile.
     #[inline(always)]
-    unsafe fn sums<const R: usize>(&self, first: usize) -> [[V; R]; P] {
+    unsafe fn multiply<const R: usize>(&self, first: usize) -> [[V; R]; P] {
         let Cut { hop, steps, .. } = *self.job.cut;
         let stride = Self::stride(hop);
         // SAFETY: the caller's.
@@ -256,34 +256,60 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// Brings the tile in scratch to its place in the output.
     #[inline(always)]
     unsafe fn settle(&mut self) {
-        for index in 0..self.waiting * V::GROUPS {
-            let (vector, g) = (index / V::GROUPS, index % V::GROUPS);
-            let tick = self.first + index;
-            // SAFETY: the caller's.
-            unsafe {
-                if P > 2 {
-                    self.settle_quads(index, tick, 0, P);
-                } else if vector % 2 == 0 {
-                    let from = vector / 2 * V::GROUPS + g;
-                    self.settle_quads(from, tick, 0, 2);
-                    if vector + 1 < self.waiting {
-                        self.settle_quads(from, tick + V::GROUPS, 2, 2);
-                    }
-                }
+        // What is known beforehand makes straight code; short filters notice.
+        let most = V::SUMS / P;
+        // SAFETY: the caller's.
+        unsafe {
+            match (self.waiting == most, self.job.out_hop) {
+                (true, hop) if hop == P => self.settle_vectors(most, P),
+                (true, hop) => self.settle_vectors(most, hop),
+                (false, hop) => self.settle_vectors(self.waiting, hop),
             }
         }
         self.waiting = 0;
     }
 
-    /// The tick's lanes are two quads; `count` of their sums from `place` on go to the output.
     #[inline(always)]
-    unsafe fn settle_quads(&self, group: usize, tick: usize, place: usize, count: usize) {
+    unsafe fn settle_vectors(&self, vectors: usize, hop: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            let out = self.part.out.add(self.first * hop);
+            if P > 2 {
+                for index in 0..vectors * V::GROUPS {
+                    Self::put_quad(self.sums(index), out.add(index * hop));
+                }
+                return;
+            }
+            for (twos, g) in (0..vectors.div_ceil(2)).flat_map(|twos| (0..V::GROUPS).map(move |g| (twos, g)))
+            {
+                let quad = self.sums(twos * V::GROUPS + g);
+                let tick = out.add((2 * twos * V::GROUPS + g) * hop);
+                if V::GROUPS == 1 && hop == P && 2 * twos + 1 < vectors {
+                    Self::put_quad(quad, tick);
+                    continue;
+                }
+                tick.copy_from_nonoverlapping(quad.as_ptr(), 2);
+                if 2 * twos + 1 < vectors {
+                    tick.add(V::GROUPS * hop).copy_from_nonoverlapping(quad[2..].as_ptr(), 2);
+                }
+            }
+        }
+    }
+
+    /// The sum of the two quads of a group in scratch.
+    #[inline(always)]
+    unsafe fn sums(&self, group: usize) -> [V::Sample; 4] {
         // SAFETY: the caller's.
         unsafe {
             let from = self.job.scratch.add(group * V::GROUP);
-            let to = self.part.out.add(tick * self.job.out_hop);
-            let quad: [V::Sample; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
-            to.copy_from_nonoverlapping(quad.as_ptr().add(place), count);
+            std::array::from_fn(|i| *from.add(i) + *from.add(4 + i))
         }
+    }
+
+    /// Of three phases there are four too: the place behind them is written before it gets its own.
+    #[inline(always)]
+    unsafe fn put_quad(quad: [V::Sample; 4], to: *mut V::Sample) {
+        // SAFETY: the caller's.
+        unsafe { to.copy_from_nonoverlapping(quad.as_ptr(), 4) }
     }
 }
