@@ -34,9 +34,9 @@ impl Cut {
     pub(crate) fn phase(&self, width: usize, p: usize, place: usize) -> usize {
         match (width, self.depth) {
             (1, _) | (_, 1) => p,
-            (3, 2) if p == 2 => p,
+            (3, _) if p == 2 => p,
+            (3, _) => (p + place) & 1,
             (_, 2) => p & 2 | (p + place) & 1,
-            (3, _) => p,
             _ => (p + place) % width,
         }
     }

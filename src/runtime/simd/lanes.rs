@@ -6,7 +6,7 @@
 //! half for eight; they do not depend on the instruction set.
 //!
 //! Two or four phases lie along diagonals: lane l of the p-th sum belongs to phase (l + p) mod 2 or 4, so that the sums
-//! come out in the order of the phases and no lanes have to be blended.
+//! come out in the order of the phases and fewer lanes have to be blended. Of three phases the first two do.
 
 /// A group of lanes; [`Lanes`] vectors consist of one or two.
 ///
@@ -14,10 +14,6 @@
 /// As for [`Lanes`].
 pub(super) trait Group: Copy {
     type Sample: Copy;
-    /// For each pair of lanes: a0 + a1, b0 + b1, a2 + a3, b2 + b3 ...
-    unsafe fn neighbours(a: Self, b: Self) -> Self;
-    /// For each four lanes: the sum of those of a, of b, of c, of d.
-    unsafe fn quads(sums: [Self; 4]) -> Self;
     /// For each pair of lanes: a0 + b1, a1 + b0, a2 + b3, a3 + b2 ...
     unsafe fn diagonal_pairs(a: Self, b: Self) -> Self;
     /// For each four lanes: the sum of those of a, b, c and d that are 0, 1, 2 and 3 lanes before, around the four.
@@ -95,22 +91,6 @@ macro_rules! plain {
             type Sample = $sample;
 
             #[inline(always)]
-            unsafe fn neighbours(a: Self, b: Self) -> Self {
-                Self(std::array::from_fn(|l| {
-                    let Self(v) = if l % 2 == 0 { a } else { b };
-                    v[l & !1] + v[l | 1]
-                }))
-            }
-
-            #[inline(always)]
-            unsafe fn quads(sums: [Self; 4]) -> Self {
-                Self(std::array::from_fn(|l| {
-                    let (Self(v), from) = (sums[l % 4], l & !3);
-                    (v[from] + v[from + 2]) + (v[from + 1] + v[from + 3])
-                }))
-            }
-
-            #[inline(always)]
             unsafe fn diagonal_pairs(a: Self, b: Self) -> Self {
                 Self(std::array::from_fn(|l| a.0[l] + b.0[l ^ 1]))
             }
@@ -167,7 +147,7 @@ macro_rules! plain {
                                 }
                             }
                         }
-                        (3, _) => put(&[Self::quads([a, b, c, d])], 4),
+                        (3, _) => put(&[Self::diagonal_halves([a, b, c, c])], 4),
                         _ => put(&[Self::diagonal_quads([a, b, c, d])], 4),
                     }
                 }

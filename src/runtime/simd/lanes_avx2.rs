@@ -14,6 +14,7 @@ macro_rules! opaque {
     }};
 }
 
+/// For each pair of lanes: a0 + a1, b0 + b1, a2 + a3, b2 + b3 ...
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn neighbours_f32(a: __m256, b: __m256) -> __m256 {
@@ -22,6 +23,7 @@ fn neighbours_f32(a: __m256, b: __m256) -> __m256 {
     _mm256_add_ps(_mm256_blend_ps::<0b1010_1010>(a, b), _mm256_permute_ps::<0b10_11_00_01>(mixed))
 }
 
+/// As [`neighbours_f32`].
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn neighbours_f64(a: __m256d, b: __m256d) -> __m256d {
@@ -51,18 +53,15 @@ fn halves_f32(a: __m256, b: __m256) -> [__m256; 2] {
     [_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b)]
 }
 
+/// For each four lanes: the sum of those of a, of b, of c, of d.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn quads_f32([a, b, c, d]: [__m256; 4]) -> __m256 {
+    neighbours_f32(far_f32(a, c), far_f32(b, d))
+}
+
 impl Group for __m256 {
     type Sample = f32;
-
-    #[inline(always)]
-    unsafe fn neighbours(a: Self, b: Self) -> Self {
-        unsafe { neighbours_f32(a, b) }
-    }
-
-    #[inline(always)]
-    unsafe fn quads([a, b, c, d]: [Self; 4]) -> Self {
-        unsafe { Self::neighbours(far_f32(a, c), far_f32(b, d)) }
-    }
 
     #[inline(always)]
     unsafe fn diagonal_pairs(a: Self, b: Self) -> Self {
@@ -99,17 +98,17 @@ impl Group for __m256 {
                 1 => lanes(0),
                 2 => {
                     // Ticks 0 4 1 5 2 6 3 7.
-                    let mixed = Self::neighbours(lanes(0), lanes(1));
+                    let mixed = neighbours_f32(lanes(0), lanes(1));
                     _mm256_permutevar8x32_ps(mixed, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7))
                 }
                 4 => {
                     // Ticks 0 2 4 6 1 3 5 7.
-                    let mixed = Self::quads([lanes(0), lanes(1), lanes(2), lanes(3)]);
+                    let mixed = quads_f32([lanes(0), lanes(1), lanes(2), lanes(3)]);
                     _mm256_permutevar8x32_ps(mixed, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7))
                 }
                 _ => {
-                    let first = Self::quads([lanes(0), lanes(1), lanes(2), lanes(3)]);
-                    let second = Self::quads([lanes(4), lanes(5), lanes(6), lanes(7)]);
+                    let first = quads_f32([lanes(0), lanes(1), lanes(2), lanes(3)]);
+                    let second = quads_f32([lanes(4), lanes(5), lanes(6), lanes(7)]);
                     let [low, high] = halves_f32(first, second);
                     _mm256_add_ps(low, high)
                 }
@@ -147,18 +146,15 @@ impl Group for __m256 {
     }
 }
 
+/// For each four lanes: the sum of those of a, of b, of c, of d.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn quads_f64([a, b, c, d]: [__m256d; 4]) -> __m256d {
+    neighbours_f64(far_f64(a, c), far_f64(b, d))
+}
+
 impl Group for __m256d {
     type Sample = f64;
-
-    #[inline(always)]
-    unsafe fn neighbours(a: Self, b: Self) -> Self {
-        unsafe { neighbours_f64(a, b) }
-    }
-
-    #[inline(always)]
-    unsafe fn quads([a, b, c, d]: [Self; 4]) -> Self {
-        unsafe { Self::neighbours(far_f64(a, c), far_f64(b, d)) }
-    }
 
     #[inline(always)]
     unsafe fn diagonal_pairs(a: Self, b: Self) -> Self {
@@ -194,8 +190,8 @@ impl Group for __m256d {
             match D {
                 1 => lanes(0),
                 // Ticks 0 2 1 3.
-                2 => _mm256_permute4x64_pd::<0b11_01_10_00>(Self::neighbours(lanes(0), lanes(1))),
-                _ => Self::quads([lanes(0), lanes(1), lanes(2), lanes(3)]),
+                2 => _mm256_permute4x64_pd::<0b11_01_10_00>(neighbours_f64(lanes(0), lanes(1))),
+                _ => quads_f64([lanes(0), lanes(1), lanes(2), lanes(3)]),
             }
         }
     }
@@ -230,80 +226,53 @@ impl Group for __m256d {
     }
 }
 
-/// One step of a tile of 4 x 3.
+/// One step of a tile of 4 x 3: the one `$s` steps behind that at the pointers.
 macro_rules! full_step {
-    ($load:literal, $spread:literal, $fma:literal, $bytes:literal) => {
+    ($s:literal, $load:literal, $spread:literal, $fma:literal, $bytes:literal) => {
         concat!(
-            $load,
-            " {x0}, [{x}]\n",
-            $load,
-            " {x1}, [{x} + {stride}]\n",
-            $load,
-            " {x2}, [{x} + 2*{stride}]\n",
-            $spread,
-            " {k}, [{w}]\n",
-            $fma,
-            " {a0}, {x0}, {k}\n",
-            $fma,
-            " {a1}, {x1}, {k}\n",
-            $fma,
-            " {a2}, {x2}, {k}\n",
-            $spread,
-            " {k}, [{w} + ",
-            $bytes,
-            "]\n",
-            $fma,
-            " {b0}, {x0}, {k}\n",
-            $fma,
-            " {b1}, {x1}, {k}\n",
-            $fma,
-            " {b2}, {x2}, {k}\n",
-            $spread,
-            " {k}, [{w} + 2*",
-            $bytes,
-            "]\n",
-            $fma,
-            " {c0}, {x0}, {k}\n",
-            $fma,
-            " {c1}, {x1}, {k}\n",
-            $fma,
-            " {c2}, {x2}, {k}\n",
-            $spread,
-            " {k}, [{w} + 3*",
-            $bytes,
-            "]\n",
-            $fma,
-            " {d0}, {x0}, {k}\n",
-            $fma,
-            " {d1}, {x1}, {k}\n",
-            $fma,
-            " {d2}, {x2}, {k}\n",
-            "sub {x}, ",
-            $bytes,
-            "\n",
-            "add {w}, 4*",
-            $bytes,
-            "\n",
+            full_step!(@input $load, "x0", "", $s, $bytes),
+            full_step!(@input $load, "x1", " + {stride}", $s, $bytes),
+            full_step!(@input $load, "x2", " + 2*{stride}", $s, $bytes),
+            full_step!(@phase $spread, $fma, "a", "0", $s, $bytes),
+            full_step!(@phase $spread, $fma, "b", "1", $s, $bytes),
+            full_step!(@phase $spread, $fma, "c", "2", $s, $bytes),
+            full_step!(@phase $spread, $fma, "d", "3", $s, $bytes),
         )
+    };
+    (@input $load:literal, $to:literal, $vector:literal, $s:literal, $bytes:literal) => {
+        concat!($load, " {", $to, "}, [{x}", $vector, " - ", $s, "*", $bytes, "]\n")
+    };
+    (@phase $spread:literal, $fma:literal, $sums:literal, $p:literal, $s:literal, $bytes:literal) => {
+        concat!(
+            $spread, " {k}, [{w} + (4*", $s, "+", $p, ")*", $bytes, "]\n",
+            $fma, " {", $sums, "0}, {x0}, {k}\n",
+            $fma, " {", $sums, "1}, {x1}, {k}\n",
+            $fma, " {", $sums, "2}, {x2}, {k}\n",
+        )
+    };
+    (@next $steps:literal, $bytes:literal) => {
+        concat!("sub {x}, ", $steps, "*", $bytes, "\nadd {w}, 4*", $steps, "*", $bytes, "\n")
     };
 }
 
 /// The loop of [`Lanes::full_tile`] for AVX2, two steps a turn. Twelve sums, three inputs and a
 /// coefficient are exactly its sixteen registers; the compiler's own order of instructions spills some.
 macro_rules! full_tile {
-    ($x:ident, $stride:ident, $w:ident, $steps:ident, $zero:expr, $size:literal, ($($form:literal),*)) => {{
+    ($x:ident, $stride:ident, $w:ident, $steps:ident, $zero:expr, $size:literal, ($load:literal, $spread:literal, $fma:literal, $bytes:literal)) => {{
         let [mut a, mut b, mut c, mut d] = [[$zero; 3]; 4];
         std::arch::asm!(
             "test {steps}, 1",
             "jz 3f",
-            full_step!($($form),*),
+            full_step!("0", $load, $spread, $fma, $bytes),
+            full_step!(@next "1", $bytes),
             "3:",
             "shr {steps}",
             "jz 4f",
             ".p2align 6",
             "2:",
-            full_step!($($form),*),
-            full_step!($($form),*),
+            full_step!("0", $load, $spread, $fma, $bytes),
+            full_step!("1", $load, $spread, $fma, $bytes),
+            full_step!(@next "2", $bytes),
             "dec {steps}",
             "jnz 2b",
             "4:",

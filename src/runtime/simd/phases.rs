@@ -247,7 +247,10 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
                     continue;
                 }
                 let quads = [sum(0, r), sum(1, r), sum(2, r), sum(3, r)];
-                let sums = if P == 3 { V::Group::quads(quads) } else { V::Group::diagonal_quads(quads) };
+                let sums = match P {
+                    3 => V::Group::diagonal_halves(quads),
+                    _ => V::Group::diagonal_quads(quads),
+                };
                 sums.store(place(r));
             }
         }

@@ -52,8 +52,11 @@ pub(super) unsafe fn store_ticks_f32<const P: usize, const D: usize>(
                 _mm_storeu_ps(out.add(3 * hop), high_f32(odd));
             }
             _ => {
-                let quads: __m256 =
-                    if P == 3 { Group::quads([a, b, c, c]) } else { Group::diagonal_quads([a, b, c, d]) };
+                let quads: __m256 = if P == 3 {
+                    Group::diagonal_halves([a, b, c, c])
+                } else {
+                    Group::diagonal_quads([a, b, c, d])
+                };
                 if P == 4 && hop == 4 {
                     return _mm256_storeu_ps(out, quads);
                 }
@@ -138,7 +141,7 @@ pub(super) unsafe fn store_ticks_f64<const P: usize, const D: usize>(
                     _mm256_storeu_pd(out.add(t * hop), quad);
                 }
             }
-            (3, _) => _mm256_storeu_pd(out, Group::quads([a, b, c, c])),
+            (3, _) => _mm256_storeu_pd(out, Group::diagonal_halves([a, b, c, c])),
             _ => _mm256_storeu_pd(out, Group::diagonal_quads([a, b, c, d])),
         }
     }
