@@ -323,41 +323,64 @@ pub fn hermitian_eigenvalues(m: &CMat) -> Result<Vec<f64>, LinalgError> {
 /// another do not matter.
 pub fn eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite("eigenvalues", m)?;
-    eigenvalues_of_blocks(m, |block| view(block).eigenvalues().ok())
+    balanced_eigenvalues(m, raw_eigenvalues).map(|(values, _)| values)
 }
 
 /// Eigenvalues of a general complex matrix, balanced first.
 pub fn eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite_c("eigenvalues", m)?;
-    eigenvalues_of_blocks(m, |block| view(block).eigenvalues().ok())
+    balanced_eigenvalues(m, raw_eigenvalues_c).map(|(values, _)| values)
 }
 
-/// Eigenvalues of a real matrix as it stands: where entries are rounding errors of others, balancing may make them count.
-pub fn raw_eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
+/// Scales that differ by more than this may do harm: a change of coordinates magnifies errors by up to its condition, here to
+/// 2e-10. Eigenvalues that all but meet move by the square root of that.
+const SAFE_CONDITION: f64 = 1e6;
+
+/// Candidates for the eigenvalues of a general real matrix, where a false one does no harm and a missed one does: those of
+/// [`eigenvalues`] and, where balancing changed scales by many decades, those of the matrix as it stands beside them.
+pub fn candidate_eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite("eigenvalues", m)?;
-    if m.is_empty() {
-        return Ok(Vec::new());
-    }
-    view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
+    both_ways(m, raw_eigenvalues)
 }
 
-/// As [`raw_eigenvalues`], complex.
-pub fn raw_eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
+/// As [`candidate_eigenvalues`], complex.
+pub fn candidate_eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite_c("eigenvalues", m)?;
-    if m.is_empty() {
-        return Ok(Vec::new());
-    }
-    view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m))
+    both_ways(m, raw_eigenvalues_c)
 }
 
-/// The eigenvalues of the balanced blocks of `m`, each by `of_block`.
-fn eigenvalues_of_blocks<T: nalgebra::ComplexField<RealField = f64>>(
+type Eigenvalues<T> = fn(&DMatrix<T>) -> Result<Vec<Complex<f64>>, LinalgError>;
+
+fn raw_eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    if m.is_empty() { Ok(Vec::new()) } else { view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m)) }
+}
+
+fn raw_eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
+    if m.is_empty() { Ok(Vec::new()) } else { view(m).eigenvalues().map_err(|_| no_convergence("eigenvalues", m)) }
+}
+
+fn both_ways<T: nalgebra::ComplexField<RealField = f64>>(
     m: &DMatrix<T>,
-    of_block: impl Fn(&DMatrix<T>) -> Option<Vec<Complex<f64>>>,
+    raw: Eigenvalues<T>,
 ) -> Result<Vec<Complex<f64>>, LinalgError> {
-    let blocks = balance::balanced_blocks(m).into_iter();
-    let values = blocks.map(|block| of_block(&block).ok_or_else(|| no_convergence("eigenvalues", m)));
-    Ok(values.collect::<Result<Vec<_>, _>>()?.concat())
+    let (mut values, condition) = balanced_eigenvalues(m, raw)?;
+    if condition > SAFE_CONDITION {
+        values.extend(raw(m)?);
+    }
+    Ok(values)
+}
+
+/// The eigenvalues of the balanced blocks of `m`, with the condition of the worst scaling.
+fn balanced_eigenvalues<T: nalgebra::ComplexField<RealField = f64>>(
+    m: &DMatrix<T>,
+    raw: Eigenvalues<T>,
+) -> Result<(Vec<Complex<f64>>, f64), LinalgError> {
+    let (mut values, mut condition) = (Vec::with_capacity(m.nrows()), 1.0f64);
+    for block in balance::balanced_blocks(m) {
+        values.extend(raw(&block.matrix)?);
+        condition = condition.max(block.condition);
+    }
+    Ok((values, condition))
 }
 
 /// Eigenvalues and eigenvectors (columns) of a general real matrix; the two of a conjugate pair are neighbours.

@@ -252,8 +252,8 @@ impl<'a> Search<'a> {
     /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`: those of eigenvalues that
     /// lie off the axis by at most `tolerance` (relative).
     ///
-    /// The Hamiltonian matrix is asked twice, balanced and as it stands: gains of many decades want the one, its smallest
-    /// entries, which are rounding errors, the other.
+    /// The Hamiltonian matrix is asked balanced and, where its scales differ by many decades, as it stands too: large gains want
+    /// the one, the smallest entries, which are rounding errors, the other.
     ///
     /// Measured outputs that are copies of one another leave no Hamiltonian matrix; then nothing is
     /// suggested and the refined grid stands, still a value that is attained.
@@ -262,12 +262,9 @@ impl<'a> Search<'a> {
         let centre = self.centre(level)?;
         let real = centre == 0.0 || centre == PI;
         let eigenvalues = if real {
-            let h = self.hamiltonian(level, centre);
-            linalg::eigenvalues(&h).and_then(|balanced| Ok([balanced, linalg::raw_eigenvalues(&h)?].concat()))
+            linalg::candidate_eigenvalues(&self.hamiltonian(level, centre))
         } else {
-            let h = self.rotated_hamiltonian(level, centre);
-            linalg::eigenvalues_c(&h)
-                .and_then(|balanced| Ok([balanced, linalg::raw_eigenvalues_c(&h)?].concat()))
+            linalg::candidate_eigenvalues_c(&self.rotated_hamiltonian(level, centre))
         };
         let eigenvalues = match eigenvalues {
             Err(linalg::LinalgError::NotFinite { .. }) if self.measured > 0 => return Ok(crossings),
