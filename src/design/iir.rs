@@ -50,7 +50,8 @@ pub fn design_iir(plant: &BlockedPlant, slack: f64) -> Result<StateSpaceDesign, 
     let mut search = Search::new(plant, &innovations)?;
     let mut mean_square = innovations.iter().filter_map(Innovations::h2).peekable();
     // The mean-square optimum is mostly the worst-case one too or far from it, and one frequency tells which.
-    let promising = mean_square.peek().map(|filters| search.may_be_optimal(filters)).transpose()? == Some(true);
+    let promising =
+        mean_square.peek().map(|filters| search.may_be_optimal(filters)).transpose()? == Some(true);
     if !promising {
         search.try_the_lower_bound()?;
     }

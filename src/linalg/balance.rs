@@ -90,16 +90,18 @@ fn drivers<T: ComplexField>(m: &DMatrix<T>) -> Vec<Vec<u64>> {
 ///
 /// nalgebra's `balance_parlett_reinsch` does the same in the 2-norm, but it rounds scales at powers of two and knows no
 /// bound on its sweeps.
-fn scales(mut m: Mat) -> Vec<f64> {
+pub(super) fn scales(mut m: Mat) -> Vec<f64> {
     let mut scales = vec![1.0; m.nrows()];
     for _ in 0..MAX_SWEEPS {
         let mut changed = false;
         for (i, scale) in scales.iter_mut().enumerate() {
             let factor = equalising(&m, i);
-            changed |= factor != 1.0;
-            m.column_mut(i).scale_mut(factor);
-            m.row_mut(i).scale_mut(1.0 / factor);
-            *scale *= factor;
+            if factor != 1.0 {
+                changed = true;
+                m.column_mut(i).scale_mut(factor);
+                m.row_mut(i).scale_mut(1.0 / factor);
+                *scale *= factor;
+            }
         }
         if !changed {
             break;

@@ -121,7 +121,7 @@ pub fn unexplained_gain(response: &CMat, measured: usize) -> Result<f64, LtiErro
 }
 
 struct Search<'a> {
-    system: &'a StateSpace,
+    system: StateSpace,
     measured: usize,
     response: &'a dyn Fn(f64) -> CMat,
     /// Frequencies looked at first, beside the uniform ones.
@@ -132,12 +132,8 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(
-        system: &'a StateSpace,
-        measured: usize,
-        response: &'a dyn Fn(f64) -> CMat,
-        hints: Vec<f64>,
-    ) -> Self {
+    fn new(system: &StateSpace, measured: usize, response: &'a dyn Fn(f64) -> CMat, hints: Vec<f64>) -> Self {
+        let system = system.rescaled();
         let scale = system.d().norm() + system.c().norm() * system.b().norm();
         Self { system, measured, response, hints, floor: f64::EPSILON.sqrt() * scale }
     }
@@ -304,7 +300,7 @@ impl<'a> Search<'a> {
     /// opposite to the centre of the Cayley transform, which is 0 or pi.
     fn hamiltonian(&self, level: f64, centre: f64) -> Mat {
         let e = if centre == PI { 1.0 } else { -1.0 };
-        let system = self.system;
+        let system = &self.system;
         let parts = (system.a() * e, system.b() * e, system.c().clone(), system.d().clone());
         hamiltonian(&cayley(parts, linalg::solve), self.measured, level, linalg::solve)
     }
@@ -313,7 +309,7 @@ impl<'a> Search<'a> {
     fn rotated_hamiltonian(&self, level: f64, centre: f64) -> CMat {
         let turn = -Complex::from_polar(1.0, -centre);
         let complex = |m: &Mat| linalg::to_complex(m);
-        let system = self.system;
+        let system = &self.system;
         let parts = (
             complex(system.a()) * turn,
             complex(system.b()) * turn,
