@@ -23,6 +23,8 @@ const ROUND_LIMIT: usize = 60;
 const FIRST_GRID: usize = 32;
 /// Relative differences of gains below this are no reason to go on climbing.
 const FLAT: f64 = 1e-11;
+/// Relative differences of gains below this are no differences.
+const ROUNDING: f64 = 1e-13;
 /// Steps of a climb are at least this part of the width that is left.
 const LEAST_STEP: f64 = 1e-3;
 /// At least so many uniform frequencies a state: |G|^2 has at most a peak for each state between 0 and pi.
@@ -200,7 +202,8 @@ impl<'a> Search<'a> {
             stalls = if gained < FLAT * best.gain { stalls + 1 } else { 0 };
             // A try far below the best one says that the step was poor, not that the top is reached.
             flats = if gained.abs() <= FLAT * best.gain { flats + 1 } else { 0 };
-            if gained > 0.0 {
+            // Of equal gains the first stays: tops at 0 and pi are there exactly.
+            if gained > ROUNDING * best.gain {
                 if w < best.frequency {
                     high = best
                 } else {
