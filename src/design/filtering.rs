@@ -96,6 +96,13 @@ pub(super) enum Trial {
 }
 
 impl Innovations {
+    /// The problem in balanced coordinates, where they can be had, and in those of the plant: near the edge of double
+    /// precision now the one, now the other is solvable.
+    pub(super) fn in_all_coordinates(plant: &BlockedPlant) -> Result<Vec<Self>, DesignError> {
+        let plain = Self::new(plant)?;
+        Ok(plain.balanced().into_iter().chain([plain]).collect())
+    }
+
     /// Separates fresh information (u1) from the rest (u2) by one LQ factorisation.
     pub(super) fn new(plant: &BlockedPlant) -> Result<Self, DesignError> {
         let sizes = output_sizes(&plant.system)?;

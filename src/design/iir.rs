@@ -5,8 +5,10 @@ use super::DesignError;
 use super::equivalence::BlockedPlant;
 use super::error_system;
 use super::filtering::{Filter, Innovations, Trial};
+use crate::linalg;
+use crate::linalg::Complex;
 use crate::lti::LtiError;
-use crate::lti::peak::unexplained_peak;
+use crate::lti::peak::{Peak, hinf_norm, unexplained_peak};
 
 /// Relative width of the interval [lower, upper] at which gamma-iteration ends.
 pub const GAMMA_ACCURACY: f64 = 5e-7;
@@ -34,23 +36,40 @@ pub struct StateSpaceDesign {
 
 /// The bound that no latency can beat: the peak of what the slow samples leave unexplained.
 pub fn noncausal_bound(plant: &BlockedPlant) -> Result<f64, DesignError> {
-    Ok(unexplained_peak(&plant.system, plant.measured)?.gain)
+    Ok(noncausal_peak(plant)?.gain)
+}
+
+fn noncausal_peak(plant: &BlockedPlant) -> Result<Peak, DesignError> {
+    Ok(unexplained_peak(&plant.system, plant.measured)?)
 }
 
 /// The least gamma of any causal bank, within [`GAMMA_ACCURACY`]; with `slack` > 0 the central filter
 /// at (1 + slack) times the optimum instead, which is kinder to all other frequencies.
 pub fn design_iir(plant: &BlockedPlant, slack: f64) -> Result<StateSpaceDesign, DesignError> {
-    let mut search = Search::new(plant)?;
-    search.start_from_h2()?;
-    search.try_the_lower_bound()?;
+    let innovations = Innovations::in_all_coordinates(plant)?;
+    let mut search = Search::new(plant, &innovations)?;
+    let mut mean_square = innovations.iter().filter_map(Innovations::h2).peekable();
+    // The mean-square optimum is mostly the worst-case one too or far from it, and one frequency tells which.
+    let promising =
+        mean_square.peek().map(|filters| search.may_be_optimal(filters)).transpose()? == Some(true);
+    if !promising {
+        search.try_the_lower_bound()?;
+    }
+    if !search.done() {
+        search.start_from(mean_square)?;
+    }
+    if promising {
+        search.try_the_lower_bound()?;
+    }
     search.bisect()?;
     search.finish(slack)
 }
 
 /// The mean-square optimal bank.
 pub fn design_h2(plant: &BlockedPlant) -> Result<StateSpaceDesign, DesignError> {
-    let mut search = Search::new(plant)?;
-    search.start_from_h2()?;
+    let innovations = Innovations::in_all_coordinates(plant)?;
+    let mut search = Search::new(plant, &innovations)?;
+    search.start_from(innovations.iter().filter_map(Innovations::h2))?;
     search
         .best
         .map(|best| search.report.fill(best))
@@ -87,27 +106,26 @@ impl Report {
 
 struct Search<'a> {
     plant: &'a BlockedPlant,
-    /// The same problem in balanced coordinates, where they can be had, and in those of the plant: near the
-    /// edge of double precision now the one, now the other is solvable.
-    innovations: Vec<Innovations>,
+    innovations: &'a [Innovations],
+    /// Where the noncausal bound is attained, radians a slow tick.
+    hardest: f64,
     best: Option<Verified>,
     report: Report,
     negligible: f64,
 }
 
 impl<'a> Search<'a> {
-    fn new(plant: &'a BlockedPlant) -> Result<Self, DesignError> {
-        let noncausal = noncausal_bound(plant)?;
-        let plain = Innovations::new(plant)?;
-        let lower = noncausal.max(plain.fresh_error()?);
-        let innovations = plain.balanced().into_iter().chain([plain]).collect();
+    fn new(plant: &'a BlockedPlant, innovations: &'a [Innovations]) -> Result<Self, DesignError> {
+        let noncausal = noncausal_peak(plant)?;
+        let fresh = innovations.first().map_or(Ok(0.0), Innovations::fresh_error)?;
         let negligible =
             NEGLIGIBLE * (plant.system.c().norm() * plant.system.b().norm() + plant.system.d().norm());
         Ok(Self {
             plant,
             innovations,
+            hardest: noncausal.frequency,
             best: None,
-            report: Report { lower, noncausal, trials: 0 },
+            report: Report { lower: noncausal.gain.max(fresh), noncausal: noncausal.gain, trials: 0 },
             negligible,
         })
     }
@@ -127,10 +145,18 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn start_from_h2(&mut self) -> Result<(), DesignError> {
+    /// Whether the error where the noncausal bound is attained is within the accuracy of the least that any filter can have.
+    fn may_be_optimal(&self, filters: &Filter) -> Result<bool, DesignError> {
+        let error = error_system::error_system(self.plant, filters)?;
+        let response = error.response_at(Complex::from_polar(1.0, self.hardest));
+        let gain = linalg::largest_singular_value_c(&response)?;
+        Ok(gain <= self.report.lower * (1.0 + GAMMA_ACCURACY) || gain <= self.negligible)
+    }
+
+    /// Keeps the first of the mean-square optimal filters that is stable.
+    fn start_from(&mut self, mean_square: impl Iterator<Item = Filter>) -> Result<(), DesignError> {
         self.report.trials += 1;
-        let candidates: Vec<Filter> = self.innovations.iter().filter_map(Innovations::h2).collect();
-        for filters in candidates {
+        for filters in mean_square {
             if let Some(found) = self.verify(filters)? {
                 self.keep(found);
                 break;
@@ -202,14 +228,15 @@ impl<'a> Search<'a> {
     fn first_ceiling(&self) -> f64 {
         let (m, n) = (self.plant.measured, self.plant.wanted);
         let silent = self.plant.system.select_outputs(m..m + n);
-        crate::lti::peak::hinf_norm(&silent).map_or(f64::MAX.sqrt(), |peak| peak.gain)
+        hinf_norm(&silent).map_or(f64::MAX.sqrt(), |peak| peak.gain)
     }
 
     fn finish(mut self, slack: f64) -> Result<StateSpaceDesign, DesignError> {
-        let optimum = self.best.take().ok_or(DesignError::RiccatiFailed { gamma: self.first_ceiling() })?;
+        let best = self.best.take();
+        let optimum = best.ok_or_else(|| DesignError::RiccatiFailed { gamma: self.first_ceiling() })?;
         if slack > 0.0 && optimum.norm > self.negligible {
             let cap = optimum.norm * (1.0 + slack);
-            for innovations in &self.innovations {
+            for innovations in self.innovations {
                 let Trial::Achieved(filters) = innovations.h_infinity(cap) else { continue };
                 let Some(relaxed) = self.verify(filters)? else { continue };
                 if relaxed.norm <= cap {

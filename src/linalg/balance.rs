@@ -22,19 +22,30 @@ pub fn power_of_two(x: f64) -> f64 {
     if x > 0.0 && x.is_finite() { (x.log2() + 0.2).round().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
 }
 
+/// A balanced diagonal block.
+pub(super) struct Balanced<T> {
+    pub(super) matrix: DMatrix<T>,
+    /// The largest scale over the smallest: the condition of the change of coordinates.
+    pub(super) condition: f64,
+}
+
 /// Matrices that together have the eigenvalues of `m`: the diagonal blocks of its block triangular form, each balanced.
-pub(super) fn balanced_blocks<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Vec<DMatrix<T>> {
+pub(super) fn balanced_blocks<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Vec<Balanced<T>> {
     let block = |states: &Vec<usize>| {
         balanced(&DMatrix::from_fn(states.len(), states.len(), |i, j| m[(states[i], states[j])].clone()))
     };
     loops(m).iter().map(block).collect()
 }
 
-fn balanced<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> DMatrix<T> {
+fn balanced<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Balanced<T> {
     let scales = scales(m.map(|x| x.modulus()));
-    let scaled = m.map_with_location(|i, j, x| x.scale(scales[j] / scales[i]));
+    let matrix = m.map_with_location(|i, j, x| x.scale(scales[j] / scales[i]));
     // Moduli at both ends of double precision may ask for scales beyond it.
-    if scaled.iter().all(|x| x.clone().is_finite()) { scaled } else { m.clone() }
+    if matrix.iter().any(|x| !x.clone().is_finite()) {
+        return Balanced { matrix: m.clone(), condition: 1.0 };
+    }
+    let (least, most) = scales.iter().fold((f64::INFINITY, 0.0f64), |(a, b), &x| (a.min(x), b.max(x)));
+    Balanced { matrix, condition: most / least }
 }
 
 /// The states in groups, each of which drives itself in a loop: the strongly connected components of the graph in which
@@ -79,16 +90,18 @@ fn drivers<T: ComplexField>(m: &DMatrix<T>) -> Vec<Vec<u64>> {
 ///
 /// nalgebra's `balance_parlett_reinsch` does the same in the 2-norm, but it rounds scales at powers of two and knows no
 /// bound on its sweeps.
-fn scales(mut m: Mat) -> Vec<f64> {
+pub(super) fn scales(mut m: Mat) -> Vec<f64> {
     let mut scales = vec![1.0; m.nrows()];
     for _ in 0..MAX_SWEEPS {
         let mut changed = false;
         for (i, scale) in scales.iter_mut().enumerate() {
             let factor = equalising(&m, i);
-            changed |= factor != 1.0;
-            m.column_mut(i).scale_mut(factor);
-            m.row_mut(i).scale_mut(1.0 / factor);
-            *scale *= factor;
+            if factor != 1.0 {
+                changed = true;
+                m.column_mut(i).scale_mut(factor);
+                m.row_mut(i).scale_mut(1.0 / factor);
+                *scale *= factor;
+            }
         }
         if !changed {
             break;

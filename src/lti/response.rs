@@ -13,19 +13,20 @@ pub struct FrequencyResponse {
     hessenberg: Mat,
     /// Q' c', n x p.
     outputs: Mat,
-    /// Q' b, n x m, complex once and for all.
-    inputs: CMat,
+    /// Q' b, n x m.
+    inputs: Mat,
     feedthrough: CMat,
 }
 
 impl FrequencyResponse {
     /// Prepares the evaluation of `system`.
     pub fn new(system: &StateSpace) -> Self {
+        let system = system.rescaled();
         let (q, hessenberg) = reduce(&system.a().transpose());
         Self {
             hessenberg,
             outputs: q.transpose() * system.c().transpose(),
-            inputs: linalg::to_complex(&(q.transpose() * system.b())),
+            inputs: q.transpose() * system.b(),
             feedthrough: linalg::to_complex(system.d()),
         }
     }
@@ -34,12 +35,20 @@ impl FrequencyResponse {
     pub fn at(&self, z: Complex<f64>) -> CMat {
         let mut x = linalg::to_complex(&self.outputs);
         self.solve_shifted(z, &mut x);
-        x.transpose() * &self.inputs + &self.feedthrough
+        self.through_inputs(&x) + &self.feedthrough
     }
 
     /// G(e^{jw}), p x m.
     pub fn at_frequency(&self, w: f64) -> CMat {
         self.at(Complex::from_polar(1.0, w))
+    }
+
+    /// X' Q' b. The inputs are real: one product for the real and imaginary parts together.
+    fn through_inputs(&self, x: &CMat) -> CMat {
+        let (n, p) = x.shape();
+        let part = |i: usize, k: usize| if i < p { x[(k, i)].re } else { x[(k, i - p)].im };
+        let parts = Mat::from_fn(2 * p, n, part) * &self.inputs;
+        CMat::from_fn(p, self.inputs.ncols(), |i, j| Complex::new(parts[(i, j)], parts[(p + i, j)]))
     }
 
     /// x <- (zI - H)^-1 x by Gaussian elimination with exchange of neighbouring rows.
@@ -129,6 +138,31 @@ mod tests {
             let mut c = Mat::zeros(1, n);
             c[n - 1] = 1.0;
             check(&StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap());
+        }
+    }
+
+    /// Gains of states on one another that differ by 20 decades, as where a filter is written in units of its own: orthogonal
+    /// changes of coordinates keep errors small beside the largest of them only.
+    #[test]
+    fn units_of_the_states_do_not_move_the_response() {
+        for n in [2_usize, 5, 12] {
+            let a = Mat::from_fn(n, n, |i, j| 0.9 * ((i * 5 + j * 3 + 1) as f64).sin() / (n as f64));
+            let b = Mat::from_fn(n, 3, |i, j| ((i + j) as f64).cos());
+            let c = Mat::from_fn(2, n, |i, j| ((i * 2 + j) as f64).sin());
+            let unit = |i: usize| ((i * 29 % 61) as f64 - 30.0).exp2();
+            let scaled = StateSpace::new(
+                Mat::from_fn(n, n, |i, j| a[(i, j)] * unit(i) / unit(j)),
+                Mat::from_fn(n, 3, |i, j| b[(i, j)] * unit(i)),
+                Mat::from_fn(2, n, |i, j| c[(i, j)] / unit(j)),
+                Mat::zeros(2, 3),
+            )
+            .unwrap();
+            let plain = StateSpace::new(a, b, c, Mat::zeros(2, 3)).unwrap();
+            let response = FrequencyResponse::new(&scaled);
+            for w in [0.0, 0.3, 1.1, 2.7] {
+                let (got, want) = (response.at_frequency(w), plain.response_at(Complex::from_polar(1.0, w)));
+                assert!((&got - &want).norm() <= 1e-13 * want.norm(), "n = {n}, w = {w}: {got} {want}");
+            }
         }
     }
 }

@@ -102,6 +102,21 @@ impl StateSpace {
         }
     }
 
+    /// The same system with its states in units that suit one another: divided by powers of two, which is exact. Orthogonal
+    /// changes of coordinates mix all states, and what is small beside rounding errors of the others is lost in them.
+    pub fn rescaled(&self) -> Self {
+        let scales = linalg::state_scales(&self.a, &self.b, &self.c);
+        let scaled = Self {
+            a: Mat::from_fn(self.order(), self.order(), |i, j| self.a[(i, j)] * (scales[j] / scales[i])),
+            b: Mat::from_fn(self.order(), self.inputs(), |i, j| self.b[(i, j)] / scales[i]),
+            c: Mat::from_fn(self.outputs(), self.order(), |i, j| self.c[(i, j)] * scales[j]),
+            d: self.d.clone(),
+        };
+        // Entries at both ends of double precision may ask for scales beyond it.
+        let finite = |m: &Mat| m.iter().all(|x| x.is_finite());
+        if [&scaled.a, &scaled.b, &scaled.c].into_iter().all(finite) { scaled } else { self.clone() }
+    }
+
     /// Largest modulus of the poles.
     pub fn spectral_radius(&self) -> Result<f64, linalg::LinalgError> {
         linalg::spectral_radius(&self.a)
