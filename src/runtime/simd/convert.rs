@@ -73,9 +73,17 @@ impl Rows {
 /// AVX2.
 #[inline(always)]
 pub(super) unsafe fn decode<L: Load>(bytes: &[u8], out: &mut [f32]) -> usize {
-    let blocks = out.chunks_exact_mut(8).zip(bytes.chunks_exact(8 * L::BYTES));
+    let (blocks, _) = out.as_chunks_mut::<32>();
     let mut done = 0;
-    for (out, bytes) in blocks {
+    for (out, bytes) in blocks.iter_mut().zip(bytes.chunks_exact(32 * L::BYTES)) {
+        for (v, out) in out.as_chunks_mut::<8>().0.iter_mut().enumerate() {
+            // SAFETY: the caller's; both slices hold 32 samples.
+            unsafe { _mm256_storeu_ps(out.as_mut_ptr(), L::load8(bytes.as_ptr().add(8 * v * L::BYTES))) };
+        }
+        done += 32;
+    }
+    let rest = out[done..].as_chunks_mut::<8>().0.iter_mut();
+    for (out, bytes) in rest.zip(bytes[done * L::BYTES..].chunks_exact(8 * L::BYTES)) {
         // SAFETY: the caller's; both slices hold eight samples.
         unsafe { _mm256_storeu_ps(out.as_mut_ptr(), L::load8(bytes.as_ptr())) };
         done += 8;
@@ -208,27 +216,49 @@ unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
     }
 }
 
-/// Encodes as s16le; returns the samples done (a multiple of 8) and how many were clipped.
+/// Encodes as s16le; returns the samples done (a multiple of 16) and how many were clipped.
 ///
 /// # Safety
 /// AVX2; `out` has room.
 #[inline(always)]
 pub(super) unsafe fn encode_s16(samples: &[f32], out: &mut [u8]) -> (usize, u64) {
-    let mut done = 0;
+    let whole = samples.len().min(out.len() / 2) & !15;
     let mut clipped = 0;
-    unsafe {
-        let (low, high) = (_mm256_set1_ps(-32768.0), _mm256_set1_ps(32767.0));
-        while done + 8 <= samples.len() && 2 * (done + 8) <= out.len() {
-            let scaled = _mm256_mul_ps(_mm256_loadu_ps(samples.as_ptr().add(done)), _mm256_set1_ps(32768.0));
-            let rounded = _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(scaled);
-            let held = _mm256_max_ps(low, _mm256_min_ps(high, rounded));
-            let outside = _mm256_cmp_ps::<_CMP_NEQ_OQ>(held, rounded);
-            clipped += u64::from((_mm256_movemask_ps(outside) as u32).count_ones());
-            let wide = _mm256_cvtps_epi32(held);
-            let packed = _mm_packs_epi32(_mm256_castsi256_si128(wide), _mm256_extracti128_si256::<1>(wide));
-            _mm_storeu_si128(out.as_mut_ptr().add(2 * done).cast(), packed);
-            done += 8;
-        }
+    for (samples, out) in samples[..whole].chunks(COUNTED).zip(out.chunks_mut(2 * COUNTED)) {
+        // SAFETY: the caller's.
+        clipped += unsafe { encode_counted(samples, out.as_mut_ptr()) };
     }
-    (done, clipped)
+    (whole, clipped)
+}
+
+/// Samples whose clipped ones are counted in the lanes of a vector, far fewer than fit.
+const COUNTED: usize = 1 << 20;
+
+/// A multiple of 16 samples; returns how many were clipped: those that do not round to an i16. Half way they round to the
+/// even one, which is the least one below and none above.
+#[inline(always)]
+unsafe fn encode_counted(samples: &[f32], out: *mut u8) -> u64 {
+    // SAFETY: the caller's.
+    unsafe {
+        let (scale, most) = (_mm256_set1_ps(32768.0), _mm256_set1_ps(32767.0));
+        let (lowest, highest) = (_mm256_set1_ps(-32768.5), _mm256_set1_ps(32767.5));
+        let mut clipped = _mm256_setzero_si256();
+        for done in (0..samples.len()).step_by(16) {
+            let mut wide = [_mm256_setzero_si256(); 2];
+            for (half, wide) in wide.iter_mut().enumerate() {
+                let scaled = _mm256_mul_ps(_mm256_loadu_ps(samples.as_ptr().add(done + 8 * half)), scale);
+                let low = _mm256_cmp_ps::<_CMP_LT_OQ>(scaled, lowest);
+                let high = _mm256_cmp_ps::<_CMP_GE_OQ>(scaled, highest);
+                clipped = _mm256_sub_epi32(clipped, _mm256_castps_si256(_mm256_or_ps(low, high)));
+                // What is too small becomes the least i32, and what is too large would; packing saturates.
+                *wide = _mm256_cvtps_epi32(_mm256_min_ps(most, scaled));
+            }
+            let packed = _mm256_packs_epi32(wide[0], wide[1]);
+            let ordered = _mm256_permute4x64_epi64::<0b11_01_10_00>(packed);
+            _mm256_storeu_si256(out.add(2 * done).cast(), ordered);
+        }
+        let mut lanes = [0u32; 8];
+        _mm256_storeu_si256(lanes.as_mut_ptr().cast(), clipped);
+        lanes.into_iter().map(u64::from).sum()
+    }
 }
