@@ -16,6 +16,12 @@ pub const GAMMA_ACCURACY: f64 = 5e-7;
 const NEGLIGIBLE: f64 = 1e-12;
 /// The bracket halves (on the logarithmic scale) in each trial.
 const TRIAL_LIMIT: usize = 80;
+/// Gammas tried below one that was not resolved.
+const LOOKS: usize = 8;
+/// Gamma-iterations with looks below between them.
+const ROUNDS: usize = 4;
+/// A look below is worth another gamma-iteration if it makes gamma this much smaller.
+const WORTH_IT: f64 = 0.9;
 
 /// A state-space design.
 #[derive(Debug, Clone)]
@@ -102,6 +108,15 @@ impl Report {
             trials: self.trials,
         }
     }
+}
+
+/// What gamma-iteration ended at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Floor {
+    /// A gamma that no filter reaches.
+    Proven,
+    /// One at which the trial failed for whatever reason.
+    Doubtful,
 }
 
 struct Search<'a> {
@@ -203,8 +218,38 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
+    /// Gamma-iteration, and where trials were not resolved a few looks below them: near the edge of double precision a smaller
+    /// gamma may well be solvable.
     fn bisect(&mut self) -> Result<(), DesignError> {
-        // `floor` is where trials failed for whatever reason; only proofs move the reported bound.
+        for _ in 0..ROUNDS {
+            if self.bisect_once()? == Floor::Proven {
+                break;
+            }
+            let before = self.upper();
+            self.look_below()?;
+            // False also where nothing was found at all.
+            if !(self.upper() < WORTH_IT * before) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn look_below(&mut self) -> Result<(), DesignError> {
+        let start = if self.upper().is_finite() { self.upper() } else { self.first_ceiling() };
+        let ratio = self.report.lower.max(self.negligible) / start;
+        for k in 1..=LOOKS {
+            let gamma = start * ratio.powf(k as f64 / (LOOKS + 1) as f64);
+            if matches!(self.attempt(gamma)?, Trial::Impossible) {
+                self.report.lower = self.report.lower.max(gamma);
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn bisect_once(&mut self) -> Result<Floor, DesignError> {
+        let mut kind = Floor::Proven;
         let mut floor = self.report.lower.max(self.negligible);
         let mut ceiling = if self.upper().is_finite() { self.upper() } else { self.first_ceiling() };
         for _ in 0..TRIAL_LIMIT {
@@ -215,13 +260,13 @@ impl<'a> Search<'a> {
             match self.attempt(gamma)? {
                 Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
                 Trial::Impossible => {
-                    floor = gamma;
+                    (floor, kind) = (gamma, Floor::Proven);
                     self.report.lower = self.report.lower.max(gamma);
                 }
-                Trial::Unresolved => floor = gamma,
+                Trial::Unresolved => (floor, kind) = (gamma, Floor::Doubtful),
             }
         }
-        Ok(())
+        Ok(kind)
     }
 
     /// ||W||, the gamma of the bank that outputs nothing, bounded by its Frobenius pieces.
