@@ -70,11 +70,14 @@ struct Table {
 }
 
 impl Table {
-    /// One row: `samples` fast samples a turn of `products` multiply-adds each. Returns the seconds of a turn, if the row
-    /// was asked for.
-    fn row(&self, name: &str, samples: usize, products: f64, turn: impl FnMut()) -> Option<f64> {
-        if self.wanted.as_ref().is_some_and(|word| !name.contains(word)) {
-            return None;
+    fn wants(&self, name: &str) -> bool {
+        self.wanted.as_ref().is_none_or(|word| name.contains(word))
+    }
+
+    /// One row: `samples` fast samples a turn of `products` multiply-adds each.
+    fn row(&self, name: &str, samples: usize, products: f64, turn: impl FnMut()) {
+        if !self.wants(name) {
+            return;
         }
         let (seconds, peak) = measure(turn);
         let rate = samples as f64 / seconds;
@@ -85,7 +88,6 @@ impl Table {
             macs / 1e9,
             100.0 * macs / peak
         );
-        Some(seconds)
     }
 
     /// The products are those of the direct form, so that the share of the peak may pass 100 % in others.
@@ -110,8 +112,8 @@ impl Table {
             self.doubles(&format!("{name}: f64"), n, m, taps, Form::Direct);
             self.doubles(&format!("{name}: f64, fast"), n, m, taps, Form::Fast);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
-            self.threads(&format!("{name}: f32, long"), n, m, taps, Form::Direct);
-            self.threads(&format!("{name}: f32, fast, long"), n, m, taps, Form::Fast);
+            self.threads(&format!("{name}: f32, two threads"), n, m, taps, Form::Direct);
+            self.threads(&format!("{name}: f32, fast, two threads"), n, m, taps, Form::Fast);
             self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
         }
     }
@@ -153,24 +155,35 @@ impl Table {
         });
     }
 
-    /// Longer calls, as for files, by one thread and by two that wait for them.
+    /// Longer calls, as for files, by two threads; how many times one thread's speed that is, from turns about.
     fn threads(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
+        if !self.wants(name) {
+            return;
+        }
         let options = Options { form, ..Options::default() };
         let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
         let workers = Workers::new(2).unwrap();
         let ticks = 16 * TICKS;
         let x = input(n, ticks);
         let mut y = vec![0.0; m * ticks];
-        let products = (n * taps) as f64 / m as f64;
-        let one = self.row(&format!("{name}, one thread"), m * ticks, products, || {
+        let (mut one, mut two) = (Duration::MAX, Duration::MAX);
+        let begin = Instant::now();
+        while begin.elapsed() < 5 * ROW {
+            let start = Instant::now();
             stream.process(black_box(&x), &mut y).unwrap();
-        });
-        let two = self.row(&format!("{name}, two threads"), m * ticks, products, || {
+            one = one.min(start.elapsed());
+            let start = Instant::now();
             stream.process_parallel(black_box(&x), &mut y, &workers).unwrap();
-        });
-        if let (Some(one), Some(two)) = (one, two) {
-            println!("| {name:<27} {:.2} times one |          |        |         |", one / two);
+            two = two.min(start.elapsed());
         }
+        let (one, two) = (one.as_secs_f64(), two.as_secs_f64());
+        let (rate, products) = ((m * ticks) as f64 / two, (n * taps) as f64 / m as f64);
+        println!(
+            "| {name:<34} | {:>8.1} | {:>6.2} | {:.2} x 1 |",
+            rate / 1e6,
+            rate * products / 1e9,
+            one / two
+        );
     }
 
     /// 16 taps a phase for every small N and M, then more and more taps.

@@ -228,7 +228,8 @@ impl<'a> Search<'a> {
             let before = self.upper();
             self.look_below()?;
             // False also where nothing was found at all.
-            if !(self.upper() < WORTH_IT * before) {
+            let gained = self.upper() < WORTH_IT * before;
+            if !gained {
                 break;
             }
         }
