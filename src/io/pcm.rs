@@ -177,7 +177,7 @@ fn quantise(value: f64, bits: u32) -> (i32, bool) {
     let full = f64::from(1u32 << bits);
     let scaled = (value * full).round_ties_even();
     let clipped = scaled < -full || scaled > full - 1.0;
-    // NaN never comes out of a filter whose input is clean; the cast would make it 0.
+    // NaN comes out of a filter only where its sums overflow; the cast makes it 0.
     (scaled.clamp(-full, full - 1.0) as i32, clipped)
 }
 

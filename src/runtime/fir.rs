@@ -102,8 +102,16 @@ impl<T: Sample> FirPlan<T> {
         replaced
     }
 
+    /// Ticks of a call that go through the window although the others need not: those whose past lies elsewhere, and as
+    /// many as it takes for the others to fill vectors. `None` if all had better go there.
+    fn beginning(&self, ticks: usize) -> Option<usize> {
+        let beginning = self.reach + (ticks.wrapping_sub(self.reach) & (self.filters.cut().vector - 1));
+        let worth_it = ticks * self.channels >= SHORT_CALL && ticks >= 2 * beginning;
+        (worth_it && beginning <= self.block).then_some(beginning)
+    }
+
     /// Filters frames in the caller's memory, but for those at the beginning, whose past lies elsewhere; false, with the
-    /// state as it was, if the beginning is too much of the call or something may not be finite.
+    /// same past as before, if the beginning is too much of the call or something may not be finite.
     ///
     /// The beginning comes last: what was just copied cannot be loaded across the borders of its stores before these
     /// have reached the cache, and short calls would wait for that.
@@ -114,11 +122,8 @@ impl<T: Sample> FirPlan<T> {
         ticks: usize,
         sink: &mut (impl FastSink + ?Sized),
     ) -> bool {
+        let Some(beginning) = self.beginning(ticks) else { return false };
         let &Cut { past, vector, .. } = self.filters.cut();
-        let beginning = self.reach + (ticks.wrapping_sub(self.reach) & (vector - 1));
-        if frames.len() < SHORT_CALL || ticks < 2 * beginning || beginning > self.block {
-            return false;
-        }
         let FirState { window, output } = state;
         let n = self.channels;
         window.room(beginning).copy_from_slice(&frames[..beginning * n]);
@@ -169,21 +174,35 @@ impl<T: Sample> FirPlan<T> {
     ) -> u64 {
         let FirState { window, output } = state;
         source.gather(self.isa, ticks.start, ticks.len(), window.room(ticks.len()));
-        let mut count = 0;
-        // Filtered first: hardly ever is there anything to replace.
-        let stretch = Stretch { x: window.view(), first: 0, ticks: ticks.len() };
-        if !self.filter(&[stretch], ticks.clone(), output, sink) {
-            count = replace_not_finite(window.room(ticks.len()));
-            if count > 0 {
-                let stretch = Stretch { x: window.view(), first: 0, ticks: ticks.len() };
-                self.filter(&[stretch], ticks.clone(), output, sink);
+        let samples = ticks.start * self.ratio..ticks.end * self.ratio;
+        let count = match sink.slots(samples.clone()) {
+            Some(slots) => self.filter_room(window, ticks.len(), slots),
+            None => {
+                let output = &mut output[..samples.len()];
+                let count = self.filter_room(window, ticks.len(), output);
+                sink.store(self.isa, samples.start, output);
+                count
             }
-        }
+        };
         window.advance(ticks.len());
         count
     }
 
-    /// Filters `ticks`, whose stretches count from the first of them; false if something may not be finite.
+    /// Filters the ticks in the window's room; returns how many samples were not finite and were taken as 0.
+    fn filter_room(&self, window: &mut Window<T>, ticks: usize, out: &mut [T]) -> u64 {
+        // Filtered first: hardly ever is there anything to replace.
+        if self.run(&[Stretch { x: window.view(), first: 0, ticks }], out) {
+            return 0;
+        }
+        let count = replace_not_finite(window.room(ticks));
+        if count > 0 {
+            self.run(&[Stretch { x: window.view(), first: 0, ticks }], out);
+        }
+        count
+    }
+
+    /// Filters `ticks`, whose stretches count from the first of them; false, and then nothing is stored elsewhere, if something
+    /// may not be finite.
     #[inline]
     fn filter(
         &self,
@@ -198,7 +217,9 @@ impl<T: Sample> FirPlan<T> {
         }
         let output = &mut output[..samples.len()];
         let finite = self.run(stretches, output);
-        sink.store(self.isa, samples.start, output);
+        if finite {
+            sink.store(self.isa, samples.start, output);
+        }
         finite
     }
 

@@ -479,6 +479,36 @@ fn bytes_that_are_not_finite_become_zero_and_are_counted() {
 }
 
 #[test]
+fn what_is_clipped_is_counted_once_also_beside_what_is_not_finite() {
+    let mut stream = Reconstructor::new(&fir_bank(vec![vec![1.0]], 1)).unwrap();
+    let mut samples = vec![0.25f32; 100];
+    (samples[3], samples[50], samples[60]) = (2.0, f32::NAN, f32::INFINITY);
+    let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let mut out = [0; 200];
+    let mut output = PcmOutput { format: PcmFormat::S16Le, bytes: &mut out, clipped: 0 };
+    let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: 1, bytes: &bytes };
+    stream.process_pcm(&[frames], &mut output).unwrap();
+    assert_eq!((output.clipped, stream.replaced()), (1, 2));
+}
+
+/// Filters that look back exactly as far as a block is long, or about, leave no whole vector of the first span behind it.
+#[test]
+fn filters_as_long_as_a_block_follow_their_definition() {
+    let mut noise = Noise(97);
+    for (n, m) in [(16, 5), (24, 7), (4, 4), (3, 1), (16, 1)] {
+        for lags in [96, 97, 98, 193] {
+            let taps = random_taps(n, lags * m, &mut noise);
+            let input = noise.samples(n * (2 * lags + 1));
+            let got = run(&fir_bank(taps.clone(), m), Options::default(), &input);
+            let most = taps.iter().flatten().map(|tap| tap.abs()).sum::<f64>();
+            for (y, want) in got.iter().zip(definition(&taps, m, &input)) {
+                assert!((f64::from(*y) - want).abs() <= 1e-5 * most, "N {n} M {m} K {lags}: {y} {want}");
+            }
+        }
+    }
+}
+
+#[test]
 fn calls_and_banks_that_do_not_fit_are_refused() {
     let bank = fir_bank(vec![vec![1.0], vec![1.0]], 2);
     let mut stream = Reconstructor::new(&bank).unwrap();

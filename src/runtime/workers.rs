@@ -1,6 +1,6 @@
 //! Calls on several threads.
 //!
-//! A call is halved until the spans are short; each span has a state of its own, made from the filter memory before it,
+//! A call is halved until the spans are short, or many; each span has a state of its own, made from the filter memory before it,
 //! so its outputs have the bits that one thread would give them. There are more spans than threads: who is done first takes
 //! the next one, so that a thread that was held up does not hold up all.
 
@@ -33,7 +33,8 @@ impl Workers {
 /// Multiply-adds that are worth a span: some tens of microseconds, many times what it costs to hand it over.
 const SPAN: usize = 1 << 20;
 
-/// Spans of a long call for each thread: enough for those that are faster to help out, and each long against making its state.
+/// Spans of a long call for each thread, at most: enough for those that are faster to help out, and each long against making its
+/// state.
 const SPANS: usize = 8;
 
 /// A plan whose calls can be cut into spans.

@@ -234,8 +234,8 @@ pub(super) unsafe fn encode_s16(samples: &[f32], out: &mut [u8]) -> (usize, u64)
 /// Samples whose clipped ones are counted in the lanes of a vector, far fewer than fit.
 const COUNTED: usize = 1 << 20;
 
-/// A multiple of 16 samples; returns how many were clipped: those that do not round to an i16. Half way they round to the
-/// even one, which is the least one below and none above.
+/// A multiple of 16 samples; returns how many were clipped: those that do not round to an i16. -32768.5 rounds to -32768, which
+/// fits, 32767.5 to 32768, which does not. NaN becomes 0.
 #[inline(always)]
 unsafe fn encode_counted(samples: &[f32], out: *mut u8) -> u64 {
     // SAFETY: the caller's.
@@ -250,8 +250,9 @@ unsafe fn encode_counted(samples: &[f32], out: *mut u8) -> u64 {
                 let low = _mm256_cmp_ps::<_CMP_LT_OQ>(scaled, lowest);
                 let high = _mm256_cmp_ps::<_CMP_GE_OQ>(scaled, highest);
                 clipped = _mm256_sub_epi32(clipped, _mm256_castps_si256(_mm256_or_ps(low, high)));
+                let number = _mm256_and_ps(scaled, _mm256_cmp_ps::<_CMP_ORD_Q>(scaled, scaled));
                 // What is too small becomes the least i32, and what is too large would; packing saturates.
-                *wide = _mm256_cvtps_epi32(_mm256_min_ps(most, scaled));
+                *wide = _mm256_cvtps_epi32(_mm256_min_ps(most, number));
             }
             let packed = _mm256_packs_epi32(wide[0], wide[1]);
             let ordered = _mm256_permute4x64_epi64::<0b11_01_10_00>(packed);

@@ -22,7 +22,7 @@ pub(super) trait Group: Copy {
     unsafe fn diagonal_halves(sums: [Self; 4]) -> Self;
     /// The outputs of one vector to frames: phase p of its t-th tick to `out[t * hop + p]`. The sums are those of P = 2, 3 or
     /// 4 phases with D <= 4 lanes a tick, in the order of diagonals; (2, 4) is left to [`Group::store_halves`]. Of
-    /// 3 phases the place behind them is written as well, before the next tick.
+    /// 3 phases the place behind them may be written as well, before the next tick.
     unsafe fn store_ticks<const P: usize, const D: usize>(
         sums: [Self; 4],
         out: *mut Self::Sample,

@@ -149,7 +149,8 @@ mod tests {
     fn encoding_is_the_same_as_one_by_one() {
         let mut samples: Vec<f32> = (0..70_000).map(|i| (i as f32 - 35_000.0) / 32768.0 + 1e-6).collect();
         samples.extend([1e30, -1e30, 1.0, -1.0, 0.5 / 32768.0, 1.5 / 32768.0, 32767.5 / 32768.0]);
-        samples.extend([-32768.5, -32769.0, 32767.4, 32767.25, -32767.5].map(|x| x / 32768.0));
+        samples.splice(0..0, [f32::NAN, f32::INFINITY, f32::NEG_INFINITY]);
+        samples.extend([-32768.5, -32769.0, 32767.4, 32767.25, -32767.5, f32::NAN].map(|x| x / 32768.0));
         for format in PcmFormat::ALL {
             let mut fast = vec![0; samples.len() * format.bytes()];
             let mut slow = fast.clone();

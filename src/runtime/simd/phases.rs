@@ -259,6 +259,9 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// Brings the tile in scratch to its place in the output.
     #[inline(always)]
     unsafe fn settle(&mut self) {
+        if self.waiting == 0 {
+            return;
+        }
         // What is known beforehand makes straight code; short filters notice.
         let most = V::SUMS / P;
         // SAFETY: the caller's.
@@ -279,13 +282,13 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
             let out = self.part.out.add(self.first * hop);
             if P > 2 {
                 for index in 0..vectors * V::GROUPS {
-                    Self::put_quad(self.sums(index), out.add(index * hop));
+                    Self::put_quad(self.added(index), out.add(index * hop));
                 }
                 return;
             }
             for (twos, g) in (0..vectors.div_ceil(2)).flat_map(|twos| (0..V::GROUPS).map(move |g| (twos, g)))
             {
-                let quad = self.sums(twos * V::GROUPS + g);
+                let quad = self.added(twos * V::GROUPS + g);
                 let tick = out.add((2 * twos * V::GROUPS + g) * hop);
                 if V::GROUPS == 1 && hop == P && 2 * twos + 1 < vectors {
                     Self::put_quad(quad, tick);
@@ -301,7 +304,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
 
     /// The sum of the two quads of a group in scratch.
     #[inline(always)]
-    unsafe fn sums(&self, group: usize) -> [V::Sample; 4] {
+    unsafe fn added(&self, group: usize) -> [V::Sample; 4] {
         // SAFETY: the caller's.
         unsafe {
             let from = self.job.scratch.add(group * V::GROUP);
@@ -309,7 +312,7 @@ impl<'a, V: Lanes, const D: usize, const P: usize> Phases<'a, V, D, P> {
         }
     }
 
-    /// Of three phases there are four too: the place behind them is written before it gets its own.
+    /// Four phases, or two of two ticks; or three and the place behind them, which is written before it gets its own.
     #[inline(always)]
     unsafe fn put_quad(quad: [V::Sample; 4], to: *mut V::Sample) {
         // SAFETY: the caller's.

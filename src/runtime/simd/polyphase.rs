@@ -80,10 +80,11 @@ impl<T: Copy + Default + 'static> Polyphase<T> {
     /// # Panics
     /// If a stretch or `out` is too short for that, or if there are more than two stretches.
     pub(crate) fn run(&self, stretches: &[Stretch<'_, T>], out: &mut [T]) -> bool {
-        let mut parts = [Part::NONE; STRETCHES];
-        let mut whole = true;
+        let (mut parts, mut whole) = ([Part::NONE; STRETCHES], true);
+        // All outputs are written through this one pointer, here and in the kernels.
+        let room = out.as_mut_ptr();
         for (part, stretch) in parts[..stretches.len()].iter_mut().zip(stretches) {
-            *part = self.part(stretch, out);
+            *part = self.part(stretch, room, out.len());
             whole &= part.ticks == stretch.ticks;
         }
         let mut scratch = std::mem::MaybeUninit::<Scratch<T>>::uninit();
@@ -103,7 +104,7 @@ impl<T: Copy + Default + 'static> Polyphase<T> {
             if !whole {
                 for (part, stretch) in parts.iter().zip(stretches) {
                     // SAFETY: as above.
-                    finite &= unsafe { rest(group, &job, part, stretch, out) };
+                    finite &= unsafe { rest(group, &job, part, stretch, room) };
                 }
             }
         }
@@ -113,14 +114,14 @@ impl<T: Copy + Default + 'static> Polyphase<T> {
     /// The whole vectors of a stretch, and of a frame of three phases without its last tick: of three phases the kernels
     /// write to the place behind them too, which belongs to the same tick, to a later one, or to none.
     #[inline(always)]
-    fn part(&self, stretch: &Stretch<'_, T>, out: &mut [T]) -> Part<T> {
+    fn part(&self, stretch: &Stretch<'_, T>, room: *mut T, len: usize) -> Part<T> {
         let Stretch { x, first, ticks } = *stretch;
         let Cut { past, hop, depth, vector, .. } = self.cut;
         let padded = (ticks + vector - 1) & !(vector - 1);
-        assert!(past + padded * hop <= x.len() && (first + ticks) * self.ratio <= out.len());
+        assert!(past + padded * hop <= x.len() && (first + ticks) * self.ratio <= len);
         Part {
-            x: x[past + hop - depth..].as_ptr(),
-            out: out[first * self.ratio..].as_mut_ptr(),
+            x: x.as_ptr().wrapping_add(past + hop - depth),
+            out: room.wrapping_add(first * self.ratio),
             ticks: ticks.saturating_sub(usize::from(self.ratio == 3)) & !(vector - 1),
         }
     }
@@ -129,17 +130,16 @@ impl<T: Copy + Default + 'static> Polyphase<T> {
 /// The ticks of a stretch, a vector at most, that are left of its part.
 ///
 /// # Safety
-/// The job and the part are those of a checked call.
-#[cold]
+/// The job, the part and the stretch are those of a checked call, whose outputs begin at `room`.
 unsafe fn rest<T: Copy + Default>(
     group: &PhaseGroup<T>,
     job: &Job<'_, T>,
     part: &Part<T>,
     stretch: &Stretch<'_, T>,
-    out: &mut [T],
+    room: *mut T,
 ) -> bool {
-    let left = stretch.first + part.ticks..stretch.first + stretch.ticks;
-    if left.is_empty() {
+    let left = stretch.ticks - part.ticks;
+    if left == 0 {
         return true;
     }
     let mut bounce = [T::default(); BOUNCE];
@@ -147,12 +147,14 @@ unsafe fn rest<T: Copy + Default>(
     let x = part.x.wrapping_add(part.ticks * job.cut.hop);
     let parts = [Part { x, out: bounce.as_mut_ptr(), ticks: job.cut.vector }];
     // SAFETY: the caller's; a vector has at most 16 ticks, so the bounce buffer holds them.
-    let finite = unsafe { (group.pass)(&Job { parts: &parts, first: 0, out_hop: hop, ..*job }) };
-    let frames = out[left.start * job.out_hop..left.end * job.out_hop].chunks_exact_mut(job.out_hop);
-    for (frame, phases) in frames.zip(bounce.chunks_exact(hop)) {
-        frame[group.first..][..group.width].copy_from_slice(&phases[..group.width]);
+    unsafe {
+        let finite = (group.pass)(&Job { parts: &parts, first: 0, out_hop: hop, ..*job });
+        for (t, phases) in bounce.chunks_exact(hop).enumerate().take(left) {
+            let frame = room.add((stretch.first + part.ticks + t) * job.out_hop);
+            frame.add(group.first).copy_from_nonoverlapping(phases.as_ptr(), group.width);
+        }
+        finite
     }
-    finite
 }
 
 /// M phases in groups of 4, before them one of 3 if M is odd, behind them one of 2 if that is not enough; 1 only if M is 1. Those
