@@ -237,12 +237,11 @@ impl<'a> Search<'a> {
     }
 
     fn look_below(&mut self) -> Result<(), DesignError> {
-        let start = if self.upper().is_finite() { self.upper() } else { self.first_ceiling() };
-        let ratio = self.report.lower.max(self.negligible) / start;
+        let start = self.ceiling();
+        let ratio = self.floor() / start;
         for k in 1..=LOOKS {
             let gamma = start * ratio.powf(k as f64 / (LOOKS + 1) as f64);
-            if matches!(self.attempt(gamma)?, Trial::Impossible) {
-                self.report.lower = self.report.lower.max(gamma);
+            if matches!(self.try_to_prove(gamma)?, Trial::Impossible) {
                 break;
             }
         }
@@ -251,23 +250,38 @@ impl<'a> Search<'a> {
 
     fn bisect_once(&mut self) -> Result<Floor, DesignError> {
         let mut kind = Floor::Proven;
-        let mut floor = self.report.lower.max(self.negligible);
-        let mut ceiling = if self.upper().is_finite() { self.upper() } else { self.first_ceiling() };
+        let (mut floor, mut ceiling) = (self.floor(), self.ceiling());
         for _ in 0..TRIAL_LIMIT {
             if self.done() || ceiling <= floor * (1.0 + 0.5 * GAMMA_ACCURACY) {
                 break;
             }
             let gamma = (floor * ceiling).sqrt();
-            match self.attempt(gamma)? {
+            match self.try_to_prove(gamma)? {
                 Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
-                Trial::Impossible => {
-                    (floor, kind) = (gamma, Floor::Proven);
-                    self.report.lower = self.report.lower.max(gamma);
-                }
+                Trial::Impossible => (floor, kind) = (gamma, Floor::Proven),
                 Trial::Unresolved => (floor, kind) = (gamma, Floor::Doubtful),
             }
         }
         Ok(kind)
+    }
+
+    /// As [`Search::attempt`]; a proof that no filter reaches `gamma` moves the reported bound.
+    fn try_to_prove(&mut self, gamma: f64) -> Result<Trial, DesignError> {
+        let trial = self.attempt(gamma)?;
+        if matches!(trial, Trial::Impossible) {
+            self.report.lower = self.report.lower.max(gamma);
+        }
+        Ok(trial)
+    }
+
+    /// The least gamma that is worth a trial.
+    fn floor(&self) -> f64 {
+        self.report.lower.max(self.negligible)
+    }
+
+    /// A gamma that some filter reaches.
+    fn ceiling(&self) -> f64 {
+        if self.upper().is_finite() { self.upper() } else { self.first_ceiling() }
     }
 
     /// ||W||, the gamma of the bank that outputs nothing, bounded by its Frobenius pieces.

@@ -90,8 +90,8 @@ impl<T: Sample> FirPlan<T> {
         sink: &mut (impl FastSink + ?Sized),
     ) -> u64 {
         let ticks = source.ticks();
-        if let Some(frames) = source.frames::<T>()
-            && self.where_they_lie(state, frames, ticks, sink)
+        if let (Some(frames), Some(out)) = (source.frames(), sink.slots(0..ticks * self.ratio))
+            && self.where_they_lie(&mut state.window, frames, ticks, out)
         {
             return 0;
         }
@@ -110,36 +110,28 @@ impl<T: Sample> FirPlan<T> {
         (worth_it && beginning <= self.block).then_some(beginning)
     }
 
-    /// Filters frames in the caller's memory, but for those at the beginning, whose past lies elsewhere; false, with the
-    /// same past as before, if the beginning is too much of the call or something may not be finite.
+    /// Filters frames in the caller's memory to outputs there, but for those at the beginning, whose past lies elsewhere; false,
+    /// with the same past as before, if the beginning is too much of the call or something may not be finite.
     ///
     /// The beginning comes last: what was just copied cannot be loaded across the borders of its stores before these
     /// have reached the cache, and short calls would wait for that.
-    fn where_they_lie(
-        &self,
-        state: &mut FirState<T>,
-        frames: &[T],
-        ticks: usize,
-        sink: &mut (impl FastSink + ?Sized),
-    ) -> bool {
+    fn where_they_lie(&self, window: &mut Window<T>, frames: &[T], ticks: usize, out: &mut [T]) -> bool {
         let Some(beginning) = self.beginning(ticks) else { return false };
-        let &Cut { past, vector, .. } = self.filters.cut();
-        let FirState { window, output } = state;
-        let n = self.channels;
+        let (n, &Cut { past, vector, .. }) = (self.channels, self.filters.cut());
         window.room(beginning).copy_from_slice(&frames[..beginning * n]);
         let begin = Stretch { x: window.view(), first: 0, ticks: beginning };
-        let once = self.filters.reads_once() && sink.takes::<T>();
-        let span = if once { SPAN_BLOCKS * self.block } else { self.block };
+        let stretch = |first: usize, end: usize| {
+            let x = &frames[first * n - past..end * n];
+            Stretch { x, first, ticks: end - first }
+        };
+        let span = if self.filters.reads_once() { SPAN_BLOCKS * self.block } else { self.block };
         // Whole vectors, as all that follows has then.
         let mut done = ticks.min(beginning + ((span - beginning) & !(vector - 1)));
-        let x = &frames[beginning * n - past..done * n];
-        let rest = Stretch { x, first: beginning, ticks: done - beginning };
-        let mut finite = self.filter(&[rest, begin], 0..done, output, sink);
+        let mut finite = self.run(&[stretch(beginning, done), begin], out);
         while finite && done < ticks {
-            let next = done..ticks.min(done + span);
-            let x = &frames[next.start * n - past..next.end * n];
-            finite = self.filter(&[Stretch { x, first: 0, ticks: next.len() }], next.clone(), output, sink);
-            done = next.end;
+            let next = ticks.min(done + span);
+            finite = self.run(&[stretch(done, next)], out);
+            done = next;
         }
         if finite {
             window.recall(frames);
@@ -199,28 +191,6 @@ impl<T: Sample> FirPlan<T> {
             self.run(&[Stretch { x: window.view(), first: 0, ticks }], out);
         }
         count
-    }
-
-    /// Filters `ticks`, whose stretches count from the first of them; false, and then nothing is stored elsewhere, if something
-    /// may not be finite.
-    #[inline]
-    fn filter(
-        &self,
-        stretches: &[Stretch<'_, T>],
-        ticks: Range<usize>,
-        output: &mut [T],
-        sink: &mut (impl FastSink + ?Sized),
-    ) -> bool {
-        let samples = ticks.start * self.ratio..ticks.end * self.ratio;
-        if let Some(slots) = sink.slots(samples.clone()) {
-            return self.run(stretches, slots);
-        }
-        let output = &mut output[..samples.len()];
-        let finite = self.run(stretches, output);
-        if finite {
-            sink.store(self.isa, samples.start, output);
-        }
-        finite
     }
 
     /// Filters stretches; false if something may not be finite.

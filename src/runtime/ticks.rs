@@ -41,10 +41,6 @@ pub(crate) trait FastSink: Send {
         Self: 'h;
     /// Samples that fit.
     fn capacity(&self) -> usize;
-    /// True if it has `slots` of this type.
-    fn takes<T: Sample>(&self) -> bool {
-        false
-    }
     /// Where these samples go, if they are of this type.
     fn slots<T: Sample>(&mut self, _samples: Range<usize>) -> Option<&mut [T]> {
         None
@@ -197,10 +193,6 @@ impl<S: Sample> FastSink for [S] {
 
     fn capacity(&self) -> usize {
         self.len()
-    }
-
-    fn takes<T: Sample>(&self) -> bool {
-        T::same(self).is_some()
     }
 
     fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {

@@ -15,8 +15,8 @@ use std::arch::x86_64::{__m256, __m256d, __m512, __m512d};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Cut {
     /// D, samples of a step: a power of two.
-    pub(crate) depth: usize,
-    pub(crate) steps: usize,
+    pub(super) depth: usize,
+    pub(super) steps: usize,
     /// Samples from tick to tick; equal to D unless D fills a group.
     pub(crate) hop: usize,
     /// Samples before a tick's frame that its window reaches back.
@@ -31,7 +31,7 @@ pub(crate) struct Cut {
 
 impl Cut {
     /// The phase that lane `place` of the p-th sum belongs to, in groups of `width` phases: along diagonals.
-    pub(crate) fn phase(&self, width: usize, p: usize, place: usize) -> usize {
+    pub(super) fn phase(&self, width: usize, p: usize, place: usize) -> usize {
         match (width, self.depth) {
             (1, _) | (_, 1) => p,
             (3, _) if p == 2 => p,
@@ -42,7 +42,7 @@ impl Cut {
     }
 
     /// The steps in the order of use for groups of `width` phases; step 0 is the newest.
-    pub(crate) fn order(&self, width: usize) -> Vec<usize> {
+    pub(super) fn order(&self, width: usize) -> Vec<usize> {
         if width == 1 { self.pairing.order() } else { (0..self.steps).collect() }
     }
 }
