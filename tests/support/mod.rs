@@ -2,6 +2,8 @@
 // Each test program uses a part of it.
 #![allow(dead_code)]
 
+pub(crate) mod specs;
+
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};

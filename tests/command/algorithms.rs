@@ -1,10 +1,8 @@
 //! Forms of FIR filters, as a user chooses them: all give the same samples at the same time.
 //! The direct form is the measure of the others.
 
-mod support;
-
+use crate::support::{Desk, bytes, channel, floats};
 use serde_json::Value;
-use support::{Desk, bytes, channel, floats};
 
 const COUNT: usize = 3000;
 

@@ -2,12 +2,9 @@
 //! solver, say about one another. A state-space bank can do all that an FIR bank can, so its gamma must not be larger;
 //! and no lower bound may exceed what any bank of the kind achieves.
 
-#[path = "support/specs.rs"]
-mod specs;
-
+use crate::support::specs::{alike, low_pass};
 use hybank::design::{analyze, certify, design};
 use hybank::spec::{DesignSpec, Family, Method, Spec};
-use specs::{alike, low_pass};
 
 struct Case {
     name: &'static str,

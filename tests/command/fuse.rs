@@ -1,11 +1,9 @@
 //! The verb fuse, as a user runs it.
 
-mod support;
-
+use crate::support::{names, text};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use support::{names, text};
 
 /// A folder with a bank in it: N = M = 2, f_1 = (1, 2, 3, 4), f_2 = (10, 20, 30), m0 = 3.
 struct Bench {

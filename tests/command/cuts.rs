@@ -1,13 +1,11 @@
 //! The same bits however a stream is cut.
 
-mod support;
-
+use self::rand_cuts::Cuts;
+use crate::support::{Desk, bytes, ticks};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{Form, Options, PcmOutput, Precision, Reconstructor};
-use rand_cuts::Cuts;
 use std::io::{Read, Write};
-use support::{Desk, bytes, ticks};
 
 /// A generator whose stream never changes (Knuth's MMIX), and the pieces that it makes.
 mod rand_cuts {

@@ -1,13 +1,11 @@
 //! The verbs design, analyze, simulate, demo and completions, as a user runs them.
 
-mod support;
-
+use crate::support::{THESIS, names, text};
 use serde_json::Value;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use support::{THESIS, names, text};
 
 /// A folder with spec.toml in it.
 struct Desk {

@@ -1,14 +1,11 @@
 //! The unit of a signal does not matter: K = W - F H is linear in the target's gain, and a channel's gain is undone by its
 //! filter. Designed, proven and read back over 18 decades.
 
-#[path = "support/specs.rs"]
-mod specs;
-
+use crate::support::specs::{alike, amplified, amplify, butterworth, tf, thesis, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::{analyze, design, prove};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
-use specs::{alike, amplified, amplify, butterworth, tf, thesis, with_taps};
 
 /// gamma of the thesis example, and of its optimal bank of 22 taps.
 const GAMMA: f64 = 0.03993204;

@@ -3,8 +3,7 @@
 //! A mutation is any change of the text after which it no longer says the same: another number, key, text or structure.
 //! Changes of layout, and of digits beyond the precision of a double, are none. `HYBANK_MUTATIONS=100000` runs that many.
 
-mod support;
-
+use crate::support::THESIS;
 use hybank::bank::{Bank, Proof, check_digest};
 use hybank::design::{analyze, design, prove};
 use hybank::spec::Spec;
@@ -13,7 +12,6 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use support::THESIS;
 
 /// The thesis example with so little latency that gamma lies above the noncausal bound.
 fn hurried() -> String {

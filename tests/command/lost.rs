@@ -1,10 +1,8 @@
 //! Samples that were lost: what tells of them, what stands in for them, what they touch. As a user runs it.
 
-mod support;
-
+use crate::support::{Desk, bytes, channel, floats, fused, ticks};
 use hound::{SampleFormat, WavSpec, WavWriter};
 use serde_json::{Value, json};
-use support::{Desk, bytes, channel, floats, fused, ticks};
 
 const COUNT: usize = 3000;
 

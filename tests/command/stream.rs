@@ -1,14 +1,11 @@
 //! The verb stream, as a user runs it.
-#![cfg(unix)]
 
-mod support;
-
+use crate::support::{Desk, bytes, floats, fused, text, ticks};
 use std::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Output};
 use std::time::Duration;
-use support::{Desk, bytes, floats, fused, text, ticks};
 
 /// A folder in which `hybank stream` works with its bank.
 struct Bench(Desk);

@@ -1,13 +1,10 @@
 //! Order reduction as a user meets it: banks of few states, proven, beside FIR banks of the same cost.
 
-#[path = "support/specs.rs"]
-mod specs;
-
+use crate::support::specs::{alike, amplified, butterworth, thesis};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::design::{Design, analyze, design, prove};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
-use specs::{alike, amplified, butterworth, thesis};
 
 fn reduced(mut spec: Spec, method: Method, reduction: Reduction) -> Design {
     spec.design = DesignSpec { reduction: Some(reduction), ..DesignSpec::new(method, None) };

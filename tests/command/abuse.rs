@@ -1,9 +1,7 @@
 //! What a tester found by abusing the binary: each stays as a test of its exit code and message.
 
-mod support;
-
+use crate::support::THESIS;
 use std::process::{Command, Output};
-use support::THESIS;
 
 /// A folder of its own with the spec in it.
 struct Folder(tempfile::TempDir);

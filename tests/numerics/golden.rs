@@ -4,14 +4,11 @@
 //! independently of this code (general conic solver on the bounded-real LMI, dense frequency grids) and are good to
 //! 1e-6 relative unless more digits stand here.
 
-#[path = "support/specs.rs"]
-mod specs;
-
+use crate::support::specs::{alike, butterworth, tf, thesis, thesis_filter, with_taps};
 use hybank::design::equivalence::BlockedPlant;
 use hybank::design::{Problem, analyze, design, error_system};
 use hybank::lti::FrequencyResponse;
 use hybank::spec::{DesignSpec, Method, Spec};
-use specs::{alike, butterworth, tf, thesis, thesis_filter, with_taps};
 use std::f64::consts::PI;
 
 fn g8() -> Spec {

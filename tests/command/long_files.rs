@@ -1,14 +1,11 @@
 //! Memory does not grow with the recording: sparse files through fuse and stream, into a pipe.
 //!
 //! The ordinary suite takes 192 MiB. With HYBANK_LONG_TESTS=1 it is 10 GiB, which takes a minute and no disk.
-#![cfg(target_os = "linux")]
 
-mod support;
-
+use crate::support::Desk;
 use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::process::Child;
-use support::Desk;
 
 /// More than this at any time is a failure, KiB.
 const MOST_RESIDENT: u64 = 64 << 10;

@@ -1,0 +1,16 @@
+//! The binary as a user runs it: exit code, standard output and standard error apart.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod abuse;
+mod algorithms;
+mod cuts;
+mod design;
+mod fuse;
+#[cfg(target_os = "linux")]
+mod long_files;
+mod lost;
+#[cfg(unix)]
+mod stream;
+mod verify;

@@ -1,0 +1,14 @@
+//! The library by its results: golden numbers, brute force, identities, random and nasty problems.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod damaged_files;
+mod equivalence;
+mod filters;
+mod gains;
+mod golden;
+mod hard_designs;
+mod random_plants;
+mod reduction;
+mod sections;
