@@ -2,6 +2,7 @@
 #![cfg_attr(not(feature = "design"), doc = "Runs hybrid multirate filter banks with fractional delays.")]
 
 pub mod sampling;
+pub mod units;
 
 #[cfg(feature = "runtime")]
 pub mod bank;
