@@ -9,6 +9,8 @@ pub mod bank;
 #[cfg(feature = "runtime")]
 pub mod io;
 #[cfg(feature = "runtime")]
+pub mod pipeline;
+#[cfg(feature = "runtime")]
 pub mod runtime;
 #[cfg(feature = "runtime")]
 pub mod spec;

@@ -4,7 +4,7 @@ use super::Failure;
 use super::output::failure;
 use crate::bank::Bank;
 use crate::io::{AtomicFile, LostSamples, PcmFrames, Until};
-use crate::runtime::{Gap, GapFiller, GapPolicy};
+use crate::pipeline::{Gap, GapFiller, GapPolicy};
 use std::borrow::Cow;
 use std::io::Write;
 use std::ops::Range;

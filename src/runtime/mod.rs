@@ -8,7 +8,6 @@ mod fast_fir;
 mod fir;
 mod fir_bank;
 mod form;
-mod gaps;
 mod overlap_save;
 mod reconstructor;
 mod sample;
@@ -23,7 +22,6 @@ mod workers;
 
 pub use error::{BuildError, ProcessError};
 pub use form::Form;
-pub use gaps::{Gap, GapFiller, GapPolicy};
 pub use reconstructor::{Options, PlanSummary, Precision, Reconstructor};
 pub use simd::{Isa, multiply_add_chains};
 pub use ticks::PcmOutput;

@@ -1,0 +1,6 @@
+//! What stands between recordings and a running bank: missing samples, latency, the end of the input.
+
+mod gaps;
+mod touch;
+
+pub use gaps::{Gap, GapFiller, GapPolicy};
