@@ -32,7 +32,7 @@ pub struct Options {
     pub recursion: Precision,
     /// Form of FIR banks, [`Form::Direct`] unless asked for otherwise, because the others round otherwise or are later.
     pub form: Form,
-    /// Instruction set; one that the processor does not have falls back to the portable kernels.
+    /// Instruction set, the widest one unless asked for otherwise.
     pub isa: Isa,
 }
 
@@ -136,10 +136,9 @@ impl Reconstructor {
     pub fn with_options(bank: &Bank, options: Options) -> Result<Self, BuildError> {
         let plan = Plan::new(bank, options)?;
         let state = plan.state();
-        let isa = if options.isa.is_available() { options.isa } else { Isa::Portable };
         let latency = bank.latency + plan.delay() * bank.ratio;
         let (channels, ratio) = (bank.channel_count(), bank.ratio);
-        Ok(Self { plan: Arc::new(plan), state, channels, ratio, latency, isa, replaced: 0 })
+        Ok(Self { plan: Arc::new(plan), state, channels, ratio, latency, isa: options.isa, replaced: 0 })
     }
 
     /// N, samples a tick in.

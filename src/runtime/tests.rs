@@ -114,14 +114,6 @@ fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
     out
 }
 
-pub(super) fn available() -> impl Iterator<Item = Isa> {
-    [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter(|isa| isa.is_available())
-}
-
-pub(super) fn fuses(isa: Isa) -> bool {
-    isa != Isa::Portable || cfg!(any(target_arch = "aarch64", target_feature = "fma"))
-}
-
 #[test]
 fn every_small_shape_has_the_bits_of_the_scalar_twin() {
     let mut noise = Noise(1);
@@ -129,9 +121,9 @@ fn every_small_shape_has_the_bits_of_the_scalar_twin() {
         for m in 1..=17 {
             let taps = random_taps(n, 1 + (7 * n + 5 * m) % 40, &mut noise);
             let input = noise.samples(n * (100 + 13 * m));
-            for isa in available() {
+            for isa in Isa::available() {
                 let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
-                assert_eq!(got, twin(&taps, m, &input, fuses(isa)), "N {n} M {m} {isa}");
+                assert_eq!(got, twin(&taps, m, &input, isa.fuses()), "N {n} M {m} {isa}");
             }
         }
     }
@@ -143,8 +135,10 @@ fn every_tap_count_and_length_has_the_bits_of_the_scalar_twin() {
     for count in 1..=70 {
         let taps = random_taps(2, count, &mut noise);
         let input = noise.samples(2 * count);
-        let got = run(&fir_bank(taps.clone(), 2), Options::default(), &input);
-        assert_eq!(got, twin(&taps, 2, &input, fuses(Isa::detect())), "{count} taps");
+        for isa in Isa::available() {
+            let got = run(&fir_bank(taps.clone(), 2), Options { isa, ..Options::default() }, &input);
+            assert_eq!(got, twin(&taps, 2, &input, isa.fuses()), "{count} taps, {isa}");
+        }
     }
 }
 
@@ -154,8 +148,10 @@ fn many_channels_and_many_phases_work() {
     for (n, m) in [(40, 3), (3, 40), (33, 33)] {
         let taps = random_taps(n, 3 * m + 1, &mut noise);
         let input = noise.samples(n * 300);
-        let got = run(&fir_bank(taps.clone(), m), Options::default(), &input);
-        assert_eq!(got, twin(&taps, m, &input, fuses(Isa::detect())));
+        for isa in Isa::available() {
+            let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
+            assert_eq!(got, twin(&taps, m, &input, isa.fuses()), "N {n} M {m} {isa}");
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::bank::{Bank, BlockFilter, SynthesisFilters};
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::tests::{Noise, available, definition, fir_bank, in_pieces, random_taps, spans_agree};
+use crate::runtime::tests::{Noise, definition, fir_bank, in_pieces, random_taps, spans_agree};
 use crate::runtime::{Form, Options, PcmOutput, Precision, Reconstructor, Workers};
 use proptest::prelude::*;
 
@@ -80,7 +80,7 @@ fn every_small_shape_has_the_bits_of_three_direct_filters() {
         let input = noise.samples(n * (1201 + n % 2));
         let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
         let bank = fir_bank(taps.clone(), m);
-        for isa in available() {
+        for isa in Isa::available() {
             let single = Options { isa, ..options(Precision::Single) };
             assert_eq!(run(&bank, single, &input), twin(&taps, m, &input, single), "N {n} M {m} {isa}");
             let double = Options { isa, ..options(Precision::Double) };

@@ -3,7 +3,7 @@
 use super::*;
 use crate::bank::Bank;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::tests::{Noise, available, definition, fir_bank, fuses, in_pieces, random_taps};
+use crate::runtime::tests::{Noise, definition, fir_bank, in_pieces, random_taps};
 use crate::runtime::{Form, Options, PcmOutput, Precision, Reconstructor};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -180,8 +180,8 @@ fn every_small_shape_has_the_bits_of_the_scalar_twin() {
         let len = lags(&taps, m).next_power_of_two().max(16) << (n % 3);
         let input = noise.samples(n * (3 * len + 7));
         let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
-        for isa in available() {
-            let twin = Twin { fused: fuses(isa) };
+        for isa in Isa::available() {
+            let twin = Twin { fused: isa.fuses() };
             let want = twin.stream(&taps, m, len, &input);
             let single = Options { isa, ..options(len, Precision::Single) };
             let got = run(&fir_bank(taps.clone(), m), single, &input);

@@ -5,6 +5,7 @@
 //! one is that of `single`.
 
 use super::Isa;
+use super::isa::Kind;
 use super::lanes::{Lanes, Plain};
 use super::phases::Phases;
 use super::single::{Pairing, Single};
@@ -184,27 +185,27 @@ kernels!(avx512_f32, __m512, f32, 8, 16, [1, 2, 4, 8], "avx512f,avx512vl,avx512b
 kernels!(avx512_f64, __m512d, f64, 4, 8, [1, 2, 4], "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma");
 
 impl FirKernel<f32> {
-    /// The kernel for an instruction set; the portable one where the processor does not have it.
+    /// The kernel for an instruction set.
     pub(crate) fn for_f32(isa: Isa) -> Self {
-        match isa {
+        match isa.kind() {
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 if isa.is_available() => avx2_f32::KERNEL,
+            Kind::Avx2 => avx2_f32::KERNEL,
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx512 if isa.is_available() => avx512_f32::KERNEL,
-            _ => portable_f32::KERNEL,
+            Kind::Avx512 => avx512_f32::KERNEL,
+            Kind::Portable => portable_f32::KERNEL,
         }
     }
 }
 
 impl FirKernel<f64> {
-    /// The kernel for an instruction set; the portable one where the processor does not have it.
+    /// The kernel for an instruction set.
     pub(crate) fn for_f64(isa: Isa) -> Self {
-        match isa {
+        match isa.kind() {
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 if isa.is_available() => avx2_f64::KERNEL,
+            Kind::Avx2 => avx2_f64::KERNEL,
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx512 if isa.is_available() => avx512_f64::KERNEL,
-            _ => portable_f64::KERNEL,
+            Kind::Avx512 => avx512_f64::KERNEL,
+            Kind::Portable => portable_f64::KERNEL,
         }
     }
 }

@@ -1,26 +1,50 @@
-//! Which instruction set the kernels use.
+//! The instruction set that kernels run on, as a value that only detection can make.
 
 use std::fmt;
 
-/// An instruction set that the kernels are compiled for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Isa {
+/// An instruction set of this processor that the kernels are compiled for.
+///
+/// A value is the proof that the processor has it: only [`Isa::detect`], [`Isa::available`] and [`Isa::portable`]
+/// make one.
+///
+/// ```
+/// use hybank::runtime::{Isa, Options};
+/// let options = Options { isa: Isa::detect(), ..Options::default() };
+/// ```
+///
+/// No other can be named:
+///
+/// ```compile_fail
+/// use hybank::runtime::{Isa, Options};
+/// let options = Options { isa: Isa::Avx2, ..Options::default() };
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Isa(Kind);
+
+/// What kernels are compiled for. Each kind that needs asking the processor exists only inside an [`Isa`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Kind {
     /// What every processor of the architecture has.
     Portable,
     /// x86-64 with AVX2 and FMA: 256-bit vectors.
+    #[cfg(target_arch = "x86_64")]
     Avx2,
     /// x86-64 with AVX-512 F, VL, BW and DQ: 512-bit vectors.
+    #[cfg(target_arch = "x86_64")]
     Avx512,
 }
 
-impl Isa {
-    /// The widest one that this processor has.
-    pub fn detect() -> Self {
-        [Self::Avx512, Self::Avx2].into_iter().find(|isa| isa.is_available()).unwrap_or(Self::Portable)
-    }
+impl Kind {
+    /// All kinds, the widest one last.
+    const ALL: &'static [Self] = &[
+        Self::Portable,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx2,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx512,
+    ];
 
-    /// True if this processor has it.
-    pub fn is_available(self) -> bool {
+    fn is_available(self) -> bool {
         match self {
             Self::Portable => true,
             #[cfg(target_arch = "x86_64")]
@@ -33,18 +57,73 @@ impl Isa {
                     && is_x86_feature_detected!("avx512bw")
                     && is_x86_feature_detected!("avx512dq")
             }
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => false,
         }
+    }
+}
+
+impl Isa {
+    /// The widest instruction set of this processor.
+    pub fn detect() -> Self {
+        Self::available().last().unwrap_or(Self::portable())
+    }
+
+    /// All instruction sets of this processor, the portable one first, the widest one last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        Kind::ALL.iter().filter(|kind| kind.is_available()).map(|&kind| Self(kind))
+    }
+
+    /// The instructions that every processor of the architecture has.
+    pub const fn portable() -> Self {
+        Self(Kind::Portable)
+    }
+
+    /// `portable`, `avx2` or `avx512`.
+    pub const fn name(self) -> &'static str {
+        match self.0 {
+            Kind::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2 => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => "avx512",
+        }
+    }
+
+    /// True if a multiply-add rounds once. The portable kernels round the product as well on processors without a
+    /// fused multiply-add (x86-64 before 2013), so that their bits differ from those of all other sets.
+    pub fn fuses(self) -> bool {
+        self.0 != Kind::Portable || super::vector::FUSED
+    }
+
+    pub(super) fn kind(self) -> Kind {
+        self.0
     }
 }
 
 impl fmt::Display for Isa {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Portable => "portable",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        })
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn detection_takes_the_widest_of_the_available_sets() {
+        let available: Vec<_> = Isa::available().collect();
+        assert_eq!(available[0], Isa::portable());
+        assert_eq!(available.last(), Some(&Isa::detect()));
+    }
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn a_set_is_available_only_if_the_processor_says_so() {
+        let names: Vec<_> = Isa::available().map(Isa::name).collect();
+        assert_eq!(
+            names.contains(&"avx2"),
+            is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+        );
+        assert!(!names.contains(&"avx512") || is_x86_feature_detected!("avx512f"));
     }
 }

@@ -43,9 +43,8 @@ mod avx2 {
 /// rest.
 pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32]) -> usize {
     #[cfg(target_arch = "x86_64")]
-    if isa != Isa::Portable {
-        // SAFETY: an `Isa` other than portable is only ever used where it is available, and each
-        // includes AVX2.
+    if isa != Isa::portable() {
+        // SAFETY: an `Isa` is made only where the processor has it, and each but the portable one includes AVX2.
         return unsafe { avx2::decode(format, bytes, out) };
     }
     let _ = (isa, format, bytes, out);
@@ -68,7 +67,7 @@ pub(crate) fn interleave(
     assert!(m * frames <= out.len());
     assert!(m == 0 || (m - 1) * stride + frames.next_multiple_of(8) <= rows.len());
     #[cfg(target_arch = "x86_64")]
-    if m > 0 && isa != Isa::Portable {
+    if m > 0 && isa != Isa::portable() {
         let rows = Rows { first: rows.as_ptr(), stride };
         // SAFETY: as in `decode`; the bounds are asserted above.
         return unsafe { avx2::interleave(rows, m, frames, out) };
@@ -84,7 +83,7 @@ pub(crate) fn interleave(
 pub(crate) fn encode(isa: Isa, format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
     assert!(samples.len() * format.bytes() <= out.len());
     #[cfg(target_arch = "x86_64")]
-    if isa != Isa::Portable {
+    if isa != Isa::portable() {
         // SAFETY: as in `decode`.
         return unsafe { avx2::encode(format, samples, out) };
     }
@@ -120,7 +119,7 @@ mod tests {
                 let mut out = vec![-1.0; n * frames];
                 let done = interleave(Isa::detect(), &rows, stride, n, frames, &mut out);
                 // At most the last block and a cut one are left to the caller.
-                assert!(done <= frames && (Isa::detect() == Isa::Portable || done + 16 > frames));
+                assert!(done <= frames && (Isa::detect() == Isa::portable() || done + 16 > frames));
                 for k in 0..done {
                     for i in 0..n {
                         assert_eq!(out[k * n + i], rows[i * stride + k], "n {n} frames {frames}");

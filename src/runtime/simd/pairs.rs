@@ -5,6 +5,7 @@
 //! operations, none of which could be fused, so the bits are the same everywhere.
 
 use super::Isa;
+use super::isa::Kind;
 
 /// Room for the frames of pairs of ticks.
 pub(crate) struct Halves<'a, T> {
@@ -47,13 +48,13 @@ macro_rules! pairs {
         /// Frames of `n` samples apart, for whole pairs; each half has room for them.
         pub(crate) fn $split(isa: Isa, frames: &[$sample], n: usize, to: Halves<'_, $sample>) {
             let Halves { even, odd, mean } = to;
-            match isa {
+            match isa.kind() {
                 #[cfg(target_arch = "x86_64")]
-                // SAFETY: the processor was asked.
-                Isa::Avx2 | Isa::Avx512 if isa.is_available() => unsafe {
+                // SAFETY: an `Isa` is made only where the processor has it.
+                Kind::Avx2 | Kind::Avx512 => unsafe {
                     $module::split_avx2(frames, n, even, odd, mean)
                 },
-                _ => $module::split(frames, n, even, odd, mean),
+                Kind::Portable => $module::split(frames, n, even, odd, mean),
             }
         }
 
@@ -61,13 +62,13 @@ macro_rules! pairs {
         /// 4 mean - even - odd.
         pub(crate) fn $join(isa: Isa, from: Products<'_, $sample>, m: usize, out: &mut [$sample]) {
             let Products { even, odd, mean } = from;
-            match isa {
+            match isa.kind() {
                 #[cfg(target_arch = "x86_64")]
-                // SAFETY: the processor was asked.
-                Isa::Avx2 | Isa::Avx512 if isa.is_available() => unsafe {
+                // SAFETY: an `Isa` is made only where the processor has it.
+                Kind::Avx2 | Kind::Avx512 => unsafe {
                     $module::join_avx2(even, odd, mean, m, out)
                 },
-                _ => $module::join(even, odd, mean, m, out),
+                Kind::Portable => $module::join(even, odd, mean, m, out),
             }
         }
 
@@ -159,9 +160,7 @@ mod tests {
 
     #[test]
     fn halves_and_outputs_are_in_their_places() {
-        for (isa, count) in
-            [Isa::Portable, Isa::detect()].into_iter().flat_map(|isa| (1..20).map(move |n| (isa, n)))
-        {
+        for (isa, count) in Isa::available().flat_map(|isa| (1..20).map(move |n| (isa, n))) {
             for pairs in [0, 1, 2, 7, 33] {
                 let x = ramp(2 * pairs * count, 0.37);
                 let [mut even, mut odd, mut mean] = [(); 3].map(|()| vec![0.0; pairs * count]);

@@ -1,6 +1,7 @@
 //! What the processor can do at most, for benchmarks to compare with.
 
 use super::Isa;
+use super::isa::Kind;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2F32, Avx512F32};
 use super::vector::{Portable, Vector};
@@ -8,19 +9,17 @@ use super::vector::{Portable, Vector};
 /// Independent chains: enough to hide the latency of a multiply-add on every processor so far.
 const CHAINS: usize = 12;
 
-/// Runs `turns` turns of 12 independent f32 multiply-adds on whole vectors of `isa` (the portable
-/// ones where the processor does not have it); returns how many scalar multiply-adds that were,
-/// and their sum, so that nothing is optimised away.
+/// Runs `turns` turns of 12 independent f32 multiply-adds on whole vectors of `isa`; returns how many scalar multiply-adds that were, and their sum, so that nothing is optimised away.
 pub fn multiply_add_chains(isa: Isa, turns: u64) -> (u64, f32) {
-    match isa {
+    match isa.kind() {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: the processor was asked.
-        Isa::Avx2 if isa.is_available() => unsafe { avx2(turns) },
+        // SAFETY: an `Isa` is made only where the processor has it.
+        Kind::Avx2 => unsafe { avx2(turns) },
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: the processor was asked.
-        Isa::Avx512 if isa.is_available() => unsafe { avx512(turns) },
+        // SAFETY: an `Isa` is made only where the processor has it.
+        Kind::Avx512 => unsafe { avx512(turns) },
         // SAFETY: needs nothing.
-        _ => unsafe { chains::<Portable<f32>>(turns) },
+        Kind::Portable => unsafe { chains::<Portable<f32>>(turns) },
     }
 }
 

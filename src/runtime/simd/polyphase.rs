@@ -98,7 +98,7 @@ impl<T: Copy + Default + 'static> Polyphase<T> {
                 out_hop: self.ratio,
                 scratch: scratch.as_mut_ptr().cast(),
             };
-            // SAFETY: the kernel was chosen for an available instruction set (`Isa::is_available`), the coefficients were
+            // SAFETY: the kernel was chosen by an `Isa`, which the processor has, the coefficients were
             // made for it and the cut, and all loads and stores lie within the bounds that `part` asserts.
             finite &= unsafe { (group.pass)(&job) };
             if !whole {

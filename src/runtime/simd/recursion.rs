@@ -7,6 +7,7 @@
 //! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
 
 use super::Isa;
+use super::isa::Kind;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2F32, Avx2F64};
 use super::vector::{Portable, Vector};
@@ -97,7 +98,7 @@ impl<T: Copy + Default> RecursionKernel<T> {
         assert!((ticks - 1) * hop < window.len());
         recursion.form.check(recursion.states, self.lanes, window.len() - (ticks - 1) * hop);
         let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
-        // SAFETY: the kernel was chosen for an available instruction set (`Isa::is_available`), and all its loads and
+        // SAFETY: the kernel was chosen by an `Isa`, which the processor has, and all its loads and
         // stores lie within the bounds asserted above.
         unsafe { (self.run)(&Job { recursion, rows, window, hop, ticks }) }
     }
@@ -286,13 +287,13 @@ kernel!(avx2, Avx2F64, f64, "avx2,fma");
 macro_rules! choose {
     ($sample:ty) => {
         impl RecursionKernel<$sample> {
-            /// The kernel for an instruction set; the portable one where the processor does not have it. With AVX-512 it
+            /// The kernel for an instruction set. With AVX-512 it
             /// is that of AVX2: the few sections of a usual bank would leave wider vectors empty.
             pub(crate) fn new(isa: Isa) -> Self {
-                match isa {
+                match isa.kind() {
                     #[cfg(target_arch = "x86_64")]
-                    Isa::Avx2 | Isa::Avx512 if isa.is_available() => Self::avx2(),
-                    _ => Self::portable(),
+                    Kind::Avx2 | Kind::Avx512 => Self::avx2(),
+                    Kind::Portable => Self::portable(),
                 }
             }
         }

@@ -65,7 +65,7 @@ fn every_shape_follows_its_definition_with_the_same_bits_for_every_cut() {
             for cut in [1, 7, 63, 64, 65, 129] {
                 assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
             }
-            let portable = run::<f64>(&filter, n, m, Isa::Portable, &input, 300).0;
+            let portable = run::<f64>(&filter, n, m, Isa::portable(), &input, 300).0;
             let apart = whole.iter().zip(&portable).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(apart < 1e-12, "{apart:e}");
         }

@@ -22,6 +22,7 @@ mod product;
 mod scatter;
 
 use super::Isa;
+use super::isa::Kind;
 use super::vector::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2F32, Avx2F64};
@@ -273,13 +274,13 @@ kernels!(avx2_f32, Avx2F32, f32, [1, 2, 4, 8], "avx2,fma");
 kernels!(avx2_f64, Avx2F64, f64, [1, 2, 4], "avx2,fma");
 
 impl TransformKernel<f32> {
-    /// The kernel for an instruction set; the portable one where the processor does not have it. A group is as wide
+    /// The kernel for an instruction set. A group is as wide
     /// as a vector of AVX2, which AVX-512 includes.
     pub(crate) fn for_f32(isa: Isa) -> Self {
-        match isa {
+        match isa.kind() {
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 | Isa::Avx512 if isa.is_available() => avx2_f32::KERNEL,
-            _ => portable_f32::KERNEL,
+            Kind::Avx2 | Kind::Avx512 => avx2_f32::KERNEL,
+            Kind::Portable => portable_f32::KERNEL,
         }
     }
 }
@@ -287,10 +288,10 @@ impl TransformKernel<f32> {
 impl TransformKernel<f64> {
     /// As [`TransformKernel::for_f32`].
     pub(crate) fn for_f64(isa: Isa) -> Self {
-        match isa {
+        match isa.kind() {
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 | Isa::Avx512 if isa.is_available() => avx2_f64::KERNEL,
-            _ => portable_f64::KERNEL,
+            Kind::Avx2 | Kind::Avx512 => avx2_f64::KERNEL,
+            Kind::Portable => portable_f64::KERNEL,
         }
     }
 }
