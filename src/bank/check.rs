@@ -167,9 +167,17 @@ fn check_delays(delays: &[f64]) -> Checked {
 }
 
 fn check_gamma(gamma: &Gamma) -> Checked {
-    for (key, value) in [("upper", gamma.upper), ("lower", gamma.lower), ("noncausal", gamma.noncausal)] {
+    let bounds = [("lower", gamma.lower), ("noncausal", gamma.noncausal)];
+    for (key, value) in [("norm", gamma.norm), ("upper", gamma.upper)].into_iter().chain(bounds) {
         if let Some(value) = value.filter(|x| !(x.is_finite() && *x >= 0.0)) {
             let rule = "a norm is zero or more, and finite; null says that it is not known";
+            return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);
+        }
+    }
+    let Some(upper) = gamma.upper else { return Ok(()) };
+    for (key, value) in bounds {
+        if let Some(value) = value.filter(|&x| x > upper) {
+            let rule = format!("a lower bound is at most gamma.upper, {upper}");
             return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);
         }
     }

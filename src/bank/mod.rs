@@ -78,16 +78,38 @@ pub struct BlockFilter {
     pub d: Vec<Vec<f64>>,
 }
 
-/// gamma = ||K|| in normalised time (h = 1), as an interval.
+/// gamma = ||K|| in normalised time (h = 1), and what bounds it; `None` is what nobody knows.
+///
+/// `lower <= upper` and `noncausal <= upper` hold wherever both are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gamma {
-    /// The exact norm of the very coefficients of this bank.
+    /// Computed norm of the very coefficients of this bank; its relative error is at most
+    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY).
+    pub norm: Option<f64>,
+    /// An upper bound of the true norm of these coefficients: proven where the bank carries a proof, else the computed norm
+    /// raised by its stated error.
     pub upper: Option<f64>,
-    /// A proven lower bound for any bank of this method and size.
+    /// A lower bound for all banks of this method and size.
     pub lower: Option<f64>,
-    /// The bound that no latency can beat.
+    /// A lower bound for all banks, of any latency.
     pub noncausal: Option<f64>,
+}
+
+impl Gamma {
+    /// Relative error of a computed norm.
+    pub const NORM_ACCURACY: f64 = 1e-9;
+
+    /// The interval of a bank of computed `norm`, below whose upper end all lower bounds stay.
+    pub fn computed(norm: f64, lower: f64, noncausal: f64) -> Self {
+        let upper = norm * (1.0 + Self::NORM_ACCURACY);
+        Self {
+            norm: Some(norm),
+            upper: Some(upper),
+            lower: Some(lower.min(norm)),
+            noncausal: Some(noncausal.min(norm)),
+        }
+    }
 }
 
 impl Bank {

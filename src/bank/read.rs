@@ -154,9 +154,14 @@ fn fixed_point(value: &Value<'_>) -> Result<FixedPoint, Fault> {
 }
 
 fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {
-    let fields = value.fields(&["upper", "lower", "noncausal"])?;
+    let fields = value.fields(&["norm", "upper", "lower", "noncausal"])?;
     let bound = |key| fields.optional(key).map(|v| v.number()).transpose();
-    Ok(Gamma { upper: bound("upper")?, lower: bound("lower")?, noncausal: bound("noncausal")? })
+    Ok(Gamma {
+        norm: bound("norm")?,
+        upper: bound("upper")?,
+        lower: bound("lower")?,
+        noncausal: bound("noncausal")?,
+    })
 }
 
 const WITNESS: &str = "a proof without it proves nothing; leave the proof out, or take the whole of it";

@@ -20,7 +20,7 @@ fn fir() -> Bank {
         method: Method::Fir,
         delays: vec![1.2, 0.6],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
-        gamma: Gamma { upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
+        gamma: Gamma { norm: None, upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
         proof: None,
         fixed_point: None,
     }
@@ -81,6 +81,7 @@ const FIR_TEXT: &str = r#"{
   }],
   "state_space": null,
   "gamma": {
+    "norm": null,
     "upper": 0.039932,
     "lower": null,
     "noncausal": 0.03
@@ -312,6 +313,7 @@ fn every_mistake_names_its_json_place_and_the_remedy() {
             "both taps and state_space",
         ),
         (last("0.039932", "-0.1"), "gamma.upper", "zero or more"),
+        (last("\"noncausal\": 0.03", "\"noncausal\": 0.05"), "gamma.noncausal", "at most gamma.upper"),
         (last("\"noncausal\"", "\"non_causal\""), "gamma", "did you mean \"noncausal\""),
         (fir_with("\"taps\": 3", "\"taps\": 0"), "spec.design.taps", "1 to 65536"),
         (fir_with("[1.0, 1.0, 0.25]", "[1.0, 1.0, NaN]"), "", "line"),

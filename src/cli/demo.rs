@@ -126,7 +126,7 @@ impl Contender {
         Self {
             name,
             file: format!("fused-{file}.wav"),
-            gamma: bank.and_then(|bank| bank.gamma.upper),
+            gamma: bank.and_then(|bank| bank.gamma.norm),
             lower: bank
                 .filter(|bank| matches!(bank.method, Method::Fir | Method::Iir))
                 .and_then(|bank| bank.gamma.lower),

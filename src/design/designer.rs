@@ -123,11 +123,7 @@ struct Bounds {
 impl Bounds {
     /// With the norm of the bank, above which no bound stays whatever the rounding.
     fn below(&self, norm: f64) -> Gamma {
-        Gamma {
-            upper: Some(norm),
-            lower: Some(self.lower.min(norm)),
-            noncausal: Some(self.noncausal.min(norm)),
-        }
+        Gamma::computed(norm, self.lower, self.noncausal)
     }
 }
 

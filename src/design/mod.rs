@@ -17,7 +17,7 @@ pub mod reduction;
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use designer::{Design, design, latency};
 pub use problem::Problem;
-pub use prove::{Certified, certify, prove};
+pub use prove::{Certified, attach_proof, certify, prove};
 pub use reduction::{OrderReduction, OrderWorth};
 
 use crate::analog::AnalogError;

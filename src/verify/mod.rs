@@ -290,8 +290,8 @@ impl<'a> Subject<'a> {
         }
         let attained =
             self.attains(&certificate.peak).ok_or(VerifyError::Void { place: "proof.upper.peak" })?;
-        if let Some(stated) = self.bank.gamma.upper {
-            let place = "gamma.upper";
+        if let Some(stated) = self.bank.gamma.norm {
+            let place = "gamma.norm";
             if stated < attained * (1.0 - ROUNDED) {
                 return Err(VerifyError::Disproved {
                     place,
@@ -308,6 +308,10 @@ impl<'a> Subject<'a> {
                     proven: gamma,
                 });
             }
+        }
+        if let Some(stated) = self.bank.gamma.upper.filter(|&x| x < attained) {
+            let (place, relation) = ("gamma.upper", "a norm of at least");
+            return Err(VerifyError::Disproved { place, stated, relation, proven: attained });
         }
         if self.keeps(&certificate.factor, gamma) {
             return Ok((gamma, attained));

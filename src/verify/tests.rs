@@ -216,9 +216,9 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
         let norm = crate::design::analyze(&bank, &[]).unwrap().gamma;
         assert!(proven.lower <= norm && proven.attained <= norm * (1.0 + 1e-9) && norm <= proven.upper);
         for factor in [1.0 - 1e-6, 1.0 + 1e-6] {
-            let gamma = Gamma { upper: Some(norm * factor), ..Gamma::default() };
+            let gamma = Gamma { norm: Some(norm * factor), ..Gamma::default() };
             let error = verify(&Bank { gamma, ..bank.clone() }).unwrap_err();
-            assert!(matches!(error, VerifyError::Disproved { place: "gamma.upper", .. }), "{error}");
+            assert!(matches!(error, VerifyError::Disproved { place: "gamma.norm", .. }), "{error}");
         }
         // A certificate is good for its gamma and no lower one.
         let certificate = bank.proof.as_ref().unwrap().upper.clone().unwrap();

@@ -5,7 +5,7 @@
 
 use crate::support::THESIS;
 use hybank::bank::{Bank, Proof, check_digest};
-use hybank::design::{analyze, design, prove};
+use hybank::design::{analyze, attach_proof, design, prove};
 use hybank::spec::Spec;
 use hybank::verify::verify;
 use serde_json::Value;
@@ -25,8 +25,9 @@ fn designed(method: &str) -> Bank {
         _ => hurried().replace("\"fir\"\ntaps = 12", &format!("\"{method}\"")),
     };
     let design = design(&Spec::from_toml(&text, "spec.toml").unwrap()).unwrap();
-    let (proof, _) = prove(&design.bank, &design.dual).unwrap();
-    Bank { proof: Some(proof), ..design.bank }
+    let mut bank = design.bank;
+    attach_proof(&mut bank, &design.dual).unwrap();
+    bank
 }
 
 /// Texts of bank files: two made here, and those of `filters/`.
@@ -193,7 +194,7 @@ fn what_the_proof_alone_lets_pass_is_true() {
                     let holds =
                         proven.attained <= gamma * (1.0 + 1e-9) && gamma <= proven.upper * (1.0 + 1e-12);
                     assert!(holds && proven.lower <= gamma * (1.0 + 1e-9), "{gamma} {proven:?}");
-                    let stated = bank.gamma.upper.unwrap_or(gamma);
+                    let stated = bank.gamma.norm.unwrap_or(gamma);
                     assert!((stated / gamma - 1.0).abs() < 1e-6, "{stated} {gamma}");
                 }
             }
@@ -289,8 +290,9 @@ fn a_designed_bank_verifies() {
     }
     let report = json(&desk.good(&["verify", "bank.json", "--json"]));
     let bank = json(&fs::read_to_string(desk.path("bank.json")).unwrap());
-    let upper = bank["gamma"]["upper"].as_f64().unwrap();
-    assert!(report["lower"].as_f64() <= Some(upper) && report["upper"].as_f64() >= Some(upper), "{report}");
+    let norm = bank["gamma"]["norm"].as_f64().unwrap();
+    assert!(report["lower"].as_f64() <= Some(norm) && report["upper"].as_f64() >= Some(norm), "{report}");
+    assert_eq!(report["upper"], bank["gamma"]["upper"]);
     assert_eq!((&report["digest"], &report["certificate_in_file"]), (&Value::Bool(true), &Value::Bool(true)));
     assert!(desk.good(&["verify", "--help"]).contains("Examples:"));
     // Another layout of the same content is the same bank.
@@ -316,8 +318,9 @@ fn altered_files_are_refused_with_the_place() {
     desk.refused(&change("/channels/0/taps/3", (tap * (1.0 + 1e-15)).into(), true), &["digest: ", "altered"]);
     desk.refused(&change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["proof.upper: "]);
     desk.refused(&change("/gamma/upper", (upper * (1.0 - 1e-6)).into(), false), &["gamma.upper: "]);
+    desk.refused(&change("/gamma/norm", (upper * (1.0 - 1e-6)).into(), false), &["gamma.norm: "]);
     desk.refused(&change("/gamma/lower", (lower * 1.001).into(), false), &["gamma.lower: "]);
-    desk.refused(&change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["gamma.upper: "]);
+    desk.refused(&change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["gamma.norm: "]);
     desk.refused(
         &change("/proof/upper/factor/2/1", 0.5.into(), false),
         &["proof.upper: ", "design the bank anew"],

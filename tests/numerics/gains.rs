@@ -22,7 +22,7 @@ fn example(method: Method) -> Spec {
 fn check(what: &str, spec: &Spec, wanted: f64) -> Bank {
     let found = design(spec).unwrap_or_else(|error| panic!("{what}: {error}"));
     let gamma = &found.bank.gamma;
-    let upper = gamma.upper.unwrap();
+    let upper = gamma.norm.unwrap();
     assert!((upper / wanted - 1.0).abs() < 1e-6, "{what}: {gamma:?}, wanted {wanted:e}");
     let (lower, noncausal) = (gamma.lower.unwrap(), gamma.noncausal.unwrap());
     assert!(lower > wanted * (1.0 - 2e-6) && noncausal > wanted * (1.0 - 2e-6), "{what}: {gamma:?}");
@@ -95,7 +95,7 @@ fn steep_front_ends_of_much_gain_are_designed() {
         let unity = FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), tf(&[1.0], &[0.1, 1.0])] };
         let gamma = |filter| {
             let spec = alike(filter, 4, 12, &[0.0, 1.3, 2.1, 2.95]);
-            design(&spec).unwrap().bank.gamma.upper.unwrap()
+            design(&spec).unwrap().bank.gamma.norm.unwrap()
         };
         let (amplified, plain) = (gamma(&filter), gamma(&unity));
         assert!((amplified / (gain * plain) - 1.0).abs() < 1e-6, "{amplified:e} {plain}");
@@ -108,7 +108,7 @@ fn orders_are_reduced_alike() {
         let mut spec = amplified(example(Method::Iir), gain);
         spec.design.reduction = Some(Reduction::Order(4));
         let found = design(&spec).unwrap();
-        found.bank.gamma.upper.unwrap() / gain
+        found.bank.gamma.norm.unwrap() / gain
     };
     let plain = reduced(1.0);
     for gain in [1e-9, 1e9] {

@@ -37,7 +37,7 @@ fn g12() -> Spec {
 /// Designs and compares; the reported interval must close and hold the golden number.
 fn check(id: &str, spec: &Spec, golden: f64, relative: f64) {
     let gamma = design(spec).unwrap_or_else(|error| panic!("{id}: {error}")).bank.gamma;
-    let (upper, lower) = (gamma.upper.unwrap(), gamma.lower.unwrap());
+    let (upper, lower) = (gamma.norm.unwrap(), gamma.lower.unwrap());
     assert!((upper / golden - 1.0).abs() <= relative, "{id}: {gamma:?}, golden {golden}");
     assert!(lower <= upper && lower >= golden * (1.0 - 2.0 * relative), "{id}: {gamma:?}, golden {golden}");
     assert!(gamma.noncausal.unwrap() <= lower, "{id}: {gamma:?}");
@@ -68,7 +68,7 @@ fn g4_the_optimum_settles_with_the_latency() {
     for (latency, golden) in [(0, 0.187045), (1, 0.0694470)] {
         let gamma = design(&thesis(latency, &[1.2, 0.6])).unwrap().bank.gamma;
         assert!(
-            (gamma.upper.unwrap() / golden - 1.0).abs() < printed(golden),
+            (gamma.norm.unwrap() / golden - 1.0).abs() < printed(golden),
             "G4b, m0 = {latency}: {gamma:?}"
         );
         assert!(gamma.lower.unwrap() > golden * (1.0 - 1e-3), "G4b, m0 = {latency}: {gamma:?}");
@@ -79,7 +79,7 @@ fn g4_the_optimum_settles_with_the_latency() {
 fn g5_wanted_samples_are_passed_on() {
     for spec in [thesis(10, &[0.0, 1.0]), with_taps(thesis(10, &[0.0, 1.0]), 22)] {
         let gamma = design(&spec).unwrap().bank.gamma;
-        assert!(gamma.upper.unwrap() < 1e-12, "{gamma:?}");
+        assert!(gamma.norm.unwrap() < 1e-12, "{gamma:?}");
     }
 }
 
@@ -94,7 +94,7 @@ fn g6_the_unit_of_time_does_not_matter() {
             design(&spec).unwrap().bank
         };
         let (scaled, unscaled) = (at_one(h), at_one(1.0));
-        let (a, b) = (scaled.gamma.upper.unwrap(), unscaled.gamma.upper.unwrap());
+        let (a, b) = (scaled.gamma.norm.unwrap(), unscaled.gamma.upper.unwrap());
         assert!((a / b - 1.0).abs() < 1e-9, "G6 at h = {h}: {a} {b}");
         assert!((a / 0.0399320 - 1.0).abs() < 2e-6, "G6 at h = {h}: {a}");
     }
@@ -208,7 +208,7 @@ fn noise_of_the_converters_is_weighed_within_the_slack() {
         };
         let mut quiet = bank.clone();
         quiet.filters = design(&with_taps(thesis(10, &[1.2, 0.6]), 22)).unwrap().bank.filters;
-        (bank.gamma.upper.unwrap(), judged(&bank), judged(&quiet))
+        (bank.gamma.norm.unwrap(), judged(&bank), judged(&quiet))
     };
     let optimum = 0.03993204;
     for sigma in [[1e-2, 1e-2], [1e-1, 1e-3], [0.3, 0.3]] {

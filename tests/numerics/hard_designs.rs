@@ -32,15 +32,15 @@ impl Case {
         let name = self.name;
         let iir = design(&self.spec(Method::Iir)).unwrap_or_else(|e| panic!("{name}: {e}")).bank;
         let fir = design(&self.spec(Method::Fir)).unwrap_or_else(|e| panic!("{name}: {e}")).bank;
-        let (iu, il) = (iir.gamma.upper.unwrap(), iir.gamma.lower.unwrap());
-        let (fu, fl) = (fir.gamma.upper.unwrap(), fir.gamma.lower.unwrap());
+        let (iu, il) = (iir.gamma.norm.unwrap(), iir.gamma.lower.unwrap());
+        let (fu, fl) = (fir.gamma.norm.unwrap(), fir.gamma.lower.unwrap());
         println!("{name}: iir [{il:.9e}, {iu:.9e}], fir [{fl:.9e}, {fu:.9e}]");
         assert!(il <= iu && fl <= fu, "{name}: an interval is empty");
         assert!(il <= fu * (1.0 + 1e-9), "{name}: the IIR bound {il} denies the FIR bank's {fu}");
         assert!(iu <= fu * (1.0 + self.accuracy), "{name}: IIR {iu} is worse than FIR {fu}");
         for bank in [&iir, &fir] {
             let again = analyze(bank, &[]).unwrap().gamma;
-            assert!((again / bank.gamma.upper.unwrap() - 1.0).abs() < 1e-9, "{name}: {again}");
+            assert!((again / bank.gamma.norm.unwrap() - 1.0).abs() < 1e-9, "{name}: {again}");
         }
     }
 }
@@ -143,7 +143,7 @@ fn the_interval_of_the_thesis_bank_is_proved_in_floating_point() {
     for method in [Method::Fir, Method::Iir] {
         let bank = design(&case.spec(method)).unwrap().bank;
         let proof = certify(&bank).unwrap();
-        let upper = bank.gamma.upper.unwrap();
+        let upper = bank.gamma.norm.unwrap();
         assert!(
             proof.attained <= proof.gamma && proof.gamma >= upper && proof.gamma <= upper * (1.0 + 1e-5),
             "{proof:?} {upper}"

@@ -113,7 +113,7 @@ fn end_of(seed: u64) -> End {
         assert!(block.a.len() <= order, "plant {seed}: {} states of {order}", block.a.len());
     }
     let gamma = &found.bank.gamma;
-    let (upper, lower) = (gamma.upper.unwrap(), gamma.lower.unwrap());
+    let (upper, lower) = (gamma.norm.unwrap(), gamma.lower.unwrap());
     assert!(
         upper.is_finite() && gamma.noncausal.unwrap() <= upper && lower <= upper,
         "plant {seed}: {gamma:?}"

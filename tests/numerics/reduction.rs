@@ -29,7 +29,7 @@ fn check(design: &Design, order: usize) -> Bank {
     let states = block(&design.bank).a.len();
     let record = design.reduction.as_ref().unwrap();
     assert!(states <= order && record.reduced.order == states, "{states} {record:?}");
-    let upper = design.bank.gamma.upper.unwrap();
+    let upper = design.bank.gamma.norm.unwrap();
     assert!((upper / record.reduced.figures.gamma - 1.0).abs() < 1e-8, "{upper} {record:?}");
     assert!(design.bank.gamma.lower.unwrap() <= upper);
     let (proof, _) = prove(&design.bank, &design.dual).unwrap();
@@ -54,7 +54,7 @@ fn few_states_of_the_thesis_example_are_proven() {
     ] {
         let found = reduced(thesis(10, &[1.2, 0.6]), method, Reduction::Order(order));
         let bank = check(&found, order);
-        let upper = bank.gamma.upper.unwrap();
+        let upper = bank.gamma.norm.unwrap();
         assert!(upper < gamma * 1.01, "{} {order}: {upper}", method.name());
         assert_eq!(bank.spec.unwrap().design.reduction, Some(Reduction::Order(order)));
     }
@@ -94,8 +94,8 @@ fn it_is_worth_its_cost_beside_taps() {
     let macs = cost(block(&found.bank));
     let mut taps = spec;
     taps.design = DesignSpec::new(Method::Fir, Some(macs.div_ceil(2)));
-    let fir = design(&taps).unwrap().bank.gamma.upper.unwrap();
-    let iir = found.bank.gamma.upper.unwrap();
+    let fir = design(&taps).unwrap().bank.gamma.norm.unwrap();
+    let iir = found.bank.gamma.norm.unwrap();
     println!("{macs} multiply-adds a tick: recursive {iir}, taps {fir}");
     assert!(iir < 0.1 * fir, "{iir} {fir}");
 }
@@ -104,7 +104,7 @@ fn it_is_worth_its_cost_beside_taps() {
 fn the_unit_of_the_signal_does_not_matter() {
     let gamma = |gain: f64| {
         let found = reduced(amplified(thesis(4, &[1.2, 0.6]), gain), Method::Iir, Reduction::Order(2));
-        check(&found, 2).gamma.upper.unwrap() / gain
+        check(&found, 2).gamma.norm.unwrap() / gain
     };
     let one = gamma(1.0);
     for gain in [1e-9, 1e-3, 1e3] {
@@ -136,7 +136,7 @@ fn nasty_front_ends_end_as_banks_of_that_order() {
             let gamma = found.bank.gamma;
             assert!(states <= order && gamma.lower <= gamma.upper, "{states} {gamma:?}");
             let again = analyze(&found.bank, &[]).unwrap().gamma;
-            assert!((again - gamma.upper.unwrap()).abs() <= 1e-8 * again + 1e-12, "{again} {gamma:?}");
+            assert!((again - gamma.norm.unwrap()).abs() <= 1e-8 * again + 1e-12, "{again} {gamma:?}");
         }
     }
 }

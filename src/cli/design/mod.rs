@@ -74,13 +74,10 @@ fn parse_method(text: &str) -> Result<Method, String> {
 /// Looks for a proof of the bank's gammas and puts it into the bank; a bank that cannot be proven is a bank all the same.
 fn attach_proof(design: &mut Design) -> ProofReport {
     let begin = Instant::now();
-    let found = design::prove(&design.bank, &design.dual);
+    let found = design::attach_proof(&mut design.bank, &design.dual);
     let seconds = begin.elapsed().as_secs_f64();
     match found {
-        Ok((proof, proven)) => {
-            design.bank.proof = Some(proof);
-            ProofReport { proven: Some(proven), unproven: None, seconds }
-        }
+        Ok(proven) => ProofReport { proven: Some(proven), unproven: None, seconds },
         Err(error) => ProofReport { proven: None, unproven: Some(error.to_string()), seconds },
     }
 }

@@ -37,7 +37,7 @@ pub(super) struct Report<'a> {
 #[derive(Debug, serde::Serialize)]
 struct Words<'a> {
     fraction_bits: i32,
-    /// gamma of these integers over that of the real taps, both exact, in decibels.
+    /// gamma of these integers over that of the real taps, both computed, in decibels.
     loss_db: f64,
     #[serde(flatten)]
     study: &'a WordStudy,
@@ -46,7 +46,7 @@ struct Words<'a> {
 impl<'a> Words<'a> {
     fn of(design: &'a Design) -> Option<Self> {
         let (integers, study) = design.bank.fixed_point.as_ref().zip(design.words.as_ref())?;
-        let loss_db = study.loss_db(design.bank.gamma.upper?);
+        let loss_db = study.loss_db(design.bank.gamma.norm?);
         Some(Self { fraction_bits: integers.fraction_bits, loss_db, study })
     }
 
@@ -140,7 +140,7 @@ impl<'a> Report<'a> {
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
         format!(
             "{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
-             gamma      {} (exact norm of this bank; worst at {:.4} Hz modulo the slow rate)\n\
+             gamma      {} (computed norm of this bank; worst at {:.4} Hz modulo the slow rate)\n\
              lower      {} ({})\n\
              noncausal  {} (no latency is better)\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
@@ -151,7 +151,7 @@ impl<'a> Report<'a> {
             self.channels,
             self.ratio,
             self.latency,
-            number(self.gamma.upper),
+            number(self.gamma.norm),
             self.peak_hertz,
             number(self.gamma.lower),
             match self.method {

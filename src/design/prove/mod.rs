@@ -85,6 +85,17 @@ pub fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), Desig
     Ok((proof, verified))
 }
 
+/// Puts a proof into `bank`, and the upper end that it proves into its gammas.
+///
+/// # Errors
+/// As [`prove`]; the bank is then left as it is.
+pub fn attach_proof(bank: &mut Bank, dual: &[DualPoint]) -> Result<Verified, DesignError> {
+    let (proof, verified) = prove(bank, dual)?;
+    bank.gamma.upper = Some(verified.upper);
+    bank.proof = Some(proof);
+    Ok(verified)
+}
+
 /// The least gamma of the ladder for which a certificate passes.
 fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
     if subject.states() > MAX_SEARCHED {
@@ -96,7 +107,7 @@ fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, Design
     let error = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
     let peak = hinf_norm(&error)?;
     // The norm in the file may differ from the one computed here in the last digits; if in more, it is not the norm.
-    let stated = bank.gamma.upper.map(|stated| stated / units.wanted);
+    let stated = bank.gamma.norm.map(|stated| stated / units.wanted);
     let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + CLAIM_TOLERANCE));
     let norm = credible.unwrap_or(0.0).max(peak.gain);
     let response = error.response_at(Complex::from_polar(1.0, peak.frequency));
