@@ -7,7 +7,7 @@
 //! overlap-save.
 
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::runtime::{Form, Options, Precision, Reconstructor};
+use hybank::runtime::{Form, Options, Precision, Stream};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -27,7 +27,7 @@ fn fir(n: usize, m: usize, taps: usize) -> Bank {
 
 /// Nanoseconds a tick, in numbers of the kernels' own type.
 fn measure(bank: &Bank, options: Options) -> f64 {
-    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let mut stream = Stream::new(&bank.plan(options).unwrap());
     let (n, m) = (stream.channels(), stream.ratio());
     let x: Vec<f64> = (0..n * TICKS).map(|i| ((i * 7919) % 1000) as f64 / 1000.0 - 0.5).collect();
     let narrow: Vec<f32> = x.iter().map(|&x| x as f32).collect();
@@ -69,7 +69,7 @@ fn main() {
             let others: Vec<_> = lengths
                 .map(|len| format!("{len}: {:.2}", measure(&bank, options(Form::OverlapSave(Some(len))))))
                 .collect();
-            let plan = |form| Reconstructor::with_options(&bank, options(form)).unwrap().plan();
+            let plan = |form| Stream::new(&bank.plan(options(form)).unwrap()).plan().summary();
             let (not_late, plan) = (plan(Form::FastestPrompt).form, plan(Form::Fastest));
             let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
             println!(

@@ -1,11 +1,11 @@
-//! How fast state-space banks run: one core, public `Reconstructor`, beside the f32 multiply-add peak of the same moment.
+//! How fast state-space banks run: one core, public `Stream`, beside the f32 multiply-add peak of the same moment.
 //!
 //! `cargo bench --bench recursion`. A section is a pair of states. With N inputs and M outputs it takes 4 + 2 N + 2 M
 //! multiply-adds, or 4 + 2 + 2 where it has one input and one output of its own; a biquad of the usual kind takes 5. So
 //! three rates stand side by side: sections, multiply-adds by five ("biquads"), and the share of the peak.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
-use hybank::runtime::{Isa, Options, Precision, Reconstructor, multiply_add_chains};
+use hybank::runtime::{Isa, Options, Precision, Stream, multiply_add_chains};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -131,7 +131,7 @@ fn peak() -> f64 {
 
 fn measure(case: &Case, recursion: Precision, call: usize) {
     let options = Options { recursion, ..Options::default() };
-    let mut stream = Reconstructor::with_options(&bank(case.filter.clone()), options).expect("a sound bank");
+    let mut stream = Stream::new(&bank(case.filter.clone()).plan(options).expect("a sound bank"));
     let (n, m) = (stream.channels(), stream.ratio());
     let x: Vec<f32> = (0..n * TICKS).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect();
     let mut y = vec![0.0; m * TICKS];
@@ -141,7 +141,7 @@ fn measure(case: &Case, recursion: Precision, call: usize) {
         }
     });
     let (ticks, peak) = (TICKS as f64 / seconds, peak());
-    let (plan, work) = (stream.plan(), ticks * case.work as f64);
+    let (plan, work) = (stream.plan().summary(), ticks * case.work as f64);
     println!(
         "| {} | {} {} | {call} | {:.1} | {:.1} | {:.2} | {:.2} | {:.1} | {:.0} % |",
         case.name,

@@ -1,14 +1,12 @@
 //! How many fast samples a second one core makes, and what share of its multiply-add peak that is.
 //!
-//! `cargo bench --bench runtime` prints a table of the public [`Reconstructor`]; a word after `--` picks the rows
+//! `cargo bench --bench runtime` prints a table of the public [`Stream`]; a word after `--` picks the rows
 //! that contain it. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
 //! of many repeats, and so is the peak, which is measured anew beside each row.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{
-    Form, Isa, Options, PcmOutput, Precision, Reconstructor, Workers, multiply_add_chains,
-};
+use hybank::runtime::{Form, Isa, Options, PcmOutput, Precision, Stream, Workers, multiply_add_chains};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -93,7 +91,7 @@ impl Table {
     /// The products are those of the direct form, so that the share of the peak may pass 100 % in others.
     fn fir(&self, name: &str, n: usize, m: usize, taps: usize, form: Form, call: usize) {
         let options = Options { form, ..Options::default() };
-        let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
+        let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let x = input(n, TICKS);
         let mut y = vec![0.0; m * TICKS];
         self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
@@ -122,7 +120,7 @@ impl Table {
     fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
         for len in [None, Some(64), Some(128), Some(256)] {
             let options = Options { form: Form::OverlapSave(len), ..Options::default() };
-            let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
+            let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
             let x = input(n, TICKS);
             let mut y = vec![0.0; m * TICKS];
             let name = format!("{name} {}", len.map_or("best".into(), |len| len.to_string()));
@@ -135,7 +133,7 @@ impl Table {
     /// In and out as f64; the peak in f64 is half the one printed.
     fn doubles(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
         let options = Options { precision: Precision::Double, form, ..Options::default() };
-        let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
+        let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let x: Vec<f64> = input(n, TICKS).into_iter().map(f64::from).collect();
         let mut y = vec![0.0; m * TICKS];
         self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
@@ -144,7 +142,7 @@ impl Table {
     }
 
     fn pcm(&self, name: &str, n: usize, m: usize, taps: usize) {
-        let mut stream = Reconstructor::new(&fir(n, m, taps)).unwrap();
+        let mut stream = Stream::new(&fir(n, m, taps).plan(Options::default()).unwrap());
         let bytes: Vec<u8> = (0..2 * n * TICKS).map(|i| (i * 31) as u8).collect();
         let mut out = vec![0; 2 * m * TICKS];
         let layout = SampleLayout::packed(PcmFormat::S16Le);
@@ -161,7 +159,7 @@ impl Table {
             return;
         }
         let options = Options { form, ..Options::default() };
-        let mut stream = Reconstructor::with_options(&fir(n, m, taps), options).unwrap();
+        let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let workers = Workers::new(2).unwrap();
         let ticks = 16 * TICKS;
         let x = input(n, ticks);
@@ -204,7 +202,7 @@ impl Table {
 
     /// Recursions have no peak to compare with: ticks are what counts.
     fn recursions(&self) {
-        let mut stream = Reconstructor::new(&recursion()).unwrap();
+        let mut stream = Stream::new(&recursion().plan(Options::default()).unwrap());
         let x = input(4, TICKS);
         let mut y = vec![0.0; 4 * TICKS];
         self.row("state space: 32 states, N 4 M 4", 4 * TICKS, 0.0, || {

@@ -4,7 +4,7 @@
 //! `cargo run --release --example design_and_fuse`
 
 use hybank::design::{Problem, design};
-use hybank::runtime::Reconstructor;
+use hybank::runtime::{Options, Stream};
 use hybank::simulate::{Analog, Source, capture};
 use hybank::spec::Spec;
 use std::error::Error;
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let captured = capture(&Problem::new(&spec, bank.latency)?, &signal, TICKS);
     let ticks: Vec<f64> = (0..TICKS).flat_map(|k| captured.channels.iter().map(move |x| x[k])).collect();
 
-    let mut fuse = Reconstructor::new(&bank)?;
+    let mut fuse = Stream::new(&bank.plan(Options::default())?);
     let mut fast = vec![0.0; TICKS * fuse.ratio()];
     let mut written = 0;
     for block in ticks.chunks(BLOCK * fuse.channels()) {

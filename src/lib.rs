@@ -1,5 +1,6 @@
 #![cfg_attr(feature = "design", doc = include_str!("../README.md"))]
 #![cfg_attr(not(feature = "design"), doc = "Runs hybrid multirate filter banks with fractional delays.")]
+#![forbid(unsafe_code)]
 
 pub mod sampling;
 pub mod units;
@@ -11,9 +12,11 @@ pub mod io;
 #[cfg(feature = "runtime")]
 pub mod pipeline;
 #[cfg(feature = "runtime")]
-pub mod runtime;
-#[cfg(feature = "runtime")]
 pub mod spec;
+
+/// The crate `hybank-runtime`: plans, streams and PCM.
+#[cfg(feature = "runtime")]
+pub use hybank_runtime as runtime;
 
 #[cfg(feature = "design")]
 pub mod analog;

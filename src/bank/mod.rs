@@ -11,6 +11,7 @@ mod check;
 mod digest;
 mod error;
 mod fixed_point;
+mod plan;
 mod proof;
 mod read;
 mod write;

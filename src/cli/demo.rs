@@ -7,7 +7,7 @@ use crate::bank::Bank;
 use crate::design::{self, Problem};
 use crate::io::PcmFormat;
 use crate::plot::{Chart, Series};
-use crate::runtime::{Options, Precision, Reconstructor};
+use crate::runtime::{Options, Precision, Stream};
 use crate::simulate::{Analog, Captured, Source, Tone, capture, interleaved};
 use crate::spec::{Method, Spec};
 use std::f64::consts::TAU;
@@ -109,7 +109,7 @@ fn contend(spec: &Spec, problem: &Problem, captured: &Captured) -> Result<Vec<Co
 
 fn fuse(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Failure> {
     let options = Options { precision: Precision::Double, ..Options::default() };
-    let mut stream = Reconstructor::with_options(bank, options).map_err(Failure::input)?;
+    let mut stream = Stream::new(&bank.plan(options).map_err(Failure::input)?);
     let ticks = channels.iter().map(Vec::len).min().unwrap_or(0);
     let frames: Vec<f64> = (0..ticks).flat_map(|k| channels.iter().map(move |channel| channel[k])).collect();
     let mut fast = vec![0.0; ticks * bank.ratio];

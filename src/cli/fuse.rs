@@ -8,7 +8,7 @@ use super::output::{Bits, Container, FastWriter, precision};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Arrival, BLOCK_BYTES, Feed, FeedOptions};
-use crate::runtime::{Form, Options, Reconstructor};
+use crate::runtime::{Form, Options, Stream};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -126,7 +126,9 @@ impl Args {
         let auto = if self.gaps.are_bridged() { Form::Direct } else { Form::Fastest };
         let form = self.form.form(auto);
         let options = Options { precision: precision(format), form, ..Options::default() };
-        let stream = Reconstructor::with_options(bank, options)
+        let stream = bank
+            .plan(options)
+            .map(|plan| Stream::new(&plan))
             .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))?;
         let extra = stream.extra_latency();
         let gaps = self.gaps.stage(bank, extra, self.force)?;

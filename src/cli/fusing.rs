@@ -4,7 +4,7 @@ use super::Failure;
 use super::gaps::{GapReport, GapStage};
 use super::output::FastWriter;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::{Form, PcmOutput, PlanSummary, Reconstructor, Workers};
+use crate::runtime::{Form, PcmOutput, PlanSummary, Stream, Workers};
 
 /// Encoded output of one step at most.
 const STEP_BYTES: usize = 256 << 10;
@@ -65,7 +65,7 @@ impl ThreadArgs {
 
 /// What a run carries from block to block.
 pub(super) struct Fusing {
-    pub(super) stream: Reconstructor,
+    pub(super) stream: Stream,
     pub(super) gaps: Option<GapStage>,
     pub(super) writer: FastWriter,
     workers: Option<Workers>,
@@ -76,11 +76,33 @@ pub(super) struct Fusing {
     buffer: Vec<u8>,
 }
 
+/// How the bank ran.
+#[derive(Debug, serde::Serialize)]
+struct PlanReport {
+    form: &'static str,
+    numbers: &'static str,
+    isa: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    transform: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    block: Option<usize>,
+    extra_latency: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    multiply_adds: Option<f64>,
+}
+
+impl From<PlanSummary> for PlanReport {
+    fn from(plan: PlanSummary) -> Self {
+        let PlanSummary { form, numbers, isa, transform, block, extra_latency, multiply_adds } = plan;
+        Self { form, numbers, isa, transform, block, extra_latency, multiply_adds }
+    }
+}
+
 /// What every verb that fuses reports.
 #[derive(Debug, serde::Serialize)]
 pub(super) struct RunReport {
     /// How the bank ran.
-    plan: PlanSummary,
+    plan: PlanReport,
     channels: usize,
     ratio: usize,
     /// Fast samples written.
@@ -100,7 +122,7 @@ pub(super) struct RunReport {
 impl Fusing {
     /// Drops the first `skip` output samples.
     pub(super) fn new(
-        stream: Reconstructor,
+        stream: Stream,
         gaps: Option<GapStage>,
         writer: FastWriter,
         skip: u64,
@@ -165,7 +187,7 @@ impl Fusing {
     /// clipped samples. Gaps are also told on standard error.
     pub(super) fn report(&mut self, notes: Vec<String>, lossless: &str) -> RunReport {
         RunReport {
-            plan: self.stream.plan(),
+            plan: self.stream.plan().summary().into(),
             channels: self.stream.channels(),
             ratio: self.stream.ratio(),
             samples: self.writer.samples(),

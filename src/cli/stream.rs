@@ -7,7 +7,7 @@ use super::output::{Container, FastWriter, is_sigmf, precision};
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{Arrival, BLOCK_BYTES, Coding, Feed, FeedOptions, PcmFormat};
-use crate::runtime::{Form, Options, Reconstructor};
+use crate::runtime::{Form, Options, Stream};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         until: args.gaps.until(),
         block_bytes: args.threads.bytes(BLOCK_BYTES),
     };
-    let stream = args.reconstructor(&bank)?;
+    let stream = args.start(&bank)?;
     let Some(mut feed) = Feed::start(&inputs, options, interrupts()?).map_err(Failure::input)? else {
         return Ok(());
     };
@@ -164,17 +164,18 @@ impl Args {
         }
     }
 
-    fn reconstructor(&self, bank: &Bank) -> Result<Reconstructor, Failure> {
+    fn start(&self, bank: &Bank) -> Result<Stream, Failure> {
         // Outside of what a gap touched the output is to have the very bits of a whole recording.
         let auto = if self.gaps.are_bridged() { Form::Direct } else { Form::FastestPrompt };
         let form = self.form.form(auto);
         let options = Options { precision: precision(self.output_format()), form, ..Options::default() };
-        Reconstructor::with_options(bank, options)
+        bank.plan(options)
+            .map(|plan| Stream::new(&plan))
             .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
 
     /// The run at its beginning.
-    fn fusing(&self, bank: &Bank, feed: &Feed, stream: Reconstructor) -> Result<Fusing, Failure> {
+    fn fusing(&self, bank: &Bank, feed: &Feed, stream: Stream) -> Result<Fusing, Failure> {
         let rates = feed.headers().map(|(name, _, rate)| (name, rate));
         let rate = match_bank::fast_rate(bank, match_bank::check_rates(bank, rates)?);
         let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };

@@ -236,7 +236,7 @@ fn decode_frame(parts: &[PcmFrames<'_>], k: usize, numbers: &mut Vec<f64>) {
 mod tests {
     use super::*;
     use crate::bank::BlockFilter;
-    use crate::runtime::Reconstructor;
+    use crate::runtime::{Options, Stream};
 
     /// A generator whose stream never changes (Knuth's MMIX), uniform in -1 .. 1.
     struct Noise(u64);
@@ -271,7 +271,7 @@ mod tests {
     }
 
     fn run(bank: &crate::bank::Bank, frames: &[f64]) -> Vec<f64> {
-        let mut stream = Reconstructor::new(bank).unwrap();
+        let mut stream = Stream::new(&bank.plan(Options::default()).unwrap());
         let mut out = vec![0.0; frames.len() / bank.channel_count() * bank.ratio];
         stream.process_f64(frames, &mut out).unwrap();
         out

@@ -4,7 +4,7 @@ use self::rand_cuts::Cuts;
 use crate::support::{Desk, bytes, ticks};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{Form, Options, PcmOutput, Precision, Reconstructor};
+use hybank::runtime::{Form, Options, PcmOutput, Precision, Stream};
 use std::io::{Read, Write};
 
 /// A generator whose stream never changes (Knuth's MMIX), and the pieces that it makes.
@@ -63,7 +63,7 @@ fn recursion(channels: usize, ratio: usize, states: usize) -> Bank {
 }
 
 /// One stream as floats and as 16-bit integers, in pieces.
-fn run(stream: &mut Reconstructor, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u8> {
+fn run(stream: &mut Stream, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u8> {
     let (n, m) = (stream.channels(), stream.ratio());
     let mut out = Vec::new();
     let mut rest = input;
@@ -105,7 +105,7 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
             each.map(move |(form, precision)| (bank, Options { form, precision, ..Options::default() }))
         })
         .map(|(bank, options)| {
-            let mut stream = Reconstructor::with_options(bank, options).unwrap();
+            let mut stream = Stream::new(&bank.plan(options).unwrap());
             let input: Vec<f32> = (0..TICKS * bank.delays.len()).map(|_| noise() as f32).collect();
             let whole = [false, true].map(|pcm| {
                 stream.reset();

@@ -173,7 +173,7 @@ fn g14_singular_values_of_the_error_system() {
 
 #[test]
 fn g15_errors_on_the_thesis_inputs() {
-    use hybank::runtime::{Options, Precision, Reconstructor};
+    use hybank::runtime::{Options, Precision, Stream};
     use hybank::simulate::{Analog, Source, capture};
     let spec = with_taps(thesis(10, &[1.2, 0.6]), 22);
     let bank = design(&spec).unwrap().bank;
@@ -184,7 +184,7 @@ fn g15_errors_on_the_thesis_inputs() {
         let frames: Vec<f64> =
             (0..101).flat_map(|k| [captured.channels[0][k], captured.channels[1][k]]).collect();
         let options = Options { precision: Precision::Double, ..Options::default() };
-        let mut stream = Reconstructor::with_options(&bank, options).unwrap();
+        let mut stream = Stream::new(&bank.plan(options).unwrap());
         let mut fast = vec![0.0; 202];
         stream.process_f64(&frames, &mut fast).unwrap();
         let square: f64 = (41..=200).map(|n| (fast[n] - captured.target[n]).powi(2)).sum();

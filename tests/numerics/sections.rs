@@ -2,7 +2,7 @@
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::design::{analyze, design};
-use hybank::runtime::{Options, Precision, Reconstructor};
+use hybank::runtime::{Options, Precision, Stream};
 use hybank::spec::Spec;
 
 fn spec(method: &str, delays: &[f64], latency: usize, target: &str) -> Spec {
@@ -48,9 +48,9 @@ fn designs_are_sections_behind_delay_lines() {
             [(DOUBLE_POLE, 2, 0), (DOUBLE_POLE, 2, 10), (BUTTERWORTH, 5, 9), (BUTTERWORTH, 5, 60)]
         {
             let bank = design(&spec(method, &[1.2, 0.6], latency, filter)).unwrap().bank;
-            let mut stream = Reconstructor::new(&bank).unwrap();
-            assert_eq!(stream.plan().form, "modal", "{method} {filter} {latency}");
-            assert_eq!(stream.plan().numbers, "f64");
+            let mut stream = Stream::new(&bank.plan(Options::default()).unwrap());
+            assert_eq!(stream.plan().summary().form, "modal", "{method} {filter} {latency}");
+            assert_eq!(stream.plan().summary().numbers, "f64");
             // Two inputs a tick of the line, and no more recursive states than the front end has.
             let states = block(&bank).a.len();
             assert!(states <= order + 2 * (latency / 2 + 1), "{method} {filter} {latency}: {states}");
@@ -80,13 +80,13 @@ fn channels_that_cannot_be_told_apart_share_a_filter_in_sections_too() {
     let alone = design(&spec("iir", &[1.2, 0.6], 8, DOUBLE_POLE)).unwrap().bank;
     let twice = design(&spec("iir", &[1.2, 0.6, 1.2], 8, DOUBLE_POLE)).unwrap().bank;
     assert!((alone.gamma.norm.unwrap() / twice.gamma.upper.unwrap() - 1.0).abs() < 1e-9);
-    let mut stream = Reconstructor::new(&twice).unwrap();
-    assert_eq!(stream.plan().form, "modal");
+    let mut stream = Stream::new(&twice.plan(Options::default()).unwrap());
+    assert_eq!(stream.plan().summary().form, "modal");
     // The same samples on both copies are the same samples on the one.
     let two = samples(2 * 200);
     let three: Vec<f64> = two.chunks_exact(2).flat_map(|u| [u[0], u[1], u[0]]).collect();
     let (mut a, mut b) = (vec![0.0; 400], vec![0.0; 400]);
-    Reconstructor::new(&alone).unwrap().process_f64(&two, &mut a).unwrap();
+    Stream::new(&alone.plan(Options::default()).unwrap()).process_f64(&two, &mut a).unwrap();
     stream.process_f64(&three, &mut b).unwrap();
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst:e}");
@@ -96,12 +96,12 @@ fn channels_that_cannot_be_told_apart_share_a_filter_in_sections_too() {
 fn single_precision_is_asked_for_and_stays_near() {
     let bank = design(&spec("iir", &[1.2, 0.6], 10, BUTTERWORTH)).unwrap().bank;
     let options = Options { recursion: Precision::Single, ..Options::default() };
-    let mut single = Reconstructor::with_options(&bank, options).unwrap();
-    assert_eq!(single.plan().numbers, "f32");
+    let mut single = Stream::new(&bank.plan(options).unwrap());
+    assert_eq!(single.plan().summary().numbers, "f32");
     let input = samples(2 * 2000);
     let (mut a, mut b) = (vec![0.0; input.len()], vec![0.0; input.len()]);
     single.process_f64(&input, &mut a).unwrap();
-    Reconstructor::new(&bank).unwrap().process_f64(&input, &mut b).unwrap();
+    Stream::new(&bank.plan(Options::default()).unwrap()).process_f64(&input, &mut b).unwrap();
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst > 0.0 && worst < 1e-5, "{worst:e}");
 }

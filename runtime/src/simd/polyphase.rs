@@ -1,7 +1,7 @@
 //! Polyphase filters with their coefficients in the order of use, and the checked calls of the FIR kernels.
 
 use super::fir::{Cut, FirKernel, Job, Part, PassFn};
-use crate::runtime::aligned::Aligned;
+use crate::aligned::Aligned;
 
 /// Stretches of a call.
 const STRETCHES: usize = 2;

@@ -2,7 +2,8 @@
 
 use super::sample::Sample;
 use super::simd::{Isa, decode, encode, interleave};
-use crate::io::{PcmFormat, PcmFrames, for_pcm_format};
+use crate::pcm::for_pcm_format;
+use crate::{PcmFormat, PcmFrames};
 use std::ops::Range;
 
 /// Room for fast samples, and what was lost on the way in.

@@ -1,10 +1,9 @@
 //! Overlap-save against the definition of the sum, and against a scalar twin with the same bits.
 
 use super::*;
-use crate::bank::Bank;
-use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::tests::{Noise, definition, fir_bank, in_pieces, random_taps};
-use crate::runtime::{Form, Options, PcmOutput, Precision, Reconstructor};
+use crate::tests::{Bank, Noise, definition, fir_bank, in_pieces, random_taps, recursive_bank, start};
+use crate::{Form, Options, PcmOutput, Precision};
+use crate::{PcmFormat, PcmFrames, SampleLayout};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 use std::ops::{Add, Mul, Sub};
@@ -163,7 +162,7 @@ fn options(len: usize, precision: Precision) -> Options {
 
 /// All outputs of an input, the first of them for its first tick.
 fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
-    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let mut stream = start(bank, options).unwrap();
     let late = stream.extra_latency();
     let mut padded = input.to_vec();
     padded.resize(input.len() + late / stream.ratio() * stream.channels(), 0.0);
@@ -235,8 +234,7 @@ fn double_precision_is_double() {
     let taps = random_taps(4, 500, &mut noise);
     let input = noise.samples(4 * 3000);
     let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
-    let mut stream =
-        Reconstructor::with_options(&fir_bank(taps.clone(), 4), options(512, Precision::Double)).unwrap();
+    let mut stream = start(&fir_bank(taps.clone(), 4), options(512, Precision::Double)).unwrap();
     let mut out = vec![0.0; wide.len()];
     stream.process_f64(&wide, &mut out).unwrap();
     let want = definition(&taps, 4, &input);
@@ -294,7 +292,7 @@ fn resets_fresh_streams_and_clones_have_the_bits_of_a_new_one() {
     let bank = fir_bank(random_taps(3, 50, &mut noise), 4);
     let options = options(32, Precision::Single);
     let input = noise.samples(3 * 777);
-    let mut stream = Reconstructor::with_options(&bank, options).unwrap();
+    let mut stream = start(&bank, options).unwrap();
     let mut want = vec![0.0; 4 * 777];
     stream.process(&input, &mut want).unwrap();
     let mut out = vec![0.0; want.len()];
@@ -315,7 +313,7 @@ fn latency_is_exact_and_flushing_brings_everything_out() {
     for (n, m, count) in [(1, 1, 9), (2, 3, 30), (5, 2, 64)] {
         let taps = random_taps(n, count, &mut noise);
         let bank = fir_bank(taps.clone(), m);
-        let mut stream = Reconstructor::with_options(&bank, options(64, Precision::Single)).unwrap();
+        let mut stream = start(&bank, options(64, Precision::Single)).unwrap();
         assert_eq!(stream.latency(), bank.latency + stream.extra_latency());
         assert_eq!(stream.memory(), Some(lags(&taps, m) - 1));
         let input = noise.samples(n * 150);
@@ -335,21 +333,20 @@ fn latency_is_exact_and_flushing_brings_everything_out() {
 fn threads_do_not_change_a_bit() {
     let mut noise = Noise(47);
     let bank = fir_bank(random_taps(2, 90, &mut noise), 2);
-    let mut one = Reconstructor::with_options(&bank, options(128, Precision::Single)).unwrap();
+    let mut one = start(&bank, options(128, Precision::Single)).unwrap();
     let mut many = one.fresh();
     let input = noise.samples(2 * 20_000);
     let mut out = [vec![0.0; 2 * 20_000], vec![0.0; 2 * 20_000]];
     one.process(&input, &mut out[0]).unwrap();
-    many.process_parallel(&input, &mut out[1], &crate::runtime::Workers::new(3).unwrap()).unwrap();
+    many.process_parallel(&input, &mut out[1], &crate::Workers::new(3).unwrap()).unwrap();
     assert_eq!(out[0], out[1]);
 }
 
 #[test]
 fn recursive_banks_have_no_transforms() {
-    let filter = crate::bank::BlockFilter { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
-    let filters = crate::bank::SynthesisFilters::StateSpace(filter);
-    let bank = Bank { filters, ..fir_bank(vec![vec![1.0]], 1) };
-    let refused = |form| Reconstructor::with_options(&bank, Options { form, ..Options::default() }).err();
+    let filter = crate::StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
+    let bank = recursive_bank(filter);
+    let refused = |form| start(&bank, Options { form, ..Options::default() }).err();
     assert_eq!(refused(Form::OverlapSave(None)), Some(BuildError::Recursive { form: "overlap-save" }));
     assert_eq!(refused(Form::Fastest), None);
 }
@@ -358,7 +355,7 @@ fn recursive_banks_have_no_transforms() {
 fn spectra_that_would_fill_the_memory_are_refused_or_not_chosen() {
     let taps = vec![vec![1.0; 1024]; 1024];
     let bank = fir_bank(taps, 1024);
-    let made = |form| Reconstructor::with_options(&bank, Options { form, ..Options::default() });
+    let made = |form| start(&bank, Options { form, ..Options::default() });
     let len = 1 << 20;
     let refused = BuildError::Spectra { channels: 1024, ratio: 1024, len };
     assert_eq!(made(Form::OverlapSave(Some(len))).err(), Some(refused));
@@ -378,7 +375,7 @@ proptest! {
         let taps = random_taps(n, count, &mut noise);
         let len = lags(&taps, m).next_power_of_two().max(16) << more;
         let bank = fir_bank(taps, m);
-        let mut stream = Reconstructor::with_options(&bank, options(len, precision)).unwrap();
+        let mut stream = start(&bank, options(len, precision)).unwrap();
         let mut input = noise.samples(n * cuts.iter().sum::<usize>());
         // Zero for what is lost gives the same.
         for place in &lost {
@@ -406,7 +403,7 @@ proptest! {
         let mut noise = Noise(seed);
         let bank = fir_bank(random_taps(n, 13, &mut noise), m);
         let input = noise.samples(n * ticks);
-        let mut stream = Reconstructor::with_options(&bank, options(16, Precision::Single)).unwrap();
+        let mut stream = start(&bank, options(16, Precision::Single)).unwrap();
         let mut want = vec![0.0; m * ticks];
         stream.process(&input, &mut want).unwrap();
         stream.reset();

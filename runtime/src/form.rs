@@ -21,7 +21,7 @@ pub enum Form {
     Fast,
     /// By Fourier transforms of F ticks, a power of two from 16 on that is at least K, or of the best such length:
     /// for long filters a fraction of the work, but later by
-    /// [`extra_latency`](crate::runtime::Reconstructor::extra_latency).
+    /// [`extra_latency`](crate::Plan::extra_latency).
     OverlapSave(Option<usize>),
     /// Whichever takes least time by the measured costs of all.
     Fastest,

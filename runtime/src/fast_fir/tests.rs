@@ -1,22 +1,23 @@
 //! The fast form against the definition of the sum, and against three direct filters with the same bits.
 
 use super::*;
-use crate::bank::{Bank, BlockFilter, SynthesisFilters};
-use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::tests::{Noise, definition, fir_bank, in_pieces, random_taps, spans_agree};
-use crate::runtime::{Form, Options, PcmOutput, Precision, Reconstructor, Workers};
+use crate::tests::{
+    Bank, Noise, definition, fir_bank, in_pieces, random_taps, recursive_bank, spans_agree, start,
+};
+use crate::{Form, Options, PcmOutput, Precision, StateSpace, Stream, Workers};
+use crate::{PcmFormat, PcmFrames, SampleLayout};
 use proptest::prelude::*;
 
 fn options(precision: Precision) -> Options {
     Options { form: Form::Fast, precision, ..Options::default() }
 }
 
-fn fast(bank: &Bank, precision: Precision) -> Reconstructor {
-    Reconstructor::with_options(bank, options(precision)).unwrap()
+fn fast(bank: &Bank, precision: Precision) -> Stream {
+    start(bank, options(precision)).unwrap()
 }
 
 fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
-    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let mut stream = start(bank, options).unwrap();
     let mut out = vec![0.0; input.len() / stream.channels() * stream.ratio()];
     assert_eq!(stream.process(input, &mut out).unwrap(), out.len());
     out
@@ -24,7 +25,7 @@ fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
 
 /// In numbers of f64.
 fn run_wide(bank: &Bank, options: Options, input: &[f64]) -> Vec<f64> {
-    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let mut stream = start(bank, options).unwrap();
     let mut out = vec![0.0; input.len() / stream.channels() * stream.ratio()];
     stream.process_f64(input, &mut out).unwrap();
     out
@@ -258,7 +259,7 @@ fn no_output_waits_for_the_second_tick_of_its_pair() {
         let want = run(&bank, options(Precision::Single), &input);
         let mut stream = fast(&bank, Precision::Single);
         assert_eq!((stream.extra_latency(), stream.latency()), (0, bank.latency));
-        assert_eq!(stream.flush_ticks(), Reconstructor::new(&bank).unwrap().flush_ticks());
+        assert_eq!(stream.flush_ticks(), start(&bank, Options::default()).unwrap().flush_ticks());
         let mut out = vec![f32::NAN; want.len()];
         for (x, y) in input.chunks(n).zip(out.chunks_mut(m)) {
             assert_eq!(stream.process(x, y), Ok(m));
@@ -329,7 +330,7 @@ fn threads_do_not_change_a_bit() {
 
 #[test]
 fn filters_that_cannot_be_halved_are_refused() {
-    let refused = |bank: &Bank| Reconstructor::with_options(bank, options(Precision::Single)).unwrap_err();
+    let refused = |bank: &Bank| start(bank, options(Precision::Single)).unwrap_err();
     for taps in [vec![], vec![1.0], vec![1.0; 3]] {
         assert_eq!(refused(&fir_bank(vec![taps.clone(), taps], 3)), BuildError::TooShort { lags: 1 });
     }
@@ -344,13 +345,10 @@ fn filters_that_cannot_be_halved_are_refused() {
         run(&bank, options(Precision::Single), &[1.0; 9]),
         [3.0, 1.0, 1.0, 4.0, 1.0, 1.0, 4.0, 1.0, 1.0]
     );
-    let filter = BlockFilter { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
-    let recursive = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir_bank(vec![vec![1.0]], 1) };
+    let filter = StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
+    let recursive = recursive_bank(filter);
     assert_eq!(refused(&recursive), BuildError::Recursive { form: "the fast form" });
-    assert!(
-        Reconstructor::with_options(&recursive, Options { form: Form::FastestPrompt, ..Options::default() })
-            .is_ok()
-    );
+    assert!(start(&recursive, Options { form: Form::FastestPrompt, ..Options::default() }).is_ok());
     assert!(matches!(refused(&fir_bank(vec![vec![0.0, 1e300]], 1)), BuildError::NotFinite { index: 1, .. }));
 }
 

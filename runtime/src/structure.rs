@@ -1,6 +1,6 @@
 //! What a state matrix is made of: states that are nothing but past inputs, and what is left.
 
-use crate::bank::BlockFilter;
+use crate::plan::StateSpace;
 use std::collections::BTreeMap;
 
 /// An input some ticks ago: (channel, ticks).
@@ -22,7 +22,7 @@ pub(crate) struct Structure {
 
 impl Structure {
     /// The matrices have fitting shapes.
-    pub(crate) fn new(filter: &BlockFilter) -> Self {
+    pub(crate) fn new(filter: &StateSpace) -> Self {
         let past = past_inputs(filter);
         let core: Vec<usize> = (0..past.len()).filter(|&s| past[s].is_none()).collect();
         let read = |s: usize| filter.c.iter().map(move |row| row[s]);
@@ -86,7 +86,7 @@ fn add(terms: &mut BTreeMap<Past, Vec<f64>>, place: Past, factors: impl Iterator
 }
 
 /// Which states are inputs of earlier ticks: those that take over an input, or such a state, unchanged.
-fn past_inputs(filter: &BlockFilter) -> Vec<Option<Past>> {
+fn past_inputs(filter: &StateSpace) -> Vec<Option<Past>> {
     let ones: Vec<(Option<usize>, Option<usize>)> =
         filter.a.iter().zip(&filter.b).map(|(a, b)| (only_one(a), only_one(b))).collect();
     let zero = |row: &[f64]| row.iter().all(|&x| x == 0.0);
@@ -120,9 +120,9 @@ fn only_one(row: &[f64]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    fn filter(a: &[&[f64]], b: &[&[f64]], c: &[&[f64]], d: &[&[f64]]) -> BlockFilter {
+    fn filter(a: &[&[f64]], b: &[&[f64]], c: &[&[f64]], d: &[&[f64]]) -> StateSpace {
         let rows = |m: &[&[f64]]| m.iter().map(|row| row.to_vec()).collect();
-        BlockFilter { a: rows(a), b: rows(b), c: rows(c), d: rows(d) }
+        StateSpace { a: rows(a), b: rows(b), c: rows(c), d: rows(d) }
     }
 
     #[test]

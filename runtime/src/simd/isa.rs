@@ -8,14 +8,14 @@ use std::fmt;
 /// make one.
 ///
 /// ```
-/// use hybank::runtime::{Isa, Options};
+/// use hybank_runtime::{Isa, Options};
 /// let options = Options { isa: Isa::detect(), ..Options::default() };
 /// ```
 ///
 /// No other can be named:
 ///
 /// ```compile_fail
-/// use hybank::runtime::{Isa, Options};
+/// use hybank_runtime::{Isa, Options};
 /// let options = Options { isa: Isa::Avx2, ..Options::default() };
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

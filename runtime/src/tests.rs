@@ -1,8 +1,6 @@
-//! The reconstructor against the definition.
+//! Streams against the definition.
 
 use super::*;
-use crate::bank::{Bank, BlockFilter, SynthesisFilters};
-use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use proptest::prelude::*;
 
 /// A generator whose stream never changes (Knuth's MMIX).
@@ -19,12 +17,45 @@ impl Noise {
     }
 }
 
-pub(super) fn fir_bank(taps: Vec<Vec<f64>>, ratio: usize) -> Bank {
-    bank(taps.len(), ratio, SynthesisFilters::Fir(taps))
+/// The coefficients of a test.
+#[derive(Clone)]
+pub(super) enum Filters {
+    Fir(Vec<Vec<f64>>),
+    StateSpace(StateSpace),
 }
 
-fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
-    Bank { latency: 3, delays: vec![0.0; channels], ..Bank::bare(filters, ratio) }
+#[derive(Clone)]
+pub(super) struct Bank {
+    pub(super) filters: Filters,
+    pub(super) ratio: usize,
+    pub(super) latency: usize,
+}
+
+impl Bank {
+    pub(super) fn channel_count(&self) -> usize {
+        match &self.filters {
+            Filters::Fir(taps) => taps.len(),
+            Filters::StateSpace(filter) => filter.d[0].len(),
+        }
+    }
+}
+
+pub(super) fn start(bank: &Bank, options: Options) -> Result<Stream, BuildError> {
+    let plan = match &bank.filters {
+        Filters::Fir(taps) => Plan::from_taps(taps, bank.ratio, bank.latency, options),
+        Filters::StateSpace(filter) => {
+            Plan::from_state_space(filter, [filter.d[0].len(), bank.ratio], bank.latency, options)
+        }
+    };
+    plan.map(|plan| Stream::new(&plan))
+}
+
+pub(super) fn fir_bank(taps: Vec<Vec<f64>>, ratio: usize) -> Bank {
+    Bank { filters: Filters::Fir(taps), ratio, latency: 3 }
+}
+
+pub(super) fn recursive_bank(filter: StateSpace) -> Bank {
+    Bank { ratio: filter.d.len(), filters: Filters::StateSpace(filter), latency: 3 }
 }
 
 pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
@@ -32,12 +63,7 @@ pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Ve
 }
 
 /// The outputs of a stream that gets `input` in pieces of so many ticks, for N inputs and M outputs a tick.
-pub(super) fn in_pieces(
-    stream: &mut Reconstructor,
-    [n, m]: [usize; 2],
-    input: &[f32],
-    cuts: &[usize],
-) -> Vec<f32> {
+pub(super) fn in_pieces(stream: &mut Stream, [n, m]: [usize; 2], input: &[f32], cuts: &[usize]) -> Vec<f32> {
     let mut pieces = vec![0.0; input.len() / n * m];
     let (mut from, mut to) = (input, &mut pieces[..]);
     for cut in cuts {
@@ -108,7 +134,7 @@ pub(super) fn definition(taps: &[Vec<f64>], ratio: usize, input: &[f32]) -> Vec<
 }
 
 fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
-    let mut stream = Reconstructor::with_options(bank, options).unwrap();
+    let mut stream = start(bank, options).unwrap();
     let mut out = vec![0.0; input.len() / stream.channels() * stream.ratio()];
     assert_eq!(stream.process(input, &mut out).unwrap(), out.len());
     out
@@ -163,7 +189,7 @@ pub(super) fn spans_agree(
     long: usize,
     noise: &mut Noise,
 ) {
-    let mut one = Reconstructor::with_options(bank, options).unwrap();
+    let mut one = start(bank, options).unwrap();
     let (n, m) = (one.channels(), one.ratio());
     let mut many = vec![one.fresh(); workers.len()];
     for ticks in [1, long, 4096, 2, long - 12_345] {
@@ -209,7 +235,7 @@ fn threads_do_not_change_a_byte() {
         [(2, 3, PcmFormat::S16Le, PcmFormat::S16Le), (3, 2, PcmFormat::S24Be, PcmFormat::F64Le)]
     {
         // Loud enough to clip.
-        let mut one = Reconstructor::new(&fir_bank(random_taps(n, 80, &mut noise), m)).unwrap();
+        let mut one = start(&fir_bank(random_taps(n, 80, &mut noise), m), Options::default()).unwrap();
         let mut many = one.fresh();
         let bytes: Vec<u8> =
             (0..n * 70_001 * format.bytes()).map(|_| (128.0 * noise.next()) as i8 as u8).collect();
@@ -236,7 +262,7 @@ fn a_recursion_stays_on_its_thread() {
     let input = noise.samples(50_000);
     let want = run(&rotation_bank(), Options::default(), &input);
     let mut out = vec![0.0; want.len()];
-    let mut stream = Reconstructor::new(&rotation_bank()).unwrap();
+    let mut stream = start(&rotation_bank(), Options::default()).unwrap();
     stream.process_parallel(&input, &mut out, &Workers::new(2).unwrap()).unwrap();
     assert_eq!(out, want);
 }
@@ -251,7 +277,7 @@ fn samples_that_are_not_finite_do_not_spread_in_long_calls() {
         places.iter().for_each(|&place| input[place] = 0.0);
         let want = run(&fir_bank(taps.clone(), m), Options::default(), &input);
         places.iter().for_each(|&place| input[place] = f32::INFINITY);
-        let mut stream = Reconstructor::new(&fir_bank(taps, m)).unwrap();
+        let mut stream = start(&fir_bank(taps, m), Options::default()).unwrap();
         let mut out = vec![0.0; want.len()];
         stream.process(&input, &mut out).unwrap();
         assert_eq!((out, stream.replaced()), (want, 4), "N {n} M {m}");
@@ -273,7 +299,7 @@ fn what_is_not_finite_is_found_wherever_it_is() {
             let want = run(&bank, Options::default(), &input);
             input[place] = if lags % 2 == 0 { f32::NAN } else { f32::NEG_INFINITY };
             for call in [420, 60, 7] {
-                let mut stream = Reconstructor::new(&bank).unwrap();
+                let mut stream = start(&bank, Options::default()).unwrap();
                 let mut out = vec![0.0; want.len()];
                 for (x, y) in input.chunks(call * n).zip(out.chunks_mut(call * m)) {
                     stream.process(x, y).unwrap();
@@ -295,7 +321,7 @@ fn double_precision_is_double() {
     let input = noise.samples(4 * 1000);
     let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
     let options = Options { precision: Precision::Double, ..Options::default() };
-    let mut stream = Reconstructor::with_options(&fir_bank(taps.clone(), 4), options).unwrap();
+    let mut stream = start(&fir_bank(taps.clone(), 4), options).unwrap();
     let mut out = vec![0.0; wide.len()];
     stream.process_f64(&wide, &mut out).unwrap();
     let worst = definition(&taps, 4, &input).iter().zip(&out).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -321,7 +347,7 @@ fn resets_and_fresh_streams_have_the_bits_of_a_new_one() {
         let n = bank.channel_count();
         let input = noise.samples(n * 777);
         let want = run(&bank, Options::default(), &input);
-        let mut stream = Reconstructor::new(&bank).unwrap();
+        let mut stream = start(&bank, Options::default()).unwrap();
         let mut out = vec![0.0; want.len()];
         stream.process(&noise.samples(n * 123), &mut out).unwrap();
         stream.fresh().process(&input, &mut out).unwrap();
@@ -335,7 +361,7 @@ fn resets_and_fresh_streams_have_the_bits_of_a_new_one() {
 #[test]
 fn a_clone_goes_on_from_the_same_place() {
     let mut noise = Noise(6);
-    let mut stream = Reconstructor::new(&fir_bank(random_taps(2, 24, &mut noise), 2)).unwrap();
+    let mut stream = start(&fir_bank(random_taps(2, 24, &mut noise), 2), Options::default()).unwrap();
     let mut out = [vec![0.0; 200], vec![0.0; 200]];
     stream.process(&noise.samples(200), &mut out[0]).unwrap();
     let mut twin = stream.clone();
@@ -348,7 +374,7 @@ fn a_clone_goes_on_from_the_same_place() {
 #[test]
 fn streams_may_change_threads() {
     fn check<T: Send + Sync>() {}
-    check::<Reconstructor>();
+    check::<Stream>();
 }
 
 proptest! {
@@ -362,7 +388,7 @@ proptest! {
         let mut noise = Noise(seed);
         let precision = if double { Precision::Double } else { Precision::Single };
         let bank = fir_bank(random_taps(n, count, &mut noise), m);
-        let mut stream = Reconstructor::with_options(&bank, Options { precision, ..Options::default() }).unwrap();
+        let mut stream = start(&bank, Options { precision, ..Options::default() }).unwrap();
         let input = noise.samples(n * cuts.iter().sum::<usize>());
         let mut whole = vec![0.0; input.len() / n * m];
         stream.process(&input, &mut whole).unwrap();
@@ -390,7 +416,7 @@ proptest! {
         }).collect();
         let planar: Vec<_> = rows.iter().map(|row| PcmFrames { layout, channels: 1, bytes: row }).collect();
         for ticks in [&[PcmFrames { layout, channels: n, bytes: &bytes }][..], &planar] {
-            let mut stream = Reconstructor::new(&bank).unwrap();
+            let mut stream = start(&bank, Options::default()).unwrap();
             let mut out = vec![0; want.len() * out_format.bytes()];
             let mut output = PcmOutput { format: out_format, bytes: &mut out, clipped: 0 };
             prop_assert_eq!(stream.process_pcm(ticks, &mut output).unwrap(), want.len());
@@ -407,13 +433,13 @@ proptest! {
 /// Two states that turn by one radian and shrink a little; c picks them, d passes input on.
 fn rotation_bank() -> Bank {
     let (s, c) = 1f64.sin_cos();
-    let filter = BlockFilter {
+    let filter = StateSpace {
         a: vec![vec![0.9 * c, -0.9 * s], vec![0.9 * s, 0.9 * c]],
         b: vec![vec![1.0], vec![0.0]],
         c: vec![vec![1.0, 0.0], vec![0.0, 1.0], vec![1.0, 1.0]],
         d: vec![vec![0.5], vec![0.0], vec![-1.0]],
     };
-    bank(1, 3, SynthesisFilters::StateSpace(filter))
+    recursive_bank(filter)
 }
 
 #[test]
@@ -437,7 +463,7 @@ fn what_is_not_finite_never_reaches_a_state() {
         input[40] = 0.0;
         let want = run(&bank, Options::default(), &input);
         input[40] = f32::NAN;
-        let mut stream = Reconstructor::new(&bank).unwrap();
+        let mut stream = start(&bank, Options::default()).unwrap();
         let mut out = vec![0.0; want.len()];
         stream.process(&input, &mut out).unwrap();
         assert_eq!((out, stream.replaced(), stream.state_resets()), (want, 1, 0));
@@ -447,10 +473,10 @@ fn what_is_not_finite_never_reaches_a_state() {
 #[test]
 fn a_recursion_that_overflows_begins_anew_and_says_so() {
     let mut bank = rotation_bank();
-    if let SynthesisFilters::StateSpace(filter) = &mut bank.filters {
+    if let Filters::StateSpace(filter) = &mut bank.filters {
         filter.a = vec![vec![1e200, 0.0], vec![0.0, 0.5]];
     }
-    let mut stream = Reconstructor::new(&bank).unwrap();
+    let mut stream = start(&bank, Options::default()).unwrap();
     let mut input = [0.0; state_space::BLOCK];
     input[0] = 1.0;
     stream.process(&input, &mut [0.0; 3 * state_space::BLOCK]).unwrap();
@@ -465,7 +491,7 @@ fn bytes_that_are_not_finite_become_zero_and_are_counted() {
     let bank = fir_bank(vec![vec![1.0]], 1);
     let bytes: Vec<u8> =
         [1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 2.0].iter().flat_map(|x| x.to_le_bytes()).collect();
-    let mut stream = Reconstructor::new(&bank).unwrap();
+    let mut stream = start(&bank, Options::default()).unwrap();
     let mut out = vec![0; 20];
     let layout = SampleLayout::packed(PcmFormat::F32Le);
     let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut out, clipped: 0 };
@@ -476,7 +502,7 @@ fn bytes_that_are_not_finite_become_zero_and_are_counted() {
 
 #[test]
 fn what_is_clipped_is_counted_once_also_beside_what_is_not_finite() {
-    let mut stream = Reconstructor::new(&fir_bank(vec![vec![1.0]], 1)).unwrap();
+    let mut stream = start(&fir_bank(vec![vec![1.0]], 1), Options::default()).unwrap();
     let mut samples = vec![0.25f32; 100];
     (samples[3], samples[50], samples[60]) = (2.0, f32::NAN, f32::INFINITY);
     let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
@@ -507,7 +533,7 @@ fn filters_as_long_as_a_block_follow_their_definition() {
 #[test]
 fn calls_and_banks_that_do_not_fit_are_refused() {
     let bank = fir_bank(vec![vec![1.0], vec![1.0]], 2);
-    let mut stream = Reconstructor::new(&bank).unwrap();
+    let mut stream = start(&bank, Options::default()).unwrap();
     let mut out = [0.0; 3];
     assert_eq!(stream.process(&[0.0; 3], &mut out), Err(ProcessError::CutTick { samples: 3, channels: 2 }));
     assert_eq!(
@@ -518,17 +544,13 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     let mut output = PcmOutput { format: PcmFormat::S8, bytes: &mut [], clipped: 0 };
     assert_eq!(stream.process_pcm(&[], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
 
-    let refused = |bank: Bank| Reconstructor::new(&bank).unwrap_err();
+    let refused = |bank: Bank| start(&bank, Options::default()).unwrap_err();
     assert_eq!(refused(Bank { ratio: 0, ..bank.clone() }), BuildError::NoRatio);
     assert_eq!(refused(fir_bank(vec![], 2)), BuildError::NoChannels);
-    assert_eq!(
-        refused(Bank { delays: vec![0.0], ..bank.clone() }),
-        BuildError::FilterCount { delays: 1, filters: 2 }
-    );
     // Finite in f64, infinite in f32.
     assert!(matches!(refused(fir_bank(vec![vec![0.0, 1e300]], 2)), BuildError::NotFinite { index: 1, .. }));
     let mut wrong = rotation_bank();
-    if let SynthesisFilters::StateSpace(filter) = &mut wrong.filters {
+    if let Filters::StateSpace(filter) = &mut wrong.filters {
         filter.c.pop();
     }
     assert!(

@@ -26,7 +26,7 @@ use super::isa::Kind;
 use super::vector::Portable;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2F32, Avx2F64};
-use crate::runtime::aligned::Aligned;
+use crate::aligned::Aligned;
 use passes::{ForwardJob, InverseJob, forward, inverse};
 use product::{ProductJob, product};
 use scatter::{ScatterJob, scatter};

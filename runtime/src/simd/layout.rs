@@ -3,7 +3,7 @@
 use super::Isa;
 #[cfg(target_arch = "x86_64")]
 use super::convert::{self, F32, Rows, S16, S32};
-use crate::io::PcmFormat;
+use crate::PcmFormat;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
@@ -94,7 +94,7 @@ pub(crate) fn encode(isa: Isa, format: PcmFormat, samples: &[f32], out: &mut [u8
 #[inline(always)]
 fn encode_each(format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
     let mut clipped = 0;
-    crate::io::for_pcm_format!(format, FORMAT => {
+    crate::pcm::for_pcm_format!(format, FORMAT => {
         for (slot, &value) in out.chunks_exact_mut(FORMAT.bytes()).zip(samples) {
             clipped += u64::from(FORMAT.encode(f64::from(value), slot));
         }

@@ -17,7 +17,7 @@ use super::simd::{Form, Isa, Polyphase, Recursion, RecursionKernel, Stretch};
 use super::structure::Structure;
 use super::ticks::{FastSink, TickSource};
 use super::window::Window;
-use crate::bank::BlockFilter;
+use crate::plan::StateSpace;
 
 /// Ticks a block. Every so many ticks from the beginning of the stream, and not of a call, the state is looked after,
 /// so that cuts do not change a bit.
@@ -54,7 +54,7 @@ pub(crate) struct StateSpaceState<T: Sample> {
 
 impl<T: Sample> StateSpacePlan<T> {
     pub(crate) fn new(
-        filter: &BlockFilter,
+        filter: &StateSpace,
         channels: usize,
         ratio: usize,
         isa: Isa,

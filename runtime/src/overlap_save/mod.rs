@@ -14,15 +14,13 @@
 #[cfg(test)]
 mod tests;
 
-use crate::runtime::BuildError;
-use crate::runtime::aligned::Aligned;
-use crate::runtime::fir::{check_finite, replace_not_finite};
-use crate::runtime::form::lags;
-use crate::runtime::sample::Sample;
-use crate::runtime::simd::{
-    Frames, Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples,
-};
-use crate::runtime::ticks::{FastSink, TickSource};
+use crate::BuildError;
+use crate::aligned::Aligned;
+use crate::fir::{check_finite, replace_not_finite};
+use crate::form::lags;
+use crate::sample::Sample;
+use crate::simd::{Frames, Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples};
+use crate::ticks::{FastSink, TickSource};
 use std::ops::Range;
 
 /// Samples of all spectra: more would take gigabytes.

@@ -142,12 +142,12 @@ impl PcmFormat {
 /// Calls `$body` with the format as a constant, so that each becomes a loop of its own.
 macro_rules! for_pcm_format {
     ($format:expr, $constant:ident => $body:expr) => {
-        $crate::io::for_pcm_format!(@ $format, $constant => $body;
+        $crate::pcm::for_pcm_format!(@ $format, $constant => $body;
             S8 U8 S16Le S16Be S24Le S24Be S32Le S32Be F32Le F32Be F64Le F64Be)
     };
     (@ $format:expr, $constant:ident => $body:expr; $($name:ident)*) => {
         match $format {
-            $($crate::io::PcmFormat::$name => { const $constant: $crate::io::PcmFormat = $crate::io::PcmFormat::$name; $body })*
+            $($crate::PcmFormat::$name => { const $constant: $crate::PcmFormat = $crate::PcmFormat::$name; $body })*
         }
     };
 }

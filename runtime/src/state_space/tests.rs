@@ -1,9 +1,9 @@
 use super::*;
-use crate::runtime::tests::Noise;
-use crate::runtime::ticks::Interleaved;
+use crate::tests::Noise;
+use crate::ticks::Interleaved;
 
 /// The definition, row by row.
-fn definition(filter: &BlockFilter, input: &[f64], channels: usize) -> Vec<f64> {
+fn definition(filter: &StateSpace, input: &[f64], channels: usize) -> Vec<f64> {
     let dot = |row: &[f64], v: &[f64]| row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
     let mut x = vec![0.0; filter.a.len()];
     let mut out = Vec::new();
@@ -15,7 +15,7 @@ fn definition(filter: &BlockFilter, input: &[f64], channels: usize) -> Vec<f64> 
 }
 
 fn run<T: Sample>(
-    filter: &BlockFilter,
+    filter: &StateSpace,
     n: usize,
     m: usize,
     isa: Isa,
@@ -31,7 +31,7 @@ fn run<T: Sample>(
     (out, plan.is_modal())
 }
 
-fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mut Noise) -> BlockFilter {
+fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mut Noise) -> StateSpace {
     let mut matrix = |rows: usize, cols: usize, scale: f64| -> Vec<Vec<f64>> {
         (0..rows).map(|_| (0..cols).map(|_| scale * noise.next()).collect()).collect()
     };
@@ -43,7 +43,7 @@ fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mu
             row.iter_mut().enumerate().filter(|(j, _)| owner[*j] != owner[i]).for_each(|(_, x)| *x = 0.0);
         }
     }
-    BlockFilter { a, b: matrix(order, n, 1.0), c: matrix(m, order, 1.0), d: matrix(m, n, 1.0) }
+    StateSpace { a, b: matrix(order, n, 1.0), c: matrix(m, order, 1.0), d: matrix(m, n, 1.0) }
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn worst(a: &[f64], b: &[f64]) -> f64 {
 
 /// The same filter with its inputs `ticks` ticks late, in a delay line that the output reads too: the form of
 /// designed banks.
-fn behind(core: &BlockFilter, ticks: usize, noise: &mut Noise) -> BlockFilter {
+fn behind(core: &StateSpace, ticks: usize, noise: &mut Noise) -> StateSpace {
     let (states, n) = (core.a.len(), core.d[0].len());
     let order = states + ticks * n;
     let mut a = vec![vec![0.0; order]; order];
@@ -95,7 +95,7 @@ fn behind(core: &BlockFilter, ticks: usize, noise: &mut Noise) -> BlockFilter {
     let newest = |i: usize, u: usize| f64::from(u8::from(i == order - n + u));
     let b = (0..order).map(|i| (0..n).map(|u| newest(i, u)).collect()).collect();
     let read = |row: &Vec<f64>| row.iter().copied().chain((0..ticks * n).map(|_| noise.next())).collect();
-    BlockFilter { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
+    StateSpace { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
 #[test]
 fn a_state_that_fades_away_becomes_zero() {
     let filter =
-        BlockFilter { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
+        StateSpace { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
     let plan = StateSpacePlan::<f64>::new(&filter, 1, 1, Isa::detect()).unwrap();
     let mut state = plan.state();
     let mut input = vec![0.0; 1200];

@@ -1,10 +1,10 @@
 //! Where things lie when a state-space bank runs, and its coefficients in that order.
 
-use crate::runtime::BuildError;
-use crate::runtime::aligned::Aligned;
-use crate::runtime::sample::Sample;
-use crate::runtime::simd::{ColumnTile, Cut, FirKernel, Form, Polyphase, Recursion, SectionVector};
-use crate::runtime::structure::{Past, Structure};
+use crate::BuildError;
+use crate::aligned::Aligned;
+use crate::sample::Sample;
+use crate::simd::{ColumnTile, Cut, FirKernel, Form, Polyphase, Recursion, SectionVector};
+use crate::structure::{Past, Structure};
 
 /// Where things lie: in a window of frames of N inputs, and in rows of S states.
 pub(super) struct Layout {

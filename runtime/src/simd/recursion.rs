@@ -11,7 +11,7 @@ use super::isa::Kind;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2F32, Avx2F64};
 use super::vector::{Portable, Vector};
-use crate::runtime::aligned::Aligned;
+use crate::aligned::Aligned;
 
 /// Ticks of a section that are computed together.
 const STEP: usize = 4;

@@ -1,13 +1,16 @@
 //! A FIR bank in the form that was chosen for it.
 
 use super::BuildError;
-use super::fast_fir::{self, FastFirPlan, FastFirState};
+#[cfg(feature = "rayon")]
+use super::fast_fir;
+use super::fast_fir::{FastFirPlan, FastFirState};
 use super::fir::{FirPlan, FirState};
 use super::form::Choice;
 use super::overlap_save::{OverlapSavePlan, OverlapSaveState};
 use super::sample::Sample;
 use super::simd::Isa;
 use super::ticks::{FastSink, TickSource};
+#[cfg(feature = "rayon")]
 use super::workers::{self, Spans, Workers};
 
 /// Coefficients in the order of use; shared by all streams of a bank.
@@ -83,35 +86,40 @@ impl<T: Sample> FirBankPlan<T> {
         }
     }
 
-    /// All ticks of `source` to `sink`, on all `workers` if there are some and the form has spans; returns how many
-    /// samples were not finite.
+    /// All ticks of `source` to `sink`; returns how many samples were not finite.
     pub(crate) fn process(
         &self,
         state: &mut FirBankState<T>,
         source: &(impl TickSource + ?Sized),
         sink: &mut (impl FastSink + ?Sized),
-        workers: Option<&Workers>,
     ) -> u64 {
         match (self, state) {
-            (Self::Direct(plan), FirBankState::Direct(state)) => share(plan, state, source, sink, workers),
-            (Self::Fast(plan), FirBankState::Fast(state)) => share(&**plan, state, source, sink, workers),
+            (Self::Direct(plan), FirBankState::Direct(state)) => plan.process(state, source, sink),
+            (Self::Fast(plan), FirBankState::Fast(state)) => plan.process(state, source, sink),
             (Self::OverlapSave(plan), FirBankState::OverlapSave(state)) => plan.process(state, source, sink),
             // A state is only ever made by its plan.
             _ => 0,
         }
     }
-}
 
-fn share<P: Spans>(
-    plan: &P,
-    state: &mut P::State,
-    source: &(impl TickSource + ?Sized),
-    sink: &mut (impl FastSink + ?Sized),
-    workers: Option<&Workers>,
-) -> u64 {
-    match workers {
-        Some(workers) => workers::process(plan, state, source, sink, workers),
-        None => plan.process(state, source, sink),
+    /// As [`FirBankPlan::process`], on all `workers` if the form has spans.
+    #[cfg(feature = "rayon")]
+    pub(crate) fn process_parallel(
+        &self,
+        state: &mut FirBankState<T>,
+        source: &(impl TickSource + ?Sized),
+        sink: &mut (impl FastSink + ?Sized),
+        workers: &Workers,
+    ) -> u64 {
+        match (self, state) {
+            (Self::Direct(plan), FirBankState::Direct(state)) => {
+                workers::process(plan, state, source, sink, workers)
+            }
+            (Self::Fast(plan), FirBankState::Fast(state)) => {
+                workers::process(&**plan, state, source, sink, workers)
+            }
+            (_, state) => self.process(state, source, sink),
+        }
     }
 }
 
@@ -126,6 +134,7 @@ impl<T: Sample> FirBankState<T> {
     }
 }
 
+#[cfg(feature = "rayon")]
 macro_rules! spans {
     ($plan:ident, $state:ident, $period:expr, $lead:expr) => {
         impl<T: Sample> Spans for $plan<T> {
@@ -164,5 +173,7 @@ macro_rules! spans {
     };
 }
 
+#[cfg(feature = "rayon")]
 spans!(FirPlan, FirState, 1, |_| 0);
+#[cfg(feature = "rayon")]
 spans!(FastFirPlan, FastFirState, fast_fir::PERIOD, FastFirState::lead);
