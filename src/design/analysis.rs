@@ -6,7 +6,6 @@ use super::iir::noncausal_bound;
 use super::problem::Problem;
 use super::{DesignError, error_system};
 use crate::bank::Bank;
-use crate::linalg::Mat;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
 
@@ -84,12 +83,8 @@ fn mean_of(bank: &Bank, plant: &BlockedPlant, noise: &[f64]) -> Result<MeanAnaly
 
 /// The filters with independent noise of the given powers on their inputs.
 fn behind_noise(filters: &StateSpace, noise: &[f64]) -> Result<StateSpace, DesignError> {
-    let scaled = |matrix: &Mat| {
-        let mut scaled = matrix.clone();
-        scaled.column_iter_mut().zip(noise).for_each(|(mut column, power)| column *= power.sqrt());
-        scaled
-    };
-    Ok(StateSpace::new(filters.a().clone(), scaled(filters.b()), filters.c().clone(), scaled(filters.d()))?)
+    let rms: Vec<f64> = noise.iter().map(|power| power.sqrt()).collect();
+    Ok(filters.scale_inputs(&rms)?)
 }
 
 /// The problem that a bank solves.

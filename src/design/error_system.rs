@@ -5,7 +5,7 @@ use super::equivalence::BlockedPlant;
 use crate::bank::{BlockFilter, SynthesisFilters};
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lti::peak::{Peak, hinf_norm, known_hinf_norm, resonances, stable_poles};
-use crate::lti::{FrequencyResponse, StateSpace, StateSpaceError};
+use crate::lti::{FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 
 /// Frequencies that are looked at first for each lag of FIR filters.
@@ -14,29 +14,18 @@ const LOOKS_PER_LAG: usize = 4;
 /// The synthesis filters as one block system: N slow samples in, M fast samples out, a tick.
 pub fn block_system(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, DesignError> {
     match filters {
-        SynthesisFilters::Fir(taps) => Ok(shift_registers(taps, ratio)?),
+        SynthesisFilters::Fir(taps) => Ok(StateSpace::fir(&by_lag(taps, ratio))?),
         SynthesisFilters::StateSpace(block) => from_block(block, ratio),
     }
 }
 
 /// K = W - F H, both driven by the plant's input.
 pub fn error_system(plant: &BlockedPlant, filters: &StateSpace) -> Result<StateSpace, DesignError> {
-    let (measured, wanted) = (plant.measured, plant.wanted);
-    let (w, h) =
-        (plant.system.select_outputs(measured..measured + wanted), plant.system.select_outputs(0..measured));
-    let (n, nf) = (plant.system.order(), filters.order());
-    let mut a = Mat::zeros(n + nf, n + nf);
-    a.view_mut((0, 0), (n, n)).copy_from(plant.system.a());
-    a.view_mut((n, 0), (nf, n)).copy_from(&(filters.b() * h.c()));
-    a.view_mut((n, n), (nf, nf)).copy_from(filters.a());
-    let mut b = Mat::zeros(n + nf, plant.system.inputs());
-    b.rows_mut(0, n).copy_from(plant.system.b());
-    b.rows_mut(n, nf).copy_from(&(filters.b() * h.d()));
-    let mut c = Mat::zeros(wanted, n + nf);
-    c.columns_mut(0, n).copy_from(&(w.c() - filters.d() * h.c()));
-    c.columns_mut(n, nf).copy_from(&-filters.c());
-    let d = w.d() - filters.d() * h.d();
-    Ok(StateSpace::new(a, b, c, d)?)
+    let (n, m) = (plant.measured, plant.wanted);
+    // [y; z; F y], of which z - F y is taken.
+    let all = plant.system.cascade(0..n, filters)?;
+    let unity = Mat::identity(m, m);
+    Ok(all.map_outputs(&linalg::hstack(&[&Mat::zeros(m, n), &unity, &-&unity])?)?)
 }
 
 /// gamma = ||K|| with its peak frequency (radians a slow tick).
@@ -85,8 +74,8 @@ impl<'a> FirError<'a> {
 
     /// gamma = ||W - F H|| of the filters `taps[i]`, with its peak frequency.
     pub fn gamma(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
-        let system = error_system(self.plant, &shift_registers(taps, self.plant.wanted)?)?;
         let lags = by_lag(taps, self.plant.wanted);
+        let system = error_system(self.plant, &StateSpace::fir(&lags)?)?;
         let response = |w: f64| {
             let g = self.response.at_frequency(w);
             let (n, m) = (self.plant.measured, self.plant.wanted);
@@ -116,32 +105,6 @@ pub fn by_lag(taps: &[Vec<f64>], ratio: usize) -> Vec<Mat> {
     let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
     let tap = |i: usize, n: usize| taps[i].get(n).copied().unwrap_or(0.0);
     (0..lags).map(|j| Mat::from_fn(ratio, taps.len(), |p, i| tap(i, p + j * ratio))).collect()
-}
-
-/// FIR filters in block form: the state holds, newest first, the last J - 1 samples of each channel.
-fn shift_registers(taps: &[Vec<f64>], ratio: usize) -> Result<StateSpace, StateSpaceError> {
-    let channels = taps.len();
-    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0);
-    let stored = lags.saturating_sub(1);
-    let tap = |i: usize, p: usize, j: usize| taps[i].get(p + j * ratio).copied().unwrap_or(0.0);
-    let order = channels * stored;
-    let mut a = Mat::zeros(order, order);
-    let mut b = Mat::zeros(order, channels);
-    let mut c = Mat::zeros(ratio, order);
-    for i in 0..channels {
-        for j in 0..stored {
-            if j == 0 {
-                b[(i * stored, i)] = 1.0;
-            } else {
-                a[(i * stored + j, i * stored + j - 1)] = 1.0;
-            }
-            for p in 0..ratio {
-                c[(p, i * stored + j)] = tap(i, p, j + 1);
-            }
-        }
-    }
-    let d = Mat::from_fn(ratio, channels, |p, i| tap(i, p, 0));
-    StateSpace::new(a, b, c, d)
 }
 
 fn from_block(block: &BlockFilter, ratio: usize) -> Result<StateSpace, DesignError> {

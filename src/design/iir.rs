@@ -287,8 +287,8 @@ impl<'a> Search<'a> {
     /// ||W||, the gamma of the bank that outputs nothing, bounded by its Frobenius pieces.
     fn first_ceiling(&self) -> f64 {
         let (m, n) = (self.plant.measured, self.plant.wanted);
-        let silent = self.plant.system.select_outputs(m..m + n);
-        hinf_norm(&silent).map_or(f64::MAX.sqrt(), |peak| peak.gain)
+        let reference = self.plant.system.select_outputs(m..m + n).map_err(LtiError::from);
+        reference.and_then(|w| hinf_norm(&w)).map_or(f64::MAX.sqrt(), |peak| peak.gain)
     }
 
     fn finish(mut self, slack: f64) -> Result<StateSpaceDesign, DesignError> {

@@ -119,6 +119,24 @@ fn equalising(m: &Mat, i: usize) -> f64 {
     if column * factor + row / factor < WORTHWHILE * (column + row) { factor } else { 1.0 }
 }
 
+/// Powers of two by which to divide the states of x+ = a x + b u, y = c x, so that what drives a state and what it drives are
+/// alike. Of b and c only the proportions count: their sizes change with the units of u and y, which are not to distort a.
+pub fn state_scales(a: &Mat, b: &Mat, c: &Mat) -> Vec<f64> {
+    let n = a.nrows();
+    let share = |part: f64, whole: f64| if part > 0.0 { part / whole } else { 0.0 };
+    let (all_in, all_out) = (b.norm(), c.norm());
+    // All inputs are one state that drives, all outputs one that is driven.
+    let mut joint = Mat::zeros(n + 2, n + 2);
+    joint.view_mut((0, 0), (n, n)).copy_from(&a.abs());
+    for i in 0..n {
+        joint[(i, n)] = share(b.row(i).norm(), all_in);
+        joint[(n + 1, i)] = share(c.column(i).norm(), all_out);
+    }
+    let mut scales = scales(joint);
+    scales.truncate(n);
+    scales
+}
+
 #[cfg(test)]
 mod tests {
     use crate::linalg::{Complex, Mat, eigenvalues, eigenvalues_c, spectral_radius, to_complex};

@@ -10,7 +10,7 @@ use super::balanced::balanced;
 use super::gramian::h2_norm;
 use super::modal::{modal, triangular};
 use super::{LtiError, StateSpace, StateSpaceError};
-use crate::linalg::Mat;
+use crate::linalg::{self, Mat};
 
 /// States that change the response by less than this fraction of it, all together, are left out: less than a
 /// quarter of what rounding the taps does.
@@ -34,13 +34,7 @@ impl TappedRecursion {
     pub fn new(system: &StateSpace) -> Result<Self, LtiError> {
         let chains = Chains::new(system.a());
         let Self { taps, tail } = Self::split(system, chains.longest)?;
-        let core = &chains.core;
-        let tail = StateSpace::new(
-            tail.a().select_rows(core).select_columns(core),
-            tail.b().select_rows(core),
-            tail.c().select_columns(core),
-            tail.d().clone(),
-        )?;
+        let tail = tail.select_states(chains.core)?;
         let energy = taps.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
         Ok(Self { taps, tail: balanced(&tail, NEGLIGIBLE * energy.sqrt())? })
     }
@@ -78,9 +72,9 @@ impl TappedRecursion {
     /// # Errors
     /// [`StateSpaceError`] if `mix` has not a row for each input.
     pub fn with_inputs(&self, mix: impl Fn(&Mat) -> Mat) -> Result<Self, StateSpaceError> {
-        let Self { taps, tail } = self;
-        let tail = StateSpace::new(tail.a().clone(), mix(tail.b()), tail.c().clone(), mix(tail.d()))?;
-        Ok(Self { taps: taps.iter().map(mix).collect(), tail })
+        let taps = self.taps.iter().map(&mix).collect();
+        let unity = Mat::identity(self.tail.inputs(), self.tail.inputs());
+        Ok(Self { taps, tail: self.tail.map_inputs(&mix(&unity))? })
     }
 
     /// a, b, c of the recursion, with d = 0.
@@ -117,27 +111,12 @@ impl TappedRecursion {
     /// [`StateSpaceError`] never for a recursion made by [`TappedRecursion::new`]: its parts fit.
     pub fn realise(&self) -> Result<StateSpace, StateSpaceError> {
         let (q, m, n) = (self.ticks(), self.tail.inputs(), self.tail.order());
-        let order = n + q * m;
-        // Where u[k - j] lies, j = 1..q.
-        let place = |j: usize| n + (q - j) * m;
-        let mut a = Mat::zeros(order, order);
-        let mut b = Mat::zeros(order, m);
-        let mut c = Mat::zeros(self.tail.outputs(), order);
-        a.view_mut((0, 0), (n, n)).copy_from(self.tail.a());
-        c.columns_mut(0, n).copy_from(self.tail.c());
-        if q == 0 {
-            b.copy_from(self.tail.b());
-        } else {
-            a.view_mut((0, place(q)), (n, m)).copy_from(self.tail.b());
-            b.rows_mut(place(1), m).fill_with_identity();
-        }
-        for j in 1..=q {
-            c.columns_mut(place(j), m).copy_from(&self.taps[j]);
-            if j > 1 {
-                a.view_mut((place(j), place(j - 1)), (m, m)).fill_with_identity();
-            }
-        }
-        StateSpace::new(a, b, c, self.taps[0].clone())
+        let line = StateSpace::delay_line(m, q);
+        let unity = Mat::identity(self.tail.outputs(), self.tail.outputs());
+        let newest_last = self.taps.iter().rev().chain([&unity]);
+        let sum = linalg::hstack(&newest_last.collect::<Vec<_>>())?;
+        let whole = line.cascade(0..m, &self.tail)?.map_outputs(&sum)?;
+        whole.select_states((q * m..q * m + n).chain(0..q * m))
     }
 }
 

@@ -23,10 +23,7 @@ pub fn controllability_root(a: &Mat, b: &Mat) -> Result<Mat, LtiError> {
         if !change.is_finite() {
             break;
         }
-        let mut both = Mat::zeros(root.nrows(), root.ncols() + more.ncols());
-        both.columns_mut(0, root.ncols()).copy_from(&root);
-        both.columns_mut(root.ncols(), more.ncols()).copy_from(&more);
-        root = linalg::lq_factor(&both);
+        root = linalg::lq_factor(&linalg::hstack(&[&root, &more])?);
         power = &power * &power;
     }
     Err(LtiError::IterationLimit { what: "the Gramian", limit: DOUBLING_LIMIT, change })

@@ -7,6 +7,7 @@ pub mod balanced;
 mod delay_line;
 pub mod exponential;
 pub mod gramian;
+mod interconnect;
 pub mod modal;
 pub mod peak;
 mod response;

@@ -263,9 +263,9 @@ impl<'a> Search<'a> {
         let centre = self.centre(level)?;
         let real = centre == 0.0 || centre == PI;
         let eigenvalues = if real {
-            linalg::candidate_eigenvalues(&self.hamiltonian(level, centre))
+            linalg::candidate_eigenvalues(&self.hamiltonian(level, centre)?)
         } else {
-            linalg::candidate_eigenvalues_c(&self.rotated_hamiltonian(level, centre))
+            linalg::candidate_eigenvalues_c(&self.rotated_hamiltonian(level, centre)?)
         };
         let eigenvalues = match eigenvalues {
             Err(linalg::LinalgError::NotFinite { .. }) if self.measured > 0 => return Ok(crossings),
@@ -303,7 +303,7 @@ impl<'a> Search<'a> {
 
     /// The Hamiltonian matrix whose eigenvalue j tan(w / 2) marks gain(w) = level, w counted from the point
     /// opposite to the centre of the Cayley transform, which is 0 or pi.
-    fn hamiltonian(&self, level: f64, centre: f64) -> Mat {
+    fn hamiltonian(&self, level: f64, centre: f64) -> Result<Mat, linalg::LinalgError> {
         let e = if centre == PI { 1.0 } else { -1.0 };
         let system = &self.system;
         let parts = (system.a() * e, system.b() * e, system.c().clone(), system.d().clone());
@@ -311,7 +311,7 @@ impl<'a> Search<'a> {
     }
 
     /// As [`Search::hamiltonian`] for any centre, which costs complex numbers.
-    fn rotated_hamiltonian(&self, level: f64, centre: f64) -> CMat {
+    fn rotated_hamiltonian(&self, level: f64, centre: f64) -> Result<CMat, linalg::LinalgError> {
         let turn = -Complex::from_polar(1.0, -centre);
         let complex = |m: &Mat| linalg::to_complex(m);
         let system = &self.system;
@@ -394,25 +394,18 @@ fn hamiltonian<T: ComplexField>(
     measured: usize,
     level: f64,
     solve: Solve<T>,
-) -> DMatrix<T> {
+) -> Result<DMatrix<T>, linalg::LinalgError> {
     let mut r = d * d.adjoint();
     for i in measured..r.nrows() {
         r[(i, i)] -= nalgebra::convert(level * level);
     }
     let s = b * d.adjoint();
     let n = a.nrows();
-    let mut right = DMatrix::zeros(r.nrows(), 2 * n);
-    right.columns_mut(0, n).copy_from(c);
-    right.columns_mut(n, n).copy_from(&s.adjoint());
-    let solved = solve(&r, &right);
+    let solved = solve(&r, &linalg::hstack(&[c, &s.adjoint()])?);
     let (rc, rs) = (solved.columns(0, n), solved.columns(n, n));
     let drift = a - &s * &rc;
-    let mut h = DMatrix::zeros(2 * n, 2 * n);
-    h.view_mut((0, 0), (n, n)).copy_from(&drift);
-    h.view_mut((0, n), (n, n)).copy_from(&(b * b.adjoint() - s * rs));
-    h.view_mut((n, 0), (n, n)).copy_from(&(c.adjoint() * rc));
-    h.view_mut((n, n), (n, n)).copy_from(&-drift.adjoint());
-    h
+    let (b_part, c_part) = (b * b.adjoint() - s * rs, c.adjoint() * rc);
+    linalg::from_blocks(&[&[&drift, &b_part], &[&c_part, &-drift.adjoint()]])
 }
 
 #[cfg(test)]

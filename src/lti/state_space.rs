@@ -5,27 +5,68 @@ use crate::linalg::{self, CMat, Complex, Mat};
 /// x+ = a x + b u, y = c x + d u with n states, m inputs, p outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateSpace {
-    a: Mat,
-    b: Mat,
-    c: Mat,
-    d: Mat,
+    pub(super) a: Mat,
+    pub(super) b: Mat,
+    pub(super) c: Mat,
+    pub(super) d: Mat,
 }
 
-/// Matrices whose shapes do not belong together.
+/// Why matrices or systems do not form a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error(
-    "state-space shapes do not fit: a is {}x{} (must be n x n), b {}x{} (n x m), c {}x{} (p x n), d {}x{} (p x m)",
-    a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1
-)]
-pub struct StateSpaceError {
-    /// Shape of a.
-    pub a: (usize, usize),
-    /// Shape of b.
-    pub b: (usize, usize),
-    /// Shape of c.
-    pub c: (usize, usize),
-    /// Shape of d.
-    pub d: (usize, usize),
+pub enum StateSpaceError {
+    /// Matrices whose shapes do not belong together.
+    #[error(
+        "state-space shapes do not fit: a is {}x{} (must be n x n), b {}x{} (n x m), c {}x{} (p x n), d {}x{} (p x m)",
+        a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1
+    )]
+    Matrices {
+        /// Shape of a.
+        a: (usize, usize),
+        /// Shape of b.
+        b: (usize, usize),
+        /// Shape of c.
+        c: (usize, usize),
+        /// Shape of d.
+        d: (usize, usize),
+    },
+    /// Two systems that cannot be connected.
+    #[error(
+        "{operation} needs {rule}: the first system is {}x{} (outputs x inputs), the second one {}x{}",
+        first.0, first.1, second.0, second.1
+    )]
+    Connection {
+        /// The operation.
+        operation: &'static str,
+        /// What it asks for.
+        rule: &'static str,
+        /// Outputs and inputs of the first system.
+        first: (usize, usize),
+        /// Outputs and inputs of the second system.
+        second: (usize, usize),
+    },
+    /// A gain matrix, or a list of gains, that does not fit the inputs or outputs it is for.
+    #[error("a gain for {count} {ports} cannot be {}x{}", gain.0, gain.1)]
+    Gain {
+        /// Inputs or outputs.
+        ports: &'static str,
+        /// How many the system has.
+        count: usize,
+        /// Shape of the gain.
+        gain: (usize, usize),
+    },
+    /// An input, output or state that is not there.
+    #[error("number {index} (from 0) was selected of {count} {ports}")]
+    Selection {
+        /// Inputs, outputs or states.
+        ports: &'static str,
+        /// The number asked for.
+        index: usize,
+        /// How many the system has.
+        count: usize,
+    },
+    /// Blocks that do not fit one another.
+    #[error(transparent)]
+    Linalg(#[from] linalg::LinalgError),
 }
 
 impl StateSpace {
@@ -35,7 +76,7 @@ impl StateSpace {
         if a.ncols() == n && b.nrows() == n && c.ncols() == n && d.shape() == (p, m) {
             return Ok(Self { a, b, c, d });
         }
-        Err(StateSpaceError { a: a.shape(), b: b.shape(), c: c.shape(), d: d.shape() })
+        Err(StateSpaceError::Matrices { a: a.shape(), b: b.shape(), c: c.shape(), d: d.shape() })
     }
 
     /// State matrix, n x n.
@@ -73,27 +114,15 @@ impl StateSpace {
         self.c.nrows()
     }
 
-    /// The same system with `rows` of its outputs only, in that order.
-    pub fn select_outputs(&self, rows: std::ops::Range<usize>) -> Self {
-        let count = rows.len();
-        Self {
-            a: self.a.clone(),
-            b: self.b.clone(),
-            c: self.c.rows(rows.start, count).into_owned(),
-            d: self.d.rows(rows.start, count).into_owned(),
-        }
-    }
-
     /// `G G*` is unchanged when the inputs are rotated: compresses them to at most n + p.
     pub fn compress_inputs(&self) -> Self {
         let (n, p) = (self.order(), self.outputs());
         if self.inputs() <= n + p {
             return self.clone();
         }
-        let mut stacked = Mat::zeros(p + n, self.inputs());
-        stacked.rows_mut(0, p).copy_from(&self.d);
-        stacked.rows_mut(p, n).copy_from(&self.b);
-        let l = linalg::lq_factor(&stacked);
+        let l = linalg::lq_factor(&Mat::from_fn(p + n, self.inputs(), |i, j| {
+            if i < p { self.d[(i, j)] } else { self.b[(i - p, j)] }
+        }));
         Self {
             a: self.a.clone(),
             b: l.rows(p, n).into_owned(),

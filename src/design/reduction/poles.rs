@@ -118,7 +118,7 @@ fn mean_square_slope(samples: &Samples<'_>, dynamics: &Dynamics) -> Result<(f64,
     let (n, r, channels) = (plant.system.order(), dynamics.tail(), dynamics.channels());
     let inner = da.view((n, n), (r, r)).into_owned();
     let outer = if dynamics.ticks == 0 {
-        let h = plant.system.select_outputs(0..plant.measured);
+        let h = plant.system.select_outputs(0..plant.measured)?;
         da.view((n, 0), (r, n)) * h.c().transpose() + db.rows(n, r) * h.d().transpose()
     } else {
         da.view((n, n + r), (r, channels)).into_owned()

@@ -86,27 +86,9 @@ fn projection(x: &Mat, z: &Mat) -> Result<Mat, DesignError> {
 
 /// The regressors and the wanted samples as outputs of one system, driven by the plant's input.
 fn driven(plant: &BlockedPlant, regressors: &StateSpace) -> Result<StateSpace, DesignError> {
-    let (h, w) = (
-        plant.system.select_outputs(0..plant.measured),
-        plant.system.select_outputs(plant.measured..plant.measured + plant.wanted),
-    );
-    let (n, r) = (h.order(), regressors.order());
-    let (x, m) = (regressors.outputs(), plant.wanted);
-    let mut a = Mat::zeros(n + r, n + r);
-    a.view_mut((0, 0), (n, n)).copy_from(h.a());
-    a.view_mut((n, 0), (r, n)).copy_from(&(regressors.b() * h.c()));
-    a.view_mut((n, n), (r, r)).copy_from(regressors.a());
-    let mut b = Mat::zeros(n + r, h.inputs());
-    b.rows_mut(0, n).copy_from(h.b());
-    b.rows_mut(n, r).copy_from(&(regressors.b() * h.d()));
-    let mut c = Mat::zeros(x + m, n + r);
-    c.view_mut((0, 0), (x, n)).copy_from(&(regressors.d() * h.c()));
-    c.view_mut((0, n), (x, r)).copy_from(regressors.c());
-    c.view_mut((x, 0), (m, n)).copy_from(w.c());
-    let mut d = Mat::zeros(x + m, h.inputs());
-    d.rows_mut(0, x).copy_from(&(regressors.d() * h.d()));
-    d.rows_mut(x, m).copy_from(w.d());
-    Ok(StateSpace::new(a, b, c, d)?)
+    let (n, m, x) = (plant.measured, plant.wanted, regressors.outputs());
+    let all = plant.system.cascade(0..n, regressors)?;
+    Ok(all.select_outputs((n + m..n + m + x).chain(n..n + m))?)
 }
 
 /// The plant at the frequencies of the worst-case problem.

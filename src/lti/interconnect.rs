@@ -1,0 +1,264 @@
+//! Systems made of systems.
+//!
+//! The pieces ([`StateSpace::gain`], [`StateSpace::delays`], [`StateSpace::delay_line`], [`StateSpace::fir`]) and the ways to
+//! connect them. States of the first operand come first. Nothing is reduced: states that cancel stay, and each entry of the
+//! result is an entry of an operand or one product of two of them, so that no digits are lost.
+
+use super::{StateSpace, StateSpaceError};
+use crate::linalg::{self, Mat};
+use std::ops::Range;
+
+impl StateSpace {
+    /// The static system y = `d` u, without states.
+    pub fn gain(d: Mat) -> Self {
+        let (p, m) = d.shape();
+        Self { a: Mat::zeros(0, 0), b: Mat::zeros(0, m), c: Mat::zeros(p, 0), d }
+    }
+
+    /// `diag(z^-k_1, z^-k_2, ..)`: output i is input i, `steps[i]` steps later. The states of a delay lie first link first.
+    pub fn delays(steps: &[usize]) -> Self {
+        let shift = |n: usize| Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)));
+        let first = |n: usize| Mat::from_fn(n, 1, |i, _| f64::from(u8::from(i == 0)));
+        let last = |n: usize| Mat::from_fn(1, n, |_, j| f64::from(u8::from(j + 1 == n)));
+        let direct = |i: usize, j: usize| f64::from(u8::from(i == j && steps[i] == 0));
+        Self {
+            a: diagonal(steps, shift),
+            b: diagonal(steps, first),
+            c: diagonal(steps, last),
+            d: Mat::from_fn(steps.len(), steps.len(), direct),
+        }
+    }
+
+    /// All that is known of `width` inputs u up to `steps` steps back: `[u[k - steps]; ..; u[k - 1]; u[k]]`. The states are
+    /// the past inputs, the oldest first.
+    pub fn delay_line(width: usize, steps: usize) -> Self {
+        let order = width * steps;
+        let ahead = |i: usize, j: usize| f64::from(u8::from(j == i + width));
+        Self {
+            a: Mat::from_fn(order, order, ahead),
+            b: Mat::from_fn(order, width, |i, j| ahead(i, order + j)),
+            c: Mat::identity(order + width, order),
+            d: Mat::from_fn(order + width, width, |i, j| f64::from(u8::from(i == order + j))),
+        }
+    }
+
+    /// `F(z) = sum_j z^-j F_j`, with a shift register for each input: the states hold its last samples, newest first.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Linalg`] if the shapes of the `F_j` differ; no `F_j` at all give the system without inputs and
+    /// outputs.
+    pub fn fir(taps: &[Mat]) -> Result<Self, StateSpaceError> {
+        let Some(d) = taps.first() else { return Ok(Self::gain(Mat::zeros(0, 0))) };
+        let (stored, inputs) = (taps.len() - 1, d.ncols());
+        linalg::vstack(&taps.iter().collect::<Vec<_>>())?;
+        linalg::hstack(&taps.iter().collect::<Vec<_>>())?;
+        let lengths = vec![stored; inputs];
+        let Self { a, b, .. } = Self::delays(&lengths);
+        let c = Mat::from_fn(d.nrows(), inputs * stored, |p, state| {
+            taps[state % stored + 1][(p, state / stored)]
+        });
+        Ok(Self { a, b, c, d: d.clone() })
+    }
+
+    /// `next` driven by this system: the transfer function `N(z) G(z)`.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Connection`] unless `next` has an input for each output.
+    pub fn series(&self, next: &Self) -> Result<Self, StateSpaceError> {
+        self.fits(next, "series", "an input of the second system for each output of the first", |g, n| {
+            g.outputs() == n.inputs()
+        })?;
+        Ok(Self {
+            a: linalg::from_blocks(&[
+                &[&self.a, &Mat::zeros(self.order(), next.order())],
+                &[&(&next.b * &self.c), &next.a],
+            ])?,
+            b: linalg::vstack(&[&self.b, &(&next.b * &self.d)])?,
+            c: linalg::hstack(&[&(&next.d * &self.c), &next.c])?,
+            d: &next.d * &self.d,
+        })
+    }
+
+    /// `[G; N G_o]`: this system with all its outputs, and below them those of `next`, which the given `outputs` o drive.
+    /// Both read the same state of this system, which is there once.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Connection`] unless `next` has an input for each of the `outputs`,
+    /// [`StateSpaceError::Selection`] if there are no such outputs.
+    pub fn cascade(&self, outputs: Range<usize>, next: &Self) -> Result<Self, StateSpaceError> {
+        let driven = self.select_outputs(outputs)?.series(next)?;
+        let unread = Mat::zeros(self.outputs(), next.order());
+        Ok(Self {
+            c: linalg::from_blocks(&[&[&self.c, &unread], &[&driven.c]])?,
+            d: linalg::vstack(&[&self.d, &driven.d])?,
+            ..driven
+        })
+    }
+
+    /// `[G; H]`: both systems with the same inputs, the outputs of this one first.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Connection`] unless both have equally many inputs.
+    pub fn stack(&self, below: &Self) -> Result<Self, StateSpaceError> {
+        self.fits(below, "stack", "equally many inputs", |g, h| g.inputs() == h.inputs())?;
+        Ok(Self {
+            a: linalg::block_diagonal(&[&self.a, &below.a]),
+            b: linalg::vstack(&[&self.b, &below.b])?,
+            c: linalg::block_diagonal(&[&self.c, &below.c]),
+            d: linalg::vstack(&[&self.d, &below.d])?,
+        })
+    }
+
+    /// `diag(G, H)`: both systems side by side, each with its own inputs and outputs.
+    pub fn append(&self, other: &Self) -> Self {
+        Self {
+            a: linalg::block_diagonal(&[&self.a, &other.a]),
+            b: linalg::block_diagonal(&[&self.b, &other.b]),
+            c: linalg::block_diagonal(&[&self.c, &other.c]),
+            d: linalg::block_diagonal(&[&self.d, &other.d]),
+        }
+    }
+
+    /// `G + H`.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Connection`] unless both have equally many inputs and equally many outputs.
+    pub fn parallel(&self, other: &Self) -> Result<Self, StateSpaceError> {
+        self.fits(other, "parallel", "equally many inputs and outputs", |g, h| g.d.shape() == h.d.shape())?;
+        Ok(Self {
+            a: linalg::block_diagonal(&[&self.a, &other.a]),
+            b: linalg::vstack(&[&self.b, &other.b])?,
+            c: linalg::hstack(&[&self.c, &other.c])?,
+            d: &self.d + &other.d,
+        })
+    }
+
+    /// `G - H`.
+    ///
+    /// # Errors
+    /// As [`StateSpace::parallel`].
+    pub fn subtract(&self, other: &Self) -> Result<Self, StateSpaceError> {
+        let negated = Self { c: -&other.c, d: -&other.d, ..other.clone() };
+        self.parallel(&negated)
+    }
+
+    /// `T G`: each output a combination of the former ones.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Gain`] unless `gain` has a column for each output.
+    pub fn map_outputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
+        if gain.ncols() != self.outputs() {
+            let (count, gain) = (self.outputs(), gain.shape());
+            return Err(StateSpaceError::Gain { ports: "outputs", count, gain });
+        }
+        Ok(Self { a: self.a.clone(), b: self.b.clone(), c: gain * &self.c, d: gain * &self.d })
+    }
+
+    /// `G T`: each input a combination of new ones.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Gain`] unless `gain` has a row for each input.
+    pub fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
+        if gain.nrows() != self.inputs() {
+            let (count, gain) = (self.inputs(), gain.shape());
+            return Err(StateSpaceError::Gain { ports: "inputs", count, gain });
+        }
+        Ok(Self { a: self.a.clone(), b: &self.b * gain, c: self.c.clone(), d: &self.d * gain })
+    }
+
+    /// `G diag(gains)`.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Gain`] unless there is a gain for each input.
+    pub fn scale_inputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
+        if gains.len() != self.inputs() {
+            let (count, gain) = (self.inputs(), (gains.len(), 1));
+            return Err(StateSpaceError::Gain { ports: "inputs", count, gain });
+        }
+        let scaled = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * gains[j]);
+        Ok(Self { a: self.a.clone(), b: scaled(&self.b), c: self.c.clone(), d: scaled(&self.d) })
+    }
+
+    /// `diag(gains) G`.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Gain`] unless there is a gain for each output.
+    pub fn scale_outputs(&self, gains: &[f64]) -> Result<Self, StateSpaceError> {
+        if gains.len() != self.outputs() {
+            let (count, gain) = (self.outputs(), (gains.len(), 1));
+            return Err(StateSpaceError::Gain { ports: "outputs", count, gain });
+        }
+        let scaled = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| gains[i] * m[(i, j)]);
+        Ok(Self { a: self.a.clone(), b: self.b.clone(), c: scaled(&self.c), d: scaled(&self.d) })
+    }
+
+    /// The same system with the given outputs only, in that order; an output may be taken twice.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Selection`] if one of them is not there.
+    pub fn select_outputs(&self, outputs: impl IntoIterator<Item = usize>) -> Result<Self, StateSpaceError> {
+        let rows = selection("outputs", self.outputs(), outputs)?;
+        let (c, d) = (self.c.select_rows(&rows), self.d.select_rows(&rows));
+        Ok(Self { a: self.a.clone(), b: self.b.clone(), c, d })
+    }
+
+    /// The same system with the given inputs only, in that order; the others are zero.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Selection`] if one of them is not there.
+    pub fn select_inputs(&self, inputs: impl IntoIterator<Item = usize>) -> Result<Self, StateSpaceError> {
+        let columns = selection("inputs", self.inputs(), inputs)?;
+        let (b, d) = (self.b.select_columns(&columns), self.d.select_columns(&columns));
+        Ok(Self { a: self.a.clone(), b, c: self.c.clone(), d })
+    }
+
+    /// The given states only, in that order, the others held at zero. With all states given this is a change of their
+    /// order, which keeps the transfer function.
+    ///
+    /// # Errors
+    /// [`StateSpaceError::Selection`] if one of them is not there.
+    pub fn select_states(&self, states: impl IntoIterator<Item = usize>) -> Result<Self, StateSpaceError> {
+        let kept = selection("states", self.order(), states)?;
+        Ok(Self {
+            a: self.a.select_rows(&kept).select_columns(&kept),
+            b: self.b.select_rows(&kept),
+            c: self.c.select_columns(&kept),
+            d: self.d.clone(),
+        })
+    }
+
+    fn fits(
+        &self,
+        other: &Self,
+        operation: &'static str,
+        rule: &'static str,
+        holds: impl Fn(&Self, &Self) -> bool,
+    ) -> Result<(), StateSpaceError> {
+        if holds(self, other) {
+            return Ok(());
+        }
+        let (first, second) = (self.d.shape(), other.d.shape());
+        Err(StateSpaceError::Connection { operation, rule, first, second })
+    }
+}
+
+/// The diagonal of blocks of the given sizes.
+fn diagonal(sizes: &[usize], block: impl Fn(usize) -> Mat) -> Mat {
+    let blocks: Vec<Mat> = sizes.iter().map(|&n| block(n)).collect();
+    linalg::block_diagonal(&blocks.iter().collect::<Vec<_>>())
+}
+
+fn selection(
+    ports: &'static str,
+    count: usize,
+    chosen: impl IntoIterator<Item = usize>,
+) -> Result<Vec<usize>, StateSpaceError> {
+    let chosen: Vec<usize> = chosen.into_iter().collect();
+    match chosen.iter().find(|&&index| index >= count) {
+        None => Ok(chosen),
+        Some(&index) => Err(StateSpaceError::Selection { ports, index, count }),
+    }
+}
+
+#[cfg(test)]
+mod tests;
