@@ -1,7 +1,7 @@
 //! Which form a FIR bank runs in, and what it costs.
 //!
 //! The cost of a tick is counted in multiply-adds of whole vectors. Its constants were fitted by `tools/form_costs.py` to what
-//! `cargo bench --bench crossover` measured (see `benches/README.md`), in f32 and f64 alike. They depend on the bank and the
+//! `cargo bench --bench algorithm_crossover` measured (see `benches/README.md`), in f32 and f64 alike. They depend on the bank and the
 //! number type only, not on the processor, its load or the length of calls: a bank gives the same bits everywhere.
 
 use super::overlap_save::Shape;

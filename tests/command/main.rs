@@ -7,6 +7,7 @@ mod abuse;
 mod algorithms;
 mod cuts;
 mod design;
+mod examples;
 mod fuse;
 #[cfg(target_os = "linux")]
 mod long_files;

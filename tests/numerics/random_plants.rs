@@ -5,6 +5,9 @@ use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, analyze, design, prove};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
 use std::f64::consts::TAU;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::ScopedJoinHandle;
 
 /// SplitMix64: small, seeded, good enough to choose cases.
 struct Dice(u64);
@@ -139,7 +142,17 @@ fn end_of(seed: u64) -> End {
 
 fn refused(seed: u64, refusal: &DesignError, end: End) -> End {
     println!("plant {seed}: {end:?}: {refusal}");
-    assert!(!refusal.to_string().is_empty());
+    // A plant within the limits of a spec may be too hard for doubles; an answer that blames anything else is a fault of ours.
+    let too_hard = matches!(
+        refusal,
+        DesignError::NotCertified
+            | DesignError::NotSearched { .. }
+            | DesignError::RiccatiFailed { .. }
+            | DesignError::Lti(_)
+            | DesignError::Linalg(_)
+            | DesignError::Verify(_)
+    );
+    assert!(too_hard, "plant {seed}: {refusal:?}");
     end
 }
 
@@ -151,10 +164,26 @@ fn wanted() -> std::ops::Range<u64> {
     number(first)..number(end)
 }
 
+/// The results for all numbers of a range, from as many threads as there are processors.
+fn each<T: Send>(range: std::ops::Range<u64>, task: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let next = AtomicU64::new(range.start);
+    let work = || -> Vec<T> {
+        let mine = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
+        mine.take_while(|&number| number < range.end).map(&task).collect()
+    };
+    std::thread::scope(|scope| {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let join =
+            |worker: ScopedJoinHandle<'_, Vec<T>>| worker.join().unwrap_or_else(|fault| resume_unwind(fault));
+        workers.into_iter().flat_map(join).collect()
+    })
+}
+
 #[test]
 fn every_plant_ends_as_a_proven_bank_or_as_a_refusal() {
     let plants = wanted();
-    let ends: Vec<End> = plants.clone().map(end_of).collect();
+    let ends = each(plants.clone(), end_of);
     let count = |end: End| ends.iter().filter(|&&other| other == end).count();
     let (proven, unproven, refused) = (count(End::Proven), count(End::Unproven), count(End::Refused));
     println!("of plants {plants:?} {proven} proven, {unproven} designed and not proven, {refused} refused");

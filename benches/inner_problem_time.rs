@@ -1,6 +1,6 @@
 //! How long does a FIR design's inner problem take, along a ladder of sizes?
 //!
-//! Run with `cargo bench --bench lmi`. Data: sampled hybrid filter banks, the same on every run.
+//! Run with `cargo bench --bench inner_problem_time`. Data: sampled hybrid filter banks, the same on every run.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use hybank::lmi::kyp;

@@ -1,11 +1,11 @@
 //! How long a design takes: the thesis example by all routes, a large IIR bank, speech.
 //!
-//! `cargo bench --bench design`
+//! `cargo bench --bench design_time`
 
 #[path = "../tests/support/specs.rs"]
 mod specs;
+mod stopwatch;
 
-use criterion::{Criterion, criterion_group, criterion_main};
 use hybank::bank::Bank;
 use hybank::design::{analyze, design, prove};
 use hybank::spec::{DesignSpec, Method, Spec, WordLengths};
@@ -13,6 +13,7 @@ use hybank::verify::verify;
 use specs::{alike, butterworth, thesis, with_taps};
 use std::f64::consts::TAU;
 use std::hint::black_box;
+use stopwatch::time;
 
 fn by(method: Method, taps: Option<usize>, spec: Spec) -> Spec {
     Spec { design: DesignSpec::new(method, taps), ..spec }
@@ -62,33 +63,20 @@ fn large() {
     }
 }
 
-fn designs(c: &mut Criterion) {
-    let mut group = c.benchmark_group("design");
-    group.sample_size(20);
-    let mut one = |name: &str, spec: Spec| {
-        group.bench_function(name, |b| b.iter(|| design(black_box(&spec)).unwrap()));
-    };
+fn main() {
+    let one = |name: &str, spec: Spec| time(name, || design(black_box(&spec)).unwrap());
     one("iir, thesis example", thesis_by(Method::Iir, None));
     one("h2, thesis example", thesis_by(Method::H2, None));
     one("fir, thesis example, 22 taps", thesis_by(Method::Fir, Some(22)));
     one("iir, 8 channels, Butterworth 6", eight(6, 1.2, 20, Method::Iir, None));
     one("fir, 4 channels, Butterworth 4, 24 taps", four());
     one("fir, 8 channels, Butterworth 4, 32 taps", eight(4, 1.8, 12, Method::Fir, Some(32)));
-    group.sample_size(10);
-    group.bench_function("fir, 8 channels, Butterworth 6, 128 taps", |b| {
-        b.iter(|| design(&many(8, 128)).unwrap())
-    });
-    group.finish();
+    one("fir, 8 channels, Butterworth 6, 128 taps", many(8, 128));
     large();
     let bank = design(&thesis_by(Method::Fir, Some(22))).unwrap().bank;
-    c.bench_function("analyze, thesis example, 22 taps", |b| {
-        b.iter(|| analyze(black_box(&bank), &[]).unwrap())
-    });
-    c.bench_function("prove, thesis example, 22 taps", |b| b.iter(|| prove(black_box(&bank), &[]).unwrap()));
+    time("analyze, thesis example, 22 taps", || analyze(black_box(&bank), &[]).unwrap());
+    time("prove, thesis example, 22 taps", || prove(black_box(&bank), &[]).unwrap());
     let proof = Some(prove(&bank, &[]).unwrap().0);
     let bank = Bank { proof, ..bank };
-    c.bench_function("verify, thesis example, 22 taps", |b| b.iter(|| verify(black_box(&bank)).unwrap()));
+    time("verify, thesis example, 22 taps", || verify(black_box(&bank)).unwrap());
 }
-
-criterion_group!(benches, designs);
-criterion_main!(benches);

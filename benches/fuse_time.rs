@@ -1,9 +1,10 @@
 //! How long `hybank fuse` takes for a recording on file: ten minutes of two 24 kHz channels of 32-bit floats through
 //! 24 taps. One hour is six times that.
 //!
-//! `cargo bench --bench fuse`; set TMPDIR to a folder in memory to leave the disk out.
+//! `cargo bench --bench fuse_time`; set TMPDIR to a folder in memory to leave the disk out.
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+mod stopwatch;
+
 use hybank::io::PcmFormat;
 use hybank::io::wav::WavFile;
 use std::fs::File;
@@ -26,27 +27,21 @@ fn write_channel(path: &Path, seed: u32) {
     wav.finish().unwrap();
 }
 
-fn fuse(c: &mut Criterion) {
+fn main() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     write_channel(&path("ch1.wav"), 1);
     write_channel(&path("ch2.wav"), 2);
-    let mut group = c.benchmark_group("fuse");
-    group.sample_size(10).throughput(Throughput::Elements(2 * u64::from(RATE) * SECONDS as u64));
-    group.bench_function("ten minutes of 2 x 24 kHz float WAV", |b| {
-        b.iter(|| {
-            let status = Command::new(env!("CARGO_BIN_EXE_hybank"))
-                .args(["fuse", concat!(env!("CARGO_MANIFEST_DIR"), "/filters/speech-2x.json")])
-                .args([path("ch1.wav"), path("ch2.wav")])
-                .args(["--force", "-o"])
-                .arg(path("fused.wav"))
-                .status()
-                .unwrap();
-            assert!(status.success());
-        });
+    let median = stopwatch::time("ten minutes of 2 x 24 kHz float WAV", || {
+        let status = Command::new(env!("CARGO_BIN_EXE_hybank"))
+            .args(["fuse", concat!(env!("CARGO_MANIFEST_DIR"), "/filters/speech-2x.json")])
+            .args([path("ch1.wav"), path("ch2.wav")])
+            .args(["--force", "-o"])
+            .arg(path("fused.wav"))
+            .status()
+            .unwrap();
+        assert!(status.success());
     });
-    group.finish();
+    let samples = 2 * RATE as usize * SECONDS;
+    println!("{:.0} million fast samples per second", samples as f64 / median.as_secs_f64() / 1e6);
 }
-
-criterion_group!(benches, fuse);
-criterion_main!(benches);

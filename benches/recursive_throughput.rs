@@ -1,6 +1,6 @@
 //! How fast state-space banks run: one core, public `Stream`, beside the f32 multiply-add peak of the same moment.
 //!
-//! `cargo bench --bench recursion`. A section is a pair of states. With N inputs and M outputs it takes 4 + 2 N + 2 M
+//! `cargo bench --bench recursive_throughput`. A section is a pair of states. With N inputs and M outputs it takes 4 + 2 N + 2 M
 //! multiply-adds, or 4 + 2 + 2 where it has one input and one output of its own; a biquad of the usual kind takes 5. So
 //! three rates stand side by side: sections, multiply-adds by five ("biquads"), and the share of the peak.
 

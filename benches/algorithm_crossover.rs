@@ -1,6 +1,6 @@
 //! From how many taps a phase on do the fast form and overlap-save take less time than the direct form?
 //!
-//! `cargo bench --bench crossover` measures all three along a ladder of K for several N and M, overlap-save with the four shortest
+//! `cargo bench --bench algorithm_crossover` measures all three along a ladder of K for several N and M, overlap-save with the four shortest
 //! transforms that hold a block of K ticks, in nanoseconds a tick (best of many repeats), and sets beside them
 //! what the plan chooses, first among the forms that are not late. The constants of the plan's cost model
 //! (`src/runtime/form.rs`) were fitted to this table. Words after `--`: `f64` for double precision, `prompt` without

@@ -1,6 +1,6 @@
 //! How many fast samples a second one core makes, and what share of its multiply-add peak that is.
 //!
-//! `cargo bench --bench runtime` prints a table of the public [`Stream`]; a word after `--` picks the rows
+//! `cargo bench --bench fir_throughput` prints a table of the public [`Stream`]; a word after `--` picks the rows
 //! that contain it. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
 //! of many repeats, and so is the peak, which is measured anew beside each row.
 

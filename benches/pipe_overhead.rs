@@ -1,7 +1,7 @@
 //! What the way in and out costs: `hybank stream` and `hybank fuse` beside `cat | cat` and sox on the same bytes in
 //! the same run, and how long the first output takes when ticks come one by one.
 //!
-//! `cargo bench --bench pipes`; set TMPDIR to a folder in memory to leave the disk out. Bank A: N = M = 2, 24 taps.
+//! `cargo bench --bench pipe_overhead`; set TMPDIR to a folder in memory to leave the disk out. Bank A: N = M = 2, 24 taps.
 
 use hybank::io::PcmFormat;
 use hybank::io::wav::WavFile;

@@ -1,0 +1,26 @@
+//! Each example is a whole small program that ends well. `cargo test` builds them beside the tests.
+
+use crate::support::text;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+#[test]
+fn every_example_runs() {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let folder = Path::new(env!("CARGO_BIN_EXE_hybank")).with_file_name("examples");
+    let names: Vec<String> = fs::read_dir(sources)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
+        .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
+        .collect();
+    assert!(names.len() >= 2, "{names:?}");
+    for name in names {
+        let program = folder.join(&name);
+        assert!(program.is_file(), "{name} is not built; `cargo build --examples` builds it");
+        let output = Command::new(program).output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{name}: {output:?}");
+        assert!(text(&output.stdout).lines().count() > 1, "{name}: {output:?}");
+    }
+}
