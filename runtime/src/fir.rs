@@ -7,7 +7,7 @@
 use super::BuildError;
 use super::aligned::Aligned;
 use super::sample::Sample;
-use super::simd::{Cut, Isa, Polyphase, Stretch};
+use super::simd::{FirKernel, Isa, Polyphase, Segment, Tiling};
 use super::ticks::{FastSink, TickSource};
 use super::window::Window;
 use std::ops::Range;
@@ -50,19 +50,19 @@ impl<T: Sample> FirPlan<T> {
         check_finite::<T>(taps)?;
         let channels = taps.len();
         let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
-        let kernel = T::fir_kernel(isa);
+        let kernel = FirKernel::<T>::new(isa);
         // Blocks, windows and coefficients are a few times this long; the sum must not overflow.
         let len = lags
             .checked_mul(channels)
             .filter(|&len| len.saturating_mul(ratio) <= isize::MAX as usize / 64)
             .ok_or(BuildError::TooLong { history: lags - 1, channels })?;
-        let cut = kernel.cut(channels, len, ratio);
+        let tiling = kernel.tiling(channels, len, ratio);
         let block = (CACHE_SAMPLES / channels).saturating_sub(lags).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT)
             / BLOCK_UNIT
             * BLOCK_UNIT;
         let coefficient = |element, phase| T::from_f64(coefficient(taps, ratio, element, phase));
-        let filters = Polyphase::new(&kernel, cut, ratio, coefficient);
-        let reach = cut.past.div_ceil(channels);
+        let filters = Polyphase::new(kernel, tiling, ratio, coefficient);
+        let reach = tiling.past.div_ceil(channels);
         Ok(Self { channels, ratio, history: lags - 1, reach, block, filters, isa })
     }
 
@@ -78,7 +78,7 @@ impl<T: Sample> FirPlan<T> {
 
     /// Zeros, for blocks of at most `block` ticks, and with `more` ticks of the past than the filters look back.
     pub(super) fn window(&self, block: usize, more: usize) -> Window<T> {
-        let (n, &Cut { past, vector, .. }) = (self.channels, self.filters.cut());
+        let (n, &Tiling { past, vector, .. }) = (self.channels, self.filters.tiling());
         Window::new(n, past + more * n, block * n, vector * n)
     }
 
@@ -105,7 +105,7 @@ impl<T: Sample> FirPlan<T> {
     /// Ticks of a call that go through the window although the others need not: those whose past lies elsewhere, and as
     /// many as it takes for the others to fill vectors. `None` if all had better go there.
     fn beginning(&self, ticks: usize) -> Option<usize> {
-        let beginning = self.reach + (ticks.wrapping_sub(self.reach) & (self.filters.cut().vector - 1));
+        let beginning = self.reach + (ticks.wrapping_sub(self.reach) & (self.filters.tiling().vector - 1));
         let worth_it = ticks * self.channels >= SHORT_CALL && ticks >= 2 * beginning;
         (worth_it && beginning <= self.block).then_some(beginning)
     }
@@ -117,20 +117,20 @@ impl<T: Sample> FirPlan<T> {
     /// have reached the cache, and short calls would wait for that.
     fn where_they_lie(&self, window: &mut Window<T>, frames: &[T], ticks: usize, out: &mut [T]) -> bool {
         let Some(beginning) = self.beginning(ticks) else { return false };
-        let (n, &Cut { past, vector, .. }) = (self.channels, self.filters.cut());
+        let (n, &Tiling { past, vector, .. }) = (self.channels, self.filters.tiling());
         window.room(beginning).copy_from_slice(&frames[..beginning * n]);
-        let begin = Stretch { x: window.view(), first: 0, ticks: beginning };
-        let stretch = |first: usize, end: usize| {
+        let begin = Segment { x: window.view(), first: 0, frames: beginning };
+        let segment = |first: usize, end: usize| {
             let x = &frames[first * n - past..end * n];
-            Stretch { x, first, ticks: end - first }
+            Segment { x, first, frames: end - first }
         };
         let span = if self.filters.reads_once() { SPAN_BLOCKS * self.block } else { self.block };
         // Whole vectors, as all that follows has then.
         let mut done = ticks.min(beginning + ((span - beginning) & !(vector - 1)));
-        let mut finite = self.run(&[stretch(beginning, done), begin], out);
+        let mut finite = self.run(&[segment(beginning, done), begin], out);
         while finite && done < ticks {
             let next = ticks.min(done + span);
-            finite = self.run(&[stretch(done, next)], out);
+            finite = self.run(&[segment(done, next)], out);
             done = next;
         }
         if finite {
@@ -183,20 +183,20 @@ impl<T: Sample> FirPlan<T> {
     /// Filters the ticks in the window's room; returns how many samples were not finite and were taken as 0.
     fn filter_room(&self, window: &mut Window<T>, ticks: usize, out: &mut [T]) -> u64 {
         // Filtered first: hardly ever is there anything to replace.
-        if self.run(&[Stretch { x: window.view(), first: 0, ticks }], out) {
+        if self.run(&[Segment { x: window.view(), first: 0, frames: ticks }], out) {
             return 0;
         }
         let count = replace_not_finite(window.room(ticks));
         if count > 0 {
-            self.run(&[Stretch { x: window.view(), first: 0, ticks }], out);
+            self.run(&[Segment { x: window.view(), first: 0, frames: ticks }], out);
         }
         count
     }
 
-    /// Filters stretches; false if something may not be finite.
+    /// Filters segments; false if something may not be finite.
     #[inline]
-    pub(super) fn run(&self, stretches: &[Stretch<'_, T>], out: &mut [T]) -> bool {
-        self.filters.run(stretches, out)
+    pub(super) fn run(&self, segments: &[Segment<'_, T>], out: &mut [T]) -> bool {
+        self.filters.run(segments, out)
     }
 }
 

@@ -29,7 +29,7 @@ use super::aligned::Aligned;
 use super::fir::{FirPlan, check_finite, replace_not_finite};
 use super::form::lags;
 use super::sample::Sample;
-use super::simd::{Halves, Isa, Products, Stretch};
+use super::simd::{Halves, Isa, Products, Segment, all_finite, join, split};
 use super::ticks::{FastSink, Interleaved, TickSource};
 use super::window::Window;
 
@@ -195,12 +195,12 @@ impl<T: Sample> FastFirPlan<T> {
     ) -> (&'a [T], u64) {
         let n = self.channels;
         let outside = source.frames::<T>().map(|frames| &frames[first * n..(first + ticks) * n]);
-        if let Some(frames) = outside.filter(|frames| T::all_finite(self.isa, frames)) {
+        if let Some(frames) = outside.filter(|frames| all_finite(self.isa, frames)) {
             return (frames, 0);
         }
         let room = &mut room[..ticks * n];
         source.gather(self.isa, first, ticks, room);
-        let replaced = if T::all_finite(self.isa, room) { 0 } else { replace_not_finite(room) };
+        let replaced = if all_finite(self.isa, room) { 0 } else { replace_not_finite(room) };
         (room, replaced)
     }
 
@@ -210,7 +210,7 @@ impl<T: Sample> FastFirPlan<T> {
         let parity = Parity::new(pairs.lead, ticks);
         self.split(pairs, parity, frames);
         self.join(pairs, parity, out);
-        if !T::all_finite(self.isa, out) {
+        if !all_finite(self.isa, out) {
             self.repair(pairs, parity, out);
         }
         pairs.even.window.advance(parity.evens);
@@ -231,10 +231,10 @@ impl<T: Sample> FastFirPlan<T> {
         if !second.is_empty() {
             let (pair, again) = pairs.frames.split_at_mut(2 * n);
             pair[n..].copy_from_slice(second);
-            T::split_pairs(self.isa, pair, n, Halves { even: again, odd, mean });
+            split(self.isa, pair, n, Halves { even: again, odd, mean });
         }
         let halves = Halves { even, odd: &mut odd[late..], mean: &mut mean[late..] };
-        T::split_pairs(self.isa, whole, n, halves);
+        split(self.isa, whole, n, halves);
         if !first.is_empty() {
             even[whole.len() / 2..].copy_from_slice(first);
             pairs.frames[..n].copy_from_slice(first);
@@ -251,11 +251,11 @@ impl<T: Sample> FastFirPlan<T> {
         let c = &mut mean.filter(&self.mean, parity.odds)[m..];
         let (second, out) = out.split_at_mut(late);
         if !second.is_empty() {
-            T::join_pairs(self.isa, Products { even: &mut a[..m], odd: b, mean: c }, m, outputs);
+            join(self.isa, Products { even: &mut a[..m], odd: b, mean: c }, m, outputs);
             second.copy_from_slice(&outputs[m..]);
         }
         let products = Products { even: &mut a[m..], odd: &b[late..], mean: &mut c[late..] };
-        T::join_pairs(self.isa, products, m, out);
+        join(self.isa, products, m, out);
         let whole = out.len() / (2 * m) * m;
         let first = a[m + whole..].iter().zip(&b[late + whole..]);
         for (slot, (&a, &b)) in out[2 * whole..].iter_mut().zip(first) {
@@ -311,7 +311,7 @@ impl<T: Sample> FastFirPlan<T> {
     fn recall(&self, pairs: &mut Pairs<T>, frames: &[T]) {
         let [mut even, mut odd, mut mean] = [(); 3].map(|()| vec![T::default(); frames.len() / 2]);
         let halves = Halves { even: &mut even, odd: &mut odd, mean: &mut mean };
-        T::split_pairs(self.isa, frames, self.channels, halves);
+        split(self.isa, frames, self.channels, halves);
         pairs.even.window.recall(&even);
         pairs.odd.window.recall(&odd);
         pairs.mean.window.recall(&mean);
@@ -364,7 +364,7 @@ impl<T: Sample> HalfRate<T> {
         if ticks > 0 {
             // Whether they are finite is asked of the outputs.
             let x = &self.window.view()[MORE * plan.channels..];
-            plan.run(&[Stretch { x, first: 0, ticks }], &mut products[m..]);
+            plan.run(&[Segment { x, first: 0, frames: ticks }], &mut products[m..]);
         }
         products[..m].copy_from_slice(&self.last);
         self.last.copy_from_slice(&products[ticks * m..]);

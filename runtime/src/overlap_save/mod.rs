@@ -19,7 +19,9 @@ use crate::aligned::Aligned;
 use crate::fir::{check_finite, replace_not_finite};
 use crate::form::lags;
 use crate::sample::Sample;
-use crate::simd::{Frames, Isa, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples};
+use crate::simd::{
+    Frames, Isa, Segments, Spectra, Transform, TransformKernel, all_finite, group_lanes, row_samples,
+};
 use crate::ticks::{FastSink, TickSource};
 use std::ops::Range;
 
@@ -151,7 +153,7 @@ impl<T: Sample> OverlapSavePlan<T> {
             shape,
             transform: Transform::new(len, T::from_f64),
             spectra: spectra(taps, &shape, isa),
-            kernel: T::transform_kernel(isa),
+            kernel: TransformKernel::new(isa),
             isa,
         })
     }
@@ -285,7 +287,7 @@ impl<T: Sample> OverlapSavePlan<T> {
         let len = (history + ticks.len()) * channels;
         // Frames are read as whole groups.
         let fits = len + group_lanes::<T>() <= x.len();
-        (fits && T::all_finite(self.isa, &x[history * channels..len + group_lanes::<T>()])).then_some(x)
+        (fits && all_finite(self.isa, &x[history * channels..len + group_lanes::<T>()])).then_some(x)
     }
 
     /// The next frames of the batch; returns how many samples were not finite and are 0 now.
@@ -299,7 +301,7 @@ impl<T: Sample> OverlapSavePlan<T> {
         let n = self.shape.channels;
         let room = &mut state.frames[(self.shape.history + state.filled) * n..][..ticks * n];
         source.gather(self.isa, first, ticks, room);
-        if T::all_finite(self.isa, room) { 0 } else { replace_not_finite(room) }
+        if all_finite(self.isa, room) { 0 } else { replace_not_finite(room) }
     }
 
     /// The outputs of a complete batch, whose frames are `outside` or in the state, to `slots` or the state.
@@ -310,7 +312,7 @@ impl<T: Sample> OverlapSavePlan<T> {
         let output = slots.unwrap_or(output);
         self.filter(work, outside.unwrap_or(frames), output);
         let wanted = &mut output[..batch * ratio];
-        if !T::all_finite(self.isa, wanted) {
+        if !all_finite(self.isa, wanted) {
             if let Some(outside) = outside {
                 let len = frames.len();
                 frames.copy_from_slice(&outside[..len]);
@@ -368,7 +370,7 @@ fn spectra<T: Sample>(taps: &[Vec<f64>], shape: &Shape, isa: Isa) -> Aligned<T> 
     let Shape { channels, ratio, history, len, depth, segments } = *shape;
     let (row, group) = (row_samples::<T>(), group_lanes::<T>());
     let transform = Transform::new(len, |x: f64| x);
-    let kernel = f64::transform_kernel(isa);
+    let kernel = TransformKernel::<f64>::new(isa);
     let mut spectra = Aligned::new((len / 2 + 1) * shape.outputs() * channels * row);
     let (mut frames, zeros) = (vec![0.0; len * QUAD], vec![0.0; len * QUAD]);
     let mut rows = vec![0.0; len * row_samples::<f64>()];

@@ -32,6 +32,9 @@ pub(super) enum Kind {
     /// x86-64 with AVX-512 F, VL, BW and DQ: 512-bit vectors.
     #[cfg(target_arch = "x86_64")]
     Avx512,
+    /// aarch64: 128-bit vectors, two to a lane group.
+    #[cfg(target_arch = "aarch64")]
+    Neon,
 }
 
 impl Kind {
@@ -42,6 +45,8 @@ impl Kind {
         Self::Avx2,
         #[cfg(target_arch = "x86_64")]
         Self::Avx512,
+        #[cfg(target_arch = "aarch64")]
+        Self::Neon,
     ];
 
     fn is_available(self) -> bool {
@@ -57,6 +62,8 @@ impl Kind {
                     && is_x86_feature_detected!("avx512bw")
                     && is_x86_feature_detected!("avx512dq")
             }
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => std::arch::is_aarch64_feature_detected!("neon"),
         }
     }
 }
@@ -77,7 +84,7 @@ impl Isa {
         Self(Kind::Portable)
     }
 
-    /// `portable`, `avx2` or `avx512`.
+    /// `portable`, `avx2`, `avx512` or `neon`.
     pub const fn name(self) -> &'static str {
         match self.0 {
             Kind::Portable => "portable",
@@ -85,6 +92,17 @@ impl Isa {
             Kind::Avx2 => "avx2",
             #[cfg(target_arch = "x86_64")]
             Kind::Avx512 => "avx512",
+            #[cfg(target_arch = "aarch64")]
+            Kind::Neon => "neon",
+        }
+    }
+
+    /// The set with vectors of one lane group that this one includes: for kernels that gain nothing from wider ones.
+    pub(super) const fn narrow(self) -> Self {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => Self(Kind::Avx2),
+            kind => Self(kind),
         }
     }
 

@@ -1,47 +1,55 @@
 //! The kernels, and the only `unsafe` code of the crate.
 //!
-//! Each kernel is one generic body over a vector type, compiled once for each instruction
-//! set inside a `#[target_feature]` function and chosen at run time. `unsafe` is needed for two
-//! things only: to call such a function after the processor was asked, and to load and store
+//! ```text
+//! isa        the instruction sets of this processor, as values that only detection makes
+//! dispatch   from an Isa to a function compiled for it
+//! vector     the vector trait, all that kernels know of an instruction set
+//! portable  avx2  avx512  neon      the trait for each set
+//! fir  recursion  transform  pairs  pcm  finite  peak      the kernels
+//! ```
+//!
+//! Each kernel is one body that is generic over the vector type, compiled once for each instruction set. `unsafe` is needed
+//! for two things only: to call such a function after the processor was asked, and to load and store
 //! vectors at addresses whose bounds the safe wrapper has checked once for the whole call.
 //!
 //! Bits: an output is a sum of a fixed shape, lanes of fused multiply-adds and a tree over the lanes (see
-//! `lanes`), the same for every instruction set. So it does not depend on vector width, block size, address or
+//! `vector`), the same for every instruction set. So it does not depend on vector width, block size, address or
 //! thread count. Only on an x86 processor without FMA (before 2013) the portable body rounds the
 //! product as well, because a fused multiply-add in software is forty times slower.
 #![allow(unsafe_code)]
+#![deny(clippy::undocumented_unsafe_blocks)]
 
-mod channels;
 #[cfg(target_arch = "x86_64")]
-mod convert;
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx2_frames;
+#[cfg(target_arch = "x86_64")]
+mod avx2_tile;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod dispatch;
 mod finite;
 mod fir;
 mod isa;
-mod lanes;
-#[cfg(target_arch = "x86_64")]
-mod lanes_avx2;
-#[cfg(target_arch = "x86_64")]
-mod lanes_avx512;
-mod layout;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod pairs;
+mod pcm;
 mod peak;
-mod phases;
-mod polyphase;
+mod portable;
 mod recursion;
-mod single;
-#[cfg(target_arch = "x86_64")]
-mod ticks_x86;
 mod transform;
 mod vector;
 
-pub(crate) use finite::{all_finite_f32, all_finite_f64};
-pub(crate) use fir::{Cut, FirKernel};
+pub(crate) use dispatch::Element;
+pub(crate) use finite::all_finite;
+pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
 pub use isa::Isa;
-pub(crate) use layout::{decode, encode, interleave};
-pub(crate) use pairs::{Halves, Products, join_f32, join_f64, split_f32, split_f64};
+pub(crate) use pairs::{Halves, Products, join, split};
+pub(crate) use pcm::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
-pub(crate) use polyphase::{Polyphase, Stretch};
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
 pub(crate) use transform::{
-    Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, TransformKernel, group_lanes, row_samples,
+    Frames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, TransformKernel, row_samples,
 };
+pub(crate) use vector::group_lanes;

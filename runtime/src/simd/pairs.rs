@@ -1,29 +1,31 @@
-//! Ticks by twos for the fast form: frames apart into those of even and of odd ticks, and products together again.
+//! Frames by twos for two-parallel fast FIR: even frames apart from odd ones, and products together again.
 //!
 //! Nothing but plain loops, compiled for each instruction set: arithmetic on numbers in a row, and copies of frames, which the
 //! compiler would turn into slow shuffles of single numbers if both were one loop. Each number is made by the same few
 //! operations, none of which could be fused, so the bits are the same everywhere.
 
-use super::Isa;
-use super::isa::Kind;
+use super::dispatch::{Element, Kernel, compiled};
+use super::isa::Isa;
+use super::vector::Vector;
+use std::marker::PhantomData;
 
-/// Room for the frames of pairs of ticks.
+/// Room for pairs of frames.
 pub(crate) struct Halves<'a, T> {
-    /// Those of the first tick of each pair.
+    /// The first frame of each pair.
     pub(crate) even: &'a mut [T],
-    /// Those of the second one.
+    /// The second one.
     pub(crate) odd: &'a mut [T],
     /// Their means.
     pub(crate) mean: &'a mut [T],
 }
 
-/// Products of the three filters for pairs of ticks.
+/// Products of the three filters for pairs of frames.
 pub(crate) struct Products<'a, T> {
-    /// These become the outputs of the first ticks.
+    /// These become the outputs of the first frames.
     pub(crate) even: &'a mut [T],
     /// Those of the pair before come first.
     pub(crate) odd: &'a [T],
-    /// These become the outputs of the second ticks.
+    /// These become the outputs of the second frames.
     pub(crate) mean: &'a mut [T],
 }
 
@@ -43,112 +45,93 @@ macro_rules! with_constant {
     };
 }
 
-macro_rules! pairs {
-    ($split:ident, $join:ident, $module:ident, $sample:ty) => {
-        /// Frames of `n` samples apart, for whole pairs; each half has room for them.
-        pub(crate) fn $split(isa: Isa, frames: &[$sample], n: usize, to: Halves<'_, $sample>) {
-            let Halves { even, odd, mean } = to;
-            match isa.kind() {
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: an `Isa` is made only where the processor has it.
-                Kind::Avx2 | Kind::Avx512 => unsafe {
-                    $module::split_avx2(frames, n, even, odd, mean)
-                },
-                Kind::Portable => $module::split(frames, n, even, odd, mean),
-            }
-        }
-
-        /// The `m` samples of the first tick of each pair: even + odd of the pair before; those of the second one:
-        /// 4 mean - even - odd.
-        pub(crate) fn $join(isa: Isa, from: Products<'_, $sample>, m: usize, out: &mut [$sample]) {
-            let Products { even, odd, mean } = from;
-            match isa.kind() {
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: an `Isa` is made only where the processor has it.
-                Kind::Avx2 | Kind::Avx512 => unsafe {
-                    $module::join_avx2(even, odd, mean, m, out)
-                },
-                Kind::Portable => $module::join(even, odd, mean, m, out),
-            }
-        }
-
-        mod $module {
-            type Slice = [$sample];
-
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2,fma")]
-            pub(super) fn split_avx2(x: &Slice, n: usize, even: &mut Slice, odd: &mut Slice, mean: &mut Slice) {
-                split(x, n, even, odd, mean);
-            }
-
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2,fma")]
-            pub(super) fn join_avx2(even: &mut Slice, odd: &Slice, mean: &mut Slice, m: usize, out: &mut Slice) {
-                join(even, odd, mean, m, out);
-            }
-
-            #[inline(always)]
-            pub(super) fn split(x: &Slice, n: usize, even: &mut Slice, odd: &mut Slice, mean: &mut Slice) {
-                let len = x.len() / 2;
-                let (even, odd, mean) = (&mut even[..len], &mut odd[..len], &mut mean[..len]);
-                with_constant!(n, N => apart::<N>(x, even, odd), apart_any(x, n, even, odd));
-                for ((slot, a), b) in mean.iter_mut().zip(&*even).zip(&*odd) {
-                    *slot = 0.5 * a + 0.5 * b;
-                }
-            }
-
-            #[inline(always)]
-            pub(super) fn join(even: &mut Slice, odd: &Slice, mean: &mut Slice, m: usize, out: &mut Slice) {
-                let len = out.len() / (2 * m) * m;
-                let (even, mean) = (&mut even[..len], &mut mean[..len]);
-                let (before, odd) = (&odd[..len], &odd[m..][..len]);
-                for (((a, c), before), b) in even.iter_mut().zip(&mut *mean).zip(before).zip(odd) {
-                    (*a, *c) = (*a + before, 4.0 * *c - *a - b);
-                }
-                with_constant!(m, M => together::<M>(even, mean, out), together_any(even, mean, m, out));
-            }
-
-            #[inline(always)]
-            fn apart<const N: usize>(x: &Slice, even: &mut Slice, odd: &mut Slice) {
-                let pairs = x.as_chunks::<N>().0.as_chunks::<2>().0.iter();
-                let halves = even.as_chunks_mut::<N>().0.iter_mut().zip(odd.as_chunks_mut::<N>().0);
-                for ([first, second], (even, odd)) in pairs.zip(halves) {
-                    (*even, *odd) = (*first, *second);
-                }
-            }
-
-            #[inline(always)]
-            fn apart_any(x: &Slice, n: usize, even: &mut Slice, odd: &mut Slice) {
-                let halves = even.chunks_exact_mut(n).zip(odd.chunks_exact_mut(n));
-                for (pair, (even, odd)) in x.chunks_exact(2 * n).zip(halves) {
-                    even.copy_from_slice(&pair[..n]);
-                    odd.copy_from_slice(&pair[n..]);
-                }
-            }
-
-            #[inline(always)]
-            fn together<const M: usize>(even: &Slice, odd: &Slice, out: &mut Slice) {
-                let halves = even.as_chunks::<M>().0.iter().zip(odd.as_chunks::<M>().0);
-                let pairs = out.as_chunks_mut::<M>().0.as_chunks_mut::<2>().0.iter_mut();
-                for ([first, second], (even, odd)) in pairs.zip(halves) {
-                    (*first, *second) = (*even, *odd);
-                }
-            }
-
-            #[inline(always)]
-            fn together_any(even: &Slice, odd: &Slice, m: usize, out: &mut Slice) {
-                let halves = even.chunks_exact(m).zip(odd.chunks_exact(m));
-                for (pair, (even, odd)) in out.chunks_exact_mut(2 * m).zip(halves) {
-                    pair[..m].copy_from_slice(even);
-                    pair[m..].copy_from_slice(odd);
-                }
-            }
-        }
-    };
+/// Frames of `n` samples apart, for whole pairs; each half has room for them.
+pub(crate) fn split<T: Element>(isa: Isa, frames: &[T], n: usize, to: Halves<'_, T>) {
+    // SAFETY: the kernel asks nothing of its job.
+    unsafe { compiled::<Split<T>>(isa.narrow())((frames, n, to)) }
 }
 
-pairs!(split_f32, join_f32, single, f32);
-pairs!(split_f64, join_f64, double, f64);
+/// The `m` samples of the first frame of each pair: even + odd of the pair before; those of the second one:
+/// 4 mean - even - odd.
+pub(crate) fn join<T: Element>(isa: Isa, from: Products<'_, T>, m: usize, out: &mut [T]) {
+    // SAFETY: the kernel asks nothing of its job.
+    unsafe { compiled::<Join<T>>(isa.narrow())((from, m, out)) }
+}
+
+struct Split<T>(PhantomData<T>);
+
+impl<T: Element> Kernel for Split<T> {
+    type Sample = T;
+    type Job<'a> = (&'a [T], usize, Halves<'a, T>);
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = T>>((x, n, to): Self::Job<'_>) {
+        let len = x.len() / 2;
+        let (even, odd, mean) = (&mut to.even[..len], &mut to.odd[..len], &mut to.mean[..len]);
+        with_constant!(n, N => apart::<T, N>(x, even, odd), apart_any(x, n, even, odd));
+        let half = T::from(0.5);
+        for ((slot, a), b) in mean.iter_mut().zip(&*even).zip(&*odd) {
+            *slot = half * *a + half * *b;
+        }
+    }
+}
+
+struct Join<T>(PhantomData<T>);
+
+impl<T: Element> Kernel for Join<T> {
+    type Sample = T;
+    type Job<'a> = (Products<'a, T>, usize, &'a mut [T]);
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = T>>((from, m, out): Self::Job<'_>) {
+        let len = out.len() / (2 * m) * m;
+        let (even, mean) = (&mut from.even[..len], &mut from.mean[..len]);
+        let (before, odd) = (&from.odd[..len], &from.odd[m..][..len]);
+        let four = T::from(4.0);
+        for (((a, c), before), b) in even.iter_mut().zip(&mut *mean).zip(before).zip(odd) {
+            (*a, *c) = (*a + *before, four * *c - *a - *b);
+        }
+        with_constant!(m, M => together::<T, M>(even, mean, out), together_any(even, mean, m, out));
+    }
+}
+
+#[inline(always)]
+fn apart<T: Copy, const N: usize>(x: &[T], even: &mut [T], odd: &mut [T]) {
+    let pairs = x.as_chunks::<N>().0.as_chunks::<2>().0.iter();
+    let halves = even.as_chunks_mut::<N>().0.iter_mut().zip(odd.as_chunks_mut::<N>().0);
+    for ([first, second], (even, odd)) in pairs.zip(halves) {
+        (*even, *odd) = (*first, *second);
+    }
+}
+
+#[inline(always)]
+fn apart_any<T: Copy>(x: &[T], n: usize, even: &mut [T], odd: &mut [T]) {
+    let halves = even.chunks_exact_mut(n).zip(odd.chunks_exact_mut(n));
+    for (pair, (even, odd)) in x.chunks_exact(2 * n).zip(halves) {
+        even.copy_from_slice(&pair[..n]);
+        odd.copy_from_slice(&pair[n..]);
+    }
+}
+
+#[inline(always)]
+fn together<T: Copy, const M: usize>(even: &[T], odd: &[T], out: &mut [T]) {
+    let halves = even.as_chunks::<M>().0.iter().zip(odd.as_chunks::<M>().0);
+    let pairs = out.as_chunks_mut::<M>().0.as_chunks_mut::<2>().0.iter_mut();
+    for ([first, second], (even, odd)) in pairs.zip(halves) {
+        (*first, *second) = (*even, *odd);
+    }
+}
+
+#[inline(always)]
+fn together_any<T: Copy>(even: &[T], odd: &[T], m: usize, out: &mut [T]) {
+    let halves = even.chunks_exact(m).zip(odd.chunks_exact(m));
+    for (pair, (even, odd)) in out.chunks_exact_mut(2 * m).zip(halves) {
+        pair[..m].copy_from_slice(even);
+        pair[m..].copy_from_slice(odd);
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -164,7 +147,7 @@ mod tests {
             for pairs in [0, 1, 2, 7, 33] {
                 let x = ramp(2 * pairs * count, 0.37);
                 let [mut even, mut odd, mut mean] = [(); 3].map(|()| vec![0.0; pairs * count]);
-                split_f32(isa, &x, count, Halves { even: &mut even, odd: &mut odd, mean: &mut mean });
+                split(isa, &x, count, Halves { even: &mut even, odd: &mut odd, mean: &mut mean });
                 for (k, i) in (0..pairs).flat_map(|k| (0..count).map(move |i| (k, i))) {
                     let (a, b) = (x[2 * k * count + i], x[(2 * k + 1) * count + i]);
                     let at = k * count + i;
@@ -173,7 +156,7 @@ mod tests {
                 let odd = [ramp(count, 0.11), odd].concat();
                 let mut out = vec![0.0; x.len()];
                 let (a, c) = (even.clone(), mean.clone());
-                join_f32(isa, Products { even: &mut even, odd: &odd, mean: &mut mean }, count, &mut out);
+                join(isa, Products { even: &mut even, odd: &odd, mean: &mut mean }, count, &mut out);
                 for (k, p) in (0..pairs).flat_map(|k| (0..count).map(move |p| (k, p))) {
                     let at = k * count + p;
                     assert_eq!(out[2 * k * count + p], a[at] + odd[at]);
@@ -187,7 +170,7 @@ mod tests {
     fn the_mean_of_the_largest_numbers_is_finite() {
         let largest = [f64::MAX; 2];
         let [mut even, mut odd, mut mean] = [[0.0]; 3];
-        split_f64(Isa::detect(), &largest, 1, Halves { even: &mut even, odd: &mut odd, mean: &mut mean });
+        split(Isa::detect(), &largest, 1, Halves { even: &mut even, odd: &mut odd, mean: &mut mean });
         assert_eq!([even, odd, mean], [[f64::MAX]; 3]);
     }
 }

@@ -1,59 +1,40 @@
 //! What the processor can do at most, for benchmarks to compare with.
 
-use super::Isa;
-use super::isa::Kind;
-#[cfg(target_arch = "x86_64")]
-use super::vector::{Avx2F32, Avx512F32};
-use super::vector::{Portable, Vector};
+use super::dispatch::{Kernel, compiled};
+use super::isa::Isa;
+use super::vector::Vector;
 
 /// Independent chains: enough to hide the latency of a multiply-add on every processor so far.
 const CHAINS: usize = 12;
 
-/// Runs `turns` turns of 12 independent f32 multiply-adds on whole vectors of `isa`; returns how many scalar multiply-adds that were, and their sum, so that nothing is optimised away.
-pub fn multiply_add_chains(isa: Isa, turns: u64) -> (u64, f32) {
-    match isa.kind() {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: an `Isa` is made only where the processor has it.
-        Kind::Avx2 => unsafe { avx2(turns) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: an `Isa` is made only where the processor has it.
-        Kind::Avx512 => unsafe { avx512(turns) },
-        // SAFETY: needs nothing.
-        Kind::Portable => unsafe { chains::<Portable<f32>>(turns) },
-    }
+/// Runs `iterations` times 12 independent f32 multiply-adds on whole vectors of `isa`; returns how many scalar
+/// multiply-adds that were, and their sum, so that nothing is optimised away.
+pub fn multiply_add_chains(isa: Isa, iterations: u64) -> (u64, f32) {
+    // SAFETY: the kernel asks nothing of its job.
+    unsafe { compiled::<Chains>(isa)(iterations) }
 }
 
-#[inline(always)]
-unsafe fn chains<V: Vector<Sample = f32>>(turns: u64) -> (u64, f32) {
-    let mut out = [0.0; 64];
-    // SAFETY: the caller's for the instruction set; one vector fits `out`.
-    unsafe {
-        let (factor, term) = (V::splat(std::hint::black_box(0.999)), V::splat(std::hint::black_box(1e-3)));
-        let mut sums = [V::splat(1.0); CHAINS];
-        for _ in 0..turns {
+struct Chains;
+
+impl Kernel for Chains {
+    type Sample = f32;
+    type Job<'a> = u64;
+    type Output = (u64, f32);
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = f32>>(iterations: u64) -> (u64, f32) {
+        // SAFETY: the caller's.
+        let splat = |value: f32| unsafe { V::splat(std::hint::black_box(value)) };
+        let (factor, term) = (splat(0.999), splat(1e-3));
+        let mut sums = [splat(1.0); CHAINS];
+        for _ in 0..iterations {
             for sum in &mut sums {
                 *sum = sum.mul_add(factor, term);
             }
         }
-        for sum in sums {
-            sum.mul_add(factor, V::load(out.as_ptr())).store(out.as_mut_ptr());
-        }
+        let total = sums.into_iter().fold(splat(0.0), |total, sum| sum.mul_add(factor, total));
+        (iterations * (CHAINS * V::LANES) as u64, total.to_array().iter().sum())
     }
-    (turns * (CHAINS * V::LANES) as u64, out.iter().sum())
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn avx2(turns: u64) -> (u64, f32) {
-    // SAFETY: the caller's.
-    unsafe { chains::<Avx2F32>(turns) }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx2,fma")]
-unsafe fn avx512(turns: u64) -> (u64, f32) {
-    // SAFETY: the caller's.
-    unsafe { chains::<Avx512F32>(turns) }
 }
 
 #[cfg(test)]

@@ -1,19 +1,18 @@
 //! State recursions x+ = A x + B u, states in lanes.
 //!
-//! Inputs are frames as they lie; the states become frames of their own, one a tick, so that the FIR kernels can
+//! Inputs are frames as they lie; the states become frames of their own, so that the FIR kernels can
 //! read both. Sections (two states that depend on one another at most) take 2 + 2 multiply-adds and two for each
 //! input; any other A is a sum of its columns, one broadcast of a state serving all states.
 //!
 //! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
 
-use super::Isa;
-use super::isa::Kind;
-#[cfg(target_arch = "x86_64")]
-use super::vector::{Avx2F32, Avx2F64};
-use super::vector::{Portable, Vector};
+use super::dispatch::{Compiled, Element, Kernel, compiled};
+use super::isa::Isa;
+use super::vector::{Vector, group_lanes};
 use crate::aligned::Aligned;
+use std::marker::PhantomData;
 
-/// Ticks of a section that are computed together.
+/// Frames of a section that are computed together.
 const STEP: usize = 4;
 
 /// A in the form in which it runs, with B.
@@ -60,26 +59,32 @@ impl<T: Copy + Default> ColumnTile<T> {
     pub(crate) const WIDEST: usize = 8;
 }
 
-/// One call of a kernel, checked.
-struct Job<'a, T: Copy + Default> {
+/// One call of the kernel, checked.
+pub(crate) struct Job<'a, T: Copy + Default> {
     recursion: &'a Recursion<T>,
     rows: *mut T,
     window: *const T,
     hop: usize,
-    ticks: usize,
+    frames: usize,
 }
 
 /// The recursion of one sample type on one instruction set.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct RecursionKernel<T: Copy + Default> {
+pub(crate) struct RecursionKernel<T: Element> {
     /// L, lanes of a vector.
     pub(crate) lanes: usize,
-    run: unsafe fn(&Job<'_, T>),
+    run: Compiled<Body<T>>,
 }
 
-impl<T: Copy + Default> RecursionKernel<T> {
-    /// Goes on by `ticks` ticks: row 0 of `rows` (rows of S states) is the state before them, row t + 1 becomes that
-    /// after tick t. An input of tick t is `window[place + t * hop]` for the input's place.
+impl<T: Element> RecursionKernel<T> {
+    /// The kernel for an instruction set, in vectors of one group: the few sections of a usual bank would leave wider
+    /// ones empty.
+    pub(crate) fn new(isa: Isa) -> Self {
+        Self { lanes: group_lanes::<T>(), run: compiled::<Body<T>>(isa.narrow()) }
+    }
+
+    /// Goes on by `frames` frames: row 0 of `rows` (rows of S states) is the state before them, row t + 1 becomes that
+    /// after frame t. An input of frame t is `window[place + t * hop]` for the input's place.
     ///
     /// # Panics
     /// If anything is too short for that.
@@ -89,18 +94,17 @@ impl<T: Copy + Default> RecursionKernel<T> {
         rows: &mut [T],
         window: &[T],
         hop: usize,
-        ticks: usize,
+        frames: usize,
     ) {
-        if recursion.states == 0 || ticks == 0 {
+        if recursion.states == 0 || frames == 0 {
             return;
         }
-        assert!((ticks + 1) * recursion.states <= rows.len());
-        assert!((ticks - 1) * hop < window.len());
-        recursion.form.check(recursion.states, self.lanes, window.len() - (ticks - 1) * hop);
+        assert!((frames + 1) * recursion.states <= rows.len());
+        assert!((frames - 1) * hop < window.len());
+        recursion.form.check(recursion.states, self.lanes, window.len() - (frames - 1) * hop);
         let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
-        // SAFETY: the kernel was chosen by an `Isa`, which the processor has, and all its loads and
-        // stores lie within the bounds asserted above.
-        unsafe { (self.run)(&Job { recursion, rows, window, hop, ticks }) }
+        // SAFETY: all loads and stores lie within the bounds asserted above.
+        unsafe { (self.run)(&Job { recursion, rows, window, hop, frames }) }
     }
 }
 
@@ -127,25 +131,39 @@ impl<T: Copy + Default> Form<T> {
     }
 }
 
-#[inline(always)]
-unsafe fn run<V: Vector>(job: &Job<'_, V::Sample>)
-where
-    V::Sample: Default,
-{
-    // SAFETY: the caller's, see `RecursionKernel::run`.
-    unsafe {
-        match &job.recursion.form {
-            Form::Sections(vectors) => {
-                let whole = job.ticks / STEP * STEP;
-                (0..whole).step_by(STEP).for_each(|t| sections::<V, STEP>(job, vectors, t));
-                (whole..job.ticks).for_each(|t| sections::<V, 1>(job, vectors, t));
+/// The recursion of either form.
+pub(crate) struct Body<T>(PhantomData<T>);
+
+impl<T: Element> Kernel for Body<T> {
+    type Sample = T;
+    type Job<'a> = &'a Job<'a, T>;
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = T>>(job: &Job<'_, T>) {
+        // SAFETY: the caller's, see `RecursionKernel::run`.
+        unsafe {
+            match &job.recursion.form {
+                Form::Sections(vectors) => {
+                    let whole = job.frames / STEP * STEP;
+                    for t in (0..whole).step_by(STEP) {
+                        sections::<V, STEP>(job, vectors, t);
+                    }
+                    for t in whole..job.frames {
+                        sections::<V, 1>(job, vectors, t);
+                    }
+                }
+                Form::Dense(tiles) => {
+                    for t in 0..job.frames {
+                        dense::<V>(job, tiles, t);
+                    }
+                }
             }
-            Form::Dense(tiles) => (0..job.ticks).for_each(|t| dense::<V>(job, tiles, t)),
         }
     }
 }
 
-/// T ticks from tick t on. One vector of sections after the other: while one waits for its own states, the next
+/// T frames from frame t on. One vector of sections after the other: while one waits for its own states, the next
 /// can begin.
 #[inline(always)]
 unsafe fn sections<V: Vector, const T: usize>(
@@ -165,7 +183,7 @@ unsafe fn sections<V: Vector, const T: usize>(
     }
 }
 
-/// T ticks: the inputs of all of them first, which do not wait for the states.
+/// T frames: the inputs of all of them first, which do not wait for the states.
 #[inline(always)]
 unsafe fn section_vector<V: Vector, const T: usize>(
     vector: &SectionVector<V::Sample>,
@@ -192,7 +210,7 @@ unsafe fn section_vector<V: Vector, const T: usize>(
                 let u = V::splat(*input);
                 *p = u.mul_add(b1, *p);
                 *q = u.mul_add(b2, *q);
-                // May leave the window after the last tick, where nothing is read.
+                // May leave the window after the last frame, where nothing is read.
                 input = input.wrapping_add(hop);
             }
         }
@@ -206,12 +224,9 @@ unsafe fn section_vector<V: Vector, const T: usize>(
     }
 }
 
-/// Tick t, for any A.
+/// Frame t, for any A.
 #[inline(always)]
-unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Sample>], t: usize)
-where
-    V::Sample: Default,
-{
+unsafe fn dense<V: Vector>(job: &Job<'_, V::Sample>, tiles: &[ColumnTile<V::Sample>], t: usize) {
     for tile in tiles {
         // SAFETY: the caller's, see `RecursionKernel::run`.
         unsafe {
@@ -261,44 +276,3 @@ unsafe fn add_column<V: Vector, const R: usize>(sums: &mut [V; R], value: V, col
         *sum = unsafe { value.mul_add(V::load(column.add(r * V::LANES)), *sum) };
     }
 }
-
-macro_rules! kernel {
-    ($name:ident, $vector:ty, $sample:ty $(, $features:literal)?) => {
-        impl RecursionKernel<$sample> {
-            fn $name() -> Self {
-                $(#[target_feature(enable = $features)])?
-                unsafe fn compiled(job: &Job<'_, $sample>) {
-                    // SAFETY: the caller's, see `RecursionKernel::run`.
-                    unsafe { run::<$vector>(job) }
-                }
-                Self { lanes: <$vector>::LANES, run: compiled }
-            }
-        }
-    };
-}
-
-kernel!(portable, Portable<f32>, f32);
-kernel!(portable, Portable<f64>, f64);
-#[cfg(target_arch = "x86_64")]
-kernel!(avx2, Avx2F32, f32, "avx2,fma");
-#[cfg(target_arch = "x86_64")]
-kernel!(avx2, Avx2F64, f64, "avx2,fma");
-
-macro_rules! choose {
-    ($sample:ty) => {
-        impl RecursionKernel<$sample> {
-            /// The kernel for an instruction set. With AVX-512 it
-            /// is that of AVX2: the few sections of a usual bank would leave wider vectors empty.
-            pub(crate) fn new(isa: Isa) -> Self {
-                match isa.kind() {
-                    #[cfg(target_arch = "x86_64")]
-                    Kind::Avx2 | Kind::Avx512 => Self::avx2(),
-                    Kind::Portable => Self::portable(),
-                }
-            }
-        }
-    };
-}
-
-choose!(f32);
-choose!(f64);

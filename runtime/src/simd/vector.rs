@@ -1,102 +1,327 @@
-//! Vectors of one sample type, alike for all instruction sets.
+//! The vector trait: all that algorithms know of an instruction set.
+//!
+//! A *lane group* is 32 bytes: 8 lanes of f32, 4 of f64. A vector is one group or two. Its lanes hold samples as they lie
+//! in memory, D lanes for each frame or segment, where D divides the group.
+//!
+//! Sums over the D lanes of a frame are trees of a fixed shape: (l0 + l2) + (l1 + l3) for four lanes, the sum of the lower
+//! half plus that of the upper half for eight. They do not depend on the instruction set.
+//!
+//! Two or four phases lie along diagonals: lane l of the p-th sum belongs to phase (l + p) mod 2 or 4. So the sums
+//! come out in the order of the phases and fewer lanes have to be blended. Of three phases the first two do.
 
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::*;
+use std::fmt::Debug;
+use std::ops::{Add, Mul, Neg, Sub};
 
-/// A register of samples.
-///
-/// # Safety
-/// The methods of a type may only run on a processor that has its instruction set, and inside a
-/// function compiled for it (or else they are calls instead of instructions). `load` and `store`
-/// touch `LANES` samples from `at`.
-pub(super) trait Vector: Copy {
-    type Sample: Copy + Default;
-    const LANES: usize;
-    unsafe fn splat(value: Self::Sample) -> Self;
-    unsafe fn load(at: *const Self::Sample) -> Self;
-    unsafe fn store(self, at: *mut Self::Sample);
-    /// self * factor + sum, rounded once.
-    unsafe fn mul_add(self, factor: Self, sum: Self) -> Self;
+/// A sample type: f32 or f64.
+pub(crate) trait Number:
+    Copy
+    + Default
+    + Debug
+    + PartialEq
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Neg<Output = Self>
+    + From<f32>
+    + Into<f64>
+    + 'static
+{
+    /// self * factor + sum; rounded once where that is an instruction of every processor of the target.
+    fn mul_add(self, factor: Self, sum: Self) -> Self;
+    /// Neither NaN nor infinite.
+    fn is_finite(self) -> bool;
+    /// The nearest number.
+    fn from_i32(value: i32) -> Self;
 }
 
-/// Arrays that the compiler turns into whatever vectors the architecture has.
-#[derive(Clone, Copy)]
-pub(super) struct Portable<T>(pub(super) [T; 4]);
-
-/// True where `mul_add` is an instruction of every processor of the target.
+/// True where a fused multiply-add is an instruction of every processor of the target. In software it would be forty
+/// times slower.
 pub(super) const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
-macro_rules! portable {
+macro_rules! number {
     ($sample:ty) => {
-        impl Vector for Portable<$sample> {
-            type Sample = $sample;
-            const LANES: usize = 4;
-
+        impl Number for $sample {
             #[inline(always)]
-            unsafe fn splat(value: $sample) -> Self {
-                Self([value; 4])
+            fn mul_add(self, factor: Self, sum: Self) -> Self {
+                if FUSED { <$sample>::mul_add(self, factor, sum) } else { self * factor + sum }
             }
 
             #[inline(always)]
-            unsafe fn load(at: *const $sample) -> Self {
-                Self(unsafe { at.cast::<[$sample; 4]>().read_unaligned() })
+            fn is_finite(self) -> bool {
+                <$sample>::is_finite(self)
             }
 
             #[inline(always)]
-            unsafe fn store(self, at: *mut $sample) {
-                unsafe { at.cast::<[$sample; 4]>().write_unaligned(self.0) }
-            }
-
-            #[inline(always)]
-            unsafe fn mul_add(self, factor: Self, sum: Self) -> Self {
-                Self(std::array::from_fn(|lane| {
-                    let (a, b, c) = (self.0[lane], factor.0[lane], sum.0[lane]);
-                    if FUSED { a.mul_add(b, c) } else { a * b + c }
-                }))
+            fn from_i32(value: i32) -> Self {
+                value as $sample
             }
         }
     };
 }
 
-portable!(f32);
-portable!(f64);
+number!(f32);
+number!(f64);
 
-#[cfg(target_arch = "x86_64")]
-macro_rules! x86 {
-    ($name:ident, $register:ty, $sample:ty, $lanes:literal, $splat:ident, $load:ident, $store:ident, $fma:ident) => {
-        #[derive(Clone, Copy)]
-        pub(super) struct $name(pub(super) $register);
-
-        impl Vector for $name {
-            type Sample = $sample;
-            const LANES: usize = $lanes;
-
-            #[inline(always)]
-            unsafe fn splat(value: $sample) -> Self {
-                Self(unsafe { $splat(value) })
-            }
-
-            #[inline(always)]
-            unsafe fn load(at: *const $sample) -> Self {
-                Self(unsafe { $load(at) })
-            }
-
-            #[inline(always)]
-            unsafe fn store(self, at: *mut $sample) {
-                unsafe { $store(at, self.0) }
-            }
-
-            #[inline(always)]
-            unsafe fn mul_add(self, factor: Self, sum: Self) -> Self {
-                Self(unsafe { $fma(self.0, factor.0, sum.0) })
-            }
-        }
-    };
+/// Lanes of a group.
+pub(crate) const fn group_lanes<T>() -> usize {
+    32 / size_of::<T>()
 }
 
-#[cfg(target_arch = "x86_64")]
-x86!(Avx2F32, __m256, f32, 8, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_fmadd_ps);
-#[cfg(target_arch = "x86_64")]
-x86!(Avx2F64, __m256d, f64, 4, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_fmadd_pd);
-#[cfg(target_arch = "x86_64")]
-x86!(Avx512F32, __m512, f32, 16, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_fmadd_ps);
+/// Lanes of the widest vector.
+const MOST_LANES: usize = 16;
+
+/// A vector of samples: one lane group or two.
+///
+/// A value exists only in code that is compiled for its instruction set and runs on a processor that has it, because
+/// all that makes a value of nothing is unsafe. So arithmetic on values is safe.
+///
+/// An instruction set must implement memory access and arithmetic. All else has a default that goes through memory, and
+/// a set overrides it where it has an instruction for it.
+///
+/// # Safety
+/// Functions that are unsafe may run only in code compiled for the instruction set, on a processor that has it. Those
+/// that take pointers touch memory as said for each.
+pub(crate) trait Vector: Copy {
+    /// The type of a lane.
+    type Sample: Number;
+    /// A vector of one group.
+    type Group: Vector<Sample = Self::Sample, Group = Self::Group>;
+    /// Lanes of the vector.
+    const LANES: usize;
+    /// Lanes of a group.
+    const GROUP: usize = group_lanes::<Self::Sample>();
+    /// Groups of the vector.
+    const GROUPS: usize = Self::LANES / Self::GROUP;
+    /// Vectors of sums in registers such that inputs and coefficients fit beside them.
+    const SUMS: usize;
+
+    /// The same value in all lanes.
+    unsafe fn splat(value: Self::Sample) -> Self;
+    /// All lanes, from `at` on.
+    unsafe fn load(at: *const Self::Sample) -> Self;
+    /// All lanes, to `at`.
+    unsafe fn store(self, at: *mut Self::Sample);
+    /// self + other.
+    fn add(self, other: Self) -> Self;
+    /// self - other.
+    fn sub(self, other: Self) -> Self;
+    /// self * factor.
+    fn mul(self, factor: Self) -> Self;
+    /// self * factor + sum, rounded once.
+    fn mul_add(self, factor: Self, sum: Self) -> Self;
+    /// sum - self * factor, rounded once.
+    fn neg_mul_add(self, factor: Self, sum: Self) -> Self;
+
+    /// All lanes zero.
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        // SAFETY: the caller's.
+        unsafe { Self::splat(Self::Sample::default()) }
+    }
+
+    /// The lanes as an array, of which the first [`Vector::LANES`] mean something.
+    #[inline(always)]
+    fn to_array(self) -> [Self::Sample; MOST_LANES] {
+        let mut lanes = [Self::Sample::default(); MOST_LANES];
+        // SAFETY: there is room for the widest vector, and `self` exists.
+        unsafe { self.store(lanes.as_mut_ptr()) };
+        lanes
+    }
+
+    /// The vector whose lane l is `lane(l)`.
+    #[inline(always)]
+    unsafe fn from_fn(lane: impl Fn(usize) -> Self::Sample) -> Self {
+        let mut lanes = [Self::Sample::default(); MOST_LANES];
+        for (l, slot) in lanes.iter_mut().enumerate().take(Self::LANES) {
+            *slot = lane(l);
+        }
+        // SAFETY: the widest vector fits the array; the rest is the caller's.
+        unsafe { Self::load(lanes.as_ptr()) }
+    }
+
+    /// Neither NaN nor infinity in any lane.
+    #[inline(always)]
+    fn finite(self) -> bool {
+        self.to_array()[..Self::LANES].iter().all(|value| value.is_finite())
+    }
+
+    /// D samples from `at` in the lanes of every frame.
+    #[inline(always)]
+    unsafe fn broadcast<const D: usize>(at: *const Self::Sample) -> Self {
+        // SAFETY: the caller's.
+        unsafe { Self::from_fn(|l| *at.add(l % D)) }
+    }
+
+    /// Frames of D lanes, the first at `at`: a group of them, then, if there is a second group, those that follow if D is
+    /// less than a group, or else the frame at `at + hop`.
+    #[inline(always)]
+    unsafe fn frames<const D: usize>(at: *const Self::Sample, _hop: usize) -> Self {
+        const { assert!(Self::GROUPS == 1) };
+        // SAFETY: the caller's.
+        unsafe { Self::load(at) }
+    }
+
+    /// For each two lanes: a0 + b1, a1 + b0.
+    #[inline(always)]
+    fn diagonal_pairs(a: Self, b: Self) -> Self {
+        let (a, b) = (a.to_array(), b.to_array());
+        // SAFETY: the arguments exist.
+        unsafe { Self::from_fn(|l| a[l] + b[l ^ 1]) }
+    }
+
+    /// For each four lanes: the sum of those of a, b, c and d that are 0, 1, 2 and 3 lanes before, around the four.
+    #[inline(always)]
+    fn diagonal_quads(sums: [Self; 4]) -> Self {
+        let [a, b, c, d] = sums.map(Self::to_array);
+        let before = |l: usize, back: usize| (l & !3) | ((l + 4 - back) & 3);
+        // SAFETY: the arguments exist.
+        unsafe { Self::from_fn(|l| (a[l] + c[before(l, 2)]) + (b[before(l, 1)] + d[before(l, 3)])) }
+    }
+
+    /// For each four lanes: a0 + a2 + b1 + b3, a1 + a3 + b0 + b2, and the same of c and d.
+    #[inline(always)]
+    fn diagonal_halves(sums: [Self; 4]) -> Self {
+        let [a, b, c, d] = sums.map(Self::to_array);
+        let half = |even: &[Self::Sample], odd: &[Self::Sample], at: usize| {
+            (even[at] + even[at + 2]) + (odd[at ^ 1] + odd[(at ^ 1) + 2])
+        };
+        // SAFETY: the arguments exist.
+        unsafe { Self::from_fn(|l| if l & 2 == 0 { half(&a, &b, l) } else { half(&c, &d, l & !2) }) }
+    }
+
+    /// The sum of each frame of D lanes, for the frames of D vectors one after another.
+    #[inline(always)]
+    fn sum_frames<const D: usize>(vectors: impl Fn(usize) -> Self) -> Self {
+        let vectors: [_; D] = std::array::from_fn(|v| vectors(v).to_array());
+        // SAFETY: the arguments exist.
+        unsafe {
+            Self::from_fn(|frame| {
+                let lane = |d: usize| vectors[(frame * D + d) / Self::LANES][(frame * D + d) % Self::LANES];
+                let four = |d: usize| (lane(d) + lane(d + 2)) + (lane(d + 1) + lane(d + 3));
+                match D {
+                    1 => lane(0),
+                    2 => lane(0) + lane(1),
+                    4 => four(0),
+                    _ => four(0) + four(4),
+                }
+            })
+        }
+    }
+
+    /// The outputs of one vector to frames: phase p of its t-th frame to `out[t * hop + p]`. The sums are those of P = 2, 3
+    /// or 4 phases with D <= 4 lanes a frame, along diagonals; P = 2 with D = 4 is left to
+    /// [`Vector::store_halves`]. Of three phases the place behind them may be written as well, before the next frame is.
+    #[inline(always)]
+    unsafe fn store_frames<const P: usize, const D: usize>(
+        sums: [Self; 4],
+        out: *mut Self::Sample,
+        hop: usize,
+    ) {
+        let [a, b, c, d] = sums;
+        let phases = match (P, D) {
+            (_, 1) => sums.map(Self::to_array),
+            (2, _) => [Self::diagonal_pairs(a, b).to_array(); 4],
+            (_, 2) => {
+                let last = Self::diagonal_pairs(c, if P == 3 { c } else { d });
+                [Self::diagonal_pairs(a, b).to_array(), last.to_array(), last.to_array(), last.to_array()]
+            }
+            (3, _) => [Self::diagonal_halves([a, b, c, c]).to_array(); 4],
+            _ => [Self::diagonal_quads(sums).to_array(); 4],
+        };
+        for (t, p) in (0..Self::LANES / D).flat_map(|t| (0..P).map(move |p| (t, p))) {
+            let value = match D {
+                1 => phases[p][t],
+                2 => phases[p / 2][2 * t + p % 2],
+                _ => phases[0][4 * t + p],
+            };
+            // SAFETY: the caller's.
+            unsafe { *out.add(t * hop + p) = value };
+        }
+    }
+
+    /// The same for P = 2 and D = 4: the two sums of one vector, then those of another, each to an output of its own.
+    #[inline(always)]
+    unsafe fn store_halves(sums: [Self; 4], out: [*mut Self::Sample; 2], hop: usize) {
+        let pairs = Self::diagonal_halves(sums).to_array();
+        for (l, &value) in pairs.iter().enumerate().take(Self::LANES) {
+            // SAFETY: the caller's.
+            unsafe { *out[l / 2 % 2].add(l / 4 * hop + l % 2) = value };
+        }
+    }
+
+    /// Both halves of each group added, for the groups of `vectors` vectors from `sums` on: four outputs each, to
+    /// `out`, `out + hop` and so on. The place behind the last frame's outputs up to four is written too, in order.
+    #[inline(always)]
+    unsafe fn add_halves(sums: *const Self::Sample, vectors: usize, out: *mut Self::Sample, hop: usize) {
+        for index in 0..vectors * Self::GROUPS {
+            // SAFETY: the caller's.
+            unsafe {
+                let from = sums.add(index * Self::GROUP);
+                let outputs: [_; 4] = std::array::from_fn(|i| *from.add(i) + *from.add(4 + i));
+                out.add(index * hop).copy_from_nonoverlapping(outputs.as_ptr(), 4);
+            }
+        }
+    }
+
+    /// The loop of a tile of P phases times R vectors, for tiles that have one in assembly: `steps` >= 1 steps from the
+    /// newest window on, vectors `stride` samples apart. `None` leaves it to the compiler.
+    #[inline(always)]
+    unsafe fn tile<const D: usize, const P: usize, const R: usize>(
+        _x: *const Self::Sample,
+        _stride: usize,
+        _coefficients: *const Self::Sample,
+        _steps: usize,
+    ) -> Option<[[Self; R]; P]> {
+        None
+    }
+
+    /// Lanes of segments, D each: those of segment s from `at + s * hop` on.
+    #[inline(always)]
+    unsafe fn segments<const D: usize>(at: *const Self::Sample, hop: usize) -> Self {
+        // SAFETY: the caller's.
+        unsafe { Self::from_fn(|l| *at.add(l / D * hop + l % D)) }
+    }
+
+    /// Lane n of each segment of the vector at `row`, in all D lanes of the segment.
+    #[inline(always)]
+    unsafe fn broadcast_lane<const D: usize>(row: *const Self::Sample, n: usize) -> Self {
+        // SAFETY: the caller's.
+        unsafe { Self::from_fn(|l| *row.add(l / D * D + n)) }
+    }
+
+    /// Samples from little-endian 16-bit integers, which are divided by 2^15.
+    #[inline(always)]
+    unsafe fn load_i16(at: *const u8) -> Self {
+        let scale = Self::Sample::from(1.0 / 32768.0);
+        // SAFETY: the caller's.
+        let integer = |l: usize| i16::from_le(unsafe { at.cast::<i16>().add(l).read_unaligned() });
+        // SAFETY: the caller's.
+        unsafe { Self::from_fn(|l| Self::Sample::from_i32(integer(l).into()) * scale) }
+    }
+
+    /// Samples from little-endian 32-bit integers, rounded to the nearest, which are divided by 2^31.
+    #[inline(always)]
+    unsafe fn load_i32(at: *const u8) -> Self {
+        let scale = Self::Sample::from(1.0 / 2147483648.0);
+        // SAFETY: the caller's.
+        let integer = |l: usize| i32::from_le(unsafe { at.cast::<i32>().add(l).read_unaligned() });
+        // SAFETY: the caller's.
+        unsafe { Self::from_fn(|l| Self::Sample::from_i32(integer(l)) * scale) }
+    }
+
+    /// Samples times 2^15 to the nearest little-endian 16-bit integers, ties to even; NaN becomes 0. Returns how many
+    /// were clipped: those that do not round to a 16-bit integer.
+    #[inline(always)]
+    unsafe fn store_i16(self, at: *mut u8) -> u32 {
+        let mut clipped = 0;
+        for (l, value) in self.to_array().into_iter().enumerate().take(Self::LANES) {
+            let scaled = (value.into() * 32768.0).round_ties_even();
+            clipped += u32::from(!(-32768.0..=32767.0).contains(&scaled) && !scaled.is_nan());
+            // SAFETY: the caller's. The cast saturates.
+            unsafe { at.cast::<i16>().add(l).write_unaligned((scaled as i16).to_le()) };
+        }
+        clipped
+    }
+}

@@ -3,7 +3,7 @@
 use crate::BuildError;
 use crate::aligned::Aligned;
 use crate::sample::Sample;
-use crate::simd::{ColumnTile, Cut, FirKernel, Form, Polyphase, Recursion, SectionVector};
+use crate::simd::{ColumnTile, FirKernel, Form, Polyphase, Recursion, SectionVector, Tiling, group_lanes};
 use crate::structure::{Past, Structure};
 
 /// Where things lie: in a window of frames of N inputs, and in rows of S states.
@@ -11,10 +11,10 @@ pub(super) struct Layout {
     /// Of the recursion.
     lanes: usize,
     channels: usize,
-    inputs: Cut,
+    inputs: Tiling,
     /// S.
     states: usize,
-    state_rows: Cut,
+    state_rows: Tiling,
     /// Place of each state among the S.
     places: Vec<usize>,
     modal: bool,
@@ -26,7 +26,7 @@ impl Layout {
         structure: &Structure,
         (channels, ratio): (usize, usize),
         lanes: usize,
-        kernel: &FirKernel<T>,
+        kernel: FirKernel<T>,
     ) -> Result<Self, BuildError> {
         let order = structure.a.len();
         let history = structure.history();
@@ -42,13 +42,13 @@ impl Layout {
             .iter()
             .max()
             .map_or(0, |place| place + 1)
-            .next_multiple_of((2 * lanes).max(kernel.group()));
+            .next_multiple_of((2 * lanes).max(group_lanes::<T>()));
         // Where there is no state, the readout is not used.
-        let state_rows = kernel.cut(states.max(kernel.group()), states, ratio);
+        let state_rows = kernel.tiling(states.max(group_lanes::<T>()), states, ratio);
         Ok(Self {
             lanes,
             channels,
-            inputs: kernel.cut(channels, len, ratio),
+            inputs: kernel.tiling(channels, len, ratio),
             states,
             state_rows,
             places,
@@ -71,7 +71,7 @@ impl Layout {
         &self,
         structure: &Structure,
         ratio: usize,
-        kernel: &FirKernel<T>,
+        kernel: FirKernel<T>,
     ) -> Polyphase<T> {
         let n = self.channels;
         let tap =
@@ -83,7 +83,7 @@ impl Layout {
         &self,
         structure: &Structure,
         ratio: usize,
-        kernel: &FirKernel<T>,
+        kernel: FirKernel<T>,
     ) -> Polyphase<T> {
         let occupants = self.occupants();
         let last = occupants.len() - 1;

@@ -13,7 +13,7 @@ use super::BuildError;
 use super::aligned::Aligned;
 use super::fir::replace_not_finite;
 use super::sample::Sample;
-use super::simd::{Form, Isa, Polyphase, Recursion, RecursionKernel, Stretch};
+use super::simd::{FirKernel, Form, Isa, Polyphase, Recursion, RecursionKernel, Segment, all_finite};
 use super::structure::Structure;
 use super::ticks::{FastSink, TickSource};
 use super::window::Window;
@@ -66,15 +66,15 @@ impl<T: Sample> StateSpacePlan<T> {
         check("c", &filter.c, (ratio, order))?;
         check("d", &filter.d, (ratio, channels))?;
         let structure = Structure::new(filter);
-        let (advance, fir) = (T::recursion_kernel(isa), T::fir_kernel(isa));
-        let layout = Layout::new(&structure, (channels, ratio), advance.lanes, &fir)?;
+        let (advance, fir) = (RecursionKernel::new(isa), FirKernel::new(isa));
+        let layout = Layout::new(&structure, (channels, ratio), advance.lanes, fir)?;
         Ok(Self {
             channels,
             ratio,
             recursion: layout.recursion(&structure),
             advance,
-            inputs_readout: layout.inputs_readout(&structure, ratio, &fir),
-            states_readout: layout.states_readout(&structure, ratio, &fir),
+            inputs_readout: layout.inputs_readout(&structure, ratio, fir),
+            states_readout: layout.states_readout(&structure, ratio, fir),
             isa,
         })
     }
@@ -85,13 +85,13 @@ impl<T: Sample> StateSpacePlan<T> {
     }
 
     pub(crate) fn state(&self) -> StateSpaceState<T> {
-        let cut = self.inputs_readout.cut();
-        let beyond = cut.vector * self.channels;
+        let tiling = self.inputs_readout.tiling();
+        let beyond = tiling.vector * self.channels;
         let states = self.recursion.states;
         // A vector may read the rows of some more ticks, which mean nothing.
-        let rows = (BLOCK + self.states_readout.cut().vector) * states;
+        let rows = (BLOCK + self.states_readout.tiling().vector) * states;
         StateSpaceState {
-            window: Window::new(self.channels, cut.past, BLOCK * self.channels, beyond),
+            window: Window::new(self.channels, tiling.past, BLOCK * self.channels, beyond),
             rows: Aligned::new(rows),
             states,
             output: Aligned::new(self.ratio * BLOCK),
@@ -114,7 +114,7 @@ impl<T: Sample> StateSpacePlan<T> {
             let ticks = (source.ticks() - first).min(BLOCK - state.since);
             let input = state.window.room(ticks);
             source.gather(self.isa, first, ticks, input);
-            if !T::all_finite(self.isa, input) {
+            if !all_finite(self.isa, input) {
                 replaced += replace_not_finite(input);
             }
             self.filter(state, ticks);
@@ -128,9 +128,9 @@ impl<T: Sample> StateSpacePlan<T> {
     fn filter(&self, state: &mut StateSpaceState<T>, ticks: usize) {
         let StateSpaceState { window, rows, output, further, .. } = state;
         self.advance.run(&self.recursion, rows, window.view(), self.channels, ticks);
-        self.inputs_readout.run(&[Stretch { x: window.view(), first: 0, ticks }], output);
+        self.inputs_readout.run(&[Segment { x: window.view(), first: 0, frames: ticks }], output);
         if self.recursion.states > 0 {
-            self.states_readout.run(&[Stretch { x: rows, first: 0, ticks }], further);
+            self.states_readout.run(&[Segment { x: rows, first: 0, frames: ticks }], further);
             output.iter_mut().zip(&further[..ticks * self.ratio]).for_each(|(y, more)| *y = *y + *more);
         }
     }

@@ -1,6 +1,7 @@
 //! Fourier transforms across channels, and the product with a matrix of spectra between them.
 //!
-//! A *row* is a group of lanes (see `channels`) of real parts and one of imaginary parts; a transform of length F
+//! A *row* is a lane group (see [`vector`](super::vector)) of real parts and one of imaginary parts, in
+//! structure-of-arrays order; a transform of length F
 //! takes F rows to F rows, every lane for itself. That is why it is written here and not taken from a crate: those
 //! transform one stream, and frames of N channels would have to be brought into N streams and back. Here they
 //! are transformed as they lie.
@@ -21,33 +22,22 @@ mod passes;
 mod product;
 mod scatter;
 
-use super::Isa;
-use super::isa::Kind;
-use super::vector::Portable;
-#[cfg(target_arch = "x86_64")]
-use super::vector::{Avx2F32, Avx2F64};
+use super::dispatch::{Element, compiled};
+use super::isa::Isa;
+use super::vector::group_lanes;
 use crate::aligned::Aligned;
-use passes::{ForwardJob, InverseJob, forward, inverse};
-use product::{ProductJob, product};
-use scatter::{ScatterJob, scatter};
+pub(crate) use complex::row_samples;
+use passes::{Forward, ForwardJob, Inverse, InverseJob};
+use product::{Product, ProductJob};
+use scatter::{Scatter, ScatterJob};
 use std::f64::consts::TAU;
 
 /// The shortest transform: two passes of radix 4.
 pub(crate) const SHORTEST_TRANSFORM: usize = 16;
 
-/// Lanes of a group.
-pub(crate) const fn group_lanes<T>() -> usize {
-    32 / size_of::<T>()
-}
-
-/// Samples of a row: real and imaginary parts.
-pub(crate) const fn row_samples<T>() -> usize {
-    2 * group_lanes::<T>()
-}
-
 /// The length F of a transform, its factors, and which rows belong together.
 #[derive(Debug)]
-pub(crate) struct Transform<T: Copy + Default> {
+pub(crate) struct Transform<T: Element> {
     len: usize,
     /// exp(-2 pi i r j / L), r = 1, 2, 3, for 1 <= j < L / 4, for L = F, F / 4 ... > 4.
     factors: Aligned<T>,
@@ -55,7 +45,7 @@ pub(crate) struct Transform<T: Copy + Default> {
     pairs: Vec<[u32; 2]>,
 }
 
-impl<T: Copy + Default> Transform<T> {
+impl<T: Element> Transform<T> {
     /// # Panics
     /// If the length is no power of two from [`SHORTEST_TRANSFORM`] on, or too large for 32-bit places.
     pub(crate) fn new(len: usize, from_f64: impl Fn(f64) -> T) -> Self {
@@ -119,15 +109,15 @@ pub(crate) struct Frames<'a, T> {
 
 /// The kernels of one sample type.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TransformKernel<T: 'static> {
+pub(crate) struct TransformKernel<T> {
     /// By log2 D.
-    forward: &'static [unsafe fn(&ForwardJob<T>)],
-    product: &'static [unsafe fn(&ProductJob<'_, T>)],
+    forward: [unsafe fn(&ForwardJob<T>); 4],
+    product: [for<'a> unsafe fn(&'a ProductJob<'a, T>); 4],
     inverse: unsafe fn(&InverseJob<T>),
-    scatter: &'static [unsafe fn(&ScatterJob<T>)],
+    scatter: [unsafe fn(&ScatterJob<T>); 4],
 }
 
-impl<T: Copy + Default + 'static> TransformKernel<T> {
+impl<T: Element> TransformKernel<T> {
     /// Transforms F frames of each segment, of which `depth` samples are lanes, to F rows.
     ///
     /// # Panics
@@ -153,7 +143,7 @@ impl<T: Copy + Default + 'static> TransformKernel<T> {
             factors: transform.factors.as_ptr(),
             rows: rows.as_mut_ptr(),
         };
-        // SAFETY: the kernel was chosen for an available instruction set; the bounds are asserted above.
+        // SAFETY: the bounds are asserted above.
         unsafe { self.forward[depth.ilog2() as usize](&job) };
     }
 
@@ -226,72 +216,27 @@ impl<T: Copy + Default + 'static> TransformKernel<T> {
     }
 }
 
-/// The kernels of one instruction set, by depth.
-macro_rules! kernels {
-    ($module:ident, $vector:ty, $sample:ty, [$($depth:literal),*] $(, $features:literal)?) => {
-        mod $module {
-            use super::*;
-
-            $(#[target_feature(enable = $features)])?
-            unsafe fn run_forward<const D: usize>(job: &ForwardJob<$sample>) {
-                // SAFETY: the caller's.
-                unsafe { forward::<$vector, D>(job) }
-            }
-
-            $(#[target_feature(enable = $features)])?
-            unsafe fn run_product<const D: usize>(job: &ProductJob<'_, $sample>) {
-                // SAFETY: the caller's.
-                unsafe { product::<$vector, D>(job) }
-            }
-
-            $(#[target_feature(enable = $features)])?
-            unsafe fn run_inverse(job: &InverseJob<$sample>) {
-                // SAFETY: the caller's.
-                unsafe { inverse::<$vector>(job) }
-            }
-
-            $(#[target_feature(enable = $features)])?
-            unsafe fn run_scatter<const D: usize>(job: &ScatterJob<$sample>) {
-                // SAFETY: the caller's.
-                unsafe { scatter::<$vector, D>(job) }
-            }
-
-            pub(super) const KERNEL: TransformKernel<$sample> = TransformKernel {
-                forward: &[$(run_forward::<$depth>),*],
-                product: &[$(run_product::<$depth>),*],
-                inverse: run_inverse,
-                scatter: &[$(run_scatter::<$depth>),*],
-            };
-        }
+/// A kernel for D = 1, 2, 4 and 8 lanes a segment.
+macro_rules! by_depth {
+    ($kernel:ident, $isa:expr) => {
+        [
+            compiled::<$kernel<T, 1>>($isa),
+            compiled::<$kernel<T, 2>>($isa),
+            compiled::<$kernel<T, 4>>($isa),
+            compiled::<$kernel<T, 8>>($isa),
+        ]
     };
 }
 
-kernels!(portable_f32, Portable<f32>, f32, [1, 2, 4, 8]);
-kernels!(portable_f64, Portable<f64>, f64, [1, 2, 4]);
-#[cfg(target_arch = "x86_64")]
-kernels!(avx2_f32, Avx2F32, f32, [1, 2, 4, 8], "avx2,fma");
-#[cfg(target_arch = "x86_64")]
-kernels!(avx2_f64, Avx2F64, f64, [1, 2, 4], "avx2,fma");
-
-impl TransformKernel<f32> {
-    /// The kernel for an instruction set. A group is as wide
-    /// as a vector of AVX2, which AVX-512 includes.
-    pub(crate) fn for_f32(isa: Isa) -> Self {
-        match isa.kind() {
-            #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 | Kind::Avx512 => avx2_f32::KERNEL,
-            Kind::Portable => portable_f32::KERNEL,
-        }
-    }
-}
-
-impl TransformKernel<f64> {
-    /// As [`TransformKernel::for_f32`].
-    pub(crate) fn for_f64(isa: Isa) -> Self {
-        match isa.kind() {
-            #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 | Kind::Avx512 => avx2_f64::KERNEL,
-            Kind::Portable => portable_f64::KERNEL,
+impl<T: Element> TransformKernel<T> {
+    /// The kernels for an instruction set, in vectors of one group.
+    pub(crate) fn new(isa: Isa) -> Self {
+        let isa = isa.narrow();
+        Self {
+            forward: by_depth!(Forward, isa),
+            product: by_depth!(Product, isa),
+            inverse: compiled::<Inverse<T>>(isa),
+            scatter: by_depth!(Scatter, isa),
         }
     }
 }

@@ -1,8 +1,9 @@
 //! The passes of the transform and of its inverse over rows.
 
-use super::super::channels::ChannelVector;
-use super::complex::Complex;
-use super::{group_lanes, row_samples};
+use super::super::dispatch::{Element, Kernel};
+use super::super::vector::{Vector, group_lanes};
+use super::complex::{Complex, row_samples};
+use std::marker::PhantomData;
 
 /// From frames to rows.
 pub(super) struct ForwardJob<T> {
@@ -22,93 +23,96 @@ pub(super) struct InverseJob<T> {
     pub(super) rows: *mut T,
 }
 
-/// The transform of length 4, or four times its inverse.
+/// The radix-4 butterfly: the transform of length 4, or four times its inverse.
 #[inline(always)]
-unsafe fn quarter<V: ChannelVector, const BACK: bool>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
-    unsafe {
-        let (even, odd) = (a.add(c), b.add(d));
-        let (even_far, odd_far) = (a.sub(c), b.sub(d));
-        let (minus, plus) = (even_far.sub_turned(odd_far), even_far.add_turned(odd_far));
-        let (first, third) = if BACK { (plus, minus) } else { (minus, plus) };
-        [even.add(odd), first, even.sub(odd), third]
-    }
+fn butterfly<V: Vector, const INVERSE: bool>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
+    let (even, odd) = (a.add(c), b.add(d));
+    let (even_far, odd_far) = (a.sub(c), b.sub(d));
+    let (minus, plus) = (even_far.sub_times_i(odd_far), even_far.add_times_i(odd_far));
+    let (first, third) = if INVERSE { (plus, minus) } else { (minus, plus) };
+    [even.add(odd), first, even.sub(odd), third]
 }
 
 /// Where a pass takes its rows from. No closure: what is not inlined is not compiled for the instruction set.
 ///
 /// # Safety
-/// As for [`Vector`](super::super::vector::Vector), and the rows exist.
-trait Rows<V: ChannelVector> {
+/// As for [`Vector`], and the rows exist.
+trait Rows<V: Vector> {
     unsafe fn row(&self, row: usize) -> Complex<V>;
 
-    /// Four rows, `quarter` apart.
+    /// Four rows, `spacing` apart.
     #[inline(always)]
-    unsafe fn four(&self, first: usize, quarter: usize) -> [Complex<V>; 4] {
+    unsafe fn four(&self, first: usize, spacing: usize) -> [Complex<V>; 4] {
+        // SAFETY: the caller's.
         unsafe {
             [
                 self.row(first),
-                self.row(first + quarter),
-                self.row(first + 2 * quarter),
-                self.row(first + 3 * quarter),
+                self.row(first + spacing),
+                self.row(first + 2 * spacing),
+                self.row(first + 3 * spacing),
             ]
         }
     }
 }
 
-/// Frames where they lie, D lanes of each segment, from lane `part` on.
-struct Gathered<'a, V: ChannelVector, const D: usize> {
+/// Frames where they lie, D lanes of each segment.
+struct Gathered<'a, V: Vector, const D: usize> {
     job: &'a ForwardJob<V::Sample>,
-    part: usize,
 }
 
-impl<V: ChannelVector, const D: usize> Rows<V> for Gathered<'_, V, D> {
+impl<V: Vector, const D: usize> Rows<V> for Gathered<'_, V, D> {
     #[inline(always)]
     unsafe fn row(&self, row: usize) -> Complex<V> {
         let ForwardJob { parts: [re, im], stride, hop, .. } = *self.job;
+        // SAFETY: the caller's.
         unsafe {
             Complex {
-                re: V::gather::<D>(re.add(row * stride), hop, self.part),
-                im: V::gather::<D>(im.add(row * stride), hop, self.part),
+                re: V::segments::<D>(re.add(row * stride), hop),
+                im: V::segments::<D>(im.add(row * stride), hop),
             }
         }
     }
 }
 
-/// Some lanes of all rows.
+/// All rows.
 #[derive(Clone, Copy)]
-struct Work<V: ChannelVector> {
+struct Work<V: Vector> {
     rows: *mut V::Sample,
     len: usize,
 }
 
-impl<V: ChannelVector> Rows<V> for Work<V> {
+impl<V: Vector> Rows<V> for Work<V> {
     #[inline(always)]
     unsafe fn row(&self, row: usize) -> Complex<V> {
+        // SAFETY: the caller's.
         unsafe { Complex::load(self.at(row)) }
     }
 }
 
 /// # Safety
 /// As for [`Rows`].
-impl<V: ChannelVector> Work<V> {
+impl<V: Vector> Work<V> {
     #[inline(always)]
     unsafe fn at(&self, row: usize) -> *mut V::Sample {
+        // SAFETY: the caller's.
         unsafe { self.rows.add(row * row_samples::<V::Sample>()) }
     }
 
     #[inline(always)]
-    unsafe fn store(&self, first: usize, quarter: usize, [a, b, c, d]: [Complex<V>; 4]) {
+    unsafe fn store(&self, first: usize, spacing: usize, [a, b, c, d]: [Complex<V>; 4]) {
+        // SAFETY: the caller's.
         unsafe {
             a.store(self.at(first));
-            b.store(self.at(first + quarter));
-            c.store(self.at(first + 2 * quarter));
-            d.store(self.at(first + 3 * quarter));
+            b.store(self.at(first + spacing));
+            c.store(self.at(first + 2 * spacing));
+            d.store(self.at(first + 3 * spacing));
         }
     }
 
-    /// The factors of place j >= 1 of a pass.
+    /// The twiddle factors of index j >= 1 of a pass.
     #[inline(always)]
-    unsafe fn turns(factors: *const V::Sample, j: usize) -> [Complex<V>; 3] {
+    unsafe fn twiddles(factors: *const V::Sample, j: usize) -> [Complex<V>; 3] {
+        // SAFETY: the caller's.
         unsafe {
             let at = factors.add(6 * (j - 1));
             [Complex::splat(at), Complex::splat(at.add(2)), Complex::splat(at.add(4))]
@@ -119,11 +123,12 @@ impl<V: ChannelVector> Work<V> {
     #[inline(always)]
     unsafe fn forward_pass(&self, from: &impl Rows<V>, base: usize, span: usize, factors: *const V::Sample) {
         let next = span / 4;
+        // SAFETY: the caller's.
         unsafe {
-            self.store(base, next, quarter::<V, false>(from.four(base, next)));
+            self.store(base, next, butterfly::<V, false>(from.four(base, next)));
             for j in 1..next {
-                let [w1, w2, w3] = Self::turns(factors, j);
-                let [a, b, c, d] = quarter::<V, false>(from.four(base + j, next));
+                let [w1, w2, w3] = Self::twiddles(factors, j);
+                let [a, b, c, d] = butterfly::<V, false>(from.four(base + j, next));
                 self.store(base + j, next, [a, b.mul(w1), c.mul(w2), d.mul(w3)]);
             }
         }
@@ -132,25 +137,27 @@ impl<V: ChannelVector> Work<V> {
     #[inline(always)]
     unsafe fn inverse_pass(&self, base: usize, span: usize, factors: *const V::Sample) {
         let next = span / 4;
+        // SAFETY: the caller's.
         unsafe {
-            self.store(base, next, quarter::<V, true>(self.four(base, next)));
+            self.store(base, next, butterfly::<V, true>(self.four(base, next)));
             for j in 1..next {
-                let [w1, w2, w3] = Self::turns(factors, j);
+                let [w1, w2, w3] = Self::twiddles(factors, j);
                 let [a, b, c, d] = self.four(base + j, next);
-                let turned = [a, b.mul_conjugate(w1), c.mul_conjugate(w2), d.mul_conjugate(w3)];
-                self.store(base + j, next, quarter::<V, true>(turned));
+                let twiddled = [a, b.mul_conjugate(w1), c.mul_conjugate(w2), d.mul_conjugate(w3)];
+                self.store(base + j, next, butterfly::<V, true>(twiddled));
             }
         }
     }
 
     /// The pass over spans of 4 rows, or of 2.
     #[inline(always)]
-    unsafe fn short_spans<const BACK: bool>(&self, span: usize) {
+    unsafe fn short_spans<const INVERSE: bool>(&self, span: usize) {
         for base in (0..self.len).step_by(4) {
+            // SAFETY: the caller's.
             unsafe {
                 let [a, b, c, d] = self.four(base, 1);
                 let done = if span == 4 {
-                    quarter::<V, BACK>([a, b, c, d])
+                    butterfly::<V, INVERSE>([a, b, c, d])
                 } else {
                     [a.add(b), a.sub(b), c.add(d), c.sub(d)]
                 };
@@ -161,6 +168,7 @@ impl<V: ChannelVector> Work<V> {
 
     #[inline(always)]
     unsafe fn forward(&self, from: &impl Rows<V>, mut factors: *const V::Sample) {
+        // SAFETY: the caller's.
         unsafe {
             self.forward_pass(from, 0, self.len, factors);
             let mut span = self.len / 4;
@@ -178,6 +186,7 @@ impl<V: ChannelVector> Work<V> {
 
     #[inline(always)]
     unsafe fn inverse(&self, mut factors: *const V::Sample) {
+        // SAFETY: the caller's.
         unsafe {
             let mut span = if self.len.ilog2().is_multiple_of(2) { 4 } else { 2 };
             self.short_spans::<true>(span);
@@ -191,21 +200,35 @@ impl<V: ChannelVector> Work<V> {
     }
 }
 
-#[inline(always)]
-pub(super) unsafe fn forward<V: ChannelVector, const D: usize>(job: &ForwardJob<V::Sample>) {
-    for part in (0..group_lanes::<V::Sample>()).step_by(V::LANES) {
-        // SAFETY: the caller's.
-        unsafe {
-            let work = Work::<V> { rows: job.rows.add(part), len: job.len };
-            work.forward(&Gathered::<V, D> { job, part }, job.factors);
+/// The transform.
+pub(super) struct Forward<T, const D: usize>(PhantomData<T>);
+
+impl<T: Element, const D: usize> Kernel for Forward<T, D> {
+    type Sample = T;
+    type Job<'a> = &'a ForwardJob<T>;
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = T>>(job: &ForwardJob<T>) {
+        if const { D > group_lanes::<T>() } {
+            unreachable!("segments have a group of lanes at most");
         }
+        // SAFETY: the caller's.
+        unsafe { Work::<V> { rows: job.rows, len: job.len }.forward(&Gathered::<V, D> { job }, job.factors) };
     }
 }
 
-#[inline(always)]
-pub(super) unsafe fn inverse<V: ChannelVector>(job: &InverseJob<V::Sample>) {
-    for part in (0..group_lanes::<V::Sample>()).step_by(V::LANES) {
+/// The inverse times F.
+pub(super) struct Inverse<T>(PhantomData<T>);
+
+impl<T: Element> Kernel for Inverse<T> {
+    type Sample = T;
+    type Job<'a> = &'a InverseJob<T>;
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = T>>(job: &InverseJob<T>) {
         // SAFETY: the caller's.
-        unsafe { Work::<V> { rows: job.rows.add(part), len: job.len }.inverse(job.factors) };
+        unsafe { Work::<V> { rows: job.rows, len: job.len }.inverse(job.factors) };
     }
 }

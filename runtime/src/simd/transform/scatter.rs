@@ -1,7 +1,9 @@
 //! Rows back to frames.
 
-use super::super::channels::ChannelVector;
-use super::{group_lanes, row_samples};
+use super::super::dispatch::{Element, Kernel};
+use super::super::vector::{Vector, group_lanes};
+use super::complex::row_samples;
+use std::marker::PhantomData;
 
 /// From the last rows of a transform to the frames of the output.
 pub(super) struct ScatterJob<T> {
@@ -14,28 +16,36 @@ pub(super) struct ScatterJob<T> {
     pub(super) count: usize,
 }
 
-#[inline(always)]
-pub(super) unsafe fn scatter<V: ChannelVector, const D: usize>(job: &ScatterJob<V::Sample>) {
-    let (row, group) = (row_samples::<V::Sample>(), group_lanes::<V::Sample>());
-    let (mut out, count, stride) = (job.out, job.count, job.stride);
-    for part in 0..2 * group / D {
-        // Real and imaginary parts take turns.
-        let mut lanes = job.rows.wrapping_add(part % 2 * group + part / 2 * D);
-        for _ in 0..count {
-            // SAFETY: the caller's.
-            unsafe {
-                if D < group {
-                    out.cast::<[V::Sample; D]>()
-                        .write_unaligned(lanes.cast::<[V::Sample; D]>().read_unaligned());
-                } else {
-                    for g in 0..job.groups {
-                        for l in (0..group).step_by(V::LANES) {
-                            V::load(lanes.add(g * job.plane + l)).store(out.add(g * group + l));
+/// Frames from the rows of D lanes each.
+pub(super) struct Scatter<T, const D: usize>(PhantomData<T>);
+
+impl<T: Element, const D: usize> Kernel for Scatter<T, D> {
+    type Sample = T;
+    type Job<'a> = &'a ScatterJob<T>;
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = T>>(job: &ScatterJob<T>) {
+        if const { D > group_lanes::<T>() } {
+            unreachable!("segments have a group of lanes at most");
+        }
+        let mut out = job.out;
+        for segment in 0..2 * V::GROUP / D {
+            // Real and imaginary parts take turns.
+            let mut lanes = job.rows.wrapping_add(segment % 2 * V::GROUP + segment / 2 * D);
+            for _ in 0..job.count {
+                // SAFETY: the caller's.
+                unsafe {
+                    if D < V::GROUP {
+                        out.cast::<[T; D]>().write_unaligned(lanes.cast::<[T; D]>().read_unaligned());
+                    } else {
+                        for g in 0..job.groups {
+                            V::load(lanes.add(g * job.plane)).store(out.add(g * V::GROUP));
                         }
                     }
                 }
+                (lanes, out) = (lanes.wrapping_add(row_samples::<T>()), out.wrapping_add(job.stride));
             }
-            (lanes, out) = (lanes.wrapping_add(row), out.wrapping_add(stride));
         }
     }
 }

@@ -1,0 +1,323 @@
+//! AVX2 and FMA: one lane group is one register.
+
+use super::avx2_frames::{
+    diagonal_quads_f32, far_f32, far_f64, high, low, store_both, store_frames_f32, store_frames_f64,
+    store_pairs, sum_frames_f32, sum_frames_f64,
+};
+use super::avx2_tile::{tile_f32, tile_f64};
+use super::vector::Vector;
+use std::arch::x86_64::*;
+
+/// Eight lanes of f32.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Avx2F32(pub(super) __m256);
+
+/// Four lanes of f64.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Avx2F64(pub(super) __m256d);
+
+/// The memory access and arithmetic of a register of x86.
+macro_rules! register {
+    ($splat:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $fmadd:ident $fnmadd:ident) => {
+        #[inline(always)]
+        unsafe fn splat(value: Self::Sample) -> Self {
+            // SAFETY: the caller's.
+            Self(unsafe { $splat(value) })
+        }
+
+        #[inline(always)]
+        unsafe fn load(at: *const Self::Sample) -> Self {
+            // SAFETY: the caller's.
+            Self(unsafe { $load(at) })
+        }
+
+        #[inline(always)]
+        unsafe fn store(self, at: *mut Self::Sample) {
+            // SAFETY: the caller's.
+            unsafe { $store(at, self.0) }
+        }
+
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            // SAFETY: a vector exists only where its instructions do.
+            Self(unsafe { $add(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            // SAFETY: as above.
+            Self(unsafe { $sub(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn mul(self, factor: Self) -> Self {
+            // SAFETY: as above.
+            Self(unsafe { $mul(self.0, factor.0) })
+        }
+
+        #[inline(always)]
+        fn mul_add(self, factor: Self, sum: Self) -> Self {
+            // SAFETY: as above.
+            Self(unsafe { $fmadd(self.0, factor.0, sum.0) })
+        }
+
+        #[inline(always)]
+        fn neg_mul_add(self, factor: Self, sum: Self) -> Self {
+            // SAFETY: as above.
+            Self(unsafe { $fnmadd(self.0, factor.0, sum.0) })
+        }
+    };
+}
+pub(super) use register;
+
+impl Vector for Avx2F32 {
+    type Sample = f32;
+    type Group = Self;
+    const LANES: usize = 8;
+    // Of 16 registers: 12 sums, 3 inputs and a coefficient.
+    const SUMS: usize = 12;
+
+    register!(_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps
+        _mm256_fmadd_ps _mm256_fnmadd_ps);
+
+    #[inline(always)]
+    fn finite(self) -> bool {
+        // x - x is 0 only if x is finite.
+        // SAFETY: a vector exists only where its instructions do.
+        unsafe {
+            let zero = _mm256_sub_ps(self.0, self.0);
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_NEQ_UQ>(zero, _mm256_setzero_ps())) == 0
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn broadcast<const D: usize>(at: *const f32) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe {
+            match D {
+                1 => _mm256_set1_ps(*at),
+                2 => _mm256_castpd_ps(_mm256_set1_pd(at.cast::<f64>().read_unaligned())),
+                4 => _mm256_broadcast_ps(&at.cast::<__m128>().read_unaligned()),
+                _ => _mm256_loadu_ps(at),
+            }
+        })
+    }
+
+    #[inline(always)]
+    fn diagonal_quads(sums: [Self; 4]) -> Self {
+        // SAFETY: a vector exists only where its instructions do.
+        Self(unsafe { diagonal_quads_f32(sums.map(|sum| sum.0)) })
+    }
+
+    #[inline(always)]
+    fn diagonal_halves([a, b, c, d]: [Self; 4]) -> Self {
+        // SAFETY: a vector exists only where its instructions do.
+        Self(unsafe {
+            let (even, odd) = (far_f32(a.0, c.0), far_f32(b.0, d.0));
+            _mm256_add_ps(even, _mm256_permute_ps::<0b10_11_00_01>(odd))
+        })
+    }
+
+    #[inline(always)]
+    fn sum_frames<const D: usize>(vectors: impl Fn(usize) -> Self) -> Self {
+        // SAFETY: a vector exists only where its instructions do.
+        Self(unsafe { sum_frames_f32::<D>(|v| vectors(v).0) })
+    }
+
+    #[inline(always)]
+    unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f32, hop: usize) {
+        // SAFETY: the caller's.
+        unsafe { store_frames_f32::<P, D>(sums.map(|sum| sum.0), out, hop) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_halves(sums: [Self; 4], out: [*mut f32; 2], hop: usize) {
+        // SAFETY: the caller's.
+        unsafe { Self::diagonal_halves(sums).store_two_halves(out, hop) }
+    }
+
+    #[inline(always)]
+    unsafe fn tile<const D: usize, const P: usize, const R: usize>(
+        x: *const f32,
+        stride: usize,
+        coefficients: *const f32,
+        steps: usize,
+    ) -> Option<[[Self; R]; P]> {
+        // SAFETY: the caller's.
+        unsafe { tile_f32::<_, D, P, R>(Self, x, stride, coefficients, steps) }
+    }
+
+    #[inline(always)]
+    unsafe fn segments<const D: usize>(at: *const f32, hop: usize) -> Self {
+        // SAFETY: the caller's.
+        unsafe {
+            let s = |segment: usize| at.add(segment * hop);
+            Self(match D {
+                1 => _mm256_setr_ps(*s(0), *s(1), *s(2), *s(3), *s(4), *s(5), *s(6), *s(7)),
+                2 => {
+                    let low = _mm_loadh_pd(_mm_load_sd(s(0).cast()), s(1).cast());
+                    let high = _mm_loadh_pd(_mm_load_sd(s(2).cast()), s(3).cast());
+                    _mm256_castpd_ps(_mm256_set_m128d(high, low))
+                }
+                4 => _mm256_set_m128(_mm_loadu_ps(s(1)), _mm_loadu_ps(at)),
+                _ => _mm256_loadu_ps(at),
+            })
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn broadcast_lane<const D: usize>(row: *const f32, n: usize) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe {
+            match D {
+                1 => _mm256_loadu_ps(row),
+                2 if n == 0 => _mm256_moveldup_ps(_mm256_loadu_ps(row)),
+                2 => _mm256_movehdup_ps(_mm256_loadu_ps(row)),
+                4 => _mm256_permutevar_ps(_mm256_loadu_ps(row), _mm256_set1_epi32(n as i32)),
+                _ => _mm256_set1_ps(*row.add(n)),
+            }
+        })
+    }
+
+    #[inline(always)]
+    unsafe fn load_i16(at: *const u8) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe {
+            let wide = _mm256_cvtepi16_epi32(_mm_loadu_si128(at.cast()));
+            _mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 32768.0))
+        })
+    }
+
+    #[inline(always)]
+    unsafe fn load_i32(at: *const u8) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe {
+            let wide = _mm256_loadu_si256(at.cast());
+            _mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 2147483648.0))
+        })
+    }
+
+    /// -32768.5 rounds to -32768, which fits, and 32767.5 to 32768, which does not.
+    #[inline(always)]
+    unsafe fn store_i16(self, at: *mut u8) -> u32 {
+        // SAFETY: the caller's.
+        unsafe {
+            let scaled = _mm256_mul_ps(self.0, _mm256_set1_ps(32768.0));
+            let low = _mm256_cmp_ps::<_CMP_LT_OQ>(scaled, _mm256_set1_ps(-32768.5));
+            let high = _mm256_cmp_ps::<_CMP_GE_OQ>(scaled, _mm256_set1_ps(32767.5));
+            let clipped = _mm256_movemask_ps(_mm256_or_ps(low, high));
+            let number = _mm256_and_ps(scaled, _mm256_cmp_ps::<_CMP_ORD_Q>(scaled, scaled));
+            // What is too small becomes the least i32, and what is too large would; packing saturates.
+            let wide = _mm256_cvtps_epi32(_mm256_min_ps(_mm256_set1_ps(32767.0), number));
+            let packed = _mm_packs_epi32(_mm256_castsi256_si128(wide), _mm256_extracti128_si256::<1>(wide));
+            _mm_storeu_si128(at.cast(), packed);
+            // Hardly ever is there anything to count.
+            if clipped == 0 { 0 } else { clipped.count_ones() }
+        }
+    }
+}
+
+impl Avx2F32 {
+    /// Two frames of [`Vector::store_halves`], whose sums are `self`.
+    ///
+    /// # Safety
+    /// As there.
+    #[inline(always)]
+    pub(super) unsafe fn store_two_halves(self, out: [*mut f32; 2], hop: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            store_pairs(low(self.0), out);
+            store_pairs(high(self.0), out.map(|out| out.add(hop)));
+        }
+    }
+}
+
+impl Vector for Avx2F64 {
+    type Sample = f64;
+    type Group = Self;
+    const LANES: usize = 4;
+    const SUMS: usize = 12;
+
+    register!(_mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd
+        _mm256_fmadd_pd _mm256_fnmadd_pd);
+
+    #[inline(always)]
+    fn finite(self) -> bool {
+        // x - x is 0 only if x is finite.
+        // SAFETY: a vector exists only where its instructions do.
+        unsafe {
+            let zero = _mm256_sub_pd(self.0, self.0);
+            _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_NEQ_UQ>(zero, _mm256_setzero_pd())) == 0
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn broadcast<const D: usize>(at: *const f64) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe {
+            match D {
+                1 => _mm256_set1_pd(*at),
+                2 => _mm256_broadcast_pd(&at.cast::<__m128d>().read_unaligned()),
+                _ => _mm256_loadu_pd(at),
+            }
+        })
+    }
+
+    #[inline(always)]
+    fn sum_frames<const D: usize>(vectors: impl Fn(usize) -> Self) -> Self {
+        // SAFETY: a vector exists only where its instructions do.
+        Self(unsafe { sum_frames_f64::<D>(|v| vectors(v).0) })
+    }
+
+    #[inline(always)]
+    unsafe fn store_frames<const P: usize, const D: usize>(sums: [Self; 4], out: *mut f64, hop: usize) {
+        // SAFETY: the caller's.
+        unsafe { store_frames_f64::<P, D>(sums.map(|sum| sum.0), out, hop) }
+    }
+
+    #[inline(always)]
+    unsafe fn store_halves([a, b, c, d]: [Self; 4], out: [*mut f64; 2], _: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            let (even, odd) = (far_f64(a.0, c.0), far_f64(b.0, d.0));
+            store_both(_mm256_add_pd(even, _mm256_permute_pd::<0b0101>(odd)), out);
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn tile<const D: usize, const P: usize, const R: usize>(
+        x: *const f64,
+        stride: usize,
+        coefficients: *const f64,
+        steps: usize,
+    ) -> Option<[[Self; R]; P]> {
+        // SAFETY: the caller's.
+        unsafe { tile_f64::<_, D, P, R>(Self, x, stride, coefficients, steps) }
+    }
+
+    #[inline(always)]
+    unsafe fn segments<const D: usize>(at: *const f64, hop: usize) -> Self {
+        // SAFETY: the caller's.
+        unsafe {
+            let s = |segment: usize| at.add(segment * hop);
+            Self(match D {
+                1 => _mm256_setr_pd(*s(0), *s(1), *s(2), *s(3)),
+                2 => _mm256_set_m128d(_mm_loadu_pd(s(1)), _mm_loadu_pd(at)),
+                _ => _mm256_loadu_pd(at),
+            })
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn broadcast_lane<const D: usize>(row: *const f64, n: usize) -> Self {
+        // SAFETY: the caller's.
+        Self(unsafe {
+            match D {
+                1 => _mm256_loadu_pd(row),
+                2 if n == 0 => _mm256_movedup_pd(_mm256_loadu_pd(row)),
+                2 => _mm256_permute_pd::<0b1111>(_mm256_loadu_pd(row)),
+                _ => _mm256_set1_pd(*row.add(n)),
+            }
+        })
+    }
+}

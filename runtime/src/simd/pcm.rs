@@ -1,0 +1,254 @@
+//! Samples of PCM formats to f32 and back, and frames from rows, a lane group at a time.
+
+use super::dispatch::{Kernel, compiled};
+use super::fir::widths;
+use super::isa::Isa;
+use super::vector::Vector;
+use crate::pcm::PcmFormat;
+use std::marker::PhantomData;
+
+/// Lanes of a group.
+const GROUP: usize = 8;
+
+/// Decodes samples from the first on as far as there is a fast way; returns how many. The caller does the rest.
+pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32]) -> usize {
+    let isa = isa.narrow();
+    // SAFETY: the kernels ask nothing of their jobs.
+    unsafe {
+        match format {
+            PcmFormat::F32Le if cfg!(target_endian = "little") => compiled::<Decode<F32>>(isa)((bytes, out)),
+            PcmFormat::S16Le => compiled::<Decode<S16>>(isa)((bytes, out)),
+            PcmFormat::S32Le => compiled::<Decode<S32>>(isa)((bytes, out)),
+            _ => 0,
+        }
+    }
+}
+
+/// Encodes all samples; returns how many were clipped.
+///
+/// # Panics
+/// If `out` is too short.
+pub(crate) fn encode(isa: Isa, format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
+    assert!(samples.len() * format.bytes() <= out.len());
+    // SAFETY: the kernel asks nothing of its job.
+    unsafe { compiled::<Encode>(isa.narrow())((format, samples, out)) }
+}
+
+/// Sample p of frame k of `out` = `rows[p * stride + k]`, for frames of `m` samples; returns the
+/// frames done, from the first on. The caller does the rest.
+///
+/// # Panics
+/// If `out` or `rows` is too short; each row needs `frames` rounded up to 8.
+pub(crate) fn interleave(
+    isa: Isa,
+    rows: &[f32],
+    stride: usize,
+    m: usize,
+    frames: usize,
+    out: &mut [f32],
+) -> usize {
+    assert!(m * frames <= out.len());
+    assert!(m == 0 || (m - 1) * stride + frames.next_multiple_of(GROUP) <= rows.len());
+    let rows = rows.as_ptr();
+    // SAFETY: the bounds are asserted above.
+    unsafe { compiled::<Interleave>(isa.narrow())(Rows { rows, stride, m, frames, out: out.as_mut_ptr() }) }
+}
+
+/// A format that has a fast way.
+trait Format {
+    /// Bytes a sample.
+    const BYTES: usize;
+    /// # Safety
+    /// As for [`Vector`]; a group of samples is at `at`.
+    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V;
+}
+
+struct F32;
+struct S16;
+struct S32;
+
+impl Format for F32 {
+    const BYTES: usize = 4;
+
+    #[inline(always)]
+    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V {
+        // SAFETY: the caller's; vectors need no alignment.
+        unsafe { V::load(at.cast()) }
+    }
+}
+
+impl Format for S16 {
+    const BYTES: usize = 2;
+
+    #[inline(always)]
+    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V {
+        // SAFETY: the caller's.
+        unsafe { V::load_i16(at) }
+    }
+}
+
+impl Format for S32 {
+    const BYTES: usize = 4;
+
+    #[inline(always)]
+    unsafe fn load<V: Vector<Sample = f32>>(at: *const u8) -> V {
+        // SAFETY: the caller's.
+        unsafe { V::load_i32(at) }
+    }
+}
+
+/// Whole groups; the samples done.
+struct Decode<F>(PhantomData<F>);
+
+impl<F: Format> Kernel for Decode<F> {
+    type Sample = f32;
+    type Job<'a> = (&'a [u8], &'a mut [f32]);
+    type Output = usize;
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = f32>>((bytes, out): Self::Job<'_>) -> usize {
+        let mut done = 0;
+        for (out, bytes) in
+            out.as_chunks_mut::<GROUP>().0.iter_mut().zip(bytes.chunks_exact(GROUP * F::BYTES))
+        {
+            // SAFETY: the caller's; both slices hold a group.
+            unsafe { F::load::<V>(bytes.as_ptr()).store(out.as_mut_ptr()) };
+            done += GROUP;
+        }
+        done
+    }
+}
+
+/// All samples; how many were clipped.
+struct Encode;
+
+impl Kernel for Encode {
+    type Sample = f32;
+    type Job<'a> = (PcmFormat, &'a [f32], &'a mut [u8]);
+    type Output = u64;
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = f32>>((format, samples, out): Self::Job<'_>) -> u64 {
+        if format != PcmFormat::S16Le {
+            return encode_each(format, samples, out);
+        }
+        let (blocks, rest) = samples.as_chunks::<GROUP>();
+        let (groups, last) = out.split_at_mut(2 * GROUP * blocks.len());
+        let mut clipped = 0;
+        for (samples, out) in blocks.iter().zip(groups.as_chunks_mut::<{ 2 * GROUP }>().0) {
+            // SAFETY: the caller's; both arrays hold a group.
+            clipped += u64::from(unsafe { V::load(samples.as_ptr()).store_i16(out.as_mut_ptr()) });
+        }
+        clipped + encode_each(format, rest, last)
+    }
+}
+
+#[inline(always)]
+fn encode_each(format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
+    let mut clipped = 0;
+    crate::pcm::for_pcm_format!(format, FORMAT => {
+        for (slot, &value) in out.chunks_exact_mut(FORMAT.bytes()).zip(samples) {
+            clipped += u64::from(FORMAT.encode(f64::from(value), slot));
+        }
+    });
+    clipped
+}
+
+/// Rows, `stride` samples apart, and the frames that they become.
+struct Rows {
+    rows: *const f32,
+    stride: usize,
+    m: usize,
+    frames: usize,
+    out: *mut f32,
+}
+
+/// Blocks of a group of frames; the frames done. Rows are what sums of phases are with one lane a frame.
+struct Interleave;
+
+impl Kernel for Interleave {
+    type Sample = f32;
+    type Job<'a> = Rows;
+    type Output = usize;
+
+    #[inline(always)]
+    unsafe fn run<V: Vector<Sample = f32>>(Rows { rows, stride, m, frames, out }: Rows) -> usize {
+        // Of three samples a frame the place behind is written too.
+        let whole = frames.saturating_sub(usize::from(m == 3)) / GROUP * GROUP;
+        for first in (0..whole).step_by(GROUP) {
+            for (sample, width) in widths(m) {
+                // SAFETY: the caller's.
+                unsafe {
+                    let row = |p: usize| V::load(rows.add((sample + p.min(width - 1)) * stride + first));
+                    let block = [row(0), row(1), row(2), row(3)];
+                    let to = out.add(first * m + sample);
+                    match width {
+                        1 => block[0].store(to),
+                        2 => V::store_frames::<2, 1>(block, to, m),
+                        3 => V::store_frames::<3, 1>(block, to, m),
+                        _ => V::store_frames::<4, 1>(block, to, m),
+                    }
+                }
+            }
+        }
+        whole
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp(count: usize) -> Vec<f32> {
+        (0..count).map(|i| i as f32).collect()
+    }
+
+    #[test]
+    fn rows_become_frames() {
+        for n in 1..40 {
+            for frames in [0usize, 1, 7, 8, 9, 16, 24, 33] {
+                let stride = frames.next_multiple_of(8) + 3;
+                let rows = ramp(n * stride + 8);
+                let mut out = vec![-1.0; n * frames];
+                let done = interleave(Isa::detect(), &rows, stride, n, frames, &mut out);
+                // At most the last block and a cut one are left to the caller.
+                assert!(done <= frames && done + 16 > frames);
+                for k in 0..done {
+                    for i in 0..n {
+                        assert_eq!(out[k * n + i], rows[i * stride + k], "n {n} frames {frames}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn decoding_is_the_same_as_one_by_one() {
+        for format in PcmFormat::ALL {
+            let bytes: Vec<u8> = (0..8 * 131u32).map(|i| (i * i % 251) as u8).collect();
+            for count in [0, 1, 7, 8, 9, 131] {
+                let mut out = vec![-1.0; count];
+                let done = decode(Isa::detect(), format, &bytes, &mut out);
+                for (slot, sample) in out[..done].iter().zip(bytes.chunks_exact(format.bytes())) {
+                    let want = format.decode(sample) as f32;
+                    assert!(slot.to_bits() == want.to_bits() || slot.is_nan() && want.is_nan(), "{format}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn encoding_is_the_same_as_one_by_one() {
+        let mut samples: Vec<f32> = (0..70_000).map(|i| (i as f32 - 35_000.0) / 32768.0 + 1e-6).collect();
+        samples.extend([1e30, -1e30, 1.0, -1.0, 0.5 / 32768.0, 1.5 / 32768.0, 32767.5 / 32768.0]);
+        samples.splice(0..0, [f32::NAN, f32::INFINITY, f32::NEG_INFINITY]);
+        samples.extend([-32768.5, -32769.0, 32767.4, 32767.25, -32767.5, f32::NAN].map(|x| x / 32768.0));
+        for format in PcmFormat::ALL {
+            let mut fast = vec![0; samples.len() * format.bytes()];
+            let mut slow = fast.clone();
+            let clipped = encode(Isa::detect(), format, &samples, &mut fast);
+            assert_eq!(clipped, encode_each(format, &samples, &mut slow), "{format}");
+            assert_eq!(fast, slow, "{format}");
+        }
+    }
+}

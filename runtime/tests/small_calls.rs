@@ -1,0 +1,91 @@
+//! Every kernel on calls of a few frames against the definition. The calls are small enough for Miri
+//! (`tools/miri.sh`), which checks each load and store of the portable kernels.
+
+use hybank_runtime::{Form, Isa, Options, Plan, Precision, StateSpace, Stream};
+
+/// y[k M + p] = sum_i sum_j f_i[p + j M] x_i[k - j].
+fn definition(taps: &[Vec<f64>], ratio: usize, input: &[f64]) -> Vec<f64> {
+    let n = taps.len();
+    let output = |t: usize| {
+        let term = |(i, f): (usize, &Vec<f64>)| {
+            let frames = 0..=t / ratio;
+            frames.filter_map(|k| f.get(t - k * ratio).map(|c| c * input[k * n + i])).sum::<f64>()
+        };
+        taps.iter().enumerate().map(term).sum()
+    };
+    (0..input.len() / n * ratio).map(output).collect()
+}
+
+/// Numbers between -1 and 1 that follow no simple rule.
+fn samples(count: usize) -> Vec<f64> {
+    (0..count).map(|i| (i * i * 7919 % 2003) as f64 / 1001.0 - 1.0).collect()
+}
+
+/// The outputs of a stream for two calls of unequal length, without those that the algorithm adds at the beginning;
+/// zeros after the input bring out the last ones.
+fn run(plan: &Plan, input: &[f64]) -> Vec<f64> {
+    let (n, m) = (plan.channels(), plan.ratio());
+    let frames = input.len() / n + plan.extra_latency() / m;
+    let mut input = input.to_vec();
+    input.resize(frames * n, 0.0);
+    let mut out = vec![0.0; frames * m];
+    let mut stream = Stream::new(plan);
+    let first = frames / 3;
+    stream.process_f64(&input[..first * n], &mut out[..first * m]).unwrap();
+    stream.process_f64(&input[first * n..], &mut out[first * m..]).unwrap();
+    out.split_off(plan.extra_latency())
+}
+
+fn assert_close(got: &[f64], want: &[f64], eps: f64, case: &str) {
+    assert_eq!(got.len(), want.len(), "{case}");
+    for (t, (got, want)) in got.iter().zip(want).enumerate() {
+        assert!((got - want).abs() < eps, "{case}: sample {t} is {got}, not {want}");
+    }
+}
+
+#[test]
+fn fir_kernels_follow_the_definition() {
+    for (n, m) in [1, 2, 3, 4, 8, 9].into_iter().flat_map(|n| [1, 2, 3, 4, 5].map(|m| (n, m))) {
+        let taps: Vec<Vec<f64>> = samples(n * 4 * m).chunks(4 * m).map(<[f64]>::to_vec).collect();
+        let input = samples(n * 40);
+        let want = definition(&taps, m, &input);
+        for isa in Isa::available() {
+            for (precision, eps) in [(Precision::Single, 3e-5), (Precision::Double, 1e-13)] {
+                for form in [Form::Direct, Form::Fast, Form::OverlapSave(Some(16))] {
+                    let options = Options { isa, precision, form, ..Options::default() };
+                    let plan = Plan::from_taps(&taps, m, 0, options).unwrap();
+                    let case = format!("N {n} M {m} {isa} {precision:?} {form:?}");
+                    assert_close(&run(&plan, &input), &want, eps, &case);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn recursions_follow_the_definition() {
+    // One pole for each of three states, and the same states mixed, which no parallel form has.
+    let poles = [0.5, -0.25, 0.75];
+    for mixed in [0.0, 0.125] {
+        let row = |i: usize| (0..3).map(|j| if i == j { poles[i] } else { mixed }).collect();
+        let matrix =
+            |rows: usize, cols: usize| samples(rows * cols).chunks(cols).map(<[f64]>::to_vec).collect();
+        let filter =
+            StateSpace { a: (0..3).map(row).collect(), b: matrix(3, 2), c: matrix(2, 3), d: matrix(2, 2) };
+        let input = samples(2 * 70);
+        let mut want = Vec::new();
+        let mut x = [0.0; 3];
+        let product = |row: &[f64], v: &[f64]| row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
+        for u in input.chunks(2) {
+            want.extend((0..2).map(|p| product(&filter.c[p], &x) + product(&filter.d[p], u)));
+            x = std::array::from_fn(|i| product(&filter.a[i], &x) + product(&filter.b[i], u));
+        }
+        for isa in Isa::available() {
+            for (recursion, eps) in [(Precision::Single, 3e-5), (Precision::Double, 1e-13)] {
+                let options = Options { isa, recursion, ..Options::default() };
+                let plan = Plan::from_state_space(&filter, [2, 2], 0, options).unwrap();
+                assert_close(&run(&plan, &input), &want, eps, &format!("mixed {mixed} {isa} {recursion:?}"));
+            }
+        }
+    }
+}
