@@ -1,7 +1,8 @@
 //! How many fast samples a second one core makes, and what share of its multiply-add peak that is.
 //!
 //! `cargo bench --bench fir_throughput` prints a table of the public [`Stream`]; a word after `--` picks the rows
-//! that contain it. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
+//! that contain it, the name of an instruction set (`portable`, `avx2`, `avx512`) that set instead of the widest one.
+//! Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
 //! of many repeats, and so is the peak, which is measured anew beside each row.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
@@ -47,7 +48,7 @@ fn input(n: usize, ticks: usize) -> Vec<f32> {
 }
 
 /// Least seconds of one turn, and the peak of one core in multiply-adds a second of the same while.
-fn measure(mut turn: impl FnMut()) -> (f64, f64) {
+fn measure(isa: Isa, mut turn: impl FnMut()) -> (f64, f64) {
     let (mut best, mut peak) = (f64::MAX, 0f64);
     let begin = Instant::now();
     while begin.elapsed() < ROW {
@@ -55,7 +56,7 @@ fn measure(mut turn: impl FnMut()) -> (f64, f64) {
         turn();
         best = best.min(start.elapsed().as_secs_f64());
         let start = Instant::now();
-        let (count, sum) = multiply_add_chains(Isa::detect(), 10_000);
+        let (count, sum) = multiply_add_chains(isa, 10_000);
         black_box(sum);
         peak = peak.max(count as f64 / start.elapsed().as_secs_f64());
     }
@@ -65,9 +66,14 @@ fn measure(mut turn: impl FnMut()) -> (f64, f64) {
 /// The rows that were asked for.
 struct Table {
     wanted: Option<String>,
+    isa: Isa,
 }
 
 impl Table {
+    fn options(&self) -> Options {
+        Options { isa: self.isa, ..Options::default() }
+    }
+
     fn wants(&self, name: &str) -> bool {
         self.wanted.as_ref().is_none_or(|word| name.contains(word))
     }
@@ -77,7 +83,7 @@ impl Table {
         if !self.wants(name) {
             return;
         }
-        let (seconds, peak) = measure(turn);
+        let (seconds, peak) = measure(self.isa, turn);
         let rate = samples as f64 / seconds;
         let macs = rate * products;
         println!(
@@ -90,7 +96,7 @@ impl Table {
 
     /// The products are those of the direct form, so that the share of the peak may pass 100 % in others.
     fn fir(&self, name: &str, n: usize, m: usize, taps: usize, form: Form, call: usize) {
-        let options = Options { form, ..Options::default() };
+        let options = Options { form, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let x = input(n, TICKS);
         let mut y = vec![0.0; m * TICKS];
@@ -119,7 +125,7 @@ impl Table {
     /// Overlap-save; the products are those of the direct form.
     fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
         for len in [None, Some(64), Some(128), Some(256)] {
-            let options = Options { form: Form::OverlapSave(len), ..Options::default() };
+            let options = Options { form: Form::OverlapSave(len), ..self.options() };
             let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
             let x = input(n, TICKS);
             let mut y = vec![0.0; m * TICKS];
@@ -132,7 +138,7 @@ impl Table {
 
     /// In and out as f64; the peak in f64 is half the one printed.
     fn doubles(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
-        let options = Options { precision: Precision::Double, form, ..Options::default() };
+        let options = Options { precision: Precision::Double, form, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let x: Vec<f64> = input(n, TICKS).into_iter().map(f64::from).collect();
         let mut y = vec![0.0; m * TICKS];
@@ -142,7 +148,7 @@ impl Table {
     }
 
     fn pcm(&self, name: &str, n: usize, m: usize, taps: usize) {
-        let mut stream = Stream::new(&fir(n, m, taps).plan(Options::default()).unwrap());
+        let mut stream = Stream::new(&fir(n, m, taps).plan(self.options()).unwrap());
         let bytes: Vec<u8> = (0..2 * n * TICKS).map(|i| (i * 31) as u8).collect();
         let mut out = vec![0; 2 * m * TICKS];
         let layout = SampleLayout::packed(PcmFormat::S16Le);
@@ -158,7 +164,7 @@ impl Table {
         if !self.wants(name) {
             return;
         }
-        let options = Options { form, ..Options::default() };
+        let options = Options { form, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let workers = Workers::new(2).unwrap();
         let ticks = 16 * TICKS;
@@ -202,7 +208,7 @@ impl Table {
 
     /// Recursions have no peak to compare with: ticks are what counts.
     fn recursions(&self) {
-        let mut stream = Stream::new(&recursion().plan(Options::default()).unwrap());
+        let mut stream = Stream::new(&recursion().plan(self.options()).unwrap());
         let x = input(4, TICKS);
         let mut y = vec![0.0; 4 * TICKS];
         self.row("state space: 32 states, N 4 M 4", 4 * TICKS, 0.0, || {
@@ -212,9 +218,14 @@ impl Table {
 }
 
 fn main() {
-    // The first word that is no option of cargo's.
-    let table = Table { wanted: std::env::args().skip(1).find(|word| !word.starts_with('-')) };
-    println!("{}, one core unless said otherwise", Isa::detect());
+    // The words that are no options of cargo's.
+    let (sets, words): (Vec<_>, Vec<_>) = std::env::args()
+        .skip(1)
+        .filter(|word| !word.starts_with('-'))
+        .partition(|word| Isa::available().any(|isa| isa.name() == word));
+    let isa = Isa::available().find(|isa| sets.iter().any(|set| isa.name() == set));
+    let table = Table { wanted: words.into_iter().next(), isa: isa.unwrap_or_else(Isa::detect) };
+    println!("{}, one core unless said otherwise", table.isa);
     println!("| {:<34} | M outs/s | GMAC/s | of peak |", "case");
     println!("|{:-<36}|----------|--------|---------|", "");
     table.cases();
