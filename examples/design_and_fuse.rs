@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("gamma between {:?} and {:?}", bank.gamma.lower, bank.gamma.upper);
 
     let source: Source = "tones:440Hz,3kHz".parse()?;
-    let signal = Analog::Known(source.in_unit(spec.fast_period));
+    let signal = Analog::Known(source.normalised(spec.fast_period));
     let captured = capture(&Problem::new(&spec, bank.latency)?, &signal, TICKS);
     let ticks: Vec<f64> = (0..TICKS).flat_map(|k| captured.channels.iter().map(move |x| x[k])).collect();
 

@@ -5,6 +5,7 @@
 
 use hybank::design::{analyze, design};
 use hybank::spec::Spec;
+use hybank::units::Seconds;
 use std::error::Error;
 
 const SPEC: &str = r#"
@@ -22,7 +23,7 @@ method = "fir"
 taps = 22
 "#;
 
-/// Delay errors in fast periods.
+/// Delay errors in seconds; the fast period of the spec is 1 s.
 const ERRORS: [f64; 7] = [-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1];
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -35,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for first in ERRORS {
         print!("{first:>7.2}");
         for second in ERRORS {
-            let judged = analyze(&bank, &[first, second])?;
+            let judged = analyze(&bank, &[Seconds(first), Seconds(second)])?;
             assert!(judged.gamma >= judged.noncausal);
             if judged.gamma > worst.0 {
                 worst = (judged.gamma, [first, second]);
@@ -45,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!();
     }
     let (gamma, [first, second]) = worst;
-    let known = analyze(&bank, &[first, second])?.noncausal;
+    let known = analyze(&bank, &[Seconds(first), Seconds(second)])?.noncausal;
     println!("\nworst {gamma:.5} at ({first}, {second}); no bank is below {known:.5} there");
     Ok(())
 }

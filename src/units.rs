@@ -56,6 +56,14 @@ macro_rules! quantity {
             }
         }
 
+        impl fmt::LowerExp for $name {
+            /// The value in scientific notation and its unit.
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                fmt::LowerExp::fmt(&self.0, f)?;
+                write!(f, " {}", Self::UNIT)
+            }
+        }
+
         impl Add for $name {
             type Output = Self;
 
@@ -323,6 +331,7 @@ mod tests {
     #[test]
     fn quantities_are_written_with_their_unit() {
         assert_eq!(Seconds(0.3).to_string(), "0.3 s");
+        assert_eq!(format!("{:e}", Hertz(48e3)), "4.8e4 Hz");
         assert_eq!(format!("{:.2}", RadiansPerFastPeriod(1.23456)), "1.23 rad per fast period");
         assert_eq!(format!("{:.1}", Decibels(-3.01)), "-3.0 dB");
     }

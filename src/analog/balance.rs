@@ -1,4 +1,4 @@
-//! Scaling by powers of two: no rounding, only better-sized numbers.
+//! Scaling of states by powers of two, which causes no rounding.
 
 use crate::linalg::{Mat, inverse, power_of_two};
 
@@ -8,7 +8,7 @@ use super::section::Realisation;
 const MAX_DOUBLINGS: usize = 60;
 
 /// Scales every state by a power of two to unit input energy: the diagonal of the controllability
-/// Gramian lies between 0.37 and 1.6 afterwards. States that the input does not reach stay as they are.
+/// Gramian lies between 0.37 and 1.6 afterwards. States that the input does not drive keep their scale.
 pub(super) fn with_unit_states(system: &Realisation) -> Realisation {
     let mut scaled = system.clone();
     for (i, energy) in input_energy(system).into_iter().enumerate() {
@@ -25,7 +25,7 @@ pub(super) fn with_unit_states(system: &Realisation) -> Realisation {
 ///
 /// The bilinear map e = (alpha + a)(alpha - a)^-1 turns it into P = e P e' + 2 alpha g g' with
 /// g = (alpha - a)^-1 b, whose series is summed by doubling. Every term is positive, so the
-/// diagonal is accurate enough to scale by even where P itself is nearly singular.
+/// diagonal is accurate enough for scaling even if P is nearly singular.
 fn input_energy(system: &Realisation) -> Vec<f64> {
     let n = system.a.nrows();
     let alpha = typical_rate(&system.a);

@@ -2,18 +2,18 @@
 
 use crate::linalg::LinalgError;
 use crate::spec::FilterProblem;
+use crate::units::{RadiansPerFastPeriod, Seconds};
 
 use super::{MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_NORMALISED_POLE};
 
-/// Why a filter was refused. Poles and zeros are given in rad/s, the unit they were written in, so
-/// that the user finds them again.
+/// Why a filter was refused. Poles and zeros are given in rad/s, as the user wrote them.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AnalogError {
-    /// The fast period that time is measured in is not usable.
-    #[error("the fast period is {value} s; it must be a positive, finite number of seconds")]
-    TimeUnit {
-        /// The offending value in seconds.
-        value: f64,
+    /// The fast period is not positive and finite.
+    #[error("the fast period is {value}; it must be a positive, finite number of seconds")]
+    FastPeriod {
+        /// The offending value.
+        value: Seconds,
     },
     /// The written form breaks a rule that has nothing to do with its poles.
     #[error(transparent)]
@@ -29,19 +29,19 @@ pub enum AnalogError {
         /// Imaginary part in rad/s.
         im: f64,
     },
-    /// A pole that is slower or faster than the sampling grid can tell.
+    /// A pole so slow or so fast that samples do not distinguish it from an integrator or from a constant gain.
     #[error(
-        "the pole {re:e} {im:+e}j rad/s is {normalised:e} rad a fast period; between {MIN_NORMALISED_POLE:e} and \
-         {MAX_NORMALISED_POLE:e} a pole can be told from an integrator and from a wire. Check the units (rad/s for \
-         poles, hertz for cutoffs, seconds for periods) or leave the pole out"
+        "the pole {re:e} {im:+e}j rad/s is {normalised:e}; the supported range is {MIN_NORMALISED_POLE:e} to \
+         {MAX_NORMALISED_POLE:e}: slower poles look like integrators to the samples, faster ones like a constant gain. \
+         Check the units (rad/s for poles, hertz for cutoffs, seconds for periods) or leave the pole out"
     )]
     PoleOutOfRange {
         /// Real part in rad/s.
         re: f64,
         /// Imaginary part in rad/s.
         im: f64,
-        /// Modulus in rad a fast period.
-        normalised: f64,
+        /// Modulus of the normalised pole.
+        normalised: RadiansPerFastPeriod,
     },
     /// A complex pole or zero without its conjugate.
     #[error(
@@ -56,8 +56,10 @@ pub enum AnalogError {
         /// Imaginary part in rad/s.
         im: f64,
     },
-    /// The response vanishes at all frequencies although no coefficient list does.
-    #[error("the output of the filter does not depend on its input; check which states b drives and c reads")]
+    /// The response is zero at all frequencies although neither b nor c is zero.
+    #[error(
+        "the output of the filter does not depend on its input; check which states b drives and c observes"
+    )]
     NoTransmission,
     /// The gain leaves the range of double precision in normalised time.
     #[error(

@@ -1,21 +1,20 @@
-//! Which zeros go with which poles, and in what order the sections follow each other.
+//! Pairing of zeros with poles, and the order of the sections.
 
 use super::roots::{RootSet, Roots};
 use super::section::Section;
 
 /// Pairs zeros with poles and orders the sections, low quality first. Needs no more zeros than poles.
 ///
-/// Always the closest of all pairs left, by ratio of frequencies, is joined: a section whose zeros are far
-/// from its poles passes one side of the spectrum at a tiny gain, which a later section has to make up for
-/// in vain where rounding has taken the digits.
+/// In each step the pair with the least ratio of frequencies is joined. If the zeros of a section were far from its poles,
+/// its gain on one side of the spectrum would be tiny, and no later section could restore the digits lost to rounding.
 pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
-    let mut free = FreePoles { real: poles.real.clone(), upper: poles.upper.clone() };
+    let mut unpaired = UnpairedPoles { real: poles.real.clone(), upper: poles.upper.clone() };
     let mut pairs: Vec<Roots> = zeros.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im }).collect();
     let mut sections = Vec::new();
-    while let Some((pair, group)) = closest_pair(&pairs, &free) {
-        sections.push(Section { zeros: pairs.remove(pair), poles: free.take(group) });
+    while let Some((pair, group)) = closest_pair(&pairs, &unpaired) {
+        sections.push(Section { zeros: pairs.remove(pair), poles: unpaired.take(group) });
     }
-    sections.extend(free.rest());
+    sections.extend(unpaired.rest());
     let mut real_zeros = zeros.real.clone();
     while let Some((zero, section)) = closest_section(&real_zeros, &sections) {
         attach(&mut sections[section], real_zeros.remove(zero));
@@ -25,7 +24,7 @@ pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
 }
 
 /// Poles not yet in a section.
-struct FreePoles {
+struct UnpairedPoles {
     real: Vec<f64>,
     upper: Vec<(f64, f64)>,
 }
@@ -35,11 +34,11 @@ struct FreePoles {
 enum Group {
     /// A conjugate pair.
     Upper(usize),
-    /// The real poles at this place and the next, neighbours in size.
+    /// The real poles at this index and the next, neighbours in size.
     Real(usize),
 }
 
-impl FreePoles {
+impl UnpairedPoles {
     fn groups(&self) -> impl Iterator<Item = Group> {
         let upper = (0..self.upper.len()).map(Group::Upper);
         upper.chain((1..self.real.len()).map(|i| Group::Real(i - 1)))
@@ -61,7 +60,7 @@ impl FreePoles {
         poles
     }
 
-    /// Sections without zeros for what is left.
+    /// Sections without zeros for the remaining poles.
     fn rest(self) -> impl Iterator<Item = Section> {
         let conjugate = self.upper.into_iter().map(|(re, im)| Roots::Conjugate { re, im });
         let single = self.real.into_iter().map(Roots::One);
@@ -69,13 +68,12 @@ impl FreePoles {
     }
 }
 
-/// How much worse it is for a zero to be slower than its pole by some ratio than to be faster. Faster, the
-/// section amplifies low frequencies by its states, which costs nothing; slower, its states have to cancel
-/// its direct term there.
+/// Factor on the distance of a zero that is slower than its pole. With a faster zero the states amplify low frequencies,
+/// which is harmless. With a slower one the states have to cancel the direct term at low frequencies.
 const SLOW_ZERO_PENALTY: f64 = 4.0;
 
-/// Distance of two frequencies on a logarithmic scale. A zero at the origin counts as a very slow one, so
-/// that it goes with the slowest pole.
+/// Distance of two frequencies on a logarithmic scale. A zero at the origin counts as very slow, so that it
+/// is paired with the slowest pole.
 fn distance(zero: f64, pole: f64) -> f64 {
     let ratio = (zero.abs().max(1e-3 * super::MIN_NORMALISED_POLE) / pole.abs()).ln();
     if ratio < 0.0 { -SLOW_ZERO_PENALTY * ratio } else { ratio }
@@ -90,9 +88,9 @@ fn pair_distance(zeros: Roots, poles: Roots) -> f64 {
     }
 }
 
-fn closest_pair(pairs: &[Roots], free: &FreePoles) -> Option<(usize, Group)> {
-    let candidates = (0..pairs.len()).flat_map(|i| free.groups().map(move |group| (i, group)));
-    let cost = |&(i, group): &(usize, Group)| pair_distance(pairs[i], free.poles(group));
+fn closest_pair(pairs: &[Roots], unpaired: &UnpairedPoles) -> Option<(usize, Group)> {
+    let candidates = (0..pairs.len()).flat_map(|i| unpaired.groups().map(move |group| (i, group)));
+    let cost = |&(i, group): &(usize, Group)| pair_distance(pairs[i], unpaired.poles(group));
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 

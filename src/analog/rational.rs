@@ -1,5 +1,4 @@
-//! Numerator over denominator: factored where the roots reproduce the coefficients, kept whole where
-//! they do not.
+//! Numerator over denominator: factored where the roots reproduce the coefficients, else kept as polynomials.
 
 use crate::linalg::{Complex, Mat, eigenvalues};
 
@@ -7,10 +6,10 @@ use super::AnalogError;
 use super::roots::RootSet;
 use super::section::Realisation;
 use super::zpk::{Zpk, times_power};
+use crate::units::{RadiansPerFastPeriod, Seconds};
 
-/// Largest relative error of a coefficient rebuilt from roots, for which the roots are taken to
-/// *be* the polynomial. Roots of multiple poles are themselves wrong by much more (the m-th root
-/// of rounding), but their errors hang together and the response does not feel them.
+/// Largest relative error of any coefficient reproduced from the roots for which the polynomial is replaced by its roots.
+/// Single roots of a multiple pole have far larger errors (the m-th root of rounding), but these cancel in the product.
 const FACTOR_TOLERANCE: f64 = 1e-13;
 
 /// `num(s) / den(s)` in normalised time, coefficients in descending powers, `den[0] = 1`.
@@ -21,15 +20,15 @@ pub(super) struct Rational {
 }
 
 impl Rational {
-    /// Strips leading zeros, divides by the leading coefficient of `den` and measures time in units of `h`
-    /// seconds. Each list must hold a coefficient other than zero.
-    pub(super) fn new(num: &[f64], den: &[f64], h: f64) -> Self {
+    /// From coefficients for s in rad/s: strips leading zeros, divides by the leading coefficient of `den` and normalises
+    /// by the fast period `h`. Each list must hold a nonzero coefficient.
+    pub(super) fn new(num: &[f64], den: &[f64], h: Seconds) -> Self {
         let (num, den) = (without_leading_zeros(num), without_leading_zeros(den));
         let (lead, n) = (den[0], den.len() - 1);
         let scale = |coefficients: &[f64]| -> Vec<f64> {
             // The coefficient of s^k is divided by h^k, and all by the lead's h^n.
             let power = |i: usize| (n + 1 + i) as i64 - coefficients.len() as i64;
-            coefficients.iter().enumerate().map(|(i, &x)| times_power(x / lead, h, power(i))).collect()
+            coefficients.iter().enumerate().map(|(i, &x)| times_power(x / lead, h.0, power(i))).collect()
         };
         Self { num: scale(num), den: scale(den) }
     }
@@ -50,14 +49,14 @@ impl Rational {
         polynomial_roots(&self.den)
     }
 
-    /// Zeros, poles and gain, if they give the coefficients back to [`FACTOR_TOLERANCE`].
-    pub(super) fn factored(&self) -> Result<Option<Zpk>, AnalogError> {
+    /// Zeros, poles and gain, if they reproduce the coefficients to [`FACTOR_TOLERANCE`].
+    pub(super) fn factored(&self) -> Result<Option<Zpk<RadiansPerFastPeriod>>, AnalogError> {
         let poles = polynomial_roots(&self.den)?;
         let gain = self.num[0];
         let monic: Vec<f64> = self.num.iter().map(|x| x / gain).collect();
         let zeros = polynomial_roots(&monic)?;
-        let faithful = rebuilds(&poles, &self.den) && rebuilds(&zeros, &monic);
-        Ok(faithful.then_some(Zpk { zeros, poles, gain }))
+        let faithful = reproduces(&poles, &self.den) && reproduces(&zeros, &monic);
+        Ok(faithful.then(|| Zpk::new(zeros, poles, gain)))
     }
 
     /// Controllable canonical form in time measured by the natural frequency.
@@ -113,13 +112,13 @@ fn polynomial_roots(monic: &[f64]) -> Result<Vec<Complex<f64>>, AnalogError> {
     Ok(roots)
 }
 
-/// Roots of s^2 + b s + c without cancellation; a double root stays one.
+/// Roots of s^2 + b s + c without cancellation; a double root is returned as such.
 fn quadratic_roots(b: f64, c: f64) -> Vec<Complex<f64>> {
     let half = -0.5 * b;
     // b^2/4 - c with one rounding: the product's own rounding error is added back.
     let square = half * half;
     let discriminant = (square - c) + half.mul_add(half, -square);
-    // Within the rounding of the coefficients themselves two equal roots are meant, in any unit of time.
+    // A discriminant within the rounding of the coefficients stands for a double root, in any unit of time.
     if discriminant.abs() <= 8.0 * f64::EPSILON * square {
         return vec![half.into(); 2];
     }
@@ -127,9 +126,9 @@ fn quadratic_roots(b: f64, c: f64) -> Vec<Complex<f64>> {
         let im = (-discriminant).sqrt();
         return vec![Complex::new(half, im), Complex::new(half, -im)];
     }
-    let far = half + discriminant.sqrt().copysign(half);
-    let near = if far == 0.0 { 0.0 } else { c / far };
-    vec![far.into(), near.into()]
+    let larger = half + discriminant.sqrt().copysign(half);
+    let smaller = if larger == 0.0 { 0.0 } else { c / larger };
+    vec![larger.into(), smaller.into()]
 }
 
 fn companion_roots(monic: &[f64]) -> Result<Vec<Complex<f64>>, AnalogError> {
@@ -144,8 +143,8 @@ fn companion_roots(monic: &[f64]) -> Result<Vec<Complex<f64>>, AnalogError> {
     Ok(eigenvalues(&companion)?.into_iter().map(|z| z * w).collect())
 }
 
-/// Whether the product of (s - roots) has the given coefficients, each to a relative error.
-fn rebuilds(roots: &[Complex<f64>], monic: &[f64]) -> bool {
+/// Whether the product of (s - roots) has the given coefficients to [`FACTOR_TOLERANCE`].
+fn reproduces(roots: &[Complex<f64>], monic: &[f64]) -> bool {
     let Ok(set) = RootSet::new(roots, "root") else { return false };
     let mut product = vec![1.0];
     for r in &set.real {

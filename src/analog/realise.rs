@@ -1,28 +1,28 @@
-//! From a written filter to a gain and a chain of blocks in normalised time.
-
-use std::f64::consts::TAU;
+//! From a written filter to a gain and blocks in series, in normalised time.
 
 use crate::linalg::{Complex, Mat, eigenvalues, solve_c, to_complex};
 use crate::spec::{Family, FilterProblem, FilterSpec};
+use crate::units::{RadiansPerFastPeriod, Seconds};
 
 use super::pairing::pair_sections;
 use super::rational::Rational;
 use super::roots::RootSet;
 use super::section::{Realisation, Section};
-use super::{AnalogError, MIN_DAMPING_RATIO, Zpk, families};
+use super::zpk::{Cutoffs, Zpk};
+use super::{AnalogError, MIN_DAMPING_RATIO, families};
 
-/// One link of a chain with one input and one output.
+/// One block of a series, with one input and one output.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Block {
     /// One or two poles with at most as many zeros.
     Section(Section),
-    /// A polynomial fraction that would not be factored.
+    /// A polynomial fraction whose computed roots do not reproduce it.
     Rational(Rational),
-    /// State equations as they were given.
+    /// State equations as the spec gives them.
     State(Realisation),
 }
 
-/// A gain and the blocks behind it.
+/// A gain and blocks in series.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Chain {
     pub(super) gain: f64,
@@ -64,23 +64,20 @@ pub(super) fn state_response(state: &Realisation, s: Complex<f64>) -> Complex<f6
 }
 
 impl Chain {
-    /// Reads a filter whose written form has been checked; `h` is the time unit in seconds.
-    pub(super) fn new(filter: &FilterSpec, h: f64) -> Result<Self, AnalogError> {
+    /// Normalises by the fast period `h` a filter whose written form has been checked.
+    pub(super) fn new(filter: &FilterSpec, h: Seconds) -> Result<Self, AnalogError> {
         match filter {
             FilterSpec::TransferFunction { num, den } => Self::from_rational(Rational::new(num, den, h)),
             FilterSpec::ZeroPoleGain { zeros, poles, gain } => {
                 let complex = |list: &[[f64; 2]]| list.iter().map(|&[re, im]| Complex::new(re, im)).collect();
-                Self::from_zpk(
-                    &Zpk { zeros: complex(zeros), poles: complex(poles), gain: *gain }.stretched(h),
-                    h,
-                )
+                Self::from_zpk(&Zpk::new(complex(zeros), complex(poles), *gain).normalised(h), h)
             }
             FilterSpec::StateSpace { a, b, c } => Ok(Self::from_matrices(a, b, c, h)),
             FilterSpec::Family { family, order, cutoff, ripple_db, attenuation_db } => {
                 let order = order.unwrap_or(1);
                 let prototype =
                     prototype(*family, order, ripple_db.unwrap_or(0.0), attenuation_db.unwrap_or(0.0))?;
-                Self::from_zpk(&prototype.stretched(TAU * cutoff * h), h)
+                Self::from_zpk(&prototype.low_pass(*cutoff, h), h)
             }
             FilterSpec::Cascade { cascade } => {
                 let mut whole = Self { gain: 1.0, blocks: Vec::new() };
@@ -94,8 +91,8 @@ impl Chain {
         }
     }
 
-    /// `zpk` in normalised time; `h` only serves to name roots in rad/s.
-    fn from_zpk(zpk: &Zpk, h: f64) -> Result<Self, AnalogError> {
+    /// `h` only serves to give roots in rad/s in errors.
+    fn from_zpk(zpk: &Zpk<RadiansPerFastPeriod>, h: Seconds) -> Result<Self, AnalogError> {
         let poles = RootSet::new(&zpk.poles, "pole").map_err(|e| in_written_unit(e, h))?;
         let zeros = RootSet::new(&zpk.zeros, "zero").map_err(|e| in_written_unit(e, h))?;
         let sections = pair_sections(&poles, &zeros);
@@ -105,16 +102,16 @@ impl Chain {
 
     fn from_rational(rational: Rational) -> Result<Self, AnalogError> {
         match rational.factored()? {
-            Some(zpk) => Self::from_zpk(&zpk, 1.0),
+            Some(zpk) => Self::from_zpk(&zpk, Seconds(1.0)),
             None => Ok(Self { gain: 1.0, blocks: vec![Block::Rational(rational)] }),
         }
     }
 
-    fn from_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>], h: f64) -> Self {
+    fn from_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>], h: Seconds) -> Self {
         let n = a.len();
         let state = Realisation {
-            a: Mat::from_fn(n, n, |i, j| a[i][j] * h),
-            b: Mat::from_fn(n, 1, |i, _| b[i][0] * h),
+            a: Mat::from_fn(n, n, |i, j| a[i][j] * h.0),
+            b: Mat::from_fn(n, 1, |i, _| b[i][0] * h.0),
             c: Mat::from_fn(1, n, |_, j| c[0][j]),
             d: 0.0,
         };
@@ -122,8 +119,13 @@ impl Chain {
     }
 }
 
-/// The family member with cutoff 1 rad/s.
-fn prototype(family: Family, order: usize, ripple_db: f64, attenuation_db: f64) -> Result<Zpk, AnalogError> {
+/// The family member with its cutoff at |s| = 1.
+fn prototype(
+    family: Family,
+    order: usize,
+    ripple_db: f64,
+    attenuation_db: f64,
+) -> Result<Zpk<Cutoffs>, AnalogError> {
     let prototype = match family {
         Family::Butterworth => families::butterworth(order),
         Family::Chebyshev1 => families::chebyshev1(order, ripple_db),
@@ -135,16 +137,17 @@ fn prototype(family: Family, order: usize, ripple_db: f64, attenuation_db: f64) 
     if prototype.poles.iter().all(|p| -p.re >= MIN_DAMPING_RATIO * p.norm()) {
         return Ok(prototype);
     }
-    let rule = "with these ripples the edge of the pass band is sharper than 1e-9 of the cutoff, which no front end \
-                and no double can hold; lower the order or set the ripples further apart"
+    let rule = "with these ripples the transition band is narrower than 1e-9 of the cutoff, beyond double precision; \
+                lower the order or set the ripples further apart"
         .into();
     Err(FilterProblem::ParameterRange { key: "order", value: order as f64, unit: "", rule }.into())
 }
 
-fn in_written_unit(error: AnalogError, h: f64) -> AnalogError {
+/// The roots that `error` names, from rad per fast period to rad/s.
+fn in_written_unit(error: AnalogError, h: Seconds) -> AnalogError {
     match error {
         AnalogError::NotConjugate { what, re, im } => {
-            AnalogError::NotConjugate { what, re: re / h, im: im / h }
+            AnalogError::NotConjugate { what, re: re / h.0, im: im / h.0 }
         }
         other => other,
     }

@@ -1,15 +1,15 @@
-//! Real polynomials of degree zero to two by their roots, and lists of roots sorted into them.
+//! Real polynomials of degree zero to two in terms of their roots, and the sorting of root lists into them.
 
 use crate::linalg::Complex;
 
 use super::AnalogError;
 
-/// How far two listed roots may be from conjugate, relative to their modulus: generous enough for
-/// values typed with 12 digits, far too tight to pair roots that were meant to differ.
+/// Tolerance on conjugate roots, relative to their modulus: wide enough for values typed with 12 digits, and narrow enough
+/// not to pair distinct roots.
 const CONJUGATE_TOLERANCE: f64 = 1e-11;
 
-/// A monic real polynomial of degree at most two, kept by its roots because a product of
-/// differences is accurate next to a root where expanded coefficients cancel.
+/// A monic real polynomial of degree at most two, stored by its roots: near a root, the product of differences is accurate
+/// while expanded coefficients cancel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Roots {
     /// The constant 1.
@@ -79,7 +79,7 @@ impl Roots {
 
 /// A list of roots split into the real ones and the conjugate pairs, each sorted.
 ///
-/// The order does not depend on the order of listing, so two spellings of one filter are equal.
+/// The result does not depend on the order of the list, so two spellings of one filter are equal.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct RootSet {
     /// Real roots, ascending.
@@ -110,7 +110,7 @@ impl RootSet {
     }
 }
 
-/// Removes and returns the value of `lower` that is the conjugate of `root` within the tolerance.
+/// Removes and returns the element of `lower` that is the conjugate of `root` within the tolerance.
 fn take_partner(root: Complex<f64>, lower: &mut Vec<Complex<f64>>) -> Option<Complex<f64>> {
     let distance = |z: &Complex<f64>| (z.conj() - root).norm();
     let (index, nearest) = lower
@@ -121,7 +121,7 @@ fn take_partner(root: Complex<f64>, lower: &mut Vec<Complex<f64>>) -> Option<Com
     (distance(&nearest) <= CONJUGATE_TOLERANCE * root.norm()).then(|| lower.remove(index))
 }
 
-/// The real part of a root whose imaginary part is only rounding noise.
+/// The real part of a root whose imaginary part is rounding error.
 fn nearly_real(root: Complex<f64>) -> Option<f64> {
     (root.im.abs() <= CONJUGATE_TOLERANCE * root.re.abs()).then_some(root.re)
 }

@@ -2,6 +2,7 @@
 
 use crate::linalg::{Complex, Mat};
 use crate::spec::FilterSpec;
+use crate::units::{RadiansPerFastPeriod, Seconds};
 
 use super::balance::with_unit_states;
 use super::realise::Chain;
@@ -10,10 +11,10 @@ use super::{AnalogError, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_NORMALISED_
 
 /// A stable, strictly proper, real filter Phi in normalised time t' = t/h.
 ///
-/// State equations x' = a x + b f, out = c x with a: n x n, b: n x 1, c: 1 x n. The gain is that of the
-/// written filter: Phi'(s') = Phi(s'/h), dimensionless. Two filters are equal when their normalised poles,
-/// zeros and gains are (for state-space forms: their matrices), however they were written down; channels
-/// with equal filters can share one state.
+/// State equations dx/dt' = a x + b f, out = c x with a: n x n, b: n x 1, c: 1 x n, all dimensionless. The gain is that
+/// of the written filter: Phi'(s') = Phi(s'/h). Two filters are equal when their normalised poles, zeros and gains are
+/// (for state-space forms: their matrices), in whatever form they were written; channels with equal filters can share
+/// one state.
 ///
 /// Source: thesis section 5.2 asks for exactly these properties (rational, stable, strictly proper).
 #[derive(Debug, Clone)]
@@ -30,16 +31,16 @@ impl PartialEq for StrictlyProper {
 }
 
 impl StrictlyProper {
-    /// Checks and realises `filter` with time measured in units of `time_unit_seconds` (h).
+    /// Checks `filter` and realises it in normalised time t' = t / h, with h = `fast_period`.
     ///
     /// # Errors
-    /// [`AnalogError`]: a time unit that is not positive; a written form that breaks a rule; poles that are
-    /// unstable, without conjugate or outside [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a
-    /// response that is zero everywhere or beyond double precision.
-    pub fn new(filter: &FilterSpec, time_unit_seconds: f64) -> Result<Self, AnalogError> {
-        let h = time_unit_seconds;
-        if !(h.is_finite() && h > 0.0) {
-            return Err(AnalogError::TimeUnit { value: h });
+    /// [`AnalogError`]: a fast period that is not positive and finite; a written form that breaks a rule; poles that
+    /// are unstable, without conjugate or outside [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a response that
+    /// is zero at all frequencies or beyond double precision.
+    pub fn new(filter: &FilterSpec, fast_period: Seconds) -> Result<Self, AnalogError> {
+        let h = fast_period;
+        if !(h.0.is_finite() && h.0 > 0.0) {
+            return Err(AnalogError::FastPeriod { value: h });
         }
         filter.check()?;
         let chain = Chain::new(filter, h)?;
@@ -58,7 +59,7 @@ impl StrictlyProper {
     /// Refuses a filter whose response is zero or not a number where its poles are.
     fn transmitting(self) -> Result<Self, AnalogError> {
         let probes = self.poles.iter().map(|p| p.norm()).chain([0.0]);
-        let largest = probes.map(|w| self.response(w).norm()).fold(0.0, f64::max);
+        let largest = probes.map(|w| self.response(RadiansPerFastPeriod(w)).norm()).fold(0.0, f64::max);
         let sum: f64 = self.realisation.a.iter().chain(&self.realisation.b).chain(&self.realisation.c).sum();
         if !(largest.is_finite() && sum.is_finite()) {
             return Err(AnalogError::GainOutOfRange { value: self.chain.gain });
@@ -86,22 +87,22 @@ impl StrictlyProper {
         self.realisation.a.nrows()
     }
 
-    /// Phi'(j w) with w in rad a fast period, from poles and zeros where the filter has them.
-    pub fn response(&self, w: f64) -> Complex<f64> {
-        let s = Complex::new(0.0, w);
+    /// Phi'(j w), from poles and zeros where the filter has them.
+    pub fn response(&self, w: RadiansPerFastPeriod) -> Complex<f64> {
+        let s = Complex::new(0.0, w.0);
         self.chain
             .blocks
             .iter()
             .fold(self.chain.gain.into(), |value: Complex<f64>, block| value * block.response(s))
     }
 
-    /// The n poles in rad a fast period.
+    /// The n poles p' = p h, real and imaginary part in rad per fast period.
     pub fn poles(&self) -> &[Complex<f64>] {
         &self.poles
     }
 }
 
-/// The blocks in a row; the gain goes to the output, so that states keep their size.
+/// The blocks in series. The gain is applied at the output, so that states keep their size.
 fn realise(chain: &Chain) -> Realisation {
     let mut whole =
         chain.blocks.iter().fold(Realisation::wire(), |whole, block| whole.then(&block.realise()));
@@ -109,13 +110,15 @@ fn realise(chain: &Chain) -> Realisation {
     whole
 }
 
-fn check_pole(pole: Complex<f64>, h: f64) -> Result<(), AnalogError> {
-    let (re, im, normalised) = (pole.re / h, pole.im / h, pole.norm());
+/// The rules for a pole, given in rad per fast period; errors name it in rad/s.
+fn check_pole(pole: Complex<f64>, h: Seconds) -> Result<(), AnalogError> {
+    let (re, im, normalised) = (pole.re / h.0, pole.im / h.0, pole.norm());
     // Written so that NaN is refused too.
     if !(-pole.re >= MIN_DAMPING_RATIO * normalised && pole.re < 0.0) {
         return Err(AnalogError::Unstable { re, im });
     }
     if !(MIN_NORMALISED_POLE..=MAX_NORMALISED_POLE).contains(&normalised) {
+        let normalised = RadiansPerFastPeriod(normalised);
         return Err(AnalogError::PoleOutOfRange { re, im, normalised });
     }
     Ok(())

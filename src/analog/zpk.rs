@@ -1,22 +1,50 @@
-//! Zeros, poles and gain: the form that filter theory thinks in.
+//! Zeros, poles and gain.
+
+use std::f64::consts::TAU;
+use std::marker::PhantomData;
 
 use crate::linalg::Complex;
+use crate::units::{Hertz, RadiansPerFastPeriod, RadiansPerSecond, Seconds};
 
-/// `gain * prod(s - zeros) / prod(s - poles)`.
+/// The unit of s of a prototype: multiples of its cutoff, which lies at |s| = 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cutoffs;
+
+/// `gain * prod(s - zeros) / prod(s - poles)` with s in the unit `U`: [`Cutoffs`] for prototypes,
+/// [`RadiansPerSecond`] for physical filters, [`RadiansPerFastPeriod`] for normalised ones.
 ///
-/// A plain value without promises; [`StrictlyProper`](super::StrictlyProper) checks it. Complex
-/// values are listed with their conjugates.
+/// A plain value: [`StrictlyProper`](super::StrictlyProper) checks it. Complex values are listed with their conjugates.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Zpk {
+pub struct Zpk<U> {
     /// Finite zeros.
     pub zeros: Vec<Complex<f64>>,
     /// Poles.
     pub poles: Vec<Complex<f64>>,
     /// Leading coefficient.
     pub gain: f64,
+    unit: PhantomData<U>,
 }
 
-impl Zpk {
+impl Zpk<Cutoffs> {
+    /// The low-pass H(s' / w') in normalised time, with w' = 2 pi f h for the cutoff f.
+    pub fn low_pass(&self, cutoff: Hertz, fast_period: Seconds) -> Zpk<RadiansPerFastPeriod> {
+        self.stretched(TAU * cutoff.0 * fast_period.0)
+    }
+}
+
+impl Zpk<RadiansPerSecond> {
+    /// The same filter in normalised time, H(s' / h).
+    pub fn normalised(&self, fast_period: Seconds) -> Zpk<RadiansPerFastPeriod> {
+        self.stretched(fast_period.0)
+    }
+}
+
+impl<U> Zpk<U> {
+    /// From zeros, poles and leading coefficient, in that order.
+    pub fn new(zeros: Vec<Complex<f64>>, poles: Vec<Complex<f64>>, gain: f64) -> Self {
+        Self { zeros, poles, gain, unit: PhantomData }
+    }
+
     /// Value at the complex frequency `s`.
     pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
         let mut value = Complex::new(self.gain, 0.0);
@@ -30,23 +58,49 @@ impl Zpk {
         self.zeros.iter().skip(self.poles.len()).fold(value, |v, zero| v * (s - zero))
     }
 
-    /// Stretches the frequency axis: `H(s / omega)`, so that what happened at 1 happens at `omega`.
-    ///
-    /// With `omega` = cutoff in rad/s it turns a prototype into a low-pass; with `omega` = h in
-    /// seconds it turns rad/s into rad per fast period.
-    pub fn stretched(&self, omega: f64) -> Self {
+    /// H(s / scale): every zero and pole times `scale`. The unit of s changes with it.
+    fn stretched<V>(&self, scale: f64) -> Zpk<V> {
         let relative_degree = self.poles.len() as i64 - self.zeros.len() as i64;
-        Self {
-            zeros: self.zeros.iter().map(|z| z * omega).collect(),
-            poles: self.poles.iter().map(|p| p * omega).collect(),
-            gain: times_power(self.gain, omega, relative_degree),
-        }
+        Zpk::new(
+            self.zeros.iter().map(|z| z * scale).collect(),
+            self.poles.iter().map(|p| p * scale).collect(),
+            times_power(self.gain, scale, relative_degree),
+        )
     }
 }
 
-/// `x * base^exponent` by repeated multiplication: no intermediate power can overflow or underflow
-/// where the result does not.
+/// `x * base^exponent` by repeated multiplication, so that no intermediate value overflows or underflows unless the
+/// result does.
 pub(super) fn times_power(x: f64, base: f64, exponent: i64) -> f64 {
     let step = |y: f64| if exponent >= 0 { y * base } else { y / base };
     (0..exponent.unsigned_abs()).fold(x, |y, _| step(y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// H'(s h) = H(s) for nine decades of fast periods on both sides of a second.
+        #[test]
+        fn normalising_keeps_the_response(decade in -9.0..9.0f64, w in 0.01..100.0f64) {
+            let h = Seconds(10f64.powf(decade));
+            let poles = vec![Complex::new(-1.0, 2.0), Complex::new(-1.0, -2.0), Complex::new(-3.0, 0.0)];
+            let filter = Zpk::<RadiansPerSecond>::new(vec![Complex::new(-5.0, 0.0)], poles, 7.0);
+            let (s, normalised) = (Complex::new(0.0, w), filter.normalised(h));
+            let (a, b) = (filter.response(s), normalised.response(s * h.0));
+            prop_assert!((a - b).norm() < 1e-12 * a.norm(), "{} {}", a, b);
+        }
+
+        /// A prototype with cutoff f is its prototype at the cutoff, whatever the unit of time.
+        #[test]
+        fn the_cutoff_lies_where_it_should(decade in -9.0..9.0f64, f in 0.01..100.0f64) {
+            let h = Seconds(10f64.powf(decade));
+            let prototype = super::super::families::butterworth(4);
+            let w = Hertz(f).angular().per_fast_period(h);
+            let at_cutoff = prototype.low_pass(Hertz(f), h).response(Complex::new(0.0, w.0));
+            prop_assert!((at_cutoff.norm() - 0.5f64.sqrt()).abs() < 1e-12);
+        }
+    }
 }

@@ -122,7 +122,7 @@ impl Bank {
     fn check_spec(&self, spec: &Spec) -> Checked {
         let inside = |problem: SpecProblem| BankError::new("", "spec".into(), problem);
         spec.check().map_err(inside)?;
-        agree("spec.fast_period", self.fast_period, spec.fast_period, self.fast_period)?;
+        agree("spec.fast_period", self.fast_period, spec.fast_period.0, self.fast_period)?;
         agree("spec.ratio", self.ratio as f64, spec.ratio as f64, 0.0)?;
         if let Some(latency) = spec.latency {
             agree("spec.latency", self.latency as f64, latency as f64, 0.0)?;
@@ -133,7 +133,7 @@ impl Bank {
             return refuse("spec.channel", BankProblem::Length { found, expected, unit: "channels", rule });
         }
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
-            agree(format!("spec.channel[{i}].delay"), delay, channel.delay, self.fast_period + delay)?;
+            agree(format!("spec.channel[{i}].delay"), delay, channel.delay.0, self.fast_period + delay)?;
         }
         match (&self.fixed_point, &spec.design.bits) {
             (Some(FixedPoint { bits, .. }), Some(asked)) if bits != asked => refuse(

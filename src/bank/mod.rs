@@ -23,6 +23,7 @@ pub use proof::{Certificate, Proof, Tone};
 pub use read::check_digest;
 
 use crate::spec::{Method, Spec};
+use crate::units::{FastPeriods, Seconds};
 
 /// `format` of a bank file.
 pub const FORMAT: &str = "hybank-bank";
@@ -145,8 +146,9 @@ impl Bank {
     }
 
     /// D_i / h of every channel, exactly whole where it is whole up to rounding.
-    pub fn delays_in_fast_periods(&self) -> Vec<f64> {
-        self.delays.iter().map(|&delay| crate::spec::delay_in_fast_periods(delay, self.fast_period)).collect()
+    pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
+        let h = Seconds(self.fast_period);
+        self.delays.iter().map(|&delay| crate::spec::delay_in_fast_periods(Seconds(delay), h)).collect()
     }
 }
 

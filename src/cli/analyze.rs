@@ -3,6 +3,7 @@
 use super::Failure;
 use super::bank_file::load;
 use crate::design::{self, Analysis, Certified, DesignError, MeanAnalysis};
+use crate::units::Seconds;
 use std::path::PathBuf;
 
 /// Computes the exact gamma of a bank, with its own delays or with others
@@ -21,7 +22,7 @@ pub(super) struct Args {
     bank: PathBuf,
     /// True delay minus the bank's, one for each channel, in seconds
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
-    delay_error: Vec<f64>,
+    delay_error: Vec<Seconds>,
     /// Also prove an upper bound of gamma in floating point (bounded-real LMI, Cholesky with all rounding errors charged)
     #[arg(long)]
     certify: bool,
@@ -30,9 +31,9 @@ pub(super) struct Args {
     json: bool,
 }
 
-fn finite(text: &str) -> Result<f64, String> {
+fn finite(text: &str) -> Result<Seconds, String> {
     match text.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) if value.is_finite() => Ok(Seconds(value)),
         _ => Err("delay errors are finite numbers, in seconds".to_owned()),
     }
 }

@@ -1,4 +1,4 @@
-//! `hybank demo`: the whole way on one example, with figures beside what else one might do.
+//! `hybank demo`: design, capture, fuse and judge on one example, in comparison with other methods.
 
 use super::Failure;
 use super::bank_file::write_text;
@@ -10,40 +10,42 @@ use crate::plot::{Chart, Series};
 use crate::runtime::{Options, Precision, Stream};
 use crate::simulate::{Analog, Captured, Source, Tone, capture, interleaved};
 use crate::spec::{Method, Spec};
-use std::f64::consts::TAU;
+use crate::units::{Decibels, Hertz, Seconds};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Two 24 kHz converters for one of 48 kHz; the same spec lies in filters/.
+/// Two 24 kHz converters in place of one at 48 kHz.
 const SPEC: &str = include_str!("../../filters/speech-2x.toml");
-const SECONDS: f64 = 2.0;
-const STEP_AT: f64 = 1.000_01;
-/// Fast samples at the beginning that the filters need to fill up; not judged.
+const DURATION: Seconds = Seconds(2.0);
+const STEP_AT: Seconds = Seconds(1.000_01);
+/// Fast samples at the beginning that are not judged, while the history of the filters fills.
 const SETTLING: usize = 200;
+/// Interval over which the error is averaged in the chart.
+const ERROR_INTERVAL: Seconds = Seconds(0.02);
 
 /// Designs, captures, fuses and judges a signal known in closed form
 ///
-/// Two virtual 24 kHz converters with delays of 1.2 and 0.6 fast samples capture a chirp, three tones and a step;
-/// hybank's banks, sinc interpolation, separate fractional delays and plain interleaving make 48 kHz of it. The error is
-/// against the exact fast samples. WAV files and figures are left in a folder.
+/// Two virtual 24 kHz converters with delays of 1.2 and 0.6 fast samples capture a chirp, three tones and a step. Two
+/// hybank banks, separate fractional delays, sinc interpolation and plain interleaving fuse the captures to 48 kHz. Each
+/// result is compared with the exact fast samples. WAV files and charts are written to a folder.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   hybank demo
   hybank demo -o /tmp/demo --force")]
 pub(super) struct Args {
-    /// The folder [default: hybank-demo, or the first hybank-demo-N that is free]
+    /// The folder to write to [default: hybank-demo, or the first unused hybank-demo-N]
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Replace files in an existing folder
     #[arg(long)]
     force: bool,
-    /// Print the figures as one JSON object
+    /// Print the results as one JSON object
     #[arg(long)]
     json: bool,
 }
 
-/// One way of making fast samples.
+/// One method with its fused samples and their error.
 #[derive(Debug, serde::Serialize)]
 struct Contender {
     name: &'static str,
@@ -52,13 +54,13 @@ struct Contender {
     lower: Option<f64>,
     rmse: f64,
     max_error: f64,
-    /// 20 log10 (rms of the target / rmse).
-    snr_db: f64,
+    /// 20 log10(rms of the target / rmse).
+    snr_db: Decibels,
     #[serde(skip)]
     samples: Vec<f64>,
 }
 
-/// Runs the verb.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the one message for the user.
@@ -67,9 +69,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let spec = Spec::from_toml(SPEC, "filters/speech-2x.toml").map_err(Failure::input)?;
     let problem =
         Problem::new(&spec, design::latency(&spec).map_err(Failure::input)?).map_err(Failure::input)?;
-    let ticks = (SECONDS / (spec.fast_period * spec.ratio as f64)) as usize;
-    let signal = Analog::Known(signal().in_unit(spec.fast_period));
-    let captured = capture(&problem, &signal, ticks);
+    let frames = (DURATION / (spec.fast_period * spec.ratio as f64)) as usize;
+    let signal = Analog::Known(signal().normalised(spec.fast_period));
+    let captured = capture(&problem, &signal, frames);
     let contenders = contend(&spec, &problem, &captured)?;
     args.save(&folder, &spec, &captured, &contenders)?;
     if args.json {
@@ -80,10 +82,10 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 
 /// A chirp, three tones and a step.
 fn signal() -> Source {
-    let tone = |hertz: f64, amplitude: f64| Tone { omega: TAU * hertz, amplitude, phase: 0.3 };
+    let tone = |f: Hertz, amplitude: f64| Tone { omega: f.angular(), amplitude, phase: 0.3 };
     Source::Sum(vec![
-        Source::Chirp { start: 50.0, end: 8000.0, length: SECONDS, amplitude: 0.3 },
-        Source::Tones(vec![tone(440.0, 0.15), tone(3100.0, 0.1), tone(6300.0, 0.05)]),
+        Source::Chirp { start: Hertz(50.0), end: Hertz(8000.0), length: DURATION, amplitude: 0.3 },
+        Source::Tones(vec![tone(Hertz(440.0), 0.15), tone(Hertz(3100.0), 0.1), tone(Hertz(6300.0), 0.05)]),
         Source::Step { at: STEP_AT, height: 0.25 },
     ])
 }
@@ -96,23 +98,23 @@ fn contend(spec: &Spec, problem: &Problem, captured: &Captured) -> Result<Vec<Co
         ("separate delays, 24 taps", Method::Separation),
         ("sinc interpolation, 24 taps", Method::Sinc),
     ] {
-        let mut wanted = spec.clone();
-        wanted.design = spec.design.with_method(method, spec.channels.len()).map_err(Failure::input)?;
-        let bank = design::design(&wanted).map_err(Failure::input)?.bank;
+        let mut variant = spec.clone();
+        variant.design = spec.design.with_method(method, spec.channels.len()).map_err(Failure::input)?;
+        let bank = design::design(&variant).map_err(Failure::input)?.bank;
         let samples = fuse(&bank, &captured.channels)?;
         contenders.push(Contender::judge(name, method.name(), Some(&bank), samples, &captured.target));
     }
-    let naive = interleaved(problem, &captured.channels);
-    contenders.push(Contender::judge("plain interleaving", "interleaved", None, naive, &captured.target));
+    let plain = interleaved(problem, &captured.channels);
+    contenders.push(Contender::judge("plain interleaving", "interleaved", None, plain, &captured.target));
     Ok(contenders)
 }
 
 fn fuse(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Failure> {
     let options = Options { precision: Precision::Double, ..Options::default() };
     let mut stream = Stream::new(&bank.plan(options).map_err(Failure::input)?);
-    let ticks = channels.iter().map(Vec::len).min().unwrap_or(0);
-    let frames: Vec<f64> = (0..ticks).flat_map(|k| channels.iter().map(move |channel| channel[k])).collect();
-    let mut fast = vec![0.0; ticks * bank.ratio];
+    let count = channels.iter().map(Vec::len).min().unwrap_or(0);
+    let frames: Vec<f64> = (0..count).flat_map(|k| channels.iter().map(move |channel| channel[k])).collect();
+    let mut fast = vec![0.0; count * bank.ratio];
     stream.process_f64(&frames, &mut fast).map_err(Failure::input)?;
     Ok(fast)
 }
@@ -132,7 +134,7 @@ impl Contender {
                 .and_then(|bank| bank.gamma.lower),
             rmse: (error_power / judged.len() as f64).sqrt(),
             max_error: judged.clone().map(|n| error(n).abs()).fold(0.0, f64::max),
-            snr_db: 10.0 * (power(&mut target[judged].iter().copied()) / error_power).log10(),
+            snr_db: Decibels::of_power(power(&mut target[judged].iter().copied()) / error_power),
             samples,
         }
     }
@@ -142,7 +144,7 @@ impl Args {
     fn folder(&self) -> Result<PathBuf, Failure> {
         let folder = match &self.output {
             Some(folder) => folder.clone(),
-            None => free_folder(),
+            None => unused_folder(),
         };
         if folder.exists() && !self.force {
             return Err(Failure::Input(format!(
@@ -151,7 +153,7 @@ impl Args {
             )));
         }
         std::fs::create_dir_all(&folder).map_err(|error| {
-            Failure::Input(format!("{}: cannot make the folder: {error}", folder.display()))
+            Failure::Input(format!("{}: cannot create the folder: {error}", folder.display()))
         })?;
         Ok(folder)
     }
@@ -163,7 +165,7 @@ impl Args {
         captured: &Captured,
         contenders: &[Contender],
     ) -> Result<(), Failure> {
-        let fast = (1.0 / spec.fast_period).round() as u32;
+        let fast = spec.fast_period.rate().0.round() as u32;
         let slow = fast / spec.ratio as u32;
         let wav = |name: &str, samples: &[f64], rate: u32| {
             write_mono(&folder.join(name), samples, rate, PcmFormat::F32Le, self.force)
@@ -185,7 +187,7 @@ impl Args {
     }
 }
 
-fn free_folder() -> PathBuf {
+fn unused_folder() -> PathBuf {
     let numbered = (2..).map(|n| PathBuf::from(format!("hybank-demo-{n}")));
     std::iter::once(PathBuf::from("hybank-demo"))
         .chain(numbered)
@@ -195,10 +197,11 @@ fn free_folder() -> PathBuf {
 
 /// The samples around the step: target, the FIR bank and plain interleaving.
 fn step_chart(spec: &Spec, captured: &Captured, contenders: &[Contender]) -> Chart {
-    let centre = (STEP_AT / spec.fast_period) as usize;
+    let centre = STEP_AT.in_fast_periods(spec.fast_period).0 as usize;
     let window = centre - 10..centre + 50;
-    let points =
-        |samples: &[f64]| window.clone().map(|n| (n as f64 * spec.fast_period * 1e3, samples[n])).collect();
+    let points = |samples: &[f64]| {
+        window.clone().map(|n| ((spec.fast_period * n as f64).0 * 1e3, samples[n])).collect()
+    };
     let mut series = vec![Series { label: "exact fast samples".into(), points: points(&captured.target) }];
     for contender in [&contenders[0], &contenders[contenders.len() - 1]] {
         series.push(Series { label: contender.name.into(), points: points(&contender.samples) });
@@ -206,20 +209,20 @@ fn step_chart(spec: &Spec, captured: &Captured, contenders: &[Contender]) -> Cha
     Chart { title: "Around the step".into(), x_label: "time (ms)".into(), y_label: "sample".into(), series }
 }
 
-/// RMS error in decibel over stretches of 20 ms; the chirp makes time an axis of frequency.
+/// RMS error in decibels over intervals of 20 ms. The chirp sweeps with time, so time stands for frequency.
 fn error_chart(spec: &Spec, captured: &Captured, contenders: &[Contender]) -> Chart {
-    let stretch = (0.02 / spec.fast_period) as usize;
+    let interval = ERROR_INTERVAL.in_fast_periods(spec.fast_period).0 as usize;
     let level = |samples: &[f64], start: usize| {
         let power: f64 =
-            (start..start + stretch).map(|n| (samples[n] - captured.target[n]).powi(2)).sum::<f64>()
-                / stretch as f64;
-        10.0 * power.max(1e-30).log10()
+            (start..start + interval).map(|n| (samples[n] - captured.target[n]).powi(2)).sum::<f64>()
+                / interval as f64;
+        Decibels::of_power(power.max(1e-30)).0
     };
     let curve = |contender: &Contender| Series {
         label: contender.name.into(),
-        points: (SETTLING..captured.target.len() - stretch)
-            .step_by(stretch)
-            .map(|start| (start as f64 * spec.fast_period, level(&contender.samples, start)))
+        points: (SETTLING..captured.target.len() - interval)
+            .step_by(interval)
+            .map(|start| ((spec.fast_period * start as f64).0, level(&contender.samples, start)))
             .collect(),
     };
     Chart {
@@ -241,15 +244,15 @@ fn report(folder: &Path, contenders: &[Contender]) -> String {
         let _ = writeln!(
             text,
             "{:<30} {:<10} {:<10.3e} {:<10.3e} {:>7.1}",
-            contender.name, gamma, contender.rmse, contender.max_error, contender.snr_db
+            contender.name, gamma, contender.rmse, contender.max_error, contender.snr_db.0
         );
     }
     if let Some(lower) = contenders[0].lower {
         let _ = writeln!(
             text,
-            "\nNo bank of 24 taps has a gamma below {lower:.6} (proved by the dual solution)."
+            "\nNo bank with 24 taps per channel has a gamma below {lower:.6} (dual solution of the design problem)."
         );
     }
-    let _ = writeln!(text, "WAV files, step.svg and error.svg are in {}.", folder.display());
+    let _ = writeln!(text, "The WAV files, step.svg and error.svg are in {}.", folder.display());
     text
 }

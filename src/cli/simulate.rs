@@ -1,4 +1,4 @@
-//! `hybank simulate`: what the slow converters would have captured.
+//! `hybank simulate`: the captures of virtual slow converters.
 
 use super::Failure;
 use super::bank_file::load_spec_or_bank;
@@ -7,30 +7,33 @@ use crate::design::{self, Problem};
 use crate::io::PcmFormat;
 use crate::simulate::{Analog, Captured, Recording, Source, capture, panels};
 use crate::spec::Spec;
+use crate::units::{FastPeriods, Hertz, Seconds};
 use std::path::{Path, PathBuf};
 
-/// A bank in normalised time has no rate of its own; its captures are labelled as parts of this one, hertz.
-const NORMALISED_RATE: f64 = 48_000.0;
-/// Fewest fast samples of an analytic source where none are asked for (thesis 5.6).
+/// The fast period that stands for normalised time: such a spec has no rate of its own.
+const NORMALISED: Seconds = Seconds(1.0);
+/// Fast rate in the WAV headers of captures in normalised time.
+const NORMALISED_RATE: Hertz = Hertz(48_000.0);
+/// Fewest fast samples of an analytic source unless `--samples` is given (thesis 5.6).
 const DEFAULT_SAMPLES: f64 = 200.0;
-/// Most fast samples of a simulation: captures are made in memory.
+/// Most fast samples of a simulation, since captures are held in memory.
 const MOST_SAMPLES: usize = 1 << 28;
-/// Most quadrature panels of a chirp for each converter: some ten seconds.
+/// Most quadrature panels of a chirp per converter, about ten seconds of work.
 const MOST_PANELS: f64 = 2e7;
 
 /// Simulates what the slow converters capture
 ///
-/// Writes ch1.wav, ch2.wav, .. at the slow rate and target.wav, what an ideal fast converter gives, late by
-/// the latency. Analytic sources are answered exactly; a WAV recording is taken as a periodic,
+/// Writes ch1.wav, ch2.wav, .. at the slow rate, and target.wav: the samples of the ideal fast converter, delayed by the
+/// latency. The response to an analytic source is exact to rounding. A WAV recording is treated as a periodic,
 /// band-limited analog signal.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sources:
-  step@0.3                  0 before 0.3 s, 1 from then on (also 300ms, 5us, 2ns)
+  step@0.3                  0 before 0.3 s, 1 afterwards (also 300ms, 5us, 2ns)
   tones:0.3,0.8             cosines of amplitude 1, angular frequencies in rad/s
-  tones:440Hz,1kHz          the same in hertz
-  chirp:50Hz..8kHz@2s       a linear sweep
-  step@1+tones:440Hz        the sum
+  tones:440Hz,1kHz          the same, frequencies in hertz
+  chirp:50Hz..8kHz@2s       a linear sweep from 50 Hz to 8 kHz in 2 s
+  step@1+tones:440Hz        a sum
   FILE.wav                  a mono recording
 
 Examples:
@@ -43,13 +46,13 @@ pub(super) struct Args {
     /// The analog signal
     #[arg(long)]
     source: String,
-    /// The folder for the captures; made if it is not there
+    /// The folder for the captures; created if missing
     #[arg(short, long)]
     output: PathBuf,
-    /// Fast samples to make (analytic sources; rounded up to whole ticks) [default: until all has happened, at least 200]
+    /// Fast samples to simulate, rounded up to whole frames [default: to the end of the source, at least 200]
     #[arg(long)]
     samples: Option<usize>,
-    /// Factor on the source
+    /// Factor that multiplies the source
     #[arg(long, default_value_t = 1.0, allow_hyphen_values = true)]
     gain: f64,
     /// Replace existing files
@@ -63,14 +66,14 @@ pub(super) struct Args {
 #[derive(Debug, serde::Serialize)]
 struct Report {
     files: Vec<String>,
-    ticks: usize,
+    frames: usize,
     slow_rate: u32,
     fast_rate: u32,
     latency: usize,
     warnings: Vec<String>,
 }
 
-/// Runs the verb.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the one message for the user.
@@ -84,12 +87,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let problem = Problem::new(&spec, latency).map_err(|error| named(&error))?;
     let (rates, mut warnings) = Rates::of(&spec).map_err(|message| named(&message))?;
     if spec.latency.is_none() {
-        warnings.push(format!("the spec leaves the latency open; {latency} fast samples are used"));
+        warnings.push(format!("the spec gives no latency; {latency} fast samples are used"));
     }
     let (signal, samples) = args.signal(&spec)?;
-    let ticks = args.ticks(samples, spec.ratio)?;
-    args.check_work(&problem, &signal, ticks)?;
-    let mut captured = capture(&problem, &signal, ticks);
+    let frames = args.frames(samples, spec.ratio)?;
+    args.check_work(&problem, &signal, frames)?;
+    let mut captured = capture(&problem, &signal, frames);
     args.scale(&mut captured)?;
     let mut files = vec![];
     for (i, samples) in captured.channels.iter().enumerate() {
@@ -98,20 +101,21 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     files.push(("target.wav".to_owned(), &captured.target, rates.fast));
     write_all(&args.output, &files, args.force)?;
     let names = files.iter().map(|(name, ..)| args.output.join(name).display().to_string()).collect();
-    Report { files: names, ticks, slow_rate: rates.slow, fast_rate: rates.fast, latency, warnings }
+    Report { files: names, frames, slow_rate: rates.slow, fast_rate: rates.fast, latency, warnings }
         .print(args.json)
 }
 
 impl Args {
-    /// The signal in fast periods and how many fast samples it lasts.
+    /// The signal in normalised time and its length in fast samples.
     fn signal(&self, spec: &Spec) -> Result<(Analog, usize), Failure> {
         let path = Path::new(&self.source);
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("wav")) {
             let (samples, rate) = read_mono(path)?;
-            // In normalised time the recording's own rate is the fast one.
-            let fast = if spec.fast_period == 1.0 { f64::from(rate) } else { 1.0 / spec.fast_period };
-            let recording = Recording::new(&samples, fast / f64::from(rate));
-            let length = (recording.duration() * (1.0 + 1e-12)).floor() as usize;
+            let rate = Hertz(f64::from(rate));
+            // In normalised time the recording's own rate is the fast rate.
+            let fast = if spec.fast_period == NORMALISED { rate } else { spec.fast_period.rate() };
+            let recording = Recording::new(&samples, FastPeriods(fast / rate));
+            let length = (recording.duration() * (1.0 + 1e-12)).0.floor() as usize;
             return Ok((
                 Analog::Recorded(recording),
                 self.samples.unwrap_or(length / spec.ratio * spec.ratio),
@@ -119,35 +123,35 @@ impl Args {
         }
         let source: Source =
             self.source.parse().map_err(|error| Failure::Usage(format!("--source: {error}")))?;
-        let source = source.in_unit(spec.fast_period);
-        let length =
-            source.duration().unwrap_or(0.0).ceil().clamp(DEFAULT_SAMPLES, MOST_SAMPLES as f64 + 1.0);
+        let source = source.normalised(spec.fast_period);
+        let duration = source.duration().unwrap_or_default();
+        let length = duration.0.ceil().clamp(DEFAULT_SAMPLES, MOST_SAMPLES as f64 + 1.0);
         Ok((Analog::Known(source), self.samples.unwrap_or(length as usize)))
     }
 
-    /// A chirp, or a front end behind which one is captured, may be too fast for its quadrature.
-    fn check_work(&self, problem: &Problem, signal: &Analog, ticks: usize) -> Result<(), Failure> {
+    /// Refuses a chirp or a front end so fast that the quadrature would take too long.
+    fn check_work(&self, problem: &Problem, signal: &Analog, frames: usize) -> Result<(), Failure> {
         let Analog::Known(source) = signal else { return Ok(()) };
-        let span = ticks as f64 * problem.ratio as f64;
+        let span = FastPeriods(frames as f64 * problem.ratio as f64);
         let work = problem.front_ends.iter().map(|filter| panels(filter, source, span)).fold(0.0, f64::max);
         if work <= MOST_PANELS {
             return Ok(());
         }
         Err(Failure::Input(format!(
-            "{}: the chirp or a front end is too fast for the fast rate: {work:.1e} integration steps, at most \
-             {MOST_PANELS:.0e} are made; check the units of frequencies and fast_period, or ask for fewer --samples",
+            "{}: the chirp or a front end is too fast for the fast rate: it takes {work:.1e} integration steps, \
+             more than the limit of {MOST_PANELS:.0e}; check the units of frequencies and fast_period, or ask for fewer --samples",
             self.source
         )))
     }
 
-    /// Applies the gain; what a 32-bit float cannot hold is refused, not written as infinity.
+    /// Applies the gain. A sample beyond the range of a 32-bit float is an error, not an infinity in the file.
     fn scale(&self, captured: &mut Captured) -> Result<(), Failure> {
         let recordings = captured.channels.iter_mut().chain(std::iter::once(&mut captured.target));
         for x in recordings.flatten() {
             *x *= self.gain;
             if x.is_nan() || x.abs() > f64::from(f32::MAX) {
                 return Err(Failure::Input(format!(
-                    "{}: a captured sample is {x:e}, more than a 32-bit float holds; use a smaller --gain",
+                    "{}: a captured sample is {x:e}, beyond the range of a 32-bit float; use a smaller --gain",
                     self.source
                 )));
             }
@@ -155,16 +159,17 @@ impl Args {
         Ok(())
     }
 
-    fn ticks(&self, samples: usize, ratio: usize) -> Result<usize, Failure> {
+    /// `samples` fast samples as whole frames.
+    fn frames(&self, samples: usize, ratio: usize) -> Result<usize, Failure> {
         if samples == 0 {
             return Err(Failure::Input(format!(
-                "{}: shorter than one slow sample, nothing to capture",
+                "{}: shorter than one slow sample, so there is nothing to capture",
                 self.source
             )));
         }
         if samples > MOST_SAMPLES {
             return Err(Failure::Input(format!(
-                "{}: {samples} fast samples, but a simulation holds at most {MOST_SAMPLES}; ask for fewer with --samples",
+                "{}: {samples} fast samples are more than the limit of {MOST_SAMPLES}; ask for fewer with --samples",
                 self.source
             )));
         }
@@ -181,10 +186,10 @@ struct Rates {
 impl Rates {
     fn of(spec: &Spec) -> Result<(Self, Vec<String>), String> {
         let ratio = spec.ratio as f64;
-        let slow = if spec.fast_period == 1.0 {
-            (NORMALISED_RATE / ratio).round().max(1.0)
+        let slow = if spec.fast_period == NORMALISED {
+            (NORMALISED_RATE / ratio).0.round().max(1.0)
         } else {
-            1.0 / (spec.fast_period * ratio)
+            (spec.fast_period * ratio).rate().0
         };
         let fast = slow * ratio;
         if fast > f64::from(u32::MAX) || slow < 0.5 {
@@ -197,8 +202,10 @@ impl Rates {
         let mut warnings = Vec::new();
         for rate in [slow, fast] {
             if (rate - rate.round()).abs() > 1e-6 * rate {
-                warnings
-                    .push(format!("WAV headers hold whole hertz: {rate} Hz is written as {}", rate.round()));
+                warnings.push(format!(
+                    "WAV headers hold whole hertz: {rate} Hz is written as {} Hz",
+                    rate.round()
+                ));
             }
         }
         Ok((Self { slow: slow.round() as u32, fast: fast.round() as u32 }, warnings))
@@ -206,11 +213,13 @@ impl Rates {
 }
 
 fn write_all(folder: &Path, files: &[(String, &Vec<f64>, u32)], force: bool) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::Input(format!("{}: cannot make the folder: {error}", folder.display())))?;
-    // All or nothing: look at every name before the first file is written.
-    let taken = files.iter().map(|(name, ..)| folder.join(name)).find(|path| path.symlink_metadata().is_ok());
-    if let (false, Some(path)) = (force, taken) {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Failure::Input(format!("{}: cannot create the folder: {error}", folder.display()))
+    })?;
+    // All or nothing: every name is checked before the first file is written.
+    let existing =
+        files.iter().map(|(name, ..)| folder.join(name)).find(|path| path.symlink_metadata().is_ok());
+    if let (false, Some(path)) = (force, existing) {
         return Err(Failure::Input(format!("{}: exists already; use --force to replace it", path.display())));
     }
     files.iter().try_for_each(|(name, samples, rate)| {
@@ -227,8 +236,8 @@ impl Report {
             return super::print_json(self);
         }
         super::print(&format!(
-            "{} ticks at {} Hz, target at {} Hz late by {} samples:\n  {}\n",
-            self.ticks,
+            "{} frames at {} Hz, target at {} Hz with a latency of {} samples:\n  {}\n",
+            self.frames,
             self.slow_rate,
             self.fast_rate,
             self.latency,

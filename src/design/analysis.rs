@@ -8,14 +8,14 @@ use super::{DesignError, error_system};
 use crate::bank::Bank;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
+use crate::units::{FastPeriods, RadiansPerSlowPeriod, Seconds};
 
 /// What a bank does on given front ends and delays.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Analysis {
     /// ||K||, h = 1.
     pub gamma: f64,
-    /// Where the worst case sits, cycles a second at the fast rate's scale (0 .. 1/(2 M h)): frequencies
-    /// of the slow rate, to which all fast ones alias.
+    /// The frequency of the worst case, hertz, 0 .. 1/(2 M h): all frequencies that alias to it take part.
     pub peak_hertz: f64,
     /// No bank at all does better on these front ends and delays.
     pub noncausal: f64,
@@ -36,18 +36,20 @@ pub struct MeanAnalysis {
     pub output_noise: f64,
 }
 
-/// Analyses `bank` with `delay_errors[i]` (seconds) added to its delays; an empty slice means none.
+/// Analyses `bank` with `delay_errors[i]` added to its delays; an empty slice means none.
 ///
 /// # Errors
 /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::DelayErrorCount`] unless there is one error a
 /// channel, [`DesignError::TooLate`] for delays out of all proportion, [`DesignError::Lti`] for unstable filters.
-pub fn analyze(bank: &Bank, delay_errors: &[f64]) -> Result<Analysis, DesignError> {
+pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, DesignError> {
     let problem = bank_problem(bank)?;
     let count = problem.channels.len();
     if !delay_errors.is_empty() && delay_errors.len() != count {
         return Err(DesignError::DelayErrorCount { given: delay_errors.len(), channels: count });
     }
-    let normalised: Vec<f64> = delay_errors.iter().map(|error| error / bank.fast_period).collect();
+    let fast_period = Seconds(bank.fast_period);
+    let normalised: Vec<FastPeriods> =
+        delay_errors.iter().map(|error| error.in_fast_periods(fast_period)).collect();
     let moved = problem.with_delay_errors(&normalised);
     moved.check_size()?;
     let plant = BlockedPlant::new(&moved);
@@ -55,7 +57,7 @@ pub fn analyze(bank: &Bank, delay_errors: &[f64]) -> Result<Analysis, DesignErro
     let distinct = BlockedPlant::new(&moved.without_duplicates().0);
     Ok(Analysis {
         gamma: peak.gain,
-        peak_hertz: peak.frequency / (std::f64::consts::TAU * bank.slow_period()),
+        peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(Seconds(bank.slow_period())).0,
         noncausal: noncausal_bound(&distinct)?.min(peak.gain),
         mean: mean_of(bank, &plant, &moved.noise)?,
     })

@@ -6,6 +6,7 @@ use super::fir::{SecondObjective, design_fir};
 use super::problem::{Channel, Problem};
 use crate::sampling::Recurrent;
 use crate::spec::Spec;
+use crate::units::FastPeriods;
 
 /// Taps a channel where the spec names none: 23 for M = 2, as in the thesis.
 pub fn default_taps(ratio: usize) -> usize {
@@ -23,7 +24,7 @@ pub fn sinc_taps(problem: &Problem, length: usize) -> Result<Vec<Vec<f64>>, Desi
     if channels != ratio {
         return Err(DesignError::SincNeedsNyquist { channels, ratio });
     }
-    let offsets: Vec<f64> = problem.channels.iter().map(|channel| -channel.delay).collect();
+    let offsets: Vec<f64> = problem.channels.iter().map(|channel| -channel.delay.0).collect();
     let sets = Recurrent::new(&offsets, ratio)?;
     Ok((0..channels).map(|i| sets.taps(i, problem.latency as f64, length)).collect())
 }
@@ -36,7 +37,7 @@ pub fn separation_taps(spec: &Spec, problem: &Problem, length: usize) -> Result<
     let mut on_grid = problem.clone();
     on_grid.latency -= split.ticks * problem.ratio;
     for (channel, &delay) in on_grid.channels.iter_mut().zip(&grid) {
-        channel.delay = delay as f64;
+        channel.delay = FastPeriods(delay as f64);
     }
     let bank = plain_fir(&on_grid, split.bank_taps)?;
     let at_slow_rate = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
@@ -44,7 +45,7 @@ pub fn separation_taps(spec: &Spec, problem: &Problem, length: usize) -> Result<
     let mut taps = Vec::with_capacity(bank.len());
     for (i, synthesis) in bank.iter().enumerate() {
         let channel = slow.channels[i];
-        let delay = channel.delay - grid[i] as f64 / problem.ratio as f64;
+        let delay = channel.delay - FastPeriods(grid[i] as f64 / problem.ratio as f64);
         let alone = Problem {
             ratio: 1,
             target: channel.front_end,
@@ -92,8 +93,8 @@ fn grid_delays(problem: &Problem) -> Vec<usize> {
         .channels
         .iter()
         .map(|channel| {
-            let last = channel.delay.ceil() as usize + problem.ratio;
-            let distance = |&a: &usize| (a as f64 - channel.delay).abs();
+            let last = channel.delay.0.ceil() as usize + problem.ratio;
+            let distance = |&a: &usize| (a as f64 - channel.delay.0).abs();
             let nearest = |free: &dyn Fn(usize) -> bool| {
                 (0..=last).filter(|&a| free(a)).min_by(|a, b| distance(a).total_cmp(&distance(b)))
             };

@@ -60,11 +60,11 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
 /// The bank with the whole of its spec.
 fn bank_of(spec: &Spec, latency: usize, filters: SynthesisFilters, gamma: Gamma) -> Bank {
     Bank {
-        fast_period: spec.fast_period,
+        fast_period: spec.fast_period.0,
         ratio: spec.ratio,
         latency,
         method: spec.design.method,
-        delays: spec.channels.iter().map(|channel| channel.delay).collect(),
+        delays: spec.channels.iter().map(|channel| channel.delay.0).collect(),
         filters,
         gamma,
         proof: None,
@@ -338,7 +338,7 @@ const WORTHWHILE: f64 = 1e-3;
 /// The shortest latency of the ladder whose IIR optimum is within [`WORTHWHILE`] of the best; for FIR banks
 /// no later than the middle of their taps, so that the filters can look both ways.
 fn choose_latency(spec: &Spec) -> Result<usize, DesignError> {
-    let base = Problem::new(spec, 0)?.longest_delay().ceil() as usize;
+    let base = Problem::new(spec, 0)?.longest_delay().0.ceil() as usize;
     let mut ladder = Vec::new();
     for ticks in LATENCY_LADDER {
         let latency = base + ticks * spec.ratio;

@@ -65,7 +65,7 @@ impl BlockedPlant {
 /// The instants of all outputs, relabelled so that the latest lies at the end of the period.
 fn schedule(problem: &Problem) -> Vec<Sample> {
     let period = problem.ratio as f64;
-    let channels = problem.channels.iter().map(|channel| (channel.front_end, -channel.delay));
+    let channels = problem.channels.iter().map(|channel| (channel.front_end, -channel.delay.0));
     let wanted = (0..problem.ratio).map(|p| (problem.target, p as f64 - problem.latency as f64));
     let times: Vec<(usize, f64)> = channels.chain(wanted).collect();
     let latest = times.iter().map(|&(_, time)| time).fold(f64::NEG_INFINITY, f64::max);

@@ -26,6 +26,7 @@ use crate::lmi::kyp::KypError;
 use crate::lmi::sampled::SampledError;
 use crate::lti::{LtiError, StateSpaceError};
 use crate::sampling::SamplingError;
+use crate::units::FastPeriods;
 use crate::verify::VerifyError;
 
 /// Why a bank could not be designed or judged.
@@ -113,14 +114,14 @@ pub enum DesignError {
     },
     /// Latency and delays so far apart that the blocked system does not fit into a computer.
     #[error(
-        "latency {latency} and delays up to {longest_delay} fast periods need delay chains of {states} states, at most \
+        "latency {latency} and delays up to {longest_delay} need delay chains of {states} states, at most \
          {limit} are supported: check the unit of the delays (seconds), and bring latency and delays closer together"
     )]
     TooLate {
         /// m0, fast samples.
         latency: usize,
-        /// The largest delay, fast periods.
-        longest_delay: f64,
+        /// The largest delay.
+        longest_delay: FastPeriods,
         /// States of all delay chains.
         states: f64,
         /// Most states.

@@ -3,6 +3,7 @@
 use super::DesignError;
 use crate::analog::StrictlyProper;
 use crate::spec::{FilterSpec, Spec};
+use crate::units::FastPeriods;
 
 /// Most states of the delay chains of the blocked system. Its matrices are dense: at this size one of them takes
 /// 128 MiB, and a norm some of these and a cubic number of operations.
@@ -30,8 +31,8 @@ pub struct Problem {
 pub struct Channel {
     /// Index of Phi_i in [`Problem::front_ends`].
     pub front_end: usize,
-    /// D_i in fast periods.
-    pub delay: f64,
+    /// D_i.
+    pub delay: FastPeriods,
 }
 
 impl Problem {
@@ -62,7 +63,7 @@ impl Problem {
     /// [`MAX_CHAIN_STATES`] states.
     pub fn check_size(&self) -> Result<(), DesignError> {
         let wanted = (0..self.ratio).map(|p| p as f64 - self.latency as f64);
-        let times: Vec<f64> = self.channels.iter().map(|channel| -channel.delay).chain(wanted).collect();
+        let times: Vec<f64> = self.channels.iter().map(|channel| -channel.delay.0).chain(wanted).collect();
         let latest = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let ticks = |time: f64| ((latest - time) / self.ratio as f64).floor();
         let states: f64 = times.into_iter().map(ticks).sum();
@@ -73,10 +74,10 @@ impl Problem {
         Err(DesignError::TooLate { latency, longest_delay, states, limit: MAX_CHAIN_STATES })
     }
 
-    /// The same problem with `errors[i]` (fast periods) added to the delays.
-    pub fn with_delay_errors(&self, errors: &[f64]) -> Self {
+    /// The same problem with `errors[i]` added to the delays.
+    pub fn with_delay_errors(&self, errors: &[FastPeriods]) -> Self {
         let mut moved = self.clone();
-        for (channel, error) in moved.channels.iter_mut().zip(errors) {
+        for (channel, &error) in moved.channels.iter_mut().zip(errors) {
             channel.delay += error;
         }
         moved
@@ -105,9 +106,9 @@ impl Problem {
         (reduced, parts)
     }
 
-    /// The largest delay, in fast periods.
-    pub fn longest_delay(&self) -> f64 {
-        self.channels.iter().map(|channel| channel.delay).fold(0.0, f64::max)
+    /// The largest delay.
+    pub fn longest_delay(&self) -> FastPeriods {
+        FastPeriods(self.channels.iter().map(|channel| channel.delay.0).fold(0.0, f64::max))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-/// plotters places SVG points on whole pixels: draw large, let the view box scale it down.
+/// plotters rounds SVG points to whole pixels, so charts are drawn larger and the view box scales them down.
 const OVERSIZE: u32 = 4;
 const WIDTH: u32 = 960;
 const HEIGHT: u32 = 420;
@@ -20,7 +20,7 @@ const COLOURS: [RGBColor; 6] = [
 pub struct Series {
     /// Legend text.
     pub label: String,
-    /// Points (x, y); what is not finite is left out.
+    /// Points (x, y); points that are not finite are left out.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -46,12 +46,12 @@ pub enum PlotError {
         /// Title of the chart.
         title: String,
     },
-    /// The drawing library refused.
+    /// The drawing library failed.
     #[error("the chart `{title}` could not be drawn: {reason}")]
     Drawing {
         /// Title of the chart.
         title: String,
-        /// What the library said.
+        /// The library's message.
         reason: String,
     },
 }
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_and_an_empty_series_are_no_trouble() {
+    fn a_constant_series_is_drawn_and_an_empty_one_refused() {
         assert!(chart(vec![(1.0, 5.0)]).to_svg().is_ok());
         assert_eq!(chart(vec![]).to_svg(), Err(PlotError::Empty { title: "t".into() }));
     }

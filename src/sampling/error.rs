@@ -5,7 +5,7 @@
 pub enum SamplingError {
     /// The number of recurrent sample sets is not the period.
     #[error(
-        "{offsets} sample sets recur with period {period}: a band-limited signal is determined by exactly one set a fast period; give {period} offsets"
+        "{offsets} sample sets were given for period {period}; band-limited interpolation needs exactly one set per fast period, so give {period} offsets"
     )]
     OffsetCount {
         /// Offsets given.
@@ -15,7 +15,7 @@ pub enum SamplingError {
     },
     /// Two recurrent sets sample the same instants.
     #[error(
-        "sample sets {first} and {second} lie {distance:e} fast periods apart modulo the period: two sets must not coincide; change one of the delays"
+        "sample sets {first} and {second} are {distance:e} fast periods apart modulo the period; two sets must not coincide, so change one of the delays"
     )]
     Coinciding {
         /// Index of one set.
@@ -30,7 +30,7 @@ pub enum SamplingError {
     NotFinite {
         /// What the number is.
         name: &'static str,
-        /// Its place in the argument.
+        /// Its index in the argument.
         index: usize,
         /// Its value.
         value: f64,
@@ -47,7 +47,7 @@ pub enum SamplingError {
     },
     /// The normal equations lost positive definiteness.
     #[error(
-        "the normal equations are not positive definite at coefficient {column} (pivot {pivot:e}): no sample reaches it; give the first differences a positive weight tau"
+        "the normal equations are not positive definite at coefficient {column} (pivot {pivot:e}): no sample determines it; give the first differences a positive weight tau"
     )]
     NotDefinite {
         /// Column of the failing pivot.

@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-/// sin(pi x), with the argument reduced before the multiplication so that integers give exactly 0.
+/// sin(pi x). The argument is reduced before the multiplication, so integers give exactly 0.
 pub fn sin_pi(x: f64) -> f64 {
     let turns = x.round();
     let sine = (PI * (x - turns)).sin();
@@ -26,14 +26,14 @@ pub fn sinc_slope(x: f64) -> f64 {
     (sin_pi(x + 0.5) - sinc(x)) / x
 }
 
-/// The largest integer not above x, saturating; without the library call that `f64::floor` is on baseline x86-64.
+/// The largest integer not above x, saturating. On baseline x86-64 `f64::floor` would be a library call.
 #[inline]
 fn floor(x: f64) -> i64 {
     let toward_zero = x as i64;
     toward_zero - i64::from(toward_zero as f64 > x)
 }
 
-/// The centred B-spline of degree ORDER - 1, as the weights of the ORDER knots that reach x.
+/// The centred B-spline of degree ORDER - 1, as the weights at x of the ORDER splines that are nonzero there.
 ///
 /// `BSpline::<1>` is the box, `BSpline::<2>` the hat, `BSpline::<4>` the cubic.
 #[derive(Debug, Clone, Copy, Default)]
@@ -43,7 +43,7 @@ impl<const ORDER: usize> BSpline<ORDER> {
     /// The degree n = ORDER - 1.
     pub const DEGREE: usize = ORDER - 1;
 
-    /// First knot k with beta(x - k) possibly nonzero, and x's place in the knot span, in \[0, 1).
+    /// First knot k with beta(x - k) possibly nonzero, and the position of x within the knot span, in \[0, 1).
     #[inline]
     pub fn locate(x: f64) -> (i64, f64) {
         // Odd degrees have their breaks on the knots, even ones half-way between.
@@ -68,16 +68,16 @@ impl<const ORDER: usize> BSpline<ORDER> {
         (first, differences(&raise::<ORDER, 1>(&[t], Self::DEGREE)).map(|[d]| d))
     }
 
-    /// First knot, weights and slopes in one go.
+    /// First knot, weights and slopes in one call.
     #[inline]
     pub fn weights_and_slopes(x: f64) -> (i64, [f64; ORDER], [f64; ORDER]) {
         let ([first], w, d) = Self::weights_and_slopes_of(&[x]);
         (first, w.map(|[w]| w), d.map(|[d]| d))
     }
 
-    /// The same for N places at once, the places innermost: they are independent of each other, which spares a
-    /// processor the wait for each step of the recursion. Same bits as one by one.
-    // Outlined, the arrays would travel through memory: half of a fit's time.
+    /// The same at N positions at once, with the positions innermost. They are independent of each other, so the
+    /// processor need not wait for each step of the recursion. The bits are those of single calls.
+    // Not inlined, the arrays would pass through memory, which takes half of a fit's time.
     #[inline(always)]
     pub fn weights_and_slopes_of<const N: usize>(
         x: &[f64; N],
@@ -89,8 +89,8 @@ impl<const ORDER: usize> BSpline<ORDER> {
     }
 }
 
-/// Weights of the `order` B-splines of degree `order` - 1 alive at the places t of a knot span (Cox-de Boor),
-/// for N places at once; `order` 0 gives zeros, the slope of the box.
+/// Weights of the `order` B-splines of degree `order` - 1 that are nonzero at the positions t of a knot span (Cox-de
+/// Boor recursion), for N positions at once; `order` 0 gives zeros, the slope of the box.
 #[inline(always)]
 fn raise<const ORDER: usize, const N: usize>(t: &[f64; N], order: usize) -> [[f64; N]; ORDER] {
     let mut w = [[0.0; N]; ORDER];
@@ -253,7 +253,7 @@ mod tests {
         fn weights_shift_with_the_knots(x in -100.0..100.0_f64, k in -50_i64..50) {
             let (first, w) = BSpline::<4>::weights(x);
             let (moved, v) = BSpline::<4>::weights(x + k as f64);
-            // Rounding of x + k may carry a place of 1 - eps into the next span; then compare values.
+            // Rounding of x + k may carry a position of 1 - eps into the next span; then compare values.
             let at = |first: i64, w: &[f64; 4], knot: i64| {
                 usize::try_from(knot - first).ok().and_then(|j| w.get(j).copied()).unwrap_or(0.0)
             };

@@ -1,28 +1,28 @@
-//! Nonuniform samples whose values carry errors and whose places carry jitter.
+//! Nonuniform samples with bounded errors of value and position (jitter).
 //!
-//! The model of the thesis (sections 3.2 and 3.4): a sample is taken at x + mu instead of x and reads
-//! f(x + mu) + e, with |e| <= E and |mu| <= B known.
+//! The model of the thesis (sections 3.2 and 3.4): a sample is taken at x + mu instead of x and has the
+//! value f(x + mu) + e, with |e| <= E and |mu| <= B known.
 
 use super::error::SamplingError;
 
-/// One sample as a measurement: where it is believed to be, what it reads, and how far off both can be.
+/// One sample as a measurement: nominal position, value, and a bound on the error of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// Believed place.
+    /// Nominal position.
     pub x: f64,
-    /// Value read.
+    /// Measured value.
     pub value: f64,
     /// Bound of the error of the value, >= 0.
     pub error: f64,
-    /// Bound of the jitter of the place, >= 0, in units of x.
+    /// Bound of the jitter of the position, >= 0, in units of x.
     pub jitter: f64,
 }
 
 impl Measured {
     /// Weight for a least-squares fit: 1 / (error^2 + (slope jitter)^2), `slope` a typical |f'|.
     ///
-    /// A displaced place reads like a value error of |f'| times the displacement; the floor keeps the
-    /// weight of a perfect sample finite (and equal to 1 / floor^2).
+    /// A displacement of the position has the effect of a value error of |f'| times the displacement. The floor keeps the
+    /// weight of a perfect sample finite: 1 / floor^2.
     pub fn weight(&self, slope: f64, floor: f64) -> f64 {
         1.0 / (self.error.powi(2) + (slope * self.jitter).powi(2) + floor.powi(2))
     }
@@ -44,16 +44,16 @@ pub struct PiecewiseLinear {
 }
 
 impl PiecewiseLinear {
-    /// Takes samples in any order; equal places keep the order given.
+    /// From samples in any order; samples at equal positions keep their order.
     ///
     /// # Errors
-    /// [`SamplingError::NotFinite`] for a place or value that is no number, and
+    /// [`SamplingError::NotFinite`] for a position or value that is not finite, and
     /// [`SamplingError::Setting`] when there is no sample.
     pub fn new(mut samples: Vec<Measured>) -> Result<Self, SamplingError> {
         for (index, s) in samples.iter().enumerate() {
             let broken = |name, value| Err(SamplingError::NotFinite { name, index, value });
             if !s.x.is_finite() {
-                return broken("sample place", s.x);
+                return broken("sample position", s.x);
             }
             if !s.value.is_finite() {
                 return broken("sample value", s.value);
@@ -67,7 +67,7 @@ impl PiecewiseLinear {
         Ok(Self { samples })
     }
 
-    /// The samples by increasing place.
+    /// The samples by increasing position.
     pub fn samples(&self) -> &[Measured] {
         &self.samples
     }
@@ -178,11 +178,11 @@ mod tests {
         let mut random = Uniform(3);
         let (mut sums, mut draws) = ([0.0; 4], 0.0);
         for _ in 0..2000 {
-            let places: Vec<Measured> = (0..10)
+            let samples: Vec<Measured> = (0..10)
                 .map(|_| random.next())
                 .flat_map(|phase| (0..5).map(move |k| exact(k as f64 + phase, 0.0)))
                 .collect();
-            let line = PiecewiseLinear::new(places).unwrap();
+            let line = PiecewiseLinear::new(samples).unwrap();
             for (k, sum) in sums.iter_mut().enumerate() {
                 *sum += line.interval_moment(k as u32 + 1).unwrap();
             }
@@ -210,7 +210,7 @@ mod tests {
     fn what_is_no_sample_is_refused() {
         assert!(matches!(PiecewiseLinear::new(vec![]), Err(SamplingError::Setting { .. })));
         let broken = PiecewiseLinear::new(vec![exact(0.0, 1.0), exact(f64::NAN, 1.0)]);
-        assert!(matches!(broken, Err(SamplingError::NotFinite { name: "sample place", index: 1, .. })));
+        assert!(matches!(broken, Err(SamplingError::NotFinite { name: "sample position", index: 1, .. })));
         assert_eq!(PiecewiseLinear::new(vec![exact(0.0, 1.0)]).unwrap().interval_moment(2), None);
     }
 }

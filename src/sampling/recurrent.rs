@@ -27,7 +27,7 @@ impl Recurrent {
     ///
     /// # Errors
     /// [`SamplingError::OffsetCount`] unless there are `period >= 1` offsets,
-    /// [`SamplingError::NotFinite`] for an offset that is no number, and
+    /// [`SamplingError::NotFinite`] for an offset that is not finite, and
     /// [`SamplingError::Coinciding`] when two offsets agree modulo the period (to 1e-9).
     pub fn new(offsets: &[f64], period: usize) -> Result<Self, SamplingError> {
         if offsets.len() != period || period == 0 {
@@ -86,7 +86,7 @@ impl Recurrent {
     /// FIR taps at the fast rate for set `set`: `taps[n] = psi_i(n - latency - t_i)`, n = 0..length.
     ///
     /// With x_i\[k\] = f(k M + t_i) the synthesis y\[k M + p\] = sum_i sum_j taps_i\[p + j M\] x_i\[k - j\]
-    /// gives f(n - latency), up to what the truncation to `length` cuts off.
+    /// gives f(n - latency) up to the error of truncation to `length` taps.
     ///
     /// # Panics
     /// Unless `set < period`.
@@ -97,9 +97,9 @@ impl Recurrent {
     /// f(t) from finitely many samples, `samples[i][k] = f(t_i + (first + k) M)`; all others count as 0.
     ///
     /// # Panics
-    /// Unless there is one slice a set.
+    /// Unless there is one slice per set.
     pub fn interpolate<S: AsRef<[f64]>>(&self, t: f64, samples: &[S], first: i64) -> f64 {
-        assert_eq!(samples.len(), self.period(), "one slice of samples a set");
+        assert_eq!(samples.len(), self.period(), "one slice of samples per set");
         let period = self.period() as f64;
         let one_set = |set: usize, values: &[f64]| {
             let start = t - self.offsets[set] - first as f64 * period;
@@ -110,10 +110,9 @@ impl Recurrent {
 
     /// Mean power gain for independent errors of unit variance on all samples.
     ///
-    /// Equals (1/M) sum_i ||psi_i||^2: 1 for uniform offsets, the price of the comparison method
-    /// for all others. psi_i is sinc(u/M) times a trigonometric polynomial whose M lines lie just
-    /// far enough apart for the shifted boxes of the sinc to be disjoint, hence
-    /// ||psi_i||^2 = M sum of the squared line amplitudes.
+    /// Equals (1/M) sum_i ||psi_i||^2: 1 for uniform offsets, more for all others. psi_i is sinc(u/M) times a
+    /// trigonometric polynomial with M lines. Each line shifts the box spectrum of the sinc; the shifted boxes are
+    /// disjoint, hence ||psi_i||^2 = M times the sum of the squared line amplitudes.
     pub fn noise_gain(&self) -> f64 {
         (0..self.period()).map(|set| self.line_power(set)).sum()
     }
@@ -153,14 +152,14 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
-    /// sum over |k| <= reach of one tone through all sets, tapered (Fejer) so that the slowly and
+    /// sum over |k| <= terms of one tone through all sets, tapered (Fejer) so that the slowly and
     /// conditionally converging series can be compared with the tone itself.
-    fn tone_through(sets: &Recurrent, omega: f64, phase: f64, t: f64, reach: i64) -> f64 {
+    fn tone_through(sets: &Recurrent, omega: f64, phase: f64, t: f64, terms: i64) -> f64 {
         let m = sets.period() as f64;
         let f = |t: f64| (omega * t + phase).cos();
-        (-reach..=reach)
+        (-terms..=terms)
             .map(|k| {
-                let taper = 1.0 - (k.abs() as f64) / (reach + 1) as f64;
+                let taper = 1.0 - (k.abs() as f64) / (terms + 1) as f64;
                 let terms = sets.offsets().iter().enumerate();
                 taper
                     * terms

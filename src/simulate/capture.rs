@@ -1,41 +1,44 @@
-//! What all converters of a problem capture of one analog signal, beside what an ideal fast one gives.
+//! The captures of all converters of a problem, and the samples of the ideal fast converter.
 
 use super::recording::Recording;
 use super::response::{Instants, sample};
-use super::source::Source;
+use super::source::NormalisedSource;
 use crate::analog::StrictlyProper;
 use crate::design::Problem;
+use crate::design::problem::Channel;
+use crate::units::FastPeriods;
 
-/// An analog signal, time in fast periods.
+/// An analog signal in normalised time.
 #[derive(Debug, Clone)]
 pub enum Analog {
     /// Known in closed form.
-    Known(Source),
+    Known(NormalisedSource),
     /// A recording, periodic and band-limited.
     Recorded(Recording),
 }
 
-/// The slow captures and the wanted fast samples of the same stretch of time.
+/// The slow samples of all channels and the reference fast samples over the same time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Captured {
     /// `channels[i][k]` = (phi_i * f)(k M - D_i).
     pub channels: Vec<Vec<f64>>,
-    /// `target[n]` = (phi_0 * f)(n - m0), M samples for each tick.
+    /// `target[n]` = (phi_0 * f)(n - m0), M samples per slow period.
     pub target: Vec<f64>,
 }
 
-/// Captures `ticks` slow ticks of `signal`.
-pub fn capture(problem: &Problem, signal: &Analog, ticks: usize) -> Captured {
+/// Captures `periods` slow periods of `signal`: slow samples k = 0 .. periods of each channel, and M times as many
+/// reference samples.
+pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
     let ratio = problem.ratio;
-    let read = |front_end: usize, first: f64, step: f64, count: usize| {
-        signal.filtered(&problem.front_ends[front_end], Instants { first, step, count })
+    let read = |front_end: usize, first: FastPeriods, step: f64, count: usize| {
+        let instants = Instants { first, step: FastPeriods(step), count };
+        signal.filtered(&problem.front_ends[front_end], instants)
     };
-    let slow = |channel: &crate::design::problem::Channel| {
-        read(channel.front_end, -channel.delay, ratio as f64, ticks)
-    };
+    let slow = |channel: &Channel| read(channel.front_end, -channel.delay, ratio as f64, periods);
+    let target_first = FastPeriods(-(problem.latency as f64));
     Captured {
         channels: problem.channels.iter().map(slow).collect(),
-        target: read(problem.target, -(problem.latency as f64), 1.0, ticks * ratio),
+        target: read(problem.target, target_first, 1.0, periods * ratio),
     }
 }
 
@@ -43,32 +46,70 @@ impl Analog {
     fn filtered(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
         match self {
             Self::Known(source) => sample(filter, source, instants),
-            Self::Recorded(recording) => {
-                recording.sample(filter, instants.first, instants.step, instants.count)
-            }
+            Self::Recorded(recording) => recording.sample(filter, instants),
         }
     }
 }
 
-/// What interleaving without any filter gives: each wanted fast sample is the slow sample whose instant lies
-/// nearest, converters taken as alike.
+/// Plain interleaving, for comparison: output n is the slow sample whose instant lies nearest to n - m0, as if all
+/// front ends were alike; 0 where that sample has not been captured.
 pub fn interleaved(problem: &Problem, channels: &[Vec<f64>]) -> Vec<f64> {
-    let ticks = channels.iter().map(Vec::len).min().unwrap_or(0);
-    let period = problem.ratio as f64;
+    let periods = channels.iter().map(Vec::len).min().unwrap_or(0);
+    let slow_period = problem.ratio as f64;
     let nearest = |n: usize| {
-        let wanted = n as f64 - problem.latency as f64;
+        let instant = n as f64 - problem.latency as f64;
         problem
             .channels
             .iter()
             .zip(channels)
             .map(|(channel, samples)| {
-                let tick = ((wanted + channel.delay) / period).round();
-                let distance = (tick * period - channel.delay - wanted).abs();
-                let value = if tick < 0.0 { 0.0 } else { samples.get(tick as usize).copied().unwrap_or(0.0) };
+                let delay = channel.delay.0;
+                let k = ((instant + delay) / slow_period).round();
+                let distance = (k * slow_period - delay - instant).abs();
+                let value = if k < 0.0 { 0.0 } else { samples.get(k as usize).copied().unwrap_or(0.0) };
                 (distance, value)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map_or(0.0, |(_, value)| value)
     };
-    (0..ticks * problem.ratio).map(nearest).collect()
+    (0..periods * problem.ratio).map(nearest).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::Spec;
+    use crate::units::Seconds;
+
+    fn problem(delays: [f64; 2], latency: usize) -> Problem {
+        let text = format!(
+            "fast_period = 1.0\nratio = 2\nlatency = {latency}\n\
+             channel = [{{ delay = {:?} }}, {{ delay = {:?} }}]\n\
+             target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n",
+            delays[0], delays[1]
+        );
+        Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap()
+    }
+
+    #[test]
+    fn a_delayed_channel_captures_what_an_undelayed_one_captures_of_the_delayed_signal() {
+        let signal = |at: f64| Analog::Known(NormalisedSource::Step { at: FastPeriods(at), height: 2.0 });
+        let late = capture(&problem([0.75, 0.0], 0), &signal(3.0), 20);
+        let shifted = capture(&problem([0.0, 0.0], 0), &signal(3.75), 20);
+        for (a, b) in late.channels[0].iter().zip(&shifted.channels[0]) {
+            assert!((a - b).abs() < 1e-14, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn whole_delays_are_perfectly_interleaved() {
+        let problem = problem([1.0, 0.0], 1);
+        let source: crate::simulate::Source = "tones:0.3,0.8".parse().unwrap();
+        let captured = capture(&problem, &Analog::Known(source.normalised(Seconds(1.0))), 40);
+        let fast = interleaved(&problem, &captured.channels);
+        assert_eq!(fast.len(), captured.target.len());
+        for (n, (a, b)) in fast.iter().zip(&captured.target).enumerate() {
+            assert!((a - b).abs() < 1e-13, "{n}: {a} {b}");
+        }
+    }
 }

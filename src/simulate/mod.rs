@@ -1,14 +1,17 @@
-//! Virtual converters: what ideal samplers behind the analog front ends would have captured.
+//! Virtual converters: what ideal samplers capture of an analog signal that has passed the analog front ends.
 //!
-//! Analytic sources are answered by closed forms and matrix exponentials, recordings by exact Fourier
-//! synthesis; nothing is ever stepped on a coarse time grid.
+//! Channel i captures (phi_i * f)(k M - D_i), time in fast periods. The response to an analytic [`Source`] is computed
+//! by closed forms, matrix exponentials and quadrature that is exact to rounding; the response to a [`Recording`] by
+//! Fourier synthesis. No time grid is involved, so the result at an instant does not depend on the other instants.
 
 mod capture;
+mod parse;
 mod recording;
 mod response;
 mod source;
 
 pub use capture::{Analog, Captured, capture, interleaved};
+pub use parse::ParseSourceError;
 pub use recording::Recording;
 pub use response::{Instants, panels, sample};
-pub use source::{ParseSourceError, Source, Tone};
+pub use source::{NormalisedSource, Source, Tone};

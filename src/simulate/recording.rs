@@ -1,32 +1,33 @@
 //! A recording as a periodic, band-limited analog signal.
 
+use super::response::Instants;
 use crate::analog::StrictlyProper;
 use crate::linalg::Complex;
+use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use realfft::RealFftPlanner;
 use rustfft::FftPlanner;
 use std::f64::consts::{PI, TAU};
 
-/// L samples, one fast period each `spacing`, repeated for ever and interpolated by the one
-/// trigonometric polynomial below their Nyquist frequency.
+/// L samples with a spacing of T fast periods, continued with period L T and interpolated by the trigonometric
+/// polynomial of least degree: f(t) = Re sum_k c_k e^{2 pi j k t / (L T)}, k = 0 .. L/2.
 #[derive(Debug, Clone)]
 pub struct Recording {
     /// X_k / L for k = 0 .. L/2, the last halved when L is even.
     spectrum: Vec<Complex<f64>>,
-    /// Fast periods from sample to sample.
-    spacing: f64,
+    /// T.
+    spacing: FastPeriods,
     length: usize,
 }
 
 impl Recording {
-    /// `samples` taken every `spacing` fast periods. Both a spacing that is not positive and an empty
-    /// recording give silence.
-    pub fn new(samples: &[f64], spacing: f64) -> Self {
+    /// `samples` taken at the instants 0, T, 2 T, .. with T = `spacing` > 0. An empty recording is the zero signal.
+    pub fn new(samples: &[f64], spacing: FastPeriods) -> Self {
         let length = samples.len();
         let mut input = samples.to_vec();
         let mut spectrum = vec![Complex::ZERO; length / 2 + 1];
         if length > 0 {
             let fft = RealFftPlanner::new().plan_fft_forward(length);
-            // The lengths fit by construction, which is all that this call can object to.
+            // The call fails for buffers of other lengths only, and these have the plan's.
             if fft.process(&mut input, &mut spectrum).is_err() {
                 spectrum.fill(Complex::ZERO);
             }
@@ -40,35 +41,36 @@ impl Recording {
         Self { spectrum, spacing, length }
     }
 
-    /// Duration in fast periods.
-    pub fn duration(&self) -> f64 {
-        self.length as f64 * self.spacing
+    /// L T, the duration.
+    pub fn duration(&self) -> FastPeriods {
+        FastPeriods(self.length as f64 * self.spacing.0)
     }
 
-    /// (phi * f)(first + n step) for n = 0 .. count, time in fast periods.
+    /// (phi * f)(t) at the given instants.
     ///
-    /// The sum over the L/2 harmonics at equally spaced instants is a chirp-z transform (Bluestein): exact
-    /// for any ratio of the two rates, in O(n log n).
-    pub fn sample(&self, filter: &StrictlyProper, first: f64, step: f64, count: usize) -> Vec<f64> {
-        if count == 0 || self.length == 0 {
-            return vec![0.0; count];
+    /// The sum over the L/2 harmonics at equally spaced instants is a chirp-z transform (Bluestein, 1970): exact to
+    /// rounding for any ratio of the two rates, in O(n log n).
+    pub fn sample(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
+        if instants.count == 0 || self.length == 0 {
+            return vec![0.0; instants.count];
         }
-        let omega = TAU / self.duration();
+        let omega = TAU / self.duration().0;
+        let (first, step) = (instants.first / self.duration(), instants.step / self.duration());
         let filtered: Vec<Complex<f64>> = self
             .spectrum
             .iter()
             .enumerate()
             .map(|(k, bin)| {
-                let w = k as f64 * omega;
+                let w = RadiansPerFastPeriod(k as f64 * omega);
                 let weight = if k == 0 { 1.0 } else { 2.0 };
-                bin * filter.response(w) * Complex::from_polar(weight, phase(k, first / self.duration()))
+                bin * filter.response(w) * Complex::from_polar(weight, phase(k, first))
             })
             .collect();
-        chirp_z(&filtered, step / self.duration(), count)
+        chirp_z(&filtered, step, instants.count)
     }
 }
 
-/// 2 pi k turn, reduced before it loses digits.
+/// 2 pi k turn modulo 2 pi; k is multiplied by the fraction of the turn alone, or digits would be lost.
 fn phase(k: usize, turn: f64) -> f64 {
     TAU * (k as f64 * turn.fract()).fract()
 }
@@ -101,8 +103,8 @@ fn chirp_z(c: &[Complex<f64>], turn: f64, count: usize) -> Vec<f64> {
     (0..count).map(|n| (signal[n] * half_square(n, turn)).re / size as f64).collect()
 }
 
-/// e^{j pi n^2 turn}. Both products are taken exactly (the rounding error of each recovered by a fused
-/// multiply-add), or the phase would lose its digits in recordings of millions of samples.
+/// e^{j pi n^2 turn}. Both products are exact: a fused multiply-add recovers the rounding error of each.
+/// Plain products would lose the digits of the phase in recordings of millions of samples.
 fn half_square(n: usize, turn: f64) -> Complex<f64> {
     let n = n as f64;
     let once = n * turn;
@@ -117,14 +119,23 @@ fn half_square(n: usize, turn: f64) -> Complex<f64> {
 mod tests {
     use super::*;
     use crate::spec::FilterSpec;
+    use crate::units::Seconds;
 
     fn filter() -> StrictlyProper {
-        StrictlyProper::new(&FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] }, 1.0)
-            .unwrap()
+        let written = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
+        StrictlyProper::new(&written, Seconds(1.0)).unwrap()
+    }
+
+    fn instants(first: f64, step: f64, count: usize) -> Instants {
+        Instants { first: FastPeriods(first), step: FastPeriods(step), count }
+    }
+
+    fn response(w: f64) -> Complex<f64> {
+        filter().response(RadiansPerFastPeriod(w))
     }
 
     /// The definition: one sum over the harmonics for each instant.
-    fn plain(samples: &[f64], spacing: f64, t: f64) -> f64 {
+    fn definition(samples: &[f64], spacing: f64, t: f64) -> f64 {
         let l = samples.len();
         let coefficient = |k: usize| -> Complex<f64> {
             samples
@@ -137,20 +148,21 @@ mod tests {
             .map(|k| {
                 let w = TAU * k as f64 / (l as f64 * spacing);
                 let weight = if k == 0 || 2 * k == l { 1.0 } else { 2.0 };
-                (coefficient(k) * filter().response(w) * Complex::from_polar(weight / l as f64, w * t)).re
+                (coefficient(k) * response(w) * Complex::from_polar(weight / l as f64, w * t)).re
             })
             .sum()
     }
 
     #[test]
-    fn agrees_with_the_plain_sum_for_any_rates() {
+    fn agrees_with_the_definition_for_any_rates() {
         for (length, spacing, first, step) in
             [(16, 1.0, -1.2, 2.0), (15, 1.0, 0.0, 3.0), (21, 0.91, -0.6, 2.0), (1, 1.0, 0.5, 2.0)]
         {
             let samples: Vec<f64> = (0..length).map(|n| ((n * n) as f64).sin()).collect();
-            let ours = Recording::new(&samples, spacing).sample(&filter(), first, step, 9);
+            let ours =
+                Recording::new(&samples, FastPeriods(spacing)).sample(&filter(), instants(first, step, 9));
             for (n, value) in ours.iter().enumerate() {
-                let reference = plain(&samples, spacing, first + n as f64 * step);
+                let reference = definition(&samples, spacing, first + n as f64 * step);
                 assert!((value - reference).abs() < 1e-12, "{length} {n}: {value} {reference}");
             }
         }
@@ -161,8 +173,9 @@ mod tests {
         let length = 300_007;
         let w = TAU * 1234.0 / length as f64;
         let samples: Vec<f64> = (0..length).map(|n| (w * n as f64).cos()).collect();
-        let ours = Recording::new(&samples, 1.0).sample(&filter(), -0.6, 2.0, length / 2);
-        let gain = filter().response(w);
+        let ours =
+            Recording::new(&samples, FastPeriods(1.0)).sample(&filter(), instants(-0.6, 2.0, length / 2));
+        let gain = response(w);
         for (n, value) in ours.iter().enumerate().step_by(977) {
             let exact = (gain * Complex::from_polar(1.0, w * (2.0 * n as f64 - 0.6))).re;
             assert!((value - exact).abs() < 1e-9, "{n}: {value} {exact}");
@@ -170,7 +183,8 @@ mod tests {
     }
 
     #[test]
-    fn nothing_recorded_is_silence() {
-        assert_eq!(Recording::new(&[], 1.0).sample(&filter(), 0.0, 1.0, 3), vec![0.0; 3]);
+    fn an_empty_recording_is_the_zero_signal() {
+        let empty = Recording::new(&[], FastPeriods(1.0));
+        assert_eq!(empty.sample(&filter(), instants(0.0, 1.0, 3)), vec![0.0; 3]);
     }
 }

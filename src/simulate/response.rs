@@ -1,38 +1,43 @@
 //! The response of a front end to an analytic source, exact to rounding at any uniformly spaced instants.
 
-use super::source::{Source, Tone};
+use super::source::{NormalisedSource, Source, Tone};
 use crate::analog::StrictlyProper;
 use crate::linalg::{self, Complex, Mat};
+use crate::units::FastPeriods;
 
-/// The instants first, first + step, ... in fast periods.
+/// The instants first + n step, n = 0 .. count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instants {
     /// First instant.
-    pub first: f64,
+    pub first: FastPeriods,
     /// Spacing, positive.
-    pub step: f64,
-    /// How many.
+    pub step: FastPeriods,
+    /// Number of instants.
     pub count: usize,
 }
 
 impl Instants {
+    /// Instant `n`, fast periods.
     fn at(&self, n: usize) -> f64 {
-        self.first + n as f64 * self.step
+        self.first.0 + n as f64 * self.step.0
     }
 }
 
-/// (phi * f)(t) at the given instants; time of filter, source and instants in fast periods.
-pub fn sample(filter: &StrictlyProper, source: &Source, instants: Instants) -> Vec<f64> {
+/// (phi * f)(t) at the given instants, accurate to rounding.
+///
+/// Steps and tones have closed forms. A chirp costs one small matrix product per panel of its quadrature; ask
+/// [`panels`] for their number first, since beyond a million panels between two instants digits are lost.
+pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Instants) -> Vec<f64> {
     match source {
-        Source::Step { at, height } => step(filter, *at, *height, instants),
+        Source::Step { at, height } => step(filter, at.0, *height, instants),
         Source::Tones(list) => tones(filter, list, instants),
         Source::Chirp { length, start, end, .. } => {
-            smooth(filter, source, (0.0, *length), start.abs().max(end.abs()), instants)
+            smooth(filter, source, (0.0, length.0), start.0.abs().max(end.0.abs()), instants)
         }
-        Source::Sum(parts) => {
+        Source::Sum(terms) => {
             let mut total = vec![0.0; instants.count];
-            for part in parts {
-                let samples = sample(filter, part, instants);
+            for term in terms {
+                let samples = sample(filter, term, instants);
                 total.iter_mut().zip(samples).for_each(|(sum, x)| *sum += x);
             }
             total
@@ -41,18 +46,19 @@ pub fn sample(filter: &StrictlyProper, source: &Source, instants: Instants) -> V
 }
 
 /// Steady state: amplitude |Phi(j omega)| cos(omega t + phase + arg Phi(j omega)).
-fn tones(filter: &StrictlyProper, tones: &[Tone], instants: Instants) -> Vec<f64> {
+fn tones(filter: &StrictlyProper, tones: &[Tone<FastPeriods>], instants: Instants) -> Vec<f64> {
     let phasors: Vec<(f64, Complex<f64>)> = tones
         .iter()
         .map(|tone| {
-            (tone.omega, filter.response(tone.omega) * Complex::from_polar(tone.amplitude, tone.phase))
+            (tone.omega.0, filter.response(tone.omega) * Complex::from_polar(tone.amplitude, tone.phase))
         })
         .collect();
     let value = |t: f64| phasors.iter().map(|(omega, p)| (p * Complex::from_polar(1.0, omega * t)).re).sum();
     (0..instants.count).map(|n| value(instants.at(n))).collect()
 }
 
-/// x(t) and the constant input as one autonomous system: no inverse of A, no cancellation.
+/// The state and the constant input form one autonomous system, (x, u)' = [A B; 0 0] (x, u), so A need not be inverted
+/// and nothing cancels.
 fn step(filter: &StrictlyProper, at: f64, height: f64, instants: Instants) -> Vec<f64> {
     let n = filter.order();
     let mut generator = Mat::zeros(n + 1, n + 1);
@@ -63,7 +69,7 @@ fn step(filter: &StrictlyProper, at: f64, height: f64, instants: Instants) -> Ve
     let mut state = Mat::zeros(n + 1, 1);
     state[n] = height;
     state = linalg::expm(&(&generator * (instants.at(first) - at))) * state;
-    let advance = linalg::expm(&(generator * instants.step));
+    let advance = linalg::expm(&(generator * instants.step.0));
     for sample in &mut output[first..] {
         *sample = (filter.c() * state.rows(0, n))[0];
         state = &advance * state;
@@ -84,25 +90,27 @@ const HALF_NODES: [(f64, f64); 8] = [
     (0.4524937450811813, 0.09472530522753432),
 ];
 
-/// A smooth source that is zero outside `support` and has no frequency above `band` (cycles a fast
-/// period): x(t + l) = e^{A l} x(t) + int_0^l e^{A(l - s)} B f(t + s) ds, the integral by a Gauss-Legendre
-/// rule on panels in which neither the source nor the filter moves by more than about one radian; the
-/// rule is then exact to rounding.
+/// The response to a smooth source that is zero outside `support` (fast periods) and has no frequency above `band`
+/// (cycles per fast period).
+///
+/// x(t + l) = e^{A l} x(t) + int_0^l e^{A (l - s)} B f(t + s) ds. The integral is taken by a Gauss-Legendre rule on
+/// panels in which the phase of the source and the exponents of the filter change by about one radian at most; the rule
+/// is then exact to rounding.
 fn smooth(
     filter: &StrictlyProper,
-    source: &Source,
+    source: &NormalisedSource,
     support: (f64, f64),
     band: f64,
     instants: Instants,
 ) -> Vec<f64> {
     let rate = panel_rate(filter, band);
     let mut state = Mat::zeros(filter.order(), 1);
-    let mut now = support.0.min(instants.first);
+    let mut now = support.0.min(instants.first.0);
     let mut output = Vec::with_capacity(instants.count);
     let mut cached: Option<Panels> = None;
     for k in 0..instants.count {
         let target = instants.at(k);
-        // The corners of the support are no smooth points: stop there.
+        // The source is not smooth at the ends of its support, so panels end there.
         for corner in [support.0, support.1, target] {
             let length = corner - now;
             if length <= 0.0 || corner > target {
@@ -121,22 +129,21 @@ fn smooth(
     output
 }
 
-/// Panels of the quadrature for each fast period of a source whose highest frequency is `band` (cycles a fast period): what
-/// [`sample`] costs.
+/// Panels of the quadrature per fast period, for a source with no frequency above `band` (cycles per fast period).
 fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
     (filter.a().norm() + std::f64::consts::TAU * band).max(f64::MIN_POSITIVE)
 }
 
-/// Panels of the quadrature that [`sample`] needs over `span` fast periods; zero for sources answered in closed form.
-pub fn panels(filter: &StrictlyProper, source: &Source, span: f64) -> f64 {
+/// Number of quadrature panels that [`sample`] needs over `span`; 0 for sources with a closed form.
+pub fn panels(filter: &StrictlyProper, source: &NormalisedSource, span: FastPeriods) -> f64 {
     match source {
-        Source::Chirp { start, end, .. } => span * panel_rate(filter, start.abs().max(end.abs())),
-        Source::Sum(parts) => parts.iter().map(|part| panels(filter, part, span)).sum(),
+        Source::Chirp { start, end, .. } => span.0 * panel_rate(filter, start.0.abs().max(end.0.abs())),
+        Source::Sum(terms) => terms.iter().map(|term| panels(filter, term, span)).sum(),
         Source::Step { .. } | Source::Tones(_) => 0.0,
     }
 }
 
-/// The quadrature of one stretch, cut into equal panels; reused for stretches of equal length.
+/// The quadrature over an interval of `length` fast periods in equal panels; reused for intervals of equal length.
 struct Panels {
     length: f64,
     count: usize,
@@ -147,7 +154,7 @@ struct Panels {
 
 impl Panels {
     fn new(filter: &StrictlyProper, length: f64, rate: f64) -> Self {
-        // Bounded so that every call ends; `panels` tells beforehand where digits or patience would be lost.
+        // Bounded so that every call ends; callers ask `panels` beforehand.
         let count = (length * rate).ceil().clamp(1.0, 1e6) as usize;
         let panel = length / count as f64;
         let mirrored = HALF_NODES.iter().map(|&(x, w)| (1.0 - x, w));
@@ -162,7 +169,7 @@ impl Panels {
         (length - self.length).abs() <= 1e-12 * self.length
     }
 
-    fn advance(&self, state: &mut Mat, source: &Source, start: f64, support: (f64, f64)) {
+    fn advance(&self, state: &mut Mat, source: &NormalisedSource, start: f64, support: (f64, f64)) {
         let panel = self.length / self.count as f64;
         for k in 0..self.count {
             let begin = start + k as f64 * panel;
@@ -171,7 +178,7 @@ impl Panels {
                 continue;
             }
             for (offset, weight) in &self.nodes {
-                let value = source.value(begin + offset);
+                let value = source.value(FastPeriods(begin + offset));
                 *state += weight * value;
             }
         }
@@ -182,22 +189,35 @@ impl Panels {
 mod tests {
     use super::*;
     use crate::spec::FilterSpec;
+    use crate::units::{CyclesPerFastPeriod, Seconds};
+
+    fn filter(num: &[f64], den: &[f64]) -> StrictlyProper {
+        let written = FilterSpec::TransferFunction { num: num.to_vec(), den: den.to_vec() };
+        StrictlyProper::new(&written, Seconds(1.0)).unwrap()
+    }
 
     fn rc(pole: f64) -> StrictlyProper {
-        StrictlyProper::new(&FilterSpec::TransferFunction { num: vec![pole], den: vec![1.0, pole] }, 1.0)
-            .unwrap()
+        filter(&[pole], &[1.0, pole])
     }
 
     fn thesis() -> StrictlyProper {
-        StrictlyProper::new(&FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] }, 1.0)
-            .unwrap()
+        filter(&[0.25], &[1.0, 1.0, 0.25])
     }
 
-    const GRID: Instants = Instants { first: -1.2, step: 2.0, count: 40 };
+    /// The source with a fast period of one second.
+    fn source(text: &str) -> NormalisedSource {
+        text.parse::<Source>().unwrap().normalised(Seconds(1.0))
+    }
+
+    fn grid(first: f64, step: f64, count: usize) -> Instants {
+        Instants { first: FastPeriods(first), step: FastPeriods(step), count }
+    }
+
+    const GRID: Instants = Instants { first: FastPeriods(-1.2), step: FastPeriods(2.0), count: 40 };
 
     #[test]
     fn the_step_response_has_its_closed_form() {
-        for (n, y) in sample(&thesis(), &"step@0.3".parse().unwrap(), GRID).into_iter().enumerate() {
+        for (n, y) in sample(&thesis(), &source("step@0.3"), GRID).into_iter().enumerate() {
             let t = GRID.at(n) - 0.3;
             let exact = if t < 0.0 { 0.0 } else { 1.0 - (1.0 + 0.5 * t) * (-0.5 * t).exp() };
             assert!((y - exact).abs() < 1e-13, "{n}: {y} {exact}");
@@ -206,7 +226,7 @@ mod tests {
 
     #[test]
     fn tones_are_in_the_steady_state() {
-        for (n, y) in sample(&rc(2.0), &"tones:0.8".parse().unwrap(), GRID).into_iter().enumerate() {
+        for (n, y) in sample(&rc(2.0), &source("tones:0.8"), GRID).into_iter().enumerate() {
             let t = GRID.at(n);
             let exact = (2.0 * (0.8 * t).cos() + 0.8 * (0.8 * t).sin()) * 2.0 / (4.0 + 0.64);
             assert!((y - exact).abs() < 1e-13, "{n}: {y} {exact}");
@@ -214,12 +234,12 @@ mod tests {
     }
 
     #[test]
-    fn a_chirp_that_stands_still_is_a_sine_switched_on_and_off() {
+    fn a_chirp_of_constant_frequency_is_a_sine_burst() {
         // End = start makes the closed form elementary: sin(w t) on [0, T) through one pole.
         for pole in [0.1, 2.0, 300.0] {
             let (w, length) = (0.7, 21.3);
-            let f = w / std::f64::consts::TAU;
-            let chirp = Source::Chirp { start: f, end: f, length, amplitude: 1.0 };
+            let f = CyclesPerFastPeriod(w / std::f64::consts::TAU);
+            let chirp = Source::Chirp { start: f, end: f, length: FastPeriods(length), amplitude: 1.0 };
             let on = |t: f64| {
                 let steady =
                     |t: f64| pole * (pole * (w * t).sin() - w * (w * t).cos()) / (pole * pole + w * w);
@@ -234,22 +254,20 @@ mod tests {
     }
 
     #[test]
-    fn a_chirp_does_not_depend_on_where_it_is_sampled() {
-        let chirp: Source = "chirp:0.01Hz..0.4Hz@60s".parse().unwrap();
-        let coarse = sample(&thesis(), &chirp, Instants { first: 0.0, step: 2.0, count: 30 });
-        let fine = sample(&thesis(), &chirp, Instants { first: 0.0, step: 0.125, count: 480 });
+    fn a_chirp_response_does_not_depend_on_the_instants() {
+        let chirp = source("chirp:0.01Hz..0.4Hz@60s");
+        let coarse = sample(&thesis(), &chirp, grid(0.0, 2.0, 30));
+        let fine = sample(&thesis(), &chirp, grid(0.0, 0.125, 480));
         for (n, y) in coarse.into_iter().enumerate() {
             assert!((y - fine[16 * n]).abs() < 1e-13, "{n}");
         }
     }
 
     #[test]
-    fn a_sum_is_the_sum() {
-        let both = sample(&thesis(), &"step@0.3+tones:0.5".parse().unwrap(), GRID);
-        let (a, b) = (
-            sample(&thesis(), &"step@0.3".parse().unwrap(), GRID),
-            sample(&thesis(), &"tones:0.5".parse().unwrap(), GRID),
-        );
+    fn the_response_to_a_sum_is_the_sum_of_responses() {
+        let both = sample(&thesis(), &source("step@0.3+tones:0.5"), GRID);
+        let (a, b) =
+            (sample(&thesis(), &source("step@0.3"), GRID), sample(&thesis(), &source("tones:0.5"), GRID));
         assert!(both.iter().zip(a.iter().zip(&b)).all(|(s, (x, y))| (s - x - y).abs() < 1e-15));
     }
 }

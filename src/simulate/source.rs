@@ -1,215 +1,166 @@
-//! Analytic sources: signals known in closed form, and how they are written on the command line.
+//! Analytic sources: analog signals known in closed form.
 
+use crate::units::{FastPeriods, Hertz, Quantity, RadiansPerSecond, Seconds, Time};
 use std::f64::consts::TAU;
-use std::str::FromStr;
 
-/// An analog signal f(t), t in seconds.
+/// An analog signal f(t) on the time base `T`: [`Seconds`] as it is written down, [`FastPeriods`] as it is simulated.
+///
+/// Frequencies follow the time base ([`Time::Frequency`]): hertz and rad/s go with seconds, cycles and radians per fast
+/// period with fast periods. [`Source::normalised`] is the one way from the first to the second.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Source {
-    /// 0 before `at`, `height` from then on (thesis 5.42).
+pub enum Source<T: Time = Seconds> {
+    /// f(t) = 0 for t < at, `height` for t >= at (thesis 5.42).
     Step {
-        /// Instant of the step, seconds.
-        at: f64,
+        /// Instant of the step.
+        at: T,
         /// Height of the step.
         height: f64,
     },
-    /// Sum of amplitude cos(omega t + phase) from t = minus infinity (thesis 5.43).
-    Tones(Vec<Tone>),
-    /// amplitude sin(2 pi (start t + (end - start) t^2 / (2 length))) for 0 <= t < length, else 0.
+    /// f(t) = sum of A cos(w t + phase) over the tones, from t = minus infinity (thesis 5.43).
+    Tones(Vec<Tone<T>>),
+    /// f(t) = A sin(2 pi (f0 t + (f1 - f0) t^2 / (2 L))) for 0 <= t < L, 0 elsewhere.
     Chirp {
-        /// Frequency at t = 0, hertz.
-        start: f64,
-        /// Frequency at t = length, hertz.
-        end: f64,
-        /// Duration in seconds.
-        length: f64,
-        /// Peak value.
+        /// f0, the frequency at t = 0.
+        start: T::Frequency,
+        /// f1, the frequency at t = L.
+        end: T::Frequency,
+        /// L, the duration.
+        length: T,
+        /// A.
         amplitude: f64,
     },
     /// The sum of several sources.
-    Sum(Vec<Source>),
+    Sum(Vec<Source<T>>),
 }
 
-/// amplitude cos(omega t + phase).
+/// A source in normalised time t' = t / h, as [`sample`](super::sample) reads it.
+pub type NormalisedSource = Source<FastPeriods>;
+
+/// A cos(w t + phase).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tone {
-    /// Angular frequency, rad/s.
-    pub omega: f64,
-    /// Peak value.
+pub struct Tone<T: Time = Seconds> {
+    /// w.
+    pub omega: T::AngularFrequency,
+    /// A.
     pub amplitude: f64,
     /// Phase at t = 0, rad.
     pub phase: f64,
 }
 
 impl Source {
-    /// The same signal with time counted in units of `unit` seconds.
-    pub fn in_unit(&self, unit: f64) -> Self {
+    /// The same signal in normalised time: t' = t / h, f' = f h, w' = w h. Values do not change: f'(t / h) = f(t).
+    pub fn normalised(&self, fast_period: Seconds) -> NormalisedSource {
+        let time = |t: Seconds| t.in_fast_periods(fast_period);
+        let frequency = |f: Hertz| f.per_fast_period(fast_period);
+        let angular = |w: RadiansPerSecond| w.per_fast_period(fast_period);
         match self {
-            Self::Step { at, height } => Self::Step { at: at / unit, height: *height },
-            Self::Tones(tones) => {
-                Self::Tones(tones.iter().map(|tone| Tone { omega: tone.omega * unit, ..*tone }).collect())
-            }
-            Self::Chirp { start, end, length, amplitude } => Self::Chirp {
-                start: start * unit,
-                end: end * unit,
-                length: length / unit,
-                amplitude: *amplitude,
+            Self::Step { at, height } => Source::Step { at: time(*at), height: *height },
+            Self::Tones(tones) => Source::Tones(
+                tones
+                    .iter()
+                    .map(|&Tone { omega, amplitude, phase }| Tone { omega: angular(omega), amplitude, phase })
+                    .collect(),
+            ),
+            &Self::Chirp { start, end, length, amplitude } => Source::Chirp {
+                start: frequency(start),
+                end: frequency(end),
+                length: time(length),
+                amplitude,
             },
-            Self::Sum(parts) => Self::Sum(parts.iter().map(|part| part.in_unit(unit)).collect()),
+            Self::Sum(terms) => Source::Sum(terms.iter().map(|term| term.normalised(fast_period)).collect()),
         }
     }
+}
 
-    /// When all has happened that happens once: the end of a chirp, the instant of a step.
-    pub fn duration(&self) -> Option<f64> {
+impl<T: Time> Source<T> {
+    /// The instant after which the signal no longer changes its law: the end of a chirp, the instant of a step, the
+    /// latest of a sum. `None` for tones alone, which go on for ever.
+    pub fn duration(&self) -> Option<T> {
         match self {
             Self::Chirp { length, .. } => Some(*length),
             Self::Step { at, .. } => Some(*at),
-            Self::Sum(parts) => parts.iter().filter_map(Self::duration).reduce(f64::max),
+            Self::Sum(terms) => {
+                let later = |a: T, b: T| if b.value() > a.value() { b } else { a };
+                terms.iter().filter_map(Self::duration).reduce(later)
+            }
             Self::Tones(_) => None,
         }
     }
 
     /// f(t).
-    pub fn value(&self, t: f64) -> f64 {
+    pub fn value(&self, t: T) -> f64 {
         match self {
             Self::Step { at, height } => {
-                if t >= *at {
+                if t.value() >= at.value() {
                     *height
                 } else {
                     0.0
                 }
             }
-            Self::Tones(tones) => {
-                tones.iter().map(|tone| tone.amplitude * (tone.omega * t + tone.phase).cos()).sum()
-            }
+            Self::Tones(tones) => tones.iter().map(|tone| tone.value(t)).sum(),
             Self::Chirp { start, end, length, amplitude } => {
-                if !(0.0..*length).contains(&t) {
+                let (start, end, length, t) = (start.value(), end.value(), length.value(), t.value());
+                if !(0.0..length).contains(&t) {
                     return 0.0;
                 }
                 amplitude * (TAU * (start + (end - start) * t / (2.0 * length)) * t).sin()
             }
-            Self::Sum(parts) => parts.iter().map(|part| part.value(t)).sum(),
+            Self::Sum(terms) => terms.iter().map(|term| term.value(t)).sum(),
         }
     }
 }
 
-/// A source that could not be read.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ParseSourceError {
-    /// No such kind of source.
-    #[error(
-        "`{text}` is no source: write step@0.3, tones:0.3,0.8 (rad/s), tones:440Hz,1kHz, \
-         chirp:100Hz..8kHz@2s, several joined by `+`, or the name of a WAV file"
-    )]
-    Unknown {
-        /// What was typed.
-        text: String,
-    },
-    /// A number that is none.
-    #[error("`{number}` in source `{text}` is not a finite number{hint}")]
-    Number {
-        /// What was typed.
-        text: String,
-        /// The part that is wrong.
-        number: String,
-        /// Which units are understood there.
-        hint: &'static str,
-    },
-}
-
-impl FromStr for Source {
-    type Err = ParseSourceError;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let mut parts =
-            text.split('+').map(|part| parse_one(text, part.trim())).collect::<Result<Vec<_>, _>>()?;
-        Ok(if parts.len() == 1 { parts.remove(0) } else { Self::Sum(parts) })
-    }
-}
-
-fn parse_one(text: &str, part: &str) -> Result<Source, ParseSourceError> {
-    if let Some(at) = part.strip_prefix("step@") {
-        return Ok(Source::Step { at: seconds(text, at)?, height: 1.0 });
-    }
-    if let Some(list) = part.strip_prefix("tones:") {
-        let tone = |s: &str| angular(text, s).map(|omega| Tone { omega, amplitude: 1.0, phase: 0.0 });
-        return Ok(Source::Tones(list.split(',').map(tone).collect::<Result<_, _>>()?));
-    }
-    let chirp = part.strip_prefix("chirp:").and_then(|rest| rest.split_once('@'));
-    if let Some((range, length)) = chirp
-        && let Some((start, end)) = range.split_once("..")
-    {
-        let (start, end) = (angular(text, start)? / TAU, angular(text, end)? / TAU);
-        return Ok(Source::Chirp { start, end, length: seconds(text, length)?, amplitude: 1.0 });
-    }
-    Err(ParseSourceError::Unknown { text: text.to_owned() })
-}
-
-/// Seconds, with an optional unit s, ms, us or ns.
-fn seconds(text: &str, number: &str) -> Result<f64, ParseSourceError> {
-    let units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("s", 1.0)];
-    scaled(text, number, &units, " (seconds; the units ms, us and ns are understood)")
-}
-
-/// rad/s when bare, or hertz with the unit Hz, kHz or MHz.
-fn angular(text: &str, number: &str) -> Result<f64, ParseSourceError> {
-    let units = [("kHz", TAU * 1e3), ("MHz", TAU * 1e6), ("Hz", TAU)];
-    scaled(text, number, &units, " (rad/s; the units Hz, kHz and MHz are understood)")
-}
-
-fn scaled(
-    text: &str,
-    number: &str,
-    units: &[(&str, f64)],
-    hint: &'static str,
-) -> Result<f64, ParseSourceError> {
-    let number = number.trim();
-    let unit = units.iter().find_map(|&(name, factor)| number.strip_suffix(name).map(|bare| (bare, factor)));
-    let (bare, factor) = unit.unwrap_or((number, 1.0));
-    match bare.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value * factor),
-        _ => Err(ParseSourceError::Number { text: text.to_owned(), number: number.to_owned(), hint }),
+impl<T: Time> Tone<T> {
+    /// A cos(w t + phase).
+    pub fn value(&self, t: T) -> f64 {
+        self.amplitude * (self.omega.value() * t.value() + self.phase).cos()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::CyclesPerFastPeriod;
+    use proptest::prelude::*;
 
     #[test]
-    fn the_written_forms_are_understood() {
-        assert_eq!("step@0.3".parse(), Ok(Source::Step { at: 0.3, height: 1.0 }));
-        let Ok(Source::Tones(tones)) = "tones:0.3,1kHz".parse() else { panic!() };
-        assert_eq!((tones[0].omega, tones[1].omega), (0.3, TAU * 1e3));
-        let chirp = "chirp:10Hz..20Hz@500ms".parse();
-        assert_eq!(chirp, Ok(Source::Chirp { start: 10.0, end: 20.0, length: 0.5, amplitude: 1.0 }));
-        assert!(matches!("step@1us+tones:2".parse(), Ok(Source::Sum(parts)) if parts.len() == 2));
+    fn every_kind_has_the_units_of_its_time_base() {
+        let source: Source = "step@0.5+tones:3+chirp:100Hz..200Hz@2s".parse().unwrap();
+        let Source::Sum(terms) = source.normalised(Seconds(1e-3)) else { panic!("a sum stays one") };
+        assert_eq!(terms[0], Source::Step { at: FastPeriods(500.0), height: 1.0 });
+        let Source::Chirp { start, length, .. } = terms[2] else { panic!("a chirp stays one") };
+        assert_eq!((start, length), (CyclesPerFastPeriod(0.1), FastPeriods(2000.0)));
     }
 
     #[test]
-    fn nonsense_is_named() {
-        for text in [
-            "",
-            "stp@1",
-            "step@",
-            "step@nan",
-            "tones:",
-            "tones:1,,2",
-            "chirp:1..2",
-            "chirp:1@2",
-            "tones:infHz",
-        ] {
-            let error = text.parse::<Source>().unwrap_err().to_string();
-            assert!(error.contains('`'), "{text}: {error}");
-        }
+    fn a_sum_lasts_as_long_as_its_longest_term() {
+        let duration = |text: &str| text.parse::<Source>().unwrap().duration();
+        assert_eq!(duration("step@0.5+chirp:1..2@3"), Some(Seconds(3.0)));
+        assert_eq!(duration("chirp:1..2@3+step@5+tones:1"), Some(Seconds(5.0)));
+        assert_eq!(duration("tones:1,2"), None);
     }
 
     #[test]
-    fn changing_the_unit_of_time_changes_nothing_else() {
-        let source: Source = "step@0.5+tones:3,4+chirp:1Hz..2Hz@2s".parse().unwrap();
-        let scaled = source.in_unit(1e-3);
-        for t in [0.0, 0.25, 0.75, 1.5, 2.5] {
-            assert!((source.value(t) - scaled.value(t * 1e3)).abs() < 1e-9);
+    fn a_chirp_has_its_frequencies_at_both_ends() {
+        // The instantaneous frequency is the slope of the phase: count the zero crossings of one half second each.
+        let chirp: Source = "chirp:10Hz..90Hz@8s".parse().unwrap();
+        let crossings = |from: f64| {
+            let value = |n: usize| chirp.value(Seconds(from + n as f64 * 0.5 / 4096.0));
+            (0..4096).filter(|&n| value(n) * value(n + 1) < 0.0).count()
+        };
+        assert!(crossings(0.0).abs_diff(2 * 6) <= 2, "{}", crossings(0.0));
+        assert!(crossings(7.49).abs_diff(2 * 44) <= 2, "{}", crossings(7.49));
+        assert_eq!((chirp.value(Seconds(-1e-9)), chirp.value(Seconds(8.0))), (0.0, 0.0));
+    }
+
+    proptest! {
+        #[test]
+        fn the_unit_of_time_changes_no_value(decade in -9.0..9.0f64, t in 0.0..3.0f64) {
+            let h = Seconds(10f64.powf(decade));
+            let source: Source = "tones:3,4+chirp:1Hz..2Hz@4s".parse().unwrap();
+            let t = Seconds(t);
+            let normalised = source.normalised(h).value(t.in_fast_periods(h));
+            prop_assert!((source.value(t) - normalised).abs() < 1e-12);
         }
     }
 }

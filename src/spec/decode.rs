@@ -1,4 +1,6 @@
-//! From a written document to a [`Spec`]: units resolved, omitted filters filled in, everything checked.
+//! From a document to a [`Spec`]: units resolved, omitted filters filled in, all rules checked.
+
+use crate::units::{FastPeriods, Hertz, Seconds};
 
 use super::design::DesignOverrides;
 use super::design::KeyProblem;
@@ -49,14 +51,14 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
 }
 
 /// h, from one of its two spellings.
-fn fast_period(top: &Fields<'_>) -> Result<f64, Fault> {
+fn fast_period(top: &Fields<'_>) -> Result<Seconds, Fault> {
     match (top.optional("fast_period"), top.optional("fast_rate")) {
         (Some(_), Some(rate)) => {
             let remedy = "they say the same thing, keep one of them";
             Err(rate.fault(SpecProblem::Conflict { first: "fast_period", second: "fast_rate", remedy }))
         }
-        (Some(period), None) => checked_number(&period, check_fast_period),
-        (None, Some(rate)) => checked_number(&rate, check_fast_rate).map(f64::recip),
+        (Some(period), None) => checked_number(&period, |h| check_fast_period(Seconds(h))).map(Seconds),
+        (None, Some(rate)) => checked_number(&rate, |f| check_fast_rate(Hertz(f))).map(|f| Hertz(f).period()),
         (None, None) => {
             let remedy = "give fast_period in seconds or fast_rate in hertz";
             Err(top.whole().fault(SpecProblem::MissingKey { key: "fast_period", remedy }))
@@ -80,9 +82,9 @@ fn checked_count(
     Ok(count)
 }
 
-/// What a channel has in common with the others unless it says otherwise.
+/// Defaults of a channel.
 struct Common<'a> {
-    fast_period: f64,
+    fast_period: Seconds,
     target: &'a FilterSpec,
     noise: f64,
 }
@@ -112,29 +114,32 @@ fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<ChannelSpec, Fault> 
     Ok(ChannelSpec { delay, filter, noise })
 }
 
-/// D_i in seconds, from one of its two spellings.
-fn delay(fields: &Fields<'_>, fast_period: f64) -> Result<f64, Fault> {
-    let (value, seconds_each, unit) = match (fields.optional("delay"), fields.optional("delay_samples")) {
-        (Some(_), Some(samples)) => {
-            let remedy = "they say the same thing, keep one of them";
-            return Err(samples.fault(SpecProblem::Conflict {
-                first: "delay",
-                second: "delay_samples",
-                remedy,
-            }));
-        }
-        (Some(delay), None) => (delay, 1.0, "s"),
-        (None, Some(samples)) => (samples, fast_period, "fast periods"),
-        (None, None) => {
-            let remedy = "give delay in seconds or delay_samples in fast periods (0 for none)";
-            return Err(fields.whole().fault(SpecProblem::MissingKey { key: "delay", remedy }));
-        }
-    };
+/// D_i, from one of its two spellings.
+fn delay(fields: &Fields<'_>, fast_period: Seconds) -> Result<Seconds, Fault> {
+    let (value, in_seconds, unit): (_, fn(f64, Seconds) -> Seconds, _) =
+        match (fields.optional("delay"), fields.optional("delay_samples")) {
+            (Some(_), Some(samples)) => {
+                let remedy = "they say the same thing, keep one of them";
+                return Err(samples.fault(SpecProblem::Conflict {
+                    first: "delay",
+                    second: "delay_samples",
+                    remedy,
+                }));
+            }
+            (Some(delay), None) => (delay, |written, _| Seconds(written), "s"),
+            (None, Some(samples)) => {
+                (samples, |written, h| FastPeriods(written).in_seconds(h), "fast periods")
+            }
+            (None, None) => {
+                let remedy = "give delay in seconds or delay_samples in fast periods (0 for none)";
+                return Err(fields.whole().fault(SpecProblem::MissingKey { key: "delay", remedy }));
+            }
+        };
     let written = value.number()?;
-    let delay = written * seconds_each;
-    check_delay(delay / fast_period, written, unit).map_err(|problem| value.fault(problem))?;
+    let delay = in_seconds(written, fast_period);
+    check_delay(delay.in_fast_periods(fast_period), written, unit).map_err(|problem| value.fault(problem))?;
     // A delay of -0.0 is a delay of 0.0.
-    Ok(delay + 0.0)
+    Ok(delay + Seconds(0.0))
 }
 
 fn design(
@@ -173,9 +178,9 @@ fn blamed(overrides: &DesignOverrides, key: &'static str, problem: &SpecProblem)
     overrides.gives(cause).then_some(cause)
 }
 
-/// One number of bits, or a list of them, whose length is for those to check who know the filters'.
+/// One number of bits, or a list of them. The length of the list is checked where that of the filters is known.
 pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
-    // What is out of range here is out of range there.
+    // A number that does not fit u32 is out of range in any case.
     let bits = |v: &Value<'_>| v.count("bits").map(|bits| u32::try_from(bits).unwrap_or(u32::MAX));
     let words = match value.items("a number of bits, or a list of them") {
         Ok(items) => WordLengths::PerTap(items.iter().map(bits).collect::<Result<_, _>>()?),
@@ -257,7 +262,7 @@ fn family(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
     Ok(FilterSpec::Family {
         family: named.name("filter family", &Family::ALL.map(|f| (f.name(), f)))?,
         order: fields.optional("order").map(|v| v.count("poles")).transpose()?,
-        cutoff: fields.required("cutoff", "give the cutoff in hertz")?.number()?,
+        cutoff: Hertz(fields.required("cutoff", "give the cutoff in hertz")?.number()?),
         ripple_db: number("ripple_db")?,
         attenuation_db: number("attenuation_db")?,
     })

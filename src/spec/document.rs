@@ -1,6 +1,6 @@
-//! What was written: a tree of keys and values that remembers where each of them stood.
+//! A document as a tree of keys and values with their spans in the text.
 //!
-//! TOML and JSON both end up here, so that one reader gives one set of messages.
+//! TOML and JSON both become this tree, so that both get the same error messages.
 
 use std::fmt;
 use std::ops::Range;
@@ -8,14 +8,14 @@ use std::ops::Range;
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
 use toml::de::{DeTable, DeValue};
 
-/// A value with its place in the text, where the notation tells it.
+/// A value with its span in the text, where the parser reports one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Node {
     pub(crate) kind: Kind,
     pub(crate) span: Option<Range<usize>>,
 }
 
-/// What a value is.
+/// A value by type.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Kind {
     Null,
@@ -37,10 +37,10 @@ pub(crate) struct Entry {
 }
 
 impl Kind {
-    /// What to call it in a message.
+    /// The name of the type in messages.
     pub(crate) fn name(&self) -> &'static str {
         match self {
-            // serde_json and others write it for what JSON cannot say.
+            // serde_json and others write NaN and infinity as null.
             Self::Null => "null (perhaps written for NaN or infinity)",
             Self::Boolean(_) => "true or false",
             Self::Integer(_) => "a whole number",
@@ -71,7 +71,7 @@ fn table_kind(table: DeTable<'_>) -> Kind {
             value: value_node(value),
         })
         .collect();
-    // The parser sorts by name; a reader expects complaints in the order of the file.
+    // The parser sorts by name; errors should come in the order of the file.
     entries.sort_by_key(|entry| entry.key_span.as_ref().map(|span| span.start));
     Kind::Table(entries)
 }

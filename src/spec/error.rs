@@ -1,4 +1,4 @@
-//! What can be wrong with a spec, and where.
+//! Errors of a spec: the location in the file and the problem.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::FilterProblem;
 use super::reader::Fault;
 
-/// A spec that was refused: the file, the place in it, and the problem.
+/// The error of a spec that cannot be used: the file, the location in it, and the problem.
 ///
 /// Displays as `file:line:column: path: problem` with the offending line below.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,31 +18,31 @@ pub struct SpecError {
 struct Inner {
     file: String,
     path: String,
-    place: Option<Place>,
+    location: Option<Location>,
     problem: SpecProblem,
     overridden: bool,
 }
 
-/// A place in a text file.
+/// A location in a text file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// Characters concerned on that line, at least 1.
+    /// Length in characters on that line, at least 1.
     pub width: usize,
-    /// The line, without its end.
+    /// The line, without its line break.
     pub text: String,
 }
 
-/// The rule that a spec breaks, with the offending value and the remedy.
+/// The rule that a spec violates, with the offending value and the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpecProblem {
     /// The text is not TOML (or JSON) at all.
     #[error("{message}")]
     Syntax {
-        /// The parser's words.
+        /// The parser's message.
         message: String,
     },
     /// A key that no table of this kind has.
@@ -50,12 +50,12 @@ pub enum SpecProblem {
     UnknownKey {
         /// The key as written.
         key: String,
-        /// A known key that is spelled much alike.
+        /// A known key with a similar spelling.
         nearest: Option<&'static str>,
         /// All known keys.
         known: Vec<&'static str>,
     },
-    /// A key that must be there.
+    /// A required key is missing.
     #[error("the key {key} is missing; {remedy}")]
     MissingKey {
         /// The key.
@@ -66,24 +66,24 @@ pub enum SpecProblem {
     /// A value of the wrong type.
     #[error("expected {expected}, found {found}")]
     WrongType {
-        /// What belongs here.
+        /// The expected type.
         expected: &'static str,
-        /// What stands here.
+        /// The type found.
         found: &'static str,
     },
     /// A name that is not on the list.
     #[error("unknown {what} \"{name}\"{}; choose one of {}", suggestion(.nearest), .known.join(", "))]
     UnknownName {
-        /// What the name should name.
+        /// What the name stands for.
         what: &'static str,
         /// The name as written.
         name: String,
-        /// A known name that is spelled much alike.
+        /// A known name with a similar spelling.
         nearest: Option<&'static str>,
         /// All known names.
         known: Vec<&'static str>,
     },
-    /// Two keys of which only one can be meant.
+    /// Two keys that exclude each other.
     #[error("both {first} and {second} are given; {remedy}")]
     Conflict {
         /// One of the two.
@@ -93,7 +93,7 @@ pub enum SpecProblem {
         /// Which one to remove.
         remedy: &'static str,
     },
-    /// A number out of its range.
+    /// A number outside its range.
     #[error("{value} {unit} is out of range: {rule}")]
     Range {
         /// The offending value.
@@ -118,7 +118,7 @@ pub enum SpecProblem {
         "the filter is empty; give num and den, or poles and gain, or a, b and c, or family and cutoff, or cascade"
     )]
     EmptyFilter,
-    /// A filter that is not possible as written.
+    /// A filter that violates a rule for filters.
     #[error(transparent)]
     Filter(#[from] FilterProblem),
 }
@@ -143,11 +143,13 @@ impl SpecError {
     /// A fault that was found in `text`.
     pub(super) fn of(file: &str, text: &str, fault: Fault) -> Self {
         let Fault { path, span, problem, overridden } = fault;
-        let place = span.map(|span| Place::locate(text, span));
-        Self { inner: Box::new(Inner { file: file.to_owned(), path, place, problem: *problem, overridden }) }
+        let location = span.map(|span| Location::find(text, span));
+        Self {
+            inner: Box::new(Inner { file: file.to_owned(), path, location, problem: *problem, overridden }),
+        }
     }
 
-    /// The key, such as `fraction_bits`, if the problem is with a value that was given in place of the file's.
+    /// The key, such as `fraction_bits`, if the problem is a value that overrides the one in the file.
     pub fn overridden(&self) -> Option<&str> {
         self.inner.overridden.then_some(self.inner.path.as_str())
     }
@@ -157,17 +159,17 @@ impl SpecError {
         &self.inner.file
     }
 
-    /// The keys that lead to the place, such as `channel[1].filter.den`; empty for the whole file.
+    /// The path of keys to the value, such as `channel[1].filter.den`; empty for the whole file.
     pub fn path(&self) -> &str {
         &self.inner.path
     }
 
     /// Line and column.
-    pub fn place(&self) -> Option<&Place> {
-        self.inner.place.as_ref()
+    pub fn location(&self) -> Option<&Location> {
+        self.inner.location.as_ref()
     }
 
-    /// What is wrong.
+    /// The rule that is violated.
     pub fn problem(&self) -> &SpecProblem {
         &self.inner.problem
     }
@@ -177,28 +179,28 @@ impl std::error::Error for SpecError {}
 
 impl fmt::Display for SpecError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Inner { file, path, place, problem, overridden } = &*self.inner;
+        let Inner { file, path, location, problem, overridden } = &*self.inner;
         if *overridden {
-            return write!(f, "{file}: the {path} given in place of the file's: {problem}");
+            return write!(f, "{file}: the {path} that overrides the file's: {problem}");
         }
         write!(f, "{file}:")?;
-        if let Some(place) = place {
-            write!(f, "{}:{}:", place.line, place.column)?;
+        if let Some(location) = location {
+            write!(f, "{}:{}:", location.line, location.column)?;
         }
         if !path.is_empty() {
             write!(f, " {path}:")?;
         }
         write!(f, " {problem}")?;
-        place.as_ref().map_or(Ok(()), |place| write!(f, "\n{place}"))
+        location.as_ref().map_or(Ok(()), |location| write!(f, "\n{location}"))
     }
 }
 
-/// Longest part of a line that a message shows, in characters.
+/// Most characters of a line that a message shows.
 const SHOWN_CHARACTERS: usize = 100;
 
-impl Place {
-    /// The line and column of the byte range `span` of `text`; a range that leaves the text is cut to it.
-    pub(crate) fn locate(text: &str, span: Range<usize>) -> Self {
+impl Location {
+    /// The location of the byte range `span` in `text`; a range that exceeds the text is clipped to it.
+    pub(crate) fn find(text: &str, span: Range<usize>) -> Self {
         let start = boundary(text, span.start);
         let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
         let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
@@ -218,11 +220,11 @@ fn boundary(text: &str, index: usize) -> usize {
     (0..=index).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0)
 }
 
-impl fmt::Display for Place {
-    /// The line with its number, and carets under the place; a long line is cut around it.
+impl fmt::Display for Location {
+    /// The line with its number and carets under the location. Of a long line, the part around it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let skipped = (self.column - 1).saturating_sub(SHOWN_CHARACTERS / 2);
-        // Tabs would put the carets elsewhere than the text.
+        // A tab would misalign the carets.
         let shown = |c: char| if c.is_control() { ' ' } else { c };
         let line: String = self.text.chars().skip(skipped).take(SHOWN_CHARACTERS).map(shown).collect();
         let number = self.line.to_string();

@@ -1,159 +1,18 @@
-//! Rules for a written filter that need no linear algebra: sizes, finite numbers, family parameters,
-//! degrees. Stability and everything else about poles is judged by the analog module.
+//! Rules for a written filter that need no linear algebra: sizes, finite numbers, family parameters, degrees.
+//! [`crate::analog`] checks the poles.
 
-use super::{Family, FilterSpec};
+use super::{Family, FilterProblem, FilterSpec};
+use crate::units::Hertz;
 
-/// Most poles a filter may have. Front ends have fewer than a dozen; at 32 poles, each of at most 1e9 rad
-/// a fast period, products of poles still fit a double.
+/// Most poles of a filter. Real front ends have fewer than a dozen. The product of 32 poles, each of at most 1e9 rad per
+/// fast period, still fits a double.
 pub const MAX_ORDER: usize = 32;
 
-/// Least ripple or attenuation in decibels that is told from none.
+/// Least ripple or attenuation in decibels; less is numerically none.
 pub const MIN_RIPPLE_DB: f64 = 1e-6;
 
 /// Most ripple or attenuation in decibels: 300 dB is the precision of double arithmetic.
 pub const MAX_RIPPLE_DB: f64 = 300.0;
-
-/// Why a written filter makes no sense.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FilterProblem {
-    /// A list or matrix has no entries.
-    #[error("{key} is empty; {remedy}")]
-    Empty {
-        /// The key of the list.
-        key: &'static str,
-        /// What to write instead.
-        remedy: &'static str,
-    },
-    /// A coefficient is NaN or infinite.
-    #[error("{key} holds {value}; every coefficient must be a finite number")]
-    NotFinite {
-        /// The key of the list or number.
-        key: &'static str,
-        /// The offending value.
-        value: f64,
-    },
-    /// More poles than are carried.
-    #[error(
-        "the filter has {order} poles, but at most {MAX_ORDER} are supported; leave out stages that do not matter"
-    )]
-    OrderTooHigh {
-        /// The key that sets the number of poles.
-        key: &'static str,
-        /// Number of poles asked for.
-        order: usize,
-    },
-    /// No pole at all.
-    #[error("the filter has no pole, so it passes every frequency; give it at least one")]
-    NoPoles {
-        /// The key that sets the number of poles.
-        key: &'static str,
-    },
-    /// Every denominator coefficient is zero.
-    #[error("den is zero ({count} coefficients, all 0); its highest power of s needs another coefficient")]
-    ZeroDenominator {
-        /// How many coefficients were given.
-        count: usize,
-    },
-    /// The filter passes nothing.
-    #[error(
-        "the filter is zero because {key} is; nothing of the signal would be left to sample, give it a gain"
-    )]
-    Zero {
-        /// The key that makes it zero.
-        key: &'static str,
-    },
-    /// As many zeros as poles, or more.
-    #[error(
-        "the filter is not strictly proper: with {zeros} zeros against {poles} poles it passes arbitrarily high \
-         frequencies, and samples of a finite-energy signal are not defined; {remedy}"
-    )]
-    NotStrictlyProper {
-        /// Degree of the numerator.
-        zeros: usize,
-        /// Degree of the denominator.
-        poles: usize,
-        /// What to do about it.
-        remedy: String,
-    },
-    /// A matrix of a state-space form that does not fit the others.
-    #[error(
-        "{key} is {rows} x {cols}, but a filter with one input, one output and {states} states needs {expected}"
-    )]
-    Shape {
-        /// Which matrix.
-        key: &'static str,
-        /// Its rows.
-        rows: usize,
-        /// Its columns; of the first row that does not fit, if the rows are unequal.
-        cols: usize,
-        /// Rows of `a`.
-        states: usize,
-        /// The size that fits.
-        expected: String,
-    },
-    /// A family parameter that is missing.
-    #[error("a {family} filter needs {key} ({meaning})")]
-    MissingParameter {
-        /// Name of the family.
-        family: &'static str,
-        /// Name of the missing key.
-        key: &'static str,
-        /// What the key means.
-        meaning: &'static str,
-    },
-    /// A family parameter that has no meaning for the family.
-    #[error("{key} = {value} has no meaning for a {family} filter; remove it")]
-    NeedlessParameter {
-        /// Name of the family.
-        family: &'static str,
-        /// Name of the key.
-        key: &'static str,
-        /// The value given.
-        value: f64,
-    },
-    /// A family parameter out of its range.
-    #[error("{key} = {value}{unit}: {rule}")]
-    ParameterRange {
-        /// Name of the key.
-        key: &'static str,
-        /// The value given.
-        value: f64,
-        /// Its unit with a leading space, or nothing.
-        unit: &'static str,
-        /// The rule that it breaks and the way out.
-        rule: String,
-    },
-    /// A cascade inside a cascade.
-    #[error("a cascade cannot hold another cascade; list all its stages in one")]
-    NestedCascade,
-    /// What is wrong with one stage of a cascade.
-    #[error("cascade[{index}]: {problem}")]
-    Stage {
-        /// Which stage, from 0.
-        index: usize,
-        /// What is wrong with it.
-        problem: Box<FilterProblem>,
-    },
-}
-
-impl FilterProblem {
-    /// The key of the filter table that the problem is about, where there is one.
-    pub fn key(&self) -> Option<&'static str> {
-        match self {
-            Self::Empty { key, .. }
-            | Self::NotFinite { key, .. }
-            | Self::OrderTooHigh { key, .. }
-            | Self::NoPoles { key }
-            | Self::Zero { key }
-            | Self::Shape { key, .. }
-            | Self::NeedlessParameter { key, .. }
-            | Self::ParameterRange { key, .. } => Some(key),
-            Self::ZeroDenominator { .. } => Some("den"),
-            Self::NestedCascade | Self::Stage { .. } => Some("cascade"),
-            Self::NotStrictlyProper { .. } | Self::MissingParameter { .. } => None,
-        }
-    }
-}
 
 impl Family {
     /// Every family, in the order of the documentation.
@@ -184,7 +43,7 @@ impl Family {
 }
 
 impl FilterSpec {
-    /// Checks everything about the written filter that does not depend on where its poles lie.
+    /// Checks all rules that do not depend on the values of the poles.
     ///
     /// # Errors
     /// The first [`FilterProblem`] found.
@@ -275,7 +134,7 @@ fn family_degrees(family: Family, order: usize) -> (usize, usize) {
     (if family.has_attenuation() { order - order % 2 } else { 0 }, order)
 }
 
-/// A stage must make sense alone, but only the whole cascade has to be strictly proper.
+/// A stage must be a valid filter by itself, but only the whole cascade has to be strictly proper.
 fn check_stage(stage: &FilterSpec) -> Result<(), FilterProblem> {
     if matches!(stage, FilterSpec::Cascade { .. }) {
         return Err(FilterProblem::NestedCascade);
@@ -362,13 +221,13 @@ fn check_order(family: Family, order: Option<usize>) -> Result<(), FilterProblem
     }
 }
 
-fn check_cutoff(cutoff: f64) -> Result<(), FilterProblem> {
-    check_finite("cutoff", [cutoff])?;
-    if cutoff > 0.0 {
+fn check_cutoff(cutoff: Hertz) -> Result<(), FilterProblem> {
+    check_finite("cutoff", [cutoff.0])?;
+    if cutoff.0 > 0.0 {
         return Ok(());
     }
     let rule = "the cutoff must be a positive frequency in hertz".into();
-    Err(FilterProblem::ParameterRange { key: "cutoff", value: cutoff, unit: " Hz", rule })
+    Err(FilterProblem::ParameterRange { key: "cutoff", value: cutoff.0, unit: " Hz", rule })
 }
 
 fn check_ripples(family: Family, ripple: Option<f64>, attenuation: Option<f64>) -> Result<(), FilterProblem> {
@@ -394,17 +253,68 @@ fn check_decibels(
     family: Family,
     key: &'static str,
     value: Option<f64>,
-    wanted: bool,
+    required: bool,
     meaning: &'static str,
 ) -> Result<(), FilterProblem> {
     let family = family.name();
     match value {
-        None if wanted => Err(FilterProblem::MissingParameter { family, key, meaning }),
-        Some(value) if !wanted => Err(FilterProblem::NeedlessParameter { family, key, value }),
+        None if required => Err(FilterProblem::MissingParameter { family, key, meaning }),
+        Some(value) if !required => Err(FilterProblem::NeedlessParameter { family, key, value }),
         Some(value) if !(MIN_RIPPLE_DB..=MAX_RIPPLE_DB).contains(&value) => {
             let rule = format!("it must lie between {MIN_RIPPLE_DB:e} and {MAX_RIPPLE_DB} dB");
             Err(FilterProblem::ParameterRange { key, value, unit: " dB", rule })
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn tf(num: &[f64], den: &[f64]) -> FilterSpec {
+        FilterSpec::TransferFunction { num: num.to_vec(), den: den.to_vec() }
+    }
+
+    #[test]
+    fn degrees_ignore_leading_zeros() {
+        assert_eq!(tf(&[0.0, 3.0], &[0.0, 0.0, 1.0, 2.0, 1.0]).degrees(), (0, 2));
+        let family = |family, order| FilterSpec::Family {
+            family,
+            order: Some(order),
+            cutoff: Hertz(1.0),
+            ripple_db: None,
+            attenuation_db: None,
+        };
+        assert_eq!(family(Family::Elliptic, 4).degrees(), (4, 4));
+        assert_eq!(family(Family::Elliptic, 5).degrees(), (4, 5));
+        assert_eq!(family(Family::Bessel, 4).degrees(), (0, 4));
+    }
+
+    #[test]
+    fn a_stage_may_be_proper_but_the_cascade_must_be_strictly_proper() {
+        let (proper, pole) = (tf(&[1.0, 3.0], &[1.0, 2.0]), tf(&[1.0], &[1.0, 1.0]));
+        let cascade = |stages: &[&FilterSpec]| FilterSpec::Cascade {
+            cascade: stages.iter().map(|&stage| stage.clone()).collect(),
+        };
+        assert_eq!(cascade(&[&proper, &pole]).check(), Ok(()));
+        assert!(matches!(
+            cascade(&[&proper, &proper]).check(),
+            Err(FilterProblem::NotStrictlyProper { zeros: 2, poles: 2, .. })
+        ));
+        let improper = tf(&[1.0, 0.0, 0.0], &[1.0, 2.0]);
+        assert!(matches!(cascade(&[&improper, &pole]).check(), Err(FilterProblem::Stage { index: 0, .. })));
+    }
+
+    proptest! {
+        /// A common factor of numerator and denominator changes no verdict.
+        #[test]
+        fn the_size_of_coefficients_does_not_matter(decade in -9i32..10, zeros in 0usize..6, poles in 0usize..6) {
+            let size = 10f64.powi(decade);
+            let check = |x: f64| tf(&vec![x; zeros + 1], &vec![x; poles + 1]).check();
+            prop_assert_eq!(check(size), check(1.0));
+            prop_assert_eq!(check(size).is_ok(), zeros < poles);
+        }
     }
 }

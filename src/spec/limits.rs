@@ -1,6 +1,7 @@
 //! Ranges of the numbers in a spec, with reasons.
 
 use super::SpecProblem;
+use crate::units::{FastPeriods, Hertz, Seconds};
 
 /// Largest M. The designer factors dense matrices of M + N rows at every frequency; the largest
 /// interleaved converters have a few hundred.
@@ -30,11 +31,12 @@ pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
 /// be a channel state of size 1e-16.
 const WHOLE_DELAY_TOLERANCE: f64 = 1e-13;
 
-/// D/h, exactly whole where it is whole up to rounding.
-pub fn delay_in_fast_periods(delay: f64, fast_period: f64) -> f64 {
-    let periods = delay / fast_period;
-    let whole = periods.round();
-    if (periods - whole).abs() <= WHOLE_DELAY_TOLERANCE * whole.max(1.0) { whole } else { periods }
+/// D / h, exactly whole where it is whole up to rounding.
+pub fn delay_in_fast_periods(delay: Seconds, fast_period: Seconds) -> FastPeriods {
+    let periods = delay.in_fast_periods(fast_period);
+    let whole = periods.0.round();
+    let is_whole = (periods.0 - whole).abs() <= WHOLE_DELAY_TOLERANCE * whole.max(1.0);
+    if is_whole { FastPeriods(whole) } else { periods }
 }
 
 pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> SpecProblem {
@@ -42,19 +44,19 @@ pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> 
 }
 
 /// h: positive, and so far from the ends of double precision that rates and squares exist.
-pub(crate) fn check_fast_period(h: f64) -> Result<(), SpecProblem> {
-    if (1e-100..=1e100).contains(&h) {
+pub(crate) fn check_fast_period(h: Seconds) -> Result<(), SpecProblem> {
+    if (1e-100..=1e100).contains(&h.0) {
         return Ok(());
     }
-    Err(range(h, "s", "the fast period must be positive, between 1e-100 and 1e100 seconds"))
+    Err(range(h.0, "s", "the fast period must be positive, between 1e-100 and 1e100 seconds"))
 }
 
 /// 1/h, by the same rule.
-pub(crate) fn check_fast_rate(rate: f64) -> Result<(), SpecProblem> {
-    if (1e-100..=1e100).contains(&rate) {
+pub(crate) fn check_fast_rate(rate: Hertz) -> Result<(), SpecProblem> {
+    if (1e-100..=1e100).contains(&rate.0) {
         return Ok(());
     }
-    Err(range(rate, "Hz", "the fast rate must be positive, between 1e-100 and 1e100 hertz"))
+    Err(range(rate.0, "Hz", "the fast rate must be positive, between 1e-100 and 1e100 hertz"))
 }
 
 /// M.
@@ -77,8 +79,9 @@ pub(crate) fn check_latency(latency: usize) -> Result<(), SpecProblem> {
     Err(range(latency as f64, "fast samples", rule))
 }
 
-/// D_i in fast periods; `written` is the number the user knows, in `unit`.
-pub(crate) fn check_delay(periods: f64, written: f64, unit: &'static str) -> Result<(), SpecProblem> {
+/// D_i in fast periods; `written` is the number in the file, in `unit`.
+pub(crate) fn check_delay(delay: FastPeriods, written: f64, unit: &'static str) -> Result<(), SpecProblem> {
+    let periods = delay.0;
     if periods < 0.0 {
         return Err(range(
             written,
@@ -164,4 +167,36 @@ pub(crate) fn check_slack(slack: f64) -> Result<(), SpecProblem> {
         return Ok(());
     }
     Err(range(slack, "(relative)", "slack is the share by which gamma may exceed its optimum, zero or more"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// A spec may give the delay k h as the rounded product: it must come back as k.
+        #[test]
+        fn whole_delays_are_whole_in_any_unit(periods in 0u32..65_536, decade in -99.0..99.0f64) {
+            let h = Seconds(10f64.powf(decade));
+            let delay = FastPeriods(periods.into()).in_seconds(h);
+            prop_assert_eq!(delay_in_fast_periods(delay, h), FastPeriods(periods.into()));
+        }
+
+        /// A fraction that is more than rounding stays.
+        #[test]
+        fn fractions_stay(periods in 1u32..1000, fraction in 1e-9..0.5f64, decade in -9.0..9.0f64) {
+            let h = Seconds(10f64.powf(decade));
+            let delay = FastPeriods(f64::from(periods) + fraction);
+            let back = delay_in_fast_periods(delay.in_seconds(h), h);
+            prop_assert!((back / delay - 1.0).abs() < 1e-15 && back.0.fract() != 0.0);
+        }
+    }
+
+    #[test]
+    fn three_tenths_of_a_second_are_three_periods() {
+        let h = Seconds(0.1);
+        assert_eq!(delay_in_fast_periods(h * 3.0, h), FastPeriods(3.0));
+        assert_eq!(delay_in_fast_periods(Seconds(0.0), h), FastPeriods(0.0));
+    }
 }

@@ -1,4 +1,4 @@
-//! The spec: what an engineer writes down about front ends, delays and rates.
+//! The spec: front ends, delays, rates and the wish for a bank, as an engineer writes them.
 //!
 //! Everything here is plain data in SI units; [`crate::analog`] turns a [`FilterSpec`] into a
 //! checked realisation and [`crate::design`] turns a [`Spec`] into a bank.
@@ -8,6 +8,7 @@ mod design;
 pub(crate) mod document;
 mod error;
 mod filter;
+mod filter_problem;
 mod limits;
 mod nearest;
 pub(crate) mod reader;
@@ -15,13 +16,15 @@ mod words;
 mod write;
 
 pub use design::DesignOverrides;
-pub use error::{Place, SpecError, SpecProblem};
-pub use filter::{FilterProblem, MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
+pub use error::{Location, SpecError, SpecProblem};
+pub use filter::{MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
+pub use filter_problem::FilterProblem;
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub(crate) use words::check_fraction_bits;
 pub use words::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
+use crate::units::{FastPeriods, Hertz, Seconds};
 use serde::{Deserialize, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
@@ -29,13 +32,13 @@ use serde::{Deserialize, Serialize};
 /// Written with serde (or [`Spec::to_toml`]) it is a legal spec file again, in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spec {
-    /// Free text.
+    /// Name for reports; free text.
     pub name: String,
-    /// h, the period of the wanted fast samples, in seconds.
-    pub fast_period: f64,
-    /// M, fast samples for each slow one.
+    /// h, the period of the fast samples.
+    pub fast_period: Seconds,
+    /// M, fast samples per slow sample.
     pub ratio: usize,
-    /// m0, the latency allowed, in fast samples; `None` lets the designer pick.
+    /// m0, the latency in fast samples; `None` lets the designer choose.
     pub latency: Option<usize>,
     /// Phi_0, the filter of the ideal fast converter.
     pub target: FilterSpec,
@@ -48,8 +51,8 @@ pub struct Spec {
 /// One slow converter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelSpec {
-    /// D_i >= 0 in seconds.
-    pub delay: f64,
+    /// D_i >= 0.
+    pub delay: Seconds,
     /// Phi_i.
     pub filter: FilterSpec,
     /// sigma_i: rms of the converter's own white noise, relative to full scale.
@@ -61,7 +64,7 @@ fn is_zero(noise: &f64) -> bool {
     *noise == 0.0
 }
 
-/// An analog filter as written down; not yet checked for stability.
+/// An analog filter as written; stability is checked by [`crate::analog`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum FilterSpec {
@@ -97,8 +100,8 @@ pub enum FilterSpec {
         /// Number of poles.
         #[serde(skip_serializing_if = "Option::is_none")]
         order: Option<usize>,
-        /// Cutoff in hertz, with scipy.signal's meaning for the family.
-        cutoff: f64,
+        /// Cutoff, with scipy.signal's meaning for the family.
+        cutoff: Hertz,
         /// Pass-band ripple in decibels (Chebyshev 1, elliptic).
         #[serde(skip_serializing_if = "Option::is_none")]
         ripple_db: Option<f64>,
@@ -107,7 +110,7 @@ pub enum FilterSpec {
         attenuation_db: Option<f64>,
     },
     /// Filters one after the other, for example a ladder filter and the pole of the sampling switch.
-    /// Only the whole has to be strictly proper.
+    /// Only the whole cascade has to be strictly proper.
     Cascade {
         /// The stages; none of them a cascade itself.
         cascade: Vec<FilterSpec>,
@@ -153,30 +156,30 @@ pub enum Method {
 pub struct DesignSpec {
     /// The method.
     pub method: Method,
-    /// Taps a channel at the fast rate, for the methods that make FIR filters.
+    /// Taps per channel at the fast rate, for FIR methods.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub taps: Option<usize>,
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slack: Option<f64>,
-    /// Bits of the taps, for integers in place of doubles.
+    /// Bits of the taps, for integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<WordLengths>,
-    /// Taps are integers times two to the minus this; `None` lets the designer pick.
+    /// Taps are integers times 2^-fraction_bits; `None` lets the designer choose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fraction_bits: Option<i32>,
-    /// Fewer states than the method would take, for the methods that make recursive filters.
+    /// Order reduction, for recursive methods.
     #[serde(flatten)]
     pub reduction: Option<Reduction>,
 }
 
-/// How far the order of a recursive bank is reduced.
+/// By how much the order of a recursive bank is reduced.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Reduction {
-    /// At most so many states, with the least error that they allow.
+    /// To at most this many states, with the least error.
     #[serde(rename = "order")]
     Order(usize),
-    /// As few states as keep the error within so many decibels of the full bank's.
+    /// To the fewest states whose error is within this many decibels of the full bank's.
     #[serde(rename = "reduction_loss_db")]
     Loss(f64),
 }
@@ -194,7 +197,7 @@ impl Spec {
     /// without taps is complete when the command line gives them.
     ///
     /// # Errors
-    /// As [`Spec::from_toml`]; [`SpecError::overridden`] tells what is wrong with `overrides` from what is wrong with the
+    /// As [`Spec::from_toml`]; [`SpecError::overridden`] distinguishes errors in `overrides` from errors in the
     /// file.
     pub fn from_toml_with(
         text: &str,
@@ -212,13 +215,13 @@ impl Spec {
     /// The spec as a TOML file that reads back equal.
     ///
     /// # Errors
-    /// [`SpecProblem`] as [`Spec::check`]; above all for NaN and infinity, which a spec must not hold.
+    /// [`SpecProblem`] as [`Spec::check`]; NaN and infinity in particular are refused.
     pub fn to_toml(&self) -> Result<String, SpecProblem> {
         self.check()?;
         toml::to_string(self).map_err(|error| SpecProblem::Syntax { message: error.to_string() })
     }
 
-    /// Checks a spec that was put together in memory by the rules for spec files.
+    /// Checks a spec built in memory by the rules for spec files.
     ///
     /// # Errors
     /// The first [`SpecProblem`] found.
@@ -229,15 +232,15 @@ impl Spec {
         self.target.check()?;
         limits::check_channel_count(self.channels.len())?;
         for channel in &self.channels {
-            limits::check_delay(channel.delay / self.fast_period, channel.delay, "s")?;
+            limits::check_delay(channel.delay.in_fast_periods(self.fast_period), channel.delay.0, "s")?;
             channel.filter.check()?;
             limits::check_noise(channel.noise)?;
         }
         self.design.check(self.channels.len())
     }
 
-    /// D_i / h of every channel, exactly whole where it is whole up to rounding.
-    pub fn delays_in_fast_periods(&self) -> Vec<f64> {
+    /// D_i / h of every channel; see [`delay_in_fast_periods`].
+    pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
         self.channels.iter().map(|channel| delay_in_fast_periods(channel.delay, self.fast_period)).collect()
     }
 }

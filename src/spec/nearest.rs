@@ -1,8 +1,8 @@
 //! "Did you mean ...?"
 
-/// The entry of `known` that differs least from `word`, if it differs by at most a third of its letters.
+/// The entry of `known` with the least edit distance to `word`, if that is at most a third of its length.
 pub(crate) fn nearest(word: &str, known: &[&'static str]) -> Option<&'static str> {
-    // Nobody mistypes a key into something far longer; this also bounds the work.
+    // A typing error does not make a key far longer; the limit also bounds the work.
     let letters: Vec<char> = word.chars().take(65).flat_map(char::to_lowercase).collect();
     if letters.len() > 64 {
         return None;
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_the_four_kinds_of_slips() {
+    fn counts_the_four_kinds_of_edits() {
         let d = |a: &str, b| distance(&a.chars().collect::<Vec<_>>(), b);
         assert_eq!(d("delay", "delay"), 0);
         assert_eq!(d("dealy", "delay"), 1);

@@ -1,4 +1,4 @@
-//! Typed access to a written document; every complaint carries its place.
+//! Typed access to a document; every error carries its path and location.
 
 use std::ops::Range;
 
@@ -6,25 +6,25 @@ use super::SpecProblem;
 use super::document::{Entry, Kind, Node};
 use super::nearest::nearest;
 
-/// A problem at a place.
+/// A problem with its path and location.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault {
     pub(crate) path: String,
     pub(crate) span: Option<Range<usize>>,
-    /// Boxed, since a fault travels through every small reading function.
+    /// Boxed to keep the result of every reading function small.
     pub(crate) problem: Box<SpecProblem>,
-    /// The value is not the document's: `path` is the key that was given in its place.
+    /// The value is an override: `path` is its key, and the location in the document does not apply.
     pub(crate) overridden: bool,
 }
 
 impl Fault {
-    /// A problem with the value that was given for `key` in place of the document's.
+    /// A problem with the value that overrides the document's `key`.
     pub(crate) fn overriding(key: &'static str, problem: SpecProblem) -> Self {
         Self { path: key.to_owned(), span: None, problem: Box::new(problem), overridden: true }
     }
 }
 
-/// A value and the path that led to it.
+/// A value and its path.
 #[derive(Debug, Clone)]
 pub(crate) struct Value<'a> {
     node: &'a Node,
@@ -63,12 +63,12 @@ impl<'a> Value<'a> {
         matches!(self.node.kind, Kind::Null)
     }
 
-    /// The keys that lead here.
+    /// The path of keys to this value.
     pub(crate) fn path(&self) -> &str {
         &self.path
     }
 
-    /// A finite number; whole numbers count.
+    /// A finite number; integers are accepted.
     pub(crate) fn number(&self) -> Result<f64, Fault> {
         let value = match self.node.kind {
             Kind::Number(x) => x,
@@ -82,7 +82,7 @@ impl<'a> Value<'a> {
         Err(self.fault(SpecProblem::Range { value, unit: "(read as a double)", rule }))
     }
 
-    /// A whole number >= 0; `unit` says what it counts.
+    /// A whole number >= 0; `unit` names what is counted.
     pub(crate) fn count(&self, unit: &'static str) -> Result<usize, Fault> {
         let out_of_range =
             |value, rule: &str| self.fault(SpecProblem::Range { value, unit, rule: rule.into() });
@@ -92,7 +92,7 @@ impl<'a> Value<'a> {
         })
     }
 
-    /// A whole number of either sign; `unit` says what it counts.
+    /// A whole number of either sign; `unit` names what is counted.
     pub(crate) fn integer(&self, unit: &'static str) -> Result<i128, Fault> {
         match self.node.kind {
             Kind::Integer(i) => Ok(i),
@@ -124,7 +124,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A list of numbers. Paths are only spelled out when something is wrong: tap lists are long.
+    /// A list of numbers. Paths are built only for errors, since tap lists are long.
     pub(crate) fn numbers(&self) -> Result<Vec<f64>, Fault> {
         let Kind::List(items) = &self.node.kind else { return Err(self.wrong_type("a list of numbers")) };
         let number = |(i, node): (usize, &'a Node)| match node.kind {
@@ -139,7 +139,7 @@ impl<'a> Value<'a> {
         self.items("a list of rows, [[..], [..]]")?.iter().map(Value::numbers).collect()
     }
 
-    /// One of `known` names; `what` says what it names.
+    /// One of the `known` names; `what` describes them in errors.
     pub(crate) fn name<T: Copy>(&self, what: &'static str, known: &[(&'static str, T)]) -> Result<T, Fault> {
         let text = self.text()?;
         if let Some((_, value)) = known.iter().find(|(name, _)| *name == text) {
@@ -150,7 +150,7 @@ impl<'a> Value<'a> {
         Err(self.fault(SpecProblem::UnknownName { what, name: text.to_owned(), nearest, known }))
     }
 
-    /// The value of `key` of a table that may hold anything else besides.
+    /// The value of `key` of a table whose other keys are not checked.
     pub(crate) fn entry(&self, key: &'static str) -> Result<Value<'a>, Fault> {
         let Kind::Table(entries) = &self.node.kind else {
             return Err(self.wrong_type("a table of keys and values"));
@@ -158,7 +158,7 @@ impl<'a> Value<'a> {
         Fields { entries, whole: self.clone() }.required(key, "every bank file starts with it")
     }
 
-    /// A table with no other keys than `known`.
+    /// A table whose keys are all in `known`.
     pub(crate) fn fields(&self, known: &[&'static str]) -> Result<Fields<'a>, Fault> {
         let Kind::Table(entries) = &self.node.kind else {
             return Err(self.wrong_type("a table of keys and values"));
@@ -180,12 +180,12 @@ impl<'a> Value<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// The table itself, for complaints about the whole of it.
+    /// The table itself, for errors that concern all of it.
     pub(crate) fn whole(&self) -> &Value<'a> {
         &self.whole
     }
 
-    /// Whether `key` is there and not null.
+    /// Whether `key` is present and not null.
     pub(crate) fn has(&self, key: &str) -> bool {
         self.optional(key).is_some()
     }
@@ -198,7 +198,7 @@ impl<'a> Fields<'a> {
         Some(Value { node: &entry.value, path }).filter(|value| !value.is_null())
     }
 
-    /// The value of `key`; `remedy` says what to write if it is absent.
+    /// The value of `key`; `remedy` is the advice if it is absent.
     pub(crate) fn required(&self, key: &'static str, remedy: &'static str) -> Result<Value<'a>, Fault> {
         self.optional(key).ok_or_else(|| self.whole.fault(SpecProblem::MissingKey { key, remedy }))
     }

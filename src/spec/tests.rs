@@ -1,4 +1,4 @@
-//! Specs that read, specs that are refused with the right place and words, and round trips.
+//! Specs that are read, specs that are refused with location and message, and round trips.
 
 use proptest::prelude::*;
 
@@ -39,19 +39,19 @@ fn thesis_with_target(filter: &str) -> String {
 }
 
 #[test]
-fn the_example_of_the_manual_reads() {
+fn the_thesis_example_is_read() {
     let spec = read(THESIS);
     let thesis = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
     let zpk = FilterSpec::ZeroPoleGain { zeros: vec![], poles: vec![[-0.5, 0.0]; 2], gain: 0.25 };
     let expected = Spec {
         name: "thesis example, FIR".into(),
-        fast_period: 1.0,
+        fast_period: Seconds(1.0),
         ratio: 2,
         latency: Some(10),
         target: thesis.clone(),
         channels: vec![
-            ChannelSpec { delay: 1.2, filter: thesis, noise: 0.0 },
-            ChannelSpec { delay: 0.6, filter: zpk, noise: 0.0 },
+            ChannelSpec { delay: Seconds(1.2), filter: thesis, noise: 0.0 },
+            ChannelSpec { delay: Seconds(0.6), filter: zpk, noise: 0.0 },
         ],
         design: DesignSpec::new(Method::Fir, Some(22)),
     };
@@ -64,22 +64,22 @@ fn rates_and_sample_delays_become_seconds() {
         .replace("delay = 1.2", "delay_samples = 3")
         .replace("delay = 0.6", "delay = 1e-5");
     let spec = read(&text);
-    assert_eq!(spec.fast_period, 1.0 / 96e3);
-    assert_eq!(spec.channels[0].delay, 3.0 / 96e3);
-    assert_eq!(spec.delays_in_fast_periods()[0], 3.0);
-    assert!((spec.delays_in_fast_periods()[1] - 0.96).abs() < 1e-15);
+    assert_eq!(spec.fast_period, Seconds(1.0 / 96e3));
+    assert_eq!(spec.channels[0].delay, Seconds(3.0 / 96e3));
+    assert_eq!(spec.delays_in_fast_periods()[0], FastPeriods(3.0));
+    assert!((spec.delays_in_fast_periods()[1].0 - 0.96).abs() < 1e-15);
 }
 
 #[test]
 fn whole_delays_stay_whole_at_every_rate() {
     for rate in [1.0, 3.0, 10.0, 44.1e3, 96e3, 1e9, 7.77e11] {
         for samples in 0..200 {
-            let h = 1.0 / rate;
-            assert_eq!(delay_in_fast_periods(f64::from(samples) * h, h), f64::from(samples), "{rate} Hz");
+            let (h, whole) = (Hertz(rate).period(), FastPeriods(f64::from(samples)));
+            assert_eq!(delay_in_fast_periods(whole.in_seconds(h), h), whole, "{rate} Hz");
         }
     }
     // A fraction that is meant is kept.
-    assert_eq!(delay_in_fast_periods(3.0 + 1e-9, 1.0), 3.0 + 1e-9);
+    assert_eq!(delay_in_fast_periods(Seconds(3.0 + 1e-9), Seconds(1.0)), FastPeriods(3.0 + 1e-9));
 }
 
 #[test]
@@ -92,12 +92,12 @@ fn latency_name_and_design_may_be_left_out() {
 }
 
 #[test]
-fn every_filter_form_reads() {
+fn every_filter_form_is_read() {
     let target = |text: &str| read(&thesis_with_target(text)).target;
     let family = |family, order, ripple_db, attenuation_db| FilterSpec::Family {
         family,
         order,
-        cutoff: 2e4,
+        cutoff: Hertz(2e4),
         ripple_db,
         attenuation_db,
     };
@@ -167,7 +167,7 @@ fn an_unknown_key_is_named_with_line_neighbour_and_all_known_keys() {
 }
 
 #[test]
-fn every_mistake_has_its_place_and_its_words() {
+fn every_mistake_has_its_line_and_its_message() {
     let target = thesis_with_target;
     for (text, line, words) in [
         // Top level.
@@ -363,12 +363,15 @@ fn carets_stand_under_the_value_even_after_tabs_and_wide_letters() {
 }
 
 #[test]
-fn a_place_outside_of_the_text_is_cut_to_it() {
+fn a_location_outside_the_text_is_clipped_to_it() {
     for (start, end) in [(0, 0), (0, 99), (99, 120), (3, 2)] {
-        let place = Place::locate("añb\nc", std::ops::Range { start, end });
-        assert!(place.line >= 1 && place.column >= 1 && place.width >= 1);
+        let location = Location::find("añb\nc", std::ops::Range { start, end });
+        assert!(location.line >= 1 && location.column >= 1 && location.width >= 1);
     }
-    assert_eq!(Place::locate("a\r\nbc\r\n", 4..5), Place { line: 2, column: 2, width: 1, text: "bc".into() });
+    assert_eq!(
+        Location::find("a\r\nbc\r\n", 4..5),
+        Location { line: 2, column: 2, width: 1, text: "bc".into() }
+    );
 }
 
 #[test]
@@ -414,7 +417,7 @@ fn specs_in_memory_are_checked_too() {
     let good = read(THESIS);
     assert_eq!(good.check(), Ok(()));
     let bad = [
-        Spec { fast_period: f64::NAN, ..good.clone() },
+        Spec { fast_period: Seconds(f64::NAN), ..good.clone() },
         Spec { ratio: 0, ..good.clone() },
         Spec { channels: vec![], ..good.clone() },
         Spec { target: FilterSpec::Cascade { cascade: vec![] }, ..good.clone() },
@@ -466,7 +469,7 @@ fn written_filter() -> impl Strategy<Value = FilterSpec> {
             FilterSpec::Family {
                 family,
                 order: (family != Family::Rc).then_some(2 * k + 1),
-                cutoff,
+                cutoff: Hertz(cutoff),
                 ripple_db: family.has_ripple().then_some(0.1),
                 attenuation_db: family.has_attenuation().then_some(51.7),
             }
@@ -480,7 +483,7 @@ fn written_filter() -> impl Strategy<Value = FilterSpec> {
 prop_compose! {
     fn written_spec()(
         name in prop_oneof![Just(String::new()), "[ -~äß\"\\n\\t]{0,12}"],
-        fast_period in (1.0..10.0f64, -12..3i32).prop_map(|(x, e)| x * 10f64.powi(e)),
+        fast_period in (1.0..10.0f64, -12..3i32).prop_map(|(x, e)| Seconds(x * 10f64.powi(e))),
         ratio in 1usize..9,
         latency in prop::option::of(0usize..100),
         target in written_filter(),
@@ -496,7 +499,7 @@ prop_compose! {
     ) -> Spec {
         Spec {
             name, fast_period, ratio, latency, target,
-            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: d * fast_period, filter, noise: 1e-4 * d.fract() }).collect(),
+            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: fast_period * d, filter, noise: 1e-4 * d.fract() }).collect(),
             design: DesignSpec {
                 method,
                 taps: method.has_taps().then_some(taps),

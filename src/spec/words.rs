@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::SpecProblem;
 use super::limits::range;
 
-/// Most bits of a tap: its integers are exact in a double, and far finer than any bank's own error.
+/// Most bits of a tap. Such integers are exact in a double and far finer than the error of any bank.
 pub const MAX_BITS: u32 = 32;
 /// Largest magnitude of `fraction_bits`.
 pub const MAX_FRACTION_BITS: i32 = 256;
@@ -37,7 +37,7 @@ impl WordLengths {
         }
     }
 
-    /// The same with `more` bits a tap (fewer if negative), where that is legal.
+    /// The same with `more` bits per tap (fewer if negative), if that is legal.
     #[must_use]
     pub fn widened(&self, more: i32) -> Option<Self> {
         let other = match self {
@@ -59,7 +59,7 @@ impl WordLengths {
         self.check_numbers()
     }
 
-    /// Checks the numbers alone; an empty list has none that is wrong.
+    /// Checks the numbers but not their count.
     pub(super) fn check_numbers(&self) -> Result<(), SpecProblem> {
         let refuse = |bits: u32, rule: String| Err(range(f64::from(bits), "bits", rule));
         match self {
@@ -119,7 +119,7 @@ impl std::str::FromStr for WordLengths {
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |text: &str| {
             text.trim().parse::<u32>().map_err(|_| {
-                format!("\"{text}\" is no number of bits; give one number, or one for each tap with commas")
+                format!("\"{text}\" is not a number of bits; give one number, or one for each tap separated by commas")
             })
         };
         match text.contains(',') {
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_list_is_told_how_many_are_wanted() {
+    fn the_error_of_an_empty_list_states_the_number_of_taps() {
         let problem = |taps| WordLengths::PerTap(vec![]).check(taps).unwrap_err().to_string();
         let (known, open) = (problem(Some(22)), problem(None));
         assert!(
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn bits_are_told_as_one_number_or_a_range() {
+    fn bits_are_displayed_as_one_number_or_a_range() {
         let text = |list: &[u32]| WordLengths::PerTap(list.to_vec()).to_string();
         assert_eq!(WordLengths::Same(8).to_string(), "8 bits");
         assert_eq!(text(&[8, 8]), "8 bits");

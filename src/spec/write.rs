@@ -5,13 +5,14 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::document::Node;
 use super::reader::{Fault, Value};
 use super::{ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, Spec, decode};
+use crate::units::Seconds;
 
-/// The written form of a [`Spec`], units in seconds and nothing left out.
+/// The written form of a [`Spec`], with all times in seconds and all defaults filled in.
 #[derive(Serialize)]
 struct Document<'a> {
     #[serde(skip_serializing_if = "str::is_empty")]
     name: &'a str,
-    fast_period: f64,
+    fast_period: Seconds,
     ratio: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     latency: Option<usize>,

@@ -43,7 +43,7 @@ impl FrontEnds {
         for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays_in_fast_periods()).enumerate() {
             taps.push(Tap {
                 filter: place(&channel.filter, format!("spec.channel[{i}].filter"))?,
-                time: -delay,
+                time: -delay.0,
             });
         }
         Ok((Self::side_by_side(filters), taps))

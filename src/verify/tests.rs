@@ -8,13 +8,14 @@ use crate::design::{Problem, error_system};
 use crate::linalg::{CMat, symmetric_eigenvalues};
 use crate::lti::FrequencyResponse;
 use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Spec};
+use crate::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
 
 fn family(family: Family, order: usize, omega: f64) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: Some(order),
-        cutoff: omega / TAU,
+        cutoff: Hertz(omega / TAU),
         ripple_db: family.has_ripple().then_some(0.5),
         attenuation_db: family.has_attenuation().then_some(55.0),
     }
@@ -34,10 +35,10 @@ fn bank(
     taps: usize,
 ) -> Bank {
     let made_up = |i: usize| (0..taps).map(|n| ((7 * n + 3 * i) % 11) as f64 / 11.0 - 0.4).collect();
-    let channel = |(filter, &delay)| ChannelSpec { delay, filter, noise: 0.0 };
+    let channel = |(filter, &delay)| ChannelSpec { delay: Seconds(delay), filter, noise: 0.0 };
     let spec = Spec {
         name: String::new(),
-        fast_period: 1.0,
+        fast_period: Seconds(1.0),
         ratio,
         latency: Some(latency),
         target,

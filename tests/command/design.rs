@@ -442,7 +442,7 @@ fn every_source_is_captured_and_fused() {
             "--samples",
             "400",
         ]);
-        assert_eq!((&captured["ticks"], &captured["latency"]), (&Value::from(200), &Value::from(10)));
+        assert_eq!((&captured["frames"], &captured["latency"]), (&Value::from(200), &Value::from(10)));
         assert_eq!(captured["files"].as_array().unwrap().len(), 3);
         let args =
             ["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav", "--keep-latency", "--force"];
@@ -489,7 +489,7 @@ fn a_recording_is_a_source() {
     (0..800).for_each(|n| writer.write_sample((omega * n as f64).sin() as f32).unwrap());
     writer.finalize().unwrap();
     let report = desk.json(&["simulate", "spec.toml", "--source", "tone.wav", "-o", "cap", "--json"]);
-    assert_eq!(report["ticks"], 400);
+    assert_eq!(report["frames"], 400);
     // The response of 0.25 / (j w + 0.5)^2 has gain 0.25 / (w^2 + 0.25).
     let (gain, phase) = (0.25 / (omega * omega + 0.25), -2.0 * (omega / 0.5).atan());
     let (_, samples) = wav(&desk.path("cap/ch1.wav"));

@@ -12,6 +12,7 @@ use hybank::design::problem::{Channel, Problem};
 use hybank::linalg::{Mat, singular_values};
 use hybank::simulate::{Instants, Source, sample};
 use hybank::spec::{Family, FilterSpec};
+use hybank::units::{FastPeriods, Hertz, Seconds};
 
 struct Case {
     problem: Problem,
@@ -19,7 +20,7 @@ struct Case {
 }
 
 fn filter(spec: &FilterSpec) -> StrictlyProper {
-    StrictlyProper::new(spec, 1.0).unwrap()
+    StrictlyProper::new(spec, Seconds(1.0)).unwrap()
 }
 
 fn tf(num: &[f64], den: &[f64]) -> FilterSpec {
@@ -32,7 +33,10 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
         latency,
         front_ends: front_ends.iter().map(filter).collect(),
         target: 0,
-        channels: channels.iter().map(|&(front_end, delay)| Channel { front_end, delay }).collect(),
+        channels: channels
+            .iter()
+            .map(|&(front_end, delay)| Channel { front_end, delay: FastPeriods(delay) })
+            .collect(),
         noise: vec![0.0; channels.len()],
     };
     // Any taps will do: the equivalence does not care whether they are good.
@@ -50,9 +54,9 @@ fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
     let scale = 1.0 / width.sqrt();
     // (phi * pulse_c)(t) for t = k step + offset is a difference of step responses on a lattice of `width`.
     let responses = |front_end: usize, offset: f64| -> Vec<f64> {
-        let step = Source::Step { at: 0.0, height: 1.0 };
-        let instants =
-            Instants { first: offset - columns as f64 * width, step: width, count: 2 * columns + 2 };
+        let step = Source::Step { at: FastPeriods(0.0), height: 1.0 };
+        let first = FastPeriods(offset - columns as f64 * width);
+        let instants = Instants { first, step: FastPeriods(width), count: 2 * columns + 2 };
         sample(&case.problem.front_ends[front_end], &step, instants)
     };
     let pulse = |table: &[f64], steps: usize, c: usize| {
@@ -62,7 +66,7 @@ fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
     let wanted = responses(case.problem.target, -(latency as f64));
     let mut errors = Mat::from_fn(ticks * ratio, columns, |n, c| pulse(&wanted, n * fineness, c));
     for (channel, taps) in case.problem.channels.iter().zip(&case.taps) {
-        let table = responses(channel.front_end, -channel.delay);
+        let table = responses(channel.front_end, -channel.delay.0);
         for n in 0..ticks * ratio {
             for k in 0..=n / ratio {
                 let Some(tap) = taps.get(n - k * ratio) else { continue };
@@ -135,7 +139,7 @@ fn a_steep_front_end() {
     let elliptic = FilterSpec::Family {
         family: Family::Elliptic,
         order: Some(5),
-        cutoff: 0.25,
+        cutoff: Hertz(0.25),
         ripple_db: Some(0.5),
         attenuation_db: Some(40.0),
     };

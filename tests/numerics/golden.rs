@@ -9,6 +9,7 @@ use hybank::design::equivalence::BlockedPlant;
 use hybank::design::{Problem, analyze, design, error_system};
 use hybank::lti::FrequencyResponse;
 use hybank::spec::{DesignSpec, Method, Spec};
+use hybank::units::Seconds;
 use std::f64::consts::PI;
 
 fn g8() -> Spec {
@@ -89,7 +90,7 @@ fn g6_the_unit_of_time_does_not_matter() {
         let at_one = |h: f64| {
             let filter = tf(&[0.25 / (h * h)], &[1.0, 1.0 / h, 0.25 / (h * h)]);
             let mut spec = alike(&filter, 2, 10, &[1.2 * h, 0.6 * h]);
-            spec.fast_period = h;
+            spec.fast_period = Seconds(h);
             spec.design = DesignSpec::new(method, (method == Method::Fir).then_some(22));
             design(&spec).unwrap().bank
         };
@@ -151,7 +152,7 @@ fn g13_jitter_of_the_optimal_bank() {
     for (errors, golden) in
         [([0.1, 0.0], 0.0389583), ([0.0, 0.1], 0.0439780), ([0.1, 0.1], 0.0433790), ([0.1, -0.1], 0.0392280)]
     {
-        let gamma = analyze(&bank, &errors).unwrap().gamma;
+        let gamma = analyze(&bank, &errors.map(Seconds)).unwrap().gamma;
         assert!((gamma / golden - 1.0).abs() < 0.02, "G13 at {errors:?}: {gamma}, golden {golden}");
     }
 }
@@ -180,7 +181,7 @@ fn g15_errors_on_the_thesis_inputs() {
     let problem = Problem::new(&spec, 10).unwrap();
     for (source, golden) in [("step@0.3", 0.000822), ("tones:0.3,0.8", 0.00177)] {
         let source: Source = source.parse().unwrap();
-        let captured = capture(&problem, &Analog::Known(source), 101);
+        let captured = capture(&problem, &Analog::Known(source.normalised(spec.fast_period)), 101);
         let frames: Vec<f64> =
             (0..101).flat_map(|k| [captured.channels[0][k], captured.channels[1][k]]).collect();
         let options = Options { precision: Precision::Double, ..Options::default() };

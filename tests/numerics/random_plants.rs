@@ -4,7 +4,7 @@
 use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, analyze, design, prove};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
-use std::f64::consts::TAU;
+use hybank::units::{RadiansPerSecond, Seconds};
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::ScopedJoinHandle;
@@ -38,7 +38,7 @@ fn front_end(dice: &mut Dice) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: Some(dice.count(1, 6)),
-        cutoff: 0.03 * 100f64.powf(dice.part()) / TAU,
+        cutoff: RadiansPerSecond(0.03 * 100f64.powf(dice.part())).in_hertz(),
         ripple_db: None,
         attenuation_db: None,
     }
@@ -76,7 +76,7 @@ fn unreduced(seed: u64) -> Spec {
         .into_iter()
         .map(|delay| {
             let filter = if alike { target.clone() } else { front_end(&mut dice) };
-            ChannelSpec { delay, filter, noise: 0.0 }
+            ChannelSpec { delay: Seconds(delay), filter, noise: 0.0 }
         })
         .collect();
     let taps = dice.count(1, 4) * ratio;
@@ -84,7 +84,7 @@ fn unreduced(seed: u64) -> Spec {
     let design = DesignSpec::new(method, (method == Method::Fir).then_some(taps));
     Spec {
         name: String::new(),
-        fast_period: 1.0,
+        fast_period: Seconds(1.0),
         ratio,
         latency: Some(dice.count(0, 3 * ratio)),
         target,

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use hybank::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
 
 /// Numerator over denominator, descending powers of s.
@@ -20,7 +21,7 @@ pub(crate) fn low_pass(family: Family, order: usize, omega: f64) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: Some(order),
-        cutoff: omega / TAU,
+        cutoff: Hertz(omega / TAU),
         ripple_db: family.has_ripple().then_some(0.5),
         attenuation_db: family.has_attenuation().then_some(55.0),
     }
@@ -33,10 +34,10 @@ pub(crate) fn butterworth(order: usize, omega: f64) -> FilterSpec {
 
 /// All channels behind the target's filter; method `iir`.
 pub(crate) fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> Spec {
-    let channel = |&delay: &f64| ChannelSpec { delay, filter: filter.clone(), noise: 0.0 };
+    let channel = |&delay: &f64| ChannelSpec { delay: Seconds(delay), filter: filter.clone(), noise: 0.0 };
     Spec {
         name: String::new(),
-        fast_period: 1.0,
+        fast_period: Seconds(1.0),
         ratio,
         latency: Some(latency),
         target: filter.clone(),

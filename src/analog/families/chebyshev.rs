@@ -1,20 +1,21 @@
 //! Chebyshev filters: equal ripple in the pass band (1) or in the stop band (2).
 
 use super::{excess_power, left_half, product_of_negatives};
-use crate::analog::Zpk;
+use crate::analog::{Cutoffs, Zpk};
 use crate::linalg::Complex;
 
-/// Chebyshev 1: poles on an ellipse; the gain falls to `-ripple_db` (> 0 dB) at the cutoff for good.
-pub fn chebyshev1(order: usize, ripple_db: f64) -> Zpk {
+/// Chebyshev 1: poles on an ellipse. The gain ripples by `ripple_db` (> 0 dB) below the cutoff and falls above it.
+pub fn chebyshev1(order: usize, ripple_db: f64) -> Zpk<Cutoffs> {
     let ripple = excess_power(ripple_db);
     let poles = ellipse(order, (1.0 / ripple.sqrt()).asinh() / order as f64);
     let dc = if order.is_multiple_of(2) { 1.0 / (1.0 + ripple).sqrt() } else { 1.0 };
-    Zpk { zeros: Vec::new(), gain: dc * product_of_negatives(&poles), poles }
+    let gain = dc * product_of_negatives(&poles);
+    Zpk::new(Vec::new(), poles, gain)
 }
 
-/// Chebyshev 2 (inverse Chebyshev): `attenuation_db` (> 0 dB) reached at the cutoff and kept above it;
-/// an even order has as many zeros as poles.
-pub fn chebyshev2(order: usize, attenuation_db: f64) -> Zpk {
+/// Chebyshev 2 (inverse Chebyshev): the attenuation is at least `attenuation_db` (> 0 dB) from the cutoff on. An even
+/// order has as many zeros as poles.
+pub fn chebyshev2(order: usize, attenuation_db: f64) -> Zpk<Cutoffs> {
     let poles: Vec<Complex<f64>> = ellipse(order, excess_power(attenuation_db).sqrt().asinh() / order as f64)
         .iter()
         .map(|p| p.inv())
@@ -25,7 +26,8 @@ pub fn chebyshev2(order: usize, attenuation_db: f64) -> Zpk {
         .filter(|z| z.im != 0.0)
         .map(|z| Complex::new(0.0, 1.0 / z.im))
         .collect();
-    Zpk { gain: product_of_negatives(&poles) / product_of_negatives(&zeros), zeros, poles }
+    let gain = product_of_negatives(&poles) / product_of_negatives(&zeros);
+    Zpk::new(zeros, poles, gain)
 }
 
 /// Butterworth angles on the ellipse with half axes sinh(mu), cosh(mu).

@@ -6,21 +6,21 @@
 
 use super::jacobi::Modulus;
 use super::{excess_power, product_of_negatives};
-use crate::analog::Zpk;
+use crate::analog::{Cutoffs, Zpk};
 use crate::linalg::Complex;
 
-/// Elliptic: `ripple_db` up to the cutoff, at least `attenuation_db` (> `ripple_db` > 0) beyond the
-/// stop-band edge that order and ripples imply; an even order has as many zeros as poles.
-pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk {
+/// Elliptic: ripple of `ripple_db` up to the cutoff, attenuation of at least `attenuation_db` (> `ripple_db` > 0) beyond
+/// the stop-band edge, which follows from order and ripples. An even order has as many zeros as poles.
+pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk<Cutoffs> {
     let ripple = excess_power(ripple_db);
     if order == 1 {
         let p = 1.0 / ripple.sqrt();
-        return Zpk { zeros: Vec::new(), poles: vec![Complex::new(-p, 0.0)], gain: p };
+        return Zpk::new(Vec::new(), vec![Complex::new(-p, 0.0)], p);
     }
     let selectivity = Modulus::new((ripple / excess_power(attenuation_db)).sqrt());
     let modulus = selectivity.with_nome_root(order);
     let quarter = modulus.quarter_period();
-    // j v0 is where the rational function's square meets -1/ripple.
+    // At j v0 the square of the elliptic rational function is -1/ripple.
     let v0 = quarter * selectivity.swapped().first_kind(1.0 / ripple.sqrt())
         / (order as f64 * selectivity.quarter_period());
     let v = modulus.swapped().functions(v0);
@@ -39,5 +39,6 @@ pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk {
         poles.extend([pole, pole.conj()]);
     }
     let dc = if order.is_multiple_of(2) { 1.0 / (1.0 + ripple).sqrt() } else { 1.0 };
-    Zpk { gain: dc * product_of_negatives(&poles) / product_of_negatives(&zeros), zeros, poles }
+    let gain = dc * product_of_negatives(&poles) / product_of_negatives(&zeros);
+    Zpk::new(zeros, poles, gain)
 }

@@ -1,12 +1,12 @@
-//! Elliptic integrals and Jacobi functions of real argument, with modulus k and complementary
-//! modulus k' given together so that neither end loses digits.
+//! Elliptic integrals and Jacobi functions of real argument. Modulus k and complementary modulus k' are stored together,
+//! so that no digits are lost for k near 0 or near 1.
 //!
 //! Sources: Abramowitz and Stegun, chapters 16 and 17; Carlson, "Numerical computation of real or
 //! complex elliptic integrals", Numerical Algorithms 10 (1995).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Steps of a quadratically (AGM) or by 4 each (Carlson) convergent iteration; far more than needed.
+/// Most steps of an iteration that converges quadratically (AGM) or by a factor of 4 per step (Carlson).
 const MAX_STEPS: usize = 64;
 
 /// A modulus with its complement, k^2 + k'^2 = 1.

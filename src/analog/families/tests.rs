@@ -10,7 +10,7 @@ struct Reference {
     order: usize,
     ripple_db: f64,
     attenuation_db: f64,
-    expected: Zpk,
+    expected: Zpk<Cutoffs>,
 }
 
 fn references() -> Vec<Reference> {
@@ -32,11 +32,11 @@ fn reference(line: &'static str) -> Reference {
         order: words[2].parse().unwrap(),
         ripple_db: number(3),
         attenuation_db: number(4),
-        expected: Zpk { zeros: roots("z"), poles: roots("p"), gain: number(5) },
+        expected: Zpk::new(roots("z"), roots("p"), number(5)),
     }
 }
 
-fn designed(r: &Reference) -> Zpk {
+fn designed(r: &Reference) -> Zpk<Cutoffs> {
     match r.family {
         "butterworth" => butterworth(r.order),
         "chebyshev1" => chebyshev1(r.order, r.ripple_db),
@@ -73,7 +73,7 @@ fn zeros_poles_and_gains_agree_with_scipy_and_with_sixty_digits() {
     }
 }
 
-fn decibels(zpk: &Zpk, w: f64) -> f64 {
+fn decibels(zpk: &Zpk<Cutoffs>, w: f64) -> f64 {
     20.0 * zpk.response(Complex::new(0.0, w)).norm().log10()
 }
 

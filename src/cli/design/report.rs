@@ -4,6 +4,7 @@ use crate::bank::{Gamma, SynthesisFilters};
 use crate::design::quantise::WordStudy;
 use crate::design::{Design, MeanAnalysis, OrderReduction, OrderWorth};
 use crate::spec::Method;
+use crate::units::{RadiansPerSlowPeriod, Seconds};
 use crate::verify::Verified;
 
 /// The report; serialised it is that of `--json`.
@@ -124,7 +125,7 @@ impl<'a> Report<'a> {
             gamma: &bank.gamma,
             words: Words::of(design),
             mean,
-            peak_hertz: design.peak_frequency / (std::f64::consts::TAU * bank.slow_period()),
+            peak_hertz: RadiansPerSlowPeriod(design.peak_frequency).in_hertz(Seconds(bank.slow_period())).0,
             iterations: design.iterations,
             seconds,
             proof,

@@ -1,0 +1,131 @@
+//! How sources are written on the command line: `step@0.3+tones:440Hz,1kHz+chirp:100Hz..8kHz@2s`.
+
+use super::source::{Source, Tone};
+use crate::units::{RadiansPerSecond, Seconds};
+use std::f64::consts::TAU;
+use std::str::FromStr;
+
+/// A text that describes no source.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ParseSourceError {
+    /// No such kind of source.
+    #[error(
+        "`{text}` is not a source; write step@0.3, tones:0.3,0.8 (rad/s), tones:440Hz,1kHz, \
+         chirp:100Hz..8kHz@2s, several joined by `+`, or the name of a WAV file"
+    )]
+    Unknown {
+        /// The text as given.
+        text: String,
+    },
+    /// Not a finite number.
+    #[error("`{number}` in source `{text}` is not a finite number{hint}")]
+    Number {
+        /// The text as given.
+        text: String,
+        /// The number as written.
+        number: String,
+        /// The units that may follow it.
+        hint: &'static str,
+    },
+}
+
+impl FromStr for Source {
+    type Err = ParseSourceError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let mut terms =
+            text.split('+').map(|term| parse_term(text, term.trim())).collect::<Result<Vec<_>, _>>()?;
+        Ok(if terms.len() == 1 { terms.remove(0) } else { Self::Sum(terms) })
+    }
+}
+
+/// One term of the sum `text`.
+fn parse_term(text: &str, term: &str) -> Result<Source, ParseSourceError> {
+    if let Some(at) = term.strip_prefix("step@") {
+        return Ok(Source::Step { at: seconds(text, at)?, height: 1.0 });
+    }
+    if let Some(list) = term.strip_prefix("tones:") {
+        let tone = |s: &str| angular(text, s).map(|omega| Tone { omega, amplitude: 1.0, phase: 0.0 });
+        return Ok(Source::Tones(list.split(',').map(tone).collect::<Result<_, _>>()?));
+    }
+    let chirp = term.strip_prefix("chirp:").and_then(|rest| rest.split_once('@'));
+    if let Some((range, length)) = chirp
+        && let Some((start, end)) = range.split_once("..")
+    {
+        let (start, end) = (angular(text, start)?.in_hertz(), angular(text, end)?.in_hertz());
+        return Ok(Source::Chirp { start, end, length: seconds(text, length)?, amplitude: 1.0 });
+    }
+    Err(ParseSourceError::Unknown { text: text.to_owned() })
+}
+
+/// Seconds, with an optional unit s, ms, us or ns.
+fn seconds(text: &str, number: &str) -> Result<Seconds, ParseSourceError> {
+    let units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("s", 1.0)];
+    scaled(text, number, &units, " (seconds, or with the unit ms, us or ns)").map(Seconds)
+}
+
+/// rad/s without a unit, or hertz with the unit Hz, kHz or MHz.
+fn angular(text: &str, number: &str) -> Result<RadiansPerSecond, ParseSourceError> {
+    let units = [("kHz", TAU * 1e3), ("MHz", TAU * 1e6), ("Hz", TAU)];
+    scaled(text, number, &units, " (rad/s, or with the unit Hz, kHz or MHz)").map(RadiansPerSecond)
+}
+
+fn scaled(
+    text: &str,
+    number: &str,
+    units: &[(&str, f64)],
+    hint: &'static str,
+) -> Result<f64, ParseSourceError> {
+    let number = number.trim();
+    let unit = units.iter().find_map(|&(name, factor)| number.strip_suffix(name).map(|bare| (bare, factor)));
+    let (bare, factor) = unit.unwrap_or((number, 1.0));
+    match bare.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value * factor),
+        _ => Err(ParseSourceError::Number { text: text.to_owned(), number: number.to_owned(), hint }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Hertz;
+
+    #[test]
+    fn all_written_forms_are_read() {
+        assert_eq!("step@0.3".parse(), Ok(Source::Step { at: Seconds(0.3), height: 1.0 }));
+        let Ok(Source::Tones(tones)) = "tones:0.3,1kHz".parse() else { panic!() };
+        assert_eq!((tones[0].omega.0, tones[1].omega.0), (0.3, TAU * 1e3));
+        let (start, end, length) = (Hertz(10.0), Hertz(20.0), Seconds(0.5));
+        assert_eq!(
+            "chirp:10Hz..20Hz@500ms".parse(),
+            Ok(Source::Chirp { start, end, length, amplitude: 1.0 })
+        );
+        assert!(matches!("step@1us+tones:2".parse(), Ok(Source::Sum(terms)) if terms.len() == 2));
+    }
+
+    #[test]
+    fn a_unit_scales_its_number() {
+        for (text, at) in [("step@1ns", 1e-9), ("step@4us", 4e-6), ("step@-2 ms", -2e-3), ("step@1e9s", 1e9)]
+        {
+            assert_eq!(text.parse(), Ok(Source::Step { at: Seconds(at), height: 1.0 }), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_error_quotes_the_text() {
+        for text in [
+            "",
+            "stp@1",
+            "step@",
+            "step@nan",
+            "tones:",
+            "tones:1,,2",
+            "chirp:1..2",
+            "chirp:1@2",
+            "tones:infHz",
+        ] {
+            let error = text.parse::<Source>().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{text}`")), "{text}: {error}");
+        }
+    }
+}
