@@ -1,4 +1,4 @@
-//! Reading files whole, but no more of them than a sound input has: a device may never end.
+//! Reading whole files up to a size limit, since a device may never end.
 
 use std::fs::File;
 use std::io::{Error, Read};
@@ -32,8 +32,8 @@ pub(crate) fn read_text(path: &Path) -> std::io::Result<String> {
 pub(crate) fn text(stream: impl Read) -> std::io::Result<String> {
     let bytes = at_most(stream, MOST_TEXT)?;
     String::from_utf8(bytes).map_err(|e| {
-        let place = e.utf8_error().valid_up_to();
-        Error::other(format!("it is no text: byte {place} is not UTF-8"))
+        let offset = e.utf8_error().valid_up_to();
+        Error::other(format!("it is not a text file: byte {offset} is not UTF-8"))
     })
 }
 

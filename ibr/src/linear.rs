@@ -1,4 +1,4 @@
-//! The one place that asks the decomposition library: singular values of small and tall matrices.
+//! All calls of the decomposition library: singular values of small and tall matrices.
 //!
 //! Matrices and vectors of fixed size are nalgebra's; the decompositions are faer's.
 
@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 
 /// The right singular vector of the least singular value, and all singular values from the largest.
 ///
-/// `rows` is any number of rows of N entries; fewer than N rows count as filled up with zeros.
+/// `rows` is any number of rows of N entries; fewer than N rows are padded with zero rows.
 /// `None` when an entry is not finite or the iteration does not converge.
 pub(crate) fn least_vector<const N: usize>(rows: &[[f64; N]]) -> Option<(SVector<f64, N>, [f64; N])> {
     if rows.iter().flatten().any(|v| !v.is_finite()) {

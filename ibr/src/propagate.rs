@@ -1,4 +1,4 @@
-//! Stage one: every pixel with depth becomes a sample at the virtual camera (thesis 2.3.1).
+//! Stage one, propagation: every pixel with depth becomes a sample in the virtual image (thesis 2.3.1).
 
 use crate::camera::{Camera, Relative};
 use crate::depth::DepthMap;
@@ -6,14 +6,14 @@ use crate::image::Image;
 use crate::sample::{Dropped, Sample};
 use rayon::prelude::*;
 
-/// One view of a rectified rig: the cameras stand on a line parallel to the image rows.
+/// One view of a rectified rig: the camera centres lie on a line parallel to the image rows.
 #[derive(Debug, Clone, Copy)]
 pub struct RectifiedView<'a> {
     /// Intensities.
     pub image: &'a Image,
     /// Disparities in pixels for a baseline of one, of the size of the image.
     pub disparity: &'a DepthMap,
-    /// Place on the line, in units of the baseline.
+    /// Position along the baseline, in units of the baseline.
     pub position: f64,
 }
 
@@ -28,18 +28,18 @@ pub struct CalibratedView<'a> {
     pub camera: Camera,
 }
 
-/// The part of the virtual image plane that samples are wanted on.
+/// The part of the virtual image plane in which samples are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
     /// Width of the virtual image in pixels.
     pub width: usize,
     /// Height of the virtual image in pixels.
     pub height: usize,
-    /// How far outside the outermost pixel centres a sample still counts, in pixels.
+    /// Distance outside the outermost pixel centres up to which samples are kept, in pixels.
     pub margin: f64,
     /// Added to the column of every sample: a registration offset of the virtual image, in pixels.
     pub offset: f64,
-    /// The rows that count: from the first to the second, both included.
+    /// The rows that are kept, from the first to the second inclusive.
     pub rows: (f64, f64),
 }
 
@@ -55,7 +55,7 @@ impl Frame {
         Self { rows: (top.max(self.rows.0), bottom.min(self.rows.1)), ..*self }
     }
 
-    /// Whether a place counts.
+    /// Whether a position lies in the frame.
     #[inline]
     pub fn holds(&self, x: f64, y: f64) -> bool {
         self.holds_column(x) && self.holds_row(y)
@@ -126,7 +126,7 @@ pub fn rectified<const C: usize>(
     (samples, dropped)
 }
 
-/// What became of one pixel.
+/// The outcome for one pixel.
 enum Fate {
     Sample(f64, f64, f64),
     Unknown,
@@ -134,7 +134,7 @@ enum Fate {
     Outside,
 }
 
-/// Where one pixel of a calibrated view goes.
+/// Propagates one pixel of a calibrated view.
 #[inline]
 fn fate(map: &Relative, x: f64, y: f64, depth: f32, frame: &Frame) -> Fate {
     if depth.is_nan() {
@@ -142,7 +142,7 @@ fn fate(map: &Relative, x: f64, y: f64, depth: f32, frame: &Frame) -> Fate {
     }
     let (u, v, d) = map.map(x, y, f64::from(depth));
     let u = u + frame.offset;
-    // NaN: out of the reach of a lens, or a depth so large that 0 * d is none.
+    // NaN: outside the domain of the lens model, or 0 * d of an infinite depth.
     if d <= 0.0 || u.is_infinite() || v.is_infinite() {
         Fate::Behind
     } else if frame.holds_column(u) && frame.holds_row(v) {
@@ -152,7 +152,7 @@ fn fate(map: &Relative, x: f64, y: f64, depth: f32, frame: &Frame) -> Fate {
     }
 }
 
-/// How many samples [`calibrated`] would give, and what it would drop.
+/// The number of samples of [`calibrated`], and the pixels that it drops.
 pub fn survey(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> (usize, Dropped) {
     let (mut samples, mut dropped) = (0, Dropped::default());
     for view in views {
@@ -166,8 +166,8 @@ pub fn survey(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> (
 
 /// All samples of calibrated views, view by view and row by row (eq. 2.2 and 2.3).
 ///
-/// Runs in parallel over the rows: a first pass counts, a second one writes every row into its place,
-/// so that the list is allocated once and does not depend on the number of threads.
+/// Runs in parallel over the rows. A first pass counts; a second pass writes every row at its offset, so that the list
+/// is allocated once and does not depend on the number of threads.
 pub fn calibrated<const C: usize>(
     views: &[CalibratedView<'_>],
     camera: &Camera,
@@ -216,13 +216,13 @@ fn write_row<const C: usize>(
     samples: &mut [Sample<C>],
 ) {
     let first = y * view.image.width();
-    let placed = view.depth.row(y).iter().enumerate().filter_map(|(x, &depth)| {
+    let known = view.depth.row(y).iter().enumerate().filter_map(|(x, &depth)| {
         match fate(map, x as f64, y as f64, depth, frame) {
             Fate::Sample(u, v, d) => Some((first + x, u, v, d as f32)),
             _ => None,
         }
     });
-    for (sample, (pixel, x, y, depth)) in samples.iter_mut().zip(placed) {
+    for (sample, (pixel, x, y, depth)) in samples.iter_mut().zip(known) {
         *sample =
             Sample { x, y, depth, value: view.image.pixel::<C>(pixel), pixel: pixel as u32, view: index };
     }
@@ -248,8 +248,8 @@ mod tests {
         let mut samples: Vec<Sample<1>> = Vec::new();
         let dropped = rectified_row(&view, 3, 1, 0.5, &frame, &mut samples);
         assert_eq!(dropped, Dropped { unknown: 1, behind: 0, outside: 1 });
-        let places: Vec<(f64, f32, u32)> = samples.iter().map(|s| (s.x, s.depth, s.pixel)).collect();
-        assert_eq!(places, [(-0.75, 0.5, 4), (1.25, 0.25, 7)]);
+        let positions: Vec<(f64, f32, u32)> = samples.iter().map(|s| (s.x, s.depth, s.pixel)).collect();
+        assert_eq!(positions, [(-0.75, 0.5, 4), (1.25, 0.25, 7)]);
         assert!(samples.iter().all(|s| s.view == 3 && s.y == 1.0 && s.value[0] == s.pixel as f32));
         let (all, _) = rectified::<1>(&[view], 0.5, &frame);
         let row: Vec<_> = all[4..].iter().map(|s| Sample { view: 3, ..*s }).collect();

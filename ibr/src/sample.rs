@@ -1,8 +1,8 @@
-//! The plain list that stands between the three stages: propagated samples.
+//! The list of propagated samples, which connects the three stages.
 
 /// One pixel of an actual view, seen from the virtual camera; C = 1 (grey) or 3 (RGB).
 ///
-/// Places are f64; depth and values are f32, which keeps the list at 40 bytes a sample.
+/// Positions are f64; depth and values are f32, which keeps the list at 40 bytes per sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<const C: usize> {
     /// Column in the virtual image, in pixels.
@@ -25,14 +25,14 @@ impl<const C: usize> Sample<C> {
     pub const BLANK: Self = Self { x: 0.0, y: 0.0, depth: 0.0, value: [0.0; C], pixel: 0, view: 0 };
 }
 
-/// Samples that the propagation did not pass on, by reason.
+/// Pixels that the propagation dropped, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Dropped {
     /// The pixel has no depth.
     pub unknown: usize,
     /// The point lies behind the virtual camera or in its focal plane.
     pub behind: usize,
-    /// The point projects farther outside the virtual image than the kernel reaches.
+    /// The point projects farther outside the virtual image than the support of the kernel.
     pub outside: usize,
 }
 

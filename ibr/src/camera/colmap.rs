@@ -1,13 +1,13 @@
 //! COLMAP text models as camera input: `cameras.txt` and `images.txt` of one folder.
 //!
-//! COLMAP puts pixel centres at half-integers; the principal point is moved by half a pixel on the way in.
+//! COLMAP puts pixel centres at half-integers; the principal point is shifted by half a pixel on reading.
 
 use super::{Camera, CameraError, Lens};
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Why a model could not be read.
+/// Errors of a COLMAP model.
 #[derive(Debug, thiserror::Error)]
 pub enum ColmapError {
     /// A file cannot be opened.
@@ -18,7 +18,7 @@ pub enum ColmapError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// A line that is not what the format says.
+    /// A line that does not follow the format.
     #[error("{}:{line}: {reason}", path.display())]
     Line {
         /// The file.
@@ -54,8 +54,8 @@ pub type Model = BTreeMap<String, ModelCamera>;
 
 /// Reads the model in `folder`.
 ///
-/// Pinhole models are read and those with up to two radial and two tangential coefficients ([`Lens`]); others
-/// are refused, since the images would have to be undistorted first.
+/// Accepts pinhole models and models with up to two radial and two tangential coefficients ([`Lens`]). Images of other
+/// models have to be undistorted first, so these are refused.
 ///
 /// # Errors
 /// [`ColmapError`], with file and line.
@@ -67,7 +67,7 @@ pub fn read_model(folder: &Path) -> Result<Model, ColmapError> {
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
 }
 
-/// The same from the texts of the two files; `folder` is for the messages.
+/// The same from the texts of the two files; `folder` appears in messages.
 ///
 /// # Errors
 /// [`ColmapError`].
@@ -100,7 +100,7 @@ struct Inner {
     lens: Option<Lens>,
 }
 
-/// Lines that say something, with their numbers.
+/// Lines with content, with their numbers.
 fn content(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines().enumerate().map(|(i, l)| (i + 1, l.trim())).filter(|(_, l)| !l.starts_with('#'))
 }
@@ -132,7 +132,7 @@ fn parse_camera(line: &str) -> Result<(u64, Inner), String> {
         "OPENCV" | "FULL_OPENCV" => (2, 4),
         other => {
             return Err(format!(
-                "camera model {other} is not known here (SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and FULL_OPENCV without k3 to k6 are); undistort the images first"
+                "camera model {other} is not supported (supported are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, and FULL_OPENCV without k3 to k6); undistort the images first"
             ));
         }
     };
@@ -145,7 +145,7 @@ fn parse_camera(line: &str) -> Result<(u64, Inner), String> {
     let (bends, beyond) = parameters[focal + 2..].split_at(most.min(parameters.len() - focal - 2));
     if let Some(value) = beyond.iter().find(|v| **v != 0.0) {
         return Err(format!(
-            "the {model} camera has a coefficient too many ({value}); undistort the images first"
+            "the {model} camera has an unsupported coefficient ({value}); undistort the images first"
         ));
     }
     let bend = |i: usize| bends.get(i).copied().unwrap_or(0.0);
@@ -158,7 +158,7 @@ fn parse_camera(line: &str) -> Result<(u64, Inner), String> {
 
 type Pose = (usize, u64, Matrix3x4<f64>, String);
 
-/// Two lines an image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points, which are not needed.
+/// Two lines per image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points, which are ignored.
 fn parse_images(text: &str) -> Result<Vec<Pose>, (usize, String)> {
     let mut lines = content(text);
     let mut poses = Vec::new();

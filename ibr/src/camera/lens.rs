@@ -1,6 +1,6 @@
 //! Lens distortion: radial with two coefficients and tangential with two (Brown 1966, as in OpenCV and COLMAP).
 //!
-//! With u = ((x - cx) / fx, (y - cy) / fy) the ideal place and r = |u|, the lens records the place
+//! With u = ((x - cx) / fx, (y - cy) / fy) the undistorted position and r = |u|, the distorted position is
 //!
 //! ```text
 //! u (1 + k1 r^2 + k2 r^4) + (2 p1 u v + p2 (r^2 + 2 u^2), 2 p2 u v + p1 (r^2 + 2 v^2)).
@@ -8,19 +8,19 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-/// Steps of Newton's method; a lens that an image came out of needs three or four.
+/// Most steps of Newton's method; real lenses need three or four.
 const STEPS: usize = 30;
-/// Residual, in units of the focal length, at which a place counts as found: a billionth of a pixel or so.
+/// Residual, in units of the focal length, at which the iteration has converged: about a billionth of a pixel.
 const RESIDUAL: f64 = 1e-12;
 
-/// The distortion of a lens, with the calibration that it is written in.
+/// The distortion of a lens, with the calibration that defines its coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
     focal: Vector2<f64>,
     centre: Vector2<f64>,
     radial: [f64; 2],
     tangential: [f64; 2],
-    /// Square of the radius up to which places in the image stay in order; beyond it the polynomial folds back.
+    /// Square of the radius up to which the distortion is monotone; beyond it the image folds back.
     reach: f64,
 }
 
@@ -31,13 +31,13 @@ impl Lens {
         Self { focal, centre, radial, tangential, reach: reach(radial) }
     }
 
-    /// Where the lens records an ideal place, in pixels; `None` beyond the radius where the image folds back.
+    /// The distorted position of an undistorted one, in pixels; `None` beyond the radius where the image folds back.
     pub fn record(&self, ideal: Vector2<f64>) -> Option<Vector2<f64>> {
         let u = (ideal - self.centre).component_div(&self.focal);
         (u.norm_squared() < self.reach).then(|| self.bend(&u).0.component_mul(&self.focal) + self.centre)
     }
 
-    /// The ideal place of a recorded one, in pixels, by Newton's method; `None` where the lens records nothing.
+    /// The undistorted position of a distorted one, in pixels, by Newton's method; `None` where there is none.
     pub fn ideal(&self, recorded: Vector2<f64>) -> Option<Vector2<f64>> {
         let goal = (recorded - self.centre).component_div(&self.focal);
         let mut u = goal;
@@ -53,7 +53,7 @@ impl Lens {
         None
     }
 
-    /// The bent place and its derivative, in units of the focal length.
+    /// The distorted position and its derivative, in units of the focal length.
     fn bend(&self, u: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let ([k1, k2], [p1, p2]) = (self.radial, self.tangential);
         let (x, y, r2) = (u.x, u.y, u.norm_squared());
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn known_places() {
+    fn known_positions() {
         // u = (0.4, 0), r^2 = 0.16: 0.4 (1 - 0.2 * 0.16 + 0.05 * 0.0256) + p2 * 3 * 0.16, and p1 * 0.16.
         let got = lens([-0.2, 0.05], [0.01, 0.02]).record(Vector2::new(520.0, 240.0)).unwrap();
         let want = (0.4 * (1.0 - 0.032 + 0.00128) + 0.0096, 0.0016);
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(barrel.ideal(Vector2::new(320.0 + 500.0 * 0.71, 240.0)), None);
         assert_eq!(barrel.ideal(Vector2::new(f64::NAN, 0.0)), None);
         assert_eq!(lens([0.1, 0.1], [0.0; 2]).reach, f64::INFINITY);
-        // Of two roots the nearer one counts.
+        // Of two roots the smaller one is the limit.
         let waved = lens([-1.0, 0.3], [0.0; 2]).reach;
         assert!((1.0 - 3.0 * waved + 1.5 * waved * waved).abs() < 1e-12 && waved < 1.0, "{waved}");
     }

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 /// A 3 x 3 part whose determinant is this small against its norm cubed does not map rays to pixels.
 const SMALLEST_DETERMINANT: f64 = 1e-12;
 
-/// Faults of cameras.
+/// Errors of cameras.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CameraError {
     /// The left 3 x 3 part is singular.
@@ -44,7 +44,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera as it is given, projective or not: depth d = pi3 . X~ in the matrix's own scale.
+    /// A camera without rescaling, projective or metric: depth d = pi3 . X~ in the scale of the matrix.
     ///
     /// # Errors
     /// [`CameraError::NotFinite`] and [`CameraError::Singular`].
@@ -55,7 +55,7 @@ impl Camera {
         }
         let m: Matrix3<f64> = matrix.fixed_columns::<3>(0).into_owned();
         let (determinant, norm) = (m.determinant(), m.norm());
-        // Rows of a camera in pixels differ by a factor of the focal length; scale them alike first.
+        // Rows of a camera in pixels differ by a factor of the focal length, so they are normalised first.
         let rows = [0, 1, 2].map(|i| m.row(i).norm());
         let volume = rows[0] * rows[1] * rows[2];
         match m.try_inverse() {
@@ -68,7 +68,7 @@ impl Camera {
 
     /// A metric camera, scaled so that d is the Euclidean depth: Pi sign(det M) / ||pi3(1:3)||.
     ///
-    /// `mirrored` says that the world frame is left-handed, where a sound camera has det M < 0.
+    /// `mirrored` states that the world frame is left-handed, in which a proper camera has det M < 0.
     ///
     /// # Errors
     /// As [`Camera::projective`].
@@ -79,7 +79,7 @@ impl Camera {
         Self::projective(matrix * (sign / given.m().row(2).norm()))
     }
 
-    /// The same camera behind a lens: its pixels are the recorded places, Pi maps to the ideal ones.
+    /// The same camera with a lens: its pixels are distorted positions, while Pi maps to undistorted ones.
     pub fn with_lens(self, lens: Lens) -> Self {
         Self { lens: Some(lens), ..self }
     }
@@ -104,15 +104,15 @@ impl Camera {
         -self.inverse * self.matrix.column(3)
     }
 
-    /// The point at depth d on the ray of pixel (x, y): M^{-1} (d x~ - m) (eq. 2.2); NaN where the lens records
-    /// nothing.
+    /// The point at depth d on the ray of pixel (x, y): M^{-1} (d x~ - m) (eq. 2.2); NaN outside the
+    /// domain of the lens.
     pub fn unproject(&self, x: f64, y: f64, d: f64) -> Vector3<f64> {
         let (x, y) = through(self.lens.as_ref(), x, y, Lens::ideal);
         self.inverse * (Vector3::new(x, y, 1.0) * d - self.matrix.column(3))
     }
 
-    /// Pixel and depth (x, y, d) of a point (eq. 2.3); d <= 0 means behind the camera, a NaN pixel out of the
-    /// reach of the lens.
+    /// Pixel and depth (x, y, d) of a point (eq. 2.3); d <= 0 means behind the camera, the pixel is NaN outside
+    /// the domain of the lens.
     pub fn project(&self, point: &Vector3<f64>) -> (f64, f64, f64) {
         let p = self.matrix * point.push(1.0);
         let (x, y) = through(self.lens.as_ref(), p.x / p.z, p.y / p.z, Lens::record);
@@ -127,7 +127,7 @@ impl Camera {
     }
 }
 
-/// A place sent one way through a lens: as it is without one, NaN beyond its reach.
+/// A position mapped by a lens; unchanged without a lens, NaN outside its domain.
 #[inline]
 fn through(
     lens: Option<&Lens>,
@@ -141,7 +141,7 @@ fn through(
     }
 }
 
-/// Pi_v X~ = d (A x~) + b: all that propagation from one camera to another needs.
+/// Pi_v X~ = d (A x~) + b: the map of pixels with depth from one camera to another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relative {
     /// A = M_v M_i^{-1}, the infinite homography.
@@ -153,7 +153,7 @@ pub struct Relative {
 }
 
 impl Relative {
-    /// Pixel and depth at the other camera of pixel (x, y) with depth d; a NaN pixel where a lens records nothing.
+    /// Pixel and depth at the other camera of pixel (x, y) with depth d; the pixel is NaN outside the domain of a lens.
     #[inline]
     pub fn map(&self, x: f64, y: f64, d: f64) -> (f64, f64, f64) {
         let (x, y) = through(self.from.as_ref(), x, y, Lens::ideal);

@@ -1,4 +1,4 @@
-//! What was typed.
+//! Command-line arguments.
 
 use crate::interpolate::{Degree, HoleFill};
 use crate::partial::{Densify, Segmentwise};
@@ -24,7 +24,7 @@ Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Render the wanted view of a scene.
+    /// Render the virtual view of a scene.
     Render(RenderArguments),
     /// Render a synthetic scene with exact depth, compare it with its exact view, write a contact sheet.
     Demo(DemoArguments),
@@ -90,7 +90,7 @@ pub(super) struct RenderArguments {
     /// Interpolation of the samples.
     #[arg(long, value_enum, default_value_t = MethodName::Auto)]
     pub(super) method: MethodName,
-    /// What becomes of holes.
+    /// Hole filling.
     #[arg(long, value_enum, default_value_t = FillName::Background)]
     pub(super) fill: FillName,
     /// How coarse depth is made dense.
@@ -117,10 +117,10 @@ pub(super) struct RenderArguments {
     /// Seed of the robust estimators (scenes without cameras).
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
-    /// Order depth the other way round (scenes without cameras).
+    /// Reverse the order of depth (scenes without cameras).
     #[arg(long)]
     pub(super) reverse_order: bool,
-    /// Number of threads; all cores if left out. The result does not depend on it.
+    /// Number of threads [default: all cores]. The result does not depend on it.
     #[arg(long, value_name = "N")]
     pub(super) threads: Option<usize>,
 }
@@ -139,7 +139,7 @@ pub(super) struct DemoArguments {
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,
-    /// Number of threads; all cores if left out.
+    /// Number of threads [default: all cores].
     #[arg(long, value_name = "N")]
     pub(super) threads: Option<usize>,
 }
@@ -160,7 +160,7 @@ fn size(text: &str) -> Result<(usize, usize), String> {
 pub(super) enum MethodName {
     /// Rows for rectified rigs, the plane elsewhere.
     Auto,
-    /// One spline a row (rectified rigs only).
+    /// One spline per row (rectified rigs only).
     Rows,
     /// The whole image at once.
     Plane,

@@ -23,7 +23,7 @@ const STEP: usize = 6;
 struct DemoSummary {
     /// Every pixel has its exact depth.
     full_depth: Summary,
-    /// One pixel in 6 x 6 has.
+    /// One pixel in 6 x 6 has exact depth.
     partial_depth: Summary,
 }
 
@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     output::refuse_format(&arguments.output)?;
     if output::is_standard(&arguments.output) && arguments.json {
         return Err(Failure::Usage(
-            "-o - and --json both want standard output; give the sheet a file".into(),
+            "-o - and --json both write to standard output; write the sheet to a file".into(),
         ));
     }
     let progress = Progress::new(4);
@@ -67,7 +67,7 @@ fn view(position: f64, size: (usize, usize)) -> Result<(Image, DepthMap), Failur
     let camera = Camera::metric(rig_camera(position, size), false).map_err(Failure::input)?;
     let (image, depth) = SyntheticScene::default().view(&camera, size);
     let disparity = rig_disparity(&depth, size.0);
-    // What a file would hold: 8 bits.
+    // Rounded to 8 bits, as in a file.
     Ok((image.quantised(), disparity))
 }
 

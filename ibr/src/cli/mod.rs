@@ -1,4 +1,4 @@
-//! The command line of `hybank-ibr`, and the only place that prints.
+//! The command line of `hybank-ibr`, and the only module that prints.
 
 mod arguments;
 mod contact;
@@ -14,11 +14,11 @@ use clap::Parser;
 use failure::Failure;
 use std::process::ExitCode;
 
-/// More threads than any machine has cores only fill its memory with stacks.
+/// More threads than cores would only use memory for stacks.
 const MOST_THREADS: usize = 1024;
 
-/// Reads the arguments, runs the verb and maps its outcome to an exit code: 0 done, 1 the input failed, 2
-/// wrong usage.
+/// Reads the arguments, runs the command and maps its outcome to an exit code: 0 success, 1 input error, 2 usage
+/// error.
 pub fn run() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => in_pool(arguments.threads, || render::run(&arguments)),
@@ -30,7 +30,7 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Runs the work on the given number of threads, or on as many as there are.
+/// Runs the work on the given number of threads, by default on all cores.
 fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
     let Some(threads) = threads else { return work() };
     if !(1..=MOST_THREADS).contains(&threads) {

@@ -13,12 +13,12 @@ pub(super) fn is_standard(path: &Path) -> bool {
 /// Refuses a file that exists, before any work is done.
 pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
     if !force && !is_standard(path) && path.exists() {
-        return Err(Failure::Input(format!("{} exists; --force overwrites it", path.display())));
+        return Err(Failure::Input(format!("{} exists; use --force to overwrite it", path.display())));
     }
     Ok(())
 }
 
-/// Refuses a name whose ending is no image format, before any work is done.
+/// Refuses a file name whose extension is not an image format, before any work is done.
 pub(super) fn refuse_format(path: &Path) -> Result<(), Failure> {
     if is_standard(path) {
         return Ok(());

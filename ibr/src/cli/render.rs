@@ -16,7 +16,7 @@ use crate::uncalibrated::chirality::Handedness;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A rendering with the region that counts, if it is not the whole image.
+/// A rendering with the region that is compared, unless that is the whole image.
 struct Rendered {
     rendering: Rendering,
     hull: Option<Vec<bool>>,
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     report(&summary, arguments)
 }
 
-/// What can be said before any file is read.
+/// Checks that need no file.
 fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     let standard = output::is_standard(&arguments.output);
     if standard && arguments.json {
@@ -144,7 +144,7 @@ fn render_uncalibrated(
     Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
 }
 
-/// Figures over the region that counts, and over the whole image if that is another one.
+/// Figures of merit over the region of the rendering, and over the whole image if the two differ.
 fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -> Result<(), Failure> {
     let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", path.display()));
     let image = &done.rendering.image;
@@ -174,7 +174,7 @@ fn mask_image(rendering: &Rendering) -> Image {
     image
 }
 
-/// Says on stderr what the figures alone may hide.
+/// Warnings on stderr about what the figures of merit alone do not show.
 fn warn(done: &Rendered) {
     let coverage = done.rendering.coverage();
     if coverage < 0.5 && done.hull.is_none() {
@@ -188,7 +188,7 @@ fn warn(done: &Rendered) {
     }
     if let Some(g) = done.geometry.as_ref().filter(|g| g.order_agreement < 0.75) {
         eprintln!(
-            "hybank-ibr: warning: only {:.0} % of the metric guesses agree on the order of depth; if near things lie behind far ones, use --reverse-order",
+            "hybank-ibr: warning: only {:.0} % of the metric guesses agree on the order of depth; if near objects appear behind far ones, use --reverse-order",
             100.0 * g.order_agreement
         );
     }

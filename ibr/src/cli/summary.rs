@@ -1,4 +1,4 @@
-//! What a rendering came to, for people and for programmes.
+//! The summary of a rendering as text and as JSON.
 
 use crate::image::quality::Quality;
 use crate::interpolate::HoleCount;
@@ -15,7 +15,7 @@ pub(super) struct Summary {
     pub(super) psnr: Option<f64>,
     pub(super) ssim: Option<f64>,
     pub(super) mae: Option<f64>,
-    /// Share of all pixels that samples reach.
+    /// Share of all pixels that samples cover.
     pub(super) coverage: f64,
     /// Time of the rendering, without reading, making depth dense, comparing and writing.
     pub(super) seconds: f64,
@@ -26,11 +26,11 @@ pub(super) struct Summary {
     /// Unknown depths filled before propagation.
     pub(super) filled_depths: usize,
     pub(super) size: [usize; 2],
-    /// Where psnr, ssim and mae were taken: the whole "image", or the "hull" of the features.
+    /// Region of psnr, ssim and mae: the whole "image", or the "hull" of the features.
     pub(super) compared_on: &'static str,
-    /// Share of the pixels that the comparison saw.
+    /// Share of the pixels that were compared.
     pub(super) compared_share: Option<f64>,
-    /// The same figures over the whole image, where that is another region.
+    /// The same figures over the whole image, if that is another region.
     pub(super) whole_image: Option<Figures>,
     pub(super) convergence: Option<Convergence>,
     pub(super) geometry: Option<GeometryReport>,
@@ -80,13 +80,13 @@ impl Summary {
         }
     }
 
-    /// Puts in the figures of a comparison.
+    /// Adds the figures of a comparison.
     pub(super) fn compare(&mut self, quality: &Quality) {
         (self.psnr, self.ssim, self.mae) = (Some(quality.psnr), Some(quality.ssim), Some(quality.mae));
         self.compared_share = Some(quality.pixels as f64 / (self.size[0] * self.size[1]) as f64);
     }
 
-    /// A few lines for people.
+    /// The summary as text.
     pub(super) fn text(&self) -> String {
         let mut lines = Vec::new();
         if let (Some(psnr), Some(ssim), Some(mae)) = (self.psnr, self.ssim, self.mae) {

@@ -1,6 +1,6 @@
 //! Filling unknown depths before propagation: the farther of the neighbours along the row.
 //!
-//! A pixel without depth is mostly one that the other eye of the sensor did not see, hence background.
+//! Depth is mostly unknown where the second sensor of a stereo pair had no view, which is background.
 
 use super::{DepthMap, Measure};
 

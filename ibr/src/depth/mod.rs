@@ -1,10 +1,10 @@
-//! Depth and disparity maps: one value a pixel, NaN where unknown.
+//! Depth and disparity maps: one value per pixel, NaN where unknown.
 
 mod fill;
 
 pub use fill::fill_unknown;
 
-/// What the numbers of a map say about distance.
+/// The quantity that a map holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
     /// Pixels of disparity for a baseline of one: larger is nearer.
@@ -23,10 +23,10 @@ impl Measure {
     }
 }
 
-/// Faults of depth maps.
+/// Errors of depth maps.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DepthError {
-    /// The scale that turns stored numbers into depth is of no use.
+    /// The scale that turns stored numbers into depth is not a positive number.
     #[error("the scale is {scale}: it must be a positive number (stored value / scale = depth or disparity)")]
     Scale {
         /// The scale given.
@@ -52,7 +52,7 @@ pub enum DepthError {
         /// Height that would fit.
         expected_height: usize,
     },
-    /// Not one value of the map is known.
+    /// All values of the map are unknown.
     #[error(
         "none of the {values} values is a positive finite number: without any depth nothing can be rendered"
     )]
@@ -126,7 +126,7 @@ impl DepthMap {
         (self.width, self.height)
     }
 
-    /// What the numbers mean.
+    /// The quantity of the values.
     pub fn measure(&self) -> Measure {
         self.measure
     }
@@ -146,7 +146,7 @@ impl DepthMap {
         self.data.iter().filter(|v| v.is_nan()).count()
     }
 
-    /// Every `step`-th value in both directions, from the first: what a coarse sensor would give.
+    /// Every `step`-th value in both directions, from the first, as from a coarse sensor.
     ///
     /// # Errors
     /// [`DepthError::Step`] for step 0, [`DepthError::AllUnknown`] when no known value is left.
@@ -160,7 +160,7 @@ impl DepthMap {
         Self::new(size, data, 1.0, self.measure)
     }
 
-    /// Refuses a map that does not belong to an image of `size` with one value every `step` pixels.
+    /// Refuses a map whose size does not fit an image of `size` with one value every `step` pixels.
     ///
     /// # Errors
     /// [`DepthError::Step`] and [`DepthError::Size`].

@@ -11,7 +11,7 @@ pub use write::{encode, save};
 
 use std::path::PathBuf;
 
-/// Faults of image files and of images that do not fit together.
+/// Errors of image files, and of images that do not fit together.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file cannot be opened or read.
@@ -22,16 +22,16 @@ pub enum ImageError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// The file is no image of a known format, or a damaged one.
-    #[error("{}: {reason}; readable are PNG, JPEG, PPM, PGM and PFM", path.display())]
+    /// The file is not an image of a known format, or is damaged.
+    #[error("{}: {reason}; the readable formats are PNG, JPEG, PPM, PGM and PFM", path.display())]
     Decode {
         /// The file.
         path: PathBuf,
-        /// What the decoder met.
+        /// The decoder's message.
         reason: String,
     },
-    /// The file has more pixels than can be worked on.
-    #[error("{}: {width} x {height} pixels are more than the {most} that can be used; cut or shrink it", path.display())]
+    /// The file has too many pixels.
+    #[error("{}: {width} x {height} pixels are more than the limit of {most}; crop or shrink the image", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -50,15 +50,15 @@ pub enum ImageError {
         /// The reason.
         reason: String,
     },
-    /// The name of the output ends in nothing that is a known format.
-    #[error("{}: the ending names no image format; use .png, .jpg, .ppm, .pgm or .pfm", path.display())]
+    /// The extension of the output file is not a known format.
+    #[error("{}: the extension is not an image format; use .png, .jpg, .ppm, .pgm or .pfm", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
     /// A depth or disparity map with colours.
     #[error(
-        "{}: a depth or disparity map has one value a pixel, but pixel ({x}, {y}) has different red, green and blue; save it as grey",
+        "{}: a depth or disparity map has one value per pixel, but pixel ({x}, {y}) has different red, green and blue; save it as a grey image",
         path.display()
     )]
     ColouredMap {
@@ -74,9 +74,9 @@ pub enum ImageError {
         "{left} has {left_width} x {left_height} pixels and {right} has {right_width} x {right_height}: they must agree"
     )]
     Sizes {
-        /// What one image is.
+        /// Name of the first image.
         left: String,
-        /// What the other image is.
+        /// Name of the second image.
         right: String,
         /// Width of the one.
         left_width: usize,
@@ -125,7 +125,7 @@ impl Image {
         Ok(Self { width, height, channels, data })
     }
 
-    /// An image of values that fill it by construction.
+    /// An image of values whose number is right by construction.
     pub(crate) fn from_values((width, height): (usize, usize), channels: usize, data: Vec<f32>) -> Self {
         debug_assert_eq!(data.len(), width * height * channels);
         Self { width, height, channels, data }
@@ -210,7 +210,7 @@ impl Image {
         self.data.iter().map(|v| to_byte(*v)).collect()
     }
 
-    /// Refuses a companion of another size; the names go into the message.
+    /// Refuses another image of a different size; the names appear in the message.
     ///
     /// # Errors
     /// [`ImageError::Sizes`].

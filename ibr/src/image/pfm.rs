@@ -1,6 +1,6 @@
 //! Portable float maps: "PF" (RGB) or "Pf" (grey), width, height, scale, then rows from the bottom up.
 //!
-//! The sign of the scale tells the byte order (negative: little endian); its magnitude is not applied.
+//! The sign of the scale gives the byte order (negative: little endian); its magnitude is not applied.
 
 /// The values of a float map, rows from the top, channels interleaved.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,10 +15,10 @@ pub struct FloatMap {
     pub data: Vec<f32>,
 }
 
-/// Reads a float map; the error says what is wrong with the bytes.
+/// Reads a float map.
 ///
 /// # Errors
-/// A sentence, for a header that is none or fewer values than it promises.
+/// A message, for an invalid header or for fewer values than the header states.
 pub fn decode(bytes: &[u8]) -> Result<FloatMap, String> {
     let mut rest = bytes;
     let channels = match word(&mut rest)? {
@@ -30,12 +30,14 @@ pub fn decode(bytes: &[u8]) -> Result<FloatMap, String> {
     let height = side(word(&mut rest)?, "height")?;
     let scale: f32 = parse(word(&mut rest)?, "scale")?;
     if scale == 0.0 || !scale.is_finite() {
-        return Err(format!("the scale is {scale}; its sign must tell the byte order"));
+        return Err(format!(
+            "the scale is {scale}; it must be nonzero and finite, since its sign gives the byte order"
+        ));
     }
     let values = width.checked_mul(height).and_then(|n| n.checked_mul(channels)).unwrap_or(usize::MAX);
     if rest.len() / 4 < values {
         return Err(format!(
-            "promises {width} x {height} x {channels} values of 4 bytes but holds {} bytes",
+            "the header states {width} x {height} x {channels} values of 4 bytes, but the file holds {} bytes",
             rest.len()
         ));
     }
@@ -63,11 +65,11 @@ pub fn encode(map: &FloatMap) -> Vec<u8> {
     bytes
 }
 
-/// The next word, and past exactly one whitespace byte behind it.
+/// The next word; consumes exactly one whitespace byte after it.
 fn word<'a>(rest: &mut &'a [u8]) -> Result<&'a str, String> {
     let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
     let bytes = &rest[start..];
-    // No header word is longer; a limit keeps binary rubbish out of the message.
+    // No header word is longer; the limit keeps binary data out of the message.
     let end = bytes.iter().take(32).position(u8::is_ascii_whitespace).ok_or("the header is cut short")?;
     let word = std::str::from_utf8(&bytes[..end]).map_err(|_| "the header is not text".to_string())?;
     *rest = &bytes[end + 1..];
@@ -110,7 +112,7 @@ mod tests {
             (b"Pf\nx 1\n-1\n", "not a number"),
             (b"Pf\n4 4\n-1\n1234", "holds 4 bytes"),
             (b"Pf\n4 4\n0\n1234", "byte order"),
-            (b"Pf\n99999999999 99999999999\n-1\n1", "promises"),
+            (b"Pf\n99999999999 99999999999\n-1\n1", "the header states"),
             (b"Pf\n4", "cut short"),
             (b"", "cut short"),
         ] {

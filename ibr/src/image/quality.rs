@@ -1,4 +1,4 @@
-//! How close a rendered view is to a photograph: PSNR, SSIM and mean absolute error.
+//! Figures of merit of a rendering against a photograph: PSNR, SSIM and mean absolute error.
 
 use super::{Image, ImageError};
 
@@ -70,7 +70,7 @@ fn structural(a: &Image, b: &Image, channel: usize, inside: &dyn Fn(usize) -> bo
             }
         }
     }
-    // A mask on the very border has no window; then nothing can be said against the likeness.
+    // A mask confined to the border contains no window; SSIM is then 1 by convention.
     if count > 0.0 { sum / count } else { 1.0 }
 }
 

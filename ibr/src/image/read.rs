@@ -5,7 +5,7 @@ use crate::files;
 use image::DynamicImage;
 use std::path::Path;
 
-/// Most pixels of an image or map: 8192 x 8192, some gigabytes of work memory.
+/// Most pixels of an image or map: 8192 x 8192, which takes some gigabytes of work memory.
 pub const MOST_PIXELS: usize = 1 << 26;
 
 /// Reads a grey or RGB image; 16-bit values are scaled to 0..255, PFM values (white = 1) times 255.
@@ -24,7 +24,7 @@ pub fn read_image(path: &Path) -> Result<Image, ImageError> {
     }
 }
 
-/// Reads a map of one value a pixel, as stored: 0..255, 0..65535 or floats.
+/// Reads a map of one value per pixel, as stored: 0..255, 0..65535 or floats.
 ///
 /// Returns width, height and the values, rows from the top.
 ///

@@ -1,16 +1,16 @@
-//! Encoding images by the ending of the file's name.
+//! Encoding images in the format of the file extension.
 
 use super::{Image, ImageError, pfm};
 use image::{ColorType, ImageFormat};
 use std::io::Cursor;
 use std::path::Path;
 
-/// The bytes of a file in the format that the ending of `path` names.
+/// The bytes of a file in the format of the extension of `path`.
 ///
-/// 8 bits a value, rounded half up; .pfm keeps floats with white = 1.
+/// 8 bits per value, rounded half up; .pfm keeps floats with white = 1.
 ///
 /// # Errors
-/// [`ImageError::UnknownFormat`] for another ending, [`ImageError::Write`] when the encoder refuses.
+/// [`ImageError::UnknownFormat`] for another extension, [`ImageError::Write`] if the encoder fails.
 pub fn encode(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let format = match ending.as_str() {
@@ -20,7 +20,7 @@ pub fn encode(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
         "pfm" => return Ok(encode_float(image)),
         _ => return Err(ImageError::UnknownFormat { path: path.into() }),
     };
-    // A .ppm holds colours and a .pgm does not, whatever the image has.
+    // A .ppm is always written in colour, a .pgm in grey.
     match ending.as_str() {
         "ppm" => encode_whole(&image.to_rgb(), format, path),
         "pgm" => encode_whole(&image.to_grey(), format, path),
@@ -31,7 +31,7 @@ pub fn encode(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
 /// Writes the image beside its final name and renames it, so that a file appears only when it is whole.
 ///
 /// # Errors
-/// As [`encode`], and [`ImageError::Write`] when the system refuses.
+/// As [`encode`], and [`ImageError::Write`] if the system fails.
 pub fn save(image: &Image, path: &Path) -> Result<(), ImageError> {
     let bytes = encode(image, path)?;
     crate::atomic::write(path, &bytes)

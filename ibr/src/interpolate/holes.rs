@@ -1,24 +1,24 @@
-//! Holes: pixels of the virtual image that no surviving sample comes near.
+//! Holes: pixels of the virtual image without a visible sample nearby.
 
-/// What becomes of holes.
+/// Hole filling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HoleFill {
-    /// The farther side is continued into the hole: what a moving camera uncovers is background.
+    /// Continue the farther side into the hole, since a moving camera uncovers background.
     #[default]
     Background,
-    /// The fit bridges the hole from side to side.
+    /// Let the fit interpolate between the sides.
     Bridge,
-    /// Holes stay black.
+    /// Leave holes black.
     Leave,
 }
 
-/// What is a hole, and what becomes of it.
+/// Definition and filling of holes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoleSettings {
-    /// Neighbouring samples farther apart than this, in pixels, have a hole between them; a pixel is in
-    /// it if no sample lies within half of this.
+    /// Neighbouring samples farther apart than this, in pixels, have a hole between them. A pixel belongs to
+    /// a hole if no sample lies within half of this distance.
     pub gap: f64,
-    /// What becomes of it.
+    /// Hole filling.
     pub fill: HoleFill,
 }
 
@@ -28,15 +28,15 @@ impl Default for HoleSettings {
     }
 }
 
-/// How a pixel of the virtual image came to its value.
+/// Origin of the value of a pixel of the virtual image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Cover {
     /// From samples.
     #[default]
     Seen,
-    /// A stretched surface left a hole: the same depth on both sides.
+    /// Crack: a hole in a stretched surface, with the same depth on both sides.
     Crack,
-    /// No view saw what is there: the depth differs across the hole, or it reaches the border.
+    /// Disocclusion: no view saw this region. The depth differs across the hole, or the hole touches the border.
     Disocclusion,
 }
 

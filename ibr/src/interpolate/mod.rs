@@ -1,6 +1,6 @@
-//! Stage three: the virtual image from the surviving samples (thesis 2.3.3).
+//! Stage three: interpolation of the virtual image from the visible samples (thesis 2.3.3).
 //!
-//! [`rows`] fits one spline a row and needs samples on whole rows, as a rectified rig gives them;
+//! [`rows`] fits one spline per row and needs samples on whole rows, as a rectified rig gives them;
 //! [`plane`] fits the whole image and takes samples anywhere.
 
 mod holes;
@@ -28,19 +28,19 @@ pub enum Variation {
     /// V_x = 1 / (1 + var(depth / mean depth) / s0^2) over the neighbourhood: 1 on flat depth, 0 across an
     /// edge, which lets the image be steep there (thesis eq. 2.5).
     Local {
-        /// Relative standard deviation of the depth at which the smoothing has halved.
+        /// Relative standard deviation of the depth at which the smoothing is halved.
         s0: f64,
     },
 }
 
-/// Settings of the fit. Intensities run from 0 to 255 and places count pixels.
+/// Settings of the fit. Intensities are 0 to 255, positions are in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitSettings {
     /// Degree of the splines.
     pub degree: Degree,
     /// Weight of the squared slope at the samples, in px^2.
     pub lambda: f64,
-    /// Weight of the squared differences of neighbouring coefficients; bridges what no sample reaches.
+    /// Weight of the squared differences of neighbouring coefficients; determines coefficients without samples.
     pub tau: f64,
     /// How lambda follows the depth.
     pub variation: Variation,
@@ -59,13 +59,13 @@ pub struct Settings {
     pub fit: FitSettings,
     /// The plane fit.
     pub plane: plane::PlaneSettings,
-    /// What is a hole and what becomes of it.
+    /// Holes and their filling.
     pub holes: HoleSettings,
-    /// The depth test of stage two: tells which depths belong to one surface.
+    /// The depth test of stage two; it decides which depths belong to one surface.
     pub depth_test: DepthTest,
 }
 
-/// Settings or samples that the third stage cannot work with.
+/// Invalid settings or samples of the third stage.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InterpolationError {
     /// A weight or length outside its range.
@@ -88,8 +88,8 @@ pub enum InterpolationError {
         /// Its row.
         row: f64,
     },
-    /// A sample that is no number.
-    #[error("sample {index} has the place ({x}, {y}) and depth {depth}: all must be finite numbers")]
+    /// A sample that is not finite.
+    #[error("sample {index} has position ({x}, {y}) and depth {depth}; all must be finite numbers")]
     NotFinite {
         /// Index of the sample.
         index: usize,
@@ -115,7 +115,7 @@ pub enum InterpolationError {
     Fit {
         /// The row.
         row: usize,
-        /// What the solver met.
+        /// The solver's error.
         source: hybank::sampling::SamplingError,
     },
 }
@@ -153,7 +153,7 @@ impl Settings {
     }
 }
 
-/// Refuses samples that are not numbers.
+/// Refuses samples that are not finite.
 pub(crate) fn check_samples<const C: usize>(
     samples: &[crate::sample::Sample<C>],
 ) -> Result<(), InterpolationError> {

@@ -8,7 +8,7 @@ use super::{Cover, HoleFill, InterpolationError, Settings, Variation};
 use crate::sample::Sample;
 use hybank::sampling::{Fit, FitSample};
 
-/// Keeps the normal equations definite where lambda and tau are 0; far below any weight that counts.
+/// Keeps the normal equations definite if lambda and tau are 0; negligible beside any other weight.
 const RIDGE: f64 = 1e-9;
 
 /// Work memory of the row fit, reused from row to row.
@@ -27,16 +27,16 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         Self { fit, smoothing: Vec::new(), sums: Vec::new(), width }
     }
 
-    /// How far outside the image samples still take part, in pixels.
+    /// Distance outside the image up to which samples are used, in pixels.
     pub const MARGIN: f64 = (ORDER - 2) as f64;
 
-    /// Interpolates one row from its surviving samples, sorted by column.
+    /// Interpolates one row from its visible samples, sorted by column.
     ///
-    /// Writes `width * C` values 0..255 and the mask, one entry a pixel. A row without samples is left
+    /// Writes `width * C` values 0..255 and the mask, one entry per pixel. A row without samples is left
     /// as it is, with every pixel a disocclusion, and false is returned.
     ///
     /// # Errors
-    /// What the solver says if tau is 0 and the holes are not filled.
+    /// The solver's error, possible only if tau is 0 and the holes are not filled.
     pub fn interpolate(
         &mut self,
         samples: &[Sample<C>],
@@ -117,7 +117,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         }
     }
 
-    /// Puts copies of a sample between two places, the ends left out.
+    /// Puts copies of a sample between two positions, ends excluded.
     fn replicate(&mut self, sample: &Sample<C>, from: f64, to: f64, settings: &Settings) {
         let parts = (to - from).round().max(1.0);
         let value = sample.value.map(f64::from);
@@ -170,7 +170,7 @@ pub(super) fn blacken(mask: &[Cover], values: &mut [f32], channels: usize) {
     }
 }
 
-/// Copies rows without any sample from the nearest row that has some; `filled` tells which have.
+/// Copies rows without samples from the nearest row that has some; `filled` marks those.
 pub fn fill_empty_rows(filled: &[bool], values: &mut [f32]) {
     let full: Vec<usize> = (0..filled.len()).filter(|y| filled[*y]).collect();
     let stride = values.len() / filled.len().max(1);
@@ -184,7 +184,7 @@ pub fn fill_empty_rows(filled: &[bool], values: &mut [f32]) {
 /// The whole third stage for samples on whole rows, in any order: a value for every pixel and the mask.
 ///
 /// # Errors
-/// [`InterpolationError`]: settings, samples that are no numbers or lie between rows, and no sample at all.
+/// [`InterpolationError`]: settings, samples that are not finite or lie between rows, and no sample at all.
 pub fn interpolate<const C: usize>(
     samples: &[Sample<C>],
     (width, height): (usize, usize),

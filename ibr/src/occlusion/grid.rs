@@ -1,18 +1,17 @@
-//! Occlusion removal in the plane: a grid of cells of the radius' size, nearest samples first in each.
+//! Occlusion removal in the plane: a grid of cells of the size of the radius, nearest samples first in each cell.
 
 use super::DepthTest;
 use crate::sample::Sample;
 use rayon::prelude::*;
 
-/// Cells a sample at most, so that a tiny radius on a wide plane does not ask for absurd memory.
+/// Most cells per sample, so that a tiny radius on a wide plane does not exhaust the memory.
 const CELLS_A_SAMPLE: usize = 4;
 
 /// Removes the hidden samples and keeps the order of the others; returns how many were removed.
 ///
-/// A sample looks into the at most nine cells that its ball meets. Each cell lists its samples from the
-/// nearest, so the search ends at the first sample that is too deep to hide anything here or that lies
-/// in the ball. O(n log n) for the sort, then O(k) a sample, k the crowd of a cell. Parallel, same bits
-/// for any number of threads.
+/// The ball of a sample meets at most nine cells. Each cell lists its samples from the nearest, so the search in it ends
+/// at the first sample that lies in the ball or is too deep to hide this one. O(n log n) for the sort, then O(k) per sample, k the number of samples in a cell. Parallel, with the same
+/// bits for any number of threads.
 pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
     let hidden = hidden(samples, test);
     let before = samples.len();
@@ -50,7 +49,7 @@ impl Grid {
         let ((left, right), (top, bottom)) = (bounds(|s| s.x), bounds(|s| s.y));
         let mut edge = epsilon;
         let limit = (CELLS_A_SAMPLE * samples.len() + 16) as f64;
-        // Doubling ends: at the latest when one cell holds everything.
+        // The doubling ends at the latest when one cell holds all samples.
         while ((right - left) / edge + 1.0) * ((bottom - top) / edge + 1.0) > limit {
             edge *= 2.0;
         }
@@ -75,9 +74,9 @@ impl Grid {
         self.order = vec![0; samples.len()];
         for (i, s) in samples.iter().enumerate() {
             let cell = self.cell(s);
-            let place = &mut self.starts[cell + 1];
-            self.order[*place as usize] = i as u32;
-            *place += 1;
+            let next = &mut self.starts[cell + 1];
+            self.order[*next as usize] = i as u32;
+            *next += 1;
         }
     }
 
@@ -104,8 +103,8 @@ impl Grid {
 
     /// Whether any sample hides `s`.
     fn hides<const C: usize>(&self, samples: &[Sample<C>], s: &Sample<C>, test: &DepthTest) -> bool {
-        // One more cell than the quotient says would only be visited through rounding; the edge is
-        // at least epsilon, so the neighbours of the own cell are enough.
+        // The cell size is at least epsilon, so only neighbouring cells matter; the bound guards against rounding of
+        // the quotient.
         let column = ((s.x - self.left) / self.edge) as usize;
         let row = ((s.y - self.top) / self.edge) as usize;
         let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
@@ -166,12 +165,12 @@ mod tests {
             raw in prop::collection::vec((-20.0..20.0_f64, -3.0..9.0_f64, 0.5..9.0_f32), 0..150),
             coarse: bool, epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64, lift in -20.0..5.0_f32
         ) {
-            let place = |x: f64| if coarse { (x * 2.0).round() / 2.0 } else { x };
+            let position = |x: f64| if coarse { (x * 2.0).round() / 2.0 } else { x };
             let samples: Vec<Sample<1>> = raw
                 .iter()
-                .map(|(x, y, d)| sample(place(*x), place(*y), if coarse { d.round() } else { *d }))
+                .map(|(x, y, d)| sample(position(*x), position(*y), if coarse { d.round() } else { *d }))
                 .collect();
-            check(&samples, &DepthTest { epsilon: place(epsilon).max(0.5), relative, absolute: 0.1 });
+            check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1 });
             // Signed keys, as chi gives them, with an absolute threshold.
             let signed: Vec<Sample<1>> =
                 samples.iter().map(|s| Sample { depth: s.depth + lift, ..*s }).collect();

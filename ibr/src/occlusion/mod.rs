@@ -1,14 +1,14 @@
-//! Stage two: samples behind another one that falls on nearly the same place are removed (thesis 2.3.2).
+//! Stage two, occlusion removal: a sample behind another one at nearly the same position is removed (thesis 2.3.2).
 //!
-//! P being the propagated samples, x in P is removed if and only if there is y in P with
+//! With P the set of propagated samples, x in P is removed if and only if there is a y in P with
 //!
 //! ```text
 //! ||x - y||_2 <= epsilon   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
 //! ```
 //!
-//! Every test is against P and not against what is left of it, so the result does not depend on any order.
-//! sigma grows with d(y); hence, if any sample of the ball hides x, the nearest one does, and it is
-//! enough to look for the least depth (also in floating point, where both sides stay monotone).
+//! Every test is against all of P, not against the samples that are left, so the result does not depend on any order.
+//! sigma grows with d(y). Hence if any sample in the ball hides x, then the nearest one does, and comparing with the least
+//! depth suffices; this also holds in floating point, since both sides are monotone.
 
 mod grid;
 mod row;
@@ -18,29 +18,29 @@ pub use row::{RowScratch, remove_in_row};
 
 use crate::sample::Sample;
 
-/// When one sample hides another.
+/// The condition under which one sample hides another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthTest {
     /// Radius of the neighbourhood in virtual pixels.
     pub epsilon: f64,
     /// Share of the nearer depth that the difference must reach; needs positive depths.
     pub relative: f64,
-    /// Difference that must be reached besides.
+    /// Absolute part of the difference that must be reached.
     pub absolute: f64,
 }
 
 impl Default for DepthTest {
     /// 5 % of the nearer depth within 0.7 px: the samples of one camera on a surface lie about a pixel apart, so
-    /// that a hidden sample has a nearer one in its ball nearly always; below 1 px rows do not see each other.
+    /// a hidden sample nearly always has a nearer one in its ball; below 1 px neighbouring rows do not interact.
     fn default() -> Self {
         Self { epsilon: 0.7, relative: 0.05, absolute: 0.0 }
     }
 }
 
-/// A depth test that would remove everything or that cannot be evaluated.
+/// A depth test that would remove all samples or cannot be evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum DepthTestError {
-    /// The radius is no positive number.
+    /// The radius is not a positive number.
     #[error("epsilon is {epsilon} px: the radius of the depth test must be a positive finite number")]
     Epsilon {
         /// Value given.
@@ -48,7 +48,7 @@ pub enum DepthTestError {
     },
     /// The thresholds are negative, not finite, or both zero.
     #[error(
-        "sigma = {relative} depth + {absolute}: neither part may be negative and one must be positive, or every sample would hide itself"
+        "sigma = {relative} depth + {absolute}: neither part may be negative and one must be positive, because otherwise every sample would hide itself"
     )]
     Sigma {
         /// Relative part given.
@@ -59,7 +59,7 @@ pub enum DepthTestError {
 }
 
 impl DepthTest {
-    /// Refuses settings that make no sense.
+    /// Refuses invalid settings.
     ///
     /// # Errors
     /// [`DepthTestError`].
@@ -75,19 +75,19 @@ impl DepthTest {
         Ok(())
     }
 
-    /// Whether a sample of depth `near` hides one of depth `far` on the same place.
+    /// Whether a sample of depth `near` hides one of depth `far` at the same position.
     #[inline]
     pub fn hides(&self, near: f64, far: f64) -> bool {
         far - near >= self.relative * near + self.absolute
     }
 
-    /// Whether two places are neighbours.
+    /// Whether two positions are neighbours.
     #[inline]
     pub fn close(&self, dx: f64, dy: f64) -> bool {
         dx * dx + dy * dy <= self.epsilon * self.epsilon
     }
 
-    /// The definition, sample against sample: O(n^2). The oracle of the fast routines.
+    /// The definition, sample against sample, O(n^2): the oracle of the fast routines.
     pub fn hidden_by_definition<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<bool> {
         let hidden = |x: &Sample<C>| {
             samples.iter().any(|y| {

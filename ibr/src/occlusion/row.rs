@@ -3,7 +3,7 @@
 use super::DepthTest;
 use crate::sample::Sample;
 
-/// What sorting and the depth test need of a sample: 16 bytes to move instead of 40.
+/// The part of a sample that sorting and the depth test need: 16 bytes to move instead of 40.
 #[derive(Debug, Clone, Copy, Default)]
 struct Key {
     x: f64,
@@ -32,7 +32,7 @@ impl<const C: usize> Default for RowScratch<C> {
 
 impl<const C: usize> RowScratch<C> {
     /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into
-    /// pixels, then insertion, which meets few samples a pixel.
+    /// pixels, then insertion, which meets few samples per pixel.
     fn sort(&mut self) {
         let n = self.keys.len();
         let (low, high) = self.keys.iter().fold((f64::MAX, f64::MIN), |(a, b), k| (a.min(k.x), b.max(k.x)));
@@ -51,12 +51,12 @@ impl<const C: usize> RowScratch<C> {
         for i in 0..cells {
             self.starts[i + 1] += self.starts[i];
         }
-        // Every one of the n places is written below.
+        // All n elements are written below.
         self.sorted.resize(n, Key::default());
         for k in &self.keys {
-            let place = &mut self.starts[cell(k)];
-            self.sorted[*place as usize] = *k;
-            *place += 1;
+            let next = &mut self.starts[cell(k)];
+            self.sorted[*next as usize] = *k;
+            *next += 1;
         }
         // After the scatter starts[i] is the end of cell i.
         let mut begin = 0;
@@ -85,7 +85,7 @@ impl<const C: usize> RowScratch<C> {
             }
             let close = |i: &u32| test.close(k.x - keys[*i as usize].x, 0.0);
             head += window[head..].iter().position(close).unwrap_or(0);
-            // A place that is no number is close to nothing, not even to itself, and stays.
+            // A NaN position is close to nothing, not even to itself, so the sample is kept.
             let nearest = window.get(head).filter(|i| close(i)).map(|i| keys[*i as usize].depth);
             if nearest.is_none_or(|n| !test.hides(f64::from(n), f64::from(k.depth))) {
                 survivors.push(samples[k.index as usize]);
@@ -94,7 +94,7 @@ impl<const C: usize> RowScratch<C> {
     }
 }
 
-/// Insertion sort for the usual handful, the library's stable sort for crowds.
+/// Insertion sort for few samples, the library's stable sort for many.
 fn sort_cell(cell: &mut [Key]) {
     if cell.len() > 24 {
         cell.sort_by(|a, b| a.x.total_cmp(&b.x));
@@ -109,10 +109,10 @@ fn sort_cell(cell: &mut [Key]) {
     }
 }
 
-/// Sorts the samples of one row by column and removes the hidden ones; returns how many those were.
+/// Sorts the samples of one row by column and removes the hidden ones; returns their number.
 ///
-/// All samples count as lying on one line: their `y` is not looked at. O(n log n) at worst, O(n) as
-/// images go; the work memory grows to the longest row and stays.
+/// All samples count as lying on one line: their `y` is ignored. O(n log n) at worst, O(n) for
+/// typical images; the work memory grows to the longest row and is kept.
 pub fn remove_in_row<const C: usize>(
     samples: &mut Vec<Sample<C>>,
     test: &DepthTest,
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_are_no_numbers_do_no_harm() {
+    fn positions_that_are_not_finite_are_harmless() {
         let test = DepthTest::default();
         for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let mut row =
@@ -195,14 +195,14 @@ mod tests {
             raw in prop::collection::vec((0.0..40.0_f64, 0.5..9.0_f32), 0..120),
             coarse: bool, epsilon in 0.1..3.0_f64, relative in 0.0..0.3_f64
         ) {
-            let place = |x: f64| if coarse { (x * 4.0).round() / 4.0 } else { x };
+            let position = |x: f64| if coarse { (x * 4.0).round() / 4.0 } else { x };
             let depth = |d: f32| if coarse { d.round().max(1.0) } else { d };
             let samples: Vec<Sample<1>> = raw
                 .iter()
                 .enumerate()
-                .map(|(i, (x, d))| sample(place(*x), depth(*d), i as u32))
+                .map(|(i, (x, d))| sample(position(*x), depth(*d), i as u32))
                 .collect();
-            let epsilon = place(epsilon).max(0.25);
+            let epsilon = position(epsilon).max(0.25);
             let test = DepthTest { epsilon, relative, absolute: 0.1 };
             let mut scratch = RowScratch::default();
             check(&samples, &test, &mut scratch);

@@ -17,7 +17,7 @@ pub(super) struct Grid {
 pub(super) struct Square {
     /// Indices of the upper left, upper right, lower left and lower right sample.
     pub(super) corners: [usize; 4],
-    /// Place of the pixel in the square, 0..1.
+    /// Position of the pixel in the square, 0..1.
     pub(super) s: f32,
     /// The same for the rows.
     pub(super) t: f32,
@@ -52,15 +52,15 @@ impl Grid {
         let (i, j) = ((x / self.step).min(self.columns - 1), (y / self.step).min(self.rows - 1));
         let (right, down) = ((i + 1).min(self.columns - 1), (j + 1).min(self.rows - 1));
         let at = |i: usize, j: usize| j * self.columns + i;
-        let place = |v: usize, k: usize| (v - k * self.step) as f32 / self.step as f32;
+        let position = |v: usize, k: usize| (v - k * self.step) as f32 / self.step as f32;
         Square {
             corners: [at(i, j), at(right, j), at(i, down), at(right, down)],
-            s: place(x, i),
-            t: place(y, j),
+            s: position(x, i),
+            t: position(y, j),
         }
     }
 
-    /// The pixel on which a sample sits.
+    /// The pixel of a sample.
     pub(super) fn pixel(&self, sample: usize) -> usize {
         sample / self.columns * self.step * self.width + sample % self.columns * self.step
     }
@@ -92,7 +92,7 @@ impl Grid {
     }
 }
 
-/// Between what is stored and what is affine on planes; its own inverse.
+/// Converts between the stored quantity and the one that is affine on planes; its own inverse.
 fn turn(value: f32, measure: Measure) -> f32 {
     match measure {
         Measure::Disparity => value,

@@ -10,7 +10,7 @@ use crate::segment::{MeanShift, SegmentError};
 /// How a coarse map is made dense.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Densify {
-    /// Bilinear everywhere: smears the depth edges.
+    /// Bilinear everywhere; blurs depth edges.
     Bilinear,
     /// The nearest sample.
     Nearest,
@@ -41,13 +41,13 @@ impl Default for Segmentwise {
     }
 }
 
-/// Why a map could not be made dense.
+/// Errors of making a map dense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PartialError {
     /// The map does not fit the image.
     #[error(transparent)]
     Depth(#[from] DepthError),
-    /// The segmentation cannot be done.
+    /// The segmentation failed.
     #[error(transparent)]
     Segment(#[from] SegmentError),
 }
@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// A bright square 20 px nearer than its dark ground: segmentwise finds the edge to the pixel.
+    /// A bright square 20 px nearer than its dark background: segmentwise finds the edge to the pixel.
     #[test]
     fn depth_edges_follow_the_image() {
         let inside = |x: usize, y: usize| (13..33).contains(&x) && (9..28).contains(&y);

@@ -1,8 +1,8 @@
 //! Segmentwise interpolation (thesis 2.4.2, Fig. 2.6).
 //!
 //! In each unit square of four depth samples: bilinear if all four belong to one depth segment; otherwise a
-//! pixel takes the depth of the closest vertex whose intensity segment is its own; pixels without such a
-//! vertex are marked and filled from around.
+//! pixel takes the depth of the closest vertex in its own intensity segment. Pixels without such a vertex are marked and
+//! filled from their neighbours.
 
 use super::Segmentwise;
 use super::grid::{Grid, Square, around};
@@ -65,12 +65,12 @@ fn one_surface(a: f32, b: f32, measure: Measure, settings: &Segmentwise) -> bool
     }
 }
 
-/// Dilation: ring by ring, a marked pixel takes the median of its known 4-neighbours that `may` give to it.
+/// Dilation: ring by ring, a marked pixel takes the median of its known 4-neighbours that `may` allows.
 fn grow(values: &mut [f32], width: usize, may: impl Fn(usize, usize) -> bool) {
     let length = values.len();
     let mut marked: Vec<usize> = (0..length).filter(|p| values[*p].is_nan()).collect();
     loop {
-        // The whole ring is computed before any of it is written: no order matters.
+        // The ring is computed before it is written, so the result does not depend on the order.
         let ring: Vec<(usize, f32)> = marked
             .iter()
             .filter_map(|&p| {

@@ -9,7 +9,7 @@ use crate::interpolate::plane::PlaneProblem;
 use crate::occlusion;
 use crate::propagate::{self, CalibratedView, Frame};
 
-/// Samples that are held in memory at a time; larger scenes are rendered in bands of rows.
+/// Most samples held in memory at a time; larger scenes are rendered in bands of rows.
 const SAMPLES_AT_A_TIME: usize = 1 << 19;
 
 /// Renders the view of `camera` with `width` x `height` pixels.
@@ -75,7 +75,7 @@ fn render_with<const C: usize>(
 }
 
 /// The first two stages for some rows of the virtual image. The band is widened by epsilon on both sides,
-/// so that what hides a sample of the band is there; only the band's own survivors are added.
+/// so that it contains every sample that can hide one of the band; only visible samples of the band itself are added.
 fn add_band<const C: usize>(
     problem: &mut PlaneProblem<C>,
     views: &[CalibratedView<'_>],
@@ -133,7 +133,7 @@ mod tests {
         assert!(got.report.occluded > 0);
         let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
-        // In bands the sums run in another order; everything else is the same.
+        // In bands only the order of summation differs.
         let mut problem = PlaneProblem::<1>::new((40, 30), &settings.interpolation).unwrap();
         for rows in [0..7, 7..8, 8..30] {
             add_band(&mut problem, &views, &target, &frame, rows, &settings).unwrap();

@@ -1,4 +1,4 @@
-//! Whole renderings: the three stages joined for each kind of input.
+//! Complete renderings: the three stages for each kind of input.
 
 pub mod calibrated;
 pub mod rectified;
@@ -10,13 +10,13 @@ use crate::interpolate::{Cover, HoleCount, InterpolationError, Settings};
 use crate::occlusion::{DepthTest, DepthTestError};
 use crate::sample::Dropped;
 
-/// Which third stage is used.
+/// The method of the third stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Rows where the samples lie on rows (rectified rigs), the plane elsewhere.
+    /// The row fit for rectified rigs, whose samples lie on rows, else the plane fit.
     #[default]
     Auto,
-    /// One spline a row; rectified rigs only.
+    /// One spline per row; rectified rigs only.
     Rows,
     /// The whole image at once.
     Plane,
@@ -50,13 +50,13 @@ impl RenderSettings {
     }
 }
 
-/// Why nothing could be rendered.
+/// Errors of a rendering.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RenderError {
     /// No view was given.
     #[error("there is no view to render from: give at least one")]
     NoViews,
-    /// More views or pixels than the samples can number.
+    /// More views or pixels than the indices of samples can hold.
     #[error("{views} views of up to {pixels} pixels: at most 65535 views of 2^32 - 1 pixels can be used")]
     TooLarge {
         /// Views given.
@@ -87,13 +87,13 @@ pub enum RenderError {
         "the row method needs a rectified rig: the samples of general cameras lie between rows; use the plane method"
     )]
     RowsOfGeneralCameras,
-    /// The place of a view or of the virtual camera is no number.
+    /// The position of a view or of the virtual camera is not finite.
     #[error("the position {position} is not a finite number")]
     Position {
         /// The position.
         position: f64,
     },
-    /// The offset is no number.
+    /// The offset is not finite.
     #[error("the offset {offset} px is not a finite number")]
     Offset {
         /// The offset.
@@ -108,23 +108,23 @@ pub enum RenderError {
     /// The interpolation failed.
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
-    /// No sample reached the virtual image.
+    /// No sample lies in the virtual image.
     #[error(
-        "no sample reaches the virtual image: of {pixels} pixels {} have no depth, {} lie behind the virtual camera and {} fall outside its image; check positions, cameras and the depth scale",
+        "no sample lies in the virtual image: of {pixels} pixels {} have no depth, {} lie behind the virtual camera and {} fall outside its image; check positions, cameras and the depth scale",
         dropped.unknown, dropped.behind, dropped.outside
     )]
     NoOverlap {
         /// Pixels of all views.
         pixels: usize,
-        /// What became of them.
+        /// Pixels dropped, by reason.
         dropped: Dropped,
     },
 }
 
-/// What happened to the samples of a rendering.
+/// Counts of samples and holes of a rendering.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct Report {
-    /// Samples that reached the virtual image.
+    /// Samples in the virtual image.
     pub propagated: usize,
     /// Of these, removed as hidden.
     pub occluded: usize,
@@ -143,20 +143,20 @@ pub struct Report {
 pub struct Rendering {
     /// The image.
     pub image: Image,
-    /// How each pixel came to its value.
+    /// Origin of each pixel's value.
     pub mask: Vec<Cover>,
     /// Counts.
     pub report: Report,
 }
 
 impl Rendering {
-    /// Share of the pixels that samples reach.
+    /// Share of the pixels that samples cover.
     pub fn coverage(&self) -> f64 {
         1.0 - HoleCount::of(&self.mask).total() as f64 / self.mask.len() as f64
     }
 }
 
-/// Refuses what the samples cannot number.
+/// Refuses more views or pixels than the indices of samples can hold.
 fn check_counts(views: usize, pixels: usize) -> Result<(), RenderError> {
     if views == 0 {
         return Err(RenderError::NoViews);

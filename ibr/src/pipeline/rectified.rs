@@ -1,4 +1,4 @@
-//! A view from a rectified rig: every row goes through the three stages by itself, rows in parallel.
+//! A view from a rectified rig: the three stages run row by row, rows in parallel.
 
 use super::{Method, RenderError, RenderSettings, Rendering, Report, check_counts};
 use crate::image::Image;
@@ -52,7 +52,7 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     }
 }
 
-/// What every row needs.
+/// The inputs that all rows share.
 struct Job<'a> {
     views: &'a [RectifiedView<'a>],
     position: f64,
@@ -81,7 +81,7 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
     let mut values = vec![0.0; width * height * C];
     let mut mask = vec![Cover::Disocclusion; width * height];
     let mut counts = vec![RowCount::default(); height];
-    // Blocks of rows share work memory; where they are cut changes nothing in the result.
+    // Blocks of rows share work memory; their borders do not affect the result.
     let block = height.div_ceil(4 * rayon::current_num_threads()).max(1);
     let outputs = values
         .par_chunks_mut(block * width * C)
@@ -108,7 +108,7 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
     Ok(Rendering { image, mask, report })
 }
 
-/// The same with the plane fit as third stage; the second stage still goes by rows.
+/// The same with the plane fit as third stage; the second stage still runs row by row.
 fn render_plane<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
     let Frame { width, height, .. } = job.frame;
     let mut problem = PlaneProblem::<C>::new((width, height), &job.settings.interpolation)?;
@@ -127,7 +127,7 @@ fn render_plane<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError>
     Ok(Rendering { image, mask: fit.mask, report })
 }
 
-/// What became of the samples of one row.
+/// Counts of the samples of one row.
 #[derive(Debug, Clone, Copy, Default)]
 struct RowCount {
     propagated: usize,
@@ -146,7 +146,7 @@ fn total<'a>(counts: impl Iterator<Item = &'a RowCount>, holes: HoleCount) -> Re
     report
 }
 
-/// Refuses to make an image of nothing.
+/// Refuses a rendering without samples.
 fn enough(job: &Job<'_>, report: &Report) -> Result<(), RenderError> {
     if report.used > 0 {
         return Ok(());
@@ -155,7 +155,7 @@ fn enough(job: &Job<'_>, report: &Report) -> Result<(), RenderError> {
     Err(RenderError::NoOverlap { pixels, dropped: report.dropped })
 }
 
-/// The samples of one row and the memory to find them in.
+/// The samples of one row and their work memory.
 struct Strip<const C: usize> {
     samples: Vec<Sample<C>>,
     scratch: RowScratch<C>,
@@ -167,7 +167,7 @@ impl<const C: usize> Strip<C> {
         Self { samples, scratch: RowScratch::default() }
     }
 
-    /// The first two stages for one row: propagates and removes what is hidden.
+    /// The first two stages for one row: propagates samples and removes hidden ones.
     fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
         let mut count = RowCount::default();
         self.samples.clear();
@@ -211,7 +211,7 @@ mod tests {
         parts.iter().enumerate().map(view).collect()
     }
 
-    /// The fused rows give what the three public stages give one after the other.
+    /// The row pipeline gives the result of the three public stages in sequence.
     #[test]
     fn equal_to_the_three_stages() {
         let parts = [scene(40, 9, 3), scene(40, 9, 3)];
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn the_own_place_of_a_camera_gives_nearly_its_image() {
+    fn the_position_of_a_camera_gives_nearly_its_image() {
         let mut parts = [scene(48, 6, 1)];
         parts[0].1 = DepthMap::new((48, 6), vec![4.0; 288], 1.0, Measure::Disparity).unwrap();
         let mut settings = RenderSettings::default();

@@ -1,4 +1,4 @@
-//! Reading a scene: sort out its kind, read files in parallel, make maps dense.
+//! Reading a scene: determine its kind, read its files in parallel, make maps dense.
 
 mod calibrated;
 mod rectified;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// How a scene is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadOptions {
-    /// Leave this view out and take its place as the wanted one.
+    /// Leave this view out and render it.
     pub view: Option<String>,
     /// Use only every K-th value of full maps.
     pub depth_step: usize,
@@ -30,10 +30,10 @@ impl Default for LoadOptions {
     }
 }
 
-/// Parses the text of a scene file; `path` is for the messages.
+/// Parses the text of a scene file; `path` appears in messages.
 ///
 /// # Errors
-/// [`SceneError::Parse`] with line, column and the keys that are known there.
+/// [`SceneError::Parse`] with line, column and the keys known there.
 pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
     toml::from_str(text).map_err(|e| {
         let hint = nearest_key(e.message()).map_or(String::new(), |key| format!("\ndid you mean `{key}`?"));
@@ -41,7 +41,7 @@ pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
     })
 }
 
-/// The known key most like the unknown one that a parser's message quotes first, if any is much like it.
+/// The known key most similar to the unknown key that the parser's message quotes first, if any is similar enough.
 fn nearest_key(message: &str) -> Option<&str> {
     let mut quoted = message.strip_prefix("unknown field ")?.split('`').skip(1).step_by(2);
     let unknown = quoted.next()?;
@@ -49,7 +49,7 @@ fn nearest_key(message: &str) -> Option<&str> {
     quoted.filter(|key| likeness(key) > 0.7).max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
 }
 
-/// Reads everything a scene names. `path` is the scene file; its folder is where relative paths start.
+/// Reads all files of a scene. Relative paths start in the folder of the scene file `path`.
 ///
 /// # Errors
 /// [`SceneError`], naming file, view and numbers.
@@ -69,14 +69,14 @@ type Loaded<T> = Result<T, SceneError>;
 impl Loader<'_> {
     fn load(&self) -> Loaded<Scene> {
         self.different_names()?;
-        let wanted = self.wanted()?;
+        let left_out = self.left_out()?;
         let views: Vec<&ViewSpec> =
-            self.spec.view.iter().enumerate().filter(|(i, _)| Some(*i) != wanted).map(|(_, v)| v).collect();
+            self.spec.view.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).map(|(_, v)| v).collect();
         if views.is_empty() {
             return Err(self.incomplete("there is no view to render from; add [[view]] tables"));
         }
         let target = self.spec.target.clone().unwrap_or_default();
-        let left_out = wanted.map(|i| &self.spec.view[i]);
+        let left_out = left_out.map(|i| &self.spec.view[i]);
         let (kind, filled) = if views.iter().any(|v| v.position.is_some()) {
             self.rectified(&views, left_out, &target)?
         } else if views.iter().any(|v| v.camera.is_some() || self.model_of(v).is_some()) {
@@ -91,7 +91,7 @@ impl Loader<'_> {
         SceneError::Incomplete { path: self.path.into(), reason: reason.into() }
     }
 
-    /// Refuses two views of one name; images without a name may be used twice.
+    /// Refuses two views with the same name; images without a name may be used twice.
     fn different_names(&self) -> Loaded<()> {
         let mut seen = std::collections::BTreeSet::new();
         match self.spec.view.iter().filter_map(|v| v.name.as_ref()).find(|name| !seen.insert(*name)) {
@@ -102,7 +102,7 @@ impl Loader<'_> {
         }
     }
 
-    /// Refuses keys of another kind of scene, which would be passed over in silence.
+    /// Refuses keys of another kind of scene instead of ignoring them.
     fn no_other_kind(&self, view: &ViewSpec, kind: &str, others: &[(&str, bool)]) -> Loaded<()> {
         match others.iter().find(|(_, given)| *given) {
             Some((key, _)) => Err(self.incomplete(format!(
@@ -121,7 +121,7 @@ impl Loader<'_> {
     }
 
     /// Index of the view that is left out.
-    fn wanted(&self) -> Loaded<Option<usize>> {
+    fn left_out(&self) -> Loaded<Option<usize>> {
         let Some(name) = &self.options.view else { return Ok(None) };
         let found = self.spec.view.iter().position(|v| v.label() == *name);
         found.map(Some).ok_or_else(|| SceneError::NoSuchView {
@@ -141,7 +141,7 @@ impl Loader<'_> {
         value.ok_or_else(|| self.incomplete(reason()))
     }
 
-    /// The size asked for, or the one that suggests itself.
+    /// The size in the scene, or the default.
     fn size(&self, target: &TargetSpec, own: (usize, usize)) -> Loaded<(usize, usize)> {
         match target.size {
             Some([w, h]) if w == 0 || h == 0 || w.saturating_mul(h) > MOST_PIXELS => Err(self
@@ -179,7 +179,7 @@ impl Loader<'_> {
     }
 }
 
-/// The values, or the first error in the order of the views: the same one on every run.
+/// The values, or the first error in the order of the views, so that every run reports the same error.
 fn in_order<T>(results: Vec<Loaded<T>>) -> Loaded<Vec<T>> {
     results.into_iter().collect()
 }
@@ -272,14 +272,14 @@ mod tests {
         let outside = text.replace("from_tracks = 2", "from_tracks = 7");
         let message = read(&outside, &LoadOptions::default()).unwrap_err();
         assert!(message.contains("3 columns, numbered from 1"), "{message}");
-        // A view takes no column that another one has said, and none may be said twice.
-        let said = text.replace("image = \"small.pgm\"", "image = \"small.pgm\"\ncolumn = 1");
-        let Kind::Uncalibrated { tracks, .. } = read(&said, &LoadOptions::default()).unwrap().kind else {
+        // A view without a column takes none that another view names, and no column may be named twice.
+        let named = text.replace("image = \"small.pgm\"", "image = \"small.pgm\"\ncolumn = 1");
+        let Kind::Uncalibrated { tracks, .. } = read(&named, &LoadOptions::default()).unwrap().kind else {
             panic!()
         };
         assert_eq!(tracks[0], [Some(Point::new(5.0, 6.0)), Some(Point::new(1.0, 2.0))]);
         for twice in
-            [said.replace("column = 1", "column = 2"), said.replace("from_tracks = 2", "from_tracks = 1")]
+            [named.replace("column = 1", "column = 2"), named.replace("from_tracks = 2", "from_tracks = 1")]
         {
             let message = read(&twice, &LoadOptions::default()).unwrap_err();
             assert!(message.contains("a column of its own"), "{message}");
@@ -322,7 +322,7 @@ mod tests {
         fails(&RIG.replace("\"right\"", "\"left\""), &["two views are named \"left\""]);
         fails(&RIG.replace("position = 1.0", "position = 1.0\ndepth = \"d.pgm\""), &["\"right\"", "`depth`"]);
         fails(&RIG.replace("position = 1.0", "position = nan"), &["\"right\"", "position = NaN"]);
-        fails(&RIG.replace("position = 0.5", "position = inf"), &["wanted view", "position = inf"]);
+        fails(&RIG.replace("position = 0.5", "position = inf"), &["virtual view", "position = inf"]);
         let options = LoadOptions { view: Some("middle".into()), ..LoadOptions::default() };
         assert!(read(RIG, &options).unwrap_err().contains("the views are left, right"));
     }

@@ -1,4 +1,4 @@
-//! Scenes: TOML files that say which images, maps and cameras belong together and what is wanted.
+//! Scenes: TOML files that list views (images, maps, cameras) and describe the virtual view.
 
 mod load;
 mod spec;
@@ -15,12 +15,12 @@ use crate::uncalibrated::Point;
 use crate::uncalibrated::tracks::TrackError;
 use std::path::PathBuf;
 
-/// A scene with everything read and checked.
+/// A scene, read and checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// What kind of scene it is, with its views.
+    /// The kind of scene, with its views.
     pub kind: Kind,
-    /// Registration offset of the wanted view in pixels.
+    /// Registration offset of the virtual view in pixels.
     pub offset: f64,
     /// Unknown depths that were filled from their neighbours.
     pub filled: usize,
@@ -33,27 +33,27 @@ pub enum Kind {
     Rectified {
         /// The views.
         views: Vec<RectifiedSource>,
-        /// Where the wanted view is taken from.
+        /// Position of the virtual view.
         position: f64,
     },
     /// Any calibrated cameras.
     Calibrated {
         /// The views.
         views: Vec<CalibratedSource>,
-        /// The wanted camera.
+        /// The virtual camera.
         camera: Camera,
-        /// Width and height of the wanted view.
+        /// Width and height of the virtual view.
         size: (usize, usize),
     },
     /// Images and tracks only.
     Uncalibrated {
         /// The images.
         images: Vec<Image>,
-        /// Places of the tracks in the images.
+        /// Positions of the tracks in the images.
         tracks: Vec<Vec<Option<Point>>>,
-        /// The wanted view.
+        /// The virtual view.
         target: Target,
-        /// Width and height of the wanted view.
+        /// Width and height of the virtual view.
         size: (usize, usize),
     },
 }
@@ -65,7 +65,7 @@ pub struct RectifiedSource {
     pub image: Image,
     /// Its disparity, dense.
     pub disparity: DepthMap,
-    /// Place on the line.
+    /// Position along the baseline.
     pub position: f64,
 }
 
@@ -80,7 +80,7 @@ pub struct CalibratedSource {
     pub camera: Camera,
 }
 
-/// Why a scene could not be used.
+/// Errors of a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The scene file cannot be opened.
@@ -88,7 +88,7 @@ pub enum SceneError {
     Read {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The system's message.
         source: std::io::Error,
     },
     /// The scene file is not a scene.
@@ -99,7 +99,7 @@ pub enum SceneError {
         /// Line, column and what was expected.
         reason: String,
     },
-    /// The scene contradicts itself or leaves something out.
+    /// The scene is contradictory or incomplete.
     #[error("{}: {reason}", path.display())]
     Incomplete {
         /// The scene file.
@@ -107,14 +107,14 @@ pub enum SceneError {
         /// What is missing, and where.
         reason: String,
     },
-    /// No view of the wanted name.
+    /// No view of that name.
     #[error("{}: there is no view {name:?}; the views are {known}", path.display())]
     NoSuchView {
         /// The scene file.
         path: PathBuf,
         /// The name asked for.
         name: String,
-        /// The names there are.
+        /// The existing names.
         known: String,
     },
     /// A camera of the scene.
@@ -124,7 +124,7 @@ pub enum SceneError {
         path: PathBuf,
         /// Which camera.
         which: String,
-        /// What is wrong with it.
+        /// The problem.
         source: CameraError,
     },
     /// A depth map of the scene.
@@ -134,7 +134,7 @@ pub enum SceneError {
         view: String,
         /// The map.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         source: DepthError,
     },
     /// A coarse depth map of the scene.
@@ -144,7 +144,7 @@ pub enum SceneError {
         view: String,
         /// The map.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         source: PartialError,
     },
     /// An image of the scene.

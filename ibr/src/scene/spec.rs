@@ -1,4 +1,4 @@
-//! What a scene file says, word for word.
+//! A scene file as written.
 
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ pub struct SceneSpec {
     /// The views.
     #[serde(default)]
     pub view: Vec<ViewSpec>,
-    /// The wanted view; may be left out if one of the views is left out and rendered.
+    /// The virtual view; optional if one of the views is left out and rendered.
     #[serde(rename = "virtual")]
     pub target: Option<TargetSpec>,
     /// File of tracks over the views (uncalibrated scenes).
@@ -26,11 +26,11 @@ pub struct SceneSpec {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ViewSpec {
-    /// Name; that of the image file if left out.
+    /// Name; defaults to the image file's.
     pub name: Option<String>,
     /// Image file.
     pub image: PathBuf,
-    /// Place on the line of a rectified rig, in baselines.
+    /// Position along the baseline of a rectified rig, in baselines.
     pub position: Option<f64>,
     /// Disparity map of a rectified rig.
     pub disparity: Option<PathBuf>,
@@ -50,30 +50,30 @@ pub struct ViewSpec {
     pub column: Option<usize>,
 }
 
-/// The wanted view.
+/// The virtual view.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TargetSpec {
-    /// Place on the line of a rectified rig, in baselines.
+    /// Position along the baseline of a rectified rig, in baselines.
     pub position: Option<f64>,
     /// 3 x 4 camera matrix, in pixels.
     pub camera: Option<[[f64; 4]; 3]>,
-    /// Name of an image of the COLMAP model whose camera is wanted.
+    /// Name of the image of the COLMAP model whose camera is used.
     pub colmap_image: Option<String>,
     /// Width and height in pixels.
     pub size: Option<[usize; 2]>,
-    /// Column of the tracks, from 1, that holds the places in the wanted view.
+    /// Column of the tracks, from 1, that holds the points in the virtual view.
     pub from_tracks: Option<usize>,
-    /// Place between the first two views, 0 to 1.
+    /// Position between the first two views, 0 to 1.
     pub between: Option<f64>,
     /// Added to every column, in pixels.
     pub offset: Option<f64>,
-    /// File of tracks, if it is not given at the top.
+    /// File of tracks, unless given at the top.
     pub matches: Option<PathBuf>,
 }
 
 impl ViewSpec {
-    /// The name, or that of the image.
+    /// The name, or the image file's.
     pub fn label(&self) -> String {
         self.name.clone().unwrap_or_else(|| self.image.display().to_string())
     }

@@ -1,4 +1,4 @@
-//! The mean-shift filter: every pixel climbs to the mode of the density around it.
+//! The mean-shift filter: every pixel moves to the mode of the density around it.
 
 use super::MeanShift;
 use crate::image::{Image, colour};
@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 /// Columns handled together; two of these hold the widest window.
 const LANES: usize = 8;
-/// Half of a normalised step below this length ends the climb.
+/// The iteration of a pixel ends when half of a normalised step is shorter than this.
 const SMALLEST_STEP: f32 = 0.1;
 
-/// Where a pixel ends: place and colour of its mode.
+/// The mode of a pixel: position and colour.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Mode {
     pub(super) x: f32,
@@ -17,7 +17,7 @@ pub(super) struct Mode {
     pub(super) luv: [f32; 3],
 }
 
-/// L, u and v with LANES columns of padding that no colour window holds.
+/// L, u and v, padded by LANES columns that lie outside any colour window.
 struct Planes {
     width: usize,
     height: usize,
@@ -62,7 +62,7 @@ fn climb(planes: &Planes, x: usize, y: usize, settings: &MeanShift) -> Mode {
     let (hs, hr) = (settings.spatial as f32, settings.range);
     for _ in 0..settings.steps {
         let sums = window(planes, &at, hs, hr);
-        // Rounding of the mean may in theory leave an empty window; the pixel then stays.
+        // Rounding of the mean may leave an empty window; the pixel then keeps its position.
         if sums.count < 0.5 {
             break;
         }
@@ -71,8 +71,8 @@ fn climb(planes: &Planes, x: usize, y: usize, settings: &MeanShift) -> Mode {
         let d = sums.luv.map(|s| s * share);
         (at.x, at.y) = (at.x + dx, at.y + dy);
         at.luv.iter_mut().zip(d).for_each(|(c, d)| *c += d);
-        let place = (dx * dx + dy * dy) / (hs * hs);
-        let step = place + (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (hr * hr);
+        let spatial = (dx * dx + dy * dy) / (hs * hs);
+        let step = spatial + (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) / (hr * hr);
         if step < SMALLEST_STEP * SMALLEST_STEP {
             break;
         }
@@ -80,7 +80,7 @@ fn climb(planes: &Planes, x: usize, y: usize, settings: &MeanShift) -> Mode {
     at
 }
 
-/// Count, sums of the places and sums of the colour differences in a window.
+/// Count, sums of positions and sums of colour differences in a window.
 struct Sums {
     count: f32,
     x: f32,
@@ -104,7 +104,7 @@ fn window(planes: &Planes, at: &Mode, hs: f32, hr: f32) -> Sums {
     sums
 }
 
-/// Adds LANES neighbouring columns, of which the first `columns` count.
+/// Adds the first `columns` of LANES neighbouring columns.
 fn add_columns(
     planes: &Planes,
     at: &Mode,
@@ -116,7 +116,7 @@ fn add_columns(
 ) {
     let (mut count, mut y_sum) = ([0.0_f32; LANES], [0.0_f32; LANES]);
     let mut luv = [[0.0_f32; LANES]; 3];
-    // A lane beyond the window has a radius no colour is within.
+    // A lane beyond the window gets a radius within which no colour lies.
     let mut radius = [-1.0_f32; LANES];
     radius[..columns].fill(hr * hr);
     for y in rows {

@@ -5,7 +5,7 @@ mod regions;
 
 use crate::image::Image;
 
-/// Settings of the mean-shift segmentation; the defaults are those of the authors' own programme.
+/// Settings of the mean-shift segmentation; the defaults are those of the authors' own program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanShift {
     /// h_s: half side of the window in pixels, at most 7.
@@ -14,7 +14,7 @@ pub struct MeanShift {
     pub range: f32,
     /// Regions with fewer pixels are merged into the neighbour of nearest colour; 1 keeps all.
     pub smallest: usize,
-    /// Greatest number of steps a pixel takes.
+    /// Most steps per pixel.
     pub steps: usize,
 }
 
@@ -24,7 +24,7 @@ impl Default for MeanShift {
     }
 }
 
-/// Settings of a segmentation outside their range.
+/// Settings of the segmentation outside their range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SegmentError {
     /// The window in the image.
@@ -43,7 +43,7 @@ pub enum SegmentError {
     },
 }
 
-/// Segments of an image: one label a pixel, 0.., in the order of their first pixels.
+/// Segments of an image: one label per pixel, 0.., in the order of their first pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Segments {
     /// Width in pixels.
@@ -62,8 +62,8 @@ const LARGEST_WINDOW: usize = 7;
 impl MeanShift {
     /// Segments an image: filter, link, merge.
     ///
-    /// Pixels climb to the mode of the density of (x/h_s, y/h_s, L/h_r, u/h_r, v/h_r) with a flat kernel;
-    /// neighbours whose modes differ by less than h_r / 2 in colour (and h_s in place) are one segment.
+    /// Pixels move to the mode of the density of (x/h_s, y/h_s, L/h_r, u/h_r, v/h_r) with a flat kernel;
+    /// neighbours whose modes differ by less than h_r / 2 in colour (and h_s in place) belong to one segment.
     /// Parallel over rows, same result for any number of threads.
     ///
     /// # Errors

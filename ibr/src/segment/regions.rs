@@ -64,10 +64,10 @@ fn colour_distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 /// Links, labels and merges.
 pub(super) fn connect(size: (usize, usize), modes: &[Mode], settings: &MeanShift) -> Segments {
     let mut sets = Sets::new(modes.len());
-    let (colour, place) = ((settings.range / 2.0).powi(2), (settings.spatial as f32).powi(2));
+    let (colour, spatial) = ((settings.range / 2.0).powi(2), (settings.spatial as f32).powi(2));
     neighbours(size, |p, q| {
         let (a, b) = (&modes[p], &modes[q]);
-        let near = (a.x - b.x).powi(2) + (a.y - b.y).powi(2) < place;
+        let near = (a.x - b.x).powi(2) + (a.y - b.y).powi(2) < spatial;
         if near && colour_distance(&a.luv, &b.luv) < colour {
             sets.join(p as u32, q as u32);
         }
@@ -80,8 +80,8 @@ pub(super) fn connect(size: (usize, usize), modes: &[Mode], settings: &MeanShift
     Segments { width: size.0, height: size.1, labels, count }
 }
 
-/// Merges each region below `smallest` pixels into its neighbour of nearest mean mode; `None` when there is
-/// none that could be merged.
+/// Merges each region below `smallest` pixels into its neighbour of nearest mean mode; `None` if there is
+/// no such region.
 fn merge_small(
     size: (usize, usize),
     labels: &[u32],
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn chains_link_and_steps_separate() {
         assert_eq!(labels(&[0.0, 3.0, 6.0, 30.0, 31.0], (5, 1), 1), [0, 0, 0, 1, 1]);
-        // Equal colours that do not touch stay apart.
+        // Regions of equal colour that do not touch remain separate.
         assert_eq!(labels(&[0.0, 50.0, 0.0], (3, 1), 1), [0, 1, 2]);
     }
 

@@ -1,7 +1,7 @@
-//! A synthetic scene with exact depth: what renderings can be compared with when there is no photograph.
+//! A synthetic scene with exact depth: a reference for renderings without a photograph.
 //!
-//! Curved and slanted textured surfaces before a wall, seen by any pinhole camera. Colours are averaged over
-//! 3 x 3 rays a pixel, depth is that of the central ray.
+//! Curved and slanted textured surfaces in front of a wall, seen by any pinhole camera. Colours are averaged over
+//! 3 x 3 rays per pixel, depth is that of the central ray.
 
 use crate::camera::Camera;
 use crate::depth::{DepthMap, Measure};
@@ -9,7 +9,7 @@ use crate::image::Image;
 use nalgebra::{Matrix3x4, Vector3};
 use rayon::prelude::*;
 
-/// Rays a pixel in each direction.
+/// Rays per pixel in each direction.
 const RAYS: usize = 3;
 
 /// A surface that rays can hit.
@@ -104,15 +104,15 @@ impl SyntheticScene {
     fn average(&self, camera: &Camera, x: f64, y: f64) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for k in 0..RAYS * RAYS {
-            let place = |i: usize| (i as f64 + 0.5) / RAYS as f64 - 0.5;
-            if let Some((_, colour)) = self.trace(camera, x + place(k % RAYS), y + place(k / RAYS)) {
+            let offset = |i: usize| (i as f64 + 0.5) / RAYS as f64 - 0.5;
+            if let Some((_, colour)) = self.trace(camera, x + offset(k % RAYS), y + offset(k / RAYS)) {
                 sum.iter_mut().zip(colour).for_each(|(s, c)| *s += c);
             }
         }
         sum.map(|s| (s / (RAYS * RAYS) as f64).clamp(0.0, 255.0))
     }
 
-    /// Depth and colour of the nearest surface on the ray of a place in the image.
+    /// Depth and colour of the nearest surface on the ray through a position in the image.
     fn trace(&self, camera: &Camera, x: f64, y: f64) -> Option<(f64, [f64; 3])> {
         let origin = camera.centre();
         let ray = camera.unproject(x, y, 1.0) - origin;
@@ -124,7 +124,7 @@ impl SyntheticScene {
 
 /// Focal length of [`rig_camera`] in units of the image width.
 pub const RIG_FOCAL: f64 = 0.9;
-/// Distance of the rig's cameras 0 and 1 in scene units.
+/// Distance between the rig's cameras 0 and 1 in scene units.
 pub const RIG_BASELINE: f64 = 0.35;
 
 /// Camera of a rectified rig at `position` (in baselines) looking along +z.

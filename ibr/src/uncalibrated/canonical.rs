@@ -46,7 +46,7 @@ pub fn canonical_pair(f: &Matrix3<f64>, matches: &[Match]) -> Result<CanonicalPa
     Ok(CanonicalPair { first, second, cameras: [one, two] })
 }
 
-/// a minimising sum |x' x (B x + e' (a . x))|^2: three unknowns, two independent rows a match.
+/// a minimising sum |x' x (B x + e' (a . x))|^2: three unknowns, two independent rows per match.
 fn best_plane(
     base: &Matrix3<f64>,
     epipole: &Vector3<f64>,

@@ -7,15 +7,16 @@
 //! chi = -(h4 . C~) / d - h4 . (r, 0),      h4 the last row of H, C the centre, r the ray of unit depth,
 //! ```
 //!
-//! so that its order is right everywhere or reversed everywhere, while d_p passes through infinity.
+//! so chi orders depth correctly on the whole image or reverses it on the whole image, while d_p passes through infinity.
 //!
-//! No change of frame is needed for this. Moving the plane at infinity off the scene by a linear programme would make
-//! all chi negative and all det M positive, but the sign of [`order_sign`] already holds in every frame, and where a
-//! pixel with chi goes does not depend on the frame at all; only a camera centre on the plane t = 0 (det M = 0) has no
-//! order, and is refused. The canonical pair stays away from that: its plane t = 0 is the one that fits the matches
-//! best, in the midst of the scene, far from any camera that sees it from the front. That plane also keeps chi small
-//! on the whole image, so that a share of its range is a threshold of depth, which it would not be in a frame where
-//! chi mostly follows the pixel.
+//! No change of frame is needed. A linear program could move the plane at infinity off the scene, which would make all chi
+//! negative and all det M positive. But the sign of [`order_sign`] holds in every frame, and the position to which a pixel
+//! with given chi propagates does not depend on the frame. Only a camera centre on the plane t = 0 (det M = 0) has no order
+//! of depth and is refused.
+//!
+//! For the canonical pair this does not happen: its plane t = 0 is the best fit to the matches, so it lies within the
+//! scene, far from any camera that sees the scene from the front. With this plane chi is also small on the whole image,
+//! so that a share of its range is a depth threshold; in other frames chi would mostly vary with the pixel.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector4};
 
@@ -30,8 +31,8 @@ pub fn depth(camera: &Matrix3x4<f64>, point: &Vector4<f64>) -> f64 {
 }
 
 /// Flips signs so that pi3_i . X_j > 0: each point by the first camera, then each other camera by the
-/// majority of the points that `seen` says it sees (all of them if it sees none). Returns how many pairs stay
-/// negative.
+/// majority of the points that it sees according to `seen` (of all points if it sees none). Returns the number of
+/// pairs that remain negative.
 pub fn orient(
     cameras: &mut [Matrix3x4<f64>],
     points: &mut [Vector4<f64>],
@@ -62,7 +63,7 @@ pub fn centre_sign(camera: &Matrix3x4<f64>) -> f64 {
     m.determinant().signum()
 }
 
-/// The one bit of the projective frame that orders depth: the sign of det H.
+/// The sign of det H, the one bit of the projective frame that decides the order of depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Handedness {
     /// det H > 0.
@@ -88,7 +89,7 @@ impl Handedness {
 
 /// s such that s chi orders the points of an oriented camera by depth, smaller nearer: sign(det H) sign(det M).
 ///
-/// The slope of chi against 1 / d has the opposite sign (section on the order in the module's head).
+/// The slope of chi against 1 / d has the opposite sign (see the module documentation).
 pub fn order_sign(camera: &Matrix3x4<f64>, hand: Handedness) -> f64 {
     hand.sign() * centre_sign(camera)
 }
@@ -192,9 +193,9 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
-        /// Where a pixel with chi goes is the same in every frame: also where the plane t = 0 cuts the scene.
+        /// A pixel with given chi propagates to the same position in every frame, even if the plane t = 0 cuts the scene.
         #[test]
-        fn places_do_not_depend_on_the_frame(entries in prop::collection::vec(-1.0..1.0_f64, 16), flips: u64) {
+        fn positions_do_not_depend_on_the_frame(entries in prop::collection::vec(-1.0..1.0_f64, 16), flips: u64) {
             let Some(mut f) = frame(&entries, flips) else { return Ok(()) };
             orient(&mut f.cameras, &mut f.points, |_, _| true);
             for source in 0..2 {

@@ -8,7 +8,7 @@ use super::{GeometryError, Match, RobustSettings, homogeneous};
 use crate::linear;
 use nalgebra::Matrix3;
 
-/// Below this ratio of the second smallest to the largest singular value the matches leave F undetermined.
+/// Below this ratio of the second smallest to the largest singular value the matches do not determine F.
 const DEGENERATE: f64 = 1e-7;
 /// Share of the matches that a homography may explain before the scene counts as planar.
 const PLANAR_SHARE: f64 = 0.95;
@@ -77,7 +77,7 @@ fn chosen(matches: &[Match], indices: &[usize]) -> Vec<Match> {
 /// F by RANSAC over samples of eight, refitted on the inliers until their set is stable.
 ///
 /// # Errors
-/// [`GeometryError`]: fewer than 8 matches or inliers, coordinates that are no numbers, planar matches.
+/// [`GeometryError`]: fewer than 8 matches or inliers, coordinates that are not finite, planar matches.
 pub fn robust(matches: &[Match], settings: &RobustSettings) -> Result<Fundamental, GeometryError> {
     if matches.len() < 8 {
         return Err(GeometryError::TooFew { what: "matches", found: matches.len(), needed: 8 });
@@ -133,7 +133,7 @@ fn refit(matches: &[Match], mut set: Vec<usize>, threshold: f64) -> Result<Funda
     Ok(Fundamental { matrix, inliers: set, rms })
 }
 
-/// Refuses matches that one homography explains: a plane, or a camera that only turned.
+/// Refuses matches that one homography explains: a planar scene, or a camera that only rotated.
 fn refuse_planes(matches: &[Match], threshold: f64) -> Result<(), GeometryError> {
     let Some(h) = homography(matches) else { return Ok(()) };
     let explained = matches.iter().filter(|m| transfer(&h, m) < threshold * threshold).count();

@@ -1,4 +1,4 @@
-//! Dense chi from sparse features: linear on the Delaunay triangles of the image.
+//! Dense chi from sparse features: linear interpolation on Delaunay triangles in the image.
 //!
 //! On a plane of the scene chi is an affine function of the pixel in every projective frame, so the
 //! interpolation is exact on planar facets; that of the projective depth itself would not be.
@@ -6,27 +6,27 @@
 use super::Point;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
-/// Features closer than this, in pixels, are one feature: the first of them.
+/// Of features closer than this, in pixels, only the first is used.
 const CLOSEST: f64 = 0.5;
 
 /// A feature with its chi.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Feature {
-    /// Place in pixels.
-    pub place: Point,
+    /// Position in pixels.
+    pub position: Point,
     /// chi there.
     pub chi: f64,
 }
 
 struct Vertex {
-    place: Point2<f64>,
+    position: Point2<f64>,
     chi: f64,
 }
 
 impl HasPosition for Vertex {
     type Scalar = f64;
     fn position(&self) -> Point2<f64> {
-        self.place
+        self.position
     }
 }
 
@@ -47,15 +47,15 @@ pub fn dense_chi(features: &[Feature], (width, height): (usize, usize)) -> Vec<f
 fn triangulate(features: &[Feature]) -> DelaunayTriangulation<Vertex> {
     let mut triangulation = DelaunayTriangulation::new();
     for f in features {
-        let place = Point2::new(f.place.x, f.place.y);
-        let apart = triangulation.nearest_neighbor(place).is_none_or(
+        let position = Point2::new(f.position.x, f.position.y);
+        let apart = triangulation.nearest_neighbor(position).is_none_or(
             |near: spade::handles::VertexHandle<'_, Vertex, _, _, _>| {
-                near.position().distance_2(place) >= CLOSEST * CLOSEST
+                near.position().distance_2(position) >= CLOSEST * CLOSEST
             },
         );
         if f.chi.is_finite() && apart {
-            // The library refuses coordinates beyond the range of its predicates; so do we.
-            let _ = triangulation.insert(Vertex { place, chi: f.chi });
+            // The library refuses coordinates beyond the range of its exact predicates; such features are skipped.
+            let _ = triangulation.insert(Vertex { position, chi: f.chi });
         }
     }
     triangulation
@@ -103,15 +103,15 @@ mod tests {
     use super::*;
 
     fn feature(x: f64, y: f64, chi: f64) -> Feature {
-        Feature { place: Point::new(x, y), chi }
+        Feature { position: Point::new(x, y), chi }
     }
 
     #[test]
     fn planes_are_exact_and_the_hull_is_filled() {
         let f = |x: f64, y: f64| 0.3 - 0.02 * x + 0.05 * y;
-        let places =
+        let positions =
             [(2.0, 1.0), (17.0, 2.0), (18.0, 12.0), (1.0, 13.0), (9.3, 6.1), (5.5, 9.2), (12.4, 3.3)];
-        let features: Vec<Feature> = places.iter().map(|(x, y)| feature(*x, *y, f(*x, *y))).collect();
+        let features: Vec<Feature> = positions.iter().map(|(x, y)| feature(*x, *y, f(*x, *y))).collect();
         let chi = dense_chi(&features, (20, 15));
         let hull = [(2.0, 1.0), (17.0, 2.0), (18.0, 12.0), (1.0, 13.0)];
         for (i, got) in chi.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! A metric guess: calibration with the principal point in the image's centre and a guessed focal length.
+//! A metric guess: a calibration with the principal point at the image centre and a guessed focal length.
 //!
-//! Too coarse to measure with, but enough for one bit (which way chi orders depth) and for placing a virtual
-//! camera between two views.
+//! It is too coarse for measurements, but sufficient to decide the order of depth (one bit) and to place a virtual camera
+//! between two views.
 
 use super::chirality::{self, Handedness};
 use super::triangulate::triangulate;
@@ -79,17 +79,17 @@ fn in_front(rays: &[[Point; 2]], r: &Matrix3<f64>, t: &Vector3<f64>) -> Vec<Opti
     rays.iter().map(point).collect()
 }
 
-/// All guesses that could be made, one a focal length.
+/// All guesses that could be made, one per focal length.
 pub fn guesses(f: &Matrix3<f64>, matches: &[Match], sizes: [(usize, usize); 2]) -> Vec<MetricGuess> {
     let side = sizes.iter().map(|s| s.0.max(s.1)).max().unwrap_or(1) as f64;
     FOCAL_LENGTHS.iter().filter_map(|factor| guess(f, matches, sizes, factor * side)).collect()
 }
 
-/// The bit that orders chi, by the majority of the guesses: the sign of the slope of chi_1 against 1 / z in
+/// The order of depth by the majority of the guesses: the sign of the slope of chi_1 against 1 / z in
 /// chi_1 ~ (1/z, x, y, 1).
 ///
 /// `points` are the oriented projective points of the matches and `camera` the oriented first camera. Returns
-/// the bit and the share of the guesses that agree with it; `None` when no guess could be made.
+/// it and the share of the guesses that agree; `None` when no guess could be made.
 pub fn handedness(
     guesses: &[MetricGuess],
     matches: &[Match],
@@ -125,9 +125,9 @@ pub fn best(guesses: &[MetricGuess]) -> Option<&MetricGuess> {
     guesses.iter().max_by(|a, b| a.fit.total_cmp(&b.fit))
 }
 
-/// Where a camera between the two views would see the matches that `guess` was made from: its rotation and
-/// centre are interpolated, and what the guess misses in the two views is blended in, so that `between` = 0
-/// and 1 are the views themselves.
+/// The image points of the matches behind `guess` in a camera between the two views. Rotation and centre are
+/// interpolated, and the residuals of the guess in the two views are blended in, so that `between` = 0 and 1 reproduce the
+/// views exactly.
 pub fn images_between(guess: &MetricGuess, matches: &[Match], between: f64) -> Vec<Option<Point>> {
     let turn = UnitQuaternion::from_rotation_matrix(&guess.r);
     let r = UnitQuaternion::identity().slerp(&turn, between);

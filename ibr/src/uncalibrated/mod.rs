@@ -1,4 +1,4 @@
-//! Rendering from images and correspondences alone (thesis 2.5): no camera is known.
+//! Rendering from images and correspondences alone (thesis 2.5): the cameras are unknown.
 //!
 //! matches -> F (eight points, RANSAC) -> a pair of projective cameras -> points, chi and its order ->
 //! chi on a Delaunay triangulation in each view -> the virtual camera -> the view.
@@ -19,38 +19,38 @@ pub mod triangulate;
 
 use crate::camera::CameraError;
 
-/// A place in an image, in pixels.
+/// A position in an image, in pixels.
 pub type Point = nalgebra::Vector2<f64>;
 
 /// A correspondence: the same scene point in a first and a second image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Match {
-    /// Place in the first image.
+    /// Position in the first image.
     pub first: Point,
-    /// Place in the second image.
+    /// Position in the second image.
     pub second: Point,
 }
 
-/// Why the geometry of the views could not be found.
+/// Errors of estimating the geometry of the views.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GeometryError {
     /// Not enough correspondences.
-    #[error("{found} {what} where at least {needed} are needed; give more tracks")]
+    #[error("{found} {what} are too few, at least {needed} are needed; give more tracks")]
     TooFew {
-        /// What there is too little of.
+        /// The objects of which there are too few.
         what: &'static str,
         /// How many there are.
         found: usize,
         /// How many are needed.
         needed: usize,
     },
-    /// A coordinate that is no number.
+    /// A coordinate that is not finite.
     #[error("match {index} has a coordinate that is not a finite number")]
     NotFinite {
         /// Index of the match.
         index: usize,
     },
-    /// All matches lie on one plane, or the camera only turned.
+    /// All matches lie on one plane, or the camera only rotated.
     #[error(
         "the matches are planar: one homography explains {explained} of {matches} of them within {threshold} px, so the fundamental matrix is not determined; add matches off the plane, or views with a baseline"
     )]
@@ -67,7 +67,7 @@ pub enum GeometryError {
         "the {what} is not determined by the matches (second smallest / largest singular value {ratio:e})"
     )]
     Degenerate {
-        /// What was to be found.
+        /// The object to be estimated.
         what: &'static str,
         /// Ratio of singular values.
         ratio: f64,
@@ -77,9 +77,9 @@ pub enum GeometryError {
         "the best {what} explains only {inliers} of {matches} matches within {threshold} px; check the tracks"
     )]
     NoConsensus {
-        /// What was to be found.
+        /// The object to be estimated.
         what: &'static str,
-        /// Matches it explains.
+        /// Matches that the model explains.
         inliers: usize,
         /// All matches.
         matches: usize,
@@ -87,9 +87,9 @@ pub enum GeometryError {
         threshold: f64,
     },
     /// A numerical routine failed.
-    #[error("the {what} could not be computed: the numbers are not finite or the iteration did not end")]
+    #[error("the {what} could not be computed: the values are not finite or the iteration did not converge")]
     Numerical {
-        /// What was to be computed.
+        /// The object to be computed.
         what: &'static str,
     },
     /// A camera of the projective frame is singular.
@@ -107,11 +107,11 @@ pub enum GeometryError {
 pub struct RobustSettings {
     /// Seed of the random samples: the same seed gives the same bits.
     pub seed: u64,
-    /// Sampson distance below which a match agrees with F, in pixels.
+    /// Sampson distance below which a match is an inlier of F, in pixels.
     pub epipolar: f64,
-    /// Reprojection error below which a match agrees with a resected camera, in pixels.
+    /// Reprojection error below which a sighting is an inlier of a resected camera, in pixels.
     pub reprojection: f64,
-    /// Probability with which a sample without outliers is to be drawn.
+    /// Probability of drawing at least one sample without outliers.
     pub confidence: f64,
     /// Greatest number of samples drawn.
     pub trials: usize,

@@ -1,4 +1,4 @@
-//! Seeded random samples and the number of them that is enough.
+//! Seeded random samples, and their number for a given confidence.
 
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;

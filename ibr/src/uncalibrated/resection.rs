@@ -6,7 +6,7 @@ use super::{GeometryError, Point, RobustSettings};
 use crate::linear;
 use nalgebra::{Matrix3x4, SMatrix, SVector, Vector4};
 
-/// A homogeneous point and where the wanted camera sees it, in pixels.
+/// A homogeneous point and its image in the camera to be found, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sighting {
     /// The point in the projective frame.
@@ -27,17 +27,17 @@ pub struct Resection {
 }
 
 const NEEDED: usize = 6;
-/// Below this ratio of singular values the sightings leave the camera undetermined (points on a plane).
+/// Below this ratio of singular values the sightings do not determine the camera, for example points on a plane.
 const DEGENERATE: f64 = 1e-9;
 /// Steps of the refinement.
 const STEPS: usize = 10;
 
-/// Finds the camera that sees the points where they were seen.
+/// Estimates the camera from points and their images.
 ///
 /// # Errors
 /// [`GeometryError`]: fewer than 6 sightings or inliers, points that leave the camera undetermined.
 pub fn resect(sightings: &[Sighting], settings: &RobustSettings) -> Result<Resection, GeometryError> {
-    let what = "matches of known points in the wanted view";
+    let what = "matches of known points in the virtual view";
     if sightings.len() < NEEDED {
         return Err(GeometryError::TooFew { what, found: sightings.len(), needed: NEEDED });
     }

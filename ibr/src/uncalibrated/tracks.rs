@@ -1,9 +1,9 @@
-//! Tracks: where scene points were seen, one line a point, one pair "x y" a view, "-" where not seen.
+//! Tracks: image positions of scene points, one line per point, one pair "x y" per view, "-" where not seen.
 
 use super::Point;
 use std::path::{Path, PathBuf};
 
-/// Why a track file could not be read.
+/// Errors of a track file.
 #[derive(Debug, thiserror::Error)]
 pub enum TrackError {
     /// The file cannot be opened.
@@ -55,7 +55,7 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    /// Reads a track file; empty lines and what follows a `#` are passed over. A point that is not seen is
+    /// Reads a track file; empty lines and text after a `#` are ignored. A point that is not seen is
     /// one `-`, or one for each coordinate.
     ///
     /// # Errors
@@ -66,7 +66,7 @@ impl Tracks {
         Self::parse(&text, path)
     }
 
-    /// The same from text; `path` is for the messages.
+    /// The same from text; `path` appears in messages.
     ///
     /// # Errors
     /// [`TrackError`].
@@ -80,7 +80,7 @@ impl Tracks {
                 lines.push((i + 1, words));
             }
         }
-        // One dash a point unless only the other reading gives every line as many columns.
+        // One dash per point, unless only one dash per coordinate gives all lines the same number of columns.
         let single = columns(&lines, one_dash);
         let rows = match columns(&lines, two_dashes) {
             Ok(rows) if single.is_err() => rows,
@@ -124,7 +124,7 @@ fn words(line: &str) -> Result<Words, String> {
     line.split_whitespace().map(word).collect()
 }
 
-/// How many words the first column of a line takes, and the point if it is one.
+/// Number of words in the first column of a line, and the point if there is one.
 type Reading = fn(&[Option<f64>]) -> (usize, Option<Point>);
 
 /// Reads all lines in one way; the error is the line, its columns and those of the first line.
@@ -141,7 +141,7 @@ fn columns(lines: &[(usize, Words)], read: Reading) -> Result<Rows, (usize, usiz
     Ok(rows)
 }
 
-/// The columns of a line, and whether it ended with a whole one and no number stood alone.
+/// The columns of a line, and whether all of them were complete.
 fn columns_of(words: &[Option<f64>], read: Reading) -> (Vec<Option<Point>>, bool) {
     let (mut row, mut rest) = (Vec::new(), words);
     while !rest.is_empty() {

@@ -1,10 +1,10 @@
-//! Conjugate gradients with the diagonal as preconditioner, one channel after the other.
+//! Conjugate gradients with diagonal preconditioner, one channel after the other.
 
 use super::stencil::Stencil;
 use super::{Convergence, PlaneSettings};
 use rayon::prelude::*;
 
-/// Entries handled together; the partial sums of a dot product follow this cut, not the threads.
+/// Entries per chunk. Partial sums of a dot product follow the chunks, not the threads, so the bits do not depend on them.
 const CHUNK: usize = 8192;
 
 /// Solves A u = rhs for every channel; returns the values interleaved, in the memory of the right-hand sides.
@@ -31,7 +31,7 @@ struct Work {
     residual: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
-    /// Partial sums of dot products: one an image row or one a chunk, never more than pixels.
+    /// Partial sums of dot products: one per image row or per chunk, never more than pixels.
     partial: Vec<f64>,
 }
 
@@ -41,7 +41,7 @@ impl Work {
         Self { u: zeros(), residual: zeros(), direction: zeros(), image: zeros(), partial: Vec::new() }
     }
 
-    /// Starts from the splat image rhs / diag, which is right but for the smoothing.
+    /// Starts from the splatted image rhs / diag, the solution without smoothing.
     fn solve(&mut self, a: &Stencil, rhs: impl Fn(usize) -> f64, settings: &PlaneSettings) -> Convergence {
         let rows = self.u.len();
         self.partial.resize(a.rows().max(rows.div_ceil(CHUNK)), 0.0);
@@ -72,7 +72,7 @@ impl Work {
         a.multiply(&self.u, &mut self.image, partials(&mut self.partial, a));
     }
 
-    /// Goes `length` along the direction; returns the new residual's energy r . D^{-1} r.
+    /// Steps by `length` along the direction; returns r . D^{-1} r of the new residual.
     fn step(&mut self, a: &Stencil, length: f64) -> f64 {
         let chunks = self.u.len().div_ceil(CHUNK);
         let blocks = self.u.par_chunks_mut(CHUNK).zip(self.residual.par_chunks_mut(CHUNK));
@@ -101,7 +101,7 @@ impl Work {
     }
 }
 
-/// One partial sum a row of the image.
+/// One partial sum per image row.
 fn partials<'a>(partial: &'a mut [f64], a: &Stencil) -> &'a mut [f64] {
     &mut partial[..a.rows()]
 }

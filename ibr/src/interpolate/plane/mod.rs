@@ -1,4 +1,4 @@
-//! The plane fit: the whole virtual image at once, samples anywhere (the row fit carried to two dimensions).
+//! The plane fit: the whole virtual image at once, for samples at any position (the row fit in two dimensions).
 //!
 //! With u the pixels, B_s the bilinear weights of sample s and g_pq the stiffness of the edge between
 //! neighbouring pixels p and q, minimise
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in units
-//! of the depth test's sigma. The bending term smooths like a cubic spline: it leaves slopes alone and noise not.
-//! Thirteen unknowns meet in an equation; conjugate gradients with the diagonal as preconditioner solve it channel by channel.
+//! of the depth test's sigma. The bending term smooths like a cubic spline: it removes noise and keeps slopes.
+//! Each equation has thirteen unknowns; conjugate gradients with diagonal preconditioner solve them channel by channel.
 
 mod background;
 mod conjugate;
@@ -27,11 +27,11 @@ pub struct PlaneSettings {
     pub stiffness: f64,
     /// Weight of the squared second difference within one surface.
     pub bending: f64,
-    /// The part of the stiffness that stays across depth edges.
+    /// The part of the stiffness that remains across depth edges.
     pub edge_stiffness: f64,
     /// Relative residual at which the conjugate gradients stop.
     pub tolerance: f64,
-    /// Their greatest number of steps for a channel.
+    /// Most steps of the conjugate gradients per channel.
     pub iterations: usize,
 }
 
@@ -41,7 +41,7 @@ impl Default for PlaneSettings {
     }
 }
 
-/// How the conjugate gradients ended.
+/// Convergence of the conjugate gradients.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct Convergence {
     /// Steps taken, the most over the channels.
@@ -52,18 +52,18 @@ pub struct Convergence {
     pub reached: bool,
 }
 
-/// What the plane fit found.
+/// The result of the plane fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaneFit {
     /// Values 0..255, `width * height * C`.
     pub values: Vec<f32>,
-    /// How each pixel came to its value.
+    /// Origin of each pixel's value.
     pub mask: Vec<Cover>,
-    /// How the solver ended.
+    /// Convergence of the solver.
     pub convergence: Convergence,
 }
 
-/// Collects surviving samples, band by band if need be, and then fits the image.
+/// Collects visible samples, all at once or band by band, and then fits the image.
 #[derive(Debug, Clone)]
 pub struct PlaneProblem<const C: usize> {
     width: usize,
@@ -98,8 +98,8 @@ impl<const C: usize> PlaneProblem<C> {
         })
     }
 
-    /// Adds surviving samples. Those more than half a pixel outside the image are passed over; the
-    /// others there count as lying on its border.
+    /// Adds visible samples. Samples more than half a pixel outside the image are ignored; samples less far outside are
+    /// moved to its border.
     ///
     /// # Errors
     /// [`InterpolationError::NotFinite`].
@@ -136,7 +136,7 @@ impl<const C: usize> PlaneProblem<C> {
         }
     }
 
-    /// Notes the depth of the sample at the pixels within half a gap of it, unless a closer one did.
+    /// Records the depth of the sample at the pixels within half a gap of it, unless another sample is closer.
     fn register(&mut self, s: &Sample<C>) {
         let half = self.settings.holes.gap / 2.0;
         let range = |centre: f64, length: usize| {
@@ -192,7 +192,7 @@ impl<const C: usize> PlaneProblem<C> {
             let Some(source) = sources[p].map(|s| s as usize) else { continue };
             self.depth[p] = self.depth[source];
             // The value of a seen pixel before the fit: its share of the right-hand side. A sample on a pixel
-            // centre reaches that pixel only, so that no source changes on the way.
+            // centre affects that pixel only, so no source changes in this loop.
             let weight = self.stencil.sample_weight(source).max(f32::MIN_POSITIVE);
             let value = self.rhs[source].map(|r| r / weight);
             self.splat((p % self.width) as f64, (p / self.width) as f64, &value);
@@ -261,10 +261,10 @@ enum Direction {
     Down,
 }
 
-/// The whole third stage for samples anywhere: a value for every pixel and the mask.
+/// The complete third stage for samples at any position: a value for every pixel, and the mask.
 ///
 /// # Errors
-/// [`InterpolationError`]: settings, samples that are no numbers, and no sample at all.
+/// [`InterpolationError`]: settings, samples that are not finite, and no sample at all.
 pub fn interpolate<const C: usize>(
     samples: &[Sample<C>],
     size: (usize, usize),
@@ -276,132 +276,4 @@ pub fn interpolate<const C: usize>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::interpolate::HoleSettings;
-
-    fn sample(x: f64, y: f64, depth: f32, value: f32) -> Sample<1> {
-        Sample { x, y, depth, value: [value], ..Sample::BLANK }
-    }
-
-    /// Irregular samples of one depth with values f(x, y).
-    fn scattered(size: usize, f: impl Fn(f64, f64) -> f64) -> Vec<Sample<1>> {
-        (0..size * size * 2)
-            .map(|i| {
-                let place = |k: usize| ((i * k + 7) % 1009) as f64 / 1009.0 * (size as f64 - 1.0);
-                let (x, y) = (place(389), place(631));
-                sample(x, y, 1.0, f(x, y) as f32)
-            })
-            .collect()
-    }
-
-    #[test]
-    fn a_constant_stays_constant() {
-        let fit = interpolate(&scattered(12, |_, _| 91.0), (12, 12), &Settings::default()).unwrap();
-        assert!(fit.values.iter().all(|v| (v - 91.0).abs() < 2e-2), "{:?}", fit.values);
-        assert!(fit.convergence.reached, "{:?}", fit.convergence);
-    }
-
-    /// The normal equations by their definition, dense, solved by elimination.
-    #[test]
-    fn equal_to_the_dense_solution() {
-        let size = 7;
-        let samples = scattered(size, |x, y| 128.0 + 60.0 * (x * 1.1).sin() * (y * 0.9).cos());
-        let mut settings = Settings::default();
-        settings.plane.tolerance = 1e-9;
-        settings.holes.fill = HoleFill::Bridge;
-        let fit = interpolate(&samples, (size, size), &settings).unwrap();
-        let n = size * size;
-        let mut a = vec![vec![0.0; n + 1]; n];
-        for s in &samples {
-            let weight = |p: usize| {
-                let hat = |t: f64| (1.0 - t.abs()).max(0.0);
-                hat(s.x - (p % size) as f64) * hat(s.y - (p / size) as f64)
-            };
-            for (p, row) in a.iter_mut().enumerate() {
-                (0..n).for_each(|q| row[q] += weight(p) * weight(q));
-                row[n] += weight(p) * f64::from(s.value[0]);
-            }
-        }
-        let g = settings.plane.stiffness + settings.plane.edge_stiffness;
-        for p in 0..n {
-            let right = (p % size + 1 < size).then_some(p + 1);
-            let down = (p + size < n).then_some(p + size);
-            for q in right.into_iter().chain(down) {
-                a[p][p] += g;
-                a[q][q] += g;
-                a[p][q] -= g;
-                a[q][p] -= g;
-            }
-            let bends = [(1, p % size + 2 < size), (size, p + 2 * size < n)];
-            for (stride, _) in bends.into_iter().filter(|b| b.1) {
-                let triple = [(p, 1.0), (p + stride, -2.0), (p + 2 * stride, 1.0)];
-                for (i, x) in triple {
-                    triple.iter().for_each(|(j, y)| a[i][*j] += settings.plane.bending * x * y);
-                }
-            }
-        }
-        for k in 0..n {
-            let top = a[k].clone();
-            for (i, row) in a.iter_mut().enumerate() {
-                if i != k {
-                    let factor = row[k] / top[k];
-                    row.iter_mut().zip(&top).for_each(|(x, t)| *x -= factor * t);
-                }
-            }
-        }
-        for (p, row) in a.iter().enumerate() {
-            let want = row[n] / row[p];
-            assert!((f64::from(fit.values[p]) - want).abs() < 2e-3, "{p}: {} {want}", fit.values[p]);
-        }
-    }
-
-    #[test]
-    fn disocclusions_take_the_farther_side() {
-        let mut samples = Vec::new();
-        for y in 0..12 {
-            for x in 0..30 {
-                match x {
-                    0..10 => samples.push(sample(x as f64, y as f64, 1.0, 200.0)),
-                    20.. => samples.push(sample(x as f64, y as f64, 4.0, 40.0)),
-                    _ => {}
-                }
-            }
-        }
-        let fit = interpolate(&samples, (30, 12), &Settings::default()).unwrap();
-        let row = &fit.values[150..180];
-        assert!(row[11..20].iter().all(|v| (v - 40.0).abs() < 5.0), "{row:?}");
-        assert!(row[9] > 190.0, "{row:?}");
-        assert!(fit.mask[160..170].iter().all(|c| *c == Cover::Disocclusion));
-        let holes = HoleSettings { fill: HoleFill::Leave, ..HoleSettings::default() };
-        let left = interpolate(&samples, (30, 12), &Settings { holes, ..Settings::default() }).unwrap();
-        assert!(left.values[160..170].iter().all(|v| *v == 0.0));
-    }
-
-    #[test]
-    fn outside_the_region_nothing_is_invented() {
-        let samples = scattered(10, |_, _| 80.0);
-        let mut problem = PlaneProblem::new((14, 10), &Settings::default()).unwrap();
-        problem.add(&samples).unwrap();
-        let region: Vec<bool> = (0..140).map(|p| p % 14 < 10).collect();
-        let fit = problem.solve(Some(&region)).unwrap();
-        for (p, inside) in region.iter().enumerate() {
-            let want = if *inside { 80.0 } else { 0.0 };
-            assert!((fit.values[p] - want).abs() < 0.1, "{p} {}", fit.values[p]);
-            assert!(*inside || fit.mask[p] == Cover::Disocclusion);
-        }
-    }
-
-    #[test]
-    fn bands_add_up_and_empty_problems_fail() {
-        let samples = scattered(9, |x, y| 10.0 * x + y);
-        let whole = interpolate(&samples, (9, 9), &Settings::default()).unwrap();
-        let mut problem = PlaneProblem::new((9, 9), &Settings::default()).unwrap();
-        let (a, b) = samples.split_at(50);
-        problem.add(a).unwrap();
-        problem.add(b).unwrap();
-        assert_eq!(problem.solve(None).unwrap(), whole);
-        let empty = PlaneProblem::<1>::new((4, 3), &Settings::default()).unwrap();
-        assert_eq!(empty.solve(None), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
-    }
-}
+mod tests;

@@ -1,12 +1,12 @@
-//! The symmetric matrix of the plane fit, nine points and the four two steps away, one half of it stored.
+//! The symmetric matrix of the plane fit: a stencil of nine pixels and four more two steps away, one half stored.
 
 use rayon::prelude::*;
 
 /// Entries of one pixel: its diagonal and the couplings to the right, down, down-right and down-left, and to
 /// the pixels two to the right and two down.
 ///
-/// f32 suffices: rounding an entry moves the fit by parts in 10^7 of a grey level's range, and the memory of
-/// the plane fit is mostly this. All arithmetic with it is f64.
+/// f32 suffices: rounding an entry changes the fit by parts in 10^7 of the grey range, and these entries take most of
+/// the memory of the plane fit. All arithmetic is in f64.
 #[derive(Debug, Clone, Copy, Default)]
 struct Couplings {
     own: f32,
@@ -31,7 +31,7 @@ impl Stencil {
         Self { width, height, entries: vec![Couplings::default(); width * height] }
     }
 
-    /// Upper left pixel of the cell around a place of the image, and the weights of its four corners
+    /// Upper left pixel of the cell around a position in the image, and the weights of its four corners
     /// (upper left, upper right, lower left, lower right).
     pub(super) fn bilinear(&self, x: f64, y: f64) -> (usize, [f32; 4]) {
         let column = (x as usize).min(self.width.saturating_sub(2));
@@ -41,7 +41,7 @@ impl Stencil {
         (row * self.width + column, weights.map(|w| w as f32))
     }
 
-    /// The corners of a cell that exist (an image one pixel wide has no right ones) and their weights.
+    /// The corners of a cell that exist, with their weights; an image one pixel wide has no right corners.
     pub(super) fn corners(
         &self,
         pixel: usize,
@@ -49,9 +49,9 @@ impl Stencil {
     ) -> impl Iterator<Item = (usize, f32)> + use<> {
         let right = if self.width > 1 { 1 } else { 0 };
         let down = if self.height > 1 { self.width } else { 0 };
-        let places = [pixel, pixel + right, pixel + down, pixel + down + right];
+        let corners = [pixel, pixel + right, pixel + down, pixel + down + right];
         // A missing corner coincides with an existing one; its weight is 0.
-        places.into_iter().zip(*weights).filter(|(_, w)| *w != 0.0)
+        corners.into_iter().zip(*weights).filter(|(_, w)| *w != 0.0)
     }
 
     /// Adds the products of the four weights of a sample.
@@ -76,7 +76,7 @@ impl Stencil {
         }
     }
 
-    /// Row sum of the sample part: the total weight with which samples reach a pixel. Before any edge is added.
+    /// Row sum of the sample part, the total weight of the samples at a pixel. Valid before any edge is added.
     pub(super) fn sample_weight(&self, p: usize) -> f32 {
         let at = |q: Option<usize>| q.and_then(|q| self.entries.get(q)).copied().unwrap_or_default();
         let e = self.entries[p];
@@ -132,7 +132,7 @@ impl Stencil {
         *two(&mut self.entries[first]) += h;
     }
 
-    /// Keeps the row of a pixel without samples and edges solvable.
+    /// Makes the row of a pixel without samples and edges nonsingular.
     pub(super) fn isolate(&mut self, p: usize) {
         self.entries[p].own += 1e-6;
     }

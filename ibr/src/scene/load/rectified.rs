@@ -15,7 +15,7 @@ impl Loader<'_> {
         let position = left_out.map_or(target.position, |v| v.position).ok_or_else(|| {
             self.incomplete("[virtual] needs a `position` on the line of the rectified rig")
         })?;
-        let position = self.finite(position, "the wanted view")?;
+        let position = self.finite(position, "the virtual view")?;
         let one = |view: &&ViewSpec| {
             let others = [
                 ("camera", view.camera.is_some()),

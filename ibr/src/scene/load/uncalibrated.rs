@@ -18,16 +18,16 @@ impl Loader<'_> {
     ) -> Loaded<Kind> {
         let file = self.matches_file(views, target)?;
         let tracks = Tracks::read(&self.file(file))?;
-        let wanted = match left_out {
+        let virtual_column = match left_out {
             Some(view) => Some(self.column_in_order(view)?),
             None => target.from_tracks,
         };
-        let columns = self.columns(views, wanted, tracks.columns())?;
+        let columns = self.columns(views, virtual_column, tracks.columns())?;
         let images = in_order(
             views.par_iter().map(|v| read_image(&self.file(&v.image)).map_err(SceneError::from)).collect(),
         )?;
         let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
-        let goal = match (wanted, target.between) {
+        let goal = match (virtual_column, target.between) {
             (Some(column), _) => Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect()),
             (None, Some(between)) => Target::Between(between),
             (None, None) => {
@@ -45,11 +45,11 @@ impl Loader<'_> {
         Ok(Kind::Uncalibrated { images, tracks, target: goal, size })
     }
 
-    /// The file of tracks, if the views are two or more and say nothing of cameras.
+    /// The file of tracks, if there are at least two views and none has camera keys.
     fn matches_file<'a>(&'a self, views: &[&ViewSpec], target: &'a TargetSpec) -> Loaded<&'a Path> {
         let file = self.spec.matches.as_deref().or(target.matches.as_deref()).ok_or_else(|| {
             self.incomplete(
-                "the views have neither `position` and `disparity`, nor `camera` and `depth`, and there is no `matches` file: say where the cameras are or give tracks",
+                "the views have neither `position` and `disparity`, nor `camera` and `depth`, and there is no `matches` file; give cameras or tracks",
             )
         })?;
         for view in views {
@@ -68,26 +68,31 @@ impl Loader<'_> {
         }
     }
 
-    /// Column of a view that is left out: its own, or its place among all views.
+    /// Column of the view that is left out: its `column`, or its index among all views.
     fn column_in_order(&self, view: &ViewSpec) -> Loaded<usize> {
-        let place = self.spec.view.iter().position(|v| v.label() == view.label());
-        view.column.or(place.map(|p| p + 1)).ok_or_else(|| self.incomplete("a view without a column"))
+        let index = self.spec.view.iter().position(|v| v.label() == view.label());
+        view.column.or(index.map(|i| i + 1)).ok_or_else(|| self.incomplete("a view without a column"))
     }
 
-    /// Columns of the views: as they say, or in order with those passed over that are wanted or said by others.
-    fn columns(&self, views: &[&ViewSpec], wanted: Option<usize>, there: usize) -> Loaded<Vec<usize>> {
-        let said: Vec<usize> = views.iter().filter_map(|v| v.column).chain(wanted).collect();
-        let mut free = (1..=there).filter(|c| !said.contains(c));
+    /// Columns of the views: their `column`, or the remaining columns in order.
+    fn columns(
+        &self,
+        views: &[&ViewSpec],
+        virtual_column: Option<usize>,
+        count: usize,
+    ) -> Loaded<Vec<usize>> {
+        let given: Vec<usize> = views.iter().filter_map(|v| v.column).chain(virtual_column).collect();
+        let mut free = (1..=count).filter(|c| !given.contains(c));
         let columns: Vec<usize> = views.iter().filter_map(|v| v.column.or_else(|| free.next())).collect();
-        let different = said.iter().enumerate().all(|(i, c)| !said[..i].contains(c));
-        let known = said.iter().all(|c| (1..=there).contains(c));
+        let different = given.iter().enumerate().all(|(i, c)| !given[..i].contains(c));
+        let known = given.iter().all(|c| (1..=count).contains(c));
         if different && known && columns.len() == views.len() {
             return Ok(columns);
         }
         let reason = format!(
-            "the tracks have {there} columns, numbered from 1; {} views{} do not fit, each needs a column of its own",
+            "the tracks have {count} columns, numbered from 1; {} views{} do not fit, each needs a column of its own",
             views.len(),
-            wanted.map_or(String::new(), |w| format!(" and the wanted column {w}"))
+            virtual_column.map_or(String::new(), |w| format!(" and the virtual view's column {w}"))
         );
         Err(self.incomplete(reason))
     }

@@ -1,73 +1,8 @@
-//! The binary, driven as a user would: exit codes, standard output and standard error apart.
+//! Renderings of each kind of scene, and the demo.
 
-use hybank_ibr::camera::Camera;
-use hybank_ibr::depth::DepthMap;
-use hybank_ibr::image::{Image, pfm, read_image, save};
-use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+use super::*;
+use hybank_ibr::image::{Image, read_image};
 use nalgebra::Matrix3x4;
-use std::path::Path;
-use std::process::{Command, Output};
-
-const SIZE: (usize, usize) = (120, 90);
-
-fn run(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hybank-ibr")).args(arguments).current_dir(folder).output().unwrap()
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-fn json(output: &Output) -> serde_json::Value {
-    assert_eq!(code(output), 0, "{}", stderr(output));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn write_map(map: &DepthMap, path: &Path) {
-    let (width, height) = map.size();
-    let data = map.data().to_vec();
-    std::fs::write(path, pfm::encode(&pfm::FloatMap { width, height, channels: 1, data })).unwrap();
-}
-
-/// A rectified rig of the synthetic scene: left.png, right.png, middle.png and their disparities.
-fn rig() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    for (name, position) in [("left", 0.0), ("right", 1.0), ("middle", 0.5)] {
-        let camera = Camera::metric(rig_camera(position, SIZE), false).unwrap();
-        let (image, depth) = SyntheticScene::default().view(&camera, SIZE);
-        save(&image, &dir.path().join(format!("{name}.png"))).unwrap();
-        write_map(&rig_disparity(&depth, SIZE.0), &dir.path().join(format!("{name}.pfm")));
-    }
-    let view = |name: &str, position: f64| {
-        format!(
-            "[[view]]\nname = \"{name}\"\nimage = \"{name}.png\"\nposition = {position:?}\ndisparity = \"{name}.pfm\"\n"
-        )
-    };
-    let scene = view("left", 0.0) + &view("right", 1.0) + "[virtual]\nposition = 0.5\n";
-    std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
-    dir
-}
-
-/// Every pixel of the views is accounted for, and so is every pixel of the result.
-fn assert_adds_up(figures: &serde_json::Value, pixels: u64) {
-    let count = |v: &serde_json::Value| v.as_u64().unwrap();
-    let (samples, holes) = (&figures["samples"], &figures["holes"]);
-    let dropped: u64 = ["unknown", "behind", "outside"].iter().map(|k| count(&samples["dropped"][k])).sum();
-    assert_eq!(samples["dropped"].as_object().unwrap().len(), 3, "{figures}");
-    assert_eq!(count(&samples["propagated"]) + dropped, pixels, "{figures}");
-    assert_eq!(
-        count(&samples["propagated"]),
-        count(&samples["occluded"]) + count(&samples["used"]),
-        "{figures}"
-    );
-    let size = count(&figures["size"][0]) * count(&figures["size"][1]);
-    let covered = 1.0 - (count(&holes["crack"]) + count(&holes["disocclusion"])) as f64 / size as f64;
-    assert!((figures["coverage"].as_f64().unwrap() - covered).abs() < 1e-9, "{figures}");
-}
 
 #[test]
 fn a_rig_is_rendered_and_compared() {
@@ -146,12 +81,12 @@ fn toml_rows(m: &Matrix3x4<f64>) -> String {
 
 /// Three cameras that are turned and moved in all directions.
 fn turned(k: usize) -> Matrix3x4<f64> {
-    let place = [[-0.25, 0.05, 0.0], [0.2, -0.04, 0.1], [0.02, 0.03, 0.05]][k];
+    let centre = [[-0.25, 0.05, 0.0], [0.2, -0.04, 0.1], [0.02, 0.03, 0.05]][k];
     let turn = [[0.01, 0.03, 0.02], [-0.015, -0.03, -0.01], [0.0, 0.005, 0.0]][k];
     let r = nalgebra::Rotation3::from_euler_angles(turn[0], turn[1], turn[2]);
     let mut rt = Matrix3x4::zeros();
     rt.fixed_columns_mut::<3>(0).copy_from(r.matrix());
-    rt.set_column(3, &-(r * nalgebra::Vector3::from(place)));
+    rt.set_column(3, &-(r * nalgebra::Vector3::from(centre)));
     let rig = rig_camera(0.5, SIZE);
     rig.fixed_columns::<3>(0) * rt
 }
@@ -247,122 +182,6 @@ fn images_and_tracks_alone_are_enough() {
 }
 
 #[test]
-fn wrong_input_has_one_clear_message() {
-    let dir = rig();
-    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
-    save(&Image::filled(30, 20, 3, 9.0), &dir.path().join("small.png")).unwrap();
-    let nan = pfm::FloatMap { width: 120, height: 90, channels: 1, data: vec![f32::NAN; 120 * 90] };
-    std::fs::write(dir.path().join("nan.pfm"), pfm::encode(&nan)).unwrap();
-    for (from, to, words) in [
-        ("left.png", "nowhere.png", &["nowhere.png"][..]),
-        ("left.png", "small.png", &["30 x 20", "120 x 90"]),
-        ("left.pfm", "nan.pfm", &["nan.pfm", "none of the 10800 values"]),
-        ("position = 0.5", "position = 5000.0", &["no sample reaches the virtual image"]),
-        ("disparity =", "disparty =", &["disparty", "line 5", "expected one of"]),
-        ("position = 0.5", "", &["[virtual] needs a `position`"]),
-        ("image = \"left.png\"", "image = 7", &["line 3"]),
-    ] {
-        std::fs::write(dir.path().join("broken.toml"), scene.replace(from, to)).unwrap();
-        let refused = run(dir.path(), &["render", "broken.toml", "-o", "o.png"]);
-        let message = stderr(&refused);
-        assert_eq!(code(&refused), 1, "{to}: {message}");
-        assert!(refused.stdout.is_empty());
-        assert!(words.iter().all(|w| message.contains(w)), "{to}: {message}");
-        assert!(!message.contains("panicked") && !dir.path().join("o.png").exists());
-    }
-    let truth = run(dir.path(), &["render", "scene.toml", "-o", "o.png", "--truth", "small.png"]);
-    assert_eq!(code(&truth), 1);
-    assert!(stderr(&truth).contains("small.png") && stderr(&truth).contains("30 x 20"), "{}", stderr(&truth));
-    assert!(!dir.path().join("o.png").exists());
-}
-
-/// Contradictions, numbers out of range and files that are no files: exit code 1 and one message with the words.
-#[test]
-fn hostile_scenes_are_refused_by_name() {
-    let dir = rig();
-    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
-    let map = |name: &str, value: f32| {
-        let data = vec![value; 120 * 90];
-        let bytes = pfm::encode(&pfm::FloatMap { width: 120, height: 90, channels: 1, data });
-        std::fs::write(dir.path().join(name), bytes).unwrap();
-    };
-    map("tiny.pfm", 1e-42);
-    map("negative.pfm", -3.0);
-    std::fs::write(dir.path().join("huge.pfm"), "Pf\n100000 100000\n-1\n").unwrap();
-    std::fs::write(dir.path().join("huge.pgm"), "P5 100000 100000 255\n").unwrap();
-    std::fs::write(dir.path().join("empty.png"), "").unwrap();
-    let whole = std::fs::read(dir.path().join("left.png")).unwrap();
-    std::fs::write(dir.path().join("cut.png"), &whole[..whole.len() / 2]).unwrap();
-    for (from, to, words) in [
-        ("left.pfm\"", "tiny.pfm\"", &["tiny.pfm", "none of the 10800"][..]),
-        ("left.pfm\"", "negative.pfm\"", &["negative.pfm", "none of the 10800"]),
-        ("left.pfm\"", "huge.pfm\"", &["huge.pfm", "100000 x 100000"]),
-        ("left.pfm\"", "left.png\"", &["left.png", "different red, green and blue"]),
-        ("left.png\"", "huge.pgm\"", &["huge.pgm"]),
-        ("left.png\"", "empty.png\"", &["empty.png"]),
-        ("left.png\"", "cut.png\"", &["cut.png"]),
-        ("left.png\"", ".\"", &["directory"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = 0.0", &["\"left\"", "the scale is 0"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = -2.0", &["\"left\"", "the scale is -2"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = nan", &["\"left\"", "the scale is NaN"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = inf", &["\"left\"", "the scale is inf"]),
-        ("left.pfm\"", "left.pfm\"\nstep = 1000", &["\"left\"", "1 x 1"]),
-        ("left.pfm\"", "left.pfm\"\nstep = 0", &["\"left\"", "at least 1"]),
-        ("left.pfm\"", "left.pfm\"\nstep = -1", &["-1", "line"]),
-        ("left.pfm\"", "left.pfm\"\ndepth = \"left.pfm\"", &["\"left\"", "`depth`"]),
-        ("position = 1.0", "position = nan", &["\"right\"", "position = NaN"]),
-        ("position = 0.5", "position = inf", &["wanted view", "position = inf"]),
-        ("position = 0.5", "position = 1e300", &["broken.toml", "of 21600 pixels"]),
-        ("\"right\"", "\"left\"", &["two views are named \"left\""]),
-        ("disparity =", "disparty =", &["did you mean `disparity`?"]),
-    ] {
-        std::fs::write(dir.path().join("broken.toml"), scene.replacen(from, to, 1)).unwrap();
-        let refused = run(dir.path(), &["render", "broken.toml", "-o", "o.png"]);
-        let message = stderr(&refused);
-        assert_eq!(code(&refused), 1, "{to}: {message}");
-        assert!(words.iter().all(|w| message.contains(w)), "{to}: {message}");
-        assert!(
-            !message.contains("panicked") && refused.stdout.is_empty() && !dir.path().join("o.png").exists()
-        );
-    }
-}
-
-/// Settings that make no sense, and outputs that cannot be: one message each, with the right exit code.
-#[test]
-fn hostile_arguments_are_refused_by_name() {
-    let dir = rig();
-    std::fs::create_dir(dir.path().join("folder.png")).unwrap();
-    let render = |more: &[&str]| run(dir.path(), &[&["render", "scene.toml"], more].concat());
-    for (arguments, exit, words) in [
-        (&["-o", "o.png", "--lambda", "nan"][..], 1, "lambda is NaN"),
-        (&["-o", "o.png", "--lambda", "-1"], 1, "lambda is -1"),
-        (&["-o", "o.png", "--tau", "inf"], 1, "tau is inf"),
-        (&["-o", "o.png", "--epsilon", "0"], 1, "epsilon is 0"),
-        (&["-o", "o.png", "--relative-depth", "-0.1"], 1, "sigma = -0.1"),
-        (&["-o", "o.png", "--offset", "nan"], 1, "offset NaN"),
-        (&["-o", "o.png", "--offset", "1e9"], 1, "no sample reaches"),
-        (&["-o", "o.png", "--threads", "100000"], 2, "1 to 1024"),
-        (&["-o", "o.png", "--mask", "o.png"], 2, "both name o.png"),
-        (&["-o", "o.png", "--depth-step", "x"], 2, "depth-step"),
-        (&["-o", "folder.png"], 1, "folder.png exists"),
-        (&["-o", "folder.png", "--force"], 1, "folder.png: it is a folder"),
-        (&["-o", "nowhere/o.png"], 1, "nowhere/o.png"),
-        (&["-o", "o.png", "--view", "middle"], 1, "the views are left, right"),
-        (&["-o", "o.png", "--truth", "nowhere.png"], 1, "nowhere.png"),
-        (&["-o", "o"], 1, "use .png"),
-    ] {
-        let refused = render(arguments);
-        let message = stderr(&refused);
-        assert_eq!(code(&refused), exit, "{arguments:?}: {message}");
-        assert!(message.contains(words) && !message.contains("panicked"), "{arguments:?}: {message}");
-        assert!(!dir.path().join("o.png").exists(), "{arguments:?}");
-    }
-    // A step beyond the map leaves one value: a flat scene, but a right answer.
-    json(&render(&["-o", "flat.png", "--depth-step", "100000", "--json"]));
-}
-
-/// Grey with colour, deep with shallow, float in both byte orders, one pixel: all are images.
-#[test]
 fn odd_images_are_fine() {
     let dir = tempfile::tempdir().unwrap();
     let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
@@ -425,32 +244,6 @@ fn colmap_lenses_are_used() {
     write_cameras("0 0 0 0");
     let wrong = psnr();
     assert!(right > 31.0 && right > wrong + 3.0, "with the lens {right} dB, without {wrong} dB");
-}
-
-#[test]
-fn wrong_usage_is_two() {
-    let dir = tempfile::tempdir().unwrap();
-    for arguments in [
-        &["render"][..],
-        &["render", "s.toml"],
-        &["paint"],
-        &["render", "s.toml", "-o", "o.png", "--depth-step", "0"],
-        &["render", "s.toml", "-o", "-", "--json"],
-        &["render", "s.toml", "-o", "o.png", "--threads", "0"],
-        &["demo", "--size", "9"],
-    ] {
-        assert_eq!(code(&run(dir.path(), arguments)), 2, "{arguments:?}");
-    }
-    let help = run(dir.path(), &["render", "--help"]);
-    assert_eq!(code(&help), 0);
-    assert!(String::from_utf8(help.stdout).unwrap().contains("Examples:"));
-    assert_eq!(code(&run(dir.path(), &["--version"])), 0);
-    let missing = run(dir.path(), &["render", "s.toml", "-o", "o.png"]);
-    assert_eq!(code(&missing), 1);
-    assert!(stderr(&missing).contains("s.toml"));
-    let format = run(dir.path(), &["render", "s.toml", "-o", "o.gif"]);
-    assert_eq!(code(&format), 1);
-    assert!(stderr(&format).contains(".png"));
 }
 
 #[test]

@@ -1,0 +1,129 @@
+//! The plane fit against the dense solution of its normal equations, and hole filling.
+
+use super::*;
+use crate::interpolate::HoleSettings;
+
+fn sample(x: f64, y: f64, depth: f32, value: f32) -> Sample<1> {
+    Sample { x, y, depth, value: [value], ..Sample::BLANK }
+}
+
+/// Irregular samples of one depth with values f(x, y).
+fn scattered(size: usize, f: impl Fn(f64, f64) -> f64) -> Vec<Sample<1>> {
+    (0..size * size * 2)
+        .map(|i| {
+            let position = |k: usize| ((i * k + 7) % 1009) as f64 / 1009.0 * (size as f64 - 1.0);
+            let (x, y) = (position(389), position(631));
+            sample(x, y, 1.0, f(x, y) as f32)
+        })
+        .collect()
+}
+
+#[test]
+fn a_constant_stays_constant() {
+    let fit = interpolate(&scattered(12, |_, _| 91.0), (12, 12), &Settings::default()).unwrap();
+    assert!(fit.values.iter().all(|v| (v - 91.0).abs() < 2e-2), "{:?}", fit.values);
+    assert!(fit.convergence.reached, "{:?}", fit.convergence);
+}
+
+/// The normal equations by their definition, dense, solved by elimination.
+#[test]
+fn equal_to_the_dense_solution() {
+    let size = 7;
+    let samples = scattered(size, |x, y| 128.0 + 60.0 * (x * 1.1).sin() * (y * 0.9).cos());
+    let mut settings = Settings::default();
+    settings.plane.tolerance = 1e-9;
+    settings.holes.fill = HoleFill::Bridge;
+    let fit = interpolate(&samples, (size, size), &settings).unwrap();
+    let n = size * size;
+    let mut a = vec![vec![0.0; n + 1]; n];
+    for s in &samples {
+        let weight = |p: usize| {
+            let hat = |t: f64| (1.0 - t.abs()).max(0.0);
+            hat(s.x - (p % size) as f64) * hat(s.y - (p / size) as f64)
+        };
+        for (p, row) in a.iter_mut().enumerate() {
+            (0..n).for_each(|q| row[q] += weight(p) * weight(q));
+            row[n] += weight(p) * f64::from(s.value[0]);
+        }
+    }
+    let g = settings.plane.stiffness + settings.plane.edge_stiffness;
+    for p in 0..n {
+        let right = (p % size + 1 < size).then_some(p + 1);
+        let down = (p + size < n).then_some(p + size);
+        for q in right.into_iter().chain(down) {
+            a[p][p] += g;
+            a[q][q] += g;
+            a[p][q] -= g;
+            a[q][p] -= g;
+        }
+        let bends = [(1, p % size + 2 < size), (size, p + 2 * size < n)];
+        for (stride, _) in bends.into_iter().filter(|b| b.1) {
+            let triple = [(p, 1.0), (p + stride, -2.0), (p + 2 * stride, 1.0)];
+            for (i, x) in triple {
+                triple.iter().for_each(|(j, y)| a[i][*j] += settings.plane.bending * x * y);
+            }
+        }
+    }
+    for k in 0..n {
+        let top = a[k].clone();
+        for (i, row) in a.iter_mut().enumerate() {
+            if i != k {
+                let factor = row[k] / top[k];
+                row.iter_mut().zip(&top).for_each(|(x, t)| *x -= factor * t);
+            }
+        }
+    }
+    for (p, row) in a.iter().enumerate() {
+        let want = row[n] / row[p];
+        assert!((f64::from(fit.values[p]) - want).abs() < 2e-3, "{p}: {} {want}", fit.values[p]);
+    }
+}
+
+#[test]
+fn disocclusions_take_the_farther_side() {
+    let mut samples = Vec::new();
+    for y in 0..12 {
+        for x in 0..30 {
+            match x {
+                0..10 => samples.push(sample(x as f64, y as f64, 1.0, 200.0)),
+                20.. => samples.push(sample(x as f64, y as f64, 4.0, 40.0)),
+                _ => {}
+            }
+        }
+    }
+    let fit = interpolate(&samples, (30, 12), &Settings::default()).unwrap();
+    let row = &fit.values[150..180];
+    assert!(row[11..20].iter().all(|v| (v - 40.0).abs() < 5.0), "{row:?}");
+    assert!(row[9] > 190.0, "{row:?}");
+    assert!(fit.mask[160..170].iter().all(|c| *c == Cover::Disocclusion));
+    let holes = HoleSettings { fill: HoleFill::Leave, ..HoleSettings::default() };
+    let left = interpolate(&samples, (30, 12), &Settings { holes, ..Settings::default() }).unwrap();
+    assert!(left.values[160..170].iter().all(|v| *v == 0.0));
+}
+
+#[test]
+fn outside_the_region_nothing_is_invented() {
+    let samples = scattered(10, |_, _| 80.0);
+    let mut problem = PlaneProblem::new((14, 10), &Settings::default()).unwrap();
+    problem.add(&samples).unwrap();
+    let region: Vec<bool> = (0..140).map(|p| p % 14 < 10).collect();
+    let fit = problem.solve(Some(&region)).unwrap();
+    for (p, inside) in region.iter().enumerate() {
+        let want = if *inside { 80.0 } else { 0.0 };
+        assert!((fit.values[p] - want).abs() < 0.1, "{p} {}", fit.values[p]);
+        assert!(*inside || fit.mask[p] == Cover::Disocclusion);
+    }
+}
+
+#[test]
+fn bands_add_up_and_empty_problems_fail() {
+    let samples = scattered(9, |x, y| 10.0 * x + y);
+    let whole = interpolate(&samples, (9, 9), &Settings::default()).unwrap();
+    let mut problem = PlaneProblem::new((9, 9), &Settings::default()).unwrap();
+    let (a, b) = samples.split_at(50);
+    problem.add(a).unwrap();
+    problem.add(b).unwrap();
+    assert_eq!(problem.solve(None).unwrap(), whole);
+    let empty = PlaneProblem::<1>::new((4, 3), &Settings::default()).unwrap();
+    assert_eq!(empty.solve(None), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
+}

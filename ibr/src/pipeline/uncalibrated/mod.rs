@@ -1,0 +1,125 @@
+//! A view from images and tracks alone (thesis 2.5).
+
+mod reconstruction;
+mod synthesis;
+
+use super::{RenderError, RenderSettings, Rendering};
+use crate::image::Image;
+use crate::interpolate::plane::PlaneSettings;
+use crate::uncalibrated::chirality::Handedness;
+use crate::uncalibrated::{GeometryError, Point, RobustSettings};
+
+/// The virtual camera.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Target {
+    /// Given by its image points: one position per track, `None` where the track is not seen.
+    Tracks(Vec<Option<Point>>),
+    /// Between the first and the second view, 0 to 1, by the metric guess.
+    Between(f64),
+}
+
+/// Settings of the uncalibrated pipeline in addition to [`RenderSettings`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UncalibratedSettings {
+    /// The robust estimators.
+    pub robust: RobustSettings,
+    /// The order of depth, if it is known; otherwise the metric guess decides.
+    pub handedness: Option<Handedness>,
+    /// Depth threshold of the occlusion test as a share of the range of chi. The meshes of two views interpolate
+    /// depth edges differently; a threshold below their difference would remove visible samples.
+    pub sigma_share: f64,
+    /// The plane fit. Positions from a mesh are wrong by fractions of a pixel, differently in each view, which acts like
+    /// noise on the values; so bending has more weight than for measured depth.
+    pub plane: PlaneSettings,
+}
+
+impl Default for UncalibratedSettings {
+    fn default() -> Self {
+        let plane = PlaneSettings { stiffness: 0.02, bending: 0.3, ..PlaneSettings::default() };
+        Self { robust: RobustSettings::default(), handedness: None, sigma_share: 0.2, plane }
+    }
+}
+
+/// Errors of a rendering from tracks.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum UncalibratedError {
+    /// The geometry could not be estimated.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// The rendering failed.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// Images and track columns do not fit.
+    #[error(
+        "{images} images have {columns} columns of tracks; at least two views are needed, each with a column"
+    )]
+    Views {
+        /// Images given.
+        images: usize,
+        /// Columns of tracks given.
+        columns: usize,
+    },
+    /// A position between the views outside 0 to 1.
+    #[error("between = {between}: the position between the views is a number from 0 to 1")]
+    Between {
+        /// Value given.
+        between: f64,
+    },
+}
+
+/// Figures of merit of the estimated geometry.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct GeometryReport {
+    /// Matches between the first two views.
+    pub matches: usize,
+    /// Matches within the threshold of F.
+    pub inliers: usize,
+    /// Root mean square Sampson distance of the inliers in pixels.
+    pub sampson_rms: f64,
+    /// Points in the virtual view from which the virtual camera was estimated.
+    pub sightings: usize,
+    /// Sightings within the threshold of the virtual camera.
+    pub resection_inliers: usize,
+    /// Root mean square reprojection error of the inliers in pixels.
+    pub resection_rms: f64,
+    /// Share of the metric guesses that agree on the order of depth; 1 if it was given.
+    pub order_agreement: f64,
+}
+
+/// A rendered view and the region that could be rendered: the convex hull of the features in the virtual view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UncalibratedRendering {
+    /// The view; black outside the region.
+    pub rendering: Rendering,
+    /// Whether a pixel lies in the region.
+    pub region: Vec<bool>,
+    /// The estimated geometry.
+    pub geometry: GeometryReport,
+    /// The order of depth used.
+    pub hand: Handedness,
+}
+
+/// Renders a view of `size` from images and `tracks[track][image]`.
+///
+/// The scene is reconstructed from the first two images; the cameras of further images are resected from the tracks.
+///
+/// # Errors
+/// [`UncalibratedError`].
+pub fn render(
+    images: &[&Image],
+    tracks: &[Vec<Option<Point>>],
+    target: &Target,
+    size: (usize, usize),
+    settings: &RenderSettings,
+    uncalibrated: &UncalibratedSettings,
+) -> Result<UncalibratedRendering, UncalibratedError> {
+    let columns = tracks.first().map_or(images.len(), Vec::len);
+    if images.len() < 2 || columns != images.len() {
+        return Err(UncalibratedError::Views { images: images.len(), columns });
+    }
+    settings.check()?;
+    let scene = reconstruction::reconstruct(images, tracks, target, uncalibrated)?;
+    let colour = images.iter().any(|i| i.channels() == 3);
+    let render = if colour { synthesis::render::<3> } else { synthesis::render::<1> };
+    Ok(render(images, &scene, size, settings, uncalibrated)?)
+}

@@ -1,0 +1,164 @@
+//! Cameras and points of a scene from tracks, in a projective frame.
+
+use super::{GeometryReport, Target, UncalibratedError, UncalibratedSettings};
+use crate::image::Image;
+use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
+use crate::uncalibrated::chirality::{self, Handedness};
+use crate::uncalibrated::fundamental::{self, Fundamental};
+use crate::uncalibrated::metric::{self, MetricGuess};
+use crate::uncalibrated::resection::{Resection, Sighting, resect};
+use crate::uncalibrated::triangulate::triangulate;
+use crate::uncalibrated::{GeometryError, Match, Point};
+use nalgebra::{Matrix3x4, Vector4};
+
+/// Matches used for a metric guess; the order of depth, one bit, needs no more.
+const GUESS_MATCHES: usize = 150;
+
+/// The scene in a projective frame: oriented cameras (the virtual one last) and points.
+pub(super) struct Reconstruction {
+    pub(super) cameras: Vec<Matrix3x4<f64>>,
+    pub(super) points: Vec<Vector4<f64>>,
+    /// Positions of the points in each image.
+    pub(super) seen: Vec<Vec<Option<Point>>>,
+    pub(super) hand: Handedness,
+    pub(super) geometry: GeometryReport,
+}
+
+/// Reconstructs the scene from the first two images and resects all further cameras, the virtual one last.
+pub(super) fn reconstruct(
+    images: &[&Image],
+    tracks: &[Vec<Option<Point>>],
+    target: &Target,
+    settings: &UncalibratedSettings,
+) -> Result<Reconstruction, UncalibratedError> {
+    let base = Base::new(images, tracks, settings)?;
+    let in_target = base.points_in(target)?;
+    let last = images.len();
+    let positions =
+        |(j, target): (&usize, &Option<Point>)| tracks[*j].iter().copied().chain([*target]).collect();
+    let seen: Vec<Vec<Option<Point>>> = base.tracks.iter().zip(&in_target).map(positions).collect();
+    let mut cameras = base.cameras.to_vec();
+    let mut resections = Vec::new();
+    for column in 2..=last {
+        let resection = resected(&base.points, &seen, column, settings)?;
+        cameras.push(resection.camera);
+        resections.push(resection);
+    }
+    let found = resections.last().ok_or(GeometryError::Numerical { what: "virtual camera" })?;
+    let mut points = base.points.clone();
+    chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
+    let (hand, order_agreement) = base.handedness(&points, &cameras[0], settings)?;
+    let geometry = GeometryReport {
+        matches: base.given,
+        inliers: base.f.inliers.len(),
+        sampson_rms: base.f.rms,
+        sightings: in_target.iter().flatten().count(),
+        resection_inliers: found.inliers.len(),
+        resection_rms: found.rms,
+        order_agreement,
+    };
+    Ok(Reconstruction { cameras, points, seen, hand, geometry })
+}
+
+/// The reconstruction of the first two views.
+struct Base {
+    /// Matches given.
+    given: usize,
+    f: Fundamental,
+    sizes: [(usize, usize); 2],
+    cameras: [Matrix3x4<f64>; 2],
+    /// Inliers of F that could be triangulated, with their matches and points.
+    tracks: Vec<usize>,
+    matches: Vec<Match>,
+    points: Vec<Vector4<f64>>,
+    guesses: Vec<MetricGuess>,
+}
+
+impl Base {
+    fn new(
+        images: &[&Image],
+        tracks: &[Vec<Option<Point>>],
+        settings: &UncalibratedSettings,
+    ) -> Result<Self, GeometryError> {
+        let numbered: Vec<(usize, Match)> = tracks
+            .iter()
+            .enumerate()
+            .filter_map(|(j, t)| Some((j, Match { first: (*t.first()?)?, second: (*t.get(1)?)? })))
+            .collect();
+        let all: Vec<Match> = numbered.iter().map(|m| m.1).collect();
+        let f = fundamental::robust(&all, &settings.robust)?;
+        let agreeing: Vec<Match> = f.inliers.iter().map(|i| all[*i]).collect();
+        let pair = canonical_pair(&f.matrix, &agreeing)?;
+        let (tracks, matches, points) = triangulated(&pair, &numbered, &f);
+        let cameras = [pair.first.inverse() * pair.cameras[0], pair.second.inverse() * pair.cameras[1]];
+        let sizes = [images[0].size(), images[1].size()];
+        let guesses = metric::guesses(&f.matrix, &some(&matches), sizes);
+        Ok(Self { given: all.len(), f, sizes, cameras, tracks, matches, points, guesses })
+    }
+
+    /// Positions of the points in the virtual view.
+    fn points_in(&self, target: &Target) -> Result<Vec<Option<Point>>, UncalibratedError> {
+        match target {
+            Target::Tracks(positions) => {
+                Ok(self.tracks.iter().map(|j| positions.get(*j).copied().flatten()).collect())
+            }
+            Target::Between(between) if (0.0..=1.0).contains(between) => {
+                let guess = metric::best(&self.guesses)
+                    .and_then(|g| metric::guess(&self.f.matrix, &self.matches, self.sizes, g.focal))
+                    .ok_or(GeometryError::Numerical { what: "metric guess" })?;
+                Ok(metric::images_between(&guess, &self.matches, *between))
+            }
+            Target::Between(between) => Err(UncalibratedError::Between { between: *between }),
+        }
+    }
+
+    /// The order of depth, given or by the majority of the guesses, and the share of the guesses that agree.
+    fn handedness(
+        &self,
+        points: &[Vector4<f64>],
+        camera: &Matrix3x4<f64>,
+        settings: &UncalibratedSettings,
+    ) -> Result<(Handedness, f64), GeometryError> {
+        if let Some(hand) = settings.handedness {
+            return Ok((hand, 1.0));
+        }
+        metric::handedness(&self.guesses, &some(&self.matches), &some(points), camera)
+            .ok_or(GeometryError::Numerical { what: "order of depth" })
+    }
+}
+
+/// Evenly spaced elements, as many as a metric guess needs.
+fn some<T: Copy>(all: &[T]) -> Vec<T> {
+    all.iter().copied().step_by(all.len().div_ceil(GUESS_MATCHES).max(1)).collect()
+}
+
+/// Points of the inliers that can be triangulated, with their track numbers and matches.
+fn triangulated(
+    pair: &CanonicalPair,
+    numbered: &[(usize, Match)],
+    f: &Fundamental,
+) -> (Vec<usize>, Vec<Match>, Vec<Vector4<f64>>) {
+    let mut all = (Vec::new(), Vec::new(), Vec::new());
+    for (track, m) in f.inliers.iter().map(|i| numbered[*i]) {
+        let (first, second) = (pair.first.apply(&m.first), pair.second.apply(&m.second));
+        if let Some(x) = triangulate(&[(&pair.cameras[0], first), (&pair.cameras[1], second)]) {
+            all.0.push(track);
+            all.1.push(m);
+            all.2.push(x);
+        }
+    }
+    all
+}
+
+fn resected(
+    points: &[Vector4<f64>],
+    seen: &[Vec<Option<Point>>],
+    column: usize,
+    settings: &UncalibratedSettings,
+) -> Result<Resection, GeometryError> {
+    let sighting = |(point, positions): (&Vector4<f64>, &Vec<Option<Point>>)| {
+        Some(Sighting { point: *point, image: positions[column]? })
+    };
+    let sightings: Vec<Sighting> = points.iter().zip(seen).filter_map(sighting).collect();
+    resect(&sightings, &settings.robust)
+}

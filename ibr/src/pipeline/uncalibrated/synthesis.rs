@@ -1,0 +1,131 @@
+//! The virtual view from a reconstructed scene: propagation by chi, occlusion removal, plane fit.
+
+use super::reconstruction::Reconstruction;
+use super::{UncalibratedRendering, UncalibratedSettings};
+use crate::camera::{Camera, Relative};
+use crate::image::Image;
+use crate::interpolate::HoleCount;
+use crate::interpolate::plane::PlaneProblem;
+use crate::occlusion::{self, DepthTest};
+use crate::pipeline::{RenderError, RenderSettings, Rendering, Report};
+use crate::propagate::Frame;
+use crate::sample::{Dropped, Sample};
+use crate::uncalibrated::chirality;
+use crate::uncalibrated::mesh::{self, Feature};
+use crate::uncalibrated::{GeometryError, Point};
+use nalgebra::{Matrix3x4, Vector4};
+
+fn camera(matrix: &Matrix3x4<f64>, which: impl Fn() -> String) -> Result<Camera, RenderError> {
+    Camera::projective(*matrix)
+        .map_err(|source| RenderError::Projective(GeometryError::Camera { which: which(), source }))
+}
+
+/// Renders the virtual view from the reconstructed scene.
+pub(super) fn render<const C: usize>(
+    images: &[&Image],
+    scene: &Reconstruction,
+    size: (usize, usize),
+    settings: &RenderSettings,
+    special: &UncalibratedSettings,
+) -> Result<UncalibratedRendering, RenderError> {
+    let target_matrix = &scene.cameras[images.len()];
+    let target = camera(target_matrix, || "the virtual camera".into())?;
+    let sign = chirality::order_sign(target_matrix, scene.hand);
+    let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
+    let mut report = Report::default();
+    let mut samples: Vec<Sample<C>> = Vec::new();
+    for (i, image) in images.iter().enumerate() {
+        let source = camera(&scene.cameras[i], || format!("the camera of view {}", i + 1))?;
+        let chi = mesh::dense_chi(&features(scene, i), image.size());
+        let map = source.relative_to(&target);
+        report.dropped += propagate_chi(image, &chi, i as u16, &map, sign, &frame, &mut samples);
+    }
+    report.propagated = samples.len();
+    if samples.is_empty() {
+        let pixels = images.iter().map(|i| i.width() * i.height()).sum();
+        return Err(RenderError::NoOverlap { pixels, dropped: report.dropped });
+    }
+    let hull = hull_features(scene, images.len());
+    let mut region: Vec<bool> = mesh::dense_chi(&hull, size).iter().map(|c| !c.is_nan()).collect();
+    let absolute = special.sigma_share * chi_range(&hull);
+    let test = DepthTest { relative: 0.0, absolute, ..*settings.depth_test() };
+    test.check()?;
+    report.occluded = occlusion::remove(&mut samples, &test);
+    report.used = samples.len();
+    let mut interpolation = settings.interpolation;
+    interpolation.depth_test = test;
+    interpolation.plane = special.plane;
+    let mut problem = PlaneProblem::<C>::new(size, &interpolation)?;
+    problem.add(&samples)?;
+    problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
+    let fit = problem.solve(Some(&region))?;
+    report.convergence = Some(fit.convergence);
+    report.holes = HoleCount::of(&fit.mask);
+    let image = Image::from_values(size, C, fit.values);
+    let rendering = Rendering { image, mask: fit.mask, report };
+    Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
+}
+
+/// The features of one view with their chi, without points behind it.
+fn features(scene: &Reconstruction, view: usize) -> Vec<Feature> {
+    let matrix = &scene.cameras[view];
+    let feature = |(point, seen): (&Vector4<f64>, &Vec<Option<Point>>)| {
+        let position = seen[view]?;
+        let front = chirality::depth(matrix, point) > 0.0;
+        front.then(|| Feature { position, chi: chirality::chi(matrix, point) })
+    };
+    scene.points.iter().zip(&scene.seen).filter_map(feature).collect()
+}
+
+/// All points in front of the virtual camera, projected into its image.
+fn hull_features(scene: &Reconstruction, target: usize) -> Vec<Feature> {
+    let matrix = &scene.cameras[target];
+    let feature = |point: &Vector4<f64>| {
+        let p = matrix * point;
+        (p.z > 0.0).then(|| Feature { position: p.xy() / p.z, chi: chirality::chi(matrix, point) })
+    };
+    scene.points.iter().filter_map(feature).collect()
+}
+
+/// The range from the 1st to the 99th percentile of chi.
+fn chi_range(features: &[Feature]) -> f64 {
+    let mut values: Vec<f64> = features.iter().map(|f| f.chi).filter(|c| c.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values.get(((values.len() as f64 - 1.0) * share).round() as usize).copied();
+    match (at(0.01), at(0.99)) {
+        (Some(low), Some(high)) => high - low,
+        _ => 0.0,
+    }
+}
+
+/// Samples of one view from its dense chi: X_p ~ \[Pi; e4\]^{-1} (x~, -chi), hence Pi_v X_p = A x~ - chi b.
+fn propagate_chi<const C: usize>(
+    image: &Image,
+    chi: &[f64],
+    view: u16,
+    map: &Relative,
+    sign: f64,
+    frame: &Frame,
+    samples: &mut Vec<Sample<C>>,
+) -> Dropped {
+    let mut dropped = Dropped::default();
+    for (pixel, chi) in chi.iter().enumerate() {
+        if chi.is_nan() {
+            dropped.unknown += 1;
+            continue;
+        }
+        let (x, y) = ((pixel % image.width()) as f64, (pixel / image.width()) as f64);
+        let p = map.a * nalgebra::Vector3::new(x, y, 1.0) - map.b * *chi;
+        let (u, v) = (p.x / p.z + frame.offset, p.y / p.z);
+        if !(p.z > 0.0 && u.is_finite() && v.is_finite()) {
+            dropped.behind += 1;
+        } else if frame.holds(u, v) {
+            let depth = (sign * chi / p.z) as f32;
+            let value = image.pixel::<C>(pixel);
+            samples.push(Sample { x: u, y: v, depth, value, pixel: pixel as u32, view });
+        } else {
+            dropped.outside += 1;
+        }
+    }
+    dropped
+}
