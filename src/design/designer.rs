@@ -160,13 +160,13 @@ fn taps_of(spec: &Spec) -> usize {
 
 fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
     let plant = BlockedPlant::new(problem);
-    let slack = spec.design.slack.unwrap_or(0.0);
+    let gamma_margin = spec.design.gamma_margin.unwrap_or(0.0);
     match spec.design.method {
         Method::Fir => {
-            let second = fir::SecondObjective::new(&problem.noise, spec.design.slack);
+            let second = fir::SecondObjective::new(&problem.noise, spec.design.gamma_margin);
             fir::design_fir(&plant, taps_of(spec), second).map(from_fir)
         }
-        Method::Iir => iir::design_iir(&plant, slack).map(from_state_space),
+        Method::Iir => iir::design_iir(&plant, gamma_margin).map(from_state_space),
         Method::H2 => iir::design_h2(&plant).map(from_state_space),
         Method::Sinc => fixed(&plant, comparison::sinc_taps(problem, taps_of(spec))?),
         Method::Separation => fixed(&plant, comparison::separation_taps(spec, problem, taps_of(spec))?),
@@ -228,7 +228,8 @@ fn with_integers(
     let (SynthesisFilters::Fir(taps), Some(bits)) = (filters, &spec.design.bits) else {
         return Ok(written);
     };
-    let subject = quantise::Subject { plant, taps, noise, slack: spec.design.slack.unwrap_or(0.0) };
+    let subject =
+        quantise::Subject { plant, taps, noise, gamma_margin: spec.design.gamma_margin.unwrap_or(0.0) };
     let (integers, study) = quantise(subject, peak.gain, bits, spec.design.fraction_bits)?;
     let judged = judged(plant, SynthesisFilters::Fir(integers.taps()))?;
     Ok(Written { judged, integers: Some((integers, study)), ..written })
@@ -280,7 +281,7 @@ fn recursive_form(
         order: block.a.len(),
         width: distinct.parts.len(),
         aim: if spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
-        slack: spec.design.slack.unwrap_or(0.0),
+        gamma_margin: spec.design.gamma_margin.unwrap_or(0.0),
     };
     let (smaller, record) = reduction::reduce(&subject, wanted)?;
     let judged = match smaller {

@@ -19,9 +19,9 @@ use crate::lti::peak::Peak;
 pub const GAMMA_ACCURACY: f64 = 5e-7;
 /// Optimal banks are many: this much of gamma (relative) always goes into the second objective, which
 /// decides among them.
-const LEAST_SLACK: f64 = 4e-7;
+const LEAST_MARGIN: f64 = 4e-7;
 /// Where the converters' noise is known, less of it is worth this much of gamma unless the spec says otherwise.
-const NOISY_SLACK: f64 = 1e-3;
+const NOISY_MARGIN: f64 = 1e-3;
 /// Rounds of exchange; each at least closes in on one peak, five are rarely needed.
 const ROUND_LIMIT: usize = 16;
 /// Times that the exact norm may find a peak that the estimates have missed.
@@ -62,14 +62,14 @@ pub struct SecondObjective {
     /// Power sigma_i^2 of the noise of each channel.
     pub noise: Vec<f64>,
     /// Relative excess over the least gamma that may be spent on it.
-    pub slack: f64,
+    pub gamma_margin: f64,
 }
 
 impl SecondObjective {
-    /// With the slack asked for, else 1e-3 where there is noise, else next to none; never less than 4e-7.
-    pub fn new(noise: &[f64], slack: Option<f64>) -> Self {
-        let usual = if noise.iter().any(|power| *power > 0.0) { NOISY_SLACK } else { LEAST_SLACK };
-        Self { noise: noise.to_vec(), slack: slack.unwrap_or(usual).max(LEAST_SLACK) }
+    /// With the margin given; the default is 1e-3 if a channel has noise, else 4e-7. Never below 4e-7.
+    pub fn new(noise: &[f64], gamma_margin: Option<f64>) -> Self {
+        let usual = if noise.iter().any(|power| *power > 0.0) { NOISY_MARGIN } else { LEAST_MARGIN };
+        Self { noise: noise.to_vec(), gamma_margin: gamma_margin.unwrap_or(usual).max(LEAST_MARGIN) }
     }
 }
 
@@ -106,7 +106,7 @@ struct Exchange<'a> {
     problem: sampled::Problem,
     /// Only the first, uniform points have a weight in it.
     square: Square,
-    slack: f64,
+    gamma_margin: f64,
     lower: f64,
     dual: Vec<DualPoint>,
     rounds: usize,
@@ -141,7 +141,7 @@ impl<'a> Exchange<'a> {
             length,
             problem,
             square: Square { weights, noise: second.noise },
-            slack: second.slack,
+            gamma_margin: second.gamma_margin,
             lower: 0.0,
             dual: Vec::new(),
             rounds: 0,
@@ -183,12 +183,12 @@ impl<'a> Exchange<'a> {
         best.ok_or(DesignError::NoTaps)
     }
 
-    /// The least second objective under (1 + slack) gamma, with frequencies added where the cap is broken; the start
+    /// The least second objective under (1 + gamma_margin) gamma, with frequencies added where the cap is broken; the start
     /// if that cannot be had.
     fn polish(&mut self, start: Candidate) -> Result<Candidate, DesignError> {
-        let cap = start.peaks.estimate * (1.0 + self.slack);
+        let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         // Aim a little below, so that the peaks between the points fit under the cap as well.
-        let aim = start.peaks.estimate * (1.0 + 0.75 * self.slack);
+        let aim = start.peaks.estimate * (1.0 + 0.75 * self.gamma_margin);
         for _ in 0..ROUND_LIMIT {
             let found = sampled::mean_square_under_cap(
                 &self.problem,

@@ -49,9 +49,9 @@ fn noncausal_peak(plant: &BlockedPlant) -> Result<Peak, DesignError> {
     Ok(unexplained_peak(&plant.system, plant.measured)?)
 }
 
-/// The least gamma of any causal bank, within [`GAMMA_ACCURACY`]; with `slack` > 0 the central filter
-/// at (1 + slack) times the optimum instead, which is kinder to all other frequencies.
-pub fn design_iir(plant: &BlockedPlant, slack: f64) -> Result<StateSpaceDesign, DesignError> {
+/// The least gamma of any causal bank, within [`GAMMA_ACCURACY`]; with `gamma_margin` > 0 the central filter
+/// at (1 + gamma_margin) times the optimum instead, which is kinder to all other frequencies.
+pub fn design_iir(plant: &BlockedPlant, gamma_margin: f64) -> Result<StateSpaceDesign, DesignError> {
     let innovations = Innovations::in_all_coordinates(plant)?;
     let mut search = Search::new(plant, &innovations)?;
     let mut mean_square = innovations.iter().filter_map(Innovations::h2).peekable();
@@ -68,7 +68,7 @@ pub fn design_iir(plant: &BlockedPlant, slack: f64) -> Result<StateSpaceDesign, 
         search.try_the_lower_bound()?;
     }
     search.bisect()?;
-    search.finish(slack)
+    search.finish(gamma_margin)
 }
 
 /// The mean-square optimal bank.
@@ -291,11 +291,11 @@ impl<'a> Search<'a> {
         reference.and_then(|w| hinf_norm(&w)).map_or(f64::MAX.sqrt(), |peak| peak.gain)
     }
 
-    fn finish(mut self, slack: f64) -> Result<StateSpaceDesign, DesignError> {
+    fn finish(mut self, gamma_margin: f64) -> Result<StateSpaceDesign, DesignError> {
         let best = self.best.take();
         let optimum = best.ok_or_else(|| DesignError::RiccatiFailed { gamma: self.first_ceiling() })?;
-        if slack > 0.0 && optimum.norm > self.negligible {
-            let cap = optimum.norm * (1.0 + slack);
+        if gamma_margin > 0.0 && optimum.norm > self.negligible {
+            let cap = optimum.norm * (1.0 + gamma_margin);
             for innovations in self.innovations {
                 let Trial::Achieved(filters) = innovations.h_infinity(cap) else { continue };
                 let Some(relaxed) = self.verify(filters)? else { continue };

@@ -5,8 +5,8 @@ use crate::units::{FastPeriods, Hertz, Seconds};
 use super::design::DesignOverrides;
 use super::design::KeyProblem;
 use super::limits::{
-    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_latency, check_noise,
-    check_order, check_ratio, check_reduction_loss, check_slack, check_taps,
+    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_gamma_margin, check_latency,
+    check_noise, check_order, check_ratio, check_reduction_loss, check_taps,
 };
 use super::reader::{Fault, Fields, Value};
 use super::words::{WordLengths, check_fraction_bits};
@@ -16,7 +16,7 @@ const TOP_KEYS: [&str; 8] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
 const CHANNEL_KEYS: [&str; 4] = ["delay", "delay_samples", "filter", "noise"];
 const DESIGN_KEYS: [&str; 8] =
-    ["method", "taps", "slack", "bits", "fraction_bits", "order", "reduction_loss_db", "noise"];
+    ["method", "taps", "gamma_margin", "bits", "fraction_bits", "order", "reduction_loss_db", "noise"];
 
 /// The keys of each written form of a filter; the first one names the form.
 const FILTER_FORMS: [&[&str]; 5] = [
@@ -152,7 +152,7 @@ fn design(
     let written = DesignOverrides {
         method: get("method").map(|v| v.name("method", &Method::ALL.map(|m| (m.name(), m)))).transpose()?,
         taps: get("taps").map(|v| checked_count(&v, "taps", check_taps)).transpose()?,
-        slack: get("slack").map(|v| checked_number(&v, check_slack)).transpose()?,
+        gamma_margin: get("gamma_margin").map(|v| checked_number(&v, check_gamma_margin)).transpose()?,
         bits: get("bits").map(|v| word_lengths(&v)).transpose()?,
         fraction_bits: get("fraction_bits").map(|v| fraction_bits(&v)).transpose()?,
         reduction: reduction(get("order"), get("reduction_loss_db"))?,

@@ -1,6 +1,8 @@
 //! The `[design]` table: defaults, overrides from the command line, and which key goes with which method.
 
-use super::limits::{check_optimised_taps, check_order, check_reduction_loss, check_slack, check_taps};
+use super::limits::{
+    check_gamma_margin, check_optimised_taps, check_order, check_reduction_loss, check_taps,
+};
 use super::words::{WordLengths, check_fraction_bits};
 use super::{DesignSpec, Method, Reduction, SpecProblem};
 
@@ -12,7 +14,7 @@ pub struct DesignOverrides {
     /// Taps a channel.
     pub taps: Option<usize>,
     /// Relative excess over the optimal gamma.
-    pub slack: Option<f64>,
+    pub gamma_margin: Option<f64>,
     /// Bits of the taps.
     pub bits: Option<WordLengths>,
     /// Taps are integers times two to the minus this.
@@ -41,8 +43,8 @@ impl Method {
         matches!(self, Self::Fir | Self::Sinc | Self::Separation)
     }
 
-    /// Whether the method minimises gamma and therefore reads `slack`.
-    pub const fn has_slack(self) -> bool {
+    /// Whether the method minimises gamma and therefore reads `gamma_margin`.
+    pub const fn has_gamma_margin(self) -> bool {
         matches!(self, Self::Fir | Self::Iir)
     }
 
@@ -77,7 +79,7 @@ impl Reduction {
 impl DesignSpec {
     /// A method, with taps if it makes FIR filters, and no other wishes.
     pub const fn new(method: Method, taps: Option<usize>) -> Self {
-        Self { method, taps, slack: None, bits: None, fraction_bits: None, reduction: None }
+        Self { method, taps, gamma_margin: None, bits: None, fraction_bits: None, reduction: None }
     }
 
     /// The same design by another method; what that has no use for is dropped.
@@ -97,8 +99,9 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let Self { method, taps, slack, bits, fraction_bits, reduction } = self.clone();
-        let written = DesignOverrides { method: Some(method), taps, slack, bits, fraction_bits, reduction };
+        let Self { method, taps, gamma_margin, bits, fraction_bits, reduction } = self.clone();
+        let written =
+            DesignOverrides { method: Some(method), taps, gamma_margin, bits, fraction_bits, reduction };
         let design = overrides.over(written).resolved();
         design.check(channels)?;
         Ok(design)
@@ -113,7 +116,7 @@ impl DesignSpec {
     pub(super) fn check_by_key(&self, channels: usize) -> Result<(), KeyProblem> {
         self.check_keys()?;
         blame("taps", self.taps.map_or(Ok(()), check_taps))?;
-        blame("slack", self.slack.map_or(Ok(()), check_slack))?;
+        blame("gamma_margin", self.gamma_margin.map_or(Ok(()), check_gamma_margin))?;
         if let Some(reduction) = self.reduction {
             blame(reduction.key(), reduction.check())?;
         }
@@ -136,7 +139,7 @@ impl DesignSpec {
     fn check_keys(&self) -> Result<(), KeyProblem> {
         let keys = [
             ("taps", self.taps.is_some(), self.method.has_taps(), "fir"),
-            ("slack", self.slack.is_some(), self.method.has_slack(), "fir or iir"),
+            ("gamma_margin", self.gamma_margin.is_some(), self.method.has_gamma_margin(), "fir or iir"),
             ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
             ("fraction_bits", self.fraction_bits.is_some(), self.method.has_bits(), "fir"),
             (
@@ -172,7 +175,7 @@ impl DesignOverrides {
         match key {
             "method" => self.method.is_some(),
             "taps" => self.taps.is_some(),
-            "slack" => self.slack.is_some(),
+            "gamma_margin" => self.gamma_margin.is_some(),
             "bits" => self.bits.is_some(),
             "fraction_bits" => self.fraction_bits.is_some(),
             _ => self.reduction.is_some_and(|reduction| reduction.key() == key),
@@ -186,7 +189,7 @@ impl DesignOverrides {
         Self {
             method: self.method.or(file.method),
             taps: self.taps.or(file.taps.filter(|_| kept(Method::has_taps))),
-            slack: self.slack.or(file.slack.filter(|_| kept(Method::has_slack))),
+            gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| kept(Method::has_gamma_margin))),
             bits: self.bits.or(file.bits.filter(|_| kept(Method::has_bits))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| kept(Method::has_bits))),
             reduction: self.reduction.or(file.reduction.filter(|_| kept(Method::has_states))),
@@ -195,8 +198,8 @@ impl DesignOverrides {
 
     /// Without a method: FIR if there are taps, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let Self { method, taps, slack, bits, fraction_bits, reduction } = self;
+        let Self { method, taps, gamma_margin, bits, fraction_bits, reduction } = self;
         let default = if taps.is_some() { Method::Fir } else { Method::Iir };
-        DesignSpec { method: method.unwrap_or(default), taps, slack, bits, fraction_bits, reduction }
+        DesignSpec { method: method.unwrap_or(default), taps, gamma_margin, bits, fraction_bits, reduction }
     }
 }

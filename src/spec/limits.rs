@@ -162,11 +162,15 @@ pub(crate) fn check_reduction_loss(db: f64) -> Result<(), SpecProblem> {
 }
 
 /// Relative excess over the optimal gamma.
-pub(crate) fn check_slack(slack: f64) -> Result<(), SpecProblem> {
-    if slack >= 0.0 && slack.is_finite() {
+pub(crate) fn check_gamma_margin(gamma_margin: f64) -> Result<(), SpecProblem> {
+    if gamma_margin >= 0.0 && gamma_margin.is_finite() {
         return Ok(());
     }
-    Err(range(slack, "(relative)", "slack is the share by which gamma may exceed its optimum, zero or more"))
+    Err(range(
+        gamma_margin,
+        "(relative)",
+        "gamma_margin is the share by which gamma may exceed its optimum, zero or more",
+    ))
 }
 
 #[cfg(test)]

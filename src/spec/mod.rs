@@ -161,7 +161,7 @@ pub struct DesignSpec {
     pub taps: Option<usize>,
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub slack: Option<f64>,
+    pub gamma_margin: Option<f64>,
     /// Bits of the taps, for integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<WordLengths>,

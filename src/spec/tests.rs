@@ -325,7 +325,7 @@ fn every_mistake_has_its_line_and_its_message() {
         (thesis_with("taps = 22", "taps = 0"), 18, "1 to 65536 taps"),
         (thesis_with("taps = 22", "taps = 65537"), 18, "1 to 65536 taps"),
         (thesis_with("taps = 22", "taps = 10_000"), 18, "taps times channels is at most 16384"),
-        (thesis_with("taps = 22", "taps = 22\nslack = -0.1"), 19, "slack is the share"),
+        (thesis_with("taps = 22", "taps = 22\ngamma_margin = -0.1"), 19, "gamma_margin is the share"),
         (thesis_with("taps = 22", "taps = 22\nbits = 1"), 19, "2 to 32 bits"),
         (thesis_with("taps = 22", "taps = 22\nbits = 12.5"), 19, "whole number"),
         (thesis_with("taps = 22", "taps = 22\nbits = 'many'"), 19, "whole number"),
@@ -490,7 +490,7 @@ prop_compose! {
         channels in prop::collection::vec((0.0..30.0f64, written_filter()), 1..4),
         method in prop::sample::select(Method::ALL.to_vec()),
         taps in 1usize..100,
-        slack in prop::option::of(0.0..0.1f64),
+        gamma_margin in prop::option::of(0.0..0.1f64),
         bits in prop::option::of((2..33u32).prop_map(WordLengths::Same)),
         fraction_bits in prop::option::of(-256..257i32),
         reduction in prop::option::of(prop_oneof![
@@ -503,7 +503,7 @@ prop_compose! {
             design: DesignSpec {
                 method,
                 taps: method.has_taps().then_some(taps),
-                slack: slack.filter(|_| method.has_slack()),
+                gamma_margin: gamma_margin.filter(|_| method.has_gamma_margin()),
                 bits: bits.clone().filter(|_| method.has_bits()),
                 fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
                 reduction: reduction.filter(|_| method.has_states()),

@@ -262,7 +262,7 @@ fn what_is_wrong_with_a_flag_names_the_flag() {
         ("spec.toml", &["--taps", "0"][..], "--taps: 0 taps", "1 to 65536"),
         ("spec.toml", &["--taps", "16000"], "--taps: 32000 taps in all", "at most 16384"),
         ("iir.toml", &["--taps", "8"], "--taps: taps has no meaning for the method iir", "fir"),
-        ("spec.toml", &["--slack=-1"], "--slack: -1", "zero or more"),
+        ("spec.toml", &["--gamma-margin=-1"], "--gamma-margin: -1", "zero or more"),
         ("spec.toml", &["--bits", "1"], "--bits: 1 bits", "2 to 32"),
         ("spec.toml", &["--bits", "8,8"], "--bits: 2 entries", "each of the 22 taps"),
         ("list.toml", &["--taps", "3"], "--taps: 2 entries", "each of the 3 taps"),
@@ -286,9 +286,9 @@ fn what_is_wrong_with_a_flag_names_the_flag() {
         assert!(!message.contains(".toml"), "the file is not to blame: {message}");
     }
     // What is wrong with the file is shown there all the same.
-    fs::write(desk.path("slack.toml"), THESIS.replace("taps = 22", "taps = 22\nslack = -1")).unwrap();
-    let args = ["design", "slack.toml", "-o", "b.json", "--bits", "8"];
-    desk.refused(1, &args, &["slack.toml:13:9: design.slack: -1", "zero or more"]);
+    fs::write(desk.path("margin.toml"), THESIS.replace("taps = 22", "taps = 22\ngamma_margin = -1")).unwrap();
+    let args = ["design", "margin.toml", "-o", "b.json", "--bits", "8"];
+    desk.refused(1, &args, &["margin.toml:13:16: design.gamma_margin: -1", "zero or more"]);
 }
 
 #[test]

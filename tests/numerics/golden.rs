@@ -195,13 +195,13 @@ fn g15_errors_on_the_thesis_inputs() {
 }
 
 /// The second objective: with noisy converters the output noise falls, the sum of both powers is least, and gamma stays under
-/// the slack.
+/// its margin.
 #[test]
-fn noise_of_the_converters_is_weighed_within_the_slack() {
-    let noisy = |sigma: [f64; 2], slack| {
+fn noise_of_the_converters_is_weighed_within_the_gamma_margin() {
+    let noisy = |sigma: [f64; 2], gamma_margin| {
         let mut spec = with_taps(thesis(10, &[1.2, 0.6]), 22);
         spec.channels.iter_mut().zip(sigma).for_each(|(channel, sigma)| channel.noise = sigma);
-        spec.design.slack = slack;
+        spec.design.gamma_margin = gamma_margin;
         let bank = design(&spec).unwrap().bank;
         let judged = |bank: &hybank::bank::Bank| {
             let mean = analyze(bank, &[]).unwrap().mean;

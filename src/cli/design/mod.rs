@@ -42,7 +42,7 @@ pub(super) struct Args {
     latency: Option<usize>,
     /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
     #[arg(long)]
-    slack: Option<f64>,
+    gamma_margin: Option<f64>,
     /// Integer taps of so many bits, sign included; or a list of bits, one for each tap (4,6,8,6,4)
     #[arg(long)]
     bits: Option<WordLengths>,
@@ -86,7 +86,7 @@ fn overrides(args: &Args) -> DesignOverrides {
     DesignOverrides {
         method: args.method,
         taps: args.taps,
-        slack: args.slack,
+        gamma_margin: args.gamma_margin,
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
         reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),

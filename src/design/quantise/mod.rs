@@ -33,7 +33,7 @@ pub struct Subject<'a> {
     /// Power of each channel's noise.
     pub noise: &'a [f64],
     /// Relative excess of gamma that may go into the mean square.
-    pub slack: f64,
+    pub gamma_margin: f64,
 }
 
 /// What integer taps cost, beside those of fewer and of more bits.
@@ -88,7 +88,7 @@ pub fn quantise(
     let mut found = quantiser.quantise_all(&all, fraction_bits)?;
     // What fits few bits fits more.
     for k in 1..found.len() {
-        if found[k - 1].is_better(&found[k], subject.slack) {
+        if found[k - 1].is_better(&found[k], subject.gamma_margin) {
             let fixed_point = FixedPoint { bits: all[k].clone(), ..found[k - 1].fixed_point.clone() };
             found[k] = Quantised { fixed_point, rounded: found[k].rounded, ..found[k - 1] };
         }

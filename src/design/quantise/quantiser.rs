@@ -28,8 +28,8 @@ pub(super) struct Quantised {
 
 impl Quantised {
     /// Smaller in gamma, or where that is next to equal in the mean square.
-    pub(super) fn is_better(&self, other: &Self, slack: f64) -> bool {
-        let alike = 1.0 + slack.max(INDIFFERENT);
+    pub(super) fn is_better(&self, other: &Self, gamma_margin: f64) -> bool {
+        let alike = 1.0 + gamma_margin.max(INDIFFERENT);
         self.gamma * alike < other.gamma
             || self.gamma < other.gamma * alike && self.mean_square < other.mean_square
     }
@@ -79,7 +79,7 @@ impl<'a> Quantiser<'a> {
             found.extend(Search::new(self, bits, finest + 1).run()?);
         }
         let least = found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min);
-        let cap = least * (1.0 + self.subject.slack.max(INDIFFERENT));
+        let cap = least * (1.0 + self.subject.gamma_margin.max(INDIFFERENT));
         let good = found.into_iter().filter(|found| found.gamma <= cap);
         let kindest = good.min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
         let Candidate { fixed_point, gamma, mean_square } = kindest.ok_or(DesignError::NoTaps)?;

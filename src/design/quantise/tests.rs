@@ -19,7 +19,7 @@ fn optimum(spec: &str) -> (BlockedPlant, Vec<Vec<f64>>) {
 }
 
 fn subject<'a>(plant: &'a BlockedPlant, taps: &'a [Vec<f64>]) -> Subject<'a> {
-    Subject { plant, taps, noise: &[], slack: 0.0 }
+    Subject { plant, taps, noise: &[], gamma_margin: 0.0 }
 }
 
 fn quantiser<'a>(plant: &'a BlockedPlant, taps: &'a [Vec<f64>]) -> Result<Quantiser<'a>, DesignError> {

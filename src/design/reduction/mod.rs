@@ -67,7 +67,7 @@ pub struct Subject<'a> {
     /// What is to be small.
     pub aim: Aim,
     /// Relative excess of gamma that may go into the mean square.
-    pub slack: f64,
+    pub gamma_margin: f64,
 }
 
 /// The reduced bank, or `None` if the full one is it, and the record.

@@ -26,7 +26,7 @@ const KINDER_LIMIT: usize = 4;
 /// Relative accuracy at which the exchange ends.
 const GAMMA_ACCURACY: f64 = 5e-7;
 /// This much of gamma (relative) always goes into the mean square, which decides among the many readouts of least gamma.
-const LEAST_SLACK: f64 = 4e-7;
+const LEAST_MARGIN: f64 = 4e-7;
 
 /// Square root of the covariance of the states of `bank` when it is driven through the front ends.
 pub(super) fn reach(plant: &BlockedPlant, bank: &StateSpace) -> Result<Mat, DesignError> {
@@ -155,17 +155,17 @@ impl<'a> Samples<'a> {
         self.worst_case(dynamics, ROUGH).map(|found| found.gamma)
     }
 
-    /// The bank of least gamma with these dynamics and, within `slack`, of least mean square. Frequencies at which its error
+    /// The bank of least gamma with these dynamics and, within `gamma_margin`, of least mean square. Frequencies at which its error
     /// rises between those sampled join them.
     pub(super) fn best_bank(
         &mut self,
         dynamics: &Dynamics,
-        slack: f64,
+        gamma_margin: f64,
     ) -> Result<TappedRecursion, DesignError> {
         let (mut least, mut cap) = self.exchanged(dynamics)?;
-        cap *= 1.0 + slack.max(LEAST_SLACK);
+        cap *= 1.0 + gamma_margin.max(LEAST_MARGIN);
         // Aim a little below, so that what rises between the frequencies fits under the cap as well.
-        let aim = cap * (1.0 - 0.25 * slack.max(LEAST_SLACK));
+        let aim = cap * (1.0 - 0.25 * gamma_margin.max(LEAST_MARGIN));
         for _ in 0..KINDER_LIMIT {
             let Some(readout) = self.kinder(dynamics, &least, aim)? else { break };
             let (bank, peaks) = self.judged(dynamics, &readout, cap)?;

@@ -25,7 +25,7 @@ fn thesis(latency: usize) -> BlockedPlant {
 
 fn subject<'a>(plant: &'a BlockedPlant, bank: &'a StateSpace, aim: Aim) -> Subject<'a> {
     let order = TappedRecursion::new(bank).unwrap().realise().unwrap().order();
-    Subject { plant, bank, order, width: plant.measured, aim, slack: 0.0 }
+    Subject { plant, bank, order, width: plant.measured, aim, gamma_margin: 0.0 }
 }
 
 fn error(plant: &BlockedPlant, bank: &StateSpace) -> StateSpace {

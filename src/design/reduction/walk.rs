@@ -190,7 +190,7 @@ impl<'a> Walk<'a> {
     fn read(&self, dynamics: Dynamics, samples: &Samples<'a>) -> Result<Found<'a>, DesignError> {
         let mut samples = samples.clone();
         let bank = match self.subject.aim {
-            Aim::WorstCase => samples.best_bank(&dynamics, self.subject.slack)?,
+            Aim::WorstCase => samples.best_bank(&dynamics, self.subject.gamma_margin)?,
             Aim::MeanSquare => dynamics.read_by(&mean_square(self.subject.plant, &dynamics)?.0)?,
         };
         let figures = figures(self.subject, &bank)?;
