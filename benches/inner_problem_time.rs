@@ -54,7 +54,7 @@ fn mean_square_under_cap(c: &mut Criterion) {
         let problem = problem(&bank, taps, points);
         let settings = sampled::Settings::default();
         let best = sampled::minimise(&problem, &settings).expect("settings are the defaults");
-        let square = sampled::Square::noiseless(vec![1.0; points], problem.channels());
+        let square = sampled::MeanSquareObjective::noiseless(vec![1.0; points], problem.channels());
         group.bench_with_input(BenchmarkId::from_parameter(name), &problem, |b, p| {
             b.iter(|| sampled::mean_square_under_cap(p, &square, 1.001 * best.gamma, &best.taps, &settings));
         });

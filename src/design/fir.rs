@@ -12,7 +12,7 @@ use super::equivalence::BlockedPlant;
 use super::error_grid::{ErrorGrid, Peaks};
 use super::iir::noncausal_bound;
 use crate::linalg::CMat;
-use crate::lmi::sampled::{self, Settings, Square, Taps};
+use crate::lmi::sampled::{self, MeanSquareObjective, Settings, Taps};
 use crate::lti::peak::Peak;
 
 /// Relative width of [lower, upper] at which the exchange of frequencies ends.
@@ -105,7 +105,7 @@ struct Exchange<'a> {
     length: usize,
     problem: sampled::Problem,
     /// Only the first, uniform points have a weight in it.
-    square: Square,
+    square: MeanSquareObjective,
     gamma_margin: f64,
     lower: f64,
     dual: Vec<DualPoint>,
@@ -140,7 +140,7 @@ impl<'a> Exchange<'a> {
             grid,
             length,
             problem,
-            square: Square { weights, noise: second.noise },
+            square: MeanSquareObjective { weights, noise: second.noise },
             gamma_margin: second.gamma_margin,
             lower: 0.0,
             dual: Vec::new(),

@@ -3,9 +3,9 @@
 
 use crate::linalg::{LinalgError, Mat, PositiveFactor};
 
-/// A factored Newton matrix, scaled to a unit diagonal, shifted only as far as it had to be.
+/// The Cholesky factor of a Newton matrix, scaled to a unit diagonal, with as small a diagonal shift as it needs.
 #[derive(Debug)]
-pub(super) struct Shifted {
+pub(super) struct RegularisedCholesky {
     matrix: Mat,
     scale: Vec<f64>,
     factor: PositiveFactor,
@@ -13,15 +13,18 @@ pub(super) struct Shifted {
     pub(super) shift: f64,
 }
 
-/// First shift tried when the matrix is not definite to rounding, and the growth of the next ones.
+/// First shift tried if the matrix is not positive definite, and the growth and limit of the next ones.
 const SHIFT_FIRST: f64 = 1e-15;
 const SHIFT_GROWTH: f64 = 10.0;
 const SHIFT_LAST: f64 = 1e-6;
-/// Steps of iterative refinement against the matrix as it is.
+/// Steps of iterative refinement against the unshifted matrix.
 const REFINEMENTS: usize = 2;
 
-impl Shifted {
-    /// Factors the symmetric `matrix` given by its lower triangle.
+impl RegularisedCholesky {
+    /// Factors the symmetric `matrix`, of which only the lower triangle is read.
+    ///
+    /// # Errors
+    /// [`LinalgError`] if even the largest shift leaves the matrix indefinite.
     pub(super) fn new(mut matrix: Mat) -> Result<Self, LinalgError> {
         matrix.fill_upper_triangle_with_lower_triangle();
         let scale: Vec<f64> =
@@ -33,7 +36,7 @@ impl Shifted {
         }
         let mut shift = 0.0;
         loop {
-            match PositiveFactor::new(&shifted(&matrix, shift)) {
+            match PositiveFactor::new(&with_shift(&matrix, shift)) {
                 Ok(factor) => return Ok(Self { matrix, scale, factor, shift }),
                 Err(error) if shift >= SHIFT_LAST => return Err(error),
                 Err(_) => shift = (shift * SHIFT_GROWTH).max(SHIFT_FIRST),
@@ -41,26 +44,10 @@ impl Shifted {
         }
     }
 
-    /// Solves against the matrix as given, as far as the shift and refinement allow.
+    /// Solves with the unshifted matrix, as far as iterative refinement reaches.
     pub(super) fn solve(&self, rhs: &[f64]) -> Vec<f64> {
-        self.solve_many(&Mat::from_column_slice(rhs.len(), 1, rhs)).as_slice().to_vec()
-    }
-
-    /// `F^{-1} rhs` with the (shifted) matrix as `F F'`.
-    pub(super) fn half(&self, rhs: &Mat) -> Mat {
-        let scaled = Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)] * self.scale[i]);
-        self.factor.solve_half(&scaled)
-    }
-
-    /// `F'^{-1} rhs`, the other half.
-    pub(super) fn half_transposed(&self, rhs: &Mat) -> Mat {
-        let mut x = self.factor.solve_half_transposed(rhs);
-        x.row_iter_mut().zip(&self.scale).for_each(|(mut row, s)| row *= *s);
-        x
-    }
-
-    fn solve_many(&self, rhs: &Mat) -> Mat {
-        let scaled = Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)] * self.scale[i]);
+        let mut scaled = Mat::from_column_slice(rhs.len(), 1, rhs);
+        scaled.iter_mut().zip(&self.scale).for_each(|(value, s)| *value *= s);
         let mut x = self.factor.solve(&scaled);
         for _ in 0..REFINEMENTS {
             let residual = &scaled - &self.matrix * &x;
@@ -70,15 +57,66 @@ impl Shifted {
             }
             x = better;
         }
+        x.iter().zip(&self.scale).map(|(value, s)| value * s).collect()
+    }
+
+    /// `F^{-1} rhs`, where `F F'` is the shifted matrix.
+    pub(super) fn solve_half(&self, rhs: &Mat) -> Mat {
+        let scaled = Mat::from_fn(rhs.nrows(), rhs.ncols(), |i, j| rhs[(i, j)] * self.scale[i]);
+        self.factor.solve_half(&scaled)
+    }
+
+    /// `F'^{-1} rhs`, where `F F'` is the shifted matrix.
+    pub(super) fn solve_half_transposed(&self, rhs: &Mat) -> Mat {
+        let mut x = self.factor.solve_half_transposed(rhs);
         x.row_iter_mut().zip(&self.scale).for_each(|(mut row, s)| row *= *s);
         x
     }
 }
 
-fn shifted(matrix: &Mat, shift: f64) -> Mat {
+fn with_shift(matrix: &Mat, shift: f64) -> Mat {
     let mut m = matrix.clone();
     for i in 0..m.nrows() {
         m[(i, i)] += shift;
     }
     m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNITS: [f64; 2] = [1e-9, 1e9];
+
+    /// Symmetric with eigenvalues 1 and `least`, in units that differ by 18 decades.
+    fn nearly_singular(least: f64) -> Mat {
+        let (u, v) = (0.6, 0.8);
+        let m = Mat::from_row_slice(
+            2,
+            2,
+            &[u * u + least * v * v, u * v * (1.0 - least), u * v * (1.0 - least), v * v + least * u * u],
+        );
+        Mat::from_fn(2, 2, |i, j| m[(i, j)] * UNITS[i] * UNITS[j])
+    }
+
+    #[test]
+    fn both_halves_make_the_inverse_in_any_units() {
+        let matrix = nearly_singular(1e-3);
+        let factor = RegularisedCholesky::new(matrix.clone()).unwrap();
+        assert_eq!(factor.shift, 0.0);
+        let inverse = factor.solve_half_transposed(&factor.solve_half(&Mat::identity(2, 2)));
+        let product = &matrix * inverse;
+        let unitless = Mat::from_fn(2, 2, |i, j| product[(i, j)] * UNITS[j] / UNITS[i]);
+        assert!((unitless - Mat::identity(2, 2)).norm() < 1e-11);
+        let x = factor.solve(&[1e-9, 0.0]);
+        let back = &matrix * Mat::from_column_slice(2, 1, &x);
+        assert!((back[0] - 1e-9).abs() < 1e-21 && back[1].abs() < 1e-3, "{back}");
+    }
+
+    #[test]
+    fn singular_matrices_are_shifted_a_little_and_indefinite_ones_refused() {
+        let singular = RegularisedCholesky::new(nearly_singular(0.0)).unwrap();
+        assert!(singular.shift <= 1e-14, "{}", singular.shift);
+        assert!(RegularisedCholesky::new(nearly_singular(-1e-2)).is_err());
+    }
 }

@@ -4,6 +4,8 @@
 //! helpers ([`exponential`]) serve exact discretisation.
 
 pub mod balanced;
+mod bounded_real;
+mod coordinates;
 mod delay_line;
 pub mod exponential;
 pub mod gramian;
@@ -14,6 +16,8 @@ mod response;
 pub mod riccati;
 mod state_space;
 
+pub use bounded_real::bounded_real_riccati;
+pub use coordinates::GramianCoordinates;
 pub use delay_line::TappedRecursion;
 pub use response::FrequencyResponse;
 pub use state_space::{StateSpace, StateSpaceError};

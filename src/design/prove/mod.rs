@@ -8,9 +8,8 @@ use super::fir::DualPoint;
 use super::{DesignError, analysis};
 use crate::bank::{Bank, Certificate, Proof, SynthesisFilters, Tone};
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
-use crate::lmi::kyp;
 use crate::lti::peak::{hinf_norm, unexplained_peak};
-use crate::lti::{FrequencyResponse, StateSpace};
+use crate::lti::{FrequencyResponse, GramianCoordinates, StateSpace, bounded_real_riccati};
 use crate::spec::Method;
 use crate::verify::{CLAIM_TOLERANCE, Midpoint, Subject, Verified};
 use units::Units;
@@ -157,14 +156,14 @@ impl Search {
         let mut inputs = Mat::zeros(n, m + n);
         inputs.columns_mut(0, m).copy_from(&c.transpose());
         inputs.columns_mut(m, n).fill_diagonal(noise / (n.max(1) as f64).sqrt());
-        let k = kyp::gramian_coordinates(&a.transpose(), &inputs, 0.0)?;
+        let k = GramianCoordinates::new(&a.transpose(), &inputs, 0.0)?;
         let heard = k.b.columns(0, m).into_owned();
         Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: heard, d: d.transpose(), inverse: k.inverse })
     }
 
     /// Rows of R with P = R R' at `gamma`, with a weight on all states that keeps the inequality away from singular.
     fn factor(&self, gamma: f64, weight: f64) -> Option<Vec<Vec<f64>>> {
-        let p = kyp::bounded_real_riccati(&self.a, &self.b, &self.c, &self.d, gamma, weight)?;
+        let p = bounded_real_riccati(&self.a, &self.b, &self.c, &self.d, gamma, weight)?;
         let half = linalg::cholesky(&p).ok()?;
         let root = linalg::lq_factor(&(self.inverse.tr_mul(&half) * gamma.sqrt()));
         Some((0..root.nrows()).map(|i| root.row(i).iter().take(i + 1).copied().collect()).collect())

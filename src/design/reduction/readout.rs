@@ -5,7 +5,7 @@ use super::dynamics::Dynamics;
 use crate::design::equivalence::BlockedPlant;
 use crate::design::{DesignError, error_system};
 use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::sampled::{self, Point, Settings, Square};
+use crate::lmi::sampled::{self, MeanSquareObjective, Point, Settings};
 use crate::lti::gramian::controllability_root;
 use crate::lti::peak::{Peak, peaks_above, resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace, TappedRecursion};
@@ -222,7 +222,7 @@ impl<'a> Samples<'a> {
         weights[..=GRID].fill(1.0 / GRID as f64);
         (weights[0], weights[GRID]) = (0.5 / GRID as f64, 0.5 / GRID as f64);
         let problem = self.problem(dynamics)?;
-        let square = Square::noiseless(weights, problem.channels());
+        let square = MeanSquareObjective::noiseless(weights, problem.channels());
         let start = vec![start.readout.clone()];
         let found = sampled::mean_square_under_cap(&problem, &square, cap, &start, &Settings::default());
         // An optimum of zero or a stalled iteration leaves nothing to win.

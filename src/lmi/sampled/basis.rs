@@ -91,8 +91,8 @@ impl Basis {
             let q = self.q.columns(0, svd.u.nrows());
             let mut row = row_vector(y, p, &self.weights, self.silent);
             for _ in 0..2 {
-                let reach = u * u.tr_mul(&q.tr_mul(&row));
-                row -= q * reach;
+                let image = u * u.tr_mul(&q.tr_mul(&row));
+                row -= q * image;
             }
             set_row(y, p, &row);
         }

@@ -176,13 +176,13 @@ impl Cone {
     }
 
     /// Largest step, up to `most`, for which all slacks stay positive definite (to a part in 2^8).
-    pub(super) fn primal_reach(&mut self, step: &SlackStep, most: f64) -> f64 {
-        let mut reach = most;
+    pub(super) fn max_primal_step(&mut self, step: &SlackStep, most: f64) -> f64 {
+        let mut longest = most;
         let mut trial = Blocks::zeros(1, self.m, self.k1);
         for l in 0..self.count() {
             let (k, dk, g) = (self.k.block(l), step.k.block(l), self.g.block(l));
             let (small, chol, t) = (&mut self.small, &mut self.chol, self.t);
-            reach = bisect(reach, |alpha| {
+            longest = bisect(longest, |alpha| {
                 for ((z, k), d) in trial.as_mut_slice().iter_mut().zip(k.data).zip(dk.data) {
                     *z = k + d * alpha;
                 }
@@ -190,23 +190,23 @@ impl Cone {
                 chol.factor(small.block_mut(0))
             });
         }
-        reach
+        longest
     }
 
     /// Largest step, up to `most`, for which all dual matrices stay positive definite.
-    pub(super) fn dual_reach(&mut self, dz: &Blocks, most: f64) -> f64 {
-        let mut reach = most;
+    pub(super) fn max_dual_step(&mut self, dz: &Blocks, most: f64) -> f64 {
+        let mut longest = most;
         for l in 0..self.count() {
             let (z, d) = (self.z.block(l), dz.block(l));
             let (full, chol) = (&mut self.full, &mut self.chol);
-            reach = bisect(reach, |alpha| {
+            longest = bisect(longest, |alpha| {
                 for ((f, z), d) in full.as_mut_slice().iter_mut().zip(z.data).zip(d.data) {
                     *f = z + d * alpha;
                 }
                 chol.factor(full.block_mut(0))
             });
         }
-        reach
+        longest
     }
 }
 

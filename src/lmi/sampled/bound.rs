@@ -10,9 +10,9 @@
 //! Dual matrices of an optimum have r = 0. What rounding leaves of it is charged for all taps
 //! within a stated radius.
 
-use super::SampledError;
 use super::basis::Basis;
 use super::prepare::Reduced;
+use super::problem::SampledError;
 use super::problem::{Problem, Taps};
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, CMat, Complex, Mat};
@@ -212,18 +212,18 @@ pub(super) fn zero_dual(problem: &Problem) -> Vec<CMat> {
 
 fn dual_matrices(reduced: &Reduced, basis: &Basis, z: &Blocks, cut: f64) -> Vec<CMat> {
     let (m, k1, k2) = (reduced.layout.rows, reduced.h.cols(), reduced.w_rest.cols());
-    let mut reach = Blocks::zeros(z.count(), m, k1);
+    let mut image = Blocks::zeros(z.count(), m, k1);
     for l in 0..z.count() {
-        let (from, to) = (z.block(l), reach.block_mut(l).data);
+        let (from, to) = (z.block(l), image.block_mut(l).data);
         (0..m * k1).for_each(|e| to[e] = -from.at(e % m, m + e / m));
     }
-    basis.project_out(reduced, &mut reach, cut);
+    basis.project_out(reduced, &mut image, cut);
     let mut rest = Blocks::zeros(1, m, k2);
     let full = |l: usize| {
         let weight = z.block(l).part(0, 0, m, m);
         rest.block_mut(0).set_product(1.0, weight.plain(), reduced.w_rest.block(l).plain());
         let mut y = CMat::zeros(m, k1 + k2);
-        y.columns_mut(0, k1).copy_from_slice(reach.block(l).data);
+        y.columns_mut(0, k1).copy_from_slice(image.block(l).data);
         y.columns_mut(k1, k2).copy_from_slice(rest.as_slice());
         y * &reduced.inputs[l]
     };

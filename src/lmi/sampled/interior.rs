@@ -5,13 +5,13 @@
 //! `c - A*(Z) = 0` starts out violated.
 
 use super::blocks::{Cone, SlackStep};
-use super::newton::{self, Seen};
+use super::newton::{self, ChannelProjection};
 use super::prepare::Reduced;
 use super::quadratic::Quadratic;
-use super::{Settings, Step};
+use super::settings::{Settings, Step};
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
-use crate::lmi::factor::Shifted;
+use crate::lmi::factor::RegularisedCholesky;
 
 /// What is minimised over the LMIs.
 #[derive(Debug, Clone)]
@@ -45,8 +45,8 @@ pub(super) struct Engine<'a> {
     pub(super) x: Vec<f64>,
     pub(super) cone: Cone,
     curvature: Option<Mat>,
-    seen_x: Seen,
-    seen_z: Seen,
+    projected_x: ChannelProjection,
+    projected_z: ChannelProjection,
     dz: Blocks,
     corrector: Blocks,
 }
@@ -81,8 +81,8 @@ impl<'a> Engine<'a> {
             x,
             cone,
             curvature,
-            seen_x: Seen::new(count, m, n, k1),
-            seen_z: Seen::new(count, m, n, k1),
+            projected_x: ChannelProjection::new(count, m, n, k1),
+            projected_z: ChannelProjection::new(count, m, n, k1),
             dz: Blocks::zeros(count, order, order),
             corrector: Blocks::zeros(count, order, order),
         })
@@ -133,25 +133,31 @@ impl<'a> Engine<'a> {
         self.cost().iter().zip(self.adjoint(&self.cone.z)).map(|(c, a)| c - a).collect()
     }
 
-    fn newton(&mut self) -> Option<Shifted> {
+    fn newton(&mut self) -> Option<RegularisedCholesky> {
         let taps = self.x.len();
         let order = taps + usize::from(self.free_t());
         let mut matrix = match &self.curvature {
             Some(q) => q.clone(),
             None => Mat::zeros(order, order),
         };
-        self.seen_x.look(&self.cone.x, &self.reduced.h);
-        self.seen_z.look(&self.cone.z, &self.reduced.h);
-        newton::add_taps(&mut matrix, &self.reduced.layout, &self.reduced.phases, &self.seen_x, &self.seen_z);
+        self.projected_x.project(&self.cone.x, &self.reduced.h);
+        self.projected_z.project(&self.cone.z, &self.reduced.h);
+        newton::add_taps(
+            &mut matrix,
+            &self.reduced.layout,
+            &self.reduced.phases,
+            &self.projected_x,
+            &self.projected_z,
+        );
         if self.free_t() {
-            let (row, corner) = newton::border(self.reduced, &self.seen_x, &self.seen_z);
+            let (row, corner) = newton::border(self.reduced, &self.projected_x, &self.projected_z);
             row.iter().enumerate().for_each(|(a, v)| matrix[(taps, a)] = *v);
             matrix[(taps, taps)] = corner;
         }
-        Shifted::new(matrix).ok()
+        RegularisedCholesky::new(matrix).ok()
     }
 
-    fn direction(&self, newton: &Shifted, rhs: &[f64]) -> Direction {
+    fn direction(&self, newton: &RegularisedCholesky, rhs: &[f64]) -> Direction {
         let mut taps = newton.solve(rhs);
         let t = if self.free_t() { taps.pop().unwrap_or(0.0) } else { 0.0 };
         let mut k = self.reduced.image(&taps);
@@ -177,17 +183,17 @@ impl<'a> Engine<'a> {
         let minus_cost: Vec<f64> = cost.iter().map(|c| -c).collect();
         let affine = self.direction(&newton, &minus_cost);
         self.cone.dual_step(&affine.slack, 0.0, None, &mut dz);
-        let reach = self.reach(&affine, &dz, 1.0);
-        let sigma = centering(self.gap_after(gap, &affine, &dz, reach) / gap);
+        let longest = self.max_steps(&affine, &dz, 1.0);
+        let sigma = centering(self.gap_after(gap, &affine, &dz, longest) / gap);
 
         self.cone.corrector(&affine.slack, &dz, &mut corrector);
         let (center, second) = (self.adjoint(&self.cone.x), self.adjoint(&corrector));
         let rhs: Vec<f64> = (0..cost.len()).map(|a| sigma * mu * center[a] - second[a] - cost[a]).collect();
         let full = self.direction(&newton, &rhs);
         self.cone.dual_step(&full.slack, sigma * mu, Some(&corrector), &mut dz);
-        let fraction = settings.step_fraction.min(0.9 + 0.09 * reach.0.min(reach.1));
-        let reach = self.reach(&full, &dz, 1.0 / fraction);
-        let alpha = (fraction * reach.0, fraction * reach.1);
+        let fraction = settings.step_fraction.min(0.9 + 0.09 * longest.0.min(longest.1));
+        let longest = self.max_steps(&full, &dz, 1.0 / fraction);
+        let alpha = (fraction * longest.0, fraction * longest.1);
 
         let done = self.advance(&full, &dz, alpha);
         self.dz = dz;
@@ -205,9 +211,9 @@ impl<'a> Engine<'a> {
 
     /// Primal and dual step lengths to the boundary. With a quadratic objective the dual residual
     /// moves with the taps, so both take the shorter one.
-    fn reach(&mut self, d: &Direction, dz: &Blocks, most: f64) -> (f64, f64) {
-        let primal = self.cone.primal_reach(&d.slack, most);
-        let dual = self.cone.dual_reach(dz, most);
+    fn max_steps(&mut self, d: &Direction, dz: &Blocks, most: f64) -> (f64, f64) {
+        let primal = self.cone.max_primal_step(&d.slack, most);
+        let dual = self.cone.max_dual_step(dz, most);
         if self.free_t() { (primal, dual) } else { (primal.min(dual), primal.min(dual)) }
     }
 

@@ -7,11 +7,11 @@
 use super::basis::Basis;
 use super::interior::{Engine, Objective};
 use super::prepare::Reduced;
-use super::problem::{Point, Problem, SampledError, Square, Taps};
+use super::problem::{MeanSquareObjective, Point, Problem, SampledError, Taps};
 use super::quadratic::Quadratic;
-use super::{Settings, Step};
-use crate::lmi::Stop;
-use crate::lmi::factor::Shifted;
+use super::settings::{Settings, Step};
+use crate::lmi::factor::RegularisedCholesky;
+use crate::lmi::outcome::Outcome;
 
 /// Steps without a better gap after which a run is over.
 const PATIENCE: usize = 6;
@@ -20,7 +20,7 @@ const PATIENCE: usize = 6;
 #[derive(Debug, Clone)]
 pub struct MeanSquare {
     /// Why the iteration ended.
-    pub stop: Stop,
+    pub outcome: Outcome,
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
     /// The second objective of these taps.
@@ -38,9 +38,13 @@ pub struct MeanSquare {
 /// Taps that minimise the second objective, by a QR factorisation (never by normal equations); least norm among
 /// directions weaker than `tol_rank` times the strongest.
 ///
-/// Fails if weights or noise do not fit: see [`Square`].
-pub fn least_squares(problem: &Problem, square: &Square, tol_rank: f64) -> Result<Taps, SampledError> {
-    problem.check_square(square)?;
+/// Fails if weights or noise do not fit: see [`MeanSquareObjective`].
+pub fn least_squares(
+    problem: &Problem,
+    square: &MeanSquareObjective,
+    tol_rank: f64,
+) -> Result<Taps, SampledError> {
+    problem.check_objective(square)?;
     let reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return Ok(problem.zero_taps());
@@ -57,7 +61,7 @@ pub fn least_squares(problem: &Problem, square: &Square, tol_rank: f64) -> Resul
 /// The result is never worse than the start, and satisfies the cap, however the iteration ended.
 pub fn mean_square_under_cap(
     problem: &Problem,
-    square: &Square,
+    square: &MeanSquareObjective,
     cap: f64,
     start: &Taps,
     settings: &Settings,
@@ -69,7 +73,7 @@ pub fn mean_square_under_cap(
     let mut best = Best::new(problem, square, cap, start)?;
     best.offer(free)?;
     if best.mean_square == free_square {
-        return Ok(best.finish(Stop::Solved, free_square, Vec::new()));
+        return Ok(best.finish(Outcome::Solved, free_square, Vec::new()));
     }
     if best.gamma >= cap {
         return Err(SampledError::Cap { cap, gamma: best.gamma });
@@ -80,9 +84,9 @@ pub fn mean_square_under_cap(
     reduced.rescale(cap);
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
     let run = Run { reduced: &reduced, start, quadratic, cap, settings };
-    let (stop, gap, steps) = run.iterate(&mut best)?;
+    let (outcome, gap, steps) = run.iterate(&mut best)?;
     let lower = (best.mean_square - gap * best.mean_square_unit(unit)).max(free_square);
-    Ok(best.finish(stop, lower, steps))
+    Ok(best.finish(outcome, lower, steps))
 }
 
 /// The same points with the error of `start` in place of what is wanted.
@@ -96,7 +100,7 @@ fn shifted(problem: &Problem, start: &Taps) -> Result<Problem, SampledError> {
 
 struct Best<'a> {
     problem: &'a Problem,
-    square: &'a Square,
+    square: &'a MeanSquareObjective,
     cap: f64,
     taps: Taps,
     mean_square: f64,
@@ -105,7 +109,12 @@ struct Best<'a> {
 }
 
 impl<'a> Best<'a> {
-    fn new(problem: &'a Problem, square: &'a Square, cap: f64, start: &Taps) -> Result<Self, SampledError> {
+    fn new(
+        problem: &'a Problem,
+        square: &'a MeanSquareObjective,
+        cap: f64,
+        start: &Taps,
+    ) -> Result<Self, SampledError> {
         let (gamma, worst_point) = problem.worst(start)?;
         let mean_square = problem.mean_square(start, square);
         Ok(Self { problem, square, cap, taps: start.clone(), mean_square, gamma, worst_point })
@@ -126,9 +135,9 @@ impl<'a> Best<'a> {
         unit * self.cap * self.cap
     }
 
-    fn finish(self, stop: Stop, lower: f64, steps: Vec<Step>) -> MeanSquare {
+    fn finish(self, outcome: Outcome, lower: f64, steps: Vec<Step>) -> MeanSquare {
         let Self { taps, mean_square, gamma, worst_point, .. } = self;
-        MeanSquare { stop, taps, mean_square, lower: lower.min(mean_square), gamma, worst_point, steps }
+        MeanSquare { outcome, taps, mean_square, lower: lower.min(mean_square), gamma, worst_point, steps }
     }
 }
 
@@ -141,16 +150,16 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Returns the stop, the gap in scaled units and the record.
-    fn iterate(&self, best: &mut Best<'_>) -> Result<(Stop, f64, Vec<Step>), SampledError> {
+    /// Returns the outcome, the gap in scaled units and the record.
+    fn iterate(&self, best: &mut Best<'_>) -> Result<(Outcome, f64, Vec<Step>), SampledError> {
         let mut steps = Vec::new();
         let zero = vec![0.0; self.reduced.layout.unknowns()];
         let objective = Objective::MeanSquare(self.quadratic.clone());
         let Some(mut engine) = Engine::new(self.reduced, objective, zero, 1.0) else {
-            return Ok((Stop::NumericalTrouble, f64::INFINITY, steps));
+            return Ok((Outcome::NumericalTrouble, f64::INFINITY, steps));
         };
-        let Ok(curvature) = Shifted::new(self.quadratic.curvature(self.reduced)) else {
-            return Ok((Stop::NumericalTrouble, f64::INFINITY, steps));
+        let Ok(curvature) = RegularisedCholesky::new(self.quadratic.curvature(self.reduced)) else {
+            return Ok((Outcome::NumericalTrouble, f64::INFINITY, steps));
         };
         let (mut least, mut waited) = (f64::INFINITY, 0);
         while steps.len() < self.settings.max_iterations {
@@ -168,16 +177,10 @@ impl Run<'_> {
         let gap = duality_gap(&engine, &curvature);
         let relative = gap / engine.value().max(f64::MIN_POSITIVE);
         best.offer(self.taps(&engine.x))?;
-        let stop = if relative <= self.settings.tol_gap_rel {
-            Stop::Solved
-        } else if relative <= self.settings.tol_gap_reduced {
-            Stop::SolvedInaccurate
-        } else if steps.len() >= self.settings.max_iterations {
-            Stop::IterationLimit
-        } else {
-            Stop::NumericalTrouble
-        };
-        Ok((stop, gap, steps))
+        let limit_reached = steps.len() >= self.settings.max_iterations;
+        let solved = [self.settings.tol_gap_rel, self.settings.tol_gap_reduced].map(|tol| relative <= tol);
+        let outcome = Outcome::at_end(solved, limit_reached);
+        Ok((outcome, gap, steps))
     }
 
     fn taps(&self, x: &[f64]) -> Taps {
@@ -188,7 +191,7 @@ impl Run<'_> {
 
 /// `<S, Z> + r' Q^{-1} r / 2` with the dual residual r: how far the Lagrangian's minimum lies below
 /// the objective, whether or not the dual equality holds.
-fn duality_gap(engine: &Engine<'_>, curvature: &Shifted) -> f64 {
+fn duality_gap(engine: &Engine<'_>, curvature: &RegularisedCholesky) -> f64 {
     let r = engine.dual_residual();
     let correction: f64 = curvature.solve(&r).iter().zip(&r).map(|(a, b)| a * b).sum();
     engine.cone.gap() + 0.5 * correction.max(0.0)

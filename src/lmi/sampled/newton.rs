@@ -15,14 +15,14 @@ use crate::linalg::{Complex, Mat};
 
 /// One Hermitian matrix family seen through the rows (u) and channels (v).
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(super) struct ChannelProjection {
     pub(super) uu: Blocks,
     pub(super) vu: Blocks,
     pub(super) vv: Blocks,
     half: Blocks,
 }
 
-impl Seen {
+impl ChannelProjection {
     pub(super) fn new(count: usize, m: usize, n: usize, k: usize) -> Self {
         Self {
             uu: Blocks::zeros(count, m, m),
@@ -33,7 +33,7 @@ impl Seen {
     }
 
     /// Projects the blocks `x` of order m + k through the channels `h` (n x k).
-    pub(super) fn look(&mut self, x: &Blocks, h: &Blocks) {
+    pub(super) fn project(&mut self, x: &Blocks, h: &Blocks) {
         let (m, k) = (self.uu.rows(), h.cols());
         for l in 0..x.count() {
             let (full, h) = (x.block(l), h.block(l));
@@ -54,14 +54,20 @@ fn copy(from: Block<'_>, to: &mut [Complex<f64>]) {
 }
 
 /// Adds the tap-tap part to the lower triangle of `matrix`.
-pub(super) fn add_taps(matrix: &mut Mat, layout: &Layout, phases: &Phases, x: &Seen, z: &Seen) {
+pub(super) fn add_taps(
+    matrix: &mut Mat,
+    layout: &Layout,
+    phases: &Phases,
+    x: &ChannelProjection,
+    z: &ChannelProjection,
+) {
     let (n, count) = (layout.channels, x.uu.count());
     let mut toeplitz = Mat::zeros(n * n, 2 * count);
     let mut hankel = Mat::zeros(n * n, 2 * count);
     for p in 0..layout.rows {
         for p2 in 0..=p {
             for l in 0..count {
-                let (xl, zl) = (SeenAt::new(x, l), SeenAt::new(z, l));
+                let (xl, zl) = (ProjectionAt::new(x, l), ProjectionAt::new(z, l));
                 for i2 in 0..n {
                     for i in 0..n {
                         let t = xl.vv.at(i, i2) * zl.uu.at(p2, p) + xl.uu.at(p2, p) * zl.vv.at(i, i2);
@@ -77,14 +83,14 @@ pub(super) fn add_taps(matrix: &mut Mat, layout: &Layout, phases: &Phases, x: &S
     }
 }
 
-struct SeenAt<'a> {
+struct ProjectionAt<'a> {
     uu: Block<'a>,
     vu: Block<'a>,
     vv: Block<'a>,
 }
 
-impl<'a> SeenAt<'a> {
-    fn new(s: &'a Seen, l: usize) -> Self {
+impl<'a> ProjectionAt<'a> {
+    fn new(s: &'a ChannelProjection, l: usize) -> Self {
         Self { uu: s.uu.block(l), vu: s.vu.block(l), vv: s.vv.block(l) }
     }
 }
@@ -95,13 +101,13 @@ fn put(data: &mut Mat, r: usize, l: usize, count: usize, z: Complex<f64>) {
 }
 
 /// Row and corner of the unknown t: `-Re sum_l e^{-i w j} (Xvu Zuu + Zvu Xuu)_{i,p}` and `Re sum_l tr(Xuu Zuu)`.
-pub(super) fn border(reduced: &Reduced, x: &Seen, z: &Seen) -> (Vec<f64>, f64) {
+pub(super) fn border(reduced: &Reduced, x: &ChannelProjection, z: &ChannelProjection) -> (Vec<f64>, f64) {
     let (n, m) = (reduced.layout.channels, reduced.layout.rows);
     let mut mixed = Blocks::zeros(1, n, m);
     let mut e = Blocks::zeros(reduced.count(), m, n);
     let mut corner = 0.0;
     for l in 0..reduced.count() {
-        let (xl, zl) = (SeenAt::new(x, l), SeenAt::new(z, l));
+        let (xl, zl) = (ProjectionAt::new(x, l), ProjectionAt::new(z, l));
         mixed.block_mut(0).set_product(-1.0, xl.vu.plain(), zl.uu.plain());
         mixed.block_mut(0).add_product(-1.0, zl.vu.plain(), xl.uu.plain());
         let to = e.block_mut(l).data;
@@ -147,8 +153,8 @@ fn add_toeplitz(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (us
 }
 
 fn add_hankel(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (usize, usize), data: &Mat) {
-    let reach = (layout.lags[p] + layout.lags[p2]).max(1) - 1;
-    let sums = phases.sum(data, reach);
+    let lags = (layout.lags[p] + layout.lags[p2]).max(1) - 1;
+    let sums = phases.sum(data, lags);
     each_pair(layout, (p, p2), |row, col, j, j2, r| matrix[(row, col)] += sums[(r, j + j2)]);
 }
 

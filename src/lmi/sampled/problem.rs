@@ -1,7 +1,7 @@
 //! The data of a sampled problem, checked once.
 
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
-use crate::lmi::SettingError;
+use crate::lmi::settings::SettingError;
 
 /// Real taps: `F_j` is M x N, one matrix for each lag j. Entries beyond a row's own number of lags
 /// are zero.
@@ -137,14 +137,14 @@ pub struct Point {
 /// sum_l weights_l ||K_l||_F^2 + sum_i noise_i sum_j |F_j e_i|^2.
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Square {
+pub struct MeanSquareObjective {
     /// One for each point; finite, not negative, not all zero.
     pub weights: Vec<f64>,
     /// Power of the white noise of each channel, N of them; finite, not negative.
     pub noise: Vec<f64>,
 }
 
-impl Square {
+impl MeanSquareObjective {
     /// Noiseless channels.
     pub fn noiseless(weights: Vec<f64>, channels: usize) -> Self {
         Self { weights, noise: vec![0.0; channels] }
@@ -235,8 +235,8 @@ impl Problem {
         Ok(worst)
     }
 
-    /// The second objective's value: see [`Square`].
-    pub fn mean_square(&self, taps: &Taps, square: &Square) -> f64 {
+    /// The second objective's value: see [`MeanSquareObjective`].
+    pub fn mean_square(&self, taps: &Taps, square: &MeanSquareObjective) -> f64 {
         let error = |l: usize| self.error_at(l, taps).iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = square.weights.iter().enumerate().map(|(l, w)| w * error(l)).sum();
         let noise =
@@ -262,7 +262,7 @@ impl Problem {
         Ok(())
     }
 
-    pub(crate) fn check_square(&self, square: &Square) -> Result<(), SampledError> {
+    pub(crate) fn check_objective(&self, square: &MeanSquareObjective) -> Result<(), SampledError> {
         if square.noise.len() != self.channels() {
             let (given, channels) = (square.noise.len(), self.channels());
             return Err(SampledError::NoiseCount { given, channels });

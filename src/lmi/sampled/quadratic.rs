@@ -5,7 +5,7 @@
 
 use super::newton;
 use super::prepare::Reduced;
-use super::problem::{Square, Taps};
+use super::problem::{MeanSquareObjective, Taps};
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
 
@@ -23,7 +23,13 @@ pub(super) struct Quadratic {
 
 impl Quadratic {
     /// `square` about `start`, the taps in units of `cap`, the objective in units of `unit cap^2`.
-    pub(super) fn new(reduced: &Reduced, square: &Square, start: &Taps, cap: f64, unit: f64) -> Self {
+    pub(super) fn new(
+        reduced: &Reduced,
+        square: &MeanSquareObjective,
+        start: &Taps,
+        cap: f64,
+        unit: f64,
+    ) -> Self {
         let weights = square.weights.iter().map(|w| w / unit).collect();
         let mut noisy = reduced.mix.clone();
         noisy.column_iter_mut().zip(&square.noise).for_each(|(mut column, noise)| column *= *noise);

@@ -1,7 +1,7 @@
 use super::*;
 use crate::linalg::{CMat, Complex};
-use crate::lmi::Stop;
 use crate::lmi::testbank::{self, TestBank};
+use crate::lmi::{Outcome, SettingError};
 
 fn bank_problem(bank: &TestBank, omegas: &[f64], taps: usize) -> Problem {
     let points = bank.samples(omegas).into_iter().map(|(omega, w, h)| Point { omega, w, h }).collect();
@@ -25,7 +25,7 @@ fn check(problem: &Problem, s: &Solution) {
 fn report(name: &str, problem: &Problem, s: &Solution, seconds: f64) {
     println!(
         "{name}: {:?} gamma {:.10} lower {:.10} gap {:.1e} steps {} residual {:.1e} {:?} {} unknowns {} points {:.3} s",
-        s.stop,
+        s.outcome,
         s.gamma,
         s.lower.value,
         s.relative_gap(),
@@ -73,7 +73,7 @@ fn golden_numbers_of_the_filter_banks() {
     for (name, bank, taps, want) in cases {
         let problem = bank_problem(bank, &testbank::grid(129), taps);
         let s = solve(name, &problem);
-        assert_eq!(s.stop, Stop::Solved, "{name}");
+        assert_eq!(s.outcome, Outcome::Solved, "{name}");
         assert!((s.gamma - want).abs() < 2e-6 * want, "{name}: {} instead of {want}", s.gamma);
         assert!(s.relative_gap() <= 1e-9, "{name}: {s:?}");
         assert!(s.steps.len() <= 25, "{name}: {} steps", s.steps.len());
@@ -90,19 +90,19 @@ fn steep_front_ends_are_solved_to_a_proven_gap() {
         let problem = bank_problem(&bank, &testbank::grid(97), taps);
         let s = solve("Butterworth 6, eight channels", &problem);
         // Rounding errors of data of order one, beside a gamma of 2e-4 to 1e-2, set this limit.
-        assert!(s.stop.is_solved() && s.relative_gap() < 1e-5, "{}", s.relative_gap());
+        assert!(s.outcome.is_solved() && s.relative_gap() < 1e-5, "{}", s.relative_gap());
         let cap = 1.01 * s.gamma;
-        let square = Square::noiseless(vec![1.0; 97], 8);
+        let square = MeanSquareObjective::noiseless(vec![1.0; 97], 8);
         let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::default()).unwrap();
         println!(
             "{:?} {} -> {} >= {}, {} steps",
-            ms.stop,
+            ms.outcome,
             problem.mean_square(&s.taps, &square),
             ms.mean_square,
             ms.lower,
             ms.steps.len()
         );
-        assert!(ms.stop.is_solved() && ms.gamma <= cap);
+        assert!(ms.outcome.is_solved() && ms.gamma <= cap);
     }
 }
 
@@ -112,7 +112,7 @@ fn channels_that_hold_the_answer_give_zero() {
     let bank = TestBank { delays: vec![0.0, 1.0], ..testbank::thesis() };
     let problem = bank_problem(&bank, &testbank::grid(65), 22);
     let s = solve("integer delays", &problem);
-    assert_eq!(s.stop, Stop::Solved);
+    assert_eq!(s.outcome, Outcome::Solved);
     assert!(s.gamma < 1e-13 && s.lower.value == 0.0, "{}", s.gamma);
 }
 
@@ -183,11 +183,11 @@ fn general_conic_solver_agrees() {
         // Clarabel itself ended some of these at reduced accuracy; our own proven gap is far below.
         assert!((s.gamma - gamma).abs() < 1e-7 * gamma, "{sizes:?}: {} instead of {gamma}", s.gamma);
         let weights = (0..omegas.len()).map(|l| 0.5 + 0.1 * l as f64).collect();
-        let square = Square::noiseless(weights, problem.channels());
+        let square = MeanSquareObjective::noiseless(weights, problem.channels());
         let settings = Settings::default();
         let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &settings).unwrap();
-        println!("{:?}", (ms.stop, ms.mean_square, ms.lower, ms.steps.len()));
-        assert_eq!(ms.stop, Stop::Solved, "{sizes:?}");
+        println!("{:?}", (ms.outcome, ms.mean_square, ms.lower, ms.steps.len()));
+        assert_eq!(ms.outcome, Outcome::Solved, "{sizes:?}");
         assert!((ms.mean_square - capped).abs() < 2e-7 * capped, "{sizes:?}: {}", ms.mean_square);
         assert!(ms.gamma <= cap && ms.lower <= ms.mean_square && ms.lower > capped * (1.0 - 2e-7));
         let taps = least_squares(&problem, &square, 1e-12).unwrap();
@@ -248,7 +248,7 @@ fn every_shape_is_solved_to_a_proven_gap() {
     for (seed, (sizes, points, lags)) in SHAPES.into_iter().enumerate() {
         let problem = random_problem(seed as u64, sizes, points, lags);
         let s = solve(&format!("{sizes:?} {points} {lags:?}"), &problem);
-        assert_eq!(s.stop, Stop::Solved);
+        assert_eq!(s.outcome, Outcome::Solved);
         assert!(s.relative_gap() <= 1e-9);
     }
 }
@@ -262,10 +262,10 @@ fn units_do_not_matter() {
     for scale in [1e-9, 1e9] {
         let wanted = changed(&problem, |_, p| p.w *= Complex::new(scale, 0.0));
         let s = solve("wanted scaled", &wanted);
-        assert!(s.stop == Stop::Solved && (s.gamma / scale - gamma).abs() < 2e-9 * gamma);
+        assert!(s.outcome == Outcome::Solved && (s.gamma / scale - gamma).abs() < 2e-9 * gamma);
         let channel = changed(&problem, |_, p| p.h.row_mut(1).iter_mut().for_each(|z| *z *= scale));
         let s = solve("channel scaled", &channel);
-        assert!(s.stop == Stop::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
+        assert!(s.outcome == Outcome::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
     }
     let mut r = Random(3);
     let turn = crate::linalg::svd_c(&r.matrix(4, 4)).unwrap().u;
@@ -284,7 +284,7 @@ fn equal_channels_count_once() {
             p.h = CMat::from_fn(2, 3, |i, j| h[(0, j)] * if i == 0 { 1.0 } else { factor });
         });
         let s = solve("double", &double);
-        assert!(s.stop == Stop::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
+        assert!(s.outcome == Outcome::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
         assert!(s.taps.iter().all(|f| f.norm() < 1e2 / factor.abs().min(1.0)));
     }
     let silent = changed(&single, |_, p| {
@@ -292,7 +292,7 @@ fn equal_channels_count_once() {
         p.h = CMat::from_fn(2, 3, |i, j| if i == 0 { h[(0, j)] } else { Complex::default() });
     });
     let s = solve("silent second channel", &silent);
-    assert!(s.stop == Stop::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
+    assert!(s.outcome == Outcome::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
     assert!(s.taps.iter().all(|f| f.column(1).norm() == 0.0));
 }
 
@@ -305,7 +305,7 @@ fn nearly_equal_channels_are_solved_to_the_reduced_gap() {
         p.h.row_mut(1).iter_mut().zip(first.iter()).for_each(|(z, f)| *z = *f + *z * 1e-6);
     });
     let (s, apart) = (solve("nearly equal", &near), solve("apart", &problem));
-    assert!(s.stop.is_solved() && s.relative_gap() < 1e-6, "{}", s.relative_gap());
+    assert!(s.outcome.is_solved() && s.relative_gap() < 1e-6, "{}", s.relative_gap());
     // The span of the channels is the same, so the optimum is too.
     assert!((s.gamma - apart.gamma).abs() < 1e-6 * apart.gamma);
 }
@@ -314,17 +314,17 @@ fn nearly_equal_channels_are_solved_to_the_reduced_gap() {
 fn problems_without_a_choice_are_right() {
     let problem = random_problem(5, (2, 2, 3), 9, &[0, 0]);
     let s = solve("no taps", &problem);
-    assert!(s.stop == Stop::Solved && s.taps.is_empty() && s.relative_gap() < 1e-12);
+    assert!(s.outcome == Outcome::Solved && s.taps.is_empty() && s.relative_gap() < 1e-12);
     let deaf = changed(&random_problem(5, (2, 2, 3), 9, &[2, 2]), |_, p| p.h.fill(Complex::default()));
     let s = solve("H = 0", &deaf);
     assert!(
-        s.stop == Stop::Solved
+        s.outcome == Outcome::Solved
             && s.relative_gap() < 1e-12
             && s.gamma == deaf.worst(&deaf.zero_taps()).unwrap().0
     );
     let nothing = changed(&random_problem(5, (2, 2, 3), 9, &[2, 2]), |_, p| p.w.fill(Complex::default()));
     let s = solve("W = 0", &nothing);
-    assert!(s.stop == Stop::Solved && s.gamma == 0.0 && s.taps.iter().all(|f| f.norm() == 0.0));
+    assert!(s.outcome == Outcome::Solved && s.gamma == 0.0 && s.taps.iter().all(|f| f.norm() == 0.0));
 }
 
 /// W in the row space of H by known taps: found again, whatever their size.
@@ -338,7 +338,7 @@ fn exactly_reproducible_targets_give_zero() {
         let zero = changed(&problem, |_, p| p.w.fill(Complex::default()));
         let reachable = changed(&problem, |l, p| p.w = -zero.error_at(l, &taps));
         let s = solve("reachable", &reachable);
-        assert!(s.stop == Stop::Solved && s.gamma < 1e-12);
+        assert!(s.outcome == Outcome::Solved && s.gamma < 1e-12);
         for (a, b) in s.taps.iter().zip(&taps) {
             assert!((a - b).norm() < 1e-10);
         }
@@ -376,19 +376,19 @@ fn mean_square_under_a_cap_is_never_worse_than_the_start() {
     for (seed, (sizes, points, lags)) in SHAPES.into_iter().enumerate() {
         let problem = random_problem(seed as u64, sizes, points, lags);
         let s = minimise(&problem, &Settings::default()).unwrap();
-        let square = Square::noiseless(vec![1.0; points], problem.channels());
+        let square = MeanSquareObjective::noiseless(vec![1.0; points], problem.channels());
         let mut last = problem.mean_square(&s.taps, &square) * (1.0 + 1e-12);
         for slack in [1e-6, 1e-3, 1e-1, 10.0] {
             let cap = s.gamma * (1.0 + slack);
             let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, &Settings::default()).unwrap();
             println!(
                 "{sizes:?} slack {slack}: {:?} {} {} {}",
-                ms.stop,
+                ms.outcome,
                 ms.mean_square,
                 ms.lower,
                 ms.steps.len()
             );
-            assert!(ms.stop.is_solved() && ms.gamma <= cap && ms.mean_square <= last * (1.0 + 1e-7));
+            assert!(ms.outcome.is_solved() && ms.gamma <= cap && ms.mean_square <= last * (1.0 + 1e-7));
             assert!(ms.lower >= ms.mean_square * (1.0 - 1e-5), "{ms:?}");
             last = ms.mean_square;
         }
@@ -404,7 +404,7 @@ fn an_exhausted_iteration_limit_keeps_honest_bounds() {
     for max_iterations in 0..6 {
         let s = minimise(&problem, &Settings { max_iterations, ..Settings::default() }).unwrap();
         check(&problem, &s);
-        assert_eq!(s.stop, Stop::IterationLimit);
+        assert_eq!(s.outcome, Outcome::IterationLimit);
         assert_eq!(s.steps.len(), max_iterations);
         assert!(s.gamma >= full.lower.value && s.lower.value <= full.gamma && s.lower.value > 0.0);
     }
@@ -442,10 +442,14 @@ fn what_is_no_problem_is_refused() {
     ));
     let s = minimise(&good, &Settings::default()).unwrap();
     let channels = good.channels();
-    let with = |weights: &[f64], noise: &[f64]| Square { weights: weights.to_vec(), noise: noise.to_vec() };
-    let capped =
-        |square: &Square, cap, taps| mean_square_under_cap(&good, square, cap, taps, &Settings::default());
-    let ones = Square::noiseless(vec![1.0; 3], channels);
+    let with = |weights: &[f64], noise: &[f64]| MeanSquareObjective {
+        weights: weights.to_vec(),
+        noise: noise.to_vec(),
+    };
+    let capped = |square: &MeanSquareObjective, cap, taps| {
+        mean_square_under_cap(&good, square, cap, taps, &Settings::default())
+    };
+    let ones = MeanSquareObjective::noiseless(vec![1.0; 3], channels);
     let refused = |weights: &[f64], noise: &[f64]| capped(&with(weights, noise), 1.0, &s.taps).unwrap_err();
     assert!(matches!(refused(&[1.0; 2], &ones.noise), SampledError::Count { given: 2, points: 3, .. }));
     assert!(matches!(refused(&[1.0, -1.0, 1.0], &ones.noise), SampledError::Weight { point: 1, .. }));
@@ -468,7 +472,7 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
     let problem = random_problem(11, (m, n, q), 9, &lags);
     let s = minimise(&problem, &Settings::default()).unwrap();
     for noise in [[0.3, 2.0], [0.0, 1.0], [1e-6, 1e3]] {
-        let square = Square { weights: vec![1.0; 9], noise: noise.to_vec() };
+        let square = MeanSquareObjective { weights: vec![1.0; 9], noise: noise.to_vec() };
         let (circle, faint) = (8, 1e-4);
         let points = (0..circle).map(|l| {
             let mut h = CMat::zeros(n, q);
@@ -478,7 +482,7 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
         let mut weights = vec![1.0; 9];
         weights.extend(vec![1.0 / (faint * faint * circle as f64); circle]);
         let longer = problem.with_points(points).unwrap();
-        let alike = Square::noiseless(weights, n);
+        let alike = MeanSquareObjective::noiseless(weights, n);
         let value = problem.mean_square(&s.taps, &square);
         assert!((longer.mean_square(&s.taps, &alike) - value).abs() < 1e-9 * value);
         let free = problem.mean_square(&least_squares(&problem, &square, 1e-12).unwrap(), &square);
@@ -486,11 +490,14 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
         assert!((free - other).abs() < 1e-9 * free, "{noise:?}: {free} {other}");
         for slack in [1e-3, 0.05, 0.5] {
             let cap = (1.0 + slack) * s.gamma;
-            let capped = |p: &Problem, q: &Square| {
+            let capped = |p: &Problem, q: &MeanSquareObjective| {
                 mean_square_under_cap(p, q, cap, &s.taps, &Settings::default()).unwrap()
             };
             let (a, b) = (capped(&problem, &square), capped(&longer, &alike));
-            assert!(a.stop.is_solved() && a.gamma <= cap && a.lower >= a.mean_square * (1.0 - 1e-6), "{a:?}");
+            assert!(
+                a.outcome.is_solved() && a.gamma <= cap && a.lower >= a.mean_square * (1.0 - 1e-6),
+                "{a:?}"
+            );
             let apart = (a.mean_square - b.mean_square).abs();
             assert!(
                 apart < 1e-6 * a.mean_square,
@@ -520,7 +527,7 @@ proptest::proptest! {
         let s = minimise(&problem, &Settings::default()).unwrap();
         check(&problem, &s);
         let zero = problem.worst(&problem.zero_taps()).unwrap().0;
-        proptest::prop_assert!(s.stop.is_solved(), "{:?}", s);
+        proptest::prop_assert!(s.outcome.is_solved(), "{:?}", s);
         proptest::prop_assert!(s.gamma <= zero * (1.0 + 1e-12) && s.lower.value <= s.gamma * (1.0 + 1e-12));
         proptest::prop_assert!(s.gamma - s.lower.value <= (1e-6 * s.gamma).max(1e-12 * zero), "{:?}", s);
     }

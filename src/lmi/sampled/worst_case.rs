@@ -5,9 +5,9 @@ use super::bound::{self, Covered, LowerBound};
 use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::{Problem, SampledError, Taps};
-use super::{Settings, Step};
+use super::settings::{Settings, Step};
 use crate::linalg::{self, CMat};
-use crate::lmi::Stop;
+use crate::lmi::outcome::Outcome;
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
@@ -19,7 +19,7 @@ const PATIENCE: usize = 6;
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// Why the iteration ended.
-    pub stop: Stop,
+    pub outcome: Outcome,
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
     /// Worst `sigma_max(K_l)` of these very taps over the points.
@@ -44,7 +44,7 @@ impl Solution {
 /// Minimises the worst-case norm. See the module's text for the problem and the method.
 ///
 /// Every well-formed problem has a solution: the result always holds the best taps found, their exact
-/// norm on the points and a proven lower bound; `stop` says whether the two met. Fails only on
+/// norm on the points and a proven lower bound; `outcome` says whether the two met. Fails only on
 /// settings out of range or if a decomposition does not converge.
 pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, SampledError> {
     settings.check()?;
@@ -56,15 +56,15 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, Samp
     let x = basis.least_squares(&reduced, &reduced.w, settings.tol_rank);
     let mut best = Best::new(problem, reduced.taps(&x), settings)?;
     if best.solved(settings.tol_gap_rel) {
-        return Ok(best.finish(Stop::Solved, Vec::new()));
+        return Ok(best.finish(Outcome::Solved, Vec::new()));
     }
     // Shift and scale to the least-squares solution: what is left to do is of order one.
     let scale = best.gamma;
     reduced.w = reduced.error(&x);
     reduced.rescale(scale);
     let run = Run { problem, reduced: &reduced, basis: &basis, settings, start: x, scale };
-    let (stop, steps) = run.iterate(&mut best)?;
-    Ok(best.finish(stop, steps))
+    let (outcome, steps) = run.iterate(&mut best)?;
+    Ok(best.finish(outcome, steps))
 }
 
 /// No taps to choose: the norm is what it is, and its own singular vectors prove it.
@@ -75,7 +75,7 @@ fn fixed(problem: &Problem) -> Result<Solution, SampledError> {
     let svd = linalg::svd_c(&problem.points()[worst_point].w)?;
     dual[worst_point] = svd.u.column(0) * svd.v.column(0).adjoint();
     let lower = LowerBound { covered: Covered::All, ..bound::lower_bound(problem, &dual, 0.0)? };
-    Ok(Solution { stop: Stop::Solved, taps, gamma, worst_point, lower, dual, steps: Vec::new() })
+    Ok(Solution { outcome: Outcome::Solved, taps, gamma, worst_point, lower, dual, steps: Vec::new() })
 }
 
 struct Best<'a> {
@@ -112,9 +112,9 @@ impl<'a> Best<'a> {
         Ok(())
     }
 
-    fn finish(self, stop: Stop, steps: Vec<Step>) -> Solution {
+    fn finish(self, outcome: Outcome, steps: Vec<Step>) -> Solution {
         let Self { taps, gamma, worst_point, lower, dual, .. } = self;
-        Solution { stop, taps, gamma, worst_point, lower, dual, steps }
+        Solution { outcome, taps, gamma, worst_point, lower, dual, steps }
     }
 }
 
@@ -129,11 +129,11 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn iterate(&self, best: &mut Best<'_>) -> Result<(Stop, Vec<Step>), SampledError> {
+    fn iterate(&self, best: &mut Best<'_>) -> Result<(Outcome, Vec<Step>), SampledError> {
         let mut steps = Vec::new();
         let zero = vec![0.0; self.start.len()];
         let Some(mut engine) = Engine::new(self.reduced, Objective::WorstCase, zero, START_MARGIN) else {
-            return Ok((Stop::NumericalTrouble, steps));
+            return Ok((Outcome::NumericalTrouble, steps));
         };
         let (mut least, mut waited) = (f64::INFINITY, 0);
         while steps.len() < self.settings.max_iterations {
@@ -141,7 +141,7 @@ impl Run<'_> {
             if merit <= 4.0 * self.settings.tol_gap_rel {
                 self.judge(&engine, best)?;
                 if best.solved(self.settings.tol_gap_rel) {
-                    return Ok((Stop::Solved, steps));
+                    return Ok((Outcome::Solved, steps));
                 }
             }
             waited = if merit < 0.9 * least { 0 } else { waited + 1 };
@@ -155,16 +155,10 @@ impl Run<'_> {
             }
         }
         self.judge(&engine, best)?;
-        let stop = if best.solved(self.settings.tol_gap_rel) {
-            Stop::Solved
-        } else if best.solved(self.settings.tol_gap_reduced) {
-            Stop::SolvedInaccurate
-        } else if steps.len() >= self.settings.max_iterations {
-            Stop::IterationLimit
-        } else {
-            Stop::NumericalTrouble
-        };
-        Ok((stop, steps))
+        let limit_reached = steps.len() >= self.settings.max_iterations;
+        let solved = [self.settings.tol_gap_rel, self.settings.tol_gap_reduced].map(|tol| best.solved(tol));
+        let outcome = Outcome::at_end(solved, limit_reached);
+        Ok((outcome, steps))
     }
 
     /// Exact norm of the taps and proven bound of the dual matrices of the iterate.

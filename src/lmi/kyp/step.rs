@@ -4,7 +4,7 @@ use crate::linalg::{self, LinalgError, Mat};
 
 /// Largest alpha for which `m + alpha d` stays positive semidefinite (infinite if all do); m must be
 /// positive definite.
-pub(super) fn reach(m: &Mat, d: &Mat) -> Result<f64, LinalgError> {
+pub(super) fn max_step(m: &Mat, d: &Mat) -> Result<f64, LinalgError> {
     if m.is_empty() {
         return Ok(f64::INFINITY);
     }
