@@ -2,7 +2,7 @@
 
 use super::equivalence::BlockedPlant;
 use super::problem::{Part, Problem};
-use super::quantise::{self, WordStudy, quantise};
+use super::quantise::{QuantisationProblem, WordStudy, quantise};
 use super::reduction::{self, Aim, OrderReduction};
 use super::{DesignError, comparison, error_system, fir, iir};
 use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
@@ -228,9 +228,9 @@ fn with_integers(
     let (SynthesisFilters::Fir(taps), Some(bits)) = (filters, &spec.design.bits) else {
         return Ok(written);
     };
-    let subject =
-        quantise::Subject { plant, taps, noise, gamma_margin: spec.design.gamma_margin.unwrap_or(0.0) };
-    let (integers, study) = quantise(subject, peak.gain, bits, spec.design.fraction_bits)?;
+    let problem =
+        QuantisationProblem { plant, taps, noise, gamma_margin: spec.design.gamma_margin.unwrap_or(0.0) };
+    let (integers, study) = quantise(problem, peak.gain, bits, spec.design.fraction_bits)?;
     let judged = judged(plant, SynthesisFilters::Fir(integers.taps()))?;
     Ok(Written { judged, integers: Some((integers, study)), ..written })
 }

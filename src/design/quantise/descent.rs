@@ -1,14 +1,14 @@
-//! Descent on the worst case itself: one tap, or two together, by one step.
+//! Descent on gamma itself: one tap or a pair of taps changes by one step.
 
-use super::super::DesignError;
-use super::super::error_grid::error_at;
 use super::lattice::Span;
+use crate::design::DesignError;
+use crate::design::error_grid::error_at;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
 
-/// Moves that are tried in pairs: those that do most against the worst case.
+/// Moves tried in pairs: those that lower the error at the worst frequency most.
 const PAIRED: usize = 48;
-/// A step must take away this part of the excess over the real taps.
+/// A move must remove this fraction of the excess over gamma of the real taps.
 const WORTHWHILE: f64 = 0.02;
 /// Rounds of single moves and pairs.
 const ROUNDS: usize = 16;
@@ -29,13 +29,13 @@ pub(super) struct Descent<'a> {
     ratio: usize,
     step: f64,
     spans: &'a [Span],
-    /// A list a channel.
+    /// One list per channel.
     integers: Vec<Vec<f64>>,
     errors: Vec<CMat>,
     gains: Vec<f64>,
     /// The points, the worst ones first.
     order: Vec<usize>,
-    /// The worst case of the real taps.
+    /// gamma of the real taps.
     real: f64,
     worst: f64,
 }
@@ -59,8 +59,7 @@ impl<'a> Descent<'a> {
         Ok(descent)
     }
 
-    /// The integers when no move helps any more, or the excess of the worst case over that of the real taps is
-    /// `negligible` (relative).
+    /// Descends until no move helps, or the relative excess over gamma of the real taps is at most `negligible`.
     pub(super) fn run(mut self, negligible: f64) -> Result<Vec<Vec<f64>>, DesignError> {
         let floor = self.real * (1.0 + negligible);
         for _ in 0..ROUNDS {
@@ -104,10 +103,10 @@ impl<'a> Descent<'a> {
 
     /// Makes the first pair of moves that helps; whether there is one.
     fn pairs(&mut self) -> Result<bool, DesignError> {
-        let top = self.order[0];
+        let worst_point = self.order[0];
         let mut ranked = Vec::new();
         for m in self.moves() {
-            ranked.push((self.gain_after(top, &[m])?, m));
+            ranked.push((self.gain_after(worst_point, &[m])?, m));
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         ranked.truncate(PAIRED);
@@ -123,7 +122,7 @@ impl<'a> Descent<'a> {
 
     fn make_if_better(&mut self, moves: &[Move]) -> Result<bool, DesignError> {
         let bar = self.worst - WORTHWHILE * (self.worst - self.real).max(0.0);
-        // The worst points, which come first, refute most moves.
+        // The worst points come first, because they reject most moves.
         for &k in &self.order {
             if self.gain_after(k, moves)? > bar {
                 return Ok(false);
@@ -149,9 +148,9 @@ impl<'a> Descent<'a> {
         let mut error = self.errors[k].clone();
         for m in moves {
             let (phase, lag) = (m.tap % self.ratio, m.tap / self.ratio);
-            let turn = Complex::from_polar(m.steps * self.step, -point.omega * lag as f64);
+            let phasor = Complex::from_polar(m.steps * self.step, -point.omega * lag as f64);
             for (e, h) in error.row_mut(phase).iter_mut().zip(point.h.row(m.channel).iter()) {
-                *e -= turn * h;
+                *e -= phasor * h;
             }
         }
         error

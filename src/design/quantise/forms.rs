@@ -1,25 +1,25 @@
-//! What a change of the taps does to the error, on average over weighted frequencies.
+//! The mean-square error that a change of the taps adds, over weighted frequencies.
 //!
-//! With taps off by Delta the error is off by `Delta H`, and its mean square `sum_k w_k |Delta(w_k) H(w_k)|^2` falls apart into
-//! one quadratic form for each phase p, in the taps `f_i[p + j M]` of that phase:
+//! A change Delta of the taps adds `Delta H` to the error. The mean square `sum_k w_k |Delta(w_k) H(w_k)|^2` is a sum of one
+//! quadratic form per phase p, in the taps `f_i[p + j M]` of that phase:
 //!
 //! ```text
 //! Q[(i, j), (i', j')] = sum_k w_k Re( e^{-i omega_k (j - j')} (H H*)[i, i'] )
 //! ```
 
-use super::super::DesignError;
+use crate::design::DesignError;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
 
-/// Added to the diagonal, relative to each entry of it, since channels may differ by many decades: taps of channels that
-/// say the same are not determined.
+/// Added to the diagonal, because the form is singular for equal channels. Relative to each entry, because channels may
+/// differ by many decades.
 const RIDGE: f64 = 1e-12;
 
 /// A tap of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Tap {
     pub(super) channel: usize,
-    /// Slow ticks back.
+    /// Delay in slow periods.
     pub(super) lag: usize,
 }
 
@@ -43,14 +43,14 @@ impl Forms {
         }
     }
 
-    /// The correlations for `lags` lags, one weight a frequency.
+    /// The correlations for `lags` lags, with one weight per frequency.
     pub(super) fn correlations(&self, weights: &[f64], lags: usize) -> Correlations {
         let channels = self.grams[0].nrows();
         let mut by_lag = vec![Mat::zeros(channels, channels); lags];
         for ((omega, gram), weight) in self.omegas.iter().zip(&self.grams).zip(weights) {
             for (d, sum) in by_lag.iter_mut().enumerate() {
-                let turn = Complex::from_polar(*weight, -omega * d as f64);
-                sum.zip_apply(gram, |x, g| *x += turn.re * g.re - turn.im * g.im);
+                let phasor = Complex::from_polar(*weight, -omega * d as f64);
+                sum.zip_apply(gram, |x, g| *x += phasor.re * g.re - phasor.im * g.im);
             }
         }
         Correlations { by_lag }
@@ -61,7 +61,7 @@ impl Correlations {
     /// L with `L L' = Q` for the taps given.
     ///
     /// # Errors
-    /// [`DesignError::Linalg`] if the form is not positive by far more than rounding.
+    /// [`DesignError::Linalg`] if rounding errors make the form indefinite.
     pub(super) fn factor(&self, taps: &[Tap]) -> Result<Mat, DesignError> {
         let n = taps.len();
         let mut form = Mat::from_fn(n, n, |r, c| self.between(taps[r], taps[c]));

@@ -1,15 +1,15 @@
-//! Closest points of a lattice: integers near given reals in the sense of a quadratic form.
+//! Closest points of a lattice: integers near given reals in a quadratic form.
 //!
-//! Minimise `|L' (x - c)|^2` over integer x in a box. The unknowns are decided from the last to the first; each decision
-//! moves what is best for those that follow by what the form says about both (Babai's nearest plane), and the
-//! cheapest partial decisions are followed side by side (a breadth-first sphere decoder with a bounded list).
+//! Minimises `|L' (x - c)|^2` over integer x in a box. The unknowns are decided from the last to the first, each given the
+//! decisions before it (Babai's nearest plane). A bounded list of the cheapest partial decisions is kept (a breadth-first
+//! sphere decoder).
 //!
 //! Sources: Babai, Combinatorica 6 (1986); Anderson and Mohan, IEEE Trans. Commun. 32 (1984) for the list.
 
 use crate::linalg::Mat;
 use crate::spec::WordLengths;
 
-/// Partial decisions that are followed.
+/// Partial decisions kept.
 const LIST: usize = 32;
 
 /// Integers between two bounds, both included.
@@ -20,7 +20,7 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// What tap `n` may be.
+    /// The range of tap `n`.
     pub(super) fn of(bits: &WordLengths, n: usize) -> Self {
         let (least, most) = bits.span(n);
         Self { least: least as f64, most: most as f64 }
@@ -41,7 +41,7 @@ impl Span {
     }
 }
 
-/// The unknowns decided so far, as deviations from the centre, with their share of the form.
+/// The unknowns decided so far, as deviations from the centre, with the value of the form.
 #[derive(Clone)]
 struct Partial {
     deviations: Vec<f64>,
@@ -49,7 +49,7 @@ struct Partial {
 }
 
 /// An integer point near `centre` with a small `|L' (x - c)|^2`, L = `factor` lower triangular, x_i in `spans[i]`.
-/// It is the closest one for one unknown, and for a diagonal form; otherwise most often.
+/// It is the closest one if there is one unknown or the form is diagonal; otherwise it may not be.
 pub(super) fn closest(factor: &Mat, centre: &[f64], spans: &[Span]) -> Vec<f64> {
     let n = centre.len();
     let mut list = vec![Partial { deviations: vec![0.0; n], cost: 0.0 }];
@@ -64,7 +64,7 @@ pub(super) fn closest(factor: &Mat, centre: &[f64], spans: &[Span]) -> Vec<f64> 
     best.iter().zip(centre).map(|(deviation, c)| (c + deviation).round()).collect()
 }
 
-/// Unknown i at the two integers nearest to what is best after the decisions made.
+/// Unknown i at the two integers nearest to its best real value given the decisions made.
 fn decide<'a>(
     partial: &'a Partial,
     i: usize,
@@ -75,14 +75,14 @@ fn decide<'a>(
     let column = factor.column(i);
     let pull: f64 = (i + 1..partial.deviations.len()).map(|l| column[l] * partial.deviations[l]).sum();
     let weight = column[i];
-    let wanted = centre - pull / weight;
-    let nearest = span.nearest(wanted);
-    let other = span.nearest(if wanted > nearest { nearest + 1.0 } else { nearest - 1.0 });
+    let best = centre - pull / weight;
+    let nearest = span.nearest(best);
+    let other = span.nearest(if best > nearest { nearest + 1.0 } else { nearest - 1.0 });
     let count = if other == nearest { 1 } else { 2 };
     [nearest, other].into_iter().take(count).map(move |x| {
         let mut next = partial.clone();
         next.deviations[i] = x - centre;
-        next.cost += (weight * (x - wanted)).powi(2);
+        next.cost += (weight * (x - best)).powi(2);
         next
     })
 }

@@ -1,76 +1,64 @@
-//! Integers at one scale: closest lattice points that follow the worst frequencies, then a descent.
+//! Integers at one scale: closest lattice points with weights on the worst frequencies, then a descent.
 
-use super::super::DesignError;
-use super::super::error_system::by_lag;
 use super::descent::Descent;
 use super::forms::Tap;
 use super::lattice::{Span, closest};
-use super::quantiser::Quantiser;
+use super::problem::{Candidate, TapError};
 use crate::bank::FixedPoint;
+use crate::design::DesignError;
+use crate::design::error_system::by_lag;
 use crate::spec::WordLengths;
 
-/// Rounds in which the weights follow the worst frequencies.
+/// Rounds of reweighting.
 const ROUNDS: usize = 12;
-/// Part of the weights that a round replaces.
+/// Fraction of the weights that a round replaces.
 const PACE: f64 = 0.2;
-/// Weight of the worst frequency, relative to the even weights of the beginning.
+/// Weight of the worst frequency, relative to the uniform weights of the start.
 const EMPHASIS: f64 = 3.0;
-/// Relative excess over the gamma of the real taps that is as good as none: 0.0002 dB.
+/// Relative excess over the gamma of the real taps that counts as none: 0.0002 dB.
 const NEGLIGIBLE: f64 = 2e-5;
-/// Integers as doubles, a list a channel.
+/// Integers as doubles, one list per channel.
 type Integers = Vec<Vec<f64>>;
-
-/// Integers that were looked at.
-pub(super) struct Candidate {
-    pub(super) fixed_point: FixedPoint,
-    /// gamma, estimated.
-    pub(super) gamma: f64,
-    /// The mean square of the error and of the converters' noise at the output, a tick.
-    pub(super) mean_square: f64,
-}
 
 /// The search at one scale.
 pub(super) struct Search<'a> {
-    quantiser: &'a Quantiser<'a>,
+    error: &'a TapError<'a>,
     bits: &'a WordLengths,
     fraction_bits: i32,
-    /// The taps in steps.
+    /// The real taps in units of the step.
     centre: Integers,
     spans: Vec<Span>,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(quantiser: &'a Quantiser<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
+    pub(super) fn new(error: &'a TapError<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
         let factor = f64::from(fraction_bits).exp2();
-        let centre: Integers = quantiser
-            .subject
-            .taps
-            .iter()
-            .map(|filter| filter.iter().map(|tap| tap * factor).collect())
-            .collect();
+        let centre: Integers =
+            error.problem.taps.iter().map(|filter| filter.iter().map(|tap| tap * factor).collect()).collect();
         let spans = (0..centre[0].len()).map(|n| Span::of(bits, n)).collect();
-        Self { quantiser, bits, fraction_bits, centre, spans }
+        Self { error, bits, fraction_bits, centre, spans }
     }
 
-    /// All candidates: the rounded taps, those of the rounds, and what a descent makes of the best of these.
+    /// All candidates: the rounded taps, those of the rounds of reweighting, and the end of a descent from the best of
+    /// these.
     pub(super) fn run(&self) -> Result<Vec<Candidate>, DesignError> {
-        let mut found = vec![self.quantiser.candidate(self.rounded())?];
-        self.follow_the_peaks(&mut found)?;
+        let mut found = vec![self.error.candidate(self.rounded())?];
+        self.reweighted(&mut found)?;
         let start = found.iter().min_by(|a, b| a.gamma.total_cmp(&b.gamma)).ok_or(DesignError::NoTaps)?;
-        found.push(self.quantiser.candidate(self.descended(&start.fixed_point)?)?);
+        found.push(self.error.candidate(self.descended(&start.fixed_point)?)?);
         Ok(found)
     }
 
     fn descended(&self, start: &FixedPoint) -> Result<FixedPoint, DesignError> {
-        let points = self.quantiser.grid.points();
+        let points = self.error.grid.points();
         let integers = start.integers.iter().map(|list| list.iter().map(|&x| x as f64).collect()).collect();
-        let lags = by_lag(&start.taps(), self.quantiser.ratio);
-        let real = self.quantiser.real;
+        let lags = by_lag(&start.taps(), self.error.ratio);
+        let real = self.error.real_gamma;
         let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
         Ok(self.fixed_point(&descent.run(NEGLIGIBLE)?))
     }
 
-    /// The taps rounded one by one, cut off where they leave their bits.
+    /// The taps rounded one by one, clipped to their bits.
     pub(super) fn rounded(&self) -> FixedPoint {
         let round = |filter: &Vec<f64>| {
             filter.iter().zip(&self.spans).map(|(tap, span)| span.nearest(*tap)).collect()
@@ -78,20 +66,20 @@ impl<'a> Search<'a> {
         self.fixed_point(&self.centre.iter().map(round).collect())
     }
 
-    /// Closest lattice points with weights that grow where the last one was worst.
-    fn follow_the_peaks(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
-        let real = self.quantiser.real;
-        let mut weights = vec![1.0; self.quantiser.grid.points().len()];
+    /// Closest lattice points, with weights that grow at the frequencies where the last point was worst (Lawson).
+    fn reweighted(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
+        let real = self.error.real_gamma;
+        let mut weights = vec![1.0; self.error.grid.points().len()];
         for _ in 0..ROUNDS {
-            let candidate = self.quantiser.candidate(self.fixed_point(&self.closest(&weights)?))?;
-            let lags = by_lag(&candidate.fixed_point.taps(), self.quantiser.ratio);
-            let room = candidate.gamma - real;
+            let candidate = self.error.candidate(self.fixed_point(&self.closest(&weights)?))?;
+            let lags = by_lag(&candidate.fixed_point.taps(), self.error.ratio);
+            let excess_of_worst = candidate.gamma - real;
             found.push(candidate);
-            if room <= NEGLIGIBLE * real {
+            if excess_of_worst <= NEGLIGIBLE * real {
                 break;
             }
-            for (weight, gain) in weights.iter_mut().zip(self.quantiser.grid.gains(&lags)?) {
-                let excess = ((gain - real) / room).max(0.0);
+            for (weight, gain) in weights.iter_mut().zip(self.error.grid.gains(&lags)?) {
+                let excess = ((gain - real) / excess_of_worst).max(0.0);
                 *weight = (1.0 - PACE) * *weight + PACE * EMPHASIS * excess * excess;
             }
         }
@@ -100,9 +88,9 @@ impl<'a> Search<'a> {
 
     /// The closest integers in the mean-square sense with these weights, phase by phase.
     fn closest(&self, weights: &[f64]) -> Result<Integers, DesignError> {
-        let ratio = self.quantiser.ratio;
+        let ratio = self.error.ratio;
         let lags = self.spans.len().div_ceil(ratio);
-        let correlations = self.quantiser.forms.correlations(weights, lags);
+        let correlations = self.error.forms.correlations(weights, lags);
         let mut integers = self.centre.clone();
         for phase in 0..ratio.min(self.spans.len()) {
             let taps = self.taps_of(phase);
@@ -117,10 +105,10 @@ impl<'a> Search<'a> {
         Ok(integers)
     }
 
-    /// The taps of a phase, in the order of time; those with few bits last, where they are decided first and the others
-    /// can make up for what they cannot do.
+    /// The taps of a phase in the order of time, those with few bits last. The lattice search decides the last ones first,
+    /// so that taps with more bits compensate for them.
     fn taps_of(&self, phase: usize) -> Vec<Tap> {
-        let ratio = self.quantiser.ratio;
+        let ratio = self.error.ratio;
         let lags = (self.spans.len() - phase).div_ceil(ratio);
         let mut taps: Vec<Tap> = (0..lags)
             .flat_map(|lag| (0..self.centre.len()).map(move |channel| Tap { channel, lag }))

@@ -2,6 +2,7 @@ use super::quantiser::INDIFFERENT;
 use super::search::Search;
 use super::*;
 use crate::bank::SynthesisFilters;
+use crate::design::equivalence::BlockedPlant;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::error_system::bank_gamma;
 use crate::design::error_system::by_lag;
@@ -18,12 +19,12 @@ fn optimum(spec: &str) -> (BlockedPlant, Vec<Vec<f64>>) {
     (BlockedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()), taps)
 }
 
-fn subject<'a>(plant: &'a BlockedPlant, taps: &'a [Vec<f64>]) -> Subject<'a> {
-    Subject { plant, taps, noise: &[], gamma_margin: 0.0 }
+fn problem<'a>(plant: &'a BlockedPlant, taps: &'a [Vec<f64>]) -> QuantisationProblem<'a> {
+    QuantisationProblem { plant, taps, noise: &[], gamma_margin: 0.0 }
 }
 
 fn quantiser<'a>(plant: &'a BlockedPlant, taps: &'a [Vec<f64>]) -> Result<Quantiser<'a>, DesignError> {
-    Quantiser::new(subject(plant, taps))
+    Quantiser::new(problem(plant, taps))
 }
 
 /// The exact norm, by another route than the search's grid.
@@ -69,7 +70,7 @@ fn small_banks_reach_what_trying_all_integers_reaches() {
         let quantiser = quantiser(&plant, &taps).unwrap();
         let found = quantiser.quantise(&words, None).unwrap();
         let scale = found.fixed_point.fraction_bits;
-        let search = Search::new(&quantiser, &words, scale);
+        let search = Search::new(&quantiser.error, &words, scale);
         let all = brute_force(&plant, &search.rounded(), 1);
         assert!(found.gamma <= all * 1.001, "{bits} bits: {} found, {all} is there", found.gamma);
         assert!(found.gamma <= found.rounded * (1.0 + INDIFFERENT));
@@ -95,18 +96,21 @@ fn far_better_than_rounding_where_the_channels_carry_little() {
     let (plant, taps) = optimum(THESIS);
     let quantiser = quantiser(&plant, &taps).unwrap();
     let found = quantiser.quantise(&WordLengths::Same(5), None).unwrap();
-    assert!(found.rounded > 1.5 * found.gamma && found.gamma < 1.01 * quantiser.real, "{found:?}");
+    assert!(
+        found.rounded > 1.5 * found.gamma && found.gamma < 1.01 * quantiser.error.real_gamma,
+        "{found:?}"
+    );
 }
 
 #[test]
 fn more_bits_cost_no_more_and_in_the_end_nothing() {
     let (plant, taps) = optimum(THESIS);
     let real = exact(&plant, taps.clone());
-    let (_, study) = quantise(subject(&plant, &taps), real, &WordLengths::Same(6), None).unwrap();
+    let (_, study) = quantise(problem(&plant, &taps), real, &WordLengths::Same(6), None).unwrap();
     let losses: Vec<f64> = study.words.iter().map(|word| word.loss_db).collect();
     assert_eq!(losses.len(), 5);
     assert!(losses.windows(2).all(|pair| pair[1] <= pair[0] + 0.01), "{losses:?}");
-    let (integers, _) = quantise(subject(&plant, &taps), real, &WordLengths::Same(24), None).unwrap();
+    let (integers, _) = quantise(problem(&plant, &taps), real, &WordLengths::Same(24), None).unwrap();
     assert!(exact(&plant, integers.taps()) < real * (1.0 + 1e-5));
 }
 
@@ -177,7 +181,7 @@ fn more_bits_never_cost_more_even_with_channels_of_unequal_gain() {
         );
     let (plant, taps) = optimum(&unequal);
     let (_, study) =
-        quantise(subject(&plant, &taps), exact(&plant, taps.clone()), &WordLengths::Same(8), None).unwrap();
+        quantise(problem(&plant, &taps), exact(&plant, taps.clone()), &WordLengths::Same(8), None).unwrap();
     let losses: Vec<f64> = study.words.iter().map(|word| word.loss_db).collect();
     assert!(losses.windows(2).all(|pair| pair[1] <= pair[0] + 0.001), "{losses:?}");
 }
@@ -190,7 +194,7 @@ fn the_mean_square_decides_among_integers_of_like_gamma() {
         let found = quantiser.quantise(&WordLengths::Same(bits), None).unwrap();
         let tried = [0, 1].map(|finer| {
             let words = WordLengths::Same(bits);
-            Search::new(&quantiser, &words, quantiser.finest_that_fits(&words) + finer).run().unwrap()
+            Search::new(&quantiser.error, &words, quantiser.finest_that_fits(&words) + finer).run().unwrap()
         });
         let cap = found.gamma * (1.0 + 1e-9);
         assert!(
@@ -202,7 +206,7 @@ fn the_mean_square_decides_among_integers_of_like_gamma() {
 #[test]
 fn a_scale_at_which_nothing_is_left_is_refused() {
     let (plant, taps) = optimum(THESIS);
-    let refused = quantise(subject(&plant, &taps), 1.0, &WordLengths::Same(6), Some(-9));
+    let refused = quantise(problem(&plant, &taps), 1.0, &WordLengths::Same(6), Some(-9));
     assert!(matches!(refused, Err(DesignError::AllZero { fraction_bits: -9, .. })), "{refused:?}");
 }
 
