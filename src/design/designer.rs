@@ -3,13 +3,13 @@
 use super::equivalence::BlockedPlant;
 use super::problem::{Part, Problem};
 use super::quantise::{QuantisationProblem, WordStudy, quantise};
-use super::reduction::{self, Aim, OrderReduction};
-use super::{DesignError, comparison, error_system, fir, iir};
+use super::reduction::{Aim, OrderReduction, ReductionProblem, reduce};
+use super::{DesignError, comparison, error_system, fir, fir_kyp, iir};
 use crate::bank::{Bank, FixedPoint, Gamma, SynthesisFilters};
 use crate::linalg::Mat;
 use crate::lti::peak::Peak;
 use crate::lti::{StateSpace, TappedRecursion};
-use crate::spec::{Method, Spec};
+use crate::spec::{Method, Solver, Spec};
 
 /// A bank with the record of its design.
 #[derive(Debug, Clone)]
@@ -163,6 +163,9 @@ fn run_method(spec: &Spec, problem: &Problem) -> Result<Found, DesignError> {
     let gamma_margin = spec.design.gamma_margin.unwrap_or(0.0);
     match spec.design.method {
         Method::Fir => {
+            if spec.design.solver == Some(Solver::Kyp) {
+                return fir_kyp::design_fir_kyp(&plant, taps_of(spec)).map(from_fir);
+            }
             let second = fir::SecondObjective::new(&problem.noise, spec.design.gamma_margin);
             fir::design_fir(&plant, taps_of(spec), second).map(from_fir)
         }
@@ -275,7 +278,7 @@ fn recursive_form(
     let (Some(wanted), SynthesisFilters::StateSpace(block)) = (spec.design.reduction, &full.filters) else {
         return Ok(full.into());
     };
-    let subject = reduction::Subject {
+    let problem = ReductionProblem {
         plant: &BlockedPlant::new(&distinct.problem),
         bank: system,
         order: block.a.len(),
@@ -283,7 +286,7 @@ fn recursive_form(
         aim: if spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
         gamma_margin: spec.design.gamma_margin.unwrap_or(0.0),
     };
-    let (smaller, record) = reduction::reduce(&subject, wanted)?;
+    let (smaller, record) = reduce(&problem, wanted)?;
     let judged = match smaller {
         None => full,
         Some(smaller) => reduced_form(plant, &distinct.parts, smaller, record.reduced.figures.gamma)?,

@@ -6,8 +6,10 @@ mod designer;
 pub mod equivalence;
 mod error_grid;
 pub mod error_system;
+mod exchange;
 mod filtering;
 pub mod fir;
+pub mod fir_kyp;
 pub mod iir;
 pub mod problem;
 mod prove;
@@ -18,7 +20,7 @@ pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use designer::{Design, design, latency};
 pub use problem::Problem;
 pub use prove::{Certified, attach_proof, certify, prove};
-pub use reduction::{OrderReduction, OrderWorth};
+pub use reduction::{OrderErrorPoint, OrderReduction};
 
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
@@ -55,6 +57,17 @@ pub enum DesignError {
     /// The bounded-real lemma could not be set up.
     #[error(transparent)]
     Kyp(#[from] KypError),
+    /// Too many states for the bounded-real LMI.
+    #[error(
+        "solver = \"kyp\" solves the bounded-real LMI for up to {limit} states of the error system, this one has {states}: use \
+         fewer taps or solver = \"sampled\""
+    )]
+    KypTooLarge {
+        /// States of the plant and of the delay lines of its measurements.
+        states: usize,
+        /// Most states.
+        limit: usize,
+    },
     /// No certificate was found, not even somewhat above the computed norm.
     #[error(
         "the computed gamma could not be proven: no certificate passes up to 10 % above it; the front ends are too stiff or \

@@ -10,13 +10,22 @@ use super::limits::{
 };
 use super::reader::{Fault, Fields, Value};
 use super::words::{WordLengths, check_fraction_bits};
-use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Spec, SpecProblem};
+use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Solver, Spec, SpecProblem};
 
 const TOP_KEYS: [&str; 8] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
 const CHANNEL_KEYS: [&str; 4] = ["delay", "delay_samples", "filter", "noise"];
-const DESIGN_KEYS: [&str; 8] =
-    ["method", "taps", "gamma_margin", "bits", "fraction_bits", "order", "reduction_loss_db", "noise"];
+const DESIGN_KEYS: [&str; 9] = [
+    "method",
+    "taps",
+    "gamma_margin",
+    "solver",
+    "bits",
+    "fraction_bits",
+    "order",
+    "reduction_loss_db",
+    "noise",
+];
 
 /// The keys of each written form of a filter; the first one names the form.
 const FILTER_FORMS: [&[&str]; 5] = [
@@ -153,6 +162,7 @@ fn design(
         method: get("method").map(|v| v.name("method", &Method::ALL.map(|m| (m.name(), m)))).transpose()?,
         taps: get("taps").map(|v| checked_count(&v, "taps", check_taps)).transpose()?,
         gamma_margin: get("gamma_margin").map(|v| checked_number(&v, check_gamma_margin)).transpose()?,
+        solver: get("solver").map(|v| v.name("solver", &Solver::ALL.map(|s| (s.name(), s)))).transpose()?,
         bits: get("bits").map(|v| word_lengths(&v)).transpose()?,
         fraction_bits: get("fraction_bits").map(|v| fraction_bits(&v)).transpose()?,
         reduction: reduction(get("order"), get("reduction_loss_db"))?,

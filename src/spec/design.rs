@@ -4,7 +4,7 @@ use super::limits::{
     check_gamma_margin, check_optimised_taps, check_order, check_reduction_loss, check_taps,
 };
 use super::words::{WordLengths, check_fraction_bits};
-use super::{DesignSpec, Method, Reduction, SpecProblem};
+use super::{DesignSpec, Method, Reduction, Solver, SpecProblem};
 
 /// A `[design]` table as far as it is written, in a file or on the command line.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,6 +15,8 @@ pub struct DesignOverrides {
     pub taps: Option<usize>,
     /// Relative excess over the optimal gamma.
     pub gamma_margin: Option<f64>,
+    /// The optimisation method of FIR designs.
+    pub solver: Option<Solver>,
     /// Bits of the taps.
     pub bits: Option<WordLengths>,
     /// Taps are integers times two to the minus this.
@@ -48,6 +50,11 @@ impl Method {
         matches!(self, Self::Fir | Self::Iir)
     }
 
+    /// Whether the method is a convex problem with a choice of solvers and therefore reads `solver`.
+    pub const fn has_solver(self) -> bool {
+        matches!(self, Self::Fir)
+    }
+
     /// Whether the method chooses among integer taps and therefore reads `bits` and `fraction_bits`.
     pub const fn has_bits(self) -> bool {
         matches!(self, Self::Fir)
@@ -56,6 +63,19 @@ impl Method {
     /// Whether the method makes recursive filters and therefore reads `order` and `reduction_loss_db`.
     pub const fn has_states(self) -> bool {
         matches!(self, Self::Iir | Self::H2)
+    }
+}
+
+impl Solver {
+    /// Every solver, the default first.
+    pub const ALL: [Self; 2] = [Self::Sampled, Self::Kyp];
+
+    /// The name in spec files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sampled => "sampled",
+            Self::Kyp => "kyp",
+        }
     }
 }
 
@@ -79,7 +99,15 @@ impl Reduction {
 impl DesignSpec {
     /// A method, with taps if it makes FIR filters, and no other wishes.
     pub const fn new(method: Method, taps: Option<usize>) -> Self {
-        Self { method, taps, gamma_margin: None, bits: None, fraction_bits: None, reduction: None }
+        Self {
+            method,
+            taps,
+            gamma_margin: None,
+            solver: None,
+            bits: None,
+            fraction_bits: None,
+            reduction: None,
+        }
     }
 
     /// The same design by another method; what that has no use for is dropped.
@@ -99,9 +127,16 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let Self { method, taps, gamma_margin, bits, fraction_bits, reduction } = self.clone();
-        let written =
-            DesignOverrides { method: Some(method), taps, gamma_margin, bits, fraction_bits, reduction };
+        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, reduction } = self.clone();
+        let written = DesignOverrides {
+            method: Some(method),
+            taps,
+            gamma_margin,
+            solver,
+            bits,
+            fraction_bits,
+            reduction,
+        };
         let design = overrides.over(written).resolved();
         design.check(channels)?;
         Ok(design)
@@ -140,6 +175,7 @@ impl DesignSpec {
         let keys = [
             ("taps", self.taps.is_some(), self.method.has_taps(), "fir"),
             ("gamma_margin", self.gamma_margin.is_some(), self.method.has_gamma_margin(), "fir or iir"),
+            ("solver", self.solver.is_some(), self.method.has_solver(), "fir"),
             ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
             ("fraction_bits", self.fraction_bits.is_some(), self.method.has_bits(), "fir"),
             (
@@ -149,6 +185,13 @@ impl DesignSpec {
                 "iir or h2",
             ),
         ];
+        if let (Some(Solver::Kyp), Some(_)) = (self.solver, self.gamma_margin) {
+            let (method, remedy) = ("fir with solver = \"kyp\"", "fir with solver = \"sampled\"");
+            return blame(
+                "gamma_margin",
+                Err(SpecProblem::NeedlessKey { key: "gamma_margin", method, remedy }),
+            );
+        }
         match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
             Some((key, _, _, remedy)) => {
                 blame(key, Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy }))
@@ -176,6 +219,7 @@ impl DesignOverrides {
             "method" => self.method.is_some(),
             "taps" => self.taps.is_some(),
             "gamma_margin" => self.gamma_margin.is_some(),
+            "solver" => self.solver.is_some(),
             "bits" => self.bits.is_some(),
             "fraction_bits" => self.fraction_bits.is_some(),
             _ => self.reduction.is_some_and(|reduction| reduction.key() == key),
@@ -190,6 +234,7 @@ impl DesignOverrides {
             method: self.method.or(file.method),
             taps: self.taps.or(file.taps.filter(|_| kept(Method::has_taps))),
             gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| kept(Method::has_gamma_margin))),
+            solver: self.solver.or(file.solver.filter(|_| kept(Method::has_solver))),
             bits: self.bits.or(file.bits.filter(|_| kept(Method::has_bits))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| kept(Method::has_bits))),
             reduction: self.reduction.or(file.reduction.filter(|_| kept(Method::has_states))),
@@ -198,8 +243,16 @@ impl DesignOverrides {
 
     /// Without a method: FIR if there are taps, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let Self { method, taps, gamma_margin, bits, fraction_bits, reduction } = self;
+        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, reduction } = self;
         let default = if taps.is_some() { Method::Fir } else { Method::Iir };
-        DesignSpec { method: method.unwrap_or(default), taps, gamma_margin, bits, fraction_bits, reduction }
+        DesignSpec {
+            method: method.unwrap_or(default),
+            taps,
+            gamma_margin,
+            solver,
+            bits,
+            fraction_bits,
+            reduction,
+        }
     }
 }

@@ -151,6 +151,16 @@ pub enum Method {
     Separation,
 }
 
+/// The optimisation method of FIR designs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Solver {
+    /// Frequencies are exchanged until gamma meets its lower bound; among the optimal taps, the secondary objective decides.
+    Sampled,
+    /// The bounded-real LMI of thesis 5.4 with a Lyapunov matrix; slower, without a secondary objective.
+    Kyp,
+}
+
 /// The `[design]` table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignSpec {
@@ -162,6 +172,9 @@ pub struct DesignSpec {
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma_margin: Option<f64>,
+    /// The optimisation method of FIR designs; `None` is [`Solver::Sampled`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub solver: Option<Solver>,
     /// Bits of the taps, for integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bits: Option<WordLengths>,

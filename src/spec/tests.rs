@@ -326,6 +326,13 @@ fn every_mistake_has_its_line_and_its_message() {
         (thesis_with("taps = 22", "taps = 65537"), 18, "1 to 65536 taps"),
         (thesis_with("taps = 22", "taps = 10_000"), 18, "taps times channels is at most 16384"),
         (thesis_with("taps = 22", "taps = 22\ngamma_margin = -0.1"), 19, "gamma_margin is the share"),
+        (thesis_with("taps = 22", "taps = 22\nsolver = 'lp'"), 19, "choose one of sampled, kyp"),
+        (thesis_with("taps = 22", "taps = 22\nsolver = 'kyp'\ngamma_margin = 0.1"), 20, "gamma_margin"),
+        (
+            thesis_with("method = \"fir\"\ntaps = 22", "method = \"iir\"\nsolver = 'kyp'"),
+            18,
+            "choose the method fir",
+        ),
         (thesis_with("taps = 22", "taps = 22\nbits = 1"), 19, "2 to 32 bits"),
         (thesis_with("taps = 22", "taps = 22\nbits = 12.5"), 19, "whole number"),
         (thesis_with("taps = 22", "taps = 22\nbits = 'many'"), 19, "whole number"),
@@ -491,6 +498,7 @@ prop_compose! {
         method in prop::sample::select(Method::ALL.to_vec()),
         taps in 1usize..100,
         gamma_margin in prop::option::of(0.0..0.1f64),
+        solver in prop::option::of(prop::sample::select(Solver::ALL.to_vec())),
         bits in prop::option::of((2..33u32).prop_map(WordLengths::Same)),
         fraction_bits in prop::option::of(-256..257i32),
         reduction in prop::option::of(prop_oneof![
@@ -503,7 +511,8 @@ prop_compose! {
             design: DesignSpec {
                 method,
                 taps: method.has_taps().then_some(taps),
-                gamma_margin: gamma_margin.filter(|_| method.has_gamma_margin()),
+                gamma_margin: gamma_margin.filter(|_| method.has_gamma_margin() && solver != Some(Solver::Kyp)),
+                solver: solver.filter(|_| method.has_solver()),
                 bits: bits.clone().filter(|_| method.has_bits()),
                 fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
                 reduction: reduction.filter(|_| method.has_states()),

@@ -11,4 +11,5 @@ mod golden;
 mod hard_designs;
 mod random_plants;
 mod reduction;
+mod second_opinion;
 mod sections;

@@ -6,7 +6,7 @@ use super::Failure;
 use super::bank_file::{bad_flag, is_dash, load_spec, write_text};
 use crate::bank::FixedPoint;
 use crate::design::{self, Design, DesignError};
-use crate::spec::{DesignOverrides, Method, Reduction, WordLengths};
+use crate::spec::{DesignOverrides, Method, Reduction, Solver, WordLengths};
 use report::{ProofReport, Report};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -43,6 +43,9 @@ pub(super) struct Args {
     /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
     #[arg(long)]
     gamma_margin: Option<f64>,
+    /// Solver of FIR designs: sampled (frequencies, fast) or kyp (the bounded-real LMI; a second opinion)
+    #[arg(long, value_parser = parse_solver)]
+    solver: Option<Solver>,
     /// Integer taps of so many bits, sign included; or a list of bits, one for each tap (4,6,8,6,4)
     #[arg(long)]
     bits: Option<WordLengths>,
@@ -71,6 +74,14 @@ fn parse_method(text: &str) -> Result<Method, String> {
         .ok_or_else(|| format!("the methods are {known}"))
 }
 
+fn parse_solver(text: &str) -> Result<Solver, String> {
+    let known = Solver::ALL.map(Solver::name).join(", ");
+    Solver::ALL
+        .into_iter()
+        .find(|solver| solver.name() == text)
+        .ok_or_else(|| format!("the solvers are {known}"))
+}
+
 /// Looks for a proof of the bank's gammas and puts it into the bank; a bank that cannot be proven is a bank all the same.
 fn attach_proof(design: &mut Design) -> ProofReport {
     let begin = Instant::now();
@@ -87,6 +98,7 @@ fn overrides(args: &Args) -> DesignOverrides {
         method: args.method,
         taps: args.taps,
         gamma_margin: args.gamma_margin,
+        solver: args.solver,
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
         reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),

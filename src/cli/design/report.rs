@@ -2,7 +2,7 @@
 
 use crate::bank::{Gamma, SynthesisFilters};
 use crate::design::quantise::WordStudy;
-use crate::design::{Design, MeanAnalysis, OrderReduction, OrderWorth};
+use crate::design::{Design, MeanAnalysis, OrderErrorPoint, OrderReduction};
 use crate::spec::Method;
 use crate::units::{RadiansPerSlowPeriod, Seconds};
 use crate::verify::Verified;
@@ -189,8 +189,8 @@ fn order_text(reduction: &OrderReduction, method: Method) -> String {
         number(Some(full.figures.gamma)),
         rounded(reduced.loss_db)
     );
-    let row = |worth: &OrderWorth| {
-        let OrderWorth { order, figures, loss_db } = worth;
+    let row = |point: &OrderErrorPoint| {
+        let OrderErrorPoint { order, figures, loss_db } = point;
         let (gamma, rms) = (number(Some(figures.gamma)), number(Some(figures.rms_error)));
         format!("{order:>10} {gamma:>14} {rms:>14} {:>10.4} dB\n", rounded(*loss_db))
     };

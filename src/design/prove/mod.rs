@@ -76,7 +76,11 @@ pub fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), Desig
     let unexplained = subject.unexplained(&tone);
     let noncausal = unexplained.filter(|&proven| enough(proven, gamma.noncausal)).map(|_| tone);
     let explained = unexplained.is_some_and(|proven| enough(proven, gamma.lower));
-    let lower = if bank.method != Method::Fir || explained { Vec::new() } else { binding_tones(bank, dual)? };
+    let lower = if bank.method != Method::Fir || explained || dual.is_empty() {
+        Vec::new()
+    } else {
+        binding_tones(bank, dual)?
+    };
     let reached = subject.out_of_reach(&lower).is_some_and(|proven| enough(proven, gamma.lower));
     let lower = if reached { lower } else { Vec::new() };
     let proof = Proof { upper, lower, noncausal };

@@ -1,70 +1,73 @@
-//! A bank without what is read from its states: a line of past inputs, and a recursion at the end of it.
+//! A bank without its output matrices: an FIR head (a delay line of inputs) and a recursive tail at its end.
 
 use crate::design::DesignError;
 use crate::linalg::{self, Mat};
 use crate::lti::balanced::balanced_when_driven;
 use crate::lti::{StateSpace, TappedRecursion};
 
-/// States that matter less than this share of the output are rounding.
+/// States below this share of the output are rounding errors.
 const NEGLIGIBLE: f64 = 1e-12;
 
-/// x+ = a x + b u[k - ticks].
+/// The recursion `x+ = a x + b u[k - lags]` behind a delay line of `lags` inputs.
 #[derive(Debug, Clone)]
 pub(super) struct Dynamics {
-    /// Past inputs that are kept.
-    pub(super) ticks: usize,
+    /// Length of the FIR head in slow periods.
+    pub(super) lags: usize,
+    /// r x r.
     pub(super) a: Mat,
     /// r x N.
     pub(super) b: Mat,
 }
 
 impl Dynamics {
-    /// All of `bank` behind a line of `ticks` inputs, the states that matter most first; `reach` is a square root of the
-    /// covariance of its states in use.
-    pub(super) fn balanced(bank: &StateSpace, ticks: usize, reach: &Mat) -> Result<Self, DesignError> {
-        let tail = TappedRecursion::split(bank, ticks)?.tail().clone();
-        let floor = NEGLIGIBLE * (tail.c() * reach).norm();
-        let tail = balanced_when_driven(&tail, reach, floor)?;
-        Ok(Self { ticks, a: tail.a().clone(), b: tail.b().clone() })
+    /// The dynamics of `bank` with an FIR head of `lags` slow periods and balanced states, those with the largest effect
+    /// first. `state_root` is a square root of the covariance of the bank's states when the plant drives it.
+    pub(super) fn balanced(bank: &StateSpace, lags: usize, state_root: &Mat) -> Result<Self, DesignError> {
+        let tail = TappedRecursion::split(bank, lags)?.tail().clone();
+        let floor = NEGLIGIBLE * (tail.c() * state_root).norm();
+        let tail = balanced_when_driven(&tail, state_root, floor)?;
+        Ok(Self { lags, a: tail.a().clone(), b: tail.b().clone() })
     }
 
-    /// The first `r` states of the recursion alone, or all if there are fewer.
+    /// Only the first `r` states of the tail, or all if there are fewer.
     pub(super) fn truncated(&self, r: usize) -> Self {
-        let r = r.min(self.tail());
+        let r = r.min(self.tail_order());
         let a = self.a.view((0, 0), (r, r)).into_owned();
-        Self { ticks: self.ticks, a, b: self.b.rows(0, r).into_owned() }
+        Self { lags: self.lags, a, b: self.b.rows(0, r).into_owned() }
     }
 
-    /// The states of the recursion divided by `sizes`.
+    /// With the states of the tail divided by `sizes`.
     pub(super) fn scaled(&self, sizes: &[f64]) -> Self {
-        let a = Mat::from_fn(self.tail(), self.tail(), |i, j| self.a[(i, j)] * sizes[j] / sizes[i]);
-        let b = Mat::from_fn(self.tail(), self.channels(), |i, j| self.b[(i, j)] / sizes[i]);
-        Self { ticks: self.ticks, a, b }
+        let a =
+            Mat::from_fn(self.tail_order(), self.tail_order(), |i, j| self.a[(i, j)] * sizes[j] / sizes[i]);
+        let b = Mat::from_fn(self.tail_order(), self.channels(), |i, j| self.b[(i, j)] / sizes[i]);
+        Self { lags: self.lags, a, b }
     }
 
-    /// r, states of the recursion.
-    pub(super) fn tail(&self) -> usize {
+    /// r, the number of states of the tail.
+    pub(super) fn tail_order(&self) -> usize {
         self.a.nrows()
     }
 
+    /// N, the number of inputs.
     pub(super) fn channels(&self) -> usize {
         self.b.ncols()
     }
 
-    /// All that an output can be read from: inputs u, outputs X = [x; u[k - ticks]; ..; u[k]].
+    /// The regressors of the output, `X = [x; u[k - lags]; ..; u[k]]`, as outputs of a system with the inputs u.
     pub(super) fn regressors(&self) -> Result<StateSpace, DesignError> {
-        let (r, n) = (self.tail(), self.channels());
-        let all = Mat::identity(r + n * (self.ticks + 1), r + n * (self.ticks + 1));
-        Ok(TappedRecursion::read_by(&all, self.ticks, &self.a, &self.b)?.realise()?)
+        let (r, n) = (self.tail_order(), self.channels());
+        let all = Mat::identity(r + n * (self.lags + 1), r + n * (self.lags + 1));
+        Ok(TappedRecursion::read_by(&all, self.lags, &self.a, &self.b)?.realise()?)
     }
 
-    /// The bank y = `readout` X.
-    pub(super) fn read_by(&self, readout: &Mat) -> Result<TappedRecursion, DesignError> {
-        Ok(TappedRecursion::read_by(readout, self.ticks, &self.a, &self.b)?)
+    /// The bank y = `outputs` X, with `outputs` the output matrices side by side, M x (r + N (lags + 1)).
+    pub(super) fn with_outputs(&self, outputs: &Mat) -> Result<TappedRecursion, DesignError> {
+        Ok(TappedRecursion::read_by(outputs, self.lags, &self.a, &self.b)?)
     }
 
-    /// Largest modulus of the poles; infinite where they cannot be had.
-    pub(super) fn radius(&self) -> f64 {
+    /// Largest modulus of the poles, infinite if the eigenvalues do not converge.
+    pub(super) fn spectral_radius(&self) -> f64 {
         linalg::spectral_radius(&self.a).unwrap_or(f64::INFINITY)
     }
 }

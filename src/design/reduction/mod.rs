@@ -1,89 +1,45 @@
-//! Order reduction: the bank of few states with as small an error as can be found.
+//! Order reduction: a bank of few states with as small an error as the search finds.
 //!
-//! The error K = W - F H is affine in the bank F, so what a smaller bank costs is ||(F - F_r) H||: the states are balanced as
-//! they are driven *through the front ends* (Enns 1984), not by white noise. Of the response the first samples may stay taps of
-//! a line of inputs, each of which costs a state a channel; different splits of the states among line and recursion are tried.
-//! Truncation alone loses needlessly. What is read from the states left is therefore optimised anew, a convex problem
-//! (`readout`), and the poles are moved downhill with the readout eliminated (`poles`). Only the last step is a local search:
-//! the gamma that is reported is that of a bank in hand, not the least of all banks of its order.
+//! The error K = W - F H is affine in the bank F, so replacing F by F_r costs `||(F - F_r) H||`. The states are therefore
+//! balanced with the inputs that the plant gives them (frequency-weighted balancing, Enns 1984), not with white noise. The
+//! first samples of the response may stay an FIR head, which costs one state per channel and slow period; several splits of
+//! the states between head and recursive tail are tried.
+//!
+//! For given dynamics, the output matrices C and D are optimised again, which is a convex problem (`output_matrices`). The
+//! poles are then refined with the output matrices eliminated (`pole_refinement`, variable projection). This last step is a
+//! local search: the gamma reported is that of the bank found, not the least of all banks of its order.
 
 mod descent;
 mod dynamics;
-mod poles;
-mod readout;
-mod walk;
+mod order_search;
+mod output_matrices;
+mod plant_samples;
+mod pole_refinement;
+mod problem;
+mod trade_off;
 
-use super::DesignError;
-use super::equivalence::BlockedPlant;
-use crate::lti::{StateSpace, TappedRecursion};
+pub use problem::{Aim, ReductionProblem};
+pub use trade_off::{Figures, OrderErrorPoint, OrderReduction};
+
+use crate::design::DesignError;
+use crate::lti::TappedRecursion;
 use crate::spec::Reduction;
+use order_search::OrderSearch;
 
-pub use poles::Aim;
-
-/// How good a bank is, h = 1.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Figures {
-    /// ||K||.
-    pub gamma: f64,
-    /// `||K||_2 / sqrt(M)`.
-    pub rms_error: f64,
-}
-
-/// What a number of states is good for.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct OrderWorth {
-    /// States.
-    pub order: usize,
-    /// The best bank found of at most so many.
-    #[serde(flatten)]
-    pub figures: Figures,
-    /// By how many decibels it falls behind the full bank, in what the method minimises: gamma (`iir`) or the mean-square
-    /// error (`h2`).
-    pub loss_db: f64,
-}
-
-/// The record of an order reduction.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct OrderReduction {
-    /// The bank as the method makes it.
-    pub full: OrderWorth,
-    /// The bank that was taken.
-    pub reduced: OrderWorth,
-    /// All orders that were looked at, ascending. All below the full one where that is cheap.
-    pub orders: Vec<OrderWorth>,
-}
-
-/// A bank to be reduced.
-#[derive(Debug, Clone, Copy)]
-pub struct Subject<'a> {
-    /// The front ends.
-    pub plant: &'a BlockedPlant,
-    /// The full bank.
-    pub bank: &'a StateSpace,
-    /// States of the full bank as it is written.
-    pub order: usize,
-    /// States that a tick of past inputs costs: the channels of the written bank, which may be more than those of the plant.
-    pub width: usize,
-    /// What is to be small.
-    pub aim: Aim,
-    /// Relative excess of gamma that may go into the mean square.
-    pub gamma_margin: f64,
-}
-
-/// The reduced bank, or `None` if the full one is it, and the record.
+/// The reduced bank and the order/error trade-off. No bank is returned if the full one is chosen.
 ///
 /// # Errors
 /// [`DesignError`] if the bank is not stable or a decomposition fails.
 pub fn reduce(
-    subject: &Subject<'_>,
-    wanted: Reduction,
+    problem: &ReductionProblem<'_>,
+    reduction: Reduction,
 ) -> Result<(Option<TappedRecursion>, OrderReduction), DesignError> {
-    let mut walk = walk::Walk::new(subject)?;
-    let order = match wanted {
-        Reduction::Order(order) => walk.at_most(order)?,
-        Reduction::Loss(db) => walk.within(db)?,
+    let mut search = OrderSearch::new(problem)?;
+    let order = match reduction {
+        Reduction::Order(order) => search.at_most(order)?,
+        Reduction::Loss(db) => search.within(db)?,
     };
-    Ok(walk.finish(order))
+    Ok(search.finish(order))
 }
 
 #[cfg(test)]

@@ -1,9 +1,12 @@
 use super::dynamics::Dynamics;
-use super::readout::{Samples, mean_square, reach};
+use super::output_matrices::{mean_square, state_covariance_root};
+use super::plant_samples::PlantSamples;
 use super::*;
+use crate::design::equivalence::BlockedPlant;
 use crate::design::iir::{design_h2, design_iir};
 use crate::design::{Problem, error_system};
 use crate::linalg::{self, Complex, Mat};
+use crate::lti::StateSpace;
 use crate::lti::balanced::balanced;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::hinf_norm;
@@ -23,9 +26,9 @@ fn thesis(latency: usize) -> BlockedPlant {
     plant(latency, "{ delay = 1.2 }, { delay = 0.6 }")
 }
 
-fn subject<'a>(plant: &'a BlockedPlant, bank: &'a StateSpace, aim: Aim) -> Subject<'a> {
+fn problem<'a>(plant: &'a BlockedPlant, bank: &'a StateSpace, aim: Aim) -> ReductionProblem<'a> {
     let order = TappedRecursion::new(bank).unwrap().realise().unwrap().order();
-    Subject { plant, bank, order, width: plant.measured, aim, gamma_margin: 0.0 }
+    ReductionProblem { plant, bank, order, width: plant.measured, aim, gamma_margin: 0.0 }
 }
 
 fn error(plant: &BlockedPlant, bank: &StateSpace) -> StateSpace {
@@ -47,11 +50,14 @@ fn every_order_has_the_gamma_that_is_reported() {
     let bank = design_iir(&plant, 0.0).unwrap().filters;
     for order in [0, 3, 6] {
         let (smaller, record) =
-            reduce(&subject(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
+            reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
         let smaller = smaller.unwrap().realise().unwrap();
         assert!(smaller.order() <= order && record.reduced.order == smaller.order(), "{record:?}");
-        let (seen, told) = (dense_grid(&error(&plant, &smaller)), record.reduced.figures.gamma);
-        assert!(seen <= told * (1.0 + 1e-7) && seen > told * (1.0 - 1e-4), "{order}: {seen} {told}");
+        let (on_grid, reported) = (dense_grid(&error(&plant, &smaller)), record.reduced.figures.gamma);
+        assert!(
+            on_grid <= reported * (1.0 + 1e-7) && on_grid > reported * (1.0 - 1e-4),
+            "{order}: {on_grid} {reported}"
+        );
         let rms = h2_norm(&error(&plant, &smaller)).unwrap() / 2f64.sqrt();
         assert!((rms / record.reduced.figures.rms_error - 1.0).abs() < 1e-12);
     }
@@ -64,10 +70,10 @@ fn more_states_are_never_worse_and_all_are_the_full_bank() {
         (Aim::WorstCase, design_iir(&plant, 0.0).unwrap().filters),
         (Aim::MeanSquare, design_h2(&plant).unwrap().filters),
     ] {
-        let subject = subject(&plant, &bank, aim);
-        let (smaller, record) = reduce(&subject, Reduction::Order(subject.order)).unwrap();
+        let problem = problem(&plant, &bank, aim);
+        let (smaller, record) = reduce(&problem, Reduction::Order(problem.order)).unwrap();
         assert!(smaller.is_none() && record.reduced == record.full && record.full.loss_db == 0.0);
-        assert_eq!(record.orders.len(), subject.order + 1);
+        assert_eq!(record.orders.len(), problem.order + 1);
         for pair in record.orders.windows(2) {
             assert!(pair[0].loss_db >= pair[1].loss_db - 1e-4, "{:?}", record.orders);
         }
@@ -107,10 +113,10 @@ fn states_of_no_use_go_without_loss() {
         (Aim::WorstCase, design_iir(&plant, 0.0).unwrap().filters),
         (Aim::MeanSquare, design_h2(&plant).unwrap().filters),
     ] {
-        let (_, bare) = reduce(&subject(&plant, &bank, aim), Reduction::Loss(0.0)).unwrap();
+        let (_, bare) = reduce(&problem(&plant, &bank, aim), Reduction::Loss(0.0)).unwrap();
         let padded = padded(&bank);
-        let subject = Subject { order: padded.order(), ..subject(&plant, &padded, aim) };
-        let (smaller, record) = reduce(&subject, Reduction::Loss(0.0)).unwrap();
+        let problem = ReductionProblem { order: padded.order(), ..problem(&plant, &padded, aim) };
+        let (smaller, record) = reduce(&problem, Reduction::Loss(0.0)).unwrap();
         assert_eq!(record.reduced.order, bare.reduced.order, "{record:?} {bare:?}");
         assert!(record.reduced.loss_db.abs() < 1e-4 && record.reduced.order <= 4, "{record:?}");
         let norm = hinf_norm(&error(&plant, &smaller.unwrap().realise().unwrap())).unwrap().gain;
@@ -119,7 +125,7 @@ fn states_of_no_use_go_without_loss() {
 }
 
 #[test]
-fn it_beats_truncation_without_weight_and_readout() {
+fn it_beats_truncation_without_weight_and_outputs() {
     let plant = thesis(10);
     let bank = design_iir(&plant, 0.0).unwrap().filters;
     let plain = balanced(&bank, 0.0).unwrap();
@@ -132,25 +138,26 @@ fn it_beats_truncation_without_weight_and_readout() {
             plain.d().clone(),
         );
         let plain = hinf_norm(&error(&plant, &cut.unwrap())).unwrap().gain;
-        let (_, record) = reduce(&subject(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
+        let (_, record) = reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
         println!("{order} states: truncated {plain}, here {}", record.reduced.figures.gamma);
         assert!(record.reduced.figures.gamma < 0.9 * plain, "{order}: {record:?} {plain}");
     }
 }
 
-/// Both readouts are optima of convex problems: no direction leads downhill. Judged by exact norms, which the optimisers
+/// Both choices of output matrices are optima of convex problems: no direction leads downhill. Judged by exact norms, which the optimisers
 /// do not use.
 #[test]
-fn no_other_readout_is_better() {
+fn no_other_outputs_is_better() {
     let plant = thesis(6);
     let bank = design_iir(&plant, 0.0).unwrap().filters;
-    for (ticks, order) in [(0, 0), (0, 3), (1, 2)] {
-        let whole = Dynamics::balanced(&bank, ticks, &reach(&plant, &bank).unwrap()).unwrap();
+    for (lags, order) in [(0, 0), (0, 3), (1, 2)] {
+        let whole = Dynamics::balanced(&bank, lags, &state_covariance_root(&plant, &bank).unwrap()).unwrap();
         let dynamics = whole.truncated(order);
         let (square, norm) = mean_square(&plant, &dynamics).unwrap();
-        let built = |readout: &Mat| error(&plant, &dynamics.read_by(readout).unwrap().realise().unwrap());
+        let built =
+            |outputs: &Mat| error(&plant, &dynamics.with_outputs(outputs).unwrap().realise().unwrap());
         assert!((h2_norm(&built(&square)).unwrap() / norm - 1.0).abs() < 1e-9);
-        let best = Samples::new(&plant).unwrap().best_bank(&dynamics, 0.0).unwrap().realise().unwrap();
+        let best = PlantSamples::new(&plant).unwrap().best_bank(&dynamics, 0.0).unwrap().realise().unwrap();
         let mut worst = Mat::zeros(2, square.ncols());
         worst.columns_mut(0, best.order()).copy_from(best.c());
         worst.columns_mut(best.order(), 2).copy_from(best.d());
@@ -163,7 +170,7 @@ fn no_other_readout_is_better() {
                 assert!(h2_norm(&moved(&square)).unwrap() > norm * (1.0 - 1e-12));
                 assert!(
                     hinf_norm(&moved(&worst)).unwrap().gain > gamma * (1.0 - 2e-6),
-                    "{ticks} {order} {seed} {step}"
+                    "{lags} {order} {seed} {step}"
                 );
             }
         }
@@ -175,8 +182,8 @@ fn a_bank_without_error_keeps_what_it_needs() {
     // The samples are those wanted, ten fast samples late: gamma is zero up to rounding.
     let plant = plant(10, "{ delay = 0.0 }, { delay = 1.0 }");
     let bank = design_iir(&plant, 0.0).unwrap().filters;
-    let subject = subject(&plant, &bank, Aim::WorstCase);
-    let (_, record) = reduce(&subject, Reduction::Loss(0.0)).unwrap();
+    let problem = problem(&plant, &bank, Aim::WorstCase);
+    let (_, record) = reduce(&problem, Reduction::Loss(0.0)).unwrap();
     assert!(record.full.figures.gamma < 1e-11 && record.reduced.figures.gamma < 1e-11, "{record:?}");
     assert!(record.reduced.loss_db < 1e-3 && record.reduced.order >= 9, "{record:?}");
 }
@@ -185,6 +192,6 @@ fn a_bank_without_error_keeps_what_it_needs() {
 fn the_same_bits_every_time() {
     let plant = thesis(5);
     let bank = design_iir(&plant, 0.0).unwrap().filters;
-    let once = || reduce(&subject(&plant, &bank, Aim::WorstCase), Reduction::Order(2)).unwrap();
+    let once = || reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(2)).unwrap();
     assert_eq!(once(), once());
 }

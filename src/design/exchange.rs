@@ -1,0 +1,221 @@
+//! The exchange algorithm for an error that is affine in the unknowns.
+//!
+//! Over real matrices `F_0 .. F_{J-1}` (M x N) minimise
+//!
+//! ```text
+//! gamma = max over omega in [0, pi] of sigma_max(K(omega)),   K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega),
+//! ```
+//!
+//! a semi-infinite problem with one constraint per frequency. On finitely many points it is solved with its dual by
+//! [`sampled`]. The optimum on the points is a lower bound for all frequencies, because fewer points are fewer
+//! constraints. The peaks of the error between the points are added to them until the largest peak meets the bound.
+//!
+//! Optimal unknowns are not unique. Among those with a gamma within a margin of the optimum, the ones with the least
+//! weighted mean square are chosen (the secondary objective), again with peaks added where they exceed the cap.
+//!
+//! FIR design uses it with the taps as unknowns (thesis 5.4), order reduction with the output matrices of given dynamics
+//! (J = 1). Source: Hettich and Kortanek, "Semi-infinite programming", SIAM Review 35 (1993), exchange methods.
+
+use super::DesignError;
+use crate::linalg::CMat;
+use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Settings, Taps};
+use crate::lti::peak::Peak;
+
+/// Relative width of the interval `[lower, gamma]` at which the exchange ends.
+pub const GAMMA_ACCURACY: f64 = 5e-7;
+/// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so it costs next to nothing.
+pub(super) const LEAST_MARGIN: f64 = 4e-7;
+/// Tolerance of the optimum on the points, relative to [`GAMMA_ACCURACY`].
+const POINTS_ACCURACY: f64 = 0.1;
+/// Excess of a peak over the optimum on the points, relative to [`GAMMA_ACCURACY`], from which it becomes a point.
+const PEAK_EXCESS: f64 = 0.2;
+/// Fraction of the margin that the secondary objective may use at the points. The rest is left to the peaks between them.
+const MARGIN_AT_POINTS: f64 = 0.75;
+/// Limit on the rounds of each objective; five are rarely needed.
+const ROUND_LIMIT: usize = 16;
+/// Frequencies closer than this are one point, in radians.
+const LEAST_DISTANCE: f64 = 1e-7;
+
+/// An error `K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega)`, affine in the unknowns `F_j`.
+pub(super) trait AffineError {
+    /// W and H at a frequency in radians per lag.
+    fn at(&self, omega: f64) -> Point;
+
+    /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`. Peaks up to
+    /// `level` may be left out.
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError>;
+}
+
+/// Local maxima of `sigma_max(K)` over the frequencies.
+#[derive(Debug, Clone)]
+pub(super) struct Peaks {
+    /// Estimate of gamma, exact if no peak was missed.
+    pub(super) estimate: f64,
+    /// The peaks, in any order.
+    pub(super) peaks: Vec<Peak>,
+}
+
+impl Peaks {
+    /// The frequencies of the peaks above `level`.
+    fn above(&self, level: f64) -> Vec<f64> {
+        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.frequency).collect()
+    }
+}
+
+/// Unknowns with the peaks of their error.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    /// `F_j`, M x N.
+    pub(super) taps: Taps,
+    /// The peaks of the error.
+    pub(super) peaks: Peaks,
+}
+
+/// A frequency with the dual matrix of the error there.
+#[derive(Debug, Clone)]
+pub struct DualPoint {
+    /// Radians per slow period.
+    pub omega: f64,
+    /// M x q; its left singular vectors are the binding directions.
+    pub weight: CMat,
+}
+
+/// The state of the exchange: the points so far and the lower bound that they prove.
+#[derive(Debug)]
+pub(super) struct Exchange<E> {
+    error: E,
+    problem: Problem,
+    /// Added points have the weight zero.
+    objective: MeanSquareObjective,
+    gamma_margin: f64,
+    /// Lower bound on gamma for all unknowns.
+    pub(super) lower: f64,
+    /// The dual matrices that prove `lower`.
+    pub(super) dual: Vec<DualPoint>,
+    /// Problems solved.
+    pub(super) rounds: usize,
+    /// Interior-point iterations of all rounds.
+    pub(super) iterations: usize,
+}
+
+impl<E: AffineError> Exchange<E> {
+    /// Starts from the points of `problem`. `objective` has a weight for each of them, `gamma_margin` is the relative
+    /// excess of gamma granted to it, at least [`LEAST_MARGIN`].
+    ///
+    /// # Errors
+    /// [`DesignError::Sampled`] if the objective does not fit the problem.
+    pub(super) fn new(
+        error: E,
+        problem: Problem,
+        objective: MeanSquareObjective,
+        gamma_margin: f64,
+    ) -> Result<Self, DesignError> {
+        problem.check_objective(&objective)?;
+        let gamma_margin = gamma_margin.max(LEAST_MARGIN);
+        let (lower, dual, rounds, iterations) = (0.0, Vec::new(), 0, 0);
+        Ok(Self { error, problem, objective, gamma_margin, lower, dual, rounds, iterations })
+    }
+
+    /// The error that is minimised.
+    pub(super) fn error(&self) -> &E {
+        &self.error
+    }
+
+    /// The frequencies of all points, in the order in which they were added.
+    pub(super) fn frequencies(&self) -> impl Iterator<Item = f64> {
+        self.problem.points().iter().map(|point| point.omega)
+    }
+
+    /// Unknowns with gamma within the margin of the optimum and the least secondary objective.
+    ///
+    /// # Errors
+    /// [`DesignError`] if a decomposition does not converge.
+    pub(super) fn optimise(&mut self) -> Result<Candidate, DesignError> {
+        let least = self.minimise_gamma()?;
+        self.minimise_mean_square(least)
+    }
+
+    /// Adds points at the given frequencies, except where there is one. Returns whether any was added.
+    pub(super) fn add(&mut self, frequencies: &[f64]) -> Result<bool, DesignError> {
+        let mut added: Vec<f64> = Vec::new();
+        for &omega in frequencies {
+            let mut known = self.frequencies().chain(added.iter().copied());
+            if known.all(|other| (other - omega).abs() > LEAST_DISTANCE) {
+                added.push(omega);
+            }
+        }
+        self.objective.weights.extend(std::iter::repeat_n(0.0, added.len()));
+        let points = added.iter().map(|&omega| self.error.at(omega));
+        self.problem = self.problem.with_points(points)?;
+        Ok(!added.is_empty())
+    }
+
+    fn minimise_gamma(&mut self) -> Result<Candidate, DesignError> {
+        let settings = Settings { tol_gap_rel: POINTS_ACCURACY * GAMMA_ACCURACY, ..Settings::default() };
+        let mut best: Option<Candidate> = None;
+        for _ in 0..ROUND_LIMIT {
+            let solution = sampled::minimise(&self.problem, &settings)?;
+            self.count_round(solution.steps.len());
+            let level = solution.gamma * (1.0 + PEAK_EXCESS * GAMMA_ACCURACY);
+            self.raise_lower_bound(solution.lower.value, solution.dual);
+            let candidate = self.judge(solution.taps, solution.gamma, level)?;
+            let above = candidate.peaks.above(level);
+            if best.as_ref().is_none_or(|best| candidate.peaks.estimate < best.peaks.estimate) {
+                best = Some(candidate);
+            }
+            let gamma = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
+            if gamma <= self.lower * (1.0 + GAMMA_ACCURACY) || !self.add(&above)? {
+                break;
+            }
+        }
+        best.ok_or(DesignError::NoTaps)
+    }
+
+    /// The least secondary objective with gamma at most `(1 + gamma_margin)` times that of `start`. Returns `start` if the
+    /// interior-point method makes no progress from there.
+    fn minimise_mean_square(&mut self, start: Candidate) -> Result<Candidate, DesignError> {
+        let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
+        let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
+        for _ in 0..ROUND_LIMIT {
+            let found = sampled::mean_square_under_cap(
+                &self.problem,
+                &self.objective,
+                cap_at_points,
+                &start.taps,
+                &Settings::default(),
+            );
+            // There is nothing to gain if gamma is zero or the iteration stalls.
+            let Ok(found) = found else { break };
+            self.count_round(found.steps.len());
+            let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
+            if candidate.peaks.estimate <= cap {
+                return Ok(candidate);
+            }
+            if !self.add(&candidate.peaks.above(cap_at_points))? {
+                break;
+            }
+        }
+        Ok(start)
+    }
+
+    fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<Candidate, DesignError> {
+        let peaks = self.error.peaks(&taps, gamma, level)?;
+        Ok(Candidate { taps, peaks })
+    }
+
+    fn raise_lower_bound(&mut self, lower: f64, dual: Vec<CMat>) {
+        if lower > self.lower {
+            self.lower = lower;
+            let weights = self.problem.points().iter().zip(dual);
+            self.dual = weights.map(|(point, weight)| DualPoint { omega: point.omega, weight }).collect();
+        }
+    }
+
+    fn count_round(&mut self, iterations: usize) {
+        self.rounds += 1;
+        self.iterations += iterations;
+    }
+}
+
+#[cfg(test)]
+mod tests;

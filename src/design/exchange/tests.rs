@@ -1,0 +1,177 @@
+use super::*;
+use crate::linalg::{self, Complex, Mat};
+use std::f64::consts::PI;
+
+/// `W = gain / (1 - a e^{-i omega})` repeated down the diagonal, and channels that measure the white input with the given
+/// gains: J lags of F approximate a geometric impulse response.
+///
+/// With J lags of one channel the distance is the Hankel norm of the rest of the response (Nehari),
+/// `gain a^J / (1 - a^2)`.
+struct Geometric {
+    a: f64,
+    gain: f64,
+    channels: Vec<f64>,
+    /// Frequencies on which peaks are looked for.
+    grid: usize,
+}
+
+impl AffineError for Geometric {
+    fn at(&self, omega: f64) -> Point {
+        let z = Complex::from_polar(1.0, -omega);
+        let w = CMat::from_element(1, 1, self.gain / (1.0 - z * self.a));
+        let h = CMat::from_fn(self.channels.len(), 1, |i, _| Complex::new(self.channels[i], 0.0));
+        Point { omega, w, h }
+    }
+
+    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError> {
+        let gain = |k: usize| {
+            let omega = PI * k as f64 / self.grid as f64;
+            Peak { gain: gain(&self.at(omega), taps), frequency: omega }
+        };
+        let gains: Vec<Peak> = (0..=self.grid).map(gain).collect();
+        let estimate = gains.iter().map(|peak| peak.gain).fold(gamma, f64::max);
+        let highest = gains.into_iter().filter(|p| p.gain > level).max_by(|a, b| a.gain.total_cmp(&b.gain));
+        Ok(Peaks { estimate, peaks: highest.into_iter().collect() })
+    }
+}
+
+fn gain(point: &Point, taps: &Taps) -> f64 {
+    let mut k = point.w.clone();
+    for (j, f) in taps.iter().enumerate() {
+        k -= linalg::to_complex(f) * &point.h * Complex::from_polar(1.0, -point.omega * j as f64);
+    }
+    linalg::singular_values_c(&k).unwrap()[0]
+}
+
+/// The exchange on five points to begin with, `lags` lags.
+fn exchange(error: Geometric, lags: usize, gamma_margin: f64) -> Exchange<Geometric> {
+    let points: Vec<Point> = (0..5).map(|k| error.at(PI * f64::from(k) / 4.0)).collect();
+    let problem = Problem::new(points, vec![lags]).unwrap();
+    let objective =
+        MeanSquareObjective::noiseless(vec![0.125, 0.25, 0.25, 0.25, 0.125], error.channels.len());
+    Exchange::new(error, problem, objective, gamma_margin).unwrap()
+}
+
+fn geometric(a: f64, gain: f64, channels: &[f64]) -> Geometric {
+    Geometric { a, gain, channels: channels.to_vec(), grid: 3000 }
+}
+
+#[test]
+fn the_optimum_is_nehari_s() {
+    for a in [0.3, -0.5, 0.8] {
+        for lags in [1, 2, 5] {
+            let mut exchange = exchange(geometric(a, 1.0, &[1.0]), lags, 0.0);
+            let best = exchange.optimise().unwrap();
+            let nehari = f64::powi(a, lags as i32).abs() / (1.0 - a * a);
+            let gamma = best.peaks.estimate;
+            assert!((gamma / nehari - 1.0).abs() < 2e-6, "{a} {lags}: {gamma} {nehari}");
+            assert!(exchange.lower <= nehari * (1.0 + 1e-9) && exchange.lower > nehari * (1.0 - 2e-6));
+        }
+    }
+}
+
+/// Equal channels, silent channels and gains far from one change neither gamma nor the bound.
+#[test]
+fn gains_and_copies_of_channels_do_not_matter() {
+    let nehari = 0.125 / 0.75;
+    for (gain, channels) in [
+        (1.0, vec![1.0, 1.0]),
+        (1.0, vec![1e-9]),
+        (1.0, vec![1e9, 0.0]),
+        (1e-9, vec![1.0]),
+        (1e9, vec![1e-9, 1.0]),
+    ] {
+        let mut exchange = exchange(geometric(0.5, gain, &channels), 3, 0.0);
+        let gamma = exchange.optimise().unwrap().peaks.estimate;
+        assert!((gamma / (gain * nehari) - 1.0).abs() < 2e-6, "{gain} {channels:?}: {gamma}");
+        assert!((exchange.lower / (gain * nehari) - 1.0).abs() < 2e-6, "{gain} {channels:?}");
+    }
+}
+
+#[test]
+fn nothing_measured_leaves_the_whole_reference_and_nothing_wanted_costs_nothing() {
+    let mut unmeasured = exchange(geometric(0.5, 1.0, &[0.0]), 2, 0.0);
+    let gamma = unmeasured.optimise().unwrap().peaks.estimate;
+    assert!((gamma - 2.0).abs() < 1e-9 && (unmeasured.lower - 2.0).abs() < 1e-6, "{gamma}");
+    let mut unwanted = exchange(geometric(0.5, 0.0, &[1.0]), 2, 0.0);
+    let best = unwanted.optimise().unwrap();
+    assert!(best.peaks.estimate == 0.0 && best.taps.iter().all(|f| f.norm() == 0.0));
+}
+
+/// The optimum of all frequencies is that of a dense grid, solved at once.
+#[test]
+fn the_exchange_ends_where_a_dense_grid_does() {
+    for a in [0.4, -0.7] {
+        let dense: Vec<Point> =
+            (0..=600).map(|k| geometric(a, 1.0, &[1.0, 2.0]).at(PI * f64::from(k) / 600.0)).collect();
+        let dense = sampled::minimise(&Problem::new(dense, vec![3]).unwrap(), &Settings::default()).unwrap();
+        let mut exchange = exchange(geometric(a, 1.0, &[1.0, 2.0]), 3, 0.0);
+        let best = exchange.optimise().unwrap();
+        assert!(
+            (best.peaks.estimate / dense.gamma - 1.0).abs() < 1e-5,
+            "{} {}",
+            best.peaks.estimate,
+            dense.gamma
+        );
+        assert!(exchange.frequencies().count() < 60, "{}", exchange.frequencies().count());
+    }
+}
+
+/// The dual matrices prove the bound: no unknowns have a smaller `sum <Y, K>` over the sum of nuclear norms.
+#[test]
+fn the_dual_points_prove_the_bound() {
+    let mut exchange = exchange(geometric(0.6, 1.0, &[1.0]), 2, 0.0);
+    exchange.optimise().unwrap();
+    let error = exchange.error();
+    let nuclear: f64 = exchange.dual.iter().map(|p| linalg::singular_values_c(&p.weight).unwrap()[0]).sum();
+    let inner = |taps: &Taps| -> f64 {
+        let at = |p: &DualPoint| {
+            let point = error.at(p.omega);
+            let f = taps.iter().enumerate().fold(CMat::zeros(1, 1), |sum, (j, f)| {
+                sum + linalg::to_complex(f) * Complex::from_polar(1.0, -p.omega * j as f64)
+            });
+            (p.weight.adjoint() * (&point.w - f * &point.h))[(0, 0)].re
+        };
+        exchange.dual.iter().map(at).sum::<f64>() / nuclear
+    };
+    for seed in 0..20 {
+        let taps: Taps = (0..2).map(|j| Mat::from_element(1, 1, f64::from(7 * seed + 3 * j).sin())).collect();
+        assert!(
+            (inner(&taps) / exchange.lower - 1.0).abs() < 1e-5,
+            "{seed}: {} {}",
+            inner(&taps),
+            exchange.lower
+        );
+    }
+}
+
+#[test]
+fn a_wider_margin_lowers_the_mean_square_within_the_cap() {
+    let mean_square = |margin: f64| {
+        let mut exchange = exchange(geometric(0.8, 1.0, &[1.0]), 2, margin);
+        let best = exchange.optimise().unwrap();
+        let error = exchange.error();
+        let square = |k: i32| gain(&error.at(PI * f64::from(k) / 4.0), &best.taps).powi(2);
+        assert!(best.peaks.estimate <= exchange.lower * (1.0 + margin) * (1.0 + 2e-6));
+        0.125 * (square(0) + square(4)) + 0.25 * (1..4).map(square).sum::<f64>()
+    };
+    let all: Vec<f64> = [0.0, 0.01, 0.1].into_iter().map(mean_square).collect();
+    assert!(all[1] < all[0] * (1.0 - 1e-3) && all[2] < all[1] * (1.0 - 1e-3), "{all:?}");
+}
+
+#[test]
+fn known_frequencies_are_not_added_twice() {
+    let mut exchange = exchange(geometric(0.5, 1.0, &[1.0]), 1, 0.0);
+    assert!(!exchange.add(&[0.0, PI + 1e-9]).unwrap());
+    assert!(exchange.add(&[1.0, 1.0]).unwrap());
+    assert_eq!(exchange.frequencies().count(), 6);
+}
+
+#[test]
+fn an_objective_that_does_not_fit_is_refused() {
+    let error = geometric(0.5, 1.0, &[1.0]);
+    let problem = Problem::new(vec![error.at(0.0), error.at(1.0)], vec![1]).unwrap();
+    let objective = MeanSquareObjective::noiseless(vec![1.0], 1);
+    let refused = Exchange::new(error, problem, objective, 0.0).err();
+    assert!(matches!(refused, Some(DesignError::Sampled(_))), "{refused:?}");
+}

@@ -1,0 +1,254 @@
+//! The order search: candidates by truncation, each with its best output matrices; the poles of the chosen one are refined.
+
+use super::dynamics::Dynamics;
+use super::output_matrices::{mean_square, state_covariance_root};
+use super::plant_samples::PlantSamples;
+use super::pole_refinement::refined;
+use super::problem::{Aim, ReductionProblem};
+use super::trade_off::{Figures, OrderErrorPoint, OrderReduction};
+use crate::design::{DesignError, error_system};
+use crate::lti::TappedRecursion;
+use crate::lti::gramian::h2_norm;
+use std::collections::BTreeMap;
+
+/// Lengths of the FIR head that are tried.
+const HEADS: usize = 8;
+/// Splits of the states whose gamma is computed: those of least mean-square error.
+const FINALISTS: usize = 3;
+/// Relative excess of the rough gamma up to which a longer FIR head is preferred, because it runs faster than a recursion.
+const HEAD_PREFERENCE: f64 = 1e-4;
+/// All orders are searched if the squares of their unknowns sum to at most this.
+const CHEAP: f64 = 1e5;
+/// Limit on the evaluations of a pole refinement, and the effort (evaluations times squared unknowns) that lowers it.
+const EVALUATIONS: f64 = 80.0;
+const EFFORT: f64 = 4e5;
+/// Poles of a reduced bank keep this distance from the unit circle.
+const MARGIN: f64 = 1e-9;
+/// Losses below this are rounding errors, in decibels.
+const ROUNDING_DB: f64 = 5e-5;
+/// Errors below this fraction of the plant's gain count as zero.
+const ZERO: f64 = 1e-12;
+
+/// The bank found for an order.
+#[derive(Debug, Clone)]
+struct ReducedBank<'a> {
+    dynamics: Dynamics,
+    bank: TappedRecursion,
+    figures: Figures,
+    /// With the frequencies of its peaks.
+    samples: PlantSamples<'a>,
+}
+
+/// The search along the orders.
+pub(super) struct OrderSearch<'a> {
+    problem: &'a ReductionProblem<'a>,
+    samples: PlantSamples<'a>,
+    /// For each length of the FIR head, all states of the tail, balanced.
+    splits: Vec<Dynamics>,
+    full: Figures,
+    banks: BTreeMap<usize, ReducedBank<'a>>,
+    zero: f64,
+}
+
+impl<'a> OrderSearch<'a> {
+    pub(super) fn new(problem: &'a ReductionProblem<'a>) -> Result<Self, DesignError> {
+        let system = &problem.plant.system;
+        Ok(Self {
+            problem,
+            samples: PlantSamples::new(problem.plant)?,
+            splits: splits(problem)?,
+            full: figures(problem, &TappedRecursion::new(problem.bank)?)?,
+            banks: BTreeMap::new(),
+            zero: ZERO * (system.c().norm() * system.b().norm() + system.d().norm()),
+        })
+    }
+
+    /// The order of the best bank of at most `order` states.
+    pub(super) fn at_most(&mut self, order: usize) -> Result<usize, DesignError> {
+        if self.is_cheap() {
+            (0..self.problem.order).try_for_each(|order| self.visit(order))?;
+        }
+        if order >= self.problem.order {
+            return Ok(self.problem.order);
+        }
+        // Order 0 always has a stable candidate.
+        for order in (0..=order).rev() {
+            self.visit(order)?;
+            if self.best(order).is_some() {
+                break;
+            }
+        }
+        self.refine_poles(order)?;
+        Ok(order)
+    }
+
+    /// The least order found whose loss is at most `db`.
+    pub(super) fn within(&mut self, db: f64) -> Result<usize, DesignError> {
+        let allowed = db + ROUNDING_DB;
+        let mut order = if self.is_cheap() { self.first_within(allowed)? } else { self.bisect(allowed)? };
+        // Pole refinement may bring a smaller order within the loss.
+        while order > 0 {
+            self.visit(order - 1)?;
+            self.refine_poles(order - 1)?;
+            if self.loss_of(order - 1) > allowed {
+                break;
+            }
+            order -= 1;
+        }
+        Ok(order)
+    }
+
+    fn is_cheap(&self) -> bool {
+        let orders = self.problem.order as f64;
+        orders * self.unknowns(self.problem.order).powi(2) <= CHEAP
+    }
+
+    /// Entries of the output matrices of a bank with so many states.
+    fn unknowns(&self, order: usize) -> f64 {
+        let plant = self.problem.plant;
+        (plant.wanted * (order + plant.measured)) as f64
+    }
+
+    fn first_within(&mut self, allowed: f64) -> Result<usize, DesignError> {
+        (0..self.problem.order).try_for_each(|order| self.visit(order))?;
+        let within = |order: &usize| self.loss_of(*order) <= allowed;
+        Ok((0..self.problem.order).find(within).unwrap_or(self.problem.order))
+    }
+
+    fn bisect(&mut self, allowed: f64) -> Result<usize, DesignError> {
+        let (mut low, mut high) = (0, self.problem.order);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            self.visit(middle)?;
+            if self.loss_of(middle) <= allowed { high = middle } else { low = middle + 1 }
+        }
+        Ok(high)
+    }
+
+    /// The quantity that the method minimises.
+    fn merit(&self, figures: &Figures) -> f64 {
+        match self.problem.aim {
+            Aim::WorstCase => figures.gamma,
+            Aim::MeanSquare => figures.rms_error,
+        }
+    }
+
+    fn loss(&self, figures: &Figures) -> f64 {
+        let size = |figures| self.merit(figures).max(self.zero);
+        20.0 * (size(figures) / size(&self.full)).log10()
+    }
+
+    fn loss_of(&self, order: usize) -> f64 {
+        self.best(order).map_or(f64::INFINITY, |found| self.loss(&found.figures))
+    }
+
+    /// The best bank found of at most `order` states; the smaller one if two are equal.
+    fn best(&self, order: usize) -> Option<&ReducedBank<'a>> {
+        let merit = |found: &ReducedBank<'_>| self.merit(&found.figures);
+        self.banks.range(..=order).map(|(_, found)| found).min_by(|a, b| merit(a).total_cmp(&merit(b)))
+    }
+
+    /// Finds a bank of `order` states by truncation, unless there is one.
+    fn visit(&mut self, order: usize) -> Result<(), DesignError> {
+        if self.banks.contains_key(&order) {
+            return Ok(());
+        }
+        let mut best: Option<(f64, Dynamics)> = None;
+        for (norm, dynamics) in self.finalists(order)? {
+            let rough = match self.problem.aim {
+                Aim::WorstCase => self.samples.rough_gamma(&dynamics)?,
+                Aim::MeanSquare => norm,
+            };
+            if best.as_ref().is_none_or(|(least, _)| rough <= least * (1.0 + HEAD_PREFERENCE)) {
+                best = Some((rough, dynamics));
+            }
+        }
+        if let Some((_, dynamics)) = best {
+            let found = self.with_best_outputs(dynamics, &self.samples)?;
+            self.banks.insert(order, found);
+        }
+        Ok(())
+    }
+
+    /// The splits of `order` states with the least mean-square errors, which are returned beside them; short heads first.
+    fn finalists(&self, order: usize) -> Result<Vec<(f64, Dynamics)>, DesignError> {
+        let mut tried = Vec::new();
+        for split in &self.splits {
+            let head = split.lags * self.problem.width;
+            if head > order {
+                continue;
+            }
+            let dynamics = split.truncated(order - head);
+            if dynamics.spectral_radius() < 1.0 - MARGIN {
+                tried.push((mean_square(self.problem.plant, &dynamics)?.1, dynamics));
+            }
+        }
+        tried.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        tried.truncate(FINALISTS);
+        tried.sort_by_key(|(_, dynamics)| dynamics.lags);
+        Ok(tried)
+    }
+
+    /// The best bank with these dynamics.
+    fn with_best_outputs(
+        &self,
+        dynamics: Dynamics,
+        samples: &PlantSamples<'a>,
+    ) -> Result<ReducedBank<'a>, DesignError> {
+        let mut samples = samples.clone();
+        let bank = match self.problem.aim {
+            Aim::WorstCase => samples.best_bank(&dynamics, self.problem.gamma_margin)?,
+            Aim::MeanSquare => dynamics.with_outputs(&mean_square(self.problem.plant, &dynamics)?.0)?,
+        };
+        let figures = figures(self.problem, &bank)?;
+        Ok(ReducedBank { dynamics, bank, figures, samples })
+    }
+
+    /// Improves the bank of `order` states by pole refinement.
+    fn refine_poles(&mut self, order: usize) -> Result<(), DesignError> {
+        let Some(start) = self.banks.get(&order) else { return Ok(()) };
+        let budget = (EFFORT / self.unknowns(order).powi(2)).clamp(0.0, EVALUATIONS) as usize;
+        if self.merit(&start.figures) <= self.merit(&self.full).max(self.zero) {
+            return Ok(());
+        }
+        let dynamics = refined(self.problem.aim, &start.samples, &start.dynamics, budget)?;
+        let found = self.with_best_outputs(dynamics, &start.samples)?;
+        if self.merit(&found.figures) < self.merit(&self.banks[&order].figures) {
+            self.banks.insert(order, found);
+        }
+        Ok(())
+    }
+
+    fn point(&self, order: usize, figures: Figures) -> OrderErrorPoint {
+        OrderErrorPoint { order, figures, loss_db: self.loss(&figures) }
+    }
+
+    /// The bank of `order` states, unless that is the full one, and the trade-off.
+    pub(super) fn finish(&self, order: usize) -> (Option<TappedRecursion>, OrderReduction) {
+        let full = self.point(self.problem.order, self.full);
+        let chosen = self.best(order).filter(|_| order < self.problem.order);
+        let states =
+            |found: &ReducedBank<'_>| found.dynamics.tail_order() + found.dynamics.lags * self.problem.width;
+        let reduced = chosen.map_or(full, |found| self.point(states(found), found.figures));
+        let orders = self.banks.keys().filter_map(|&k| Some(self.point(k, self.best(k)?.figures)));
+        let record = OrderReduction { full, reduced, orders: orders.chain([full]).collect() };
+        (chosen.map(|found| found.bank.clone()), record)
+    }
+}
+
+/// The error of a bank.
+fn figures(problem: &ReductionProblem<'_>, bank: &TappedRecursion) -> Result<Figures, DesignError> {
+    let error = error_system::error_system(problem.plant, &bank.realise()?)?;
+    let gamma = crate::lti::peak::hinf_norm(&error)?.gain;
+    Ok(Figures { gamma, rms_error: h2_norm(&error)? / (problem.plant.wanted as f64).sqrt() })
+}
+
+/// The full bank with FIR heads of several lengths and balanced tails.
+fn splits(problem: &ReductionProblem<'_>) -> Result<Vec<Dynamics>, DesignError> {
+    let longest = TappedRecursion::new(problem.bank)?.ticks();
+    let state_root = state_covariance_root(problem.plant, problem.bank)?;
+    let mut lengths: Vec<usize> =
+        (0..=HEADS.min(longest)).map(|k| k * longest / HEADS.min(longest).max(1)).collect();
+    lengths.dedup();
+    lengths.into_iter().map(|lags| Dynamics::balanced(problem.bank, lags, &state_root)).collect()
+}

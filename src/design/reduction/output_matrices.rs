@@ -1,0 +1,76 @@
+//! Output matrices of least mean square for given dynamics: the error W - F H is affine in them, so that they are one
+//! projection.
+
+use super::dynamics::Dynamics;
+use crate::design::equivalence::BlockedPlant;
+use crate::design::{DesignError, error_system};
+use crate::linalg::{self, Mat};
+use crate::lti::StateSpace;
+use crate::lti::gramian::controllability_root;
+
+/// Directions of the regressors below this share of the strongest are rounding errors.
+const RANK: f64 = 1e-12;
+
+/// Square root of the covariance of the states of `bank` when the plant drives it with white noise.
+pub(super) fn state_covariance_root(plant: &BlockedPlant, bank: &StateSpace) -> Result<Mat, DesignError> {
+    let error = error_system::error_system(plant, bank)?;
+    let root = controllability_root(error.a(), error.b())?;
+    Ok(root.rows(plant.system.order(), bank.order()).into_owned())
+}
+
+/// The same dynamics with tail states of unit mean square, and the root mean squares of the channels.
+pub(super) fn normalised(
+    plant: &BlockedPlant,
+    dynamics: &Dynamics,
+) -> Result<(Dynamics, Vec<f64>), DesignError> {
+    let (x, _) = covariance_roots(plant, dynamics)?;
+    let size = |i: usize| Some(x.row(i).norm()).filter(|size| size.is_normal()).unwrap_or(1.0);
+    let states: Vec<f64> = (0..dynamics.tail_order()).map(size).collect();
+    let channels = (x.nrows() - dynamics.channels()..x.nrows()).map(size).collect();
+    Ok((dynamics.scaled(&states), channels))
+}
+
+/// The output matrices of least mean square, with the H2 norm of their error.
+pub(super) fn mean_square(plant: &BlockedPlant, dynamics: &Dynamics) -> Result<(Mat, f64), DesignError> {
+    let (x, z) = covariance_roots(plant, dynamics)?;
+    let outputs = projection(&x, &z)?;
+    let error = (z - &outputs * x).norm();
+    Ok((outputs, error))
+}
+
+/// Rows X and Z with the covariance `[X; Z] [X; Z]'` of the regressors and the reference.
+fn covariance_roots(plant: &BlockedPlant, dynamics: &Dynamics) -> Result<(Mat, Mat), DesignError> {
+    let driven = driven(plant, &dynamics.regressors()?)?;
+    let root = controllability_root(driven.a(), driven.b())?;
+    let (rows, inputs) = (driven.outputs(), driven.inputs());
+    let mut t = Mat::zeros(rows, root.ncols() + inputs);
+    t.columns_mut(0, root.ncols()).copy_from(&(driven.c() * &root));
+    t.columns_mut(root.ncols(), inputs).copy_from(driven.d());
+    let regressors = rows - plant.wanted;
+    Ok((t.rows(0, regressors).into_owned(), t.rows(regressors, plant.wanted).into_owned()))
+}
+
+/// F of least `||z - F x||`, and of these the least in units of the rows of x.
+fn projection(x: &Mat, z: &Mat) -> Result<Mat, DesignError> {
+    let scale: Vec<f64> =
+        x.row_iter().map(|row| row.norm()).map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
+    let mut unit = x.clone();
+    unit.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row *= *s);
+    let svd = linalg::svd(&unit)?;
+    let floor = RANK * svd.s.first().copied().unwrap_or(0.0);
+    let mut components = z * &svd.v;
+    components
+        .column_iter_mut()
+        .zip(&svd.s)
+        .for_each(|(mut column, &s)| column *= if s > floor { 1.0 / s } else { 0.0 });
+    let mut outputs = components * svd.u.transpose();
+    outputs.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column *= *s);
+    Ok(outputs)
+}
+
+/// The regressors and the reference as outputs of one system, driven by the plant's input.
+fn driven(plant: &BlockedPlant, regressors: &StateSpace) -> Result<StateSpace, DesignError> {
+    let (n, m, x) = (plant.measured, plant.wanted, regressors.outputs());
+    let all = plant.system.cascade(0..n, regressors)?;
+    Ok(all.select_outputs((n + m..n + m + x).chain(n..n + m))?)
+}
