@@ -19,7 +19,8 @@ pub fn hstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> Result<DMatrix<T>, Lina
     Ok(whole)
 }
 
-/// `[p_1; p_2; ..]`: the `parts` on top of one another, the first one uppermost. No parts give a 0 x 0 matrix.
+/// `[p_1; p_2; ..]`: the `parts` on top of one another, the first one uppermost. No parts give a 0 x 0
+/// matrix.
 ///
 /// # Errors
 /// [`LinalgError::Sizes`] if the numbers of columns differ.
@@ -38,14 +39,15 @@ pub fn vstack<T: ComplexField>(parts: &[&DMatrix<T>]) -> Result<DMatrix<T>, Lina
 /// The matrix of the given rows of blocks, `from_blocks(&[&[&a, &b], &[&c, &d]]) = [a b; c d]`.
 ///
 /// # Errors
-/// [`LinalgError::Sizes`] if the blocks of a row differ in their numbers of rows, or the rows in their widths.
+/// [`LinalgError::Sizes`] if the blocks of a row differ in their numbers of rows, or the rows in their
+/// widths.
 pub fn from_blocks<T: ComplexField>(rows: &[&[&DMatrix<T>]]) -> Result<DMatrix<T>, LinalgError> {
     let rows = rows.iter().map(|row| hstack(row)).collect::<Result<Vec<_>, _>>()?;
     vstack(&rows.iter().collect::<Vec<_>>())
 }
 
-/// `diag(p_1, p_2, ..)`: the `parts` along the diagonal, zeros elsewhere. Parts without rows or without columns take up
-/// columns or rows only.
+/// `diag(p_1, p_2, ..)`: the `parts` along the diagonal, zeros elsewhere. Parts without rows or without
+/// columns take up columns or rows only.
 pub fn block_diagonal<T: ComplexField>(parts: &[&DMatrix<T>]) -> DMatrix<T> {
     let (rows, cols) = parts.iter().fold((0, 0), |(r, c), m| (r + m.nrows(), c + m.ncols()));
     let mut whole = DMatrix::zeros(rows, cols);

@@ -1,9 +1,9 @@
-//! What helps an eigenvalue routine: parts that do not drive one another in a loop are told apart, and each is scaled.
+//! What helps an eigenvalue routine: permutation to block triangular form, then diagonal balancing of each block.
 //!
-//! The error of a backward stable routine is relative to the norm of the matrix. Where states have units that differ by many
-//! decades, or one part drives another through a large gain, that norm says nothing about the eigenvalues. Both
-//! steps keep them exactly: block triangular form by a permutation, and a diagonal similarity by powers of two
-//! (Osborne 1960; Parlett and Reinsch 1969).
+//! The error of a backward stable routine is relative to the norm of the matrix. Where states have units
+//! that differ by many decades, or one part drives another through a large gain, that norm says nothing
+//! about the eigenvalues. Both steps keep them exactly: block triangular form by a permutation, and a
+//! diagonal similarity by powers of two (Osborne 1960; Parlett and Reinsch 1969).
 
 use super::Mat;
 use nalgebra::{ComplexField, DMatrix};
@@ -29,7 +29,8 @@ pub(super) struct Balanced<T> {
     pub(super) condition: f64,
 }
 
-/// Matrices that together have the eigenvalues of `m`: the diagonal blocks of its block triangular form, each balanced.
+/// Matrices that together have the eigenvalues of `m`: the diagonal blocks of its block triangular form,
+/// each balanced.
 pub(super) fn balanced_blocks<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Vec<Balanced<T>> {
     let block = |states: &Vec<usize>| {
         balanced(&DMatrix::from_fn(states.len(), states.len(), |i, j| m[(states[i], states[j])].clone()))
@@ -48,9 +49,9 @@ fn balanced<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Balanced<T> {
     Balanced { matrix, condition: most / least }
 }
 
-/// The states in groups, each of which drives itself in a loop: the strongly connected components of the graph in which
-/// state j drives state i where m[i, j] is not zero. In this order a permuted `m` is block triangular up to the order of
-/// the groups.
+/// The states in groups, each of which drives itself in a loop: the strongly connected components of the
+/// graph in which state j drives state i where m[i, j] is not zero. In this order a permuted `m` is block
+/// triangular up to the order of the groups.
 fn loops<T: ComplexField>(m: &DMatrix<T>) -> Vec<Vec<usize>> {
     let n = m.nrows();
     let drivers = drivers(m);
@@ -85,11 +86,11 @@ fn drivers<T: ComplexField>(m: &DMatrix<T>) -> Vec<Vec<u64>> {
     sets
 }
 
-/// The diagonal D of powers of two for which off-diagonal rows and columns of the same index of D^-1 m D are alike in
-/// 1-norm, of a matrix `m` of moduli.
+/// The diagonal D of powers of two for which off-diagonal rows and columns of the same index of D^-1 m D
+/// are alike in 1-norm, of a matrix `m` of moduli.
 ///
-/// nalgebra's `balance_parlett_reinsch` does the same in the 2-norm, but it rounds scales at powers of two and knows no
-/// bound on its sweeps.
+/// nalgebra's `balance_parlett_reinsch` does the same in the 2-norm, but it rounds scales at powers of two
+/// and knows no bound on its sweeps.
 pub(super) fn scales(mut m: Mat) -> Vec<f64> {
     let mut scales = vec![1.0; m.nrows()];
     for _ in 0..MAX_SWEEPS {
@@ -110,7 +111,8 @@ pub(super) fn scales(mut m: Mat) -> Vec<f64> {
     scales
 }
 
-/// The factor for column `i`, and its inverse for row `i`, that makes both alike; 1 if it would win next to nothing.
+/// The factor for column `i`, and its inverse for row `i`, that makes both alike; 1 if it would win next to
+/// nothing.
 fn equalising(m: &Mat, i: usize) -> f64 {
     let off_diagonal = |k: &usize| *k != i;
     let row: f64 = (0..m.ncols()).filter(off_diagonal).map(|k| m[(i, k)]).sum();
@@ -119,8 +121,9 @@ fn equalising(m: &Mat, i: usize) -> f64 {
     if column * factor + row / factor < WORTHWHILE * (column + row) { factor } else { 1.0 }
 }
 
-/// Powers of two by which to divide the states of x+ = a x + b u, y = c x, so that what drives a state and what it drives are
-/// alike. Of b and c only the proportions count: their sizes change with the units of u and y, which are not to distort a.
+/// Powers of two by which to divide the states of x+ = a x + b u, y = c x, so that what drives a state and
+/// what it drives are alike. Of b and c only the proportions count: their sizes change with the units of u
+/// and y, which are not to distort a.
 pub fn state_scales(a: &Mat, b: &Mat, c: &Mat) -> Vec<f64> {
     let n = a.nrows();
     let share = |part: f64, whole: f64| if part > 0.0 { part / whole } else { 0.0 };
@@ -181,8 +184,9 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_are_loops_are_told_apart() {
-        // Two rotations, the one driving the other with 1e12: no state is free of loops, but the two parts are.
+    fn loops_that_drive_one_another_are_blocks_of_their_own() {
+        // Two rotations, the one driving the other with 1e12: no state is free of loops, but the two parts
+        // are.
         let mut m = Mat::zeros(4, 4);
         for (at, angle) in [(0, 0.3f64), (2, 1.1)] {
             let (s, c) = angle.sin_cos();

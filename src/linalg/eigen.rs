@@ -25,8 +25,8 @@ pub fn hermitian_eigenvalues(m: &CMat) -> Result<Vec<f64>, LinalgError> {
     view(m).self_adjoint_eigenvalues(Side::Lower).map_err(|_| no_convergence("hermitian eigenvalues", m))
 }
 
-/// Eigenvalues of a general real matrix, which is balanced first: units of the states and gains from one part to
-/// another do not matter.
+/// Eigenvalues of a general real matrix, which is balanced first: units of the states and gains from one
+/// part to another do not matter.
 pub fn eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite("eigenvalues", m)?;
     balanced_eigenvalues(m, raw_eigenvalues).map(|(values, _)| values)
@@ -38,12 +38,13 @@ pub fn eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
     balanced_eigenvalues(m, raw_eigenvalues_c).map(|(values, _)| values)
 }
 
-/// Scales that differ by more than this may do harm: a change of coordinates magnifies errors by up to its condition, here to
-/// 2e-10. Eigenvalues that all but meet move by the square root of that.
+/// Scales that differ by more than this may do harm: a change of coordinates magnifies errors by up to its
+/// condition, here to 2e-10. Eigenvalues that all but meet move by the square root of that.
 const SAFE_CONDITION: f64 = 1e6;
 
-/// Candidates for the eigenvalues of a general real matrix, where a false one does no harm and a missed one does: those of
-/// [`eigenvalues`] and, where balancing changed scales by many decades, those of the matrix as it stands beside them.
+/// Candidates for the eigenvalues of a general real matrix, where a false one does no harm and a missed one
+/// does: those of [`eigenvalues`] and, where balancing changed scales by many decades, those of the matrix
+/// as it stands beside them.
 pub fn candidate_eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite("eigenvalues", m)?;
     both_ways(m, raw_eigenvalues)
@@ -97,7 +98,8 @@ fn balanced_eigenvalues<T: nalgebra::ComplexField<RealField = f64>>(
     Ok((values, condition))
 }
 
-/// Eigenvalues and eigenvectors (columns) of a general real matrix; the two of a conjugate pair are neighbours.
+/// Eigenvalues and eigenvectors (columns) of a general real matrix; the two of a conjugate pair are
+/// neighbours.
 pub fn eigen(m: &Mat) -> Result<(Vec<Complex<f64>>, CMat), LinalgError> {
     check_finite("eigen", m)?;
     if m.is_empty() {

@@ -53,9 +53,9 @@ pub fn singular_values_c(m: &CMat) -> Result<Vec<f64>, LinalgError> {
     view(m).singular_values().map_err(|_| no_convergence("singular values", m))
 }
 
-/// Largest singular value of a complex matrix; 0 for an empty one. Up to rank two by the closed form, else from the largest
-/// eigenvalue of the smaller Gram matrix, which squares all but loses digits of small ones only: the relative error is a few eps, and
-/// it takes a third or less of the time of a decomposition.
+/// Largest singular value of a complex matrix; 0 for an empty one. Up to rank two by the closed form, else
+/// from the largest eigenvalue of the smaller Gram matrix, which squares all but loses digits of small ones
+/// only: the relative error is a few eps, and it takes a third or less of the time of a decomposition.
 pub fn largest_singular_value_c(m: &CMat) -> Result<f64, LinalgError> {
     check_finite_c("singular values", m)?;
     let scale = m.iter().map(|z| z.re.abs().max(z.im.abs())).fold(0.0, f64::max);
@@ -94,8 +94,8 @@ fn largest_by_gram(m: &CMat) -> Result<f64, LinalgError> {
     Ok(values.last().copied().unwrap_or(0.0).max(0.0).sqrt())
 }
 
-/// For two vectors u, v as rows or columns: `sigma^2 = (a + c) / 2 + hypot((a - c) / 2, |b|)` with `a = |u|^2`,
-/// `c = |v|^2`, `b = <u, v>`.
+/// For two vectors u, v as rows or columns: `sigma^2 = (a + c) / 2 + hypot((a - c) / 2, |b|)` with `a =
+/// |u|^2`, `c = |v|^2`, `b = <u, v>`.
 fn largest_of_two<'a>(
     u: impl Iterator<Item = &'a Complex<f64>>,
     v: impl Iterator<Item = &'a Complex<f64>>,

@@ -1,6 +1,6 @@
 //! Square-root balanced truncation (Laub, Heath, Paige, Ward 1987; Tombs, Postlethwaite 1987).
 
-use super::gramian::controllability_root;
+use super::gramian::{controllability_root, observability_root};
 use super::{LtiError, StateSpace};
 use crate::linalg::{self, Mat};
 
@@ -8,8 +8,8 @@ use crate::linalg::{self, Mat};
 /// descending order, without the states at the end that together change the transfer function by at most
 /// `floor` (twice the sum of their sigma bounds the H-infinity norm of what is left out: Glover 1984).
 ///
-/// No Gramian is ever squared, so that small sigma keep their digits. States that cannot be reached or
-/// seen are always left out, `floor` = 0 included, as far as they are exactly so.
+/// No Gramian is ever squared, so that small sigma keep their digits. States that are not controllable or
+/// not observable are always left out, `floor` = 0 included, as far as they are exactly so.
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable.
@@ -17,22 +17,27 @@ pub fn balanced(system: &StateSpace, floor: f64) -> Result<StateSpace, LtiError>
     balanced_when_driven(system, &controllability_root(system.a(), system.b())?, floor)
 }
 
-/// As [`balanced`] for a system in use: `reach` is a square root of the covariance of its states when it is driven by what
-/// drives it there, for example another system (Enns 1984). The leading states then matter most *there*.
+/// As [`balanced`] for a system in use: `controllability_root` is a square root of the covariance of its
+/// states when it is driven by what drives it there, for example another system (Enns 1984). The leading
+/// states then matter most *there*.
 ///
-/// With the output unweighted every leading part is stable, since the observability Gramian stays one of the whole. What is
-/// left out has no bound as simple as that of [`balanced`]: measure it.
+/// With the output unweighted every leading part is stable, since the observability Gramian stays one of
+/// the whole. What is left out has no bound as simple as that of [`balanced`]: measure it.
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable.
-pub fn balanced_when_driven(system: &StateSpace, reach: &Mat, floor: f64) -> Result<StateSpace, LtiError> {
-    let sight = controllability_root(&system.a().transpose(), &system.c().transpose())?;
-    let svd = linalg::svd(&(sight.transpose() * reach))?;
+pub fn balanced_when_driven(
+    system: &StateSpace,
+    controllability_root: &Mat,
+    floor: f64,
+) -> Result<StateSpace, LtiError> {
+    let observability_root = observability_root(system.a(), system.c())?;
+    let svd = linalg::svd(&(observability_root.transpose() * controllability_root))?;
     let kept = kept(&svd.s, floor);
     let root = |k: usize| svd.s[k].sqrt();
     let right = Mat::from_fn(svd.v.nrows(), kept, |i, k| svd.v[(i, k)] / root(k));
     let left = Mat::from_fn(kept, svd.u.nrows(), |k, i| svd.u[(i, k)] / root(k));
-    let (forward, back) = (reach * right, left * sight.transpose());
+    let (forward, back) = (controllability_root * right, left * observability_root.transpose());
     let a = &back * system.a() * &forward;
     Ok(StateSpace::new(a, back * system.b(), system.c() * forward, system.d().clone())?)
 }
@@ -82,8 +87,8 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_reached_or_hardly_matters_is_left_out() {
-        // States: seen and reached; not reached; reached and hardly seen.
+    fn uncontrollable_and_negligible_states_are_left_out() {
+        // Observable and controllable; not controllable; hardly observable.
         let a = Mat::from_diagonal(&nalgebra::dvector![0.5, 0.9, -0.3]);
         let b = Mat::from_column_slice(3, 1, &[1.0, 0.0, 1.0]);
         let c = Mat::from_row_slice(1, 3, &[1.0, 1.0, 1e-9]);
@@ -92,10 +97,10 @@ mod tests {
         let small = balanced(&system, 1e-6).unwrap();
         assert_eq!(small.order(), 1);
         assert!(response_gap(&small, &system) < 1e-8);
-        let silent =
+        let undriven =
             StateSpace::new(system.a().clone(), Mat::zeros(3, 1), system.c().clone(), Mat::zeros(1, 1))
                 .unwrap();
-        assert_eq!(balanced(&silent, 0.0).unwrap().order(), 0);
+        assert_eq!(balanced(&undriven, 0.0).unwrap().order(), 0);
     }
 
     #[test]

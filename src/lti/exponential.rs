@@ -1,6 +1,6 @@
 //! Exact discretisation: square roots of the finite-time controllability Gramian.
 
-use crate::linalg::{self, Mat};
+use crate::linalg::{self, LinalgError, Mat};
 
 /// Eight-point Gauss-Legendre abscissae on [0, 1] and weights (Abramowitz & Stegun, table 25.4).
 /// The integrand below is entire and, after halving, nearly constant: the rule's error
@@ -19,20 +19,20 @@ const NODES: [(f64, f64); 8] = [
 /// e^{A t} of a block-diagonal A, block by block: a stiff block then costs a slow one no digits
 /// (scaling and squaring scales for the largest block).
 #[derive(Debug, Clone)]
-pub struct Flow {
+pub struct StateTransition {
     blocks: Vec<Mat>,
     order: usize,
 }
 
-impl Flow {
-    /// The flow of dx/dt = diag(blocks) x; the blocks are square.
+impl StateTransition {
+    /// The transition of dx/dt = diag(blocks) x; the blocks are square.
     pub fn new(blocks: Vec<Mat>) -> Self {
         let order = blocks.iter().map(Mat::nrows).sum();
         Self { blocks, order }
     }
 
     /// e^{A t}, n x n.
-    pub fn at(&self, t: f64) -> Mat {
+    pub fn over(&self, t: f64) -> Mat {
         let mut transition = Mat::zeros(self.order, self.order);
         let mut start = 0;
         for block in &self.blocks {
@@ -55,38 +55,34 @@ impl Flow {
 /// would lose half of the digits. So the *square root* is computed: quadrature columns
 /// sqrt(weight) e^{a s} b over a sub-interval short against the dynamics, then doubling
 /// S(2t) = [S(t), e^{a t} S(t)], compressed by an LQ factorisation each time.
-pub fn gramian_root(flow: &Flow, b: &Mat, t: f64) -> Mat {
-    let halvings = halvings(flow, t);
+///
+/// # Errors
+/// [`LinalgError::Sizes`] never.
+pub fn gramian_root(transition: &StateTransition, b: &Mat, t: f64) -> Result<Mat, LinalgError> {
+    let halvings = halvings(transition, t);
     let mut step = t * 0.5_f64.powi(halvings as i32);
-    let mut root = quadrature_root(flow, b, step);
+    let mut root = quadrature_root(transition, b, step);
     for _ in 0..halvings {
-        root = linalg::lq_factor(&beside(&root, &(flow.at(step) * &root)));
+        root = linalg::lq_factor(&linalg::hstack(&[&root, &(transition.over(step) * &root)])?);
         step *= 2.0;
     }
-    root
+    Ok(root)
 }
 
 /// How often t must be halved until ||a|| t <= 1/2.
-fn halvings(flow: &Flow, t: f64) -> usize {
-    let size = flow.norm() * t * 2.0;
+fn halvings(transition: &StateTransition, t: f64) -> usize {
+    let size = transition.norm() * t * 2.0;
     if size <= 1.0 { 0 } else { (size.log2().ceil() as usize).min(128) }
 }
 
-fn quadrature_root(flow: &Flow, b: &Mat, t: f64) -> Mat {
+fn quadrature_root(transition: &StateTransition, b: &Mat, t: f64) -> Mat {
     let (n, m) = b.shape();
     let mut columns = Mat::zeros(n, NODES.len() * m);
     for (k, (node, weight)) in NODES.iter().enumerate() {
-        let column = flow.at(node * t) * b * (weight * t).sqrt();
+        let column = transition.over(node * t) * b * (weight * t).sqrt();
         columns.columns_mut(k * m, m).copy_from(&column);
     }
     linalg::lq_factor(&columns)
-}
-
-fn beside(left: &Mat, right: &Mat) -> Mat {
-    let mut both = Mat::zeros(left.nrows(), left.ncols() + right.ncols());
-    both.columns_mut(0, left.ncols()).copy_from(left);
-    both.columns_mut(left.ncols(), right.ncols()).copy_from(right);
-    both
 }
 
 #[cfg(test)]
@@ -109,7 +105,7 @@ mod tests {
         let a = Mat::from_row_slice(3, 3, &[-1.0, 2.0, 0.0, -2.0, -1.0, 1.0, 0.0, 0.0, -0.3]);
         let b = Mat::from_row_slice(3, 1, &[0.0, 1.0, 1.0]);
         for t in [1e-3, 0.1, 1.0, 4.0] {
-            let root = gramian_root(&Flow::new(vec![a.clone()]), &b, t);
+            let root = gramian_root(&StateTransition::new(vec![a.clone()]), &b, t).unwrap();
             let (ours, reference) = (&root * root.transpose(), van_loan(&a, &b, t));
             assert!((&ours - &reference).norm() < 1e-12 * reference.norm(), "t = {t}");
         }
@@ -119,10 +115,11 @@ mod tests {
     fn one_pole_has_its_closed_form_for_any_stiffness() {
         for pole in [1e-9, 1e-3, 1.0, 1e3, 1e9] {
             let root = gramian_root(
-                &Flow::new(vec![Mat::from_element(1, 1, -pole)]),
+                &StateTransition::new(vec![Mat::from_element(1, 1, -pole)]),
                 &Mat::from_element(1, 1, 1.0),
                 1.0,
-            );
+            )
+            .unwrap();
             let exact = -(-2.0 * pole).exp_m1() / (2.0 * pole);
             assert!((root[0] * root[0] - exact).abs() < 1e-11 * exact, "pole {pole}");
         }
@@ -137,7 +134,7 @@ mod tests {
         let mut b = Mat::zeros(n, 1);
         b[n - 1] = 1.0;
         let t: f64 = 1e-2;
-        let root = gramian_root(&Flow::new(vec![a.clone()]), &b, t);
+        let root = gramian_root(&StateTransition::new(vec![a.clone()]), &b, t).unwrap();
         let ours: f64 = (0..n).map(|i| root[(i, i)].abs().ln()).sum::<f64>() * 2.0;
         let factorial = |k: usize| (1..=k).map(|i| (i as f64).ln()).sum::<f64>();
         let hilbert = 4.0 * (1..n).map(factorial).sum::<f64>() - (1..2 * n).map(factorial).sum::<f64>();

@@ -29,6 +29,14 @@ pub fn controllability_root(a: &Mat, b: &Mat) -> Result<Mat, LtiError> {
     Err(LtiError::IterationLimit { what: "the Gramian", limit: DOUBLING_LIMIT, change })
 }
 
+/// Square root of the observability Gramian, `S S' = sum_k a'^k c' c a^k`: see [`controllability_root`].
+///
+/// # Errors
+/// [`LtiError::IterationLimit`] when `a` is not stable.
+pub fn observability_root(a: &Mat, c: &Mat) -> Result<Mat, LtiError> {
+    controllability_root(&a.transpose(), &c.transpose())
+}
+
 /// The H2 norm: square root of `trace(c P c' + d d')`, P the controllability Gramian.
 pub fn h2_norm(system: &StateSpace) -> Result<f64, LtiError> {
     let root = controllability_root(system.a(), system.b())?;

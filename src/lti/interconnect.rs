@@ -1,8 +1,9 @@
 //! Systems made of systems.
 //!
-//! The pieces ([`StateSpace::gain`], [`StateSpace::delays`], [`StateSpace::delay_line`], [`StateSpace::fir`]) and the ways to
-//! connect them. States of the first operand come first. Nothing is reduced: states that cancel stay, and each entry of the
-//! result is an entry of an operand or one product of two of them, so that no digits are lost.
+//! The pieces ([`StateSpace::gain`], [`StateSpace::delays`], [`StateSpace::delay_line`],
+//! [`StateSpace::fir`]) and the ways to connect them. States of the first operand come first. Nothing is
+//! reduced: states that cancel stay, and each entry of the result is an entry of an operand or one product
+//! of two of them, so that no digits are lost.
 
 use super::{StateSpace, StateSpaceError};
 use crate::linalg::{self, Mat};
@@ -15,7 +16,8 @@ impl StateSpace {
         Self { a: Mat::zeros(0, 0), b: Mat::zeros(0, m), c: Mat::zeros(p, 0), d }
     }
 
-    /// `diag(z^-k_1, z^-k_2, ..)`: output i is input i, `steps[i]` steps later. The states of a delay lie first link first.
+    /// `diag(z^-k_1, z^-k_2, ..)`: output i is input i, `steps[i]` steps later. The states of a delay lie
+    /// first link first.
     pub fn delays(steps: &[usize]) -> Self {
         let shift = |n: usize| Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)));
         let first = |n: usize| Mat::from_fn(n, 1, |i, _| f64::from(u8::from(i == 0)));
@@ -29,8 +31,8 @@ impl StateSpace {
         }
     }
 
-    /// All that is known of `width` inputs u up to `steps` steps back: `[u[k - steps]; ..; u[k - 1]; u[k]]`. The states are
-    /// the past inputs, the oldest first.
+    /// All that is known of `width` inputs u up to `steps` steps back: `[u[k - steps]; ..; u[k - 1];
+    /// u[k]]`. The states are the past inputs, the oldest first.
     pub fn delay_line(width: usize, steps: usize) -> Self {
         let order = width * steps;
         let ahead = |i: usize, j: usize| f64::from(u8::from(j == i + width));
@@ -42,11 +44,12 @@ impl StateSpace {
         }
     }
 
-    /// `F(z) = sum_j z^-j F_j`, with a shift register for each input: the states hold its last samples, newest first.
+    /// `F(z) = sum_j z^-j F_j`, with a shift register for each input: the states hold its last samples,
+    /// newest first.
     ///
     /// # Errors
-    /// [`StateSpaceError::Linalg`] if the shapes of the `F_j` differ; no `F_j` at all give the system without inputs and
-    /// outputs.
+    /// [`StateSpaceError::Linalg`] if the shapes of the `F_j` differ; no `F_j` at all give the system
+    /// without inputs and outputs.
     pub fn fir(taps: &[Mat]) -> Result<Self, StateSpaceError> {
         let Some(d) = taps.first() else { return Ok(Self::gain(Mat::zeros(0, 0))) };
         let (stored, inputs) = (taps.len() - 1, d.ncols());
@@ -79,8 +82,8 @@ impl StateSpace {
         })
     }
 
-    /// `[G; N G_o]`: this system with all its outputs, and below them those of `next`, which the given `outputs` o drive.
-    /// Both read the same state of this system, which is there once.
+    /// `[G; N G_o]`: this system with all its outputs, and below them those of `next`, which the given
+    /// `outputs` o drive. Both read the same state of this system, which is there once.
     ///
     /// # Errors
     /// [`StateSpaceError::Connection`] unless `next` has an input for each of the `outputs`,
@@ -212,8 +215,8 @@ impl StateSpace {
         Ok(Self { a: self.a.clone(), b, c: self.c.clone(), d })
     }
 
-    /// The given states only, in that order, the others held at zero. With all states given this is a change of their
-    /// order, which keeps the transfer function.
+    /// The given states only, in that order, the others held at zero. With all states given this is a
+    /// change of their order, which keeps the transfer function.
     ///
     /// # Errors
     /// [`StateSpaceError::Selection`] if one of them is not there.

@@ -6,8 +6,8 @@
 pub mod balanced;
 mod bounded_real;
 mod coordinates;
-mod delay_line;
 pub mod exponential;
+mod fir_with_tail;
 pub mod gramian;
 mod interconnect;
 pub mod modal;
@@ -18,7 +18,7 @@ mod state_space;
 
 pub use bounded_real::bounded_real_riccati;
 pub use coordinates::GramianCoordinates;
-pub use delay_line::TappedRecursion;
+pub use fir_with_tail::FirWithTail;
 pub use response::FrequencyResponse;
 pub use state_space::{StateSpace, StateSpaceError};
 

@@ -1,17 +1,18 @@
 //! Coordinates in which a recursion costs least: parallel sections, or else a triangle.
 
-use super::gramian::controllability_root;
+use super::gramian::{controllability_root, observability_root};
 use super::{LtiError, StateSpace};
 use crate::linalg::{self, CMat, Complex, Mat};
 
-/// Parallel sections are made of eigenvectors of at most this condition: what a section gets wrong by rounding
-/// is magnified by as much where sections cancel one another.
+/// Parallel sections are made of eigenvectors of at most this condition: what a section gets wrong by
+/// rounding is magnified by as much where sections cancel one another.
 const CONDITION_LIMIT: f64 = 1e4;
 
-/// The system as parallel sections: `a` block-diagonal with a real pole alone, or a conjugate pair
-/// s + jw, s - jw as [[s, w], [-w, s]], and exact zeros elsewhere. Pairs come first, each kind by falling modulus.
-/// In each section the mean squares of its states and of what they do to the output are equal for white input (the
-/// traces of its two Gramians, up to a power of 16), so that no state is much larger or smaller than what it is good for.
+/// The system as parallel sections: `a` block-diagonal with a real pole alone, or a conjugate pair s + jw,
+/// s - jw as [[s, w], [-w, s]], and exact zeros elsewhere. Pairs come first, each kind by falling modulus.
+/// In each section the mean squares of its states and of what they do to the output are equal for white
+/// input (the traces of its two Gramians, up to a power of 16), so that no state is much larger or smaller
+/// than what it is good for.
 ///
 /// `None` where the eigenvectors are nearly dependent (repeated and close poles): see [`triangular`].
 ///
@@ -36,8 +37,8 @@ pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
     sections(&modes, b, c, system.d().clone()).map(Some)
 }
 
-/// The system in a real Schur basis: `a` is zero below its diagonal but for 2 x 2 blocks. The change of coordinates is a
-/// rotation and costs no accuracy, whatever the poles.
+/// The system in a real Schur basis: `a` is zero below its diagonal but for 2 x 2 blocks. The change of
+/// coordinates is a rotation and costs no accuracy, whatever the poles.
 ///
 /// # Errors
 /// [`LtiError`] if the iteration does not converge.
@@ -69,8 +70,8 @@ fn modes(a: &Mat) -> Result<Vec<Mode>, LtiError> {
     Ok(modes)
 }
 
-/// Real and imaginary parts of the eigenvectors, each turned so that the two are orthogonal, and scaled to unit
-/// length together.
+/// Real and imaginary parts of the eigenvectors, each turned so that the two are orthogonal, and scaled to
+/// unit length together.
 fn basis(modes: &[Mode], n: usize) -> Mat {
     let mut basis = Mat::zeros(n, n);
     let mut next = 0;
@@ -105,9 +106,7 @@ fn sections(modes: &[Mode], mut b: Mat, mut c: Mat, d: Mat) -> Result<StateSpace
 
 /// The power of two by which to divide the states of a section for Gramians of equal trace.
 fn equalising(a: &Mat, b: &Mat, c: &Mat) -> Result<f64, LtiError> {
-    let reach = controllability_root(a, b)?.norm();
-    let sight = controllability_root(&a.transpose(), &c.transpose())?.norm();
-    let ratio = (reach / sight).sqrt();
+    let ratio = (controllability_root(a, b)?.norm() / observability_root(a, c)?.norm()).sqrt();
     Ok(if ratio.is_normal() { ratio.log2().round().exp2() } else { 1.0 })
 }
 

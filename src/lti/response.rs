@@ -141,8 +141,8 @@ mod tests {
         }
     }
 
-    /// Gains of states on one another that differ by 20 decades, as where a filter is written in units of its own: orthogonal
-    /// changes of coordinates keep errors small beside the largest of them only.
+    /// Gains of states on one another that differ by 20 decades, as where a filter is written in units of
+    /// its own: orthogonal changes of coordinates keep errors small beside the largest of them only.
     #[test]
     fn units_of_the_states_do_not_move_the_response() {
         for n in [2_usize, 5, 12] {

@@ -131,8 +131,9 @@ impl StateSpace {
         }
     }
 
-    /// The same system with its states in units that suit one another: divided by powers of two, which is exact. Orthogonal
-    /// changes of coordinates mix all states, and what is small beside rounding errors of the others is lost in them.
+    /// The same system with its states in units that suit one another: divided by powers of two, which is
+    /// exact. Orthogonal changes of coordinates mix all states, and what is small beside rounding errors of
+    /// the others is lost in them.
     pub fn rescaled(&self) -> Self {
         let scales = linalg::state_scales(&self.a, &self.b, &self.c);
         let scaled = Self {

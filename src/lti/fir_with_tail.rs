@@ -1,8 +1,9 @@
-//! A recursion at the end of a delay line.
+//! A FIR head with a recursive tail.
 //!
-//! Filters that look ahead hold delay chains: states that only pass values on. Together they are one large defective
-//! eigenvalue at zero, hopeless for any modal form, and yet nothing but a filter of finitely many taps. The first q taps
-//! of the response are therefore taken as such; what comes after them is a recursion without the chains,
+//! Filters that look ahead hold delay chains: states that only pass values on. Together they are one large
+//! defective eigenvalue at zero, which has no modal form, and yet only a filter of finitely many taps. The first
+//! q + 1 taps of the response are therefore the FIR head, and the response after them is that of a recursion
+//! without the chains, the tail:
 //!
 //! y[k] = sum_{j = 0..q} h_j u[k - j] + c x[k],  x[k + 1] = a x[k] + b u[k - q].
 
@@ -16,111 +17,110 @@ use crate::linalg::{self, Mat};
 /// quarter of what rounding the taps does.
 const NEGLIGIBLE: f64 = f64::EPSILON / 4.0;
 
-/// See the module's text.
+/// A FIR head with a recursive tail: y[k] = sum h_j u[k - j] + c x[k], x[k + 1] = a x[k] + b u[k - q].
 #[derive(Debug, Clone, PartialEq)]
-pub struct TappedRecursion {
+pub struct FirWithTail {
     /// h_0 .. h_q, p x m each.
-    taps: Vec<Mat>,
+    head: Vec<Mat>,
     /// a, b, c, with d = 0.
     tail: StateSpace,
 }
 
-impl TappedRecursion {
-    /// The same transfer function, q being the length of the longest chain at the end of which nothing but the
-    /// output is. The recursion is balanced, and states of no account are left out.
+impl FirWithTail {
+    /// The same transfer function, q being the length of the longest delay chain that drives only the output. The
+    /// tail is balanced, and its negligible states are left out.
     ///
     /// # Errors
     /// [`LtiError`] if the system is not stable.
     pub fn new(system: &StateSpace) -> Result<Self, LtiError> {
         let chains = Chains::new(system.a());
-        let Self { taps, tail } = Self::split(system, chains.longest)?;
+        let Self { head, tail } = Self::split(system, chains.longest)?;
         let tail = tail.select_states(chains.core)?;
-        let energy = taps.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
-        Ok(Self { taps, tail: balanced(&tail, NEGLIGIBLE * energy.sqrt())? })
+        let energy = head.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
+        Ok(Self { head, tail: balanced(&tail, NEGLIGIBLE * energy.sqrt())? })
     }
 
-    /// The same transfer function with the first `ticks` samples of its response after the direct one as taps and all states
-    /// in the recursion: `y[k] = sum h_j u[k - j] + c a^ticks x[k - ticks]`.
+    /// The same transfer function with q = `length` and all states in the tail:
+    /// `y[k] = sum h_j u[k - j] + c a^q x[k - q]`.
     ///
     /// # Errors
     /// [`StateSpaceError`] never: the parts fit.
-    pub fn split(system: &StateSpace, ticks: usize) -> Result<Self, StateSpaceError> {
-        let mut taps = vec![system.d().clone()];
-        let mut outlook = system.c().clone();
-        for _ in 0..ticks {
-            taps.push(&outlook * system.b());
-            outlook *= system.a();
+    pub fn split(system: &StateSpace, length: usize) -> Result<Self, StateSpaceError> {
+        let mut head = vec![system.d().clone()];
+        let mut c = system.c().clone();
+        for _ in 0..length {
+            head.push(&c * system.b());
+            c *= system.a();
         }
-        let silent = Mat::zeros(system.outputs(), system.inputs());
-        Ok(Self { taps, tail: StateSpace::new(system.a().clone(), system.b().clone(), outlook, silent)? })
+        let zero = Mat::zeros(system.outputs(), system.inputs());
+        Ok(Self { head, tail: StateSpace::new(system.a().clone(), system.b().clone(), c, zero)? })
     }
 
-    /// The recursion x+ = a x + b u at the end of a line of `ticks` inputs, of which `readout` = [c h_q .. h_0] is read.
+    /// The tail x+ = a x + b u behind a head of q = `length`, with `outputs` = [c h_q .. h_0].
     ///
     /// # Errors
     /// [`StateSpaceError`] if the shapes do not fit.
-    pub fn read_by(readout: &Mat, ticks: usize, a: &Mat, b: &Mat) -> Result<Self, StateSpaceError> {
-        let (p, n, m) = (readout.nrows(), a.nrows(), b.ncols());
-        let tap = |j: usize| readout.columns(n + (ticks - j) * m, m).into_owned();
-        let c = readout.columns(0, n).into_owned();
+    pub fn with_outputs(outputs: &Mat, length: usize, a: &Mat, b: &Mat) -> Result<Self, StateSpaceError> {
+        let (p, n, m) = (outputs.nrows(), a.nrows(), b.ncols());
+        let tap = |j: usize| outputs.columns(n + (length - j) * m, m).into_owned();
+        let c = outputs.columns(0, n).into_owned();
         let tail = StateSpace::new(a.clone(), b.clone(), c, Mat::zeros(p, m))?;
-        Ok(Self { taps: (0..=ticks).map(tap).collect(), tail })
+        Ok(Self { head: (0..=length).map(tap).collect(), tail })
     }
 
-    /// The same outputs for inputs u = `mix` v.
+    /// The same outputs for inputs u = `gain` v.
     ///
     /// # Errors
-    /// [`StateSpaceError`] if `mix` has not a row for each input.
-    pub fn with_inputs(&self, mix: impl Fn(&Mat) -> Mat) -> Result<Self, StateSpaceError> {
-        let taps = self.taps.iter().map(&mix).collect();
-        let unity = Mat::identity(self.tail.inputs(), self.tail.inputs());
-        Ok(Self { taps, tail: self.tail.map_inputs(&mix(&unity))? })
+    /// [`StateSpaceError::Gain`] if `gain` has not a row for each input.
+    pub fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
+        let tail = self.tail.map_inputs(gain)?;
+        Ok(Self { head: self.head.iter().map(|tap| tap * gain).collect(), tail })
     }
 
-    /// a, b, c of the recursion, with d = 0.
+    /// a, b, c of the tail, with d = 0.
     pub fn tail(&self) -> &StateSpace {
         &self.tail
     }
 
-    /// The recursion as parallel sections, see [`modal`].
+    /// The tail as parallel sections, see [`modal`].
     ///
     /// # Errors
     /// As [`modal`].
     pub fn modal(&self) -> Result<Option<Self>, LtiError> {
         let tail = modal(&self.tail)?;
-        Ok(tail.map(|tail| Self { taps: self.taps.clone(), tail }))
+        Ok(tail.map(|tail| Self { head: self.head.clone(), tail }))
     }
 
-    /// The recursion as a triangle, see [`triangular`].
+    /// The tail as a triangle, see [`triangular`].
     ///
     /// # Errors
     /// As [`triangular`].
     pub fn triangular(&self) -> Result<Self, LtiError> {
-        Ok(Self { taps: self.taps.clone(), tail: triangular(&self.tail)? })
+        Ok(Self { head: self.head.clone(), tail: triangular(&self.tail)? })
     }
 
-    /// q, ticks that the line is long.
-    pub fn ticks(&self) -> usize {
-        self.taps.len() - 1
+    /// q, the steps by which the input of the tail is delayed.
+    pub fn head_length(&self) -> usize {
+        self.head.len() - 1
     }
 
-    /// One system: the states of the recursion first, then the line from its oldest inputs to its newest. So `a` is block
+    /// One system: the states of the tail first, then the past inputs from the oldest to the newest. So `a` is block
     /// triangular, and as sparse as can be.
     ///
     /// # Errors
-    /// [`StateSpaceError`] never for a recursion made by [`TappedRecursion::new`]: its parts fit.
+    /// [`StateSpaceError`] never for a value made by [`FirWithTail::new`]: its parts fit.
     pub fn realise(&self) -> Result<StateSpace, StateSpaceError> {
-        let (q, m, n) = (self.ticks(), self.tail.inputs(), self.tail.order());
+        let (q, m, n) = (self.head_length(), self.tail.inputs(), self.tail.order());
         let line = StateSpace::delay_line(m, q);
         let unity = Mat::identity(self.tail.outputs(), self.tail.outputs());
-        let newest_last = self.taps.iter().rev().chain([&unity]);
+        let newest_last = self.head.iter().rev().chain([&unity]);
         let sum = linalg::hstack(&newest_last.collect::<Vec<_>>())?;
         let whole = line.cascade(0..m, &self.tail)?.map_outputs(&sum)?;
         whole.select_states((q * m..q * m + n).chain(0..q * m))
     }
 }
 
-/// The states that reach nothing but the output after some steps, told by exact zeros.
+/// The states that drive nothing but the output after some steps, as exact zeros show.
 struct Chains {
     /// Steps after which none of them matters.
     longest: usize,
@@ -133,8 +133,8 @@ impl Chains {
         let mut core: Vec<usize> = (0..a.nrows()).collect();
         let mut longest = 0;
         loop {
-            let reaches_core = |&j: &usize| core.iter().any(|&i| a[(i, j)] != 0.0);
-            let rest: Vec<usize> = core.iter().copied().filter(reaches_core).collect();
+            let drives_core = |&j: &usize| core.iter().any(|&i| a[(i, j)] != 0.0);
+            let rest: Vec<usize> = core.iter().copied().filter(drives_core).collect();
             if rest.len() == core.len() {
                 return Self { longest, core };
             }
@@ -197,11 +197,11 @@ mod tests {
     fn chains_become_taps_and_the_rest_a_pair() {
         for (long, short) in [(1, 1), (4, 1), (5, 4), (30, 7)] {
             let system = with_chains(long, short);
-            let tapped = TappedRecursion::new(&system).unwrap();
-            assert_eq!((tapped.ticks(), tapped.tail.order()), (long, 2));
-            let modal = tapped.modal().unwrap().unwrap();
-            let triangular = tapped.triangular().unwrap();
-            for form in [tapped, modal, triangular] {
+            let split = FirWithTail::new(&system).unwrap();
+            assert_eq!((split.head_length(), split.tail.order()), (long, 2));
+            let modal = split.modal().unwrap().unwrap();
+            let triangular = split.triangular().unwrap();
+            for form in [split, modal, triangular] {
                 let made = form.realise().unwrap();
                 assert_eq!(made.order(), 2 + 2 * long);
                 check_same(&system, &made, 1e-12);
@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn the_matrix_has_nothing_but_its_section_and_the_line() {
-        let a = TappedRecursion::new(&with_chains(3, 2))
+        let a = FirWithTail::new(&with_chains(3, 2))
             .unwrap()
             .modal()
             .unwrap()
@@ -225,8 +225,8 @@ mod tests {
             for j in 0..8 {
                 let (section, fed) = (i < 2 && j < 2, i < 2 && (2..4).contains(&j));
                 let shifted = i >= 2 && j == i + 2;
-                let wanted = if shifted { 1.0 } else { 0.0 };
-                assert!(section || fed || a[(i, j)] == wanted, "({i}, {j}): {}", a[(i, j)]);
+                let want = if shifted { 1.0 } else { 0.0 };
+                assert!(section || fed || a[(i, j)] == want, "({i}, {j}): {}", a[(i, j)]);
             }
         }
     }
@@ -237,9 +237,9 @@ mod tests {
         let b = Mat::from_fn(6, 1, |i, _| 1.0 + i as f64);
         let c = Mat::from_fn(2, 6, |i, j| (i + 2 * j) as f64);
         let system = StateSpace::new(a, b, c, Mat::zeros(2, 1)).unwrap();
-        let tapped = TappedRecursion::new(&system).unwrap();
-        assert_eq!((tapped.ticks(), tapped.tail.order()), (6, 0));
-        assert_eq!(impulse_responses(&system, 20), impulse_responses(&tapped.realise().unwrap(), 20));
+        let split = FirWithTail::new(&system).unwrap();
+        assert_eq!((split.head_length(), split.tail.order()), (6, 0));
+        assert_eq!(impulse_responses(&system, 20), impulse_responses(&split.realise().unwrap(), 20));
     }
 
     #[test]
@@ -247,15 +247,15 @@ mod tests {
         let a = Mat::from_row_slice(3, 3, &[0.5, 0.4, 0.0, -0.4, 0.5, 0.0, 0.1, 0.0, -0.9]);
         let (b, c) = (Mat::from_element(3, 1, 1.0), Mat::from_row_slice(1, 3, &[1.0, -1.0, 2.0]));
         let system = StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap();
-        let tapped = TappedRecursion::new(&system).unwrap();
-        assert_eq!((tapped.ticks(), tapped.tail.order()), (0, 3));
-        check_same(&system, &tapped.modal().unwrap().unwrap().realise().unwrap(), 1e-13);
+        let split = FirWithTail::new(&system).unwrap();
+        assert_eq!((split.head_length(), split.tail.order()), (0, 3));
+        check_same(&system, &split.modal().unwrap().unwrap().realise().unwrap(), 1e-13);
     }
 
     #[test]
     fn an_unstable_system_is_refused() {
         let one = Mat::from_element(1, 1, 1.0);
         let system = StateSpace::new(one.clone() * 1.5, one.clone(), one.clone(), one).unwrap();
-        assert!(TappedRecursion::new(&system).is_err());
+        assert!(FirWithTail::new(&system).is_err());
     }
 }

@@ -1,0 +1,87 @@
+//! Local maxima of the gain, and their refinement between neighbouring frequencies.
+
+use super::Peak;
+use crate::lti::LtiError;
+use std::f64::consts::PI;
+
+/// Relative differences of gains below this are no reason to go on refining.
+const FLAT: f64 = 1e-11;
+/// Relative differences of gains below this are no differences.
+const ROUNDING: f64 = 1e-13;
+/// Steps of a refinement are at least this part of the width that is left.
+const LEAST_STEP: f64 = 1e-3;
+
+/// Refines the peak between the outer of three neighbouring points by parabolas through the last three
+/// points, falling back on golden sections; `at` evaluates the gain. The gain is flat at its peak: its
+/// value converges twice as fast as the frequency.
+pub(super) fn refine(
+    at: impl Fn(f64) -> Result<Peak, LtiError>,
+    [mut low, start, mut high]: [Peak; 3],
+) -> Result<Peak, LtiError> {
+    let mut best = start;
+    let (mut stalls, mut flats) = (0, 0);
+    while high.frequency - low.frequency > 1e-9 && flats < 2 {
+        let w = next_abscissa(low, best, high, stalls);
+        let tried = at(w)?;
+        let gained = tried.gain - best.gain;
+        stalls = if gained < FLAT * best.gain { stalls + 1 } else { 0 };
+        // A try far below the best one says that the step was poor, not that the peak is reached.
+        flats = if gained.abs() <= FLAT * best.gain { flats + 1 } else { 0 };
+        // Of equal gains the first stays: peaks at 0 and pi are there exactly.
+        if gained > ROUNDING * best.gain {
+            if w < best.frequency {
+                high = best
+            } else {
+                low = best
+            }
+            best = tried;
+        } else if w < best.frequency {
+            low = tried;
+        } else {
+            high = tried;
+        }
+    }
+    Ok(best.folded())
+}
+
+/// Vertex of the parabola through three points, at least [`LEAST_STEP`] of their width away from the best
+/// one (a shorter step finds the same gain up to rounding, wherever the peak is), or, where it is no use,
+/// a golden section of the longer side.
+fn next_abscissa(low: Peak, best: Peak, high: Peak, stalls: usize) -> f64 {
+    const GOLDEN: f64 = 0.381_966_011_250_105_1;
+    let (a, m, b) = (low.frequency, best.frequency, high.frequency);
+    let (left, right) = ((m - a) * (best.gain - high.gain), (b - m) * (best.gain - low.gain));
+    let step = -0.5 * ((m - a) * left - (b - m) * right) / (left + right);
+    let longer = if m - a > b - m { a - m } else { b - m };
+    let least = LEAST_STEP * (b - a);
+    let step = if step.abs() < least { least.copysign(longer) } else { step };
+    let inside = m + step > a && m + step < b;
+    if stalls % 3 < 2 && inside { m + step } else { m + GOLDEN * longer }
+}
+
+pub(super) fn higher(a: Peak, b: Peak) -> Peak {
+    if b.gain > a.gain { b } else { a }
+}
+
+/// The local maxima between their neighbours. The gain is even about 0 and about pi, so the neighbours
+/// there are mirror images.
+pub(super) fn local_maxima(grid: &[Peak]) -> Vec<[Peak; 3]> {
+    let last = grid.len() - 1;
+    let neighbours = |k: usize| {
+        let mirror = |about: f64, peak: Peak| Peak { frequency: 2.0 * about - peak.frequency, ..peak };
+        let low = if k == 0 { mirror(0.0, grid[1]) } else { grid[k - 1] };
+        let high = if k == last { mirror(PI, grid[last - 1]) } else { grid[k + 1] };
+        [low, grid[k], high]
+    };
+    let is_maximum = |[low, middle, high]: &[Peak; 3]| middle.gain >= low.gain.max(high.gain);
+    (0..=last).map(neighbours).filter(is_maximum).collect()
+}
+
+/// How high the gain may rise between `low` and `high`, of which `middle` is the highest that was evaluated: a
+/// gain that is concave there lies below the chords on either side of `middle`, extended to the other.
+pub(super) fn upper_estimate(low: Peak, middle: Peak, high: Peak) -> f64 {
+    let (left, right) = (middle.frequency - low.frequency, high.frequency - middle.frequency);
+    let beyond_left = (middle.gain - low.gain) * right / left;
+    let beyond_right = (middle.gain - high.gain) * left / right;
+    middle.gain + beyond_left.max(beyond_right)
+}
