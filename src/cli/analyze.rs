@@ -75,7 +75,7 @@ impl Report {
         let MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
         format!(
             "gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n{proof}\
-             worst at     {peak_hertz:.6} Hz modulo the slow rate\n\
+             worst at     {peak_hertz:.6} modulo the slow rate\n\
              noncausal    {noncausal:.9}   no bank at all is better\n\
              rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
              noise gain   {noise_gain:.6}      for independent noise on the slow samples\n\

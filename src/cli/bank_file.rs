@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::bank::{Bank, SynthesisFilters};
-use crate::design::error_system;
+use crate::design::filters;
 use crate::io::AtomicFile;
 use crate::spec::{DesignOverrides, Spec, SpecProblem};
 use std::io::{Read, Write};
@@ -24,7 +24,7 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
 fn check_stable(bank: &Bank, path: &Path) -> Result<(), Failure> {
     if let SynthesisFilters::StateSpace(_) = &bank.filters {
         let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(path)));
-        let block = error_system::block_system(&bank.filters, bank.ratio).map_err(|error| named(&error))?;
+        let block = filters::lifted(&bank.filters, bank.ratio).map_err(|error| named(&error))?;
         let radius = block.spectral_radius().map_err(|error| named(&error))?;
         if radius >= 1.0 {
             return Err(named(&format!(

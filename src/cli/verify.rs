@@ -67,7 +67,7 @@ fn report(args: &Args) -> Result<Report, Failure> {
     let verified = if certificate_in_file {
         verify(&bank).map_err(|error| named(&error))?
     } else {
-        design::prove(&bank, &[]).map_err(|error| named(&error))?.1
+        design::prove(&bank).map_err(|error| named(&error))?.1
     };
     Ok(Report { scope: scope(&bank), words: words(&bank), bank: file, verified, digest, certificate_in_file })
 }

@@ -1,10 +1,12 @@
-//! The error of FIR banks on a fine grid of frequencies: an estimate of gamma, cheap enough for taps that still change.
+//! The error of FIR banks on a fine grid of frequencies: an estimate of gamma, cheap enough for taps that
+//! still change.
 
 use super::DesignError;
-use super::equivalence::BlockedPlant;
-use super::error_system::{FirError, filter_response};
+use super::exchange::{AffineError, Peaks};
+use super::filters;
+use super::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Mat};
-use crate::lmi::sampled::Point;
+use crate::lmi::sampled::{Point, Taps};
 use crate::lti::peak::Peak;
 use std::f64::consts::PI;
 
@@ -16,29 +18,17 @@ const FINE: usize = 8;
 
 /// A plant at equidistant frequencies from 0 to pi.
 pub(super) struct ErrorGrid<'a> {
-    error: FirError<'a>,
+    plant: &'a LiftedPlant,
     points: Vec<Point>,
-}
-
-/// What a grid tells about the error of a bank.
-#[derive(Debug, Clone)]
-pub(super) struct Peaks {
-    /// gamma, if no peak was missed.
-    pub(super) estimate: f64,
-    /// Local peaks, between the points too.
-    pub(super) peaks: Vec<Peak>,
 }
 
 impl<'a> ErrorGrid<'a> {
     /// A grid for filters of `lags` slow lags.
-    ///
-    /// # Errors
-    /// [`DesignError::Lti`] if the plant is not stable.
-    pub(super) fn new(plant: &'a BlockedPlant, lags: usize) -> Result<Self, DesignError> {
+    pub(super) fn new(plant: &'a LiftedPlant, lags: usize) -> Self {
         let intervals = FINE * LEAST_POINTS.max(POINTS_PER_LAG * lags);
-        let mut grid = Self { error: FirError::new(plant)?, points: Vec::new() };
+        let mut grid = Self { plant, points: Vec::new() };
         grid.points = (0..=intervals).map(|k| grid.at(PI * k as f64 / intervals as f64)).collect();
-        Ok(grid)
+        grid
     }
 
     /// All points.
@@ -55,15 +45,10 @@ impl<'a> ErrorGrid<'a> {
         (points, weights)
     }
 
-    /// The plant at any frequency (radians a slow tick).
+    /// The plant at any frequency (radians per slow period).
     pub(super) fn at(&self, omega: f64) -> Point {
-        let (h, w) = self.error.plant_at(omega);
+        let (h, w) = self.plant.response(omega);
         Point { omega, h, w }
-    }
-
-    /// The exact norm of the filters `taps[i]`.
-    pub(super) fn gamma(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
-        self.error.gamma(taps)
     }
 
     /// The gain of the error with `taps` at each point.
@@ -71,7 +56,7 @@ impl<'a> ErrorGrid<'a> {
         self.points.iter().map(|point| gain(point, taps)).collect()
     }
 
-    /// The mean square of the error a tick, for white noise of unit density at the analog input.
+    /// The mean square of the error per slow period, for white noise of unit density at the analog input.
     pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
         let last = self.points.len() - 1;
         let weight = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
@@ -79,8 +64,8 @@ impl<'a> ErrorGrid<'a> {
         self.points.iter().enumerate().map(square).sum::<f64>() / last as f64
     }
 
-    /// The peaks of the error with `taps`: at the points of the grid, and between them on the parabolas through three
-    /// neighbours.
+    /// The peaks of the error with `taps`: at the points of the grid, and between them on the parabolas
+    /// through three neighbours.
     pub(super) fn peaks(&self, taps: &[Mat]) -> Result<Peaks, DesignError> {
         let gains = self.gains(taps)?;
         let step = self.points[1].omega;
@@ -93,8 +78,8 @@ impl<'a> ErrorGrid<'a> {
                 let (shift, _) = parabola(at(k - 1), at(k), at(k + 1));
                 let frequency = ((k as f64 + shift) * step).clamp(0.0, PI);
                 let between = gain(&self.at(frequency), taps)?;
-                let top = Peak { gain: at(k), frequency: k as f64 * step };
-                peaks.push(if between > top.gain { Peak { gain: between, frequency } } else { top });
+                let point = Peak { gain: at(k), frequency: k as f64 * step };
+                peaks.push(if between > point.gain { Peak { gain: between, frequency } } else { point });
             }
         }
         let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
@@ -102,16 +87,19 @@ impl<'a> ErrorGrid<'a> {
     }
 }
 
-impl Peaks {
-    /// The frequencies of the peaks higher than `level`.
-    pub(super) fn above(&self, level: f64) -> Vec<f64> {
-        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.frequency).collect()
+impl AffineError for ErrorGrid<'_> {
+    fn at(&self, omega: f64) -> Point {
+        self.at(omega)
+    }
+
+    fn peaks(&self, taps: &Taps, _gamma: f64, _level: f64) -> Result<Peaks, DesignError> {
+        self.peaks(taps)
     }
 }
 
 /// K = W - F H at a point.
 pub(super) fn error_at(point: &Point, taps: &[Mat]) -> CMat {
-    &point.w - filter_response(taps, point.omega) * &point.h
+    &point.w - filters::response(taps, point.omega) * &point.h
 }
 
 fn gain(point: &Point, taps: &[Mat]) -> Result<f64, DesignError> {

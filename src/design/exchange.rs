@@ -22,7 +22,7 @@ use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Settings, T
 use crate::lti::peak::Peak;
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
-pub const GAMMA_ACCURACY: f64 = 5e-7;
+pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
 /// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so it costs next to nothing.
 pub(super) const LEAST_MARGIN: f64 = 4e-7;
 /// Tolerance of the optimum on the points, relative to [`GAMMA_ACCURACY`].
@@ -73,11 +73,11 @@ pub(super) struct Candidate {
 
 /// A frequency with the dual matrix of the error there.
 #[derive(Debug, Clone)]
-pub struct DualPoint {
+pub(crate) struct DualPoint {
     /// Radians per slow period.
-    pub omega: f64,
+    pub(crate) omega: f64,
     /// M x q; its left singular vectors are the binding directions.
-    pub weight: CMat,
+    pub(crate) weight: CMat,
 }
 
 /// The state of the exchange: the points so far and the lower bound that they prove.
@@ -117,6 +117,7 @@ impl<E: AffineError> Exchange<E> {
     }
 
     /// The error that is minimised.
+    #[cfg(test)]
     pub(super) fn error(&self) -> &E {
         &self.error
     }

@@ -2,11 +2,12 @@
 
 use super::DesignError;
 use crate::analog::StrictlyProper;
+use crate::linalg::Mat;
 use crate::spec::{FilterSpec, Spec};
 use crate::units::FastPeriods;
 
-/// Most states of the delay chains of the blocked system. Its matrices are dense: at this size one of them takes
-/// 128 MiB, and a norm some of these and a cubic number of operations.
+/// Most states of the delay chains of the blocked system. Its matrices are dense: at this size one of them
+/// takes 128 MiB, and a norm some of these and a cubic number of operations.
 pub const MAX_CHAIN_STATES: usize = 4096;
 
 /// Front ends, delays and rates in units of the fast period (h = 1).
@@ -59,14 +60,15 @@ impl Problem {
     /// Delay chains of bounded length.
     ///
     /// # Errors
-    /// [`DesignError::TooLate`] if latency and delays lie so far apart that the chains between them have more than
-    /// [`MAX_CHAIN_STATES`] states.
+    /// [`DesignError::TooLate`] if latency and delays lie so far apart that the chains between them have
+    /// more than [`MAX_CHAIN_STATES`] states.
     pub fn check_size(&self) -> Result<(), DesignError> {
-        let wanted = (0..self.ratio).map(|p| p as f64 - self.latency as f64);
-        let times: Vec<f64> = self.channels.iter().map(|channel| -channel.delay.0).chain(wanted).collect();
+        let references = (0..self.ratio).map(|p| p as f64 - self.latency as f64);
+        let times: Vec<f64> =
+            self.channels.iter().map(|channel| -channel.delay.0).chain(references).collect();
         let latest = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let ticks = |time: f64| ((latest - time) / self.ratio as f64).floor();
-        let states: f64 = times.into_iter().map(ticks).sum();
+        let periods = |time: f64| ((latest - time) / self.ratio as f64).floor();
+        let states: f64 = times.into_iter().map(periods).sum();
         if states <= MAX_CHAIN_STATES as f64 {
             return Ok(());
         }
@@ -83,27 +85,27 @@ impl Problem {
         moved
     }
 
-    /// The same problem with each group of indistinguishable channels (same filter, same delay)
-    /// replaced by one, their weighted mean, and the part that each channel has in it.
-    pub(super) fn without_duplicates(&self) -> (Self, Vec<Part>) {
-        let mut reduced = self.clone();
-        reduced.channels.clear();
+    /// Each group of channels that cannot be told apart (same filter, same delay) replaced by one, their
+    /// weighted mean.
+    pub(super) fn merge_channels(&self) -> MergedChannels {
+        let mut merged = self.clone();
+        merged.channels.clear();
         for channel in &self.channels {
-            if !reduced.channels.contains(channel) {
-                reduced.channels.push(*channel);
+            if !merged.channels.contains(channel) {
+                merged.channels.push(*channel);
             }
         }
-        reduced.noise = vec![0.0; reduced.channels.len()];
-        let mut parts = vec![Part { representative: 0, share: 0.0 }; self.channels.len()];
-        for (representative, common) in reduced.channels.iter().enumerate() {
-            let group: Vec<usize> = (0..parts.len()).filter(|&i| self.channels[i] == *common).collect();
+        merged.noise = vec![0.0; merged.channels.len()];
+        let mut shares = vec![Share { representative: 0, share: 0.0 }; self.channels.len()];
+        for (representative, common) in merged.channels.iter().enumerate() {
+            let group: Vec<usize> = (0..shares.len()).filter(|&i| self.channels[i] == *common).collect();
             let noise: Vec<f64> = group.iter().map(|&i| self.noise[i]).collect();
             for (&i, share) in group.iter().zip(least_noise_shares(&noise)) {
-                parts[i] = Part { representative, share };
-                reduced.noise[representative] += share * share * self.noise[i];
+                shares[i] = Share { representative, share };
+                merged.noise[representative] += share * share * self.noise[i];
             }
         }
-        (reduced, parts)
+        MergedChannels { problem: merged, shares }
     }
 
     /// The largest delay.
@@ -112,16 +114,49 @@ impl Problem {
     }
 }
 
-/// Which channel of a reduced problem a channel is part of, and its weight there.
+/// A problem in which no two channels are alike, and the shares that the original channels have in its
+/// filters.
+#[derive(Debug, Clone)]
+pub(super) struct MergedChannels {
+    /// Each channel once.
+    pub(super) problem: Problem,
+    /// One for each of the original channels.
+    pub(super) shares: Vec<Share>,
+}
+
+/// Which merged channel a channel is part of, and its weight there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Part {
+pub(super) struct Share {
+    /// Index of the merged channel.
     pub(super) representative: usize,
     /// The shares of a group sum to 1.
     pub(super) share: f64,
 }
 
-/// The weights, of sum 1, with which a mean of equal signals with noise of the given powers has the least noise: in
-/// inverse proportion to the powers; among the noiseless alone if there are any.
+impl MergedChannels {
+    /// No channel is like another.
+    pub(super) fn are_all(&self) -> bool {
+        self.problem.channels.len() == self.shares.len()
+    }
+
+    /// Channels that cannot be told apart share their common filter: the same error, the least noise.
+    pub(super) fn share_taps(&self, taps: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let share = |part: &Share| taps[part.representative].iter().map(|tap| tap * part.share).collect();
+        self.shares.iter().map(share).collect()
+    }
+
+    /// From the original channels to the merged ones: F for these times this matrix is F for those.
+    pub(super) fn shares(&self) -> Mat {
+        let entry = |merged: usize, channel: usize| {
+            let part = self.shares[channel];
+            if part.representative == merged { part.share } else { 0.0 }
+        };
+        Mat::from_fn(self.problem.channels.len(), self.shares.len(), entry)
+    }
+}
+
+/// The weights, of sum 1, with which a mean of equal signals with noise of the given powers has the least
+/// noise: in inverse proportion to the powers; among the noiseless alone if there are any.
 fn least_noise_shares(noise: &[f64]) -> Vec<f64> {
     let least = noise.iter().copied().fold(f64::INFINITY, f64::min);
     let weight = |power: f64| if least == 0.0 { f64::from(u8::from(power == 0.0)) } else { least / power };

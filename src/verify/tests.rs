@@ -3,8 +3,7 @@
 use super::spectrum::{self, Complex};
 use super::*;
 use crate::bank::{BlockFilter, Gamma};
-use crate::design::equivalence::BlockedPlant;
-use crate::design::{Problem, error_system};
+use crate::design::{LiftedPlant, Problem, filters};
 use crate::linalg::{CMat, symmetric_eigenvalues};
 use crate::lti::FrequencyResponse;
 use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Spec};
@@ -93,8 +92,8 @@ fn cases() -> Vec<(&'static str, Bank)> {
 /// K(z) K(z)* by the designer's route.
 fn designers(bank: &Bank, omega: f64) -> CMat {
     let problem = Problem::new(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
-    let filters = error_system::block_system(&bank.filters, bank.ratio).unwrap();
-    let error = error_system::error_system(&BlockedPlant::new(&problem), &filters).unwrap();
+    let filters = filters::lifted(&bank.filters, bank.ratio).unwrap();
+    let error = LiftedPlant::new(&problem).unwrap().error_system(&filters).unwrap();
     let k = FrequencyResponse::new(&error).at_frequency(omega);
     &k * k.adjoint()
 }
@@ -158,16 +157,11 @@ fn gram_matrices_are_positive_and_tight() {
     }
 }
 
-fn proven(bank: &Bank, dual: &[crate::design::fir::DualPoint]) -> (Bank, Verified) {
-    let (proof, verified) = crate::design::prove(bank, dual).unwrap();
-    (Bank { proof: Some(proof), ..bank.clone() }, verified)
-}
-
 fn designed(method: Method, latency: usize, taps: usize) -> (Bank, Verified) {
     let mut spec = alike(&thesis_filter(), &[1.2, 0.6], 2, latency, 1).spec.unwrap();
     spec.design = DesignSpec::new(method, method.has_taps().then_some(taps));
     let design = crate::design::design(&spec).unwrap();
-    proven(&design.bank, &design.dual)
+    (design.bank, design.proof.unwrap())
 }
 
 #[test]
@@ -255,7 +249,7 @@ fn an_unstable_bank_has_no_certificate() {
     let unstable = BlockFilter { a: grown, ..block.clone() };
     let bank = Bank { filters: SynthesisFilters::StateSpace(unstable), gamma: Gamma::default(), ..bank };
     assert!(matches!(verify(&bank), Err(VerifyError::NotProven { .. })));
-    assert!(crate::design::prove(&bank, &[]).is_err());
+    assert!(crate::design::prove(&bank).is_err());
 }
 
 #[test]

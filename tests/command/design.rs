@@ -98,7 +98,8 @@ fn number(value: &Value, path: &str) -> f64 {
 fn a_design_is_reported_and_analysed() {
     let desk = Desk::new();
     let out = desk.good(&["design", "spec.toml", "-o", "bank.json"]);
-    for part in ["bank.json: fir, 2 channels, ratio 2, 22 taps a channel, latency 10", "gamma      0.039932"]
+    for part in
+        ["bank.json: fir, 2 channels, ratio 2, 22 taps per channel, latency 10", "gamma      0.039932"]
     {
         assert!(out.contains(part), "{out}");
     }

@@ -6,8 +6,8 @@
 
 use hybank::analog::StrictlyProper;
 use hybank::bank::SynthesisFilters;
-use hybank::design::equivalence::BlockedPlant;
-use hybank::design::error_system;
+use hybank::design::LiftedPlant;
+use hybank::design::filters::lifted;
 use hybank::design::problem::{Channel, Problem};
 use hybank::linalg::{Mat, singular_values};
 use hybank::simulate::{Instants, Source, sample};
@@ -85,10 +85,9 @@ fn brute_force(case: &Case, ticks: usize, fineness: usize) -> f64 {
 }
 
 fn computed(case: &Case) -> f64 {
-    let plant = BlockedPlant::new(&case.problem);
+    let plant = LiftedPlant::new(&case.problem).unwrap();
     let filters = SynthesisFilters::Fir(case.taps.clone());
-    let block = error_system::block_system(&filters, case.problem.ratio).unwrap();
-    error_system::gamma(&plant, &block).unwrap().gain
+    plant.norm(&lifted(&filters, case.problem.ratio).unwrap()).unwrap().gain
 }
 
 fn check(name: &str, case: &Case) {

@@ -2,7 +2,7 @@
 //! holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many, `HYBANK_PLANTS=124..125` that one.
 
 use hybank::bank::SynthesisFilters;
-use hybank::design::{DesignError, analyze, design, prove};
+use hybank::design::{DesignError, analyze, design};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
 use hybank::units::{RadiansPerSecond, Seconds};
 use std::panic::resume_unwind;
@@ -123,8 +123,8 @@ fn end_of(seed: u64) -> End {
     );
     let again = analyze(&found.bank, &[]).unwrap().gamma;
     assert!((again - upper).abs() <= 1e-8 * upper + 1e-12, "plant {seed}: {again} {upper}");
-    match prove(&found.bank, &found.dual) {
-        Ok((_, proven)) => {
+    match &found.proof {
+        Ok(proven) => {
             let slack = 1e-6 * upper + 1e-9;
             assert!(
                 proven.lower <= proven.upper && proven.attained <= proven.upper,
@@ -136,7 +136,7 @@ fn end_of(seed: u64) -> End {
             );
             End::Proven
         }
-        Err(refusal) => refused(seed, &refusal, End::Unproven),
+        Err(refusal) => refused(seed, refusal, End::Unproven),
     }
 }
 

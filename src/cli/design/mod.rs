@@ -5,17 +5,18 @@ mod report;
 use super::Failure;
 use super::bank_file::{bad_flag, is_dash, load_spec, write_text};
 use crate::bank::FixedPoint;
-use crate::design::{self, Design, DesignError};
+use crate::design::{self, DesignError};
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, WordLengths};
-use report::{ProofReport, Report};
+use report::Report;
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Designs the synthesis filters for a spec
 ///
-/// The bank file holds the filters, the spec with all defaults filled in, and gamma: the exact worst-case gain from the
-/// analog input to the error (upper), a proven lower bound for any bank of that method and size (lower), and the
-/// bound that no latency can beat (noncausal), all in normalised time.
+/// The bank file holds the filters, the spec with all defaults filled in, and gamma, the worst-case gain from the
+/// analog input to the error: the computed norm, an upper bound of the true one, a lower bound for all banks of that
+/// method and size (lower), and one for all banks of any latency (noncausal), all in normalised time. It also holds
+/// what `hybank verify` needs to prove them, if that was found.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +35,7 @@ pub(super) struct Args {
     /// Another method than the spec's
     #[arg(long, value_parser = parse_method)]
     method: Option<Method>,
-    /// Another number of taps a channel than the spec's
+    /// Another number of taps per channel than the spec's
     #[arg(long)]
     taps: Option<usize>,
     /// Another latency than the spec's, in fast samples
@@ -82,17 +83,6 @@ fn parse_solver(text: &str) -> Result<Solver, String> {
         .ok_or_else(|| format!("the solvers are {known}"))
 }
 
-/// Looks for a proof of the bank's gammas and puts it into the bank; a bank that cannot be proven is a bank all the same.
-fn attach_proof(design: &mut Design) -> ProofReport {
-    let begin = Instant::now();
-    let found = design::attach_proof(&mut design.bank, &design.dual);
-    let seconds = begin.elapsed().as_secs_f64();
-    match found {
-        Ok(proven) => ProofReport { proven: Some(proven), unproven: None, seconds },
-        Err(error) => ProofReport { proven: None, unproven: Some(error.to_string()), seconds },
-    }
-}
-
 fn overrides(args: &Args) -> DesignOverrides {
     DesignOverrides {
         method: args.method,
@@ -125,16 +115,15 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     spec.check().map_err(|problem| bad_flag("latency", &problem))?;
     let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
     let begin = Instant::now();
-    let mut found = design::design(&spec).map_err(named)?;
-    let seconds = begin.elapsed().as_secs_f64();
+    let found = design::design(&spec).map_err(named)?;
+    let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
-    let proof = attach_proof(&mut found);
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
     if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_silent) {
         eprintln!("hybank: warning: {SILENT}");
     }
-    let report = Report::new(args.output.display().to_string(), &found, mean, seconds, &proof);
+    let report = Report::new(args.output.display().to_string(), &found, mean, seconds);
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {

@@ -4,7 +4,7 @@ use crate::bank::{Gamma, SynthesisFilters};
 use crate::design::quantise::WordStudy;
 use crate::design::{Design, MeanAnalysis, OrderErrorPoint, OrderReduction};
 use crate::spec::Method;
-use crate::units::{RadiansPerSlowPeriod, Seconds};
+use crate::units::{Hertz, Seconds};
 use crate::verify::Verified;
 
 /// The report; serialised it is that of `--json`.
@@ -17,6 +17,7 @@ pub(super) struct Report<'a> {
     latency: usize,
     latency_chosen: bool,
     taps: Option<usize>,
+    taps_chosen: bool,
     states: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     reduction: Option<&'a OrderReduction>,
@@ -27,11 +28,11 @@ pub(super) struct Report<'a> {
     #[serde(flatten)]
     mean: MeanAnalysis,
     /// Hertz, at the slow rate to which all frequencies alias.
-    peak_hertz: f64,
+    peak_hertz: Hertz,
     iterations: usize,
     seconds: f64,
     #[serde(flatten)]
-    proof: &'a ProofReport,
+    proof: ProofReport,
 }
 
 /// What integer taps cost.
@@ -74,16 +75,24 @@ impl<'a> Words<'a> {
 
 /// What `hybank verify` will say of the file.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct ProofReport {
-    pub(super) proven: Option<Verified>,
+struct ProofReport {
+    proven: Option<Verified>,
     /// Why there is no proof in the file.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) unproven: Option<String>,
+    unproven: Option<String>,
     #[serde(rename = "proof_seconds")]
-    pub(super) seconds: f64,
+    seconds: f64,
 }
 
 impl ProofReport {
+    fn of(design: &Design) -> Self {
+        Self {
+            proven: design.proof.as_ref().ok().copied(),
+            unproven: design.proof.as_ref().err().map(ToString::to_string),
+            seconds: design.proof_time.as_secs_f64(),
+        }
+    }
+
     fn text(&self) -> String {
         match (&self.proven, &self.unproven) {
             (Some(proven), _) => format!(
@@ -100,13 +109,7 @@ impl ProofReport {
 
 impl<'a> Report<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(super) fn new(
-        output: String,
-        design: &'a Design,
-        mean: MeanAnalysis,
-        seconds: f64,
-        proof: &'a ProofReport,
-    ) -> Self {
+    pub(super) fn new(output: String, design: &'a Design, mean: MeanAnalysis, seconds: f64) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
@@ -120,28 +123,32 @@ impl<'a> Report<'a> {
             latency: bank.latency,
             latency_chosen: design.latency_chosen,
             taps,
+            taps_chosen: design.taps_chosen,
             states,
             reduction: design.reduction.as_ref(),
             gamma: &bank.gamma,
             words: Words::of(design),
             mean,
-            peak_hertz: RadiansPerSlowPeriod(design.peak_frequency).in_hertz(Seconds(bank.slow_period())).0,
+            peak_hertz: design.peak_frequency.in_hertz(Seconds(bank.slow_period())),
             iterations: design.iterations,
             seconds,
-            proof,
+            proof: ProofReport::of(design),
         }
     }
 
     pub(super) fn text(&self) -> String {
         let size = match (self.taps, self.states) {
-            (Some(taps), _) => format!("{taps} taps a channel"),
+            (Some(taps), _) if self.taps_chosen => {
+                format!("{taps} taps per channel (chosen; set `taps` to change it)")
+            }
+            (Some(taps), _) => format!("{taps} taps per channel"),
             (_, Some(states)) => format!("{states} states"),
             _ => String::new(),
         };
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
         format!(
             "{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
-             gamma      {} (computed norm of this bank; worst at {:.4} Hz modulo the slow rate)\n\
+             gamma      {} (computed norm of this bank; worst at {:.4} modulo the slow rate)\n\
              lower      {} ({})\n\
              noncausal  {} (no latency is better)\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\

@@ -3,12 +3,12 @@
 
 mod units;
 
-use super::equivalence::BlockedPlant;
-use super::fir::DualPoint;
+use super::methods::DualPoint;
+use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
 use crate::bank::{Bank, Certificate, Proof, SynthesisFilters, Tone};
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
-use crate::lti::peak::{hinf_norm, unexplained_peak};
+use crate::lti::peak::hinf_norm;
 use crate::lti::{FrequencyResponse, GramianCoordinates, StateSpace, bounded_real_riccati};
 use crate::spec::Method;
 use crate::verify::{CLAIM_TOLERANCE, Midpoint, Subject, Verified};
@@ -67,7 +67,7 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
 ///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
-pub fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), DesignError> {
+pub(crate) fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), DesignError> {
     let subject = Subject::new(bank)?;
     let upper = Some(certificate(&subject, bank)?);
     let gamma = &bank.gamma;
@@ -92,7 +92,7 @@ pub fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), Desig
 ///
 /// # Errors
 /// As [`prove`]; the bank is then left as it is.
-pub fn attach_proof(bank: &mut Bank, dual: &[DualPoint]) -> Result<Verified, DesignError> {
+pub(crate) fn attach_proof(bank: &mut Bank, dual: &[DualPoint]) -> Result<Verified, DesignError> {
     let (proof, verified) = prove(bank, dual)?;
     bank.gamma.upper = Some(verified.upper);
     bank.proof = Some(proof);
@@ -176,11 +176,10 @@ impl Search {
 
 /// A tone at which the samples leave most of the wanted ones unexplained.
 fn noncausal_tone(bank: &Bank) -> Result<Tone, DesignError> {
-    let problem = analysis::bank_problem(bank)?.without_duplicates().0;
-    let plant = BlockedPlant::new(&problem);
-    let (n, m) = (plant.measured, plant.wanted);
-    let frequency = unexplained_peak(&plant.system, n)?.frequency;
-    let l = linalg::lq_factor_c(&FrequencyResponse::new(&plant.system).at_frequency(frequency));
+    let plant = LiftedPlant::new(&analysis::bank_problem(bank)?.merge_channels().problem)?;
+    let (n, m) = (plant.channels(), plant.ratio());
+    let frequency = plant.noncausal_bound()?.frequency;
+    let l = linalg::lq_factor_c(&FrequencyResponse::new(plant.system()).at_frequency(frequency));
     let rest = l.ncols().saturating_sub(n);
     let part = if rest == 0 { CMat::zeros(m, 1) } else { l.view((n, n), (m, rest)).into_owned() };
     Ok(tone(frequency, &leading_direction(&part)?))
@@ -207,8 +206,9 @@ fn pairs(column: &CMat) -> Vec<[f64; 2]> {
 /// tones are that error's. Channels that cannot be told apart count once.
 fn binding_tones(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<Tone>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
-    let (problem, parts) = analysis::bank_problem(bank)?.without_duplicates();
-    let plant = BlockedPlant::new(&problem);
+    let merged = analysis::bank_problem(bank)?.merge_channels();
+    let plant = LiftedPlant::new(&merged.problem)?;
+    let parts = &merged.shares;
     let directions = directions(dual)?;
     let mut served = Service::new(&plant, &directions, taps[0].len());
     served.solve()?;
@@ -251,9 +251,9 @@ struct Service<'a> {
 }
 
 impl<'a> Service<'a> {
-    fn new(plant: &BlockedPlant, directions: &'a [(f64, CMat)], length: usize) -> Self {
-        let response = FrequencyResponse::new(&plant.system);
-        let (n, m) = (plant.measured, plant.wanted);
+    fn new(plant: &LiftedPlant, directions: &'a [(f64, CMat)], length: usize) -> Self {
+        let response = FrequencyResponse::new(plant.system());
+        let (n, m) = (plant.channels(), plant.ratio());
         let target = |(omega, a): &(f64, CMat)| {
             let l = linalg::lq_factor_c(&response.at_frequency(*omega));
             let k = n.min(l.ncols());

@@ -3,15 +3,15 @@
 use super::forms::Forms;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::design::equivalence::BlockedPlant;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::error_system::by_lag;
+use crate::design::filters::polyphase;
+use crate::design::plant::LiftedPlant;
 
 /// Taps to be replaced by integers times a power of two.
 #[derive(Debug, Clone, Copy)]
 pub struct QuantisationProblem<'a> {
     /// The plant whose error counts.
-    pub plant: &'a BlockedPlant,
+    pub plant: &'a LiftedPlant,
     /// One filter per channel, all of the same length.
     pub taps: &'a [Vec<f64>],
     /// Noise power of each channel.
@@ -49,9 +49,9 @@ impl<'a> TapError<'a> {
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn new(problem: QuantisationProblem<'a>) -> Result<Self, DesignError> {
-        let ratio = problem.plant.wanted;
-        let lags = by_lag(problem.taps, ratio);
-        let grid = ErrorGrid::new(problem.plant, lags.len())?;
+        let ratio = problem.plant.ratio();
+        let lags = polyphase(problem.taps, ratio);
+        let grid = ErrorGrid::new(problem.plant, lags.len());
         let forms = Forms::new(grid.points());
         let real_gamma = grid.peaks(&lags)?.estimate;
         let real_mean_square = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
@@ -61,14 +61,14 @@ impl<'a> TapError<'a> {
     /// The error of integer taps.
     pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<Candidate, DesignError> {
         let taps = fixed_point.taps();
-        let lags = by_lag(&taps, self.ratio);
+        let lags = polyphase(&taps, self.ratio);
         let mean_square = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
         Ok(Candidate { gamma: self.grid.peaks(&lags)?.estimate, mean_square, fixed_point })
     }
 
     /// Estimate of gamma of integer taps.
     pub(super) fn gamma(&self, fixed_point: &FixedPoint) -> Result<f64, DesignError> {
-        Ok(self.grid.peaks(&by_lag(&fixed_point.taps(), self.ratio))?.estimate)
+        Ok(self.grid.peaks(&polyphase(&fixed_point.taps(), self.ratio))?.estimate)
     }
 }
 

@@ -6,7 +6,7 @@ use super::lattice::{Span, closest};
 use super::problem::{Candidate, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::design::error_system::by_lag;
+use crate::design::filters::polyphase;
 use crate::spec::WordLengths;
 
 /// Rounds of reweighting.
@@ -52,7 +52,7 @@ impl<'a> Search<'a> {
     fn descended(&self, start: &FixedPoint) -> Result<FixedPoint, DesignError> {
         let points = self.error.grid.points();
         let integers = start.integers.iter().map(|list| list.iter().map(|&x| x as f64).collect()).collect();
-        let lags = by_lag(&start.taps(), self.error.ratio);
+        let lags = polyphase(&start.taps(), self.error.ratio);
         let real = self.error.real_gamma;
         let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
         Ok(self.fixed_point(&descent.run(NEGLIGIBLE)?))
@@ -72,7 +72,7 @@ impl<'a> Search<'a> {
         let mut weights = vec![1.0; self.error.grid.points().len()];
         for _ in 0..ROUNDS {
             let candidate = self.error.candidate(self.fixed_point(&self.closest(&weights)?))?;
-            let lags = by_lag(&candidate.fixed_point.taps(), self.error.ratio);
+            let lags = polyphase(&candidate.fixed_point.taps(), self.error.ratio);
             let excess_of_worst = candidate.gamma - real;
             found.push(candidate);
             if excess_of_worst <= NEGLIGIBLE * real {

@@ -2,38 +2,37 @@ use super::quantiser::INDIFFERENT;
 use super::search::Search;
 use super::*;
 use crate::bank::SynthesisFilters;
-use crate::design::equivalence::BlockedPlant;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::error_system::bank_gamma;
-use crate::design::error_system::by_lag;
-use crate::design::{Problem, design};
+use crate::design::filters::polyphase;
+use crate::design::plant::LiftedPlant;
+use crate::design::{Problem, ProofSearch, design_with};
 use crate::spec::{MAX_FRACTION_BITS, Spec};
 
 const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
 
 /// A plant with the taps of its optimal FIR bank.
-fn optimum(spec: &str) -> (BlockedPlant, Vec<Vec<f64>>) {
+fn optimum(spec: &str) -> (LiftedPlant, Vec<Vec<f64>>) {
     let spec = Spec::from_toml(spec, "spec.toml").unwrap();
-    let found = design(&spec).unwrap();
+    let found = design_with(&spec, ProofSearch::Skip).unwrap();
     let SynthesisFilters::Fir(taps) = found.bank.filters else { unreachable!() };
-    (BlockedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()), taps)
+    (LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()).unwrap(), taps)
 }
 
-fn problem<'a>(plant: &'a BlockedPlant, taps: &'a [Vec<f64>]) -> QuantisationProblem<'a> {
+fn problem<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> QuantisationProblem<'a> {
     QuantisationProblem { plant, taps, noise: &[], gamma_margin: 0.0 }
 }
 
-fn quantiser<'a>(plant: &'a BlockedPlant, taps: &'a [Vec<f64>]) -> Result<Quantiser<'a>, DesignError> {
+fn quantiser<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> Result<Quantiser<'a>, DesignError> {
     Quantiser::new(problem(plant, taps))
 }
 
 /// The exact norm, by another route than the search's grid.
-fn exact(plant: &BlockedPlant, taps: Vec<Vec<f64>>) -> f64 {
-    bank_gamma(plant, &SynthesisFilters::Fir(taps)).unwrap().gain
+fn exact(plant: &LiftedPlant, taps: Vec<Vec<f64>>) -> f64 {
+    plant.bank_norm(&SynthesisFilters::Fir(taps)).unwrap().gain
 }
 
 /// Every integer point within `reach` of the rounded taps.
-fn brute_force(plant: &BlockedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
+fn brute_force(plant: &LiftedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
     let cells: Vec<(usize, usize)> = rounded
         .integers
         .iter()
@@ -54,8 +53,8 @@ fn brute_force(plant: &BlockedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
             inside &= (least..=most).contains(&point.integers[i][n]);
         }
         if inside {
-            let lags = by_lag(&point.taps(), plant.wanted);
-            best = best.min(ErrorGrid::new(plant, lags.len()).unwrap().peaks(&lags).unwrap().estimate);
+            let lags = polyphase(&point.taps(), plant.ratio());
+            best = best.min(ErrorGrid::new(plant, lags.len()).peaks(&lags).unwrap().estimate);
         }
     }
     best

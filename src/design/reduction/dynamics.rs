@@ -3,7 +3,7 @@
 use crate::design::DesignError;
 use crate::linalg::{self, Mat};
 use crate::lti::balanced::balanced_when_driven;
-use crate::lti::{StateSpace, TappedRecursion};
+use crate::lti::{FirWithTail, StateSpace};
 
 /// States below this share of the output are rounding errors.
 const NEGLIGIBLE: f64 = 1e-12;
@@ -23,7 +23,7 @@ impl Dynamics {
     /// The dynamics of `bank` with an FIR head of `lags` slow periods and balanced states, those with the largest effect
     /// first. `state_root` is a square root of the covariance of the bank's states when the plant drives it.
     pub(super) fn balanced(bank: &StateSpace, lags: usize, state_root: &Mat) -> Result<Self, DesignError> {
-        let tail = TappedRecursion::split(bank, lags)?.tail().clone();
+        let tail = FirWithTail::split(bank, lags)?.tail().clone();
         let floor = NEGLIGIBLE * (tail.c() * state_root).norm();
         let tail = balanced_when_driven(&tail, state_root, floor)?;
         Ok(Self { lags, a: tail.a().clone(), b: tail.b().clone() })
@@ -58,12 +58,12 @@ impl Dynamics {
     pub(super) fn regressors(&self) -> Result<StateSpace, DesignError> {
         let (r, n) = (self.tail_order(), self.channels());
         let all = Mat::identity(r + n * (self.lags + 1), r + n * (self.lags + 1));
-        Ok(TappedRecursion::read_by(&all, self.lags, &self.a, &self.b)?.realise()?)
+        Ok(FirWithTail::with_outputs(&all, self.lags, &self.a, &self.b)?.realise()?)
     }
 
     /// The bank y = `outputs` X, with `outputs` the output matrices side by side, M x (r + N (lags + 1)).
-    pub(super) fn with_outputs(&self, outputs: &Mat) -> Result<TappedRecursion, DesignError> {
-        Ok(TappedRecursion::read_by(outputs, self.lags, &self.a, &self.b)?)
+    pub(super) fn with_outputs(&self, outputs: &Mat) -> Result<FirWithTail, DesignError> {
+        Ok(FirWithTail::with_outputs(outputs, self.lags, &self.a, &self.b)?)
     }
 
     /// Largest modulus of the poles, infinite if the eigenvalues do not converge.

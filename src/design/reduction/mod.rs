@@ -22,7 +22,7 @@ pub use problem::{Aim, ReductionProblem};
 pub use trade_off::{Figures, OrderErrorPoint, OrderReduction};
 
 use crate::design::DesignError;
-use crate::lti::TappedRecursion;
+use crate::lti::FirWithTail;
 use crate::spec::Reduction;
 use order_search::OrderSearch;
 
@@ -33,7 +33,7 @@ use order_search::OrderSearch;
 pub fn reduce(
     problem: &ReductionProblem<'_>,
     reduction: Reduction,
-) -> Result<(Option<TappedRecursion>, OrderReduction), DesignError> {
+) -> Result<(Option<FirWithTail>, OrderReduction), DesignError> {
     let mut search = OrderSearch::new(problem)?;
     let order = match reduction {
         Reduction::Order(order) => search.at_most(order)?,

@@ -6,8 +6,8 @@ use super::plant_samples::PlantSamples;
 use super::pole_refinement::refined;
 use super::problem::{Aim, ReductionProblem};
 use super::trade_off::{Figures, OrderErrorPoint, OrderReduction};
-use crate::design::{DesignError, error_system};
-use crate::lti::TappedRecursion;
+use crate::design::DesignError;
+use crate::lti::FirWithTail;
 use crate::lti::gramian::h2_norm;
 use std::collections::BTreeMap;
 
@@ -33,7 +33,7 @@ const ZERO: f64 = 1e-12;
 #[derive(Debug, Clone)]
 struct ReducedBank<'a> {
     dynamics: Dynamics,
-    bank: TappedRecursion,
+    bank: FirWithTail,
     figures: Figures,
     /// With the frequencies of its peaks.
     samples: PlantSamples<'a>,
@@ -52,12 +52,12 @@ pub(super) struct OrderSearch<'a> {
 
 impl<'a> OrderSearch<'a> {
     pub(super) fn new(problem: &'a ReductionProblem<'a>) -> Result<Self, DesignError> {
-        let system = &problem.plant.system;
+        let system = problem.plant.system();
         Ok(Self {
             problem,
             samples: PlantSamples::new(problem.plant)?,
             splits: splits(problem)?,
-            full: figures(problem, &TappedRecursion::new(problem.bank)?)?,
+            full: figures(problem, &FirWithTail::new(problem.bank)?)?,
             banks: BTreeMap::new(),
             zero: ZERO * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
@@ -106,7 +106,7 @@ impl<'a> OrderSearch<'a> {
     /// Entries of the output matrices of a bank with so many states.
     fn unknowns(&self, order: usize) -> f64 {
         let plant = self.problem.plant;
-        (plant.wanted * (order + plant.measured)) as f64
+        (plant.ratio() * (order + plant.channels())) as f64
     }
 
     fn first_within(&mut self, allowed: f64) -> Result<usize, DesignError> {
@@ -224,7 +224,7 @@ impl<'a> OrderSearch<'a> {
     }
 
     /// The bank of `order` states, unless that is the full one, and the trade-off.
-    pub(super) fn finish(&self, order: usize) -> (Option<TappedRecursion>, OrderReduction) {
+    pub(super) fn finish(&self, order: usize) -> (Option<FirWithTail>, OrderReduction) {
         let full = self.point(self.problem.order, self.full);
         let chosen = self.best(order).filter(|_| order < self.problem.order);
         let states =
@@ -237,15 +237,15 @@ impl<'a> OrderSearch<'a> {
 }
 
 /// The error of a bank.
-fn figures(problem: &ReductionProblem<'_>, bank: &TappedRecursion) -> Result<Figures, DesignError> {
-    let error = error_system::error_system(problem.plant, &bank.realise()?)?;
+fn figures(problem: &ReductionProblem<'_>, bank: &FirWithTail) -> Result<Figures, DesignError> {
+    let error = problem.plant.error_system(&bank.realise()?)?;
     let gamma = crate::lti::peak::hinf_norm(&error)?.gain;
-    Ok(Figures { gamma, rms_error: h2_norm(&error)? / (problem.plant.wanted as f64).sqrt() })
+    Ok(Figures { gamma, rms_error: h2_norm(&error)? / (problem.plant.ratio() as f64).sqrt() })
 }
 
 /// The full bank with FIR heads of several lengths and balanced tails.
 fn splits(problem: &ReductionProblem<'_>) -> Result<Vec<Dynamics>, DesignError> {
-    let longest = TappedRecursion::new(problem.bank)?.ticks();
+    let longest = FirWithTail::new(problem.bank)?.head_length();
     let state_root = state_covariance_root(problem.plant, problem.bank)?;
     let mut lengths: Vec<usize> =
         (0..=HEADS.min(longest)).map(|k| k * longest / HEADS.min(longest).max(1)).collect();

@@ -2,8 +2,8 @@
 //! projection.
 
 use super::dynamics::Dynamics;
-use crate::design::equivalence::BlockedPlant;
-use crate::design::{DesignError, error_system};
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Mat};
 use crate::lti::StateSpace;
 use crate::lti::gramian::controllability_root;
@@ -12,15 +12,15 @@ use crate::lti::gramian::controllability_root;
 const RANK: f64 = 1e-12;
 
 /// Square root of the covariance of the states of `bank` when the plant drives it with white noise.
-pub(super) fn state_covariance_root(plant: &BlockedPlant, bank: &StateSpace) -> Result<Mat, DesignError> {
-    let error = error_system::error_system(plant, bank)?;
+pub(super) fn state_covariance_root(plant: &LiftedPlant, bank: &StateSpace) -> Result<Mat, DesignError> {
+    let error = plant.error_system(bank)?;
     let root = controllability_root(error.a(), error.b())?;
-    Ok(root.rows(plant.system.order(), bank.order()).into_owned())
+    Ok(root.rows(plant.system().order(), bank.order()).into_owned())
 }
 
 /// The same dynamics with tail states of unit mean square, and the root mean squares of the channels.
 pub(super) fn normalised(
-    plant: &BlockedPlant,
+    plant: &LiftedPlant,
     dynamics: &Dynamics,
 ) -> Result<(Dynamics, Vec<f64>), DesignError> {
     let (x, _) = covariance_roots(plant, dynamics)?;
@@ -31,7 +31,7 @@ pub(super) fn normalised(
 }
 
 /// The output matrices of least mean square, with the H2 norm of their error.
-pub(super) fn mean_square(plant: &BlockedPlant, dynamics: &Dynamics) -> Result<(Mat, f64), DesignError> {
+pub(super) fn mean_square(plant: &LiftedPlant, dynamics: &Dynamics) -> Result<(Mat, f64), DesignError> {
     let (x, z) = covariance_roots(plant, dynamics)?;
     let outputs = projection(&x, &z)?;
     let error = (z - &outputs * x).norm();
@@ -39,15 +39,15 @@ pub(super) fn mean_square(plant: &BlockedPlant, dynamics: &Dynamics) -> Result<(
 }
 
 /// Rows X and Z with the covariance `[X; Z] [X; Z]'` of the regressors and the reference.
-fn covariance_roots(plant: &BlockedPlant, dynamics: &Dynamics) -> Result<(Mat, Mat), DesignError> {
-    let driven = driven(plant, &dynamics.regressors()?)?;
+fn covariance_roots(plant: &LiftedPlant, dynamics: &Dynamics) -> Result<(Mat, Mat), DesignError> {
+    let driven = plant.driving(&dynamics.regressors()?)?;
     let root = controllability_root(driven.a(), driven.b())?;
     let (rows, inputs) = (driven.outputs(), driven.inputs());
     let mut t = Mat::zeros(rows, root.ncols() + inputs);
     t.columns_mut(0, root.ncols()).copy_from(&(driven.c() * &root));
     t.columns_mut(root.ncols(), inputs).copy_from(driven.d());
-    let regressors = rows - plant.wanted;
-    Ok((t.rows(0, regressors).into_owned(), t.rows(regressors, plant.wanted).into_owned()))
+    let regressors = rows - plant.ratio();
+    Ok((t.rows(0, regressors).into_owned(), t.rows(regressors, plant.ratio()).into_owned()))
 }
 
 /// F of least `||z - F x||`, and of these the least in units of the rows of x.
@@ -66,11 +66,4 @@ fn projection(x: &Mat, z: &Mat) -> Result<Mat, DesignError> {
     let mut outputs = components * svd.u.transpose();
     outputs.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column *= *s);
     Ok(outputs)
-}
-
-/// The regressors and the reference as outputs of one system, driven by the plant's input.
-fn driven(plant: &BlockedPlant, regressors: &StateSpace) -> Result<StateSpace, DesignError> {
-    let (n, m, x) = (plant.measured, plant.wanted, regressors.outputs());
-    let all = plant.system.cascade(0..n, regressors)?;
-    Ok(all.select_outputs((n + m..n + m + x).chain(n..n + m))?)
 }

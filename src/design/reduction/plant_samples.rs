@@ -2,13 +2,13 @@
 //! problem at sampled frequencies.
 
 use super::dynamics::Dynamics;
-use crate::design::equivalence::BlockedPlant;
+use crate::design::DesignError;
 use crate::design::exchange::{AffineError, Exchange, Peaks};
-use crate::design::{DesignError, error_system};
-use crate::linalg::{self, CMat, Complex, Mat};
+use crate::design::plant::LiftedPlant;
+use crate::linalg::{CMat, Complex, Mat};
 use crate::lmi::sampled::{self, MeanSquareObjective, Point, Settings, Taps};
 use crate::lti::peak::{peaks_above, resonances, stable_poles};
-use crate::lti::{FrequencyResponse, TappedRecursion};
+use crate::lti::{FirWithTail, FrequencyResponse};
 use std::f64::consts::PI;
 
 /// Intervals of the uniform frequencies.
@@ -23,8 +23,7 @@ const LEAST_DISTANCE: f64 = 1e-9;
 /// The plant at the frequencies of the worst-case problem.
 #[derive(Debug, Clone)]
 pub(super) struct PlantSamples<'a> {
-    pub(super) plant: &'a BlockedPlant,
-    response: FrequencyResponse,
+    pub(super) plant: &'a LiftedPlant,
     /// The first GRID + 1 are uniform.
     pub(super) samples: Vec<PlantSample>,
 }
@@ -54,12 +53,11 @@ impl<'a> PlantSamples<'a> {
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable.
-    pub(super) fn new(plant: &'a BlockedPlant) -> Result<Self, DesignError> {
-        let response = FrequencyResponse::new(&plant.system.compress_inputs());
-        let mut samples = Self { plant, response, samples: Vec::new() };
+    pub(super) fn new(plant: &'a LiftedPlant) -> Result<Self, DesignError> {
+        let mut samples = Self { plant, samples: Vec::new() };
         let uniform = (0..=GRID).map(|k| PI * k as f64 / GRID as f64);
         let near = (1..=TOWARDS_ZERO).map(|k| PI / GRID as f64 * 0.5_f64.powi(k as i32));
-        for omega in uniform.chain(near).chain(resonances(&stable_poles(&plant.system)?)) {
+        for omega in uniform.chain(near).chain(resonances(&stable_poles(plant.system())?)) {
             samples.add(omega);
         }
         Ok(samples)
@@ -73,15 +71,14 @@ impl<'a> PlantSamples<'a> {
     }
 
     fn at(&self, omega: f64) -> PlantSample {
-        let g = linalg::lq_factor_c(&self.response.at_frequency(omega));
-        let (n, m) = (self.plant.measured, self.plant.wanted);
-        PlantSample { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
+        let (h, w) = self.plant.response(omega);
+        PlantSample { omega, h, w }
     }
 
     fn problem(&self, dynamics: &Dynamics) -> Result<sampled::Problem, DesignError> {
         let regressors = FrequencyResponse::new(&dynamics.regressors()?);
         let points = self.samples.iter().map(|sample| point(sample.clone(), &regressors)).collect();
-        Ok(sampled::Problem::new(points, vec![1; self.plant.wanted])?)
+        Ok(sampled::Problem::new(points, vec![1; self.plant.ratio()])?)
     }
 
     /// The output matrices of least gamma at the sampled frequencies, to a relative accuracy.
@@ -102,7 +99,7 @@ impl<'a> PlantSamples<'a> {
         &mut self,
         dynamics: &Dynamics,
         gamma_margin: f64,
-    ) -> Result<TappedRecursion, DesignError> {
+    ) -> Result<FirWithTail, DesignError> {
         let problem = self.problem(dynamics)?;
         let objective = MeanSquareObjective::noiseless(self.weights(), problem.channels());
         let error = OutputError::new(self, dynamics)?;
@@ -142,7 +139,7 @@ impl AffineError for OutputError<'_> {
 
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError> {
         let bank = self.dynamics.with_outputs(&taps[0])?;
-        let error = error_system::error_system(self.samples.plant, &bank.realise()?)?;
+        let error = self.samples.plant.error_system(&bank.realise()?)?;
         let peaks = peaks_above(&error, level)?;
         let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
         Ok(Peaks { estimate, peaks })

@@ -12,7 +12,7 @@ use super::dynamics::Dynamics;
 use super::output_matrices::{mean_square, normalised};
 use super::plant_samples::{PlantSamples, delay};
 use super::problem::Aim;
-use crate::design::{DesignError, error_system};
+use crate::design::DesignError;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lti::gramian::controllability_root;
 use crate::lti::{FrequencyResponse, StateSpace};
@@ -107,15 +107,15 @@ fn worst_case_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Resul
 fn mean_square_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Result<(f64, Mat), DesignError> {
     let plant = samples.plant;
     let (outputs, norm) = mean_square(plant, dynamics)?;
-    let error = error_system::error_system(plant, &dynamics.with_outputs(&outputs)?.realise()?)?;
+    let error = plant.error_system(&dynamics.with_outputs(&outputs)?.realise()?)?;
     let square = |root: Mat| &root * root.transpose();
     let p = square(controllability_root(error.a(), error.b())?);
     let q = square(controllability_root(&error.a().transpose(), &error.c().transpose())?);
     let (da, db) = (&q * error.a() * p, q * error.b());
-    let (n, r, channels) = (plant.system.order(), dynamics.tail_order(), dynamics.channels());
+    let (n, r, channels) = (plant.system().order(), dynamics.tail_order(), dynamics.channels());
     let inner = da.view((n, n), (r, r)).into_owned();
     let outer = if dynamics.lags == 0 {
-        let h = plant.system.select_outputs(0..plant.measured)?;
+        let h = plant.system().select_outputs(0..plant.channels())?;
         da.view((n, 0), (r, n)) * h.c().transpose() + db.rows(n, r) * h.d().transpose()
     } else {
         da.view((n, n + r), (r, channels)).into_owned()

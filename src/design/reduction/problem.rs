@@ -1,6 +1,6 @@
 //! The bank to reduce.
 
-use crate::design::equivalence::BlockedPlant;
+use crate::design::plant::LiftedPlant;
 use crate::lti::StateSpace;
 
 /// The quantity that a reduction minimises.
@@ -16,7 +16,7 @@ pub enum Aim {
 #[derive(Debug, Clone, Copy)]
 pub struct ReductionProblem<'a> {
     /// The plant whose error counts.
-    pub plant: &'a BlockedPlant,
+    pub plant: &'a LiftedPlant,
     /// The full bank.
     pub bank: &'a StateSpace,
     /// States of the full bank in the form that is written.

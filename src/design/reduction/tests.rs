@@ -2,37 +2,45 @@ use super::dynamics::Dynamics;
 use super::output_matrices::{mean_square, state_covariance_root};
 use super::plant_samples::PlantSamples;
 use super::*;
-use crate::design::equivalence::BlockedPlant;
-use crate::design::iir::{design_h2, design_iir};
-use crate::design::{Problem, error_system};
+use crate::design::Problem;
+use crate::design::methods::{Filters, Settings, synthesise};
+use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Complex, Mat};
 use crate::lti::StateSpace;
 use crate::lti::balanced::balanced;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::hinf_norm;
-use crate::spec::Spec;
+use crate::spec::{Method, Spec};
 
 /// The thesis example with other delays and latency.
-fn plant(latency: usize, delays: &str) -> BlockedPlant {
+fn plant(latency: usize, delays: &str) -> LiftedPlant {
     let text = format!(
         "fast_period = 1.0\nratio = 2\nlatency = {latency}\n\
          target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
          channel = [{delays}]\ndesign = {{ method = \"iir\" }}"
     );
-    BlockedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap())
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap()).unwrap()
 }
 
-fn thesis(latency: usize) -> BlockedPlant {
+fn thesis(latency: usize) -> LiftedPlant {
     plant(latency, "{ delay = 1.2 }, { delay = 0.6 }")
 }
 
-fn problem<'a>(plant: &'a BlockedPlant, bank: &'a StateSpace, aim: Aim) -> ReductionProblem<'a> {
-    let order = TappedRecursion::new(bank).unwrap().realise().unwrap().order();
-    ReductionProblem { plant, bank, order, width: plant.measured, aim, gamma_margin: 0.0 }
+/// The full bank.
+fn bank_of(method: Method, plant: &LiftedPlant) -> StateSpace {
+    match synthesise(method, plant, &Settings::default()).unwrap().filters {
+        Filters::StateSpace(system) => system,
+        Filters::Fir(_) => unreachable!(),
+    }
 }
 
-fn error(plant: &BlockedPlant, bank: &StateSpace) -> StateSpace {
-    error_system::error_system(plant, bank).unwrap()
+fn problem<'a>(plant: &'a LiftedPlant, bank: &'a StateSpace, aim: Aim) -> ReductionProblem<'a> {
+    let order = FirWithTail::new(bank).unwrap().realise().unwrap().order();
+    ReductionProblem { plant, bank, order, width: plant.channels(), aim, gamma_margin: 0.0 }
+}
+
+fn error(plant: &LiftedPlant, bank: &StateSpace) -> StateSpace {
+    plant.error_system(bank).unwrap()
 }
 
 /// Largest gain on a dense grid, by one LU factorisation a frequency: a lower bound that knows no level sets.
@@ -47,7 +55,7 @@ fn dense_grid(error: &StateSpace) -> f64 {
 #[test]
 fn every_order_has_the_gamma_that_is_reported() {
     let plant = thesis(10);
-    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let bank = bank_of(Method::Iir, &plant);
     for order in [0, 3, 6] {
         let (smaller, record) =
             reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
@@ -66,10 +74,9 @@ fn every_order_has_the_gamma_that_is_reported() {
 #[test]
 fn more_states_are_never_worse_and_all_are_the_full_bank() {
     let plant = thesis(10);
-    for (aim, bank) in [
-        (Aim::WorstCase, design_iir(&plant, 0.0).unwrap().filters),
-        (Aim::MeanSquare, design_h2(&plant).unwrap().filters),
-    ] {
+    for (aim, bank) in
+        [(Aim::WorstCase, bank_of(Method::Iir, &plant)), (Aim::MeanSquare, bank_of(Method::H2, &plant))]
+    {
         let problem = problem(&plant, &bank, aim);
         let (smaller, record) = reduce(&problem, Reduction::Order(problem.order)).unwrap();
         assert!(smaller.is_none() && record.reduced == record.full && record.full.loss_db == 0.0);
@@ -109,10 +116,9 @@ fn padded(bank: &StateSpace) -> StateSpace {
 #[test]
 fn states_of_no_use_go_without_loss() {
     let plant = thesis(3);
-    for (aim, bank) in [
-        (Aim::WorstCase, design_iir(&plant, 0.0).unwrap().filters),
-        (Aim::MeanSquare, design_h2(&plant).unwrap().filters),
-    ] {
+    for (aim, bank) in
+        [(Aim::WorstCase, bank_of(Method::Iir, &plant)), (Aim::MeanSquare, bank_of(Method::H2, &plant))]
+    {
         let (_, bare) = reduce(&problem(&plant, &bank, aim), Reduction::Loss(0.0)).unwrap();
         let padded = padded(&bank);
         let problem = ReductionProblem { order: padded.order(), ..problem(&plant, &padded, aim) };
@@ -127,7 +133,7 @@ fn states_of_no_use_go_without_loss() {
 #[test]
 fn it_beats_truncation_without_weight_and_outputs() {
     let plant = thesis(10);
-    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let bank = bank_of(Method::Iir, &plant);
     let plain = balanced(&bank, 0.0).unwrap();
     for order in [2, 4, 7] {
         let first = |m: &Mat, r: usize, c: usize| m.view((0, 0), (r, c)).into_owned();
@@ -149,7 +155,7 @@ fn it_beats_truncation_without_weight_and_outputs() {
 #[test]
 fn no_other_outputs_is_better() {
     let plant = thesis(6);
-    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let bank = bank_of(Method::Iir, &plant);
     for (lags, order) in [(0, 0), (0, 3), (1, 2)] {
         let whole = Dynamics::balanced(&bank, lags, &state_covariance_root(&plant, &bank).unwrap()).unwrap();
         let dynamics = whole.truncated(order);
@@ -181,7 +187,7 @@ fn no_other_outputs_is_better() {
 fn a_bank_without_error_keeps_what_it_needs() {
     // The samples are those wanted, ten fast samples late: gamma is zero up to rounding.
     let plant = plant(10, "{ delay = 0.0 }, { delay = 1.0 }");
-    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let bank = bank_of(Method::Iir, &plant);
     let problem = problem(&plant, &bank, Aim::WorstCase);
     let (_, record) = reduce(&problem, Reduction::Loss(0.0)).unwrap();
     assert!(record.full.figures.gamma < 1e-11 && record.reduced.figures.gamma < 1e-11, "{record:?}");
@@ -191,7 +197,7 @@ fn a_bank_without_error_keeps_what_it_needs() {
 #[test]
 fn the_same_bits_every_time() {
     let plant = thesis(5);
-    let bank = design_iir(&plant, 0.0).unwrap().filters;
+    let bank = bank_of(Method::Iir, &plant);
     let once = || reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(2)).unwrap();
     assert_eq!(once(), once());
 }

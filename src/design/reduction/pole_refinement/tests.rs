@@ -1,13 +1,13 @@
 use super::*;
 use crate::design::Problem;
-use crate::design::equivalence::BlockedPlant;
+use crate::design::plant::LiftedPlant;
 use crate::spec::Spec;
 
-fn plant() -> BlockedPlant {
+fn plant() -> LiftedPlant {
     let text = "fast_period = 1.0\nratio = 2\nlatency = 10\n\
         target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
         channel = [{ delay = 1.2 }, { delay = 0.6 }]\ndesign = { method = \"iir\" }";
-    BlockedPlant::new(&Problem::new(&Spec::from_toml(text, "spec.toml").unwrap(), 10).unwrap())
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(text, "spec.toml").unwrap(), 10).unwrap()).unwrap()
 }
 
 /// Both gradients against differences.

@@ -1,16 +1,16 @@
-//! A-posteriori filtering: the best causal estimate of z from y for a blocked plant, in the worst-case
+//! A-posteriori filtering: the best causal estimate of z from y for a lifted plant, in the worst-case
 //! (H-infinity) or mean-square (H2) sense, by one Riccati equation (thesis 5.3; Hassibi, Sayed,
 //! Kailath, "Indefinite-Quadratic Estimation and Control", 1999, ch. 4).
 
-use super::DesignError;
-use super::equivalence::BlockedPlant;
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Mat};
 use crate::lti::gramian::controllability_root;
 use crate::lti::riccati::{self, RiccatiOutcome, RiccatiSolution};
 use crate::lti::{LtiError, StateSpace};
 use std::ops::Range;
 
-/// A fresh part below this fraction of its measurement is rounding: the channel says nothing new.
+/// A feedthrough below this fraction of its measurement is rounding: the channel adds no information.
 const INNOVATION_FLOOR: f64 = 1e-12;
 /// A verdict "impossible" is believed up to this residual of the Riccati equation, in coordinates in which
 /// the mean-square covariance is the identity: the plant to which the verdict applies exactly is that close.
@@ -22,38 +22,40 @@ const CLEARLY_NEGATIVE: f64 = 1e-5;
 
 /// The plant with the measured inputs taken out.
 ///
-/// Measurements are of two kinds. *Fresh* ones have a part that nothing before said: y_f = L (C_f x + u1)
-/// with L triangular. *Late* ones (channels whole ticks behind) are states of a delay chain, read without any
-/// noise: y_l = s C_l x with their size s. With yw = [L^-1 y_f; y_l / s],
+/// Measurements are of two kinds. Those *with feedthrough* depend on the inputs of the period itself: y_f =
+/// L (C_f x + w1) with L triangular. *Delayed* ones (channels delayed by whole periods) are states of a
+/// delay chain, a noise-free measurement y_d = s C_d x with their size s, so that R is singular. With yw =
+/// [L^-1 y_f; y_d / s],
 ///
-/// x+ = F x + B1 L^-1 y_f + B2 u2,  yw = C2 x + [u1; 0],  z = C1 x + X L^-1 y_f + Y u2.
+/// x+ = F x + B1 L^-1 y_f + B2 w2,  yw = C2 x + [w1; 0],  z = C1 x + X L^-1 y_f + Y w2.
 ///
 /// The samples are nearly noise-free, so the square D2 D2' may be as ill-conditioned as 1e22; here it
 /// never appears, only its triangular root L.
 ///
-/// Late measurements leave the weight R of the Riccati equation singular. Substituting P = P0 + Delta turns it
-/// into one for Delta with R + C P0 C' in place of R and F P0 F' + Q - P0 in place of Q. P0 is diagonal on the late
-/// chains, where the last link moves nowhere, so that no cross terms arise: the late measurements get
-/// unit noise, exactly undone in Q. It falls along the chain, which keeps Q positive at the last link (the doubling
-/// would break down on its first step otherwise).
+/// Substituting P = P0 + Delta turns the Riccati equation into one for Delta with R + C P0 C' in place of R
+/// and F P0 F' + Q - P0 in place of Q. P0 is diagonal on the delay chains, where the last link moves
+/// nowhere, so that no cross terms arise: the delayed measurements get unit noise, exactly undone in Q. It
+/// falls along the chain, which keeps Q positive at the last link (the doubling would break down on its
+/// first step otherwise).
 #[derive(Debug, Clone)]
 pub(super) struct Innovations {
     f: Mat,
     b1: Mat,
     b2: Mat,
     c1: Mat,
-    /// Fresh rows first, then the late ones.
+    /// Rows with feedthrough first, then the delayed ones.
     c2: Mat,
     x: Mat,
     y: Mat,
-    /// Fresh x fresh, lower triangular.
+    /// L, lower triangular.
     root: Mat,
-    /// P0: q, q - 1, .. 1 times the variance along a late chain of q links.
+    /// P0: q, q - 1, .. 1 times the variance along a delay chain of q links.
     p0: Mat,
-    fresh: Vec<usize>,
-    late: Vec<Late>,
+    /// The channels with feedthrough.
+    direct: Vec<usize>,
+    delayed: Vec<DelayedChannel>,
     channels: usize,
-    /// A channel was left out because its fresh part is rounding.
+    /// A channel was left out because its feedthrough is rounding.
     incomplete: bool,
     /// The verdict "impossible" may be believed: the coordinates are balanced and no channel is left out.
     conclusive: bool,
@@ -61,8 +63,8 @@ pub(super) struct Innovations {
     plant: Option<Box<PlantSide>>,
 }
 
-/// What a filter is made of, in the coordinates of the plant. There the delay chains are visible: their columns
-/// hold a single one and exact zeros.
+/// What a filter is made of, in the coordinates of the plant. There the delay chains are visible: their
+/// columns hold a single one and exact zeros.
 #[derive(Debug, Clone)]
 struct PlantSide {
     /// From these coordinates to those of the plant.
@@ -75,7 +77,7 @@ struct PlantSide {
 
 /// A channel read from the end of a delay chain.
 #[derive(Debug, Clone)]
-struct Late {
+struct DelayedChannel {
     channel: usize,
     chain: Range<usize>,
     size: f64,
@@ -96,53 +98,54 @@ pub(super) enum Trial {
 }
 
 impl Innovations {
-    /// The problem in balanced coordinates, where they can be had, and in those of the plant: near the edge of double
-    /// precision now the one, now the other is solvable.
-    pub(super) fn in_all_coordinates(plant: &BlockedPlant) -> Result<Vec<Self>, DesignError> {
+    /// The problem in balanced coordinates, where they exist, and in those of the plant: near the edge of
+    /// double precision sometimes only one of them is solvable.
+    pub(super) fn in_all_coordinates(plant: &LiftedPlant) -> Result<Vec<Self>, DesignError> {
         let plain = Self::new(plant)?;
         Ok(plain.balanced().into_iter().chain([plain]).collect())
     }
 
-    /// Separates fresh information (u1) from the rest (u2) by one LQ factorisation.
-    pub(super) fn new(plant: &BlockedPlant) -> Result<Self, DesignError> {
-        let sizes = output_sizes(&plant.system)?;
-        let (fresh, behind): (Vec<usize>, Vec<usize>) =
-            (0..plant.measured).partition(|&channel| plant.chain(channel).is_empty());
-        let late = behind
+    /// Separates the measured inputs (w1) from the rest (w2) by one LQ factorisation.
+    pub(super) fn new(plant: &LiftedPlant) -> Result<Self, DesignError> {
+        let sizes = output_sizes(plant.system())?;
+        let (direct, behind): (Vec<usize>, Vec<usize>) =
+            (0..plant.channels()).partition(|&channel| plant.chain(channel).is_empty());
+        let delayed = behind
             .into_iter()
-            .map(|channel| Late { channel, chain: plant.chain(channel), size: sizes[channel] })
+            .map(|channel| DelayedChannel { channel, chain: plant.chain(channel), size: sizes[channel] })
             .collect();
-        let telling = independent(plant, &fresh, &sizes);
-        let incomplete = telling.len() < fresh.len();
-        Ok(Self::separate(plant, telling, late, incomplete))
+        let informative = independent(plant, &direct, &sizes);
+        let incomplete = informative.len() < direct.len();
+        Self::separate(plant, informative, delayed, incomplete)
     }
 
-    fn separate(plant: &BlockedPlant, fresh: Vec<usize>, late: Vec<Late>, incomplete: bool) -> Self {
-        let system = &plant.system;
-        let (known, wanted, n) = (fresh.len(), plant.wanted, system.order());
-        let wanted_rows: Vec<usize> = (plant.measured..plant.measured + wanted).collect();
+    fn separate(
+        plant: &LiftedPlant,
+        direct: Vec<usize>,
+        delayed: Vec<DelayedChannel>,
+        incomplete: bool,
+    ) -> Result<Self, DesignError> {
+        let measurement = plant.system().select_outputs(direct.iter().copied())?;
+        let reference = plant.reference()?;
+        let system = plant.system();
+        let (known, references, n) = (direct.len(), plant.ratio(), system.order());
         // [D_f; D_z; B] = L Q: in the rotated inputs D is lower triangular.
-        let mut stacked = Mat::zeros(known + wanted + n, system.inputs());
-        stacked.rows_mut(0, known).copy_from(&system.d().select_rows(&fresh));
-        stacked.rows_mut(known, wanted).copy_from(&system.d().select_rows(&wanted_rows));
-        stacked.rows_mut(known + wanted, n).copy_from(system.b());
-        let l = linalg::lq_factor(&stacked);
+        let l = linalg::lq_factor(&linalg::vstack(&[measurement.d(), reference.d(), system.b()])?);
         let rest = l.ncols() - known;
-        let root = l.view((0, 0), (known, known)).into_owned();
-        let b1 = l.view((known + wanted, 0), (n, known)).into_owned();
-        let b2 = l.view((known + wanted, known), (n, rest)).into_owned();
-        let x = l.view((known, 0), (wanted, known)).into_owned();
-        let y = l.view((known, known), (wanted, rest)).into_owned();
-        let cf = linalg::solve_lower(&root, &system.c().select_rows(&fresh));
-        let c1 = system.c().select_rows(&wanted_rows) - &x * &cf;
+        let block =
+            |row: usize, col: usize, rows: usize, cols: usize| l.view((row, col), (rows, cols)).into_owned();
+        let root = block(0, 0, known, known);
+        let (x, y) = (block(known, 0, references, known), block(known, known, references, rest));
+        let below = known + references;
+        let (b1, b2) = (block(below, 0, n, known), block(below, known, n, rest));
+        let cf = linalg::solve_lower(&root, measurement.c());
+        let c1 = reference.c() - &x * &cf;
         let f = system.a() - &b1 * &cf;
-        let mut c2 = Mat::zeros(known + late.len(), n);
-        c2.rows_mut(0, known).copy_from(&cf);
-        for (row, channel) in late.iter().enumerate() {
-            c2[(known + row, channel.chain.end - 1)] = 1.0 / channel.size;
-        }
-        let p0 = late_variances(&late, n);
-        Self {
+        let c2 = linalg::vstack(&[&cf, &last_links(&delayed, n)])?;
+        let p0 = chain_variances(&delayed, n);
+        let channels = plant.channels();
+        let (conclusive, plant) = (false, None);
+        Ok(Self {
             f,
             b1,
             b2,
@@ -152,13 +155,13 @@ impl Innovations {
             y,
             root,
             p0,
-            fresh,
-            late,
-            channels: plant.measured,
+            direct,
+            delayed,
+            channels,
             incomplete,
-            conclusive: false,
-            plant: None,
-        }
+            conclusive,
+            plant,
+        })
     }
 
     /// F P0 F' - P0: what the substitution adds to Q.
@@ -167,8 +170,8 @@ impl Innovations {
     }
 
     /// The same problem in state coordinates in which the mean-square optimal prediction error is white.
-    /// States of smooth front ends differ by many decades and are nearly dependent; the covariances of all gammas are near
-    /// the mean-square one, so there they are near the identity.
+    /// States of smooth front ends differ by many decades and are nearly dependent; the covariances of all
+    /// gammas are near the mean-square one, so there they are near the identity.
     ///
     /// `None` where the mean-square problem has no usable solution.
     pub(super) fn balanced(&self) -> Option<Self> {
@@ -196,8 +199,9 @@ impl Innovations {
         })
     }
 
-    /// No causal filter beats the part of z that is fresh and unmeasured: sigma_max(Y).
-    pub(super) fn fresh_error(&self) -> Result<f64, DesignError> {
+    /// sigma_max(Y): no causal filter has a smaller error, since nothing measured depends on these inputs
+    /// in time.
+    pub(super) fn unmeasured_feedthrough(&self) -> Result<f64, DesignError> {
         if self.y.is_empty() {
             return Ok(0.0);
         }
@@ -233,13 +237,10 @@ impl Innovations {
     /// (F, G, H) of the Riccati equation Delta = F Delta (I + G Delta)^-1 F' + H; `None` unless
     /// E = gamma^2 I - Y Y' > 0.
     fn weights(&self, gamma: f64) -> Option<(Mat, Mat, Mat)> {
-        let wanted = self.y.nrows();
-        let slack = Mat::identity(wanted, wanted) * (gamma * gamma) - &self.y * self.y.transpose();
-        linalg::cholesky(&slack).ok()?;
-        let mut right = Mat::zeros(wanted, self.c1.ncols() + self.y.ncols());
-        right.columns_mut(0, self.c1.ncols()).copy_from(&self.c1);
-        right.columns_mut(self.c1.ncols(), self.y.ncols()).copy_from(&self.y);
-        let solved = linalg::solve_positive(&slack, &right).ok()?;
+        let references = self.y.nrows();
+        let e = Mat::identity(references, references) * (gamma * gamma) - &self.y * self.y.transpose();
+        linalg::cholesky(&e).ok()?;
+        let solved = linalg::solve_positive(&e, &linalg::hstack(&[&self.c1, &self.y]).ok()?).ok()?;
         let (ec, ey) = (solved.columns(0, self.c1.ncols()), solved.columns(self.c1.ncols(), self.y.ncols()));
         let by = &self.b2 * self.y.transpose();
         let f = &self.f + &by * ec;
@@ -263,10 +264,10 @@ impl Innovations {
         self.filter(&p).map_or(Trial::Unresolved, Trial::Achieved)
     }
 
-    /// Ry = diag(I, 0) + C2 P C2': the late measurements have no noise.
+    /// Ry = diag(I, 0) + C2 P C2': the delayed measurements have no noise.
     fn innovation(&self, p: &Mat) -> Mat {
         let mut ry = linalg::symmetric_part(&(&self.c2 * p * self.c2.transpose()));
-        for i in 0..self.fresh.len() {
+        for i in 0..self.direct.len() {
             ry[(i, i)] += 1.0;
         }
         ry
@@ -288,30 +289,38 @@ impl Innovations {
     fn with_gain(&self, gain: &Mat, f: &Mat, b1: &Mat, c1: &Mat, c2: &Mat) -> Option<Filter> {
         let (mut k, mut df) = (f * gain, c1 * gain);
         let (a, c) = (f - &k * c2, c1 - &df * c2);
-        let known = self.fresh.len();
-        k.columns_mut(0, known).zip_apply(b1, |gain, direct| *gain += direct);
-        df.columns_mut(0, known).zip_apply(&self.x, |gain, direct| *gain += direct);
+        let known = self.direct.len();
+        k.columns_mut(0, known).zip_apply(b1, |gain, feedthrough| *gain += feedthrough);
+        df.columns_mut(0, known).zip_apply(&self.x, |gain, feedthrough| *gain += feedthrough);
         StateSpace::new(a, self.on_channels(&k), c, self.on_channels(&df)).ok()
     }
 
     /// From gains on yw to gains on the channels, zero for those left out.
     fn on_channels(&self, gains: &Mat) -> Mat {
-        let known = self.fresh.len();
-        let fresh = unwhiten(&self.root, &gains.columns(0, known).into_owned());
+        let known = self.direct.len();
+        let direct = unwhiten(&self.root, &gains.columns(0, known).into_owned());
         let mut all = Mat::zeros(gains.nrows(), self.channels);
-        for (i, &channel) in self.fresh.iter().enumerate() {
-            all.set_column(channel, &fresh.column(i));
+        for (i, &channel) in self.direct.iter().enumerate() {
+            all.set_column(channel, &direct.column(i));
         }
-        for (i, late) in self.late.iter().enumerate() {
-            all.set_column(late.channel, &(gains.column(known + i) / late.size));
+        for (i, delayed) in self.delayed.iter().enumerate() {
+            all.set_column(delayed.channel, &(gains.column(known + i) / delayed.size));
         }
         all
     }
 }
 
-fn late_variances(late: &[Late], n: usize) -> Mat {
+/// The rows C_d that read the last link of each chain, in units of its size.
+fn last_links(delayed: &[DelayedChannel], n: usize) -> Mat {
+    let entry = |row: usize, state: usize| {
+        if state + 1 == delayed[row].chain.end { 1.0 / delayed[row].size } else { 0.0 }
+    };
+    Mat::from_fn(delayed.len(), n, entry)
+}
+
+fn chain_variances(delayed: &[DelayedChannel], n: usize) -> Mat {
     let mut p0 = Mat::zeros(n, n);
-    for channel in late {
+    for channel in delayed {
         for (weight, state) in channel.chain.clone().rev().enumerate() {
             p0[(state, state)] = (weight + 1) as f64 * channel.size * channel.size;
         }
@@ -328,12 +337,12 @@ fn unwhiten(root: &Mat, m: &Mat) -> Mat {
     flipped(&linalg::solve_lower(&upper, &flipped(&m.transpose()))).transpose()
 }
 
-/// The channels whose fresh part is more than rounding, given the channels before them.
-fn independent(plant: &BlockedPlant, fresh: &[usize], sizes: &[f64]) -> Vec<usize> {
-    let mut kept: Vec<usize> = Vec::with_capacity(fresh.len());
-    for &channel in fresh {
+/// The channels whose feedthrough is more than rounding, given the channels before them.
+fn independent(plant: &LiftedPlant, direct: &[usize], sizes: &[f64]) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::with_capacity(direct.len());
+    for &channel in direct {
         kept.push(channel);
-        let l = linalg::lq_factor(&plant.system.d().select_rows(&kept));
+        let l = linalg::lq_factor(&plant.system().d().select_rows(&kept));
         let row = kept.len() - 1;
         let innovation = if row < l.ncols() { l[(row, row)].abs() } else { 0.0 };
         if innovation <= INNOVATION_FLOOR * sizes[channel] {
@@ -349,3 +358,6 @@ fn output_sizes(system: &StateSpace) -> Result<Vec<f64>, LtiError> {
     let size = |i: usize| history.row(i).norm().hypot(system.d().row(i).norm());
     Ok((0..system.outputs()).map(size).collect())
 }
+
+#[cfg(test)]
+mod tests;

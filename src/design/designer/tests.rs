@@ -1,0 +1,85 @@
+use super::*;
+use crate::bank::SynthesisFilters;
+use crate::units::Seconds;
+
+fn spec(design: &str, channels: &str) -> Spec {
+    let text = format!(
+        "fast_period = 1.0\nratio = 2\nlatency = 10\n\
+         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
+         channel = [{channels}]\ndesign = {{ {design} }}"
+    );
+    Spec::from_toml(&text, "spec.toml").unwrap()
+}
+
+const THESIS: &str = "{ delay = 1.2 }, { delay = 0.6 }";
+
+#[test]
+fn a_spec_made_in_memory_is_checked_first() {
+    // taps = 0 underflowed in `separation`.
+    for method in [Method::Fir, Method::Sinc, Method::Separation] {
+        let mut spec = spec("method = \"fir\", taps = 22", THESIS);
+        (spec.design.method, spec.design.taps) = (method, Some(0));
+        assert!(matches!(design(&spec), Err(DesignError::Spec(_))), "{}", method.name());
+    }
+    let mut without_taps = spec("method = \"fir\", taps = 22", THESIS);
+    without_taps.design.taps = None;
+    assert!(matches!(design(&without_taps), Err(DesignError::Spec(_))));
+    let mut ratio = spec("method = \"iir\"", THESIS);
+    ratio.ratio = 0;
+    assert!(matches!(design(&ratio), Err(DesignError::Spec(_))));
+    let mut delay = spec("method = \"iir\"", THESIS);
+    delay.channels[0].delay = Seconds(f64::NAN);
+    assert!(matches!(design(&delay), Err(DesignError::Spec(_))));
+}
+
+#[test]
+fn taps_that_the_designer_chose_are_stated() {
+    for method in ["sinc", "separation"] {
+        let open = spec(&format!("method = \"{method}\""), THESIS);
+        let found = design_with(&open, ProofSearch::Skip).unwrap();
+        assert!(found.taps_chosen);
+        assert_eq!(found.bank.spec.as_ref().unwrap().design.taps, Some(23));
+        let SynthesisFilters::Fir(taps) = &found.bank.filters else { unreachable!() };
+        assert!(taps.iter().all(|filter| filter.len() == 23));
+        // The spec in the bank gives the same bank again, with nothing left to choose.
+        let again = design_with(found.bank.spec.as_ref().unwrap(), ProofSearch::Skip).unwrap();
+        assert_eq!((again.taps_chosen, &again.bank), (false, &found.bank));
+    }
+    assert!(!design_with(&spec("method = \"iir\"", THESIS), ProofSearch::Skip).unwrap().taps_chosen);
+}
+
+#[test]
+fn a_design_carries_its_proof_or_the_reason_why_there_is_none() {
+    for method in ["method = \"fir\", taps = 22", "method = \"iir\"", "method = \"sinc\""] {
+        let spec = spec(method, THESIS);
+        let found = design(&spec).unwrap();
+        let proven = found.proof.unwrap();
+        assert!(found.bank.proof.is_some());
+        assert_eq!(found.bank.gamma.upper, Some(proven.upper));
+        assert!(found.bank.gamma.norm.unwrap() < proven.upper, "{proven:?}");
+        let skipped = design_with(&spec, ProofSearch::Skip).unwrap();
+        assert_eq!(skipped.proof, Err(DesignError::ProofSkipped));
+        assert!(skipped.bank.proof.is_none() && skipped.bank.filters == found.bank.filters);
+    }
+}
+
+#[test]
+fn channels_that_are_alike_share_one_filter_by_their_noise() {
+    let alone = spec("method = \"fir\", taps = 14", "{ delay = 1.2 }, { delay = 0.6 }");
+    let twice = spec(
+        "method = \"fir\", taps = 14",
+        "{ delay = 1.2 }, { delay = 0.6, noise = 1e-9 }, { delay = 0.6, noise = 2e-9 }",
+    );
+    let taps = |spec: &Spec| match design_with(spec, ProofSearch::Skip).unwrap().bank.filters {
+        SynthesisFilters::Fir(taps) => taps,
+        SynthesisFilters::StateSpace(_) => unreachable!(),
+    };
+    let (one, three) = (taps(&alone), taps(&twice));
+    assert_eq!((one.len(), three.len()), (2, 3));
+    for (quiet, loud) in three[1].iter().zip(&three[2]) {
+        // Shares in inverse proportion to the powers, 4 : 1.
+        assert!((quiet - 4.0 * loud).abs() <= 1e-15 + 1e-12 * quiet.abs(), "{quiet} {loud}");
+    }
+    let norm = |spec: &Spec| design_with(spec, ProofSearch::Skip).unwrap().bank.gamma.norm.unwrap();
+    assert!((norm(&alone) / norm(&twice) - 1.0).abs() < 2e-3);
+}

@@ -1,0 +1,145 @@
+//! What can go wrong on the way from a spec to a bank.
+
+use crate::analog::AnalogError;
+use crate::linalg::LinalgError;
+use crate::lmi::kyp::KypError;
+use crate::lmi::sampled::SampledError;
+use crate::lti::{LtiError, StateSpaceError};
+use crate::sampling::SamplingError;
+use crate::spec::SpecProblem;
+use crate::units::FastPeriods;
+use crate::verify::VerifyError;
+
+/// Why a bank could not be designed or judged.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DesignError {
+    /// The spec breaks a rule for specs.
+    #[error(transparent)]
+    Spec(#[from] SpecProblem),
+    /// A filter of the spec is no front end.
+    #[error("{place}: {source}")]
+    Analog {
+        /// Which filter: the target's or a channel's.
+        place: String,
+        /// What is wrong with it.
+        source: AnalogError,
+    },
+    /// A property of a system could not be computed.
+    #[error(transparent)]
+    Lti(#[from] LtiError),
+    /// A decomposition failed.
+    #[error(transparent)]
+    Linalg(#[from] LinalgError),
+    /// Matrices that do not belong together.
+    #[error(transparent)]
+    Shapes(#[from] StateSpaceError),
+    /// A sampled worst-case problem was not well formed.
+    #[error(transparent)]
+    Sampled(#[from] SampledError),
+    /// The bounded-real lemma could not be set up.
+    #[error(transparent)]
+    Kyp(#[from] KypError),
+    /// Too many states for the bounded-real LMI.
+    #[error(
+        "solver = \"kyp\" solves the bounded-real LMI for up to {limit} states of the error system, this one has {states}: use \
+         fewer taps or solver = \"sampled\""
+    )]
+    KypTooLarge {
+        /// States of the plant and of the delay lines of its measurements.
+        states: usize,
+        /// Most states.
+        limit: usize,
+    },
+    /// No certificate was found, not even somewhat above the computed norm.
+    #[error(
+        "the computed gamma could not be proven: no certificate passes up to 10 % above it; the front ends are too stiff or \
+         the channels too nearly equal for double precision"
+    )]
+    NotCertified,
+    /// The caller did not ask for a proof.
+    #[error("no proof was looked for")]
+    ProofSkipped,
+    /// Too large for the search.
+    #[error("a proof is looked for up to {limit} states of the error system, this bank's has {states}")]
+    NotSearched {
+        /// Its states.
+        states: usize,
+        /// Most states.
+        limit: usize,
+    },
+    /// What was found does not prove the gammas.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    /// Nothing is left of the taps at the scale that was asked for.
+    #[error(
+        "with fraction_bits = {fraction_bits} all integer taps are zero: the taps fit their bits up to fraction_bits = {fitting}; give about that, or leave it out"
+    )]
+    AllZero {
+        /// The scale.
+        fraction_bits: i32,
+        /// The finest one at which no tap is cut off.
+        fitting: i32,
+    },
+    /// The interior-point method gave no taps at all.
+    #[error("no taps were found; please report the spec")]
+    NoTaps,
+    /// The sinc comparison needs as many samples as Nyquist asks for.
+    #[error(
+        "method = \"sinc\" needs as many channels as the ratio (N = M), got {channels} channels and ratio {ratio}: \
+         use \"fir\", \"iir\" or \"h2\""
+    )]
+    SincNeedsNyquist {
+        /// N.
+        channels: usize,
+        /// M.
+        ratio: usize,
+    },
+    /// Sample instants that do not determine a band-limited signal.
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    /// A bank made elsewhere says nothing about its front ends.
+    #[error(
+        "this bank carries no spec (\"spec\": null): its front ends are unknown, so its error cannot be computed"
+    )]
+    NoSpec,
+    /// One delay error per channel.
+    #[error("{given} delay errors were given for {channels} channels: give one for each channel, in seconds")]
+    DelayErrorCount {
+        /// Numbers given.
+        given: usize,
+        /// N.
+        channels: usize,
+    },
+    /// Latency and delays so far apart that the lifted system does not fit into a computer.
+    #[error(
+        "latency {latency} and delays up to {longest_delay} need delay chains of {states} states, at most \
+         {limit} are supported: check the unit of the delays (seconds), and bring latency and delays closer together"
+    )]
+    TooLate {
+        /// m0, fast samples.
+        latency: usize,
+        /// The largest delay.
+        longest_delay: FastPeriods,
+        /// States of all delay chains.
+        states: f64,
+        /// Most states.
+        limit: usize,
+    },
+    /// A bank's state-space matrices have rows of unequal lengths.
+    #[error("the bank's state-space matrices do not fit: expected {rows} rows of {cols} numbers")]
+    RaggedStateSpace {
+        /// Expected rows.
+        rows: usize,
+        /// Expected columns.
+        cols: usize,
+    },
+    /// No Riccati equation could be solved, not even at the easy end.
+    #[error(
+        "the Riccati equation could not be solved at gamma = {gamma}: the front ends are too stiff or the \
+         channels too nearly equal for double precision; try method = \"fir\", or move nearly equal delays apart"
+    )]
+    RiccatiFailed {
+        /// The largest gamma tried.
+        gamma: f64,
+    },
+}

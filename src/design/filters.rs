@@ -1,0 +1,115 @@
+//! The synthesis filters as the matrix F(z) of their polyphase components, `f_i[p + j M] = F_j[p, i]`.
+
+use super::DesignError;
+use crate::bank::{BlockFilter, SynthesisFilters};
+use crate::linalg::{CMat, Complex, Mat};
+use crate::lti::StateSpace;
+
+/// The taps F_0, F_1, .. of F(z), M x N each, for filters `taps[i][n] = f_i[n]`; at least one.
+pub fn polyphase(taps: &[Vec<f64>], ratio: usize) -> Vec<Mat> {
+    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
+    let tap = |i: usize, n: usize| taps[i].get(n).copied().unwrap_or(0.0);
+    (0..lags).map(|j| Mat::from_fn(ratio, taps.len(), |p, i| tap(i, p + j * ratio))).collect()
+}
+
+/// The first `length` samples of each impulse response: the inverse of [`polyphase`].
+pub fn impulse_responses(lags: &[Mat], length: usize) -> Vec<Vec<f64>> {
+    let (ratio, channels) = lags.first().map_or((1, 0), Mat::shape);
+    (0..channels).map(|i| (0..length).map(|n| lags[n / ratio][(n % ratio, i)]).collect()).collect()
+}
+
+/// F at e^{jw}: the sum of e^{-jwj} F_j, w in radians per slow period.
+pub fn response(lags: &[Mat], w: f64) -> CMat {
+    let (rows, cols) = lags.first().map_or((0, 0), Mat::shape);
+    let mut filter = CMat::zeros(rows, cols);
+    for (j, lag) in lags.iter().enumerate() {
+        let rotation = Complex::from_polar(1.0, -w * j as f64);
+        filter.zip_apply(lag, |sum, tap| *sum += rotation * tap);
+    }
+    filter
+}
+
+/// F(z) of a bank as one system: N slow samples in and M fast samples out per slow period.
+///
+/// # Errors
+/// [`DesignError::RaggedStateSpace`] for matrices with rows of unequal lengths.
+pub fn lifted(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, DesignError> {
+    match filters {
+        SynthesisFilters::Fir(taps) => Ok(StateSpace::fir(&polyphase(taps, ratio))?),
+        SynthesisFilters::StateSpace(block) => from_block(block, ratio),
+    }
+}
+
+fn from_block(block: &BlockFilter, ratio: usize) -> Result<StateSpace, DesignError> {
+    let (n, channels) = (block.a.len(), block.d.first().map_or(0, Vec::len));
+    let a = matrix(&block.a, n, n)?;
+    let b = matrix(&block.b, n, channels)?;
+    let c = matrix(&block.c, ratio, n)?;
+    let d = matrix(&block.d, ratio, channels)?;
+    Ok(StateSpace::new(a, b, c, d)?)
+}
+
+fn matrix(rows: &[Vec<f64>], r: usize, c: usize) -> Result<Mat, DesignError> {
+    if rows.len() != r || rows.iter().any(|row| row.len() != c) {
+        return Err(DesignError::RaggedStateSpace { rows: r, cols: c });
+    }
+    Ok(Mat::from_fn(r, c, |i, j| rows[i][j]))
+}
+
+/// A system as a bank holds it: lists of rows.
+pub fn to_block(system: &StateSpace) -> BlockFilter {
+    let rows = |m: &Mat| m.row_iter().map(|row| row.iter().copied().collect()).collect();
+    BlockFilter { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn polyphase_components_are_the_samples_at_their_places() {
+        let taps = vec![vec![1.0, 2.0, 3.0, 4.0, 5.0], vec![6.0]];
+        let lags = polyphase(&taps, 2);
+        assert_eq!(lags.len(), 3);
+        assert_eq!(
+            (lags[0][(1, 0)], lags[2][(0, 0)], lags[0][(0, 1)], lags[2][(1, 0)]),
+            (2.0, 5.0, 6.0, 0.0)
+        );
+        let back = impulse_responses(&lags, 5);
+        assert_eq!(back, vec![vec![1.0, 2.0, 3.0, 4.0, 5.0], vec![6.0, 0.0, 0.0, 0.0, 0.0]]);
+    }
+
+    #[test]
+    fn the_lifted_system_answers_an_impulse_with_the_taps() {
+        let taps = vec![vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], vec![-1.0, 0.5, 0.25]];
+        for ratio in [1, 2, 3, 7, 9] {
+            let filters = SynthesisFilters::Fir(taps.clone());
+            let system = lifted(&filters, ratio).unwrap();
+            for (i, filter) in taps.iter().enumerate() {
+                let mut x = system.b().column(i).into_owned();
+                let mut answer: Vec<f64> = system.d().column(i).iter().copied().collect();
+                while answer.len() < 12 {
+                    answer.extend((system.c() * &x).iter());
+                    x = system.a() * x;
+                }
+                let want = (0..answer.len()).map(|n| filter.get(n).copied().unwrap_or(0.0));
+                assert_eq!(answer, want.collect::<Vec<_>>(), "ratio {ratio}, channel {i}");
+            }
+            // By way of the matrices in a bank file nothing changes.
+            let stored = SynthesisFilters::StateSpace(to_block(&system));
+            assert_eq!(lifted(&stored, ratio).unwrap(), system);
+        }
+    }
+
+    #[test]
+    fn rows_of_unequal_lengths_are_refused() {
+        let block = BlockFilter {
+            a: vec![vec![0.5, 0.0], vec![0.0]],
+            b: vec![vec![1.0], vec![1.0]],
+            c: vec![vec![1.0, 1.0]],
+            d: vec![vec![0.0]],
+        };
+        let ragged = lifted(&SynthesisFilters::StateSpace(block), 1);
+        assert_eq!(ragged, Err(DesignError::RaggedStateSpace { rows: 2, cols: 2 }));
+    }
+}

@@ -1,0 +1,142 @@
+//! The exact discrete-time equivalent of the hybrid system, lifted to one step per slow period (thesis 5.2,
+//! Theorem 5.1).
+//!
+//! In one slow period the analog state moves under the input; every sample, of a slow channel or of the
+//! ideal fast one, is a row of that state at some instant of the period. The period is cut at these
+//! instants. Over a piece of length l the state becomes e^{A l} x + w with w independent of the other
+//! pieces and w w* = G(l), the finite-time Gramian; any square root of G(l) is a norm-equivalent input
+//! (thesis 5.16). Following the state from instant to instant therefore gives the lifted system with all its
+//! feedthroughs at once, for any real delays, and never squares anything.
+//!
+//! Time labels: moving all instants by one constant changes neither the norm of the error system
+//! nor the filters. The latest instant is put at the very end of the period, so that the other
+//! samples are *ahead* of the state at its beginning and need no delay chains. An instant earlier than
+//! one period is that of the same row, delayed by whole periods.
+
+use super::DesignError;
+use super::problem::Problem;
+use crate::analog::StrictlyProper;
+use crate::linalg::{self, Mat};
+use crate::lti::StateSpace;
+use crate::lti::exponential::{StateTransition, gramian_root};
+use std::ops::Range;
+
+/// Instants closer than this (fast periods) are one: far below what any converter resolves, far above
+/// the rounding of delay / period.
+const SAME_INSTANT: f64 = 1e-11;
+
+/// The lifted analysis side.
+pub(super) struct Lifted {
+    /// x+ = A x + B w, [y; z] = C x + D w.
+    pub(super) system: StateSpace,
+    /// For each measurement the states of its delay chain, first link first.
+    pub(super) chains: Vec<Range<usize>>,
+}
+
+/// When and where a sample is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct SamplingInstant {
+    /// Index of the filter that is sampled.
+    front_end: usize,
+    /// Fast periods after the beginning of the slow period, in (0, M].
+    time: f64,
+    /// Slow periods by which the sample is delayed besides.
+    delay: usize,
+}
+
+/// The exact equivalent of `problem`.
+pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
+    let instants = schedule(problem);
+    let delays: Vec<usize> = instants.iter().map(|instant| instant.delay).collect();
+    let prompt = follow_state(problem, &instants)?;
+    let ends = delays.iter().scan(prompt.order(), |end, &delay| {
+        *end += delay;
+        Some(*end)
+    });
+    let chains = ends.zip(&delays).map(|(end, &delay)| if delay == 0 { 0..0 } else { end - delay..end });
+    let chains = chains.take(problem.channels.len()).collect();
+    let system = prompt.series(&StateSpace::delays(&delays))?.compress_inputs();
+    Ok(Lifted { system, chains })
+}
+
+/// The instants of all outputs, the measurements first, relabelled so that the latest lies at the end of
+/// the period.
+fn schedule(problem: &Problem) -> Vec<SamplingInstant> {
+    let period = problem.ratio as f64;
+    let measurements = problem.channels.iter().map(|channel| (channel.front_end, -channel.delay.0));
+    let references = (0..problem.ratio).map(|p| (problem.target, p as f64 - problem.latency as f64));
+    let times: Vec<(usize, f64)> = measurements.chain(references).collect();
+    let latest = times.iter().map(|&(_, time)| time).fold(f64::NEG_INFINITY, f64::max);
+    times.iter().map(|&(front_end, time)| before_the_end(front_end, latest - time, period)).collect()
+}
+
+/// The instant that lies `age` fast periods before the end of the slow period.
+fn before_the_end(front_end: usize, age: f64, period: f64) -> SamplingInstant {
+    let nearest = (age / period).round();
+    let on_a_boundary = (age - nearest * period).abs() < SAME_INSTANT;
+    let delay = if on_a_boundary { nearest } else { (age / period).floor() };
+    let time = if on_a_boundary { period } else { period - (age - delay * period) };
+    SamplingInstant { front_end, time, delay: delay as usize }
+}
+
+/// Follows the joint analog state through one period: the system whose outputs are the samples, as yet
+/// without their delays by whole periods.
+fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<StateSpace, DesignError> {
+    let joint = JointState::new(&problem.front_ends)?;
+    let mut order: Vec<usize> = (0..instants.len()).collect();
+    order.sort_by(|&i, &j| instants[i].time.total_cmp(&instants[j].time));
+    let mut rows = vec![(Mat::zeros(1, 0), Mat::zeros(1, 0)); instants.len()];
+    let mut now = 0.0;
+    let mut state = Mat::identity(joint.order(), joint.order());
+    let mut input = Mat::zeros(joint.order(), 0);
+    for index in order {
+        let SamplingInstant { front_end, time, .. } = instants[index];
+        if time - now >= SAME_INSTANT {
+            (state, input) = joint.advance(&state, &input, time - now)?;
+            now = time;
+        }
+        let output = joint.c.rows(front_end, 1);
+        rows[index] = (output * &state, output * &input);
+    }
+    // The latest sample ends the period by construction; a rest below SAME_INSTANT is none.
+    debug_assert!(problem.ratio as f64 - now < SAME_INSTANT);
+    let width = input.ncols();
+    let (c, d): (Vec<Mat>, Vec<Mat>) =
+        rows.into_iter().map(|(c, d)| (c, d.resize_horizontally(width, 0.0))).unzip();
+    let stacked = |rows: &[Mat]| linalg::vstack(&rows.iter().collect::<Vec<_>>());
+    Ok(StateSpace::new(state, input, stacked(&c)?, stacked(&d)?)?)
+}
+
+/// All distinct front ends side by side, driven by the same input: dx/dt = diag(A_i) x + B f, row i of C
+/// reads filter i.
+struct JointState {
+    transition: StateTransition,
+    b: Mat,
+    c: Mat,
+}
+
+impl JointState {
+    fn new(front_ends: &[StrictlyProper]) -> Result<Self, DesignError> {
+        let b: Vec<&Mat> = front_ends.iter().map(StrictlyProper::b).collect();
+        let c: Vec<&Mat> = front_ends.iter().map(StrictlyProper::c).collect();
+        Ok(Self {
+            transition: StateTransition::new(front_ends.iter().map(|filter| filter.a().clone()).collect()),
+            b: linalg::vstack(&b)?,
+            c: linalg::block_diagonal(&c),
+        })
+    }
+
+    fn order(&self) -> usize {
+        self.b.nrows()
+    }
+
+    /// x <- e^{A l} x + S w_new over a piece of length l: the new inputs become further columns.
+    fn advance(&self, state: &Mat, input: &Mat, length: f64) -> Result<(Mat, Mat), DesignError> {
+        let transition = self.transition.over(length);
+        let root = gramian_root(&self.transition, &self.b, length)?;
+        Ok((&transition * state, linalg::hstack(&[&(&transition * input), &root])?))
+    }
+}
+
+#[cfg(test)]
+mod tests;

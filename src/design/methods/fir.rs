@@ -1,0 +1,96 @@
+//! FIR design: the taps of least gamma (thesis 5.4), and of least mean-square error among these.
+//!
+//! The bounded-real LMI of thesis 5.4 in the frequency domain is the semi-infinite problem min over taps of
+//! max over w of sigma_max(W(w) - F(w) H(w)), which [`Exchange`] solves: its lower bound holds for all taps of
+//! that length. The norm of the taps found is the upper bound. While taps still change, their norm is only
+//! estimated, from the peaks between the points of a fine grid; the taps that are returned have the computed
+//! one.
+
+use super::{Filters, GAMMA_ACCURACY, Settings, Synthesis};
+use crate::design::DesignError;
+use crate::design::error_grid::ErrorGrid;
+use crate::design::exchange::{Exchange, LEAST_MARGIN};
+use crate::design::filters::impulse_responses;
+use crate::design::plant::LiftedPlant;
+use crate::lmi::sampled::{MeanSquareObjective, Problem};
+use crate::lti::peak::Peak;
+
+/// Where the converters' noise is known, less of it is worth this much of gamma unless the spec says otherwise.
+const NOISY_MARGIN: f64 = 1e-3;
+/// Times that the norm may find a peak that the estimates have missed.
+const SURPRISE_LIMIT: usize = 8;
+
+/// The `settings.taps` taps per channel of least gamma within [`GAMMA_ACCURACY`]. Optimal banks are many: among
+/// them, and within the gamma margin, those of least power per slow period of the error for white noise of unit
+/// density at the analog input and of the converters' noise at the output,
+/// `||K||_2^2 + sum_i noise_i ||f_i||^2`.
+///
+/// # Errors
+/// [`DesignError::Lti`] for unstable plants; [`DesignError::NoTaps`] if the interior-point method found none.
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+    let mut exchange = exchange(plant, settings)?;
+    let best = least_gamma(plant, settings.taps, &mut exchange)?;
+    let noncausal = plant.noncausal_bound()?.gain;
+    Ok(Synthesis {
+        filters: Filters::Fir(best.taps),
+        peak: best.peak,
+        lower: exchange.lower.max(noncausal).min(best.peak.gain),
+        noncausal: noncausal.min(best.peak.gain),
+        dual: exchange.dual,
+        iterations: exchange.iterations,
+    })
+}
+
+fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
+    let ratio = plant.ratio();
+    let lags: Vec<usize> = (0..ratio).map(|p| settings.taps.saturating_sub(p).div_ceil(ratio)).collect();
+    let grid = ErrorGrid::new(plant, lags[0]);
+    let (points, weights) = grid.coarse();
+    let noise = plant.problem().noise.clone();
+    let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
+    Exchange::new(grid, Problem::new(points, lags)?, MeanSquareObjective { weights, noise }, margin)
+}
+
+/// 1e-3 if a channel has noise, else next to none.
+fn usual_margin(noise: &[f64]) -> f64 {
+    if noise.iter().any(|power| *power > 0.0) { NOISY_MARGIN } else { LEAST_MARGIN }
+}
+
+/// Taps with their norm.
+struct Judged {
+    taps: Vec<Vec<f64>>,
+    /// Their norm by the grid.
+    estimate: f64,
+    peak: Peak,
+}
+
+/// The exchange, repeated with the peak of the norm as a further point where the grid had missed it.
+fn least_gamma(
+    plant: &LiftedPlant,
+    length: usize,
+    exchange: &mut Exchange<ErrorGrid<'_>>,
+) -> Result<Judged, DesignError> {
+    let mut best = judged(plant, length, exchange)?;
+    for _ in 0..SURPRISE_LIMIT {
+        let missed = best.peak.gain > best.estimate * (1.0 + GAMMA_ACCURACY);
+        if !missed || !exchange.add(&[best.peak.frequency])? {
+            break;
+        }
+        let other = judged(plant, length, exchange)?;
+        if other.peak.gain < best.peak.gain {
+            best = other;
+        }
+    }
+    Ok(best)
+}
+
+fn judged(
+    plant: &LiftedPlant,
+    length: usize,
+    exchange: &mut Exchange<ErrorGrid<'_>>,
+) -> Result<Judged, DesignError> {
+    let found = exchange.optimise()?;
+    let taps = impulse_responses(&found.taps, length);
+    let peak = plant.fir_norm(&taps)?;
+    Ok(Judged { taps, estimate: found.peaks.estimate, peak })
+}

@@ -1,0 +1,243 @@
+//! Gamma-iteration: the search for the least gamma for which the filtering Riccati equation has a solution.
+
+use super::filtering::{Filter, Innovations, Trial};
+use super::{Filters, GAMMA_ACCURACY, Synthesis};
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
+use crate::linalg::{self, Complex};
+use crate::lti::LtiError;
+use crate::lti::peak::{Peak, hinf_norm};
+
+/// Gammas below this fraction of ||W|| are zero: the references are reproduced to rounding.
+const NEGLIGIBLE: f64 = 1e-12;
+/// The bracket halves (on the logarithmic scale) in each trial.
+const TRIAL_LIMIT: usize = 80;
+/// Gammas tried below one that was not resolved.
+const TRIALS_BELOW: usize = 8;
+/// Gamma-iterations with trials below between them.
+const ROUND_LIMIT: usize = 4;
+/// Trials below are worth another gamma-iteration if they make gamma this much smaller.
+const WORTHWHILE: f64 = 0.9;
+
+/// Filters with the norm of their error system.
+#[derive(Debug, Clone)]
+pub(super) struct Judged {
+    filters: Filter,
+    pub(super) peak: Peak,
+}
+
+/// What gamma-iteration ended at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Floor {
+    /// A gamma that no filter reaches.
+    Impossible,
+    /// One at which the trial failed for whatever reason.
+    Unresolved,
+}
+
+/// The state of the search: [lower, best] with the filters that attain the upper end.
+pub(super) struct GammaIteration<'a> {
+    plant: &'a LiftedPlant,
+    innovations: &'a [Innovations],
+    /// The noncausal bound and where it is attained.
+    noncausal: Peak,
+    /// No causal filter reaches less.
+    lower: f64,
+    best: Option<Judged>,
+    /// Riccati equations solved.
+    trials: usize,
+    negligible: f64,
+}
+
+impl<'a> GammaIteration<'a> {
+    pub(super) fn new(plant: &'a LiftedPlant, innovations: &'a [Innovations]) -> Result<Self, DesignError> {
+        let noncausal = plant.noncausal_bound()?;
+        let feedthrough = innovations.first().map_or(Ok(0.0), Innovations::unmeasured_feedthrough)?;
+        let system = plant.system();
+        Ok(Self {
+            plant,
+            innovations,
+            noncausal,
+            lower: noncausal.gain.max(feedthrough),
+            best: None,
+            trials: 0,
+            negligible: NEGLIGIBLE * (system.c().norm() * system.b().norm() + system.d().norm()),
+        })
+    }
+
+    pub(super) fn innovations(&self) -> &'a [Innovations] {
+        self.innovations
+    }
+
+    /// The filters with their norm; `None` for filters that rounding has made unstable.
+    pub(super) fn judge(&self, filters: Filter) -> Result<Option<Judged>, DesignError> {
+        match self.plant.norm(&filters) {
+            Ok(peak) => Ok(Some(Judged { filters, peak })),
+            Err(DesignError::Lti(LtiError::Unstable { .. })) => Ok(None),
+            Err(other) => Err(other),
+        }
+    }
+
+    fn keep(&mut self, found: Judged) {
+        if self.best.as_ref().is_none_or(|best| found.peak.gain < best.peak.gain) {
+            self.best = Some(found);
+        }
+    }
+
+    /// Whether the error where the noncausal bound is attained is within the accuracy of the least that any
+    /// filter can have.
+    pub(super) fn may_be_optimal(&self, filters: &Filter) -> Result<bool, DesignError> {
+        let error = self.plant.error_system(filters)?;
+        let response = error.response_at(Complex::from_polar(1.0, self.noncausal.frequency));
+        let gain = linalg::largest_singular_value_c(&response)?;
+        Ok(gain <= self.lower * (1.0 + GAMMA_ACCURACY) || self.is_negligible(gain))
+    }
+
+    /// Keeps the first of the mean-square optimal filters that is stable.
+    pub(super) fn start_from(
+        &mut self,
+        mean_square: impl Iterator<Item = Filter>,
+    ) -> Result<(), DesignError> {
+        self.trials += 1;
+        for filters in mean_square {
+            if let Some(found) = self.judge(filters)? {
+                self.keep(found);
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn upper(&self) -> f64 {
+        self.best.as_ref().map_or(f64::INFINITY, |best| best.peak.gain)
+    }
+
+    pub(super) fn is_negligible(&self, gain: f64) -> bool {
+        gain <= self.negligible
+    }
+
+    pub(super) fn done(&self) -> bool {
+        self.upper() <= self.lower * (1.0 + GAMMA_ACCURACY) || self.is_negligible(self.upper())
+    }
+
+    /// One gamma; only a filter whose norm keeps the promise counts.
+    fn attempt(&mut self, gamma: f64) -> Result<Trial, DesignError> {
+        for innovations in self.innovations {
+            self.trials += 1;
+            match innovations.h_infinity(gamma) {
+                Trial::Achieved(filters) => {
+                    let Some(found) = self.judge(filters.clone())? else { continue };
+                    let promise_kept = found.peak.gain <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
+                    self.keep(found);
+                    if promise_kept {
+                        return Ok(Trial::Achieved(filters));
+                    }
+                }
+                Trial::Impossible => return Ok(Trial::Impossible),
+                Trial::Unresolved => {}
+            }
+        }
+        Ok(Trial::Unresolved)
+    }
+
+    /// In most problems the noncausal bound is reached, so it is tried first.
+    pub(super) fn try_the_lower_bound(&mut self) -> Result<(), DesignError> {
+        if !self.done() {
+            self.attempt(self.lower * (1.0 + 0.8 * GAMMA_ACCURACY))?;
+        }
+        Ok(())
+    }
+
+    /// Gamma-iteration, and a few trials below where trials were not resolved: near the edge of double
+    /// precision a smaller gamma may well be solvable.
+    pub(super) fn bisect(&mut self) -> Result<(), DesignError> {
+        for _ in 0..ROUND_LIMIT {
+            if self.bisect_once()? == Floor::Impossible {
+                break;
+            }
+            let before = self.upper();
+            self.try_below()?;
+            // False also where nothing was found at all.
+            let gained = self.upper() < WORTHWHILE * before;
+            if !gained {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn try_below(&mut self) -> Result<(), DesignError> {
+        let start = self.ceiling();
+        let ratio = self.floor() / start;
+        for k in 1..=TRIALS_BELOW {
+            let gamma = start * ratio.powf(k as f64 / (TRIALS_BELOW + 1) as f64);
+            if matches!(self.attempt_or_exclude(gamma)?, Trial::Impossible) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn bisect_once(&mut self) -> Result<Floor, DesignError> {
+        let mut kind = Floor::Impossible;
+        let (mut floor, mut ceiling) = (self.floor(), self.ceiling());
+        for _ in 0..TRIAL_LIMIT {
+            if self.done() || ceiling <= floor * (1.0 + 0.5 * GAMMA_ACCURACY) {
+                break;
+            }
+            let gamma = (floor * ceiling).sqrt();
+            match self.attempt_or_exclude(gamma)? {
+                Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
+                Trial::Impossible => (floor, kind) = (gamma, Floor::Impossible),
+                Trial::Unresolved => (floor, kind) = (gamma, Floor::Unresolved),
+            }
+        }
+        Ok(kind)
+    }
+
+    /// As [`GammaIteration::attempt`]; a gamma that no filter reaches raises the lower bound.
+    fn attempt_or_exclude(&mut self, gamma: f64) -> Result<Trial, DesignError> {
+        let trial = self.attempt(gamma)?;
+        if matches!(trial, Trial::Impossible) {
+            self.lower = self.lower.max(gamma);
+        }
+        Ok(trial)
+    }
+
+    /// The least gamma that is worth a trial.
+    fn floor(&self) -> f64 {
+        self.lower.max(self.negligible)
+    }
+
+    /// A gamma that some filter reaches.
+    fn ceiling(&self) -> f64 {
+        if self.upper().is_finite() { self.upper() } else { self.zero_output_norm() }
+    }
+
+    /// ||W||, the gamma of the bank that outputs zeros.
+    fn zero_output_norm(&self) -> f64 {
+        let norm = self.plant.reference().and_then(|w| Ok(hinf_norm(&w)?));
+        norm.map_or(f64::MAX.sqrt(), |peak| peak.gain)
+    }
+
+    /// The filters of least norm that were found.
+    ///
+    /// # Errors
+    /// [`DesignError::RiccatiFailed`] if there are none.
+    pub(super) fn best(&self) -> Result<Judged, DesignError> {
+        self.best.clone().ok_or_else(|| DesignError::RiccatiFailed { gamma: self.zero_output_norm() })
+    }
+
+    /// `chosen` with the bounds that were found.
+    pub(super) fn synthesis(&self, chosen: Judged) -> Synthesis {
+        let Judged { filters, peak } = chosen;
+        Synthesis {
+            filters: Filters::StateSpace(filters),
+            peak,
+            lower: self.lower.min(peak.gain),
+            noncausal: self.noncausal.gain.min(peak.gain),
+            dual: Vec::new(),
+            iterations: self.trials,
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! The least gamma of any causal bank, by a-posteriori H-infinity filtering and gamma-iteration (thesis
+//! 5.3).
+
+use super::filtering::{Innovations, Trial};
+use super::gamma_iteration::{GammaIteration, Judged};
+use super::{Settings, Synthesis};
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
+
+/// The least gamma within [`GAMMA_ACCURACY`](super::GAMMA_ACCURACY); with `settings.gamma_margin` > 0 the
+/// central filter at (1 + margin) times the optimum instead, which has the smaller error at all other
+/// frequencies.
+///
+/// # Errors
+/// [`DesignError::RiccatiFailed`] if no Riccati equation could be solved, [`DesignError::Lti`] if the plant
+/// is not stable.
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+    let innovations = Innovations::in_all_coordinates(plant)?;
+    let mut iteration = GammaIteration::new(plant, &innovations)?;
+    let mut mean_square = innovations.iter().filter_map(Innovations::h2).peekable();
+    // The mean-square optimum is mostly the worst-case one too or far from it, and one frequency tells
+    // which.
+    let promising =
+        mean_square.peek().map(|filters| iteration.may_be_optimal(filters)).transpose()? == Some(true);
+    if !promising {
+        iteration.try_the_lower_bound()?;
+    }
+    if !iteration.done() {
+        iteration.start_from(mean_square)?;
+    }
+    if promising {
+        iteration.try_the_lower_bound()?;
+    }
+    iteration.bisect()?;
+    let optimum = iteration.best()?;
+    let relaxed = relaxed(&mut iteration, &optimum, settings.gamma_margin.unwrap_or(0.0))?;
+    Ok(iteration.synthesis(relaxed.unwrap_or(optimum)))
+}
+
+/// A central filter whose norm is within `margin` of the optimum, if one is wanted and found.
+fn relaxed(
+    iteration: &mut GammaIteration<'_>,
+    optimum: &Judged,
+    margin: f64,
+) -> Result<Option<Judged>, DesignError> {
+    if margin <= 0.0 || iteration.is_negligible(optimum.peak.gain) {
+        return Ok(None);
+    }
+    let cap = optimum.peak.gain * (1.0 + margin);
+    for innovations in iteration.innovations() {
+        let Trial::Achieved(filters) = innovations.h_infinity(cap) else { continue };
+        let Some(relaxed) = iteration.judge(filters)? else { continue };
+        if relaxed.peak.gain <= cap {
+            return Ok(Some(relaxed));
+        }
+    }
+    Ok(None)
+}

@@ -1,0 +1,97 @@
+//! The design methods: one file each, and one signature.
+//!
+//! | method | minimises | filters | lower end |
+//! |---|---|---|---|
+//! | [`fir`] | the norm of the error, over taps of given length (thesis 5.4) | FIR | dual of the sampled problem |
+//! | [`iir`] | the norm of the error, over all causal filters (thesis 5.3) | state space | Riccati equation without solution |
+//! | [`h2`] | the mean-square error: `iir` at gamma = infinity | state space | noncausal bound |
+//! | [`sinc`] | nothing: Yen's interpolation, truncated (thesis 5.6.3) | FIR | noncausal bound |
+//! | [`separation`] | delays and bank one after the other (thesis 5.6.3) | FIR | noncausal bound |
+
+mod filtering;
+pub(crate) mod fir;
+pub(crate) mod fir_kyp;
+mod gamma_iteration;
+pub(crate) mod h2;
+pub(crate) mod iir;
+pub(crate) mod separation;
+pub(crate) mod sinc;
+
+use super::DesignError;
+pub(crate) use super::exchange::{DualPoint, GAMMA_ACCURACY};
+use super::plant::LiftedPlant;
+use super::problem::Problem;
+use crate::lti::StateSpace;
+use crate::lti::peak::Peak;
+use crate::spec::{Method, Solver};
+
+/// Settings of a method beside the plant.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Settings {
+    /// Taps per channel at the fast rate, for the methods that make FIR filters.
+    pub(crate) taps: usize,
+    /// Relative excess over the least gamma that may go into the mean square; `None` is the method's own.
+    pub(crate) gamma_margin: Option<f64>,
+    /// Solver of `fir`; `None` is the sampled one.
+    pub(crate) solver: Option<Solver>,
+    /// The channels of the plant in units of the slow period, for `separation`.
+    pub(crate) at_slow_rate: Option<Problem>,
+}
+
+/// Synthesis filters, one per channel of the plant.
+#[derive(Debug, Clone)]
+pub(crate) enum Filters {
+    /// `taps[i][n]` = `f_i[n]` at the fast rate.
+    Fir(Vec<Vec<f64>>),
+    /// F(z), M x N.
+    StateSpace(StateSpace),
+}
+
+/// The result of a method.
+#[derive(Debug, Clone)]
+pub(crate) struct Synthesis {
+    pub(crate) filters: Filters,
+    /// The norm of the error system of these filters, and where it is attained (radians per slow period).
+    pub(crate) peak: Peak,
+    /// No filters that the method could have found have a smaller norm. At most `peak.gain`.
+    pub(crate) lower: f64,
+    /// No filters at all have a smaller norm, whatever their latency. At most `peak.gain`.
+    pub(crate) noncausal: f64,
+    /// What the lower end was read from, for `fir`; else empty.
+    pub(crate) dual: Vec<DualPoint>,
+    /// Interior-point iterations or Riccati equations.
+    pub(crate) iterations: usize,
+}
+
+impl Synthesis {
+    /// FIR filters that nothing was minimised for: what bounds all filters is all that is known below their
+    /// norm.
+    fn of_taps(plant: &LiftedPlant, taps: Vec<Vec<f64>>) -> Result<Self, DesignError> {
+        let peak = plant.fir_norm(&taps)?;
+        let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
+        let filters = Filters::Fir(taps);
+        Ok(Self { filters, peak, lower: noncausal, noncausal, dual: Vec::new(), iterations: 0 })
+    }
+}
+
+/// The filters of `method` for the channels of `plant`.
+///
+/// # Errors
+/// As the method's own `synthesise`.
+pub(crate) fn synthesise(
+    method: Method,
+    plant: &LiftedPlant,
+    settings: &Settings,
+) -> Result<Synthesis, DesignError> {
+    match method {
+        Method::Fir if settings.solver == Some(Solver::Kyp) => fir_kyp::synthesise(plant, settings),
+        Method::Fir => fir::synthesise(plant, settings),
+        Method::Iir => iir::synthesise(plant, settings),
+        Method::H2 => h2::synthesise(plant, settings),
+        Method::Sinc => sinc::synthesise(plant, settings),
+        Method::Separation => separation::synthesise(plant, settings),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,141 @@
+//! Fractional delays first, then a bank for integer delays, to compare with (thesis 5.6.3).
+
+use super::{Filters, Settings, Synthesis, fir};
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
+use crate::design::problem::{Channel, Problem};
+use crate::units::FastPeriods;
+
+/// Two steps: a fractional-delay filter for each channel, designed alone at the slow rate, brings its
+/// samples onto the fast grid; a bank designed for integer delays fuses them. `settings.taps` taps per
+/// channel in all.
+///
+/// # Errors
+/// As [`fir::synthesise`]; [`DesignError::NoTaps`] without the channels at the slow rate.
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+    let problem = plant.problem();
+    let split = Split::new(problem, settings.taps);
+    let grid = grid_delays(problem);
+    let bank = fir_taps(&on_grid(problem, &grid, &split), split.bank_taps)?;
+    let slow = settings.at_slow_rate.as_ref().ok_or(DesignError::NoTaps)?;
+    let mut taps = Vec::with_capacity(bank.len());
+    for (i, synthesis) in bank.iter().enumerate() {
+        let shift = FastPeriods(grid[i] as f64 / problem.ratio as f64);
+        let fractional = fir_taps(&alone(slow, i, shift, split.periods), split.delay_taps)?;
+        taps.push(cascade(&fractional[0], synthesis, problem.ratio));
+    }
+    Synthesis::of_taps(plant, taps)
+}
+
+/// The taps of least gamma, without regard to noise.
+fn fir_taps(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError> {
+    let noiseless = Problem { noise: vec![0.0; problem.channels.len()], ..problem.clone() };
+    let settings = Settings { taps, ..Settings::default() };
+    match fir::synthesise(&LiftedPlant::new(&noiseless)?, &settings)?.filters {
+        Filters::Fir(taps) => Ok(taps),
+        Filters::StateSpace(_) => Err(DesignError::NoTaps),
+    }
+}
+
+/// The channels as the second step sees them: with whole delays, and with the latency that the first step
+/// has left.
+fn on_grid(problem: &Problem, grid: &[usize], split: &Split) -> Problem {
+    let mut on_grid = problem.clone();
+    on_grid.latency -= split.periods * problem.ratio;
+    for (channel, &delay) in on_grid.channels.iter_mut().zip(grid) {
+        channel.delay = FastPeriods(delay as f64);
+    }
+    on_grid
+}
+
+/// Channel `i` alone at the slow rate, with the samples `shift` slow periods late as its own reference.
+fn alone(slow: &Problem, i: usize, shift: FastPeriods, latency: usize) -> Problem {
+    let channel = slow.channels[i];
+    Problem {
+        ratio: 1,
+        latency,
+        target: channel.front_end,
+        channels: vec![Channel { delay: channel.delay - shift, ..channel }],
+        ..slow.clone()
+    }
+}
+
+/// How taps and latency are shared between the two steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Split {
+    /// Latency of the fractional-delay filters, slow periods.
+    periods: usize,
+    /// Their taps, at the slow rate.
+    delay_taps: usize,
+    /// Taps of the integer-delay bank, at the fast rate.
+    bank_taps: usize,
+}
+
+impl Split {
+    /// A quarter of the latency goes to the fractional delays, as far as the taps allow.
+    fn new(problem: &Problem, length: usize) -> Self {
+        let periods =
+            (problem.latency / (4 * problem.ratio)).min(length.saturating_sub(1) / (4 * problem.ratio));
+        let delay_taps = 2 * periods + 1;
+        Self { periods, delay_taps, bank_taps: length - problem.ratio * (delay_taps - 1) }
+    }
+}
+
+/// For each channel the nearest whole delay whose place in the slow period is still free (when all are
+/// taken, the nearest).
+fn grid_delays(problem: &Problem) -> Vec<usize> {
+    let mut taken = vec![false; problem.ratio];
+    let chosen = |channel: &Channel| {
+        let chosen = nearest(channel.delay.0, &taken);
+        taken[chosen % problem.ratio] = true;
+        chosen
+    };
+    problem.channels.iter().map(chosen).collect()
+}
+
+/// The whole delay nearest to `delay` whose place in the slow period is not `taken`, or the nearest of all.
+fn nearest(delay: f64, taken: &[bool]) -> usize {
+    let last = delay.ceil() as usize + taken.len();
+    let distance = |&a: &usize| (a as f64 - delay).abs();
+    let least = |free: &dyn Fn(usize) -> bool| {
+        (0..=last).filter(|&a| free(a)).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    };
+    least(&|a| !taken[a % taken.len()]).or_else(|| least(&|_| true)).unwrap_or(0)
+}
+
+/// (slow filter, upsampled by M) * (fast filter).
+fn cascade(slow: &[f64], fast: &[f64], ratio: usize) -> Vec<f64> {
+    let mut product = vec![0.0; fast.len() + ratio * (slow.len() - 1)];
+    for (k, s) in slow.iter().enumerate() {
+        for (n, f) in fast.iter().enumerate() {
+            product[k * ratio + n] += s * f;
+        }
+    }
+    product
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cascade_is_the_convolution_with_the_upsampled_filter() {
+        assert_eq!(cascade(&[1.0, 2.0], &[1.0, 0.0, 5.0], 2), vec![1.0, 0.0, 7.0, 0.0, 10.0]);
+    }
+
+    #[test]
+    fn every_channel_gets_a_place_of_its_own_as_long_as_there_are_any() {
+        let places = |delays: &[f64], ratio: usize| {
+            let mut taken = vec![false; ratio];
+            let place = |&delay: &f64| {
+                let chosen = nearest(delay, &taken);
+                taken[chosen % ratio] = true;
+                chosen
+            };
+            delays.iter().map(place).collect::<Vec<_>>()
+        };
+        assert_eq!(places(&[1.2, 0.6], 2), [1, 0]);
+        assert_eq!(places(&[1.2, 0.9, 1.1], 2), [1, 0, 1]);
+        assert_eq!(places(&[7.4], 1), [7]);
+    }
+}

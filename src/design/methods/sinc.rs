@@ -1,0 +1,23 @@
+//! Sinc interpolation of recurrent nonuniform samples, to compare with (thesis 5.6.3).
+
+use super::{Settings, Synthesis};
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
+use crate::sampling::Recurrent;
+
+/// Yen's interpolation of the recurrent nonuniform samples, as if front ends were ideal, truncated to
+/// `settings.taps` taps per channel.
+///
+/// # Errors
+/// [`DesignError::SincNeedsNyquist`] unless N = M; [`DesignError::Sampling`] for delays that coincide
+/// modulo the slow period.
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+    let (problem, channels, ratio) = (plant.problem(), plant.channels(), plant.ratio());
+    if channels != ratio {
+        return Err(DesignError::SincNeedsNyquist { channels, ratio });
+    }
+    let offsets: Vec<f64> = problem.channels.iter().map(|channel| -channel.delay.0).collect();
+    let sets = Recurrent::new(&offsets, ratio)?;
+    let taps = |i: usize| sets.taps(i, problem.latency as f64, settings.taps);
+    Synthesis::of_taps(plant, (0..channels).map(taps).collect())
+}

@@ -1,0 +1,188 @@
+//! One contract for all methods: shapes, bounds, and the norm by another route.
+
+use super::*;
+use crate::design::filters::{lifted, polyphase};
+use crate::linalg::{self, CMat, Complex};
+use crate::spec::Spec;
+use crate::units::Seconds;
+use std::f64::consts::PI;
+
+struct Case {
+    name: &'static str,
+    ratio: usize,
+    latency: usize,
+    channels: &'static str,
+}
+
+const CASES: [Case; 7] = [
+    Case { name: "thesis", ratio: 2, latency: 10, channels: "{ delay = 1.2 }, { delay = 0.6 }" },
+    Case { name: "no latency", ratio: 2, latency: 0, channels: "{ delay = 1.2 }, { delay = 0.6 }" },
+    Case { name: "one channel", ratio: 1, latency: 3, channels: "{ delay = 0.4 }" },
+    Case { name: "one channel, undersampled", ratio: 2, latency: 4, channels: "{ delay = 0.4 }" },
+    Case {
+        name: "oversampled, with noise",
+        ratio: 2,
+        latency: 6,
+        channels: "{ delay = 0.2, noise = 1e-3 }, { delay = 0.9 }, { delay = 1.6, noise = 1e-2 }",
+    },
+    Case {
+        name: "whole periods of delay",
+        ratio: 2,
+        latency: 0,
+        channels: "{ delay = 0.5 }, { delay = 5.0 }",
+    },
+    Case {
+        name: "twice the same channel",
+        ratio: 2,
+        latency: 5,
+        channels: "{ delay = 0.5 }, { delay = 1.1 }, { delay = 0.5, noise = 1e-2 }",
+    },
+];
+
+fn spec(case: &Case, method: Method) -> Spec {
+    let taps = if method.has_taps() { ", taps = 13" } else { "" };
+    let text = format!(
+        "fast_period = 1.0\nratio = {}\nlatency = {}\n\
+         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
+         channel = [{}]\ndesign = {{ method = \"{}\"{taps} }}",
+        case.ratio,
+        case.latency,
+        case.channels,
+        method.name()
+    );
+    Spec::from_toml(&text, "spec.toml").unwrap()
+}
+
+/// A plant whose channels can be told apart, as the designer hands it to a method.
+fn plant(case: &Case) -> LiftedPlant {
+    let problem = Problem::new(&spec(case, Method::Iir), case.latency).unwrap();
+    LiftedPlant::new(&problem.merge_channels().problem).unwrap()
+}
+
+fn settings(case: &Case, method: Method) -> Settings {
+    let spec = spec(case, method);
+    let slow = Spec { fast_period: Seconds(case.ratio as f64), ..spec };
+    let at_slow_rate = Some(Problem::new(&slow, 0).unwrap().merge_channels().problem);
+    Settings { taps: 13, at_slow_rate, ..Settings::default() }
+}
+
+/// F(z) by its definition.
+fn filter_response(filters: &Filters, ratio: usize, z: Complex<f64>) -> CMat {
+    match filters {
+        Filters::StateSpace(system) => system.response_at(z),
+        Filters::Fir(taps) => {
+            let term = |j: usize, lag: &crate::linalg::Mat| linalg::to_complex(lag) * z.powi(-(j as i32));
+            polyphase(taps, ratio).iter().enumerate().map(|(j, lag)| term(j, lag)).sum()
+        }
+    }
+}
+
+/// The largest gain of W - F H on a dense grid, from the responses of the three.
+fn dense_grid(plant: &LiftedPlant, filters: &Filters) -> f64 {
+    let (h, w) = (plant.measurement().unwrap(), plant.reference().unwrap());
+    let gain = |k: usize| {
+        let z = Complex::from_polar(1.0, PI * k as f64 / 1500.0);
+        let error = w.response_at(z) - filter_response(filters, plant.ratio(), z) * h.response_at(z);
+        linalg::singular_values_c(&error).unwrap()[0]
+    };
+    (0..=1500).map(gain).fold(0.0, f64::max)
+}
+
+fn check(case: &Case, method: Method, synthesis: &Synthesis, plant: &LiftedPlant) {
+    let what = format!("{}, {}", case.name, method.name());
+    let Synthesis { filters, peak, lower, noncausal, .. } = synthesis;
+    match filters {
+        Filters::Fir(taps) => {
+            assert!(method.has_taps(), "{what}");
+            assert_eq!(taps.len(), plant.channels(), "{what}");
+            assert!(taps.iter().all(|filter| filter.len() == 13), "{what}");
+        }
+        Filters::StateSpace(system) => {
+            assert!(!method.has_taps(), "{what}");
+            assert_eq!((system.outputs(), system.inputs()), (plant.ratio(), plant.channels()), "{what}");
+            assert!(system.spectral_radius().unwrap() < 1.0, "{what}");
+        }
+    }
+    assert!(
+        0.0 <= *noncausal && noncausal <= lower && *lower <= peak.gain,
+        "{what}: {noncausal} {lower} {peak:?}"
+    );
+    let grid = dense_grid(plant, filters);
+    assert!(grid <= peak.gain * (1.0 + 1e-8), "{what}: {grid} above {peak:?}");
+    assert!(grid >= peak.gain * (1.0 - 1e-3), "{what}: {grid} far below {peak:?}");
+}
+
+#[test]
+fn every_method_keeps_the_contract() {
+    for case in &CASES {
+        let plant = plant(case);
+        for method in Method::ALL {
+            match synthesise(method, &plant, &settings(case, method)) {
+                Ok(synthesis) => check(case, method, &synthesis, &plant),
+                Err(DesignError::SincNeedsNyquist { channels, ratio }) => {
+                    assert!(method == Method::Sinc && channels != ratio, "{}", case.name);
+                }
+                Err(error) => panic!("{}, {}: {error}", case.name, method.name()),
+            }
+        }
+    }
+}
+
+#[test]
+fn no_method_beats_those_that_minimise_gamma() {
+    for case in &CASES {
+        let plant = plant(case);
+        let norm = |method: Method| synthesise(method, &plant, &settings(case, method)).map(|s| s.peak.gain);
+        let (iir, fir) = (norm(Method::Iir).unwrap(), norm(Method::Fir).unwrap());
+        let tolerance = 1.0 + 2.0 * GAMMA_ACCURACY;
+        assert!(iir <= fir * tolerance, "{}: {iir} {fir}", case.name);
+        for other in [Method::H2, Method::Sinc, Method::Separation] {
+            let Ok(other_norm) = norm(other) else { continue };
+            assert!(iir <= other_norm * tolerance, "{}, {}: {iir} {other_norm}", case.name, other.name());
+            let is_fir = other.has_taps();
+            // fir spends 1e-3 of gamma where there is noise.
+            assert!(!is_fir || fir <= other_norm * (1.0 + 2e-3), "{}: {fir} {other_norm}", case.name);
+        }
+    }
+}
+
+#[test]
+fn the_bounded_real_lmi_is_a_second_opinion_on_the_exchange() {
+    for case in &CASES[..3] {
+        let plant = plant(case);
+        let sampled = settings(case, Method::Fir);
+        let kyp = Settings { solver: Some(Solver::Kyp), ..sampled.clone() };
+        let [sampled, kyp] = [sampled, kyp].map(|s| synthesise(Method::Fir, &plant, &s).unwrap());
+        check(case, Method::Fir, &kyp, &plant);
+        let gap = (kyp.peak.gain / sampled.peak.gain - 1.0).abs();
+        assert!(gap < 1e-5, "{}: {} {}", case.name, kyp.peak.gain, sampled.peak.gain);
+        assert!(kyp.lower <= sampled.peak.gain * (1.0 + 1e-6), "{}", case.name);
+    }
+}
+
+#[test]
+fn a_margin_is_spent_on_the_mean_square() {
+    let plant = plant(&CASES[0]);
+    let h2 = |filters: &Filters| {
+        let system = match filters {
+            Filters::StateSpace(system) => system.clone(),
+            Filters::Fir(taps) => lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), 2).unwrap(),
+        };
+        crate::lti::gramian::h2_norm(&plant.error_system(&system).unwrap()).unwrap()
+    };
+    for method in [Method::Fir, Method::Iir] {
+        let tight = settings(&CASES[0], method);
+        let wide = Settings { gamma_margin: Some(0.05), ..tight.clone() };
+        let (tight, wide) =
+            (synthesise(method, &plant, &tight).unwrap(), synthesise(method, &plant, &wide).unwrap());
+        assert!(wide.peak.gain <= tight.peak.gain * 1.05 * (1.0 + 1e-9), "{}", method.name());
+        // The least gamma of this plant is that of the Kalman filter, so `iir` has nothing left to gain.
+        assert!(method == Method::Iir || h2(&wide.filters) < h2(&tight.filters), "{}", method.name());
+    }
+}
+
+#[test]
+fn sinc_names_both_numbers_it_needs_equal() {
+    let error = synthesise(Method::Sinc, &plant(&CASES[3]), &settings(&CASES[3], Method::Sinc)).unwrap_err();
+    assert_eq!(error, DesignError::SincNeedsNyquist { channels: 1, ratio: 2 });
+}

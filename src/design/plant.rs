@@ -1,0 +1,196 @@
+//! The lifted plant: what the design methods see of front ends, delays and rates.
+
+use super::DesignError;
+use super::filters;
+use super::lifting::{Lifted, lift};
+use super::problem::Problem;
+use crate::bank::SynthesisFilters;
+use crate::linalg::{self, CMat, Mat};
+use crate::lti::peak::{
+    Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
+};
+use crate::lti::{FrequencyResponse, StateSpace};
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// Initial frequencies of a norm for each lag of FIR filters.
+const FREQUENCIES_PER_LAG: usize = 4;
+
+/// The hybrid error system of the thesis as a discrete-time plant, one step per slow period (Props. 5.1 to
+/// 5.3 and Theorem 5.1):
+///
+/// ```text
+///                 +-----------------------+
+///                 |                       |   z   reference: the M fast samples y_0[kM], .., y_0[kM+M-1]
+///          +----->|  W(z)        M x n_w  |---------------------------------------->(+)---> e = z - F y
+///          |      |                       |                                          ^ -
+///    w ----+      |  one state x, n       |                                          |
+///   n_w inputs    |                       |   y   measurement: N samples, +-------+  |
+///          |      |  H(z)        N x n_w  |----one per channel ---------->| F(z)  |--+
+///          +----->|                       |                               | M x N |
+///                 +-----------------------+                               +-------+
+/// ```
+///
+/// `x+ = A x + B w`, `[y; z] = C x + D w`, and `||K|| = ||W - F H||` is the gain from the analog input to
+/// the error, h = 1. The input w is norm-equivalent to the analog one: `[H; W] [H; W]*` is that of the
+/// hybrid system, so the singular values of K are too. F holds the polyphase components `F_{p,i}` of the
+/// synthesis filters.
+#[derive(Debug, Clone)]
+pub struct LiftedPlant {
+    problem: Problem,
+    system: StateSpace,
+    chains: Vec<Range<usize>>,
+    response: OnceLock<FrequencyResponse>,
+    resonances: OnceLock<Vec<f64>>,
+}
+
+impl LiftedPlant {
+    /// The exact equivalent of `problem`.
+    ///
+    /// # Errors
+    /// [`DesignError::Linalg`] or [`DesignError::Shapes`] never for a [`Problem`] made by [`Problem::new`].
+    pub fn new(problem: &Problem) -> Result<Self, DesignError> {
+        let Lifted { system, chains } = lift(problem)?;
+        let problem = problem.clone();
+        Ok(Self { problem, system, chains, response: OnceLock::new(), resonances: OnceLock::new() })
+    }
+
+    /// What was lifted.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// `[H; W]`: the measurements y first, then the references z.
+    pub fn system(&self) -> &StateSpace {
+        &self.system
+    }
+
+    /// N, the measurements per slow period.
+    pub fn channels(&self) -> usize {
+        self.problem.channels.len()
+    }
+
+    /// M, the references per slow period.
+    pub fn ratio(&self) -> usize {
+        self.problem.ratio
+    }
+
+    /// H(z), N x n_w.
+    ///
+    /// # Errors
+    /// [`DesignError::Shapes`] never: the outputs are there.
+    pub fn measurement(&self) -> Result<StateSpace, DesignError> {
+        Ok(self.system.select_outputs(0..self.channels())?)
+    }
+
+    /// W(z), M x n_w.
+    ///
+    /// # Errors
+    /// [`DesignError::Shapes`] never: the outputs are there.
+    pub fn reference(&self) -> Result<StateSpace, DesignError> {
+        Ok(self.system.select_outputs(self.channels()..self.channels() + self.ratio())?)
+    }
+
+    /// The states of the delay chain of `channel`, first link first; empty unless the channel is delayed by
+    /// whole slow periods. The measurement is then the last link, without feedthrough.
+    pub(super) fn chain(&self, channel: usize) -> Range<usize> {
+        self.chains[channel].clone()
+    }
+
+    /// `[X y; z]`: the outputs of `filters` X, which the measurements drive, and below them the references.
+    ///
+    /// # Errors
+    /// [`DesignError::Shapes`] unless `filters` has N inputs.
+    pub fn driving(&self, filters: &StateSpace) -> Result<StateSpace, DesignError> {
+        let (n, m, x) = (self.channels(), self.ratio(), filters.outputs());
+        let all = self.system.cascade(0..n, filters)?;
+        Ok(all.select_outputs((n + m..n + m + x).chain(n..n + m))?)
+    }
+
+    /// The error system K = W - F H, M x n_w; states of the plant first.
+    ///
+    /// # Errors
+    /// [`DesignError::Shapes`] unless `filters` is M x N.
+    pub fn error_system(&self, filters: &StateSpace) -> Result<StateSpace, DesignError> {
+        let unity = Mat::identity(self.ratio(), self.ratio());
+        Ok(self.driving(filters)?.map_outputs(&linalg::hstack(&[&-&unity, &unity])?)?)
+    }
+
+    /// (H, W) at e^{j omega}, omega in radians per slow period, their columns compressed to at most N + M:
+    /// the products of `[H; W]` with its adjoint are kept.
+    pub fn response(&self, omega: f64) -> (CMat, CMat) {
+        let g = linalg::lq_factor_c(&self.frequency_response().at_frequency(omega));
+        let (n, m) = (self.channels(), self.ratio());
+        (g.rows(0, n).into_owned(), g.rows(n, m).into_owned())
+    }
+
+    /// ||K|| with the frequency at which it is attained, radians per slow period.
+    ///
+    /// # Errors
+    /// [`DesignError::Shapes`] unless `filters` is M x N, [`DesignError::Lti`] if the error system is not
+    /// stable.
+    pub fn norm(&self, filters: &StateSpace) -> Result<Peak, DesignError> {
+        Ok(hinf_norm(&self.error_system(filters)?)?)
+    }
+
+    /// As [`LiftedPlant::norm`] for FIR filters `taps[i][n] = f_i[n]`: their response is a polynomial, and
+    /// that of the plant is prepared once for all filters.
+    ///
+    /// # Errors
+    /// [`DesignError::Shapes`] unless there is a filter for each channel, [`DesignError::Lti`] if the plant
+    /// is not stable.
+    pub fn fir_norm(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
+        let lags = filters::polyphase(taps, self.ratio());
+        let system = self.error_system(&StateSpace::fir(&lags)?)?;
+        let (n, m) = (self.channels(), self.ratio());
+        let plant = self.frequency_response();
+        let response = |w: f64| {
+            let g = plant.at_frequency(w);
+            g.rows(n, m) - filters::response(&lags, w) * g.rows(0, n)
+        };
+        // A polynomial in e^{-jw} has at most a peak for each of its lags between 0 and pi.
+        let grid = FREQUENCIES_PER_LAG * lags.len();
+        let mut initial = self.resonances()?.to_vec();
+        initial.extend((1..grid).map(|k| PI * k as f64 / grid as f64));
+        Ok(hinf_norm_with_response(&system, &response, initial)?)
+    }
+
+    /// ||K|| of the very coefficients of a bank.
+    ///
+    /// # Errors
+    /// As [`LiftedPlant::norm`]; [`DesignError::RaggedStateSpace`] for matrices with rows of unequal
+    /// lengths.
+    pub fn bank_norm(&self, filters: &SynthesisFilters) -> Result<Peak, DesignError> {
+        match filters {
+            SynthesisFilters::Fir(taps) => self.fir_norm(taps),
+            SynthesisFilters::StateSpace(_) => self.norm(&filters::lifted(filters, self.ratio())?),
+        }
+    }
+
+    /// What the measurements leave unexplained of the references: max over omega of sigma_max(W - W H* (H
+    /// H*)^+ H). No filter, causal or not, has a smaller ||K||.
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] if the plant is not stable.
+    pub fn noncausal_bound(&self) -> Result<Peak, DesignError> {
+        Ok(unexplained_peak(&self.system, self.channels())?)
+    }
+
+    fn frequency_response(&self) -> &FrequencyResponse {
+        self.response.get_or_init(|| FrequencyResponse::new(&self.system.compress_inputs()))
+    }
+
+    /// The frequencies near the poles of the plant, which are those of all FIR error systems, apart from
+    /// poles at zero.
+    fn resonances(&self) -> Result<&[f64], DesignError> {
+        if self.resonances.get().is_none() {
+            let found = resonances(&stable_poles(&self.system)?);
+            return Ok(self.resonances.get_or_init(|| found));
+        }
+        Ok(self.resonances.get().map_or(&[], Vec::as_slice))
+    }
+}
+
+#[cfg(test)]
+mod tests;

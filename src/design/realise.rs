@@ -1,0 +1,153 @@
+//! From the filters of a method to those of a bank: shared among merged channels, of the order and word
+//! length that the spec asks for, in the form that runs fastest.
+
+use super::methods::{Filters, Synthesis};
+use super::plant::LiftedPlant;
+use super::problem::{MergedChannels, Problem};
+use super::quantise::{QuantisationProblem, WordStudy, quantise};
+use super::reduction::{Aim, OrderReduction, ReductionProblem, reduce};
+use super::{DesignError, filters};
+use crate::bank::{FixedPoint, SynthesisFilters};
+use crate::lti::peak::Peak;
+use crate::lti::{FirWithTail, StateSpace};
+use crate::spec::{Method, Spec};
+
+/// A change of coordinates may cost this fraction of gamma.
+const FORM_ACCURACY: f64 = 1e-9;
+
+/// A bank's filters as they go into the file, with what became of their order and of their taps.
+pub(super) struct Realised {
+    pub(super) filters: SynthesisFilters,
+    /// The norm of the error system of these very coefficients.
+    pub(super) peak: Peak,
+    pub(super) reduction: Option<OrderReduction>,
+    pub(super) integers: Option<(FixedPoint, WordStudy)>,
+}
+
+/// Filters with the norm of their error system.
+struct Judged {
+    filters: SynthesisFilters,
+    peak: Peak,
+}
+
+impl From<Judged> for Realised {
+    fn from(Judged { filters, peak }: Judged) -> Self {
+        Self { filters, peak, reduction: None, integers: None }
+    }
+}
+
+/// The filters of `synthesis`, made for the `merged` channels, as those of all channels of `problem`.
+///
+/// # Errors
+/// [`DesignError`] as the reduction, the search for integers and the norm.
+pub(super) fn realise(
+    spec: &Spec,
+    problem: &Problem,
+    merged: &MergedChannels,
+    merged_plant: &LiftedPlant,
+    synthesis: &Synthesis,
+) -> Result<Realised, DesignError> {
+    let whole = if merged.are_all() { merged_plant.clone() } else { LiftedPlant::new(problem)? };
+    let realisation = Realisation { spec, whole: &whole, merged, merged_plant };
+    match &synthesis.filters {
+        Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
+        Filters::StateSpace(system) => realisation.state_space(system, synthesis.peak.gain),
+    }
+}
+
+struct Realisation<'a> {
+    spec: &'a Spec,
+    /// All channels.
+    whole: &'a LiftedPlant,
+    merged: &'a MergedChannels,
+    /// Those that can be told apart.
+    merged_plant: &'a LiftedPlant,
+}
+
+impl Realisation<'_> {
+    fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Judged, DesignError> {
+        if self.merged.are_all() {
+            return Ok(Judged { filters: SynthesisFilters::Fir(taps.to_vec()), peak });
+        }
+        judged(self.whole, SynthesisFilters::Fir(self.merged.share_taps(taps)))
+    }
+
+    /// With integer taps where the spec asks for these.
+    fn with_integers(&self, real: Judged) -> Result<Realised, DesignError> {
+        let (SynthesisFilters::Fir(taps), Some(bits)) = (&real.filters, &self.spec.design.bits) else {
+            return Ok(real.into());
+        };
+        let problem = QuantisationProblem {
+            plant: self.whole,
+            taps,
+            noise: &self.whole.problem().noise,
+            gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
+        };
+        let (integers, study) = quantise(problem, real.peak.gain, bits, self.spec.design.fraction_bits)?;
+        let judged = judged(self.whole, SynthesisFilters::Fir(integers.taps()))?;
+        Ok(Realised { integers: Some((integers, study)), ..judged.into() })
+    }
+
+    /// A recursive bank of the order that the spec asks for; `norm` is that of `system` on the merged
+    /// channels.
+    fn state_space(&self, system: &StateSpace, norm: f64) -> Result<Realised, DesignError> {
+        let full = self.fastest_form(&system.map_inputs(&self.merged.shares())?, norm)?;
+        let (Some(wanted), SynthesisFilters::StateSpace(block)) = (self.spec.design.reduction, &full.filters)
+        else {
+            return Ok(full.into());
+        };
+        let problem = ReductionProblem {
+            plant: self.merged_plant,
+            bank: system,
+            order: block.a.len(),
+            width: self.whole.channels(),
+            aim: if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
+            gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
+        };
+        let (smaller, record) = reduce(&problem, wanted)?;
+        let judged = match smaller {
+            None => full,
+            Some(smaller) => self.reduced_form(&smaller, record.reduced.figures.gamma)?,
+        };
+        Ok(Realised { reduction: Some(record), ..judged.into() })
+    }
+
+    /// A reduced bank for all channels, in a fast form if one keeps the norm `promised`.
+    fn reduced_form(&self, reduced: &FirWithTail, promised: f64) -> Result<Judged, DesignError> {
+        let whole = reduced.map_inputs(&self.merged.shares())?;
+        match self.fast_form(&whole, promised)? {
+            Some(found) => Ok(found),
+            None => judged(self.whole, block_filters(&whole.realise()?)),
+        }
+    }
+
+    /// The filters in the cheapest form that keeps the norm `promised`: parallel sections behind a FIR
+    /// head, a triangle there, or else as they are.
+    fn fastest_form(&self, system: &StateSpace, promised: f64) -> Result<Judged, DesignError> {
+        match self.fast_form(&FirWithTail::new(system)?, promised)? {
+            Some(found) => Ok(found),
+            None => judged(self.whole, block_filters(system)),
+        }
+    }
+
+    /// The first of the fast forms that keeps the norm, if any does.
+    fn fast_form(&self, split: &FirWithTail, promised: f64) -> Result<Option<Judged>, DesignError> {
+        let forms = [split.modal(), split.triangular().map(Some)];
+        for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {
+            let found = judged(self.whole, block_filters(&form.realise()?))?;
+            if found.peak.gain <= promised * (1.0 + FORM_ACCURACY) {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn block_filters(system: &StateSpace) -> SynthesisFilters {
+    SynthesisFilters::StateSpace(filters::to_block(system))
+}
+
+fn judged(plant: &LiftedPlant, filters: SynthesisFilters) -> Result<Judged, DesignError> {
+    let peak = plant.bank_norm(&filters)?;
+    Ok(Judged { filters, peak })
+}
