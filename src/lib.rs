@@ -2,6 +2,8 @@
 #![cfg_attr(not(feature = "design"), doc = "Runs hybrid multirate filter banks with fractional delays.")]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "files")]
+pub mod files;
 pub mod sampling;
 pub mod units;
 

@@ -22,7 +22,7 @@ fn frames(bytes: &[u8], buffer: usize) -> Option<Vec<u8>> {
         all.extend_from_slice(&block[..filled]);
     }
     assert!(header.data_bytes.is_none_or(|promised| all.len() as u64 <= promised));
-    assert!(reader.notes().iter().all(|note| !note.to_string().is_empty()));
+    assert!(reader.faults().iter().all(|fault| !fault.to_string().is_empty()));
     Some(all)
 }
 

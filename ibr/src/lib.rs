@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-pub mod atomic;
 pub mod camera;
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -3,10 +3,14 @@
 use super::Failure;
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::filters;
-use crate::io::AtomicFile;
+use crate::files::{self, AtomicFile, Bound};
 use crate::spec::{DesignOverrides, Spec, SpecProblem};
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
+
+/// How long a spec or bank file may be: a bank of the largest size with its proof has less.
+const TEXT_FILE: Bound =
+    Bound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
 
 /// Whether a path stands for standard input or output.
 pub(super) fn is_dash(path: &Path) -> bool {
@@ -67,6 +71,14 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<Spec, Failure> {
     Ok(Spec { latency, ..spec })
 }
 
+/// Refuses an output file that is also the input.
+pub(super) fn refuse_overlap(output: &Path, input: &Path) -> Result<(), Failure> {
+    if is_dash(output) {
+        return Ok(());
+    }
+    files::refuse_overlaps(&[output], &[input]).map_err(Failure::input)
+}
+
 /// Writes a text file that appears when it is whole; `-` is standard output.
 pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Failure> {
     if is_dash(path) {
@@ -85,11 +97,10 @@ pub(super) fn name(path: &Path) -> String {
 
 /// The text of a file; `-` is standard input.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    let mut text = String::new();
     let read = if is_dash(path) {
-        std::io::stdin().read_to_string(&mut text).map(|_| text)
+        files::text_of(std::io::stdin().lock(), &name(path), TEXT_FILE)
     } else {
-        std::fs::read_to_string(path)
+        files::read_text(path, TEXT_FILE)
     };
-    read.map_err(|error| Failure::Input(format!("{}: cannot read it: {error}", name(path))))
+    read.map_err(Failure::input)
 }

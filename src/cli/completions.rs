@@ -16,7 +16,7 @@ pub(super) struct Args {
     shell: Shell,
 }
 
-/// Runs the verb.
+/// Runs the command.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "hybank", &mut script);

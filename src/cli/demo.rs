@@ -2,10 +2,9 @@
 
 use super::Failure;
 use super::bank_file::write_text;
-use super::recordings::write_mono;
+use super::recordings::{Mono, write_recordings};
 use crate::bank::Bank;
 use crate::design::{self, Problem};
-use crate::io::PcmFormat;
 use crate::plot::{Chart, Series};
 use crate::runtime::{Options, Precision, Stream};
 use crate::simulate::{Analog, Captured, Source, Tone, capture, interleaved};
@@ -167,16 +166,15 @@ impl Args {
     ) -> Result<(), Failure> {
         let fast = spec.fast_period.rate().0.round() as u32;
         let slow = fast / spec.ratio as u32;
-        let wav = |name: &str, samples: &[f64], rate: u32| {
-            write_mono(&folder.join(name), samples, rate, PcmFormat::F32Le, self.force)
-        };
-        for (i, channel) in captured.channels.iter().enumerate() {
-            wav(&format!("ch{}.wav", i + 1), channel, slow)?;
-        }
-        wav("target.wav", &captured.target, fast)?;
-        for contender in contenders {
-            wav(&contender.file, &contender.samples, fast)?;
-        }
+        let channels = captured.channels.iter().enumerate();
+        let mut files: Vec<_> = channels
+            .map(|(i, samples)| (folder.join(format!("ch{}.wav", i + 1)), Mono { samples, rate: slow }))
+            .collect();
+        files.push((folder.join("target.wav"), Mono { samples: &captured.target, rate: fast }));
+        let fused = |contender: &'_ Contender| folder.join(&contender.file);
+        files.extend(contenders.iter().map(|c| (fused(c), Mono { samples: &c.samples, rate: fast })));
+        let files: Vec<_> = files.iter().map(|(path, mono)| (path.as_path(), *mono)).collect();
+        write_recordings(&files, self.force)?;
         for (name, chart) in [
             ("step.svg", step_chart(spec, captured, contenders)),
             ("error.svg", error_chart(spec, captured, contenders)),

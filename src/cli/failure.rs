@@ -1,5 +1,7 @@
-//! How a verb fails: one message on stderr and an exit code.
+//! How a command fails: one message on stderr and an exit code.
 
+use super::say::say_line;
+use crate::pipeline::PipelineError;
 use std::process::ExitCode;
 
 /// A failure with the one message that the user sees.
@@ -19,15 +21,23 @@ impl Failure {
         Self::Input(message.to_string())
     }
 
+    /// A failure of a run; a reader of its output that went away is none.
+    pub(super) fn running(error: impl Into<PipelineError>) -> Self {
+        match error.into() {
+            error if error.is_closed_pipe() => Self::ClosedPipe,
+            error => Self::input(error),
+        }
+    }
+
     /// Prints the message and gives the exit code.
     pub fn report(&self) -> ExitCode {
         match self {
             Self::Input(message) => {
-                eprintln!("hybank: {message}");
+                say_line(message);
                 ExitCode::from(1)
             }
             Self::Usage(message) => {
-                eprintln!("hybank: {message}");
+                say_line(message);
                 ExitCode::from(2)
             }
             Self::ClosedPipe => ExitCode::SUCCESS,

@@ -1,22 +1,23 @@
 //! `hybank fuse`: slow recordings in, one fast recording out.
 
 use super::Failure;
-use super::fusing::{FormArg, Fusing, RunReport, ThreadArgs};
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
-use super::output::{Bits, Container, FastWriter, precision};
+use super::output::{Bits, check_files, precision};
+use super::run::{FormArg, RunReport, ThreadArgs, finish};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{Arrival, BLOCK_BYTES, Feed, FeedOptions};
-use crate::runtime::{Form, Options, Stream};
+use crate::io::{BLOCK_BYTES, Container, MultiReader, ReadOptions, SampleWriter};
+use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
+use crate::runtime::{Form, Options, Plan};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Fuses slow recordings into one fast recording
 ///
-/// The recordings are one mono WAV file a channel, in the order of the bank, or one N-channel WAV
-/// file. The result lines up with their time axis and has exactly M samples for each tick: the
+/// The recordings are one mono WAV file per channel, in the order of the bank, or one N-channel WAV
+/// file. The result lines up with their time axis and has exactly M samples for each input frame: the
 /// first m0 samples are dropped and the end is flushed with zeros.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -27,7 +28,7 @@ Examples:
 pub(super) struct Args {
     /// The bank: what `hybank design` wrote
     bank: PathBuf,
-    /// One mono WAV file or SigMF recording a channel, or one of N channels; `-` is standard input
+    /// One mono WAV file or SigMF recording per channel, or one of N channels; `-` is standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta); `-` is standard output
@@ -36,7 +37,7 @@ pub(super) struct Args {
     /// Samples of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
     #[arg(long, value_enum, default_value_t = Bits::F32)]
     bits: Bits,
-    /// Form of FIR filters; auto: whichever is faster for the bank, and direct with --gaps
+    /// Form of FIR filters; auto: the fastest for the bank, and direct with --gaps
     #[arg(long, value_enum, default_value_t = FormArg::Auto)]
     form: FormArg,
     /// Keep the bank's latency: the causal output, as `stream` gives it
@@ -59,123 +60,115 @@ pub(super) struct Args {
 
 /// What happened.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct Report<'a> {
     #[serde(flatten)]
-    run: RunReport,
+    run: &'a RunReport,
     /// Hertz of the output, rounded.
     rate: u64,
-    /// Slow ticks read.
-    ticks: u64,
+    /// Input frames read.
+    frames: u64,
     /// Samples dropped at the beginning so that the output lines up with the inputs; with --keep-latency only those that
-    /// are due to the form.
+    /// the form adds.
     latency_dropped: u64,
     seconds: f64,
 }
 
-/// Runs the verb.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the one message for the user.
-pub(super) fn run(args: Args) -> Result<(), Failure> {
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
-    let lost = args.gaps.lost()?;
-    let options = FeedOptions {
-        lost: lost.as_ref(),
-        until: args.gaps.until(),
-        block_bytes: args.threads.bytes(BLOCK_BYTES),
-        ..FeedOptions::files()
-    };
-    let feed = Feed::start(&args.inputs, options, interrupts()?).map_err(Failure::input)?;
-    let mut feed = feed.ok_or_else(|| interrupted(0))?;
-    let channels = || feed.headers().map(|(name, channels, _)| (name, channels));
-    match_bank::check_channels(&bank, &args.bank, channels())?;
-    let slow_rate = match_bank::check_rates(&bank, feed.headers().map(|(name, _, rate)| (name, rate)))?;
-    let rate = match_bank::fast_rate(&bank, slow_rate);
-    let mut fusing = args.fusing(&bank, rate)?;
-    let latency_dropped = fusing.skip;
-    pump(&mut fusing, &mut feed)?;
-    fusing.flush(feed.ticks() * bank.ratio as u64)?;
-    let mut notes = feed.notes();
-    notes.extend((feed.ticks() == 0).then(|| args.nothing_to_fuse()));
-    let report = Report {
-        run: fusing.report(notes, "--bits 32f"),
-        rate: rate.round() as u64,
-        ticks: feed.ticks(),
-        latency_dropped,
-        seconds: begin.elapsed().as_secs_f64(),
-    };
-    args.finish(fusing, &report)
+    let Some(mut reader) = args.start_reader()? else { return Err(interrupted(0)) };
+    match_bank::check_channels(&bank, &args.bank, &reader)?;
+    let rate = match_bank::output_rate(&bank, &reader)?;
+    let plan = args.plan(&bank)?;
+    let skip = if args.keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
+    let mut pipeline = args.pipeline(&bank, &plan, skip)?;
+    let mut outputs = args.outputs(rate)?;
+    run_all(&mut pipeline, &mut reader, &mut outputs)?;
+    let frames = reader.consumed();
+    pipeline.flush(frames * bank.ratio as u64, &mut outputs).map_err(Failure::running)?;
+    let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
+    let seconds = begin.elapsed().as_secs_f64();
+    let report = Report { run: &run, rate: rate.round() as u64, frames, latency_dropped: skip, seconds };
+    finish(outputs, &run, args.strict, args.json.then_some(&report))
 }
 
 impl Args {
+    /// What cannot be, before any file is read.
     fn check(&self) -> Result<(), Failure> {
         match_bank::check_stdin(&self.bank, &self.inputs)?;
+        self.gaps.check()?;
         if self.json && self.output.as_os_str() == "-" {
             let message = "--json and `-o -` both want standard output; write the samples to a file";
             return Err(Failure::Usage(message.into()));
         }
-        Ok(())
+        let inputs = self.inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
+        check_files(&self.output, self.gaps.mask(), &inputs)
     }
 
-    /// The run at its beginning, with an output of `rate` hertz.
-    fn fusing(&self, bank: &Bank, rate: f64) -> Result<Fusing, Failure> {
+    /// `None` if an interrupt came first.
+    fn start_reader(&self) -> Result<Option<MultiReader>, Failure> {
+        let lost = self.gaps.lost_samples()?;
+        let files = ReadOptions { block_bytes: self.threads.bytes(BLOCK_BYTES), ..ReadOptions::files() };
+        let options = self.gaps.read_options(lost.as_ref(), files);
+        MultiReader::start(&self.inputs, options, interrupts()).map_err(Failure::input)
+    }
+
+    fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
+        // Outputs that no gap affects are to have the very bits of a whole recording.
+        let auto = if self.gaps.policy().is_some() { Form::Direct } else { Form::Fastest };
+        let precision = precision(self.bits.format());
+        let options = Options { precision, form: self.form.form(auto), ..Options::default() };
+        bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+    }
+
+    fn pipeline(&self, bank: &Bank, plan: &Plan, skip: u64) -> Result<Pipeline, Failure> {
+        let (format, gaps, workers) = (self.bits.format(), self.gaps.policy(), self.threads.workers()?);
+        Pipeline::new(bank, plan, Settings { format, skip, gaps, workers }).map_err(Failure::running)
+    }
+
+    /// The outputs at their beginning, of `rate` hertz.
+    fn outputs(&self, rate: f64) -> Result<FileOutputs, Failure> {
+        let mask = self.gaps.begin_mask(self.force)?;
         let format = self.bits.format();
-        // Outside of what a gap touched the output is to have the very bits of a whole recording.
-        let auto = if self.gaps.are_bridged() { Form::Direct } else { Form::Fastest };
-        let form = self.form.form(auto);
-        let options = Options { precision: precision(format), form, ..Options::default() };
-        let stream = bank
-            .plan(options)
-            .map(|plan| Stream::new(&plan))
-            .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))?;
-        let extra = stream.extra_latency();
-        let gaps = self.gaps.stage(bank, extra, self.force)?;
-        let writer = FastWriter::create(&self.output, Container::Wav, format, rate, self.force)?;
-        let skip = if self.keep_latency { extra } else { stream.latency() };
-        Fusing::new(stream, gaps, writer, skip as u64, self.threads)
+        let samples = SampleWriter::create(&self.output, Container::Wav, format, rate, self.force);
+        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask))
     }
 
-    /// What is said of recordings without a tick: the output is as empty as they are.
-    fn nothing_to_fuse(&self) -> String {
-        let names: Vec<_> = self.inputs.iter().map(|path| path.display().to_string()).collect();
-        format!("{}: no samples to fuse (the length is zero), so the output has none", names.join(", "))
-    }
-
-    /// Judges the run, then gives the output its name.
-    fn finish(&self, fusing: Fusing, report: &Report) -> Result<(), Failure> {
-        report.run.judge(self.strict)?;
-        fusing.finish()?;
-        if self.json { super::print_json(report) } else { Ok(()) }
+    fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {
+        let names = || self.inputs.iter().map(|path| path.display().to_string()).collect();
+        let empty = (reader.consumed() == 0).then(|| Warning::Empty(names()));
+        reader.warnings().into_iter().map(Warning::Input).chain(empty).collect()
     }
 }
 
-/// All ticks there are.
-fn pump(fusing: &mut Fusing, feed: &mut Feed) -> Result<(), Failure> {
-    let progress = progress_bar(feed.promised_ticks());
-    loop {
-        match feed.wait().map_err(Failure::input)? {
-            Arrival::Ticks(ticks) => {
-                fusing.fuse(&feed.frames(), u64::MAX)?;
-                feed.consume(ticks);
-                progress.inc(ticks as u64);
-            }
-            Arrival::End => break,
-            Arrival::Stopped => return Err(interrupted(feed.ticks())),
-        }
+/// All frames there are.
+fn run_all(
+    pipeline: &mut Pipeline,
+    reader: &mut MultiReader,
+    outputs: &mut FileOutputs,
+) -> Result<(), Failure> {
+    let progress = progress_bar(reader.promised_frames());
+    let ending = run_pipeline(reader, pipeline, outputs, |frames| progress.inc(frames as u64));
+    match ending.map_err(Failure::running)? {
+        Ending::Inputs => progress.finish_and_clear(),
+        Ending::Stopped => return Err(interrupted(reader.consumed())),
     }
-    progress.finish_and_clear();
     Ok(())
 }
 
-fn interrupted(ticks: u64) -> Failure {
-    Failure::Input(format!("interrupted after {ticks} ticks; nothing was kept, run it again"))
+fn interrupted(frames: u64) -> Failure {
+    Failure::Input(format!("interrupted after {frames} frames; nothing was kept, run it again"))
 }
 
 /// Drawn on a terminal only.
-fn progress_bar(ticks: Option<u64>) -> ProgressBar {
-    let bar = ticks.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
+fn progress_bar(frames: Option<u64>) -> ProgressBar {
+    let bar = frames.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
     let style = ProgressStyle::with_template("{bar:40} {percent}% {eta}");
     style.map_or(bar.clone(), |style| bar.with_style(style))
 }

@@ -1,27 +1,74 @@
-//! Ctrl-C: the first one is a wish, the second an order.
+//! Ctrl-C and SIGTERM: the first one is a wish, the second an order.
 
-use super::Failure;
 use crossbeam_channel::Receiver;
 
-/// A channel that speaks at the first interrupt; the second one ends the process.
 #[cfg(unix)]
-pub(super) fn interrupts() -> Result<Receiver<()>, Failure> {
+mod watch {
+    use crate::files::remove_unfinished;
+    use crate::io::is_stdout_stalled;
+    use crossbeam_channel::{Receiver, Sender, bounded, never};
     use signal_hook::consts::{SIGINT, SIGTERM};
-    let (tell, stop) = crossbeam_channel::bounded(1);
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).map_err(Failure::input)?;
-    std::thread::spawn(move || {
-        for (count, signal) in signals.forever().enumerate() {
-            if count > 0 {
-                std::process::exit(128 + signal);
+    use signal_hook::iterator::Signals;
+    use std::time::Duration;
+
+    /// How long, after the first signal, whoever reads standard output may refuse to take more.
+    const PATIENCE: Duration = Duration::from_secs(2);
+    const STEP: Duration = Duration::from_millis(50);
+
+    /// See [`super::interrupts`].
+    pub(super) fn start() -> Receiver<()> {
+        let (stop_sender, stop) = bounded(1);
+        let (signal_sender, signals) = bounded::<Signals>(1);
+        // The thread first: where none can be started, signals keep their usual meaning.
+        let watch = move || {
+            if let Ok(signals) = signals.recv() {
+                until_the_end(signals, &stop_sender);
             }
-            // The receiver lives as long as the run.
-            let _ = tell.send(());
+        };
+        if std::thread::Builder::new().name("signals".into()).spawn(watch).is_err() {
+            return never();
         }
-    });
-    Ok(stop)
+        match Signals::new([SIGINT, SIGTERM]) {
+            Ok(signals) => {
+                // The thread waits for them.
+                let _ = signal_sender.send(signals);
+                stop
+            }
+            Err(_) => never(),
+        }
+    }
+
+    fn until_the_end(mut signals: Signals, stop: &Sender<()>) {
+        let Some(first) = signals.forever().next() else { return };
+        // The receiver lives as long as the run.
+        let _ = stop.send(());
+        loop {
+            if let Some(second) = signals.pending().next() {
+                end(second);
+            }
+            // The run waits for its reader and cannot see the wish.
+            if is_stdout_stalled(PATIENCE) {
+                end(first);
+            }
+            std::thread::sleep(STEP);
+        }
+    }
+
+    fn end(signal: i32) -> ! {
+        remove_unfinished();
+        std::process::exit(128 + signal)
+    }
 }
 
+/// A channel with a message once the first interrupt has come. A second one ends the process, as does the first one
+/// if nobody takes what is written to standard output; unfinished files are removed.
+#[cfg(unix)]
+pub(super) fn interrupts() -> Receiver<()> {
+    watch::start()
+}
+
+/// Nothing, on a system without signals.
 #[cfg(not(unix))]
-pub(super) fn interrupts() -> Result<Receiver<()>, Failure> {
-    Ok(crossbeam_channel::never())
+pub(super) fn interrupts() -> Receiver<()> {
+    crossbeam_channel::never()
 }

@@ -2,39 +2,48 @@
 
 use super::Failure;
 use crate::bank::Bank;
+use crate::io::MultiReader;
 use std::path::{Path, PathBuf};
 
 /// `-` may be given once.
 pub(super) fn check_stdin(bank: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
     let all = inputs.iter().map(PathBuf::as_path).chain([bank]);
     if all.filter(|path| path.as_os_str() == "-").count() > 1 {
-        return Err(Failure::Usage("`-` is given twice; standard input can feed one of them only".into()));
+        return Err(Failure::Usage("`-` is given twice; standard input can be only one of them".into()));
     }
     Ok(())
 }
 
-/// The inputs, with name and channels, together have the bank's N channels.
-pub(super) fn check_channels<'a>(
-    bank: &Bank,
-    path: &Path,
-    inputs: impl Iterator<Item = (&'a str, usize)>,
-) -> Result<(), Failure> {
-    let inputs: Vec<_> = inputs.collect();
-    let (given, wanted) = (inputs.iter().map(|(_, channels)| channels).sum::<usize>(), bank.channel_count());
+/// The inputs together have the bank's N channels.
+pub(super) fn check_channels(bank: &Bank, path: &Path, reader: &MultiReader) -> Result<(), Failure> {
+    let (given, wanted) = (reader.channels(), bank.channel_count());
     if given == wanted {
         return Ok(());
     }
-    let files: Vec<_> = inputs.iter().map(|(name, channels)| format!("{name}: {channels}")).collect();
+    let files: Vec<_> =
+        reader.headers().map(|(name, header)| format!("{name}: {}", header.channels)).collect();
     Err(Failure::Input(format!(
-        "{} wants {wanted} channels, the input has {given} ({}); give one mono recording a channel or one of {wanted} channels",
+        "{} has {wanted} channels, but the input has {given} ({}); give one mono recording per channel or one of {wanted} channels",
         path.display(),
         files.join(", ")
     )))
 }
 
-/// All inputs, with name and rate where they say it, at the slow rate 1 / (M h), to the hertz that a header
-/// can say; at any common rate for a bank in normalised time. Returns that rate.
-pub(super) fn check_rates<'a>(
+/// The rate of the output in hertz: the bank's own, or that of the inputs for a bank in normalised time.
+///
+/// # Errors
+/// Inputs whose rates differ, or are not the bank's 1 / (M h).
+pub(super) fn output_rate(bank: &Bank, reader: &MultiReader) -> Result<f64, Failure> {
+    let rates = reader.headers().map(|(name, header)| (name, header.rate));
+    match input_rate(bank, rates)? {
+        Some(rate) if bank.fast_period == 1.0 => Ok(rate * bank.ratio as f64),
+        _ => Ok(1.0 / bank.fast_period),
+    }
+}
+
+/// The common rate of the inputs, where they say it: 1 / (M h), to the hertz that a header can say, or any for a bank in
+/// normalised time.
+fn input_rate<'a>(
     bank: &Bank,
     inputs: impl Iterator<Item = (&'a str, Option<f64>)>,
 ) -> Result<Option<f64>, Failure> {
@@ -60,12 +69,4 @@ pub(super) fn check_rates<'a>(
 /// Equal to the hertz, or to nine digits.
 fn same_rate(a: f64, b: f64) -> bool {
     (a - b).abs() <= f64::max(0.5, 1e-9 * b)
-}
-
-/// The rate of the output in hertz: the bank's own, or that of the inputs for a bank in normalised time.
-pub(super) fn fast_rate(bank: &Bank, slow_rate: Option<f64>) -> f64 {
-    match slow_rate {
-        Some(rate) if bank.fast_period == 1.0 => rate * bank.ratio as f64,
-        _ => 1.0 / bank.fast_period,
-    }
 }

@@ -1,4 +1,7 @@
-//! The command line: one file a verb; the only place that prints.
+//! The command line: one file per command; the only place that prints.
+
+// Printing macros panic where their output cannot be written.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
 
 mod analyze;
 mod bank_file;
@@ -7,19 +10,22 @@ mod demo;
 mod design;
 mod failure;
 mod fuse;
-mod fusing;
 mod gaps;
 mod interrupt;
 mod match_bank;
 mod output;
+mod print;
 mod recordings;
+mod run;
+mod say;
 mod simulate;
 mod stream;
 mod verify;
 
 use clap::{Parser, Subcommand};
 pub use failure::Failure;
-use std::io::{ErrorKind, Write};
+use print::{print, print_json};
+use say::{say, warn};
 use std::process::ExitCode;
 
 /// Several slow, imperfectly timed converters doing the work of one fast one
@@ -42,11 +48,11 @@ Exit codes: 0 done; 1 the input or the design failed; 2 wrong usage."
 )]
 pub struct Cli {
     #[command(subcommand)]
-    verb: Verb,
+    command: Command,
 }
 
 #[derive(Debug, Subcommand)]
-enum Verb {
+enum Command {
     Design(design::Args),
     Analyze(analyze::Args),
     Verify(verify::Args),
@@ -57,39 +63,35 @@ enum Verb {
     Completions(completions::Args),
 }
 
-/// Runs the verb that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
+/// Runs the command that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
 /// 2 (wrong usage).
 pub fn run() -> ExitCode {
-    match dispatch(Cli::parse().verb) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+    match Cli::try_parse() {
+        Ok(cli) => match dispatch(cli.command) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(failure) => failure.report(),
+        },
+        Err(message) => show(&message),
     }
 }
 
-fn dispatch(verb: Verb) -> Result<(), Failure> {
-    match verb {
-        Verb::Design(args) => design::run(&args),
-        Verb::Analyze(args) => analyze::run(&args),
-        Verb::Verify(args) => verify::run(&args),
-        Verb::Simulate(args) => simulate::run(&args),
-        Verb::Fuse(args) => fuse::run(args),
-        Verb::Stream(args) => stream::run(&args),
-        Verb::Demo(args) => demo::run(&args),
-        Verb::Completions(args) => completions::run(&args),
+/// Shows help, version, or what is wrong with the usage.
+fn show(message: &clap::Error) -> ExitCode {
+    match message.print() {
+        Err(error) if !message.use_stderr() => print::print_failure(&error).report(),
+        _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
     }
 }
 
-/// Results on standard output; a reader that went away ends the run quietly.
-fn print(text: &str) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        Ok(()) => Ok(()),
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Err(Failure::ClosedPipe),
-        Err(error) => Err(Failure::Input(format!("standard output: cannot write it: {error}"))),
+fn dispatch(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Design(args) => design::run(&args),
+        Command::Analyze(args) => analyze::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Fuse(args) => fuse::run(&args),
+        Command::Stream(args) => stream::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Completions(args) => completions::run(&args),
     }
-}
-
-/// One JSON object on standard output.
-fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
-    print(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"))
 }

@@ -1,34 +1,33 @@
-//! Whole mono recordings in memory, for the verbs that work on short ones.
+//! Whole mono recordings in memory, for the commands that work on short ones.
 
 use super::Failure;
+use crate::files::{AtomicFile, commit_all};
 use crate::io::wav::WavFile;
-use crate::io::{Arrival, AtomicFile, Feed, FeedOptions, PcmFormat};
+use crate::io::{Arrival, MultiReader, PcmFormat, ReadOptions};
 use std::io;
 use std::path::Path;
 
 /// The samples and the rate (hertz) of a mono WAV file or SigMF recording.
 pub(super) fn read_mono(path: &Path) -> Result<(Vec<f64>, u32), Failure> {
-    let feed = Feed::start(&[path.to_owned()], FeedOptions::files(), crossbeam_channel::never());
-    let mut feed = feed.map_err(Failure::input)?.ok_or_else(|| Failure::input("interrupted"))?;
-    if feed.channels() != 1 {
+    let reader = MultiReader::start(&[path.to_owned()], ReadOptions::files(), crossbeam_channel::never());
+    let mut reader = reader.map_err(Failure::input)?.ok_or_else(|| Failure::input("interrupted"))?;
+    if reader.channels() != 1 {
         return Err(Failure::Input(format!(
             "{}: {} channels, but a source is mono; extract one channel first",
             path.display(),
-            feed.channels()
+            reader.channels()
         )));
     }
-    let rate = feed.headers().find_map(|(_, _, rate)| rate).unwrap_or(0.0).round() as u32;
+    let rate = reader.headers().find_map(|(_, header)| header.rate).unwrap_or(0.0).round() as u32;
     let mut samples = Vec::new();
-    while let Arrival::Ticks(ticks) = feed.wait().map_err(Failure::input)? {
-        for frames in feed.frames() {
+    while let Arrival::Frames(count) = reader.wait().map_err(Failure::input)? {
+        for frames in reader.frames() {
             let format = frames.layout.format;
             samples.extend(frames.bytes.chunks_exact(frames.frame_bytes()).map(|b| format.decode(b)));
         }
-        feed.consume(ticks);
+        reader.consume(count);
     }
-    for note in feed.notes() {
-        eprintln!("hybank: warning: {note}");
-    }
+    reader.warnings().iter().for_each(|warning| super::warn(&warning.to_string()));
     refuse_useless(path, &samples)?;
     Ok((samples, rate))
 }
@@ -47,24 +46,37 @@ fn refuse_useless(path: &Path, samples: &[f64]) -> Result<(), Failure> {
     }
 }
 
-/// Writes a mono WAV file that appears when it is whole.
-pub(super) fn write_mono(
-    path: &Path,
-    samples: &[f64],
-    rate: u32,
-    format: PcmFormat,
-    force: bool,
-) -> Result<(), Failure> {
+/// A mono recording to be written.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mono<'a> {
+    pub(super) samples: &'a [f64],
+    /// Hertz.
+    pub(super) rate: u32,
+}
+
+/// Writes mono WAV files with 32-bit floats, which appear together when they are whole.
+pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Result<(), Failure> {
+    let begin = |(path, mono): &(&Path, Mono<'_>)| begin_recording(path, *mono, force);
+    let files = files.iter().map(begin).collect::<Result<Vec<_>, _>>()?;
+    commit_all(files).map_err(Failure::input)
+}
+
+/// A recording that is whole but has no name yet.
+fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<AtomicFile, Failure> {
+    let format = PcmFormat::F32Le;
     let file = AtomicFile::create(path, force).map_err(Failure::input)?;
     let size = format.bytes();
-    let mut bytes = vec![0; samples.len() * size];
-    for (slot, &x) in bytes.chunks_exact_mut(size).zip(samples) {
+    let mut bytes = vec![0; mono.samples.len() * size];
+    for (slot, &x) in bytes.chunks_exact_mut(size).zip(mono.samples) {
         format.encode(x, slot);
     }
-    let written = WavFile::new(file, format, 1, rate).and_then(|mut wav| {
+    let written = WavFile::new(file, format, 1, mono.rate).and_then(|mut wav| {
         wav.write_bytes(&bytes)?;
         wav.finish()
     });
     let cannot = |error: io::Error| Failure::Input(format!("{}: cannot write it: {error}", path.display()));
-    written.map_err(cannot)?.commit().map_err(Failure::input)
+    let mut file = written.map_err(cannot)?;
+    // One open file at a time, however many there are.
+    file.seal().map_err(Failure::input)?;
+    Ok(file)
 }

@@ -2,9 +2,9 @@
 
 use super::Failure;
 use super::bank_file::load_spec_or_bank;
-use super::recordings::{read_mono, write_mono};
+use super::recordings::{Mono, read_mono, write_recordings};
 use crate::design::{self, Problem};
-use crate::io::PcmFormat;
+use crate::files::refuse_overlaps;
 use crate::simulate::{Analog, Captured, Recording, Source, capture, panels};
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz, Seconds};
@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         files.push((format!("ch{}.wav", i + 1), samples, rates.slow));
     }
     files.push(("target.wav".to_owned(), &captured.target, rates.fast));
-    write_all(&args.output, &files, args.force)?;
+    write_all(&args.output, &files, &[&args.spec, Path::new(&args.source)], args.force)?;
     let names = files.iter().map(|(name, ..)| args.output.join(name).display().to_string()).collect();
     Report { files: names, frames, slow_rate: rates.slow, fast_rate: rates.fast, latency, warnings }
         .print(args.json)
@@ -212,26 +212,26 @@ impl Rates {
     }
 }
 
-fn write_all(folder: &Path, files: &[(String, &Vec<f64>, u32)], force: bool) -> Result<(), Failure> {
+fn write_all(
+    folder: &Path,
+    files: &[(String, &Vec<f64>, u32)],
+    inputs: &[&Path],
+    force: bool,
+) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| {
         Failure::Input(format!("{}: cannot create the folder: {error}", folder.display()))
     })?;
-    // All or nothing: every name is checked before the first file is written.
-    let existing =
-        files.iter().map(|(name, ..)| folder.join(name)).find(|path| path.symlink_metadata().is_ok());
-    if let (false, Some(path)) = (force, existing) {
-        return Err(Failure::Input(format!("{}: exists already; use --force to replace it", path.display())));
-    }
-    files.iter().try_for_each(|(name, samples, rate)| {
-        write_mono(&folder.join(name), samples, *rate, PcmFormat::F32Le, force)
-    })
+    let paths: Vec<_> = files.iter().map(|(name, ..)| folder.join(name)).collect();
+    let outputs: Vec<_> = paths.iter().map(|path| path.as_path()).collect();
+    refuse_overlaps(&outputs, inputs).map_err(Failure::input)?;
+    let recordings = files.iter().map(|(_, samples, rate)| Mono { samples: samples.as_slice(), rate: *rate });
+    let recordings: Vec<_> = outputs.into_iter().zip(recordings).collect();
+    write_recordings(&recordings, force)
 }
 
 impl Report {
     fn print(&self, json: bool) -> Result<(), Failure> {
-        for warning in &self.warnings {
-            eprintln!("hybank: warning: {warning}");
-        }
+        self.warnings.iter().for_each(|warning| super::warn(warning));
         if json {
             return super::print_json(self);
         }

@@ -1,20 +1,24 @@
 //! `hybank stream`: slow samples in and fast samples out, as they come.
 
-use super::fusing::{FormArg, Fusing, RunReport, ThreadArgs};
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
-use super::output::{Container, FastWriter, is_sigmf, precision};
+use super::output::{check_files, precision};
+use super::run::{FormArg, RunReport, ThreadArgs, finish};
+use super::say::say_line;
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{Arrival, BLOCK_BYTES, Coding, Feed, FeedOptions, PcmFormat};
-use crate::runtime::{Form, Options, Stream};
-use std::path::PathBuf;
+use crate::io::{
+    BLOCK_BYTES, Coding, Container, MultiReader, PcmFormat, ReadOptions, SampleWriter, is_sigmf,
+};
+use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
+use crate::runtime::{Form, Options, Plan};
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Fuses slow samples as they arrive
 ///
-/// Reads interleaved ticks (one sample of each channel, in the order of the bank) from standard input,
-/// or from each --input what it holds, and writes the M fast samples of a tick as soon as its inputs
+/// Reads interleaved frames (one sample of each channel, in the order of the bank) from standard input,
+/// or from each --input what it holds, and writes the M output samples of a frame as soon as its inputs
 /// are there. The output is causal: it is late by the bank's latency, and nothing is dropped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -27,7 +31,7 @@ Examples:
   hybank stream bank.json --input ch1.sigmf-meta --input ch2.sigmf-meta -o fast.sigmf-meta
   sox both.flac -t wav - | hybank stream bank.json --format wav | play -t wav -
 
-An interrupt (Ctrl-C) ends the stream after whole ticks; a second one ends it at once.")]
+An interrupt (Ctrl-C) ends the stream after whole frames; a second one ends it at once.")]
 pub(super) struct Args {
     /// The bank: what `hybank design` wrote
     bank: PathBuf,
@@ -37,19 +41,19 @@ pub(super) struct Args {
     /// How the output is stored, if not like the input
     #[arg(long, value_name = "FORMAT", value_parser = parse_coding)]
     output_format: Option<Coding>,
-    /// A FIFO or file with one channel, given once a channel, or with all of them, given once; a SigMF recording
-    /// (a name that ends in sigmf-meta) tells its own format and channels
+    /// A FIFO or file with one channel, given once per channel, or with all of them, given once; a SigMF recording
+    /// (a name that ends in sigmf-meta) says its own format and channels
     #[arg(long, value_name = "FILE")]
     input: Vec<PathBuf>,
-    /// Where the fast samples go: a file that appears when it is whole (a SigMF recording, if its name ends in
+    /// Where the output samples go: a file that appears when it is whole (a SigMF recording, if its name ends in
     /// sigmf-meta); standard output if left out
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
-    /// Form of FIR filters; auto is the faster one of direct and fast, because overlap-save makes the output later (--json
-    /// tells by how much), and direct where gaps are bridged
+    /// Form of FIR filters; auto is the faster one of direct and fast, because overlap-save adds latency (--json
+    /// says how much), and direct where gaps are filled
     #[arg(long, value_enum, default_value_t = FormArg::Auto)]
     form: FormArg,
-    /// Bring out the last samples at the end, as many as the latency, with zeros for input
+    /// Output the last samples at the end, as many as the latency, with zeros for input
     #[arg(long)]
     flush: bool,
     #[command(flatten)]
@@ -76,63 +80,44 @@ fn parse_coding(name: &str) -> Result<Coding, String> {
 
 /// What happened.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct Report<'a> {
     #[serde(flatten)]
-    run: RunReport,
-    /// Slow ticks read.
-    ticks: u64,
+    run: &'a RunReport,
+    /// Input frames read.
+    frames: u64,
     /// True if a signal ended the stream.
     interrupted: bool,
 }
 
-/// Runs the verb.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let inputs = args.inputs();
-    match_bank::check_stdin(&args.bank, &inputs)?;
-    if args.json && args.output.as_os_str() == "-" {
-        return Err(Failure::Usage("--json needs --output: standard output carries the samples".into()));
-    }
+    args.check(&inputs)?;
     let bank = bank_file::load(&args.bank)?;
     args.check_inputs(&inputs, bank.channel_count())?;
-    let lost = args.gaps.lost()?;
-    let options = FeedOptions {
-        coding: args.format,
-        channels: bank.channel_count(),
-        lost: lost.as_ref(),
-        until: args.gaps.until(),
-        block_bytes: args.threads.bytes(BLOCK_BYTES),
-    };
-    let stream = args.start(&bank)?;
-    let Some(mut feed) = Feed::start(&inputs, options, interrupts()?).map_err(Failure::input)? else {
-        return Ok(());
-    };
-    let channels = || feed.headers().map(|(name, channels, _)| (name, channels));
-    match_bank::check_channels(&bank, &args.bank, channels())?;
-    let mut fusing = args.fusing(&bank, &feed, stream)?;
-    let interrupted = pump(&mut fusing, &mut feed)?;
+    let plan = args.plan(&bank)?;
+    let Some(mut reader) = args.start_reader(&inputs, bank.channel_count())? else { return Ok(()) };
+    match_bank::check_channels(&bank, &args.bank, &reader)?;
+    let rate = match_bank::output_rate(&bank, &reader)?;
+    let mut pipeline = args.pipeline(&bank, &plan)?;
+    let mut outputs = args.outputs(rate)?;
+    let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |_| {}).map_err(Failure::running)?;
     if args.flush {
-        let samples = fusing.stream.flush_ticks() * bank.ratio;
-        fusing.flush(fusing.writer.samples() + samples as u64)?;
+        let samples = pipeline.stream().flush_ticks() * bank.ratio;
+        pipeline.flush(pipeline.samples() + samples as u64, &mut outputs).map_err(Failure::running)?;
     }
-    let run = fusing.report(feed.notes(), "--output-format f32le");
-    args.finish(fusing, &Report { run, ticks: feed.ticks(), interrupted })
-}
-
-/// Until the input ends (false) or an interrupt comes (true).
-fn pump(fusing: &mut Fusing, feed: &mut Feed) -> Result<bool, Failure> {
-    loop {
-        match feed.wait().map_err(Failure::input)? {
-            Arrival::Ticks(ticks) => {
-                fusing.fuse(&feed.frames(), u64::MAX)?;
-                feed.consume(ticks);
-            }
-            Arrival::End => return Ok(false),
-            Arrival::Stopped => return Ok(true),
-        }
+    let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
+    let run = RunReport::new(pipeline.finish(), tolerated, "--output-format f32le");
+    let (frames, interrupted) = (reader.consumed(), ending == Ending::Stopped);
+    let report = Report { run: &run, frames, interrupted };
+    let finished = finish(outputs, &run, args.strict, args.json.then_some(&report));
+    if interrupted && finished.is_ok() {
+        say_line(&format!("interrupted after {frames} frames, {} samples written", run.samples));
     }
+    finished
 }
 
 impl Args {
@@ -140,7 +125,20 @@ impl Args {
         if self.input.is_empty() { vec!["-".into()] } else { self.input.clone() }
     }
 
-    /// Raw inputs are one interleaved or one a channel; others say themselves what they hold.
+    /// What cannot be, before any file is read.
+    fn check(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
+        match_bank::check_stdin(&self.bank, inputs)?;
+        self.gaps.check()?;
+        if self.json && self.output.as_os_str() == "-" {
+            let message = "--json needs --output: standard output carries the samples";
+            return Err(Failure::Usage(message.into()));
+        }
+        let inputs = inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
+        check_files(&self.output, self.gaps.mask(), &inputs)
+    }
+
+    /// Raw inputs are one interleaved or one per channel; others say themselves what they hold.
     fn check_inputs(&self, inputs: &[PathBuf], channels: usize) -> Result<(), Failure> {
         let raw = matches!(self.format, Coding::Raw(_)) && !inputs.iter().any(|path| is_sigmf(path));
         if raw && inputs.len() != 1 && inputs.len() != channels {
@@ -150,6 +148,15 @@ impl Args {
             )));
         }
         Ok(())
+    }
+
+    /// `None` if an interrupt came first.
+    fn start_reader(&self, inputs: &[PathBuf], channels: usize) -> Result<Option<MultiReader>, Failure> {
+        let lost = self.gaps.lost_samples()?;
+        let block_bytes = self.threads.bytes(BLOCK_BYTES);
+        let raw = ReadOptions { coding: self.format, channels, block_bytes, ..ReadOptions::files() };
+        let options = self.gaps.read_options(lost.as_ref(), raw);
+        MultiReader::start(inputs, options, interrupts()).map_err(Failure::input)
     }
 
     fn output_coding(&self) -> Coding {
@@ -164,33 +171,24 @@ impl Args {
         }
     }
 
-    fn start(&self, bank: &Bank) -> Result<Stream, Failure> {
-        // Outside of what a gap touched the output is to have the very bits of a whole recording.
-        let auto = if self.gaps.are_bridged() { Form::Direct } else { Form::FastestPrompt };
-        let form = self.form.form(auto);
-        let options = Options { precision: precision(self.output_format()), form, ..Options::default() };
-        bank.plan(options)
-            .map(|plan| Stream::new(&plan))
-            .map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+    fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
+        // Outputs that no gap affects are to have the very bits of a whole recording.
+        let auto = if self.gaps.policy().is_some() { Form::Direct } else { Form::FastestPrompt };
+        let precision = precision(self.output_format());
+        let options = Options { precision, form: self.form.form(auto), ..Options::default() };
+        bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
 
-    /// The run at its beginning.
-    fn fusing(&self, bank: &Bank, feed: &Feed, stream: Stream) -> Result<Fusing, Failure> {
-        let rates = feed.headers().map(|(name, _, rate)| (name, rate));
-        let rate = match_bank::fast_rate(bank, match_bank::check_rates(bank, rates)?);
+    fn pipeline(&self, bank: &Bank, plan: &Plan) -> Result<Pipeline, Failure> {
+        let (format, gaps, workers) = (self.output_format(), self.gaps.policy(), self.threads.workers()?);
+        Pipeline::new(bank, plan, Settings { format, skip: 0, gaps, workers }).map_err(Failure::running)
+    }
+
+    /// The outputs at their beginning, of `rate` hertz.
+    fn outputs(&self, rate: f64) -> Result<FileOutputs, Failure> {
+        let mask = self.gaps.begin_mask(self.force)?;
         let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };
-        let gaps = self.gaps.stage(bank, stream.extra_latency(), self.force)?;
-        let writer = FastWriter::create(&self.output, container, self.output_format(), rate, self.force)?;
-        Fusing::new(stream, gaps, writer, 0, self.threads)
-    }
-
-    fn finish(&self, fusing: Fusing, report: &Report) -> Result<(), Failure> {
-        report.run.judge(self.strict)?;
-        if report.interrupted {
-            let (ticks, samples) = (report.ticks, report.run.samples);
-            eprintln!("hybank: interrupted after {ticks} ticks, {samples} samples written");
-        }
-        fusing.finish()?;
-        if self.json { super::print_json(report) } else { Ok(()) }
+        let samples = SampleWriter::create(&self.output, container, self.output_format(), rate, self.force);
+        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask))
     }
 }

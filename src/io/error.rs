@@ -1,5 +1,6 @@
 //! Why samples could not be read or written.
 
+use crate::files::FileError;
 use std::io;
 
 /// A fault of a file or stream; every sentence names the file, the place, the rule and the remedy.
@@ -10,16 +11,31 @@ pub enum IoError {
     System {
         /// Name of the file or stream.
         file: String,
-        /// What was tried, as a verb phrase.
+        /// What was tried, as a phrase with a verb: `open it`.
         action: &'static str,
         /// The system's reason.
         source: io::Error,
     },
-    /// The output exists and was not to be replaced.
-    #[error("{file}: the file exists; give another name or --force to replace it")]
-    Exists {
-        /// Name of the file.
+    /// A file could not be read or written as a whole.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The thread that read an input ended before the input did; a fault of this program.
+    #[error(
+        "{file}: its reader ended before the input did, so the rest is not known; this is a fault of hybank, please report it"
+    )]
+    ReaderDied {
+        /// Name of the input.
         file: String,
+    },
+    /// One pipe is given for two inputs.
+    #[error(
+        "{first} and {second} are the same pipe, each byte of which only one of them would get; give each channel a pipe of its own"
+    )]
+    SharedPipe {
+        /// Name of one input.
+        first: String,
+        /// Name of the other.
+        second: String,
     },
     /// The first bytes are not those of a WAV file.
     #[error(
@@ -50,7 +66,7 @@ pub enum IoError {
         file: String,
         /// The field's name.
         field: &'static str,
-        /// Its place.
+        /// Its offset in bytes.
         offset: u64,
         /// What it holds.
         value: u64,
@@ -66,7 +82,7 @@ pub enum IoError {
         file: String,
         /// The WAV format tag.
         tag: u16,
-        /// Bits a sample.
+        /// Bits per sample.
         bits: u16,
     },
     /// A SigMF recording that is not one of plain real samples.
@@ -84,6 +100,16 @@ pub enum IoError {
         file: String,
         /// Line, reason and remedy.
         problem: String,
+    },
+    /// The rate of an output is too high for WAV.
+    #[error(
+        "{file}: the rate of {rate} Hz does not fit a WAV header; give the output a name that ends in sigmf-meta, or write raw samples with `hybank stream`"
+    )]
+    WavRate {
+        /// Name of the file.
+        file: String,
+        /// The rate in hertz.
+        rate: f64,
     },
     /// There is no data chunk.
     #[error("{file}: no data chunk after {offset} bytes of header; the file holds no samples")]

@@ -1,23 +1,31 @@
 //! What a file beside the samples says of those that were lost.
 
 use super::IoError;
-use super::sequence::{Anchor, MOST_LOST, Sequence};
+use super::timestamps::{MAX_LOST_AT_ONCE, Timestamp, Timestamps};
+use crate::files::{Bound, read_text};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
 
-/// Void samples of one channel.
+/// How long a file of lost samples may be: a million lines.
+const LOST_FILE: Bound = Bound {
+    bytes: 64 << 20,
+    kind: "a file of lost samples",
+    remedy: "give the file that was meant, or fuse the recording in parts",
+};
+
+/// Invalid samples of one channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Mark {
+pub(super) struct Dropout {
     /// The channel, from 0.
     pub(super) channel: usize,
-    /// Ticks.
-    pub(super) ticks: Range<u64>,
+    /// Frames.
+    pub(super) frames: Range<u64>,
 }
 
 /// A file beside the samples that says which of them were lost.
 ///
-/// JSON Lines: one object a line, empty lines are passed over. There are two kinds, which may be mixed:
+/// JSON Lines: one object per line, empty lines are skipped. There are two kinds of line, which may be mixed:
 ///
 /// ```text
 /// {"channel": 1, "sample_start": 5, "global_index": 108}
@@ -29,16 +37,16 @@ pub(super) struct Mark {
 /// samples were *left out* of the input. Time begins at the earliest number of any input; one without such
 /// lines begins there too.
 ///
-/// The second kind is that of the report of gaps: from tick 40 on, 3 samples of channel 2 are *in* the
-/// input but void.
+/// The second kind is that of the report of gaps: from frame 40 on, 3 samples of channel 2 are *in* the
+/// input but invalid.
 ///
 /// Channels count from 1; a line without `channel` holds for all of them. Channels that are interleaved
-/// in one input lose samples together, or have void ones.
+/// in one input lose samples together, or have invalid ones.
 #[derive(Debug, Clone)]
 pub struct LostSamples {
     file: String,
-    anchors: Vec<(Option<usize>, Anchor)>,
-    marks: Vec<(Option<usize>, Range<u64>)>,
+    timestamps: Vec<(Option<usize>, Timestamp)>,
+    dropouts: Vec<(Option<usize>, Range<u64>)>,
 }
 
 /// A line, as written.
@@ -57,21 +65,19 @@ struct Line {
 
 /// What is lost in one input.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct LostOfInput {
-    pub(super) sequence: Sequence,
-    /// In the order of their first ticks; channels count from the input's first.
-    pub(super) marks: Vec<Mark>,
+pub(super) struct LostInInput {
+    pub(super) timestamps: Timestamps,
+    /// In the order of their first frames; channels count from the input's first.
+    pub(super) dropouts: Vec<Dropout>,
 }
 
 impl LostSamples {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`IoError::System`] if it cannot be read, [`IoError::Lost`] for a line that is neither of the two kinds.
+    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Lost`] for a line that is neither of the two kinds.
     pub fn read(path: &Path) -> Result<Self, IoError> {
-        let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(IoError::system(&name, "read it"))?;
-        Self::parse(&text, &name)
+        Self::parse(&read_text(path, LOST_FILE)?, &path.display().to_string())
     }
 
     /// As [`LostSamples::read`], from text; `file` is the name for complaints.
@@ -79,7 +85,7 @@ impl LostSamples {
     /// # Errors
     /// [`IoError::Lost`] for a line that is neither of the two kinds.
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
-        let mut lost = Self { file: file.to_owned(), anchors: Vec::new(), marks: Vec::new() };
+        let mut lost = Self { file: file.to_owned(), timestamps: Vec::new(), dropouts: Vec::new() };
         for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
             lost.add(line).map_err(|problem| lost.fault(format!("line {}: {problem}", number + 1)))?;
         }
@@ -95,13 +101,14 @@ impl LostSamples {
         match line {
             Line {
                 sample_start: Some(frame), global_index: Some(index), first: None, length: None, ..
-            } => self.anchors.push((channel, Anchor { frame, index })),
+            } => self.timestamps.push((channel, Timestamp { frame, index })),
             Line {
                 first: Some(first), length: Some(length), sample_start: None, global_index: None, ..
             } => {
-                let end = first.checked_add(length).filter(|_| length <= MOST_LOST);
-                let end = end.ok_or_else(|| format!("length is {length}; it may be at most {MOST_LOST}"))?;
-                self.marks.push((channel, first..end));
+                let end = first.checked_add(length).filter(|_| length <= MAX_LOST_AT_ONCE);
+                let end =
+                    end.ok_or_else(|| format!("length is {length}; it may be at most {MAX_LOST_AT_ONCE}"))?;
+                self.dropouts.push((channel, first..end));
             }
             _ => return Err("give either sample_start and global_index, or first and length".into()),
         }
@@ -109,9 +116,10 @@ impl LostSamples {
     }
 
     /// The lines of each input, given the channels of all inputs in their order.
-    pub(super) fn of_inputs(&self, channels: &[usize]) -> Result<Vec<LostOfInput>, IoError> {
+    pub(super) fn of_inputs(&self, channels: &[usize]) -> Result<Vec<LostInInput>, IoError> {
         let all = channels.iter().sum::<usize>();
-        let named = self.anchors.iter().map(|(channel, _)| channel).chain(self.marks.iter().map(|(c, _)| c));
+        let named =
+            self.timestamps.iter().map(|(channel, _)| channel).chain(self.dropouts.iter().map(|(c, _)| c));
         if let Some(channel) = named.flatten().find(|&&channel| channel >= all) {
             return Err(self.fault(format!("channel {} is named, but there are {all}", channel + 1)));
         }
@@ -123,36 +131,36 @@ impl LostSamples {
         channels.iter().map(of_input).collect()
     }
 
-    fn of_input(&self, channels: Range<usize>) -> Result<LostOfInput, IoError> {
-        let anchors = |wanted: usize| -> Vec<Anchor> {
-            let lines = self.anchors.iter().filter(|(channel, _)| channel.is_none_or(|c| c == wanted));
-            lines.map(|&(_, anchor)| anchor).collect()
+    fn of_input(&self, channels: Range<usize>) -> Result<LostInInput, IoError> {
+        let timestamps = |wanted: usize| -> Vec<Timestamp> {
+            let lines = self.timestamps.iter().filter(|(channel, _)| channel.is_none_or(|c| c == wanted));
+            lines.map(|&(_, timestamp)| timestamp).collect()
         };
-        let mut told =
-            channels.clone().map(|channel| (channel, anchors(channel))).filter(|(_, a)| !a.is_empty());
-        let (channel, anchors) = told.next().unwrap_or_default();
-        if let Some((other, _)) = told.find(|(_, others)| *others != anchors) {
+        let mut given =
+            channels.clone().map(|channel| (channel, timestamps(channel))).filter(|(_, a)| !a.is_empty());
+        let (channel, timestamps) = given.next().unwrap_or_default();
+        if let Some((other, _)) = given.find(|(_, others)| *others != timestamps) {
             return Err(self.fault(format!(
-                "channels {} and {} are interleaved in one input but lose different samples; mark void samples with first and length",
+                "channels {} and {} are interleaved in one input but lose different samples; dropout invalid samples with first and length",
                 channel + 1,
                 other + 1
             )));
         }
-        let sequence = Sequence::new(anchors).map_err(|problem| self.fault(problem))?;
-        Ok(LostOfInput { sequence, marks: self.marks_of(channels) })
+        let timestamps = Timestamps::new(timestamps).map_err(|problem| self.fault(problem))?;
+        Ok(LostInInput { timestamps, dropouts: self.dropouts_of(channels) })
     }
 
-    fn marks_of(&self, channels: Range<usize>) -> Vec<Mark> {
-        let named = |&(channel, ref ticks): &(Option<usize>, Range<u64>)| {
+    fn dropouts_of(&self, channels: Range<usize>) -> Vec<Dropout> {
+        let named = |&(channel, ref frames): &(Option<usize>, Range<u64>)| {
             let here = channels.clone().filter(move |&c| channel.is_none_or(|channel| channel == c));
             let first = channels.start;
-            let ticks = ticks.clone();
-            here.map(move |c| Mark { channel: c - first, ticks: ticks.clone() })
+            let frames = frames.clone();
+            here.map(move |c| Dropout { channel: c - first, frames: frames.clone() })
         };
-        let mut marks: Vec<_> =
-            self.marks.iter().flat_map(named).filter(|mark| !mark.ticks.is_empty()).collect();
-        marks.sort_by_key(|mark| (mark.ticks.start, mark.channel));
-        marks
+        let mut dropouts: Vec<_> =
+            self.dropouts.iter().flat_map(named).filter(|dropout| !dropout.frames.is_empty()).collect();
+        dropouts.sort_by_key(|dropout| (dropout.frames.start, dropout.channel));
+        dropouts
     }
 
     /// A complaint about this file.
@@ -181,19 +189,19 @@ mod tests {
         {"channel": 2, "first": 7, "length": 0}
     "#;
 
-    fn mark(channel: usize, ticks: Range<u64>) -> Mark {
-        Mark { channel, ticks }
+    fn dropout(channel: usize, frames: Range<u64>) -> Dropout {
+        Dropout { channel, frames }
     }
 
     #[test]
     fn lines_go_to_their_inputs() {
         let lost = LostSamples::parse(TEXT, "lost").unwrap();
         let inputs = lost.of_inputs(&[1, 2]).unwrap();
-        let anchor = |frame, index| Anchor { frame, index };
-        assert_eq!(inputs[0].sequence, Sequence::new(vec![anchor(0, 10), anchor(5, 18)]).unwrap());
-        assert_eq!(inputs[1].sequence, Sequence::new(vec![anchor(5, 18)]).unwrap());
-        assert_eq!(inputs[0].marks, [mark(0, 20..21)]);
-        assert_eq!(inputs[1].marks, [mark(0, 20..21), mark(1, 20..21), mark(1, 40..43)]);
+        let timestamp = |frame, index| Timestamp { frame, index };
+        assert_eq!(inputs[0].timestamps, Timestamps::new(vec![timestamp(0, 10), timestamp(5, 18)]).unwrap());
+        assert_eq!(inputs[1].timestamps, Timestamps::new(vec![timestamp(5, 18)]).unwrap());
+        assert_eq!(inputs[0].dropouts, [dropout(0, 20..21)]);
+        assert_eq!(inputs[1].dropouts, [dropout(0, 20..21), dropout(1, 20..21), dropout(1, 40..43)]);
     }
 
     #[test]

@@ -1,28 +1,32 @@
-//! Samples in and out: WAV, SigMF, raw PCM, what is known of lost samples, whole-file writers.
+//! Samples in and out: WAV, SigMF, raw PCM, and what is known of lost samples.
 //!
 //! Words: a *frame* holds one sample of each channel of a file or stream; a sample is stored in
 //! one of the [`PcmFormat`]s; integer formats are full scale = 1.0.
 
-mod atomic;
-#[cfg(target_os = "linux")]
-mod direct;
+mod aligned_input;
 mod error;
-mod feed;
+mod fault;
 mod frames;
-mod lane;
+mod input_thread;
 mod lost;
+mod multi_reader;
 mod pipe;
-mod reader;
-mod sequence;
+mod sample_writer;
 mod sigmf;
+#[cfg(target_os = "linux")]
+mod stdin_reader;
+mod stream_header;
+mod timestamps;
 pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
-pub use atomic::AtomicFile;
 pub use error::IoError;
-pub use feed::{Arrival, BLOCK_BYTES, Coding, Feed, FeedOptions, Until};
+pub use fault::{InputFault, InputWarning};
 pub use frames::FrameReader;
 pub use lost::LostSamples;
-pub use pipe::stdout_file;
-pub use sequence::MOST_LOST;
-pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta};
+pub use multi_reader::{Arrival, BLOCK_BYTES, MultiReader, ReadOptions, Until};
+pub use pipe::{Stdout, is_stdout_stalled};
+pub use sample_writer::{Container, SampleWriter};
+pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf};
+pub use stream_header::{Coding, StreamHeader};
+pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};

@@ -1,7 +1,10 @@
 //! Standard input and output as files, and pipes wide enough for two processors.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Write};
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 /// Pipes are widened to this where the system allows it; 64 KiB would halve the throughput
 /// between two processors.
@@ -23,24 +26,63 @@ pub(super) fn stdin_file() -> io::Result<io::Stdin> {
 }
 
 /// Standard output without line buffering.
-///
-/// # Errors
-/// The system's refusal to duplicate the descriptor.
 #[cfg(unix)]
-pub fn stdout_file() -> io::Result<File> {
+fn stdout_file() -> io::Result<File> {
     use std::os::fd::AsFd;
     let file = File::from(io::stdout().as_fd().try_clone_to_owned()?);
     widen_pipe(&file);
     Ok(file)
 }
 
-/// Standard output.
-///
-/// # Errors
-/// None here.
 #[cfg(not(unix))]
-pub fn stdout_file() -> io::Result<io::Stdout> {
+fn stdout_file() -> io::Result<io::Stdout> {
     Ok(io::stdout())
+}
+
+/// When the write to standard output that is under way began, in milliseconds since [`CLOCK`]; 0 for none.
+static WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
+static CLOCK: LazyLock<Instant> = LazyLock::new(Instant::now);
+
+/// Bytes of one write: of a longer one nobody could say whether it makes progress.
+const WRITE_BYTES: usize = 64 << 10;
+
+/// Standard output for samples, without a buffer.
+pub struct Stdout {
+    #[cfg(unix)]
+    file: File,
+    #[cfg(not(unix))]
+    file: io::Stdout,
+}
+
+impl Stdout {
+    /// Standard output, with a wide pipe where the system allows it.
+    ///
+    /// # Errors
+    /// The system's refusal to duplicate the descriptor.
+    pub fn new() -> io::Result<Self> {
+        LazyLock::force(&CLOCK);
+        Ok(Self { file: stdout_file()? })
+    }
+}
+
+impl Write for Stdout {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let now = CLOCK.elapsed().as_millis() as u64;
+        WRITE_BEGAN.store(now.max(1), Ordering::Relaxed);
+        let written = self.file.write(&bytes[..bytes.len().min(WRITE_BYTES)]);
+        WRITE_BEGAN.store(0, Ordering::Relaxed);
+        written
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// True if a write to a [`Stdout`] of this process has waited for so long: whoever reads it does not take more.
+pub fn is_stdout_stalled(patience: Duration) -> bool {
+    let began = WRITE_BEGAN.load(Ordering::Relaxed);
+    began > 0 && CLOCK.elapsed() >= Duration::from_millis(began) + patience
 }
 
 /// Files that are no pipes, and systems that refuse, stay as they are.

@@ -3,15 +3,23 @@
 //! Real samples only, one or several interleaved channels. Captures whose `core:global_index` runs
 //! ahead of their `core:sample_start` tell of samples that were lost.
 
-use super::sequence::{Anchor, Sequence};
+use super::timestamps::{Timestamp, Timestamps};
 use super::{IoError, PcmFormat};
+use crate::files::{Bound, read_text};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Interleaved channels that are read at most, as many as a WAV header can say.
 const MOST_CHANNELS: usize = 65_535;
 
-/// The part of a SigMF metadata file that matters here; other keys are passed over.
+/// How long a metadata file may be.
+const META_FILE: Bound = Bound {
+    bytes: 64 << 20,
+    kind: "a SigMF metadata file",
+    remedy: "give the file that was meant, or remove annotations from it",
+};
+
+/// The part of a SigMF metadata file that matters here; other keys are skipped.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SigmfMeta {
     /// What holds for the whole recording.
@@ -30,13 +38,13 @@ pub struct SigmfGlobal {
     /// For example `rf32_le`.
     #[serde(rename = "core:datatype")]
     pub datatype: String,
-    /// Frames a second.
+    /// Frames per second.
     #[serde(rename = "core:sample_rate", default, skip_serializing_if = "Option::is_none")]
     pub sample_rate: Option<f64>,
     /// Interleaved channels.
     #[serde(rename = "core:num_channels", default, skip_serializing_if = "Option::is_none")]
     pub num_channels: Option<usize>,
-    /// Name of the sample file, if it is not the metadata's own with the ending sigmf-data.
+    /// Name of the sample file in the same folder, if it is not the metadata's own with the ending sigmf-data.
     #[serde(rename = "core:dataset", default, skip_serializing_if = "Option::is_none")]
     pub dataset: Option<String>,
     /// Number of the file's first frame, where a recording was split into several files.
@@ -86,11 +94,9 @@ impl SigmfMeta {
     /// Reads a metadata file.
     ///
     /// # Errors
-    /// [`IoError::System`] if it cannot be read, [`IoError::Sigmf`] if it is not what it should be.
+    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Sigmf`] if it is not what it should be.
     pub fn read(path: &Path) -> Result<Self, IoError> {
-        let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(IoError::system(&name, "read it"))?;
-        Self::parse(&text, &name)
+        Self::parse(&read_text(path, META_FILE)?, &path.display().to_string())
     }
 
     /// As [`SigmfMeta::read`], from text; `file` is the name for complaints.
@@ -101,7 +107,12 @@ impl SigmfMeta {
         let fault = |problem| IoError::Sigmf { file: file.to_owned(), problem };
         let meta: Self = serde_json::from_str(text).map_err(|error| fault(error.to_string()))?;
         meta.format(file)?;
-        meta.sequence(file)?;
+        meta.timestamps(file)?;
+        if let Some(name) = meta.global.dataset.as_deref().filter(|name| !is_file_name(name)) {
+            return Err(fault(format!(
+                "core:dataset is {name:?}; it must be the name of a file in the same folder, without any path"
+            )));
+        }
         match (meta.global.num_channels, meta.global.sample_rate) {
             (Some(count), _) if !(1..=MOST_CHANNELS).contains(&count) => {
                 Err(fault(format!("core:num_channels is {count}; it may be 1 to {MOST_CHANNELS}")))
@@ -131,7 +142,7 @@ impl SigmfMeta {
     }
 
     /// When the frames of the sample file were taken.
-    pub(super) fn sequence(&self, file: &str) -> Result<Sequence, IoError> {
+    pub(super) fn timestamps(&self, file: &str) -> Result<Timestamps, IoError> {
         let fault = |problem| IoError::Sigmf { file: file.to_owned(), problem };
         if !self.captures.is_sorted_by_key(|capture| capture.sample_start) {
             return Err(fault("the captures are not in the order of their core:sample_start".into()));
@@ -142,13 +153,13 @@ impl SigmfMeta {
             ));
         }
         let offset = self.global.offset;
-        let anchors = self.captures.iter().filter_map(|capture| {
+        let timestamps = self.captures.iter().filter_map(|capture| {
             let frame = capture.sample_start.checked_sub(offset);
-            capture.global_index.map(|index| frame.map(|frame| Anchor { frame, index }))
+            capture.global_index.map(|index| frame.map(|frame| Timestamp { frame, index }))
         });
         let before = || fault(format!("a capture begins before core:offset {offset}"));
-        let anchors = anchors.collect::<Option<Vec<_>>>().ok_or_else(before)?;
-        Sequence::new(anchors).map_err(fault)
+        let timestamps = timestamps.collect::<Option<Vec<_>>>().ok_or_else(before)?;
+        Timestamps::new(timestamps).map_err(fault)
     }
 }
 
@@ -161,6 +172,13 @@ fn datatype(format: PcmFormat) -> String {
     if order.is_empty() { format!("{kind}{bits}") } else { format!("{kind}{bits}_{order}") }
 }
 
+/// True for a name that stays in its folder.
+fn is_file_name(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    let plain = matches!(parts.next(), Some(Component::Normal(part)) if part == name);
+    plain && parts.next().is_none() && !name.contains(['\\', '\0'])
+}
+
 /// The two files of a recording, given either of them.
 pub(super) fn file_pair(path: &Path, meta: Option<&SigmfMeta>) -> (PathBuf, PathBuf) {
     let data = match meta.and_then(|meta| meta.global.dataset.as_ref()) {
@@ -171,7 +189,7 @@ pub(super) fn file_pair(path: &Path, meta: Option<&SigmfMeta>) -> (PathBuf, Path
 }
 
 /// True for the names of SigMF's two files.
-pub(super) fn is_sigmf(path: &Path) -> bool {
+pub fn is_sigmf(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "sigmf-meta" || extension == "sigmf-data")
 }
 
@@ -204,24 +222,24 @@ mod tests {
 
     #[test]
     fn captures_with_an_index_are_the_sequence() {
-        let anchor = |frame, index| Anchor { frame, index };
+        let timestamp = |frame, index| Timestamp { frame, index };
         let mut recording = meta("ri8", &[(10, Some(100)), (12, None), (15, Some(107))]);
         assert_eq!(
-            recording.sequence("test").unwrap(),
-            Sequence::new(vec![anchor(10, 100), anchor(15, 107)]).unwrap()
+            recording.timestamps("test").unwrap(),
+            Timestamps::new(vec![timestamp(10, 100), timestamp(15, 107)]).unwrap()
         );
         // Sample numbers of a recording that was split count from its offset.
         recording.global.offset = 10;
         assert_eq!(
-            recording.sequence("test").unwrap(),
-            Sequence::new(vec![anchor(0, 100), anchor(5, 107)]).unwrap()
+            recording.timestamps("test").unwrap(),
+            Timestamps::new(vec![timestamp(0, 100), timestamp(5, 107)]).unwrap()
         );
-        assert!(meta("ri8", &[(0, None), (5, None)]).sequence("test").unwrap().is_empty());
+        assert!(meta("ri8", &[(0, None), (5, None)]).timestamps("test").unwrap().is_empty());
     }
 
     #[test]
     fn captures_that_cannot_be_are_refused() {
-        let refused = |recording: SigmfMeta| recording.sequence("test").unwrap_err().to_string();
+        let refused = |recording: SigmfMeta| recording.timestamps("test").unwrap_err().to_string();
         let overlap = refused(meta("ri8", &[(0, Some(5)), (4, Some(6))]));
         assert!(overlap.contains("must not overlap"), "{overlap}");
         let disorder = refused(meta("ri8", &[(4, None), (2, None)]));
@@ -236,5 +254,17 @@ mod tests {
             assert!(error.starts_with("test: ") && error.contains(key), "{error}");
         }
         assert!(refused(recording).contains("core:header_bytes"));
+    }
+
+    #[test]
+    fn the_samples_stay_beside_their_metadata() {
+        let text = |name: &str| format!(r#"{{"global":{{"core:datatype":"ri8","core:dataset":"{name}"}}}}"#);
+        for name in ["/dev/zero", "../other", "..", ".", "sub/data", "data/", "./data", "a\\\\b", ""] {
+            let error = SigmfMeta::parse(&text(name), "test").unwrap_err().to_string();
+            assert!(error.contains("core:dataset") && error.contains("same folder"), "{name}: {error}");
+        }
+        for name in ["data", "data.bin", "..data"] {
+            assert!(SigmfMeta::parse(&text(name), "test").is_ok(), "{name}");
+        }
     }
 }

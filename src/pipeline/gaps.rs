@@ -3,6 +3,7 @@
 //! A missing sample is marked by NaN. An output of an FIR bank is affected if one of its taps falls on a missing
 //! sample, and it is exact again when the filters have forgotten the gap; a recursion never forgets.
 
+use super::Gap;
 use super::touch::Touch;
 use crate::bank::{Bank, SynthesisFilters};
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
@@ -19,17 +20,6 @@ pub enum GapPolicy {
     Zero,
     /// The channel's last good sample (zero before the first).
     Hold,
-}
-
-/// A run of missing samples of one channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct Gap {
-    /// The channel, from 1.
-    pub channel: usize,
-    /// Frame of its first sample, from 0.
-    pub first: u64,
-    /// Samples that are missing.
-    pub length: u64,
 }
 
 /// What is known of a channel.

@@ -7,7 +7,7 @@
 //! phases run along with the frames, so a frame costs M additions, whatever the length of the filters, and a gap
 //! costs two additions for each interval, once.
 
-use super::gaps::Gap;
+use super::Gap;
 
 /// Lags j with f_i[p + jM] != 0 that follow each other, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,6 +2,7 @@
 //!
 //! TOML and JSON both become this tree, so that both get the same error messages.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::ops::Range;
 
@@ -152,12 +153,27 @@ impl<'de> Visitor<'de> for KindVisitor {
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Kind, A::Error> {
         let mut entries: Vec<Entry> = Vec::new();
+        let mut keys = HashSet::new();
         while let Some(key) = map.next_key::<String>()? {
-            if entries.iter().any(|entry| entry.key == key) {
+            if !keys.insert(key.clone()) {
                 return Err(A::Error::custom(format!("the key \"{key}\" is given twice; keep one of them")));
             }
             entries.push(Entry { key, key_span: None, value: map.next_value()? });
         }
         Ok(Kind::Table(entries))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_given_twice_is_found_among_very_many() {
+        // Comparing each key with all before it would take minutes.
+        let keys: String = (0..300_000).map(|i| format!("\"k{i}\":0,")).collect();
+        let error = serde_json::from_str::<Node>(&format!("{{{keys}\"k7\":1}}")).unwrap_err().to_string();
+        assert!(error.contains("\"k7\" is given twice"), "{error}");
+        assert!(serde_json::from_str::<Node>(&format!("{{{keys}\"new\":1}}")).is_ok());
     }
 }

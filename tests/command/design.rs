@@ -456,7 +456,7 @@ fn every_source_is_captured_and_fused() {
     desk.refused(
         1,
         &["simulate", "bank.json", "--source", "step@0.3", "-o", "cap"],
-        &["cap/ch1.wav", "exists already", "--force"],
+        &["cap/ch1.wav", "file exists", "--force"],
     );
 }
 

@@ -83,7 +83,7 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
             let report = desk.report(&[verb, &told, &["--gaps", policy]].concat());
             assert_eq!(report["gaps"]["list"], gaps(&[(1, 0, 2), (1, 7, 1), (1, 100, 1400)]));
             assert_eq!(
-                (report["gaps"]["missing"].as_u64(), report["ticks"].as_u64()),
+                (report["gaps"]["missing"].as_u64(), report["frames"].as_u64()),
                 (Some(1403), Some(3000))
             );
             assert_eq!(report["replaced"], 0);
@@ -136,10 +136,10 @@ fn channels_that_end_early_may_be_bridged_to_the_end_of_the_longest() {
     desk.write("b", bytes(&channel(&whole, 1)));
     let args = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out", "--gaps", "zero"];
     let report = desk.report(&args);
-    assert_eq!((report["ticks"].as_u64(), report["gaps"]["count"].as_u64()), (Some(4000), Some(0)));
+    assert_eq!((report["frames"].as_u64(), report["gaps"]["count"].as_u64()), (Some(4000), Some(0)));
     assert_eq!(report["warnings"].as_array().unwrap().len(), 1);
     let report = desk.report(&[&args[..], &["--longest", "--strict"]].concat());
-    assert_eq!((report["ticks"].as_u64(), &report["warnings"]), (Some(5000), &json!([])));
+    assert_eq!((report["frames"].as_u64(), &report["warnings"]), (Some(5000), &json!([])));
     assert_eq!(report["gaps"]["list"], gaps(&[(1, 4000, 1000)]));
     let mut zeros = whole.clone();
     zeros.chunks_exact_mut(2).skip(4000).for_each(|tick| tick[0] = 0.0);

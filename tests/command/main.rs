@@ -8,10 +8,14 @@ mod algorithms;
 mod cuts;
 mod design;
 mod examples;
+#[cfg(target_os = "linux")]
+mod faults;
 mod fuse;
 #[cfg(target_os = "linux")]
 mod long_files;
 mod lost;
+#[cfg(unix)]
+mod outputs;
 #[cfg(unix)]
 mod stream;
 mod verify;

@@ -205,8 +205,8 @@ fn an_interrupt_ends_after_whole_ticks_and_reports() {
     drop(stdin);
     assert!(output.status.success(), "{output:?}");
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((report["interrupted"].as_bool(), report["ticks"].as_u64()), (Some(true), Some(100)));
-    assert!(text(&output.stderr).contains("interrupted after 100 ticks, 200 samples written"), "{output:?}");
+    assert_eq!((report["interrupted"].as_bool(), report["frames"].as_u64()), (Some(true), Some(100)));
+    assert!(text(&output.stderr).contains("interrupted after 100 frames, 200 samples written"), "{output:?}");
     assert_eq!(floats(&fs::read(bench.path("out.raw")).unwrap()), fused(&input));
 }
 

@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         contact::difference(&full.image, &exact, gain),
         contact::difference(&partial.image, &exact, gain),
     ];
-    output::write_image(&contact::sheet(&pictures, 3), &arguments.output)?;
+    output::write_images(&[(&contact::sheet(&pictures, 3), &arguments.output)], arguments.force)?;
     drop(progress);
     report(&DemoSummary { full_depth: full_summary, partial_depth: partial_summary }, arguments)
 }
@@ -103,7 +103,7 @@ fn report(summary: &DemoSummary, arguments: &DemoArguments) -> Result<(), Failur
         arguments.output.display()
     );
     if output::is_standard(&arguments.output) {
-        eprint!("{text}");
+        output::say(&text);
         return Ok(());
     }
     output::print(&text)

@@ -39,11 +39,11 @@ impl Failure {
     pub(super) fn report(&self) -> ExitCode {
         match self {
             Self::Input(message) => {
-                eprintln!("hybank-ibr: {message}");
+                super::output::say(&format!("hybank-ibr: {message}\n"));
                 ExitCode::from(1)
             }
             Self::Usage(message) => {
-                eprintln!("hybank-ibr: {message}");
+                super::output::say(&format!("hybank-ibr: {message}\n"));
                 ExitCode::from(2)
             }
             Self::ClosedPipe => ExitCode::SUCCESS,

@@ -1,7 +1,8 @@
 //! Writing results: files that are not overwritten by accident, and standard output.
 
 use super::failure::Failure;
-use crate::image::{Image, encode, save};
+use crate::image::{Image, begin, encode};
+use hybank::files::commit_all;
 use std::io::Write;
 use std::path::Path;
 
@@ -26,11 +27,16 @@ pub(super) fn refuse_format(path: &Path) -> Result<(), Failure> {
     encode(&Image::filled(1, 1, 1, 0.0), path).map(|_| ()).map_err(Failure::input)
 }
 
-/// Writes an image to a file, or as PNG to standard output.
-pub(super) fn write_image(image: &Image, path: &Path) -> Result<(), Failure> {
-    if !is_standard(path) {
-        return save(image, path).map_err(Failure::input);
-    }
+/// Writes images to files, which appear together, or as PNG to standard output.
+pub(super) fn write_images(images: &[(&Image, &Path)], force: bool) -> Result<(), Failure> {
+    let (to_output, to_files): (Vec<_>, Vec<_>) = images.iter().partition(|(_, path)| is_standard(path));
+    let files = to_files.iter().map(|(image, path)| begin(image, path, force));
+    let files = files.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+    to_output.iter().try_for_each(|(image, _)| print_image(image))?;
+    commit_all(files).map_err(Failure::input)
+}
+
+fn print_image(image: &Image) -> Result<(), Failure> {
     let bytes = encode(image, Path::new("standard output.png")).map_err(Failure::input)?;
     let mut out = std::io::stdout().lock();
     out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
@@ -40,4 +46,9 @@ pub(super) fn write_image(image: &Image, path: &Path) -> Result<(), Failure> {
 pub(super) fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
+}
+
+/// Writes text to standard error; one that cannot be written is no reason to lose a result.
+pub(super) fn say(text: &str) {
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }

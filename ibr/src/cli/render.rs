@@ -42,10 +42,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
         compare(&mut summary, &done, truth, path)?;
     }
     progress.step("writing");
-    if let Some(mask) = &arguments.mask {
-        output::write_image(&mask_image(&done.rendering), mask)?;
-    }
-    output::write_image(&done.rendering.image, &arguments.output)?;
+    let mask = arguments.mask.as_ref().map(|path| (mask_image(&done.rendering), path));
+    let mut images = vec![(&done.rendering.image, arguments.output.as_path())];
+    images.extend(mask.iter().map(|(mask, path)| (mask, path.as_path())));
+    output::write_images(&images, arguments.force)?;
     drop(progress);
     warn(&done);
     report(&summary, arguments)
@@ -62,17 +62,24 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     if arguments.depth_step == 0 {
         return Err(Failure::Usage("--depth-step 0: the step must be at least 1".into()));
     }
-    if arguments.mask.as_ref() == Some(&arguments.output) {
-        let path = arguments.output.display();
-        return Err(Failure::Usage(format!(
-            "-o and --mask both name {path}; give the mask a file of its own"
-        )));
+    if arguments.mask.as_deref().is_some_and(output::is_standard) {
+        return Err(Failure::Usage("--mask -: the mask cannot go to standard output; give it a file".into()));
     }
+    refuse_overlaps(arguments)?;
     for path in [Some(&arguments.output), arguments.mask.as_ref()].into_iter().flatten() {
         output::refuse_existing(path, arguments.force)?;
         output::refuse_format(path)?;
     }
     Ok(())
+}
+
+/// Outputs are different files, and none of them is the scene or the true view.
+fn refuse_overlaps(arguments: &RenderArguments) -> Result<(), Failure> {
+    let outputs = [Some(arguments.output.as_path()), arguments.mask.as_deref()];
+    let outputs: Vec<_> = outputs.into_iter().flatten().filter(|path| !output::is_standard(path)).collect();
+    let inputs = [Some(arguments.scene.as_path()), arguments.truth.as_deref()];
+    let inputs: Vec<_> = inputs.into_iter().flatten().collect();
+    hybank::files::refuse_overlaps(&outputs, &inputs).map_err(Failure::input)
 }
 
 fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
@@ -176,21 +183,22 @@ fn mask_image(rendering: &Rendering) -> Image {
 
 /// Warnings on stderr about what the figures of merit alone do not show.
 fn warn(done: &Rendered) {
+    let warn = |text: String| output::say(&format!("hybank-ibr: warning: {text}\n"));
     let coverage = done.rendering.coverage();
     if coverage < 0.5 && done.hull.is_none() {
-        eprintln!("hybank-ibr: warning: only {:.1} % of the image is covered by samples", 100.0 * coverage);
+        warn(format!("only {:.1} % of the image is covered by samples", 100.0 * coverage));
     }
     if let Some(c) = done.rendering.report.convergence.filter(|c| !c.reached) {
-        eprintln!(
-            "hybank-ibr: warning: the plane fit stopped after {} steps at a relative residual of {:.1e}",
+        warn(format!(
+            "the plane fit stopped after {} steps at a relative residual of {:.1e}",
             c.steps, c.residual
-        );
+        ));
     }
     if let Some(g) = done.geometry.as_ref().filter(|g| g.order_agreement < 0.75) {
-        eprintln!(
-            "hybank-ibr: warning: only {:.0} % of the metric guesses agree on the order of depth; if near objects appear behind far ones, use --reverse-order",
+        warn(format!(
+            "only {:.0} % of the metric guesses agree on the order of depth; if near objects appear behind far ones, use --reverse-order",
             100.0 * g.order_agreement
-        );
+        ));
     }
 }
 
@@ -200,7 +208,7 @@ fn report(summary: &Summary, arguments: &RenderArguments) -> Result<(), Failure>
         return output::print(&(json + "\n"));
     }
     if output::is_standard(&arguments.output) {
-        eprint!("{}", summary.text());
+        output::say(&summary.text());
         return Ok(());
     }
     output::print(&summary.text())

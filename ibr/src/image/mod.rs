@@ -7,7 +7,7 @@ mod read;
 mod write;
 
 pub use read::{MOST_PIXELS, read_image, read_map};
-pub use write::{encode, save};
+pub use write::{begin, encode, save};
 
 use std::path::PathBuf;
 
@@ -42,6 +42,9 @@ pub enum ImageError {
         /// Most pixels.
         most: usize,
     },
+    /// The file cannot be created or get its name.
+    #[error(transparent)]
+    File(#[from] hybank::files::FileError),
     /// The file cannot be written.
     #[error("{}: {reason}", path.display())]
     Write {

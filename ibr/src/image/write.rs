@@ -1,8 +1,9 @@
 //! Encoding images in the format of the file extension.
 
 use super::{Image, ImageError, pfm};
+use hybank::files::AtomicFile;
 use image::{ColorType, ImageFormat};
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 use std::path::Path;
 
 /// The bytes of a file in the format of the extension of `path`.
@@ -28,14 +29,24 @@ pub fn encode(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
     }
 }
 
-/// Writes the image beside its final name and renames it, so that a file appears only when it is whole.
+/// Writes the image to a file that appears only when it is whole, in the place of one that exists.
 ///
 /// # Errors
-/// As [`encode`], and [`ImageError::Write`] if the system fails.
+/// As [`encode`], and [`ImageError::File`] if the system fails.
 pub fn save(image: &Image, path: &Path) -> Result<(), ImageError> {
+    Ok(begin(image, path, true)?.commit()?)
+}
+
+/// As [`save`], without giving the file its name yet: several of them are committed together by
+/// [`commit_all`](hybank::files::commit_all).
+///
+/// # Errors
+/// As [`save`], and [`ImageError::File`] if the file exists and `replace` is not set.
+pub fn begin(image: &Image, path: &Path, replace: bool) -> Result<AtomicFile, ImageError> {
     let bytes = encode(image, path)?;
-    crate::atomic::write(path, &bytes)
-        .map_err(|e| ImageError::Write { path: path.into(), reason: e.to_string() })
+    let mut file = AtomicFile::create(path, replace)?;
+    file.write_all(&bytes).map_err(|e| ImageError::Write { path: path.into(), reason: e.to_string() })?;
+    Ok(file)
 }
 
 fn encode_float(image: &Image) -> Vec<u8> {
@@ -86,6 +97,6 @@ mod tests {
         let image = Image::filled(2, 2, 1, 7.0);
         assert!(matches!(encode(&image, Path::new("x.gif")), Err(ImageError::UnknownFormat { .. })));
         assert!(matches!(encode(&image, Path::new("x")), Err(ImageError::UnknownFormat { .. })));
-        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(ImageError::Write { .. })));
+        assert!(matches!(save(&image, Path::new("/nowhere/x.png")), Err(ImageError::File(_))));
     }
 }

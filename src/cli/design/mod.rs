@@ -3,7 +3,7 @@
 mod report;
 
 use super::Failure;
-use super::bank_file::{bad_flag, is_dash, load_spec, write_text};
+use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text};
 use crate::bank::FixedPoint;
 use crate::design::{self, DesignError};
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, WordLengths};
@@ -109,6 +109,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             "--json and `-o -` both want standard output; write the bank to a file".into(),
         ));
     }
+    refuse_overlap(&args.output, &args.spec)?;
     let mut spec = load_spec(&args.spec, overrides(args))?;
     spec.latency = args.latency.or(spec.latency);
     // Everything else was checked on reading.
@@ -121,13 +122,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
     if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_silent) {
-        eprintln!("hybank: warning: {SILENT}");
+        super::warn(SILENT);
     }
     let report = Report::new(args.output.display().to_string(), &found, mean, seconds);
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {
-        eprint!("{}", report.text());
+        super::say(&report.text());
         Ok(())
     } else {
         super::print(&report.text())

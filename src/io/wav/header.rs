@@ -15,7 +15,7 @@ pub struct WavHeader {
     pub layout: SampleLayout,
     /// Samples a frame, at least 1.
     pub channels: usize,
-    /// Frames a second, at least 1.
+    /// Frames per second, at least 1.
     pub rate: u32,
     /// Bytes of samples, `None` if they go on until the end.
     pub data_bytes: Option<u64>,

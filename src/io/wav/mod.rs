@@ -2,7 +2,7 @@
 //!
 //! The reader needs no seeking and takes what is found in the wild: streamed headers whose length
 //! is unknown, odd chunks without their pad byte, headers of 16, 18 and 40 bytes, metadata before
-//! the samples, truncated files. What it had to tolerate comes back as [`WavNote`]s.
+//! the samples, truncated files. What it had to tolerate comes back as [`InputFault`](super::InputFault)s.
 
 mod chunks;
 mod header;
@@ -12,5 +12,5 @@ mod tests;
 mod writer;
 
 pub use header::WavHeader;
-pub use reader::{WavNote, WavReader};
+pub use reader::WavReader;
 pub use writer::{WavFile, stream_header};

@@ -2,40 +2,11 @@
 
 use super::chunks::Chunks;
 use super::header::WavHeader;
-use crate::io::{FrameReader, IoError, PcmFormat, SampleLayout};
-use std::fmt;
+use crate::io::{FrameReader, InputFault, IoError, PcmFormat, SampleLayout};
 use std::io::{Chain, Cursor, Read};
 
 /// Samples looked at to tell 24 high bits of 32 from 24 low ones.
 const JUSTIFICATION_SAMPLES: usize = 16384;
-
-/// A fault that was tolerated; known when the samples have ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WavNote {
-    /// The file ends before the header's promise: bytes that are not there.
-    Truncated {
-        /// Promised bytes that did not come.
-        missing_bytes: u64,
-    },
-    /// The last frame was cut and left out.
-    CutFrame {
-        /// Its bytes that were there.
-        bytes: usize,
-    },
-}
-
-impl fmt::Display for WavNote {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Truncated { missing_bytes } => {
-                write!(f, "the file is truncated: {missing_bytes} bytes that its header promises are missing")
-            }
-            Self::CutFrame { bytes } => {
-                write!(f, "the last frame is cut ({bytes} bytes of it are there) and was left out")
-            }
-        }
-    }
-}
 
 /// A WAV source, placed behind its header.
 #[derive(Debug)]
@@ -73,11 +44,11 @@ impl<R: Read> WavReader<R> {
     }
 
     /// What had to be tolerated; complete when the frames have ended.
-    pub fn notes(&self) -> Vec<WavNote> {
+    pub fn faults(&self) -> Vec<InputFault> {
         let missing_bytes = self.frames.missing_bytes();
         let bytes = self.frames.cut_bytes();
-        let truncated = (missing_bytes > 0).then_some(WavNote::Truncated { missing_bytes });
-        let cut = (bytes > 0).then_some(WavNote::CutFrame { bytes });
+        let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
+        let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
         truncated.into_iter().chain(cut).collect()
     }
 }

@@ -1,19 +1,19 @@
 //! Headers as they are found in the wild, hound as the oracle for the tame ones.
 
 use super::*;
-use crate::io::{IoError, PcmFormat, SampleLayout};
+use crate::io::{InputFault, IoError, PcmFormat, SampleLayout};
 use proptest::prelude::*;
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
 /// Header and samples as f64, as far as there are whole frames.
-fn read(bytes: &[u8]) -> Result<(WavHeader, Vec<f64>, Vec<WavNote>), IoError> {
+fn read(bytes: &[u8]) -> Result<(WavHeader, Vec<f64>, Vec<InputFault>), IoError> {
     let mut reader = WavReader::new(bytes, "test.wav")?;
     let header = reader.header().clone();
     let mut data = vec![0; bytes.len() + header.frame_bytes()];
     let filled = reader.frames().fill(&mut data).unwrap();
     let SampleLayout { format, container } = header.layout;
     let samples = data[..filled].chunks_exact(container).map(|b| format.decode(b)).collect();
-    Ok((header, samples, reader.notes()))
+    Ok((header, samples, reader.faults()))
 }
 
 fn chunk(id: &[u8; 4], content: &[u8]) -> Vec<u8> {
@@ -309,8 +309,8 @@ fn a_file_cut_at_any_byte_gives_what_is_whole_or_says_why_not() {
                     assert_eq!(samples, all[..there.min(promised) / frame * header.channels]);
                     let missing_bytes = promised.saturating_sub(there) as u64;
                     let bytes = there.min(promised) % frame;
-                    let truncated = (missing_bytes > 0).then_some(WavNote::Truncated { missing_bytes });
-                    let cut_frame = (bytes > 0).then_some(WavNote::CutFrame { bytes });
+                    let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
+                    let cut_frame = (bytes > 0).then_some(InputFault::CutFrame { bytes });
                     assert_eq!(notes, truncated.into_iter().chain(cut_frame).collect::<Vec<_>>());
                 }
                 Err(IoError::TruncatedHeader { offset, .. } | IoError::NoData { offset, .. }) => {

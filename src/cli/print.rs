@@ -1,0 +1,23 @@
+//! Standard output: results.
+
+use super::Failure;
+use std::io::{ErrorKind, Write};
+
+/// Results on standard output; a reader that went away ends the run quietly.
+pub(super) fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
+}
+
+/// One JSON object on standard output.
+pub(super) fn print_json(report: &impl serde::Serialize) -> Result<(), Failure> {
+    print(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"))
+}
+
+/// Why standard output could not be written.
+pub(super) fn print_failure(error: &std::io::Error) -> Failure {
+    match error.kind() {
+        ErrorKind::BrokenPipe => Failure::ClosedPipe,
+        _ => Failure::Input(format!("standard output: cannot write it: {error}")),
+    }
+}

@@ -1,0 +1,141 @@
+//! What `fuse` and `stream` share: options of the filters, the report, the end of a run.
+
+use super::Failure;
+use super::gaps::say_gaps;
+use super::print::print_json;
+use super::say::warn;
+use crate::pipeline::{FileOutputs, GapSummary, Outcome, Warning};
+use crate::runtime::{Form, PlanSummary, Workers};
+
+/// In which form FIR filters run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum FormArg {
+    /// The fastest one that suits the command
+    Auto,
+    /// Every product; adds no latency
+    Direct,
+    /// Frames by twos, three products instead of four; up to a quarter faster for long filters, adds no latency
+    Fast,
+    /// Fourier transforms of blocks; faster for long filters, but adds latency
+    OverlapSave,
+}
+
+impl FormArg {
+    /// `auto` is what leaving the choice to the command means.
+    pub(super) fn form(self, auto: Form) -> Form {
+        match self {
+            Self::Auto => auto,
+            Self::Direct => Form::Direct,
+            Self::Fast => Form::Fast,
+            Self::OverlapSave => Form::OverlapSave(None),
+        }
+    }
+}
+
+/// Threads of the filters.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct ThreadArgs {
+    /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any number. More
+    /// than one pays with many taps or channels; otherwise reading and writing take longer than filtering
+    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+}
+
+impl ThreadArgs {
+    /// `None` if the calling thread does all.
+    pub(super) fn workers(self) -> Result<Option<Workers>, Failure> {
+        if self.threads == 1 {
+            return Ok(None);
+        }
+        let refused = |error| Failure::Input(format!("--threads {}: {error}; ask for fewer", self.threads));
+        Workers::new(self.threads.into()).map(Some).map_err(refused)
+    }
+
+    /// Bytes of each input that are read at a time, for `bytes` with one thread: enough for all threads.
+    pub(super) fn bytes(self, bytes: usize) -> usize {
+        if self.threads == 1 { bytes } else { 8 * bytes }
+    }
+}
+
+/// How the bank ran.
+#[derive(Debug, serde::Serialize)]
+struct PlanReport {
+    form: &'static str,
+    numbers: &'static str,
+    isa: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    transform: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    block: Option<usize>,
+    extra_latency: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    multiply_adds: Option<f64>,
+}
+
+impl From<PlanSummary> for PlanReport {
+    fn from(plan: PlanSummary) -> Self {
+        let PlanSummary { form, numbers, isa, transform, block, extra_latency, multiply_adds } = plan;
+        Self { form, numbers, isa, transform, block, extra_latency, multiply_adds }
+    }
+}
+
+/// What every command that fuses reports.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct RunReport {
+    /// How the bank ran.
+    plan: PlanReport,
+    channels: usize,
+    ratio: usize,
+    /// Output samples written.
+    pub(super) samples: u64,
+    /// Output samples that saturated.
+    clipped: u64,
+    /// Input samples that were NaN or infinite and became 0.
+    replaced: u64,
+    /// Times that a recursion's state was not finite and was set to zero.
+    state_resets: u64,
+    /// Missing samples, if --gaps asked for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gaps: Option<GapSummary>,
+    warnings: Vec<String>,
+}
+
+impl RunReport {
+    /// Of an outcome and what was tolerated before; `lossless` is the option that would have kept clipped samples.
+    pub(super) fn new(outcome: Outcome, tolerated: Vec<Warning>, lossless: &str) -> Self {
+        let text = |warning| match warning {
+            Warning::Clipped(_) => format!("{warning}; {lossless} keeps them"),
+            _ => warning.to_string(),
+        };
+        let warnings = tolerated.into_iter().chain(outcome.warnings()).map(text).collect();
+        let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps } = outcome;
+        let plan = plan.into();
+        Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings }
+    }
+
+    /// With `strict` the first warning is an error.
+    fn judge(&self, strict: bool) -> Result<(), Failure> {
+        match self.warnings.first() {
+            Some(first) if strict => Err(Failure::Input(format!("{first} (an error because of --strict)"))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Judges the run, gives the outputs their names, and only then says what was tolerated: warnings that cannot be written
+/// cost nothing. `report` is printed if it is wanted.
+pub(super) fn finish(
+    outputs: FileOutputs,
+    run: &RunReport,
+    strict: bool,
+    report: Option<&impl serde::Serialize>,
+) -> Result<(), Failure> {
+    let judged = run.judge(strict);
+    if judged.is_ok() {
+        outputs.finish().map_err(Failure::running)?;
+    }
+    run.gaps.iter().for_each(say_gaps);
+    judged?;
+    run.warnings.iter().for_each(|warning| warn(warning));
+    report.map_or(Ok(()), print_json)
+}

@@ -1,0 +1,422 @@
+//! A file that appears only when it is whole.
+
+use super::{FileError, place};
+use std::collections::BTreeSet;
+use std::fs::{self, File, Metadata, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// Links that are followed one after another, as many as Linux follows.
+const MOST_LINKS: usize = 40;
+/// Characters of the target's name in that of the unfinished file, so that this is not too long for the file system.
+const NAME_PART: usize = 60;
+
+const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and redirect";
+
+/// Unfinished files of this process.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Removes all files of this process that have not been committed: for a thread that is about to end the process
+/// while others are writing.
+pub fn remove_unfinished() {
+    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        // There is nobody to tell.
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// A file that is written under a hidden name beside its target and gets its name by [`AtomicFile::commit`]; dropped
+/// without that, it leaves nothing behind. The hidden name is `.NAME.PROCESS-NUMBER.part`; a file that has it already is
+/// never touched.
+#[derive(Debug)]
+pub struct AtomicFile {
+    file: Option<File>,
+    beside: PathBuf,
+    target: PathBuf,
+    name: String,
+    replace: bool,
+}
+
+/// How a file got its name, and so how that can be undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Placed {
+    /// Nothing had the name.
+    New,
+    /// The hidden name is now that of the file that was replaced.
+    Exchanged,
+    /// What had the name is gone.
+    Replaced,
+}
+
+impl AtomicFile {
+    /// Starts a file that will be called `target`, with `replace` in the place of one that exists and with its
+    /// permission bits. A link is followed to the file that it leads to.
+    ///
+    /// # Errors
+    /// [`FileError::Exists`] if there is one already and `replace` is not set, [`FileError::NotAFile`] for what is no
+    /// plain file (a folder, device, pipe, socket, link to nothing or open descriptor), or the system's refusal.
+    pub fn create(target: &Path, replace: bool) -> Result<Self, FileError> {
+        let name = target.display().to_string();
+        let (target, known) = destination(target)?;
+        if known.is_some() && !replace {
+            return Err(FileError::Exists { file: name });
+        }
+        let begin = || {
+            let (beside, file) = create_beside(&target, known.is_some())?;
+            let begun = Self { file: Some(file), beside, target, name: name.clone(), replace };
+            unfinished(|files| files.insert(begun.beside.clone()));
+            match (&begun.file, known) {
+                (Some(file), Some(known)) => file.set_permissions(known.permissions())?,
+                _ => {}
+            }
+            Ok(begun)
+        };
+        begin().map_err(FileError::system(&name, "create it"))
+    }
+
+    /// The name that was asked for.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Gives the file its final name.
+    ///
+    /// # Errors
+    /// [`FileError::Exists`] if a file appeared under the name and must not be replaced, or the system's refusal to
+    /// store the bytes or to give the name; nothing is left behind then.
+    pub fn commit(mut self) -> Result<(), FileError> {
+        self.seal()?;
+        let placed = if self.replace {
+            fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced)
+        } else {
+            place::rename_new(&self.beside, &self.target).map(|()| Placed::New)
+        };
+        let placed = placed.map_err(|error| self.refused(error))?;
+        self.keep(placed);
+        Ok(())
+    }
+
+    /// Brings the bytes to the disk and closes the file, which has no name yet; later writes fail. Sets of many files need no
+    /// more than one open file this way.
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub fn seal(&mut self) -> Result<(), FileError> {
+        let Some(file) = self.file.take() else { return Ok(()) };
+        place::sync_and_close(file).map_err(FileError::system(&self.name, "write it to the end"))
+    }
+
+    /// Gives the file, sealed before, its name in a way that can be undone if the system allows.
+    pub(super) fn place(&mut self) -> Result<Placed, FileError> {
+        let placed = match place::rename_new(&self.beside, &self.target) {
+            Err(error) if self.replace && error.kind() == io::ErrorKind::AlreadyExists => {
+                match place::exchange(&self.beside, &self.target) {
+                    Ok(()) => Ok(Placed::Exchanged),
+                    Err(_) => fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced),
+                }
+            }
+            other => other.map(|()| Placed::New),
+        };
+        placed.map_err(|error| self.refused(error))
+    }
+
+    /// Takes the name back; what was replaced gets its own again, unless it is gone.
+    pub(super) fn undo(mut self, placed: Placed) {
+        // The failure that led here is reported; a second one adds nothing.
+        match placed {
+            Placed::New => drop(fs::remove_file(&self.target)),
+            Placed::Exchanged => drop(place::exchange(&self.beside, &self.target)),
+            Placed::Replaced => {}
+        }
+        if placed != Placed::Exchanged {
+            self.forget();
+        }
+    }
+
+    /// Leaves the file under its name, for good.
+    pub(super) fn keep(mut self, placed: Placed) {
+        if placed != Placed::Exchanged {
+            self.forget();
+        }
+        // Otherwise the hidden name is that of the old file, which goes with this value.
+    }
+
+    /// Nothing has the hidden name any more.
+    fn forget(&mut self) {
+        unfinished(|files| files.remove(&self.beside));
+        self.beside = PathBuf::new();
+    }
+
+    fn refused(&self, error: io::Error) -> FileError {
+        let file = self.name.clone();
+        if error.kind() == io::ErrorKind::AlreadyExists && !self.replace {
+            return FileError::Exists { file };
+        }
+        FileError::System { file, action: "give the finished file its name", source: error }
+    }
+
+    fn file(&mut self) -> io::Result<&mut File> {
+        self.file.as_mut().ok_or_else(|| io::Error::other("the file is already closed"))
+    }
+}
+
+impl Drop for AtomicFile {
+    fn drop(&mut self) {
+        if !self.beside.as_os_str().is_empty() {
+            // There is nobody to tell: the failure that led here is already on its way.
+            let _ = fs::remove_file(&self.beside);
+            self.forget();
+        }
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file()?.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file()?.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file()?.seek(to)
+    }
+}
+
+fn unfinished<R>(change: impl FnOnce(&mut BTreeSet<PathBuf>) -> R) -> R {
+    change(&mut UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Where a file of this name has to be put, and the plain file that is there.
+fn destination(path: &Path) -> Result<(PathBuf, Option<Metadata>), FileError> {
+    let refused = |what| Err(FileError::NotAFile { file: path.display().to_string(), what });
+    let Ok(found) = path.symlink_metadata() else { return Ok((path.to_owned(), None)) };
+    let (target, found) = if found.is_symlink() {
+        match follow(path) {
+            Ok(end) => end,
+            Err(what) => return refused(what),
+        }
+    } else {
+        (path.to_owned(), found)
+    };
+    match found {
+        _ if found.is_file() => Ok((target, Some(found))),
+        _ if found.is_dir() => refused("a folder; give the name of a file in it"),
+        // A rename would put a plain file in the place of /dev/full or of a pipe that somebody listens to.
+        _ => refused(OTHER_KIND),
+    }
+}
+
+/// The end of a chain of links, or what is wrong with it.
+fn follow(link: &Path) -> Result<(PathBuf, Metadata), &'static str> {
+    const NOTHING: &str = "a link to nothing; remove the link, or give the name that it should lead to";
+    let mut path = link.to_owned();
+    for _ in 0..MOST_LINKS {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).to_owned();
+        // Links there stand for open files (/dev/stdout), not for names.
+        if folder.canonicalize().is_ok_and(|folder| folder.starts_with("/proc")) {
+            return Err("a link to an open file; write to `-` and redirect");
+        }
+        path = folder.join(fs::read_link(&path).map_err(|_| NOTHING)?);
+        let found = path.symlink_metadata().map_err(|_| NOTHING)?;
+        if !found.is_symlink() {
+            return Ok((path, found));
+        }
+    }
+    Err("a link that leads back to itself; remove it")
+}
+
+/// Opens a new file next to `target`, under a name that nobody has; `private` until its permissions are set.
+fn create_beside(target: &Path, private: bool) -> io::Result<(PathBuf, File)> {
+    let name = target.file_name().ok_or(io::ErrorKind::InvalidFilename)?.to_string_lossy();
+    let name: String = name.chars().take(NAME_PART).collect();
+    let mut options = OpenOptions::new();
+    options.write(true).read(true).create_new(true);
+    #[cfg(unix)]
+    if private {
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    }
+    for number in 0..1000u32 {
+        let beside = target.with_file_name(format!(".{name}.{}-{number}.part", std::process::id()));
+        match options.open(&beside) {
+            Ok(file) => return Ok((beside, file)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::ErrorKind::AlreadyExists.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn appears_only_when_committed() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("out.wav");
+        let mut file = AtomicFile::create(&target, false).unwrap();
+        file.write_all(b"whole").unwrap();
+        assert!(!target.exists());
+        file.commit().unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"whole");
+        assert_eq!(names(folder.path()), ["out.wav"]);
+    }
+
+    #[test]
+    fn leaves_nothing_when_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut file = AtomicFile::create(&folder.path().join("out.wav"), false).unwrap();
+        file.write_all(b"half").unwrap();
+        drop(file);
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn replaces_only_when_asked() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("out.wav");
+        fs::write(&target, "old").unwrap();
+        let error = AtomicFile::create(&target, false).unwrap_err();
+        assert!(matches!(error, FileError::Exists { .. }) && error.to_string().contains("--force"));
+        assert_eq!(fs::read(&target).unwrap(), b"old");
+        AtomicFile::create(&target, true).unwrap().commit().unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"");
+    }
+
+    #[test]
+    fn what_came_in_between_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("out.wav");
+        // Two runs that began before either of them ended.
+        let mut first = AtomicFile::create(&target, false).unwrap();
+        let mut second = AtomicFile::create(&target, false).unwrap();
+        first.write_all(b"first").unwrap();
+        second.write_all(b"second").unwrap();
+        first.commit().unwrap();
+        assert!(matches!(second.commit().unwrap_err(), FileError::Exists { .. }));
+        assert_eq!(fs::read(&target).unwrap(), b"first");
+        assert_eq!(names(folder.path()), ["out.wav"]);
+    }
+
+    #[test]
+    fn hidden_names_of_others_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let stale = folder.path().join(format!(".out.wav.{}-0.part", std::process::id()));
+        fs::write(&stale, "not ours").unwrap();
+        let target = folder.path().join("out.wav");
+        AtomicFile::create(&target, false).unwrap().commit().unwrap();
+        drop(AtomicFile::create(&target, true).unwrap());
+        assert_eq!(fs::read(&stale).unwrap(), b"not ours");
+    }
+
+    #[test]
+    fn a_name_as_long_as_the_system_allows_is_no_fault() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("x".repeat(250));
+        AtomicFile::create(&target, false).unwrap().commit().unwrap();
+        assert!(target.exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_replaced_file_keeps_its_permissions_and_is_never_more_open() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("out.wav");
+        for mode in [0o600, 0o640, 0o444] {
+            let _ = fs::remove_file(&target);
+            fs::write(&target, "old").unwrap();
+            fs::set_permissions(&target, fs::Permissions::from_mode(mode)).unwrap();
+            let file = AtomicFile::create(&target, true).unwrap();
+            assert_eq!(file.beside.metadata().unwrap().permissions().mode() & 0o777, mode);
+            file.commit().unwrap();
+            assert_eq!(target.metadata().unwrap().permissions().mode() & 0o777, mode);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_or_refused_but_never_replaced() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir(path("sub")).unwrap();
+        fs::write(path("sub/real"), "old").unwrap();
+        symlink("sub/real", path("link")).unwrap();
+        symlink("link", path("second")).unwrap();
+        symlink("none", path("dangling")).unwrap();
+        symlink("circle", path("circle")).unwrap();
+        assert!(matches!(AtomicFile::create(&path("second"), false), Err(FileError::Exists { .. })));
+        let mut file = AtomicFile::create(&path("second"), true).unwrap();
+        file.write_all(b"new").unwrap();
+        file.commit().unwrap();
+        assert_eq!(fs::read(path("sub/real")).unwrap(), b"new");
+        for (name, part) in [("dangling", "link to nothing"), ("circle", "back to itself")] {
+            let error = AtomicFile::create(&path(name), true).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+        for name in ["link", "second", "dangling", "circle"] {
+            assert!(path(name).symlink_metadata().unwrap().is_symlink(), "{name}");
+        }
+        assert_eq!(names(&path("sub")), ["real"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn links_to_open_files_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = File::create(folder.path().join("open")).unwrap();
+        let descriptor = format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&open));
+        std::os::unix::fs::symlink(&descriptor, folder.path().join("link")).unwrap();
+        for path in [PathBuf::from(descriptor), folder.path().join("link")] {
+            let error = AtomicFile::create(&path, true).unwrap_err().to_string();
+            assert!(error.contains("open file") && error.contains("redirect"), "{error}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_pipes_and_sockets_are_never_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&target).unwrap();
+        let error = AtomicFile::create(&target, true).unwrap_err().to_string();
+        assert!(error.contains("socket") && error.contains("redirect"), "{error}");
+        assert!(target.symlink_metadata().unwrap().file_type().is_socket());
+        assert_eq!(names(folder.path()), ["socket"]);
+    }
+
+    #[test]
+    fn refuses_folders_and_missing_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(AtomicFile::create(folder.path(), true).is_err());
+        let error = AtomicFile::create(&folder.path().join("no/such/out.wav"), false).unwrap_err();
+        assert!(error.to_string().contains("no/such/out.wav"));
+    }
+
+    #[test]
+    fn unfinished_files_can_be_removed_from_elsewhere() {
+        // Not remove_unfinished itself: other tests of this process are writing.
+        let folder = tempfile::tempdir().unwrap();
+        let file = AtomicFile::create(&folder.path().join("out.wav"), false).unwrap();
+        assert!(unfinished(|files| files.contains(&file.beside)));
+        let beside = file.beside.clone();
+        file.commit().unwrap();
+        assert!(unfinished(|files| !files.contains(&beside)));
+    }
+}

@@ -1,0 +1,80 @@
+//! Reading files whole, but no more of them than a sound input has: a device never ends.
+
+use super::FileError;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// How long a kind of file may be.
+#[derive(Debug, Clone, Copy)]
+pub struct Bound {
+    /// The most bytes.
+    pub bytes: u64,
+    /// The kind, with its article: `a bank file`.
+    pub kind: &'static str,
+    /// What to do about a longer one.
+    pub remedy: &'static str,
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+/// The system's refusal, or [`FileError::TooLong`].
+pub fn read_bytes(path: &Path, bound: Bound) -> Result<Vec<u8>, FileError> {
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(FileError::system(&name, "read it"))?;
+    bytes_of(file, &name, bound)
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// As [`read_bytes`], or [`FileError::NotText`].
+pub fn read_text(path: &Path, bound: Bound) -> Result<String, FileError> {
+    text(read_bytes(path, bound)?, &path.display().to_string())
+}
+
+/// The text of a stream called `name`.
+///
+/// # Errors
+/// As [`read_text`].
+pub fn text_of(stream: impl Read, name: &str, bound: Bound) -> Result<String, FileError> {
+    text(bytes_of(stream, name, bound)?, name)
+}
+
+fn bytes_of(stream: impl Read, name: &str, bound: Bound) -> Result<Vec<u8>, FileError> {
+    let mut bytes = Vec::new();
+    let read = stream.take(bound.bytes.saturating_add(1)).read_to_end(&mut bytes);
+    read.map_err(FileError::system(name, "read it"))?;
+    if bytes.len() as u64 > bound.bytes {
+        let Bound { bytes: most, kind, remedy } = bound;
+        return Err(FileError::TooLong { file: name.to_owned(), most, kind, remedy });
+    }
+    Ok(bytes)
+}
+
+fn text(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
+    String::from_utf8(bytes).map_err(|error| FileError::NotText {
+        file: name.to_owned(),
+        offset: error.utf8_error().valid_up_to(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOUND: Bound = Bound { bytes: 4, kind: "a test", remedy: "write a shorter one" };
+
+    #[test]
+    fn what_never_ends_is_refused_with_bound_and_remedy() {
+        let error = text_of(std::io::repeat(7), "endless", BOUND).unwrap_err().to_string();
+        assert_eq!(error, "endless: longer than 4 bytes, the most that a test may have; write a shorter one");
+        assert_eq!(text_of(&b"1234"[..], "fits", BOUND).unwrap(), "1234");
+    }
+
+    #[test]
+    fn what_is_no_text_says_where() {
+        assert!(text_of(&b"ab\xff"[..], "x", BOUND).unwrap_err().to_string().contains("byte 2"));
+    }
+}

@@ -1,0 +1,298 @@
+//! One input as the consumer sees it: frames in the order of time, with NaN for the lost ones.
+//!
+//! Nothing is copied where nothing is lost: the frames are those of the block that was read.
+
+use super::lost::{Dropout, LostInInput};
+use super::timestamps::Segment;
+use super::{PcmFormat, PcmFrames, SampleLayout, StreamHeader};
+use std::collections::VecDeque;
+
+/// Lost frames that are handed out at a time.
+const LOST_FRAMES: usize = 1024;
+
+/// Bytes that were read, whole frames.
+#[derive(Debug, Default)]
+pub(super) struct Block {
+    pub(super) bytes: Vec<u8>,
+    pub(super) filled: usize,
+}
+
+/// What the next frames are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum View {
+    /// Those of the block.
+    Read,
+    /// Those of the block, some channels invalid.
+    Dropouts,
+    /// Lost; the block stays where it is.
+    Lost,
+    /// Lost, since the input is over.
+    Over,
+}
+
+/// The input's frames in the order of time.
+#[derive(Debug)]
+pub(super) struct AlignedInput {
+    pub(super) header: StreamHeader,
+    block: Block,
+    /// Bytes of the block that are used up.
+    used: usize,
+    /// No block will follow.
+    ended: bool,
+    segments: VecDeque<Segment>,
+    /// Invalid samples ahead, and those that time is in.
+    dropouts: VecDeque<Dropout>,
+    active: Vec<Dropout>,
+    /// Frames that are over.
+    time: u64,
+    /// Frames of the input that are over.
+    frames: u64,
+    view: View,
+    /// Numbers in place of lost or partly invalid frames.
+    numbers: Vec<u8>,
+}
+
+impl AlignedInput {
+    pub(super) fn new(header: StreamHeader) -> Self {
+        Self {
+            header,
+            block: Block::default(),
+            used: 0,
+            ended: false,
+            segments: [Segment::Frames(u64::MAX)].into(),
+            dropouts: VecDeque::new(),
+            active: Vec::new(),
+            time: 0,
+            frames: 0,
+            view: View::Read,
+            numbers: Vec::new(),
+        }
+    }
+
+    /// Takes what is known of lost frames, before the first one is used.
+    pub(super) fn lose(&mut self, segments: VecDeque<Segment>, lost: LostInInput) {
+        self.segments = segments;
+        self.dropouts = lost.dropouts.into();
+        self.enter_dropouts();
+    }
+
+    /// Takes the next block, once the last one is used up; gives that one back.
+    pub(super) fn refill(&mut self, block: Block) -> Block {
+        self.used = 0;
+        std::mem::replace(&mut self.block, block)
+    }
+
+    /// The block, once it is used up.
+    pub(super) fn take_used(&mut self) -> Option<Block> {
+        let done = self.left() == 0 && !self.block.bytes.is_empty();
+        done.then(|| self.refill(Block::default()))
+    }
+
+    /// No block will follow.
+    pub(super) fn end(&mut self) {
+        self.ended = true;
+    }
+
+    /// True once no block will follow.
+    pub(super) fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// True if a block must come before this input can go on.
+    pub(super) fn waits(&self) -> bool {
+        self.ready() == 0 && !self.ended
+    }
+
+    /// True if there is nothing left, not even lost frames.
+    pub(super) fn is_over(&self) -> bool {
+        self.ready() == 0 && self.ended
+    }
+
+    /// Frames of the block that are left.
+    pub(super) fn left(&self) -> usize {
+        (self.block.filled - self.used) / self.header.frame_bytes()
+    }
+
+    /// Frames of the input that are used or at hand.
+    pub(super) fn seen(&self) -> u64 {
+        self.frames + self.left() as u64
+    }
+
+    /// True if timestamps or lost frames lie beyond the frames so far.
+    pub(super) fn has_unreached_segments(&self) -> bool {
+        self.segments.len() > 1
+    }
+
+    /// Frames that are at hand and alike.
+    pub(super) fn ready(&self) -> usize {
+        let (frames, most) = match self.segments.front() {
+            Some(&Segment::Lost(count)) => (clamp(count), LOST_FRAMES),
+            Some(&Segment::Frames(count)) if self.active.is_empty() => {
+                (self.left().min(clamp(count)), usize::MAX)
+            }
+            Some(&Segment::Frames(count)) => (self.left().min(clamp(count)), LOST_FRAMES),
+            None => (0, 0),
+        };
+        frames.min(most).min(clamp(self.next_border() - self.time))
+    }
+
+    /// Makes `frames` frames visible: at most those that are ready, or any number once the input is over.
+    pub(super) fn prepare(&mut self, frames: usize) {
+        self.view = match self.segments.front() {
+            _ if self.is_over() => View::Over,
+            Some(Segment::Lost(_)) => View::Lost,
+            _ if self.active.is_empty() => View::Read,
+            _ => View::Dropouts,
+        };
+        match self.view {
+            View::Read => {}
+            View::Dropouts => self.decode_with_dropouts(frames),
+            View::Lost | View::Over => {
+                self.numbers.clear();
+                let samples = frames * self.header.channels;
+                self.numbers.extend(std::iter::repeat_n(f64::NAN.to_le_bytes(), samples).flatten());
+            }
+        }
+    }
+
+    /// What was prepared.
+    pub(super) fn view(&self, frames: usize) -> PcmFrames<'_> {
+        let channels = self.header.channels;
+        if self.view == View::Read {
+            let bytes = &self.block.bytes[self.used..self.used + frames * self.header.frame_bytes()];
+            return PcmFrames { layout: self.header.layout, channels, bytes };
+        }
+        let layout = SampleLayout::packed(PcmFormat::F64Le);
+        PcmFrames { layout, channels, bytes: &self.numbers[..frames * channels * 8] }
+    }
+
+    /// Goes on by `frames` frames.
+    pub(super) fn advance(&mut self, frames: usize) {
+        self.time += frames as u64;
+        if self.view == View::Over {
+            return;
+        }
+        if self.view != View::Lost {
+            self.used += frames * self.header.frame_bytes();
+            self.frames += frames as u64;
+        }
+        if let Some(Segment::Lost(count) | Segment::Frames(count)) = self.segments.front_mut() {
+            *count -= (*count).min(frames as u64);
+            if *count == 0 {
+                self.segments.pop_front();
+            }
+        }
+        self.enter_dropouts();
+    }
+
+    fn enter_dropouts(&mut self) {
+        let time = self.time;
+        self.active.retain(|dropout| dropout.frames.end > time);
+        while self.dropouts.front().is_some_and(|dropout| dropout.frames.start <= time) {
+            self.active.extend(self.dropouts.pop_front().filter(|dropout| dropout.frames.end > time));
+        }
+    }
+
+    /// The next frame at which a dropout begins or ends.
+    fn next_border(&self) -> u64 {
+        let ends = self.active.iter().map(|dropout| dropout.frames.end);
+        ends.chain(self.dropouts.front().map(|dropout| dropout.frames.start)).min().unwrap_or(u64::MAX)
+    }
+
+    fn decode_with_dropouts(&mut self, frames: usize) {
+        let StreamHeader { layout, channels, .. } = self.header;
+        let bytes = &self.block.bytes[self.used..self.used + frames * self.header.frame_bytes()];
+        self.numbers.clear();
+        for (index, sample) in bytes.chunks_exact(layout.container).enumerate() {
+            let invalid = self.active.iter().any(|dropout| dropout.channel == index % channels);
+            let value = if invalid { f64::NAN } else { layout.format.decode(sample) };
+            self.numbers.extend(value.to_le_bytes());
+        }
+    }
+}
+
+fn clamp(count: u64) -> usize {
+    usize::try_from(count).unwrap_or(usize::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames of big-endian 16-bit samples 0, 1, 2, ..
+    fn input(
+        channels: usize,
+        segments: &[Segment],
+        dropouts: &[(usize, std::ops::Range<u64>)],
+    ) -> AlignedInput {
+        let layout = SampleLayout::packed(PcmFormat::S16Be);
+        let mut input = AlignedInput::new(StreamHeader { layout, channels, rate: None, promised: None });
+        let dropout = |(channel, frames): &(usize, std::ops::Range<u64>)| Dropout {
+            channel: *channel,
+            frames: frames.clone(),
+        };
+        let lost = LostInInput { dropouts: dropouts.iter().map(dropout).collect(), ..LostInInput::default() };
+        input.lose(segments.iter().copied().collect(), lost);
+        input
+    }
+
+    /// All frames, from blocks of `block` frames, in steps of at most `step`.
+    fn run(mut input: AlignedInput, frames: usize, block: usize, step: usize) -> Vec<Option<i16>> {
+        let channels = input.header.channels;
+        let bytes: Vec<u8> = (0..(frames * channels) as i16).flat_map(i16::to_be_bytes).collect();
+        let mut blocks = bytes.chunks(2 * channels * block);
+        let mut out = Vec::new();
+        loop {
+            if input.waits() {
+                match blocks.next() {
+                    Some(bytes) => drop(input.refill(Block { bytes: bytes.to_vec(), filled: bytes.len() })),
+                    None => input.end(),
+                }
+                continue;
+            }
+            if input.is_over() {
+                return out;
+            }
+            let count = input.ready().min(step);
+            input.prepare(count);
+            let frames = input.view(count);
+            let values =
+                frames.bytes.chunks_exact(frames.layout.container).map(|b| frames.layout.format.decode(b));
+            out.extend(values.map(|x| x.is_finite().then_some((x * 32768.0) as i16)));
+            input.advance(count);
+        }
+    }
+
+    #[test]
+    fn lost_frames_and_invalid_samples_come_out_as_nan_however_they_are_cut() {
+        let segments = [Segment::Lost(2), Segment::Frames(3), Segment::Lost(2893), Segment::Frames(u64::MAX)];
+        // Frames 2, 3, 4 of time are frames 0, 1, 2 of the input; 2898 is its frame 3.
+        let dropouts = [(1, 0..3), (0, 4..2899), (1, 2898..2900), (1, 2899..2901)];
+        let mut want = vec![None; 4];
+        want.extend([Some(0), None, Some(2), Some(3), None, Some(5)]);
+        want.extend(vec![None; 2 * 2893]);
+        want.extend([None, None, Some(8), None, Some(10), None, Some(12), Some(13)]);
+        for (block, step) in [(1, 1), (2, 3), (5, 1000), (7, usize::MAX)] {
+            assert_eq!(run(input(2, &segments, &dropouts), 7, block, step), want, "{block} {step}");
+        }
+    }
+
+    #[test]
+    fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
+        let mut short = input(1, &[Segment::Frames(9), Segment::Lost(4), Segment::Frames(u64::MAX)], &[]);
+        assert_eq!(
+            run(input(1, &[Segment::Frames(3), Segment::Lost(1)], &[]), 3, 2, 9),
+            [Some(0), Some(1), Some(2), None]
+        );
+        let _ = short.refill(Block { bytes: vec![0; 4], filled: 4 });
+        short.end();
+        short.prepare(2);
+        short.advance(2);
+        assert!(short.is_over() && short.has_unreached_segments() && short.seen() == 2);
+        // From here on it is lost for as long as anybody asks.
+        short.prepare(5);
+        assert_eq!(short.view(5).frames(), 5);
+        short.advance(5);
+        assert!(short.is_over() && short.seen() == 2);
+    }
+}

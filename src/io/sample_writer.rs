@@ -1,0 +1,143 @@
+//! One channel of output samples: to a file or SigMF recording that appears when whole, or to standard output.
+
+use super::wav::{WavFile, stream_header};
+use super::{IoError, PcmFormat, SigmfMeta, Stdout};
+use crate::files::AtomicFile;
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+/// What surrounds the samples of an output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Container {
+    /// A WAV header.
+    Wav,
+    /// Nothing.
+    Raw,
+}
+
+/// The open end.
+enum Target {
+    Wav(WavFile<AtomicFile>),
+    Raw(AtomicFile),
+    Stdout(Stdout),
+    /// Raw samples, and the metadata beside them.
+    Sigmf {
+        data: AtomicFile,
+        meta: AtomicFile,
+        text: String,
+    },
+}
+
+/// One channel of encoded samples on their way out.
+pub struct SampleWriter {
+    target: Target,
+    name: String,
+}
+
+impl SampleWriter {
+    /// Begins an output at `rate` hertz. `-` is standard output, where a WAV header says no length; a name that ends in
+    /// sigmf-meta is a SigMF recording. `replace` allows files to be replaced.
+    ///
+    /// # Errors
+    /// [`IoError`] for files that exist or cannot be created, for samples or rates that WAV cannot hold, and for a standard
+    /// output that is a terminal.
+    pub fn create(
+        path: &Path,
+        container: Container,
+        format: PcmFormat,
+        rate: f64,
+        replace: bool,
+    ) -> Result<Self, IoError> {
+        let to_stdout = path.as_os_str() == "-";
+        let name = if to_stdout { "standard output".into() } else { path.display().to_string() };
+        let refused = || IoError::system(&name, "write it");
+        let target = match container {
+            _ if is_sigmf_meta(path) => sigmf_target(path, format, rate, replace)?,
+            Container::Wav if to_stdout => {
+                let header = stream_header(format, 1, wav_rate(&name, rate)?).map_err(refused())?;
+                stdout_target(&header).map_err(refused())?
+            }
+            Container::Wav => {
+                let rate = wav_rate(&name, rate)?;
+                let file = AtomicFile::create(path, replace)?;
+                Target::Wav(WavFile::new(file, format, 1, rate).map_err(refused())?)
+            }
+            Container::Raw if to_stdout => stdout_target(&[]).map_err(refused())?,
+            Container::Raw => Target::Raw(AtomicFile::create(path, replace)?),
+        };
+        Ok(Self { target, name })
+    }
+
+    /// The files that an output of this name has: none for `-`, two for a SigMF recording.
+    pub fn files(path: &Path) -> Vec<PathBuf> {
+        match path {
+            _ if path.as_os_str() == "-" => Vec::new(),
+            _ if is_sigmf_meta(path) => vec![path.to_owned(), path.with_extension("sigmf-data")],
+            _ => vec![path.to_owned()],
+        }
+    }
+
+    /// Appends encoded samples.
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), IoError> {
+        let written = match &mut self.target {
+            Target::Wav(file) => file.write_bytes(bytes),
+            Target::Raw(file) => file.write_all(bytes),
+            Target::Stdout(stdout) => stdout.write_all(bytes),
+            Target::Sigmf { data, .. } => data.write_all(bytes),
+        };
+        written.map_err(IoError::system(&self.name, "write it"))
+    }
+
+    /// Completes headers and metadata; the files, which have no names yet, are to be committed.
+    ///
+    /// # Errors
+    /// The system's refusal.
+    pub fn finish(self) -> Result<Vec<AtomicFile>, IoError> {
+        let refused = IoError::system(&self.name, "write it");
+        match self.target {
+            Target::Wav(file) => Ok(vec![file.finish().map_err(refused)?]),
+            Target::Raw(file) => Ok(vec![file]),
+            Target::Stdout(mut stdout) => stdout.flush().map(|()| Vec::new()).map_err(refused),
+            Target::Sigmf { data, mut meta, text } => {
+                meta.write_all(text.as_bytes()).map_err(refused)?;
+                Ok(vec![data, meta])
+            }
+        }
+    }
+}
+
+fn is_sigmf_meta(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "sigmf-meta")
+}
+
+fn sigmf_target(path: &Path, format: PcmFormat, rate: f64, replace: bool) -> Result<Target, IoError> {
+    let meta = AtomicFile::create(path, replace)?;
+    let data = AtomicFile::create(&path.with_extension("sigmf-data"), replace)?;
+    let text = serde_json::to_string_pretty(&SigmfMeta::for_output(format, rate));
+    let fault = |error: serde_json::Error| IoError::Sigmf {
+        file: path.display().to_string(),
+        problem: error.to_string(),
+    };
+    Ok(Target::Sigmf { data, meta, text: text.map_err(fault)? + "\n" })
+}
+
+/// The nearest rate that a WAV header can say.
+fn wav_rate(file: &str, rate: f64) -> Result<u32, IoError> {
+    if rate > f64::from(u32::MAX) {
+        return Err(IoError::WavRate { file: file.to_owned(), rate });
+    }
+    Ok(rate.round().max(1.0) as u32)
+}
+
+/// Standard output for samples, which a terminal cannot show.
+fn stdout_target(header: &[u8]) -> io::Result<Target> {
+    if io::stdout().is_terminal() {
+        return Err(io::Error::other("it is a terminal; redirect it to a file or a pipe"));
+    }
+    let mut stdout = Stdout::new()?;
+    stdout.write_all(header)?;
+    Ok(Target::Stdout(stdout))
+}

@@ -1,0 +1,153 @@
+//! When the frames of an input were taken: which follow one another without a break, and how many
+//! were lost in between.
+
+use std::collections::VecDeque;
+
+/// Frames that one break may lose at most, 2^36 (a minute at a gigahertz).
+pub const MAX_LOST_AT_ONCE: u64 = 1 << 36;
+
+/// Frames that an input may lose in all unless more are allowed, 2^26 (23 minutes at 48 kHz, 256 MiB of 32-bit floats
+/// for each sample of an output frame): a mistaken number would otherwise ask for output without end.
+pub const MAX_LOST: u64 = 1 << 26;
+
+/// Frame `frame` of the input was number `index` at the converter, where lost frames count too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Timestamp {
+    pub(super) frame: u64,
+    pub(super) index: u64,
+}
+
+impl Timestamp {
+    /// Index of the input's first frame, if nothing was lost before this one.
+    fn beginning(self) -> Option<u64> {
+        self.index.checked_sub(self.frame)
+    }
+}
+
+/// Frames that follow each other, or a break.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Segment {
+    /// So many frames were lost.
+    Lost(u64),
+    /// So many follow each other; `u64::MAX` to the end.
+    Frames(u64),
+}
+
+impl Segment {
+    /// Frames that were lost.
+    pub(super) fn lost(&self) -> u64 {
+        if let Self::Lost(frames) = *self { frames } else { 0 }
+    }
+}
+
+/// Timestamps in their order; without any the frames follow each other from the first to the last.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Timestamps(Vec<Timestamp>);
+
+impl Timestamps {
+    /// Checks that time and file run in the same direction.
+    pub(super) fn new(timestamps: Vec<Timestamp>) -> Result<Self, String> {
+        if let Some(first) = timestamps.first().filter(|first| first.beginning().is_none()) {
+            return Err(format!(
+                "sample_start {} has global_index {}, so that the samples before it would have been taken before 0; add a constant to all indices",
+                first.frame, first.index
+            ));
+        }
+        for pair in timestamps.windows(2) {
+            lost_between(pair[0], pair[1])?;
+        }
+        Ok(Self(timestamps))
+    }
+
+    /// True if nothing is known.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Index of the input's first frame, if anything is known.
+    pub(super) fn beginning(&self) -> Option<u64> {
+        self.0.first().and_then(|first| first.beginning())
+    }
+
+    /// Frames and breaks in their order, with time counted from `origin`, which is not later than
+    /// the beginning.
+    pub(super) fn segments(&self, origin: u64) -> Result<VecDeque<Segment>, String> {
+        let mut segments = VecDeque::new();
+        let first = Timestamp { frame: 0, index: origin };
+        let mut last = Timestamp { frame: 0, index: self.beginning().unwrap_or(origin) };
+        let mut add = |frames, lost| {
+            segments.extend((frames > 0).then_some(Segment::Frames(frames)));
+            segments.extend((lost > 0).then_some(Segment::Lost(lost)));
+        };
+        add(0, lost_between(first, last)?);
+        for &timestamp in &self.0 {
+            add(timestamp.frame - last.frame, lost_between(last, timestamp)?);
+            last = timestamp;
+        }
+        segments.push_back(Segment::Frames(u64::MAX));
+        Ok(segments)
+    }
+}
+
+/// Frames lost between two timestamps.
+fn lost_between(a: Timestamp, b: Timestamp) -> Result<u64, String> {
+    let lost = b.frame.checked_sub(a.frame).zip(b.index.checked_sub(a.index));
+    let lost = lost.and_then(|(frames, time)| time.checked_sub(frames)).ok_or_else(|| {
+        format!(
+            "sample_start {} with global_index {} does not lie behind sample_start {} with global_index {}; captures must be in order and must not overlap",
+            b.frame, b.index, a.frame, a.index
+        )
+    })?;
+    if lost > MAX_LOST_AT_ONCE {
+        return Err(format!(
+            "{lost} samples are lost before sample_start {}; more than {MAX_LOST_AT_ONCE} at once are taken for a mistake, fuse the parts one by one",
+            b.frame
+        ));
+    }
+    Ok(lost)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn timestamps(pairs: &[(u64, u64)]) -> Result<Timestamps, String> {
+        Timestamps::new(pairs.iter().map(|&(frame, index)| Timestamp { frame, index }).collect())
+    }
+
+    fn segments(pairs: &[(u64, u64)], origin: u64) -> Vec<Segment> {
+        timestamps(pairs).unwrap().segments(origin).unwrap().into()
+    }
+
+    #[test]
+    fn breaks_lie_where_the_count_jumps() {
+        use Segment::{Frames, Lost};
+        let rest = Frames(u64::MAX);
+        assert_eq!(segments(&[], 7), [rest]);
+        assert_eq!(segments(&[(0, 100)], 100), [rest]);
+        assert_eq!(segments(&[(0, 100)], 98), [Lost(2), rest]);
+        // Two late, two lost after three, then up to 3000.
+        let want = [Lost(2), Frames(3), Lost(2), Frames(2), Lost(2893), rest];
+        assert_eq!(segments(&[(0, 100), (3, 105), (5, 3000)], 98), want);
+        // What stands before the first timestamp lies directly before it.
+        assert_eq!(segments(&[(4, 14), (6, 17)], 8), [Lost(2), Frames(4), Frames(2), Lost(1), rest]);
+        // Lost at the very beginning, said twice.
+        assert_eq!(segments(&[(0, 5), (0, 6)], 5), [Lost(1), rest]);
+        assert_eq!(timestamps(&[(4, 14)]).unwrap().beginning(), Some(10));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        for (pairs, part) in [
+            (&[(0, 5), (4, 6)][..], "must not overlap"),
+            (&[(4, 4), (2, 9)], "must not overlap"),
+            (&[(4, 3)], "before 0"),
+            (&[(0, 0), (1, MAX_LOST_AT_ONCE + 2)], "mistake"),
+            (&[(0, 0), (1, u64::MAX)], "mistake"),
+        ] {
+            let fault = timestamps(pairs).unwrap_err();
+            assert!(fault.contains(part), "{fault}");
+        }
+        assert!(timestamps(&[(0, u64::MAX)]).unwrap().segments(0).unwrap_err().contains("mistake"));
+    }
+}

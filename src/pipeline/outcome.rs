@@ -1,0 +1,82 @@
+//! What happened, as values.
+
+use super::Gap;
+use crate::io::InputWarning;
+use crate::runtime::PlanSummary;
+use std::fmt;
+
+/// What a run has done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// How the bank ran.
+    pub plan: PlanSummary,
+    /// N.
+    pub channels: usize,
+    /// M.
+    pub ratio: usize,
+    /// Output samples.
+    pub samples: u64,
+    /// Output samples that saturated; samples that were dropped with the latency do not count.
+    pub clipped: u64,
+    /// Input samples that were NaN or infinite and became 0.
+    pub replaced: u64,
+    /// Times that a recursion's state was not finite and was set to zero.
+    pub state_resets: u64,
+    /// Missing samples, if they were to be filled.
+    pub gaps: Option<GapSummary>,
+}
+
+/// The gaps of a run.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct GapSummary {
+    /// Gaps in all.
+    pub count: u64,
+    /// Samples that were missing in all.
+    pub missing: u64,
+    /// The gaps in the order of their ends, at most 65,536 of them.
+    pub list: Vec<Gap>,
+}
+
+/// Something that was tolerated.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Warning {
+    /// A fault of an input.
+    Input(InputWarning),
+    /// The inputs, which these are, have no frame.
+    Empty(Vec<String>),
+    /// So many input samples were NaN or infinite.
+    Replaced(u64),
+    /// So many output samples saturated.
+    Clipped(u64),
+    /// So many times a recursion's state was not finite.
+    StateReset(u64),
+}
+
+impl Outcome {
+    /// What the filters had to tolerate.
+    pub fn warnings(&self) -> impl Iterator<Item = Warning> + use<> {
+        let counted = |count: u64, warning: fn(u64) -> Warning| (count > 0).then(|| warning(count));
+        let replaced = counted(self.replaced, Warning::Replaced);
+        let clipped = counted(self.clipped, Warning::Clipped);
+        [replaced, clipped, counted(self.state_resets, Warning::StateReset)].into_iter().flatten()
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(warning) => warning.fmt(f),
+            Self::Empty(inputs) => {
+                let inputs = inputs.join(", ");
+                write!(f, "{inputs}: no samples to fuse (the length is zero), so the output has none")
+            }
+            Self::Replaced(count) => {
+                write!(f, "{count} input samples were NaN or infinite and were replaced by 0")
+            }
+            Self::Clipped(count) => write!(f, "{count} output samples were clipped"),
+            Self::StateReset(count) => {
+                write!(f, "{count} times the filter state was not finite and was set to zero")
+            }
+        }
+    }
+}

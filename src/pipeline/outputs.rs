@@ -1,0 +1,66 @@
+//! Where output samples go.
+
+use super::PipelineError;
+use crate::files::{AtomicFile, commit_all};
+use crate::io::{IoError, SampleWriter};
+use std::io::Write;
+
+/// Output samples that belong together.
+#[derive(Debug, Clone, Copy)]
+pub struct Block<'a> {
+    /// Encoded samples.
+    pub samples: &'a [u8],
+    /// One byte per sample, 1 if a missing input affects it, else 0; `None` if gaps are not filled.
+    pub mask: Option<&'a [u8]>,
+}
+
+/// Takes output samples.
+pub trait Output {
+    /// Takes the next samples.
+    ///
+    /// # Errors
+    /// Those of the place where they go.
+    fn write(&mut self, block: Block<'_>) -> Result<(), IoError>;
+}
+
+/// Samples to a file or standard output, the mask to a file of its own. Files appear only by
+/// [`FileOutputs::finish`], and together.
+pub struct FileOutputs {
+    samples: SampleWriter,
+    mask: Option<AtomicFile>,
+}
+
+impl FileOutputs {
+    /// Samples to `samples`, and the mask to `mask`, if it is wanted.
+    pub fn new(samples: SampleWriter, mask: Option<AtomicFile>) -> Self {
+        Self { samples, mask }
+    }
+
+    /// Completes the files and gives them their names.
+    ///
+    /// # Errors
+    /// The system's refusal, or [`FileError::Exists`](crate::files::FileError::Exists) if one of the names was taken in the
+    /// meantime; no file is left behind then.
+    pub fn finish(self) -> Result<(), PipelineError> {
+        let mut files = self.samples.finish()?;
+        files.extend(self.mask);
+        Ok(commit_all(files)?)
+    }
+}
+
+impl Output for FileOutputs {
+    fn write(&mut self, block: Block<'_>) -> Result<(), IoError> {
+        if let (Some(file), Some(mask)) = (&mut self.mask, block.mask) {
+            file.write_all(mask).map_err(IoError::system(file.name(), "write it"))?;
+        }
+        self.samples.write(block.samples)
+    }
+}
+
+#[cfg(test)]
+impl Output for Vec<u8> {
+    fn write(&mut self, block: Block<'_>) -> Result<(), IoError> {
+        self.extend_from_slice(block.samples);
+        Ok(())
+    }
+}

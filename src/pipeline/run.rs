@@ -1,0 +1,37 @@
+//! All frames of a reader through a pipeline.
+
+use super::{Output, Pipeline, PipelineError};
+use crate::io::{Arrival, MultiReader};
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The inputs ended.
+    Inputs,
+    /// The reader's stop channel asked for it; all frames so far have come out.
+    Stopped,
+}
+
+/// Runs until the inputs end or a stop is asked for; `progress` is told the frames of each step. Nothing is flushed.
+///
+/// # Errors
+/// [`PipelineError`] for an input that cannot be read, frames that do not fit the bank, or an output that cannot be
+/// written.
+pub fn run(
+    reader: &mut MultiReader,
+    pipeline: &mut Pipeline,
+    output: &mut impl Output,
+    mut progress: impl FnMut(usize),
+) -> Result<Ending, PipelineError> {
+    loop {
+        match reader.wait()? {
+            Arrival::Frames(frames) => {
+                pipeline.push(&reader.frames(), output)?;
+                reader.consume(frames);
+                progress(frames);
+            }
+            Arrival::End => return Ok(Ending::Inputs),
+            Arrival::Stopped => return Ok(Ending::Stopped),
+        }
+    }
+}

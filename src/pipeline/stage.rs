@@ -1,0 +1,338 @@
+//! Frames through gaps and filters into encoded output samples.
+
+use super::mask::MaskDelay;
+use super::{Block, GapFiller, GapPolicy, GapSummary, Outcome, Output, PipelineError};
+use crate::bank::Bank;
+use crate::io::{PcmFormat, PcmFrames, SampleLayout};
+use crate::runtime::{PcmOutput, Plan, ProcessError, Stream, Workers};
+use std::ops::Range;
+
+/// Encoded output of one step at most, for one thread.
+const STEP_BYTES: usize = 256 << 10;
+/// Frames of zeros that flush at a time.
+const FLUSH_FRAMES: usize = 256;
+
+/// How a pipeline runs.
+#[derive(Debug)]
+pub struct Settings {
+    /// How output samples are stored.
+    pub format: PcmFormat,
+    /// Output samples that are dropped at the beginning.
+    pub skip: u64,
+    /// What stands in for missing samples; `None` leaves NaN and infinity to the runtime, which replaces them by 0.
+    pub gaps: Option<GapPolicy>,
+    /// Threads that filter; `None` for the calling thread.
+    pub workers: Option<Workers>,
+}
+
+impl Settings {
+    /// Encoded output without anything else.
+    pub fn plain(format: PcmFormat) -> Self {
+        Self { format, skip: 0, gaps: None, workers: None }
+    }
+}
+
+/// Runs one stream: fills gaps, filters, drops the latency, counts.
+#[derive(Debug)]
+pub struct Pipeline {
+    stream: Stream,
+    gaps: Option<(GapFiller, MaskDelay)>,
+    workers: Option<Workers>,
+    format: PcmFormat,
+    step_bytes: usize,
+    /// Output samples still to be dropped.
+    skip: u64,
+    samples: u64,
+    clipped: u64,
+    buffer: Vec<u8>,
+}
+
+impl Pipeline {
+    /// A stream of `plan` at its beginning; `plan` is that of `bank`.
+    ///
+    /// # Errors
+    /// [`PipelineError::Build`] for a bank without outputs or inputs whose gaps are to be filled.
+    pub fn new(bank: &Bank, plan: &Plan, settings: Settings) -> Result<Self, PipelineError> {
+        let Settings { format, skip, gaps, workers } = settings;
+        let filler = gaps.map(|policy| GapFiller::new(bank, policy)).transpose()?;
+        let delay = MaskDelay::new(plan.extra_latency());
+        Ok(Self {
+            stream: Stream::new(plan),
+            gaps: filler.map(|filler| (filler, delay)),
+            // Enough for all threads.
+            step_bytes: if workers.is_some() { 8 * STEP_BYTES } else { STEP_BYTES },
+            workers,
+            format,
+            skip,
+            samples: 0,
+            clipped: 0,
+            buffer: Vec::new(),
+        })
+    }
+
+    /// The stream, with the latency and the counts of the runtime.
+    pub fn stream(&self) -> &Stream {
+        &self.stream
+    }
+
+    /// Output samples so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Takes frames: the channels are those of all `parts` one after another.
+    ///
+    /// # Errors
+    /// [`PipelineError::Process`] if the channels are not those of the bank, or those of the output.
+    pub fn push(&mut self, parts: &[PcmFrames<'_>], output: &mut impl Output) -> Result<(), PipelineError> {
+        self.push_at_most(parts, u64::MAX, output)
+    }
+
+    /// Takes frames of zeros until `samples` samples have come out since the beginning.
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn flush(&mut self, samples: u64, output: &mut impl Output) -> Result<(), PipelineError> {
+        let layout = SampleLayout::packed(PcmFormat::F32Le);
+        let (channels, ratio) = (self.stream.channels(), self.stream.ratio() as u64);
+        let zeros = vec![0; FLUSH_FRAMES * channels * 4];
+        while self.samples < samples {
+            let wanted = samples - self.samples;
+            let frames = (wanted + self.skip).div_ceil(ratio).min(FLUSH_FRAMES as u64) as usize;
+            let part = PcmFrames { layout, channels, bytes: &zeros[..frames * channels * 4] };
+            self.push_at_most(&[part], wanted, output)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the gaps that are open, and says what happened.
+    pub fn finish(mut self) -> Outcome {
+        let gaps = self.gaps.as_mut().map(|(filler, _)| {
+            filler.finish();
+            let (count, missing, list) = (filler.total(), filler.missing(), filler.gaps().to_vec());
+            GapSummary { count, missing, list }
+        });
+        Outcome {
+            plan: self.stream.plan().summary(),
+            channels: self.stream.channels(),
+            ratio: self.stream.ratio(),
+            samples: self.samples,
+            clipped: self.clipped,
+            replaced: self.stream.replaced(),
+            state_resets: self.stream.state_resets(),
+            gaps,
+        }
+    }
+
+    /// As [`Pipeline::push`], with at most `limit` samples coming out.
+    fn push_at_most(
+        &mut self,
+        parts: &[PcmFrames<'_>],
+        limit: u64,
+        output: &mut impl Output,
+    ) -> Result<(), PipelineError> {
+        let frames = parts.iter().map(PcmFrames::frames).min().unwrap_or(0);
+        let step = (self.step_bytes / self.stream.ratio() / self.format.bytes()).max(1);
+        let mut limit = limit;
+        for first in (0..frames).step_by(step) {
+            let count = step.min(frames - first);
+            limit -= self.step(&ranges(parts, first..first + count), limit, output)?;
+        }
+        Ok(())
+    }
+
+    /// One step; returns the samples that came out.
+    fn step(
+        &mut self,
+        parts: &[PcmFrames<'_>],
+        limit: u64,
+        output: &mut impl Output,
+    ) -> Result<u64, PipelineError> {
+        let frames = parts.iter().map(PcmFrames::frames).min().unwrap_or(0);
+        let samples = frames * self.stream.ratio();
+        let skip = usize::try_from(self.skip).unwrap_or(usize::MAX).min(samples);
+        let limit = usize::try_from(limit).unwrap_or(usize::MAX);
+        let kept = skip..samples.min(skip.saturating_add(limit));
+        let size = self.format.bytes();
+        self.buffer.resize(samples * size, 0);
+        let mut engine = Engine {
+            stream: &mut self.stream,
+            workers: self.workers.as_ref(),
+            format: self.format,
+            clipped: &mut self.clipped,
+        };
+        let mask = match &mut self.gaps {
+            Some((filler, delay)) => {
+                engine.run(&filler.fill_pcm(parts, &mut delay.block), &mut self.buffer, kept.clone())?;
+                delay.enter();
+                Some(delay.of(kept.clone()))
+            }
+            None => {
+                engine.run(parts, &mut self.buffer, kept.clone())?;
+                None
+            }
+        };
+        output.write(Block { samples: &self.buffer[kept.start * size..kept.end * size], mask })?;
+        if let Some((_, delay)) = &mut self.gaps {
+            delay.leave();
+        }
+        self.skip -= skip as u64;
+        self.samples += kept.len() as u64;
+        Ok(kept.len() as u64)
+    }
+}
+
+/// What filters and encodes a step.
+struct Engine<'a> {
+    stream: &'a mut Stream,
+    workers: Option<&'a Workers>,
+    format: PcmFormat,
+    clipped: &'a mut u64,
+}
+
+impl Engine<'_> {
+    /// All output samples of the frames into `bytes`; of the clipped ones only those in `kept` are counted.
+    fn run(
+        &mut self,
+        parts: &[PcmFrames<'_>],
+        bytes: &mut [u8],
+        kept: Range<usize>,
+    ) -> Result<(), ProcessError> {
+        let ratio = self.stream.ratio();
+        let frames = bytes.len() / self.format.bytes() / ratio;
+        // Floats do not clip, and mostly all samples are kept.
+        if self.format.is_float() || kept == (0..frames * ratio) {
+            *self.clipped += self.run_frames(parts, bytes)?;
+            return Ok(());
+        }
+        // Whole frames before, in and behind what is kept, and between them frames of which a part is kept.
+        let whole = kept.start.div_ceil(ratio)..(kept.end / ratio).max(kept.start.div_ceil(ratio));
+        let bounds = [0, kept.start / ratio, whole.start, whole.end, kept.end.div_ceil(ratio), frames];
+        let mut first = 0;
+        for (i, &bound) in bounds.iter().enumerate().skip(1) {
+            let end = bound.max(first);
+            let range = first..end;
+            let place = range.start * ratio * self.format.bytes()..range.end * ratio * self.format.bytes();
+            let (parts, bytes) = (ranges(parts, range.clone()), &mut bytes[place]);
+            match i {
+                2 | 4 => self.run_partly_kept(&parts, bytes, range.start * ratio, &kept)?,
+                _ => {
+                    let clipped = self.run_frames(&parts, bytes)?;
+                    *self.clipped += if i == 3 { clipped } else { 0 };
+                }
+            }
+            first = end;
+        }
+        Ok(())
+    }
+
+    /// Whole frames; returns how many samples were clipped.
+    fn run_frames(&mut self, parts: &[PcmFrames<'_>], bytes: &mut [u8]) -> Result<u64, ProcessError> {
+        let mut output = PcmOutput { format: self.format, bytes, clipped: 0 };
+        match self.workers {
+            Some(workers) => self.stream.process_pcm_parallel(parts, &mut output, workers),
+            None => self.stream.process_pcm(parts, &mut output),
+        }?;
+        Ok(output.clipped)
+    }
+
+    /// Frames whose samples, from number `first` on, are encoded and counted one by one.
+    fn run_partly_kept(
+        &mut self,
+        parts: &[PcmFrames<'_>],
+        bytes: &mut [u8],
+        first: usize,
+        kept: &Range<usize>,
+    ) -> Result<(), ProcessError> {
+        let size = self.format.bytes();
+        let mut values = vec![0; bytes.len() / size * 8];
+        self.stream.process_pcm(
+            parts,
+            &mut PcmOutput { format: PcmFormat::F64Le, bytes: &mut values, clipped: 0 },
+        )?;
+        for (n, (value, slot)) in values.chunks_exact(8).zip(bytes.chunks_exact_mut(size)).enumerate() {
+            let value = PcmFormat::F64Le.decode(value);
+            // The runtime rounds to f32 first where the format has fewer digits than that.
+            let value = if size < 4 { f64::from(value as f32) } else { value };
+            let clipped = self.format.encode(value, slot);
+            *self.clipped += u64::from(clipped && kept.contains(&(first + n)));
+        }
+        Ok(())
+    }
+}
+
+/// The same frames of all parts.
+fn ranges<'a>(parts: &[PcmFrames<'a>], frames: Range<usize>) -> Vec<PcmFrames<'a>> {
+    parts.iter().map(|part| part.range(frames.clone())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bank::SynthesisFilters;
+    use crate::runtime::{Form, Options};
+
+    /// Samples in -1.5 .. 1.5, so that a third of them clips.
+    fn noise(count: usize) -> Vec<f32> {
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            ((state >> 40) as f32 / (1u64 << 24) as f32 - 0.5) * 3.0
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    /// The whole output as numbers, by the plan itself.
+    fn reference(plan: &Plan, input: &[f32], zeros: usize) -> Vec<f64> {
+        let mut padded = input.to_vec();
+        padded.resize(input.len() + zeros * plan.channels(), 0.0);
+        let mut out = vec![0.0; padded.len() / plan.channels() * plan.ratio()];
+        Stream::new(plan).process(&padded, &mut out).unwrap();
+        out.iter().map(|&x| f64::from(x)).collect()
+    }
+
+    #[test]
+    fn only_samples_of_the_output_are_counted_as_clipped() {
+        for (m, skip, frames, form) in [
+            (1, 0, 50, Form::Direct),
+            (2, 3, 50, Form::Direct),
+            (3, 4, 50, Form::Direct),
+            (3, 7, 1, Form::Direct),
+            (5, 2, 40, Form::Fast),
+            (4, 37, 60, Form::Direct),
+            (8, 9, 1, Form::Direct),
+            (2, 5, 700, Form::OverlapSave(None)),
+        ] {
+            let taps = vec![noise(4 * m).iter().map(|&x| f64::from(x)).collect(), vec![0.7; 2 * m]];
+            let bank = Bank { delays: vec![0.0; 2], ..Bank::bare(SynthesisFilters::Fir(taps), m) };
+            let plan = bank.plan(Options { form, ..Options::default() }).unwrap();
+            let input = noise(2 * frames);
+            let samples = frames * m;
+            let all = reference(&plan, &input, (skip + plan.extra_latency()) / m + 2);
+            let skip = skip + plan.extra_latency();
+            for format in [PcmFormat::S8, PcmFormat::S16Le, PcmFormat::S24Be, PcmFormat::F32Le] {
+                let settings = Settings { skip: skip as u64, ..Settings::plain(format) };
+                let mut pipeline = Pipeline::new(&bank, &plan, settings).unwrap();
+                let mut got = Vec::new();
+                let bytes: Vec<u8> = input.iter().flat_map(|x| x.to_le_bytes()).collect();
+                // Pieces of 3 frames, so that borders of blocks and of what is kept meet in all ways.
+                for piece in bytes.chunks(8 * 3) {
+                    let layout = SampleLayout::packed(PcmFormat::F32Le);
+                    pipeline.push(&[PcmFrames { layout, channels: 2, bytes: piece }], &mut got).unwrap();
+                }
+                pipeline.flush(samples as u64, &mut got).unwrap();
+                let mut want = vec![0; samples * format.bytes()];
+                let kept = all[skip..skip + samples].iter().zip(want.chunks_exact_mut(format.bytes()));
+                let clipped: u64 = kept.map(|(&x, slot)| u64::from(format.encode(x, slot))).sum();
+                let outcome = pipeline.finish();
+                assert_eq!(
+                    (outcome.samples, outcome.clipped),
+                    (samples as u64, clipped),
+                    "{m} {skip} {format}"
+                );
+                assert!(got == want, "{m} {skip} {format}");
+                assert!(clipped > 0 || format == PcmFormat::F32Le || samples < 10);
+            }
+        }
+    }
+}

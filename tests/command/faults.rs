@@ -1,0 +1,128 @@
+//! Systems that refuse: standard streams that cannot be written, threads that cannot be started, inputs without end.
+
+use crate::support::{Desk, bytes, fused, names, text, ticks};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// More than any address space: no thread with such a stack can be started.
+const IMPOSSIBLE_STACK: &str = "1000000000000000";
+
+/// hybank in a shell, which redirects its streams; `$H` stands for the binary.
+fn shell(desk: &Desk, script: &str) -> Output {
+    let mut command = Command::new("sh");
+    command.current_dir(desk.path("")).env("H", env!("CARGO_BIN_EXE_hybank"));
+    command.args(["-c", script]).output().unwrap()
+}
+
+#[test]
+fn warnings_that_cannot_be_written_cost_nothing() {
+    let desk = Desk::new();
+    desk.write("in", [bytes(&ticks(50)), vec![1, 2, 3]].concat());
+    let want = bytes(&fused(&ticks(50)));
+    for refusal in ["2>/dev/full", "2>&-"] {
+        let output = shell(&desk, &format!("$H stream bank.json --input in -o out --force {refusal}"));
+        assert_eq!(output.status.code(), Some(0), "{refusal}");
+        assert!(desk.read("out") == want, "{refusal}");
+        let failing = shell(&desk, &format!("$H stream none.json {refusal}"));
+        assert_eq!(failing.status.code(), Some(1), "{refusal}");
+        let wrong = shell(&desk, &format!("$H stream --no-such-option {refusal}"));
+        assert_eq!(wrong.status.code(), Some(2), "{refusal}");
+    }
+}
+
+#[test]
+fn a_full_standard_output_is_an_error_of_one_line() {
+    let desk = Desk::new();
+    desk.write("spec.toml", crate::support::THESIS);
+    desk.report(&["design", "spec.toml", "-o", "thesis.json"]);
+    desk.write("in", bytes(&ticks(50)));
+    for args in [
+        "--help",
+        "--version",
+        "fuse --help",
+        "completions bash",
+        "verify thesis.json",
+        "analyze thesis.json --json",
+        "stream bank.json --input in",
+        "design spec.toml -o -",
+    ] {
+        let output = shell(&desk, &format!("$H {args} >/dev/full"));
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{args}: {message}");
+        assert!(message.starts_with("hybank: standard output: cannot write it"), "{args}: {message}");
+        assert_eq!(message.lines().count(), 1, "{args}: {message}");
+    }
+    // A reader that has seen enough is no error.
+    let output = shell(&desk, "$H completions bash | head -c 1");
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+}
+
+#[test]
+fn without_threads_the_work_is_done_or_refused_in_one_line() {
+    let desk = Desk::new();
+    desk.write("spec.toml", crate::support::THESIS);
+    let input = bytes(&ticks(50));
+    desk.write("in", &input);
+    let run = |args: &str| shell(&desk, &format!("RUST_MIN_STACK={IMPOSSIBLE_STACK} $H {args}"));
+    // Raw standard input needs no thread, and an interrupt then has its usual meaning.
+    let output = run("stream bank.json <in");
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    assert!(output.stdout == bytes(&fused(&ticks(50))));
+    for args in ["design spec.toml -o thesis.json", "verify thesis.json"] {
+        let output = run(args);
+        assert!(output.status.success() && output.stderr.is_empty(), "{args}: {output:?}");
+    }
+    for (args, part) in [
+        ("stream bank.json --input in", "in: cannot start a thread that reads it"),
+        ("stream bank.json --threads 2 <in", "--threads 2"),
+    ] {
+        let output = run(args);
+        let message = text(&output.stderr);
+        assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{args}: {message}");
+        assert!(message.contains(part), "{args}: {message}");
+    }
+}
+
+#[test]
+fn a_signal_ends_a_run_whose_output_nobody_takes() {
+    let desk = Desk::new();
+    // More than any pipe holds.
+    desk.write("in", bytes(&ticks(1 << 20)));
+    let before = names(&desk.path(""));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hybank"))
+        .current_dir(desk.path(""))
+        .args(["stream", "bank.json", "--input", "in", "--gaps", "zero", "--mask", "mask"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while names(&desk.path("")) == before {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // Until the pipe is full.
+    std::thread::sleep(Duration::from_millis(500));
+    let begin = Instant::now();
+    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    while child.try_wait().unwrap().is_none() {
+        assert!(begin.elapsed() < Duration::from_secs(60), "the signal did not end the run");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(child.wait().unwrap().code(), Some(128 + 15));
+    assert_eq!(names(&desk.path("")), before, "an unfinished file is left");
+}
+
+#[test]
+fn inputs_without_end_are_refused_with_their_bound() {
+    let desk = Desk::new();
+    desk.write("in", bytes(&[1.0; 20]));
+    let bound = "longer than 268435456 bytes, the most that a spec or bank file may have";
+    desk.refused(1, &["verify", "/dev/zero"], &["/dev/zero", bound]);
+    let stream =
+        ["stream", "bank.json", "--input", "in", "--input", "in", "-o", "out", "--gaps", "zero", "--lost"];
+    desk.refused(1, &[&stream[..], &["/dev/zero"]].concat(), &["/dev/zero", "longer than", "lost samples"]);
+    desk.write("lost", "{\"channel\":1,\"sample_start\":0,\"global_index\":0}\n{\"channel\":1,\"sample_start\":1,\"global_index\":4000000000}");
+    let refused = [&stream[..], &["lost"]].concat();
+    desk.refused(1, &refused, &["in: ", "more than 67108864", "--max-lost 3999999999"]);
+    desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "/dev/zero"}}"#);
+    let args = ["stream", "bank.json", "--input", "zero.sigmf-meta", "-o", "out"];
+    desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset", "same folder"]);
+}

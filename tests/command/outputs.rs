@@ -1,0 +1,148 @@
+//! Which files a run may write, when they appear, and what becomes of what was there.
+
+use crate::support::{Desk, bytes, channel, fused, names, text, ticks};
+use std::fs;
+use std::io::Write;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::process::{Child, Command};
+
+/// A desk with the recordings a.wav and b.wav of two channels.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    let frames = ticks(100);
+    wav(&desk, "a.wav", &channel(&frames, 0));
+    wav(&desk, "b.wav", &channel(&frames, 1));
+    desk
+}
+
+fn wav(desk: &Desk, name: &str, samples: &[f32]) {
+    let (bits_per_sample, sample_format) = (32, hound::SampleFormat::Float);
+    let spec = hound::WavSpec { channels: 1, sample_rate: 24_000, bits_per_sample, sample_format };
+    let mut writer = hound::WavWriter::create(desk.path(name), spec).unwrap();
+    samples.iter().for_each(|&x| writer.write_sample(x).unwrap());
+    writer.finalize().unwrap();
+}
+
+/// `hybank stream`, with more arguments, that has begun its output and waits for the rest of its input.
+fn waiting(desk: &Desk, more: &[&str], unfinished: usize) -> Child {
+    let mut child = desk.spawn(&[&["stream", "bank.json"], more].concat());
+    child.stdin.as_mut().unwrap().write_all(&bytes(&ticks(10))).unwrap();
+    while names(&desk.path("")).iter().filter(|name| name.ends_with(".part")).count() < unfinished {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    child
+}
+
+fn end(mut child: Child) -> (Option<i32>, String) {
+    drop(child.stdin.take());
+    let output = child.wait_with_output().unwrap();
+    (output.status.code(), text(&output.stderr))
+}
+
+#[test]
+fn an_input_is_never_replaced_even_by_force() {
+    let desk = desk();
+    fs::hard_link(desk.path("a.wav"), desk.path("same.wav")).unwrap();
+    symlink("b.wav", desk.path("link.wav")).unwrap();
+    let before = (desk.read("a.wav"), desk.read("b.wav"), desk.read("bank.json"));
+    for output in ["a.wav", "./b.wav", "same.wav", "link.wav", "bank.json"] {
+        let args = ["fuse", "bank.json", "a.wav", "b.wav", "-o", output, "--force"];
+        desk.refused(1, &args, &[output, "also the input"]);
+        let mask =
+            ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--force", "--gaps", "zero", "--mask"];
+        desk.refused(1, &[&mask[..], &[output]].concat(), &[output, "also the input"]);
+    }
+    desk.write("spec.toml", crate::support::THESIS);
+    desk.refused(1, &["design", "spec.toml", "-o", "spec.toml", "--force"], &["also the input"]);
+    fs::copy(desk.path("a.wav"), desk.path("ch1.wav")).unwrap();
+    let simulate = ["simulate", "spec.toml", "--source", "ch1.wav", "-o", ".", "--force"];
+    desk.refused(1, &simulate, &["ch1.wav", "also the input"]);
+    assert_eq!((desk.read("a.wav"), desk.read("b.wav"), desk.read("bank.json")), before);
+}
+
+#[test]
+fn output_and_mask_are_two_files() {
+    let desk = desk();
+    let fuse = |output, mask| {
+        ["fuse", "bank.json", "a.wav", "b.wav", "--gaps", "mask", "--force", "-o", output, "--mask", mask]
+    };
+    desk.refused(1, &fuse("out.wav", "./out.wav"), &["same file"]);
+    desk.refused(1, &fuse("out.sigmf-meta", "out.sigmf-data"), &["same file"]);
+    desk.refused(2, &fuse("out.wav", "-"), &["--mask -", "standard output"]);
+}
+
+#[test]
+fn links_are_followed_and_permissions_kept() {
+    let desk = desk();
+    desk.write("real.wav", "old");
+    fs::set_permissions(desk.path("real.wav"), fs::Permissions::from_mode(0o600)).unwrap();
+    symlink("real.wav", desk.path("link.wav")).unwrap();
+    symlink("nothing", desk.path("dangling.wav")).unwrap();
+    symlink("/dev/stdout", desk.path("stdout.wav")).unwrap();
+    let fuse = |output| ["fuse", "bank.json", "a.wav", "b.wav", "--force", "-o", output];
+    let output = desk.run(&fuse("link.wav"), &[]);
+    assert!(output.status.success(), "{output:?}");
+    assert!(desk.path("link.wav").symlink_metadata().unwrap().is_symlink());
+    let mode = desk.path("real.wav").metadata().unwrap().permissions().mode();
+    assert_eq!((&desk.read("real.wav")[..4], mode & 0o777), (&b"RIFF"[..], 0o600));
+    desk.refused(1, &fuse("dangling.wav"), &["dangling.wav", "link to nothing"]);
+    desk.refused(1, &fuse("stdout.wav"), &["stdout.wav", "redirect"]);
+    assert!(desk.path("stdout.wav").symlink_metadata().unwrap().is_symlink());
+}
+
+#[test]
+fn of_two_runs_at_once_the_later_one_replaces_nothing() {
+    let desk = Desk::new();
+    let first = waiting(&desk, &["-o", "out"], 1);
+    let second = waiting(&desk, &["-o", "out"], 2);
+    assert_eq!(end(first), (Some(0), String::new()));
+    let before = desk.read("out");
+    let (code, message) = end(second);
+    assert!(code == Some(1) && message.contains("out: the file exists"), "{message}");
+    assert_eq!(message.lines().count(), 1);
+    assert_eq!((desk.read("out"), names(&desk.path(""))), (before, vec!["bank.json".into(), "out".into()]));
+}
+
+#[test]
+fn output_and_mask_appear_together_or_not_at_all() {
+    let desk = Desk::new();
+    let args = ["-o", "out", "--gaps", "mask", "--mask", "mask"];
+    let child = waiting(&desk, &args, 2);
+    desk.write("mask", "another's");
+    let (code, message) = end(child);
+    assert!(code == Some(1) && message.contains("mask: the file exists"), "{message}");
+    assert_eq!(names(&desk.path("")), ["bank.json", "mask"]);
+    assert_eq!(desk.read("mask"), b"another's");
+    let child = waiting(&desk, &[&args[..], &["--force"]].concat(), 2);
+    assert_eq!(end(child).0, Some(0));
+    assert_eq!((desk.read("out"), desk.read("mask")), (bytes(&fused(&ticks(10))), vec![0; 20]));
+    assert_eq!(names(&desk.path("")), ["bank.json", "mask", "out"]);
+}
+
+#[test]
+fn one_pipe_is_not_read_for_two_channels() {
+    let desk = Desk::new();
+    assert!(Command::new("mkfifo").arg(desk.path("pipe")).status().unwrap().success());
+    symlink("pipe", desk.path("link")).unwrap();
+    for second in ["pipe", "link"] {
+        let args = ["stream", "bank.json", "--input", "pipe", "--input", second];
+        desk.refused(1, &args, &["pipe", "the same pipe"]);
+    }
+}
+
+#[test]
+fn samples_that_are_dropped_with_the_latency_do_not_count_as_clipped() {
+    let desk = Desk::new();
+    // The first three output samples, 10, 20 and 30 times 0.2, are before the output's beginning.
+    wav(&desk, "a.wav", &[0.0; 5]);
+    wav(&desk, "b.wav", &[0.2, 0.0, 0.0, 0.0, 0.0]);
+    let args = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--bits", "16", "--strict"];
+    assert_eq!(desk.report(&args)["clipped"], 0);
+    wav(&desk, "b.wav", &[0.0, 0.2, 0.0, 0.0, 0.0]);
+    let output = desk.run(&[&args[..], &["--force"]].concat(), &[]);
+    let message = text(&output.stderr);
+    assert!(
+        output.status.code() == Some(1) && message.starts_with("hybank: 2 output samples were clipped"),
+        "{message}"
+    );
+}
