@@ -20,12 +20,14 @@ pub mod spec;
 #[cfg(feature = "runtime")]
 pub use hybank_runtime as runtime;
 
+/// The crate `hybank-linalg`: decompositions and Fourier transforms.
+#[cfg(feature = "design")]
+pub use hybank_linalg as linalg;
+
 #[cfg(feature = "design")]
 pub mod analog;
 #[cfg(feature = "design")]
 pub mod design;
-#[cfg(feature = "design")]
-pub mod linalg;
 #[cfg(feature = "design")]
 pub mod lmi;
 #[cfg(feature = "design")]

@@ -52,7 +52,7 @@ fn two_views_full_depth(size: (usize, usize)) {
 }
 
 fn main() {
-    [(450, 375), (1920, 1080)].map(two_views_full_depth);
+    [(450, 375), (1920, 1080)].into_iter().for_each(two_views_full_depth);
     let image = &views((450, 375))[0].image;
     time("mean shift, 450x375", || MeanShift::default().segment(image).expect("default settings"));
 }

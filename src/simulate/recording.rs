@@ -2,10 +2,8 @@
 
 use super::response::Instants;
 use crate::analog::StrictlyProper;
-use crate::linalg::Complex;
+use crate::linalg::{Complex, fourier};
 use crate::units::{FastPeriods, RadiansPerFastPeriod};
-use realfft::RealFftPlanner;
-use rustfft::FftPlanner;
 use std::f64::consts::{PI, TAU};
 
 /// L samples with a spacing of T fast periods, continued with period L T and interpolated by the trigonometric
@@ -23,15 +21,7 @@ impl Recording {
     /// `samples` taken at the instants 0, T, 2 T, .. with T = `spacing` > 0. An empty recording is the zero signal.
     pub fn new(samples: &[f64], spacing: FastPeriods) -> Self {
         let length = samples.len();
-        let mut input = samples.to_vec();
-        let mut spectrum = vec![Complex::ZERO; length / 2 + 1];
-        if length > 0 {
-            let fft = RealFftPlanner::new().plan_fft_forward(length);
-            // The call fails for buffers of other lengths only, and these have the plan's.
-            if fft.process(&mut input, &mut spectrum).is_err() {
-                spectrum.fill(Complex::ZERO);
-            }
-        }
+        let mut spectrum = fourier::real_spectrum(samples);
         spectrum.iter_mut().for_each(|bin| *bin /= length.max(1) as f64);
         if length.is_multiple_of(2)
             && let Some(nyquist) = spectrum.last_mut()
@@ -80,8 +70,6 @@ fn phase(k: usize, turn: f64) -> f64 {
 /// k n = (k^2 + n^2 - (n - k)^2) / 2 makes the sum a convolution with a chirp.
 fn chirp_z(c: &[Complex<f64>], turn: f64, count: usize) -> Vec<f64> {
     let size = (c.len() + count - 1).next_power_of_two();
-    let mut planner = FftPlanner::new();
-    let forward = planner.plan_fft_forward(size);
     let mut signal = vec![Complex::ZERO; size];
     for (k, (slot, value)) in signal.iter_mut().zip(c).enumerate() {
         *slot = value * half_square(k, turn);
@@ -96,11 +84,8 @@ fn chirp_z(c: &[Complex<f64>], turn: f64, count: usize) -> Vec<f64> {
             kernel[size - n] = value;
         }
     }
-    forward.process(&mut signal);
-    forward.process(&mut kernel);
-    signal.iter_mut().zip(&kernel).for_each(|(s, k)| *s *= k);
-    planner.plan_fft_inverse(size).process(&mut signal);
-    (0..count).map(|n| (signal[n] * half_square(n, turn)).re / size as f64).collect()
+    let sum = fourier::circular_convolution(signal, kernel);
+    (0..count).map(|n| (sum[n] * half_square(n, turn)).re / size as f64).collect()
 }
 
 /// e^{j pi n^2 turn}. Both products are exact: a fused multiply-add recovers the rounding error of each.

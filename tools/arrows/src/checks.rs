@@ -8,8 +8,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Libraries of the workspace, each with its folder; `hybank` is divided into rooms, the others are rooms themselves.
-const LIBRARIES: [(&str, &str); 3] =
-    [("hybank", "src"), ("hybank_runtime", "runtime/src"), ("hybank_ibr", "ibr/src")];
+const LIBRARIES: [(&str, &str); 4] = [
+    ("hybank", "src"),
+    ("hybank_linalg", "linalg/src"),
+    ("hybank_runtime", "runtime/src"),
+    ("hybank_ibr", "ibr/src"),
+];
 const DIVIDED: &str = "hybank";
 
 pub(crate) struct Survey {

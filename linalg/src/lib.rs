@@ -4,12 +4,18 @@
 //! nalgebra's SVD is wrong on rank-deficient matrices and its Schur form may never end on delay
 //! lines. The two share memory (both are column-major), so nothing is copied on the way in.
 //! Everything here is sequential and therefore gives the same bits on every run.
+//!
+//! It is a crate of its own because the generic code of these libraries is compiled where it is first called with a
+//! type: here once, and not again with every change and every test of the crates above.
+
+#![forbid(unsafe_code)]
 
 mod assemble;
 mod balance;
 pub mod blocks;
 mod cholesky;
 mod eigen;
+pub mod fourier;
 mod lq;
 mod solve;
 mod svd;

@@ -142,7 +142,7 @@ pub fn state_scales(a: &Mat, b: &Mat, c: &Mat) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::linalg::{Complex, Mat, eigenvalues, eigenvalues_c, spectral_radius, to_complex};
+    use crate::{Complex, Mat, eigenvalues, eigenvalues_c, spectral_radius, to_complex};
 
     /// A delay line of `n` behind a stable pair of states that drives it with `gain`.
     fn driven_line(n: usize, gain: f64) -> Mat {

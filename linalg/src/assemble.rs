@@ -78,7 +78,7 @@ fn check<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::Mat;
+    use crate::Mat;
 
     fn numbered(rows: usize, cols: usize, start: f64) -> Mat {
         Mat::from_fn(rows, cols, |i, j| start + (10 * i + j) as f64)

@@ -143,7 +143,7 @@ pub fn spectral_radius(m: &Mat) -> Result<f64, LinalgError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::svd;
+    use crate::svd;
 
     fn delay_line(n: usize) -> Mat {
         Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)))
