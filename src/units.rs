@@ -11,18 +11,24 @@
 //! ```
 //!
 //! Specs, banks and reports hold the units on the left, the designer and the simulator those on the right. Each type
-//! holds one `f64` in its own unit; any value is legal, since ranges belong to those who read them. A conversion is
-//! one multiplication or division by h, so it is exact to half a unit in the last place per operation, and it
-//! overflows or underflows where f64 does.
+//! holds one `f64` in its own unit. Any value is legal; ranges are checked where values are read. A conversion rounds once
+//! per multiplication or division in its equation, and overflows or underflows as f64 does.
 //!
-//! Arithmetic that keeps the unit is defined (sums, differences, multiples); the quotient of two equal units is a
-//! plain number. All that mixes units goes through a named conversion:
+//! Sums, differences and multiples keep the unit, and the quotient of two values of one unit is a plain number. Every
+//! change of unit is a named conversion:
 //!
 //! ```
 //! use hybank::units::{Hertz, Seconds};
 //! let h = Seconds(1.0 / 48_000.0);
 //! assert_eq!(format!("{:.1}", Seconds(25e-6).in_fast_periods(h)), "1.2 fast periods");
 //! assert!((Hertz(12_000.0).angular().per_fast_period(h).0 - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+//! ```
+//!
+//! A value in another unit does not compile:
+//!
+//! ```compile_fail,E0308
+//! use hybank::units::{FastPeriods, Seconds};
+//! let delay: FastPeriods = Seconds(25e-6);
 //! ```
 
 use std::f64::consts::TAU;
@@ -129,7 +135,7 @@ pub trait Quantity: Copy + fmt::Debug + fmt::Display + PartialEq {
     fn value(self) -> f64;
 }
 
-/// A unit of time, with the units of frequency that go with it: what is true of one time base is not said of another.
+/// A unit of time and the units of frequency that belong to it. A value generic over `Time` cannot mix two time bases.
 pub trait Time: Quantity {
     /// Cycles per unit of this time.
     type Frequency: Quantity;
@@ -269,7 +275,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Equal but for `ulps` roundings.
+    /// Equal up to `ulps` roundings.
     fn close(a: f64, b: f64, ulps: f64) -> bool {
         (a - b).abs() <= ulps * f64::EPSILON * a.abs().max(b.abs())
     }

@@ -90,11 +90,11 @@ fn house_tracks(path: &Path, views: &[usize]) -> Vec<Vec<Option<Point>>> {
         .iter()
         .map(|v| {
             let number = |w: &str| w.parse::<f64>().unwrap();
-            let place = |line: &str| {
+            let point = |line: &str| {
                 let mut words = line.split_whitespace().map(number);
                 Point::new(words.next().unwrap(), words.next().unwrap())
             };
-            text(format!("house.{v:03}.corners")).lines().map(place).collect()
+            text(format!("house.{v:03}.corners")).lines().map(point).collect()
         })
         .collect();
     let row = |line: &str| {

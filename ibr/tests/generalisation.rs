@@ -1,5 +1,5 @@
 //! The same defaults on scenes of quite different kinds: synthetic ones with an exact truth, and photographs that
-//! the defaults were not chosen on. Each is held against rounding every pixel to its place and keeping the nearest.
+//! the defaults were not chosen on. Each is compared with rounding every pixel to the nearest position and keeping the nearest sample.
 
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, quality, read_image, read_map};
@@ -20,7 +20,7 @@ struct Layer {
     paint: fn(f64, f64) -> f64,
 }
 
-/// Brightness and disparity of the nearest layer at a place of the camera's image.
+/// Brightness and disparity of the nearest layer at a position in the camera's image.
 fn look(layers: &[Layer], c: f64, x: f64, y: f64) -> (f64, f64) {
     let hits = layers.iter().filter_map(|l| {
         let column = (x + c * l.a) / (1.0 - c * l.b);
@@ -29,15 +29,15 @@ fn look(layers: &[Layer], c: f64, x: f64, y: f64) -> (f64, f64) {
     hits.max_by(|p, q| p.1.total_cmp(&q.1)).expect("the last layer covers everything")
 }
 
-/// What a camera records: brightness averaged over 3 x 3 places a pixel, 8 bits; disparity of the pixel's centre.
+/// What a camera records: brightness averaged over 3 x 3 positions per pixel, 8 bits; disparity of the pixel's centre.
 fn record(layers: &[Layer], c: f64) -> (Image, DepthMap) {
-    let place = |i: usize| ((i % WIDTH) as f64, (i / WIDTH) as f64);
+    let position_of = |i: usize| ((i % WIDTH) as f64, (i / WIDTH) as f64);
     let grey = |i: usize| {
-        let (x, y) = place(i);
+        let (x, y) = position_of(i);
         let part = |k: usize| (k as f64 - 1.0) / 3.0;
         (0..9).map(|k| look(layers, c, x + part(k % 3), y + part(k / 3)).0).sum::<f64>() as f32 / 9.0
     };
-    let depth = |i: usize| look(layers, c, place(i).0, place(i).1).1 as f32;
+    let depth = |i: usize| look(layers, c, position_of(i).0, position_of(i).1).1 as f32;
     let image = Image::new(WIDTH, HEIGHT, 1, (0..WIDTH * HEIGHT).map(grey).collect()).unwrap().quantised();
     let map = (0..WIDTH * HEIGHT).map(depth).collect();
     (image, DepthMap::new((WIDTH, HEIGHT), map, 1.0, Measure::Disparity).unwrap())
@@ -124,10 +124,10 @@ fn rounded(views: &[RectifiedView<'_>], position: f64) -> Image {
             for (x, d) in
                 view.disparity.row(y).iter().map(|d| f64::from(*d)).enumerate().filter(|p| !p.1.is_nan())
             {
-                let place = (x as f64 + (view.position - position) * d + 0.5).floor();
-                let inside = place >= 0.0 && place < width as f64;
-                if inside && own[place as usize].as_ref().is_none_or(|o| d > o.0) {
-                    own[place as usize] =
+                let column = (x as f64 + (view.position - position) * d + 0.5).floor();
+                let inside = column >= 0.0 && column < width as f64;
+                if inside && own[column as usize].as_ref().is_none_or(|o| d > o.0) {
+                    own[column as usize] =
                         Some((d, view.image.row(y)[x * channels..(x + 1) * channels].to_vec()));
                 }
             }

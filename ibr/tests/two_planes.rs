@@ -53,13 +53,13 @@ fn tracks(cameras: &[Camera]) -> Vec<Vec<Option<Point>>> {
     let square = grid(17, 0.5, NEAR).map(|p| Vector3::new(p.x * 0.6 / 0.675, p.y, NEAR));
     let points = square.chain(grid(41, 3.1, FAR));
     let track = |p: Vector3<f64>| {
-        let place = |camera: &Camera| {
+        let image_point = |camera: &Camera| {
             let (x, y, _) = camera.project(&p);
             let inside = x >= 0.0 && y >= 0.0 && x <= 159.0 && y <= 119.0;
             let hidden = p.z == FAR && seen(camera, x, y).0.z < FAR - 1.0;
             (inside && !hidden).then(|| Point::new(x, y))
         };
-        cameras.iter().map(place).collect()
+        cameras.iter().map(image_point).collect()
     };
     points.map(track).collect()
 }

@@ -15,7 +15,7 @@ pub enum AnalogError {
         /// The offending value.
         value: Seconds,
     },
-    /// The written form breaks a rule that has nothing to do with its poles.
+    /// The written form violates a rule that does not concern its poles.
     #[error(transparent)]
     Spec(#[from] FilterProblem),
     /// A pole in the right half plane or on the imaginary axis.

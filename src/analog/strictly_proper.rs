@@ -34,7 +34,7 @@ impl StrictlyProper {
     /// Checks `filter` and realises it in normalised time t' = t / h, with h = `fast_period`.
     ///
     /// # Errors
-    /// [`AnalogError`]: a fast period that is not positive and finite; a written form that breaks a rule; poles that
+    /// [`AnalogError`]: a fast period that is not positive and finite; a written form that violates a rule; poles that
     /// are unstable, without conjugate or outside [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a response that
     /// is zero at all frequencies or beyond double precision.
     pub fn new(filter: &FilterSpec, fast_period: Seconds) -> Result<Self, AnalogError> {

@@ -7,6 +7,21 @@ use std::f64::consts::TAU;
 ///
 /// Frequencies follow the time base ([`Time::Frequency`]): hertz and rad/s go with seconds, cycles and radians per fast
 /// period with fast periods. [`Source::normalised`] is the one way from the first to the second.
+///
+/// ```
+/// use hybank::simulate::{Analog, Source};
+/// use hybank::units::Seconds;
+/// let step: Source = Source::Step { at: Seconds(0.3), height: 1.0 };
+/// let signal = Analog::Known(step.normalised(Seconds(1.0 / 48_000.0)));
+/// ```
+///
+/// A source in seconds is refused by the simulator:
+///
+/// ```compile_fail,E0308
+/// use hybank::simulate::{Analog, Source};
+/// use hybank::units::Seconds;
+/// let signal = Analog::Known(Source::Step { at: Seconds(0.3), height: 1.0 });
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source<T: Time = Seconds> {
     /// f(t) = 0 for t < at, `height` for t >= at (thesis 5.42).

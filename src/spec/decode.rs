@@ -9,7 +9,7 @@ use super::limits::{
     check_noise, check_order, check_ratio, check_reduction_loss, check_taps,
 };
 use super::reader::{Fault, Fields, Value};
-use super::words::{WordLengths, check_fraction_bits};
+use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Solver, Spec, SpecProblem};
 
 const TOP_KEYS: [&str; 8] =
@@ -41,15 +41,12 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
     let top = document.fields(&TOP_KEYS)?;
     let name = top.optional("name").map(|v| v.text()).transpose()?.unwrap_or_default().to_owned();
     let fast_period = fast_period(&top)?;
-    let ratio = top.required("ratio", "give M, the fast samples for each slow one")?;
+    let ratio = top.required("ratio", "give M, the number of fast samples per slow sample")?;
     let ratio = checked_count(&ratio, "fast samples", check_ratio)?;
     let latency =
         top.optional("latency").map(|v| checked_count(&v, "fast samples", check_latency)).transpose()?;
     let target = top
-        .required(
-            "target",
-            "describe the filter of the fast converter that you wish for, [target] filter = { .. }",
-        )?
+        .required("target", "describe the filter of the ideal fast converter, [target] filter = { .. }")?
         .fields(&["filter"])?;
     let target = filter(&target.required("filter", "give the target's analog filter")?)?;
     let table = top.optional("design").map(|table| table.fields(&DESIGN_KEYS)).transpose()?;
@@ -63,7 +60,7 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
 fn fast_period(top: &Fields<'_>) -> Result<Seconds, Fault> {
     match (top.optional("fast_period"), top.optional("fast_rate")) {
         (Some(_), Some(rate)) => {
-            let remedy = "they say the same thing, keep one of them";
+            let remedy = "they have the same meaning, keep one of them";
             Err(rate.fault(SpecProblem::Conflict { first: "fast_period", second: "fast_rate", remedy }))
         }
         (Some(period), None) => checked_number(&period, |h| check_fast_period(Seconds(h))).map(Seconds),
@@ -128,7 +125,7 @@ fn delay(fields: &Fields<'_>, fast_period: Seconds) -> Result<Seconds, Fault> {
     let (value, in_seconds, unit): (_, fn(f64, Seconds) -> Seconds, _) =
         match (fields.optional("delay"), fields.optional("delay_samples")) {
             (Some(_), Some(samples)) => {
-                let remedy = "they say the same thing, keep one of them";
+                let remedy = "they have the same meaning, keep one of them";
                 return Err(samples.fault(SpecProblem::Conflict {
                     first: "delay",
                     second: "delay_samples",
@@ -181,7 +178,7 @@ fn design(
     }
 }
 
-/// The key of `overrides` that a problem with `key` comes from, if it is one of these.
+/// The key of `overrides` that causes a problem with `key`, if there is one.
 fn blamed(overrides: &DesignOverrides, key: &'static str, problem: &SpecProblem) -> Option<&'static str> {
     let other_length = key == "bits" && matches!(problem, SpecProblem::Range { unit: "entries", .. });
     let cause = if other_length && !overrides.gives(key) { "taps" } else { key };
@@ -212,7 +209,7 @@ pub(crate) fn fraction_bits(value: &Value<'_>) -> Result<i32, Fault> {
 fn reduction(order: Option<Value<'_>>, loss: Option<Value<'_>>) -> Result<Option<Reduction>, Fault> {
     match (order, loss) {
         (Some(_), Some(loss)) => {
-            let remedy = "the one follows from the other, keep one of them";
+            let remedy = "each determines the other, keep one of them";
             Err(loss.fault(SpecProblem::Conflict { first: "order", second: "reduction_loss_db", remedy }))
         }
         (Some(order), None) => checked_count(&order, "states", check_order).map(Reduction::Order).map(Some),

@@ -1,17 +1,17 @@
-//! The `[design]` table: defaults, overrides from the command line, and which key goes with which method.
+//! The `[design]` table: defaults, overrides from the command line, and the keys of each method.
 
 use super::limits::{
     check_gamma_margin, check_optimised_taps, check_order, check_reduction_loss, check_taps,
 };
-use super::words::{WordLengths, check_fraction_bits};
+use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{DesignSpec, Method, Reduction, Solver, SpecProblem};
 
-/// A `[design]` table as far as it is written, in a file or on the command line.
+/// The keys of a `[design]` table that are present, in a file or on the command line.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DesignOverrides {
-    /// The method. On the command line another one than the file's drops what the file says and it has no use for.
+    /// The method. If it overrides the method of a file, keys of the file that it does not read are dropped.
     pub method: Option<Method>,
-    /// Taps a channel.
+    /// Taps per channel.
     pub taps: Option<usize>,
     /// Relative excess over the optimal gamma.
     pub gamma_margin: Option<f64>,
@@ -19,9 +19,9 @@ pub struct DesignOverrides {
     pub solver: Option<Solver>,
     /// Bits of the taps.
     pub bits: Option<WordLengths>,
-    /// Taps are integers times two to the minus this.
+    /// Taps are integers times 2^-fraction_bits.
     pub fraction_bits: Option<i32>,
-    /// The order, or the loss by its reduction.
+    /// The order, or the loss by order reduction.
     pub reduction: Option<Reduction>,
 }
 
@@ -80,7 +80,7 @@ impl Solver {
 }
 
 impl Reduction {
-    /// The key that says it.
+    /// The key in spec files.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Order(_) => "order",
@@ -97,7 +97,7 @@ impl Reduction {
 }
 
 impl DesignSpec {
-    /// A method, with taps if it makes FIR filters, and no other wishes.
+    /// A method, with taps if it makes FIR filters, and no other keys.
     pub const fn new(method: Method, taps: Option<usize>) -> Self {
         Self {
             method,
@@ -110,7 +110,7 @@ impl DesignSpec {
         }
     }
 
-    /// The same design by another method; what that has no use for is dropped.
+    /// The same design by another method; keys that it does not read are dropped.
     ///
     /// # Errors
     /// [`SpecProblem`] if the method needs taps and there are none, or too many for `channels`.
@@ -118,7 +118,7 @@ impl DesignSpec {
         self.overridden(DesignOverrides { method: Some(method), ..Default::default() }, channels)
     }
 
-    /// The same design with another number of taps a channel.
+    /// The same design with another number of taps per channel.
     ///
     /// # Errors
     /// [`SpecProblem`] if the method makes no FIR filters, or the number is out of range.
@@ -142,12 +142,12 @@ impl DesignSpec {
         Ok(design)
     }
 
-    /// Checks the numbers and that every key goes with the method.
+    /// Checks the numbers, and that the method reads every key.
     pub(super) fn check(&self, channels: usize) -> Result<(), SpecProblem> {
         self.check_by_key(channels).map_err(|KeyProblem { problem, .. }| problem)
     }
 
-    /// As [`Self::check`], with the key whose value is to be blamed.
+    /// As [`Self::check`], with the key whose value is wrong.
     pub(super) fn check_by_key(&self, channels: usize) -> Result<(), KeyProblem> {
         self.check_keys()?;
         blame("taps", self.taps.map_or(Ok(()), check_taps))?;
@@ -158,12 +158,12 @@ impl DesignSpec {
         blame("fraction_bits", self.fraction_bits.map_or(Ok(()), check_fraction_bits))?;
         blame("bits", self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)))?;
         if let (Some(_), None) = (self.fraction_bits, &self.bits) {
-            let remedy = "fraction_bits places the point of taps of so many bits, for example bits = 16";
+            let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
             return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
         }
         match (self.method, self.taps) {
             (Method::Fir, None) => {
-                let remedy = "the method fir needs the number of taps a channel at the fast rate, for example taps = 22";
+                let remedy = "the method fir needs the number of taps per channel at the fast rate, for example taps = 22";
                 blame("method", Err(SpecProblem::MissingKey { key: "taps", remedy }))
             }
             (Method::Fir, Some(taps)) => blame("taps", check_optimised_taps(taps, channels)),
@@ -201,7 +201,7 @@ impl DesignSpec {
     }
 }
 
-/// What is wrong with a table, and by which of its keys.
+/// A problem of a table, and the key that causes it.
 #[derive(Debug)]
 pub(super) struct KeyProblem {
     pub(super) key: &'static str,
@@ -226,7 +226,7 @@ impl DesignOverrides {
         }
     }
 
-    /// What the command line says counts; what the file says about the method that it replaces does not.
+    /// Values of the command line take precedence. Keys of the file that a new method does not read are dropped.
     pub(super) fn over(self, file: Self) -> Self {
         let replaced = self.method;
         let kept = |has: fn(Method) -> bool| replaced.is_none_or(has);
@@ -241,7 +241,7 @@ impl DesignOverrides {
         }
     }
 
-    /// Without a method: FIR if there are taps, else IIR, which needs no size.
+    /// The default method is FIR if taps are given, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
         let Self { method, taps, gamma_margin, solver, bits, fraction_bits, reduction } = self;
         let default = if taps.is_some() { Method::Fir } else { Method::Iir };

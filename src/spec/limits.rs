@@ -1,4 +1,4 @@
-//! Ranges of the numbers in a spec, with reasons.
+//! Ranges of the numbers in a spec, each with its reason.
 
 use super::SpecProblem;
 use crate::units::{FastPeriods, Hertz, Seconds};
@@ -10,25 +10,25 @@ pub const MAX_RATIO: usize = 1024;
 /// Largest number of channels N; see [`MAX_RATIO`].
 pub const MAX_CHANNELS: usize = 1024;
 
-/// Most taps a channel, for every FIR method.
+/// Most taps per channel, for every FIR method.
 pub const MAX_TAPS: usize = 65_536;
 
 /// Most taps of all channels together for the method `fir`: the Hessian of its solver is dense, 2 GiB at
 /// this size.
 pub const MAX_OPTIMISED_TAPS: usize = 16_384;
 
-/// Largest latency and largest delay in fast periods: each one costs a state in the blocked system.
+/// Largest latency and largest delay in fast periods: each period costs a state of the lifted system.
 pub const MAX_LATENCY: usize = 65_536;
 
-/// Largest order that may be asked for: no bank that the designer makes has as many states.
+/// Largest order of a spec; banks of the designer have fewer states.
 pub const MAX_STATES: usize = 65_536;
 
-/// Largest loss by order reduction that may be asked for: beyond it no state at all is left.
+/// Largest loss by order reduction of a spec; a larger one would leave no state.
 pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
 
-/// How close to a whole number of fast periods a delay is taken to be whole, relative to its size (at
-/// least one period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; the spurious fraction would
-/// be a channel state of size 1e-16.
+/// Distance to a whole number of fast periods within which a delay is rounded to it, relative to its size (at least one
+/// period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; without rounding, the fraction would become a channel
+/// state of size 1e-16.
 const WHOLE_DELAY_TOLERANCE: f64 = 1e-13;
 
 /// D / h, exactly whole where it is whole up to rounding.
@@ -43,7 +43,7 @@ pub(super) fn range(value: f64, unit: &'static str, rule: impl Into<String>) -> 
     SpecProblem::Range { value, unit, rule: rule.into() }
 }
 
-/// h: positive, and so far from the ends of double precision that rates and squares exist.
+/// h: positive, with a margin to the ends of double precision for rates and squares.
 pub(crate) fn check_fast_period(h: Seconds) -> Result<(), SpecProblem> {
     if (1e-100..=1e100).contains(&h.0) {
         return Ok(());
@@ -64,7 +64,7 @@ pub(crate) fn check_ratio(ratio: usize) -> Result<(), SpecProblem> {
     if (1..=MAX_RATIO).contains(&ratio) {
         return Ok(());
     }
-    let rule = format!("ratio counts the fast samples for each slow one and must be 1 to {MAX_RATIO}");
+    let rule = format!("ratio is the number of fast samples per slow sample and must be 1 to {MAX_RATIO}");
     Err(range(ratio as f64, "fast samples", rule))
 }
 
@@ -74,7 +74,7 @@ pub(crate) fn check_latency(latency: usize) -> Result<(), SpecProblem> {
         return Ok(());
     }
     let rule = format!(
-        "latency is counted in fast samples and at most {MAX_LATENCY}; every one costs the designer a state"
+        "latency is in fast samples and at most {MAX_LATENCY}, since every sample of latency is a state of the design problem"
     );
     Err(range(latency as f64, "fast samples", rule))
 }
@@ -106,7 +106,7 @@ pub(crate) fn check_channel_count(count: usize) -> Result<(), SpecProblem> {
     Err(range(count as f64, "channels", format!("a bank has 1 to {MAX_CHANNELS} channels")))
 }
 
-/// Taps a channel.
+/// Taps per channel.
 pub(crate) fn check_taps(taps: usize) -> Result<(), SpecProblem> {
     if (1..=MAX_TAPS).contains(&taps) {
         return Ok(());
@@ -114,7 +114,7 @@ pub(crate) fn check_taps(taps: usize) -> Result<(), SpecProblem> {
     Err(range(taps as f64, "taps", format!("a channel's filter has 1 to {MAX_TAPS} taps at the fast rate")))
 }
 
-/// Taps of all channels together, which only the optimising method limits.
+/// Taps of all channels together, limited only for the method `fir`.
 pub(crate) fn check_optimised_taps(taps: usize, channels: usize) -> Result<(), SpecProblem> {
     let total = taps.saturating_mul(channels);
     if total <= MAX_OPTIMISED_TAPS {
@@ -134,7 +134,7 @@ pub(crate) fn check_noise(noise: f64) -> Result<(), SpecProblem> {
     Err(range(
         noise,
         "of full scale",
-        "noise is the rms of a converter's own noise relative to full scale, from 0 to 1; 1e-4 is 80 dB below",
+        "noise is the rms of the converter's noise relative to full scale, from 0 to 1; 1e-4 is -80 dB",
     ))
 }
 
@@ -144,19 +144,19 @@ pub(crate) fn check_order(order: usize) -> Result<(), SpecProblem> {
         return Ok(());
     }
     let rule = format!(
-        "order is the most states that the bank may have, 0 to {MAX_STATES}; leave it out for all that are of use"
+        "order is the largest number of states of the bank, 0 to {MAX_STATES}; leave it out for no limit"
     );
     Err(range(order as f64, "states", rule))
 }
 
-/// Decibels that may be lost by reducing the order.
+/// Decibels that order reduction may lose.
 pub(crate) fn check_reduction_loss(db: f64) -> Result<(), SpecProblem> {
     if (0.0..=MAX_REDUCTION_LOSS_DB).contains(&db) {
         return Ok(());
     }
     let rule = format!(
-        "reduction_loss_db is how far above the full bank's the error of the reduced one may lie, 0 to {MAX_REDUCTION_LOSS_DB} dB; \
-         0 leaves out only states that are of no use"
+        "reduction_loss_db is the increase of the error that order reduction may cause, 0 to {MAX_REDUCTION_LOSS_DB} dB; \
+         0 removes only states without effect"
     );
     Err(range(db, "dB", rule))
 }

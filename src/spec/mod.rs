@@ -12,7 +12,7 @@ mod filter_problem;
 mod limits;
 mod nearest;
 pub(crate) mod reader;
-mod words;
+mod word_lengths;
 mod write;
 
 pub use design::DesignOverrides;
@@ -21,8 +21,8 @@ pub use filter::{MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::FilterProblem;
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
-pub(crate) use words::check_fraction_bits;
-pub use words::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
+pub(crate) use word_lengths::check_fraction_bits;
+pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use crate::units::{FastPeriods, Hertz, Seconds};
 use serde::{Deserialize, Serialize};

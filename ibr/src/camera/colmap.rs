@@ -261,8 +261,11 @@ mod tests {
         let message =
             |cameras: &str, images: &str| read_model(folder(cameras, images).path()).unwrap_err().to_string();
         let fine = "1 SIMPLE_PINHOLE 10 10 5 5 5\n";
-        assert!(message("1 FULL_OPENCV 10 10 5 5 5 5 0 0 0 0 0.1\n", "").contains("too many (0.1)"));
-        assert!(message("1 PINHOLE 10 10 5 5 5 5 0.2\n", "").contains("too many (0.2)"));
+        assert!(
+            message("1 FULL_OPENCV 10 10 5 5 5 5 0 0 0 0 0.1\n", "")
+                .contains("unsupported coefficient (0.1)")
+        );
+        assert!(message("1 PINHOLE 10 10 5 5 5 5 0.2\n", "").contains("unsupported coefficient (0.2)"));
         assert!(message("\n1 FOV 10 10 5 5 5 5 1\n", "").contains("cameras.txt:2: camera model FOV"));
         assert!(message("1 PINHOLE 10 10 5\n", "").contains("missing"));
         assert!(message(fine, "1 1 0 0 0 0 0 x 1 a.png\n\n").contains("images.txt:1: the TZ \"x\""));

@@ -1,4 +1,4 @@
-//! How a verb fails: one message on stderr and an exit code.
+//! Failure of a command: one message on stderr and an exit code.
 
 use std::process::ExitCode;
 
@@ -14,7 +14,7 @@ pub(super) enum Failure {
 }
 
 impl Failure {
-    /// A failure of the input, from anything that can say what is wrong.
+    /// A failure of the input, from any error.
     pub(super) fn input(message: impl ToString) -> Self {
         Self::Input(message.to_string())
     }

@@ -1,9 +1,9 @@
-//! A progress bar over the steps of a verb, on a terminal only.
+//! A progress bar over the steps of a command, on a terminal only.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 
-/// The steps of a verb as they pass.
+/// The steps of a command.
 pub(super) struct Progress {
     bar: ProgressBar,
 }

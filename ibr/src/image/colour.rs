@@ -1,4 +1,4 @@
-//! CIE Luv, the colour space in which equal distances look about equally different.
+//! CIE Luv, a colour space in which equal distances correspond to about equal perceived differences.
 
 use super::Image;
 

@@ -154,7 +154,7 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
 
 /// The pixels from `low` to `high`, both included.
 fn pixels(low: f64, high: f64, width: usize) -> std::ops::Range<usize> {
-    // Casts saturate and cut toward zero: what lies outside the image is cut off, and above -1 the
+    // Casts saturate and cut toward zero: positions outside the image are cut off, and above -1 the
     // floor of high + 1 is its integer part (rounding functions are library calls on baseline x86-64).
     let end = ((high + 1.0) as usize).min(width);
     let start = low.max(0.0);

@@ -24,7 +24,7 @@ fn files_are_not_overwritten_and_appear_whole() {
     std::fs::write(&out, "precious").unwrap();
     let refused = run(dir.path(), &["render", "scene.toml", "-o", "out.png"]);
     assert_eq!(code(&refused), 1);
-    assert!(stderr(&refused).contains("out.png exists; --force overwrites it"), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("out.png exists; use --force to overwrite it"), "{}", stderr(&refused));
     assert_eq!(std::fs::read_to_string(&out).unwrap(), "precious");
     let failed = run(dir.path(), &["render", "scene.toml", "-o", "new.png", "--view", "nobody"]);
     assert_eq!(code(&failed), 1);
@@ -167,7 +167,11 @@ fn images_and_tracks_alone_are_enough() {
     std::fs::write(dir.path().join("tracks.txt"), few).unwrap();
     let refused = run(dir.path(), &["render", "s.toml", "-o", "q.png"]);
     assert_eq!(code(&refused), 1);
-    assert!(stderr(&refused).contains("7 matches where at least 8 are needed"), "{}", stderr(&refused));
+    assert!(
+        stderr(&refused).contains("7 matches are too few, at least 8 are needed"),
+        "{}",
+        stderr(&refused)
+    );
     let plane: String = (0..40)
         .map(|i| {
             let (x, y) = ((i * 37 % 100) as f64, (i * 53 % 80) as f64);

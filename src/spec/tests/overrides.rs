@@ -1,0 +1,41 @@
+//! The `[design]` table with overrides.
+
+use super::*;
+
+#[test]
+fn the_command_line_overrides_the_design() {
+    let with =
+        |text: &str, overrides| Spec::from_toml_with(text, "spec.toml", overrides).map(|spec| spec.design);
+    let method = |method| DesignOverrides { method: Some(method), ..Default::default() };
+    let no_taps = thesis_with("taps = 22", "");
+    let taps = DesignOverrides { taps: Some(7), ..Default::default() };
+    assert_eq!(with(&no_taps, taps.clone()).unwrap().taps, Some(7));
+    assert_eq!(with(THESIS, taps).unwrap().taps, Some(7));
+    // The file's taps go with its method, not with another that has none.
+    assert_eq!(with(THESIS, method(Method::H2)), Ok(DesignSpec::new(Method::H2, None)));
+    assert_eq!(with(THESIS, method(Method::Sinc)).unwrap().taps, Some(22));
+    let both = DesignOverrides { method: Some(Method::Iir), taps: Some(5), ..Default::default() };
+    assert!(matches!(
+        with(THESIS, both).unwrap_err().problem(),
+        SpecProblem::NeedlessKey { key: "taps", .. }
+    ));
+
+    let wanted = |reduction| DesignOverrides { reduction: Some(reduction), ..Default::default() };
+    let iir = thesis_with("method = \"fir\"", "method = \"iir\"\norder = 7").replace("taps = 22", "");
+    assert_eq!(with(&iir, DesignOverrides::default()).unwrap().reduction, Some(Reduction::Order(7)));
+    let loss = Reduction::Loss(0.5);
+    assert_eq!(with(&iir, wanted(loss)).unwrap().reduction, Some(loss));
+    assert_eq!(with(&iir, method(Method::H2)).unwrap().reduction, Some(Reduction::Order(7)));
+    assert_eq!(with(&iir, method(Method::Separation)).unwrap().reduction, None);
+    assert!(matches!(
+        with(THESIS, wanted(loss)).unwrap_err().problem(),
+        SpecProblem::NeedlessKey { key: "reduction_loss_db", .. }
+    ));
+
+    let design = read(THESIS).design;
+    assert_eq!(design.with_method(Method::Iir, 2).unwrap().taps, None);
+    assert_eq!(design.with_taps(9, 2).unwrap(), DesignSpec::new(Method::Fir, Some(9)));
+    assert!(design.with_taps(0, 2).is_err());
+    let iir = design.with_method(Method::Iir, 2).unwrap();
+    assert!(iir.with_taps(9, 2).is_err() && iir.with_method(Method::Fir, 2).is_err());
+}

@@ -1,0 +1,115 @@
+//! Specs that are read: units, defaults and the forms of filters.
+
+use super::*;
+
+#[test]
+fn the_thesis_example_is_read() {
+    let spec = read(THESIS);
+    let thesis = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
+    let zpk = FilterSpec::ZeroPoleGain { zeros: vec![], poles: vec![[-0.5, 0.0]; 2], gain: 0.25 };
+    let expected = Spec {
+        name: "thesis example, FIR".into(),
+        fast_period: Seconds(1.0),
+        ratio: 2,
+        latency: Some(10),
+        target: thesis.clone(),
+        channels: vec![
+            ChannelSpec { delay: Seconds(1.2), filter: thesis, noise: 0.0 },
+            ChannelSpec { delay: Seconds(0.6), filter: zpk, noise: 0.0 },
+        ],
+        design: DesignSpec::new(Method::Fir, Some(22)),
+    };
+    assert_eq!(spec, expected);
+}
+
+#[test]
+fn rates_and_sample_delays_become_seconds() {
+    let text = thesis_with("fast_period = 1.0", "fast_rate = 96_000")
+        .replace("delay = 1.2", "delay_samples = 3")
+        .replace("delay = 0.6", "delay = 1e-5");
+    let spec = read(&text);
+    assert_eq!(spec.fast_period, Seconds(1.0 / 96e3));
+    assert_eq!(spec.channels[0].delay, Seconds(3.0 / 96e3));
+    assert_eq!(spec.delays_in_fast_periods()[0], FastPeriods(3.0));
+    assert!((spec.delays_in_fast_periods()[1].0 - 0.96).abs() < 1e-15);
+}
+
+#[test]
+fn whole_delays_stay_whole_at_every_rate() {
+    for rate in [1.0, 3.0, 10.0, 44.1e3, 96e3, 1e9, 7.77e11] {
+        for samples in 0..200 {
+            let (h, whole) = (Hertz(rate).period(), FastPeriods(f64::from(samples)));
+            assert_eq!(delay_in_fast_periods(whole.in_seconds(h), h), whole, "{rate} Hz");
+        }
+    }
+    // A fraction that is meant is kept.
+    assert_eq!(delay_in_fast_periods(Seconds(3.0 + 1e-9), Seconds(1.0)), FastPeriods(3.0 + 1e-9));
+}
+
+#[test]
+fn latency_name_and_design_may_be_left_out() {
+    let end = THESIS.find("[design]").unwrap();
+    let spec = read(&THESIS[..end].replace("latency = 10", "").replace("name = \"thesis example, FIR\"", ""));
+    assert_eq!((spec.latency, spec.name.as_str()), (None, ""));
+    assert_eq!(spec.design, DesignSpec::new(Method::Iir, None));
+    assert_eq!(read(&thesis_with("method = \"fir\"", "")).design.method, Method::Fir);
+}
+
+#[test]
+fn every_filter_form_is_read() {
+    let target = |text: &str| read(&thesis_with_target(text)).target;
+    let family = |family, order, ripple_db, attenuation_db| FilterSpec::Family {
+        family,
+        order,
+        cutoff: Hertz(2e4),
+        ripple_db,
+        attenuation_db,
+    };
+    assert_eq!(
+        target(r#"{ a = [[-1, 2.5], [0, -3]], b = [[0], [1]], c = [[1, 0]] }"#),
+        FilterSpec::StateSpace {
+            a: vec![vec![-1.0, 2.5], vec![0.0, -3.0]],
+            b: vec![vec![0.0], vec![1.0]],
+            c: vec![vec![1.0, 0.0]],
+        }
+    );
+    assert_eq!(
+        target(r#"{ poles = [-2, [-1, 3.5], [-1.0, -3.5]], gain = 7 }"#),
+        FilterSpec::ZeroPoleGain {
+            zeros: vec![],
+            poles: vec![[-2.0, 0.0], [-1.0, 3.5], [-1.0, -3.5]],
+            gain: 7.0
+        }
+    );
+    for (text, expected) in [
+        ("family = 'butterworth', order = 4", family(Family::Butterworth, Some(4), None, None)),
+        ("family = 'bessel', order = 5", family(Family::Bessel, Some(5), None, None)),
+        (
+            "family = 'chebyshev1', order = 4, ripple_db = 0.5",
+            family(Family::Chebyshev1, Some(4), Some(0.5), None),
+        ),
+        (
+            "family = 'chebyshev2', order = 5, attenuation_db = 60",
+            family(Family::Chebyshev2, Some(5), None, Some(60.0)),
+        ),
+        (
+            "family = 'elliptic', order = 3, ripple_db = 1, attenuation_db = 60",
+            family(Family::Elliptic, Some(3), Some(1.0), Some(60.0)),
+        ),
+        ("family = 'rc'", family(Family::Rc, None, None, None)),
+        ("family = 'rc', order = 1", family(Family::Rc, Some(1), None, None)),
+    ] {
+        assert_eq!(target(&format!("{{ {text}, cutoff = 20e3 }}")), expected);
+    }
+    let cascade = target(
+        "{ cascade = [ { family = 'elliptic', order = 4, cutoff = 1.0, ripple_db = 1, attenuation_db = 60 },
+                       { family = 'rc', cutoff = 50.0 } ] }",
+    );
+    assert_eq!(cascade.degrees(), (4, 5));
+    // A table of its own is the same as an inline table.
+    let table = thesis_with(
+        "[target]\nfilter = { num = [0.25], den = [1.0, 1.0, 0.25] }",
+        "[target.filter]\nnum = [0.25]\nden = [1, 1, 0.25]",
+    );
+    assert_eq!(read(&table), read(THESIS));
+}

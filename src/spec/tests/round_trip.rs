@@ -1,0 +1,102 @@
+//! Specs that are written and read back, and damaged texts.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// Numbers of every size, with the awkward ones among them.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        (1.0..10.0f64, -30..30i32).prop_map(|(x, e)| x * 10f64.powi(e)),
+        Just(0.1),
+        Just(1.0 / 3.0),
+        Just(f64::MIN_POSITIVE),
+        Just(5e-324),
+        Just(1.7976931348623157e308),
+    ]
+}
+
+fn written_filter() -> impl Strategy<Value = FilterSpec> {
+    let list = |size| prop::collection::vec(number(), size);
+    let tf = (list(1..3), list(3..6)).prop_map(|(num, den)| FilterSpec::TransferFunction { num, den });
+    let pole = [number(), number()];
+    let zpk = (prop::collection::vec(pole, 1..5), number()).prop_map(|(poles, gain)| {
+        FilterSpec::ZeroPoleGain { zeros: vec![[-0.0, 1.0]; poles.len() - 1], poles, gain }
+    });
+    let ss = (1usize..4, number()).prop_map(|(n, x)| FilterSpec::StateSpace {
+        a: vec![vec![-x; n]; n],
+        b: vec![vec![x]; n],
+        c: vec![vec![1.0; n]],
+    });
+    let family =
+        (prop::sample::select(Family::ALL.to_vec()), 0usize..5, number()).prop_map(|(family, k, cutoff)| {
+            FilterSpec::Family {
+                family,
+                order: (family != Family::Rc).then_some(2 * k + 1),
+                cutoff: Hertz(cutoff),
+                ripple_db: family.has_ripple().then_some(0.1),
+                attenuation_db: family.has_attenuation().then_some(51.7),
+            }
+        });
+    let single = prop_oneof![tf, zpk, ss, family];
+    let cascade =
+        prop::collection::vec(single.clone(), 1..3).prop_map(|cascade| FilterSpec::Cascade { cascade });
+    prop_oneof![4 => single, 1 => cascade]
+}
+
+prop_compose! {
+    fn written_spec()(
+        name in prop_oneof![Just(String::new()), "[ -~äß\"\\n\\t]{0,12}"],
+        fast_period in (1.0..10.0f64, -12..3i32).prop_map(|(x, e)| Seconds(x * 10f64.powi(e))),
+        ratio in 1usize..9,
+        latency in prop::option::of(0usize..100),
+        target in written_filter(),
+        channels in prop::collection::vec((0.0..30.0f64, written_filter()), 1..4),
+        method in prop::sample::select(Method::ALL.to_vec()),
+        taps in 1usize..100,
+        gamma_margin in prop::option::of(0.0..0.1f64),
+        solver in prop::option::of(prop::sample::select(Solver::ALL.to_vec())),
+        bits in prop::option::of((2..33u32).prop_map(WordLengths::Same)),
+        fraction_bits in prop::option::of(-256..257i32),
+        reduction in prop::option::of(prop_oneof![
+            (0usize..99).prop_map(Reduction::Order), (0.0..9.0f64).prop_map(Reduction::Loss)
+        ]),
+    ) -> Spec {
+        Spec {
+            name, fast_period, ratio, latency, target,
+            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: fast_period * d, filter, noise: 1e-4 * d.fract() }).collect(),
+            design: DesignSpec {
+                method,
+                taps: method.has_taps().then_some(taps),
+                gamma_margin: gamma_margin.filter(|_| method.has_gamma_margin() && solver != Some(Solver::Kyp)),
+                solver: solver.filter(|_| method.has_solver()),
+                bits: bits.clone().filter(|_| method.has_bits()),
+                fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
+                reduction: reduction.filter(|_| method.has_states()),
+            },
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn what_is_written_reads_back_equal(spec in written_spec()) {
+        prop_assert_eq!(spec.check(), Ok(()));
+        let toml = spec.to_toml().unwrap();
+        prop_assert_eq!(&Spec::from_toml(&toml, "spec.toml").unwrap(), &spec, "{}", toml);
+        let json = serde_json::to_string(&spec).unwrap();
+        prop_assert_eq!(&serde_json::from_str::<Spec>(&json).unwrap(), &spec, "{}", json);
+    }
+
+    #[test]
+    fn a_damaged_spec_is_refused_or_read_but_never_panics(at in 0usize..400, cut in 0usize..20, put in "[ -~\\n=\\[\\]{}é]{0,6}") {
+        let start = at.min(THESIS.len());
+        let end = (at + cut).min(THESIS.len());
+        let damaged = format!("{}{put}{}", &THESIS[..start], &THESIS[end..]);
+        if let Err(error) = Spec::from_toml(&damaged, "spec.toml") {
+            prop_assert!(error.to_string().starts_with("spec.toml:"));
+        }
+    }
+}
