@@ -3,18 +3,22 @@
 //! Over real matrices `F_0 .. F_{J-1}` (M x N) minimise
 //!
 //! ```text
-//! gamma = max over omega in [0, pi] of sigma_max(K(omega)),   K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega),
+//! gamma = max over omega in [0, pi] of sigma_max(K(omega)),
+//! K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega),
 //! ```
 //!
-//! a semi-infinite problem with one constraint per frequency. On finitely many points it is solved with its dual by
-//! [`sampled`]. The optimum on the points is a lower bound for all frequencies, because fewer points are fewer
-//! constraints. The peaks of the error between the points are added to them until the largest peak meets the bound.
+//! a semi-infinite problem with one constraint per frequency. On finitely many points it is solved with its
+//! dual by [`sampled`]. The optimum on the points is a lower bound for all frequencies, because fewer points
+//! are fewer constraints. The peaks of the error between the points are added to them until the largest peak
+//! meets the bound.
 //!
-//! Optimal unknowns are not unique. Among those with a gamma within a margin of the optimum, the ones with the least
-//! weighted mean square are chosen (the secondary objective), again with peaks added where they exceed the cap.
+//! Optimal unknowns are not unique. Among those with a gamma within a margin of the optimum, the ones with
+//! the least weighted mean square are chosen (the secondary objective), again with peaks added where they
+//! exceed the cap.
 //!
-//! FIR design uses it with the taps as unknowns (thesis 5.4), order reduction with the output matrices of given dynamics
-//! (J = 1). Source: Hettich and Kortanek, "Semi-infinite programming", SIAM Review 35 (1993), exchange methods.
+//! FIR design uses it with the taps as unknowns (thesis 5.4), order reduction with the output matrices of
+//! given dynamics (J = 1). Source: Hettich and Kortanek, "Semi-infinite programming", SIAM Review 35 (1993),
+//! exchange methods.
 
 use super::DesignError;
 use crate::linalg::CMat;
@@ -23,13 +27,16 @@ use crate::lti::peak::Peak;
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
-/// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so it costs next to nothing.
+/// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so it costs
+/// next to nothing.
 pub(super) const LEAST_MARGIN: f64 = 4e-7;
 /// Tolerance of the optimum on the points, relative to [`GAMMA_ACCURACY`].
 const POINTS_ACCURACY: f64 = 0.1;
-/// Excess of a peak over the optimum on the points, relative to [`GAMMA_ACCURACY`], from which it becomes a point.
+/// Excess of a peak over the optimum on the points, relative to [`GAMMA_ACCURACY`], from which it becomes a
+/// point.
 const PEAK_EXCESS: f64 = 0.2;
-/// Fraction of the margin that the secondary objective may use at the points. The rest is left to the peaks between them.
+/// Fraction of the margin that the secondary objective may use at the points. The rest is left to the peaks
+/// between them.
 const MARGIN_AT_POINTS: f64 = 0.75;
 /// Limit on the rounds of each objective; five are rarely needed.
 const ROUND_LIMIT: usize = 16;
@@ -41,8 +48,8 @@ pub(super) trait AffineError {
     /// W and H at a frequency in radians per lag.
     fn at(&self, omega: f64) -> Point;
 
-    /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`. Peaks up to
-    /// `level` may be left out.
+    /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`.
+    /// Peaks up to `level` may be left out.
     fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks, DesignError>;
 }
 
@@ -99,8 +106,8 @@ pub(super) struct Exchange<E> {
 }
 
 impl<E: AffineError> Exchange<E> {
-    /// Starts from the points of `problem`. `objective` has a weight for each of them, `gamma_margin` is the relative
-    /// excess of gamma granted to it, at least [`LEAST_MARGIN`].
+    /// Starts from the points of `problem`. `objective` has a weight for each of them, `gamma_margin` is the
+    /// relative excess of gamma granted to it, at least [`LEAST_MARGIN`].
     ///
     /// # Errors
     /// [`DesignError::Sampled`] if the objective does not fit the problem.
@@ -172,8 +179,8 @@ impl<E: AffineError> Exchange<E> {
         best.ok_or(DesignError::NoTaps)
     }
 
-    /// The least secondary objective with gamma at most `(1 + gamma_margin)` times that of `start`. Returns `start` if the
-    /// interior-point method makes no progress from there.
+    /// The least secondary objective with gamma at most `(1 + gamma_margin)` times that of `start`. Returns
+    /// `start` if the interior-point method makes no progress from there.
     fn minimise_mean_square(&mut self, start: Candidate) -> Result<Candidate, DesignError> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);

@@ -3,7 +3,8 @@
 
 use crate::linalg::{LinalgError, Mat, PositiveFactor};
 
-/// The Cholesky factor of a Newton matrix, scaled to a unit diagonal, with as small a diagonal shift as it needs.
+/// The Cholesky factor of a Newton matrix, scaled to a unit diagonal, with as small a diagonal shift as it
+/// needs.
 #[derive(Debug)]
 pub(super) struct RegularisedCholesky {
     matrix: Mat,

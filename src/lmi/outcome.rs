@@ -1,6 +1,7 @@
 //! How an iteration ended.
 
-/// How an iteration ended. Bounds, residuals and iterates are returned beside it; a hard problem is not an error.
+/// How an iteration ended. Bounds, residuals and iterates are returned beside it; a hard problem is not an
+/// error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// The duality gap is within the tolerance.
@@ -19,7 +20,8 @@ impl Outcome {
         matches!(self, Self::Solved | Self::SolvedInaccurate)
     }
 
-    /// The outcome of an iteration whose gap meets the tolerance and the reduced tolerance as told by `solved`.
+    /// The outcome of an iteration; `solved` says whether the gap meets the tolerance and the reduced
+    /// tolerance.
     pub(super) fn at_end(solved: [bool; 2], limit_reached: bool) -> Self {
         match solved {
             [true, _] => Self::Solved,

@@ -1,18 +1,20 @@
-//! The Riccati equation of the bounded real lemma (Green and Limebeer, *Linear Robust Control*, 1995, appendix B).
+//! The Riccati equation of the bounded real lemma (Green and Limebeer, *Linear Robust Control*, 1995,
+//! appendix B).
 
 use super::riccati::{RiccatiOutcome, solve_doubling};
 use crate::linalg::{self, Mat};
 
-/// The stabilising solution P (n x n) of the bounded-real Riccati equation at the level g with `weight` on all states,
+/// The stabilising solution P (n x n) of the bounded-real Riccati equation at the level g with `weight` on
+/// all states,
 ///
 /// ```text
 /// P = A'PA + C'C/g + weight I + (A'PB + C'D/g) (g I - D'D/g - B'PB)^-1 (A'PB + C'D/g)'.
 /// ```
 ///
-/// For stable A, `weight` = 0 and g above the H-infinity norm of `C (zI - A)^-1 B + D` it exists, with `P >= 0` and
-/// `g I - D'D/g - B'PB > 0`; a solution without these two signs says nothing about the norm. It is solved by doubling in
-/// the form `P = F'P (I + G P)^-1 F + H` with `R = g I - D'D/g`, `F = A + B R^-1 D'C/g`,
-/// `G = -B R^-1 B'`, `H = C'C/g + C'D R^-1 D'C/g^2 + weight I`.
+/// For stable A, `weight` = 0 and g above the H-infinity norm of `C (zI - A)^-1 B + D` it exists, with
+/// `P >= 0` and `g I - D'D/g - B'PB > 0`; a solution without these two signs says nothing about the norm. It
+/// is solved by doubling in the form `P = F'P (I + G P)^-1 F + H` with `R = g I - D'D/g`,
+/// `F = A + B R^-1 D'C/g`, `G = -B R^-1 B'`, `H = C'C/g + C'D R^-1 D'C/g^2 + weight I`.
 ///
 /// `None` if g is not above the norm of D, or if the doubling finds no stabilising solution.
 pub fn bounded_real_riccati(a: &Mat, b: &Mat, c: &Mat, d: &Mat, g: f64, weight: f64) -> Option<Mat> {
@@ -39,8 +41,8 @@ mod tests {
         Mat::from_element(1, 1, value)
     }
 
-    /// 1 / (z - 0.5) has the norm 2. Just above it the equation has a solution; between 2/3 and 2 its discriminant
-    /// is negative.
+    /// 1 / (z - 0.5) has the norm 2. Just above it the equation has a solution; between 2/3 and 2 its
+    /// discriminant is negative.
     #[test]
     fn a_solution_exists_above_the_norm_and_not_below() {
         let solved = |g: f64| bounded_real_riccati(&one(0.5), &one(1.0), &one(1.0), &one(0.0), g, 0.0);

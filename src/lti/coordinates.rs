@@ -19,11 +19,12 @@ pub struct GramianCoordinates {
 }
 
 impl GramianCoordinates {
-    /// Scales every state to unit variance, so that the units of the states do not matter, and drops the directions with a
-    /// standard deviation below `tol_rank` times the largest.
+    /// Scales every state to unit variance, so that the units of the states do not matter, and drops the
+    /// directions with a standard deviation below `tol_rank` times the largest.
     ///
     /// # Errors
-    /// [`LtiError::IterationLimit`] if A is not stable, [`LtiError::Linalg`] if the decomposition does not converge.
+    /// [`LtiError::IterationLimit`] if A is not stable, [`LtiError::Linalg`] if the decomposition does not
+    /// converge.
     pub fn new(a: &Mat, b: &Mat, tol_rank: f64) -> Result<Self, LtiError> {
         let root = controllability_root(a, b)?;
         let n = a.nrows();

@@ -17,26 +17,26 @@ fn design(spec: &Spec) -> Result<Design, DesignError> {
     design_with(spec, ProofSearch::Skip)
 }
 
-fn g8() -> Spec {
+pub(crate) fn g8() -> Spec {
     alike(&tf(&[2.0], &[1.0, 2.0]), 2, 4, &[0.3, 1.7])
 }
 
-fn g9() -> Spec {
+pub(crate) fn g9() -> Spec {
     let mut spec = alike(&thesis_filter(), 3, 6, &[0.25, 1.1, 2.6]);
     spec.channels[1].filter = tf(&[1.0], &[1.0, 1.0]);
     spec.channels[2].filter = tf(&[0.36], &[1.0, 0.84, 0.36]);
     spec
 }
 
-fn g10() -> Spec {
+pub(crate) fn g10() -> Spec {
     alike(&butterworth(4, 1.2), 4, 12, &[0.0, 1.3, 2.1, 2.95])
 }
 
-fn g11() -> Spec {
+pub(crate) fn g11() -> Spec {
     alike(&thesis_filter(), 3, 6, &[0.2, 1.9])
 }
 
-fn g12() -> Spec {
+pub(crate) fn g12() -> Spec {
     alike(&thesis_filter(), 2, 6, &[0.2, 0.9, 1.6])
 }
 

@@ -2,8 +2,8 @@ use super::*;
 use crate::linalg::{self, Complex, Mat};
 use std::f64::consts::PI;
 
-/// `W = gain / (1 - a e^{-i omega})` repeated down the diagonal, and channels that measure the white input with the given
-/// gains: J lags of F approximate a geometric impulse response.
+/// `W = gain / (1 - a e^{-i omega})` repeated down the diagonal, and channels that measure the white input
+/// with the given gains: J lags of F approximate a geometric impulse response.
 ///
 /// With J lags of one channel the distance is the Hankel norm of the rest of the response (Nehari),
 /// `gain a^J / (1 - a^2)`.
@@ -70,7 +70,7 @@ fn the_optimum_is_nehari_s() {
     }
 }
 
-/// Equal channels, silent channels and gains far from one change neither gamma nor the bound.
+/// Equal channels, zero channels and gains far from one change neither gamma nor the bound.
 #[test]
 fn gains_and_copies_of_channels_do_not_matter() {
     let nehari = 0.125 / 0.75;
@@ -89,12 +89,12 @@ fn gains_and_copies_of_channels_do_not_matter() {
 }
 
 #[test]
-fn nothing_measured_leaves_the_whole_reference_and_nothing_wanted_costs_nothing() {
-    let mut unmeasured = exchange(geometric(0.5, 1.0, &[0.0]), 2, 0.0);
-    let gamma = unmeasured.optimise().unwrap().peaks.estimate;
-    assert!((gamma - 2.0).abs() < 1e-9 && (unmeasured.lower - 2.0).abs() < 1e-6, "{gamma}");
-    let mut unwanted = exchange(geometric(0.5, 0.0, &[1.0]), 2, 0.0);
-    let best = unwanted.optimise().unwrap();
+fn a_zero_measurement_leaves_the_reference_and_a_zero_reference_has_no_error() {
+    let mut zero_measurement = exchange(geometric(0.5, 1.0, &[0.0]), 2, 0.0);
+    let gamma = zero_measurement.optimise().unwrap().peaks.estimate;
+    assert!((gamma - 2.0).abs() < 1e-9 && (zero_measurement.lower - 2.0).abs() < 1e-6, "{gamma}");
+    let mut zero_reference = exchange(geometric(0.5, 0.0, &[1.0]), 2, 0.0);
+    let best = zero_reference.optimise().unwrap();
     assert!(best.peaks.estimate == 0.0 && best.taps.iter().all(|f| f.norm() == 0.0));
 }
 

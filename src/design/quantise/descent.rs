@@ -59,7 +59,8 @@ impl<'a> Descent<'a> {
         Ok(descent)
     }
 
-    /// Descends until no move helps, or the relative excess over gamma of the real taps is at most `negligible`.
+    /// Descends until no move helps, or the relative excess over gamma of the real taps is at most
+    /// `negligible`.
     pub(super) fn run(mut self, negligible: f64) -> Result<Vec<Vec<f64>>, DesignError> {
         let floor = self.real * (1.0 + negligible);
         for _ in 0..ROUNDS {

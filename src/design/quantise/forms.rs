@@ -1,7 +1,7 @@
 //! The mean-square error that a change of the taps adds, over weighted frequencies.
 //!
-//! A change Delta of the taps adds `Delta H` to the error. The mean square `sum_k w_k |Delta(w_k) H(w_k)|^2` is a sum of one
-//! quadratic form per phase p, in the taps `f_i[p + j M]` of that phase:
+//! A change Delta of the taps adds `Delta H` to the error. The mean square `sum_k w_k |Delta(w_k) H(w_k)|^2`
+//! is a sum of one quadratic form per phase p, in the taps `f_i[p + j M]` of that phase:
 //!
 //! ```text
 //! Q[(i, j), (i', j')] = sum_k w_k Re( e^{-i omega_k (j - j')} (H H*)[i, i'] )
@@ -11,8 +11,8 @@ use crate::design::DesignError;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
 
-/// Added to the diagonal, because the form is singular for equal channels. Relative to each entry, because channels may
-/// differ by many decades.
+/// Added to the diagonal, because the form is singular for equal channels. Relative to each entry, because
+/// channels may differ by many decades.
 const RIDGE: f64 = 1e-12;
 
 /// A tap of a phase.

@@ -1,8 +1,8 @@
 //! Closest points of a lattice: integers near given reals in a quadratic form.
 //!
-//! Minimises `|L' (x - c)|^2` over integer x in a box. The unknowns are decided from the last to the first, each given the
-//! decisions before it (Babai's nearest plane). A bounded list of the cheapest partial decisions is kept (a breadth-first
-//! sphere decoder).
+//! Minimises `|L' (x - c)|^2` over integer x in a box. The unknowns are decided from the last to the first,
+//! each given the decisions before it (Babai's nearest plane). A bounded list of the cheapest partial
+//! decisions is kept (a breadth-first sphere decoder).
 //!
 //! Sources: Babai, Combinatorica 6 (1986); Anderson and Mohan, IEEE Trans. Commun. 32 (1984) for the list.
 
@@ -48,8 +48,9 @@ struct Partial {
     cost: f64,
 }
 
-/// An integer point near `centre` with a small `|L' (x - c)|^2`, L = `factor` lower triangular, x_i in `spans[i]`.
-/// It is the closest one if there is one unknown or the form is diagonal; otherwise it may not be.
+/// An integer point near `centre` with a small `|L' (x - c)|^2`, L = `factor` lower triangular, x_i in
+/// `spans[i]`. It is the closest one if there is one unknown or the form is diagonal; otherwise it may not
+/// be.
 pub(super) fn closest(factor: &Mat, centre: &[f64], spans: &[Span]) -> Vec<f64> {
     let n = centre.len();
     let mut list = vec![Partial { deviations: vec![0.0; n], cost: 0.0 }];

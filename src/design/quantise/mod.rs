@@ -1,16 +1,16 @@
-//! Taps for fixed-point hardware: integers times a power of two, chosen for the least gamma instead of the least distance
-//! from the optimal taps.
+//! Taps for fixed-point hardware: integers times a power of two, chosen for the least gamma instead of the
+//! least distance from the optimal taps.
 //!
-//! Rounding each tap by itself wastes gamma, because noise in the taps matters only where the channels carry signal. The
-//! search has two stages:
-//! 1. The closest point of a lattice in the quadratic form of the mean-square error that a change of taps adds (`forms`,
-//!    `lattice`). The weights of the form grow at the frequencies where the last integers were worst (Lawson's method of
-//!    minimax approximation).
+//! Rounding each tap by itself wastes gamma, because noise in the taps matters only where the channels carry
+//! signal. The search has two stages:
+//! 1. The closest point of a lattice in the quadratic form of the mean-square error that a change of taps
+//!    adds (`forms`, `lattice`). The weights of the form grow at the frequencies where the last integers
+//!    were worst (Lawson's method of minimax approximation).
 //! 2. A descent on gamma itself, from the best of these points (`descent`).
 //!
-//! The scale is the finest power of two at which the taps fit their bits, or one step finer with the largest taps clipped.
-//! Among all candidates with about the least gamma, the one with the least mean-square error and converter noise at the
-//! output is chosen.
+//! The scale is the finest power of two at which the taps fit their bits, or one step finer with the largest
+//! taps clipped. Among all candidates with about the least gamma, the one with the least mean-square error
+//! and converter noise at the output is chosen.
 
 mod descent;
 mod forms;
@@ -31,13 +31,14 @@ use quantiser::{Quantised, Quantiser};
 /// Differences of bits of a study.
 const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
 
-/// The best integers found near the filters of `problem`, whose norm is `real_gamma`, and the cost of the neighbouring word
-/// lengths.
+/// The best integers found near the filters of `problem`, whose norm is `real_gamma`, and the cost of the
+/// neighbouring word lengths.
 ///
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
-/// [`DesignError::NoTaps`] if `bits` are out of their range, and [`DesignError::AllZero`] if all taps are zero at the scale
-/// given. If the scale is left open all taps may be zero, too: see [`FixedPoint::is_silent`].
+/// [`DesignError::NoTaps`] if `bits` are out of their range, and [`DesignError::AllZero`] if all taps are
+/// zero at the scale given. If the scale is left open all taps may be zero, too: see
+/// [`FixedPoint::is_silent`].
 pub fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,

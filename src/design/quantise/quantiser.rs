@@ -95,8 +95,8 @@ impl<'a> Quantiser<'a> {
         }
     }
 
-    /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are zero at every
-    /// scale, because of their bits, do not count.
+    /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are
+    /// zero at every scale, because of their bits, do not count.
     pub(super) fn finest_that_fits(&self, bits: &WordLengths) -> i32 {
         let spans = self.error.problem.taps.iter().flat_map(|filter| {
             filter

@@ -39,8 +39,8 @@ impl<'a> Search<'a> {
         Self { error, bits, fraction_bits, centre, spans }
     }
 
-    /// All candidates: the rounded taps, those of the rounds of reweighting, and the end of a descent from the best of
-    /// these.
+    /// All candidates: the rounded taps, those of the rounds of reweighting, and the end of a descent from
+    /// the best of these.
     pub(super) fn run(&self) -> Result<Vec<Candidate>, DesignError> {
         let mut found = vec![self.error.candidate(self.rounded())?];
         self.reweighted(&mut found)?;
@@ -66,7 +66,8 @@ impl<'a> Search<'a> {
         self.fixed_point(&self.centre.iter().map(round).collect())
     }
 
-    /// Closest lattice points, with weights that grow at the frequencies where the last point was worst (Lawson).
+    /// Closest lattice points, with weights that grow at the frequencies where the last point was worst
+    /// (Lawson).
     fn reweighted(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
         let real = self.error.real_gamma;
         let mut weights = vec![1.0; self.error.grid.points().len()];
@@ -105,8 +106,8 @@ impl<'a> Search<'a> {
         Ok(integers)
     }
 
-    /// The taps of a phase in the order of time, those with few bits last. The lattice search decides the last ones first,
-    /// so that taps with more bits compensate for them.
+    /// The taps of a phase in the order of time, those with few bits last. The lattice search decides the
+    /// last ones first, so that taps with more bits compensate for them.
     fn taps_of(&self, phase: usize) -> Vec<Tap> {
         let ratio = self.error.ratio;
         let lags = (self.spans.len() - phase).div_ceil(ratio);

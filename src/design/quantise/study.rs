@@ -27,7 +27,8 @@ pub struct WordLoss {
 }
 
 impl WordStudy {
-    /// `gamma` over that of the real taps in decibels: 0 where both are zero, infinite where only the real one is.
+    /// `gamma` over that of the real taps in decibels: 0 where both are zero, infinite where only the real
+    /// one is.
     pub fn loss_db(&self, gamma: f64) -> f64 {
         20.0 * decades(gamma, self.real_gamma)
     }

@@ -147,8 +147,11 @@ fn taps_of_any_size_find_their_scale() {
         let scaled: Vec<Vec<f64>> = taps.iter().map(|f| f.iter().map(|t| t * factor).collect()).collect();
         let quantiser = quantiser(&plant, &scaled).unwrap();
         let finest = quantiser.finest_that_fits(&WordLengths::Same(8));
-        let top = largest * f64::from(exponent + finest).exp2();
-        assert!((63.0..128.0).contains(&top), "2^{exponent}: scale {finest}, largest integer {top}");
+        let largest_integer = largest * f64::from(exponent + finest).exp2();
+        assert!(
+            (63.0..128.0).contains(&largest_integer),
+            "2^{exponent}: scale {finest}, largest integer {largest_integer}"
+        );
     }
     let zeros = vec![vec![0.0; 22]; 2];
     let quantiser = quantiser(&plant, &zeros).unwrap();
@@ -219,13 +222,13 @@ fn taps_that_can_only_be_zero_do_not_decide_the_scale() {
     // No bits at all, and one bit, which is -1 or 0.
     for none in [0, 1] {
         let words = WordLengths::PerTap((0..8).map(|n| if large.contains(&n) { none } else { 6 }).collect());
-        let silent = |n: usize, tap: f64| large.contains(&n) && (none == 0 || tap > 0.0);
-        let silenced = |filter: &Vec<f64>| {
-            filter.iter().enumerate().map(|(n, &tap)| if silent(n, tap) { 0.0 } else { tap }).collect()
+        let always_zero = |n: usize, tap: f64| large.contains(&n) && (none == 0 || tap > 0.0);
+        let with_zeros = |filter: &Vec<f64>| {
+            filter.iter().enumerate().map(|(n, &tap)| if always_zero(n, tap) { 0.0 } else { tap }).collect()
         };
-        let silenced: Vec<Vec<f64>> = taps.iter().map(silenced).collect();
+        let zeroed: Vec<Vec<f64>> = taps.iter().map(with_zeros).collect();
         let finest = |taps: &[Vec<f64>]| quantiser(&plant, taps).unwrap().finest_that_fits(&words);
-        assert_eq!(finest(&taps), finest(&silenced), "{none} bits");
+        assert_eq!(finest(&taps), finest(&zeroed), "{none} bits");
     }
 }
 

@@ -1,6 +1,6 @@
-//! Descent of a function that is smooth almost everywhere: quasi-Newton steps (BFGS) with a weak Wolfe line search, which
-//! also works where the minimum is a kink (Lewis and Overton, "Nonsmooth optimization via quasi-Newton methods", Math.
-//! Programming 141, 2013).
+//! Descent of a function that is smooth almost everywhere: quasi-Newton steps (BFGS) with a weak Wolfe line
+//! search, which also works where the minimum is a kink (Lewis and Overton, "Nonsmooth optimization via
+//! quasi-Newton methods", Math. Programming 141, 2013).
 
 use crate::linalg::Mat;
 
@@ -24,8 +24,8 @@ pub(super) struct Evaluated {
     pub(super) gradient: Mat,
 }
 
-/// Descends from `start` until it arrives or `f` has been asked `budget` times. `f` gives value and gradient, or `None`
-/// outside of its domain. The result is never above the start.
+/// Descends from `start` until it arrives or `f` has been asked `budget` times. `f` gives value and
+/// gradient, or `None` outside of its domain. The result is never above the start.
 pub(super) fn descend(
     f: &mut dyn FnMut(&Mat) -> Option<(f64, Mat)>,
     start: Evaluated,

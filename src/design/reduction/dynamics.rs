@@ -20,8 +20,9 @@ pub(super) struct Dynamics {
 }
 
 impl Dynamics {
-    /// The dynamics of `bank` with an FIR head of `lags` slow periods and balanced states, those with the largest effect
-    /// first. `state_root` is a square root of the covariance of the bank's states when the plant drives it.
+    /// The dynamics of `bank` with an FIR head of `lags` slow periods and balanced states, those with the
+    /// largest effect first. `state_root` is a square root of the covariance of the bank's states when the
+    /// plant drives it.
     pub(super) fn balanced(bank: &StateSpace, lags: usize, state_root: &Mat) -> Result<Self, DesignError> {
         let tail = FirWithTail::split(bank, lags)?.tail().clone();
         let floor = NEGLIGIBLE * (tail.c() * state_root).norm();
@@ -54,7 +55,8 @@ impl Dynamics {
         self.b.ncols()
     }
 
-    /// The regressors of the output, `X = [x; u[k - lags]; ..; u[k]]`, as outputs of a system with the inputs u.
+    /// The regressors of the output, `X = [x; u[k - lags]; ..; u[k]]`, as outputs of a system with the
+    /// inputs u.
     pub(super) fn regressors(&self) -> Result<StateSpace, DesignError> {
         let (r, n) = (self.tail_order(), self.channels());
         let all = Mat::identity(r + n * (self.lags + 1), r + n * (self.lags + 1));

@@ -1,13 +1,15 @@
 //! Order reduction: a bank of few states with as small an error as the search finds.
 //!
-//! The error K = W - F H is affine in the bank F, so replacing F by F_r costs `||(F - F_r) H||`. The states are therefore
-//! balanced with the inputs that the plant gives them (frequency-weighted balancing, Enns 1984), not with white noise. The
-//! first samples of the response may stay an FIR head, which costs one state per channel and slow period; several splits of
-//! the states between head and recursive tail are tried.
+//! The error K = W - F H is affine in the bank F, so replacing F by F_r costs `||(F - F_r) H||`. The states
+//! are therefore balanced with the inputs that the plant gives them (frequency-weighted balancing, Enns
+//! 1984), not with white noise. The first samples of the response may stay an FIR head, which costs one
+//! state per channel and slow period; several splits of the states between head and recursive tail are
+//! tried.
 //!
-//! For given dynamics, the output matrices C and D are optimised again, which is a convex problem (`output_matrices`). The
-//! poles are then refined with the output matrices eliminated (`pole_refinement`, variable projection). This last step is a
-//! local search: the gamma reported is that of the bank found, not the least of all banks of its order.
+//! For given dynamics, the output matrices C and D are optimised again, which is a convex problem
+//! (`output_matrices`). The poles are then refined with the output matrices eliminated (`pole_refinement`,
+//! variable projection). This last step is a local search: the gamma reported is that of the bank found, not
+//! the least of all banks of its order.
 
 mod descent;
 mod dynamics;

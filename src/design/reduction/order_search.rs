@@ -1,4 +1,5 @@
-//! The order search: candidates by truncation, each with its best output matrices; the poles of the chosen one are refined.
+//! The order search: candidates by truncation, each with its best output matrices; the poles of the chosen
+//! one are refined.
 
 use super::dynamics::Dynamics;
 use super::output_matrices::{mean_square, state_covariance_root};
@@ -15,11 +16,13 @@ use std::collections::BTreeMap;
 const HEADS: usize = 8;
 /// Splits of the states whose gamma is computed: those of least mean-square error.
 const FINALISTS: usize = 3;
-/// Relative excess of the rough gamma up to which a longer FIR head is preferred, because it runs faster than a recursion.
+/// Relative excess of the rough gamma up to which a longer FIR head is preferred, because it runs faster
+/// than a recursion.
 const HEAD_PREFERENCE: f64 = 1e-4;
 /// All orders are searched if the squares of their unknowns sum to at most this.
 const CHEAP: f64 = 1e5;
-/// Limit on the evaluations of a pole refinement, and the effort (evaluations times squared unknowns) that lowers it.
+/// Limit on the evaluations of a pole refinement, and the effort (evaluations times squared unknowns) that
+/// lowers it.
 const EVALUATIONS: f64 = 80.0;
 const EFFORT: f64 = 4e5;
 /// Poles of a reduced bank keep this distance from the unit circle.
@@ -170,7 +173,8 @@ impl<'a> OrderSearch<'a> {
         Ok(())
     }
 
-    /// The splits of `order` states with the least mean-square errors, which are returned beside them; short heads first.
+    /// The splits of `order` states with the least mean-square errors, which are returned beside them; short
+    /// heads first.
     fn finalists(&self, order: usize) -> Result<Vec<(f64, Dynamics)>, DesignError> {
         let mut tried = Vec::new();
         for split in &self.splits {

@@ -1,5 +1,5 @@
-//! Output matrices of least gamma for given dynamics: the error W - F H is affine in them, so that they are a convex
-//! problem at sampled frequencies.
+//! Output matrices of least gamma for given dynamics: the error W - F H is affine in them, so that they are
+//! a convex problem at sampled frequencies.
 
 use super::dynamics::Dynamics;
 use crate::design::DesignError;
@@ -93,8 +93,8 @@ impl<'a> PlantSamples<'a> {
         self.worst_case(dynamics, RANKING_ACCURACY).map(|found| found.gamma)
     }
 
-    /// The bank of least gamma with these dynamics and, within `gamma_margin`, of least mean square. The frequencies that
-    /// the exchange adds stay.
+    /// The bank of least gamma with these dynamics and, within `gamma_margin`, of least mean square. The
+    /// frequencies that the exchange adds stay.
     pub(super) fn best_bank(
         &mut self,
         dynamics: &Dynamics,

@@ -1,11 +1,13 @@
-//! Pole refinement by variable projection: a descent on the error of the best output matrices as a function of the dynamics.
+//! Pole refinement by variable projection: a descent on the error of the best output matrices as a function
+//! of the dynamics.
 //!
-//! The output matrices are eliminated: `phi(a, b) = min over c, d of the error`. By the envelope theorem the gradient of phi
-//! is that of the error with the optimal output matrices held fixed. For gamma it is weighted with the dual matrices Y_l of
-//! the convex problem, scaled to nuclear norms that sum to one:
+//! The output matrices are eliminated: `phi(a, b) = min over c, d of the error`. By the envelope theorem the
+//! gradient of phi is that of the error with the optimal output matrices held fixed. For gamma it is
+//! weighted with the dual matrices Y_l of the convex problem, scaled to nuclear norms that sum to one:
 //! `d gamma = Re sum_l <Y_l, dK_l>` with `dK = -C (zI - a)^-1 (da x + db z^-lags H)`.
 //!
-//! Source: Golub and Pereyra, "Separable nonlinear least squares: the variable projection method", Inverse Problems 19 (2003).
+//! Source: Golub and Pereyra, "Separable nonlinear least squares: the variable projection method", Inverse
+//! Problems 19 (2003).
 
 use super::descent::{Evaluated, descend};
 use super::dynamics::Dynamics;
@@ -102,8 +104,8 @@ fn worst_case_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Resul
     Ok((found.gamma, packed(&da, &db) / total))
 }
 
-/// The H2 norm of the error of the best output matrices, and its gradient: with the Gramians P and Q of the error system (A, B),
-/// d ||K||^2 = 2 <Q A P, dA> + 2 <Q B, dB>.
+/// The H2 norm of the error of the best output matrices, and its gradient: with the Gramians P and Q of the
+/// error system (A, B), d ||K||^2 = 2 <Q A P, dA> + 2 <Q B, dB>.
 fn mean_square_gradient(samples: &PlantSamples<'_>, dynamics: &Dynamics) -> Result<(f64, Mat), DesignError> {
     let plant = samples.plant;
     let (outputs, norm) = mean_square(plant, dynamics)?;

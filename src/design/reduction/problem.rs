@@ -21,8 +21,8 @@ pub struct ReductionProblem<'a> {
     pub bank: &'a StateSpace,
     /// States of the full bank in the form that is written.
     pub order: usize,
-    /// States per slow period of FIR head: the channels of the written bank. The plant may have fewer, because equal channels
-    /// are merged.
+    /// States per slow period of FIR head: the channels of the written bank. The plant may have fewer,
+    /// because equal channels are merged.
     pub width: usize,
     /// The quantity that is minimised.
     pub aim: Aim,

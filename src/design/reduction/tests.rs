@@ -43,7 +43,8 @@ fn error(plant: &LiftedPlant, bank: &StateSpace) -> StateSpace {
     plant.error_system(bank).unwrap()
 }
 
-/// Largest gain on a dense grid, by one LU factorisation a frequency: a lower bound that knows no level sets.
+/// Largest gain on a dense grid, by one LU factorisation a frequency: a lower bound that knows no level
+/// sets.
 fn dense_grid(error: &StateSpace) -> f64 {
     let gain = |k: usize| {
         let z = Complex::from_polar(1.0, std::f64::consts::PI * k as f64 / 4000.0);
@@ -84,12 +85,13 @@ fn more_states_are_never_worse_and_all_are_the_full_bank() {
         for pair in record.orders.windows(2) {
             assert!(pair[0].loss_db >= pair[1].loss_db - 1e-4, "{:?}", record.orders);
         }
-        // Every one of these states but the last two is worth more than a decibel here.
+        // Every one of these states but the last two lowers the error by more than half a decibel.
         assert!(record.orders[..8].windows(2).all(|pair| pair[0].loss_db > pair[1].loss_db + 0.5));
     }
 }
 
-/// F with states that are of no use: never reached, never seen, and the same recursion thrice, of which two cancel.
+/// F with redundant states: uncontrollable ones, unobservable ones, and the same recursion three times, of
+/// which two cancel.
 fn padded(bank: &StateSpace) -> StateSpace {
     let (n, m, p) = (bank.order(), bank.inputs(), bank.outputs());
     let extra = Mat::from_row_slice(3, 3, &[0.5, 0.3, 0.0, -0.3, 0.5, 0.0, 0.0, 0.1, 0.9]);
@@ -114,7 +116,7 @@ fn padded(bank: &StateSpace) -> StateSpace {
 }
 
 #[test]
-fn states_of_no_use_go_without_loss() {
+fn redundant_states_are_removed_without_loss() {
     let plant = thesis(3);
     for (aim, bank) in
         [(Aim::WorstCase, bank_of(Method::Iir, &plant)), (Aim::MeanSquare, bank_of(Method::H2, &plant))]
@@ -150,8 +152,8 @@ fn it_beats_truncation_without_weight_and_outputs() {
     }
 }
 
-/// Both choices of output matrices are optima of convex problems: no direction leads downhill. Judged by exact norms, which the optimisers
-/// do not use.
+/// Both choices of output matrices are optima of convex problems: no direction leads downhill. Judged by
+/// exact norms, which the optimisers do not use.
 #[test]
 fn no_other_outputs_is_better() {
     let plant = thesis(6);
@@ -185,7 +187,7 @@ fn no_other_outputs_is_better() {
 
 #[test]
 fn a_bank_without_error_keeps_what_it_needs() {
-    // The samples are those wanted, ten fast samples late: gamma is zero up to rounding.
+    // The measurement is the reference, ten fast samples earlier: gamma is zero up to rounding errors.
     let plant = plant(10, "{ delay = 0.0 }, { delay = 1.0 }");
     let bank = bank_of(Method::Iir, &plant);
     let problem = problem(&plant, &bank, Aim::WorstCase);

@@ -17,8 +17,8 @@ pub struct OrderErrorPoint {
     /// The error of the best bank found with at most so many states.
     #[serde(flatten)]
     pub figures: Figures,
-    /// Excess over the full bank in decibels of the quantity that the method minimises: gamma (`iir`) or the mean-square
-    /// error (`h2`).
+    /// Excess over the full bank in decibels of the quantity that the method minimises: gamma (`iir`) or the
+    /// mean-square error (`h2`).
     pub loss_db: f64,
 }
 
@@ -29,6 +29,7 @@ pub struct OrderReduction {
     pub full: OrderErrorPoint,
     /// The bank chosen.
     pub reduced: OrderErrorPoint,
-    /// The order/error trade-off: all orders searched, ascending. All orders below the full one where that is cheap.
+    /// The order/error trade-off: all orders searched, ascending. All orders below the full one where that
+    /// is cheap.
     pub orders: Vec<OrderErrorPoint>,
 }

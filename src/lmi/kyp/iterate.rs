@@ -137,8 +137,8 @@ impl<'a> Iterate<'a> {
     fn direction(&self, newton: &Newton, target: &Mat) -> Direction {
         let rhs = linalg::symmetric_part(&(newton.g_inverse.tr_mul(target) * &newton.g_inverse));
         let image = self.map.adjoint(&rhs);
-        let wanted = Mat::from_column_slice(self.x.len() + 1, 1, &self.dual_residual());
-        let (w, x) = newton.solve(&Mat::from_column_slice(image.len(), 1, &image), &wanted);
+        let required = Mat::from_column_slice(self.x.len() + 1, 1, &self.dual_residual());
+        let (w, x) = newton.solve(&Mat::from_column_slice(image.len(), 1, &image), &required);
         let mut x = x.as_slice().to_vec();
         let z = self.map.expand(w.as_slice());
         let gamma = x.pop().unwrap_or(0.0);

@@ -1,7 +1,7 @@
 //! The bounded real lemma with outputs affine in the unknowns (the LMI of thesis 5.4).
 //!
-//! For a fixed stable (A, B) and `C(x) = C_0 + sum_k x_k C_k`, `D(x) = D_0 + sum_k x_k D_k`, minimise gamma such
-//! that some symmetric P satisfies
+//! For a fixed stable (A, B) and `C(x) = C_0 + sum_k x_k C_k`, `D(x) = D_0 + sum_k x_k D_k`, minimise gamma
+//! such that some symmetric P satisfies
 //!
 //! ```text
 //! [ P - A'PA   -A'PB            C(x)'   ]
@@ -18,9 +18,10 @@
 //!             tr Zuu + tr Zyy = 1,   Z >= 0.
 //! ```
 //!
-//! The Lyapunov equality determines Zxx, so the unknowns of the Newton system are `Zxu, Zuu, Zyx, Zyu, Zyy` and x.
-//! The n(n+1)/2 entries of P are not among them; they follow from a Lyapunov equation. Both sides are feasible in all
-//! iterations: the dual starts from any `Zuu > 0` with its Gramian, the primal from a Lyapunov matrix and a large gamma.
+//! The Lyapunov equality determines Zxx, so the unknowns of the Newton system are `Zxu, Zuu, Zyx, Zyu, Zyy`
+//! and x. The n(n+1)/2 entries of P are not among them; they follow from a Lyapunov equation. Both sides are
+//! feasible in all iterations: the dual starts from any `Zuu > 0` with its Gramian, the primal from a
+//! Lyapunov matrix and a large gamma.
 //!
 //! Sources: Vandenberghe, Balakrishnan, Wallin, Hansson, Roh, "Interior-point algorithms for
 //! semidefinite programming problems derived from the KYP lemma", in *Positive polynomials in

@@ -14,7 +14,8 @@ pub(super) struct Direction {
     pub(super) z: Mat,
 }
 
-/// The factored Newton system of an iterate, in the Nesterov-Todd scaling: `G'SG = G^-1 Z G^-T = diag(lambda)`.
+/// The factored Newton system of an iterate, in the Nesterov-Todd scaling:
+/// `G'SG = G^-1 Z G^-T = diag(lambda)`.
 ///
 /// Directions are formed in scaled coordinates, where rounding errors are small beside every eigenvalue; in
 /// the plain coordinates they would drown the small eigenvalues of S and Z near the optimum.
@@ -29,7 +30,8 @@ pub(super) struct Newton {
 }
 
 impl Newton {
-    /// The system for `map` and `border` at the primal matrix `s` and the dual matrix `z`, both positive definite.
+    /// The system for `map` and `border` at the primal matrix `s` and the dual matrix `z`, both positive
+    /// definite.
     pub(super) fn new(map: &Covariance, border: &Mat, s: &Mat, z: &Mat) -> Result<Self, LinalgError> {
         let (ls, lz) = (linalg::cholesky(s)?, linalg::cholesky(z)?);
         let svd = linalg::svd(&ls.tr_mul(&lz))?;
@@ -45,11 +47,11 @@ impl Newton {
         Ok(Self { factor, triangle, columns: rows.transpose(), g, g_inverse, lambda })
     }
 
-    /// `H w + K x = image`, `K'w = wanted`, by an orthogonal projection in the coordinates where H is the
+    /// `H w + K x = image`, `K'w = required`, by an orthogonal projection in the coordinates where H is the
     /// identity: the dual equalities hold to rounding however ill-conditioned H is.
-    pub(super) fn solve(&self, image: &Mat, wanted: &Mat) -> (Mat, Mat) {
+    pub(super) fn solve(&self, image: &Mat, required: &Mat) -> (Mat, Mat) {
         let half = self.factor.solve_half(image);
-        let needed = linalg::solve_lower(&self.triangle, wanted);
+        let needed = linalg::solve_lower(&self.triangle, required);
         let component = self.columns.tr_mul(&half) - needed;
         let x = linalg::solve_lower_transposed(&self.triangle, &component);
         (self.factor.solve_half_transposed(&(half - &self.columns * component)), x)

@@ -58,7 +58,8 @@ impl Problem {
     /// A: n x n, B: n x m, `c` = C_0: p x n, `d` = D_0: p x m, `terms` = (C_k, D_k).
     ///
     /// # Errors
-    /// [`KypError::Size`] and [`KypError::NotFinite`] name the matrix, [`KypError::Unstable`] has the spectral radius.
+    /// [`KypError::Size`] and [`KypError::NotFinite`] name the matrix, [`KypError::Unstable`] has the
+    /// spectral radius.
     pub fn new(a: Mat, b: Mat, c: Mat, d: Mat, terms: Vec<(Mat, Mat)>) -> Result<Self, KypError> {
         let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
         check("A", &a, n, n)?;

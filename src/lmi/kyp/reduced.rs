@@ -1,11 +1,12 @@
-//! The problem in Gramian coordinates, relative to the outputs of least squares. In these coordinates the squared H2
-//! norm is the squared norm of [C D], so that the H2-optimal unknowns are a projection.
+//! The problem in Gramian coordinates, relative to the outputs of least squares. In these coordinates the
+//! squared H2 norm is the squared norm of [C D], so that the H2-optimal unknowns are a projection.
 
 use super::problem::{KypError, Problem};
 use crate::linalg::{self, LinalgError, Mat};
 use crate::lti::GramianCoordinates;
 
-/// The problem of the iteration: `vec [C D] = k0 + terms y`, orthonormal `terms` orthogonal to `k0`, `|k0| = 1`.
+/// The problem of the iteration: `vec [C D] = k0 + terms y`, orthonormal `terms` orthogonal to `k0`,
+/// `|k0| = 1`.
 pub(super) struct Reduced {
     pub(super) coordinates: GramianCoordinates,
     pub(super) outputs: usize,

@@ -7,8 +7,8 @@ use crate::lmi::settings::{SettingError, check_settings};
 pub struct Settings {
     /// Most predictor-corrector steps (default 80).
     pub max_iterations: usize,
-    /// Duality gap to reach, relative to gamma (default 1e-7). Rounding errors in the Newton matrix end the progress near
-    /// 1e-9.
+    /// Duality gap to reach, relative to gamma (default 1e-7). Rounding errors in the Newton matrix end the
+    /// progress near 1e-9.
     pub tol_gap_rel: f64,
     /// Duality gap that counts as zero, relative to the norm of the data (default 1e-13).
     pub tol_gap_abs: f64,

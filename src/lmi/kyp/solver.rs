@@ -29,11 +29,12 @@ pub struct Solution {
 
 /// Minimises gamma; the module documentation has the problem and the method.
 ///
-/// Every problem has a solution, because A is stable and a norm is at least 0. The result holds the best unknowns found
-/// and bounds on the optimum, whatever the outcome.
+/// Every problem has a solution, because A is stable and a norm is at least 0. The result holds the best
+/// unknowns found and bounds on the optimum, whatever the outcome.
 ///
 /// # Errors
-/// [`KypError::Setting`] for a setting out of its range, [`KypError::Linalg`] if a decomposition does not converge.
+/// [`KypError::Setting`] for a setting out of its range, [`KypError::Linalg`] if a decomposition does not
+/// converge.
 pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, KypError> {
     settings.check()?;
     let reduced = Reduced::new(problem, settings.tol_rank)?;

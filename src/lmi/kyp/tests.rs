@@ -6,8 +6,8 @@ use crate::lmi::{Outcome, SettingError};
 use crate::lti::StateSpace;
 use crate::lti::peak::hinf_norm;
 
-/// A random-looking FIR problem: plant (a, b), wanted w = cw x + dw u, measured h = ch x + dh u, taps F_j on
-/// h[k - j]. Returns the KYP problem and the sampled one on the given grid.
+/// A random-looking FIR problem: plant (a, b), reference w = cw x + dw u, measurement h = ch x + dh u, taps
+/// F_j on h[k - j]. Returns the KYP problem and the sampled one on the given grid.
 struct Fir {
     a: Mat,
     b: Mat,

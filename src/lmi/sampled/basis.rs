@@ -1,11 +1,11 @@
-//! Orthonormal bases of what the taps can do, for least squares and for making dual matrices
-//! exactly orthogonal to every tap.
+//! Orthonormal bases of the range of the taps, for least squares and for dual matrices that are exactly
+//! orthogonal to every tap.
 
 use super::prepare::Reduced;
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, LinalgError, Mat, Svd};
 
-/// Singular values below this, relative to the largest, cannot be told from zero.
+/// Singular values below this, relative to the largest, count as zero.
 const INJECTIVE: f64 = 1e-12;
 
 /// The map from one row's taps to that row of `F(omega_l) h_l`, as a QR factorisation that serves all
@@ -15,8 +15,8 @@ pub(super) struct Basis {
     q: Mat,
     triangles: Vec<(usize, Svd)>,
     weights: Vec<f64>,
-    /// Rows below the responses, where nothing is wanted.
-    silent: usize,
+    /// Rows below the responses, whose reference is zero.
+    zero_rows: usize,
 }
 
 impl Basis {
@@ -25,14 +25,14 @@ impl Basis {
         Self::with_noise(reduced, weights, &[])
     }
 
-    /// With the taps of original channel i, times `noise[i]`, as further entries that are wanted to be zero.
+    /// With the taps of original channel i, times `noise[i]`, as further rows whose reference is zero.
     pub(super) fn with_noise(
         reduced: &Reduced,
         weights: Vec<f64>,
         noise: &[f64],
     ) -> Result<Self, LinalgError> {
         let map = row_map(reduced, &weights, noise);
-        let silent = map.nrows() - 2 * reduced.h.cols() * reduced.count();
+        let zero_rows = map.nrows() - 2 * reduced.h.cols() * reduced.count();
         let (l, q) = linalg::lq(&map.transpose());
         let (q, r) = (q.transpose(), l.transpose());
         let mut triangles: Vec<(usize, Svd)> = Vec::new();
@@ -43,7 +43,7 @@ impl Basis {
                 triangles.push((lags, linalg::svd(&r.view((0, 0), (rows, cols)).into_owned())?));
             }
         }
-        Ok(Self { q, triangles, weights, silent })
+        Ok(Self { q, triangles, weights, zero_rows })
     }
 
     /// The triangle for a number of lags; none for a row without taps.
@@ -71,8 +71,9 @@ impl Basis {
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
             let (u, kept) = (&svd.u, kept(svd, cut));
-            let seen = self.q.columns(0, u.nrows()).tr_mul(&row_vector(w, p, &self.weights, self.silent));
-            let mut c = u.columns(0, kept).tr_mul(&seen);
+            let component =
+                self.q.columns(0, u.nrows()).tr_mul(&row_vector(w, p, &self.weights, self.zero_rows));
+            let mut c = u.columns(0, kept).tr_mul(&component);
             for (value, s) in c.iter_mut().zip(&svd.s) {
                 *value /= s;
             }
@@ -82,14 +83,14 @@ impl Basis {
         x
     }
 
-    /// Removes from each row of `y` what the taps of that row can reach, twice for the last digits.
-    /// Only meaningful for a basis with unit weights.
+    /// Makes each row of `y` orthogonal to the range of its taps, in two passes for the last digits. Needs a
+    /// basis with unit weights.
     pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Blocks, cut: f64) {
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
             let u = svd.u.columns(0, kept(svd, cut));
             let q = self.q.columns(0, svd.u.nrows());
-            let mut row = row_vector(y, p, &self.weights, self.silent);
+            let mut row = row_vector(y, p, &self.weights, self.zero_rows);
             for _ in 0..2 {
                 let image = u * u.tr_mul(&q.tr_mul(&row));
                 row -= q * image;
@@ -104,8 +105,8 @@ fn kept(svd: &Svd, cut: f64) -> usize {
     svd.s.iter().filter(|s| **s > floor).count()
 }
 
-/// Rows: real parts of all (point, input), then imaginary parts, then the noise of all (lag, channel with noise).
-/// Columns: lag by lag, channels inside.
+/// Rows: real parts of all (point, input), then imaginary parts, then the noise of all (lag, channel with
+/// noise). Columns: lag by lag, channels inside.
 fn row_map(reduced: &Reduced, weights: &[f64], noise: &[f64]) -> Mat {
     let (n, k, lags) = (reduced.layout.channels, reduced.h.cols(), reduced.phases.lags());
     let half = k * reduced.count();
@@ -125,9 +126,9 @@ fn row_map(reduced: &Reduced, weights: &[f64], noise: &[f64]) -> Mat {
     map
 }
 
-fn row_vector(y: &Blocks, p: usize, weights: &[f64], silent: usize) -> Mat {
+fn row_vector(y: &Blocks, p: usize, weights: &[f64], zero_rows: usize) -> Mat {
     let (k, half) = (y.cols(), y.cols() * y.count());
-    Mat::from_fn(2 * half + silent, 1, |r, _| {
+    Mat::from_fn(2 * half + zero_rows, 1, |r, _| {
         if r >= 2 * half {
             return 0.0;
         }

@@ -1,4 +1,4 @@
-//! The small LMIs, one a point, with their dual matrices.
+//! The small LMIs, one per point, with their dual matrices.
 //!
 //! `S = [t I - G, K; K*, I]` is never stored: it follows from t and K, and it is positive definite
 //! if and only if `t I - G - K K*` is.

@@ -1,4 +1,4 @@
-//! A lower bound on the worst case that holds whatever the iteration did.
+//! A lower bound on the worst case that holds for any dual matrices, converged or not.
 //!
 //! For any matrices `Y_l` (M x q) and any taps F, by the duality of spectral and nuclear norm,
 //!
@@ -7,7 +7,7 @@
 //! r_{p,i,j} = sum_l Re <Y_l, e^{-i omega_l j} E_{p,i} H_l>.
 //! ```
 //!
-//! Dual matrices of an optimum have r = 0. What rounding leaves of it is charged for all taps
+//! Dual matrices of an optimum have r = 0. The rest that rounding errors leave is subtracted for all taps
 //! within a stated radius.
 
 use super::basis::Basis;
@@ -17,7 +17,7 @@ use super::problem::{Problem, Taps};
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, CMat, Complex, Mat};
 
-/// Cuts tried for telling weak directions of tap space from rounding errors; the best bound counts.
+/// Thresholds tried between weak directions of tap space and rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
 /// Where the data do not confine the taps: up to this many times the size of the solution (or of unit
 /// gain) they are covered by the bound.
@@ -50,7 +50,7 @@ pub enum Covered {
 }
 
 impl LowerBound {
-    /// The bound nobody can dispute.
+    /// The trivial bound.
     pub(super) fn zero() -> Self {
         Self { value: 0.0, residual: 0.0, covered: Covered::All }
     }
@@ -166,8 +166,8 @@ pub(super) fn cover(
     basis: &Basis,
     (taps, gamma): (&Taps, f64),
 ) -> Result<(f64, Covered), SampledError> {
-    let wanted = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
-    let stated = RADIUS_FACTOR * size(problem, taps).max(wanted);
+    let reference = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
+    let stated = RADIUS_FACTOR * size(problem, taps).max(reference);
     let spread = (problem.rows() as f64).sqrt() * gamma;
     let image = problem.points().iter().map(|p| (p.w.norm() + spread).powi(2)).sum::<f64>().sqrt();
     let confined = RADIUS_SAFETY * image * basis.inverse_norm() * mix_norm(problem, reduced)?;

@@ -1,8 +1,8 @@
-//! The second objective: least weighted mean square, with the noise of the channels, free or under a cap on the
-//! worst case.
+//! The secondary objective: the least weighted mean square, with the noise of the channels, free or under a
+//! cap on the worst case.
 //!
-//! Optimal worst-case taps are usually many; among all taps within a small slack of the optimum the
-//! ones of least mean square are good at every other frequency too.
+//! Taps of least worst case are usually not unique. Among the taps within a small margin of the optimum,
+//! those of least mean square have small errors at all frequencies.
 
 use super::basis::Basis;
 use super::interior::{Engine, Objective};
@@ -13,7 +13,7 @@ use super::settings::{Settings, Step};
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::outcome::Outcome;
 
-/// Steps without a better gap after which a run is over.
+/// Steps without a smaller gap after which the iteration ends.
 const PATIENCE: usize = 6;
 
 /// Taps of least mean square under a cap.
@@ -23,7 +23,7 @@ pub struct MeanSquare {
     pub outcome: Outcome,
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
-    /// The second objective of these taps.
+    /// The secondary objective of these taps.
     pub mean_square: f64,
     /// Lower bound on it for any taps under the cap, from the dual iterate (valid up to rounding).
     pub lower: f64,
@@ -35,8 +35,8 @@ pub struct MeanSquare {
     pub steps: Vec<Step>,
 }
 
-/// Taps that minimise the second objective, by a QR factorisation (never by normal equations); least norm among
-/// directions weaker than `tol_rank` times the strongest.
+/// Taps that minimise the secondary objective, by a QR factorisation (never by normal equations); least norm
+/// among directions weaker than `tol_rank` times the strongest.
 ///
 /// Fails if weights or noise do not fit: see [`MeanSquareObjective`].
 pub fn least_squares(
@@ -54,7 +54,7 @@ pub fn least_squares(
     Ok(reduced.taps(&basis.least_squares(&reduced, &reduced.w, tol_rank)))
 }
 
-/// Minimises the second objective subject to `sigma_max(K_l) <= cap` at every point.
+/// Minimises the secondary objective subject to `sigma_max(K_l) <= cap` at every point.
 ///
 /// `start` must satisfy the cap strictly: the taps of [`super::minimise`] with a cap a little above
 /// their gamma. If the unconstrained least-squares taps satisfy the cap they are returned at once.
@@ -80,7 +80,7 @@ pub fn mean_square_under_cap(
     }
     // From the start, in units of the cap and of the start's own mean square.
     let unit = best.mean_square / (cap * cap);
-    let mut reduced = Reduced::new(&shifted(problem, start)?)?;
+    let mut reduced = Reduced::new(&residual_problem(problem, start)?)?;
     reduced.rescale(cap);
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
     let run = Run { reduced: &reduced, start, quadratic, cap, settings };
@@ -89,8 +89,8 @@ pub fn mean_square_under_cap(
     Ok(best.finish(outcome, lower, steps))
 }
 
-/// The same points with the error of `start` in place of what is wanted.
-fn shifted(problem: &Problem, start: &Taps) -> Result<Problem, SampledError> {
+/// The problem with the error of `start` as its reference.
+fn residual_problem(problem: &Problem, start: &Taps) -> Result<Problem, SampledError> {
     let point = |l: usize| {
         let p = &problem.points()[l];
         Point { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }

@@ -13,7 +13,7 @@ use super::prepare::Reduced;
 use crate::linalg::blocks::{Block, Blocks, inner};
 use crate::linalg::{Complex, Mat};
 
-/// One Hermitian matrix family seen through the rows (u) and channels (v).
+/// A family of Hermitian matrices, projected on the rows (u) and channels (v).
 #[derive(Debug, Clone)]
 pub(super) struct ChannelProjection {
     pub(super) uu: Blocks,
@@ -100,7 +100,8 @@ fn put(data: &mut Mat, r: usize, l: usize, count: usize, z: Complex<f64>) {
     data[(r, count + l)] = z.im;
 }
 
-/// Row and corner of the unknown t: `-Re sum_l e^{-i w j} (Xvu Zuu + Zvu Xuu)_{i,p}` and `Re sum_l tr(Xuu Zuu)`.
+/// Row and corner of the unknown t: `-Re sum_l e^{-i w j} (Xvu Zuu + Zvu Xuu)_{i,p}` and
+/// `Re sum_l tr(Xuu Zuu)`.
 pub(super) fn border(reduced: &Reduced, x: &ChannelProjection, z: &ChannelProjection) -> (Vec<f64>, f64) {
     let (n, m) = (reduced.layout.channels, reduced.layout.rows);
     let mut mixed = Blocks::zeros(1, n, m);

@@ -1,13 +1,13 @@
-//! From the problem as given to the one that is iterated on: inputs compressed at each point,
-//! channels mixed to equal, uncorrelated strength.
+//! The problem of the iteration: inputs compressed at each point, channels mixed to equal strength without
+//! correlation.
 
 use super::fourier::{Layout, Phases};
 use super::problem::{Problem, SampledError, Taps};
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, CMat, Mat};
 
-/// Singular values of the row-normalised channels below this are no channel of their own: the
-/// directions they stand for cannot be told from rounding errors.
+/// Singular values of the row-normalised channels below this are rounding errors; their directions are
+/// dropped.
 const CHANNEL_RANK: f64 = 1e-14;
 
 /// The problem in coordinates fit for iterating.
@@ -15,9 +15,9 @@ const CHANNEL_RANK: f64 = 1e-14;
 pub(super) struct Reduced {
     /// Mixed channels, n x k1.
     pub(super) h: Blocks,
-    /// What is wanted in the reachable inputs, M x k1.
+    /// The reference in the inputs that the channels measure, M x k1.
     pub(super) w: Blocks,
-    /// What no tap reaches, M x k2.
+    /// The reference in the other inputs, M x k2; the taps do not act on it.
     pub(super) w_rest: Blocks,
     /// `w_rest w_rest*`, M x M.
     pub(super) g: Blocks,
@@ -93,7 +93,7 @@ impl Reduced {
         c.column_iter().map(|col| Mat::from_column_slice(m, n, col.as_slice()) * &self.mix).collect()
     }
 
-    /// Divides everything wanted by `scale`.
+    /// Divides the reference by `scale`.
     pub(super) fn rescale(&mut self, scale: f64) {
         for (blocks, factor) in [
             (&mut self.w, 1.0 / scale),
@@ -113,7 +113,7 @@ fn stack(h: &CMat, w: &CMat) -> CMat {
 }
 
 /// n x N real matrix after which the channels, summed over all points, have unit mean power each and
-/// no correlation. Equal channels collapse into one, silent ones disappear.
+/// no correlation. Equal channels become one, zero channels none.
 fn mixing(channels: &Blocks) -> Result<Mat, SampledError> {
     let (n, k, count) = (channels.rows(), channels.cols(), channels.count());
     let half = k * count;

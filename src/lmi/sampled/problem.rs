@@ -7,7 +7,7 @@ use crate::lmi::settings::SettingError;
 /// are zero.
 pub type Taps = Vec<Mat>;
 
-/// What cannot be a problem.
+/// Why data do not form a sampled problem.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SampledError {
     /// There is no point.
@@ -119,19 +119,19 @@ pub enum SampledError {
     Linalg(#[from] LinalgError),
 }
 
-/// One frequency with what is wanted and what is measured there.
+/// A frequency with the responses of the reference and the measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// Frequency in radians a lag.
+    /// Frequency in radians per lag.
     pub omega: f64,
-    /// Wanted response, M x q.
+    /// Response of the reference, M x q.
     pub w: CMat,
-    /// Measured responses, N x q.
+    /// Responses of the measurements, N x q.
     pub h: CMat,
 }
 
-/// The second objective: the weighted mean square of the error, and the power of the noise that the channels
-/// themselves add,
+/// The secondary objective: the weighted mean square of the error, and the power of the noise that the
+/// channels themselves add,
 ///
 /// ```text
 /// sum_l weights_l ||K_l||_F^2 + sum_i noise_i sum_j |F_j e_i|^2.
@@ -223,7 +223,7 @@ impl Problem {
         &point.w - response(taps, point.omega, self.rows(), self.channels()) * &point.h
     }
 
-    /// Worst `sigma_max(K_l)` over the points, and the index of the point where it is attained.
+    /// Largest `sigma_max(K_l)` over the points, and the index of the point where it is attained.
     pub fn worst(&self, taps: &Taps) -> Result<(f64, usize), SampledError> {
         let mut worst = (0.0, 0);
         for l in 0..self.points.len() {
@@ -235,7 +235,7 @@ impl Problem {
         Ok(worst)
     }
 
-    /// The second objective's value: see [`MeanSquareObjective`].
+    /// Value of the secondary objective: see [`MeanSquareObjective`].
     pub fn mean_square(&self, taps: &Taps, square: &MeanSquareObjective) -> f64 {
         let error = |l: usize| self.error_at(l, taps).iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = square.weights.iter().enumerate().map(|(l, w)| w * error(l)).sum();

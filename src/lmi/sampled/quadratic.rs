@@ -1,7 +1,8 @@
-//! The second objective in the coordinates of the iteration.
+//! The secondary objective in the coordinates of the iteration.
 //!
-//! With taps `F = start + cap x mix` the objective, in units of `unit cap^2`, is a convex quadratic function of
-//! the unknowns: `sum_l w_l ||k_l||_F^2`, and for each row and lag of the taps a term `x G x' + b x' + c` of the noise.
+//! With taps `F = start + cap x mix` the objective, in units of `unit cap^2`, is a convex quadratic function
+//! of the unknowns: `sum_l w_l ||k_l||_F^2`, and for each row and lag of the taps a term `x G x' + b x' + c`
+//! of the noise.
 
 use super::newton;
 use super::prepare::Reduced;
@@ -38,8 +39,8 @@ impl Quadratic {
         let mut slope = Mat::zeros(m * n, start.len());
         let mut constant = 0.0;
         for (j, f) in start.iter().enumerate() {
-            let seen = f * noisy.transpose() * (2.0 / (unit * cap));
-            slope.column_mut(j).copy_from_slice(seen.as_slice());
+            let cross = f * noisy.transpose() * (2.0 / (unit * cap));
+            slope.column_mut(j).copy_from_slice(cross.as_slice());
             let power = f.column_iter().zip(&square.noise).map(|(c, noise)| noise * c.norm_squared());
             constant += power.sum::<f64>() / (unit * cap * cap);
         }

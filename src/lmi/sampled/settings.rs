@@ -7,9 +7,9 @@ use crate::lmi::settings::{SettingError, check_settings};
 pub struct Settings {
     /// Most predictor-corrector steps (default 80).
     pub max_iterations: usize,
-    /// Wanted proven gap, relative to gamma (default 1e-9).
+    /// Duality gap to reach, relative to gamma (default 1e-9).
     pub tol_gap_rel: f64,
-    /// Gap that is as good as none, relative to the largest `sigma_max(W_l)` (default 1e-13).
+    /// Duality gap that counts as zero, relative to the largest `sigma_max(W_l)` (default 1e-13).
     pub tol_gap_abs: f64,
     /// Gap, relative to gamma, up to which a stalled run still counts as solved (default 1e-5).
     pub tol_gap_reduced: f64,
@@ -46,7 +46,7 @@ impl Settings {
 }
 
 /// One line of the iteration record. The objective is in scaled units (`t` for the worst case, the
-/// mean square for the second objective).
+/// mean square for the secondary objective).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// Objective at the start of the step.

@@ -12,7 +12,7 @@ use crate::lmi::outcome::Outcome;
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
 const START_MARGIN: f64 = 2.0;
-/// Steps without a better gap after which a run is over.
+/// Steps without a smaller gap after which the iteration ends.
 const PATIENCE: usize = 6;
 
 /// Taps of least worst-case norm with the interval that the optimum lies in.
@@ -22,11 +22,11 @@ pub struct Solution {
     pub outcome: Outcome,
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
-    /// Worst `sigma_max(K_l)` of these very taps over the points.
+    /// Largest `sigma_max(K_l)` of these taps over the points.
     pub gamma: f64,
     /// Index of the point where it is attained.
     pub worst_point: usize,
-    /// Proven lower bound on gamma for any taps of the same lags.
+    /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
     pub lower: LowerBound,
     /// The matrices `Y_l` (M x q) that prove it through [`super::lower_bound`].
     pub dual: Vec<CMat>,
@@ -43,9 +43,12 @@ impl Solution {
 
 /// Minimises the worst-case norm. See the module's text for the problem and the method.
 ///
-/// Every well-formed problem has a solution: the result always holds the best taps found, their exact
-/// norm on the points and a proven lower bound; `outcome` says whether the two met. Fails only on
-/// settings out of range or if a decomposition does not converge.
+/// Every well-formed problem has a solution: the result holds the best taps found, their worst case over the
+/// points and a lower bound, whatever the outcome.
+///
+/// # Errors
+/// [`SampledError::Setting`] for a setting out of its range, [`SampledError::Linalg`] if a decomposition
+/// does not converge.
 pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, SampledError> {
     settings.check()?;
     let mut reduced = Reduced::new(problem)?;
@@ -58,7 +61,7 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, Samp
     if best.solved(settings.tol_gap_rel) {
         return Ok(best.finish(Outcome::Solved, Vec::new()));
     }
-    // Shift and scale to the least-squares solution: what is left to do is of order one.
+    // Shift and scale to the least-squares solution: the rest is of order one.
     let scale = best.gamma;
     reduced.w = reduced.error(&x);
     reduced.rescale(scale);
@@ -67,7 +70,7 @@ pub fn minimise(problem: &Problem, settings: &Settings) -> Result<Solution, Samp
     Ok(best.finish(outcome, steps))
 }
 
-/// No taps to choose: the norm is what it is, and its own singular vectors prove it.
+/// A problem without taps: its singular vectors attain the lower bound.
 fn fixed(problem: &Problem) -> Result<Solution, SampledError> {
     let taps = problem.zero_taps();
     let (gamma, worst_point) = problem.worst(&taps)?;

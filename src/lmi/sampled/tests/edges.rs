@@ -1,0 +1,98 @@
+//! Nothing to choose, nothing to reach, too few iterations, data that are no problem.
+
+use super::*;
+
+#[test]
+fn problems_without_a_choice_are_right() {
+    let problem = random_problem(5, (2, 2, 3), 9, &[0, 0]);
+    let s = solve("no taps", &problem);
+    assert!(s.outcome == Outcome::Solved && s.taps.is_empty() && s.relative_gap() < 1e-12);
+    let deaf = changed(&random_problem(5, (2, 2, 3), 9, &[2, 2]), |_, p| p.h.fill(Complex::default()));
+    let s = solve("H = 0", &deaf);
+    assert!(
+        s.outcome == Outcome::Solved
+            && s.relative_gap() < 1e-12
+            && s.gamma == deaf.worst(&deaf.zero_taps()).unwrap().0
+    );
+    let nothing = changed(&random_problem(5, (2, 2, 3), 9, &[2, 2]), |_, p| p.w.fill(Complex::default()));
+    let s = solve("W = 0", &nothing);
+    assert!(s.outcome == Outcome::Solved && s.gamma == 0.0 && s.taps.iter().all(|f| f.norm() == 0.0));
+}
+
+/// W in the row space of H by known taps: found again, whatever their size.
+#[test]
+fn exactly_reproducible_targets_give_zero() {
+    for (seed, sizes) in [(1, (2, 2, 4)), (2, (3, 2, 3)), (3, (1, 3, 3))] {
+        let problem = random_problem(seed, sizes, 30, &vec![4; sizes.0]);
+        let mut r = Random(99 + seed);
+        let taps: Taps =
+            (0..4).map(|_| crate::linalg::Mat::from_fn(sizes.0, sizes.1, |_, _| r.next())).collect();
+        let zero = changed(&problem, |_, p| p.w.fill(Complex::default()));
+        let reachable = changed(&problem, |l, p| p.w = -zero.error_at(l, &taps));
+        let s = solve("reachable", &reachable);
+        assert!(s.outcome == Outcome::Solved && s.gamma < 1e-12);
+        for (a, b) in s.taps.iter().zip(&taps) {
+            assert!((a - b).norm() < 1e-10);
+        }
+    }
+}
+
+#[test]
+fn an_exhausted_iteration_limit_keeps_valid_bounds() {
+    let problem = random_problem(31, (2, 2, 4), 30, &[5, 5]);
+    let full = minimise(&problem, &Settings::default()).unwrap();
+    for max_iterations in 0..6 {
+        let s = minimise(&problem, &Settings { max_iterations, ..Settings::default() }).unwrap();
+        check(&problem, &s);
+        assert_eq!(s.outcome, Outcome::IterationLimit);
+        assert_eq!(s.steps.len(), max_iterations);
+        assert!(s.gamma >= full.lower.value && s.lower.value <= full.gamma && s.lower.value > 0.0);
+    }
+}
+
+#[test]
+fn what_is_no_problem_is_refused() {
+    let good = random_problem(1, (2, 2, 3), 3, &[2, 2]);
+    let with = |change: &dyn Fn(&mut Vec<Point>)| {
+        let mut points = good.points().to_vec();
+        change(&mut points);
+        Problem::new(points, vec![2, 2]).unwrap_err()
+    };
+    assert_eq!(with(&|p| p.clear()), SampledError::NoPoints);
+    assert!(matches!(with(&|p| p[2].h = CMat::zeros(2, 4)), SampledError::Size { name: "H", point: 2, .. }));
+    assert!(matches!(with(&|p| p[1].w = CMat::zeros(3, 3)), SampledError::Size { name: "W", point: 1, .. }));
+    assert!(matches!(with(&|p| p[1].omega = f64::NAN), SampledError::NotFinite { name: "omega", point: 1 }));
+    let bad = Complex::new(0.0, f64::INFINITY);
+    assert!(matches!(with(&|p| p[0].h[(1, 1)] = bad), SampledError::NotFinite { name: "H", point: 0 }));
+    assert!(matches!(
+        Problem::new(good.points().to_vec(), vec![1]),
+        Err(SampledError::Lags { given: 1, rows: 2 })
+    ));
+    let settings = Settings { step_fraction: 1.0, ..Settings::default() };
+    assert!(matches!(
+        minimise(&good, &settings),
+        Err(SampledError::Setting(SettingError { name: "step_fraction", .. }))
+    ));
+    let s = minimise(&good, &Settings::default()).unwrap();
+    let channels = good.channels();
+    let with = |weights: &[f64], noise: &[f64]| MeanSquareObjective {
+        weights: weights.to_vec(),
+        noise: noise.to_vec(),
+    };
+    let capped = |square: &MeanSquareObjective, cap, taps| {
+        mean_square_under_cap(&good, square, cap, taps, &Settings::default())
+    };
+    let ones = MeanSquareObjective::noiseless(vec![1.0; 3], channels);
+    let refused = |weights: &[f64], noise: &[f64]| capped(&with(weights, noise), 1.0, &s.taps).unwrap_err();
+    assert!(matches!(refused(&[1.0; 2], &ones.noise), SampledError::Count { given: 2, points: 3, .. }));
+    assert!(matches!(refused(&[1.0, -1.0, 1.0], &ones.noise), SampledError::Weight { point: 1, .. }));
+    assert!(matches!(refused(&[1.0; 3], &[]), SampledError::NoiseCount { given: 0, .. }));
+    let negative = vec![-1.0; channels];
+    assert!(matches!(refused(&[1.0; 3], &negative), SampledError::Noise { channel: 0, .. }));
+    assert!(matches!(capped(&ones, 0.5 * s.gamma, &s.taps), Err(SampledError::Cap { .. })));
+    assert!(matches!(
+        capped(&ones, 1.0, &vec![crate::linalg::Mat::zeros(1, 1)]),
+        Err(SampledError::TapsShape { .. })
+    ));
+    assert!(matches!(lower_bound(&good, &[], 1.0), Err(SampledError::Count { .. })));
+}
