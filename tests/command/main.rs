@@ -7,6 +7,7 @@ mod abuse;
 mod algorithms;
 mod cuts;
 mod design;
+mod docs;
 mod examples;
 #[cfg(target_os = "linux")]
 mod faults;

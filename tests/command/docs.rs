@@ -61,7 +61,8 @@ impl Folder {
         let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
         let readme = fs::read_to_string(readme).expect("README.md");
         let spec = snippets(&readme).into_iter().find(|snippet| snippet.language == "toml");
-        fs::write(folder.path().join("spec.toml"), spec.expect("a spec in README.md").text).expect("spec.toml");
+        fs::write(folder.path().join("spec.toml"), spec.expect("a spec in README.md").text)
+            .expect("spec.toml");
         Self { page: page.to_owned(), folder }
     }
 
