@@ -3,7 +3,8 @@
 use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits};
 
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, Certificate, FixedPoint, Gamma, SynthesisFilters, Tone,
+    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma, LowerProof,
+    SynthesisFilters,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96 kHz.
@@ -82,15 +83,22 @@ impl Bank {
 
     fn check_proof(&self) -> Checked {
         let Some(proof) = &self.proof else { return Ok(()) };
-        let check = |path: &str, tone: &Tone, measured| check_tone(path, tone, self.ratio, measured);
+        let check =
+            |path: &str, witness: &DualWitness, measured| check_witness(path, witness, self.ratio, measured);
         if let Some(certificate) = &proof.upper {
             check_certificate(certificate)?;
             check("proof.upper.peak", &certificate.peak, 0)?;
         }
-        for (k, tone) in proof.lower.iter().enumerate() {
-            check(&format!("proof.lower[{k}]"), tone, self.channel_count())?;
+        match &proof.lower {
+            Some(LowerProof::Fir(witnesses)) => {
+                for (k, witness) in witnesses.iter().enumerate() {
+                    check(&format!("proof.lower[{k}]"), witness, self.channel_count())?;
+                }
+            }
+            Some(LowerProof::Causal(witness)) => check_causal(witness)?,
+            None => {}
         }
-        proof.noncausal.as_ref().map_or(Ok(()), |tone| check("proof.noncausal", tone, 0))
+        proof.noncausal.as_ref().map_or(Ok(()), |witness| check("proof.noncausal", witness, 0))
     }
 
     fn check_scalars(&self) -> Checked {
@@ -258,21 +266,37 @@ fn check_certificate(certificate: &Certificate) -> Checked {
     Ok(())
 }
 
-fn check_tone(path: &str, tone: &Tone, wanted: usize, measured: usize) -> Checked {
-    check_finite(&format!("{path}.half"), &tone.half)?;
-    if tone.half == [0.0; 2] {
+fn check_causal(witness: &CausalWitness) -> Checked {
+    if !(witness.gamma.is_finite() && witness.gamma >= 0.0) {
+        let rule = "a norm is zero or more, and finite";
+        return out_of_range("proof.lower.gamma", witness.gamma, "(h = 1)", rule);
+    }
+    if !(1..=CausalWitness::MAX_PERIODS).contains(&witness.periods) {
+        let rule = format!("the recursion runs for 1 to {} slow periods", CausalWitness::MAX_PERIODS);
+        return out_of_range("proof.lower.periods", witness.periods as f64, "slow periods", rule);
+    }
+    Ok(())
+}
+
+fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: usize) -> Checked {
+    check_finite(&format!("{path}.half"), &witness.half)?;
+    if witness.half == [0.0; 2] {
         let rule = "half is about cos(w/2), sin(w/2); both cannot be zero";
         return out_of_range(format!("{path}.half"), 0.0, "", rule);
     }
-    for (key, list, expected) in [("wanted", &tone.wanted, wanted), ("measured", &tone.measured, measured)] {
+    for (key, list, expected) in [("wanted", &witness.wanted, reference), ("measured", &witness.measured, measured)] {
         let path = format!("{path}.{key}");
         if list.len() != expected {
-            let (found, rule) = (list.len(), "a tone has one weight for each sample of a tick");
+            let (found, rule) = (list.len(), "a witness has one weight for each sample of a slow period");
             return refuse(path, BankProblem::Length { found, expected, unit: "weights", rule });
         }
         for (i, pair) in list.iter().enumerate() {
             check_finite(&format!("{path}[{i}]"), pair)?;
         }
+    }
+    if witness.wanted.iter().flatten().all(|&x| x == 0.0) {
+        let rule = "a witness of weight zero shows nothing";
+        return out_of_range(format!("{path}.wanted"), 0.0, "", rule);
     }
     Ok(())
 }

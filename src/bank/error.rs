@@ -40,7 +40,7 @@ pub enum BankProblem {
     },
     /// A bank of another version of the format.
     #[error(
-        "the bank has version {found}, this program reads version {VERSION}; design it anew, or update the program"
+        "the bank has version {found}, this program reads version {VERSION}; design it again, or update the program"
     )]
     Version {
         /// What the file says.
@@ -54,7 +54,7 @@ pub enum BankProblem {
     },
     /// A digest of another content.
     #[error(
-        "it is not the digest of this content: something in the file was altered; take the original, or design the bank anew"
+        "it is not the digest of this content: something in the file was altered; take the original, or design the bank again"
     )]
     Altered,
     /// A key, a type or a number that is wrong as such.
@@ -102,7 +102,7 @@ pub enum BankProblem {
     },
     /// Integer taps of other bits than the spec asks for.
     #[error(
-        "the bank's integers have {bank}, its spec asks for {spec}; design the bank anew, or set spec to null"
+        "the bank's integers have {bank}, its spec asks for {spec}; design the bank again, or set spec to null"
     )]
     WordsDiffer {
         /// In the bank.
@@ -122,7 +122,7 @@ pub enum BankProblem {
     },
     /// The bank and the spec in it say different things.
     #[error(
-        "the bank says {bank}, its spec says {spec}; they must agree, design the bank anew or set spec to null"
+        "the bank says {bank}, its spec says {spec}; they must agree, design the bank again or set spec to null"
     )]
     SpecDiffers {
         /// The bank's number.

@@ -19,7 +19,7 @@ mod write;
 pub use check::MAX_BANK_LATENCY;
 pub use error::{BankError, BankProblem};
 pub use fixed_point::FixedPoint;
-pub use proof::{Certificate, Proof, Tone};
+pub use proof::{CausalWitness, Certificate, DualWitness, LowerProof, Proof};
 pub use read::check_digest;
 
 use crate::spec::{Method, Spec};
@@ -31,7 +31,7 @@ pub const FORMAT: &str = "hybank-bank";
 /// `version` of the bank files written and read.
 pub const VERSION: usize = 1;
 
-/// N synthesis filters for one spec, whole: what `design` makes and every other verb reads.
+/// N synthesis filters for one spec, whole: what `design` makes and every other command reads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bank {
     /// The spec it was designed for, with all defaults filled in; `None` for a bank made elsewhere.
@@ -61,11 +61,11 @@ pub struct Bank {
 pub enum SynthesisFilters {
     /// `taps[i][n]` = `f_i[n]` at the fast rate.
     Fir(Vec<Vec<f64>>),
-    /// One block for each slow tick.
+    /// One block per slow period.
     StateSpace(BlockFilter),
 }
 
-/// x+ = a x + b u, y = c x + d u; u the N slow samples of a tick, y its M fast samples.
+/// x+ = a x + b u, y = c x + d u; u the N slow samples of a period, y its M fast samples.
 /// Row-major lists of rows.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]

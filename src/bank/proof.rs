@@ -2,40 +2,65 @@
 
 use serde::Serialize;
 
-/// Witnesses for the gammas of a bank. Each part may be missing; what is missing is found anew before a proof.
+/// Witnesses for the gammas of a bank. Each part may be missing; what is missing proves nothing.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Proof {
     /// For `gamma.upper`, from above and from below.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub upper: Option<Certificate>,
-    /// For `gamma.lower` of an FIR bank: tones that bind all taps of its length. Empty where `gamma.noncausal` says as
-    /// much, and for the other methods.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub lower: Vec<Tone>,
-    /// For `gamma.noncausal`: a tone at which the samples say least about the wanted ones.
+    /// For `gamma.lower`. Left out where `gamma.noncausal` says as much.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub noncausal: Option<Tone>,
+    pub lower: Option<LowerProof>,
+    /// For `gamma.noncausal`: a frequency and direction in which the samples say least about the reference samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noncausal: Option<DualWitness>,
 }
 
-/// Certificate that a bank keeps a gamma, and a tone at which it comes near it.
+/// What proves a lower bound.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum LowerProof {
+    /// For FIR banks of a length: witnesses that together bind all taps.
+    Fir(Vec<DualWitness>),
+    /// For all causal banks.
+    Causal(CausalWitness),
+}
+
+/// A gamma that no causal bank reaches: the finite-horizon filtering recursion breaks down within so many slow periods.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CausalWitness {
+    /// No causal bank has less (h = 1).
+    pub gamma: f64,
+    /// T, 1 to [`MAX_PERIODS`](Self::MAX_PERIODS).
+    pub periods: usize,
+}
+
+impl CausalWitness {
+    /// Most slow periods of a witness.
+    pub const MAX_PERIODS: usize = 4096;
+}
+
+/// Certificate that a bank keeps a gamma, and a frequency at which it comes near it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Certificate {
-    /// ||K|| is less than this (h = 1); some 1e-8 above `gamma.upper`, which is the norm itself.
+    /// ||K|| is less than this (h = 1); `gamma.upper`, some 1e-8 above `gamma.norm`.
     pub gamma: f64,
     /// Where the bank's own gain is largest.
-    pub peak: Tone,
+    pub peak: DualWitness,
     /// Lower triangular R, row by row, with P = R R' of the bounded-real lemma in the coordinates of [`crate::verify`].
     pub factor: Vec<Vec<f64>>,
 }
 
-/// A tone at the point e^{i w} = (c + i s)^2 / (c^2 + s^2) of the unit circle, w in radians a slow tick.
+/// Weights of the samples at the point e^{i w} = (c + i s)^2 / (c^2 + s^2) of the unit circle, w in radians per slow period.
+///
+/// A witness of weight zero shows nothing, and is refused.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Tone {
+pub struct DualWitness {
     /// `[c, s]`, about cos(w/2) and sin(w/2).
     pub half: [f64; 2],
-    /// Weights of the M wanted samples of a tick, `[re, im]`.
+    /// Weights of the M reference samples of a slow period, `[re, im]`.
     pub wanted: Vec<[f64; 2]>,
-    /// Weights of the N measured samples of a tick; empty where they follow from the rest.
+    /// Weights of the N measured samples of a slow period; empty where they follow from the rest.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub measured: Vec<[f64; 2]>,
 }

@@ -6,8 +6,8 @@ use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
 
 use super::digest::{digest, is_digest};
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, Certificate, FORMAT, FixedPoint, Gamma, Proof,
-    SynthesisFilters, Tone, VERSION,
+    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint, Gamma,
+    LowerProof, Proof, SynthesisFilters, VERSION,
 };
 
 const KEYS: [&str; 14] = [
@@ -168,27 +168,37 @@ const WITNESS: &str = "a proof without it proves nothing; leave the proof out, o
 
 fn proof(value: &Value<'_>) -> Result<Proof, Fault> {
     let fields = value.fields(&["upper", "lower", "noncausal"])?;
-    let lower = fields.optional("lower").map(|v| v.items("a list of tones")).transpose()?.unwrap_or_default();
     Ok(Proof {
         upper: fields.optional("upper").map(|v| certificate(&v)).transpose()?,
-        lower: lower.iter().map(tone).collect::<Result<_, _>>()?,
-        noncausal: fields.optional("noncausal").map(|v| tone(&v)).transpose()?,
+        lower: fields.optional("lower").map(|v| lower_proof(&v)).transpose()?,
+        noncausal: fields.optional("noncausal").map(|v| witness(&v)).transpose()?,
     })
+}
+
+/// A list of witnesses for FIR banks, or a table with gamma and periods for causal ones.
+fn lower_proof(value: &Value<'_>) -> Result<LowerProof, Fault> {
+    if let Ok(list) = value.items("a list of witnesses") {
+        return Ok(LowerProof::Fir(list.iter().map(witness).collect::<Result<_, _>>()?));
+    }
+    let fields = value.fields(&["gamma", "periods"])?;
+    let gamma = fields.required("gamma", WITNESS)?.number()?;
+    let periods = fields.required("periods", WITNESS)?.count("slow periods")?;
+    Ok(LowerProof::Causal(CausalWitness { gamma, periods }))
 }
 
 fn certificate(value: &Value<'_>) -> Result<Certificate, Fault> {
     let fields = value.fields(&["gamma", "peak", "factor"])?;
     Ok(Certificate {
         gamma: fields.required("gamma", WITNESS)?.number()?,
-        peak: tone(&fields.required("peak", WITNESS)?)?,
+        peak: witness(&fields.required("peak", WITNESS)?)?,
         factor: fields.required("factor", WITNESS)?.matrix()?,
     })
 }
 
-fn tone(value: &Value<'_>) -> Result<Tone, Fault> {
+fn witness(value: &Value<'_>) -> Result<DualWitness, Fault> {
     let fields = value.fields(&["half", "wanted", "measured"])?;
     let measured = fields.optional("measured").map(|v| pairs(&v)).transpose()?;
-    Ok(Tone {
+    Ok(DualWitness {
         half: pair(&fields.required("half", WITNESS)?)?,
         wanted: pairs(&fields.required("wanted", WITNESS)?)?,
         measured: measured.unwrap_or_default(),

@@ -97,15 +97,15 @@ fn the_file_looks_as_the_format_says() {
 
 /// Proof parts of a bank with two channels and ratio 2.
 fn with_proof() -> Bank {
-    let tone = |measured: Vec<[f64; 2]>| Tone {
+    let witness = |measured: Vec<[f64; 2]>| DualWitness {
         half: [0.8, -0.6],
         wanted: vec![[1.0, 0.5], [-0.0, 0.25]],
         measured,
     };
     let factor = vec![vec![0.1], vec![0.2, 1.0 / 3.0], vec![1e-9, -2.5, 7.0]];
-    let upper = Some(Certificate { gamma: 0.04, peak: tone(vec![]), factor });
-    let lower = vec![tone(vec![[0.5, 0.0], [1.5e-300, 2.0]])];
-    Bank { proof: Some(Proof { upper, lower, noncausal: Some(tone(vec![])) }), ..fir() }
+    let upper = Some(Certificate { gamma: 0.04, peak: witness(vec![]), factor });
+    let lower = Some(LowerProof::Fir(vec![witness(vec![[0.5, 0.0], [1.5e-300, 2.0]])]));
+    Bank { proof: Some(Proof { upper, lower, noncausal: Some(witness(vec![])) }), ..fir() }
 }
 
 #[test]

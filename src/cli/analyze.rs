@@ -6,10 +6,10 @@ use crate::design::{self, Analysis, Certified, DesignError, MeanAnalysis};
 use crate::units::Seconds;
 use std::path::PathBuf;
 
-/// Computes the exact gamma of a bank, with its own delays or with others
+/// Computes the gamma of a bank, with its own delays or with others
 ///
-/// Works on the coefficients in the file, not on what the designer promised: the error system is built anew from the
-/// spec inside the bank and its H-infinity norm computed.
+/// Works on the coefficients in the file, not on what the designer promised: the error system is built again from the
+/// spec inside the bank and its H-infinity norm computed (relative error 1e-9).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -23,7 +23,7 @@ pub(super) struct Args {
     /// True delay minus the bank's, one for each channel, in seconds
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     delay_error: Vec<Seconds>,
-    /// Also prove an upper bound of gamma in floating point (bounded-real LMI, Cholesky with all rounding errors charged)
+    /// Also prove an upper bound of gamma (bounded-real lemma, every rounding error charged)
     #[arg(long)]
     certify: bool,
     /// Print the result as one JSON object
@@ -38,7 +38,7 @@ fn finite(text: &str) -> Result<Seconds, String> {
     }
 }
 
-/// Runs the verb.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the one message for the user.

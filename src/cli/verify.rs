@@ -4,16 +4,15 @@ use super::Failure;
 use super::bank_file::{name, read_text};
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
-use crate::spec::Method;
-use crate::verify::{Verified, verify};
+use crate::verify::{BoundedBanks, Verified, verify};
 use std::path::PathBuf;
 
 /// Proves the gammas in a bank file, from the file alone
 ///
 /// Rebuilds the error system from the spec and the coefficients in the file, by other means than the designer's and with every
-/// rounding error charged, and proves both ends of gamma with the certificate and the tones that the file carries. A file in
-/// which a coefficient, a gamma or a matrix was altered is refused: by its digest, or because the proof no longer fits. For a
-/// bank made elsewhere, without digest and certificate, a certificate is looked for first.
+/// rounding error charged, and proves both ends of gamma with the certificate and the witnesses that the file carries. Each
+/// gamma that the file states must be proven. A file in which a coefficient, a gamma or a matrix was altered is refused: by
+/// its digest, or because the proof no longer fits. A bank without a proof is refused at once; --search looks for one.
 ///
 /// Taken for given are the state equations of the front ends, as realised in double precision from the spec.
 #[derive(Debug, clap::Args)]
@@ -22,11 +21,15 @@ Examples:
   hybank verify bank.json
   hybank design spec.toml -o - | hybank verify -
   hybank verify bank.json --json | jq '[.lower, .upper]'
+  hybank verify elsewhere.json --search
 
 Exit codes: 0 proven; 1 the file is not what it says, with the place that does not fit.")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
+    /// Look for a proof of a bank that carries none; gammas that it does not reach are then only not refuted
+    #[arg(long)]
+    search: bool,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -42,13 +45,13 @@ struct Report {
     /// The certificate came with the file; otherwise it was found now.
     certificate_in_file: bool,
     #[serde(skip)]
-    scope: String,
+    taps: usize,
     /// The taps are integers of so many bits.
     #[serde(skip)]
     words: String,
 }
 
-/// Runs the verb.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the one message for the user.
@@ -64,21 +67,19 @@ fn report(args: &Args) -> Result<Report, Failure> {
     let bank = Bank::from_json(&text, &file).map_err(Failure::input)?;
     let digest = check_digest(&text, &file).map_err(Failure::input)?;
     let certificate_in_file = bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
-    let verified = if certificate_in_file {
-        verify(&bank).map_err(|error| named(&error))?
-    } else {
+    let verified = if args.search && !certificate_in_file {
         design::prove(&bank).map_err(|error| named(&error))?.1
+    } else {
+        verify(&bank).map_err(|error| named(&error))?
     };
-    Ok(Report { scope: scope(&bank), words: words(&bank), bank: file, verified, digest, certificate_in_file })
+    Ok(Report { taps: taps(&bank), words: words(&bank), bank: file, verified, digest, certificate_in_file })
 }
 
-/// Of which banks the lower end speaks.
-fn scope(bank: &Bank) -> String {
-    match (&bank.filters, bank.method) {
-        (SynthesisFilters::Fir(taps), Method::Fir) => {
-            format!("no FIR bank of {} taps a channel is better", taps[0].len())
-        }
-        _ => "no bank at all is better".to_owned(),
+/// Taps per channel; zero for recursive filters.
+fn taps(bank: &Bank) -> usize {
+    match &bank.filters {
+        SynthesisFilters::Fir(taps) => taps[0].len(),
+        SynthesisFilters::StateSpace(_) => 0,
     }
 }
 
@@ -91,6 +92,17 @@ fn words(bank: &Bank) -> String {
 }
 
 impl Report {
+    /// Which banks the lower end holds for.
+    fn scope(&self) -> String {
+        match self.verified.lower_banks {
+            BoundedBanks::Any => "no bank at all is better".to_owned(),
+            BoundedBanks::Causal => "no causal bank of this latency is better".to_owned(),
+            BoundedBanks::FirOfThisLength => {
+                format!("no FIR bank of {} taps per channel is better", self.taps)
+            }
+        }
+    }
+
     fn text(&self) -> String {
         let Verified { lower, upper, attained, noncausal, states, .. } = self.verified;
         let origin = if self.certificate_in_file { "from the file" } else { "found now, the file has none" };
@@ -100,9 +112,9 @@ impl Report {
         format!(
             "{}: proven, gamma in [{}, {}] (h = 1), relative width {width:.1e}\n\
              upper      {}   bounded-real lemma, P of order {states} {origin}\n\
-             attained   {}   this bank's own gain at one tone\n\
-             lower      {}   {}{}\n\
-             noncausal  {}   no bank at all is better{}\n\
+             attained   {}   this bank's own gain at one frequency\n\
+             lower      {}   {}\n\
+             noncausal  {}   no bank at all is better\n\
              {}digest     {digest}\n",
             self.bank,
             number(lower),
@@ -110,18 +122,11 @@ impl Report {
             number(upper),
             number(attained),
             number(lower),
-            self.scope,
-            stated(self.verified.lower_only_stated),
+            self.scope(),
             number(noncausal),
-            stated(self.verified.noncausal_only_stated),
             self.words,
         )
     }
-}
-
-/// What the file says beyond what was proven.
-fn stated(only: bool) -> &'static str {
-    if only { " (the file states more, which is not proven)" } else { "" }
 }
 
 /// All digits: rounding would move a bound.

@@ -1,7 +1,8 @@
-//! Numbers known to lie in an interval: a midpoint of 106 bits and a radius that every operation enlarges by its own
+//! Numbers known to lie in an interval: a midpoint of 106 bits (or 512) and a radius that every operation enlarges by its own
 //! rounding error. What is computed with them encloses the exact result for every choice of values in the operands.
 
-use super::double_word::{Double, ROUNDING};
+use super::double_double::DoubleDouble;
+use super::number::Number;
 use nalgebra::DMatrix;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -12,18 +13,18 @@ const TINY: f64 = 1e-290;
 
 /// All numbers x with `|x - mid| <= radius`. A radius of infinity or NaN says that nothing is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Ball {
-    mid: Double,
+pub(super) struct Ball<F = DoubleDouble> {
+    mid: F,
     radius: f64,
 }
 
 /// Matrix of enclosed numbers.
-pub(super) type Matrix = DMatrix<Ball>;
+pub(super) type Matrix<F = DoubleDouble> = DMatrix<Ball<F>>;
 
-impl Ball {
-    pub(super) const ZERO: Self = Self { mid: Double::ZERO, radius: 0.0 };
+impl<F: Number> Ball<F> {
+    pub(super) const ZERO: Self = Self { mid: F::ZERO, radius: 0.0 };
 
-    pub(super) fn mid(self) -> Double {
+    pub(super) fn mid(self) -> F {
         self.mid
     }
 
@@ -37,13 +38,8 @@ impl Ball {
         self.radius
     }
 
-    /// Exactly `a - b`.
-    pub(super) fn difference(a: f64, b: f64) -> Self {
-        Self { mid: Double::difference(a, b), radius: 0.0 }
-    }
-
     /// Exactly the midpoint given.
-    pub(super) fn exactly(mid: Double) -> Self {
+    pub(super) fn exactly(mid: F) -> Self {
         Self { mid, radius: 0.0 }
     }
 
@@ -72,15 +68,15 @@ impl Ball {
         self == Self::ZERO
     }
 
-    fn rounded(mid: Double, inherited: f64) -> Self {
-        Self { mid, radius: (inherited + ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
+    fn rounded(mid: F, inherited: f64) -> Self {
+        Self { mid, radius: (inherited + F::ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
     }
 
     /// Enclosure of the root; NaN where the ball holds negative numbers.
     pub(super) fn sqrt(self) -> Self {
         let least = self.lower();
         if least.is_nan() || least < 0.0 {
-            return Self { mid: Double::from(f64::NAN), radius: f64::NAN };
+            return Self { mid: F::from(f64::NAN), radius: f64::NAN };
         }
         let root = self.mid.sqrt();
         // |sqrt(x) - sqrt(m)| = |x - m| / (sqrt(x) + sqrt(m)).
@@ -89,20 +85,20 @@ impl Ball {
     }
 }
 
-impl From<f64> for Ball {
+impl<F: Number> From<f64> for Ball<F> {
     fn from(value: f64) -> Self {
         Self { mid: value.into(), radius: 0.0 }
     }
 }
 
-impl Neg for Ball {
+impl<F: Number> Neg for Ball<F> {
     type Output = Self;
     fn neg(self) -> Self {
         Self { mid: -self.mid, radius: self.radius }
     }
 }
 
-impl Add for Ball {
+impl<F: Number> Add for Ball<F> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         match (self.is_zero(), other.is_zero()) {
@@ -113,14 +109,14 @@ impl Add for Ball {
     }
 }
 
-impl Sub for Ball {
+impl<F: Number> Sub for Ball<F> {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         self + -other
     }
 }
 
-impl Mul for Ball {
+impl<F: Number> Mul for Ball<F> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         if self.is_zero() || other.is_zero() {
@@ -132,13 +128,13 @@ impl Mul for Ball {
     }
 }
 
-impl Div for Ball {
+impl<F: Number> Div for Ball<F> {
     type Output = Self;
     /// NaN where the divisor's ball holds zero.
     fn div(self, other: Self) -> Self {
         let least = other.mid.nearest().abs() * (1.0 - f64::EPSILON) - other.radius * OUTWARD;
         if least.is_nan() || least <= 0.0 {
-            return Self { mid: Double::from(f64::NAN), radius: f64::NAN };
+            return Self { mid: F::from(f64::NAN), radius: f64::NAN };
         }
         let quotient = self.mid / other.mid;
         // |x/y - m/n| <= (|x - m| + |m/n| |y - n|) / |y|.
@@ -148,36 +144,36 @@ impl Div for Ball {
 }
 
 /// The matrix of exactly these doubles.
-pub(super) fn exact(m: &DMatrix<f64>) -> Matrix {
+pub(super) fn exact<F: Number>(m: &DMatrix<f64>) -> Matrix<F> {
     m.map(Ball::from)
 }
 
-pub(super) fn zeros(rows: usize, columns: usize) -> Matrix {
+pub(super) fn zeros<F: Number>(rows: usize, columns: usize) -> Matrix<F> {
     Matrix::from_element(rows, columns, Ball::ZERO)
 }
 
-pub(super) fn identity(order: usize) -> Matrix {
+pub(super) fn identity<F: Number>(order: usize) -> Matrix<F> {
     Matrix::from_fn(order, order, |i, j| Ball::from(f64::from(u8::from(i == j))))
 }
 
-pub(super) fn add(a: &Matrix, b: &Matrix) -> Matrix {
+pub(super) fn add<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     a.zip_map(b, |x, y| x + y)
 }
 
-pub(super) fn subtract(a: &Matrix, b: &Matrix) -> Matrix {
+pub(super) fn subtract<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     a.zip_map(b, |x, y| x - y)
 }
 
-pub(super) fn scaled(a: &Matrix, by: Ball) -> Matrix {
+pub(super) fn scaled<F: Number>(a: &Matrix<F>, by: Ball<F>) -> Matrix<F> {
     a.map(|x| x * by)
 }
 
 /// a b. Entries of `a` that are exactly zero cost nothing: most of what occurs here is sparse.
-pub(super) fn product(a: &Matrix, b: &Matrix) -> Matrix {
+pub(super) fn product<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     assert_eq!(a.ncols(), b.nrows(), "the matrices of a product fit each other");
     let mut result = zeros(a.nrows(), b.ncols());
     for i in 0..a.nrows() {
-        let row: Vec<(usize, Ball)> =
+        let row: Vec<(usize, Ball<F>)> =
             (0..a.ncols()).map(|k| (k, a[(i, k)])).filter(|(_, x)| !x.is_zero()).collect();
         for j in 0..b.ncols() {
             result[(i, j)] = row.iter().fold(Ball::ZERO, |sum, &(k, x)| sum + x * b[(k, j)]);
@@ -187,32 +183,36 @@ pub(super) fn product(a: &Matrix, b: &Matrix) -> Matrix {
 }
 
 /// a b'.
-pub(super) fn product_transposed(a: &Matrix, b: &Matrix) -> Matrix {
+pub(super) fn product_transposed<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     product(a, &b.transpose())
 }
 
 /// a s a' for a symmetric s.
-pub(super) fn congruence(a: &Matrix, s: &Matrix) -> Matrix {
+pub(super) fn congruence<F: Number>(a: &Matrix<F>, s: &Matrix<F>) -> Matrix<F> {
     // The second product in the form (a (a s)')', so that the sparse factor stands on the left.
     symmetric(&product(a, &product(a, s).transpose()))
 }
 
 /// The matrix again, made symmetric to the bit; for matrices that are symmetric by definition and whose two triangles
 /// both enclose the same numbers.
-pub(super) fn symmetric(m: &Matrix) -> Matrix {
+pub(super) fn symmetric<F: Number>(m: &Matrix<F>) -> Matrix<F> {
     Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i.max(j), i.min(j))])
 }
 
 /// A bound on the largest sum of moduli in a row.
-pub(super) fn row_sum(m: &Matrix) -> f64 {
+pub(super) fn row_sum<F: Number>(m: &Matrix<F>) -> f64 {
     let sum = |i: usize| m.row(i).iter().fold(0.0, |sum, x| (sum + x.magnitude()) * OUTWARD);
     (0..m.nrows()).map(sum).fold(0.0, nan_max)
 }
 
+/// A bound on the sum of the radii in each row.
+pub(super) fn row_radii<F: Number>(m: &Matrix<F>) -> Vec<f64> {
+    m.row_iter().map(|row| row.iter().fold(0.0, |sum, x| (sum + x.radius) * OUTWARD)).collect()
+}
+
 /// The same for radii only: a bound on the spectral norm of a symmetric matrix within the radii.
-pub(super) fn radius_sum(m: &Matrix) -> f64 {
-    let sum = |i: usize| m.row(i).iter().fold(0.0, |sum, x| (sum + x.radius) * OUTWARD);
-    (0..m.nrows()).map(sum).fold(0.0, nan_max)
+pub(super) fn radius_sum<F: Number>(m: &Matrix<F>) -> f64 {
+    row_radii(m).into_iter().fold(0.0, nan_max)
 }
 
 /// The larger one, NaN if either is: an unknown bound stays unknown.
@@ -221,7 +221,7 @@ pub(super) fn nan_max(a: f64, b: f64) -> f64 {
 }
 
 /// The nearest doubles to the midpoints.
-pub(super) fn nearest(m: &Matrix) -> DMatrix<f64> {
+pub(super) fn nearest<F: Number>(m: &Matrix<F>) -> DMatrix<f64> {
     m.map(Ball::nearest)
 }
 
@@ -236,9 +236,9 @@ mod tests {
         /// Any values in the operands give a value in the result: tried with the ends, against 106 bits.
         #[test]
         fn results_hold_all_values(a in -1e3..1e3f64, b in -1e3..1e3f64, ra in 0.0..1.0f64, rb in 0.0..1.0f64, s in -1.0..1.0f64, t in -1.0..1.0f64) {
-            let (x, y) = (Ball::from(a).widened(ra), Ball::from(b).widened(rb));
-            let (u, v) = (Double::from(a) + Double::from(s * ra), Double::from(b) + Double::from(t * rb));
-            let holds = |ball: Ball, value: Double| ball.radius.is_nan() || (value - ball.mid).nearest().abs() <= ball.radius;
+            let (x, y) = (Ball::<DoubleDouble>::from(a).widened(ra), Ball::from(b).widened(rb));
+            let (u, v) = (DoubleDouble::from(a) + DoubleDouble::from(s * ra), DoubleDouble::from(b) + DoubleDouble::from(t * rb));
+            let holds = |ball: Ball, value: DoubleDouble| ball.radius.is_nan() || (value - ball.mid).nearest().abs() <= ball.radius;
             prop_assert!(holds(x + y, u + v) && holds(x - y, u - v) && holds(x * y, u * v));
             prop_assert!(holds(x / y, u / v));
             prop_assert!(holds(x.sqrt(), u.sqrt()));
@@ -248,10 +248,10 @@ mod tests {
 
     #[test]
     fn what_is_unknown_stays_unknown() {
-        let zero = Ball::from(1e-9).widened(1e-8);
+        let zero = Ball::<DoubleDouble>::from(1e-9).widened(1e-8);
         let unknown = Ball::from(1.0) / zero;
         assert!(unknown.radius().is_nan() && (unknown + Ball::from(1.0)).radius().is_nan());
         assert!(row_sum(&Matrix::from_element(1, 1, unknown)).is_nan());
-        assert!(Ball::from(-1.0).sqrt().radius().is_nan());
+        assert!(Ball::<DoubleDouble>::from(-1.0).sqrt().radius().is_nan());
     }
 }

@@ -1,13 +1,14 @@
 //! The error system K = W - F H of a bank in state-space form: xi+ = A xi + J u, e = C xi + L u, where u has the Gram
-//! matrix of a [`Tick`].
+//! matrix of a [`SlowPeriod`].
 //!
-//! The state xi is, in this order: the analog state at the beginning of the tick (the distinct filters in the order
-//! target, channels); for each of the wanted samples 0..M-1 and then of the channels 1..N that is counted whole ticks late
-//! its delay line, latest first; the state of the bank: for taps the past samples of channel 1, latest first, then of
+//! The state xi is, in this order: the analog state at the beginning of the period (the distinct filters in the order
+//! target, channels); for each of the reference samples 0..M-1 and then of the channels 1..N that is counted whole periods
+//! late its delay line, latest first; the state of the bank: for taps the past samples of channel 1, latest first, then of
 //! channel 2, ..; for a block filter its own state.
 
 use super::ball::{self, Ball, Matrix};
-use super::tick::Tick;
+use super::number::Number;
+use super::slow_period::SlowPeriod;
 use crate::bank::{BlockFilter, SynthesisFilters};
 use std::ops::Range;
 
@@ -82,51 +83,56 @@ pub(super) struct ErrorSystem {
 }
 
 /// Where the parts of the state lie.
-struct Layout {
+pub(super) struct Layout {
     lines: Vec<Range<usize>>,
     filter: Range<usize>,
 }
 
 impl Layout {
-    fn new(tick: &Tick, filter_states: usize) -> Self {
-        let mut next = tick.order();
+    pub(super) fn new<F: Number>(period: &SlowPeriod<F>, filter_states: usize) -> Self {
+        let mut next = period.order();
         let mut take = |count: usize| {
             next += count;
             next - count..next
         };
-        let lines = tick.ticks_late.iter().map(|&ticks| take(ticks)).collect();
+        let lines = period.periods_late.iter().map(|&late| take(late)).collect();
         Self { lines, filter: take(filter_states) }
+    }
+
+    /// Number of states.
+    pub(super) fn order(&self) -> usize {
+        self.filter.end
     }
 }
 
 /// Number of states of the error system of a bank, before anything of that size is built.
-pub(super) fn order(tick: &Tick, filters: &SynthesisFilters, ratio: usize) -> usize {
+pub(super) fn order(analog: usize, periods_late: &[usize], filters: &SynthesisFilters, ratio: usize) -> usize {
     let own = match filters {
         SynthesisFilters::Fir(taps) => taps.len() * (taps[0].len().div_ceil(ratio) - 1),
         SynthesisFilters::StateSpace(block) => block.a.len(),
     };
-    Layout::new(tick, own).filter.end
+    periods_late.iter().fold(analog + own, |sum, &late| sum.saturating_add(late))
 }
 
 /// Linear maps from the state xi and the inputs u, row by row.
-struct Rows {
-    state: Matrix,
-    input: Matrix,
+pub(super) struct Rows<F> {
+    pub(super) state: Matrix<F>,
+    pub(super) input: Matrix<F>,
 }
 
-impl Rows {
+impl<F: Number> Rows<F> {
     fn zeros(count: usize, states: usize, inputs: usize) -> Self {
         Self { state: ball::zeros(count, states), input: ball::zeros(count, inputs) }
     }
 
-    /// Makes `row` the sample `s` of the tick, as it is taken.
-    fn take_sample(&mut self, row: usize, tick: &Tick, s: usize) {
-        self.state.view_mut((row, 0), (1, tick.order())).copy_from(&tick.readouts.row(s));
-        self.input[(row, tick.order() + s)] = Ball::from(1.0);
+    /// Makes `row` the sample `s` of the period, as it is taken.
+    fn take_sample(&mut self, row: usize, period: &SlowPeriod<F>, s: usize) {
+        self.state.view_mut((row, 0), (1, period.order())).copy_from(&period.outputs.row(s));
+        self.input[(row, period.order() + s)] = Ball::from(1.0);
     }
 
     /// Takes `by` times the rows `range` of `other` from the rows from `start` on.
-    fn subtract(&mut self, start: usize, by: &Matrix, other: &Self, range: Range<usize>) {
+    fn subtract(&mut self, start: usize, by: &Matrix<F>, other: &Self, range: Range<usize>) {
         for (to, from) in [(&mut self.state, &other.state), (&mut self.input, &other.input)] {
             let part = ball::product(by, &from.rows(range.start, range.len()).into_owned());
             let mut rows = to.rows_mut(start, by.nrows());
@@ -136,39 +142,41 @@ impl Rows {
     }
 }
 
-/// Fills in the delay lines, and gives the samples at the tick in which they count.
-fn deliver(whole: &mut Rows, tick: &Tick, layout: &Layout) -> Rows {
-    let mut delivered = Rows::zeros(tick.samples(), whole.state.ncols(), whole.input.ncols());
+/// The analog side with its delay lines: xi+ (with `more` rows of zeros below), and the samples in the period in which they
+/// count.
+pub(super) fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: usize) -> (Rows<F>, Rows<F>) {
+    let (n, order, inputs) = (period.order(), layout.order(), period.order() + period.samples());
+    let mut next = Rows::zeros(order + more, order, inputs);
+    next.state.view_mut((0, 0), (n, n)).copy_from(&period.transition);
+    (0..n).for_each(|i| next.input[(i, i)] = Ball::from(1.0));
+    let mut delivered = Rows::zeros(period.samples(), order, inputs);
     for (s, line) in layout.lines.iter().enumerate() {
         if line.is_empty() {
-            delivered.take_sample(s, tick, s);
+            delivered.take_sample(s, period, s);
             continue;
         }
-        whole.take_sample(line.start, tick, s);
-        (line.start + 1..line.end).for_each(|link| whole.state[(link, link - 1)] = Ball::from(1.0));
+        next.take_sample(line.start, period, s);
+        (line.start + 1..line.end).for_each(|link| next.state[(link, link - 1)] = Ball::from(1.0));
         delivered.state[(s, line.end - 1)] = Ball::from(1.0);
     }
-    delivered
+    (next, delivered)
 }
 
 impl ErrorSystem {
-    pub(super) fn new(tick: &Tick, filters: &BlockForm) -> Self {
+    pub(super) fn new(period: &SlowPeriod, filters: &BlockForm) -> Self {
         let outputs = filters.d.nrows();
-        let layout = Layout::new(tick, filters.a.nrows());
-        let (n, order) = (tick.order(), layout.filter.end);
-        let mut whole = Rows::zeros(order + outputs, order, n + tick.samples());
-        whole.state.view_mut((0, 0), (n, n)).copy_from(&tick.transition);
-        (0..n).for_each(|i| whole.input[(i, i)] = Ball::from(1.0));
-        let delivered = deliver(&mut whole, tick, &layout);
-        let (wanted, measured) = (0..outputs, outputs..tick.samples());
+        let layout = Layout::new(period, filters.a.nrows());
+        let order = layout.order();
+        let (mut whole, delivered) = sampled(period, &layout, outputs);
+        let (reference, measured) = (0..outputs, outputs..period.samples());
         let own = layout.filter;
         whole.state.view_mut((own.start, own.start), (own.len(), own.len())).copy_from(&filters.a);
         whole.subtract(own.start, &filters.b.map(|x| -x), &delivered, measured.clone());
-        // e = wanted - c eta - d measured.
+        // e = reference - c eta - d measured.
         whole.state.view_mut((order, own.start), (outputs, own.len())).copy_from(&filters.c.map(|x| -x));
-        whole.subtract(order, &ball::identity(outputs).map(|x| -x), &delivered, wanted);
+        whole.subtract(order, &ball::identity(outputs).map(|x| -x), &delivered, reference);
         whole.subtract(order, &filters.d, &delivered, measured);
-        Self { system: whole.state, inputs: whole.input, gram: tick.gram.clone(), outputs }
+        Self { system: whole.state, inputs: whole.input, gram: period.gram.clone(), outputs }
     }
 
     /// n, the number of states.

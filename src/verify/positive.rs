@@ -6,20 +6,21 @@
 //! Stability of Numerical Algorithms*, theorems 10.3 and 10.5). So the midpoint less (radii + g tr + margin) I is factored.
 
 use super::ball::{self, Ball, Matrix};
-use super::double_word::{Double, ROUNDING};
+use super::double_double::{DoubleDouble, ROUNDING};
+use super::number::Number;
 use nalgebra::DMatrix;
 
 /// Lower triangular.
 #[derive(Debug, Clone)]
 pub(super) struct Factor {
-    rows: Vec<Vec<Double>>,
+    rows: Vec<Vec<DoubleDouble>>,
 }
 
 /// L L' = m in rounded arithmetic of 106 bits; `None` at the first pivot that is not positive.
-pub(super) fn cholesky(m: &DMatrix<Double>) -> Option<Factor> {
-    let mut rows: Vec<Vec<Double>> = Vec::with_capacity(m.nrows());
+pub(super) fn cholesky(m: &DMatrix<DoubleDouble>) -> Option<Factor> {
+    let mut rows: Vec<Vec<DoubleDouble>> = Vec::with_capacity(m.nrows());
     for i in 0..m.nrows() {
-        let mut row: Vec<Double> = Vec::with_capacity(i + 1);
+        let mut row: Vec<DoubleDouble> = Vec::with_capacity(i + 1);
         for j in 0..i {
             let above = &rows[j];
             let sum = (0..j).fold(m[(i, j)], |sum, k| sum - row[k] * above[k]);
@@ -51,8 +52,8 @@ pub(super) fn root(m: &Matrix) -> Option<Matrix> {
 
 impl Factor {
     /// (L L')^-1 v, rounded.
-    pub(super) fn solve(&self, v: &[Double]) -> Vec<Double> {
-        let mut x: Vec<Double> = Vec::with_capacity(v.len());
+    pub(super) fn solve(&self, v: &[DoubleDouble]) -> Vec<DoubleDouble> {
+        let mut x: Vec<DoubleDouble> = Vec::with_capacity(v.len());
         for (row, &value) in self.rows.iter().zip(v) {
             let sum = x.iter().zip(row).fold(value, |sum, (&x, &l)| sum - l * x);
             x.push(sum / row[row.len() - 1]);
@@ -103,7 +104,7 @@ pub(super) fn exceeds(m: &Matrix, least: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::{Mat, symmetric_eigenvalues};
+    use crate::linalg::symmetric_eigenvalues;
 
     /// Q diag(values) Q' with a Householder reflection: eigenvalues known beforehand.
     fn with_eigenvalues(values: &[f64]) -> Matrix {
@@ -153,11 +154,16 @@ mod tests {
     #[test]
     fn solutions_solve() {
         let m = with_eigenvalues(&[1.0, 3.0, 1e-9, 2.0]);
-        let v: Vec<Double> = [1.0, -2.0, 0.5, 3.0].map(Double::from).to_vec();
+        let v: Vec<DoubleDouble> = [1.0, -2.0, 0.5, 3.0].map(DoubleDouble::from).to_vec();
         let x = cholesky(&m.map(Ball::mid)).unwrap().solve(&v);
         let column = Matrix::from_fn(4, 1, |i, _| Ball::exactly(x[i]));
         let back = ball::product(&m, &column);
         assert!((0..4).all(|i| (back[i].mid() - v[i]).nearest().abs() < 1e-18));
-        assert_eq!(Mat::zeros(0, 0).nrows(), 0);
+        // Two right sides at once: the inverse acts linearly, so x(v) + x(w) = x(v + w).
+        let w: Vec<DoubleDouble> = [0.25, 1.0, -3.0, 7.0].map(DoubleDouble::from).to_vec();
+        let factor = cholesky(&m.map(Ball::mid)).unwrap();
+        let sum: Vec<DoubleDouble> = v.iter().zip(&w).map(|(&v, &w)| v + w).collect();
+        let (x, y, z) = (factor.solve(&v), factor.solve(&w), factor.solve(&sum));
+        assert!((0..4).all(|i| (x[i] + y[i] - z[i]).nearest().abs() < 1e-18 * (1.0 + z[i].nearest().abs())));
     }
 }

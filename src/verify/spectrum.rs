@@ -3,18 +3,18 @@
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::BlockForm;
-use super::tick::Tick;
+use super::slow_period::SlowPeriod;
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, Mat};
 
 /// A complex matrix.
 #[derive(Debug, Clone)]
-pub(super) struct Complex {
+pub(super) struct ComplexMatrix {
     pub(super) re: Matrix,
     pub(super) im: Matrix,
 }
 
-impl Complex {
+impl ComplexMatrix {
     pub(super) fn zeros(rows: usize, columns: usize) -> Self {
         Self { re: ball::zeros(rows, columns), im: ball::zeros(rows, columns) }
     }
@@ -119,9 +119,9 @@ impl Complex {
 }
 
 /// z^-k on the unit circle.
-pub(super) fn delay(z: &Complex, ticks: usize) -> Complex {
-    let (mut power, mut square) = (Complex::real(ball::identity(1)), z.adjoint());
-    let mut rest = ticks;
+pub(super) fn delay(z: &ComplexMatrix, periods: usize) -> ComplexMatrix {
+    let (mut power, mut square) = (ComplexMatrix::real(ball::identity(1)), z.adjoint());
+    let mut rest = periods;
     while rest > 0 {
         if rest & 1 == 1 {
             power = power.product(&square);
@@ -138,12 +138,12 @@ const REFINEMENTS: usize = 6;
 /// (z I - a)^-1 right, as a real system B x = r of twice the order.
 ///
 /// Any approximate solution will do: it is wrong by at most ||B^-1|| times its residual, which is enclosed.
-fn resolved(a: &Matrix, z: &Complex, right: &Complex) -> Complex {
+fn resolved(a: &Matrix, z: &ComplexMatrix, right: &ComplexMatrix) -> ComplexMatrix {
     let n = a.nrows();
     if n == 0 {
         return right.clone();
     }
-    let shifted = Complex {
+    let shifted = ComplexMatrix {
         re: ball::subtract(&ball::scaled(&ball::identity(n), z.re[(0, 0)]), a),
         im: ball::scaled(&ball::identity(n), z.im[(0, 0)]),
     }
@@ -159,7 +159,7 @@ fn resolved(a: &Matrix, z: &Complex, right: &Complex) -> Complex {
     let largest = residual(&x).iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let error = 1.01 * inverse_norm(&shifted, &inverse) * largest;
     let part = |start: usize| x.rows(start, n).map(|x| x.widened(error));
-    Complex { re: part(0), im: part(n) }
+    ComplexMatrix { re: part(0), im: part(n) }
 }
 
 /// A bound on the row sums of B^-1 from an approximate inverse R: ||R|| / (1 - q) with q = ||I - R B|| < 1/2, else NaN. The product
@@ -174,43 +174,43 @@ fn inverse_norm(matrix: &Matrix, inverse: &Mat) -> f64 {
     if 1.01 * q < 0.5 { 1.01 * sums(inverse) / (1.0 - 1.01 * q) } else { f64::NAN }
 }
 
-/// Gram matrix of all samples of a tick at the point z of the unit circle: G G* of their responses G to the input.
-pub(super) fn gram(tick: &Tick, z: &Complex) -> Complex {
-    let (n, samples) = (tick.order(), tick.samples());
-    let from_state = Complex::real(tick.readouts.clone()).product(&resolved(
-        &tick.transition,
+/// Gram matrix of all samples of a slow period at the point z of the unit circle: G G* of their responses G to the input.
+pub(super) fn gram(period: &SlowPeriod, z: &ComplexMatrix) -> ComplexMatrix {
+    let (n, samples) = (period.order(), period.samples());
+    let from_state = ComplexMatrix::real(period.outputs.clone()).product(&resolved(
+        &period.transition,
         z,
-        &Complex::real(ball::identity(n)),
+        &ComplexMatrix::real(ball::identity(n)),
     ));
-    let mut rows = Complex::zeros(samples, n + samples);
+    let mut rows = ComplexMatrix::zeros(samples, n + samples);
     for s in 0..samples {
-        let phase = delay(z, tick.ticks_late[s]);
+        let phase = delay(z, period.periods_late[s]);
         let row = from_state.rows(s, 1).times(&phase);
         rows.re.view_mut((s, 0), (1, n)).copy_from(&row.re);
         rows.im.view_mut((s, 0), (1, n)).copy_from(&row.im);
         (rows.re[(s, n + s)], rows.im[(s, n + s)]) = (phase.re[(0, 0)], phase.im[(0, 0)]);
     }
-    rows.product(&Complex::real(tick.gram.clone())).product(&rows.adjoint())
+    rows.product(&ComplexMatrix::real(period.gram.clone())).product(&rows.adjoint())
 }
 
 /// F(z), M x N, of the bank's filters.
-pub(super) fn filter_response(filters: &SynthesisFilters, ratio: usize, z: &Complex) -> Complex {
+pub(super) fn filter_response(filters: &SynthesisFilters, ratio: usize, z: &ComplexMatrix) -> ComplexMatrix {
     match filters {
         SynthesisFilters::Fir(taps) => {
             let lags = taps[0].len().div_ceil(ratio);
             let tap = |p: usize, i: usize, lag: usize| taps[i].get(p + lag * ratio).copied().unwrap_or(0.0);
             let back = z.adjoint();
             // Horner's rule in z^-1.
-            (0..lags).rev().fold(Complex::zeros(ratio, taps.len()), |sum, lag| {
-                sum.times(&back).plus(&Complex::real(Matrix::from_fn(ratio, taps.len(), |p, i| {
+            (0..lags).rev().fold(ComplexMatrix::zeros(ratio, taps.len()), |sum, lag| {
+                sum.times(&back).plus(&ComplexMatrix::real(Matrix::from_fn(ratio, taps.len(), |p, i| {
                     Ball::from(tap(p, i, lag))
                 })))
             })
         }
         SynthesisFilters::StateSpace(_) => {
             let BlockForm { a, b, c, d } = BlockForm::new(filters, ratio);
-            let moving = Complex::real(c).product(&resolved(&a, z, &Complex::real(b)));
-            Complex::real(d).plus(&moving)
+            let moving = ComplexMatrix::real(c).product(&resolved(&a, z, &ComplexMatrix::real(b)));
+            ComplexMatrix::real(d).plus(&moving)
         }
     }
 }
@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn any_two_doubles_name_a_point_of_the_circle() {
         for half in [[1.0, 0.0], [0.0, 1.0], [0.8, -0.6], [1e-100, 3e-100], [0.1, 7.0]] {
-            let z = Complex::unit(half);
+            let z = ComplexMatrix::unit(half);
             let angle = 2.0 * f64::atan2(half[1], half[0]);
             assert!((z.re[(0, 0)].nearest() - angle.cos()).abs() < 1e-15, "{half:?}");
             assert!((z.im[(0, 0)].nearest() - angle.sin()).abs() < 1e-15, "{half:?}");
@@ -234,24 +234,24 @@ mod tests {
     #[test]
     fn resolvents_invert() {
         let a = Matrix::from_fn(4, 4, |i, j| Ball::from(0.3 * ((3 * i + 5 * j) as f64).sin()));
-        let z = Complex::unit([0.3, 0.9]);
-        let r = resolved(&a, &z, &Complex::real(ball::identity(4)));
-        let shifted = Complex::real(ball::identity(4)).times(&z).minus(&Complex::real(a));
-        let rest = shifted.product(&r).minus(&Complex::real(ball::identity(4)));
+        let z = ComplexMatrix::unit([0.3, 0.9]);
+        let r = resolved(&a, &z, &ComplexMatrix::real(ball::identity(4)));
+        let shifted = ComplexMatrix::real(ball::identity(4)).times(&z).minus(&ComplexMatrix::real(a));
+        let rest = shifted.product(&r).minus(&ComplexMatrix::real(ball::identity(4)));
         assert!(rest.square().magnitude().sqrt() < 1e-25);
         assert!(rest.re.iter().chain(&rest.im).all(|x| x.nearest().abs() <= x.radius()));
         // A pole on the circle has none.
-        let one = Complex::real(ball::identity(1));
+        let one = ComplexMatrix::real(ball::identity(1));
         assert!(resolved(&ball::identity(1), &one, &one).re[(0, 0)].radius().is_nan());
     }
 
     #[test]
     fn delays_are_powers() {
-        let z = Complex::unit([0.7, 0.2]);
+        let z = ComplexMatrix::unit([0.7, 0.2]);
         let step = delay(&z, 1);
         let mut power = delay(&z, 0);
-        for ticks in 0..20 {
-            assert!(power.minus(&delay(&z, ticks)).square().nearest() < 1e-56, "{ticks}");
+        for periods in 0..20 {
+            assert!(power.minus(&delay(&z, periods)).square().nearest() < 1e-56, "{periods}");
             power = power.product(&step);
         }
     }

@@ -1,12 +1,12 @@
 //! The enclosed error system against the designer's, which shares no code with it; and what a proof must not accept.
 
-use super::spectrum::{self, Complex};
+use super::spectrum::{self, ComplexMatrix};
 use super::*;
-use crate::bank::{BlockFilter, Gamma};
+use crate::bank::{BlockFilter, Gamma, LowerProof, SynthesisFilters};
 use crate::design::{LiftedPlant, Problem, filters};
 use crate::linalg::{CMat, symmetric_eigenvalues};
 use crate::lti::FrequencyResponse;
-use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Spec};
+use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
 use crate::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
 
@@ -70,12 +70,12 @@ fn cases() -> Vec<(&'static str, Bank)> {
     let mixed = vec![thesis.clone(), rc(1.0), family(Family::Elliptic, 5, 2.0)];
     vec![
         ("thesis", alike(&thesis, &[1.2, 0.6], 2, 10, 22)),
-        ("whole ticks late", alike(&thesis, &[0.2, 9.1], 2, 3, 7)),
-        ("exactly whole ticks", alike(&thesis, &[0.0, 4.0, 8.0], 4, 9, 9)),
+        ("whole periods late", alike(&thesis, &[0.2, 9.1], 2, 3, 7)),
+        ("exactly whole periods", alike(&thesis, &[0.0, 4.0, 8.0], 4, 9, 9)),
         ("samples as wanted", alike(&thesis, &[0.0, 1.0], 2, 10, 22)),
         ("equal delays", alike(&thesis, &[0.6, 0.6], 2, 4, 8)),
         ("delays almost equal", alike(&thesis, &[0.6, 0.6 + 1e-9], 2, 4, 8)),
-        ("a delay a hair from a tick", alike(&thesis, &[2.0 - 1e-7, 1.0], 2, 5, 8)),
+        ("a delay a hair from a period", alike(&thesis, &[2.0 - 1e-7, 1.0], 2, 5, 8)),
         ("one channel, no ratio", alike(&rc(2.0), &[0.25], 1, 1, 5)),
         ("stiff", alike(&stiff, &[0.3, 1.7], 2, 6, 9)),
         ("stiffer", alike(&rc(1e8), &[0.3, 1.7], 2, 6, 9)),
@@ -98,25 +98,25 @@ fn designers(bank: &Bank, omega: f64) -> CMat {
     &k * k.adjoint()
 }
 
-/// The same from the enclosed tick and the filters' response.
-fn enclosed(subject: &Subject<'_>, half: [f64; 2]) -> Complex {
-    let (bank, z) = (subject.bank, Complex::unit(half));
+/// The same from the enclosed period and the filters' response.
+fn enclosed(error: &EnclosedErrorSystem<'_>, half: [f64; 2]) -> ComplexMatrix {
+    let (bank, z) = (error.bank, ComplexMatrix::unit(half));
     let through = spectrum::filter_response(&bank.filters, bank.ratio, &z);
     let (m, n) = (bank.ratio, bank.channel_count());
-    let mut combine = Complex::zeros(m, m + n);
+    let mut combine = ComplexMatrix::zeros(m, m + n);
     (0..m).for_each(|p| combine.re[(p, p)] = ball::Ball::from(1.0));
     combine.re.columns_mut(m, n).copy_from(&through.re.map(|x| -x));
     combine.im.columns_mut(m, n).copy_from(&through.im.map(|x| -x));
-    combine.product(&spectrum::gram(&subject.tick, &z)).product(&combine.adjoint())
+    combine.product(&spectrum::gram(&error.period, &z)).product(&combine.adjoint())
 }
 
 #[test]
 fn the_error_system_is_the_designers() {
     for (name, bank) in cases() {
-        let subject = Subject::new(&bank).unwrap();
+        let error = EnclosedErrorSystem::new(&bank).unwrap();
         for omega in [0.0, 1e-3, 0.4, 1.3, 2.9, std::f64::consts::PI] {
             let (s, c) = (0.5 * omega).sin_cos();
-            let ours = enclosed(&subject, [c, s]);
+            let ours = enclosed(&error, [c, s]);
             let theirs = designers(&bank, omega);
             let size = theirs.norm();
             let gap = ours.re.zip_zip_map(&ours.im, &theirs, |re, im, z| {
@@ -134,8 +134,8 @@ fn the_error_system_is_the_designers() {
 #[test]
 fn the_state_equations_have_the_same_response() {
     for (name, bank) in cases() {
-        let subject = Subject::new(&bank).unwrap();
-        let Midpoint { a, b, c, d } = subject.midpoint().unwrap();
+        let error = EnclosedErrorSystem::new(&bank).unwrap();
+        let Midpoint { a, b, c, d } = error.midpoint().unwrap();
         let system = crate::lti::StateSpace::new(a, b, c, d).unwrap();
         for omega in [0.1, 1.3, 3.0] {
             let k = FrequencyResponse::new(&system).at_frequency(omega);
@@ -149,7 +149,7 @@ fn the_state_equations_have_the_same_response() {
 #[test]
 fn gram_matrices_are_positive_and_tight() {
     for (name, bank) in cases() {
-        let gram = Subject::new(&bank).unwrap().tick.gram;
+        let gram = EnclosedErrorSystem::new(&bank).unwrap().period.gram;
         let eigenvalues = symmetric_eigenvalues(&ball::nearest(&gram)).unwrap();
         let largest = eigenvalues[eigenvalues.len() - 1];
         assert!(eigenvalues[0] > -1e-14 * largest, "{name}: {eigenvalues:?}");
@@ -174,19 +174,19 @@ fn the_interval_of_the_thesis_example_is_known() {
     }
 }
 
-/// Ten taps are too few (G3): the bound comes from tones that bind the taps together, far above the noncausal one.
+/// Ten taps are too few (G3): the bound comes from witnesses that bind the taps together, far above the noncausal one.
 #[test]
-fn short_filters_are_bound_by_several_tones() {
+fn short_filters_are_bound_by_several_witnesses() {
     for (latency, taps, golden) in [(10, 10, 0.0934525), (1, 12, 0.069447031)] {
         let (bank, proven) = designed(Method::Fir, latency, taps);
         assert!((proven.lower / golden - 1.0).abs() < 1e-6, "{proven:?}");
-        assert!(proven.lower > 1.2 * proven.noncausal && !proven.lower_only_stated, "{proven:?}");
-        let tones = bank.proof.as_ref().unwrap().lower.clone();
-        // The same tones claim nothing of longer filters, for which they do not cancel.
+        assert!(proven.lower > 1.2 * proven.noncausal, "{proven:?}");
+        let Some(LowerProof::Fir(witnesses)) = bank.proof.as_ref().unwrap().lower.clone() else { panic!("witnesses") };
+        // The same witnesses claim nothing of longer filters, for which they do not cancel.
         let SynthesisFilters::Fir(lists) = &bank.filters else { panic!("taps") };
         let longer = lists.iter().map(|list| [list.as_slice(), &[0.0; 12]].concat()).collect();
         let longer = Bank { filters: SynthesisFilters::Fir(longer), ..bank.clone() };
-        let bound = Subject::new(&longer).unwrap().out_of_reach(&tones).unwrap();
+        let bound = EnclosedErrorSystem::new(&longer).unwrap().fir_bound(&witnesses).unwrap();
         assert!(bound < 0.9 * golden, "{bound}");
     }
 }
@@ -217,10 +217,10 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
         }
         // A certificate is good for its gamma and no lower one.
         let certificate = bank.proof.as_ref().unwrap().upper.clone().unwrap();
-        let subject = Subject::new(&bank).unwrap();
-        assert!(subject.keeps(&certificate.factor, certificate.gamma));
-        assert!(!subject.keeps(&certificate.factor, norm * (1.0 - 1e-6)));
-        assert!(!subject.keeps(&certificate.factor, norm * (1.0 - 1e-12)));
+        let error = EnclosedErrorSystem::new(&bank).unwrap();
+        assert!(error.keeps(&certificate.factor, certificate.gamma));
+        assert!(!error.keeps(&certificate.factor, norm * (1.0 - 1e-6)));
+        assert!(!error.keeps(&certificate.factor, norm * (1.0 - 1e-12)));
     }
 }
 
@@ -228,16 +228,16 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
 #[test]
 fn no_certificate_passes_below_the_norm() {
     let (bank, proven) = designed(Method::Fir, 10, 22);
-    let subject = Subject::new(&bank).unwrap();
+    let error = EnclosedErrorSystem::new(&bank).unwrap();
     let factor = bank.proof.as_ref().unwrap().upper.as_ref().unwrap().factor.clone();
     for scale in [0.5, 0.999999, 1.0, 1.000001, 1.5, 1e3] {
         let scaled: Vec<Vec<f64>> =
             factor.iter().map(|row| row.iter().map(|x| x * scale).collect()).collect();
-        assert!(!subject.keeps(&scaled, proven.attained), "{scale}");
-        assert!(!subject.keeps(&scaled, 0.9 * proven.attained), "{scale}");
+        assert!(!error.keeps(&scaled, proven.attained), "{scale}");
+        assert!(!error.keeps(&scaled, 0.9 * proven.attained), "{scale}");
     }
     let zero: Vec<Vec<f64>> = factor.iter().map(|row| vec![0.0; row.len()]).collect();
-    assert!(!subject.keeps(&zero, 1e9) && !subject.keeps(&factor[1..], 1e9));
+    assert!(!error.keeps(&zero, 1e9) && !error.keeps(&factor[1..], 1e9));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod causal_optima;
 mod damaged_files;
 mod equivalence;
 mod filters;
@@ -13,3 +14,4 @@ mod random_plants;
 mod reduction;
 mod second_opinion;
 mod sections;
+mod soundness;

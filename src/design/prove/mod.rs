@@ -1,17 +1,18 @@
 //! The search for what proves a bank's gammas. [`crate::verify`] does the proving; whatever is found here is worth
 //! nothing until it has passed there.
 
+mod causal;
 mod units;
 
 use super::methods::DualPoint;
 use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
-use crate::bank::{Bank, Certificate, Proof, SynthesisFilters, Tone};
+use crate::bank::{Bank, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters};
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
 use crate::lti::peak::hinf_norm;
 use crate::lti::{FrequencyResponse, GramianCoordinates, StateSpace, bounded_real_riccati};
 use crate::spec::Method;
-use crate::verify::{CLAIM_TOLERANCE, Midpoint, Subject, Verified};
+use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
 use units::Units;
 
 /// Relative excesses over the computed norm at which a certificate is looked for, smallest first.
@@ -20,23 +21,27 @@ const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
 /// Weights on all states, relative to the excess.
 const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
-/// Norms below this, relative to the scale of what is wanted, are zero up to rounding.
+/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
 const FLOOR: f64 = 1e-10;
 /// Significant digits of the certificate's numbers in the file.
 const DIGITS: [usize; 4] = [9, 12, 15, 17];
-/// Part of the dual's weight below which a tone does not matter.
+/// Part of the dual's weight below which a direction does not matter.
 const NEGLIGIBLE: f64 = 1e-9;
 /// Most states of an error system for which a certificate is looked for: eigenvalues of matrices twice as large are needed.
 const MAX_SEARCHED: usize = 512;
-/// Tones at most.
-const MAX_TONES: usize = 64;
+/// Witnesses at most.
+const MAX_WITNESSES: usize = 64;
 /// Directions of tap space that matter less than this, relative to the strongest, are left alone.
 const RANK: f64 = 1e-13;
 /// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess (and of the number of
 /// states): no direction is unobservable then, and the norm would rise by a hundredth of the excess only.
 const STATE_NOISE: f64 = 0.1;
+/// Relative excess of a stated norm over the one computed here that is taken for rounding.
+const SAME_NORM: f64 = 1e-6;
 /// What a bound may fall short of the designer's and still be taken for its proof.
-const SHORTFALL: f64 = 0.5 * CLAIM_TOLERANCE;
+const SHORTFALL: f64 = 0.5e-6;
+/// What a stated lower bound stays below the proven one: another machine may round an approximate inverse otherwise.
+const STATED_BELOW: f64 = 1e-12;
 
 /// A gamma that is proven, not only computed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -54,68 +59,86 @@ pub struct Certified {
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
 pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
-    let subject = Subject::new(bank)?;
-    let upper = certificate(&subject, bank)?;
-    let (gamma, proof) = (upper.gamma, Proof { upper: Some(upper), ..Proof::default() });
-    let attained = subject.judge(&proof)?.attained;
-    Ok(Certified { gamma, attained, states: subject.states() })
+    let error = EnclosedErrorSystem::new(bank)?;
+    let upper = certificate(&error, bank)?;
+    let proof = Proof { upper: Some(upper), ..Proof::default() };
+    let Verified { upper, attained, states, .. } = error.judge(&proof, Strictness::NotRefuted)?;
+    Ok(Certified { gamma: upper, attained, states })
 }
 
-/// The bank with all that can be proven of its gammas, and what that is.
+/// Witnesses for all that can be proven of the bank's gammas, and what that is.
 ///
 /// `dual` is that of the design (FIR), from which the lower end is proven where the noncausal bound does not.
 ///
 /// # Errors
-/// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
+/// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found; [`DesignError::Verify`] if the proof
+/// refutes a gamma of the bank.
 pub(crate) fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), DesignError> {
-    let subject = Subject::new(bank)?;
-    let upper = Some(certificate(&subject, bank)?);
-    let gamma = &bank.gamma;
-    let enough = |proven: f64, stated: Option<f64>| stated.is_none_or(|x| proven >= x * (1.0 - SHORTFALL));
-    let tone = noncausal_tone(bank)?;
-    let unexplained = subject.unexplained(&tone);
-    let noncausal = unexplained.filter(|&proven| enough(proven, gamma.noncausal)).map(|_| tone);
-    let explained = unexplained.is_some_and(|proven| enough(proven, gamma.lower));
-    let lower = if bank.method != Method::Fir || explained || dual.is_empty() {
-        Vec::new()
-    } else {
-        binding_tones(bank, dual)?
-    };
-    let reached = subject.out_of_reach(&lower).is_some_and(|proven| enough(proven, gamma.lower));
-    let lower = if reached { lower } else { Vec::new() };
-    let proof = Proof { upper, lower, noncausal };
-    let verified = subject.judge(&proof)?;
+    let error = EnclosedErrorSystem::new(bank)?;
+    let upper = certificate(&error, bank)?;
+    let witness = noncausal_witness(bank)?;
+    let noncausal = error.noncausal_bound(&witness);
+    let above = noncausal.unwrap_or(0.0);
+    let explained = bank.gamma.lower.is_some_and(|stated| above >= stated * (1.0 - SHORTFALL));
+    let lower = if explained { None } else { lower_proof(&error, bank, dual, (above, upper.gamma))? };
+    let proof = Proof { upper: Some(upper), lower, noncausal: noncausal.map(|_| witness) };
+    let verified = error.judge(&proof, Strictness::NotRefuted)?;
     Ok((proof, verified))
 }
 
-/// Puts a proof into `bank`, and the upper end that it proves into its gammas.
+/// Puts a proof into `bank`, and what it proves into its gammas; the computed norm stays.
 ///
 /// # Errors
 /// As [`prove`]; the bank is then left as it is.
 pub(crate) fn attach_proof(bank: &mut Bank, dual: &[DualPoint]) -> Result<Verified, DesignError> {
     let (proof, verified) = prove(bank, dual)?;
-    bank.gamma.upper = Some(verified.upper);
+    let stated = |proven: f64| Some(proven * (1.0 - STATED_BELOW));
+    bank.gamma = Gamma {
+        upper: Some(verified.upper),
+        lower: stated(verified.lower),
+        noncausal: stated(verified.noncausal),
+        ..bank.gamma
+    };
     bank.proof = Some(proof);
     Ok(verified)
 }
 
+/// What proves a lower bound between the ends of `interval`: the dual of an FIR design, or else a horizon within which every
+/// causal bank fails.
+fn lower_proof(
+    error: &EnclosedErrorSystem<'_>,
+    bank: &Bank,
+    dual: &[DualPoint],
+    interval: (f64, f64),
+) -> Result<Option<LowerProof>, DesignError> {
+    let bound = bank.method == Method::Fir && !dual.is_empty();
+    let witnesses = if bound { binding_witnesses(bank, dual)? } else { Vec::new() };
+    let reached = error.fir_bound(&witnesses).unwrap_or(0.0);
+    let enough = bank.gamma.lower.is_none_or(|stated| reached >= stated * (1.0 - SHORTFALL));
+    let causal = if reached > interval.0 && enough { None } else { causal::witness(error, interval) };
+    Ok(match causal {
+        Some(witness) if witness.gamma > reached => Some(LowerProof::Causal(witness)),
+        _ => (reached > interval.0).then_some(LowerProof::Fir(witnesses)),
+    })
+}
+
 /// The least gamma of the ladder for which a certificate passes.
-fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
-    if subject.states() > MAX_SEARCHED {
-        return Err(DesignError::NotSearched { states: subject.states(), limit: MAX_SEARCHED });
+fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
+    if error.states() > MAX_SEARCHED {
+        return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED });
     }
-    let raw = subject.midpoint().ok_or(DesignError::NotCertified)?;
-    let units = Units::of(&raw, subject.scale())?;
+    let raw = error.midpoint().ok_or(DesignError::NotCertified)?;
+    let units = Units::of(&raw, error.scale())?;
     let middle = units.of_one(&raw);
-    let error = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
-    let peak = hinf_norm(&error)?;
+    let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
+    let peak = hinf_norm(&system)?;
     // The norm in the file may differ from the one computed here in the last digits; if in more, it is not the norm.
     let stated = bank.gamma.norm.map(|stated| stated / units.wanted);
-    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + CLAIM_TOLERANCE));
+    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
     let norm = credible.unwrap_or(0.0).max(peak.gain);
-    let response = error.response_at(Complex::from_polar(1.0, peak.frequency));
-    let tone = tone(peak.frequency, &leading_direction(&response)?);
-    let floor = FLOOR * subject.scale() / units.wanted;
+    let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
+    let peak_witness = witness(peak.frequency, &leading_direction(&response)?);
+    let floor = FLOOR * error.scale() / units.wanted;
     let relative: &[f64] = if norm > floor { &EXCESSES } else { &FLOOR_EXCESSES };
     for excess in relative.iter().map(|excess| excess * norm.max(floor)) {
         let gamma = (norm + excess) * units.wanted;
@@ -124,8 +147,8 @@ fn certificate(subject: &Subject<'_>, bank: &Bank) -> Result<Certificate, Design
         };
         for weight in STATE_WEIGHTS {
             let Some(factor) = search.factor(norm + 0.5 * excess, weight * excess) else { continue };
-            if let Some(factor) = shortest(units.factor(factor), |factor| subject.keeps(factor, gamma)) {
-                return Ok(Certificate { gamma, peak: tone, factor });
+            if let Some(factor) = shortest(units.factor(factor), |factor| error.keeps(factor, gamma)) {
+                return Ok(Certificate { gamma, peak: peak_witness, factor });
             }
         }
     }
@@ -161,8 +184,8 @@ impl Search {
         inputs.columns_mut(0, m).copy_from(&c.transpose());
         inputs.columns_mut(m, n).fill_diagonal(noise / (n.max(1) as f64).sqrt());
         let k = GramianCoordinates::new(&a.transpose(), &inputs, 0.0)?;
-        let heard = k.b.columns(0, m).into_owned();
-        Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: heard, d: d.transpose(), inverse: k.inverse })
+        let outputs = k.b.columns(0, m).into_owned();
+        Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: outputs, d: d.transpose(), inverse: k.inverse })
     }
 
     /// Rows of R with P = R R' at `gamma`, with a weight on all states that keeps the inequality away from singular.
@@ -174,15 +197,15 @@ impl Search {
     }
 }
 
-/// A tone at which the samples leave most of the wanted ones unexplained.
-fn noncausal_tone(bank: &Bank) -> Result<Tone, DesignError> {
+/// A frequency and direction in which the samples leave most of the reference samples unexplained.
+fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
     let plant = LiftedPlant::new(&analysis::bank_problem(bank)?.merge_channels().problem)?;
     let (n, m) = (plant.channels(), plant.ratio());
     let frequency = plant.noncausal_bound()?.frequency;
     let l = linalg::lq_factor_c(&FrequencyResponse::new(plant.system()).at_frequency(frequency));
     let rest = l.ncols().saturating_sub(n);
     let part = if rest == 0 { CMat::zeros(m, 1) } else { l.view((n, n), (m, rest)).into_owned() };
-    Ok(tone(frequency, &leading_direction(&part)?))
+    Ok(witness(frequency, &leading_direction(&part)?))
 }
 
 /// The left singular vector of the largest singular value.
@@ -190,9 +213,9 @@ fn leading_direction(response: &CMat) -> Result<CMat, DesignError> {
     Ok(linalg::svd_c(response)?.u.columns(0, 1).into_owned())
 }
 
-fn tone(frequency: f64, wanted: &CMat) -> Tone {
+fn witness(frequency: f64, wanted: &CMat) -> DualWitness {
     let (s, c) = (0.5 * frequency).sin_cos();
-    Tone { half: [c, s], wanted: pairs(wanted), measured: Vec::new() }
+    DualWitness { half: [c, s], wanted: pairs(wanted), measured: Vec::new() }
 }
 
 fn pairs(column: &CMat) -> Vec<[f64; 2]> {
@@ -200,11 +223,11 @@ fn pairs(column: &CMat) -> Vec<[f64; 2]> {
     column.iter().map(|z| [z.re + 0.0, z.im + 0.0]).collect()
 }
 
-/// Tones with the directions and frequencies of the dual that no taps of the bank's length can serve all at once.
+/// Witnesses with the directions and frequencies of the dual that no taps of the bank's length can serve all at once.
 ///
 /// For given directions a the taps of least sum of ||a* K||^2 leave an error to which no change of the taps is of any use: the
-/// tones are that error's. Channels that cannot be told apart count once.
-fn binding_tones(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<Tone>, DesignError> {
+/// witnesses are that error's. Channels that cannot be told apart count once.
+fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
     let merged = analysis::bank_problem(bank)?.merge_channels();
     let plant = LiftedPlant::new(&merged.problem)?;
@@ -219,9 +242,9 @@ fn binding_tones(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<Tone>, DesignErr
         let weight = |i: usize| if first(i) { column[group(i)] } else { Complex::new(0.0, 0.0) };
         (0..parts.len()).map(weight).map(|z| [-z.re, -z.im]).collect()
     };
-    let tones = directions.iter().enumerate();
-    Ok(tones
-        .map(|(t, (omega, a))| Tone { measured: spread(served.estimate(t)), ..tone(*omega, a) })
+    let directions = directions.iter().enumerate();
+    Ok(directions
+        .map(|(t, (omega, a))| DualWitness { measured: spread(served.estimate(t)), ..witness(*omega, a) })
         .collect())
 }
 
@@ -235,7 +258,7 @@ fn directions(dual: &[DualPoint]) -> Result<Vec<(f64, CMat)>, DesignError> {
     }
     all.sort_by(|x, y| y.0.total_cmp(&x.0));
     let total: f64 = all.iter().map(|(weight, ..)| weight).sum();
-    let heavy = all.into_iter().take(MAX_TONES).take_while(|(weight, ..)| *weight > NEGLIGIBLE * total);
+    let heavy = all.into_iter().take(MAX_WITNESSES).take_while(|(weight, ..)| *weight > NEGLIGIBLE * total);
     Ok(heavy.map(|(_, omega, a)| (omega, a)).collect())
 }
 

@@ -6,52 +6,49 @@
 //! *Accurate calculation of Euclidean norms using double-word arithmetic*, ACM TOMS 49 (2023) (25/8 u^2). All of them
 //! are below [`ROUNDING`] relative, unless a result underflows.
 
+use super::number::Number;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// 2^-100: bounds the relative error of every operation on [`Double`], with room to spare.
+/// 2^-100: bounds the relative error of every operation on [`DoubleDouble`], with room to spare.
 pub(super) const ROUNDING: f64 = 1.0 / (1u128 << 100) as f64;
 
 /// `high + low` with `|low| <= ulp(high) / 2`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Double {
+pub(super) struct DoubleDouble {
     high: f64,
     low: f64,
 }
 
 /// a + b exactly, as a rounded sum and its error (Knuth).
-fn two_sum(a: f64, b: f64) -> Double {
+fn two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
     let part = high - a;
-    Double { high, low: (a - (high - part)) + (b - part) }
+    DoubleDouble { high, low: (a - (high - part)) + (b - part) }
 }
 
 /// [`two_sum`] for `|a| >= |b|` (Dekker).
-fn fast_two_sum(a: f64, b: f64) -> Double {
+fn fast_two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
-    Double { high, low: b - (high - a) }
+    DoubleDouble { high, low: b - (high - a) }
 }
 
 /// a b exactly, as a rounded product and its error.
-fn two_product(a: f64, b: f64) -> Double {
+fn two_product(a: f64, b: f64) -> DoubleDouble {
     let high = a * b;
-    Double { high, low: a.mul_add(b, -high) }
+    DoubleDouble { high, low: a.mul_add(b, -high) }
 }
 
-impl Double {
-    pub(super) const ZERO: Self = Self { high: 0.0, low: 0.0 };
+impl Number for DoubleDouble {
+    const ZERO: Self = Self { high: 0.0, low: 0.0 };
+    const ROUNDING: f64 = ROUNDING;
+    /// 0.5^30 / 30! = 4e-42.
+    const SERIES_TERMS: usize = 30;
 
-    /// The nearest double.
-    pub(super) fn nearest(self) -> f64 {
+    fn nearest(self) -> f64 {
         self.high
     }
 
-    /// The difference of two doubles, exactly.
-    pub(super) fn difference(a: f64, b: f64) -> Self {
-        two_sum(a, -b)
-    }
-
-    /// NaN for negative numbers.
-    pub(super) fn sqrt(self) -> Self {
+    fn sqrt(self) -> Self {
         if self == Self::ZERO {
             return self;
         }
@@ -61,20 +58,20 @@ impl Double {
     }
 }
 
-impl From<f64> for Double {
+impl From<f64> for DoubleDouble {
     fn from(value: f64) -> Self {
         Self { high: value, low: 0.0 }
     }
 }
 
-impl Neg for Double {
+impl Neg for DoubleDouble {
     type Output = Self;
     fn neg(self) -> Self {
         Self { high: -self.high, low: -self.low }
     }
 }
 
-impl Add for Double {
+impl Add for DoubleDouble {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         let (s, t) = (two_sum(self.high, other.high), two_sum(self.low, other.low));
@@ -83,14 +80,14 @@ impl Add for Double {
     }
 }
 
-impl Sub for Double {
+impl Sub for DoubleDouble {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         self + -other
     }
 }
 
-impl Mul for Double {
+impl Mul for DoubleDouble {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         let c = two_product(self.high, other.high);
@@ -99,7 +96,7 @@ impl Mul for Double {
     }
 }
 
-impl Div for Double {
+impl Div for DoubleDouble {
     type Output = Self;
     fn div(self, other: Self) -> Self {
         let first = self.high / other.high;
@@ -118,13 +115,13 @@ mod tests {
     use proptest::prelude::*;
 
     /// m 2^e with integers, so that sums and products can be checked in exact integer arithmetic.
-    fn double(m: i64, low: i64) -> Double {
+    fn double(m: i64, low: i64) -> DoubleDouble {
         // high: 50 bits; low: below half an ulp of high.
         fast_two_sum(m as f64, low as f64 * 2f64.powi(-60))
     }
 
     /// The value times 2^60, exactly.
-    fn scaled(x: Double) -> i128 {
+    fn scaled(x: DoubleDouble) -> i128 {
         (x.high * 2f64.powi(60)) as i128 + (x.low * 2f64.powi(60)) as i128
     }
 
@@ -160,8 +157,8 @@ mod tests {
 
     #[test]
     fn a_third_has_a_hundred_bits() {
-        let third = Double::from(1.0) / Double::from(3.0);
-        let rest = third * Double::from(3.0) - Double::from(1.0);
+        let third = DoubleDouble::from(1.0) / DoubleDouble::from(3.0);
+        let rest = third * DoubleDouble::from(3.0) - DoubleDouble::from(1.0);
         assert!(rest.high.abs() <= ROUNDING);
         // The low part of 1/3 to double precision: 1/3 - fl(1/3) = 2^-54 / 3.
         assert!((third.low / (2f64.powi(-54) / 3.0) - 1.0).abs() < 1e-15);

@@ -1,33 +1,35 @@
-//! What the analog state does in a given time: e^{A t} and the Gramian G(t) = int_0^t e^{A s} B B' e^{A' s} ds, enclosed.
+//! The state transition over a given time: e^{A t} and the Gramian G(t) = int_0^t e^{A s} B B' e^{A' s} ds, enclosed.
 //!
 //! Both by their Taylor series over a time that is short against the dynamics, with the rest of the series in the radius,
 //! and then by doubling: e^{2 A t} = (e^{A t})^2, G(2 t) = G(t) + e^{A t} G(t) e^{A' t}. Only sums and products occur.
 
 use super::ball::{self, Ball, Matrix};
+use super::double_double::DoubleDouble;
+use super::number::Number;
 
-/// Terms of the series. With `2 ||A|| t <= 1/2` the first that is left out is below 0.5^30 / 30! = 4e-42.
-const TERMS: usize = 30;
 /// Halvings of the time at most: ||A|| t up to 1e18.
 const MAX_HALVINGS: i32 = 64;
 
 /// e^{A t} and G(t).
 #[derive(Debug, Clone)]
-pub(super) struct Flow {
-    pub(super) transition: Matrix,
-    pub(super) gramian: Matrix,
+pub(super) struct StateTransition<F = DoubleDouble> {
+    /// e^{A t}.
+    pub(super) transition: Matrix<F>,
+    /// G(t).
+    pub(super) gramian: Matrix<F>,
 }
 
-/// Encloses both for `dx/dt = a x + b f` after the time `t >= 0`.
-pub(super) fn flow(a: &Matrix, b: &Matrix, t: Ball) -> Flow {
+/// Encloses both for `dx/dt = a x + b f` after the time `t`.
+pub(super) fn state_transition<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>) -> StateTransition<F> {
     let norm = ball::nan_max(ball::row_sum(a), ball::row_sum(&a.transpose()));
     let halvings = halvings(norm * t.magnitude());
-    let mut flow = taylor(a, b, t * Ball::from(0.5f64.powi(halvings)), norm);
+    let mut whole = taylor(a, b, t * Ball::from(0.5f64.powi(halvings)), norm);
     for _ in 0..halvings {
-        let Flow { transition, gramian } = &flow;
+        let StateTransition { transition, gramian } = &whole;
         let grown = ball::add(gramian, &ball::congruence(transition, gramian));
-        flow = Flow { gramian: grown, transition: ball::product(transition, transition) };
+        whole = StateTransition { gramian: grown, transition: ball::product(transition, transition) };
     }
-    flow
+    whole
 }
 
 /// How often the time must be halved until `2 ||A|| t <= 1/2`.
@@ -36,13 +38,13 @@ fn halvings(size: f64) -> i32 {
 }
 
 /// The series sum_k (A t)^k / k! and sum_k t^k / k! M_k with M_1 = B B', M_{k+1} = A M_k + M_k A'.
-fn taylor(a: &Matrix, b: &Matrix, t: Ball, norm: f64) -> Flow {
-    let n = a.nrows();
+fn taylor<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> StateTransition<F> {
+    let (n, terms) = (a.nrows(), F::SERIES_TERMS);
     let at = ball::scaled(a, t);
     let inputs = ball::scaled(&ball::product_transposed(b, b), t);
     let (mut power, mut derivative) = (ball::identity(n), inputs.clone());
     let (mut transition, mut gramian) = (power.clone(), inputs.clone());
-    for k in 1..TERMS {
+    for k in 1..terms {
         let over = |k: usize| Ball::from(1.0) / Ball::from(k as f64);
         power = ball::scaled(&ball::product(&at, &power), over(k));
         transition = ball::add(&transition, &power);
@@ -51,12 +53,12 @@ fn taylor(a: &Matrix, b: &Matrix, t: Ball, norm: f64) -> Flow {
         gramian = ball::add(&gramian, &derivative);
     }
     // The terms left out fall at least as fast as 1, 1/2, 1/4, ...
-    let (size, factorial) = (norm * t.magnitude() * 1.001, factorial(TERMS));
-    let rest = 2.0 * size.powi(TERMS as i32) / factorial;
-    let gramian_rest = 2.0 * ball::row_sum(&inputs) * (2.0 * size).powi(TERMS as i32) / factorial;
+    let (size, factorial) = (norm * t.magnitude() * 1.001, factorial(terms));
+    let rest = 2.0 * size.powi(terms as i32) / factorial;
+    let gramian_rest = 2.0 * ball::row_sum(&inputs) * (2.0 * size).powi(terms as i32) / factorial;
     // Written so that NaN is unknown too.
     let known = |rest: f64| if size <= 0.26 { 1.01 * rest } else { f64::NAN };
-    Flow {
+    StateTransition {
         transition: transition.map(|x| x.widened(known(rest))),
         gramian: gramian.map(|x| x.widened(known(gramian_rest))),
     }
@@ -68,11 +70,12 @@ fn factorial(n: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::big_float::BigFloat;
     use super::*;
     use crate::linalg::Mat;
 
-    fn enclosed(a: &Mat, b: &Mat, t: f64) -> Flow {
-        flow(&ball::exact(a), &ball::exact(b), Ball::from(t))
+    fn enclosed(a: &Mat, b: &Mat, t: f64) -> StateTransition {
+        state_transition(&ball::exact(a), &ball::exact(b), Ball::from(t))
     }
 
     #[test]
@@ -119,6 +122,20 @@ mod tests {
         }
     }
 
+    /// The enclosures of 512 bits lie in those of 106, and are tight.
+    #[test]
+    fn more_digits_agree() {
+        let a = Mat::from_row_slice(3, 3, &[-1.0, 2.0, 0.0, -2.0, -1.0, 30.0, 0.0, 0.0, -70.0]);
+        let b = Mat::from_row_slice(3, 1, &[0.0, 1.0, 1.0]);
+        let short = enclosed(&a, &b, 1.7);
+        let long: StateTransition<BigFloat> =
+            state_transition(&ball::exact(&a), &ball::exact(&b), Ball::from(1.7));
+        for (x, y) in short.gramian.iter().zip(&long.gramian) {
+            assert!((x.nearest() - y.nearest()).abs() <= 2.0 * f64::EPSILON * x.nearest().abs(), "{x:?} {y:?}");
+        }
+        assert!(ball::radius_sum(&long.gramian) < 1e-140 && ball::radius_sum(&long.transition) < 1e-140);
+    }
+
     /// Splitting the time anywhere gives enclosures of the same numbers.
     #[test]
     fn times_add_up() {
@@ -126,7 +143,7 @@ mod tests {
         let b = Mat::from_row_slice(3, 1, &[0.0, 1.0, 1.0]);
         let whole = enclosed(&a, &b, 2.0);
         for t in [1e-6, 0.3, 1.9] {
-            let rest = flow(&ball::exact(&a), &ball::exact(&b), Ball::difference(2.0, t));
+            let rest = state_transition(&ball::exact(&a), &ball::exact(&b), Ball::from(2.0) - Ball::from(t));
             let first = enclosed(&a, &b, t);
             let joined = ball::product(&rest.transition, &first.transition);
             let gramian = ball::add(&rest.gramian, &ball::congruence(&rest.transition, &first.gramian));

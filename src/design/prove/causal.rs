@@ -1,0 +1,58 @@
+//! The search for a gamma, as large as possible, that the finite-horizon recursion of [`crate::verify`] refutes.
+
+use crate::bank::CausalWitness;
+use crate::verify::{EnclosedErrorSystem, Precision, Recursion};
+
+/// Most slow periods tried in 106 bits.
+const SHORT_PERIODS: usize = 512;
+/// Most slow periods tried in 512 bits, where each takes some milliseconds.
+const LONG_PERIODS: usize = 128;
+/// What the first gammas tried fall short of the upper end: banks are mostly optimal.
+const FIRST_SHORTFALLS: [f64; 3] = [1e-6, 1e-5, 1e-4];
+/// Relative width of the interval at which the bisection ends.
+const WIDTH: f64 = 1e-5;
+/// Bisections at most.
+const MAX_BISECTIONS: usize = 24;
+
+/// The largest gamma found in the interval that no causal bank reaches.
+pub(super) fn witness(
+    error: &EnclosedErrorSystem<'_>,
+    (lower, upper): (f64, f64),
+) -> Option<CausalWitness> {
+    let refuted = |gamma: f64, precision: Precision| {
+        let limit = if precision == Precision::Short { SHORT_PERIODS } else { LONG_PERIODS };
+        match error.causal_recursion(gamma, limit, precision) {
+            Recursion::Refuted { periods } => Some(CausalWitness { gamma, periods }),
+            Recursion::Standing | Recursion::Undecided => None,
+        }
+    };
+    let near = FIRST_SHORTFALLS.map(|shortfall| upper * (1.0 - shortfall));
+    let near = near.into_iter().filter(|&gamma| gamma > lower);
+    let short = near.clone().find_map(|gamma| refuted(gamma, Precision::Short));
+    let reached = short.map_or(lower, |witness| witness.gamma);
+    if reached >= upper * (1.0 - FIRST_SHORTFALLS[1]) {
+        return short;
+    }
+    let long = near.filter(|&gamma| gamma > reached).find_map(|gamma| refuted(gamma, Precision::Long));
+    let search = |precision| bisected((lower, upper), |gamma| refuted(gamma, precision));
+    long.or(short).or_else(|| search(Precision::Short)).or_else(|| search(Precision::Long))
+}
+
+/// Bisection between the ends, by ratio because they may be far apart.
+fn bisected(
+    (lower, upper): (f64, f64),
+    refuted: impl Fn(f64) -> Option<CausalWitness>,
+) -> Option<CausalWitness> {
+    let (mut best, mut below, mut standing) = (None, lower, upper);
+    for _ in 0..MAX_BISECTIONS {
+        if standing - below <= WIDTH * standing {
+            break;
+        }
+        let gamma = if below > 0.0 { (below * standing).sqrt() } else { 0.1 * standing };
+        match refuted(gamma) {
+            Some(witness) => (best, below) = (Some(witness), gamma),
+            None => standing = gamma,
+        }
+    }
+    best
+}

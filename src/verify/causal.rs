@@ -1,0 +1,173 @@
+//! The lower end for causal banks: no filter that uses present and past samples only has an error system of norm below gamma.
+//!
+//! # The game over T periods
+//! Let the plant start from rest, xi_0 = 0, and let W and H map the inputs w of the periods 0..T-1 to the reference samples
+//! z and the measured samples y of these periods. If y = 0 then the output of every causal bank over these periods is zero too,
+//! and its error is z. So a w with `H w = 0` and `|W w| >= gamma |w|` shows that no causal bank, linear or not, has less than
+//! gamma: what happens after period T only adds to the error. (By Arveson's distance formula for nests these bounds tend to the
+//! optimum as T grows.)
+//!
+//! Such a w exists if the Gram matrix of all y and z less gamma^2 on z,
+//!
+//! ```text
+//! Delta = [H H'  H W'            ]
+//!         [W H'  W W' - gamma^2 I],
+//! ```
+//!
+//! has fewer negative eigenvalues than there are z: where H H' > 0, its Schur complement W (I - H'(H H')^-1 H) W' - gamma^2 I then
+//! has an eigenvalue mu - gamma^2 >= 0 with eigenvector b, and w = (I - H'(H H')^-1 H) W'b does it.
+//!
+//! # The recursion
+//! The block pivots of Delta, period by period, are those of the a-posteriori filtering Riccati difference equation from P = 0
+//! (B. Hassibi, A. H. Sayed, T. Kailath, *Indefinite-Quadratic Estimation and Control*, SIAM 1999, section 4.2): with
+//! `[xi+; y; z] = [A; C_2; C_1] xi + [J; L_2; L_1] u` and the Gram matrix S of u,
+//!
+//! ```text
+//! G = [A; C_2; C_1] P [A; C_2; C_1]' + [J; L_2; L_1] S [J; L_2; L_1]' - diag(0, 0, gamma^2 I),
+//! P+ = the Schur complement of the block of y and z in G.
+//! ```
+//!
+//! By Sylvester's law the pivots of y are positive and those of z negative as long as the inertia of Delta is right; the first z
+//! pivot that is not negative refutes gamma.
+//!
+//! # Without widths that grow
+//! While the inertia is right, a' P+ a is the largest over b_z of the least over b_y of `[a; b]' G [a; b]`; so P+ grows with
+//! P, and so do the pivots of z. Each period may therefore begin with exact numbers: from the enclosure of P+ its midpoint is
+//! kept, less a diagonal above all radii. What is kept is at most P+, and a pivot of z that it makes nonnegative is so for P+.
+//!
+//! A measured sample counts from the period on in which it may first differ from zero. Of measured samples that are the same filter's a
+//! whole number of periods apart the earliest says everything. Where R = L_2 S L_2' is singular (delayed channels are noise-free
+//! measurements of delay-line states) nothing changes: the pivots of y are variances given the past.
+
+use super::ball::{self, Ball, Matrix};
+use super::error_system::{Layout, Rows, sampled};
+use super::number::Number;
+use super::slow_period::SlowPeriod;
+
+/// Most states, delay lines included.
+const MAX_STATES: usize = 128;
+
+/// Relative change of P per period below which it has settled.
+const SETTLED: f64 = 1e-13;
+
+/// How many bits the recursion computes with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 106: quick, and enough for most.
+    Short,
+    /// 512: for steep filters, whose samples say nearly the same.
+    Long,
+}
+
+/// What the recursion has shown of a gamma.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recursion {
+    /// No causal bank has less than gamma; so many periods show it.
+    Refuted {
+        /// T.
+        periods: usize,
+    },
+    /// The inertia stayed right for all the periods asked for, or until P settled. Shows nothing.
+    Standing,
+    /// The sign of a pivot does not show in the digits of this arithmetic.
+    Undecided,
+}
+
+/// The analog side as the filter sees it, with what the recursion needs of each period.
+#[derive(Debug, Clone)]
+pub(super) struct CausalPlant<F> {
+    /// [A; C_2; C_1].
+    system: Matrix<F>,
+    /// [J; L_2; L_1] S [J; L_2; L_1]'.
+    fresh: Matrix<F>,
+    /// For each measured sample the first period in which it is not zero.
+    first: Vec<usize>,
+}
+
+impl<F: Number> CausalPlant<F> {
+    /// `measured` lists the rows of the measured samples that say something of their own; `None` if there are too many states.
+    pub(super) fn new(period: &SlowPeriod<F>, ratio: usize, measured: &[usize]) -> Option<Self> {
+        let used = |s: usize| s < ratio || measured.contains(&s);
+        let late = period.periods_late.iter().enumerate();
+        let periods_late: Vec<usize> = late.map(|(s, &late)| if used(s) { late } else { 0 }).collect();
+        if periods_late.iter().sum::<usize>() + period.order() > MAX_STATES {
+            return None;
+        }
+        let first = measured.iter().map(|&s| periods_late[s]).collect();
+        let period = SlowPeriod { periods_late, ..period.clone() };
+        let (next, samples) = sampled(&period, &Layout::new(&period, 0), 0);
+        let order = |rows: &dyn Fn(&Rows<F>) -> Matrix<F>| {
+            let (next, samples) = (rows(&next), rows(&samples));
+            let n = next.nrows();
+            let source = |i: usize| if i < measured.len() { measured[i] } else { i - measured.len() };
+            Matrix::from_fn(n + measured.len() + ratio, next.ncols(), |i, j| {
+                if i < n { next[(i, j)] } else { samples[(source(i - n), j)] }
+            })
+        };
+        let inputs = order(&|rows| rows.input.clone());
+        let system = order(&|rows| rows.state.clone());
+        Some(Self { system, fresh: ball::congruence(&inputs, &period.gram), first })
+    }
+
+    /// Runs the recursion at `gamma` for at most `periods` periods.
+    pub(super) fn recursion(&self, gamma: f64, periods: usize) -> Recursion {
+        let n = self.system.ncols();
+        let (measured, rows) = (n + self.first.len(), self.system.nrows());
+        let square = Ball::from(gamma) * Ball::from(gamma);
+        let mut p: Matrix<F> = ball::zeros(n, n);
+        for period in 0..periods {
+            let mut gram = ball::add(&ball::congruence(&self.system, &p), &self.fresh);
+            (measured..rows).for_each(|i| gram[(i, i)] = gram[(i, i)] - square);
+            for (row, _) in (n..).zip(&self.first).filter(|&(_, &first)| first <= period) {
+                if gram[(row, row)].lower().is_nan() || gram[(row, row)].lower() <= 0.0 {
+                    return Recursion::Undecided;
+                }
+                eliminate(&mut gram, n, row);
+            }
+            for row in measured..rows {
+                let pivot = gram[(row, row)];
+                if pivot.lower() >= 0.0 {
+                    return Recursion::Refuted { periods: period + 1 };
+                }
+                if pivot.upper().is_nan() || pivot.upper() >= 0.0 {
+                    return Recursion::Undecided;
+                }
+                eliminate(&mut gram, n, row);
+            }
+            let next = from_below(&gram.view((0, 0), (n, n)).into_owned());
+            let settled = |(a, b): (&Ball<F>, &Ball<F>)| {
+                (a.nearest() - b.nearest()).abs() <= SETTLED * b.nearest().abs()
+            };
+            if period >= n && p.iter().zip(&next).all(settled) {
+                return Recursion::Standing;
+            }
+            p = next;
+        }
+        Recursion::Standing
+    }
+}
+
+/// Takes the part along `row` away from the first `n` rows and from those after it, and likewise the columns.
+fn eliminate<F: Number>(gram: &mut Matrix<F>, n: usize, row: usize) {
+    let pivot = gram[(row, row)];
+    let column: Vec<Ball<F>> = gram.column(row).iter().copied().collect();
+    let quotients: Vec<Ball<F>> = column.iter().map(|&x| x / pivot).collect();
+    let remains = |i: &usize| *i < n || *i > row;
+    for i in (0..gram.nrows()).filter(remains) {
+        for j in (0..=i).filter(remains) {
+            gram[(i, j)] = gram[(i, j)] - column[i] * quotients[j];
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+}
+
+/// Exact numbers of which the matrix is at most every matrix of the enclosure, in the order of symmetric matrices (Gershgorin).
+fn from_below<F: Number>(m: &Matrix<F>) -> Matrix<F> {
+    let radii = ball::row_radii(m);
+    Matrix::from_fn(m.nrows(), m.ncols(), |i, j| {
+        let mid = Ball::exactly(m[(i.max(j), i.min(j))].mid());
+        // Twice the radii and once the roundings of the difference itself.
+        let shift = 2.0 * radii[i] + 4.0 * F::ROUNDING * mid.magnitude();
+        if i == j && shift > 0.0 { Ball::exactly((mid - Ball::from(shift)).mid()) } else { mid }
+    })
+}

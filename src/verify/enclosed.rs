@@ -1,0 +1,228 @@
+//! A bank with its error system enclosed: built once, judged with any witnesses.
+
+use super::ball::{self, Matrix};
+use super::big_float::BigFloat;
+use super::causal::{CausalPlant, Precision, Recursion};
+use super::double_double::DoubleDouble;
+use super::error_system::{self, BlockForm, ErrorSystem};
+use super::front_ends::FrontEnds;
+use super::slow_period::SlowPeriod;
+use super::timeline::{SamplingInstant, Timeline};
+use super::{
+    BoundedBanks, MAX_ANALOG_STATES, MAX_STATES, MAX_WORK, Strictness, Verified, VerifyError, lower, positive,
+    spectrum, statements, upper,
+};
+use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, Proof, SynthesisFilters};
+use crate::linalg::Mat;
+use crate::units::Seconds;
+use std::sync::OnceLock;
+
+/// The error system of a bank, enclosed.
+#[derive(Debug, Clone)]
+pub struct EnclosedErrorSystem<'a> {
+    pub(super) bank: &'a Bank,
+    front_ends: FrontEnds,
+    samples: Vec<SamplingInstant>,
+    timeline: Timeline,
+    pub(super) period: SlowPeriod,
+    equations: ErrorSystem,
+    short: OnceLock<Option<CausalPlant<DoubleDouble>>>,
+    long: OnceLock<Option<CausalPlant<BigFloat>>>,
+}
+
+/// Midpoints of the enclosed error system, for whoever looks for a certificate: xi+ = a xi + b w, e = c xi + d w with w white.
+#[derive(Debug, Clone)]
+pub struct Midpoint {
+    /// n x n.
+    pub a: Mat,
+    /// n x m.
+    pub b: Mat,
+    /// M x n.
+    pub c: Mat,
+    /// M x m.
+    pub d: Mat,
+}
+
+impl<'a> EnclosedErrorSystem<'a> {
+    /// Encloses the error system of `bank`.
+    ///
+    /// # Errors
+    /// [`VerifyError::NoSpec`], [`VerifyError::FrontEnd`], [`VerifyError::TooManyFilters`], [`VerifyError::TooLarge`].
+    pub fn new(bank: &'a Bank) -> Result<Self, VerifyError> {
+        let (front_ends, samples) = FrontEnds::new(bank)?;
+        let analog = front_ends.order();
+        if analog > MAX_ANALOG_STATES || samples.len() * analog.pow(3) > MAX_WORK {
+            return Err(VerifyError::TooManyFilters { states: analog, samples: samples.len() });
+        }
+        let fast_period = bank.spec.as_ref().map_or(Seconds(bank.fast_period), |spec| spec.fast_period);
+        let timeline = Timeline::new(&samples, fast_period, bank.ratio)?;
+        let states = error_system::order(analog, timeline.periods_late(), &bank.filters, bank.ratio);
+        if states > MAX_STATES {
+            return Err(VerifyError::TooLarge { states });
+        }
+        let period = SlowPeriod::new(&front_ends, &timeline, &samples);
+        let equations = ErrorSystem::new(&period, &BlockForm::new(&bank.filters, bank.ratio));
+        let (short, long) = (OnceLock::new(), OnceLock::new());
+        Ok(Self { bank, front_ends, samples, timeline, period, equations, short, long })
+    }
+
+    /// Number of states of the error system, the order of P.
+    pub fn states(&self) -> usize {
+        self.equations.order()
+    }
+
+    /// Root of the energy that the input of one slow period brings into the reference samples: the size against which a gamma is
+    /// small.
+    pub fn scale(&self) -> f64 {
+        let n = self.period.order();
+        (n..n + self.bank.ratio).map(|i| self.period.gram[(i, i)].nearest()).sum::<f64>().sqrt()
+    }
+
+    /// Whether two samples are always equal.
+    fn same(&self, i: usize, j: usize) -> bool {
+        self.same_later(i, j) && self.period.periods_late[i] == self.period.periods_late[j]
+    }
+
+    /// Whether two samples are the same up to a delay by whole slow periods.
+    fn same_later(&self, i: usize, j: usize) -> bool {
+        self.samples[i].filter == self.samples[j].filter && self.timeline.of(i) == self.timeline.of(j)
+    }
+
+    /// The channels of which no earlier one is `equal`.
+    fn first_channels(&self, equal: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+        let m = self.bank.ratio;
+        (0..self.bank.channel_count()).filter(|&i| (0..i).all(|j| !equal(m + i, m + j))).collect()
+    }
+
+    /// Rows of the measured samples that a causal bank needs: of those equal up to whole slow periods the earliest.
+    fn earliest_samples(&self) -> Vec<usize> {
+        let late = |s: usize| self.period.periods_late[s];
+        let measured = self.bank.ratio..self.samples.len();
+        let before = |i: usize, j: usize| self.same_later(i, j) && (late(i), i) < (late(j), j);
+        measured.clone().filter(|&j| measured.clone().all(|i| !before(i, j))).collect()
+    }
+
+    /// Whether `factor` proves ||K|| <= `gamma`.
+    pub fn keeps(&self, factor: &[Vec<f64>], gamma: f64) -> bool {
+        upper::proves(&self.equations, factor, gamma)
+    }
+
+    /// A proven lower bound of ||K||, from the gain at a frequency.
+    pub fn attains(&self, witness: &DualWitness) -> Option<f64> {
+        lower::gain(&self.period, &self.bank.filters, self.bank.ratio, witness)
+    }
+
+    /// A proven lower bound for any bank on these front ends, causal or not.
+    pub fn noncausal_bound(&self, witness: &DualWitness) -> Option<f64> {
+        let channels = self.first_channels(|i, j| self.same_later(i, j));
+        lower::unexplained(&self.period, self.bank.ratio, &channels, witness)
+    }
+
+    /// A proven lower bound for FIR banks as long as this one.
+    pub fn fir_bound(&self, witnesses: &[DualWitness]) -> Option<f64> {
+        let SynthesisFilters::Fir(taps) = &self.bank.filters else { return None };
+        let channels = self.first_channels(|i, j| self.same(i, j));
+        lower::of_length(&self.period, self.bank.ratio, &channels, taps[0].len(), witnesses)
+    }
+
+    /// What `periods` slow periods show of `gamma` for causal banks.
+    pub fn causal_recursion(&self, gamma: f64, periods: usize, precision: Precision) -> Recursion {
+        let (m, measured) = (self.bank.ratio, || self.earliest_samples());
+        match precision {
+            Precision::Short => {
+                let plant = self.short.get_or_init(|| CausalPlant::new(&self.period, m, &measured()));
+                plant.as_ref().map_or(Recursion::Undecided, |plant| plant.recursion(gamma, periods))
+            }
+            Precision::Long => {
+                let plant = self.long.get_or_init(|| {
+                    let period = SlowPeriod::new(&self.front_ends, &self.timeline, &self.samples);
+                    CausalPlant::new(&period, m, &measured())
+                });
+                plant.as_ref().map_or(Recursion::Undecided, |plant| plant.recursion(gamma, periods))
+            }
+        }
+    }
+
+    /// Whether the recursion refutes `gamma` for causal banks within `periods` slow periods.
+    fn refuted(&self, gamma: f64, periods: usize) -> bool {
+        let shown = |precision| self.causal_recursion(gamma, periods, precision);
+        [Precision::Short, Precision::Long]
+            .into_iter()
+            .any(|precision| matches!(shown(precision), Recursion::Refuted { .. }))
+    }
+
+    /// The error system in double precision; `None` if its inputs have no root, which does not happen.
+    pub fn midpoint(&self) -> Option<Midpoint> {
+        let root = positive::root(&self.equations.gram)?;
+        let (n, m) = (self.equations.order(), self.equations.outputs);
+        let system = ball::nearest(&self.equations.system);
+        let inputs: Matrix = ball::product(&self.equations.inputs, &root);
+        let inputs = ball::nearest(&inputs);
+        Some(Midpoint {
+            a: system.rows(0, n).into_owned(),
+            b: inputs.rows(0, n).into_owned(),
+            c: system.rows(n, m).into_owned(),
+            d: inputs.rows(n, m).into_owned(),
+        })
+    }
+
+    /// Gram matrix of the M reference and N measured samples at a point of the unit circle, in double precision.
+    pub fn gram_at(&self, half: [f64; 2]) -> crate::linalg::CMat {
+        let gram = spectrum::gram(&self.period, &spectrum::ComplexMatrix::unit(half));
+        gram.re.zip_map(&gram.im, |re, im| crate::linalg::Complex::new(re.nearest(), im.nearest()))
+    }
+
+    /// Proves what the witnesses of `proof` show, and compares the gammas in the file with it.
+    ///
+    /// # Errors
+    /// [`VerifyError`] naming what does not fit.
+    pub fn judge(&self, proof: &Proof, strictness: Strictness) -> Result<Verified, VerifyError> {
+        let proven = self.proven(proof)?;
+        statements::compare(&self.bank.gamma, &proven, self.scale(), strictness)?;
+        Ok(proven)
+    }
+
+    /// What the witnesses of `proof` show.
+    ///
+    /// # Errors
+    /// [`VerifyError`] naming the witness that does not prove what it says.
+    pub fn proven(&self, proof: &Proof) -> Result<Verified, VerifyError> {
+        let certificate = proof.upper.as_ref().ok_or(VerifyError::NoCertificate)?;
+        let (found, states, upper) = (certificate.factor.len(), self.states(), certificate.gamma);
+        if found != states {
+            return Err(VerifyError::CertificateSize { found, states });
+        }
+        let attained =
+            self.attains(&certificate.peak).ok_or(VerifyError::Void { place: "proof.upper.peak" })?;
+        if !self.keeps(&certificate.factor, upper) {
+            return Err(VerifyError::NotProven { gamma: upper });
+        }
+        let noncausal = match &proof.noncausal {
+            Some(witness) => {
+                self.noncausal_bound(witness).ok_or(VerifyError::Void { place: "proof.noncausal" })?
+            }
+            None => 0.0,
+        };
+        let (bound, banks) = self.lower_bound(proof.lower.as_ref())?;
+        let (lower, lower_banks) =
+            if bound > noncausal { (bound, banks) } else { (noncausal, BoundedBanks::Any) };
+        Ok(Verified { lower, lower_banks, upper, attained, noncausal, states })
+    }
+
+    fn lower_bound(&self, proof: Option<&LowerProof>) -> Result<(f64, BoundedBanks), VerifyError> {
+        match proof {
+            None => Ok((0.0, BoundedBanks::Any)),
+            Some(LowerProof::Fir(witnesses)) => {
+                let bound = self.fir_bound(witnesses).ok_or(VerifyError::Void { place: "proof.lower" })?;
+                Ok((bound, BoundedBanks::FirOfThisLength))
+            }
+            Some(LowerProof::Causal(CausalWitness { gamma, periods })) => {
+                if self.refuted(*gamma, *periods) {
+                    Ok((*gamma, BoundedBanks::Causal))
+                } else {
+                    Err(VerifyError::NotRefuted { gamma: *gamma, periods: *periods })
+                }
+            }
+        }
+    }
+}

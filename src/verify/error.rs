@@ -1,0 +1,107 @@
+//! Why a bank is not what its file says, or cannot be judged.
+
+use super::{MAX_ANALOG_STATES, MAX_STATES};
+use crate::analog::AnalogError;
+
+/// Why a bank is not what its file says, or cannot be judged.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum VerifyError {
+    /// Nothing is known about the front ends.
+    #[error(
+        "spec: it is null, so the front ends are unknown and nothing can be proven; design the bank with its spec"
+    )]
+    NoSpec,
+    /// A filter of the spec is no front end.
+    #[error("{place}: {source}")]
+    FrontEnd {
+        /// Key in the file.
+        place: String,
+        /// What is wrong with it.
+        source: AnalogError,
+    },
+    /// Too large a system.
+    #[error(
+        "the error system has {states} states, at most {MAX_STATES} are proven; bring latency and delays closer together, or \
+         use fewer taps"
+    )]
+    TooLarge {
+        /// Its states.
+        states: usize,
+    },
+    /// Too many different filters.
+    #[error(
+        "spec: the distinct filters have {states} states together and a slow period {samples} samples; at most \
+         {MAX_ANALOG_STATES} states, fewer with many samples, are proven; give channels that have the same filter the same text"
+    )]
+    TooManyFilters {
+        /// States of all distinct filters.
+        states: usize,
+        /// M + N.
+        samples: usize,
+    },
+    /// The file carries no certificate.
+    #[error(
+        "proof.upper: the file carries no proof; `hybank design` writes one, and `hybank verify --search` looks for one"
+    )]
+    NoCertificate,
+    /// The certificate belongs to another system.
+    #[error(
+        "proof.upper.factor: it has {found} rows, but the error system of this bank has {states} states: the file was altered"
+    )]
+    CertificateSize {
+        /// Rows given.
+        found: usize,
+        /// Rows needed.
+        states: usize,
+    },
+    /// The certificate does not prove what it says.
+    #[error(
+        "proof.upper: the certificate does not prove that these coefficients keep gamma = {gamma}: a coefficient, the spec, \
+         the gamma or the certificate was altered; design the bank again"
+    )]
+    NotProven {
+        /// The certificate's gamma.
+        gamma: f64,
+    },
+    /// The certificate is true but says too little.
+    #[error(
+        "proof.upper: it proves a norm of {attained} to {upper} only, too wide for a statement; design the bank again"
+    )]
+    TooWide {
+        /// Proven from below.
+        attained: f64,
+        /// Proven from above.
+        upper: f64,
+    },
+    /// The recursion does not refute what the file says that it does.
+    #[error(
+        "proof.lower: {periods} slow periods do not refute gamma = {gamma} for causal banks; the file was altered, design the \
+         bank again"
+    )]
+    NotRefuted {
+        /// The gamma that should be out of reach.
+        gamma: f64,
+        /// T.
+        periods: usize,
+    },
+    /// A stated number is wrong, or more than was proven.
+    #[error(
+        "{place}: the file states {stated}, but {relation} {proven} is proven; the file was altered, design the bank again"
+    )]
+    Disproved {
+        /// Key in the file.
+        place: &'static str,
+        /// What the file says.
+        stated: f64,
+        /// How the proven number relates to the true one.
+        relation: &'static str,
+        /// What was proven.
+        proven: f64,
+    },
+    /// A witness that proves nothing.
+    #[error("{place}: this witness proves nothing; the file was altered, design the bank again")]
+    Void {
+        /// Key in the file.
+        place: &'static str,
+    },
+}

@@ -1,0 +1,33 @@
+//! What a floating-point number must offer so that enclosures can be computed with it.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A floating-point number whose operations have a proven relative error.
+pub(super) trait Number:
+    Copy
+    + std::fmt::Debug
+    + Default
+    + PartialEq
+    + Send
+    + Sync
+    + 'static
+    + From<f64>
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+{
+    /// Zero.
+    const ZERO: Self;
+    /// Bounds the relative error of each operation, underflow apart.
+    const ROUNDING: f64;
+    /// Terms of an exponential series after which the rest lies below the rounding.
+    const SERIES_TERMS: usize;
+
+    /// The nearest double, up to a relative error of 2^-52.
+    fn nearest(self) -> f64;
+
+    /// NaN for negative numbers.
+    fn sqrt(self) -> Self;
+}

@@ -1,0 +1,88 @@
+//! One slow period of the analog side: how the state and all samples of a period depend on the state before and on the
+//! input, the latter only through the Gram matrix of the maps from input to numbers (theory: K K* knows no more).
+//!
+//! For two samples at instants t_a >= t_b of the period, rows c_a, c_b, the entry of the Gram matrix is
+//! `c_a e^{A (t_a - t_b)} G(t_b) c_b'`. The period ends with the latest sample; the others follow at their instants, whole
+//! periods later where they are older than a period.
+
+use super::ball::{self, Matrix};
+use super::double_double::DoubleDouble;
+use super::front_ends::FrontEnds;
+use super::number::Number;
+use super::state_transition::{StateTransition, state_transition};
+use super::timeline::{SamplingInstant, Timeline};
+
+/// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `periods_late` slow periods later.
+#[derive(Debug, Clone)]
+pub(super) struct SlowPeriod<F = DoubleDouble> {
+    /// e^{A M}.
+    pub(super) transition: Matrix<F>,
+    /// One row per sample.
+    pub(super) outputs: Matrix<F>,
+    /// Gram matrix of (w, v), states first.
+    pub(super) gram: Matrix<F>,
+    /// For each sample.
+    pub(super) periods_late: Vec<usize>,
+}
+
+impl<F: Number> SlowPeriod<F> {
+    /// Follows `front_ends` through the period of `timeline` with `samples`.
+    pub(super) fn new(front_ends: &FrontEnds, timeline: &Timeline, samples: &[SamplingInstant]) -> Self {
+        let (a, b) = front_ends.dynamics();
+        let since_start: Vec<StateTransition<F>> =
+            (0..timeline.len()).map(|k| state_transition(&a, &b, timeline.since_start(k))).collect();
+        let rows: Vec<Matrix<F>> = samples.iter().map(|sample| front_ends.output(sample.filter)).collect();
+        let n = front_ends.order();
+        let mut outputs = ball::zeros(samples.len(), n);
+        for (i, row) in rows.iter().enumerate() {
+            outputs.set_row(i, &ball::product(row, &since_start[timeline.of(i)].transition).row(0));
+        }
+        // The latest sample ends the period.
+        let end = &since_start[since_start.len() - 1];
+        let mut gram = ball::zeros(n + samples.len(), n + samples.len());
+        gram.view_mut((0, 0), (n, n)).copy_from(&end.gramian);
+        let between: Vec<Matrix<F>> = (1..timeline.len())
+            .map(|k| state_transition(&a, &b, timeline.since_previous(k)).transition)
+            .collect();
+        correlate(&mut gram, timeline, &since_start, &between, &rows);
+        let periods_late = timeline.periods_late().to_vec();
+        Self { transition: end.transition.clone(), outputs, gram: ball::symmetric(&gram), periods_late }
+    }
+
+    /// Number of analog states.
+    pub(super) fn order(&self) -> usize {
+        self.transition.nrows()
+    }
+
+    /// Number of samples.
+    pub(super) fn samples(&self) -> usize {
+        self.outputs.nrows()
+    }
+}
+
+/// Fills the lower triangle beyond the states: each sample with all that is not earlier.
+fn correlate<F: Number>(
+    gram: &mut Matrix<F>,
+    timeline: &Timeline,
+    since_start: &[StateTransition<F>],
+    between: &[Matrix<F>],
+    rows: &[Matrix<F>],
+) {
+    let n = gram.nrows() - rows.len();
+    for (b, row) in rows.iter().enumerate() {
+        // What the state at some later instant has in common with sample b.
+        let mut common = ball::product_transposed(&since_start[timeline.of(b)].gramian, row);
+        for k in timeline.of(b)..timeline.len() {
+            if k > timeline.of(b) {
+                common = ball::product(&between[k - 1], &common);
+            }
+            for a in (0..rows.len()).filter(|&a| timeline.of(a) == k) {
+                let value = ball::product(&rows[a], &common)[(0, 0)];
+                gram[(n + a.max(b), n + a.min(b))] = value;
+            }
+        }
+        for i in 0..n {
+            gram[(n + b, i)] = common[(i, 0)];
+        }
+    }
+}

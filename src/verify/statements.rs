@@ -1,0 +1,91 @@
+//! The gammas that a file states against those that were proven.
+
+use super::{Verified, VerifyError};
+use crate::bank::Gamma;
+
+/// Relative excess of a certificate's gamma over the norm for which the stated number still counts as the same.
+const CERTIFICATE_WIDTH: f64 = 1e-8;
+/// How far a stated lower bound may lie below the proven one: less says that a number was altered.
+const UNDERSTATED: f64 = 1e-6;
+/// Most relative width of the interval proven for the norm.
+const WIDEST: f64 = 0.2;
+/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
+const FLOOR: f64 = 1e-10;
+/// Most width of the interval proven for such a norm, relative to the scale.
+const WIDEST_AT_FLOOR: f64 = 2e-6;
+
+/// What may be said beyond the proof.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Strictness {
+    /// Nothing: each stated number is proven.
+    Proven,
+    /// What the proof does not refute.
+    NotRefuted,
+}
+
+fn disproved(place: &'static str, stated: f64, relation: &'static str, proven: f64) -> Result<(), VerifyError> {
+    Err(VerifyError::Disproved { place, stated, relation, proven })
+}
+
+/// Compares each gamma in the file with what was proven; `scale` is the size of the reference samples.
+///
+/// # Errors
+/// [`VerifyError::Disproved`] with the first number that is not so, [`VerifyError::TooWide`] where the interval says little of
+/// the norm.
+pub(super) fn compare(
+    gamma: &Gamma,
+    proven: &Verified,
+    scale: f64,
+    strictness: Strictness,
+) -> Result<(), VerifyError> {
+    let Verified { attained, upper, .. } = *proven;
+    if !(upper - attained <= (WIDEST * upper).max(WIDEST_AT_FLOOR * scale)) {
+        return Err(VerifyError::TooWide { attained, upper });
+    }
+    compare_norm(gamma, proven, FLOOR * scale)?;
+    compare_upper(gamma, proven, strictness)?;
+    for (place, stated, bound) in
+        [("gamma.lower", gamma.lower, proven.lower), ("gamma.noncausal", gamma.noncausal, proven.noncausal)]
+    {
+        let Some(stated) = stated else { continue };
+        if stated > upper {
+            return disproved(place, stated, "for this bank a norm of at most", upper);
+        }
+        if stated > bound && strictness == Strictness::Proven {
+            return disproved(place, stated, "only", bound);
+        }
+        if stated < bound * (1.0 - UNDERSTATED) - FLOOR * scale {
+            return disproved(place, stated, "a bound of at least", bound);
+        }
+    }
+    Ok(())
+}
+
+/// The computed norm with its own error lies in the proven interval.
+fn compare_norm(gamma: &Gamma, proven: &Verified, floor: f64) -> Result<(), VerifyError> {
+    let Some(stated) = gamma.norm else { return Ok(()) };
+    let error = Gamma::NORM_ACCURACY * stated + floor;
+    if stated + error < proven.attained {
+        return disproved("gamma.norm", stated, "a norm of at least", proven.attained);
+    }
+    if stated - error > proven.upper {
+        return disproved("gamma.norm", stated, "a norm of at most", proven.upper);
+    }
+    Ok(())
+}
+
+/// The stated upper end is the certificate's.
+fn compare_upper(gamma: &Gamma, proven: &Verified, strictness: Strictness) -> Result<(), VerifyError> {
+    let Some(stated) = gamma.upper else { return Ok(()) };
+    let place = "gamma.upper";
+    match strictness {
+        _ if stated < proven.attained => disproved(place, stated, "a norm of at least", proven.attained),
+        Strictness::Proven if stated < proven.upper => {
+            disproved(place, stated, "no less than", proven.upper)
+        }
+        Strictness::Proven if stated > proven.upper * (1.0 + CERTIFICATE_WIDTH) => {
+            disproved(place, stated, "a norm of at most", proven.upper)
+        }
+        _ => Ok(()),
+    }
+}

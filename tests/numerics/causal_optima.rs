@@ -1,0 +1,154 @@
+//! The least gamma of any causal bank, proven from below by `verify`'s recursion, against true optima.
+//!
+//! The numbers are those of an independent computation: a doubling Riccati equation in 900-bit arithmetic and modal
+//! coordinates, true to 2e-6. Some of its 174 cases stand here; the whole table is read from the file named by
+//! `HYBANK_CAUSAL_OPTIMA` (JSON) where that is set.
+
+use crate::support::specs::alike;
+use hybank::bank::{Bank, SynthesisFilters};
+use hybank::spec::{Family, FilterSpec, Spec};
+use hybank::units::Hertz;
+use hybank::verify::{EnclosedErrorSystem, Precision, Recursion};
+
+/// Error of the table.
+const TABLE: f64 = 3e-6;
+/// Slow periods at most.
+const PERIODS: usize = 512;
+
+struct Case {
+    name: String,
+    spec: Spec,
+    optimum: f64,
+    noncausal: f64,
+}
+
+fn case(
+    (family, order, cutoff): (Family, usize, f64),
+    ratio: usize,
+    latency: usize,
+    delays: &[f64],
+    (optimum, noncausal): (f64, f64),
+) -> Case {
+    let name = format!("{family:?} {order} at {cutoff}, M = {ratio}, latency {latency}, {delays:?}");
+    let filter = FilterSpec::Family {
+        family,
+        order: Some(order),
+        cutoff: Hertz(cutoff),
+        ripple_db: family.has_ripple().then_some(0.5),
+        attenuation_db: family.has_attenuation().then_some(60.0),
+    };
+    let spec = alike(&filter, ratio, latency, delays);
+    Case { name, spec, optimum, noncausal }
+}
+
+/// Steep and gentle filters, one channel and four, hardly any latency and some.
+fn golden() -> Vec<Case> {
+    vec![
+        case((Family::Butterworth, 2, 0.1), 2, 0, &[0.6], (0.3421665, 0.1591749)),
+        case((Family::Butterworth, 2, 0.1), 4, 2, &[2.3], (0.6543281, 0.5392855)),
+        case((Family::Butterworth, 2, 0.1), 4, 1, &[2.3], (0.7519916, 0.5392855)),
+        case((Family::Butterworth, 4, 0.1), 2, 1, &[0.6], (0.0482543, 0.0255936)),
+        case((Family::Butterworth, 4, 0.1), 2, 2, &[0.6], (0.02770561, 0.0255936)),
+        case((Family::Butterworth, 4, 0.1), 4, 2, &[2.3], (0.5768853, 0.3790364)),
+        case((Family::Butterworth, 4, 0.25), 2, 0, &[0.6], (0.8151188, 0.7072165)),
+        case((Family::Butterworth, 4, 0.25), 4, 0, &[2.3], (0.9986254, 0.9980779)),
+        case((Family::Butterworth, 4, 0.25), 4, 2, &[0.0, 1.3, 2.1, 2.95], (0.4801483, 0.0483771)),
+        case((Family::Butterworth, 8, 0.1), 2, 1, &[0.6], (0.007744863, 0.0006553599)),
+        case((Family::Butterworth, 8, 0.1), 4, 4, &[2.3], (0.2049205, 0.1654597)),
+        case((Family::Butterworth, 8, 0.1), 4, 2, &[2.3], (0.4741524, 0.1654597)),
+        case((Family::Chebyshev1, 8, 0.1), 2, 0, &[0.6], (0.006750596, 2.061575e-05)),
+        case((Family::Chebyshev1, 8, 0.1), 2, 1, &[0.6], (0.001119147, 2.061575e-05)),
+        case((Family::Chebyshev1, 8, 0.1), 4, 4, &[2.3], (0.1002612, 0.0223595)),
+        case((Family::Elliptic, 5, 0.1), 2, 1, &[0.6], (0.007013631, 0.002903868)),
+        case((Family::Elliptic, 5, 0.1), 2, 2, &[0.6], (0.003489372, 0.002903868)),
+        case((Family::Elliptic, 5, 0.1), 4, 8, &[2.3], (0.1101964, 0.1044714)),
+        case((Family::Bessel, 6, 0.05), 2, 0, &[0.6], (0.003010487, 6.273528e-05)),
+        case((Family::Bessel, 6, 0.05), 4, 8, &[2.3], (0.004267246, 0.003743923)),
+        case((Family::Bessel, 6, 0.05), 4, 4, &[2.3], (0.01160882, 0.003743923)),
+    ]
+}
+
+/// The whole table, where it is given.
+fn table() -> Vec<Case> {
+    let Ok(path) = std::env::var("HYBANK_CAUSAL_OPTIMA") else {
+        println!("HYBANK_CAUSAL_OPTIMA is not set: only the cases of this file are tried");
+        return Vec::new();
+    };
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let family = |name: &str| match name {
+        "butterworth" => Family::Butterworth,
+        "bessel" => Family::Bessel,
+        "chebyshev1" => Family::Chebyshev1,
+        "elliptic" => Family::Elliptic,
+        _ => panic!("{name}"),
+    };
+    let read = |case_: &serde_json::Value| {
+        let number = |key: &str| case_[key].as_f64().unwrap();
+        let filter = &case_["filter"];
+        let delays: Vec<f64> =
+            case_["delay_samples"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        case(
+            (
+                family(filter["family"].as_str().unwrap()),
+                filter["order"].as_u64().unwrap() as usize,
+                filter["cutoff"].as_f64().unwrap(),
+            ),
+            number("ratio") as usize,
+            number("latency") as usize,
+            &delays,
+            (number("optimum"), number("noncausal")),
+        )
+    };
+    document["cases"].as_array().unwrap().iter().map(read).collect()
+}
+
+/// A bank of zeros on the case's front ends: the recursion does not ask for the filters.
+fn silent(spec: &Spec) -> Bank {
+    let filters = SynthesisFilters::Fir(vec![vec![0.0]; spec.channels.len()]);
+    Bank {
+        spec: Some(spec.clone()),
+        latency: spec.latency.unwrap(),
+        delays: spec.channels.iter().map(|channel| channel.delay.0).collect(),
+        ..Bank::bare(filters, spec.ratio)
+    }
+}
+
+/// What the table leaves open is not refuted, and what lies `width` below the optimum is, unless the noncausal bound says so.
+#[test]
+fn the_recursion_refutes_what_no_causal_bank_reaches_and_nothing_else() {
+    let widths = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+    let mut reached = [0usize; 7];
+    let cases: Vec<Case> = golden().into_iter().chain(table()).collect();
+    for Case { name, spec, optimum, noncausal } in &cases {
+        let bank = silent(spec);
+        let error = EnclosedErrorSystem::new(&bank).unwrap();
+        let begin = std::time::Instant::now();
+        for precision in [Precision::Short, Precision::Long] {
+            let above = error.causal_recursion(optimum * (1.0 + TABLE), PERIODS, precision);
+            let refuted = matches!(above, Recursion::Refuted { .. });
+            assert!(!refuted, "{name}: {above:?} above the optimum {optimum}, {precision:?}");
+        }
+        let below = |width: f64| {
+            let gamma = optimum * (1.0 - TABLE) * (1.0 - width);
+            match error.causal_recursion(gamma, PERIODS, Precision::Short) {
+                Recursion::Refuted { periods } => Recursion::Refuted { periods },
+                _ => error.causal_recursion(gamma, PERIODS, Precision::Long),
+            }
+        };
+        let proven = |width: f64| {
+            optimum * (1.0 - width) <= *noncausal || matches!(below(width), Recursion::Refuted { .. })
+        };
+        let best = widths.iter().position(|&width| proven(width)).unwrap();
+        reached[best] += 1;
+        println!(
+            "{name}: {:e}, below {:?}, {:.0} ms",
+            widths[best],
+            below(widths[best]),
+            begin.elapsed().as_secs_f64() * 1e3
+        );
+    }
+    println!("widths {widths:?}: {reached:?} of {}", cases.len());
+    let narrow: usize = reached[..3].iter().sum();
+    assert!(narrow * 100 >= 95 * cases.len(), "{narrow} of {} within 1e-4", cases.len());
+}
