@@ -51,7 +51,10 @@ pub(super) fn compare(
         if stated > upper {
             return disproved(place, stated, "for this bank a norm of at most", upper);
         }
-        if stated > bound && strictness == Strictness::Proven {
+        if strictness == Strictness::NotRefuted {
+            continue;
+        }
+        if stated > bound {
             return disproved(place, stated, "only", bound);
         }
         if stated < bound * (1.0 - UNDERSTATED) - FLOOR * scale {

@@ -4,11 +4,12 @@
 //! coordinates, true to 2e-6. Some of its 174 cases stand here; the whole table is read from the file named by
 //! `HYBANK_CAUSAL_OPTIMA` (JSON) where that is set.
 
-use crate::support::specs::alike;
+use crate::support::specs::{alike, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
+use hybank::design::design;
 use hybank::spec::{Family, FilterSpec, Spec};
 use hybank::units::Hertz;
-use hybank::verify::{EnclosedErrorSystem, Precision, Recursion};
+use hybank::verify::{EnclosedErrorSystem, Precision, Recursion, verify};
 
 /// Error of the table.
 const TABLE: f64 = 3e-6;
@@ -151,4 +152,20 @@ fn the_recursion_refutes_what_no_causal_bank_reaches_and_nothing_else() {
     println!("widths {widths:?}: {reached:?} of {}", cases.len());
     let narrow: usize = reached[..3].iter().sum();
     assert!(narrow * 100 >= 95 * cases.len(), "{narrow} of {} within 1e-4", cases.len());
+}
+
+/// Covariances of so many samples have eigenvalues below 106 bits, so that no dual witness binds the taps: the causal bound, which
+/// long filters all but reach, holds for them too.
+#[test]
+fn long_fir_banks_are_proven_by_the_causal_bound() {
+    for taps in [48, 64] {
+        let Case { spec, optimum, noncausal, .. } =
+            case((Family::Butterworth, 4, 0.1), 2, 1, &[1.2, 0.6], (0.01289579, 0.002532753));
+        let design = design(&with_taps(spec, taps)).unwrap();
+        let proven = design.proof.unwrap();
+        println!("{taps} taps: {proven:?}");
+        assert!(proven.lower <= proven.upper && proven.lower > optimum * (1.0 - 1e-4), "{taps}: {proven:?}");
+        assert!((proven.noncausal / noncausal - 1.0).abs() < 1e-6, "{taps}: {proven:?}");
+        assert_eq!(verify(&design.bank).unwrap(), proven);
+    }
 }

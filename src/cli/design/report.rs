@@ -5,7 +5,7 @@ use crate::design::quantise::WordStudy;
 use crate::design::{Design, MeanAnalysis, OrderErrorPoint, OrderReduction};
 use crate::spec::Method;
 use crate::units::{Hertz, Seconds};
-use crate::verify::Verified;
+use crate::verify::{BoundedBanks, Verified};
 
 /// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
@@ -93,6 +93,11 @@ impl ProofReport {
         }
     }
 
+    /// Whether the lower end is that of all causal banks.
+    fn causal(&self) -> bool {
+        self.proven.is_some_and(|proven| proven.lower_banks == BoundedBanks::Causal)
+    }
+
     fn text(&self) -> String {
         match (&self.proven, &self.unproven) {
             (Some(proven), _) => format!(
@@ -165,6 +170,7 @@ impl<'a> Report<'a> {
             match self.method {
                 Method::Fir => "no bank of this length is better",
                 Method::Iir => "no causal bank is better",
+                _ if self.proof.causal() => "no causal bank is better; this method does not aim at gamma",
                 Method::H2 | Method::Sinc | Method::Separation =>
                     "no bank at all is better; this method does not aim at gamma",
             },

@@ -11,8 +11,10 @@ const LONG_PERIODS: usize = 128;
 const FIRST_SHORTFALLS: [f64; 3] = [1e-6, 1e-5, 1e-4];
 /// Relative width of the interval at which the bisection ends.
 const WIDTH: f64 = 1e-5;
-/// Bisections at most.
-const MAX_BISECTIONS: usize = 24;
+/// Bisections at most in 106 bits.
+const SHORT_BISECTIONS: usize = 24;
+/// Bisections at most in 512 bits.
+const LONG_BISECTIONS: usize = 6;
 
 /// The largest gamma found in the interval that no causal bank reaches.
 pub(super) fn witness(
@@ -34,17 +36,20 @@ pub(super) fn witness(
         return short;
     }
     let long = near.filter(|&gamma| gamma > reached).find_map(|gamma| refuted(gamma, Precision::Long));
-    let search = |precision| bisected((lower, upper), |gamma| refuted(gamma, precision));
-    long.or(short).or_else(|| search(Precision::Short)).or_else(|| search(Precision::Long))
+    let search = |precision, count| bisected((lower, upper), count, |gamma| refuted(gamma, precision));
+    long.or(short)
+        .or_else(|| search(Precision::Short, SHORT_BISECTIONS))
+        .or_else(|| search(Precision::Long, LONG_BISECTIONS))
 }
 
-/// Bisection between the ends, by ratio because they may be far apart.
+/// `count` bisections between the ends, by ratio because they may be far apart.
 fn bisected(
     (lower, upper): (f64, f64),
+    count: usize,
     refuted: impl Fn(f64) -> Option<CausalWitness>,
 ) -> Option<CausalWitness> {
     let (mut best, mut below, mut standing) = (None, lower, upper);
-    for _ in 0..MAX_BISECTIONS {
+    for _ in 0..count {
         if standing - below <= WIDTH * standing {
             break;
         }
