@@ -3,8 +3,8 @@
 use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits};
 
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma, LowerProof,
-    SynthesisFilters,
+    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma,
+    LowerProof, SynthesisFilters,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96 kHz.
@@ -284,7 +284,9 @@ fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: 
         let rule = "half is about cos(w/2), sin(w/2); both cannot be zero";
         return out_of_range(format!("{path}.half"), 0.0, "", rule);
     }
-    for (key, list, expected) in [("wanted", &witness.wanted, reference), ("measured", &witness.measured, measured)] {
+    for (key, list, expected) in
+        [("wanted", &witness.wanted, reference), ("measured", &witness.measured, measured)]
+    {
         let path = format!("{path}.{key}");
         if list.len() != expected {
             let (found, rule) = (list.len(), "a witness has one weight for each sample of a slow period");

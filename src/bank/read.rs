@@ -6,8 +6,8 @@ use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
 
 use super::digest::{digest, is_digest};
 use super::{
-    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint, Gamma,
-    LowerProof, Proof, SynthesisFilters, VERSION,
+    Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FORMAT, FixedPoint,
+    Gamma, LowerProof, Proof, SynthesisFilters, VERSION,
 };
 
 const KEYS: [&str; 14] = [

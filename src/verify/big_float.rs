@@ -89,9 +89,11 @@ impl BigFloat {
             let mut carry = false;
             for (i, entry) in sum.iter_mut().enumerate().take(WORDS + 1) {
                 let part = part(i);
-                let (first, over) = if subtract { entry.overflowing_sub(part) } else { entry.overflowing_add(part) };
+                let (first, over) =
+                    if subtract { entry.overflowing_sub(part) } else { entry.overflowing_add(part) };
                 let step = u64::from(carry);
-                let (second, again) = if subtract { first.overflowing_sub(step) } else { first.overflowing_add(step) };
+                let (second, again) =
+                    if subtract { first.overflowing_sub(step) } else { first.overflowing_add(step) };
                 (*entry, carry) = (second, over || again);
             }
             sum[WORDS + 1] = u64::from(carry && !subtract);

@@ -9,8 +9,8 @@ use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
 use super::timeline::{SamplingInstant, Timeline};
 use super::{
-    BoundedBanks, MAX_ANALOG_STATES, MAX_STATES, MAX_WORK, Strictness, Verified, VerifyError, lower, positive,
-    spectrum, statements, upper,
+    BoundedBanks, MAX_ANALOG_STATES, MAX_STATES, MAX_WORK, Strictness, Verified, VerifyError, lower,
+    positive, spectrum, statements, upper,
 };
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, Proof, SynthesisFilters};
 use crate::linalg::Mat;

@@ -106,7 +106,12 @@ impl Layout {
 }
 
 /// Number of states of the error system of a bank, before anything of that size is built.
-pub(super) fn order(analog: usize, periods_late: &[usize], filters: &SynthesisFilters, ratio: usize) -> usize {
+pub(super) fn order(
+    analog: usize,
+    periods_late: &[usize],
+    filters: &SynthesisFilters,
+    ratio: usize,
+) -> usize {
     let own = match filters {
         SynthesisFilters::Fir(taps) => taps.len() * (taps[0].len().div_ceil(ratio) - 1),
         SynthesisFilters::StateSpace(block) => block.a.len(),

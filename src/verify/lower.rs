@@ -18,12 +18,17 @@
 use super::ball::{self, Ball, Matrix};
 use super::double_double::DoubleDouble;
 use super::positive;
-use super::spectrum::{self, ComplexMatrix};
 use super::slow_period::SlowPeriod;
+use super::spectrum::{self, ComplexMatrix};
 use crate::bank::{DualWitness, SynthesisFilters};
 
 /// A gain that the bank itself has: `||K|| >= ||a* K(z)|| / ||a||`.
-pub(super) fn gain(period: &SlowPeriod, filters: &SynthesisFilters, ratio: usize, witness: &DualWitness) -> Option<f64> {
+pub(super) fn gain(
+    period: &SlowPeriod,
+    filters: &SynthesisFilters,
+    ratio: usize,
+    witness: &DualWitness,
+) -> Option<f64> {
     let z = ComplexMatrix::unit(witness.half);
     let reference = ComplexMatrix::column(&witness.wanted);
     let through = spectrum::filter_response(filters, ratio, &z).adjoint().product(&reference);
@@ -49,7 +54,12 @@ fn root_of_quotient(a: Ball, b: Ball) -> Option<f64> {
 
 /// A bound for any bank, causal or not, of any length: sqrt(a* S a / a* a) at the witness's frequency. `channels` are those that
 /// can be told apart.
-pub(super) fn unexplained(period: &SlowPeriod, ratio: usize, channels: &[usize], witness: &DualWitness) -> Option<f64> {
+pub(super) fn unexplained(
+    period: &SlowPeriod,
+    ratio: usize,
+    channels: &[usize],
+    witness: &DualWitness,
+) -> Option<f64> {
     let gram = spectrum::gram(period, &ComplexMatrix::unit(witness.half));
     let measured: Vec<usize> = channels.iter().map(|i| ratio + i).collect();
     let all: Vec<usize> = (0..ratio).chain(measured.iter().copied()).collect();

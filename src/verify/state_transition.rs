@@ -131,7 +131,10 @@ mod tests {
         let long: StateTransition<BigFloat> =
             state_transition(&ball::exact(&a), &ball::exact(&b), Ball::from(1.7));
         for (x, y) in short.gramian.iter().zip(&long.gramian) {
-            assert!((x.nearest() - y.nearest()).abs() <= 2.0 * f64::EPSILON * x.nearest().abs(), "{x:?} {y:?}");
+            assert!(
+                (x.nearest() - y.nearest()).abs() <= 2.0 * f64::EPSILON * x.nearest().abs(),
+                "{x:?} {y:?}"
+            );
         }
         assert!(ball::radius_sum(&long.gramian) < 1e-140 && ball::radius_sum(&long.transition) < 1e-140);
     }

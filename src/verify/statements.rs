@@ -23,7 +23,12 @@ pub enum Strictness {
     NotRefuted,
 }
 
-fn disproved(place: &'static str, stated: f64, relation: &'static str, proven: f64) -> Result<(), VerifyError> {
+fn disproved(
+    place: &'static str,
+    stated: f64,
+    relation: &'static str,
+    proven: f64,
+) -> Result<(), VerifyError> {
     Err(VerifyError::Disproved { place, stated, relation, proven })
 }
 
@@ -83,9 +88,7 @@ fn compare_upper(gamma: &Gamma, proven: &Verified, strictness: Strictness) -> Re
     let place = "gamma.upper";
     match strictness {
         _ if stated < proven.attained => disproved(place, stated, "a norm of at least", proven.attained),
-        Strictness::Proven if stated < proven.upper => {
-            disproved(place, stated, "no less than", proven.upper)
-        }
+        Strictness::Proven if stated < proven.upper => disproved(place, stated, "no less than", proven.upper),
         Strictness::Proven if stated > proven.upper * (1.0 + CERTIFICATE_WIDTH) => {
             disproved(place, stated, "a norm of at most", proven.upper)
         }

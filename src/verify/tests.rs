@@ -181,7 +181,9 @@ fn short_filters_are_bound_by_several_witnesses() {
         let (bank, proven) = designed(Method::Fir, latency, taps);
         assert!((proven.lower / golden - 1.0).abs() < 1e-6, "{proven:?}");
         assert!(proven.lower > 1.2 * proven.noncausal, "{proven:?}");
-        let Some(LowerProof::Fir(witnesses)) = bank.proof.as_ref().unwrap().lower.clone() else { panic!("witnesses") };
+        let Some(LowerProof::Fir(witnesses)) = bank.proof.as_ref().unwrap().lower.clone() else {
+            panic!("witnesses")
+        };
         // The same witnesses claim nothing of longer filters, for which they do not cancel.
         let SynthesisFilters::Fir(lists) = &bank.filters else { panic!("taps") };
         let longer = lists.iter().map(|list| [list.as_slice(), &[0.0; 12]].concat()).collect();

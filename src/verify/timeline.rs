@@ -82,8 +82,10 @@ impl Timeline {
     ) -> Result<Self, VerifyError> {
         let compare = |a: Instant, b: Instant| a.compare(b, fast_period);
         let times = samples.iter().map(|sample| sample.time);
-        let latest =
-            times.clone().max_by(|&a, &b| compare(a, b)).unwrap_or(Instant { whole: 0.0, delay: Seconds(0.0) });
+        let latest = times
+            .clone()
+            .max_by(|&a, &b| compare(a, b))
+            .unwrap_or(Instant { whole: 0.0, delay: Seconds(0.0) });
         let periods = |time: Instant| -> Result<f64, VerifyError> {
             let age = latest.since::<BigFloat>(time, fast_period).nearest();
             let mut periods = (age / ratio as f64).floor();
@@ -170,8 +172,12 @@ mod tests {
 
     #[test]
     fn samples_older_than_a_period_are_late() {
-        let line = Timeline::new(&[sample(0.0, 0.0), sample(1.0, 0.0), sample(0.0, 2.5), sample(0.0, 4.0)], Seconds(1.0), 2)
-            .unwrap();
+        let line = Timeline::new(
+            &[sample(0.0, 0.0), sample(1.0, 0.0), sample(0.0, 2.5), sample(0.0, 4.0)],
+            Seconds(1.0),
+            2,
+        )
+        .unwrap();
         assert_eq!(line.periods_late(), [0, 0, 1, 2]);
         assert_eq!((line.of(0), line.of(1), line.of(2), line.of(3)), (1, 2, 0, 1));
         let times: Vec<f64> = (0..3).map(|k| line.since_start::<BigFloat>(k).nearest()).collect();

@@ -162,7 +162,8 @@ fn forged(bank: &Bank, trick: usize) -> (&'static str, Bank) {
             "noncausal := upper"
         }
         6 => {
-            proof.lower = Some(LowerProof::Causal(CausalWitness { gamma: gamma.upper.unwrap(), periods: 100 }));
+            proof.lower =
+                Some(LowerProof::Causal(CausalWitness { gamma: gamma.upper.unwrap(), periods: 100 }));
             gamma.lower = gamma.upper;
             "an invented recursion"
         }
@@ -208,9 +209,9 @@ fn files_whose_gammas_are_false_are_refused() {
         for trick in 0..14 {
             let (name, forged) = forged(&bank, trick);
             let read = forged.to_json().and_then(|text| Bank::from_json(&text, "forged.json"));
-            let judged = read.map_err(|error| error.to_string()).and_then(|bank| {
-                verify(&bank).map_err(|error| error.to_string())
-            });
+            let judged = read
+                .map_err(|error| error.to_string())
+                .and_then(|bank| verify(&bank).map_err(|error| error.to_string()));
             assert!(judged.is_err(), "{name}: {judged:?} {:?}", forged.gamma);
             // Without the reader's checks, too.
             assert!(verify(&forged).is_err(), "{name}");

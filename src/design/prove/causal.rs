@@ -17,10 +17,7 @@ const SHORT_BISECTIONS: usize = 24;
 const LONG_BISECTIONS: usize = 6;
 
 /// The largest gamma found in the interval that no causal bank reaches.
-pub(super) fn witness(
-    error: &EnclosedErrorSystem<'_>,
-    (lower, upper): (f64, f64),
-) -> Option<CausalWitness> {
+pub(super) fn witness(error: &EnclosedErrorSystem<'_>, (lower, upper): (f64, f64)) -> Option<CausalWitness> {
     let refuted = |gamma: f64, precision: Precision| {
         let limit = if precision == Precision::Short { SHORT_PERIODS } else { LONG_PERIODS };
         match error.causal_recursion(gamma, limit, precision) {
