@@ -90,3 +90,6 @@ pub fn bank_problem(bank: &Bank) -> Result<Problem, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     Problem::new(spec, bank.latency)
 }
+
+#[cfg(test)]
+mod tests;

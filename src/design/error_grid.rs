@@ -115,3 +115,6 @@ fn parabola(a: f64, b: f64, c: f64) -> (f64, f64) {
     let shift = (0.5 * (a - c) / curvature).clamp(-1.0, 1.0);
     (shift, b - 0.25 * (a - c) * shift)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,4 +1,4 @@
-//! Discrete-time state-space systems: responses, Gramians, peak gains, Riccati equations.
+//! Discrete-time state-space systems: connections, responses, Gramians, peak gains, Riccati equations.
 //!
 //! Knows no filter bank: a system has inputs, outputs and states, nothing else. Continuous-time
 //! helpers ([`exponential`]) serve exact discretisation.

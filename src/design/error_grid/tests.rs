@@ -1,0 +1,57 @@
+use super::*;
+use crate::design::problem::Problem;
+use crate::lti::StateSpace;
+use crate::lti::gramian::h2_norm;
+use crate::spec::Spec;
+
+fn plant(ratio: usize) -> LiftedPlant {
+    let text = format!(
+        "fast_period = 1.0\nratio = {ratio}\nlatency = 6\n\
+         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
+         channel = [{{ delay = 1.2 }}, {{ delay = 0.6 }}]\ndesign = {{ method = \"iir\" }}"
+    );
+    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 6).unwrap()).unwrap()
+}
+
+fn taps(count: usize) -> Vec<Vec<f64>> {
+    let tap = |i: usize, n: usize| ((1 + i * 5 + n * 3) as f64).sin() * 0.4;
+    (0..2).map(|i| (0..count).map(|n| tap(i, n)).collect()).collect()
+}
+
+/// The estimate is attained, so it is never above the norm, and fine enough to come close to it.
+#[test]
+fn estimates_come_close_to_the_norm_from_below() {
+    for (ratio, count) in [(1, 1), (2, 9), (2, 30), (3, 14)] {
+        let plant = plant(ratio);
+        let lags = filters::polyphase(&taps(count), ratio);
+        let estimate = ErrorGrid::new(&plant, lags.len()).peaks(&lags).unwrap().estimate;
+        let norm = plant.fir_norm(&taps(count)).unwrap().gain;
+        assert!(estimate <= norm * (1.0 + 1e-9) && estimate > norm * (1.0 - 1e-6), "{estimate} {norm}");
+    }
+}
+
+#[test]
+fn mean_squares_are_squared_h2_norms() {
+    for (ratio, count) in [(1, 1), (2, 9), (3, 14)] {
+        let plant = plant(ratio);
+        let lags = filters::polyphase(&taps(count), ratio);
+        let square = ErrorGrid::new(&plant, lags.len()).mean_square(&lags);
+        let error = plant.error_system(&StateSpace::fir(&lags).unwrap()).unwrap();
+        let want = h2_norm(&error).unwrap().powi(2);
+        assert!((square / want - 1.0).abs() < 1e-9, "{square} {want}");
+    }
+}
+
+#[test]
+fn a_parabola_has_its_vertex_where_it_is() {
+    let parabola_of = |vertex: f64, height: f64| {
+        let at = |x: f64| height - 0.3 * (x - vertex) * (x - vertex);
+        parabola(at(-1.0), at(0.0), at(1.0))
+    };
+    for vertex in [-0.9, -0.2, 0.0, 0.5] {
+        let (shift, height) = parabola_of(vertex, 2.0);
+        assert!((shift - vertex).abs() < 1e-14 && (height - 2.0).abs() < 1e-14);
+    }
+    // No maximum: the middle point stands.
+    assert_eq!(parabola(1.0, 1.0, 1.0), (0.0, 1.0));
+}
