@@ -92,7 +92,8 @@ impl Realisation<'_> {
     /// channels.
     fn state_space(&self, system: &StateSpace, norm: f64) -> Result<Realised, DesignError> {
         let full = self.fastest_form(&system.map_inputs(&self.merged.shares())?, norm)?;
-        let (Some(wanted), SynthesisFilters::StateSpace(block)) = (self.spec.design.reduction, &full.filters)
+        let (Some(reduction), SynthesisFilters::StateSpace(block)) =
+            (self.spec.design.reduction, &full.filters)
         else {
             return Ok(full.into());
         };
@@ -104,7 +105,7 @@ impl Realisation<'_> {
             aim: if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
             gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
         };
-        let (smaller, record) = reduce(&problem, wanted)?;
+        let (smaller, record) = reduce(&problem, reduction)?;
         let judged = match smaller {
             None => full,
             Some(smaller) => self.reduced_form(&smaller, record.reduced.figures.gamma)?,

@@ -26,7 +26,7 @@ fn estimates_come_close_to_the_norm_from_below() {
         let lags = filters::polyphase(&taps(count), ratio);
         let estimate = ErrorGrid::new(&plant, lags.len()).peaks(&lags).unwrap().estimate;
         let norm = plant.fir_norm(&taps(count)).unwrap().gain;
-        assert!(estimate <= norm * (1.0 + 1e-9) && estimate > norm * (1.0 - 1e-6), "{estimate} {norm}");
+        assert!(estimate <= norm * (1.0 + 1e-9) && estimate > norm * (1.0 - 1e-5), "{estimate} {norm}");
     }
 }
 
@@ -50,7 +50,7 @@ fn a_parabola_has_its_vertex_where_it_is() {
     };
     for vertex in [-0.9, -0.2, 0.0, 0.5] {
         let (shift, height) = parabola_of(vertex, 2.0);
-        assert!((shift - vertex).abs() < 1e-14 && (height - 2.0).abs() < 1e-14);
+        assert!((shift - vertex).abs() < 1e-13 && (height - 2.0).abs() < 1e-13);
     }
     // No maximum: the middle point stands.
     assert_eq!(parabola(1.0, 1.0, 1.0), (0.0, 1.0));

@@ -37,7 +37,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     Ok(iteration.synthesis(relaxed.unwrap_or(optimum)))
 }
 
-/// A central filter whose norm is within `margin` of the optimum, if one is wanted and found.
+/// A central filter whose norm is within `margin` of the optimum, if one is asked for and found.
 fn relaxed(
     iteration: &mut GammaIteration<'_>,
     optimum: &Judged,

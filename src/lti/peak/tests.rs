@@ -107,9 +107,9 @@ fn refinement_reaches_the_peak_whatever_the_first_points() {
         // In x = (w - middle) / width the parabola through -1, 0 and 1 has its vertex at `vertex`.
         let slope = skew + 2.0 * vertex;
         let gain = |x: f64| 1.0 - sharp * (x * x + skew * x * x * x - slope * x);
-        let looks = std::cell::Cell::new(0);
+        let evaluations = std::cell::Cell::new(0);
         let response = |w: f64| {
-            looks.set(looks.get() + 1);
+            evaluations.set(evaluations.get() + 1);
             let rounding = 3e-12 * ((w * 1e15).rem_euclid(7.0) / 3.5 - 1.0);
             CMat::from_element(1, 1, Complex::new(gain((w - middle) / width) + rounding, 0.0))
         };
@@ -118,6 +118,6 @@ fn refinement_reaches_the_peak_whatever_the_first_points() {
         let top = refine::refine(|w| search.at(w), [look(-1.0), look(0.0), look(1.0)]).unwrap();
         let exact = gain(slope / (1.0 + (1.0 + 3.0 * skew * slope).sqrt()));
         assert!((top.gain - exact).abs() < 1e-11, "{seed}: {top:?} {exact}");
-        assert!(looks.get() <= 20, "{seed}: {} looks", looks.get());
+        assert!(evaluations.get() <= 20, "{seed}: {} evaluations", evaluations.get());
     }
 }
