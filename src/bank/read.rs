@@ -1,7 +1,8 @@
 //! From JSON text to a checked [`Bank`].
 
+use crate::spec::Fault;
 use crate::spec::document::Node;
-use crate::spec::reader::{Fault, Fields, Value};
+use crate::spec::reader::{Fields, Value};
 use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
 
 use super::digest::{digest, is_digest};

@@ -2,13 +2,14 @@
 
 use crate::units::{FastPeriods, Hertz, Seconds};
 
+use super::Fault;
 use super::design::DesignOverrides;
 use super::design::KeyProblem;
 use super::limits::{
     check_channel_count, check_delay, check_fast_period, check_fast_rate, check_gamma_margin, check_latency,
     check_noise, check_order, check_ratio, check_reduction_loss, check_taps,
 };
-use super::reader::{Fault, Fields, Value};
+use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Solver, Spec, SpecProblem};
 

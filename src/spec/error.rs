@@ -4,7 +4,6 @@ use std::fmt;
 use std::ops::Range;
 
 use super::FilterProblem;
-use super::reader::Fault;
 
 /// The error of a spec that cannot be used: the file, the location in it, and the problem.
 ///
@@ -21,6 +20,24 @@ struct Inner {
     location: Option<Location>,
     problem: SpecProblem,
     overridden: bool,
+}
+
+/// A problem with its path and location.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fault {
+    pub(crate) path: String,
+    pub(crate) span: Option<Range<usize>>,
+    /// Boxed to keep the result of every reading function small.
+    pub(crate) problem: Box<SpecProblem>,
+    /// The value is an override: `path` is its key, and the location in the document does not apply.
+    pub(crate) overridden: bool,
+}
+
+impl Fault {
+    /// A problem with the value that overrides the document's `key`.
+    pub(crate) fn overriding(key: &'static str, problem: SpecProblem) -> Self {
+        Self { path: key.to_owned(), span: None, problem: Box::new(problem), overridden: true }
+    }
 }
 
 /// A location in a text file.

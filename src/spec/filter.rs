@@ -1,12 +1,9 @@
 //! Rules for a written filter that need no linear algebra: sizes, finite numbers, family parameters, degrees.
 //! [`crate::analog`] checks the poles.
 
+use super::filter_problem::MAX_ORDER;
 use super::{Family, FilterProblem, FilterSpec};
 use crate::units::Hertz;
-
-/// Most poles of a filter. Real front ends have fewer than a dozen. The product of 32 poles, each of at most 1e9 rad per
-/// fast period, still fits a double.
-pub const MAX_ORDER: usize = 32;
 
 /// Least ripple or attenuation in decibels; less is numerically none.
 pub const MIN_RIPPLE_DB: f64 = 1e-6;

@@ -16,9 +16,10 @@ mod word_lengths;
 mod write;
 
 pub use design::DesignOverrides;
+pub(crate) use error::Fault;
 pub use error::{Location, SpecError, SpecProblem};
-pub use filter::{MAX_ORDER, MAX_RIPPLE_DB, MIN_RIPPLE_DB};
-pub use filter_problem::FilterProblem;
+pub use filter::{MAX_RIPPLE_DB, MIN_RIPPLE_DB};
+pub use filter_problem::{FilterProblem, MAX_ORDER};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub(crate) use word_lengths::check_fraction_bits;

@@ -1,28 +1,9 @@
 //! Typed access to a document; every error carries its path and location.
 
-use std::ops::Range;
-
+use super::Fault;
 use super::SpecProblem;
 use super::document::{Entry, Kind, Node};
 use super::nearest::nearest;
-
-/// A problem with its path and location.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fault {
-    pub(crate) path: String,
-    pub(crate) span: Option<Range<usize>>,
-    /// Boxed to keep the result of every reading function small.
-    pub(crate) problem: Box<SpecProblem>,
-    /// The value is an override: `path` is its key, and the location in the document does not apply.
-    pub(crate) overridden: bool,
-}
-
-impl Fault {
-    /// A problem with the value that overrides the document's `key`.
-    pub(crate) fn overriding(key: &'static str, problem: SpecProblem) -> Self {
-        Self { path: key.to_owned(), span: None, problem: Box::new(problem), overridden: true }
-    }
-}
 
 /// A value and its path.
 #[derive(Debug, Clone)]

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::Fault;
 use super::document::Node;
-use super::reader::{Fault, Value};
+use super::reader::Value;
 use super::{ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, Spec, decode};
 use crate::units::Seconds;
 

@@ -1,35 +1,23 @@
 //! The same bits however a stream is cut.
 
-use self::rand_cuts::Cuts;
+use crate::support::random::Random;
 use crate::support::{Desk, bytes, ticks};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{Form, Options, PcmOutput, Precision, Stream};
 use std::io::{Read, Write};
 
-/// A generator whose stream never changes (Knuth's MMIX), and the pieces that it makes.
-mod rand_cuts {
-    pub(crate) struct Cuts(pub(crate) u64);
-
-    impl Cuts {
-        pub(crate) fn next(&mut self) -> u64 {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            self.0 >> 33
-        }
-
-        /// Lengths that add up to `total`, short and long ones, with zeros among them.
-        pub(crate) fn of(&mut self, total: usize) -> Vec<usize> {
-            let mut cuts = Vec::new();
-            let mut left = total;
-            while left > 0 {
-                let longest = [1, 3, 40, total][self.next() as usize % 4];
-                let piece = (self.next() as usize % (longest + 1)).min(left);
-                cuts.push(piece);
-                left -= piece;
-            }
-            cuts
-        }
+/// Lengths that add up to `total`, short and long ones, with zeros among them.
+fn pieces(random: &mut Random, total: usize) -> Vec<usize> {
+    let mut pieces = Vec::new();
+    let mut left = total;
+    while left > 0 {
+        let longest = random.of(&[1, 3, 40, total]);
+        let piece = random.count(0, longest).min(left);
+        pieces.push(piece);
+        left -= piece;
     }
+    pieces
 }
 
 fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
@@ -37,8 +25,8 @@ fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
 }
 
 fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut cuts = Cuts(seed);
-    move || cuts.next() as f64 / (1u64 << 30) as f64 - 1.0
+    let mut random = Random(seed);
+    move || random.sample()
 }
 
 fn fir(channels: usize, ratio: usize, taps: usize) -> Bank {
@@ -91,7 +79,7 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
     const TICKS: usize = 300;
     let banks =
         [fir(2, 2, 24), fir(3, 4, 37), fir(1, 5, 9), fir(8, 8, 128), recursion(2, 2, 6), recursion(3, 2, 5)];
-    let mut cuts = Cuts(1);
+    let mut cuts = Random(1);
     let mut noise = noise(2);
     let mut streams: Vec<_> = banks
         .iter()
@@ -118,7 +106,7 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
         let count = streams.len();
         let (stream, input, whole) = &mut streams[turn % count];
         let pcm = turn / count % 4 == 3;
-        let pieces = cuts.of(TICKS);
+        let pieces = pieces(&mut cuts, TICKS);
         stream.reset();
         assert!(run(stream, input, pcm, &pieces) == whole[usize::from(pcm)], "turn {turn}: {pieces:?}");
     }
@@ -129,11 +117,11 @@ fn pipes_that_drip_give_the_same_bytes() {
     let desk = Desk::new();
     let input = bytes(&ticks(700));
     let whole = desk.run(&["stream", "bank.json"], &input).stdout;
-    let mut cuts = Cuts(3);
+    let mut cuts = Random(3);
     for turn in 0..30 {
         let mut child = desk.spawn(&["stream", "bank.json"]);
         let mut stdin = child.stdin.take().unwrap();
-        let (pieces, input) = (cuts.of(input.len()), input.clone());
+        let (pieces, input) = (pieces(&mut cuts, input.len()), input.clone());
         let feeder = std::thread::spawn(move || {
             let mut rest = &input[..];
             for piece in pieces {

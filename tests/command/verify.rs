@@ -4,6 +4,7 @@
 //! Changes of layout, and of digits beyond the precision of a double, are none. `HYBANK_MUTATIONS=100000` runs that many.
 
 use crate::support::THESIS;
+use crate::support::random::Random;
 use hybank::bank::{Bank, Proof, check_digest};
 use hybank::design::{analyze, design, prove};
 use hybank::spec::Spec;
@@ -52,23 +53,6 @@ fn accepted(text: &str) -> Result<(), String> {
     verify(&bank).map(drop).map_err(|error| error.to_string())
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014): the same mutations on every machine.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, sides: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % sides as u64) as usize
-    }
-
-    fn of<T: Copy>(&mut self, list: &[T]) -> T {
-        list[self.below(list.len())]
-    }
-}
-
 /// Places of the numbers of a text: start and end.
 fn numbers(text: &str) -> Vec<(usize, usize)> {
     let bytes = text.as_bytes();
@@ -83,7 +67,7 @@ fn replaced(text: &str, (start, end): (usize, usize), by: &str) -> String {
     format!("{}{by}{}", &text[..start], &text[end..])
 }
 
-fn mutated(text: &str, dice: &mut Dice) -> String {
+fn mutated(text: &str, dice: &mut Random) -> String {
     let numbers = numbers(text);
     let at = dice.of(&numbers);
     let old = &text[at.0..at.1];
@@ -155,7 +139,7 @@ fn every_mutation_of_a_bank_file_is_refused() {
             (name, text, value)
         })
         .collect();
-    let mut dice = Dice(2026);
+    let mut dice = Random(2026);
     let (mut refused, mut unchanged) = (0, 0);
     while refused < count {
         let (name, text, value) = &files[dice.below(files.len())];
@@ -177,7 +161,7 @@ fn every_mutation_of_a_bank_file_is_refused() {
 /// Without the digest the proof stands alone: what it lets pass must be true.
 #[test]
 fn what_the_proof_alone_lets_pass_is_true() {
-    let mut dice = Dice(7);
+    let mut dice = Random(7);
     let (mut passed, mut refused) = (0, 0);
     for method in ["fir", "iir"] {
         let text = designed(method).to_json().unwrap();

@@ -1,6 +1,7 @@
 //! Damaged files, by the thousand: every parser gives an answer or a message that names the file, and never panics.
 //! The seeds are those of the fuzz targets, the damage is the same in every run.
 
+use crate::support::random::Random;
 use hybank::bank::Bank;
 use hybank::io::wav::WavReader;
 use hybank::io::{LostSamples, SigmfMeta};
@@ -11,33 +12,23 @@ use std::path::Path;
 /// Damaged copies of each seed.
 const COPIES: usize = 3000;
 
-/// A generator whose stream never changes (Knuth's MMIX).
-struct Dice(u64);
+/// One to four faults.
+fn damage(dice: &mut Random, seed: &[u8]) -> Vec<u8> {
+    let mut bytes = seed.to_vec();
+    (0..=dice.below(4)).for_each(|_| fault(dice, &mut bytes));
+    bytes
+}
 
-impl Dice {
-    fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 33) as usize % count
-    }
-
-    /// One to four faults.
-    fn damage(&mut self, seed: &[u8]) -> Vec<u8> {
-        let mut bytes = seed.to_vec();
-        (0..=self.below(4)).for_each(|_| self.fault(&mut bytes));
-        bytes
-    }
-
-    fn fault(&mut self, bytes: &mut Vec<u8>) {
-        let place = self.below(bytes.len() + 1);
-        let length = (1 + self.below(8)).min(bytes.len() - place);
-        match self.below(6) {
-            0 => bytes.truncate(place),
-            1 => drop(bytes.drain(place..place + length)),
-            2 => bytes.splice(place..place, bytes[place..place + length].to_vec()).for_each(drop),
-            3 => bytes.insert(place, self.below(256) as u8),
-            4 => bytes[place..place + length].fill([0, 0xFF, 0x7F, 0x80, b'9', b'"'][self.below(6)]),
-            _ => bytes[place..place + length.min(1)].iter_mut().for_each(|byte| *byte ^= 1 << self.below(8)),
-        }
+fn fault(dice: &mut Random, bytes: &mut Vec<u8>) {
+    let place = dice.below(bytes.len() + 1);
+    let length = (1 + dice.below(8)).min(bytes.len() - place);
+    match dice.below(6) {
+        0 => bytes.truncate(place),
+        1 => drop(bytes.drain(place..place + length)),
+        2 => bytes.splice(place..place, bytes[place..place + length].to_vec()).for_each(drop),
+        3 => bytes.insert(place, dice.below(256) as u8),
+        4 => bytes[place..place + length].fill(dice.of(&[0, 0xFF, 0x7F, 0x80, b'9', b'"'])),
+        _ => bytes[place..place + length.min(1)].iter_mut().for_each(|byte| *byte ^= 1 << dice.below(8)),
     }
 }
 
@@ -47,10 +38,10 @@ fn damaged(target: &str, mut check: impl FnMut(&[u8])) {
     let mut seeds: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     seeds.sort();
     assert!(!seeds.is_empty());
-    let mut dice = Dice(1);
+    let mut dice = Random(1);
     for seed in seeds.iter().map(|path| fs::read(path).unwrap()) {
         check(&seed);
-        (0..COPIES).for_each(|_| check(&dice.damage(&seed)));
+        (0..COPIES).for_each(|_| check(&damage(&mut dice, &seed)));
     }
 }
 

@@ -1,6 +1,7 @@
 //! Random plants, from one channel to eight, steep and flat, delays down to equal: each ends as a bank with an interval that
 //! holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many, `HYBANK_PLANTS=124..125` that one.
 
+use crate::support::random::Random;
 use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, analyze, design};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
@@ -9,31 +10,8 @@ use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::ScopedJoinHandle;
 
-/// SplitMix64: small, seeded, good enough to choose cases.
-struct Dice(u64);
-
-impl Dice {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// From `least` to `most`.
-    fn count(&mut self, least: usize, most: usize) -> usize {
-        least + (self.next() % (most - least + 1) as u64) as usize
-    }
-
-    /// In [0, 1).
-    fn part(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// A low-pass of order 1 to 6 with its cutoff between 0.03 and 3 radians a fast sample.
-fn front_end(dice: &mut Dice) -> FilterSpec {
+fn front_end(dice: &mut Random) -> FilterSpec {
     let family = if dice.part() < 0.5 { Family::Butterworth } else { Family::Bessel };
     FilterSpec::Family {
         family,
@@ -45,9 +23,9 @@ fn front_end(dice: &mut Dice) -> FilterSpec {
 }
 
 /// Equal, nearly equal, or anywhere within two ticks.
-fn delays(dice: &mut Dice, channels: usize, ratio: usize) -> Vec<f64> {
+fn delays(dice: &mut Random, channels: usize, ratio: usize) -> Vec<f64> {
     let (kind, first) = (dice.count(0, 3), 2.0 * ratio as f64 * dice.part());
-    let delay = |dice: &mut Dice| match kind {
+    let delay = |dice: &mut Random| match kind {
         0 => first,
         1 => first + 1e-3 * dice.part(),
         _ => 2.0 * ratio as f64 * dice.part(),
@@ -58,7 +36,7 @@ fn delays(dice: &mut Dice, channels: usize, ratio: usize) -> Vec<f64> {
 /// A random plant; half of the recursive banks are to have few states.
 fn plant(seed: u64) -> Spec {
     let mut spec = unreduced(seed);
-    let mut dice = Dice(!seed);
+    let mut dice = Random(!seed);
     if spec.design.method == Method::Iir && dice.part() < 0.5 {
         let (order, db) = (dice.count(0, 12), 6.0 * dice.part());
         let by_order = dice.part() < 0.7;
@@ -68,7 +46,7 @@ fn plant(seed: u64) -> Spec {
 }
 
 fn unreduced(seed: u64) -> Spec {
-    let mut dice = Dice(seed);
+    let mut dice = Random(seed);
     let (channels, ratio) = (dice.count(1, 8), dice.count(1, 8));
     let target = front_end(&mut dice);
     let alike = dice.part() < 0.5;

@@ -2,6 +2,7 @@
 // Each test program uses a part of it.
 #![allow(dead_code)]
 
+pub(crate) mod random;
 pub(crate) mod specs;
 
 use std::fs;

@@ -2,7 +2,7 @@
 
 use super::arguments::DemoArguments;
 use super::contact;
-use super::failure::Failure;
+use super::failure::{self, Failure};
 use super::output;
 use super::progress::Progress;
 use super::summary::Summary;
@@ -103,7 +103,7 @@ fn report(summary: &DemoSummary, arguments: &DemoArguments) -> Result<(), Failur
         arguments.output.display()
     );
     if output::is_standard(&arguments.output) {
-        output::say(&text);
+        failure::say(&text);
         return Ok(());
     }
     output::print(&text)

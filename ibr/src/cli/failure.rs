@@ -1,5 +1,6 @@
 //! Failure of a command: one message on stderr and an exit code.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 /// A failure with the one message that the user sees.
@@ -39,14 +40,19 @@ impl Failure {
     pub(super) fn report(&self) -> ExitCode {
         match self {
             Self::Input(message) => {
-                super::output::say(&format!("hybank-ibr: {message}\n"));
+                say(&format!("hybank-ibr: {message}\n"));
                 ExitCode::from(1)
             }
             Self::Usage(message) => {
-                super::output::say(&format!("hybank-ibr: {message}\n"));
+                say(&format!("hybank-ibr: {message}\n"));
                 ExitCode::from(2)
             }
             Self::ClosedPipe => ExitCode::SUCCESS,
         }
     }
+}
+
+/// Writes text to standard error; one that cannot be written is no reason to lose a result.
+pub(super) fn say(text: &str) {
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }

@@ -1,7 +1,7 @@
 //! `hybank-ibr render`: a scene file in, an image and its figures out.
 
 use super::arguments::RenderArguments;
-use super::failure::Failure;
+use super::failure::{self, Failure};
 use super::output;
 use super::progress::Progress;
 use super::summary::{Figures, Summary};
@@ -183,7 +183,7 @@ fn mask_image(rendering: &Rendering) -> Image {
 
 /// Warnings on stderr about what the figures of merit alone do not show.
 fn warn(done: &Rendered) {
-    let warn = |text: String| output::say(&format!("hybank-ibr: warning: {text}\n"));
+    let warn = |text: String| failure::say(&format!("hybank-ibr: warning: {text}\n"));
     let coverage = done.rendering.coverage();
     if coverage < 0.5 && done.hull.is_none() {
         warn(format!("only {:.1} % of the image is covered by samples", 100.0 * coverage));
@@ -208,7 +208,7 @@ fn report(summary: &Summary, arguments: &RenderArguments) -> Result<(), Failure>
         return output::print(&(json + "\n"));
     }
     if output::is_standard(&arguments.output) {
-        output::say(&summary.text());
+        failure::say(&summary.text());
         return Ok(());
     }
     output::print(&summary.text())

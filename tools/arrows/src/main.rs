@@ -1,6 +1,6 @@
 //! Who imports whom: fails on a circle of files and on an arrow that ARCHITECTURE.md does not allow.
 //!
-//! `cargo run -p arrows`; `cargo run -p arrows -- --list` prints the arrows between rooms with a file that draws each.
+//! `cargo run -p arrows`, with the folder of another workspace if it is not this one; `cargo run -p arrows -- --list` prints the arrows between rooms with a file that draws each.
 //! Imports are `use` lines and paths in the code, followed to the file that holds what they name. Tests may import anything.
 
 mod checks;
@@ -11,11 +11,12 @@ mod rules;
 mod tokens;
 
 use checks::Survey;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let given = std::env::args().skip(1).find(|word| word != "--list").map(PathBuf::from);
+    let root = given.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."));
     let survey = match Survey::new(&root) {
         Ok(survey) => survey,
         Err(error) => {
