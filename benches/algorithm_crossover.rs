@@ -7,7 +7,7 @@
 //! overlap-save.
 
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::runtime::{Form, Options, Precision, Stream};
+use hybank::runtime::{Algorithm, Options, Precision, Stream};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -41,7 +41,7 @@ fn measure(bank: &Bank, options: Options) -> f64 {
         for _ in 0..calls {
             match options.precision {
                 Precision::Single => stream.process(black_box(&narrow), &mut narrow_y),
-                Precision::Double => stream.process_f64(black_box(&x), &mut y),
+                Precision::Double => stream.process(black_box(&x), &mut y),
             }
             .unwrap();
         }
@@ -61,21 +61,29 @@ fn main() {
     for (n, m) in SHAPES {
         for k in LAGS {
             let bank = fir(n, m, k * m);
-            let options = |form| Options { precision, form, ..Options::default() };
-            let direct = measure(&bank, options(Form::Direct));
-            let fast = measure(&bank, options(Form::Fast));
+            let options = |algorithm| Options { precision, algorithm, ..Options::default() };
+            let direct = measure(&bank, options(Algorithm::Direct));
+            let fast = measure(&bank, options(Algorithm::FastFir));
             let shortest = (2 * k).next_power_of_two().max(16);
             let lengths = (0..if prompt { 0 } else { 4 }).map(|i| shortest << i);
             let others: Vec<_> = lengths
-                .map(|len| format!("{len}: {:.2}", measure(&bank, options(Form::OverlapSave(Some(len))))))
+                .map(|len| {
+                    format!(
+                        "{len}: {:.2}",
+                        measure(&bank, options(Algorithm::OverlapSave { transform: Some(len) }))
+                    )
+                })
                 .collect();
-            let plan = |form| Stream::new(&bank.plan(options(form)).unwrap()).plan().summary();
-            let (not_late, plan) = (plan(Form::FastestPrompt).form, plan(Form::Fastest));
+            let plan = |algorithm| Stream::new(&bank.plan(options(algorithm)).unwrap()).plan().summary();
+            let (not_late, plan) = (
+                plan(Algorithm::Auto { added_latency: false }).algorithm,
+                plan(Algorithm::Auto { added_latency: true }),
+            );
             let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
             println!(
                 "| {n} | {m} | {k} | {direct:.2} | {fast:.2} | {} | {not_late} | {}{length} |",
                 others.join(", "),
-                plan.form
+                plan.algorithm
             );
         }
     }

@@ -7,7 +7,9 @@
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{Form, Isa, Options, PcmOutput, Precision, Stream, Workers, multiply_add_chains};
+use hybank::runtime::{
+    Algorithm, Isa, Options, PcmOutput, Precision, Stream, ThreadPool, multiply_add_chains,
+};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -21,7 +23,7 @@ fn fir(n: usize, m: usize, taps: usize) -> Bank {
     Bank::bare(SynthesisFilters::Fir((0..n).map(f).collect()), m)
 }
 
-/// 16 pairs of states in modal form, four channels.
+/// 16 pairs of states in modal algorithm, four channels.
 fn recursion() -> Bank {
     let n = 32;
     let entry = |i: usize, j: usize| match () {
@@ -94,9 +96,9 @@ impl Table {
         );
     }
 
-    /// The products are those of the direct form, so that the share of the peak may pass 100 % in others.
-    fn fir(&self, name: &str, n: usize, m: usize, taps: usize, form: Form, call: usize) {
-        let options = Options { form, ..self.options() };
+    /// The products are those of the direct algorithm, so that the share of the peak may pass 100 % in others.
+    fn fir(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm, call: usize) {
+        let options = Options { algorithm, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let x = input(n, TICKS);
         let mut y = vec![0.0; m * TICKS];
@@ -109,15 +111,15 @@ impl Table {
 
     fn cases(&self) {
         for (name, n, m, taps) in CASES {
-            self.fir(&format!("{name}: f32"), n, m, taps, Form::Direct, TICKS);
-            self.fir(&format!("{name}: f32, 64 ticks a call"), n, m, taps, Form::Direct, 64);
-            self.fir(&format!("{name}: f32, fast"), n, m, taps, Form::Fast, TICKS);
-            self.fir(&format!("{name}: f32, fast, 64 ticks a call"), n, m, taps, Form::Fast, 64);
-            self.doubles(&format!("{name}: f64"), n, m, taps, Form::Direct);
-            self.doubles(&format!("{name}: f64, fast"), n, m, taps, Form::Fast);
+            self.fir(&format!("{name}: f32"), n, m, taps, Algorithm::Direct, TICKS);
+            self.fir(&format!("{name}: f32, 64 ticks a call"), n, m, taps, Algorithm::Direct, 64);
+            self.fir(&format!("{name}: f32, fast"), n, m, taps, Algorithm::FastFir, TICKS);
+            self.fir(&format!("{name}: f32, fast, 64 ticks a call"), n, m, taps, Algorithm::FastFir, 64);
+            self.doubles(&format!("{name}: f64"), n, m, taps, Algorithm::Direct);
+            self.doubles(&format!("{name}: f64, fast"), n, m, taps, Algorithm::FastFir);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
-            self.threads(&format!("{name}: f32, two threads"), n, m, taps, Form::Direct);
-            self.threads(&format!("{name}: f32, fast, two threads"), n, m, taps, Form::Fast);
+            self.threads(&format!("{name}: f32, two threads"), n, m, taps, Algorithm::Direct);
+            self.threads(&format!("{name}: f32, fast, two threads"), n, m, taps, Algorithm::FastFir);
             self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
         }
     }
@@ -125,7 +127,7 @@ impl Table {
     /// Overlap-save; the products are those of the direct form.
     fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
         for len in [None, Some(64), Some(128), Some(256)] {
-            let options = Options { form: Form::OverlapSave(len), ..self.options() };
+            let options = Options { algorithm: Algorithm::OverlapSave { transform: len }, ..self.options() };
             let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
             let x = input(n, TICKS);
             let mut y = vec![0.0; m * TICKS];
@@ -137,13 +139,13 @@ impl Table {
     }
 
     /// In and out as f64; the peak in f64 is half the one printed.
-    fn doubles(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
-        let options = Options { precision: Precision::Double, form, ..self.options() };
+    fn doubles(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm) {
+        let options = Options { precision: Precision::Double, algorithm, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let x: Vec<f64> = input(n, TICKS).into_iter().map(f64::from).collect();
         let mut y = vec![0.0; m * TICKS];
         self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
-            stream.process_f64(black_box(&x), &mut y).unwrap();
+            stream.process(black_box(&x), &mut y).unwrap();
         });
     }
 
@@ -160,13 +162,13 @@ impl Table {
     }
 
     /// Longer calls, as for files, by two threads; how many times one thread's speed that is, from turns about.
-    fn threads(&self, name: &str, n: usize, m: usize, taps: usize, form: Form) {
+    fn threads(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm) {
         if !self.wants(name) {
             return;
         }
-        let options = Options { form, ..self.options() };
+        let options = Options { algorithm, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-        let workers = Workers::new(2).unwrap();
+        let workers = ThreadPool::new(2).unwrap();
         let ticks = 16 * TICKS;
         let x = input(n, ticks);
         let mut y = vec![0.0; m * ticks];
@@ -194,15 +196,22 @@ impl Table {
     fn ladder(&self) {
         for n in 1..=16 {
             for m in 1..=16 {
-                self.fir(&format!("ladder: N {n} M {m}, 16 taps a phase"), n, m, 16 * m, Form::Direct, TICKS);
+                self.fir(
+                    &format!("ladder: N {n} M {m}, 16 taps a phase"),
+                    n,
+                    m,
+                    16 * m,
+                    Algorithm::Direct,
+                    TICKS,
+                );
             }
         }
         for taps in [2, 8, 32, 128, 512, 2048] {
-            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Form::Direct, TICKS);
+            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Algorithm::Direct, TICKS);
         }
         for taps in [256, 512, 1024] {
-            self.fir(&format!("taps: N 8 M 8, {taps} taps"), 8, 8, taps, Form::Direct, TICKS);
-            self.fir(&format!("taps: N 8 M 8, {taps} taps, fast"), 8, 8, taps, Form::Fast, TICKS);
+            self.fir(&format!("taps: N 8 M 8, {taps} taps"), 8, 8, taps, Algorithm::Direct, TICKS);
+            self.fir(&format!("taps: N 8 M 8, {taps} taps, fast"), 8, 8, taps, Algorithm::FastFir, TICKS);
         }
     }
 

@@ -145,7 +145,7 @@ fn measure(case: &Case, recursion: Precision, call: usize) {
     println!(
         "| {} | {} {} | {call} | {:.1} | {:.1} | {:.2} | {:.2} | {:.1} | {:.0} % |",
         case.name,
-        plan.form,
+        plan.algorithm,
         plan.numbers,
         1e-6 * ticks,
         1e-6 * ticks * m as f64,
@@ -159,7 +159,7 @@ fn measure(case: &Case, recursion: Precision, call: usize) {
 fn main() {
     println!("{}, f32 peak {:.1} GMAC/s\n", Isa::detect(), 1e-9 * peak());
     println!(
-        "| bank | form | ticks a call | M ticks/s | M outputs/s | G sections/s | G biquads/s | GMAC/s | of f32 peak |"
+        "| bank | algorithm | ticks a call | M ticks/s | M outputs/s | G sections/s | G biquads/s | GMAC/s | of f32 peak |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for recursion in [Precision::Double, Precision::Single] {

@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut fast = vec![0.0; TICKS * fuse.ratio()];
     let mut written = 0;
     for block in ticks.chunks(BLOCK * fuse.channels()) {
-        written += fuse.process_f64(block, &mut fast[written..])?;
+        written += fuse.process(block, &mut fast[written..])?;
     }
 
     // Until its memory is full the bank sees a signal that was zero before.

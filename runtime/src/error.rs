@@ -1,10 +1,10 @@
-//! Why a bank could not be made ready, or a call was refused.
+//! Why a bank could not be made ready, a call was refused, or a plan was not taken over.
 
 /// A bank that cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BuildError {
     /// M is 0.
-    #[error("the bank's ratio M is 0; a tick must give at least one fast sample")]
+    #[error("the bank's ratio M is 0; a frame must give at least one output sample")]
     NoRatio,
     /// N is 0.
     #[error("the bank has no channels; at least one is needed")]
@@ -39,31 +39,31 @@ pub enum BuildError {
     },
     /// A coefficient is NaN, infinite, or infinite once rounded to the kernel's precision.
     #[error(
-        "coefficient {index} of {place} is {value}; coefficients must be finite in the precision of the kernel"
+        "coefficient {index} of {location} is {value}; coefficients must be finite in the precision of the kernel"
     )]
     NotFinite {
         /// Which filter or matrix.
-        place: String,
-        /// Position in it.
+        location: String,
+        /// Its index there.
         index: usize,
         /// The value.
         value: f64,
     },
     /// No transform of this length holds the filters.
     #[error(
-        "a transform of {len} ticks does not fit filters of {lags} ticks: overlap-save needs a power of two from {shortest} to 16777216 that is no shorter than the filters; choose another length or the direct form"
+        "a transform of {len} frames does not fit filters of {phase_taps} taps per phase: overlap-save needs a power of two from {shortest} to 16777216 that is no shorter than the filters; choose another length or `direct`"
     )]
     Transform {
         /// F.
         len: usize,
         /// K.
-        lags: usize,
+        phase_taps: usize,
         /// The least F.
         shortest: usize,
     },
     /// The spectra of the filters would take gigabytes.
     #[error(
-        "the spectra of {channels} x {ratio} filters over {len} ticks are too large for overlap-save; choose a shorter transform or the direct form"
+        "the spectra of {channels} x {ratio} filters over {len} frames are too large for overlap-save; choose a shorter transform or `direct`"
     )]
     Spectra {
         /// N.
@@ -73,26 +73,26 @@ pub enum BuildError {
         /// F.
         len: usize,
     },
-    /// A form of FIR filters was asked for, but the filters never forget.
-    #[error("{form} needs FIR filters, and this bank is recursive; leave the form to the plan")]
+    /// An algorithm for FIR filters was asked for, but the filters are recursive.
+    #[error("{algorithm} needs FIR filters, and this bank is recursive (IIR); use `direct` or `auto`")]
     Recursive {
-        /// The form.
-        form: &'static str,
+        /// Its name.
+        algorithm: &'static str,
     },
-    /// The fast form was asked for, but the filters cannot be halved.
+    /// Fast FIR was asked for, but there are no pairs of taps.
     #[error(
-        "the fast form halves filters of at least 2 ticks, and these reach over {lags} (taps / M); choose the direct form"
+        "fast-fir pairs the taps of each phase, at least 2, and these filters have {phase_taps} (taps / M); use `direct`"
     )]
     TooShort {
         /// K.
-        lags: usize,
+        phase_taps: usize,
     },
     /// The filters together are too long for 32-bit offsets.
     #[error(
-        "the filters look back {history} ticks on {channels} channels, more than the runtime can address; shorten them"
+        "the filters look back {history} frames on {channels} channels, more than the runtime can address; shorten them"
     )]
     TooLong {
-        /// Ticks of memory.
+        /// K - 1.
         history: usize,
         /// N.
         channels: usize,
@@ -102,13 +102,25 @@ pub enum BuildError {
 /// A call whose slices do not fit together; nothing was processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ProcessError {
-    /// The input is not a whole number of ticks.
+    /// The input is not a whole number of frames.
     #[error("the input holds {samples} samples, which is not a multiple of the {channels} channels")]
-    CutTick {
+    PartialFrame {
         /// Samples given.
         samples: usize,
         /// N.
         channels: usize,
+    },
+    /// The channels of planar input differ in length.
+    #[error(
+        "channel {channel} has {samples} samples, channel 0 has {first}; all channels need the same number"
+    )]
+    UnequalChannels {
+        /// Samples of channel 0.
+        first: usize,
+        /// The first channel that differs, from 0.
+        channel: usize,
+        /// Samples of that channel.
+        samples: usize,
     },
     /// The input has another number of channels.
     #[error("the input has {given} channels, the bank has {wanted}")]
@@ -119,11 +131,36 @@ pub enum ProcessError {
         wanted: usize,
     },
     /// The output slice is too short.
-    #[error("the output has room for {given} samples, {wanted} are needed (M for each tick)")]
+    #[error("the output has room for {given} samples, {wanted} are needed (M per frame)")]
     OutputTooShort {
         /// Samples of room.
         given: usize,
         /// Samples needed.
         wanted: usize,
+    },
+}
+
+/// Coefficients by which a stream cannot go on; it runs as before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SwapError {
+    /// The plans have other numbers of channels or output samples.
+    #[error(
+        "the stream has N = {} channels and M = {}, the new plan {} and {}; a stream keeps its shape", from[0], from[1], to[0], to[1]
+    )]
+    Shape {
+        /// N and M of the stream.
+        from: [usize; 2],
+        /// N and M of the new plan.
+        to: [usize; 2],
+    },
+    /// The state of the stream does not tell the state of the new plan.
+    #[error(
+        "a stream of `{from}` cannot go on by this plan of `{to}`: direct and fast-fir follow each other, overlap-save the same taps per phase, transform and precision, and a recursion only its own plan"
+    )]
+    State {
+        /// Algorithm of the stream.
+        from: &'static str,
+        /// Algorithm of the new plan.
+        to: &'static str,
     },
 }

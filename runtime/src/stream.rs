@@ -1,96 +1,51 @@
 //! One stream through a plan: its state, and the calls that take samples.
 
 #[cfg(feature = "rayon")]
-use super::Workers;
-use super::fir_bank::{FirBankPlan, FirBankState};
-use super::plan::{Engine, Plan, State};
-use super::sample::Sample;
-use super::ticks::{FastSink, Interleaved, PcmOutput, TickSource};
-use super::{PcmFrames, ProcessError};
+use crate::adapters::SplitOutput;
+use crate::adapters::{Input, Interleaved, Output, Planar, Zeros};
+use crate::engine::Engine;
+use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, SwapError};
 
-/// Fuses the ticks of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0
-/// before the first tick.
+/// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the first frame.
 ///
-/// The coefficients are shared: a clone is a second stream at the same place, and
-/// [`Stream::fresh`] one at its beginning. [`Stream::process`] allocates nothing and
-/// locks nothing, and the same ticks give the same bits however they are cut into calls.
+/// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls take whole frames
+/// and return the samples written. They allocate nothing and lock nothing (except those of a [`ThreadPool`](crate::ThreadPool)),
+/// and the same frames give the same bits however they are cut into calls.
 ///
-/// ```
-/// use hybank_runtime::{Options, Plan, Stream};
-/// let taps = [vec![1.0, 0.0], vec![0.0, 1.0]];
-/// let plan = Plan::from_taps(&taps, 2, 1, Options::default())?;
-/// let mut stream = Stream::new(&plan);
-/// let mut fast = vec![0.0; 2 * plan.ratio()];
-/// for ticks in [[1.0, 10.0, 2.0, 20.0], [3.0, 30.0, 4.0, 40.0]] {
-///     let written = stream.process(&ticks, &mut fast)?;
-///     println!("{:?}, {} samples late", &fast[..written], plan.latency());
-/// }
-/// assert_eq!(fast, [3.0, 30.0, 4.0, 40.0]);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// # Worst case of a call
+/// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. The direct algorithm and overlap-save
+/// notice them, and sums that overflow, in their outputs: each frame is filtered at most twice, so that such a call does at
+/// most twice the multiply-adds of any other. Fast FIR and recursions look at the input first, and filter each frame once; fast FIR
+/// computes outputs that overflow once more from the definition in f64 (N K multiply-adds, not vectorised). FIR filters
+/// take no notice of denormals beyond what the processor does; recursions flush them from their state every 64 frames.
+///
+/// A clone is a second stream at the same place.
 #[derive(Debug, Clone)]
 pub struct Stream {
     plan: Plan,
-    state: State,
+    engine: Engine,
+    /// Frames since the beginning.
+    position: u64,
     replaced: u64,
-}
-
-/// Runs the FIR plan of a call, on one thread or on several.
-trait FirRunner {
-    fn run<T: Sample>(
-        &self,
-        plan: &FirBankPlan<T>,
-        state: &mut FirBankState<T>,
-        source: &(impl TickSource + ?Sized),
-        sink: &mut (impl FastSink + ?Sized),
-    ) -> u64;
-}
-
-/// On this thread.
-struct Here;
-
-impl FirRunner for Here {
-    fn run<T: Sample>(
-        &self,
-        plan: &FirBankPlan<T>,
-        state: &mut FirBankState<T>,
-        source: &(impl TickSource + ?Sized),
-        sink: &mut (impl FastSink + ?Sized),
-    ) -> u64 {
-        plan.process(state, source, sink)
-    }
-}
-
-#[cfg(feature = "rayon")]
-impl FirRunner for Workers {
-    fn run<T: Sample>(
-        &self,
-        plan: &FirBankPlan<T>,
-        state: &mut FirBankState<T>,
-        source: &(impl TickSource + ?Sized),
-        sink: &mut (impl FastSink + ?Sized),
-    ) -> u64 {
-        plan.process_parallel(state, source, sink, self)
-    }
 }
 
 impl Stream {
     /// A stream at its beginning.
     pub fn new(plan: &Plan) -> Self {
-        Self { plan: plan.clone(), state: plan.engine().state(), replaced: 0 }
+        Self { plan: plan.clone(), engine: plan.start(), position: 0, replaced: 0 }
     }
 
-    /// How the stream runs.
+    /// What the stream runs by.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// N, samples a tick in.
+    /// N, samples per frame of the input.
     pub fn channels(&self) -> usize {
         self.plan.channels()
     }
 
-    /// M, samples a tick out.
+    /// M, output samples per frame.
     pub fn ratio(&self) -> usize {
         self.plan.ratio()
     }
@@ -105,14 +60,14 @@ impl Stream {
         self.plan.extra_latency()
     }
 
-    /// See [`Plan::memory`].
-    pub fn memory(&self) -> Option<usize> {
-        self.plan.memory()
+    /// See [`Plan::history`].
+    pub fn history(&self) -> Option<usize> {
+        self.plan.history()
     }
 
-    /// Ticks of zeros that bring out the last samples, as many as the latency.
-    pub fn flush_ticks(&self) -> usize {
-        self.latency().div_ceil(self.ratio())
+    /// Frames since the beginning.
+    pub fn position(&self) -> u64 {
+        self.position
     }
 
     /// Input samples that were NaN or infinite and became 0, since the beginning.
@@ -120,85 +75,47 @@ impl Stream {
         self.replaced
     }
 
-    /// Times a recursion's state was not finite and began anew, since the beginning.
+    /// Times a recursion's state was not finite and became 0, since the beginning.
     pub fn state_resets(&self) -> u64 {
-        match &self.state {
-            State::RecursionSingle(state) => state.resets,
-            State::RecursionDouble(state) => state.resets,
-            _ => 0,
-        }
+        self.engine.resets()
     }
 
-    /// A stream of the same bank at its beginning.
+    /// A stream of the same plan at its beginning.
     pub fn fresh(&self) -> Self {
         Self::new(&self.plan)
     }
 
-    /// Back to the beginning; gives the same bits as a new one.
+    /// Back to the beginning, without allocating; gives the same bits as a new stream.
     pub fn reset(&mut self) {
-        self.replaced = 0;
-        match &mut self.state {
-            State::FirSingle(state) => state.reset(),
-            State::FirDouble(state) => state.reset(),
-            State::RecursionSingle(state) => state.reset(),
-            State::RecursionDouble(state) => state.reset(),
-        }
+        self.engine.reset();
+        (self.position, self.replaced) = (0, 0);
     }
 
-    /// Takes whole ticks (N samples each, interleaved) and writes M samples for each; returns the
-    /// samples written, `input.len() / N * M`. NaN and infinity in the input become 0 and are counted, see
-    /// [`Stream::replaced`].
+    /// Filters interleaved samples in f32 or f64 (whatever the precision of the kernels): sample of channel i in frame k at
+    /// `input[k N + i]`, output sample p of that frame at `output[k M + p]`. Returns the samples written,
+    /// `input.len() / N * M`.
     ///
     /// # Errors
     /// [`ProcessError`] if the slices do not fit; nothing is processed then.
-    pub fn process(&mut self, input: &[f32], output: &mut [f32]) -> Result<usize, ProcessError> {
-        let source = self.interleaved(input)?;
-        self.run(&source, output, &Here)
+    pub fn process<S: Sample>(&mut self, input: &[S], output: &mut [S]) -> Result<usize, ProcessError> {
+        self.run(&Interleaved::new(input, self.channels())?, output)
     }
 
-    /// As [`Stream::process`], on all `workers` at once, with the same bits: each takes spans of ticks and
-    /// begins with the filter memory before them. Recursions, overlap-save, and calls of less than some two million
-    /// multiply-adds stay on this thread. Unlike `process` it allocates (the states of the spans) and waits for the workers.
+    /// As [`Stream::process`], from a slice for each channel: sample of channel i in frame k at `input[i][k]`.
     ///
     /// # Errors
-    /// As [`Stream::process`].
-    #[cfg(feature = "rayon")]
-    pub fn process_parallel(
+    /// As [`Stream::process`], and if the channels differ in length.
+    pub fn process_planar<S: Sample>(
         &mut self,
-        input: &[f32],
-        output: &mut [f32],
-        workers: &Workers,
+        input: &[&[S]],
+        output: &mut [S],
     ) -> Result<usize, ProcessError> {
-        let source = self.interleaved(input)?;
-        self.run(&source, output, workers)
+        self.run(&Planar::new(input)?, output)
     }
 
-    /// As [`Stream::process_pcm`], on all `workers` at once; see [`Stream::process_parallel`].
-    ///
-    /// # Errors
-    /// As [`Stream::process`].
-    #[cfg(feature = "rayon")]
-    pub fn process_pcm_parallel(
-        &mut self,
-        input: &[PcmFrames<'_>],
-        output: &mut PcmOutput<'_>,
-        workers: &Workers,
-    ) -> Result<usize, ProcessError> {
-        self.run(input, output, workers)
-    }
-
-    /// As [`Stream::process`], for f64 samples (whatever the precision of the kernels).
-    ///
-    /// # Errors
-    /// As [`Stream::process`].
-    pub fn process_f64(&mut self, input: &[f64], output: &mut [f64]) -> Result<usize, ProcessError> {
-        let source = self.interleaved(input)?;
-        self.run(&source, output, &Here)
-    }
-
-    /// As [`Stream::process`], from and to samples as they lie in files and pipes: the
-    /// channels are those of all `input` recordings one after another, the ticks those that all of
-    /// them have. Outputs that do not fit an integer format saturate and are counted.
+    /// As [`Stream::process`], from and to samples as they lie in files and pipes: the channels are those of all `input`
+    /// recordings one after another, the frames those that all of them have. Outputs that do not fit an integer format
+    /// saturate and are counted.
     ///
     /// # Errors
     /// As [`Stream::process`].
@@ -207,49 +124,139 @@ impl Stream {
         input: &[PcmFrames<'_>],
         output: &mut PcmOutput<'_>,
     ) -> Result<usize, ProcessError> {
-        self.run(input, output, &Here)
+        self.run(input, output)
     }
 
-    fn interleaved<'a, S>(&self, samples: &'a [S]) -> Result<Interleaved<'a, S>, ProcessError> {
-        let channels = self.channels();
-        Interleaved::new(samples, channels).ok_or(ProcessError::CutTick { samples: samples.len(), channels })
-    }
-
-    fn run(
+    /// As [`Stream::process`], from any input and to any output.
+    ///
+    /// # Errors
+    /// As [`Stream::process`].
+    pub fn run(
         &mut self,
-        source: &(impl TickSource + ?Sized),
-        sink: &mut (impl FastSink + ?Sized),
-        runner: &impl FirRunner,
+        input: &(impl Input + ?Sized),
+        output: &mut (impl Output + ?Sized),
     ) -> Result<usize, ProcessError> {
-        let wanted = self.check(source, sink)?;
-        self.replaced += match (self.plan.engine(), &mut self.state) {
-            (Engine::FirSingle(plan), State::FirSingle(state)) => runner.run(plan, state, source, sink),
-            (Engine::FirDouble(plan), State::FirDouble(state)) => runner.run(plan, state, source, sink),
-            (Engine::RecursionSingle(plan), State::RecursionSingle(state)) => {
-                plan.process(state, source, sink)
-            }
-            (Engine::RecursionDouble(plan), State::RecursionDouble(state)) => {
-                plan.process(state, source, sink)
-            }
-            // A state is only ever made by its plan.
-            _ => 0,
-        };
-        Ok(wanted)
+        let samples = self.check(input, output)?;
+        self.replaced += self.engine.process(input, output);
+        self.position += input.frames() as u64;
+        Ok(samples)
+    }
+
+    /// As [`Stream::run`], on all threads of `pool` at once, with the same bits: each takes chunks of frames and begins with
+    /// the history before them. Recursions, overlap-save, and calls of less than some two million multiply-adds stay on
+    /// this thread. Unlike `run` it allocates (the states of the chunks) and waits for the threads.
+    ///
+    /// # Errors
+    /// As [`Stream::process`].
+    #[cfg(feature = "rayon")]
+    pub fn run_parallel(
+        &mut self,
+        input: &(impl Input + Sync + ?Sized),
+        output: &mut (impl SplitOutput + ?Sized),
+        pool: &crate::ThreadPool,
+    ) -> Result<usize, ProcessError> {
+        let samples = self.check(input, output)?;
+        self.replaced += self.engine.process_parallel(input, output, pool);
+        self.position += input.frames() as u64;
+        Ok(samples)
+    }
+
+    /// As [`Stream::process`], on all threads of `pool` at once; see [`Stream::run_parallel`].
+    ///
+    /// # Errors
+    /// As [`Stream::process`].
+    #[cfg(feature = "rayon")]
+    pub fn process_parallel<S: Sample>(
+        &mut self,
+        input: &[S],
+        output: &mut [S],
+        pool: &crate::ThreadPool,
+    ) -> Result<usize, ProcessError> {
+        self.run_parallel(&Interleaved::new(input, self.channels())?, output, pool)
+    }
+
+    /// As [`Stream::process_pcm`], on all threads of `pool` at once; see [`Stream::run_parallel`].
+    ///
+    /// # Errors
+    /// As [`Stream::process`].
+    #[cfg(feature = "rayon")]
+    pub fn process_pcm_parallel(
+        &mut self,
+        input: &[PcmFrames<'_>],
+        output: &mut PcmOutput<'_>,
+        pool: &crate::ThreadPool,
+    ) -> Result<usize, ProcessError> {
+        self.run_parallel(input, output, pool)
+    }
+
+    /// Brings out the last samples by [`Plan::flush_frames`] frames of zeros, which are part of the stream like any others.
+    /// Returns the samples written, that many frames times M; `output` needs room for them.
+    ///
+    /// # Errors
+    /// [`ProcessError::OutputTooShort`]; nothing is processed then.
+    pub fn flush(&mut self, output: &mut (impl Output + ?Sized)) -> Result<usize, ProcessError> {
+        let zeros = Zeros { channels: self.channels(), frames: self.plan.flush_frames() };
+        self.run(&zeros, output)
+    }
+
+    /// Goes on by other coefficients of the same N and M, with the history kept: for a bank that was redesigned while the
+    /// stream runs. Allocates the new state; [`Stream::continue_from`] does not.
+    ///
+    /// # Errors
+    /// [`SwapError`]; the stream is as before then.
+    pub fn swap(&mut self, plan: &Plan) -> Result<(), SwapError> {
+        let mut next = Self::new(plan);
+        next.continue_from(self)?;
+        *self = next;
+        Ok(())
+    }
+
+    /// Makes this stream, whatever it was, the continuation of `running` by its own plan, at the same frame and with the same counts.
+    /// Does not allocate: make the new stream on another thread, and call this at a frame boundary on the thread
+    /// that runs.
+    ///
+    /// From one FIR plan without added latency (direct, fast FIR; any K, any precision) to another, the outputs are
+    /// those that the new plan would have given from the beginning, bit for bit: at once if the [history](Plan::history) of
+    /// the new plan is no longer than that of the old one, else as many frames later as the new one looks back. What the
+    /// old plan had forgotten counts as 0 in between.
+    ///
+    /// From one overlap-save plan to another of the same K, transform and precision, outputs of complete batches are still those of the old
+    /// plan; the new one makes all batches from the running one on, so that it has taken over after one
+    /// [alignment](Plan::alignment). A recursion can only go on by its own plan: its state means nothing to other coefficients.
+    ///
+    /// # Errors
+    /// [`SwapError`]; the stream is as before then.
+    pub fn continue_from(&mut self, running: &Self) -> Result<(), SwapError> {
+        let ([from, to], [old, new]) = ([running, self].map(Self::shape), [&running.plan, &self.plan]);
+        if from != to {
+            return Err(SwapError::Shape { from, to });
+        }
+        let [from, to] = [old, new].map(|plan| plan.algorithm());
+        if !self.engine.continue_from(&running.engine, running.position) {
+            return Err(SwapError::State { from, to });
+        }
+        (self.position, self.replaced) = (running.position, running.replaced);
+        Ok(())
     }
 
     /// The samples that will be written, if everything fits.
     fn check(
         &self,
-        source: &(impl TickSource + ?Sized),
-        sink: &(impl FastSink + ?Sized),
+        input: &(impl Input + ?Sized),
+        output: &(impl Output + ?Sized),
     ) -> Result<usize, ProcessError> {
-        if source.channels() != self.channels() {
-            return Err(ProcessError::Channels { given: source.channels(), wanted: self.channels() });
+        if input.channels() != self.channels() {
+            return Err(ProcessError::Channels { given: input.channels(), wanted: self.channels() });
         }
-        let wanted = source.ticks() * self.ratio();
-        if sink.capacity() < wanted {
-            return Err(ProcessError::OutputTooShort { given: sink.capacity(), wanted });
+        let wanted = input.frames() * self.ratio();
+        if output.capacity() < wanted {
+            return Err(ProcessError::OutputTooShort { given: output.capacity(), wanted });
         }
         Ok(wanted)
+    }
+
+    /// N and M.
+    fn shape(&self) -> [usize; 2] {
+        [self.channels(), self.ratio()]
     }
 }

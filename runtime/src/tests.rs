@@ -185,22 +185,22 @@ fn many_channels_and_many_phases_work() {
 pub(super) fn spans_agree(
     bank: &Bank,
     options: Options,
-    workers: &[Workers],
+    pools: &[ThreadPool],
     long: usize,
     noise: &mut Noise,
 ) {
     let mut one = start(bank, options).unwrap();
     let (n, m) = (one.channels(), one.ratio());
-    let mut many = vec![one.fresh(); workers.len()];
+    let mut many = vec![one.fresh(); pools.len()];
     for ticks in [1, long, 4096, 2, long - 12_345] {
         let mut input = noise.samples(n * ticks);
         input[n * ticks / 2] = f32::NAN;
         let mut want = vec![0.0; m * ticks];
         one.process(&input, &mut want).unwrap();
-        for (stream, workers) in many.iter_mut().zip(workers) {
+        for (stream, pools) in many.iter_mut().zip(pools) {
             let mut out = vec![0.0; m * ticks];
-            assert_eq!(stream.process_parallel(&input, &mut out, workers), Ok(m * ticks));
-            assert!(out == want, "N {n} M {m} {:?} {ticks} ticks {workers:?}", stream.memory());
+            assert_eq!(stream.process_parallel(&input, &mut out, pools), Ok(m * ticks));
+            assert!(out == want, "N {n} M {m} {:?} {ticks} ticks {pools:?}", stream.history());
             assert_eq!(one.replaced(), stream.replaced());
         }
     }
@@ -209,7 +209,7 @@ pub(super) fn spans_agree(
 #[test]
 fn threads_do_not_change_a_bit() {
     let mut noise = Noise(31);
-    let workers: Vec<_> = [1, 2, 3].into_iter().map(|threads| Workers::new(threads).unwrap()).collect();
+    let pools: Vec<_> = [1, 2, 3].into_iter().map(|threads| ThreadPool::new(threads).unwrap()).collect();
     // Long enough for several spans of a million multiply-adds each.
     for (n, m, taps, long) in [
         (1, 1, 33, 90_000),
@@ -222,7 +222,7 @@ fn threads_do_not_change_a_bit() {
     ] {
         for precision in [Precision::Single, Precision::Double] {
             let bank = fir_bank(random_taps(n, taps, &mut noise), m);
-            spans_agree(&bank, Options { precision, ..Options::default() }, &workers, long, &mut noise);
+            spans_agree(&bank, Options { precision, ..Options::default() }, &pools, long, &mut noise);
         }
     }
 }
@@ -230,7 +230,7 @@ fn threads_do_not_change_a_bit() {
 #[test]
 fn threads_do_not_change_a_byte() {
     let mut noise = Noise(33);
-    let workers = Workers::new(3).unwrap();
+    let pools = ThreadPool::new(3).unwrap();
     for (n, m, format, out_format) in
         [(2, 3, PcmFormat::S16Le, PcmFormat::S16Le), (3, 2, PcmFormat::S24Be, PcmFormat::F64Le)]
     {
@@ -249,7 +249,7 @@ fn threads_do_not_change_a_byte() {
         let mut want = PcmOutput { format: out_format, bytes: want, clipped: 5 };
         let mut got = PcmOutput { format: out_format, bytes: got, clipped: 5 };
         one.process_pcm(&frames, &mut want).unwrap();
-        many.process_pcm_parallel(&frames, &mut got, &workers).unwrap();
+        many.process_pcm_parallel(&frames, &mut got, &pools).unwrap();
         assert_eq!(want.clipped, got.clipped);
         assert!(want.clipped > 5 || out_format == PcmFormat::F64Le);
         assert!(want.bytes == got.bytes, "{format} to {out_format}");
@@ -263,7 +263,7 @@ fn a_recursion_stays_on_its_thread() {
     let want = run(&rotation_bank(), Options::default(), &input);
     let mut out = vec![0.0; want.len()];
     let mut stream = start(&rotation_bank(), Options::default()).unwrap();
-    stream.process_parallel(&input, &mut out, &Workers::new(2).unwrap()).unwrap();
+    stream.process_parallel(&input, &mut out, &ThreadPool::new(2).unwrap()).unwrap();
     assert_eq!(out, want);
 }
 
@@ -323,7 +323,7 @@ fn double_precision_is_double() {
     let options = Options { precision: Precision::Double, ..Options::default() };
     let mut stream = start(&fir_bank(taps.clone(), 4), options).unwrap();
     let mut out = vec![0.0; wide.len()];
-    stream.process_f64(&wide, &mut out).unwrap();
+    stream.process(&wide, &mut out).unwrap();
     let worst = definition(&taps, 4, &input).iter().zip(&out).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     // 64 products below 1 and their sums: 64 roundings of numbers below 64.
     assert!(worst < 64.0 * 64.0 * f64::EPSILON / 8.0, "{worst:e}");
@@ -477,9 +477,9 @@ fn a_recursion_that_overflows_begins_anew_and_says_so() {
         filter.a = vec![vec![1e200, 0.0], vec![0.0, 0.5]];
     }
     let mut stream = start(&bank, Options::default()).unwrap();
-    let mut input = [0.0; state_space::BLOCK];
+    let mut input = [0.0; crate::algorithms::recursive::BLOCK];
     input[0] = 1.0;
-    stream.process(&input, &mut [0.0; 3 * state_space::BLOCK]).unwrap();
+    stream.process(&input, &mut [0.0; 3 * crate::algorithms::recursive::BLOCK]).unwrap();
     assert_eq!(stream.state_resets(), 1);
     let mut out = [0.0; 3];
     stream.process(&[2.0], &mut out).unwrap();
@@ -535,7 +535,10 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     let bank = fir_bank(vec![vec![1.0], vec![1.0]], 2);
     let mut stream = start(&bank, Options::default()).unwrap();
     let mut out = [0.0; 3];
-    assert_eq!(stream.process(&[0.0; 3], &mut out), Err(ProcessError::CutTick { samples: 3, channels: 2 }));
+    assert_eq!(
+        stream.process(&[0.0; 3], &mut out),
+        Err(ProcessError::PartialFrame { samples: 3, channels: 2 })
+    );
     assert_eq!(
         stream.process(&[0.0; 4], &mut out),
         Err(ProcessError::OutputTooShort { given: 3, wanted: 4 })

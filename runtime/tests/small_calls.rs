@@ -1,7 +1,7 @@
 //! Every kernel on calls of a few frames against the definition. The calls are small enough for Miri
 //! (`tools/miri.sh`), which checks each load and store of the portable kernels.
 
-use hybank_runtime::{Form, Isa, Options, Plan, Precision, StateSpace, Stream};
+use hybank_runtime::{Algorithm, Isa, Options, Plan, Precision, StateSpace, Stream};
 
 /// y[k M + p] = sum_i sum_j f_i[p + j M] x_i[k - j].
 fn definition(taps: &[Vec<f64>], ratio: usize, input: &[f64]) -> Vec<f64> {
@@ -31,8 +31,8 @@ fn run(plan: &Plan, input: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; frames * m];
     let mut stream = Stream::new(plan);
     let first = frames / 3;
-    stream.process_f64(&input[..first * n], &mut out[..first * m]).unwrap();
-    stream.process_f64(&input[first * n..], &mut out[first * m..]).unwrap();
+    stream.process(&input[..first * n], &mut out[..first * m]).unwrap();
+    stream.process(&input[first * n..], &mut out[first * m..]).unwrap();
     out.split_off(plan.extra_latency())
 }
 
@@ -51,10 +51,12 @@ fn fir_kernels_follow_the_definition() {
         let want = definition(&taps, m, &input);
         for isa in Isa::available() {
             for (precision, eps) in [(Precision::Single, 3e-5), (Precision::Double, 1e-13)] {
-                for form in [Form::Direct, Form::Fast, Form::OverlapSave(Some(16))] {
-                    let options = Options { isa, precision, form, ..Options::default() };
+                for algorithm in
+                    [Algorithm::Direct, Algorithm::FastFir, Algorithm::OverlapSave { transform: Some(16) }]
+                {
+                    let options = Options { isa, precision, algorithm, ..Options::default() };
                     let plan = Plan::from_taps(&taps, m, 0, options).unwrap();
-                    let case = format!("N {n} M {m} {isa} {precision:?} {form:?}");
+                    let case = format!("N {n} M {m} {isa} {precision:?} {algorithm:?}");
                     assert_close(&run(&plan, &input), &want, eps, &case);
                 }
             }
@@ -64,7 +66,7 @@ fn fir_kernels_follow_the_definition() {
 
 #[test]
 fn recursions_follow_the_definition() {
-    // One pole for each of three states, and the same states mixed, which no parallel form has.
+    // One pole for each of three states, and the same states mixed, which no parallel algorithm has.
     let poles = [0.5, -0.25, 0.75];
     for mixed in [0.0, 0.125] {
         let row = |i: usize| (0..3).map(|j| if i == j { poles[i] } else { mixed }).collect();

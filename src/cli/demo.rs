@@ -114,7 +114,7 @@ fn fuse(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Failure> {
     let count = channels.iter().map(Vec::len).min().unwrap_or(0);
     let frames: Vec<f64> = (0..count).flat_map(|k| channels.iter().map(move |channel| channel[k])).collect();
     let mut fast = vec![0.0; count * bank.ratio];
-    stream.process_f64(&frames, &mut fast).map_err(Failure::input)?;
+    stream.process(&frames, &mut fast).map_err(Failure::input)?;
     Ok(fast)
 }
 

@@ -4,12 +4,12 @@ use super::Failure;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Bits, check_files, precision};
-use super::run::{FormArg, RunReport, ThreadArgs, finish};
+use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{BLOCK_BYTES, Container, MultiReader, ReadOptions, SampleWriter};
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
-use crate::runtime::{Form, Options, Plan};
+use crate::runtime::{Algorithm, Options, Plan};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -37,9 +37,9 @@ pub(super) struct Args {
     /// Samples of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
     #[arg(long, value_enum, default_value_t = Bits::F32)]
     bits: Bits,
-    /// Form of FIR filters; auto: the fastest for the bank, and direct with --gaps
-    #[arg(long, value_enum, default_value_t = FormArg::Auto)]
-    form: FormArg,
+    /// Algorithm of FIR filters; auto: the fastest for the bank, and direct with --gaps
+    #[arg(long, value_enum, default_value_t = AlgorithmArg::Auto)]
+    algorithm: AlgorithmArg,
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
@@ -68,7 +68,7 @@ struct Report<'a> {
     /// Input frames read.
     frames: u64,
     /// Samples dropped at the beginning so that the output lines up with the inputs; with --keep-latency only those that
-    /// the form adds.
+    /// the algorithm adds.
     latency_dropped: u64,
     seconds: f64,
 }
@@ -121,9 +121,13 @@ impl Args {
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
         // Outputs that no gap affects are to have the very bits of a whole recording.
-        let auto = if self.gaps.policy().is_some() { Form::Direct } else { Form::Fastest };
+        let auto = if self.gaps.policy().is_some() {
+            Algorithm::Direct
+        } else {
+            Algorithm::Auto { added_latency: true }
+        };
         let precision = precision(self.bits.format());
-        let options = Options { precision, form: self.form.form(auto), ..Options::default() };
+        let options = Options { precision, algorithm: self.algorithm.resolve(auto), ..Options::default() };
         bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
 

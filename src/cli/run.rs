@@ -5,29 +5,29 @@ use super::gaps::say_gaps;
 use super::print::print_json;
 use super::say::warn;
 use crate::pipeline::{FileOutputs, GapSummary, Outcome, Warning};
-use crate::runtime::{Form, PlanSummary, Workers};
+use crate::runtime::{Algorithm, PlanSummary, ThreadPool};
 
-/// In which form FIR filters run.
+/// How FIR filters are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum FormArg {
+pub(super) enum AlgorithmArg {
     /// The fastest one that suits the command
     Auto,
     /// Every product; adds no latency
     Direct,
     /// Frames by twos, three products instead of four; up to a quarter faster for long filters, adds no latency
-    Fast,
+    FastFir,
     /// Fourier transforms of blocks; faster for long filters, but adds latency
     OverlapSave,
 }
 
-impl FormArg {
+impl AlgorithmArg {
     /// `auto` is what leaving the choice to the command means.
-    pub(super) fn form(self, auto: Form) -> Form {
+    pub(super) fn resolve(self, auto: Algorithm) -> Algorithm {
         match self {
             Self::Auto => auto,
-            Self::Direct => Form::Direct,
-            Self::Fast => Form::Fast,
-            Self::OverlapSave => Form::OverlapSave(None),
+            Self::Direct => Algorithm::Direct,
+            Self::FastFir => Algorithm::FastFir,
+            Self::OverlapSave => Algorithm::OverlapSave { transform: None },
         }
     }
 }
@@ -43,12 +43,12 @@ pub(super) struct ThreadArgs {
 
 impl ThreadArgs {
     /// `None` if the calling thread does all.
-    pub(super) fn workers(self) -> Result<Option<Workers>, Failure> {
+    pub(super) fn workers(self) -> Result<Option<ThreadPool>, Failure> {
         if self.threads == 1 {
             return Ok(None);
         }
         let refused = |error| Failure::Input(format!("--threads {}: {error}; ask for fewer", self.threads));
-        Workers::new(self.threads.into()).map(Some).map_err(refused)
+        ThreadPool::new(self.threads.into()).map(Some).map_err(refused)
     }
 
     /// Bytes of each input that are read at a time, for `bytes` with one thread: enough for all threads.
@@ -60,7 +60,7 @@ impl ThreadArgs {
 /// How the bank ran.
 #[derive(Debug, serde::Serialize)]
 struct PlanReport {
-    form: &'static str,
+    algorithm: &'static str,
     numbers: &'static str,
     isa: String,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -74,8 +74,8 @@ struct PlanReport {
 
 impl From<PlanSummary> for PlanReport {
     fn from(plan: PlanSummary) -> Self {
-        let PlanSummary { form, numbers, isa, transform, block, extra_latency, multiply_adds } = plan;
-        Self { form, numbers, isa, transform, block, extra_latency, multiply_adds }
+        let PlanSummary { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds } = plan;
+        Self { algorithm, numbers, isa, transform, block, extra_latency, multiply_adds }
     }
 }
 

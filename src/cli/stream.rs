@@ -3,7 +3,7 @@
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{check_files, precision};
-use super::run::{FormArg, RunReport, ThreadArgs, finish};
+use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
 use super::say::say_line;
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
@@ -11,7 +11,7 @@ use crate::io::{
     BLOCK_BYTES, Coding, Container, MultiReader, PcmFormat, ReadOptions, SampleWriter, is_sigmf,
 };
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
-use crate::runtime::{Form, Options, Plan};
+use crate::runtime::{Algorithm, Options, Plan};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -49,10 +49,10 @@ pub(super) struct Args {
     /// sigmf-meta); standard output if left out
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
-    /// Form of FIR filters; auto is the faster one of direct and fast, because overlap-save adds latency (--json
+    /// Algorithm of FIR filters; auto is the faster one of direct and fast-fir, because overlap-save adds latency (--json
     /// says how much), and direct where gaps are filled
-    #[arg(long, value_enum, default_value_t = FormArg::Auto)]
-    form: FormArg,
+    #[arg(long, value_enum, default_value_t = AlgorithmArg::Auto)]
+    algorithm: AlgorithmArg,
     /// Output the last samples at the end, as many as the latency, with zeros for input
     #[arg(long)]
     flush: bool,
@@ -106,7 +106,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mut outputs = args.outputs(rate)?;
     let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |_| {}).map_err(Failure::running)?;
     if args.flush {
-        let samples = pipeline.stream().flush_ticks() * bank.ratio;
+        let samples = pipeline.stream().plan().flush_frames() * bank.ratio;
         pipeline.flush(pipeline.samples() + samples as u64, &mut outputs).map_err(Failure::running)?;
     }
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
@@ -173,9 +173,13 @@ impl Args {
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
         // Outputs that no gap affects are to have the very bits of a whole recording.
-        let auto = if self.gaps.policy().is_some() { Form::Direct } else { Form::FastestPrompt };
+        let auto = if self.gaps.policy().is_some() {
+            Algorithm::Direct
+        } else {
+            Algorithm::Auto { added_latency: false }
+        };
         let precision = precision(self.output_format());
-        let options = Options { precision, form: self.form.form(auto), ..Options::default() };
+        let options = Options { precision, algorithm: self.algorithm.resolve(auto), ..Options::default() };
         bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
 

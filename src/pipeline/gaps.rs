@@ -263,7 +263,7 @@ mod tests {
     fn run(bank: &crate::bank::Bank, frames: &[f64]) -> Vec<f64> {
         let mut stream = Stream::new(&bank.plan(Options::default()).unwrap());
         let mut out = vec![0.0; frames.len() / bank.channel_count() * bank.ratio];
-        stream.process_f64(frames, &mut out).unwrap();
+        stream.process(frames, &mut out).unwrap();
         out
     }
 

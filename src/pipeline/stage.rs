@@ -4,7 +4,7 @@ use super::mask::MaskDelay;
 use super::{Block, GapFiller, GapPolicy, GapSummary, Outcome, Output, PipelineError};
 use crate::bank::Bank;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::{PcmOutput, Plan, ProcessError, Stream, Workers};
+use crate::runtime::{PcmOutput, Plan, ProcessError, Stream, ThreadPool};
 use std::ops::Range;
 
 /// Encoded output of one step at most, for one thread.
@@ -22,7 +22,7 @@ pub struct Settings {
     /// What stands in for missing samples; `None` leaves NaN and infinity to the runtime, which replaces them by 0.
     pub gaps: Option<GapPolicy>,
     /// Threads that filter; `None` for the calling thread.
-    pub workers: Option<Workers>,
+    pub workers: Option<ThreadPool>,
 }
 
 impl Settings {
@@ -37,7 +37,7 @@ impl Settings {
 pub struct Pipeline {
     stream: Stream,
     gaps: Option<(GapFiller, MaskDelay)>,
-    workers: Option<Workers>,
+    workers: Option<ThreadPool>,
     format: PcmFormat,
     step_bytes: usize,
     /// Output samples still to be dropped.
@@ -185,7 +185,7 @@ impl Pipeline {
 /// What filters and encodes a step.
 struct Engine<'a> {
     stream: &'a mut Stream,
-    workers: Option<&'a Workers>,
+    workers: Option<&'a ThreadPool>,
     format: PcmFormat,
     clipped: &'a mut u64,
 }
@@ -270,7 +270,7 @@ fn ranges<'a>(parts: &[PcmFrames<'a>], frames: Range<usize>) -> Vec<PcmFrames<'a
 mod tests {
     use super::*;
     use crate::bank::SynthesisFilters;
-    use crate::runtime::{Form, Options};
+    use crate::runtime::{Algorithm, Options};
 
     /// Samples in -1.5 .. 1.5, so that a third of them clips.
     fn noise(count: usize) -> Vec<f32> {
@@ -293,19 +293,19 @@ mod tests {
 
     #[test]
     fn only_samples_of_the_output_are_counted_as_clipped() {
-        for (m, skip, frames, form) in [
-            (1, 0, 50, Form::Direct),
-            (2, 3, 50, Form::Direct),
-            (3, 4, 50, Form::Direct),
-            (3, 7, 1, Form::Direct),
-            (5, 2, 40, Form::Fast),
-            (4, 37, 60, Form::Direct),
-            (8, 9, 1, Form::Direct),
-            (2, 5, 700, Form::OverlapSave(None)),
+        for (m, skip, frames, algorithm) in [
+            (1, 0, 50, Algorithm::Direct),
+            (2, 3, 50, Algorithm::Direct),
+            (3, 4, 50, Algorithm::Direct),
+            (3, 7, 1, Algorithm::Direct),
+            (5, 2, 40, Algorithm::FastFir),
+            (4, 37, 60, Algorithm::Direct),
+            (8, 9, 1, Algorithm::Direct),
+            (2, 5, 700, Algorithm::OverlapSave { transform: None }),
         ] {
             let taps = vec![noise(4 * m).iter().map(|&x| f64::from(x)).collect(), vec![0.7; 2 * m]];
             let bank = Bank { delays: vec![0.0; 2], ..Bank::bare(SynthesisFilters::Fir(taps), m) };
-            let plan = bank.plan(Options { form, ..Options::default() }).unwrap();
+            let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
             let input = noise(2 * frames);
             let samples = frames * m;
             let all = reference(&plan, &input, (skip + plan.extra_latency()) / m + 2);

@@ -68,15 +68,15 @@ fn same(a: &[f32], b: &[f32]) {
 fn fuse_takes_the_faster_form_and_gives_the_same_samples() {
     let desk = desk();
     for latency in [&[][..], &["--keep-latency"]] {
-        let of = |form| fuse(&desk, &[&["--form", form], latency].concat());
+        let of = |form| fuse(&desk, &[&["--algorithm", form], latency].concat());
         let (direct, report) = of("direct");
-        assert_eq!((direct.len(), &report["plan"]["form"]), (2 * COUNT, &Value::from("direct")));
+        assert_eq!((direct.len(), &report["plan"]["algorithm"]), (2 * COUNT, &Value::from("direct")));
         assert_eq!(report["plan"]["multiply_adds"], 600.0);
         assert_eq!(report["latency_dropped"], if latency.is_empty() { 7 } else { 0 });
-        let (pairs, report) = of("fast");
+        let (pairs, report) = of("fast-fir");
         same(&pairs, &direct);
         let plan = &report["plan"];
-        assert_eq!((&plan["form"], &plan["extra_latency"]), (&"fast".into(), &0.into()));
+        assert_eq!((&plan["algorithm"], &plan["extra_latency"]), (&"fast-fir".into(), &0.into()));
         // Three filters of 150 ticks on two channels, and means and outputs.
         assert_eq!(plan["multiply_adds"], 3.0 * 150.0 + 1.0 + 2.0);
         assert_eq!(report["latency_dropped"], if latency.is_empty() { 7 } else { 0 });
@@ -89,30 +89,39 @@ fn fuse_takes_the_faster_form_and_gives_the_same_samples() {
         let extra = plan["extra_latency"].as_u64().unwrap();
         assert_eq!(report["latency_dropped"], extra + if latency.is_empty() { 7 } else { 0 });
         assert!(plan["multiply_adds"].as_f64().unwrap() < 200.0, "{plan}");
-        assert_eq!((&report["replaced"], &plan["form"]), (&Value::from(21), &Value::from("overlap-save")));
+        assert_eq!(
+            (&report["replaced"], &plan["algorithm"]),
+            (&Value::from(21), &Value::from("overlap-save"))
+        );
         assert_eq!(of("auto").1["plan"], *plan);
         assert_eq!(of("auto").0, blocks);
     }
     // Short filters stay direct.
     let report = desk.report(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav"]);
-    assert_eq!(report["plan"]["form"], "direct");
+    assert_eq!(report["plan"]["algorithm"], "direct");
 }
 
 #[test]
 fn stream_is_late_only_when_asked_to_be() {
     let desk = desk();
-    let (direct, report) = stream(&desk, &["--flush", "--form", "direct"]);
-    assert_eq!((&report["plan"]["form"], &report["plan"]["extra_latency"]), (&"direct".into(), &0.into()));
+    let (direct, report) = stream(&desk, &["--flush", "--algorithm", "direct"]);
+    assert_eq!(
+        (&report["plan"]["algorithm"], &report["plan"]["extra_latency"]),
+        (&"direct".into(), &0.into())
+    );
     let (pairs, report) = stream(&desk, &["--flush"]);
-    assert_eq!((&report["plan"]["form"], &report["plan"]["extra_latency"]), (&"fast".into(), &0.into()));
+    assert_eq!(
+        (&report["plan"]["algorithm"], &report["plan"]["extra_latency"]),
+        (&"fast-fir".into(), &0.into())
+    );
     same(&pairs, &direct);
-    assert_eq!(stream(&desk, &["--form", "fast"]).0, pairs[..2 * COUNT]);
-    let (blocks, report) = stream(&desk, &["--flush", "--form", "overlap-save"]);
+    assert_eq!(stream(&desk, &["--algorithm", "fast-fir"]).0, pairs[..2 * COUNT]);
+    let (blocks, report) = stream(&desk, &["--flush", "--algorithm", "overlap-save"]);
     let extra = report["plan"]["extra_latency"].as_u64().unwrap() as usize;
     assert!(extra > 0 && blocks[..extra].iter().all(|&y| y == 0.0));
     same(&blocks[extra..], &direct);
     // Without a flush the end stays inside.
-    let (cut, _) = stream(&desk, &["--form", "overlap-save"]);
+    let (cut, _) = stream(&desk, &["--algorithm", "overlap-save"]);
     assert_eq!(cut, blocks[..2 * COUNT]);
 }
 
@@ -120,11 +129,11 @@ fn stream_is_late_only_when_asked_to_be() {
 fn masks_line_up_with_every_form() {
     let desk = desk();
     let gaps = ["--gaps", "hold", "--mask", "mask"];
-    let (direct, report) = fuse(&desk, &[&gaps[..], &["--form", "direct"]].concat());
+    let (direct, report) = fuse(&desk, &[&gaps[..], &["--algorithm", "direct"]].concat());
     let (mask, list) = (desk.read("mask"), &report["gaps"]);
     assert!(mask.contains(&1) && mask.contains(&0) && mask.len() == direct.len());
-    for form in ["fast", "overlap-save"] {
-        let (other, report) = fuse(&desk, &[&gaps[..], &["--form", form]].concat());
+    for form in ["fast-fir", "overlap-save"] {
+        let (other, report) = fuse(&desk, &[&gaps[..], &["--algorithm", form]].concat());
         same(&other, &direct);
         assert_eq!((&desk.read("mask"), &report["gaps"]), (&mask, list));
     }
@@ -133,11 +142,11 @@ fn masks_line_up_with_every_form() {
 
     let (direct, report) = stream(&desk, &[&gaps[..], &["--flush"]].concat());
     let (mask, list) = (desk.read("mask"), &report["gaps"]);
-    assert_eq!(report["plan"]["form"], "direct");
-    let (pairs, report) = stream(&desk, &[&gaps[..], &["--flush", "--form", "fast"]].concat());
+    assert_eq!(report["plan"]["algorithm"], "direct");
+    let (pairs, report) = stream(&desk, &[&gaps[..], &["--flush", "--algorithm", "fast-fir"]].concat());
     same(&pairs, &direct);
     assert_eq!((&desk.read("mask"), &report["gaps"]), (&mask, list));
-    let (_, report) = stream(&desk, &[&gaps[..], &["--flush", "--form", "overlap-save"]].concat());
+    let (_, report) = stream(&desk, &[&gaps[..], &["--flush", "--algorithm", "overlap-save"]].concat());
     let extra = report["plan"]["extra_latency"].as_u64().unwrap() as usize;
     let late = desk.read("mask");
     assert_eq!(report["gaps"], *list);
@@ -149,14 +158,14 @@ fn masks_line_up_with_every_form() {
 fn forms_that_do_not_fit_are_refused() {
     let desk = desk();
     let iir = concat!(env!("CARGO_MANIFEST_DIR"), "/filters/thesis-iir.json");
-    let args = |form| ["fuse", iir, "a.wav", "b.wav", "-o", "new.wav", "--form", form];
+    let args = |form| ["fuse", iir, "a.wav", "b.wav", "-o", "new.wav", "--algorithm", form];
     desk.refused(
         1,
         &args("overlap-save"),
         &["thesis-iir.json", "overlap-save needs FIR filters", "recursive"],
     );
-    desk.refused(1, &args("fast"), &["thesis-iir.json", "the fast form needs FIR filters", "recursive"]);
-    desk.refused(2, &args("fourier"), &["--form", "overlap-save"]);
+    desk.refused(1, &args("fast-fir"), &["thesis-iir.json", "fast-fir needs FIR filters", "recursive"]);
+    desk.refused(2, &args("fourier"), &["--algorithm", "overlap-save"]);
     let bank = std::fs::read_to_string(desk.path("long.json")).unwrap();
     let mut bank: Value = serde_json::from_str(&bank).unwrap();
     bank["channels"]
@@ -165,6 +174,6 @@ fn forms_that_do_not_fit_are_refused() {
         .iter_mut()
         .for_each(|channel| channel["taps"] = [1.0, 0.5].into());
     desk.write("short.json", bank.to_string());
-    let short = ["fuse", "short.json", "a.wav", "b.wav", "-o", "new.wav", "--form", "fast"];
-    desk.refused(1, &short, &["short.json", "at least 2 ticks, and these reach over 1", "direct form"]);
+    let short = ["fuse", "short.json", "a.wav", "b.wav", "-o", "new.wav", "--algorithm", "fast-fir"];
+    desk.refused(1, &short, &["short.json", "at least 2, and these filters have 1", "use `direct`"]);
 }

@@ -4,7 +4,7 @@ use crate::support::random::Random;
 use crate::support::{Desk, bytes, ticks};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{Form, Options, PcmOutput, Precision, Stream};
+use hybank::runtime::{Algorithm, Options, PcmOutput, Precision, Stream};
 use std::io::{Read, Write};
 
 /// Lengths that add up to `total`, short and long ones, with zeros among them.
@@ -85,12 +85,16 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
         .iter()
         .flat_map(|bank| {
             let forms = if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
-                &[Form::Direct][..]
+                &[Algorithm::Direct][..]
             } else {
-                &[Form::Direct, Form::Fast]
+                &[Algorithm::Direct, Algorithm::FastFir]
             };
-            let each = forms.iter().flat_map(|&form| [(form, Precision::Single), (form, Precision::Double)]);
-            each.map(move |(form, precision)| (bank, Options { form, precision, ..Options::default() }))
+            let each = forms
+                .iter()
+                .flat_map(|&algorithm| [(algorithm, Precision::Single), (algorithm, Precision::Double)]);
+            each.map(move |(algorithm, precision)| {
+                (bank, Options { algorithm, precision, ..Options::default() })
+            })
         })
         .map(|(bank, options)| {
             let mut stream = Stream::new(&bank.plan(options).unwrap());

@@ -331,7 +331,7 @@ fn faults_have_one_clear_message_and_leave_nothing() {
 fn empty_recordings_give_an_empty_one_with_a_warning() {
     let bench = Bench::new();
     bench.wav("empty.wav", 1, 24_000, &[]);
-    for more in [&[][..], &["--keep-latency"], &["--form", "overlap-save"], &["--gaps", "zero"]] {
+    for more in [&[][..], &["--keep-latency"], &["--algorithm", "overlap-save"], &["--gaps", "zero"]] {
         let args =
             [&["fuse", "bank.json", "empty.wav", "empty.wav", "-o", "out.wav", "--force"], more].concat();
         let output = bench.run(&args);

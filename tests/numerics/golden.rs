@@ -192,7 +192,7 @@ fn g15_errors_on_the_thesis_inputs() {
         let options = Options { precision: Precision::Double, ..Options::default() };
         let mut stream = Stream::new(&bank.plan(options).unwrap());
         let mut fast = vec![0.0; 202];
-        stream.process_f64(&frames, &mut fast).unwrap();
+        stream.process(&frames, &mut fast).unwrap();
         let square: f64 = (41..=200).map(|n| (fast[n] - captured.target[n]).powi(2)).sum();
         let rmse = (square / 160.0).sqrt();
         assert!((rmse / golden - 1.0).abs() < 0.1, "G15: {rmse}, golden {golden}");

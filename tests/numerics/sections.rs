@@ -54,14 +54,14 @@ fn designs_are_sections_behind_delay_lines() {
         {
             let bank = design(&spec(method, &[1.2, 0.6], latency, filter)).unwrap().bank;
             let mut stream = Stream::new(&bank.plan(Options::default()).unwrap());
-            assert_eq!(stream.plan().summary().form, "modal", "{method} {filter} {latency}");
+            assert_eq!(stream.plan().summary().algorithm, "parallel-form", "{method} {filter} {latency}");
             assert_eq!(stream.plan().summary().numbers, "f64");
             // Two inputs a tick of the line, and no more recursive states than the front end has.
             let states = block(&bank).a.len();
             assert!(states <= order + 2 * (latency / 2 + 1), "{method} {filter} {latency}: {states}");
             let input = samples(2 * 500);
             let mut fast = vec![0.0; input.len()];
-            stream.process_f64(&input, &mut fast).unwrap();
+            stream.process(&input, &mut fast).unwrap();
             let want = slow_run(block(&bank), &input);
             let worst = fast.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(worst < 1e-12, "{method} {filter} {latency}: {worst:e}");
@@ -86,13 +86,13 @@ fn channels_that_cannot_be_told_apart_share_a_filter_in_sections_too() {
     let twice = design(&spec("iir", &[1.2, 0.6, 1.2], 8, DOUBLE_POLE)).unwrap().bank;
     assert!((alone.gamma.norm.unwrap() / twice.gamma.upper.unwrap() - 1.0).abs() < 1e-9);
     let mut stream = Stream::new(&twice.plan(Options::default()).unwrap());
-    assert_eq!(stream.plan().summary().form, "modal");
+    assert_eq!(stream.plan().summary().algorithm, "parallel-form");
     // The same samples on both copies are the same samples on the one.
     let two = samples(2 * 200);
     let three: Vec<f64> = two.chunks_exact(2).flat_map(|u| [u[0], u[1], u[0]]).collect();
     let (mut a, mut b) = (vec![0.0; 400], vec![0.0; 400]);
-    Stream::new(&alone.plan(Options::default()).unwrap()).process_f64(&two, &mut a).unwrap();
-    stream.process_f64(&three, &mut b).unwrap();
+    Stream::new(&alone.plan(Options::default()).unwrap()).process(&two, &mut a).unwrap();
+    stream.process(&three, &mut b).unwrap();
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst:e}");
 }
@@ -105,8 +105,8 @@ fn single_precision_is_asked_for_and_stays_near() {
     assert_eq!(single.plan().summary().numbers, "f32");
     let input = samples(2 * 2000);
     let (mut a, mut b) = (vec![0.0; input.len()], vec![0.0; input.len()]);
-    single.process_f64(&input, &mut a).unwrap();
-    Stream::new(&bank.plan(Options::default()).unwrap()).process_f64(&input, &mut b).unwrap();
+    single.process(&input, &mut a).unwrap();
+    Stream::new(&bank.plan(Options::default()).unwrap()).process(&input, &mut b).unwrap();
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst > 0.0 && worst < 1e-5, "{worst:e}");
 }

@@ -1,12 +1,11 @@
 //! Where things lie when a state-space bank runs, and its coefficients in that order.
 
-use crate::BuildError;
+use super::delay_lines::{DelayLines, PastInput};
 use crate::aligned::Aligned;
-use crate::sample::Sample;
 use crate::simd::{ColumnTile, FirKernel, Form, Polyphase, Recursion, SectionVector, Tiling, group_lanes};
-use crate::structure::{Past, Structure};
+use crate::{BuildError, Sample};
 
-/// Where things lie: in a window of frames of N inputs, and in rows of S states.
+/// Where things lie: in a history of frames of N inputs, and in rows of S states.
 pub(super) struct Layout {
     /// Of the recursion.
     lanes: usize,
@@ -17,25 +16,25 @@ pub(super) struct Layout {
     state_rows: Tiling,
     /// Place of each state among the S.
     places: Vec<usize>,
-    modal: bool,
+    parallel: bool,
 }
 
 impl Layout {
     /// For N channels and M phases, and a recursion in vectors of `lanes`.
     pub(super) fn new<T: Sample>(
-        structure: &Structure,
+        delay_lines: &DelayLines,
         (channels, ratio): (usize, usize),
         lanes: usize,
         kernel: FirKernel<T>,
     ) -> Result<Self, BuildError> {
-        let order = structure.a.len();
-        let history = structure.history();
+        let order = delay_lines.a.len();
+        let history = delay_lines.history();
         let len = (history + 1)
             .checked_mul(channels)
             .filter(|&len| len <= u32::MAX as usize / 64)
             .ok_or(BuildError::TooLong { history, channels })?;
-        let sections = structure.sections();
-        let modal = sections.is_some();
+        let sections = delay_lines.sections();
+        let parallel = sections.is_some();
         let places =
             sections.map_or_else(|| (0..order).collect(), |twos| section_places(&twos, order, lanes));
         let states = places
@@ -52,12 +51,12 @@ impl Layout {
             states,
             state_rows,
             places,
-            modal,
+            parallel,
         })
     }
 
-    fn place(&self, (channel, ticks): Past) -> u32 {
-        (self.inputs.past - ticks * self.channels + channel) as u32
+    fn place(&self, (channel, frames): PastInput) -> u32 {
+        (self.inputs.past - frames * self.channels + channel) as u32
     }
 
     /// The state at each place; `None` for padding.
@@ -69,31 +68,31 @@ impl Layout {
 
     pub(super) fn inputs_readout<T: Sample>(
         &self,
-        structure: &Structure,
+        delay_lines: &DelayLines,
         ratio: usize,
         kernel: FirKernel<T>,
     ) -> Polyphase<T> {
         let n = self.channels;
         let tap =
-            |e: usize, p: usize| structure.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |taps| taps[p]);
+            |e: usize, p: usize| delay_lines.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |taps| taps[p]);
         Polyphase::new(kernel, self.inputs, ratio, |e, p| T::from_f64(tap(e, p)))
     }
 
     pub(super) fn states_readout<T: Sample>(
         &self,
-        structure: &Structure,
+        delay_lines: &DelayLines,
         ratio: usize,
         kernel: FirKernel<T>,
     ) -> Polyphase<T> {
         let occupants = self.occupants();
         let last = occupants.len() - 1;
-        let factor = |e: usize, p: usize| occupants[last - e].map_or(0.0, |state| structure.c[state][p]);
+        let factor = |e: usize, p: usize| occupants[last - e].map_or(0.0, |state| delay_lines.c[state][p]);
         Polyphase::new(kernel, self.state_rows, ratio, |e, p| T::from_f64(factor(e, p)))
     }
 
-    pub(super) fn recursion<T: Sample>(&self, structure: &Structure) -> Recursion<T> {
-        let columns = Columns { layout: self, structure, occupants: self.occupants() };
-        let form = if self.modal {
+    pub(super) fn recursion<T: Sample>(&self, delay_lines: &DelayLines) -> Recursion<T> {
+        let columns = Columns { layout: self, delay_lines, occupants: self.occupants() };
+        let form = if self.parallel {
             let vectors = (0..self.states).step_by(2 * self.lanes);
             Form::Sections(vectors.map(|first| columns.section_vector(first)).collect())
         } else {
@@ -106,7 +105,7 @@ impl Layout {
 /// The columns of A and B, as the recursion takes them.
 struct Columns<'a> {
     layout: &'a Layout,
-    structure: &'a Structure,
+    delay_lines: &'a DelayLines,
     occupants: Vec<Option<usize>>,
 }
 
@@ -122,12 +121,12 @@ impl Columns<'_> {
         // What the states from `to` on take from those from `from` on, lane by lane.
         let a = |to: usize, from: usize| {
             let pairs = self.occupants[to..to + lanes].iter().zip(&self.occupants[from..from + lanes]);
-            pairs.map(|(i, j)| i.zip(*j).map_or(0.0, |(i, j)| self.structure.a[i][j])).map(T::from_f64)
+            pairs.map(|(i, j)| i.zip(*j).map_or(0.0, |(i, j)| self.delay_lines.a[i][j])).map(T::from_f64)
         };
         let (p, q) = (first, first + lanes);
         let mut coefficients: Vec<T> = a(p, p).chain(a(p, q)).chain(a(q, p)).chain(a(q, q)).collect();
         let mut inputs = Vec::new();
-        for (&past, factors) in &self.structure.b {
+        for (&past, factors) in &self.delay_lines.b {
             let column: Vec<T> = self.column(|state| factors[state], first, 2 * lanes);
             if column.iter().any(|&factor| factor != T::default()) {
                 inputs.push(self.layout.place(past));
@@ -159,11 +158,11 @@ impl Columns<'_> {
             }
         };
         let count = vectors * self.layout.lanes;
-        for (&past, factors) in &self.structure.b {
+        for (&past, factors) in &self.delay_lines.b {
             keep(&mut inputs, self.layout.place(past), self.column(|i| factors[i], first, count));
         }
         for (j, &place) in self.layout.places.iter().enumerate() {
-            keep(&mut columns, place as u32, self.column(|i| self.structure.a[i][j], first, count));
+            keep(&mut columns, place as u32, self.column(|i| self.delay_lines.a[i][j], first, count));
         }
         ColumnTile { first, vectors, inputs, columns, coefficients: Aligned::from_slice(&coefficients) }
     }

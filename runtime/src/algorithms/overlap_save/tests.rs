@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::tests::{Bank, Noise, definition, fir_bank, in_pieces, random_taps, recursive_bank, start};
-use crate::{Form, Options, PcmOutput, Precision};
+use crate::{Algorithm, Options, PcmOutput, Precision};
 use crate::{PcmFormat, PcmFrames, SampleLayout};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -109,7 +109,7 @@ impl Twin {
 
     /// The outputs of whole pairs of blocks.
     fn stream<T: Real>(self, taps: &[Vec<f64>], ratio: usize, len: usize, input: &[T]) -> Vec<T> {
-        let (n, lags) = (taps.len(), lags(taps, ratio));
+        let (n, lags) = (taps.len(), phase_taps(taps, ratio));
         let block = len - (lags - 1);
         let spectrum = |f: &[f64], p: usize| -> Vec<[T; 2]> {
             let tap =
@@ -157,7 +157,7 @@ impl Twin {
 }
 
 fn options(len: usize, precision: Precision) -> Options {
-    Options { form: Form::OverlapSave(Some(len)), precision, ..Options::default() }
+    Options { algorithm: Algorithm::OverlapSave { transform: Some(len) }, precision, ..Options::default() }
 }
 
 /// All outputs of an input, the first of them for its first tick.
@@ -176,7 +176,7 @@ fn every_small_shape_has_the_bits_of_the_scalar_twin() {
     let mut noise = Noise(41);
     for (n, m) in (1..=9).flat_map(|n| (1..=9).map(move |m| (n, m))).chain([(17, 2), (2, 17), (12, 12)]) {
         let taps = random_taps(n, 1 + (7 * n + 5 * m) % 40, &mut noise);
-        let len = lags(&taps, m).next_power_of_two().max(16) << (n % 3);
+        let len = phase_taps(&taps, m).next_power_of_two().max(16) << (n % 3);
         let input = noise.samples(n * (3 * len + 7));
         let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
         for isa in Isa::available() {
@@ -218,7 +218,7 @@ fn the_error_is_within_the_stated_bound() {
                 // Values from 1e-9 to 1e9.
                 taps.iter_mut().flatten().for_each(|tap| *tap *= 10f64.powf(9.0 * noise.next()));
             }
-            for len in [0, 2].map(|more| lags(&taps, m).next_power_of_two().max(16) << more) {
+            for len in [0, 2].map(|more| phase_taps(&taps, m).next_power_of_two().max(16) << more) {
                 let input = noise.samples(n * (2 * len + 50));
                 let got = run(&fir_bank(taps.clone(), m), options(len, Precision::Single), &input);
                 let error = relative_error(&taps, m, len, &input, f64::from(f32::EPSILON), &got);
@@ -236,7 +236,7 @@ fn double_precision_is_double() {
     let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
     let mut stream = start(&fir_bank(taps.clone(), 4), options(512, Precision::Double)).unwrap();
     let mut out = vec![0.0; wide.len()];
-    stream.process_f64(&wide, &mut out).unwrap();
+    stream.process(&wide, &mut out).unwrap();
     let want = definition(&taps, 4, &input);
     let worst =
         want.iter().zip(&out[stream.extra_latency()..]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -266,8 +266,8 @@ fn long_prime_and_empty_filters_work() {
         let taps = random_taps(2, count, &mut noise);
         let input = noise.samples(2 * 3000);
         let bank = fir_bank(taps.clone(), 2);
-        let form = Form::OverlapSave(None);
-        let got = run(&bank, Options { form, ..Options::default() }, &input);
+        let algorithm = Algorithm::OverlapSave { transform: None };
+        let got = run(&bank, Options { algorithm, ..Options::default() }, &input);
         let scale = 1e-6 * (count as f64 + 1.0).sqrt() * 100.0;
         for (t, (a, b)) in definition(&taps, 2, &input).iter().zip(&got).enumerate() {
             assert!((a - f64::from(*b)).abs() < scale, "{count} taps, output {t}: {b} for {a}");
@@ -315,12 +315,12 @@ fn latency_is_exact_and_flushing_brings_everything_out() {
         let bank = fir_bank(taps.clone(), m);
         let mut stream = start(&bank, options(64, Precision::Single)).unwrap();
         assert_eq!(stream.latency(), bank.latency + stream.extra_latency());
-        assert_eq!(stream.memory(), Some(lags(&taps, m) - 1));
+        assert_eq!(stream.history(), Some(phase_taps(&taps, m) - 1));
         let input = noise.samples(n * 150);
         let mut out = vec![0.0; m * 150];
         stream.process(&input, &mut out).unwrap();
-        let mut tail = vec![0.0; m * stream.flush_ticks()];
-        stream.process(&vec![0.0; n * stream.flush_ticks()], &mut tail).unwrap();
+        let mut tail = vec![0.0; m * stream.plan().flush_frames()];
+        stream.process(&vec![0.0; n * stream.plan().flush_frames()], &mut tail).unwrap();
         out.extend(tail);
         let (late, all) = out.split_at(stream.extra_latency());
         assert!(late.iter().all(|&y| y == 0.0));
@@ -338,7 +338,7 @@ fn threads_do_not_change_a_bit() {
     let input = noise.samples(2 * 20_000);
     let mut out = [vec![0.0; 2 * 20_000], vec![0.0; 2 * 20_000]];
     one.process(&input, &mut out[0]).unwrap();
-    many.process_parallel(&input, &mut out[1], &crate::Workers::new(3).unwrap()).unwrap();
+    many.process_parallel(&input, &mut out[1], &crate::ThreadPool::new(3).unwrap()).unwrap();
     assert_eq!(out[0], out[1]);
 }
 
@@ -346,19 +346,22 @@ fn threads_do_not_change_a_bit() {
 fn recursive_banks_have_no_transforms() {
     let filter = crate::StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
     let bank = recursive_bank(filter);
-    let refused = |form| start(&bank, Options { form, ..Options::default() }).err();
-    assert_eq!(refused(Form::OverlapSave(None)), Some(BuildError::Recursive { form: "overlap-save" }));
-    assert_eq!(refused(Form::Fastest), None);
+    let refused = |algorithm| start(&bank, Options { algorithm, ..Options::default() }).err();
+    assert_eq!(
+        refused(Algorithm::OverlapSave { transform: None }),
+        Some(BuildError::Recursive { algorithm: "overlap-save" })
+    );
+    assert_eq!(refused(Algorithm::Auto { added_latency: true }), None);
 }
 
 #[test]
 fn spectra_that_would_fill_the_memory_are_refused_or_not_chosen() {
     let taps = vec![vec![1.0; 1024]; 1024];
     let bank = fir_bank(taps, 1024);
-    let made = |form| start(&bank, Options { form, ..Options::default() });
+    let made = |algorithm| start(&bank, Options { algorithm, ..Options::default() });
     let len = 1 << 20;
     let refused = BuildError::Spectra { channels: 1024, ratio: 1024, len };
-    assert_eq!(made(Form::OverlapSave(Some(len))).err(), Some(refused));
+    assert_eq!(made(Algorithm::OverlapSave { transform: Some(len) }).err(), Some(refused));
 }
 
 proptest! {
@@ -373,7 +376,7 @@ proptest! {
         let mut noise = Noise(seed);
         let precision = if double { Precision::Double } else { Precision::Single };
         let taps = random_taps(n, count, &mut noise);
-        let len = lags(&taps, m).next_power_of_two().max(16) << more;
+        let len = phase_taps(&taps, m).next_power_of_two().max(16) << more;
         let bank = fir_bank(taps, m);
         let mut stream = start(&bank, options(len, precision)).unwrap();
         let mut input = noise.samples(n * cuts.iter().sum::<usize>());

@@ -3,6 +3,10 @@
 //! Integers of b bits map to x = i / 2^(b-1), so that full scale is 1.0; `u8` is offset by 128.
 //! Numbers map back by rounding to the nearest integer (ties to even) and saturating.
 
+mod frames;
+
+pub use frames::{PcmFrames, SampleLayout};
+
 use std::fmt;
 use std::str::FromStr;
 

@@ -1,15 +1,15 @@
-//! The fast form against the definition of the sum, and against three direct filters with the same bits.
+//! Fast FIR against the definition of the sum, and against three direct filters with the same bits.
 
 use super::*;
 use crate::tests::{
     Bank, Noise, definition, fir_bank, in_pieces, random_taps, recursive_bank, spans_agree, start,
 };
-use crate::{Form, Options, PcmOutput, Precision, StateSpace, Stream, Workers};
+use crate::{Algorithm, Options, PcmOutput, Precision, StateSpace, Stream, ThreadPool};
 use crate::{PcmFormat, PcmFrames, SampleLayout};
 use proptest::prelude::*;
 
 fn options(precision: Precision) -> Options {
-    Options { form: Form::Fast, precision, ..Options::default() }
+    Options { algorithm: Algorithm::FastFir, precision, ..Options::default() }
 }
 
 fn fast(bank: &Bank, precision: Precision) -> Stream {
@@ -27,7 +27,7 @@ fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
 fn run_wide(bank: &Bank, options: Options, input: &[f64]) -> Vec<f64> {
     let mut stream = start(bank, options).unwrap();
     let mut out = vec![0.0; input.len() / stream.channels() * stream.ratio()];
-    stream.process_f64(input, &mut out).unwrap();
+    stream.process(input, &mut out).unwrap();
     out
 }
 
@@ -36,7 +36,7 @@ macro_rules! twin {
     ($name:ident, $sample:ty, $run:ident) => {
         fn $name(taps: &[Vec<f64>], m: usize, input: &[$sample], options: Options) -> Vec<$sample> {
             let n = taps.len();
-            let lags = lags(taps, m);
+            let lags = phase_taps(taps, m);
             // Lag 2 j + parity of a filter.
             let tap = |f: &[f64], t: usize, parity: usize| {
                 f.get((2 * (t / m) + parity) * m + t % m).copied().unwrap_or(0.0)
@@ -53,7 +53,7 @@ macro_rules! twin {
             let ticks: Vec<&[$sample]> = padded.chunks(n).collect();
             let half = |parity: usize| ticks.iter().skip(parity).step_by(2).copied().flatten().copied();
             let means: Vec<$sample> = half(0).zip(half(1)).map(|(a, b)| (a + b) / 2.0).collect();
-            let direct = Options { form: Form::Direct, ..options };
+            let direct = Options { algorithm: Algorithm::Direct, ..options };
             let a = $run(&even, direct, &half(0).collect::<Vec<_>>());
             let b = $run(&odd, direct, &half(1).collect::<Vec<_>>());
             let c = $run(&mean, direct, &means);
@@ -109,7 +109,7 @@ fn norm(values: impl Iterator<Item = f64>) -> f64 {
 
 /// For each output the sum over channels of the norm of the phase's filter times the norm of the inputs in its memory.
 fn scales(taps: &[Vec<f64>], m: usize, input: &[f32]) -> Vec<f64> {
-    let (n, memory) = (taps.len(), lags(taps, m).next_multiple_of(2));
+    let (n, memory) = (taps.len(), phase_taps(taps, m).next_multiple_of(2));
     let scale = |t: usize| {
         let from = (t / m + 1).saturating_sub(memory);
         let inputs =
@@ -121,8 +121,8 @@ fn scales(taps: &[Vec<f64>], m: usize, input: &[f32]) -> Vec<f64> {
 }
 
 /// The largest error in units of eps times the scale of the output.
-fn relative_error(taps: &[Vec<f64>], m: usize, input: &[f32], form: Form) -> f64 {
-    let options = Options { form, ..Options::default() };
+fn relative_error(taps: &[Vec<f64>], m: usize, input: &[f32], algorithm: Algorithm) -> f64 {
+    let options = Options { algorithm, ..Options::default() };
     let got = run(&fir_bank(taps.to_vec(), m), options, input);
     let errors = definition(taps, m, input).into_iter().zip(got).zip(scales(taps, m, input));
     // An output of nothing but zeros has no error at all.
@@ -155,8 +155,8 @@ fn the_error_is_within_the_stated_bound() {
                 taps.iter_mut().flatten().for_each(|tap| *tap *= 10f64.powf(9.0 * noise.next()));
             }
             for (which, input) in nasty_inputs(n, 150, &mut noise).iter().enumerate() {
-                let [fast, direct] =
-                    [Form::Fast, Form::Direct].map(|form| relative_error(&taps, m, input, form));
+                let [fast, direct] = [Algorithm::FastFir, Algorithm::Direct]
+                    .map(|algorithm| relative_error(&taps, m, input, algorithm));
                 let place = format!("N {n} M {m} {count} taps, input {which}");
                 // Taps, means and products are rounded, and three sums in place of one: a few eps each.
                 assert!(fast < 6.0, "{place}: {fast} eps");
@@ -175,11 +175,11 @@ fn the_error_of_noise_is_hardly_more_than_that_of_the_direct_form() {
             taps.iter().map(|f| f.iter().map(|&tap| f64::from(tap as f32)).collect()).collect();
         let input = noise.samples(n * 3000);
         let want = definition(&taps, m, &input);
-        let error = |form| {
-            let got = run(&fir_bank(taps.clone(), m), Options { form, ..Options::default() }, &input);
+        let error = |algorithm| {
+            let got = run(&fir_bank(taps.clone(), m), Options { algorithm, ..Options::default() }, &input);
             norm(want.iter().zip(got).map(|(a, b)| a - f64::from(b)))
         };
-        let ratio = error(Form::Fast) / error(Form::Direct);
+        let ratio = error(Algorithm::FastFir) / error(Algorithm::Direct);
         assert!((0.9..1.5).contains(&ratio), "N {n} M {m} K {lags}: {ratio}");
     }
 }
@@ -259,7 +259,10 @@ fn no_output_waits_for_the_second_tick_of_its_pair() {
         let want = run(&bank, options(Precision::Single), &input);
         let mut stream = fast(&bank, Precision::Single);
         assert_eq!((stream.extra_latency(), stream.latency()), (0, bank.latency));
-        assert_eq!(stream.flush_ticks(), start(&bank, Options::default()).unwrap().flush_ticks());
+        assert_eq!(
+            stream.plan().flush_frames(),
+            start(&bank, Options::default()).unwrap().plan().flush_frames()
+        );
         let mut out = vec![f32::NAN; want.len()];
         for (x, y) in input.chunks(n).zip(out.chunks_mut(m)) {
             assert_eq!(stream.process(x, y), Ok(m));
@@ -273,7 +276,7 @@ fn an_input_is_forgotten_after_the_memory() {
     let mut noise = Noise(59);
     for (count, memory) in [(2, 1), (3, 3), (16, 15), (17, 17)] {
         let bank = fir_bank(random_taps(1, count, &mut noise), 1);
-        assert_eq!(fast(&bank, Precision::Single).memory(), Some(memory));
+        assert_eq!(fast(&bank, Precision::Single).history(), Some(memory));
         for place in 0..2 {
             let mut input = noise.samples(100);
             let want = run(&bank, options(Precision::Single), &input);
@@ -311,7 +314,7 @@ fn resets_fresh_streams_and_clones_have_the_bits_of_a_new_one() {
 #[test]
 fn threads_do_not_change_a_bit() {
     let mut noise = Noise(61);
-    let workers: Vec<_> = [1, 2, 3].into_iter().map(|threads| Workers::new(threads).unwrap()).collect();
+    let pools: Vec<_> = [1, 2, 3].into_iter().map(|threads| ThreadPool::new(threads).unwrap()).collect();
     // Long enough for several spans of a million multiply-adds each.
     for (n, m, taps, long) in [
         (1, 1, 33, 120_000),
@@ -323,7 +326,7 @@ fn threads_do_not_change_a_bit() {
     ] {
         for precision in [Precision::Single, Precision::Double] {
             let bank = fir_bank(random_taps(n, taps, &mut noise), m);
-            spans_agree(&bank, options(precision), &workers, long, &mut noise);
+            spans_agree(&bank, options(precision), &pools, long, &mut noise);
         }
     }
 }
@@ -332,12 +335,10 @@ fn threads_do_not_change_a_bit() {
 fn filters_that_cannot_be_halved_are_refused() {
     let refused = |bank: &Bank| start(bank, options(Precision::Single)).unwrap_err();
     for taps in [vec![], vec![1.0], vec![1.0; 3]] {
-        assert_eq!(refused(&fir_bank(vec![taps.clone(), taps], 3)), BuildError::TooShort { lags: 1 });
+        assert_eq!(refused(&fir_bank(vec![taps.clone(), taps], 3)), BuildError::TooShort { phase_taps: 1 });
     }
     assert!(
-        refused(&fir_bank(vec![vec![1.0]], 1))
-            .to_string()
-            .contains("at least 2 ticks, and these reach over 1")
+        refused(&fir_bank(vec![vec![1.0]], 1)).to_string().contains("at least 2, and these filters have 1")
     );
     // One filter is enough.
     let bank = fir_bank(vec![vec![1.0; 4], vec![], vec![2.0]], 3);
@@ -347,8 +348,14 @@ fn filters_that_cannot_be_halved_are_refused() {
     );
     let filter = StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
     let recursive = recursive_bank(filter);
-    assert_eq!(refused(&recursive), BuildError::Recursive { form: "the fast form" });
-    assert!(start(&recursive, Options { form: Form::FastestPrompt, ..Options::default() }).is_ok());
+    assert_eq!(refused(&recursive), BuildError::Recursive { algorithm: "fast-fir" });
+    assert!(
+        start(
+            &recursive,
+            Options { algorithm: Algorithm::Auto { added_latency: false }, ..Options::default() }
+        )
+        .is_ok()
+    );
     assert!(matches!(refused(&fir_bank(vec![vec![0.0, 1e300]], 1)), BuildError::NotFinite { index: 1, .. }));
 }
 

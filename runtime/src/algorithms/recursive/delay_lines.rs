@@ -1,32 +1,32 @@
 //! What a state matrix is made of: states that are nothing but past inputs, and what is left.
 
-use crate::plan::StateSpace;
+use crate::StateSpace;
 use std::collections::BTreeMap;
 
-/// An input some ticks ago: (channel, ticks).
-pub(crate) type Past = (usize, usize);
+/// An input some frames ago: (channel, frames).
+pub(super) type PastInput = (usize, usize);
 
 /// A state-space filter with its delay lines taken out:
-/// y = sum taps u + sum c x, x+ = sum a x + sum b u, where u are inputs of this tick and of earlier ones.
+/// y = sum taps u + sum c x, x+ = sum a x + sum b u, where u are inputs of this frame and of earlier ones.
 #[derive(Debug)]
-pub(crate) struct Structure {
+pub(crate) struct DelayLines {
     /// For each past input that the output takes, its M factors.
-    pub(crate) taps: BTreeMap<Past, Vec<f64>>,
+    pub(crate) taps: BTreeMap<PastInput, Vec<f64>>,
     /// For each past input that the states take, a factor for each state.
-    pub(crate) b: BTreeMap<Past, Vec<f64>>,
+    pub(crate) b: BTreeMap<PastInput, Vec<f64>>,
     /// Row by row.
     pub(crate) a: Vec<Vec<f64>>,
     /// One list of M factors for each state.
     pub(crate) c: Vec<Vec<f64>>,
 }
 
-impl Structure {
+impl DelayLines {
     /// The matrices have fitting shapes.
     pub(crate) fn new(filter: &StateSpace) -> Self {
         let past = past_inputs(filter);
         let core: Vec<usize> = (0..past.len()).filter(|&s| past[s].is_none()).collect();
         let read = |s: usize| filter.c.iter().map(move |row| row[s]);
-        let mut structure = Self {
+        let mut delay_lines = Self {
             taps: BTreeMap::new(),
             b: BTreeMap::new(),
             a: core.iter().map(|&r| core.iter().map(|&s| filter.a[r][s]).collect()).collect(),
@@ -34,20 +34,20 @@ impl Structure {
         };
         let channels = filter.d.first().map_or(0, Vec::len);
         for i in 0..channels {
-            add(&mut structure.taps, (i, 0), filter.d.iter().map(|row| row[i]));
-            add(&mut structure.b, (i, 0), core.iter().map(|&r| filter.b[r][i]));
+            add(&mut delay_lines.taps, (i, 0), filter.d.iter().map(|row| row[i]));
+            add(&mut delay_lines.b, (i, 0), core.iter().map(|&r| filter.b[r][i]));
         }
         for (s, &place) in past.iter().enumerate() {
             let Some(place) = place else { continue };
-            add(&mut structure.taps, place, read(s));
-            add(&mut structure.b, place, core.iter().map(|&r| filter.a[r][s]));
+            add(&mut delay_lines.taps, place, read(s));
+            add(&mut delay_lines.b, place, core.iter().map(|&r| filter.a[r][s]));
         }
-        structure
+        delay_lines
     }
 
-    /// Ticks that the delay lines look back.
+    /// Frames that the delay lines look back.
     pub(crate) fn history(&self) -> usize {
-        self.taps.keys().chain(self.b.keys()).map(|&(_, ticks)| ticks).max().unwrap_or(0)
+        self.taps.keys().chain(self.b.keys()).map(|&(_, frames)| frames).max().unwrap_or(0)
     }
 
     /// The states by twos such that each depends on the other one of its two at most; one may be alone. `None` if
@@ -74,7 +74,7 @@ impl Structure {
     }
 }
 
-fn add(terms: &mut BTreeMap<Past, Vec<f64>>, place: Past, factors: impl Iterator<Item = f64>) {
+fn add(terms: &mut BTreeMap<PastInput, Vec<f64>>, place: PastInput, factors: impl Iterator<Item = f64>) {
     let factors: Vec<f64> = factors.collect();
     if factors.iter().all(|&factor| factor == 0.0) {
         return;
@@ -85,8 +85,8 @@ fn add(terms: &mut BTreeMap<Past, Vec<f64>>, place: Past, factors: impl Iterator
     }
 }
 
-/// Which states are inputs of earlier ticks: those that take over an input, or such a state, unchanged.
-fn past_inputs(filter: &StateSpace) -> Vec<Option<Past>> {
+/// Which states are inputs of earlier frames: those that take over an input, or such a state, unchanged.
+fn past_inputs(filter: &StateSpace) -> Vec<Option<PastInput>> {
     let ones: Vec<(Option<usize>, Option<usize>)> =
         filter.a.iter().zip(&filter.b).map(|(a, b)| (only_one(a), only_one(b))).collect();
     let zero = |row: &[f64]| row.iter().all(|&x| x == 0.0);
@@ -100,9 +100,9 @@ fn past_inputs(filter: &StateSpace) -> Vec<Option<Past>> {
             _ => {}
         }
     }
-    while let Some((s, (i, ticks))) = found.pop() {
-        past[s] = Some((i, ticks));
-        found.extend(followers[s].iter().map(|&next| (next, (i, ticks + 1))));
+    while let Some((s, (i, frames))) = found.pop() {
+        past[s] = Some((i, frames));
+        found.extend(followers[s].iter().map(|&next| (next, (i, frames + 1))));
     }
     past
 }
@@ -128,25 +128,25 @@ mod tests {
     #[test]
     fn delay_lines_are_found_and_what_they_feed() {
         // States: a pole fed by u[k - 2] and u[k]; u[k - 2]; u[k - 1].
-        let structure = Structure::new(&filter(
+        let delay_lines = DelayLines::new(&filter(
             &[&[0.5, 3.0, 0.0], &[0.0, 0.0, 1.0], &[0.0, 0.0, 0.0]],
             &[&[2.0], &[0.0], &[1.0]],
             &[&[1.0, 7.0, 0.0]],
             &[&[9.0]],
         ));
-        assert_eq!(structure.a, [[0.5]]);
-        assert_eq!(structure.c, [[1.0]]);
-        assert_eq!(structure.b, BTreeMap::from([((0, 0), vec![2.0]), ((0, 2), vec![3.0])]));
-        assert_eq!(structure.taps, BTreeMap::from([((0, 0), vec![9.0]), ((0, 2), vec![7.0])]));
-        assert_eq!(structure.history(), 2);
+        assert_eq!(delay_lines.a, [[0.5]]);
+        assert_eq!(delay_lines.c, [[1.0]]);
+        assert_eq!(delay_lines.b, BTreeMap::from([((0, 0), vec![2.0]), ((0, 2), vec![3.0])]));
+        assert_eq!(delay_lines.taps, BTreeMap::from([((0, 0), vec![9.0]), ((0, 2), vec![7.0])]));
+        assert_eq!(delay_lines.history(), 2);
     }
 
     #[test]
     fn rings_and_states_with_a_factor_are_no_delay_lines() {
         let ring = filter(&[&[0.0, 1.0], &[1.0, 0.0]], &[&[0.0], &[0.0]], &[&[1.0, 0.0]], &[&[0.0]]);
-        assert_eq!(Structure::new(&ring).a, [[0.0, 1.0], [1.0, 0.0]]);
+        assert_eq!(DelayLines::new(&ring).a, [[0.0, 1.0], [1.0, 0.0]]);
         let scaled = filter(&[&[0.0, 1.0], &[0.0, 0.0]], &[&[0.0], &[2.0]], &[&[1.0, 0.0]], &[&[0.0]]);
-        assert_eq!(Structure::new(&scaled).a.len(), 2);
+        assert_eq!(DelayLines::new(&scaled).a.len(), 2);
     }
 
     #[test]
@@ -155,7 +155,7 @@ mod tests {
             let mut a = vec![vec![0.0; 5]; 5];
             (0..5).for_each(|i| a[i][i] = 0.5);
             pairs.iter().for_each(|&(i, j)| a[i][j] = 0.1);
-            Structure { taps: BTreeMap::new(), b: BTreeMap::new(), a, c: vec![vec![]; 5] }.sections()
+            DelayLines { taps: BTreeMap::new(), b: BTreeMap::new(), a, c: vec![vec![]; 5] }.sections()
         };
         assert_eq!(with(&[]), Some(vec![(0, Some(1)), (2, Some(3)), (4, None)]));
         assert_eq!(with(&[(3, 1)]), Some(vec![(1, Some(3)), (0, Some(2)), (4, None)]));

@@ -1,28 +1,26 @@
-//! FIR banks: the overlap-save form, for long filters.
+//! Overlap-save: FIR filtering by Fourier transforms, for long filters.
 //!
-//! The F ticks up to the end of a block of B = F - (K - 1) ticks are transformed, multiplied by the M by N spectra of
+//! The F frames up to the end of a block of B = F - (K - 1) frames are transformed, multiplied by the M by N spectra of
 //! the filters, and transformed back; the last B of them are outputs of the sum (Oppenheim and Schafer,
 //! section 8.7). Channels lie in lanes, and so do S segments of the stream where a vector has room for them, see
-//! [`simd`](super::simd). Two blocks are the two parts of a complex one, so that a *batch* of 2 S B ticks is made
+//! [`simd`](crate::simd). Two blocks are the two parts of a complex one, so that a *batch* of 2 S B frames is made
 //! at once.
 //!
 //! Batches are counted from the beginning of the stream and not of a call, so that cuts do not change a bit. An output
-//! is there when its batch is complete: all are late by 2 S B - 1 ticks. The error of an output is about
+//! is there when its batch is complete: all are late by 2 S B - 1 frames. The error of an output is about
 //! eps log2 F times the norm of its filters times that of the inputs of its two blocks, and not only of those in
 //! the filter memory.
 
 #[cfg(test)]
 mod tests;
 
-use crate::BuildError;
+use super::filter::{Facts, Filter, check_finite, phase_taps, replace_not_finite};
+use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
-use crate::fir::{check_finite, replace_not_finite};
-use crate::form::lags;
-use crate::sample::Sample;
 use crate::simd::{
-    Frames, Isa, Segments, Spectra, Transform, TransformKernel, all_finite, group_lanes, row_samples,
+    Frames, Segments, Spectra, Transform, TransformKernel, all_finite, group_lanes, row_samples,
 };
-use crate::ticks::{FastSink, TickSource};
+use crate::{BuildError, Isa, Sample};
 use std::ops::Range;
 
 /// Samples of all spectra: more would take gigabytes.
@@ -37,7 +35,7 @@ const SCALE: f64 = (1u64 << 40) as f64;
 pub(crate) struct Shape {
     pub(crate) channels: usize,
     pub(crate) ratio: usize,
-    /// K - 1: ticks that the filters look back.
+    /// K - 1: frames that the filters look back.
     pub(crate) history: usize,
     /// F.
     pub(crate) len: usize,
@@ -54,17 +52,17 @@ impl Shape {
         Self { channels, ratio, history, len, depth, segments: group / depth }
     }
 
-    /// B, ticks of a block.
+    /// B, frames of a block.
     pub(crate) fn block(&self) -> usize {
         self.len - self.history
     }
 
-    /// Ticks that are made at once.
+    /// Frames that are made at once.
     pub(crate) fn batch(&self) -> usize {
         2 * self.segments * self.block()
     }
 
-    /// Ticks by which outputs are late.
+    /// Frames by which outputs are late.
     pub(crate) fn delay(&self) -> usize {
         self.batch() - 1
     }
@@ -96,9 +94,9 @@ impl Shape {
     }
 }
 
-/// Coefficients in the order of use; shared by all streams of a bank.
+/// Coefficients in the order of use.
 #[derive(Debug)]
-pub(crate) struct OverlapSavePlan<T: Sample> {
+pub(crate) struct OverlapSave<T: Sample> {
     pub(crate) shape: Shape,
     transform: Transform<T>,
     /// H(f) / F.
@@ -110,23 +108,23 @@ pub(crate) struct OverlapSavePlan<T: Sample> {
 /// What a stream remembers.
 #[derive(Debug, Clone)]
 pub(crate) struct OverlapSaveState<T: Sample> {
-    /// K - 1 ticks of the past, then the batch that is being filled.
-    frames: Aligned<T>,
-    /// Ticks of the batch that are there.
+    /// K - 1 frames of the past, then the batch that is being filled.
+    samples: Aligned<T>,
+    /// Frames of the batch that are there.
     filled: usize,
     /// Outputs of the batch before.
     output: Aligned<T>,
     work: Work<T>,
 }
 
-/// What is known of the ticks of a call.
+/// What is known of the frames of a call.
 #[derive(Default)]
 struct Progress {
     /// From here on, up to the next one, the caller's frames are finite.
     clean: usize,
     /// Up to here the state knows them.
     known: usize,
-    /// Up to here outputs are in the sink.
+    /// Up to here outputs are in the output.
     written: usize,
     /// Samples that were not finite.
     replaced: u64,
@@ -139,12 +137,12 @@ struct Work<T: Sample> {
     phases: Aligned<T>,
 }
 
-impl<T: Sample> OverlapSavePlan<T> {
+impl<T: Sample> OverlapSave<T> {
     /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters, in transforms of length F = `len`, a power
     /// of two from 16 on that is longer than the filters' memory.
     pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, len: usize, isa: Isa) -> Result<Self, BuildError> {
         check_finite::<T>(taps)?;
-        let history = lags(taps, ratio) - 1;
+        let history = phase_taps(taps, ratio) - 1;
         let shape = Shape::new(taps.len(), ratio, history, len, group_lanes::<T>());
         if !shape.spectra_fit() {
             return Err(BuildError::Spectra { channels: taps.len(), ratio, len });
@@ -158,133 +156,90 @@ impl<T: Sample> OverlapSavePlan<T> {
         })
     }
 
-    /// A stream's state before its first tick.
-    pub(crate) fn state(&self) -> OverlapSaveState<T> {
-        let shape = &self.shape;
-        let plane = shape.len * row_samples::<T>();
-        // Frames are read and written as whole groups.
-        let beyond = group_lanes::<T>();
-        OverlapSaveState {
-            frames: Aligned::new((shape.history + shape.batch()) * shape.channels + beyond),
-            filled: 0,
-            output: Aligned::new(shape.batch() * shape.ratio + beyond),
-            work: Work {
-                channels: Aligned::new(shape.inputs() * plane),
-                phases: Aligned::new(shape.outputs() * plane),
-            },
-        }
-    }
-
-    /// All ticks of `source` to `sink`; returns how many samples were not finite.
-    pub(crate) fn process(
-        &self,
-        state: &mut OverlapSaveState<T>,
-        source: &(impl TickSource + ?Sized),
-        sink: &mut (impl FastSink + ?Sized),
-    ) -> u64 {
-        let mut progress = Progress::default();
-        let mut first = 0;
-        while first < source.ticks() {
-            let end = first + (source.ticks() - first).min(self.shape.batch() - state.filled);
-            let outside = self.take(state, source, first..end, &mut progress);
-            let complete = state.filled + end - first == self.shape.batch();
-            // The last tick of a batch already takes the first output of it, the others take the next ones.
-            let late = end - usize::from(complete);
-            self.pass_on(state, sink, first, progress.written.max(first)..late);
-            state.filled += end - first;
-            if complete {
-                let behind = source.ticks() - late;
-                progress.written = self.complete(state, outside, sink, late, behind);
-            }
-            first = end;
-        }
-        self.recall(state, source, first, &progress);
-        progress.replaced
-    }
-
-    /// The next ticks of the batch: where they lie in the caller's memory (as a whole batch), or into the state.
+    /// The next frames of the batch: where they lie in the caller's memory (as a whole batch), or into the state.
     fn take<'a>(
         &self,
         state: &mut OverlapSaveState<T>,
-        source: &'a (impl TickSource + ?Sized),
-        ticks: Range<usize>,
+        input: &'a (impl Input + ?Sized),
+        frames: Range<usize>,
         progress: &mut Progress,
     ) -> Option<&'a [T]> {
-        let outside = source.frames::<T>().and_then(|frames| self.in_place(frames, progress.clean, &ticks));
+        let outside =
+            input.in_memory::<T>().and_then(|samples| self.in_place(samples, progress.clean, &frames));
         if outside.is_none() {
-            self.recall(state, source, ticks.start, progress);
-            let count = self.gather(state, source, ticks.start, ticks.len());
+            self.load_history(state, input, frames.start, progress);
+            let count = self.gather(state, input, frames.start, frames.len());
             if count > 0 {
                 progress.replaced += count;
-                progress.clean = ticks.end;
+                progress.clean = frames.end;
             }
-            progress.known = ticks.end;
+            progress.known = frames.end;
         }
         outside
     }
 
-    /// The state's past is that of tick `first` again, if the ticks before stayed in the caller's memory.
-    fn recall(
+    /// The state's past is that of frame `first` again, if the frames before stayed in the caller's memory.
+    fn load_history(
         &self,
         state: &mut OverlapSaveState<T>,
-        source: &(impl TickSource + ?Sized),
+        input: &(impl Input + ?Sized),
         first: usize,
         progress: &Progress,
     ) {
         let Shape { channels, history, .. } = self.shape;
-        if let (true, Some(frames)) = (progress.known < first, source.frames::<T>()) {
-            let past = &frames[(first - history) * channels..first * channels];
-            state.frames[..past.len()].copy_from_slice(past);
+        if let (true, Some(samples)) = (progress.known < first, input.in_memory::<T>()) {
+            let past = &samples[(first - history) * channels..first * channels];
+            state.samples[..past.len()].copy_from_slice(past);
         }
     }
 
-    /// Outputs of the batch before to the ticks of a call of which `first` is the next one of the batch.
+    /// Outputs of the batch before to the frames of a call of which `first` is the next one of the batch.
     fn pass_on(
         &self,
         state: &OverlapSaveState<T>,
-        sink: &mut (impl FastSink + ?Sized),
+        output: &mut (impl Output + ?Sized),
         first: usize,
-        ticks: Range<usize>,
+        frames: Range<usize>,
     ) {
         let m = self.shape.ratio;
-        if !ticks.is_empty() {
-            let place = state.filled + 1 + ticks.start - first;
-            sink.store(self.isa, ticks.start * m, &state.output[place * m..][..ticks.len() * m]);
+        if !frames.is_empty() {
+            let place = state.filled + 1 + frames.start - first;
+            output.store(self.isa, frames.start * m, &state.output[place * m..][..frames.len() * m]);
         }
     }
 
-    /// Makes the batch, whose first output belongs to tick `tick` of the call, `behind` ticks before its end. Returns the
-    /// tick up to which outputs are in the sink: all of them, if there is room.
+    /// Makes the batch, whose first output belongs to frame `frame` of the call, `behind` frames before its end. Returns the
+    /// frame up to which outputs are in the output: all of them, if there is room.
     fn complete(
         &self,
         state: &mut OverlapSaveState<T>,
         outside: Option<&[T]>,
-        sink: &mut (impl FastSink + ?Sized),
-        tick: usize,
+        output: &mut (impl Output + ?Sized),
+        frame: usize,
         behind: usize,
     ) -> usize {
         let m = self.shape.ratio;
         // Whole lanes are written: somewhat more than the batch, which is still to come.
         let needed = self.shape.batch() + group_lanes::<T>();
         if needed <= behind
-            && let Some(slots) = sink.slots(tick * m..(tick + needed) * m)
+            && let Some(slots) = output.slots(frame * m..(frame + needed) * m)
         {
             self.batch(state, outside, Some(slots));
-            return tick + self.shape.batch();
+            return frame + self.shape.batch();
         }
         self.batch(state, outside, None);
-        sink.store(self.isa, tick * m, &state.output[..m]);
-        tick + 1
+        output.store(self.isa, frame * m, &state.output[..m]);
+        frame + 1
     }
 
     /// The frames of a whole batch with their past as they lie in the caller's memory, if they are all there
     /// and finite.
-    fn in_place<'a>(&self, frames: &'a [T], clean: usize, ticks: &Range<usize>) -> Option<&'a [T]> {
+    fn in_place<'a>(&self, samples: &'a [T], clean: usize, frames: &Range<usize>) -> Option<&'a [T]> {
         let Shape { channels, history, .. } = self.shape;
-        let whole = ticks.len() == self.shape.batch();
-        let from = ticks.start.checked_sub(history).filter(|&from| whole && from >= clean)?;
-        let x = &frames[from * channels..];
-        let len = (history + ticks.len()) * channels;
+        let whole = frames.len() == self.shape.batch();
+        let from = frames.start.checked_sub(history).filter(|&from| whole && from >= clean)?;
+        let x = &samples[from * channels..];
+        let len = (history + frames.len()) * channels;
         // Frames are read as whole groups.
         let fits = len + group_lanes::<T>() <= x.len();
         (fits && all_finite(self.isa, &x[history * channels..len + group_lanes::<T>()])).then_some(x)
@@ -294,49 +249,49 @@ impl<T: Sample> OverlapSavePlan<T> {
     fn gather(
         &self,
         state: &mut OverlapSaveState<T>,
-        source: &(impl TickSource + ?Sized),
+        input: &(impl Input + ?Sized),
         first: usize,
-        ticks: usize,
+        frames: usize,
     ) -> u64 {
         let n = self.shape.channels;
-        let room = &mut state.frames[(self.shape.history + state.filled) * n..][..ticks * n];
-        source.gather(self.isa, first, ticks, room);
+        let room = &mut state.samples[(self.shape.history + state.filled) * n..][..frames * n];
+        input.load(self.isa, first, room);
         if all_finite(self.isa, room) { 0 } else { replace_not_finite(room) }
     }
 
     /// The outputs of a complete batch, whose frames are `outside` or in the state, to `slots` or the state.
     fn batch(&self, state: &mut OverlapSaveState<T>, outside: Option<&[T]>, slots: Option<&mut [T]>) {
-        let OverlapSaveState { frames, output, work, filled } = state;
+        let OverlapSaveState { samples, output, work, filled } = state;
         let Shape { channels, ratio, history, .. } = self.shape;
         let batch = self.shape.batch();
         let output = slots.unwrap_or(output);
-        self.filter(work, outside.unwrap_or(frames), output);
+        self.filter(work, outside.unwrap_or(samples), output);
         let wanted = &mut output[..batch * ratio];
         if !all_finite(self.isa, wanted) {
             if let Some(outside) = outside {
-                let len = frames.len();
-                frames.copy_from_slice(&outside[..len]);
+                let len = samples.len();
+                samples.copy_from_slice(&outside[..len]);
             }
-            scale(frames, 1.0 / SCALE);
-            self.filter(work, frames, output);
+            scale(samples, 1.0 / SCALE);
+            self.filter(work, samples, output);
             scale(&mut output[..batch * ratio], SCALE);
-            scale(frames, SCALE);
+            scale(samples, SCALE);
         }
         if outside.is_none() {
-            frames.copy_within(batch * channels..(batch + history) * channels, 0);
+            samples.copy_within(batch * channels..(batch + history) * channels, 0);
         }
         *filled = 0;
     }
 
     /// From frames to the outputs of a batch, and to a group of lanes behind it.
-    fn filter(&self, work: &mut Work<T>, frames: &[T], output: &mut [T]) {
+    fn filter(&self, work: &mut Work<T>, samples: &[T], output: &mut [T]) {
         let Shape { channels, ratio, depth, len, .. } = self.shape;
         let plane = len * row_samples::<T>();
         let block = self.shape.block();
         let hop = block * channels;
         for (i, rows) in work.channels.chunks_exact_mut(plane).enumerate() {
-            let frames = &frames[i * depth..];
-            let segments = Segments { parts: [frames, &frames[hop..]], stride: channels, hop: 2 * hop };
+            let samples = &samples[i * depth..];
+            let segments = Segments { parts: [samples, &samples[hop..]], stride: channels, hop: 2 * hop };
             self.kernel.forward(&self.transform, depth, segments, rows);
         }
         let spectra = Spectra { channels, rows: &self.spectra };
@@ -349,12 +304,84 @@ impl<T: Sample> OverlapSavePlan<T> {
     }
 }
 
-impl<T: Sample> OverlapSaveState<T> {
-    /// As new.
-    pub(crate) fn reset(&mut self) {
-        self.frames.fill(T::default());
-        self.output.fill(T::default());
-        self.filled = 0;
+impl<T: Sample> Filter for OverlapSave<T> {
+    type State = OverlapSaveState<T>;
+
+    fn facts(&self) -> Facts {
+        let shape = &self.shape;
+        Facts {
+            name: "overlap-save",
+            history: Some(shape.history),
+            delay: shape.delay(),
+            alignment: shape.batch(),
+            transform: Some((shape.len, shape.block())),
+            multiply_adds: Some(shape.multiply_adds()),
+        }
+    }
+
+    fn state(&self) -> OverlapSaveState<T> {
+        let shape = &self.shape;
+        let plane = shape.len * row_samples::<T>();
+        // Frames are read and written as whole groups.
+        let padding = group_lanes::<T>();
+        OverlapSaveState {
+            samples: Aligned::new((shape.history + shape.batch()) * shape.channels + padding),
+            filled: 0,
+            output: Aligned::new(shape.batch() * shape.ratio + padding),
+            work: Work {
+                channels: Aligned::new(shape.inputs() * plane),
+                phases: Aligned::new(shape.outputs() * plane),
+            },
+        }
+    }
+
+    fn reset(state: &mut OverlapSaveState<T>) {
+        state.samples.fill(T::default());
+        state.output.fill(T::default());
+        state.filled = 0;
+    }
+
+    fn process(
+        &self,
+        state: &mut OverlapSaveState<T>,
+        input: &(impl Input + ?Sized),
+        output: &mut (impl Output + ?Sized),
+    ) -> u64 {
+        let mut progress = Progress::default();
+        let mut first = 0;
+        while first < input.frames() {
+            let end = first + (input.frames() - first).min(self.shape.batch() - state.filled);
+            let outside = self.take(state, input, first..end, &mut progress);
+            let complete = state.filled + end - first == self.shape.batch();
+            // The last frame of a batch already takes the first output of it, the others take the next ones.
+            let late = end - usize::from(complete);
+            self.pass_on(state, output, first, progress.written.max(first)..late);
+            state.filled += end - first;
+            if complete {
+                let behind = input.frames() - late;
+                progress.written = self.complete(state, outside, output, late, behind);
+            }
+            first = end;
+        }
+        self.load_history(state, input, first, &progress);
+        progress.replaced
+    }
+
+    /// A batch means the same to all coefficients of one shape: outputs of complete batches are still those of the other
+    /// ones.
+    fn take_over(
+        &self,
+        state: &mut OverlapSaveState<T>,
+        (other, from): (&Self, &OverlapSaveState<T>),
+        _same: bool,
+    ) -> bool {
+        let fits = self.shape == other.shape;
+        if fits {
+            state.samples.copy_from_slice(&from.samples);
+            state.output.copy_from_slice(&from.output);
+            state.filled = from.filled;
+        }
+        fits
     }
 }
 
@@ -372,15 +399,15 @@ fn spectra<T: Sample>(taps: &[Vec<f64>], shape: &Shape, isa: Isa) -> Aligned<T> 
     let transform = Transform::new(len, |x: f64| x);
     let kernel = TransformKernel::<f64>::new(isa);
     let mut spectra = Aligned::new((len / 2 + 1) * shape.outputs() * channels * row);
-    let (mut frames, zeros) = (vec![0.0; len * QUAD], vec![0.0; len * QUAD]);
+    let (mut samples, zeros) = (vec![0.0; len * QUAD], vec![0.0; len * QUAD]);
     let mut rows = vec![0.0; len * row_samples::<f64>()];
     for (channel, quad) in (0..channels).flat_map(|i| (0..ratio).step_by(QUAD).map(move |p| (i, p))) {
         let phases = quad..(quad + QUAD).min(ratio);
         for (k, p) in (0..=history).flat_map(|k| phases.clone().map(move |p| (k, p))) {
             let tap = taps[channel].get(p + k * ratio);
-            frames[k * QUAD + p - quad] = tap.map_or(0.0, |tap| tap / len as f64);
+            samples[k * QUAD + p - quad] = tap.map_or(0.0, |tap| tap / len as f64);
         }
-        let segment = Segments { parts: [&frames, &zeros], stride: QUAD, hop: 0 };
+        let segment = Segments { parts: [&samples, &zeros], stride: QUAD, hop: 0 };
         kernel.forward(&transform, QUAD, segment, &mut rows);
         for (pair, from) in transform.half_rows().enumerate() {
             let from = &rows[from * row_samples::<f64>()..];

@@ -1,6 +1,6 @@
 use super::*;
+use crate::adapters::Interleaved;
 use crate::tests::Noise;
-use crate::ticks::Interleaved;
 
 /// The definition, row by row.
 fn definition(filter: &StateSpace, input: &[f64], channels: usize) -> Vec<f64> {
@@ -22,13 +22,13 @@ fn run<T: Sample>(
     input: &[f64],
     cut: usize,
 ) -> (Vec<f64>, bool) {
-    let plan = StateSpacePlan::<T>::new(filter, n, m, isa).unwrap();
+    let plan = Recursive::<T>::new(filter, n, m, isa).unwrap();
     let mut state = plan.state();
     let mut out = vec![0.0; input.len() / n * m];
     for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
         plan.process(&mut state, &Interleaved::new(x, n).unwrap(), y);
     }
-    (out, plan.is_modal())
+    (out, plan.is_parallel())
 }
 
 fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mut Noise) -> StateSpace {
@@ -49,17 +49,17 @@ fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mu
 #[test]
 fn every_shape_follows_its_definition_with_the_same_bits_for_every_cut() {
     let mut noise = Noise(21);
-    let modal: [&[usize]; 6] = [&[1], &[2], &[1, 2], &[2, 1, 1, 2], &[1, 1, 1, 2, 2, 1, 2, 2], &[2; 16]];
+    let parallel: [&[usize]; 6] = [&[1], &[2], &[1, 2], &[2, 1, 1, 2], &[1, 1, 1, 2, 2, 1, 2, 2], &[2; 16]];
     let dense = [0, 1, 3, 5, 8, 17].map(|order| (order, None));
-    let shapes = modal.map(|blocks| (blocks.iter().sum(), Some(blocks))).into_iter().chain(dense);
+    let shapes = parallel.map(|blocks| (blocks.iter().sum(), Some(blocks))).into_iter().chain(dense);
     for (order, blocks) in shapes {
         for (n, m) in [(1, 1), (2, 3), (4, 4), (3, 9)] {
             let filter = random(order, n, m, blocks, &mut noise);
             let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
             let want = definition(&filter, &input, n);
-            let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+            let (whole, is_parallel) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
             // Small dense matrices are block-diagonal too.
-            assert!(is_modal || (blocks.is_none() && order > 2), "{order} {blocks:?}");
+            assert!(is_parallel || (blocks.is_none() && order > 2), "{order} {blocks:?}");
             let worst = whole.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(worst < 1e-12, "order {order} N {n} M {m}: {worst:e}");
             for cut in [1, 7, 63, 64, 65, 129] {
@@ -76,11 +76,11 @@ fn worst(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// The same filter with its inputs `ticks` ticks late, in a delay line that the output reads too: the form of
+/// The same filter with its inputs `frames` frames late, in a delay line that the output reads too: the form of
 /// designed banks.
-fn behind(core: &StateSpace, ticks: usize, noise: &mut Noise) -> StateSpace {
+fn behind(core: &StateSpace, frames: usize, noise: &mut Noise) -> StateSpace {
     let (states, n) = (core.a.len(), core.d[0].len());
-    let order = states + ticks * n;
+    let order = states + frames * n;
     let mut a = vec![vec![0.0; order]; order];
     for (i, row) in a.iter_mut().enumerate() {
         match core.a.get(i) {
@@ -94,7 +94,7 @@ fn behind(core: &StateSpace, ticks: usize, noise: &mut Noise) -> StateSpace {
     }
     let newest = |i: usize, u: usize| f64::from(u8::from(i == order - n + u));
     let b = (0..order).map(|i| (0..n).map(|u| newest(i, u)).collect()).collect();
-    let read = |row: &Vec<f64>| row.iter().copied().chain((0..ticks * n).map(|_| noise.next())).collect();
+    let read = |row: &Vec<f64>| row.iter().copied().chain((0..frames * n).map(|_| noise.next())).collect();
     StateSpace { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
 }
 
@@ -102,13 +102,13 @@ fn behind(core: &StateSpace, ticks: usize, noise: &mut Noise) -> StateSpace {
 fn delay_lines_before_the_states_follow_the_definition() {
     let mut noise = Noise(22);
     for (order, blocks) in [(0, None), (2, Some(&[2][..])), (5, Some(&[2, 1, 2])), (4, None)] {
-        for (n, m, ticks) in [(1, 1, 3), (1, 3, 1), (2, 2, 5), (3, 2, 4), (4, 4, 17), (5, 9, 2)] {
-            let filter = behind(&random(order, n, m, blocks, &mut noise), ticks, &mut noise);
+        for (n, m, frames) in [(1, 1, 3), (1, 3, 1), (2, 2, 5), (3, 2, 4), (4, 4, 17), (5, 9, 2)] {
+            let filter = behind(&random(order, n, m, blocks, &mut noise), frames, &mut noise);
             let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
-            let (whole, is_modal) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
-            assert!(is_modal || (blocks.is_none() && order > 2));
+            let (whole, is_parallel) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+            assert!(is_parallel || (blocks.is_none() && order > 2));
             let error = worst(&whole, &definition(&filter, &input, n));
-            assert!(error < 1e-12, "order {order} N {n} M {m} behind {ticks}: {error:e}");
+            assert!(error < 1e-12, "order {order} N {n} M {m} behind {frames}: {error:e}");
             for cut in [1, 63, 65] {
                 assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
             }
@@ -144,7 +144,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
     let mut noise = Noise(24);
     let mut filter = random(24, 1, 2, None, &mut noise);
     (0..24).for_each(|i| filter.a[i][..i].fill(0.0));
-    let plan = StateSpacePlan::<f64>::new(&filter, 1, 2, Isa::detect()).unwrap();
+    let plan = Recursive::<f64>::new(&filter, 1, 2, Isa::detect()).unwrap();
     let Form::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
     let columns: Vec<usize> = tiles.iter().map(|tile| tile.columns.len()).collect();
     assert_eq!(columns[0], 24);
@@ -158,7 +158,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
 fn a_state_that_fades_away_becomes_zero() {
     let filter =
         StateSpace { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
-    let plan = StateSpacePlan::<f64>::new(&filter, 1, 1, Isa::detect()).unwrap();
+    let plan = Recursive::<f64>::new(&filter, 1, 1, Isa::detect()).unwrap();
     let mut state = plan.state();
     let mut input = vec![0.0; 1200];
     input[0] = 1.0;

@@ -1,0 +1,61 @@
+//! Samples in memory, channel after channel.
+
+use super::{Input, MOST_ROWS, convert, interleave_rows};
+use crate::{Isa, ProcessError, Sample};
+
+/// A slice for each channel: sample of channel i in frame k at `[i][k]`.
+#[derive(Debug, Clone, Copy)]
+pub struct Planar<'a, S> {
+    channels: &'a [&'a [S]],
+    frames: usize,
+}
+
+impl<'a, S: Sample> Planar<'a, S> {
+    /// # Errors
+    /// [`ProcessError::UnequalChannels`] if the channels differ in length.
+    pub fn new(channels: &'a [&'a [S]]) -> Result<Self, ProcessError> {
+        let frames = channels.first().map_or(0, |first| first.len());
+        match channels.iter().position(|channel| channel.len() != frames) {
+            Some(channel) => Err(ProcessError::UnequalChannels {
+                first: frames,
+                channel,
+                samples: channels[channel].len(),
+            }),
+            None => Ok(Self { channels, frames }),
+        }
+    }
+}
+
+impl<S: Sample> Input for Planar<'_, S> {
+    fn channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    fn frames(&self) -> usize {
+        self.frames
+    }
+
+    /// One channel is interleaved as it lies.
+    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
+        match self.channels {
+            [alone] => T::same(alone),
+            _ => None,
+        }
+    }
+
+    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
+        let n = self.channels.len();
+        match T::as_f32_mut(samples) {
+            Some(samples) if n <= MOST_ROWS => interleave_rows(isa, n, samples, |i, start, row| {
+                convert(&self.channels[i][first + start..][..row.len()], row);
+            }),
+            _ => {
+                for (k, frame) in (first..).zip(samples.chunks_exact_mut(n)) {
+                    for (slot, channel) in frame.iter_mut().zip(self.channels) {
+                        *slot = T::from_f64(channel[k].to_f64());
+                    }
+                }
+            }
+        }
+    }
+}

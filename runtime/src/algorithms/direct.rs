@@ -1,0 +1,294 @@
+//! The direct polyphase algorithm for FIR filters.
+//!
+//! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], as one product of a frame's history (the last K frames as they lie)
+//! with a vector of coefficients for each phase p. The order of the sum is that of the [kernels](crate::simd); it is the
+//! same wherever the frame stands in its call.
+//!
+//! NaN and infinity are detected in the output sums, not by a pass over the input. A block in which they are found is
+//! filtered again with zeros in their place, so that each frame is filtered at most twice.
+
+use super::filter::{Facts, Filter, Past, check_finite, phase_taps, replace_not_finite};
+use crate::adapters::{Input, Output};
+use crate::aligned::Aligned;
+use crate::history::History;
+use crate::simd::{FirKernel, Polyphase, Segment, Tiling};
+use crate::{BuildError, Isa, Sample};
+use std::ops::Range;
+
+/// Samples of a block that should stay in the first-level cache beside coefficients and output.
+const CACHE_SAMPLES: usize = 4096;
+/// Frames of a block are a multiple of this, and so of every tile.
+const BLOCK_UNIT: usize = 96;
+/// Copying all frames of a call of fewer samples is cheaper than one more tile of the kernel.
+const SHORT_CALL: usize = 256;
+/// Blocks of a segment where each frame is read only once, so that the cache does not matter.
+const SEGMENT_BLOCKS: usize = 8;
+
+/// Coefficients in the order of use.
+#[derive(Debug)]
+pub(crate) struct Direct<T: Sample> {
+    pub(crate) channels: usize,
+    pub(crate) ratio: usize,
+    /// K - 1: frames that the filters look back.
+    history: usize,
+    /// Frames of a [`History`], with those that only padding reaches.
+    history_frames: usize,
+    /// Frames of a block.
+    block: usize,
+    filters: Polyphase<T>,
+    isa: Isa,
+}
+
+/// What a stream remembers.
+#[derive(Debug, Clone)]
+pub(crate) struct DirectState<T: Sample> {
+    history: History<T>,
+    /// One block of output, for outputs of another type.
+    output: Aligned<T>,
+}
+
+impl<T: Sample> Direct<T> {
+    /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters.
+    pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Self, BuildError> {
+        check_finite::<T>(taps)?;
+        let (channels, phase_taps) = (taps.len(), phase_taps(taps, ratio));
+        let kernel = FirKernel::<T>::new(isa);
+        // Blocks, histories and coefficients are a few times this long; the sum must not overflow.
+        let len = phase_taps
+            .checked_mul(channels)
+            .filter(|&len| len.saturating_mul(ratio) <= isize::MAX as usize / 64)
+            .ok_or(BuildError::TooLong { history: phase_taps - 1, channels })?;
+        let tiling = kernel.tiling(channels, len, ratio);
+        let block = (CACHE_SAMPLES / channels).saturating_sub(phase_taps).clamp(BLOCK_UNIT, 8 * BLOCK_UNIT)
+            / BLOCK_UNIT
+            * BLOCK_UNIT;
+        let coefficient = |element, phase| T::from_f64(coefficient(taps, ratio, element, phase));
+        let filters = Polyphase::new(kernel, tiling, ratio, coefficient);
+        let history_frames = tiling.past.div_ceil(channels);
+        Ok(Self { channels, ratio, history: phase_taps - 1, history_frames, block, filters, isa })
+    }
+
+    /// N K: multiply-adds for each output sample, without those by padding.
+    pub(super) fn multiply_adds(&self) -> f64 {
+        (self.channels * (self.history + 1)) as f64
+    }
+
+    /// Frames that a state must know.
+    pub(super) fn history_frames(&self) -> usize {
+        self.history_frames
+    }
+
+    /// Zeros, for blocks of at most `block` frames, and with `more` frames than the filters look back.
+    pub(super) fn history(&self, block: usize, more: usize) -> History<T> {
+        let (n, &Tiling { past, vector, .. }) = (self.channels, self.filters.tiling());
+        History::new(n, past + more * n, block * n, vector * n)
+    }
+
+    /// Frames at the beginning of a call that go through the state's history although the others need not: those whose
+    /// history lies there, and as many as it takes for the others to fill vectors. `None` if all had better go there.
+    fn head(&self, frames: usize) -> Option<usize> {
+        let vector = self.filters.tiling().vector;
+        let head = self.history_frames + (frames.wrapping_sub(self.history_frames) & (vector - 1));
+        let pays = frames * self.channels >= SHORT_CALL && frames >= 2 * head;
+        (pays && head <= self.block).then_some(head)
+    }
+
+    /// Filters samples in the caller's memory to outputs there, segment by segment, until one may not be finite; returns
+    /// the frames before that segment, all of them if there is none, with the history that follows them.
+    ///
+    /// The head is filtered last in its segment: its loads would straddle recent stores, and store forwarding would stall.
+    fn process_in_memory(
+        &self,
+        history: &mut History<T>,
+        samples: &[T],
+        frames: usize,
+        out: &mut [T],
+    ) -> usize {
+        let Some(head) = self.head(frames) else { return 0 };
+        let (n, &Tiling { past, vector, .. }) = (self.channels, self.filters.tiling());
+        history.room(head).copy_from_slice(&samples[..head * n]);
+        let begin = Segment { x: history.view(), first: 0, frames: head };
+        let segment = |first: usize, end: usize| {
+            let x = &samples[first * n - past..end * n];
+            Segment { x, first, frames: end - first }
+        };
+        let len = if self.filters.reads_once() { SEGMENT_BLOCKS * self.block } else { self.block };
+        // Whole vectors, so that all segments behind it are whole vectors too.
+        let first = frames.min(head + ((len - head) & !(vector - 1)));
+        if !self.run(&[segment(head, first), begin], out) {
+            return 0;
+        }
+        let mut done = first;
+        while done < frames {
+            let next = frames.min(done + len);
+            if !self.run(&[segment(done, next)], out) {
+                break;
+            }
+            done = next;
+        }
+        history.load(&samples[..done * n]);
+        done
+    }
+
+    /// Filters at most a block through the state's history; returns how many samples were not finite and were taken
+    /// as 0. If that is `expected`, they are looked for before filtering and not after it.
+    fn process_block(
+        &self,
+        state: &mut DirectState<T>,
+        input: &(impl Input + ?Sized),
+        frames: Range<usize>,
+        output: &mut (impl Output + ?Sized),
+        expected: bool,
+    ) -> u64 {
+        let DirectState { history, output: block } = state;
+        let room = history.room(frames.len());
+        input.load(self.isa, frames.start, room);
+        let known = if expected { replace_not_finite(room) } else { 0 };
+        let samples = frames.start * self.ratio..frames.end * self.ratio;
+        let found = match output.slots(samples.clone()) {
+            Some(slots) => self.filter_room(history, frames.len(), slots, expected),
+            None => {
+                let block = &mut block[..samples.len()];
+                let count = self.filter_room(history, frames.len(), block, expected);
+                output.store(self.isa, samples.start, block);
+                count
+            }
+        };
+        history.advance(frames.len());
+        known + found
+    }
+
+    /// Filters the frames in the history's room; returns how many samples were not finite and were taken as 0, if it is not
+    /// known that there are none.
+    fn filter_room(&self, history: &mut History<T>, frames: usize, out: &mut [T], known_finite: bool) -> u64 {
+        // Filtered first: hardly ever is there anything to replace.
+        if self.run(&[Segment { x: history.view(), first: 0, frames }], out) || known_finite {
+            return 0;
+        }
+        let count = replace_not_finite(history.room(frames));
+        if count > 0 {
+            self.run(&[Segment { x: history.view(), first: 0, frames }], out);
+        }
+        count
+    }
+
+    /// Filters segments; false if something may not be finite.
+    #[inline]
+    pub(super) fn run(&self, segments: &[Segment<'_, T>], out: &mut [T]) -> bool {
+        self.filters.run(segments, out)
+    }
+
+    /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
+    /// [`Direct::history_frames`] of them.
+    #[cfg(feature = "rayon")]
+    fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> DirectState<T> {
+        let mut samples = vec![T::default(); self.history_frames * self.channels];
+        input.load(self.isa, first - self.history_frames, &mut samples);
+        // They are counted where they are processed.
+        replace_not_finite(&mut samples);
+        let mut state = self.state();
+        state.history.load(&samples);
+        state
+    }
+}
+
+impl<T: Sample> Filter for Direct<T> {
+    type State = DirectState<T>;
+
+    fn facts(&self) -> Facts {
+        Facts {
+            name: "direct",
+            history: Some(self.history),
+            delay: 0,
+            alignment: 1,
+            transform: None,
+            multiply_adds: Some(self.multiply_adds()),
+        }
+    }
+
+    fn state(&self) -> DirectState<T> {
+        DirectState { history: self.history(self.block, 0), output: Aligned::new(self.ratio * self.block) }
+    }
+
+    fn reset(state: &mut DirectState<T>) {
+        state.history.reset();
+    }
+
+    fn process(
+        &self,
+        state: &mut DirectState<T>,
+        input: &(impl Input + ?Sized),
+        output: &mut (impl Output + ?Sized),
+    ) -> u64 {
+        let (frames, mut done, mut expected) = (input.frames(), 0, false);
+        if let (Some(samples), Some(out)) = (input.in_memory(), output.slots(0..frames * self.ratio)) {
+            done = self.process_in_memory(&mut state.history, samples, frames, out);
+            expected = self.head(frames).is_some();
+        }
+        let mut replaced = 0;
+        while done < frames {
+            let end = frames.min(done + self.block);
+            replaced += self.process_block(state, input, done..end, output, expected);
+            done = end;
+        }
+        replaced
+    }
+
+    #[cfg(feature = "rayon")]
+    fn process_parallel(
+        &self,
+        state: &mut DirectState<T>,
+        input: &(impl Input + Sync + ?Sized),
+        output: &mut (impl crate::adapters::SplitOutput + ?Sized),
+        pool: &crate::ThreadPool,
+    ) -> u64 {
+        crate::parallel::process(self, state, input, output, pool)
+    }
+
+    fn past(state: &DirectState<T>) -> Option<&dyn Past> {
+        Some(state)
+    }
+
+    fn load(&self, state: &mut DirectState<T>, past: &dyn Past, _position: u64) -> bool {
+        state.history.fill(|age, channel| T::from_f64(past.sample(age, channel)));
+        true
+    }
+}
+
+#[cfg(feature = "rayon")]
+impl<T: Sample> crate::parallel::Chunked for Direct<T> {
+    const ALIGNMENT: usize = 1;
+
+    fn frame_multiply_adds(&self) -> usize {
+        (self.multiply_adds() * self.ratio as f64) as usize
+    }
+
+    fn ratio(&self) -> usize {
+        self.ratio
+    }
+
+    fn history_frames(&self) -> usize {
+        self.history_frames
+    }
+
+    fn phase_offset(_: &DirectState<T>) -> usize {
+        0
+    }
+
+    fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> DirectState<T> {
+        self.state_at(input, first)
+    }
+}
+
+impl<T: Sample> Past for DirectState<T> {
+    fn sample(&self, age: usize, channel: usize) -> f64 {
+        self.history.past(age, channel).to_f64()
+    }
+}
+
+/// Coefficient of the sample `element` samples before the last one of a frame.
+fn coefficient(taps: &[Vec<f64>], ratio: usize, element: usize, phase: usize) -> f64 {
+    let n = taps.len();
+    let (lag, channel) = (element / n, n - 1 - element % n);
+    taps[channel].get(phase + lag * ratio).copied().unwrap_or(0.0)
+}

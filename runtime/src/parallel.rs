@@ -1,0 +1,154 @@
+//! Calls on several threads.
+//!
+//! A call is halved until its chunks are short, or many; each chunk has a state of its own, made from the history before it,
+//! so its outputs have the bits that one thread would give them. There are more chunks than threads: a thread that is done
+//! takes the next one, so that a thread that was held up does not hold up all.
+
+use crate::Isa;
+use crate::Sample;
+use crate::adapters::{Input, SplitOutput};
+use crate::algorithms::Filter;
+use std::io;
+use std::ops::Range;
+
+/// Threads that wait for work; any number of streams may use them.
+#[derive(Debug)]
+pub struct ThreadPool {
+    pool: rayon::ThreadPool,
+}
+
+impl ThreadPool {
+    /// Starts `threads` threads, one for each processor if that is 0.
+    ///
+    /// # Errors
+    /// If the system starts no more threads.
+    pub fn new(threads: usize) -> io::Result<Self> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        Ok(Self { pool: pool.map_err(io::Error::other)? })
+    }
+
+    /// How many there are.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+}
+
+/// Multiply-adds that are worth a chunk: some tens of microseconds, many times what it costs to hand it over.
+const CHUNK_MULTIPLY_ADDS: usize = 1 << 20;
+
+/// Chunks of a long call for each thread, at most: enough for those that are faster to help out, and each long against making
+/// its state.
+const CHUNKS_PER_THREAD: usize = 8;
+
+/// A filter whose calls can be cut into chunks.
+pub(crate) trait Chunked: Filter {
+    /// Frames from one where a chunk may begin to the next.
+    const ALIGNMENT: usize;
+    /// Multiply-adds of a frame.
+    fn frame_multiply_adds(&self) -> usize;
+    /// M.
+    fn ratio(&self) -> usize;
+    /// Frames that a state must know.
+    fn history_frames(&self) -> usize;
+    /// Frames since a chunk could have begun, for a stream in this state.
+    fn phase_offset(state: &Self::State) -> usize;
+    /// A state before frame `first`, which has so many frames before it and at which a chunk may begin.
+    fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> Self::State;
+}
+
+/// Runs a call on all threads and leaves the state after its last frame; returns how many samples were not finite.
+pub(crate) fn process<F: Chunked>(
+    filter: &F,
+    state: &mut F::State,
+    input: &(impl Input + Sync + ?Sized),
+    output: &mut (impl SplitOutput + ?Sized),
+    pool: &ThreadPool,
+) -> u64 {
+    let frames = input.frames();
+    let least = CHUNK_MULTIPLY_ADDS.div_ceil(filter.frame_multiply_adds()).max(4 * filter.history_frames());
+    if pool.threads() == 1 || frames < 2 * least {
+        return filter.process(state, input, output);
+    }
+    let chunk = least.max(frames / (CHUNKS_PER_THREAD * pool.threads()));
+    let call = Call { filter, input, phase_offset: F::phase_offset(state), chunk };
+    let (replaced, last) = pool.pool.install(|| call.chunks(0..frames, Some(state), output));
+    if let Some(last) = last {
+        *state = last;
+    }
+    replaced
+}
+
+/// A call whose chunks are shared out.
+struct Call<'a, F, I: ?Sized> {
+    filter: &'a F,
+    input: &'a I,
+    /// Frames since a chunk could have begun, before the call.
+    phase_offset: usize,
+    /// Least frames of a chunk.
+    chunk: usize,
+}
+
+impl<F: Chunked, I: Input + Sync + ?Sized> Call<'_, F, I> {
+    /// The frames of a range to an output of their own. The first chunk has the stream's `state`, the others make theirs;
+    /// returns how many samples were not finite, and the state after the last chunk if it is not the stream's.
+    fn chunks(
+        &self,
+        frames: Range<usize>,
+        state: Option<&mut F::State>,
+        output: &mut (impl SplitOutput + ?Sized),
+    ) -> (u64, Option<F::State>) {
+        if frames.len() < 2 * self.chunk {
+            return self.chunk(frames, state, output);
+        }
+        let middle = frames.start + frames.len() / 2;
+        let middle = middle - (self.phase_offset + middle) % F::ALIGNMENT;
+        output.halves((middle - frames.start) * self.filter.ratio(), |earlier, later| {
+            let ((some, _), (more, last)) = rayon::join(
+                || self.chunks(frames.start..middle, state, earlier),
+                || self.chunks(middle..frames.end, None, later),
+            );
+            (some + more, last)
+        })
+    }
+
+    fn chunk(
+        &self,
+        frames: Range<usize>,
+        state: Option<&mut F::State>,
+        output: &mut (impl SplitOutput + ?Sized),
+    ) -> (u64, Option<F::State>) {
+        let chunk = Chunk { input: self.input, frames: frames.clone() };
+        match state {
+            Some(state) => (self.filter.process(state, &chunk, output), None),
+            None => {
+                let mut own = self.filter.state_at(self.input, frames.start);
+                (self.filter.process(&mut own, &chunk, output), Some(own))
+            }
+        }
+    }
+}
+
+/// Some of the frames of an input.
+struct Chunk<'a, I: ?Sized> {
+    input: &'a I,
+    frames: Range<usize>,
+}
+
+impl<I: Input + ?Sized> Input for Chunk<'_, I> {
+    fn channels(&self) -> usize {
+        self.input.channels()
+    }
+
+    fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
+        let n = self.channels();
+        self.input.in_memory().map(|samples| &samples[self.frames.start * n..self.frames.end * n])
+    }
+
+    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
+        self.input.load(isa, self.frames.start + first, samples);
+    }
+}
