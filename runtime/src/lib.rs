@@ -57,19 +57,23 @@ mod plan;
 mod precision;
 mod sample;
 mod simd;
+mod state_space;
 mod stream;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "rayon")]
+mod thread_pool;
 
 pub use adapters::{Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
 pub use algorithms::choice::Algorithm;
 pub use complex::ComplexStream;
 pub use error::{BuildError, ProcessError, SwapError};
-#[cfg(feature = "rayon")]
-pub use parallel::ThreadPool;
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
-pub use plan::{Options, Plan, PlanSummary, StateSpace};
+pub use plan::{Options, Plan, PlanSummary};
 pub use precision::Precision;
 pub use sample::Sample;
 pub use simd::{Isa, multiply_add_chains};
+pub use state_space::StateSpace;
 pub use stream::Stream;
+#[cfg(feature = "rayon")]
+pub use thread_pool::ThreadPool;

@@ -4,34 +4,10 @@
 //! so its outputs have the bits that one thread would give them. There are more chunks than threads: a thread that is done
 //! takes the next one, so that a thread that was held up does not hold up all.
 
-use crate::Isa;
-use crate::Sample;
 use crate::adapters::{Input, SplitOutput};
 use crate::algorithms::Filter;
-use std::io;
+use crate::{Isa, Sample, ThreadPool};
 use std::ops::Range;
-
-/// Threads that wait for work; any number of streams may use them.
-#[derive(Debug)]
-pub struct ThreadPool {
-    pool: rayon::ThreadPool,
-}
-
-impl ThreadPool {
-    /// Starts `threads` threads, one for each processor if that is 0.
-    ///
-    /// # Errors
-    /// If the system starts no more threads.
-    pub fn new(threads: usize) -> io::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        Ok(Self { pool: pool.map_err(io::Error::other)? })
-    }
-
-    /// How many there are.
-    pub fn threads(&self) -> usize {
-        self.pool.current_num_threads()
-    }
-}
 
 /// Multiply-adds that are worth a chunk: some tens of microseconds, many times what it costs to hand it over.
 const CHUNK_MULTIPLY_ADDS: usize = 1 << 20;
@@ -71,7 +47,7 @@ pub(crate) fn process<F: Chunked>(
     }
     let chunk = least.max(frames / (CHUNKS_PER_THREAD * pool.threads()));
     let call = Call { filter, input, phase_offset: F::phase_offset(state), chunk };
-    let (replaced, last) = pool.pool.install(|| call.chunks(0..frames, Some(state), output));
+    let (replaced, last) = pool.install(|| call.chunks(0..frames, Some(state), output));
     if let Some(last) = last {
         *state = last;
     }

@@ -3,7 +3,7 @@
 use crate::algorithms::choice::{Choice, check_recursive};
 use crate::algorithms::{Direct, Facts, FastFir, OverlapSave, Recursive};
 use crate::engine::{Coefficients, Engine};
-use crate::{Algorithm, BuildError, Isa, Precision};
+use crate::{Algorithm, BuildError, Isa, Precision, StateSpace};
 use std::sync::Arc;
 
 /// How a bank is made ready to run.
@@ -30,20 +30,6 @@ impl Default for Options {
             isa: Isa::detect(),
         }
     }
-}
-
-/// A filter in state space, one step per frame: x+ = a x + b u, y = c x + d u; u the N samples of a frame, y its
-/// M output samples. Row-major lists of rows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StateSpace {
-    /// n x n.
-    pub a: Vec<Vec<f64>>,
-    /// n x N.
-    pub b: Vec<Vec<f64>>,
-    /// M x n.
-    pub c: Vec<Vec<f64>>,
-    /// M x N.
-    pub d: Vec<Vec<f64>>,
 }
 
 /// How a bank runs, for reports.

@@ -74,6 +74,7 @@ impl<T: Sample> Direct<T> {
     }
 
     /// Frames that a state must know.
+    #[cfg(feature = "rayon")]
     pub(super) fn history_frames(&self) -> usize {
         self.history_frames
     }

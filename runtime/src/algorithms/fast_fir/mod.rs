@@ -246,6 +246,7 @@ impl<T: Sample> FastFir<T> {
     }
 
     /// Frames that a state must know: all histories, and a pair for products that are remembered.
+    #[cfg(feature = "rayon")]
     fn history_frames(&self) -> usize {
         let longest = [&self.even, &self.odd, &self.mean].map(Direct::history_frames).into_iter().max();
         PAIR * (longest.unwrap_or(0) + MORE + 1)
