@@ -17,6 +17,7 @@ mod long_files;
 mod lost;
 #[cfg(unix)]
 mod outputs;
+mod snapshots;
 #[cfg(unix)]
 mod stream;
 mod verify;
