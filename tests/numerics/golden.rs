@@ -100,7 +100,7 @@ fn g6_the_unit_of_time_does_not_matter() {
             design(&spec).unwrap().bank
         };
         let (scaled, unscaled) = (at_one(h), at_one(1.0));
-        let (a, b) = (scaled.gamma.norm.unwrap(), unscaled.gamma.upper.unwrap());
+        let (a, b) = (scaled.gamma.norm.unwrap(), unscaled.gamma.norm.unwrap());
         assert!((a / b - 1.0).abs() < 1e-9, "G6 at h = {h}: {a} {b}");
         assert!((a / 0.0399320 - 1.0).abs() < 2e-6, "G6 at h = {h}: {a}");
     }
