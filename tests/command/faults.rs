@@ -126,3 +126,57 @@ fn inputs_without_end_are_refused_with_their_bound() {
     let args = ["stream", "bank.json", "--input", "zero.sigmf-meta", "-o", "out"];
     desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset", "same folder"]);
 }
+
+#[test]
+fn a_disk_that_is_full_leaves_nothing_behind() {
+    let desk = Desk::new();
+    desk.write("in", bytes(&ticks(50_000)));
+    desk.write("old", "old");
+    let before = names(&desk.path(""));
+    // In units of 512 bytes: less than the output, in the samples or only in the mask.
+    for (blocks, args) in [
+        (16, "-o out"),
+        (16, "-o old --force"),
+        (16, "-o out.sigmf-meta"),
+        (16, "-o out --gaps zero --mask mask --output-format s8"),
+    ] {
+        let run = format!("trap '' XFSZ; ulimit -f {blocks}; $H stream bank.json --input in {args}");
+        let output = shell(&desk, &run);
+        let message = text(&output.stderr);
+        assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{args}: {message}");
+        assert!(message.contains("cannot write it"), "{args}: {message}");
+        assert_eq!(names(&desk.path("")), before, "{args}");
+        assert_eq!(desk.read("old"), b"old");
+    }
+}
+
+/// 20 kills, or as many as HYBANK_KILLS says.
+#[test]
+fn a_killed_run_leaves_the_old_file_or_the_whole_new_one() {
+    let kills = std::env::var("HYBANK_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(20);
+    let desk = Desk::new();
+    let input = ticks(100_000);
+    desk.write("in", bytes(&input));
+    let new = bytes(&fused(&input));
+    let (mut state, mut longest) = (1u64, 40_000);
+    for kill in 0..kills {
+        desk.write("out", "old");
+        let begin = Instant::now();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hybank"))
+            .current_dir(desk.path(""))
+            .args(["stream", "bank.json", "--input", "in", "-o", "out", "--force"])
+            .spawn()
+            .unwrap();
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        std::thread::sleep(Duration::from_micros((state >> 33) % longest));
+        let done = child.try_wait().unwrap().is_some();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if done {
+            // So that kills fall between the beginning and the end of a run on this machine.
+            longest = (begin.elapsed().as_micros() as u64).clamp(1_000, longest);
+        }
+        let content = desk.read("out");
+        assert!(content == b"old" || content == new, "kill {kill}: {} bytes", content.len());
+    }
+}
