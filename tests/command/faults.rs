@@ -155,7 +155,7 @@ fn a_disk_that_is_full_leaves_nothing_behind() {
 fn a_killed_run_leaves_the_old_file_or_the_whole_new_one() {
     let kills = std::env::var("HYBANK_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(20);
     let desk = Desk::new();
-    let input = ticks(100_000);
+    let input = ticks(10_000);
     desk.write("in", bytes(&input));
     let new = bytes(&fused(&input));
     let (mut state, mut longest) = (1u64, 40_000);
