@@ -65,6 +65,12 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     if arguments.mask.as_deref().is_some_and(output::is_standard) {
         return Err(Failure::Usage("--mask -: the mask cannot go to standard output; give it a file".into()));
     }
+    if arguments.mask.as_ref() == Some(&arguments.output) {
+        let path = arguments.output.display();
+        return Err(Failure::Usage(format!(
+            "-o and --mask both name {path}; give the mask a file of its own"
+        )));
+    }
     refuse_overlaps(arguments)?;
     for path in [Some(&arguments.output), arguments.mask.as_ref()].into_iter().flatten() {
         output::refuse_existing(path, arguments.force)?;
