@@ -110,15 +110,23 @@ impl AtomicFile {
     /// Gives the file, sealed before, its name in a way that can be undone if the system allows.
     pub(super) fn place(&mut self) -> Result<Placed, FileError> {
         let placed = match place::rename_new(&self.beside, &self.target) {
-            Err(error) if self.replace && error.kind() == io::ErrorKind::AlreadyExists => {
-                match place::exchange(&self.beside, &self.target) {
-                    Ok(()) => Ok(Placed::Exchanged),
-                    Err(_) => fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced),
-                }
-            }
+            Err(error) if self.replace && error.kind() == io::ErrorKind::AlreadyExists => self.exchange(),
             other => other.map(|()| Placed::New),
         };
         placed.map_err(|error| self.refused(error))
+    }
+
+    /// Gives the file the name of another file, which gets the hidden one if the system allows.
+    fn exchange(&self) -> io::Result<Placed> {
+        if place::exchange(&self.beside, &self.target).is_err() {
+            return fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced);
+        }
+        // The system exchanges a file with a folder too, and no output replaces a folder.
+        if self.beside.symlink_metadata().is_ok_and(|found| found.is_dir()) {
+            place::exchange(&self.beside, &self.target)?;
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        Ok(Placed::Exchanged)
     }
 
     /// Takes the name back; what was replaced gets its own again, unless it is gone.

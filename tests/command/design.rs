@@ -109,9 +109,11 @@ fn a_design_is_reported_and_analysed() {
     let upper = number(&bank, "/gamma/upper");
     // The thesis example; digits from an independent conic solver on the bounded-real LMI.
     assert!((upper / 0.039_932_04 - 1.0).abs() < 1e-6, "{upper}");
+    let norm = number(&bank, "/gamma/norm");
+    assert!(norm <= upper && upper < norm * (1.0 + 1e-7), "{norm} {upper}");
     let analysis = desk.json(&["analyze", "bank.json", "--certify", "--json"]);
-    assert!((number(&analysis, "/gamma") / upper - 1.0).abs() < 1e-9, "{analysis}");
-    assert!(number(&analysis, "/certified/gamma") >= upper, "{analysis}");
+    assert!((number(&analysis, "/gamma") / norm - 1.0).abs() < 1e-9, "{analysis}");
+    assert!(number(&analysis, "/certified/gamma") >= norm, "{analysis}");
     let moved = desk.json(&["analyze", "bank.json", "--delay-error", "0,0.1", "--json"]);
     assert!((number(&moved, "/gamma") / 0.043_978 - 1.0).abs() < 0.02, "{moved}");
     assert!(desk.good(&["analyze", "bank.json"]).contains("noise gain"));
@@ -318,7 +320,7 @@ fn a_bank_without_any_error_loses_nothing_by_integers() {
                  design = { method = \"fir\", taps = 1, bits = 4 }\n";
     fs::write(desk.path("exact.toml"), exact).unwrap();
     let report = desk.json(&["design", "exact.toml", "-o", "b.json", "--json"]);
-    assert_eq!(number(&report, "/gamma/upper"), 0.0);
+    assert_eq!(number(&report, "/gamma/norm"), 0.0);
     assert_eq!(number(&report, "/words/loss_db"), 0.0);
     assert!(
         desk.good(&["design", "exact.toml", "-o", "b.json", "--force"]).contains("gamma is 0.0000 dB above")
