@@ -66,9 +66,8 @@ impl AtomicFile {
             let (beside, file) = create_beside(&target, known.is_some())?;
             let begun = Self { file: Some(file), beside, target, name: name.clone(), replace };
             unfinished(|files| files.insert(begun.beside.clone()));
-            match (&begun.file, known) {
-                (Some(file), Some(known)) => file.set_permissions(known.permissions())?,
-                _ => {}
+            if let (Some(file), Some(known)) = (&begun.file, known) {
+                file.set_permissions(known.permissions())?;
             }
             Ok(begun)
         };

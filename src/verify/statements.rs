@@ -44,7 +44,8 @@ pub(super) fn compare(
     strictness: Strictness,
 ) -> Result<(), VerifyError> {
     let Verified { attained, upper, .. } = *proven;
-    if !(upper - attained <= (WIDEST * upper).max(WIDEST_AT_FLOOR * scale)) {
+    let is_narrow = upper - attained <= (WIDEST * upper).max(WIDEST_AT_FLOOR * scale);
+    if !is_narrow {
         return Err(VerifyError::TooWide { attained, upper });
     }
     compare_norm(gamma, proven, FLOOR * scale)?;

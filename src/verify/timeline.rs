@@ -89,7 +89,8 @@ impl Timeline {
         let periods = |time: Instant| -> Result<f64, VerifyError> {
             let age = latest.since::<BigFloat>(time, fast_period).nearest();
             let mut periods = (age / ratio as f64).floor();
-            if !(periods < MAX_PERIODS_LATE) {
+            let is_supported = periods < MAX_PERIODS_LATE;
+            if !is_supported {
                 return Err(VerifyError::TooLarge { states: usize::MAX });
             }
             let after = |periods: f64| compare(time.later_by_periods(periods, ratio), latest).is_gt();
