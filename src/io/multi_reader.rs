@@ -459,7 +459,7 @@ mod tests {
         let lost = LostSamples::parse(lines, "lost").unwrap();
         let start = |max_lost| {
             let options = ReadOptions { lost: Some(&lost), max_lost, ..raw(1) };
-            MultiReader::start(&[path.clone()], options, crossbeam_channel::never())
+            MultiReader::start(std::slice::from_ref(&path), options, crossbeam_channel::never())
         };
         assert!(start(80).is_ok());
         let error = start(79).err().unwrap().to_string();
