@@ -6,10 +6,11 @@ use crate::design::{self, Analysis, Certified, DesignError, MeanAnalysis};
 use crate::units::Seconds;
 use std::path::PathBuf;
 
-/// Computes the gamma of a bank, with its own delays or with others
+/// Computes the gamma of a bank, with the delays of its spec or with others
 ///
-/// Works on the coefficients in the file, not on what the designer promised: the error system is built again from the
-/// spec inside the bank and its H-infinity norm computed (relative error 1e-9).
+/// gamma is the worst-case gain from the analog input to the error. The command builds the error system from
+/// the coefficients and the spec in the bank file and computes its H-infinity norm (relative error 1e-9).
+/// The gammas that the file states are not used.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -20,10 +21,10 @@ Examples:
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
-    /// True delay minus the bank's, one for each channel, in seconds
+    /// True delay minus the delay in the bank, one value per channel, in seconds
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     delay_error: Vec<Seconds>,
-    /// Also prove an upper bound of gamma (bounded-real lemma, every rounding error charged)
+    /// Also prove an upper bound of gamma (bounded-real lemma, with every rounding error bounded)
     #[arg(long)]
     certify: bool,
     /// Print the result as one JSON object

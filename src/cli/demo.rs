@@ -22,7 +22,7 @@ const SETTLING: usize = 200;
 /// Interval over which the error is averaged in the chart.
 const ERROR_INTERVAL: Seconds = Seconds(0.02);
 
-/// Designs, captures, fuses and judges a signal known in closed form
+/// Compares hybank with other methods on a signal whose exact samples are known
 ///
 /// Two virtual 24 kHz converters with delays of 1.2 and 0.6 fast samples capture a chirp, three tones and a step. Two
 /// hybank banks, separate fractional delays, sinc interpolation and plain interleaving fuse the captures to 48 kHz. Each

@@ -17,8 +17,8 @@ use std::time::Instant;
 /// Fuses slow recordings into one fast recording
 ///
 /// The recordings are one mono WAV file per channel, in the order of the bank, or one N-channel WAV
-/// file. The result lines up with their time axis and has exactly M samples for each input frame: the
-/// first m0 samples are dropped and the end is flushed with zeros.
+/// file. The output lines up with the time axis of the inputs and has exactly M samples per input frame: the
+/// first m0 samples, the latency of the bank, are dropped, and the end is flushed with zeros.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -26,7 +26,7 @@ Examples:
   hybank fuse bank.json both.wav -o fused.wav --bits 24 --force
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
 pub(super) struct Args {
-    /// The bank: what `hybank design` wrote
+    /// The bank (JSON), as `hybank design` writes it
     bank: PathBuf,
     /// One mono WAV file or SigMF recording per channel, or one of N channels; `-` is standard input
     #[arg(required = true)]
@@ -34,7 +34,7 @@ pub(super) struct Args {
     /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta); `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
-    /// Samples of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
+    /// Sample format of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
     #[arg(long, value_enum, default_value_t = Bits::F32)]
     bits: Bits,
     /// Algorithm of FIR filters; auto: the fastest for the bank, and direct with --gaps

@@ -13,21 +13,24 @@ const REPORTED: usize = 10;
 /// Options of the commands that can fill gaps.
 #[derive(Debug, clap::Args)]
 pub(super) struct GapArgs {
-    /// Fill and report missing samples, which are signalled by NaN, by jumps of SigMF `core:global_index`, or by --lost: with
-    /// the last good sample, with zero, or with zero and a mask (which needs --mask)
+    /// Fill and report missing samples: hold repeats the last good sample, zero takes 0, and mask takes 0
+    /// and needs --mask. Missing samples are signalled by NaN, by jumps of SigMF `core:global_index`, or by
+    /// --lost
     #[arg(long, value_enum, value_name = "POLICY")]
     gaps: Option<Policy>,
-    /// Write one byte for each output sample: 1 if a missing sample affects it, 0 if not
+    /// Write one byte per output sample: 1 if a missing sample affects it, 0 if not
     #[arg(long, value_name = "FILE", requires = "gaps")]
     mask: Option<PathBuf>,
-    /// Lines of JSON that say which samples were left out, {"channel": 1, "sample_start": 5, "global_index": 8}, or
-    /// are invalid, {"channel": 2, "first": 40, "length": 3}
+    /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
+    /// sample 5 of the input was number 8 at the converter. {"channel": 2, "first": 40, "length": 3}:
+    /// samples 40 to 42 are invalid
     #[arg(long, value_name = "FILE", requires = "gaps")]
     lost: Option<PathBuf>,
-    /// The most samples that a channel may have lost in all; more are taken for a mistaken number
+    /// The most samples that a channel may lose in all; more are an error, because a number is probably
+    /// wrong
     #[arg(long, value_name = "SAMPLES", requires = "gaps", default_value_t = MAX_LOST)]
     max_lost: u64,
-    /// Continue until the last channel ends: what the others lack is missing, and not left out of the result
+    /// Continue until the last channel ends; the missing ends of the other channels are filled as gaps
     #[arg(long, requires = "gaps")]
     longest: bool,
 }
@@ -35,7 +38,7 @@ pub(super) struct GapArgs {
 /// What stands in for a missing sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Policy {
-    /// The channel's last good sample
+    /// The last good sample of the channel
     Hold,
     /// Zero
     Zero,

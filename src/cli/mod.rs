@@ -28,10 +28,10 @@ use print::{print, print_json};
 use say::{say, warn};
 use std::process::ExitCode;
 
-/// Several slow, imperfectly timed converters doing the work of one fast one
+/// Lets several slow, imperfectly timed converters do the work of one fast converter
 ///
-/// hybank designs the digital synthesis filters that fuse slow captures into one fast signal with the
-/// least worst-case error, proves how good they are, and runs them.
+/// hybank designs the digital filters that fuse slow captures into one fast signal with the least worst-case
+/// error. It proves how good these filters are, and it runs them.
 #[derive(Debug, Parser)]
 #[command(
     name = "hybank",

@@ -23,13 +23,13 @@ const MOST_PANELS: f64 = 2e7;
 
 /// Simulates what the slow converters capture
 ///
-/// Writes ch1.wav, ch2.wav, .. at the slow rate, and target.wav: the samples of the ideal fast converter, delayed by the
-/// latency. The response to an analytic source is exact to rounding. A WAV recording is treated as a periodic,
-/// band-limited analog signal.
+/// Writes ch1.wav, ch2.wav, .. at the slow rate, and target.wav: the samples of the ideal fast converter,
+/// delayed by the latency. The samples of a step, tone or chirp are exact to rounding. A WAV recording is
+/// treated as a periodic, band-limited analog signal.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sources:
-  step@0.3                  0 before 0.3 s, 1 afterwards (also 300ms, 5us, 2ns)
+  step@0.3                  0 before 0.3 s, 1 afterwards (units: s, ms, us, ns; s if left out)
   tones:0.3,0.8             cosines of amplitude 1, angular frequencies in rad/s
   tones:440Hz,1kHz          the same, frequencies in hertz
   chirp:50Hz..8kHz@2s       a linear sweep from 50 Hz to 8 kHz in 2 s
@@ -52,7 +52,7 @@ pub(super) struct Args {
     /// Fast samples to simulate, rounded up to whole frames [default: to the end of the source, at least 200]
     #[arg(long)]
     samples: Option<usize>,
-    /// Factor that multiplies the source
+    /// Factor by which the captures and the target are multiplied
     #[arg(long, default_value_t = 1.0, allow_hyphen_values = true)]
     gain: f64,
     /// Replace existing files

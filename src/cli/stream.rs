@@ -17,9 +17,9 @@ use std::str::FromStr;
 
 /// Fuses slow samples as they arrive
 ///
-/// Reads interleaved frames (one sample of each channel, in the order of the bank) from standard input,
-/// or from each --input what it holds, and writes the M output samples of a frame as soon as its inputs
-/// are there. The output is causal: it is late by the bank's latency, and nothing is dropped.
+/// Reads interleaved frames (one sample of each channel, in the order of the bank) from standard input, or
+/// the channels of each --input. Writes the M output samples of a frame as soon as its inputs have arrived.
+/// The output is causal: it is delayed by the latency of the bank, and nothing is dropped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sample formats, as in ffmpeg:
@@ -33,20 +33,20 @@ Examples:
 
 An interrupt (Ctrl-C) ends the stream after whole frames; a second one ends it at once.")]
 pub(super) struct Args {
-    /// The bank: what `hybank design` wrote
+    /// The bank (JSON), as `hybank design` writes it
     bank: PathBuf,
-    /// How the samples are stored
+    /// Sample format of the input
     #[arg(long, value_name = "FORMAT", default_value = "f32le", value_parser = parse_coding)]
     format: Coding,
-    /// How the output is stored, if not like the input
+    /// Sample format of the output [default: that of the input]
     #[arg(long, value_name = "FORMAT", value_parser = parse_coding)]
     output_format: Option<Coding>,
-    /// A FIFO or file with one channel, given once per channel, or with all of them, given once; a SigMF recording
-    /// (a name that ends in sigmf-meta) says its own format and channels
+    /// A FIFO or file. Give the option once per channel, or once for an input that holds all channels. A
+    /// SigMF recording (a name that ends in sigmf-meta) states its own format and channels
     #[arg(long, value_name = "FILE")]
     input: Vec<PathBuf>,
-    /// Where the output samples go: a file that appears when it is whole (a SigMF recording, if its name ends in
-    /// sigmf-meta); standard output if left out
+    /// The output file, which appears when it is complete (a SigMF recording if its name ends in
+    /// sigmf-meta); `-` is standard output
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
     /// Algorithm of FIR filters; auto is the faster one of direct and fast-fir, because overlap-save adds latency (--json
@@ -60,7 +60,7 @@ pub(super) struct Args {
     gaps: GapArgs,
     #[command(flatten)]
     threads: ThreadArgs,
-    /// Make every tolerated fault (a cut frame, unequal lengths, NaN, clipping) an error
+    /// Make every tolerated fault (an incomplete last frame, unequal lengths, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
     /// Replace an existing output

@@ -9,12 +9,14 @@ use std::path::PathBuf;
 
 /// Proves the gammas in a bank file, from the file alone
 ///
-/// Rebuilds the error system from the spec and the coefficients in the file, by other means than the designer's and with every
-/// rounding error charged, and proves both ends of gamma with the certificate and the witnesses that the file carries. Each
-/// gamma that the file states must be proven. A file in which a coefficient, a gamma or a matrix was altered is refused: by
-/// its digest, or because the proof no longer fits. A bank without a proof is refused at once; --search looks for one.
+/// Rebuilds the error system from the spec and the coefficients in the file. It shares no code with the
+/// designer and bounds every rounding error. It proves an upper and a lower bound of gamma with the
+/// certificate and the witnesses in the file. Each gamma that the file states must be proven. A file with an
+/// altered coefficient, gamma or matrix is refused: its digest does not match, or the proof fails. A bank
+/// without a proof is refused at once; --search looks for one.
 ///
-/// Taken for given are the state equations of the front ends, as realised in double precision from the spec.
+/// The state equations of the front ends, as realised in double precision from the spec, are assumed to be
+/// correct.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -23,11 +25,12 @@ Examples:
   hybank verify bank.json --json | jq '[.lower, .upper]'
   hybank verify elsewhere.json --search
 
-Exit codes: 0 proven; 1 the file is not what it says, with the place that does not fit.")]
+Exit codes: 0 proven; 1 refused, with the reason; 2 wrong usage.")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
-    /// Look for a proof of a bank that carries none; gammas that it does not reach are then only not refuted
+    /// Look for a proof if the file has none; a gamma that this proof neither reaches nor refutes is
+    /// accepted
     #[arg(long)]
     search: bool,
     /// Print the result as one JSON object

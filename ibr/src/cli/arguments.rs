@@ -6,7 +6,7 @@ use crate::pipeline::{Method, RenderSettings};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-/// Image-based rendering with depth: new views from photographs.
+/// Renders new views from photographs with depth (image-based rendering).
 #[derive(Debug, Parser)]
 #[command(name = "hybank-ibr", version, about, after_help = EXAMPLES)]
 pub(super) struct Arguments {
@@ -26,7 +26,8 @@ Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 pub(super) enum Command {
     /// Render the virtual view of a scene.
     Render(RenderArguments),
-    /// Render a synthetic scene with exact depth, compare it with its exact view, write a contact sheet.
+    /// Render a synthetic scene with exact depth, compare the result with the exact view, and write a
+    /// contact sheet.
     Demo(DemoArguments),
 }
 
@@ -34,9 +35,10 @@ const RENDER_EXAMPLES: &str = "Examples:
   hybank-ibr render scene.toml -o middle.png --truth photo.png
       renders the view that [virtual] asks for and prints PSNR, SSIM, mean absolute error and coverage
   hybank-ibr render scene.toml --view left -o left.png
-      leaves the view \"left\" out and renders it from the others
+      leaves out the view \"left\" and renders it from the other views
   hybank-ibr render - -o - < scene.toml > middle.png
-      scene from standard input (paths relative to the working directory), PNG to standard output
+      reads the scene from standard input (paths are relative to the working directory) and writes a PNG to
+      standard output
 
 A scene of a rectified rig:
   [[view]]
@@ -54,43 +56,44 @@ A scene of a rectified rig:
   [virtual]
   position = 0.5
 
-General cameras: camera = [[..4..],[..],[..]] and depth = \"d.pfm\" in place of position and
-disparity, or colmap = \"folder\"; [virtual] camera = .., size = [w, h]. No cameras: views with images
-only, matches = \"tracks.txt\" and [virtual] from_tracks = 3 (a column, from 1) or between = 0.5.";
+A scene of general cameras has camera = [[..4..],[..],[..]] and depth = \"d.pfm\" in place of position and
+disparity, or colmap = \"folder\"; [virtual] has camera = .. and size = [w, h]. A scene without cameras has
+views with images only, and matches = \"tracks.txt\"; [virtual] has from_tracks = 3 (a column, counted
+from 1) or between = 0.5.";
 
 #[derive(Debug, Args)]
 #[command(after_help = RENDER_EXAMPLES)]
 pub(super) struct RenderArguments {
-    /// Scene file (TOML), - for standard input.
+    /// Scene file (TOML); `-` is standard input.
     pub(super) scene: PathBuf,
-    /// Image to write (.png, .jpg, .ppm, .pgm, .pfm), - for PNG on standard output.
+    /// Image to write (.png, .jpg, .ppm, .pgm, .pfm); `-` is PNG on standard output.
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: PathBuf,
     /// Leave this view out and render it.
     #[arg(long, value_name = "NAME")]
     pub(super) view: Option<String>,
-    /// Use only every K-th value of full depth maps, in both directions.
+    /// Use only every K-th value of full depth maps, in rows and columns.
     #[arg(long, value_name = "K", default_value_t = 1)]
     pub(super) depth_step: usize,
-    /// Photograph to compare with.
+    /// Photograph of the virtual view, to compare the rendering with.
     #[arg(long, value_name = "FILE")]
     pub(super) truth: Option<PathBuf>,
-    /// Write the mask too: white seen, grey crack, black disocclusion.
+    /// Also write a mask: white for seen pixels, grey for cracks, black for disocclusions.
     #[arg(long, value_name = "FILE")]
     pub(super) mask: Option<PathBuf>,
-    /// Print one JSON object.
+    /// Print the results as one JSON object.
     #[arg(long)]
     pub(super) json: bool,
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,
-    /// Registration offset added to every column, in pixels; overrides that of the scene.
+    /// Offset added to every column of the virtual view, in pixels; overrides that of the scene.
     #[arg(long, value_name = "PX", allow_hyphen_values = true)]
     pub(super) offset: Option<f64>,
-    /// Interpolation of the samples.
+    /// How samples are interpolated.
     #[arg(long, value_enum, default_value_t = MethodName::Auto)]
     pub(super) method: MethodName,
-    /// Hole filling.
+    /// How holes are filled.
     #[arg(long, value_enum, default_value_t = FillName::Background)]
     pub(super) fill: FillName,
     /// How coarse depth is made dense.
@@ -111,16 +114,16 @@ pub(super) struct RenderArguments {
     /// Radius of the depth test, px.
     #[arg(long, value_name = "PX", allow_negative_numbers = true)]
     pub(super) epsilon: Option<f64>,
-    /// Share of the nearer depth by which a hidden sample is deeper.
+    /// Depth difference from which a sample is hidden, as a share of the nearer depth.
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub(super) relative_depth: Option<f64>,
     /// Seed of the robust estimators (scenes without cameras).
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
-    /// Reverse the order of depth (scenes without cameras).
+    /// Exchange near and far (scenes without cameras).
     #[arg(long)]
     pub(super) reverse_order: bool,
-    /// Number of threads [default: all cores]. The result does not depend on it.
+    /// Number of threads [default: all cores]. The result has the same bits for every number.
     #[arg(long, value_name = "N")]
     pub(super) threads: Option<usize>,
 }
@@ -133,7 +136,7 @@ pub(super) struct DemoArguments {
     /// Width and height of the views.
     #[arg(long, value_name = "WxH", default_value = "480x360", value_parser = size)]
     pub(super) size: (usize, usize),
-    /// Print one JSON object.
+    /// Print the results as one JSON object.
     #[arg(long)]
     pub(super) json: bool,
     /// Overwrite existing files.
@@ -158,37 +161,37 @@ fn size(text: &str) -> Result<(usize, usize), String> {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum MethodName {
-    /// Rows for rectified rigs, the plane elsewhere.
+    /// rows for rectified rigs, plane for other scenes.
     Auto,
     /// One spline per row (rectified rigs only).
     Rows,
-    /// The whole image at once.
+    /// One spline for the whole image.
     Plane,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum FillName {
-    /// The farther side is continued.
+    /// Continue the farther side into the hole.
     Background,
-    /// The fit bridges them.
+    /// Let the fitted spline bridge the hole.
     Bridge,
-    /// They stay black.
+    /// Leave holes black.
     Leave,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum DensifyName {
-    /// By segments of image and depth.
+    /// Interpolate within segments of image and depth.
     Segmentwise,
-    /// Bilinear everywhere.
+    /// Bilinear interpolation everywhere.
     Bilinear,
-    /// The nearest sample.
+    /// The value of the nearest sample.
     Nearest,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum DegreeName {
-    /// Hats.
+    /// Linear B-splines.
     Linear,
     /// Cubic B-splines.
     Cubic,

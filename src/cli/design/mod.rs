@@ -13,10 +13,11 @@ use std::time::Instant;
 
 /// Designs the synthesis filters for a spec
 ///
-/// The bank file holds the filters, the spec with all defaults filled in, and gamma, the worst-case gain from the
-/// analog input to the error: the computed norm, an upper bound of the true one, a lower bound for all banks of that
-/// method and size (lower), and one for all banks of any latency (noncausal), all in normalised time. It also holds
-/// what `hybank verify` needs to prove them, if that was found.
+/// The bank file holds the filters, the spec with all defaults filled in, and gamma, the worst-case gain
+/// from the analog input to the error. Four values of gamma are stated, in normalised time: the computed
+/// norm of this bank, an upper bound of its true norm, a lower bound for all banks of that method and size
+/// (lower), and a lower bound for all banks of any latency (noncausal). If a proof of these values was
+/// found, the file holds it too, for `hybank verify`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -32,31 +33,33 @@ pub(super) struct Args {
     /// The bank file (JSON); `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
-    /// Another method than the spec's
+    /// Design method, in place of that of the spec: fir, iir, h2, sinc or separation
     #[arg(long, value_parser = parse_method)]
     method: Option<Method>,
-    /// Another number of taps per channel than the spec's
+    /// Taps per channel, in place of those of the spec
     #[arg(long)]
     taps: Option<usize>,
-    /// Another latency than the spec's, in fast samples
+    /// Latency in fast samples, in place of that of the spec
     #[arg(long)]
     latency: Option<usize>,
-    /// Relative excess over the optimal gamma that may go into a smaller mean-square error and output noise
+    /// Share by which gamma may exceed its minimum, for a smaller mean-square error and output noise
     #[arg(long)]
     gamma_margin: Option<f64>,
-    /// Solver of FIR designs: sampled (frequencies, fast) or kyp (the bounded-real LMI; a second opinion)
+    /// Solver of FIR designs: sampled (on a grid of frequencies, fast) or kyp (bounded-real LMI, a second
+    /// opinion)
     #[arg(long, value_parser = parse_solver)]
     solver: Option<Solver>,
-    /// Integer taps of so many bits, sign included; or a list of bits, one for each tap (4,6,8,6,4)
+    /// Integer taps of this many bits, sign included; or a list with the bits of each tap (4,6,8,6,4)
     #[arg(long)]
     bits: Option<WordLengths>,
-    /// Integer taps times two to the minus this; chosen for the least gamma if left out
+    /// A tap is its integer times 2^-FRACTION_BITS; chosen for the least gamma if left out
     #[arg(long, allow_negative_numbers = true)]
     fraction_bits: Option<i32>,
-    /// At most so many states, with the least error that they allow (methods iir and h2)
+    /// Use at most this many states (methods iir and h2)
     #[arg(long)]
     order: Option<usize>,
-    /// As few states as keep the error within so many decibels of the full bank's (methods iir and h2)
+    /// Use the fewest states whose error is at most this many decibels above that of the full bank (methods
+    /// iir and h2)
     #[arg(long, value_name = "DB", conflicts_with = "order")]
     reduction_loss_db: Option<f64>,
     /// Replace an existing bank file
