@@ -16,11 +16,12 @@ pub mod pipeline;
 #[cfg(feature = "runtime")]
 pub mod spec;
 
-/// The crate `hybank-runtime`: plans, streams and PCM.
+/// The crate `hybank-runtime`: it compiles a bank into a plan, filters streams with it, and converts PCM
+/// samples.
 #[cfg(feature = "runtime")]
 pub use hybank_runtime as runtime;
 
-/// The crate `hybank-linalg`: decompositions and Fourier transforms.
+/// The crate `hybank-linalg`: matrix decompositions and Fourier transforms.
 #[cfg(feature = "design")]
 pub use hybank_linalg as linalg;
 

@@ -1,5 +1,5 @@
-//! Judging a bank: its norm with the delays it was designed for or with others, mean-square error,
-//! noise gain.
+//! Analysis of a bank: the norm of its error system, its mean-square error and its noise gain, with the
+//! delays it was designed for or with others.
 
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -8,22 +8,22 @@ use crate::bank::Bank;
 use crate::lti::gramian::h2_norm;
 use crate::units::{FastPeriods, Hertz, RadiansPerSlowPeriod, Seconds};
 
-/// What a bank does on given front ends and delays.
+/// The error of a bank with given front ends and delays.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Analysis {
-    /// ||K||, h = 1.
+    /// The norm ||K|| of the error system, in normalised time (h = 1).
     pub gamma: f64,
-    /// Where the worst case sits, hertz, from 0 to 1/(2 M h): all higher frequencies alias to one of these
-    /// in the slow samples.
+    /// Frequency of the worst case in hertz, from 0 to 1/(2 M h). All higher frequencies alias to one of
+    /// these in the slow samples.
     pub peak_hertz: Hertz,
-    /// No bank at all does better on these front ends and delays.
+    /// The noncausal bound: no bank has a smaller norm with these front ends and delays.
     pub noncausal: f64,
-    /// What it does on average.
+    /// Averages over time and inputs.
     #[serde(flatten)]
     pub mean: MeanAnalysis,
 }
 
-/// What a bank does on average over time and inputs.
+/// The error and noise of a bank, averaged over time and inputs.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct MeanAnalysis {
     /// Root mean square of e for white noise f of unit density (h = 1): `||K||_2 / sqrt(M)`.
@@ -40,8 +40,8 @@ pub struct MeanAnalysis {
 ///
 /// # Errors
 /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::DelayErrorCount`] unless there is
-/// one error per channel, [`DesignError::TooLate`] for delays out of all proportion, [`DesignError::Lti`]
-/// for unstable filters.
+/// one error per channel, [`DesignError::TooLate`] for delays that need too many delay-chain states,
+/// [`DesignError::Lti`] for unstable filters.
 pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, DesignError> {
     let problem = bank_problem(bank)?;
     let count = problem.channels.len();
@@ -63,8 +63,8 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     })
 }
 
-/// The averages alone, of a bank on its own front ends and delays: far less work than the norm of a large
-/// bank.
+/// Only the averages of [`analyze`], with the bank's own front ends and delays. For a large bank this takes
+/// far less time than the norm.
 ///
 /// # Errors
 /// As [`analyze`].

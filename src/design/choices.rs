@@ -1,5 +1,4 @@
-//! What the designer chooses where a spec leaves it open: the latency, and the taps of the comparison
-//! methods.
+//! Defaults for what a spec leaves open: the latency, and the number of taps of the comparison methods.
 
 use super::DesignError;
 use super::methods::{Settings, iir};
@@ -9,7 +8,7 @@ use crate::spec::Spec;
 
 /// Latencies tried beyond the longest delay, in slow periods.
 const LATENCY_LADDER: [usize; 6] = [1, 2, 3, 4, 6, 8];
-/// A longer latency must lower gamma by this fraction to be worth it.
+/// A longer latency is chosen only if it lowers gamma by at least this fraction.
 const WORTHWHILE: f64 = 1e-3;
 
 /// The spec with nothing left open: latency, and taps for the methods that make FIR filters.
@@ -23,13 +22,13 @@ pub(super) fn completed(spec: &Spec) -> Result<Spec, DesignError> {
     Ok(complete)
 }
 
-/// Taps per channel: what the spec says, or for the comparison methods 12 M - 1, which is the thesis's 23
-/// for M = 2. The method `fir` has no default; [`Spec::check`] asks for the number.
+/// Taps per channel: the number in the spec, or 12 M - 1 for the comparison methods (23 for M = 2, as in
+/// the thesis). The method `fir` has no default; [`Spec::check`] asks for the number.
 fn taps(spec: &Spec) -> usize {
     spec.design.taps.unwrap_or(12 * spec.ratio - 1)
 }
 
-/// m0 of a spec in fast samples: what it says, or the designer's choice.
+/// The latency m0 of a spec in fast samples: the number in the spec, or the designer's choice.
 ///
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`], or no IIR optimum to choose by.
@@ -38,7 +37,7 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
 }
 
 /// The shortest latency of the ladder whose IIR optimum is within [`WORTHWHILE`] of the best; for FIR banks
-/// no shorter than half of their taps, so that the filters can look both ways.
+/// at least half of their taps, so that the filters use samples on both sides of the output instant.
 fn choose_latency(spec: &Spec) -> Result<usize, DesignError> {
     let base = Problem::new(spec, 0)?.longest_delay().0.ceil() as usize;
     let ladder = optima(spec, base)?;
@@ -48,7 +47,8 @@ fn choose_latency(spec: &Spec) -> Result<usize, DesignError> {
     Ok(if spec.design.method.has_taps() { chosen.max(centre(spec, base)) } else { chosen })
 }
 
-/// Latencies beyond `base` with their IIR optima, up to the first that all but reaches the noncausal bound.
+/// Latencies beyond `base` with their IIR optima, up to the first latency whose optimum is almost the
+/// noncausal bound.
 fn optima(spec: &Spec, base: usize) -> Result<Vec<(usize, f64)>, DesignError> {
     let mut ladder = Vec::new();
     for periods in LATENCY_LADDER {
@@ -63,7 +63,7 @@ fn optima(spec: &Spec, base: usize) -> Result<Vec<(usize, f64)>, DesignError> {
     Ok(ladder)
 }
 
-/// The latency at which FIR filters of the spec's length are centred on the sample they make.
+/// The latency at which FIR filters of the spec's length are centred on their output sample.
 fn centre(spec: &Spec, longest_delay: usize) -> usize {
     let taps = taps(spec);
     (taps / 2).max(longest_delay.min(taps))

@@ -1,4 +1,4 @@
-//! The way from a spec to a finished bank.
+//! The steps from a spec to a finished bank.
 
 use super::choices::completed;
 use super::methods::{self, DualPoint, Settings, Synthesis};
@@ -17,46 +17,46 @@ use std::time::{Duration, Instant};
 /// A bank with the record of its design.
 #[derive(Debug, Clone)]
 pub struct Design {
-    /// The bank, whole; with its proof where one was found.
+    /// The finished bank. It carries its proof if one was found.
     pub bank: Bank,
     /// The latency was left to the designer.
     pub latency_chosen: bool,
     /// The number of taps was left to the designer.
     pub taps_chosen: bool,
-    /// Where the worst case sits.
+    /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
-    /// Riccati equations or interior-point iterations.
+    /// Number of Riccati equations solved, or of interior-point iterations.
     pub iterations: usize,
-    /// For integer taps what they cost.
+    /// For integer taps, the increase of the error that they cause.
     pub words: Option<WordStudy>,
-    /// What became of the order, where the spec asks for fewer states.
+    /// The result of the order reduction, if the spec asks for fewer states.
     pub reduction: Option<OrderReduction>,
-    /// What the bank's proof proves, or the reason why the bank carries none.
+    /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
     /// Time that the search for the proof took.
     pub proof_time: Duration,
 }
 
-/// Whether a design looks for the proof of its gammas, which may take longer than the design itself.
+/// Whether [`design_with`] searches for a proof of the gammas. The search may take longer than the design.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProofSearch {
-    /// The bank carries its proof, if one is found.
+    /// Search. The bank carries the proof if one is found.
     Run,
-    /// The bank carries none, and [`Design::proof`] says that none was looked for.
+    /// Do not search. The bank carries no proof; [`Design::proof`] is [`DesignError::ProofSkipped`].
     Skip,
 }
 
 /// Designs the bank that `spec` asks for, with the proof of its gammas.
 ///
 /// # Errors
-/// [`DesignError`]: a spec that breaks the rules of [`Spec::check`], front ends that are none, a comparison
-/// method that does not apply, numerics that gave no bank at all. A bank without proof is no error: see
-/// [`Design::proof`].
+/// [`DesignError`] if the spec breaks a rule of [`Spec::check`], a filter of the spec is not a valid front
+/// end, a comparison method does not apply, or no bank was found for numerical reasons. A bank without a
+/// proof is not an error: see [`Design::proof`].
 pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     design_with(spec, ProofSearch::Run)
 }
 
-/// As [`design`], with the search for the proof left to the caller.
+/// As [`design`]; `search` says whether to search for a proof.
 ///
 /// # Errors
 /// As [`design`].
@@ -70,14 +70,14 @@ pub fn design_with(spec: &Spec, search: ProofSearch) -> Result<Design, DesignErr
     Ok(judge(spec, complete, realised, &synthesis).proved(&synthesis.dual, search))
 }
 
-/// The spec with nothing left open, and the problem that it states when the units are gone.
+/// The spec with all defaults filled in, and its problem in normalised time.
 fn normalise(spec: &Spec) -> Result<(Spec, Problem), DesignError> {
     let complete = completed(spec)?;
     let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
     Ok((complete, problem))
 }
 
-/// The settings of a method by a complete spec.
+/// The settings of the method, from a complete spec.
 fn settings(spec: &Spec) -> Result<Settings, DesignError> {
     let at_slow_rate = || {
         let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
@@ -92,8 +92,8 @@ fn settings(spec: &Spec) -> Result<Settings, DesignError> {
     })
 }
 
-/// The bank with the norm of its very coefficients, below which all lower bounds stay, and the whole of its
-/// spec.
+/// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that
+/// norm.
 fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis) -> Design {
     let Realised { filters, peak, reduction, integers } = realised;
     let (fixed_point, words) = integers.unzip();
@@ -123,7 +123,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
 }
 
 impl Design {
-    /// With the proof in the bank, if one is looked for and found.
+    /// Adds the proof to the bank, if `search` asks for one and it is found.
     fn proved(mut self, dual: &[DualPoint], search: ProofSearch) -> Self {
         if search == ProofSearch::Run {
             let begin = Instant::now();

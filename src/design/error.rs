@@ -1,4 +1,4 @@
-//! What can go wrong on the way from a spec to a bank.
+//! Errors of design and analysis.
 
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
@@ -10,13 +10,13 @@ use crate::spec::SpecProblem;
 use crate::units::FastPeriods;
 use crate::verify::VerifyError;
 
-/// Why a bank could not be designed or judged.
+/// Why a bank could not be designed or analysed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// The spec breaks a rule for specs.
     #[error(transparent)]
     Spec(#[from] SpecProblem),
-    /// A filter of the spec is no front end.
+    /// A filter of the spec is not a valid front end.
     #[error("{place}: {source}")]
     Analog {
         /// Which filter: the target's or a channel's.
@@ -30,7 +30,7 @@ pub enum DesignError {
     /// A decomposition failed.
     #[error(transparent)]
     Linalg(#[from] LinalgError),
-    /// Matrices that do not belong together.
+    /// Matrix sizes do not match.
     #[error(transparent)]
     Shapes(#[from] StateSpaceError),
     /// A sampled worst-case problem was not well formed.
@@ -50,7 +50,7 @@ pub enum DesignError {
         /// Most states.
         limit: usize,
     },
-    /// No certificate was found, not even somewhat above the computed norm.
+    /// No certificate was found, not even for a gamma up to 10 % above the computed norm.
     #[error(
         "the computed gamma could not be proven: no certificate passes up to 10 % above it; the front ends are too stiff or \
          the channels too nearly equal for double precision"
@@ -59,7 +59,7 @@ pub enum DesignError {
     /// The caller did not ask for a proof.
     #[error("no proof was looked for")]
     ProofSkipped,
-    /// Too large for the search.
+    /// The error system is too large for the search for a proof.
     #[error("a proof is looked for up to {limit} states of the error system, this bank's has {states}")]
     NotSearched {
         /// Its states.
@@ -67,23 +67,23 @@ pub enum DesignError {
         /// Most states.
         limit: usize,
     },
-    /// What was found does not prove the gammas.
+    /// The proof that was found does not prove the gammas.
     #[error(transparent)]
     Verify(#[from] VerifyError),
-    /// Nothing is left of the taps at the scale that was asked for.
+    /// At the requested scale all taps round to zero.
     #[error(
         "with fraction_bits = {fraction_bits} all integer taps are zero: the taps fit their bits up to fraction_bits = {fitting}; give about that, or leave it out"
     )]
     AllZero {
         /// The scale.
         fraction_bits: i32,
-        /// The finest one at which no tap is cut off.
+        /// The finest scale at which no tap is clipped.
         fitting: i32,
     },
-    /// The interior-point method gave no taps at all.
+    /// The interior-point method found no taps.
     #[error("no taps were found; please report the spec")]
     NoTaps,
-    /// The sinc comparison needs as many samples as Nyquist asks for.
+    /// The sinc comparison needs the Nyquist rate: as many channels as the ratio.
     #[error(
         "method = \"sinc\" needs as many channels as the ratio (N = M), got {channels} channels and ratio {ratio}: \
          use \"fir\", \"iir\" or \"h2\""
@@ -97,7 +97,7 @@ pub enum DesignError {
     /// Sample instants that do not determine a band-limited signal.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// A bank made elsewhere says nothing about its front ends.
+    /// The bank carries no spec, so its front ends are unknown.
     #[error(
         "this bank carries no spec (\"spec\": null): its front ends are unknown, so its error cannot be computed"
     )]
@@ -110,7 +110,7 @@ pub enum DesignError {
         /// N.
         channels: usize,
     },
-    /// Latency and delays so far apart that the lifted system does not fit into a computer.
+    /// Latency and delays are so far apart that the lifted system is too large.
     #[error(
         "latency {latency} and delays up to {longest_delay} need delay chains of {states} states, at most \
          {limit} are supported: check the unit of the delays (seconds), and bring latency and delays closer together"
@@ -133,7 +133,7 @@ pub enum DesignError {
         /// Expected columns.
         cols: usize,
     },
-    /// No Riccati equation could be solved, not even at the easy end.
+    /// No Riccati equation could be solved, not even at the largest gamma.
     #[error(
         "the Riccati equation could not be solved at gamma = {gamma}: the front ends are too stiff or the \
          channels too nearly equal for double precision; try method = \"fir\", or move nearly equal delays apart"

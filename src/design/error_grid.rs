@@ -1,5 +1,5 @@
-//! The error of FIR banks on a fine grid of frequencies: an estimate of gamma, cheap enough for taps that
-//! still change.
+//! The error of FIR banks on a fine grid of frequencies. It gives a cheap estimate of gamma while the taps
+//! are still being optimised.
 
 use super::DesignError;
 use super::exchange::{AffineError, Peaks};
@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 /// Grid intervals for each slow lag: enough for the mean square of a polynomial of that degree to be exact.
 const POINTS_PER_LAG: usize = 3;
 const LEAST_POINTS: usize = 24;
-/// Peaks are looked for on a grid this much finer.
+/// The grid for peaks is finer by this factor.
 const FINE: usize = 8;
 
 /// A plant at equidistant frequencies from 0 to pi.
@@ -36,7 +36,7 @@ impl<'a> ErrorGrid<'a> {
         &self.points
     }
 
-    /// Those that are enough for a mean square, with their trapezoidal weights.
+    /// The coarser points that suffice for a mean square, with their trapezoidal weights.
     pub(super) fn coarse(&self) -> (Vec<Point>, Vec<f64>) {
         let points: Vec<Point> = self.points.iter().step_by(FINE).cloned().collect();
         let last = points.len() - 1;
@@ -64,8 +64,8 @@ impl<'a> ErrorGrid<'a> {
         self.points.iter().enumerate().map(square).sum::<f64>() / last as f64
     }
 
-    /// The peaks of the error with `taps`: at the points of the grid, and between them on the parabolas
-    /// through three neighbours.
+    /// The peaks of the error with `taps`. A parabola through three neighbouring grid points locates a peak
+    /// between them.
     pub(super) fn peaks(&self, taps: &[Mat]) -> Result<Peaks, DesignError> {
         let gains = self.gains(taps)?;
         let step = self.points[1].omega;

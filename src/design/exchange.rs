@@ -7,14 +7,14 @@
 //! K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega),
 //! ```
 //!
-//! a semi-infinite problem with one constraint per frequency. On finitely many points it is solved with its
-//! dual by [`sampled`]. The optimum on the points is a lower bound for all frequencies, because fewer points
-//! are fewer constraints. The peaks of the error between the points are added to them until the largest peak
-//! meets the bound.
+//! This is a semi-infinite problem with one constraint per frequency. [`sampled`] solves it and its dual at
+//! finitely many points. The optimum at the points is a lower bound of the optimum over all frequencies,
+//! because it has fewer constraints. The peaks of the error between the points are added to them until the
+//! largest peak meets the bound.
 //!
-//! Optimal unknowns are not unique. Among those with a gamma within a margin of the optimum, the ones with
-//! the least weighted mean square are chosen (the secondary objective), again with peaks added where they
-//! exceed the cap.
+//! Optimal unknowns are not unique. Among those whose gamma is within a margin of the optimum, the exchange
+//! chooses the ones with the least weighted mean square (the secondary objective). Peaks above the margin
+//! are again added as points.
 //!
 //! FIR design uses it with the taps as unknowns (thesis 5.4), order reduction with the output matrices of
 //! given dynamics (J = 1). Source: Hettich and Kortanek, "Semi-infinite programming", SIAM Review 35 (1993),
@@ -27,8 +27,8 @@ use crate::lti::peak::Peak;
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
-/// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so it costs
-/// next to nothing.
+/// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so even
+/// this margin lets the mean square improve.
 pub(super) const LEAST_MARGIN: f64 = 4e-7;
 /// Tolerance of the optimum on the points, relative to [`GAMMA_ACCURACY`].
 const POINTS_ACCURACY: f64 = 0.1;
@@ -56,7 +56,7 @@ pub(super) trait AffineError {
 /// Local maxima of `sigma_max(K)` over the frequencies.
 #[derive(Debug, Clone)]
 pub(super) struct Peaks {
-    /// Estimate of gamma, exact if no peak was missed.
+    /// Estimate of gamma; equal to gamma if no peak was missed.
     pub(super) estimate: f64,
     /// The peaks, in any order.
     pub(super) peaks: Vec<Peak>,

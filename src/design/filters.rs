@@ -95,7 +95,7 @@ mod tests {
                 let want = (0..answer.len()).map(|n| filter.get(n).copied().unwrap_or(0.0));
                 assert_eq!(answer, want.collect::<Vec<_>>(), "ratio {ratio}, channel {i}");
             }
-            // By way of the matrices in a bank file nothing changes.
+            // Conversion to the matrices of a bank file and back changes nothing.
             let stored = SynthesisFilters::StateSpace(to_block(&system));
             assert_eq!(lifted(&stored, ratio).unwrap(), system);
         }

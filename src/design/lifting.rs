@@ -1,17 +1,17 @@
 //! The exact discrete-time equivalent of the hybrid system, lifted to one step per slow period (thesis 5.2,
 //! Theorem 5.1).
 //!
-//! In one slow period the analog state moves under the input; every sample, of a slow channel or of the
-//! ideal fast one, is a row of that state at some instant of the period. The period is cut at these
-//! instants. Over a piece of length l the state becomes e^{A l} x + w with w independent of the other
-//! pieces and w w* = G(l), the finite-time Gramian; any square root of G(l) is a norm-equivalent input
-//! (thesis 5.16). Following the state from instant to instant therefore gives the lifted system with all its
-//! feedthroughs at once, for any real delays, and never squares anything.
+//! The input drives the analog state through one slow period. Each sample, of a slow channel or of the
+//! ideal fast one, is a linear output C x of that state at some instant of the period. These instants
+//! divide the period into segments. Over a segment of length l the state becomes e^{A l} x + w. Here w does
+//! not depend on the other segments, and w w* = G(l) is the finite-time Gramian. Any square root of G(l) is
+//! a norm-equivalent input (thesis 5.16). Propagating the state from instant to instant therefore gives the
+//! whole lifted system with its feedthroughs, for any real delays. No matrix is squared on the way.
 //!
-//! Time labels: moving all instants by one constant changes neither the norm of the error system
-//! nor the filters. The latest instant is put at the very end of the period, so that the other
-//! samples are *ahead* of the state at its beginning and need no delay chains. An instant earlier than
-//! one period is that of the same row, delayed by whole periods.
+//! Choice of the time origin: a common shift of all instants changes neither the norm of the error system
+//! nor the filters. The latest instant is placed at the end of the period. All samples taken within that
+//! period then come *after* the state at its beginning and need no delay chains. An older sample is the
+//! sample at the same phase of the period, delayed by whole periods.
 
 use super::DesignError;
 use super::problem::Problem;
@@ -21,15 +21,15 @@ use crate::lti::StateSpace;
 use crate::lti::exponential::{StateTransition, gramian_root};
 use std::ops::Range;
 
-/// Instants closer than this (fast periods) are one: far below what any converter resolves, far above
-/// the rounding of delay / period.
+/// Instants closer than this (in fast periods) are treated as equal. It is far below the resolution of any
+/// converter and far above the rounding error of delay / period.
 const SAME_INSTANT: f64 = 1e-11;
 
 /// The lifted analysis side.
 pub(super) struct Lifted {
     /// x+ = A x + B w, [y; z] = C x + D w.
     pub(super) system: StateSpace,
-    /// For each measurement the states of its delay chain, first link first.
+    /// For each measurement the states of its delay chain; the first state holds the newest sample.
     pub(super) chains: Vec<Range<usize>>,
 }
 
@@ -40,11 +40,11 @@ struct SamplingInstant {
     front_end: usize,
     /// Fast periods after the beginning of the slow period, in (0, M].
     time: f64,
-    /// Slow periods by which the sample is delayed besides.
+    /// Whole slow periods by which the sample is delayed in addition.
     delay: usize,
 }
 
-/// The exact equivalent of `problem`.
+/// The exactly equivalent lifted system of `problem`.
 pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
     let instants = schedule(problem);
     let delays: Vec<usize> = instants.iter().map(|instant| instant.delay).collect();
@@ -79,8 +79,8 @@ fn before_the_end(front_end: usize, age: f64, period: f64) -> SamplingInstant {
     SamplingInstant { front_end, time, delay: delay as usize }
 }
 
-/// Follows the joint analog state through one period: the system whose outputs are the samples, as yet
-/// without their delays by whole periods.
+/// Propagates the joint analog state through one period. The outputs of the returned system are the
+/// samples, without their delays by whole periods.
 fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<StateSpace, DesignError> {
     let joint = JointState::new(&problem.front_ends)?;
     let mut order: Vec<usize> = (0..instants.len()).collect();
@@ -98,7 +98,7 @@ fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<State
         let output = joint.c.rows(front_end, 1);
         rows[index] = (output * &state, output * &input);
     }
-    // The latest sample ends the period by construction; a rest below SAME_INSTANT is none.
+    // The latest sample ends the period by construction; a remainder below SAME_INSTANT is ignored.
     debug_assert!(problem.ratio as f64 - now < SAME_INSTANT);
     let width = input.ncols();
     let (c, d): (Vec<Mat>, Vec<Mat>) =
@@ -130,7 +130,7 @@ impl JointState {
         self.b.nrows()
     }
 
-    /// x <- e^{A l} x + S w_new over a piece of length l: the new inputs become further columns.
+    /// x <- e^{A l} x + S w_new over a segment of length l: the new inputs become further columns.
     fn advance(&self, state: &Mat, input: &Mat, length: f64) -> Result<(Mat, Mat), DesignError> {
         let transition = self.transition.over(length);
         let root = gramian_root(&self.transition, &self.b, length)?;

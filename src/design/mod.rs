@@ -1,4 +1,5 @@
-//! From a spec to a bank: exact equivalence, lifting, IIR, H2 and FIR design, certificates.
+//! Designs a bank from a spec. The analog and digital parts become one exactly equivalent discrete-time
+//! system ([`LiftedPlant`]); an IIR, H2 or FIR method finds the filters; a certificate proves their error.
 
 pub mod analysis;
 mod choices;
@@ -28,8 +29,8 @@ pub use reduction::{OrderErrorPoint, OrderReduction};
 use crate::bank::{Bank, Proof};
 use crate::verify::Verified;
 
-/// Whatever can be proven of the gammas of a bank that was designed elsewhere or earlier. [`design`] has
-/// seen more, the dual of its optimum, and may prove a higher lower end.
+/// Searches for a proof of the gammas of a bank that was designed elsewhere or earlier. [`design`] also
+/// knows the dual solution of its optimum, so it may prove a larger lower bound.
 ///
 /// # Errors
 /// As [`analyze`]; [`DesignError::NotCertified`] if no certificate was found.

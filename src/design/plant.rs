@@ -1,4 +1,5 @@
-//! The lifted plant: what the design methods see of front ends, delays and rates.
+//! The lifted plant: the discrete-time model of front ends, delays and rates on which the design methods
+//! work.
 
 use super::DesignError;
 use super::filters;
@@ -14,7 +15,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// Initial frequencies of a norm for each lag of FIR filters.
+/// Number of initial frequencies in the search for a norm, per lag of FIR filters.
 const FREQUENCIES_PER_LAG: usize = 4;
 
 /// The hybrid error system of the thesis as a discrete-time plant, one step per slow period (Props. 5.1 to
@@ -33,8 +34,8 @@ const FREQUENCIES_PER_LAG: usize = 4;
 /// ```
 ///
 /// `x+ = A x + B w`, `[y; z] = C x + D w`, and `||K|| = ||W - F H||` is the gain from the analog input to
-/// the error, h = 1. The input w is norm-equivalent to the analog one: `[H; W] [H; W]*` is that of the
-/// hybrid system, so the singular values of K are too. F holds the polyphase components `F_{p,i}` of the
+/// the error, h = 1. The input w is norm-equivalent to the analog input: `[H; W] [H; W]*` equals that of
+/// the hybrid system, so K has the same singular values. F holds the polyphase components `F_{p,i}` of the
 /// synthesis filters.
 #[derive(Debug, Clone)]
 pub struct LiftedPlant {
@@ -46,7 +47,7 @@ pub struct LiftedPlant {
 }
 
 impl LiftedPlant {
-    /// The exact equivalent of `problem`.
+    /// The exactly equivalent plant of `problem`.
     ///
     /// # Errors
     /// [`DesignError::Linalg`] or [`DesignError::Shapes`] never for a [`Problem`] made by [`Problem::new`].
@@ -56,7 +57,7 @@ impl LiftedPlant {
         Ok(Self { problem, system, chains, response: OnceLock::new(), resonances: OnceLock::new() })
     }
 
-    /// What was lifted.
+    /// The problem in normalised time from which the plant was made.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
@@ -92,8 +93,9 @@ impl LiftedPlant {
         Ok(self.system.select_outputs(self.channels()..self.channels() + self.ratio())?)
     }
 
-    /// The states of the delay chain of `channel`, first link first; empty unless the channel is delayed by
-    /// whole slow periods. The measurement is then the last link, without feedthrough.
+    /// The states of the delay chain of `channel`, newest sample first. The range is empty unless the
+    /// channel is delayed by whole slow periods. The measurement of a delayed channel is the last state of
+    /// its chain, without feedthrough.
     pub(super) fn chain(&self, channel: usize) -> Range<usize> {
         self.chains[channel].clone()
     }
@@ -117,8 +119,8 @@ impl LiftedPlant {
         Ok(self.driving(filters)?.map_outputs(&linalg::hstack(&[&-&unity, &unity])?)?)
     }
 
-    /// (H, W) at e^{j omega}, omega in radians per slow period, their columns compressed to at most N + M:
-    /// the products of `[H; W]` with its adjoint are kept.
+    /// (H, W) at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N +
+    /// M, which keeps `[H; W] [H; W]*`.
     pub fn response(&self, omega: f64) -> (CMat, CMat) {
         let g = linalg::lq_factor_c(&self.frequency_response().at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
@@ -134,8 +136,8 @@ impl LiftedPlant {
         Ok(hinf_norm(&self.error_system(filters)?)?)
     }
 
-    /// As [`LiftedPlant::norm`] for FIR filters `taps[i][n] = f_i[n]`: their response is a polynomial, and
-    /// that of the plant is prepared once for all filters.
+    /// As [`LiftedPlant::norm`], faster for FIR filters `taps[i][n] = f_i[n]`: their response is a
+    /// polynomial, and the response of the plant is prepared once for all filters.
     ///
     /// # Errors
     /// [`DesignError::Shapes`] unless there is a filter for each channel, [`DesignError::Lti`] if the plant
@@ -149,14 +151,14 @@ impl LiftedPlant {
             let g = plant.at_frequency(w);
             g.rows(n, m) - filters::response(&lags, w) * g.rows(0, n)
         };
-        // A polynomial in e^{-jw} has at most a peak for each of its lags between 0 and pi.
+        // Between 0 and pi a polynomial in e^{-jw} has at most one peak per lag.
         let grid = FREQUENCIES_PER_LAG * lags.len();
         let mut initial = self.resonances()?.to_vec();
         initial.extend((1..grid).map(|k| PI * k as f64 / grid as f64));
         Ok(hinf_norm_with_response(&system, &response, initial)?)
     }
 
-    /// ||K|| of the very coefficients of a bank.
+    /// ||K|| of a bank's filters, computed from the coefficients in the bank.
     ///
     /// # Errors
     /// As [`LiftedPlant::norm`]; [`DesignError::RaggedStateSpace`] for matrices with rows of unequal
@@ -168,8 +170,8 @@ impl LiftedPlant {
         }
     }
 
-    /// What the measurements leave unexplained of the references: max over omega of sigma_max(W - W H* (H
-    /// H*)^+ H). No filter, causal or not, has a smaller ||K||.
+    /// The part of the references that no filter can estimate from the measurements: max over omega of
+    /// sigma_max(W - W H* (H H*)^+ H). No filter, causal or not, has a smaller ||K||.
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable.
@@ -181,8 +183,8 @@ impl LiftedPlant {
         self.response.get_or_init(|| FrequencyResponse::new(&self.system.compress_inputs()))
     }
 
-    /// The frequencies near the poles of the plant, which are those of all FIR error systems, apart from
-    /// poles at zero.
+    /// The frequencies near the poles of the plant. Apart from poles at zero, every FIR error system has
+    /// these poles.
     fn resonances(&self) -> Result<&[f64], DesignError> {
         if self.resonances.get().is_none() {
             let found = resonances(&stable_poles(&self.system)?);

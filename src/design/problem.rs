@@ -1,4 +1,4 @@
-//! The design problem in normalised time: what is left of a spec when the units are gone.
+//! The design problem in normalised time: a spec without its units.
 
 use super::DesignError;
 use crate::analog::StrictlyProper;
@@ -6,18 +6,18 @@ use crate::linalg::Mat;
 use crate::spec::{FilterSpec, Spec};
 use crate::units::FastPeriods;
 
-/// Most states of the delay chains of the blocked system. Its matrices are dense: at this size one of them
-/// takes 128 MiB, and a norm some of these and a cubic number of operations.
+/// Maximum number of states of the delay chains of the lifted system. Its matrices are dense: at this size
+/// one matrix takes 128 MiB. A norm needs several of them, and its time grows with the cube of the states.
 pub const MAX_CHAIN_STATES: usize = 4096;
 
 /// Front ends, delays and rates in units of the fast period (h = 1).
 #[derive(Debug, Clone)]
 pub struct Problem {
-    /// M.
+    /// M, the ratio of output rate to input rate.
     pub ratio: usize,
-    /// m0, fast samples.
+    /// The latency m0 in fast samples.
     pub latency: usize,
-    /// The distinct analog filters. Channels with equal filters share one, and so its state.
+    /// The distinct analog filters. Channels with equal filters share one filter and its state.
     pub front_ends: Vec<StrictlyProper>,
     /// Index of Phi_0 in `front_ends`.
     pub target: usize,
@@ -57,7 +57,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Delay chains of bounded length.
+    /// Checks that the delay chains are not too long.
     ///
     /// # Errors
     /// [`DesignError::TooLate`] if latency and delays lie so far apart that the chains between them have
@@ -85,8 +85,8 @@ impl Problem {
         moved
     }
 
-    /// Each group of channels that cannot be told apart (same filter, same delay) replaced by one, their
-    /// weighted mean.
+    /// Replaces each group of identical channels (same filter, same delay) by one channel, their weighted
+    /// mean.
     pub(super) fn merge_channels(&self) -> MergedChannels {
         let mut merged = self.clone();
         merged.channels.clear();
@@ -114,17 +114,16 @@ impl Problem {
     }
 }
 
-/// A problem in which no two channels are alike, and the shares that the original channels have in its
-/// filters.
+/// A problem without identical channels, and the share of each original channel in its merged channel.
 #[derive(Debug, Clone)]
 pub(super) struct MergedChannels {
-    /// Each channel once.
+    /// The problem with each distinct channel once.
     pub(super) problem: Problem,
     /// One for each of the original channels.
     pub(super) shares: Vec<Share>,
 }
 
-/// Which merged channel a channel is part of, and its weight there.
+/// The merged channel to which a channel belongs, and its weight there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Share {
     /// Index of the merged channel.
@@ -134,18 +133,20 @@ pub(super) struct Share {
 }
 
 impl MergedChannels {
-    /// No channel is like another.
+    /// Whether the original channels were all distinct.
     pub(super) fn are_all(&self) -> bool {
         self.problem.channels.len() == self.shares.len()
     }
 
-    /// Channels that cannot be told apart share their common filter: the same error, the least noise.
+    /// Distributes each merged filter over its identical channels by their shares. The error stays the
+    /// same, and the noise is least.
     pub(super) fn share_taps(&self, taps: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let share = |part: &Share| taps[part.representative].iter().map(|tap| tap * part.share).collect();
         self.shares.iter().map(share).collect()
     }
 
-    /// From the original channels to the merged ones: F for these times this matrix is F for those.
+    /// The matrix that maps the original channels to the merged ones: F of the merged channels times this
+    /// matrix is F of the original channels.
     pub(super) fn shares(&self) -> Mat {
         let entry = |merged: usize, channel: usize| {
             let part = self.shares[channel];
@@ -155,8 +156,8 @@ impl MergedChannels {
     }
 }
 
-/// The weights, of sum 1, with which a mean of equal signals with noise of the given powers has the least
-/// noise: in inverse proportion to the powers; among the noiseless alone if there are any.
+/// Weights of sum 1 for the mean of equal signals with the least noise, given the noise power of each. They
+/// are inversely proportional to the powers. If any signals are noiseless, only these have weight.
 fn least_noise_shares(noise: &[f64]) -> Vec<f64> {
     let least = noise.iter().copied().fold(f64::INFINITY, f64::min);
     let weight = |power: f64| if least == 0.0 { f64::from(u8::from(power == 0.0)) } else { least / power };

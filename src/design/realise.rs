@@ -1,5 +1,6 @@
-//! From the filters of a method to those of a bank: shared among merged channels, of the order and word
-//! length that the spec asks for, in the form that runs fastest.
+//! Turns the filters of a method into those of a bank: it distributes the filters of merged channels,
+//! reduces the order or quantises the taps if the spec asks for it, and chooses the realisation that runs
+//! fastest.
 
 use super::methods::{Filters, Synthesis};
 use super::plant::LiftedPlant;
@@ -12,13 +13,13 @@ use crate::lti::peak::Peak;
 use crate::lti::{FirWithTail, StateSpace};
 use crate::spec::{Method, Spec};
 
-/// A change of coordinates may cost this fraction of gamma.
+/// A change of coordinates may increase gamma by this fraction.
 const FORM_ACCURACY: f64 = 1e-9;
 
-/// A bank's filters as they go into the file, with what became of their order and of their taps.
+/// A bank's filters as they are written to the file, with the results of order reduction and quantisation.
 pub(super) struct Realised {
     pub(super) filters: SynthesisFilters,
-    /// The norm of the error system of these very coefficients.
+    /// The norm of the error system of the final coefficients.
     pub(super) peak: Peak,
     pub(super) reduction: Option<OrderReduction>,
     pub(super) integers: Option<(FixedPoint, WordStudy)>,
@@ -36,10 +37,10 @@ impl From<Judged> for Realised {
     }
 }
 
-/// The filters of `synthesis`, made for the `merged` channels, as those of all channels of `problem`.
+/// Extends the filters of `synthesis`, designed for the `merged` channels, to all channels of `problem`.
 ///
 /// # Errors
-/// [`DesignError`] as the reduction, the search for integers and the norm.
+/// [`DesignError`] if the order reduction, the quantisation or the norm fails.
 pub(super) fn realise(
     spec: &Spec,
     problem: &Problem,
@@ -60,7 +61,7 @@ struct Realisation<'a> {
     /// All channels.
     whole: &'a LiftedPlant,
     merged: &'a MergedChannels,
-    /// Those that can be told apart.
+    /// The merged channels.
     merged_plant: &'a LiftedPlant,
 }
 
@@ -72,7 +73,7 @@ impl Realisation<'_> {
         judged(self.whole, SynthesisFilters::Fir(self.merged.share_taps(taps)))
     }
 
-    /// With integer taps where the spec asks for these.
+    /// Quantises the taps if the spec asks for integer taps.
     fn with_integers(&self, real: Judged) -> Result<Realised, DesignError> {
         let (SynthesisFilters::Fir(taps), Some(bits)) = (&real.filters, &self.spec.design.bits) else {
             return Ok(real.into());
@@ -88,8 +89,8 @@ impl Realisation<'_> {
         Ok(Realised { integers: Some((integers, study)), ..judged.into() })
     }
 
-    /// A recursive bank of the order that the spec asks for; `norm` is that of `system` on the merged
-    /// channels.
+    /// A recursive bank of the order that the spec asks for; `norm` is the norm of the error of `system`
+    /// with the merged channels.
     fn state_space(&self, system: &StateSpace, norm: f64) -> Result<Realised, DesignError> {
         let full = self.fastest_form(&system.map_inputs(&self.merged.shares())?, norm)?;
         let (Some(reduction), SynthesisFilters::StateSpace(block)) =
@@ -113,7 +114,7 @@ impl Realisation<'_> {
         Ok(Realised { reduction: Some(record), ..judged.into() })
     }
 
-    /// A reduced bank for all channels, in a fast form if one keeps the norm `promised`.
+    /// A reduced bank for all channels, in a fast realisation if one keeps the norm `promised`.
     fn reduced_form(&self, reduced: &FirWithTail, promised: f64) -> Result<Judged, DesignError> {
         let whole = reduced.map_inputs(&self.merged.shares())?;
         match self.fast_form(&whole, promised)? {
@@ -122,8 +123,8 @@ impl Realisation<'_> {
         }
     }
 
-    /// The filters in the cheapest form that keeps the norm `promised`: parallel sections behind a FIR
-    /// head, a triangle there, or else as they are.
+    /// The filters in the cheapest realisation that keeps the norm `promised`: an FIR head followed by
+    /// parallel sections, an FIR head followed by a triangular state matrix, or the filters as they are.
     fn fastest_form(&self, system: &StateSpace, promised: f64) -> Result<Judged, DesignError> {
         match self.fast_form(&FirWithTail::new(system)?, promised)? {
             Some(found) => Ok(found),
@@ -131,7 +132,7 @@ impl Realisation<'_> {
         }
     }
 
-    /// The first of the fast forms that keeps the norm, if any does.
+    /// The first of the fast realisations that keeps the norm, if any does.
     fn fast_form(&self, split: &FirWithTail, promised: f64) -> Result<Option<Judged>, DesignError> {
         let forms = [split.modal(), split.triangular().map(Some)];
         for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {

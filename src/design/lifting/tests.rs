@@ -33,7 +33,7 @@ fn problems() -> Vec<Problem> {
         // Delayed by whole periods, at the border of a period, and longer than the latency.
         one_pole(&[0.1, 4.0], 2, 0, &[(0, 0.0), (1, 4.0), (0, 7.3)]),
         one_pole(&[0.7], 4, 13, &[(0, 0.25), (0, 0.25), (0, 9.0)]),
-        // Equal but for rounding.
+        // Equal up to rounding.
         one_pole(&[1.0], 2, 5, &[(0, 0.1 + 0.2), (0, 0.3)]),
     ]
 }

@@ -10,17 +10,19 @@ use crate::lti::riccati::{self, RiccatiOutcome, RiccatiSolution};
 use crate::lti::{LtiError, StateSpace};
 use std::ops::Range;
 
-/// A feedthrough below this fraction of its measurement is rounding: the channel adds no information.
+/// A feedthrough below this fraction of its measurement is a rounding error: the channel adds no
+/// information.
 const INNOVATION_FLOOR: f64 = 1e-12;
-/// A verdict "impossible" is believed up to this residual of the Riccati equation, in coordinates in which
-/// the mean-square covariance is the identity: the plant to which the verdict applies exactly is that close.
+/// The result "impossible" is accepted up to this residual of the Riccati equation, in coordinates in which
+/// the mean-square covariance is the identity. The result is exact for a plant that differs by no more than
+/// that.
 const RESIDUAL_OF_PROOF: f64 = 1e-7;
-/// Directions with less than this share of the largest error variance are scaled as if they had it.
+/// Least share of the largest error variance with which a direction is scaled.
 const BALANCING_FLOOR: f64 = 1e-13;
-/// Eigenvalues of a semidefinite matrix do not fall this far (relative) below zero by rounding.
+/// Rounding does not move an eigenvalue of a semidefinite matrix this far (relative) below zero.
 const CLEARLY_NEGATIVE: f64 = 1e-5;
 
-/// The plant with the measured inputs taken out.
+/// The plant with the measured inputs eliminated.
 ///
 /// Measurements are of two kinds. Those *with feedthrough* depend on the inputs of the period itself: y_f =
 /// L (C_f x + w1) with L triangular. *Delayed* ones (channels delayed by whole periods) are states of a
@@ -33,10 +35,10 @@ const CLEARLY_NEGATIVE: f64 = 1e-5;
 /// never appears, only its triangular root L.
 ///
 /// Substituting P = P0 + Delta turns the Riccati equation into one for Delta with R + C P0 C' in place of R
-/// and F P0 F' + Q - P0 in place of Q. P0 is diagonal on the delay chains, where the last link moves
-/// nowhere, so that no cross terms arise: the delayed measurements get unit noise, exactly undone in Q. It
-/// falls along the chain, which keeps Q positive at the last link (the doubling would break down on its
-/// first step otherwise).
+/// and F P0 F' + Q - P0 in place of Q. P0 is diagonal on the delay chains. The last state of a chain drives
+/// no other state, so that no cross terms arise. The delayed measurements get unit noise, which the change
+/// of Q compensates exactly. P0 decreases along the chain, which keeps Q positive at the last state;
+/// otherwise the doubling algorithm would break down on its first step.
 #[derive(Debug, Clone)]
 pub(super) struct Innovations {
     f: Mat,
@@ -57,14 +59,14 @@ pub(super) struct Innovations {
     channels: usize,
     /// A channel was left out because its feedthrough is rounding.
     incomplete: bool,
-    /// The verdict "impossible" may be believed: the coordinates are balanced and no channel is left out.
+    /// The result "impossible" may be accepted: the coordinates are balanced and no channel is left out.
     conclusive: bool,
-    /// The same in the plant's own coordinates, unless these are they.
+    /// The same in the plant's own coordinates; `None` if the coordinates are already those of the plant.
     plant: Option<Box<PlantSide>>,
 }
 
-/// What a filter is made of, in the coordinates of the plant. There the delay chains are visible: their
-/// columns hold a single one and exact zeros.
+/// The matrices from which a filter is built, in the coordinates of the plant. In these the columns of the
+/// delay chains have one entry 1 and exact zeros elsewhere.
 #[derive(Debug, Clone)]
 struct PlantSide {
     /// From these coordinates to those of the plant.
@@ -86,20 +88,20 @@ struct DelayedChannel {
 /// A filter xh+ = a xh + b y, zh = c xh + d y.
 pub(super) type Filter = StateSpace;
 
-/// What one gamma came to.
+/// The result for one gamma.
 #[derive(Debug, Clone)]
 pub(super) enum Trial {
     /// A stable filter that achieves it.
     Achieved(Filter),
-    /// The stabilising solution exists and has the wrong inertia: no filter achieves it.
+    /// The stabilising solution exists and has the wrong inertia, so no filter achieves gamma.
     Impossible,
-    /// The numerics say nothing.
+    /// Undecided, for numerical reasons.
     Unresolved,
 }
 
 impl Innovations {
-    /// The problem in balanced coordinates, where they exist, and in those of the plant: near the edge of
-    /// double precision sometimes only one of them is solvable.
+    /// The problem in balanced coordinates, if they exist, and in those of the plant. Near the limits of
+    /// double precision sometimes only one of the two can be solved.
     pub(super) fn in_all_coordinates(plant: &LiftedPlant) -> Result<Vec<Self>, DesignError> {
         let plain = Self::new(plant)?;
         Ok(plain.balanced().into_iter().chain([plain]).collect())
@@ -170,8 +172,8 @@ impl Innovations {
     }
 
     /// The same problem in state coordinates in which the mean-square optimal prediction error is white.
-    /// States of smooth front ends differ by many decades and are nearly dependent; the covariances of all
-    /// gammas are near the mean-square one, so there they are near the identity.
+    /// The states of smooth front ends differ by many decades and are nearly dependent. The covariances of
+    /// all gammas are near the mean-square one, so in these coordinates they are near the identity.
     ///
     /// `None` where the mean-square problem has no usable solution.
     pub(super) fn balanced(&self) -> Option<Self> {
@@ -199,8 +201,8 @@ impl Innovations {
         })
     }
 
-    /// sigma_max(Y): no causal filter has a smaller error, since nothing measured depends on these inputs
-    /// in time.
+    /// sigma_max(Y), a lower bound of the error of every causal filter: no measurement that is available in
+    /// time depends on these inputs.
     pub(super) fn unmeasured_feedthrough(&self) -> Result<f64, DesignError> {
         if self.y.is_empty() {
             return Ok(0.0);
@@ -208,7 +210,7 @@ impl Innovations {
         Ok(linalg::singular_values(&self.y)?[0])
     }
 
-    /// The mean-square optimal (Kalman) filter: gamma to infinity.
+    /// The mean-square optimal (Kalman) filter, which is the limit for gamma to infinity.
     pub(super) fn h2(&self) -> Option<Filter> {
         self.filter(&self.mean_square_covariance()?)
     }
@@ -249,10 +251,10 @@ impl Innovations {
         Some((f, linalg::symmetric_part(&g), linalg::symmetric_part(&h)))
     }
 
-    /// gamma is achieved iff P >= 0 and C1 P+ C1' < E with the a-posteriori covariance P+. Where gamma falls
-    /// through the optimum that margin closes and an eigenvalue of P leaves through infinity to come back
-    /// negative: only such an eigenvalue is taken for a proof. That the filter keeps the promise is for the
-    /// caller to verify on the error system itself, which is worth more than the rounded margin.
+    /// gamma is achieved iff P >= 0 and C1 P+ C1' < E with the a-posteriori covariance P+. As gamma
+    /// decreases through the optimum, that margin closes, and an eigenvalue of P goes through infinity and
+    /// becomes negative. Only such an eigenvalue counts as a proof that gamma is impossible. Rounding
+    /// errors affect the margin, so the caller computes the norm of the error system of the filter.
     fn judge(&self, solution: &RiccatiSolution) -> Trial {
         let p = &solution.x + &self.p0;
         let Ok(eigenvalues) = linalg::symmetric_eigenvalues(&p) else { return Trial::Unresolved };
@@ -274,7 +276,7 @@ impl Innovations {
     }
 
     /// The central filter of a covariance: gains K = F P C2' Ry^-1 and Df = C1 P C2' Ry^-1. Its states are
-    /// estimates of the plant's, whatever the coordinates of P.
+    /// estimates of the plant's states, in all coordinates of P.
     fn filter(&self, p: &Mat) -> Option<Filter> {
         let pc = p * self.c2.transpose();
         let gain = linalg::solve_positive(&self.innovation(p), &pc.transpose()).ok()?.transpose();
@@ -310,7 +312,7 @@ impl Innovations {
     }
 }
 
-/// The rows C_d that read the last link of each chain, in units of its size.
+/// The rows C_d, which output the last state of each chain, in units of its size.
 fn last_links(delayed: &[DelayedChannel], n: usize) -> Mat {
     let entry = |row: usize, state: usize| {
         if state + 1 == delayed[row].chain.end { 1.0 / delayed[row].size } else { 0.0 }
@@ -332,12 +334,12 @@ fn chain_variances(delayed: &[DelayedChannel], n: usize) -> Mat {
 fn unwhiten(root: &Mat, m: &Mat) -> Mat {
     let n = root.nrows();
     let flipped = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(m.nrows() - 1 - i, j)]);
-    // root' x = m' is upper triangular: turn both upside down to use the lower solver.
+    // root' x = m' is upper triangular: reverse the order of rows and columns to use the lower solver.
     let upper = Mat::from_fn(n, n, |i, j| root[(n - 1 - j, n - 1 - i)]);
     flipped(&linalg::solve_lower(&upper, &flipped(&m.transpose()))).transpose()
 }
 
-/// The channels whose feedthrough is more than rounding, given the channels before them.
+/// The channels whose feedthrough, given the channels before them, is larger than rounding errors.
 fn independent(plant: &LiftedPlant, direct: &[usize], sizes: &[f64]) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::with_capacity(direct.len());
     for &channel in direct {

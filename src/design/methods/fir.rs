@@ -1,4 +1,4 @@
-//! FIR design: the taps of least gamma (thesis 5.4), and of least mean-square error among these.
+//! FIR design: the taps of least gamma (thesis 5.4), and among these the ones of least mean-square error.
 //!
 //! The bounded-real LMI of thesis 5.4 in the frequency domain is the semi-infinite problem min over taps of
 //! max over w of sigma_max(W(w) - F(w) H(w)), which [`Exchange`] solves: its lower bound holds for all taps of
@@ -15,15 +15,16 @@ use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem};
 use crate::lti::peak::Peak;
 
-/// Where the converters' noise is known, less of it is worth this much of gamma unless the spec says otherwise.
+/// Default relative margin of gamma that may be spent on less noise at the output, if the converters' noise
+/// is known.
 const NOISY_MARGIN: f64 = 1e-3;
-/// Times that the norm may find a peak that the estimates have missed.
+/// Limit on the number of times that the norm finds a peak which the estimates missed.
 const SURPRISE_LIMIT: usize = 8;
 
-/// The `settings.taps` taps per channel of least gamma within [`GAMMA_ACCURACY`]. Optimal banks are many: among
-/// them, and within the gamma margin, those of least power per slow period of the error for white noise of unit
-/// density at the analog input and of the converters' noise at the output,
-/// `||K||_2^2 + sum_i noise_i ||f_i||^2`.
+/// The `settings.taps` taps per channel of least gamma within [`GAMMA_ACCURACY`]. Optimal banks are not
+/// unique. Of all banks within the gamma margin, this function returns the one with the least power per
+/// slow period, summed over the error for white noise of unit density at the analog input and the
+/// converters' noise at the output: `||K||_2^2 + sum_i noise_i ||f_i||^2`.
 ///
 /// # Errors
 /// [`DesignError::Lti`] for unstable plants; [`DesignError::NoTaps`] if the interior-point method found none.
@@ -51,7 +52,7 @@ fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<
     Exchange::new(grid, Problem::new(points, lags)?, MeanSquareObjective { weights, noise }, margin)
 }
 
-/// 1e-3 if a channel has noise, else next to none.
+/// 1e-3 if a channel has noise, else the least possible margin.
 fn usual_margin(noise: &[f64]) -> f64 {
     if noise.iter().any(|power| *power > 0.0) { NOISY_MARGIN } else { LEAST_MARGIN }
 }
@@ -59,12 +60,13 @@ fn usual_margin(noise: &[f64]) -> f64 {
 /// Taps with their norm.
 struct Judged {
     taps: Vec<Vec<f64>>,
-    /// Their norm by the grid.
+    /// Their norm, estimated on the grid.
     estimate: f64,
     peak: Peak,
 }
 
-/// The exchange, repeated with the peak of the norm as a further point where the grid had missed it.
+/// The exchange. If the grid missed the peak of the norm, the exchange is repeated with that peak as a
+/// further point.
 fn least_gamma(
     plant: &LiftedPlant,
     length: usize,

@@ -8,8 +8,8 @@
 //! e      = z - sum_j F_j y[k-j]        F_j[p, i] = f_i[p + j M]
 //! ```
 //!
-//! [`kyp::minimise`] finds the taps of least norm with a Lyapunov matrix instead of frequencies. It shares no
-//! numerics with the exchange of frequencies, so it is the second opinion on it.
+//! [`kyp::minimise`] finds the taps of least norm with a Lyapunov matrix instead of frequencies. It shares
+//! no numerics with the exchange of frequencies, so it is an independent check of it.
 
 use super::{Filters, Settings, Synthesis};
 use crate::design::DesignError;
@@ -18,12 +18,13 @@ use crate::linalg::Mat;
 use crate::lmi::kyp::{self, Problem};
 use crate::lti::StateSpace;
 
-/// Most states of the error system; the time grows with the sixth power.
+/// Maximum number of states of the error system; the time grows with its sixth power.
 const MAX_STATES: usize = 160;
 
 /// The `settings.taps` taps per channel of least gamma, without a secondary objective.
 ///
-/// `lower` is the value of the dual covariance, a lower bound up to rounding errors; there are no dual points.
+/// `lower` is the dual objective at the covariance found: a lower bound up to rounding errors. There are no
+/// dual points.
 ///
 /// # Errors
 /// [`DesignError::KypTooLarge`] for more than 160 states, [`DesignError::Kyp`] if a decomposition fails.
@@ -55,7 +56,7 @@ fn problem(plant: &LiftedPlant, taps: usize, stored: usize) -> Result<Problem, D
     let reference = all.select_outputs(history..history + m)?;
     let unknowns = (0..n).flat_map(|channel| (0..taps).map(move |tap| (channel, tap)));
     let term = |(channel, tap): (usize, usize)| {
-        // The delay line shows the oldest measurements first.
+        // The delay line outputs the oldest measurements first.
         let delayed = (stored - tap / m) * n + channel;
         let placed = |of: &Mat| {
             let entry = |p: usize, j: usize| if p == tap % m { -of[(delayed, j)] } else { 0.0 };

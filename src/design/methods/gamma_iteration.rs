@@ -8,15 +8,16 @@ use crate::linalg::{self, Complex};
 use crate::lti::LtiError;
 use crate::lti::peak::{Peak, hinf_norm};
 
-/// Gammas below this fraction of ||W|| are zero: the references are reproduced to rounding.
+/// Gammas below this fraction of ||W|| count as zero: the references are reproduced up to rounding errors.
 const NEGLIGIBLE: f64 = 1e-12;
 /// The bracket halves (on the logarithmic scale) in each trial.
 const TRIAL_LIMIT: usize = 80;
-/// Gammas tried below one that was not resolved.
+/// Number of smaller gammas that are tried after an unresolved one.
 const TRIALS_BELOW: usize = 8;
-/// Gamma-iterations with trials below between them.
+/// Limit on the number of gamma-iterations; trials at smaller gammas come between them.
 const ROUND_LIMIT: usize = 4;
-/// Trials below are worth another gamma-iteration if they make gamma this much smaller.
+/// Another gamma-iteration follows if the trials at smaller gammas reduced gamma to less than this
+/// fraction.
 const WORTHWHILE: f64 = 0.9;
 
 /// Filters with the norm of their error system.
@@ -26,12 +27,12 @@ pub(super) struct Judged {
     pub(super) peak: Peak,
 }
 
-/// What gamma-iteration ended at.
+/// The lower end of the bracket at which gamma-iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Floor {
-    /// A gamma that no filter reaches.
+    /// A gamma that no filter achieves.
     Impossible,
-    /// One at which the trial failed for whatever reason.
+    /// A gamma at which the trial was not resolved.
     Unresolved,
 }
 
@@ -39,9 +40,9 @@ enum Floor {
 pub(super) struct GammaIteration<'a> {
     plant: &'a LiftedPlant,
     innovations: &'a [Innovations],
-    /// The noncausal bound and where it is attained.
+    /// The noncausal bound and the frequency at which it is attained.
     noncausal: Peak,
-    /// No causal filter reaches less.
+    /// No causal filter achieves less.
     lower: f64,
     best: Option<Judged>,
     /// Riccati equations solved.
@@ -69,7 +70,7 @@ impl<'a> GammaIteration<'a> {
         self.innovations
     }
 
-    /// The filters with their norm; `None` for filters that rounding has made unstable.
+    /// The filters with their norm; `None` if rounding errors made the filters unstable.
     pub(super) fn judge(&self, filters: Filter) -> Result<Option<Judged>, DesignError> {
         match self.plant.norm(&filters) {
             Ok(peak) => Ok(Some(Judged { filters, peak })),
@@ -84,8 +85,8 @@ impl<'a> GammaIteration<'a> {
         }
     }
 
-    /// Whether the error where the noncausal bound is attained is within the accuracy of the least that any
-    /// filter can have.
+    /// Whether the error of `filters`, at the frequency where the noncausal bound is attained, equals the
+    /// least error of any filter up to the accuracy.
     pub(super) fn may_be_optimal(&self, filters: &Filter) -> Result<bool, DesignError> {
         let error = self.plant.error_system(filters)?;
         let response = error.response_at(Complex::from_polar(1.0, self.noncausal.frequency));
@@ -120,7 +121,7 @@ impl<'a> GammaIteration<'a> {
         self.upper() <= self.lower * (1.0 + GAMMA_ACCURACY) || self.is_negligible(self.upper())
     }
 
-    /// One gamma; only a filter whose norm keeps the promise counts.
+    /// Tries one gamma. A filter counts as found only if its computed norm confirms gamma.
     fn attempt(&mut self, gamma: f64) -> Result<Trial, DesignError> {
         for innovations in self.innovations {
             self.trials += 1;
@@ -140,7 +141,7 @@ impl<'a> GammaIteration<'a> {
         Ok(Trial::Unresolved)
     }
 
-    /// In most problems the noncausal bound is reached, so it is tried first.
+    /// In most problems a causal filter achieves the noncausal bound, so it is tried first.
     pub(super) fn try_the_lower_bound(&mut self) -> Result<(), DesignError> {
         if !self.done() {
             self.attempt(self.lower * (1.0 + 0.8 * GAMMA_ACCURACY))?;
@@ -148,8 +149,8 @@ impl<'a> GammaIteration<'a> {
         Ok(())
     }
 
-    /// Gamma-iteration, and a few trials below where trials were not resolved: near the edge of double
-    /// precision a smaller gamma may well be solvable.
+    /// Gamma-iteration, and a few trials at smaller gammas after an unresolved trial: near the limits of
+    /// double precision a smaller gamma may be solvable.
     pub(super) fn bisect(&mut self) -> Result<(), DesignError> {
         for _ in 0..ROUND_LIMIT {
             if self.bisect_once()? == Floor::Impossible {
@@ -157,7 +158,7 @@ impl<'a> GammaIteration<'a> {
             }
             let before = self.upper();
             self.try_below()?;
-            // False also where nothing was found at all.
+            // Also false if nothing was found.
             let gained = self.upper() < WORTHWHILE * before;
             if !gained {
                 break;
@@ -195,7 +196,7 @@ impl<'a> GammaIteration<'a> {
         Ok(kind)
     }
 
-    /// As [`GammaIteration::attempt`]; a gamma that no filter reaches raises the lower bound.
+    /// As [`GammaIteration::attempt`]; a gamma that no filter achieves raises the lower bound.
     fn attempt_or_exclude(&mut self, gamma: f64) -> Result<Trial, DesignError> {
         let trial = self.attempt(gamma)?;
         if matches!(trial, Trial::Impossible) {
@@ -204,12 +205,12 @@ impl<'a> GammaIteration<'a> {
         Ok(trial)
     }
 
-    /// The least gamma that is worth a trial.
+    /// The least gamma to try.
     fn floor(&self) -> f64 {
         self.lower.max(self.negligible)
     }
 
-    /// A gamma that some filter reaches.
+    /// A gamma that some filter achieves.
     fn ceiling(&self) -> f64 {
         if self.upper().is_finite() { self.upper() } else { self.zero_output_norm() }
     }

@@ -1,4 +1,5 @@
-//! The least mean-square error of any causal bank: the Kalman filter, `iir` at gamma = infinity.
+//! The bank with the least mean-square error of all causal banks: the Kalman filter, which is `iir` at
+//! gamma = infinity.
 
 use super::filtering::Innovations;
 use super::gamma_iteration::GammaIteration;
@@ -6,7 +7,7 @@ use super::{Settings, Synthesis};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 
-/// The filters of least mean-square error for white noise at the analog input. It has no settings.
+/// The filters of least mean-square error for white noise at the analog input. The method has no settings.
 ///
 /// # Errors
 /// [`DesignError::RiccatiFailed`] if the Riccati equation could not be solved, [`DesignError::Lti`] if the

@@ -1,5 +1,5 @@
-//! The least gamma of any causal bank, by a-posteriori H-infinity filtering and gamma-iteration (thesis
-//! 5.3).
+//! The bank with the least gamma of all causal banks, by a-posteriori H-infinity filtering and
+//! gamma-iteration (thesis 5.3).
 
 use super::filtering::{Innovations, Trial};
 use super::gamma_iteration::{GammaIteration, Judged};
@@ -18,8 +18,8 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     let innovations = Innovations::in_all_coordinates(plant)?;
     let mut iteration = GammaIteration::new(plant, &innovations)?;
     let mut mean_square = innovations.iter().filter_map(Innovations::h2).peekable();
-    // The mean-square optimum is mostly the worst-case one too or far from it, and one frequency tells
-    // which.
+    // The mean-square optimum is usually either the worst-case optimum too or far from it. The error at one
+    // frequency distinguishes the two cases.
     let promising =
         mean_square.peek().map(|filters| iteration.may_be_optimal(filters)).transpose()? == Some(true);
     if !promising {

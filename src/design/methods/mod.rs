@@ -1,4 +1,4 @@
-//! The design methods: one file each, and one signature.
+//! The design methods. Each has its own file; all have the same signature.
 //!
 //! | method | minimises | filters | lower end |
 //! |---|---|---|---|
@@ -25,14 +25,15 @@ use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
 use crate::spec::{Method, Solver};
 
-/// Settings of a method beside the plant.
+/// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Settings {
     /// Taps per channel at the fast rate, for the methods that make FIR filters.
     pub(crate) taps: usize,
-    /// Relative excess over the least gamma that may go into the mean square; `None` is the method's own.
+    /// Relative excess over the least gamma that may be spent on a smaller mean square; `None` is the
+    /// method's default.
     pub(crate) gamma_margin: Option<f64>,
-    /// Solver of `fir`; `None` is the sampled one.
+    /// Solver of `fir`; `None` is the sampled worst-case solver.
     pub(crate) solver: Option<Solver>,
     /// The channels of the plant in units of the slow period, for `separation`.
     pub(crate) at_slow_rate: Option<Problem>,
@@ -51,21 +52,21 @@ pub(crate) enum Filters {
 #[derive(Debug, Clone)]
 pub(crate) struct Synthesis {
     pub(crate) filters: Filters,
-    /// The norm of the error system of these filters, and where it is attained (radians per slow period).
+    /// The norm of the error system of these filters, and the frequency of its peak in radians per slow
+    /// period.
     pub(crate) peak: Peak,
-    /// No filters that the method could have found have a smaller norm. At most `peak.gain`.
+    /// Lower bound of the norm over all filters of the method's kind. At most `peak.gain`.
     pub(crate) lower: f64,
-    /// No filters at all have a smaller norm, whatever their latency. At most `peak.gain`.
+    /// Lower bound of the norm over all filters of any latency. At most `peak.gain`.
     pub(crate) noncausal: f64,
-    /// What the lower end was read from, for `fir`; else empty.
+    /// For `fir` the dual solution, which gives `lower`; else empty.
     pub(crate) dual: Vec<DualPoint>,
-    /// Interior-point iterations or Riccati equations.
+    /// Number of interior-point iterations or of Riccati equations solved.
     pub(crate) iterations: usize,
 }
 
 impl Synthesis {
-    /// FIR filters that nothing was minimised for: what bounds all filters is all that is known below their
-    /// norm.
+    /// FIR filters of a method that minimises nothing. The only lower bound is the one for all filters.
     fn of_taps(plant: &LiftedPlant, taps: Vec<Vec<f64>>) -> Result<Self, DesignError> {
         let peak = plant.fir_norm(&taps)?;
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);

@@ -1,4 +1,4 @@
-//! Fractional delays first, then a bank for integer delays, to compare with (thesis 5.6.3).
+//! A comparison method: first fractional-delay filters, then a bank for integer delays (thesis 5.6.3).
 
 use super::{Filters, Settings, Synthesis, fir};
 use crate::design::DesignError;
@@ -7,8 +7,8 @@ use crate::design::problem::{Channel, Problem};
 use crate::units::FastPeriods;
 
 /// Two steps: a fractional-delay filter for each channel, designed alone at the slow rate, brings its
-/// samples onto the fast grid; a bank designed for integer delays fuses them. `settings.taps` taps per
-/// channel in all.
+/// samples onto the fast grid; a bank designed for integer delays fuses them. Both steps together have
+/// `settings.taps` taps per channel.
 ///
 /// # Errors
 /// As [`fir::synthesise`]; [`DesignError::NoTaps`] without the channels at the slow rate.
@@ -37,8 +37,8 @@ fn fir_taps(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError
     }
 }
 
-/// The channels as the second step sees them: with whole delays, and with the latency that the first step
-/// has left.
+/// The channels as inputs of the second step: with integer delays, and with the latency that the first step
+/// leaves.
 fn on_grid(problem: &Problem, grid: &[usize], split: &Split) -> Problem {
     let mut on_grid = problem.clone();
     on_grid.latency -= split.periods * problem.ratio;
@@ -48,7 +48,8 @@ fn on_grid(problem: &Problem, grid: &[usize], split: &Split) -> Problem {
     on_grid
 }
 
-/// Channel `i` alone at the slow rate, with the samples `shift` slow periods late as its own reference.
+/// Channel `i` alone at the slow rate, with its own samples, delayed by `shift` slow periods, as the
+/// reference.
 fn alone(slow: &Problem, i: usize, shift: FastPeriods, latency: usize) -> Problem {
     let channel = slow.channels[i];
     Problem {
@@ -81,8 +82,8 @@ impl Split {
     }
 }
 
-/// For each channel the nearest whole delay whose place in the slow period is still free (when all are
-/// taken, the nearest).
+/// For each channel the nearest integer delay whose phase in the slow period no other channel has (if all
+/// phases are taken, the nearest delay).
 fn grid_delays(problem: &Problem) -> Vec<usize> {
     let mut taken = vec![false; problem.ratio];
     let chosen = |channel: &Channel| {
@@ -93,7 +94,8 @@ fn grid_delays(problem: &Problem) -> Vec<usize> {
     problem.channels.iter().map(chosen).collect()
 }
 
-/// The whole delay nearest to `delay` whose place in the slow period is not `taken`, or the nearest of all.
+/// The integer delay nearest to `delay` whose phase in the slow period is not `taken`; if all are, the
+/// nearest integer.
 fn nearest(delay: f64, taken: &[bool]) -> usize {
     let last = delay.ceil() as usize + taken.len();
     let distance = |&a: &usize| (a as f64 - delay).abs();

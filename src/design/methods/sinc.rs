@@ -1,11 +1,11 @@
-//! Sinc interpolation of recurrent nonuniform samples, to compare with (thesis 5.6.3).
+//! A comparison method: sinc interpolation of recurrent nonuniform samples (thesis 5.6.3).
 
 use super::{Settings, Synthesis};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::sampling::Recurrent;
 
-/// Yen's interpolation of the recurrent nonuniform samples, as if front ends were ideal, truncated to
+/// Yen's interpolation of the recurrent nonuniform samples, for ideal front ends, truncated to
 /// `settings.taps` taps per channel.
 ///
 /// # Errors

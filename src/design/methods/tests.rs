@@ -1,4 +1,4 @@
-//! One contract for all methods: shapes, bounds, and the norm by another route.
+//! Tests of all methods: shapes, bounds, and the norm computed independently.
 
 use super::*;
 use crate::design::filters::{lifted, polyphase};
@@ -53,7 +53,7 @@ fn spec(case: &Case, method: Method) -> Spec {
     Spec::from_toml(&text, "spec.toml").unwrap()
 }
 
-/// A plant whose channels can be told apart, as the designer hands it to a method.
+/// A plant without identical channels, as the designer passes it to a method.
 fn plant(case: &Case) -> LiftedPlant {
     let problem = Problem::new(&spec(case, Method::Iir), case.latency).unwrap();
     LiftedPlant::new(&problem.merge_channels().problem).unwrap()

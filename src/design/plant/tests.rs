@@ -34,7 +34,8 @@ fn taps(plant: &LiftedPlant) -> Vec<Vec<f64>> {
     (0..plant.channels()).map(|i| (0..3 * plant.ratio() + 1).map(|n| tap(i, n)).collect()).collect()
 }
 
-/// Largest gain on a dense grid, by one LU factorisation per frequency: a lower bound that knows no level sets.
+/// Largest gain on a dense grid, by one LU factorisation per frequency: a lower bound that does not use
+/// level sets.
 fn dense_grid(error: &StateSpace) -> f64 {
     let gain = |k: usize| {
         let z = Complex::from_polar(1.0, PI * k as f64 / 4000.0);

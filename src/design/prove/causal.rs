@@ -1,22 +1,22 @@
-//! The search for a gamma, as large as possible, that the finite-horizon recursion of [`crate::verify`] refutes.
+//! Searches for the largest gamma that the finite-horizon recursion of [`crate::verify`] refutes.
 
 use crate::bank::CausalWitness;
 use crate::verify::{EnclosedErrorSystem, Precision, Recursion};
 
-/// Most slow periods tried in 106 bits.
+/// Maximum number of slow periods in 106-bit arithmetic.
 const SHORT_PERIODS: usize = 512;
-/// Most slow periods tried in 512 bits, where each takes some milliseconds.
+/// Maximum number of slow periods in 512-bit arithmetic, where each takes some milliseconds.
 const LONG_PERIODS: usize = 128;
-/// What the first gammas tried fall short of the upper end: banks are mostly optimal.
+/// Relative distances of the first trial gammas below the upper end. Most banks are almost optimal.
 const FIRST_SHORTFALLS: [f64; 3] = [1e-6, 1e-5, 1e-4];
 /// Relative width of the interval at which the bisection ends.
 const WIDTH: f64 = 1e-5;
-/// Bisections at most in 106 bits.
+/// Maximum number of bisections in 106-bit arithmetic.
 const SHORT_BISECTIONS: usize = 24;
-/// Bisections at most in 512 bits.
+/// Maximum number of bisections in 512-bit arithmetic.
 const LONG_BISECTIONS: usize = 6;
 
-/// The largest gamma found in the interval that no causal bank reaches.
+/// The largest gamma found in the interval that no causal bank achieves.
 pub(super) fn witness(error: &EnclosedErrorSystem<'_>, (lower, upper): (f64, f64)) -> Option<CausalWitness> {
     let refuted = |gamma: f64, precision: Precision| {
         let limit = if precision == Precision::Short { SHORT_PERIODS } else { LONG_PERIODS };
@@ -39,7 +39,7 @@ pub(super) fn witness(error: &EnclosedErrorSystem<'_>, (lower, upper): (f64, f64
         .or_else(|| search(Precision::Long, LONG_BISECTIONS))
 }
 
-/// `count` bisections between the ends, by ratio because they may be far apart.
+/// `count` bisections between the ends, at the geometric mean because the ends may be far apart.
 fn bisected(
     (lower, upper): (f64, f64),
     count: usize,

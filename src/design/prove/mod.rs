@@ -1,5 +1,5 @@
-//! The search for what proves a bank's gammas. [`crate::verify`] does the proving; whatever is found here is worth
-//! nothing until it has passed there.
+//! Searches for certificates and witnesses that prove a bank's gammas. They prove nothing by themselves:
+//! [`crate::verify`] checks them.
 
 mod causal;
 mod units;
@@ -15,9 +15,10 @@ use crate::spec::Method;
 use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
 use units::Units;
 
-/// Relative excesses over the computed norm at which a certificate is looked for, smallest first.
+/// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
+/// first.
 const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
-/// The same, in units of the floor, for norms that are zero up to rounding.
+/// The same in units of `FLOOR`, for norms that are zero up to rounding.
 const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
 /// Weights on all states, relative to the excess.
 const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
@@ -25,22 +26,25 @@ const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
 const FLOOR: f64 = 1e-10;
 /// Significant digits of the certificate's numbers in the file.
 const DIGITS: [usize; 4] = [9, 12, 15, 17];
-/// Part of the dual's weight below which a direction does not matter.
+/// Directions with less than this share of the dual's weight are ignored.
 const NEGLIGIBLE: f64 = 1e-9;
-/// Most states of an error system for which a certificate is looked for: eigenvalues of matrices twice as large are needed.
+/// Maximum number of states of an error system for which the search tries to find a certificate. It needs
+/// eigenvalues of matrices twice as large.
 const MAX_SEARCHED: usize = 512;
-/// Witnesses at most.
+/// Maximum number of witnesses.
 const MAX_WITNESSES: usize = 64;
-/// Directions of tap space that matter less than this, relative to the strongest, are left alone.
+/// Directions of tap space with less effect than this, relative to the strongest, are not used.
 const RANK: f64 = 1e-13;
-/// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess (and of the number of
-/// states): no direction is unobservable then, and the norm would rise by a hundredth of the excess only.
+/// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess
+/// (and of the number of states). With it no direction is unobservable. The noise would raise the norm by
+/// only a hundredth of the excess.
 const STATE_NOISE: f64 = 0.1;
-/// Relative excess of a stated norm over the one computed here that is taken for rounding.
+/// Relative excess of a stated norm over the one computed here that counts as rounding.
 const SAME_NORM: f64 = 1e-6;
-/// What a bound may fall short of the designer's and still be taken for its proof.
+/// Relative distance below the designer's bound at which a proven bound still counts as its proof.
 const SHORTFALL: f64 = 0.5e-6;
-/// What a stated lower bound stays below the proven one: another machine may round an approximate inverse otherwise.
+/// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
+/// inverse differently.
 const STATED_BELOW: f64 = 1e-12;
 
 /// A gamma that is proven, not only computed.
@@ -66,9 +70,9 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
     Ok(Certified { gamma: upper, attained, states })
 }
 
-/// Witnesses for all that can be proven of the bank's gammas, and what that is.
+/// Searches for witnesses of the bank's gammas. Returns the proof and the bounds that it proves.
 ///
-/// `dual` is that of the design (FIR), from which the lower end is proven where the noncausal bound does not.
+/// `dual` is the dual solution of an FIR design. It proves the lower end if the noncausal bound does not.
 ///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found; [`DesignError::Verify`] if the proof
@@ -86,10 +90,10 @@ pub(crate) fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified)
     Ok((proof, verified))
 }
 
-/// Puts a proof into `bank`, and what it proves into its gammas; the computed norm stays.
+/// Adds a proof to `bank` and sets the gammas to the proven bounds. The computed norm does not change.
 ///
 /// # Errors
-/// As [`prove`]; the bank is then left as it is.
+/// As [`prove`]; `bank` is then unchanged.
 pub(crate) fn attach_proof(bank: &mut Bank, dual: &[DualPoint]) -> Result<Verified, DesignError> {
     let (proof, verified) = prove(bank, dual)?;
     let stated = |proven: f64| Some(proven * (1.0 - STATED_BELOW));
@@ -103,8 +107,8 @@ pub(crate) fn attach_proof(bank: &mut Bank, dual: &[DualPoint]) -> Result<Verifi
     Ok(verified)
 }
 
-/// What proves a lower bound between the ends of `interval`: the dual of an FIR design, or else a horizon within which every
-/// causal bank fails.
+/// A proof of a lower bound within `interval`: by the dual solution of an FIR design, or else by a finite
+/// horizon over which every causal bank has a larger error.
 fn lower_proof(
     error: &EnclosedErrorSystem<'_>,
     bank: &Bank,
@@ -122,7 +126,7 @@ fn lower_proof(
     })
 }
 
-/// The least gamma of the ladder for which a certificate passes.
+/// The certificate with the least gamma, of those tried, that passes.
 fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
     if error.states() > MAX_SEARCHED {
         return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED });
@@ -132,7 +136,8 @@ fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certifica
     let middle = units.of_one(&raw);
     let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
     let peak = hinf_norm(&system)?;
-    // The norm in the file may differ from the one computed here in the last digits; if in more, it is not the norm.
+    // The norm in the file may differ from the one computed here in the last digits; if the difference is
+    // larger, the stated number is not the norm.
     let stated = bank.gamma.norm.map(|stated| stated / units.wanted);
     let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
     let norm = credible.unwrap_or(0.0).max(peak.gain);
@@ -155,7 +160,7 @@ fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certifica
     Err(DesignError::NotCertified)
 }
 
-/// The factor with as few digits as still prove, if it proves at all.
+/// The factor with the fewest digits that still prove the bound; `None` if it proves nothing.
 fn shortest(factor: Vec<Vec<f64>>, proves: impl Fn(&[Vec<f64>]) -> bool) -> Option<Vec<Vec<f64>>> {
     let rounded = |digits: usize| -> Vec<Vec<f64>> {
         let round = |x: &f64| format!("{x:.digits$e}").parse().unwrap_or(*x);
@@ -176,7 +181,7 @@ struct Search {
 }
 
 impl Search {
-    /// Coordinates with `noise` on the states altogether.
+    /// Coordinates for the system with a total of `noise` added to the states.
     fn new(middle: &Midpoint, noise: f64) -> Result<Self, DesignError> {
         let Midpoint { a, b, c, d } = middle;
         let (n, m) = (a.nrows(), c.nrows());
@@ -188,7 +193,8 @@ impl Search {
         Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: outputs, d: d.transpose(), inverse: k.inverse })
     }
 
-    /// Rows of R with P = R R' at `gamma`, with a weight on all states that keeps the inequality away from singular.
+    /// Rows of R with P = R R' at `gamma`, with a weight on all states that keeps the inequality strictly
+    /// feasible.
     fn factor(&self, gamma: f64, weight: f64) -> Option<Vec<Vec<f64>>> {
         let p = bounded_real_riccati(&self.a, &self.b, &self.c, &self.d, gamma, weight)?;
         let half = linalg::cholesky(&p).ok()?;
@@ -197,7 +203,8 @@ impl Search {
     }
 }
 
-/// A frequency and direction in which the samples leave most of the reference samples unexplained.
+/// The frequency and direction in which the largest part of the reference samples cannot be estimated from
+/// the samples.
 fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
     let plant = LiftedPlant::new(&analysis::bank_problem(bank)?.merge_channels().problem)?;
     let (n, m) = (plant.channels(), plant.ratio());
@@ -219,14 +226,15 @@ fn witness(frequency: f64, wanted: &CMat) -> DualWitness {
 }
 
 fn pairs(column: &CMat) -> Vec<[f64; 2]> {
-    // Without negative zeros, which only irritate in a file.
+    // Adding 0.0 turns negative zeros into positive ones, for the file.
     column.iter().map(|z| [z.re + 0.0, z.im + 0.0]).collect()
 }
 
-/// Witnesses with the directions and frequencies of the dual that no taps of the bank's length can serve all at once.
+/// Witnesses that bound all FIR banks of the bank's length, with the directions and frequencies of the dual
+/// solution.
 ///
-/// For given directions a the taps of least sum of ||a* K||^2 leave an error to which no change of the taps is of any use: the
-/// witnesses are that error's. Channels that cannot be told apart count once.
+/// For given directions a, consider the taps of least sum of ||a* K||^2. Their error is orthogonal to every
+/// change of the taps, and this error gives the witnesses. Identical channels count once.
 fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
     let merged = analysis::bank_problem(bank)?.merge_channels();
@@ -262,7 +270,8 @@ fn directions(dual: &[DualPoint]) -> Result<Vec<(f64, CMat)>, DesignError> {
     Ok(heavy.map(|(_, omega, a)| (omega, a)).collect())
 }
 
-/// How FIR taps serve the wanted directions at some frequencies: min over taps of sum |a* (W - F H)|^2.
+/// The least-squares problem of the taps for given directions a and frequencies: min over taps of sum |a*
+/// (W - F H)|^2.
 struct Service<'a> {
     directions: &'a [(f64, CMat)],
     channels: usize,
@@ -286,7 +295,7 @@ impl<'a> Service<'a> {
         Self { directions, channels: n, ratio: m, length, targets, taps: Vec::new() }
     }
 
-    /// What one unit of the tap of channel i at time n adds to F* a at a direction.
+    /// The contribution of a unit tap at time n to F* a, for one direction.
     fn turn(&self, direction: usize, n: usize) -> Complex<f64> {
         let (omega, a) = &self.directions[direction];
         a[n % self.ratio] * Complex::from_polar(1.0, omega * (n / self.ratio) as f64)
@@ -300,7 +309,7 @@ impl<'a> Service<'a> {
         CMat::from_fn(self.channels, 1, |i, _| sum(i))
     }
 
-    /// The taps of least sum and, among these, of least size.
+    /// The taps of the least sum of squares; if they are not unique, those of least norm.
     fn solve(&mut self) -> Result<(), DesignError> {
         let rows: usize = self.targets.iter().map(|(root, _)| 2 * root.ncols()).sum();
         let mut map = Mat::zeros(rows, self.channels * self.length);
@@ -319,13 +328,13 @@ impl<'a> Service<'a> {
                 row += 2;
             }
         }
-        // Each channel in a unit of its own, so that none is too weak to matter.
+        // Each channel has its own unit, so that weak channels are not lost to rounding.
         let units = self.units(&map);
         map.column_iter_mut().zip(&units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
         let svd = linalg::svd(&map)?;
         let floor = RANK * svd.s.first().copied().unwrap_or(0.0);
         let mut taps = Mat::zeros(map.ncols(), 1);
-        // The second pass takes away what rounding left of the first.
+        // The second pass corrects the rounding errors of the first.
         for _ in 0..2 {
             let mut part = svd.u.tr_mul(&(&right - &map * &taps));
             part.iter_mut().zip(&svd.s).for_each(|(x, &s)| *x = if s > floor { *x / s } else { 0.0 });
@@ -335,7 +344,7 @@ impl<'a> Service<'a> {
         Ok(())
     }
 
-    /// For each tap the power of two near to the largest effect of its channel's taps.
+    /// For each tap the power of two that is near the largest effect of any tap of its channel.
     fn units(&self, map: &Mat) -> Vec<f64> {
         let channel = |i: usize| map.columns(i * self.length, self.length).amax();
         (0..self.channels).flat_map(|i| vec![power_of_two(channel(i)); self.length]).collect()

@@ -1,4 +1,4 @@
-//! Units in which the search for a certificate is done, so that gains of the front ends do not matter to it.
+//! Units for the search for a certificate. They make the search independent of the gains of the front ends.
 //!
 //! With xi = T eta, T diagonal, and e counted in units of s, a P that proves ||K|| <= gamma for [A, J; C, L] is T Q T' where
 //! Q proves ||K|| / s <= gamma / s for [T^-1 A T, T^-1 J; C T / s, L / s].
@@ -8,15 +8,15 @@ use crate::lti::LtiError;
 use crate::lti::gramian::controllability_root;
 use crate::verify::Midpoint;
 
-/// Powers of two, so that changing them rounds nothing.
+/// Units of states and references. They are powers of two, so that a change of units rounds nothing.
 pub(super) struct Units {
     states: Vec<f64>,
-    /// Of the wanted samples, and so of gamma.
+    /// Unit of the reference samples, and so of gamma.
     pub(super) wanted: f64,
 }
 
 impl Units {
-    /// Units near to the standard deviations of the states and to the size `scale` of the wanted samples.
+    /// Units near the standard deviations of the states and near the size `scale` of the reference samples.
     ///
     /// # Errors
     /// [`LtiError::IterationLimit`] if the system is not stable.
@@ -40,7 +40,7 @@ impl Units {
         }
     }
 
-    /// Rows of R in the units of the file from those in these.
+    /// Converts rows of R from these units to those of the file.
     pub(super) fn factor(&self, rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let scaled = |(row, unit): (Vec<f64>, &f64)| row.into_iter().map(|x| x * unit).collect();
         rows.into_iter().zip(&self.states).map(scaled).collect()

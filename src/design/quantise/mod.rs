@@ -28,7 +28,7 @@ use crate::design::DesignError;
 use crate::spec::WordLengths;
 use quantiser::{Quantised, Quantiser};
 
-/// Differences of bits of a study.
+/// Word lengths of a study, relative to the requested one.
 const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
 
 /// The best integers found near the filters of `problem`, whose norm is `real_gamma`, and the cost of the
@@ -37,8 +37,7 @@ const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
 /// [`DesignError::NoTaps`] if `bits` are out of their range, and [`DesignError::AllZero`] if all taps are
-/// zero at the scale given. If the scale is left open all taps may be zero, too: see
-/// [`FixedPoint::is_silent`].
+/// zero at the given scale. Without a given scale all taps may be zero, too: see [`FixedPoint::is_silent`].
 pub fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,

@@ -26,7 +26,7 @@ fn quantiser<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> Result<Quantis
     Quantiser::new(problem(plant, taps))
 }
 
-/// The exact norm, by another route than the search's grid.
+/// The computed norm, which does not use the grid of the search.
 fn exact(plant: &LiftedPlant, taps: Vec<Vec<f64>>) -> f64 {
     plant.bank_norm(&SynthesisFilters::Fir(taps)).unwrap().gain
 }

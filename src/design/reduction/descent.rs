@@ -4,15 +4,15 @@
 
 use crate::linalg::Mat;
 
-/// A step must reach this part of the decrease that the slope promises ...
+/// A step must achieve this fraction of the decrease that the slope predicts ...
 const DECREASE: f64 = 1e-4;
-/// ... and see the slope reduced to this part.
+/// ... and must reduce the slope to this fraction.
 const CURVATURE: f64 = 0.5;
 /// Halvings and doublings of a step.
 const LINE_LIMIT: usize = 24;
-/// The first step is this part of the size of the start.
+/// Length of the first step relative to the norm of the start.
 const FIRST_STEP: f64 = 0.05;
-/// A descent that gains less than this (relative) in [`PATIENCE`] steps has arrived.
+/// A descent has converged if it gains less than this (relative) in [`PATIENCE`] steps.
 const GAIN: f64 = 1e-4;
 const PATIENCE: usize = 6;
 
@@ -24,8 +24,8 @@ pub(super) struct Evaluated {
     pub(super) gradient: Mat,
 }
 
-/// Descends from `start` until it arrives or `f` has been asked `budget` times. `f` gives value and
-/// gradient, or `None` outside of its domain. The result is never above the start.
+/// Descends from `start` until it converges or has evaluated `f` `budget` times. `f` returns value and
+/// gradient, or `None` outside its domain. The result is never above the start.
 pub(super) fn descend(
     f: &mut dyn FnMut(&Mat) -> Option<(f64, Mat)>,
     start: Evaluated,

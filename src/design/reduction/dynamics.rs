@@ -8,7 +8,7 @@ use crate::lti::{FirWithTail, StateSpace};
 /// States below this share of the output are rounding errors.
 const NEGLIGIBLE: f64 = 1e-12;
 
-/// The recursion `x+ = a x + b u[k - lags]` behind a delay line of `lags` inputs.
+/// The recursion `x+ = a x + b u[k - lags]` after a delay line of `lags` inputs.
 #[derive(Debug, Clone)]
 pub(super) struct Dynamics {
     /// Length of the FIR head in slow periods.

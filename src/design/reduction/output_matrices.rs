@@ -1,5 +1,5 @@
-//! Output matrices of least mean square for given dynamics: the error W - F H is affine in them, so that
-//! they are one projection.
+//! Output matrices of least mean square for given dynamics. The error W - F H is affine in them, so that
+//! one projection gives them.
 
 use super::dynamics::Dynamics;
 use crate::design::DesignError;

@@ -1,5 +1,5 @@
-//! Output matrices of least gamma for given dynamics: the error W - F H is affine in them, so that they are
-//! a convex problem at sampled frequencies.
+//! Output matrices of least gamma for given dynamics. The error W - F H is affine in them, so that they
+//! solve a convex problem at sampled frequencies.
 
 use super::dynamics::Dynamics;
 use crate::design::DesignError;
