@@ -1,4 +1,4 @@
-//! The invariants of a bank, wherever it comes from.
+//! The invariants of every bank, read or designed.
 
 use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits};
 
@@ -10,7 +10,8 @@ use super::{
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96 kHz.
 pub const MAX_BANK_LATENCY: usize = 1 << 24;
 
-/// Relative difference between a number of the bank and its twin in the spec that is no more than rounding.
+/// Relative difference between a number of the bank and the same number in the spec that counts as
+/// rounding.
 const SPEC_TOLERANCE: f64 = 1e-9;
 
 type Checked = Result<(), BankError>;
@@ -25,9 +26,9 @@ fn out_of_range(path: impl Into<String>, value: f64, unit: &'static str, rule: i
 
 impl Bank {
     /// Checks everything that can be checked without linear algebra: numbers finite and in range, lists and
-    /// matrices of matching sizes, filters that go with the method, a spec that says the same.
+    /// matrices of matching sizes, filters that fit the method, a spec that agrees with the bank.
     ///
-    /// Whether a state-space bank is stable is for the design side to check.
+    /// This does not check whether a state-space bank is stable; the design modules do.
     ///
     /// # Errors
     /// [`BankError`] with an empty file name and the JSON place of the first thing that is wrong.

@@ -1,4 +1,5 @@
-//! The digest of a bank file: catches every change of its content, those too small to break a proof among them.
+//! The digest of a bank file. It detects every change of the content, even one too small to invalidate the
+//! proof.
 //!
 //! It is the SHA-256 of a canonical form of the document, so that layout does not matter: a table is `{`, its members in
 //! the order of their keys' bytes, and `}`; a member is key and value; a list is `[`, its items and `]`; a text or key is `"`, its

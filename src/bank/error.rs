@@ -1,4 +1,4 @@
-//! What can be wrong with a bank, and where.
+//! Errors of a bank: the location and the problem.
 
 use std::fmt;
 
@@ -30,7 +30,7 @@ pub enum BankProblem {
         /// The parser's words, with line and column.
         message: String,
     },
-    /// The JSON is something else than a bank.
+    /// The JSON is not a bank.
     #[error(
         "the file says format \"{found}\", a bank says \"{FORMAT}\"; give a file written by `hybank design`"
     )]
@@ -46,18 +46,18 @@ pub enum BankProblem {
         /// What the file says.
         found: usize,
     },
-    /// A text that is no digest.
+    /// The text is not a digest.
     #[error("\"{found}\" is no digest, which is sha256: with 64 hexadecimal digits; leave it out")]
     Digest {
         /// What the file says.
         found: String,
     },
-    /// A digest of another content.
+    /// The digest does not match the content.
     #[error(
         "it is not the digest of this content: something in the file was altered; take the original, or design the bank again"
     )]
     Altered,
-    /// A key, a type or a number that is wrong as such.
+    /// A key, a type or a number that is wrong in itself.
     #[error(transparent)]
     Value(#[from] SpecProblem),
     /// A NaN or an infinity.
@@ -88,7 +88,7 @@ pub enum BankProblem {
         /// Why, and what to do.
         rule: &'static str,
     },
-    /// A tap that is not the integer that the file says.
+    /// A tap that differs from the integer in the file.
     #[error(
         "the tap {tap:e} is not {integer} times {step:e}, as fixed_point says; take the original, or leave fixed_point out"
     )]
@@ -100,7 +100,7 @@ pub enum BankProblem {
         /// 2^-fraction_bits.
         step: f64,
     },
-    /// Integer taps of other bits than the spec asks for.
+    /// The word lengths of the integer taps differ from those in the spec.
     #[error(
         "the bank's integers have {bank}, its spec asks for {spec}; design the bank again, or set spec to null"
     )]
@@ -120,7 +120,7 @@ pub enum BankProblem {
         /// The other one.
         found: &'static str,
     },
-    /// The bank and the spec in it say different things.
+    /// The bank and its spec contain different numbers.
     #[error(
         "the bank says {bank}, its spec says {spec}; they must agree, design the bank again or set spec to null"
     )]
@@ -137,7 +137,7 @@ impl BankError {
         Self { inner: Box::new(Inner { file: file.to_owned(), path, problem: problem.into() }) }
     }
 
-    /// The same error, now that the file is known.
+    /// The same error with the name of the file.
     pub(super) fn in_file(mut self, file: &str) -> Self {
         self.inner.file = file.to_owned();
         self

@@ -1,18 +1,18 @@
-//! Taps as integers: what a bank for fixed-point hardware says of its words.
+//! Fixed-point taps: integers with a common scale.
 
 use serde::Serialize;
 
 use crate::spec::WordLengths;
 
-/// Taps that are integers times 2^-`fraction_bits`, `f_i[n] = integers[i][n] * 2^-fraction_bits`, each of so many bits in two's
-/// complement.
+/// Taps that are integers times 2^-`fraction_bits`, `f_i[n] = integers[i][n] * 2^-fraction_bits`, in two's
+/// complement with the given word lengths.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FixedPoint {
     /// Bits of each tap.
     pub bits: WordLengths,
     /// Bits after the point.
     pub fraction_bits: i32,
-    /// A list a channel.
+    /// One list per channel.
     pub integers: Vec<Vec<i64>>,
 }
 
@@ -27,7 +27,7 @@ impl FixedPoint {
         self.integers.iter().flatten().all(|&integer| integer == 0)
     }
 
-    /// The taps that the integers stand for, exactly.
+    /// The taps as floating-point numbers; the conversion is exact.
     pub fn taps(&self) -> Vec<Vec<f64>> {
         let tap = |&integer: &i64| integer as f64 * self.step();
         self.integers.iter().map(|list| list.iter().map(tap).collect()).collect()

@@ -1,11 +1,11 @@
-//! The bank: synthesis filters with the facts needed to run and judge them, and its file format.
+//! The bank: synthesis filters with the data needed to run and verify them, and its file format.
 //!
-//! [`Bank::from_json`] and [`Bank::to_json`] are the two ends of the file format `hybank-bank`, version 1.
-//! Every number reads back to the same bits. Unknown keys are refused by name; the one exception is
-//! `meta`, which may hold anything that other programs wish to keep in the file and is not read.
+//! [`Bank::from_json`] reads the file format `hybank-bank`, version 1, and [`Bank::to_json`] writes it.
+//! Every number reads back to the same bits. Unknown keys are refused by name, except `meta`, which is not
+//! read: other programs may store anything there.
 //!
-//! A file may carry a [`Proof`] of its gammas and a digest of its content. Reading does not look at the digest, so that a
-//! bank can be edited and run; [`check_digest`] compares it.
+//! A file may carry a [`Proof`] of its gammas and a digest of its content. Reading ignores the digest, so
+//! that an edited bank can be run; [`check_digest`] compares the digest with the content.
 
 mod check;
 mod digest;
@@ -31,32 +31,32 @@ pub const FORMAT: &str = "hybank-bank";
 /// `version` of the bank files written and read.
 pub const VERSION: usize = 1;
 
-/// N synthesis filters for one spec, whole: what `design` makes and every other command reads.
+/// N synthesis filters with the data to run them. `design` writes a bank, and the other commands read it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bank {
     /// The spec it was designed for, with all defaults filled in; `None` for a bank made elsewhere.
     pub spec: Option<Spec>,
-    /// h in seconds.
+    /// The fast period h in seconds.
     pub fast_period: f64,
-    /// M.
+    /// M, the number of fast samples per slow sample.
     pub ratio: usize,
-    /// m0 in fast samples.
+    /// The latency m0 in fast samples.
     pub latency: usize,
-    /// How it was designed.
+    /// The design method.
     pub method: Method,
-    /// D_i in seconds, one a channel.
+    /// The delay D_i of each channel in seconds.
     pub delays: Vec<f64>,
-    /// F_1 .. F_N.
+    /// The synthesis filters F_1 .. F_N.
     pub filters: SynthesisFilters,
-    /// The integers that the taps stand for, where they were chosen among these.
+    /// The integers of the taps, if the taps are fixed-point numbers.
     pub fixed_point: Option<FixedPoint>,
-    /// How good it is.
+    /// The worst-case error gamma and its bounds.
     pub gamma: Gamma,
-    /// What proves it, where the file carries that.
+    /// The proof of `gamma`, if the file carries one.
     pub proof: Option<Proof>,
 }
 
-/// The synthesis filters in the form they run in.
+/// The synthesis filters: FIR taps or a state-space block.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SynthesisFilters {
     /// `taps[i][n]` = `f_i[n]` at the fast rate.
@@ -80,17 +80,17 @@ pub struct BlockFilter {
     pub d: Vec<Vec<f64>>,
 }
 
-/// gamma = ||K|| in normalised time (h = 1), and what bounds it; `None` is what nobody knows.
+/// gamma = ||K|| in normalised time (h = 1), and its bounds; `None` if unknown.
 ///
 /// `lower <= upper` and `noncausal <= upper` hold wherever both are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gamma {
-    /// Computed norm of the very coefficients of this bank; its relative error is at most
+    /// Norm computed from the coefficients of this bank; its relative error is at most
     /// [`NORM_ACCURACY`](Self::NORM_ACCURACY).
     pub norm: Option<f64>,
-    /// An upper bound of the true norm of these coefficients: proven where the bank carries a proof, else the computed norm
-    /// raised by its stated error.
+    /// An upper bound of the true norm of these coefficients: proven if the bank carries a proof, else the
+    /// computed norm plus its stated error.
     pub upper: Option<f64>,
     /// A lower bound for all banks of this method and size.
     pub lower: Option<f64>,
@@ -102,7 +102,7 @@ impl Gamma {
     /// Relative error of a computed norm.
     pub const NORM_ACCURACY: f64 = 1e-9;
 
-    /// The interval of a bank of computed `norm`, below whose upper end all lower bounds stay.
+    /// The bounds of a bank with the computed `norm`. No lower bound exceeds the upper bound.
     pub fn computed(norm: f64, lower: f64, noncausal: f64) -> Self {
         let upper = norm * (1.0 + Self::NORM_ACCURACY);
         Self {
@@ -115,7 +115,8 @@ impl Gamma {
 }
 
 impl Bank {
-    /// Filters made elsewhere as a bank: h = 1, no latency, no delays, and nothing known of front ends and gammas.
+    /// A bank of filters that were designed elsewhere: h = 1, no latency, no delays, unknown front ends and
+    /// gammas.
     pub fn bare(filters: SynthesisFilters, ratio: usize) -> Self {
         let (method, channels) = match &filters {
             SynthesisFilters::Fir(taps) => (Method::Fir, taps.len()),
@@ -145,7 +146,7 @@ impl Bank {
         self.fast_period * self.ratio as f64
     }
 
-    /// D_i / h of every channel, exactly whole where it is whole up to rounding.
+    /// D_i / h of every channel. A value that is whole up to rounding becomes exactly whole.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
         let h = Seconds(self.fast_period);
         self.delays.iter().map(|&delay| crate::spec::delay_in_fast_periods(Seconds(delay), h)).collect()

@@ -1,14 +1,14 @@
-//! A bank made ready to run.
+//! Compiles a bank into a plan of the runtime.
 
 use super::{Bank, SynthesisFilters};
 use crate::runtime::{BuildError, Options, Plan, StateSpace};
 
 impl Bank {
-    /// The coefficients in the order of use, shared by any number of streams of the runtime.
+    /// Compiles the bank into a plan, which any number of streams of the runtime may share.
     ///
     /// # Errors
-    /// [`BuildError`] if the bank's parts do not fit together, hold values that are not finite, or cannot run as `options`
-    /// ask.
+    /// [`BuildError`] if the bank's parts do not fit together, hold values that are not finite, or cannot
+    /// run with `options`.
     pub fn plan(&self, options: Options) -> Result<Plan, BuildError> {
         let channels = self.channel_count();
         match &self.filters {

@@ -1,4 +1,4 @@
-//! From JSON text to a checked [`Bank`].
+//! Reads JSON text into a checked [`Bank`].
 
 use crate::spec::Fault;
 use crate::spec::document::Node;
@@ -30,7 +30,7 @@ const KEYS: [&str; 14] = [
 const REWRITE: &str = "a bank without it cannot be run; give a file written by `hybank design`";
 
 impl Bank {
-    /// Reads a bank file's text; `file_name` only serves the messages.
+    /// Reads a bank file's text; `file_name` is used only in messages.
     ///
     /// # Errors
     /// [`BankError`] naming the JSON place, the rule and the remedy for the first thing that is wrong.
@@ -41,10 +41,11 @@ impl Bank {
     }
 }
 
-/// Compares the digest of a bank file with its content; whether there is one at all.
+/// Compares the digest of a bank file with its content. Returns false if the file has no digest.
 ///
 /// # Errors
-/// [`BankError`] if the text is not JSON, its digest is none, or the content is not the one that it was made of.
+/// [`BankError`] if the text is not JSON, the digest is malformed, or the digest does not match the
+/// content.
 pub fn check_digest(text: &str, file_name: &str) -> Result<bool, BankError> {
     let checked = parse(text).and_then(|document| {
         let top = Value::root(&document).fields(&KEYS)?;
@@ -102,7 +103,7 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
     })
 }
 
-/// Format and version come before everything else: a bank of a later version may well have other keys.
+/// Checks format and version first, because a bank of a later version may have other keys.
 fn check_header(document: &Value<'_>) -> Result<(), BankError> {
     let format = document.entry("format")?;
     let found = format.text()?;
@@ -143,7 +144,7 @@ fn filters(top: &Fields<'_>, channels: &[Fields<'_>]) -> Result<SynthesisFilters
 fn fixed_point(value: &Value<'_>) -> Result<FixedPoint, Fault> {
     let fields = value.fields(&["bits", "fraction_bits", "integers"])?;
     let required = |key| fields.required(key, "integer taps are known by bits, fraction_bits and integers");
-    // What does not fit is out of every span, too.
+    // An integer that does not fit i64 is out of every range, too.
     let integer = |v: &Value<'_>| v.integer("(integer tap)").map(|i| i64::try_from(i).unwrap_or(i64::MAX));
     let list = |v: &Value<'_>| v.items("a list of integers")?.iter().map(integer).collect();
     let lists = required("integers")?.items("a list of integers for each channel")?;

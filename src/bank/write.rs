@@ -1,4 +1,4 @@
-//! From a [`Bank`] to JSON text.
+//! Writes a [`Bank`] as JSON text.
 
 use std::io;
 
@@ -42,11 +42,11 @@ struct Channel<'a> {
 }
 
 impl Bank {
-    /// The text of the bank file with its digest: objects indented, lists on one line, numbers with as many digits as
-    /// it takes to read the same bits back.
+    /// The text of the bank file with its digest: objects indented, lists on one line, numbers with as many
+    /// digits as are needed to read back the same bits.
     ///
     /// # Errors
-    /// [`BankError`] as [`Bank::check`]; above all for NaN and infinity, which JSON has not.
+    /// [`BankError`] as [`Bank::check`]; in particular for NaN and infinity, which JSON cannot represent.
     pub fn to_json(&self) -> Result<String, BankError> {
         self.check()?;
         let bare = text(&self.document(None))?;

@@ -1,4 +1,4 @@
-//! From a document to a [`Spec`]: units resolved, omitted filters filled in, all rules checked.
+//! Turns a document into a [`Spec`]: resolves units, fills in omitted filters, checks all rules.
 
 use crate::units::{FastPeriods, Hertz, Seconds};
 

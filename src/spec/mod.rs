@@ -1,4 +1,4 @@
-//! The spec: front ends, delays, rates and the wish for a bank, as an engineer writes them.
+//! The spec of a bank: front ends, delays, rates and design settings, as an engineer writes them.
 //!
 //! Everything here is plain data in SI units; [`crate::analog`] turns a [`FilterSpec`] into a
 //! checked realisation and [`crate::design`] turns a [`Spec`] into a bank.
@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
 ///
-/// Written with serde (or [`Spec::to_toml`]) it is a legal spec file again, in SI units.
+/// Serialised with serde (or [`Spec::to_toml`]) it is a valid spec file in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spec {
     /// Name for reports; free text.
@@ -45,7 +45,7 @@ pub struct Spec {
     pub target: FilterSpec,
     /// The real channels, in the order of the recordings.
     pub channels: Vec<ChannelSpec>,
-    /// How to design.
+    /// The design settings.
     pub design: DesignSpec,
 }
 
@@ -148,7 +148,7 @@ pub enum Method {
     H2,
     /// Papoulis/Yen interpolation of recurrent nonuniform samples, truncated (for comparison).
     Sinc,
-    /// Fractional delays undone channel by channel, then integer delays (for comparison).
+    /// First a fractional-delay filter per channel, then a bank for integer delays (for comparison).
     Separation,
 }
 
@@ -156,7 +156,8 @@ pub enum Method {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Solver {
-    /// Frequencies are exchanged until gamma meets its lower bound; among the optimal taps, the secondary objective decides.
+    /// The exchange algorithm: frequencies are added until gamma meets its lower bound. The secondary
+    /// objective chooses among the optimal taps.
     Sampled,
     /// The bounded-real LMI of thesis 5.4 with a Lyapunov matrix; slower, without a secondary objective.
     Kyp,
@@ -199,7 +200,7 @@ pub enum Reduction {
 }
 
 impl Spec {
-    /// Reads a spec file's text; `file_name` only serves the messages.
+    /// Reads a spec file's text; `file_name` is used only in messages.
     ///
     /// # Errors
     /// [`SpecError`] with line, column, rule and remedy for the first thing that is wrong.

@@ -1,17 +1,18 @@
-//! Numbers known to lie in an interval: a midpoint of 106 bits (or 512) and a radius that every operation enlarges by its own
-//! rounding error. What is computed with them encloses the exact result for every choice of values in the operands.
+//! Interval arithmetic with midpoint and radius. The midpoint has 106 bits (or 512), and every operation
+//! adds a bound of its rounding error to the radius. A result encloses the exact result for all values in
+//! the operands.
 
 use super::double_double::DoubleDouble;
 use super::number::Number;
 use nalgebra::DMatrix;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Makes up for the roundings of the radius itself, a dozen operations in double precision at most.
+/// Compensates for the rounding of the radius itself: at most a dozen operations in double precision.
 const OUTWARD: f64 = 1.0 + 32.0 * f64::EPSILON;
 /// Covers results that underflow.
 const TINY: f64 = 1e-290;
 
-/// All numbers x with `|x - mid| <= radius`. A radius of infinity or NaN says that nothing is known.
+/// All numbers x with `|x - mid| <= radius`. With an infinite or NaN radius the number is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Ball<F = DoubleDouble> {
     mid: F,
@@ -72,7 +73,7 @@ impl<F: Number> Ball<F> {
         Self { mid, radius: (inherited + F::ROUNDING * mid.nearest().abs()) * OUTWARD + TINY }
     }
 
-    /// Enclosure of the root; NaN where the ball holds negative numbers.
+    /// Enclosure of the root; NaN if the ball contains negative numbers.
     pub(super) fn sqrt(self) -> Self {
         let least = self.lower();
         if least.is_nan() || least < 0.0 {
@@ -130,7 +131,7 @@ impl<F: Number> Mul for Ball<F> {
 
 impl<F: Number> Div for Ball<F> {
     type Output = Self;
-    /// NaN where the divisor's ball holds zero.
+    /// NaN if the divisor's ball contains zero.
     fn div(self, other: Self) -> Self {
         let least = other.mid.nearest().abs() * (1.0 - f64::EPSILON) - other.radius * OUTWARD;
         if least.is_nan() || least <= 0.0 {
@@ -168,7 +169,7 @@ pub(super) fn scaled<F: Number>(a: &Matrix<F>, by: Ball<F>) -> Matrix<F> {
     a.map(|x| x * by)
 }
 
-/// a b. Entries of `a` that are exactly zero cost nothing: most of what occurs here is sparse.
+/// a b. Entries of `a` that are exactly zero are skipped, because most matrices here are sparse.
 pub(super) fn product<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     assert_eq!(a.ncols(), b.nrows(), "the matrices of a product fit each other");
     let mut result = zeros(a.nrows(), b.ncols());
@@ -193,8 +194,8 @@ pub(super) fn congruence<F: Number>(a: &Matrix<F>, s: &Matrix<F>) -> Matrix<F> {
     symmetric(&product(a, &product(a, s).transpose()))
 }
 
-/// The matrix again, made symmetric to the bit; for matrices that are symmetric by definition and whose two triangles
-/// both enclose the same numbers.
+/// Copies one triangle into the other, so that the matrix is exactly symmetric. Both triangles must enclose
+/// the same numbers.
 pub(super) fn symmetric<F: Number>(m: &Matrix<F>) -> Matrix<F> {
     Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i.max(j), i.min(j))])
 }
@@ -215,7 +216,7 @@ pub(super) fn radius_sum<F: Number>(m: &Matrix<F>) -> f64 {
     row_radii(m).into_iter().fold(0.0, nan_max)
 }
 
-/// The larger one, NaN if either is: an unknown bound stays unknown.
+/// The larger one; NaN if either is NaN, so that an unknown bound stays unknown.
 pub(super) fn nan_max(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
@@ -233,7 +234,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Any values in the operands give a value in the result: tried with the ends, against 106 bits.
+        /// The result encloses the results for all values in the operands; tested at the end points,
+        /// against 106-bit arithmetic.
         #[test]
         fn results_hold_all_values(a in -1e3..1e3f64, b in -1e3..1e3f64, ra in 0.0..1.0f64, rb in 0.0..1.0f64, s in -1.0..1.0f64, t in -1.0..1.0f64) {
             let (x, y) = (Ball::<DoubleDouble>::from(a).widened(ra), Ball::from(b).widened(rb));

@@ -13,7 +13,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 const WORDS: usize = 8;
 const BITS: i64 = 64 * WORDS as i64;
 
-/// A floating-point number with a mantissa of 512 bits; zero has no mantissa, NaN says that nothing is known.
+/// A floating-point number with a mantissa of 512 bits; zero has no mantissa, NaN is an unknown number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct BigFloat {
     /// Least significant word first; the top bit is set unless the number is zero.

@@ -1,11 +1,13 @@
-//! The lower end for causal banks: no filter that uses present and past samples only has an error system of norm below gamma.
+//! Lower bound for causal banks: no filter that uses only present and past samples has an error system of
+//! norm below gamma.
 //!
 //! # The game over T periods
-//! Let the plant start from rest, xi_0 = 0, and let W and H map the inputs w of the periods 0..T-1 to the reference samples
-//! z and the measured samples y of these periods. If y = 0 then the output of every causal bank over these periods is zero too,
-//! and its error is z. So a w with `H w = 0` and `|W w| >= gamma |w|` shows that no causal bank, linear or not, has less than
-//! gamma: what happens after period T only adds to the error. (By Arveson's distance formula for nests these bounds tend to the
-//! optimum as T grows.)
+//! Let the plant start from rest, xi_0 = 0, and let W and H map the inputs w of the periods 0..T-1 to the
+//! reference samples z and the measured samples y of these periods. If y = 0 then the output of every
+//! causal bank over these periods is zero too, and its error is z. So a w with `H w = 0` and `|W w| >=
+//! gamma |w|` shows that no causal bank, linear or not, has a norm below gamma: the error after period T
+//! only increases the norm. (By Arveson's distance formula for nests these bounds tend to the optimum as T
+//! grows.)
 //!
 //! Such a w exists if the Gram matrix of all y and z less gamma^2 on z,
 //!
@@ -14,8 +16,9 @@
 //!         [W H'  W W' - gamma^2 I],
 //! ```
 //!
-//! has fewer negative eigenvalues than there are z: where H H' > 0, its Schur complement W (I - H'(H H')^-1 H) W' - gamma^2 I then
-//! has an eigenvalue mu - gamma^2 >= 0 with eigenvector b, and w = (I - H'(H H')^-1 H) W'b does it.
+//! has fewer negative eigenvalues than there are z: where H H' > 0, its Schur complement W (I - H'(H H')^-1
+//! H) W' - gamma^2 I then has an eigenvalue mu - gamma^2 >= 0 with eigenvector b, and w = (I - H'(H H')^-1
+//! H) W'b is such an input.
 //!
 //! # The recursion
 //! The block pivots of Delta, period by period, are those of the a-posteriori filtering Riccati difference equation from P = 0
@@ -30,50 +33,53 @@
 //! By Sylvester's law the pivots of y are positive and those of z negative as long as the inertia of Delta is right; the first z
 //! pivot that is not negative refutes gamma.
 //!
-//! # Without widths that grow
-//! While the inertia is right, a' P+ a is the largest over b_z of the least over b_y of `[a; b]' G [a; b]`; so P+ grows with
-//! P, and so do the pivots of z. Each period may therefore begin with exact numbers: from the enclosure of P+ its midpoint is
-//! kept, less a diagonal above all radii. What is kept is at most P+, and a pivot of z that it makes nonnegative is so for P+.
+//! # Enclosures that do not grow
+//! While the inertia is right, a' P+ a is the largest over b_z of the least over b_y of `[a; b]' G [a; b]`;
+//! so P+ grows with P, and so do the pivots of z. Each period may therefore begin with exact numbers: the
+//! midpoint of the enclosure of P+ minus a diagonal matrix that dominates all radii. This matrix is at most
+//! P+. So if it makes a pivot of z nonnegative, the pivot is also nonnegative for P+.
 //!
-//! A measured sample counts from the period on in which it may first differ from zero. Of measured samples that are the same filter's a
-//! whole number of periods apart the earliest says everything. Where R = L_2 S L_2' is singular (delayed channels are noise-free
-//! measurements of delay-line states) nothing changes: the pivots of y are variances given the past.
+//! A measured sample counts from the first period in which it may differ from zero. If the same filter is
+//! sampled at instants a whole number of periods apart, only the earliest sample is used. R = L_2 S L_2'
+//! may be singular (delayed channels are noise-free measurements of delay-line states); the argument still
+//! holds, because the pivots of y are variances given the past.
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::{Layout, Rows, sampled};
 use super::number::Number;
 use super::slow_period::SlowPeriod;
 
-/// Most states, delay lines included.
+/// Maximum number of states, including delay lines.
 const MAX_STATES: usize = 128;
 
 /// Relative change of P per period below which it has settled.
 const SETTLED: f64 = 1e-13;
 
-/// How many bits the recursion computes with.
+/// The precision of the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
-    /// 106: quick, and enough for most.
+    /// 106 bits: fast, and sufficient for most banks.
     Short,
-    /// 512: for steep filters, whose samples say nearly the same.
+    /// 512 bits: for steep filters, whose samples are nearly dependent.
     Long,
 }
 
-/// What the recursion has shown of a gamma.
+/// The result of the recursion for a gamma.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Recursion {
-    /// No causal bank has less than gamma; so many periods show it.
+    /// No causal bank has a norm below gamma.
     Refuted {
-        /// T.
+        /// The number T of slow periods.
         periods: usize,
     },
-    /// The inertia stayed right for all the periods asked for, or until P settled. Shows nothing.
+    /// The inertia stayed right for the requested number of periods, or until P converged. This proves
+    /// nothing.
     Standing,
-    /// The sign of a pivot does not show in the digits of this arithmetic.
+    /// The precision does not suffice to determine the sign of a pivot.
     Undecided,
 }
 
-/// The analog side as the filter sees it, with what the recursion needs of each period.
+/// The analog side with its delay lines, and the matrices that the recursion needs.
 #[derive(Debug, Clone)]
 pub(super) struct CausalPlant<F> {
     /// [A; C_2; C_1].
@@ -85,7 +91,8 @@ pub(super) struct CausalPlant<F> {
 }
 
 impl<F: Number> CausalPlant<F> {
-    /// `measured` lists the rows of the measured samples that say something of their own; `None` if there are too many states.
+    /// `measured` lists the rows of the measured samples that are not redundant; `None` if there are too
+    /// many states.
     pub(super) fn new(period: &SlowPeriod<F>, ratio: usize, measured: &[usize]) -> Option<Self> {
         let used = |s: usize| s < ratio || measured.contains(&s);
         let late = period.periods_late.iter().enumerate();
@@ -147,7 +154,7 @@ impl<F: Number> CausalPlant<F> {
     }
 }
 
-/// Takes the part along `row` away from the first `n` rows and from those after it, and likewise the columns.
+/// Eliminates `row` from the first `n` rows and from the rows after it, and likewise the columns.
 fn eliminate<F: Number>(gram: &mut Matrix<F>, n: usize, row: usize) {
     let pivot = gram[(row, row)];
     let column: Vec<Ball<F>> = gram.column(row).iter().copied().collect();
@@ -161,12 +168,13 @@ fn eliminate<F: Number>(gram: &mut Matrix<F>, n: usize, row: usize) {
     }
 }
 
-/// Exact numbers of which the matrix is at most every matrix of the enclosure, in the order of symmetric matrices (Gershgorin).
+/// An exact matrix that is at most every matrix of the enclosure, in the order of symmetric matrices
+/// (Gershgorin).
 fn from_below<F: Number>(m: &Matrix<F>) -> Matrix<F> {
     let radii = ball::row_radii(m);
     Matrix::from_fn(m.nrows(), m.ncols(), |i, j| {
         let mid = Ball::exactly(m[(i.max(j), i.min(j))].mid());
-        // Twice the radii and once the roundings of the difference itself.
+        // Twice the radii plus the rounding error of the difference.
         let shift = 2.0 * radii[i] + 4.0 * F::ROUNDING * mid.magnitude();
         if i == j && shift > 0.0 { Ball::exactly((mid - Ball::from(shift)).mid()) } else { mid }
     })

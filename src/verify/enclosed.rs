@@ -1,4 +1,5 @@
-//! A bank with its error system enclosed: built once, judged with any witnesses.
+//! An enclosure of the error system of a bank. It is built once and serves to check any number of
+//! witnesses.
 
 use super::ball::{self, Matrix};
 use super::big_float::BigFloat;
@@ -30,7 +31,8 @@ pub struct EnclosedErrorSystem<'a> {
     long: OnceLock<Option<CausalPlant<BigFloat>>>,
 }
 
-/// Midpoints of the enclosed error system, for whoever looks for a certificate: xi+ = a xi + b w, e = c xi + d w with w white.
+/// Midpoints of the enclosed error system, for the search for a certificate: xi+ = a xi + b w, e = c xi + d
+/// w with w white.
 #[derive(Debug, Clone)]
 pub struct Midpoint {
     /// n x n.
@@ -71,8 +73,8 @@ impl<'a> EnclosedErrorSystem<'a> {
         self.equations.order()
     }
 
-    /// Root of the energy that the input of one slow period brings into the reference samples: the size against which a gamma is
-    /// small.
+    /// Root of the energy that the input of one slow period contributes to the reference samples. A gamma
+    /// is small if it is small relative to this.
     pub fn scale(&self) -> f64 {
         let n = self.period.order();
         (n..n + self.bank.ratio).map(|i| self.period.gram[(i, i)].nearest()).sum::<f64>().sqrt()
@@ -88,13 +90,14 @@ impl<'a> EnclosedErrorSystem<'a> {
         self.samples[i].filter == self.samples[j].filter && self.timeline.of(i) == self.timeline.of(j)
     }
 
-    /// The channels of which no earlier one is `equal`.
+    /// The channels that are not `equal` to an earlier one.
     fn first_channels(&self, equal: impl Fn(usize, usize) -> bool) -> Vec<usize> {
         let m = self.bank.ratio;
         (0..self.bank.channel_count()).filter(|&i| (0..i).all(|j| !equal(m + i, m + j))).collect()
     }
 
-    /// Rows of the measured samples that a causal bank needs: of those equal up to whole slow periods the earliest.
+    /// Rows of the measured samples that a causal bank needs: of samples that are equal up to whole slow
+    /// periods, only the earliest.
     fn earliest_samples(&self) -> Vec<usize> {
         let late = |s: usize| self.period.periods_late[s];
         let measured = self.bank.ratio..self.samples.len();
@@ -125,7 +128,7 @@ impl<'a> EnclosedErrorSystem<'a> {
         lower::of_length(&self.period, self.bank.ratio, &channels, taps[0].len(), witnesses)
     }
 
-    /// What `periods` slow periods show of `gamma` for causal banks.
+    /// Runs the recursion for causal banks at `gamma` over `periods` slow periods.
     pub fn causal_recursion(&self, gamma: f64, periods: usize, precision: Precision) -> Recursion {
         let (m, measured) = (self.bank.ratio, || self.earliest_samples());
         match precision {
@@ -151,7 +154,8 @@ impl<'a> EnclosedErrorSystem<'a> {
             .any(|precision| matches!(shown(precision), Recursion::Refuted { .. }))
     }
 
-    /// The error system in double precision; `None` if its inputs have no root, which does not happen.
+    /// The error system in double precision; `None` if the Gram matrix of its inputs has no root, which
+    /// does not happen.
     pub fn midpoint(&self) -> Option<Midpoint> {
         let root = positive::root(&self.equations.gram)?;
         let (n, m) = (self.equations.order(), self.equations.outputs);
@@ -172,20 +176,21 @@ impl<'a> EnclosedErrorSystem<'a> {
         gram.re.zip_map(&gram.im, |re, im| crate::linalg::Complex::new(re.nearest(), im.nearest()))
     }
 
-    /// Proves what the witnesses of `proof` show, and compares the gammas in the file with it.
+    /// Computes the bounds that the witnesses of `proof` prove, and compares the gammas in the file with
+    /// them.
     ///
     /// # Errors
-    /// [`VerifyError`] naming what does not fit.
+    /// [`VerifyError`] naming the first mismatch.
     pub fn judge(&self, proof: &Proof, strictness: Strictness) -> Result<Verified, VerifyError> {
         let proven = self.proven(proof)?;
         statements::compare(&self.bank.gamma, &proven, self.scale(), strictness)?;
         Ok(proven)
     }
 
-    /// What the witnesses of `proof` show.
+    /// The bounds that the witnesses of `proof` prove.
     ///
     /// # Errors
-    /// [`VerifyError`] naming the witness that does not prove what it says.
+    /// [`VerifyError`] naming the witness that does not prove its bound.
     pub fn proven(&self, proof: &Proof) -> Result<Verified, VerifyError> {
         let certificate = proof.upper.as_ref().ok_or(VerifyError::NoCertificate)?;
         let (found, states, upper) = (certificate.factor.len(), self.states(), certificate.gamma);

@@ -1,17 +1,17 @@
-//! Why a bank is not what its file says, or cannot be judged.
+//! Errors of verification.
 
 use super::{MAX_ANALOG_STATES, MAX_STATES};
 use crate::analog::AnalogError;
 
-/// Why a bank is not what its file says, or cannot be judged.
+/// The file states something that is not proven, or the bank cannot be checked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum VerifyError {
-    /// Nothing is known about the front ends.
+    /// The file carries no spec, so the front ends are unknown.
     #[error(
         "spec: it is null, so the front ends are unknown and nothing can be proven; design the bank with its spec"
     )]
     NoSpec,
-    /// A filter of the spec is no front end.
+    /// A filter of the spec is not a valid front end.
     #[error("{place}: {source}")]
     FrontEnd {
         /// Key in the file.
@@ -19,7 +19,7 @@ pub enum VerifyError {
         /// What is wrong with it.
         source: AnalogError,
     },
-    /// Too large a system.
+    /// The error system is too large.
     #[error(
         "the error system has {states} states, at most {MAX_STATES} are proven; bring latency and delays closer together, or \
          use fewer taps"
@@ -28,7 +28,7 @@ pub enum VerifyError {
         /// Its states.
         states: usize,
     },
-    /// Too many different filters.
+    /// Too many distinct filters.
     #[error(
         "spec: the distinct filters have {states} states together and a slow period {samples} samples; at most \
          {MAX_ANALOG_STATES} states, fewer with many samples, are proven; give channels that have the same filter the same text"
@@ -54,7 +54,7 @@ pub enum VerifyError {
         /// Rows needed.
         states: usize,
     },
-    /// The certificate does not prove what it says.
+    /// The certificate does not prove its gamma.
     #[error(
         "proof.upper: the certificate does not prove that these coefficients keep gamma = {gamma}: a coefficient, the spec, \
          the gamma or the certificate was altered; design the bank again"
@@ -63,7 +63,7 @@ pub enum VerifyError {
         /// The certificate's gamma.
         gamma: f64,
     },
-    /// The certificate is true but says too little.
+    /// The certificate is valid, but its interval is too wide.
     #[error(
         "proof.upper: it proves a norm of {attained} to {upper} only, too wide for a statement; design the bank again"
     )]
@@ -73,32 +73,32 @@ pub enum VerifyError {
         /// Proven from above.
         upper: f64,
     },
-    /// The recursion does not refute what the file says that it does.
+    /// The recursion does not refute the gamma that the file states.
     #[error(
         "proof.lower: {periods} slow periods do not refute gamma = {gamma} for causal banks; the file was altered, design the \
          bank again"
     )]
     NotRefuted {
-        /// The gamma that should be out of reach.
+        /// The gamma that, according to the file, no causal bank achieves.
         gamma: f64,
-        /// T.
+        /// The number T of slow periods.
         periods: usize,
     },
-    /// A stated number is wrong, or more than was proven.
+    /// A stated number contradicts the proven bound or claims more than it.
     #[error(
         "{place}: the file states {stated}, but {relation} {proven} is proven; the file was altered, design the bank again"
     )]
     Disproved {
         /// Key in the file.
         place: &'static str,
-        /// What the file says.
+        /// The number in the file.
         stated: f64,
-        /// How the proven number relates to the true one.
+        /// The relation of the proven number to the true one.
         relation: &'static str,
-        /// What was proven.
+        /// The proven number.
         proven: f64,
     },
-    /// A witness that proves nothing.
+    /// A witness proves nothing.
     #[error("{place}: this witness proves nothing; the file was altered, design the bank again")]
     Void {
         /// Key in the file.

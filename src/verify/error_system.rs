@@ -1,10 +1,11 @@
 //! The error system K = W - F H of a bank in state-space form: xi+ = A xi + J u, e = C xi + L u, where u has the Gram
 //! matrix of a [`SlowPeriod`].
 //!
-//! The state xi is, in this order: the analog state at the beginning of the period (the distinct filters in the order
-//! target, channels); for each of the reference samples 0..M-1 and then of the channels 1..N that is counted whole periods
-//! late its delay line, latest first; the state of the bank: for taps the past samples of channel 1, latest first, then of
-//! channel 2, ..; for a block filter its own state.
+//! The state xi is, in this order: the analog state at the beginning of the period (the distinct filters in
+//! the order target, channels); the delay line, latest first, of each sample that is counted whole periods
+//! late, in the order reference samples 0..M-1, channels 1..N; the state of the bank. For taps, the state
+//! of the bank holds the past samples of channel 1, latest first, then those of channel 2, and so on. For a
+//! block filter it is the filter's own state.
 
 use super::ball::{self, Ball, Matrix};
 use super::number::Number;
@@ -29,7 +30,7 @@ impl BlockForm {
         }
     }
 
-    /// The state remembers the last J - 1 samples of each channel, J lags of M taps being as long as the filters.
+    /// The state holds the last J - 1 samples of each channel; the filters have J lags of M taps.
     fn from_taps(taps: &[Vec<f64>], ratio: usize) -> Self {
         let (channels, lags) = (taps.len(), taps[0].len().div_ceil(ratio));
         let depth = lags - 1;
@@ -82,7 +83,7 @@ pub(super) struct ErrorSystem {
     pub(super) outputs: usize,
 }
 
-/// Where the parts of the state lie.
+/// The index ranges of the parts of the state.
 pub(super) struct Layout {
     lines: Vec<Range<usize>>,
     filter: Range<usize>,
@@ -105,7 +106,7 @@ impl Layout {
     }
 }
 
-/// Number of states of the error system of a bank, before anything of that size is built.
+/// Number of states of the error system of a bank, computed before any matrix of that size is allocated.
 pub(super) fn order(
     analog: usize,
     periods_late: &[usize],
@@ -136,7 +137,7 @@ impl<F: Number> Rows<F> {
         self.input[(row, period.order() + s)] = Ball::from(1.0);
     }
 
-    /// Takes `by` times the rows `range` of `other` from the rows from `start` on.
+    /// Subtracts `by` times the rows `range` of `other` from the rows that begin at `start`.
     fn subtract(&mut self, start: usize, by: &Matrix<F>, other: &Self, range: Range<usize>) {
         for (to, from) in [(&mut self.state, &other.state), (&mut self.input, &other.input)] {
             let part = ball::product(by, &from.rows(range.start, range.len()).into_owned());
@@ -147,8 +148,8 @@ impl<F: Number> Rows<F> {
     }
 }
 
-/// The analog side with its delay lines: xi+ (with `more` rows of zeros below), and the samples in the period in which they
-/// count.
+/// The analog side with its delay lines: xi+ (with `more` rows of zeros below), and the samples that are
+/// counted in this period.
 pub(super) fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: usize) -> (Rows<F>, Rows<F>) {
     let (n, order, inputs) = (period.order(), layout.order(), period.order() + period.samples());
     let mut next = Rows::zeros(order + more, order, inputs);

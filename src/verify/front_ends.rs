@@ -1,4 +1,5 @@
-//! The analog side of a bank in normalised time, as the proof takes it for given: state equations in doubles.
+//! The analog side of a bank in normalised time: state equations in doubles, which the proof takes as
+//! exact.
 
 use super::VerifyError;
 use super::ball::{self, Matrix};
@@ -12,7 +13,7 @@ use crate::units::Seconds;
 /// The distinct filters side by side, driven by the same input: dx/dt = a x + b f.
 #[derive(Debug, Clone)]
 pub(super) struct FrontEnds {
-    /// With the first state of each.
+    /// Each filter with the index of its first state.
     filters: Vec<(usize, StrictlyProper)>,
 }
 

@@ -1,4 +1,5 @@
-//! The lower end: what no bank can do, shown by dual witnesses at frequencies where the samples do not say enough.
+//! Lower bounds that hold for every bank, proven by dual witnesses at frequencies where the samples do not
+//! determine the reference.
 //!
 //! At a point z of the unit circle let Gamma = [G_w; G_h] [..]* be the Gram matrix of the M reference and the N measured samples'
 //! responses, and K = G_w - F G_h. For every direction a of the reference samples and every combination b of all samples,
@@ -7,13 +8,15 @@
 //! ||a|| ||b* G|| ||K|| >= Re a* K G* b = Re a* (Gamma b)_w - Re a* F (Gamma b)_h.
 //! ```
 //!
-//! *Any bank*: if (Gamma b)_h = 0 the filters have no part in it. The best such b = [a; b_h] gives a* S a >= for the Schur
-//! complement S of Gamma_hh, the part of the reference samples that the measured ones leave unexplained.
+//! *Any bank*: if (Gamma b)_h = 0, the right-hand side does not depend on the filters. The best such b =
+//! [a; b_h] gives a* S a with the Schur complement S of Gamma_hh, the part of the reference samples that
+//! cannot be estimated from the measured ones.
 //!
-//! *Banks of a given length*: F_{p,i}(z) = sum_j f_i[p + j M] z^-j. Several witnesses together bind all taps if
-//! r_{p,i,j} = sum over witnesses of Re conj(a_p) z^-j (Gamma b)_{h,i} = 0. What remains of r is removed by adding a continuous
-//! spectrum in the span of the samples themselves. It costs at most |r| / sqrt(lambda) in the root of its energy, lambda the
-//! least eigenvalue of the covariance matrix of the samples that the taps of one output see (for white noise at the input).
+//! *Banks of a given length*: F_{p,i}(z) = sum_j f_i[p + j M] z^-j. Several witnesses together bind all
+//! taps if r_{p,i,j} = sum over witnesses of Re conj(a_p) z^-j (Gamma b)_{h,i} = 0. A remaining r is
+//! removed by adding a continuous spectrum in the span of the samples themselves. The root of its energy is
+//! at most |r| / sqrt(lambda). Here lambda is the least eigenvalue of the covariance matrix of the samples
+//! that the taps of one output weight (for white noise at the input).
 
 use super::ball::{self, Ball, Matrix};
 use super::double_double::DoubleDouble;
@@ -22,7 +25,7 @@ use super::slow_period::SlowPeriod;
 use super::spectrum::{self, ComplexMatrix};
 use crate::bank::{DualWitness, SynthesisFilters};
 
-/// A gain that the bank itself has: `||K|| >= ||a* K(z)|| / ||a||`.
+/// A lower bound of the norm of this bank, from its gain at a frequency: `||K|| >= ||a* K(z)|| / ||a||`.
 pub(super) fn gain(
     period: &SlowPeriod,
     filters: &SynthesisFilters,
@@ -41,9 +44,9 @@ fn energy(gram: &ComplexMatrix, b: &ComplexMatrix) -> Ball {
     b.inner(&gram.product(b))
 }
 
-/// A lower bound of sqrt(a / b), `None` where nothing is known.
+/// A lower bound of sqrt(a / b); `None` if it is unknown.
 fn root_of_quotient(a: Ball, b: Ball) -> Option<f64> {
-    // A witness of weight zero shows nothing, and NaN is no bound; `max` would hide it.
+    // A witness of weight zero proves nothing, and NaN is not a bound; `max` would hide it.
     let quotient = (a / b).lower();
     if !quotient.is_finite() || b.lower() <= 0.0 {
         return None;
@@ -52,8 +55,8 @@ fn root_of_quotient(a: Ball, b: Ball) -> Option<f64> {
     value.is_finite().then(|| value.max(0.0))
 }
 
-/// A bound for any bank, causal or not, of any length: sqrt(a* S a / a* a) at the witness's frequency. `channels` are those that
-/// can be told apart.
+/// A bound for any bank, causal or not, of any length: sqrt(a* S a / a* a) at the witness's frequency.
+/// `channels` lists the distinct channels.
 pub(super) fn unexplained(
     period: &SlowPeriod,
     ratio: usize,
@@ -74,7 +77,7 @@ pub(super) fn unexplained(
     let part = |start: usize| Matrix::from_fn(n, 1, |i, _| Ball::exactly(solution[start + i]));
     let b = reference.above(&ComplexMatrix { re: part(0), im: part(n) });
     let gram = gram.select(&all, &all);
-    // The best b_h lowers the energy once more, by r* Gamma_hh^-1 r of the residual r of the one found.
+    // The optimal b_h has less energy than the b_h found, by r* Gamma_hh^-1 r with the residual r.
     let residual = gram.product(&b).rows(ratio, n).square();
     let missed = residual / Ball::from(least);
     root_of_quotient(energy(&gram, &b) - missed, reference.square())
@@ -86,7 +89,8 @@ fn least_eigenvalue(m: &Matrix) -> Option<f64> {
     (1..29).map(|k| size * 0.1f64.powi(k)).find(|&least| positive::exceeds(m, least))
 }
 
-/// A bound for all FIR banks with `length` taps a channel, from `witnesses` that together see none of the taps.
+/// A bound for all FIR banks with `length` taps per channel, from `witnesses` whose sum does not depend on
+/// the taps.
 pub(super) fn of_length(
     period: &SlowPeriod,
     ratio: usize,
@@ -110,7 +114,7 @@ pub(super) fn of_length(
 struct BindingSums {
     ratio: usize,
     length: usize,
-    /// Rows of the measured samples that can be told apart.
+    /// Rows of the distinct measured samples.
     measured: Vec<usize>,
     /// sum Re a* (Gamma b)_w.
     value: Ball,
@@ -161,7 +165,7 @@ struct Covariance {
 }
 
 impl Covariance {
-    /// X = E X E' + G by doubling; what is left after 2^k steps is at most ||E^(2^k)||^2 of the whole.
+    /// X = E X E' + G by doubling; the remainder after 2^k steps is at most ||E^(2^k)||^2 of the whole.
     fn new(period: &SlowPeriod) -> Option<Self> {
         let n = period.order();
         let mut state = period.gram.view((0, 0), (n, n)).into_owned();

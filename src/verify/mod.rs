@@ -1,7 +1,8 @@
-//! Proof of a bank's gammas from its file alone, in arithmetic whose every rounding is charged.
+//! Proves a bank's gammas from its file alone, in arithmetic that bounds every rounding error.
 //!
-//! This module shares no code with the designer: it neither searches nor optimises, it checks. What a proof needs is in the
-//! file ([`Proof`](crate::bank::Proof)); where that came from does not matter.
+//! This module shares no code with the designer: it neither searches nor optimises; it checks. The file
+//! holds the certificate and the witnesses of the proof ([`Proof`](crate::bank::Proof)). How they were
+//! found does not matter.
 //!
 //! # What is proven
 //! For the error system K of the bank's own coefficients (thesis Props. 5.1-5.3), in normalised time (h = 1):
@@ -12,15 +13,17 @@
 //! - no causal bank has a gamma below `lower`, by the inertia of a finite-horizon Riccati recursion ([`Recursion`]);
 //! - no bank at all, causal or not, has a gamma below `noncausal`, by one dual witness.
 //!
-//! Each gamma that the file states is compared with these: a file states no more than what is proven.
+//! Each gamma that the file states is compared with these bounds. A file that states more than they prove
+//! is refused.
 //!
-//! # From where on
-//! Taken for given, exactly as doubles: the state equations of the front ends in normalised time that [`crate::analog`]
-//! realises from the spec (their rounding, some 1e-15 relative, is tested there, not proven here), delays and fast period in
-//! seconds, the latency, and the coefficients in the file. From these on everything is enclosed: delays in fast periods are
-//! quotients that are compared exactly, exponentials and Gramians are Taylor series with their rest, frequency responses are
-//! bounded by a residual, positive definiteness is shown by a Cholesky factorisation in double-double arithmetic (Rump, 2006),
-//! everything else by intervals of 106 or 512 bits.
+//! # Assumptions
+//! The proof starts from these doubles, taken as exact: the state equations of the front ends in normalised
+//! time that [`crate::analog`] realises from the spec (their rounding, some 1e-15 relative, is tested
+//! there, not proven here), the delays and the fast period in seconds, the latency, and the coefficients in
+//! the file. Everything computed from them is enclosed. Delays in fast periods are quotients that are
+//! compared exactly. Exponentials and Gramians are Taylor series with a bound of the remainder. Frequency
+//! responses are bounded by a residual. A Cholesky factorisation in double-double arithmetic shows positive
+//! definiteness (Rump, 2006). Everything else is computed in intervals of 106 or 512 bits.
 //!
 //! Not proven: that the spec describes the hardware.
 
@@ -51,14 +54,15 @@ pub use self::statements::Strictness;
 
 use crate::bank::{Bank, Proof};
 
-/// Most states of an error system that is proven: its matrices are dense.
+/// Maximum number of states of an error system that can be proven: its matrices are dense.
 pub const MAX_STATES: usize = 2048;
-/// Most analog states of all distinct front ends together.
+/// Maximum number of analog states of all distinct front ends together.
 pub const MAX_ANALOG_STATES: usize = 128;
-/// Most samples of a slow period times the cube of the analog states: a minute's work.
+/// Maximum of the samples of a slow period times the cube of the analog states: about a minute of
+/// computing.
 const MAX_WORK: usize = 100_000_000;
 
-/// Which banks a lower bound holds for.
+/// The class of banks for which a lower bound holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BoundedBanks {
@@ -70,24 +74,24 @@ pub enum BoundedBanks {
     FirOfThisLength,
 }
 
-/// What was proven of a bank; all numbers for h = 1.
+/// The proven bounds of a bank, in normalised time (h = 1).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Verified {
-    /// No bank of those in `lower_banks` has less.
+    /// No bank of the class `lower_banks` has a smaller gamma.
     pub lower: f64,
-    /// Which banks `lower` holds for.
+    /// The class of banks for which `lower` holds.
     pub lower_banks: BoundedBanks,
     /// ||K|| of this bank is at most this.
     pub upper: f64,
     /// ||K|| of this bank is at least this.
     pub attained: f64,
-    /// No bank at all has less.
+    /// No bank, causal or not, has a smaller gamma.
     pub noncausal: f64,
     /// Order of P.
     pub states: usize,
 }
 
-/// Proves the gammas of a bank with the witnesses that it carries.
+/// Proves the gammas of a bank with the certificate and the witnesses that it carries.
 ///
 /// # Errors
 /// [`VerifyError`] naming what does not fit; [`VerifyError::NoCertificate`] at once for a bank that carries no proof.

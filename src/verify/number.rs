@@ -1,4 +1,4 @@
-//! What a floating-point number must offer so that enclosures can be computed with it.
+//! The trait of the floating-point numbers with which enclosures are computed.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -22,7 +22,7 @@ pub(super) trait Number:
     const ZERO: Self;
     /// Bounds the relative error of each operation, underflow apart.
     const ROUNDING: f64;
-    /// Terms of an exponential series after which the rest lies below the rounding.
+    /// Terms of an exponential series after which the remainder lies below the rounding.
     const SERIES_TERMS: usize;
 
     /// The nearest double, up to a relative error of 2^-52.

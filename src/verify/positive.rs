@@ -1,4 +1,4 @@
-//! Proof that a symmetric matrix is positive definite, for all matrices in its enclosure.
+//! Proves that every matrix in an enclosure of a symmetric matrix is positive definite.
 //!
 //! If a Cholesky factorisation in floating point runs to its end, the matrix it was given differs from a positive
 //! semidefinite one by at most g tr in the spectral norm, g = (n + 2) u / (1 - (n + 2) u), u the relative error of an operation
@@ -36,7 +36,8 @@ pub(super) fn cholesky(m: &DMatrix<DoubleDouble>) -> Option<Factor> {
     Some(Factor { rows })
 }
 
-/// R with R R' = m up to a shift of 1e-28 of its size, which makes a semidefinite m definite. Rounded: no part of a proof.
+/// R with R R' = m up to a shift of 1e-28 of its size, which makes a semidefinite m definite. The result is
+/// rounded and must not be used in a proof.
 pub(super) fn root(m: &Matrix) -> Option<Matrix> {
     let n = m.nrows();
     let scales = scales(m);
@@ -66,7 +67,8 @@ impl Factor {
     }
 }
 
-/// Powers of two that bring the diagonal of a matrix to the size of one: exact, and the proof no longer depends on units.
+/// Powers of two that bring the diagonal of a matrix to the size of one: the scaling is exact, and the
+/// proof does not depend on units.
 fn scales(m: &Matrix) -> Vec<f64> {
     let power = |i: usize| {
         let diagonal = m[(i, i)].nearest();

@@ -1,9 +1,10 @@
-//! One slow period of the analog side: how the state and all samples of a period depend on the state before and on the
-//! input, the latter only through the Gram matrix of the maps from input to numbers (theory: K K* knows no more).
+//! One slow period of the analog side: the dependence of the state and of all samples of a period on the
+//! previous state and on the input. The input enters only through the Gram matrix of the maps from it to
+//! these numbers, because K K* depends on no more.
 //!
 //! For two samples at instants t_a >= t_b of the period, rows c_a, c_b, the entry of the Gram matrix is
-//! `c_a e^{A (t_a - t_b)} G(t_b) c_b'`. The period ends with the latest sample; the others follow at their instants, whole
-//! periods later where they are older than a period.
+//! `c_a e^{A (t_a - t_b)} G(t_b) c_b'`. The period ends with the latest sample; samples older than a period
+//! are counted whole periods later.
 
 use super::ball::{self, Matrix};
 use super::double_double::DoubleDouble;
@@ -60,7 +61,8 @@ impl<F: Number> SlowPeriod<F> {
     }
 }
 
-/// Fills the lower triangle beyond the states: each sample with all that is not earlier.
+/// Fills the lower triangle beyond the states: the entries of each sample with the samples at the same
+/// instant or later.
 fn correlate<F: Number>(
     gram: &mut Matrix<F>,
     timeline: &Timeline,
@@ -70,7 +72,7 @@ fn correlate<F: Number>(
 ) {
     let n = gram.nrows() - rows.len();
     for (b, row) in rows.iter().enumerate() {
-        // What the state at some later instant has in common with sample b.
+        // Covariance of the state at a later instant with sample b.
         let mut common = ball::product_transposed(&since_start[timeline.of(b)].gramian, row);
         for k in timeline.of(b)..timeline.len() {
             if k > timeline.of(b) {

@@ -132,7 +132,7 @@ pub(super) fn delay(z: &ComplexMatrix, periods: usize) -> ComplexMatrix {
     power
 }
 
-/// Steps of refinement at most; each gains the digits that the condition leaves of a double.
+/// Maximum number of refinement steps. The better the condition, the more digits each step gains.
 const REFINEMENTS: usize = 6;
 
 /// (z I - a)^-1 right, as a real system B x = r of twice the order.
@@ -240,7 +240,7 @@ mod tests {
         let rest = shifted.product(&r).minus(&ComplexMatrix::real(ball::identity(4)));
         assert!(rest.square().magnitude().sqrt() < 1e-25);
         assert!(rest.re.iter().chain(&rest.im).all(|x| x.nearest().abs() <= x.radius()));
-        // A pole on the circle has none.
+        // At a pole on the unit circle there is no response.
         let one = ComplexMatrix::real(ball::identity(1));
         assert!(resolved(&ball::identity(1), &one, &one).re[(0, 0)].radius().is_nan());
     }

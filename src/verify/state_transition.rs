@@ -1,13 +1,14 @@
 //! The state transition over a given time: e^{A t} and the Gramian G(t) = int_0^t e^{A s} B B' e^{A' s} ds, enclosed.
 //!
-//! Both by their Taylor series over a time that is short against the dynamics, with the rest of the series in the radius,
-//! and then by doubling: e^{2 A t} = (e^{A t})^2, G(2 t) = G(t) + e^{A t} G(t) e^{A' t}. Only sums and products occur.
+//! Both are computed from their Taylor series over a time that is short relative to the dynamics, with the
+//! remainder of the series in the radius, and then by doubling: e^{2 A t} = (e^{A t})^2, G(2 t) = G(t) +
+//! e^{A t} G(t) e^{A' t}. Only sums and products occur.
 
 use super::ball::{self, Ball, Matrix};
 use super::double_double::DoubleDouble;
 use super::number::Number;
 
-/// Halvings of the time at most: ||A|| t up to 1e18.
+/// Maximum number of halvings of the time: ||A|| t up to 1e18.
 const MAX_HALVINGS: i32 = 64;
 
 /// e^{A t} and G(t).
@@ -56,7 +57,7 @@ fn taylor<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> Sta
     let (size, factorial) = (norm * t.magnitude() * 1.001, factorial(terms));
     let rest = 2.0 * size.powi(terms as i32) / factorial;
     let gramian_rest = 2.0 * ball::row_sum(&inputs) * (2.0 * size).powi(terms as i32) / factorial;
-    // Written so that NaN is unknown too.
+    // This form of the comparison also treats NaN as unknown.
     let known = |rest: f64| if size <= 0.26 { 1.01 * rest } else { f64::NAN };
     StateTransition {
         transition: transition.map(|x| x.widened(known(rest))),

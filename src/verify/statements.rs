@@ -1,25 +1,26 @@
-//! The gammas that a file states against those that were proven.
+//! Compares the gammas that a file states with the proven bounds.
 
 use super::{Verified, VerifyError};
 use crate::bank::Gamma;
 
 /// Relative excess of a certificate's gamma over the norm for which the stated number still counts as the same.
 const CERTIFICATE_WIDTH: f64 = 1e-8;
-/// How far a stated lower bound may lie below the proven one: less says that a number was altered.
+/// Relative distance by which a stated lower bound may lie below the proven one. A larger distance shows
+/// that a number was altered.
 const UNDERSTATED: f64 = 1e-6;
-/// Most relative width of the interval proven for the norm.
+/// Maximum relative width of the proven interval of the norm.
 const WIDEST: f64 = 0.2;
 /// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
 const FLOOR: f64 = 1e-10;
-/// Most width of the interval proven for such a norm, relative to the scale.
+/// Maximum width of the proven interval of such a norm, relative to the scale.
 const WIDEST_AT_FLOOR: f64 = 2e-6;
 
-/// What may be said beyond the proof.
+/// Which stated numbers a comparison accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Strictness {
-    /// Nothing: each stated number is proven.
+    /// Only numbers that are proven.
     Proven,
-    /// What the proof does not refute.
+    /// All numbers that the proof does not refute.
     NotRefuted,
 }
 
@@ -35,8 +36,8 @@ fn disproved(
 /// Compares each gamma in the file with what was proven; `scale` is the size of the reference samples.
 ///
 /// # Errors
-/// [`VerifyError::Disproved`] with the first number that is not so, [`VerifyError::TooWide`] where the interval says little of
-/// the norm.
+/// [`VerifyError::Disproved`] with the first number that fails the comparison, [`VerifyError::TooWide`] if
+/// the proven interval of the norm is too wide.
 pub(super) fn compare(
     gamma: &Gamma,
     proven: &Verified,

@@ -1,4 +1,5 @@
-//! The enclosed error system against the designer's, which shares no code with it; and what a proof must not accept.
+//! Tests of the enclosed error system against the designer's, which shares no code with it, and of proofs
+//! that must be refused.
 
 use super::spectrum::{self, ComplexMatrix};
 use super::*;
@@ -24,7 +25,7 @@ fn thesis_filter() -> FilterSpec {
     FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] }
 }
 
-/// A bank with made-up coefficients: what is compared does not ask whether it is any good.
+/// A bank with arbitrary coefficients; the comparisons hold for good and bad banks.
 fn bank(
     target: FilterSpec,
     filters: Vec<FilterSpec>,
@@ -217,7 +218,7 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
             let error = verify(&Bank { gamma, ..bank.clone() }).unwrap_err();
             assert!(matches!(error, VerifyError::Disproved { place: "gamma.norm", .. }), "{error}");
         }
-        // A certificate is good for its gamma and no lower one.
+        // A certificate proves its gamma and no lower one.
         let certificate = bank.proof.as_ref().unwrap().upper.clone().unwrap();
         let error = EnclosedErrorSystem::new(&bank).unwrap();
         assert!(error.keeps(&certificate.factor, certificate.gamma));

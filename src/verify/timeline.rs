@@ -1,7 +1,8 @@
-//! When the samples of a slow period are taken, compared exactly.
+//! The sampling instants of a slow period, compared exactly.
 //!
-//! A delay D in seconds and a fast period h are doubles, and D / h is a rational number that no double need hold. Instants are
-//! kept as whole - D / h and compared without rounding, so that a delay next to a whole number is not taken for one.
+//! A delay D in seconds and a fast period h are doubles, and D / h is a rational number that a double may
+//! not represent. Instants are kept as whole - D / h and compared without rounding, so that a delay near a
+//! whole number is not treated as whole.
 
 use super::VerifyError;
 use super::ball::Ball;
@@ -10,7 +11,7 @@ use super::number::Number;
 use crate::units::Seconds;
 use std::cmp::Ordering;
 
-/// Most periods by which a sample may be late: beyond, doubles no longer count them one by one.
+/// Maximum number of periods by which a sample may be late; the limit keeps the count exact in doubles.
 const MAX_PERIODS_LATE: f64 = (1u64 << 40) as f64;
 
 /// The instant `whole - delay / h` in fast periods, `whole` a whole number.
@@ -71,10 +72,11 @@ impl Instant {
 }
 
 impl Timeline {
-    /// Folds the samples into the period of `ratio` fast periods that ends with the latest of them.
+    /// Reduces the instants modulo the slow period of `ratio` fast periods, which ends with the latest
+    /// sample.
     ///
     /// # Errors
-    /// [`VerifyError::TooLarge`] where one is so late that periods are not counted any more.
+    /// [`VerifyError::TooLarge`] if a sample is later than the maximum number of periods.
     pub(super) fn new(
         samples: &[SamplingInstant],
         fast_period: Seconds,

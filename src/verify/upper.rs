@@ -1,4 +1,5 @@
-//! The upper end: ||K|| <= gamma by the bounded-real lemma, in the form that needs K's input through its Gram matrix only.
+//! Upper bound: ||K|| <= gamma by the bounded-real lemma. In the form used here the input of K enters only
+//! through its Gram matrix.
 //!
 //! With xi+ = A xi + J u, e = C xi + L u and the Gram matrix S of u, let P = P' >= 0 satisfy
 //!
