@@ -45,7 +45,7 @@ impl RegularisedCholesky {
         }
     }
 
-    /// Solves with the unshifted matrix, as far as iterative refinement reaches.
+    /// Solves with the unshifted matrix, up to the accuracy of the iterative refinement.
     pub(super) fn solve(&self, rhs: &[f64]) -> Vec<f64> {
         let mut scaled = Mat::from_column_slice(rhs.len(), 1, rhs);
         scaled.iter_mut().zip(&self.scale).for_each(|(value, s)| *value *= s);

@@ -5,10 +5,10 @@
 //! | [`sampled`] | least worst-case norm of `W - F H` at sampled frequencies | 1000 taps, 500 frequencies |
 //! | [`kyp`] | bounded real lemma with outputs affine in the unknowns | tens of states, at most 160 |
 //!
-//! [`sampled`] is the engine of the designs. Its optimum on a finite set of frequencies is a lower bound for
-//! the whole unit circle; with the peaks of the norm added as points, the two optima meet. [`kyp`] solves
-//! the same problem with a Lyapunov matrix instead of frequencies (thesis 5.4) and serves as the second
-//! opinion.
+//! The design methods use [`sampled`]. Its optimum on a finite set of frequencies is a lower bound for the
+//! whole unit circle; with the peaks of the norm added as points, the two optima meet. [`kyp`] solves the
+//! same problem with a Lyapunov matrix instead of frequencies (thesis 5.4) and serves as an independent
+//! check.
 //!
 //! Both are primal-dual predictor-corrector methods. A hard problem is not an error: each solver returns its
 //! best iterate, bounds on the optimum and an [`Outcome`]. Rounding errors limit the relative accuracy of

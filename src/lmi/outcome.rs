@@ -15,7 +15,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Whether the duality gap is within the reduced tolerance at least.
+    /// Whether the duality gap is at most the reduced tolerance.
     pub fn is_solved(self) -> bool {
         matches!(self, Self::Solved | Self::SolvedInaccurate)
     }

@@ -19,7 +19,7 @@ pub struct TestBank {
     pub c: Mat,
     /// Delays of the channels in fast periods.
     pub delays: Vec<f64>,
-    /// Fast samples a slow period.
+    /// Fast samples per slow period.
     pub ratio: usize,
     /// Latency in fast samples.
     pub latency: usize,
@@ -203,7 +203,7 @@ pub fn thesis() -> TestBank {
     TestBank { a, b, c, delays: vec![1.2, 0.6], ratio: 2, latency: 10 }
 }
 
-/// Eight channels behind a Butterworth filter of order 4.
+/// Eight channels, each after a Butterworth filter of order 4.
 pub fn eight_channels(latency: usize) -> TestBank {
     let (a, b, c) = low_pass(&butterworth(4, 1.8));
     let delays = vec![0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];

@@ -5,11 +5,12 @@ use super::{LtiError, StateSpace};
 use crate::linalg::{self, Mat};
 
 /// The system in coordinates in which both Gramians are diag(sigma), the Hankel singular values in
-/// descending order, without the states at the end that together change the transfer function by at most
-/// `floor` (twice the sum of their sigma bounds the H-infinity norm of what is left out: Glover 1984).
+/// descending order, truncated after the state from which on all further states together change the
+/// transfer function by at most `floor` (twice the sum of their sigma bounds the H-infinity norm of the
+/// truncation error: Glover 1984).
 ///
-/// No Gramian is ever squared, so that small sigma keep their digits. States that are not controllable or
-/// not observable are always left out, `floor` = 0 included, as far as they are exactly so.
+/// The algorithm works on square roots of the Gramians, so that small sigma keep their digits. States that
+/// are exactly uncontrollable or unobservable are always left out, even with `floor` = 0.
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable.
@@ -17,12 +18,12 @@ pub fn balanced(system: &StateSpace, floor: f64) -> Result<StateSpace, LtiError>
     balanced_when_driven(system, &controllability_root(system.a(), system.b())?, floor)
 }
 
-/// As [`balanced`] for a system in use: `controllability_root` is a square root of the covariance of its
-/// states when it is driven by what drives it there, for example another system (Enns 1984). The leading
-/// states then matter most *there*.
+/// As [`balanced`] for a system that is driven by another signal than white noise, for example by the
+/// output of another system (Enns 1984). `controllability_root` is a square root of the covariance of the
+/// states under that signal. The leading states then have the largest effect for that signal.
 ///
-/// With the output unweighted every leading part is stable, since the observability Gramian stays one of
-/// the whole. What is left out has no bound as simple as that of [`balanced`]: measure it.
+/// The output is not weighted, so every truncation is stable. The truncation error has no bound as simple
+/// as that of [`balanced`]; compute it.
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable.

@@ -16,8 +16,8 @@ const NODES: [(f64, f64); 8] = [
     (0.9801449282487681, 0.05061426814518853),
 ];
 
-/// e^{A t} of a block-diagonal A, block by block: a stiff block then costs a slow one no digits
-/// (scaling and squaring scales for the largest block).
+/// e^{A t} of a block-diagonal A, computed block by block. Scaling and squaring of the whole matrix would
+/// scale for the largest block, and the slow blocks would lose digits.
 #[derive(Debug, Clone)]
 pub struct StateTransition {
     blocks: Vec<Mat>,

@@ -1,9 +1,9 @@
-//! A FIR head with a recursive tail.
+//! An FIR head with a recursive tail.
 //!
-//! Filters that look ahead hold delay chains: states that only pass values on. Together they are one large
-//! defective eigenvalue at zero, which has no modal form, and yet only a filter of finitely many taps. The first
-//! q + 1 taps of the response are therefore the FIR head, and the response after them is that of a recursion
-//! without the chains, the tail:
+//! Filters with latency contain delay chains: states that only pass values on. Together these states form
+//! one large defective eigenvalue at zero, which has no modal form. Their response has finitely many taps.
+//! The first q + 1 taps of the response are therefore realised as the FIR head. A recursion without the
+//! chains, the tail, produces the rest:
 //!
 //! y[k] = sum_{j = 0..q} h_j u[k - j] + c x[k],  x[k + 1] = a x[k] + b u[k - q].
 
@@ -13,11 +13,11 @@ use super::modal::{modal, triangular};
 use super::{LtiError, StateSpace, StateSpaceError};
 use crate::linalg::{self, Mat};
 
-/// States that change the response by less than this fraction of it, all together, are left out: less than a
-/// quarter of what rounding the taps does.
+/// States that together change the response by less than this fraction are left out. That is a quarter of
+/// the effect of rounding the taps.
 const NEGLIGIBLE: f64 = f64::EPSILON / 4.0;
 
-/// A FIR head with a recursive tail: y[k] = sum h_j u[k - j] + c x[k], x[k + 1] = a x[k] + b u[k - q].
+/// An FIR head with a recursive tail: y[k] = sum h_j u[k - j] + c x[k], x[k + 1] = a x[k] + b u[k - q].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirWithTail {
     /// h_0 .. h_q, p x m each.
@@ -56,7 +56,7 @@ impl FirWithTail {
         Ok(Self { head, tail: StateSpace::new(system.a().clone(), system.b().clone(), c, zero)? })
     }
 
-    /// The tail x+ = a x + b u behind a head of q = `length`, with `outputs` = [c h_q .. h_0].
+    /// The tail x+ = a x + b u after a head of q = `length`, with `outputs` = [c h_q .. h_0].
     ///
     /// # Errors
     /// [`StateSpaceError`] if the shapes do not fit.
@@ -71,7 +71,7 @@ impl FirWithTail {
     /// The same outputs for inputs u = `gain` v.
     ///
     /// # Errors
-    /// [`StateSpaceError::Gain`] if `gain` has not a row for each input.
+    /// [`StateSpaceError::Gain`] unless `gain` has a row for each input.
     pub fn map_inputs(&self, gain: &Mat) -> Result<Self, StateSpaceError> {
         let tail = self.tail.map_inputs(gain)?;
         Ok(Self { head: self.head.iter().map(|tap| tap * gain).collect(), tail })
@@ -104,8 +104,8 @@ impl FirWithTail {
         self.head.len() - 1
     }
 
-    /// One system: the states of the tail first, then the past inputs from the oldest to the newest. So `a` is block
-    /// triangular, and as sparse as can be.
+    /// One system: the states of the tail first, then the past inputs from the oldest to the newest. So `a`
+    /// is block triangular and as sparse as possible.
     ///
     /// # Errors
     /// [`StateSpaceError`] never for a value made by [`FirWithTail::new`]: its parts fit.
@@ -120,9 +120,9 @@ impl FirWithTail {
     }
 }
 
-/// The states that drive nothing but the output after some steps, as exact zeros show.
+/// The delay chains that drive only the output, recognised by exact zeros.
 struct Chains {
-    /// Steps after which none of them matters.
+    /// Steps after which none of them has any effect.
     longest: usize,
     /// All other states.
     core: Vec<usize>,

@@ -1,9 +1,9 @@
-//! Systems made of systems.
+//! Interconnections of systems.
 //!
-//! The pieces ([`StateSpace::gain`], [`StateSpace::delays`], [`StateSpace::delay_line`],
-//! [`StateSpace::fir`]) and the ways to connect them. States of the first operand come first. Nothing is
-//! reduced: states that cancel stay, and each entry of the result is an entry of an operand or one product
-//! of two of them, so that no digits are lost.
+//! The elementary systems ([`StateSpace::gain`], [`StateSpace::delays`], [`StateSpace::delay_line`],
+//! [`StateSpace::fir`]) and their connections. States of the first operand come first. Nothing is reduced:
+//! states that cancel stay, and each entry of the result is an entry of an operand or one product of two of
+//! them, so that no digits are lost.
 
 use super::{StateSpace, StateSpaceError};
 use crate::linalg::{self, Mat};
@@ -16,8 +16,8 @@ impl StateSpace {
         Self { a: Mat::zeros(0, 0), b: Mat::zeros(0, m), c: Mat::zeros(p, 0), d }
     }
 
-    /// `diag(z^-k_1, z^-k_2, ..)`: output i is input i, `steps[i]` steps later. The states of a delay lie
-    /// first link first.
+    /// `diag(z^-k_1, z^-k_2, ..)`: output i is input i, `steps[i]` steps later. The states of a delay are
+    /// ordered from the newest sample to the oldest.
     pub fn delays(steps: &[usize]) -> Self {
         let shift = |n: usize| Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1)));
         let first = |n: usize| Mat::from_fn(n, 1, |i, _| f64::from(u8::from(i == 0)));
@@ -31,8 +31,8 @@ impl StateSpace {
         }
     }
 
-    /// All that is known of `width` inputs u up to `steps` steps back: `[u[k - steps]; ..; u[k - 1];
-    /// u[k]]`. The states are the past inputs, the oldest first.
+    /// The present and the past `steps` samples of `width` inputs u: `[u[k - steps]; ..; u[k - 1]; u[k]]`.
+    /// The states are the past inputs, the oldest first.
     pub fn delay_line(width: usize, steps: usize) -> Self {
         let order = width * steps;
         let ahead = |i: usize, j: usize| f64::from(u8::from(j == i + width));
@@ -48,7 +48,7 @@ impl StateSpace {
     /// newest first.
     ///
     /// # Errors
-    /// [`StateSpaceError::Linalg`] if the shapes of the `F_j` differ; no `F_j` at all give the system
+    /// [`StateSpaceError::Linalg`] if the shapes of the `F_j` differ; an empty list gives the system
     /// without inputs and outputs.
     pub fn fir(taps: &[Mat]) -> Result<Self, StateSpaceError> {
         let Some(d) = taps.first() else { return Ok(Self::gain(Mat::zeros(0, 0))) };
@@ -83,7 +83,7 @@ impl StateSpace {
     }
 
     /// `[G; N G_o]`: this system with all its outputs, and below them those of `next`, which the given
-    /// `outputs` o drive. Both read the same state of this system, which is there once.
+    /// `outputs` o drive. Both use the same state of this system, which the result contains once.
     ///
     /// # Errors
     /// [`StateSpaceError::Connection`] unless `next` has an input for each of the `outputs`,

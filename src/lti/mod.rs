@@ -1,6 +1,6 @@
 //! Discrete-time state-space systems: connections, responses, Gramians, peak gains, Riccati equations.
 //!
-//! Knows no filter bank: a system has inputs, outputs and states, nothing else. Continuous-time
+//! This module does not depend on filter banks: a system has inputs, outputs and states. Continuous-time
 //! helpers ([`exponential`]) serve exact discretisation.
 
 pub mod balanced;
@@ -33,14 +33,14 @@ pub enum LtiError {
         /// Largest modulus of the eigenvalues of `a`.
         radius: f64,
     },
-    /// A bounded iteration ran out.
+    /// An iteration reached its limit.
     #[error("{what} did not settle within {limit} steps (last relative change {change:e})")]
     IterationLimit {
         /// What was iterated.
         what: &'static str,
         /// The bound.
         limit: usize,
-        /// How far it still moved.
+        /// The last change.
         change: f64,
     },
     /// Matrices that do not form a system.

@@ -1,26 +1,27 @@
-//! Coordinates in which a recursion costs least: parallel sections, or else a triangle.
+//! Coordinates in which a recursion needs the fewest operations: parallel sections, or else a triangular
+//! state matrix.
 
 use super::gramian::{controllability_root, observability_root};
 use super::{LtiError, StateSpace};
 use crate::linalg::{self, CMat, Complex, Mat};
 
-/// Parallel sections are made of eigenvectors of at most this condition: what a section gets wrong by
-/// rounding is magnified by as much where sections cancel one another.
+/// Maximum condition number of the eigenvectors for parallel sections. Where sections cancel one another,
+/// their rounding errors are magnified by up to this number.
 const CONDITION_LIMIT: f64 = 1e4;
 
 /// The system as parallel sections: `a` block-diagonal with a real pole alone, or a conjugate pair s + jw,
 /// s - jw as [[s, w], [-w, s]], and exact zeros elsewhere. Pairs come first, each kind by falling modulus.
-/// In each section the mean squares of its states and of what they do to the output are equal for white
-/// input (the traces of its two Gramians, up to a power of 16), so that no state is much larger or smaller
-/// than what it is good for.
+/// In each section the traces of the controllability and the observability Gramian are equal up to a power
+/// of 16. So for white input no state is much larger or smaller than its effect on the output.
 ///
-/// `None` where the eigenvectors are nearly dependent (repeated and close poles): see [`triangular`].
+/// `None` if the eigenvectors are nearly dependent (repeated and close poles): see [`triangular`].
 ///
 /// # Errors
-/// [`LtiError`] if the system is not stable or its eigenvectors cannot be had.
+/// [`LtiError`] if the system is not stable or its eigenvectors cannot be computed.
 pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
     let modes = modes(system.a())?;
-    // Poles of a real matrix come in pairs; should rounding have parted one, there is no real basis.
+    // Complex poles of a real matrix come in pairs. If rounding has separated a pair, there is no real
+    // basis.
     if modes.iter().map(Mode::order).sum::<usize>() != system.order() {
         return Ok(None);
     }
@@ -37,8 +38,8 @@ pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
     sections(&modes, b, c, system.d().clone()).map(Some)
 }
 
-/// The system in a real Schur basis: `a` is zero below its diagonal but for 2 x 2 blocks. The change of
-/// coordinates is a rotation and costs no accuracy, whatever the poles.
+/// The system in a real Schur basis: `a` is zero below its diagonal except in 2 x 2 blocks. The change of
+/// coordinates is orthogonal, so it loses no accuracy for any poles.
 ///
 /// # Errors
 /// [`LtiError`] if the iteration does not converge.

@@ -1,4 +1,4 @@
-//! Frequency responses at many points: one Hessenberg reduction, then O(n^2) a point.
+//! Frequency responses at many points: one Hessenberg reduction, then O(n^2) operations per point.
 
 use super::StateSpace;
 use crate::linalg::{self, CMat, Complex, Mat};
@@ -6,8 +6,8 @@ use nalgebra::linalg::Hessenberg;
 
 /// Evaluates G(z) = c (zI - a)^-1 b + d at many z.
 ///
-/// With a' = Q H Q' the transposed problem (zI - H) X = Q' c' has as many right-hand sides as the
-/// system has outputs, which in this field are few, and G = X' Q' b + d.
+/// With a' = Q H Q' the transposed problem (zI - H) X = Q' c' has as many right-hand sides as the system
+/// has outputs, which here are few. Then G = X' Q' b + d.
 #[derive(Debug, Clone)]
 pub struct FrequencyResponse {
     hessenberg: Mat,
@@ -65,8 +65,8 @@ impl FrequencyResponse {
     }
 }
 
-/// (Q, H) with m = Q H Q'. nalgebra's reduction is finite (no iteration), so its trouble with
-/// delay lines does not arise; it refuses sizes below two.
+/// (Q, H) with m = Q H Q'. nalgebra's reduction is not iterative, so the convergence failure of its QR
+/// iteration with delay lines does not occur. It refuses sizes below two.
 fn reduce(m: &Mat) -> (Mat, Mat) {
     if m.nrows() < 2 {
         (Mat::identity(m.nrows(), m.nrows()), m.clone())

@@ -6,22 +6,22 @@
 
 use crate::linalg::{self, Mat};
 
-/// The stabilising solution converges quadratically; near the edge of solvability by halves. Sixty
-/// doublings are 2^60 steps of the underlying recursion.
+/// The doubling converges quadratically to the stabilising solution; near the limit of solvability the
+/// error only halves per step. Sixty doublings are 2^60 steps of the underlying recursion.
 const DOUBLING_LIMIT: usize = 60;
 /// Steps of the plain recursion after the doubling.
 const POLISHING_LIMIT: usize = 4;
 /// Relative change at which the doubling has converged.
 const CONVERGED: f64 = 1e-14;
-/// A relative residual above this is not a solution at all; below it the caller judges.
+/// A relative residual above this is not a solution; below it the caller decides.
 const RESIDUAL_LIMIT: f64 = 1e-3;
 
-/// How a doubling ended. Not converging says nothing about whether a solution exists.
+/// The result of a doubling. If it does not converge, a solution may still exist.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RiccatiOutcome {
     /// The stabilising solution.
     Solved(RiccatiSolution),
-    /// No solution was reached; the numbers say how it went.
+    /// No solution was found.
     Unresolved {
         /// Doublings done.
         steps: usize,
@@ -30,7 +30,7 @@ pub enum RiccatiOutcome {
     },
 }
 
-/// A stabilising solution with what speaks for it.
+/// A stabilising solution with its closed loop and its residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RiccatiSolution {
     /// X, n x n, symmetric.
@@ -39,7 +39,7 @@ pub struct RiccatiSolution {
     pub closed_loop: Mat,
     /// Doublings done.
     pub steps: usize,
-    /// ||F' X (I + G X)^-1 F + H - X||: X solves the equation exactly for an H that is off by this much.
+    /// ||F' X (I + G X)^-1 F + H - X||: X solves the equation exactly for an H that differs by this much.
     pub residual: f64,
 }
 
@@ -127,7 +127,7 @@ fn plain_weight(g: &Mat, x: &Mat) -> Mat {
     x * linalg::inverse(&identity_plus(g, x))
 }
 
-/// (X^-1 + G)^-1, the same for an invertible X: loses no digits where X is about to be infinite.
+/// (X^-1 + G)^-1, the same for an invertible X. It loses no digits where X is almost infinite.
 fn inverse_weight(g: &Mat, x: &Mat) -> Mat {
     linalg::inverse(&(linalg::inverse(x) + g))
 }

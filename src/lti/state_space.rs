@@ -14,7 +14,7 @@ pub struct StateSpace {
 /// Why matrices or systems do not form a system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StateSpaceError {
-    /// Matrices whose shapes do not belong together.
+    /// The shapes of the matrices do not match.
     #[error(
         "state-space shapes do not fit: a is {}x{} (must be n x n), b {}x{} (n x m), c {}x{} (p x n), d {}x{} (p x m)",
         a.0, a.1, b.0, b.1, c.0, c.1, d.0, d.1
@@ -37,14 +37,14 @@ pub enum StateSpaceError {
     Connection {
         /// The operation.
         operation: &'static str,
-        /// What it asks for.
+        /// The rule that it requires.
         rule: &'static str,
         /// Outputs and inputs of the first system.
         first: (usize, usize),
         /// Outputs and inputs of the second system.
         second: (usize, usize),
     },
-    /// A gain matrix, or a list of gains, that does not fit the inputs or outputs it is for.
+    /// The size of a gain matrix, or of a list of gains, does not match the inputs or outputs.
     #[error("a gain for {count} {ports} cannot be {}x{}", gain.0, gain.1)]
     Gain {
         /// Inputs or outputs.
@@ -64,7 +64,7 @@ pub enum StateSpaceError {
         /// How many the system has.
         count: usize,
     },
-    /// Blocks that do not fit one another.
+    /// The sizes of the blocks do not match.
     #[error(transparent)]
     Linalg(#[from] linalg::LinalgError),
 }
@@ -131,9 +131,9 @@ impl StateSpace {
         }
     }
 
-    /// The same system with its states in units that suit one another: divided by powers of two, which is
-    /// exact. Orthogonal changes of coordinates mix all states, and what is small beside rounding errors of
-    /// the others is lost in them.
+    /// The same system with balanced states, divided by powers of two, which is exact. Orthogonal changes
+    /// of coordinates mix all states, so without this the small states would be lost in the rounding errors
+    /// of the large ones.
     pub fn rescaled(&self) -> Self {
         let scales = linalg::state_scales(&self.a, &self.b, &self.c);
         let scaled = Self {
@@ -142,7 +142,7 @@ impl StateSpace {
             c: Mat::from_fn(self.outputs(), self.order(), |i, j| self.c[(i, j)] * scales[j]),
             d: self.d.clone(),
         };
-        // Entries at both ends of double precision may ask for scales beyond it.
+        // Entries near both limits of double precision may need scales beyond it.
         let finite = |m: &Mat| m.iter().all(|x| x.is_finite());
         if [&scaled.a, &scaled.b, &scaled.c].into_iter().all(finite) { scaled } else { self.clone() }
     }

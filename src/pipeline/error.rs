@@ -1,10 +1,10 @@
-//! Why a pipeline cannot be built or go on.
+//! Errors of a pipeline.
 
 use crate::files::FileError;
 use crate::io::IoError;
 use crate::runtime::{BuildError, ProcessError};
 
-/// A fault of one of the stages.
+/// An error of one of the stages.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
     /// The bank's parts do not fit together.
@@ -16,7 +16,7 @@ pub enum PipelineError {
     /// An input cannot be read, or an output written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// An output file cannot be created or get its name.
+    /// An output file cannot be created or renamed to its final name.
     #[error(transparent)]
     File(#[from] FileError),
 }

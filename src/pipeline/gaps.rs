@@ -1,7 +1,8 @@
-//! Samples that are missing: what stands in for them, where they were, and which outputs they affect.
+//! Missing samples: their replacement, their position, and the outputs that they affect.
 //!
-//! A missing sample is marked by NaN. An output of an FIR bank is affected if one of its taps falls on a missing
-//! sample, and it is exact again when the filters have forgotten the gap; a recursion never forgets.
+//! A missing sample is marked by NaN. An output of an FIR bank is affected if one of its taps falls on a
+//! missing sample. Outputs are exact again when the gap has left the history of the filters. A recursive
+//! bank has infinite history, so all later outputs count as affected.
 
 use super::Gap;
 use super::touch::Touch;
@@ -10,10 +11,10 @@ use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::runtime::BuildError;
 use std::borrow::Cow;
 
-/// Gaps that a report lists one by one; more are only counted, so that memory stays bounded.
+/// Maximum number of gaps that a report lists; further gaps are only counted, so that memory stays bounded.
 const LISTED: usize = 65_536;
 
-/// What stands in for a missing sample.
+/// The replacement of a missing sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GapPolicy {
     /// Zero.
@@ -22,7 +23,7 @@ pub enum GapPolicy {
     Hold,
 }
 
-/// What is known of a channel.
+/// The state of a channel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Channel {
     /// The last good sample.
@@ -33,8 +34,8 @@ struct Channel {
 
 /// Fills gaps frame by frame.
 ///
-/// A frame costs O(N + M) however long the filters are; a gap costs one pass over its channel's zero and nonzero
-/// taps at most, when it ends.
+/// A frame takes O(N + M) operations for filters of any length. A gap takes at most one pass over the taps
+/// of its channel, when it ends.
 #[derive(Debug, Clone)]
 pub struct GapFiller {
     policy: GapPolicy,
@@ -52,7 +53,7 @@ pub struct GapFiller {
 }
 
 impl GapFiller {
-    /// For the channels and taps of a bank.
+    /// A filler for the channels and taps of a bank.
     ///
     /// # Errors
     /// [`BuildError::NoRatio`] and [`BuildError::NoChannels`] for a bank without outputs or inputs.
@@ -78,8 +79,8 @@ impl GapFiller {
         })
     }
 
-    /// Replaces what is not finite in whole frames of N samples, and sets `mask[k M + p]` to 1 where
-    /// output p of frame k is affected by a missing sample, to 0 elsewhere.
+    /// Replaces the samples that are not finite in whole frames of N samples, and sets `mask[k M + p]` to 1
+    /// where output p of frame k is affected by a missing sample, to 0 elsewhere.
     pub fn fill(&mut self, frames: &mut [f64], mask: &mut Vec<u8>) {
         let n = self.channels.len();
         mask.clear();
@@ -92,7 +93,7 @@ impl GapFiller {
     }
 
     /// As [`GapFiller::fill`], for samples as they lie in files and pipes: the channels are those of all
-    /// `parts` one after another. Frames without gaps are given back as they are.
+    /// `parts` one after another. Frames without gaps are returned unchanged.
     pub fn fill_pcm<'a>(
         &'a mut self,
         parts: &'a [PcmFrames<'a>],
@@ -136,7 +137,8 @@ impl GapFiller {
         self.missing
     }
 
-    /// True if no gap is open and none can affect another output, or every output is affected for ever.
+    /// True if the mask no longer changes: no gap is open and none affects a later output, or all later
+    /// outputs are affected.
     fn is_at_rest(&self) -> bool {
         self.touch.as_ref().is_none_or(|touch| touch.is_settled(self.frame))
             && self.channels.iter().all(|channel| channel.open.is_none())

@@ -1,23 +1,23 @@
-//! Marks of frames to marks of outputs that come later.
+//! Delays the mask of frames by the latency of the outputs.
 
 use std::ops::Range;
 
-/// Aligns the mask with the outputs of an algorithm that adds latency: y\[n\] comes as output n + latency.
+/// Aligns the mask with the outputs of an algorithm that adds latency: y\[n\] is output number n + latency.
 #[derive(Debug, Clone)]
 pub(super) struct MaskDelay {
     /// The marks of the block's frames.
     pub(super) block: Vec<u8>,
-    /// The marks of the block's outputs, and of the later ones that are known already.
+    /// The marks of the block's outputs, and the known marks of later outputs.
     marks: Vec<u8>,
 }
 
 impl MaskDelay {
-    /// For outputs that are `latency` samples later than the frames say.
+    /// A delay for outputs that are `latency` samples late.
     pub(super) fn new(latency: usize) -> Self {
         Self { block: Vec::new(), marks: vec![0; latency] }
     }
 
-    /// Takes the marks of the block's frames in.
+    /// Appends the marks of the block's frames.
     pub(super) fn enter(&mut self) {
         self.marks.extend_from_slice(&self.block);
     }
@@ -27,7 +27,7 @@ impl MaskDelay {
         &self.marks[samples]
     }
 
-    /// Forgets the marks of the block's outputs.
+    /// Removes the marks of the block's outputs.
     pub(super) fn leave(&mut self) {
         self.marks.drain(..self.block.len());
     }

@@ -1,13 +1,14 @@
-//! From recordings to a running bank and on to its outputs: what `hybank fuse` and `hybank stream` share.
+//! Runs a bank on recordings or streams and writes its outputs. `hybank fuse` and `hybank stream` share
+//! this module.
 //!
 //! ```text
 //! MultiReader -> GapFiller -> runtime::Stream -> latency skip -> Output (samples and mask)
 //! ```
 //!
-//! A [`Pipeline`] takes frames as they arrive, fills what is missing, runs the bank, drops the latency, and hands encoded
-//! samples to an [`Output`] together with a mask of the samples that missing inputs affect. [`run`] does that for all frames
-//! of a [`MultiReader`](crate::io::MultiReader). What happened is an [`Outcome`] of counts and [`Warning`]s; nothing is
-//! printed.
+//! A [`Pipeline`] takes frames as they arrive. It fills missing samples, runs the bank, drops the latency,
+//! and passes encoded samples to an [`Output`], with a mask of the samples that missing inputs affect.
+//! [`run`] processes all frames of a [`MultiReader`](crate::io::MultiReader). The result is an [`Outcome`]
+//! with counts and [`Warning`]s; nothing is printed.
 
 mod error;
 mod gap;

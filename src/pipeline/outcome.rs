@@ -1,14 +1,14 @@
-//! What happened, as values.
+//! The result of a run.
 
 use super::Gap;
 use crate::io::InputWarning;
 use crate::runtime::PlanSummary;
 use std::fmt;
 
-/// What a run has done.
+/// Counts and settings of a finished run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// How the bank ran.
+    /// The plan with which the bank ran.
     pub plan: PlanSummary,
     /// N.
     pub channels: usize,
@@ -29,31 +29,31 @@ pub struct Outcome {
 /// The gaps of a run.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct GapSummary {
-    /// Gaps in all.
+    /// Number of gaps.
     pub count: u64,
-    /// Samples that were missing in all.
+    /// Number of missing samples.
     pub missing: u64,
     /// The gaps in the order of their ends, at most 65,536 of them.
     pub list: Vec<Gap>,
 }
 
-/// Something that was tolerated.
+/// A fault that was tolerated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Warning {
     /// A fault of an input.
     Input(InputWarning),
-    /// The inputs, which these are, have no frame.
+    /// The inputs of these names have no frames.
     Empty(Vec<String>),
-    /// So many input samples were NaN or infinite.
+    /// This many input samples were NaN or infinite.
     Replaced(u64),
-    /// So many output samples saturated.
+    /// This many output samples saturated.
     Clipped(u64),
-    /// So many times a recursion's state was not finite.
+    /// A recursion's state was not finite this many times.
     StateReset(u64),
 }
 
 impl Outcome {
-    /// What the filters had to tolerate.
+    /// The faults that the filters tolerated.
     pub fn warnings(&self) -> impl Iterator<Item = Warning> + use<> {
         let counted = |count: u64, warning: fn(u64) -> Warning| (count > 0).then(|| warning(count));
         let replaced = counted(self.replaced, Warning::Replaced);

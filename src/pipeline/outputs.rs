@@ -1,11 +1,11 @@
-//! Where output samples go.
+//! Destinations of output samples.
 
 use super::PipelineError;
 use crate::files::{AtomicFile, commit_all};
 use crate::io::{IoError, SampleWriter};
 use std::io::Write;
 
-/// Output samples that belong together.
+/// Output samples with their mask.
 #[derive(Debug, Clone, Copy)]
 pub struct Block<'a> {
     /// Encoded samples.
@@ -19,28 +19,28 @@ pub trait Output {
     /// Takes the next samples.
     ///
     /// # Errors
-    /// Those of the place where they go.
+    /// The errors of the destination.
     fn write(&mut self, block: Block<'_>) -> Result<(), IoError>;
 }
 
-/// Samples to a file or standard output, the mask to a file of its own. Files appear only by
-/// [`FileOutputs::finish`], and together.
+/// Samples to a file or standard output, the mask to a file of its own. [`FileOutputs::finish`] makes all
+/// files appear together; before it no file is visible.
 pub struct FileOutputs {
     samples: SampleWriter,
     mask: Option<AtomicFile>,
 }
 
 impl FileOutputs {
-    /// Samples to `samples`, and the mask to `mask`, if it is wanted.
+    /// Writes samples to `samples`, and the mask to `mask` if given.
     pub fn new(samples: SampleWriter, mask: Option<AtomicFile>) -> Self {
         Self { samples, mask }
     }
 
-    /// Completes the files and gives them their names.
+    /// Completes the files and renames them to their final names.
     ///
     /// # Errors
-    /// The system's refusal, or [`FileError::Exists`](crate::files::FileError::Exists) if one of the names was taken in the
-    /// meantime; no file is left behind then.
+    /// The system's refusal, or [`FileError::Exists`](crate::files::FileError::Exists) if one of the names
+    /// was taken in the meantime; then no file remains.
     pub fn finish(self) -> Result<(), PipelineError> {
         let mut files = self.samples.finish()?;
         files.extend(self.mask);

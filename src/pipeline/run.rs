@@ -1,4 +1,4 @@
-//! All frames of a reader through a pipeline.
+//! Runs all frames of a reader through a pipeline.
 
 use super::{Output, Pipeline, PipelineError};
 use crate::io::{Arrival, MultiReader};
@@ -8,11 +8,12 @@ use crate::io::{Arrival, MultiReader};
 pub enum Ending {
     /// The inputs ended.
     Inputs,
-    /// The reader's stop channel asked for it; all frames so far have come out.
+    /// A message came on the reader's stop channel. All frames read so far have been processed.
     Stopped,
 }
 
-/// Runs until the inputs end or a stop is asked for; `progress` is told the frames of each step. Nothing is flushed.
+/// Runs until the inputs end or a stop is requested. Each step calls `progress` with its number of frames.
+/// This function does not flush.
 ///
 /// # Errors
 /// [`PipelineError`] for an input that cannot be read, frames that do not fit the bank, or an output that cannot be

@@ -1,4 +1,4 @@
-//! Frames through gaps and filters into encoded output samples.
+//! The stages of a pipeline: gap filling, filtering and encoding.
 
 use super::mask::MaskDelay;
 use super::{Block, GapFiller, GapPolicy, GapSummary, Outcome, Output, PipelineError};
@@ -7,32 +7,32 @@ use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::runtime::{PcmOutput, Plan, ProcessError, Stream, ThreadPool};
 use std::ops::Range;
 
-/// Encoded output of one step at most, for one thread.
+/// Maximum size of the encoded output of one step, for one thread.
 const STEP_BYTES: usize = 256 << 10;
-/// Frames of zeros that flush at a time.
+/// Number of zero frames per step of a flush.
 const FLUSH_FRAMES: usize = 256;
 
-/// How a pipeline runs.
+/// Settings of a pipeline.
 #[derive(Debug)]
 pub struct Settings {
-    /// How output samples are stored.
+    /// Format of the output samples.
     pub format: PcmFormat,
-    /// Output samples that are dropped at the beginning.
+    /// Number of output samples that are dropped at the beginning.
     pub skip: u64,
-    /// What stands in for missing samples; `None` leaves NaN and infinity to the runtime, which replaces them by 0.
+    /// Replacement of missing samples. With `None` the runtime replaces NaN and infinity by 0.
     pub gaps: Option<GapPolicy>,
-    /// Threads that filter; `None` for the calling thread.
+    /// Threads for filtering; `None` uses the calling thread.
     pub workers: Option<ThreadPool>,
 }
 
 impl Settings {
-    /// Encoded output without anything else.
+    /// Settings that only encode the output: no gaps, no latency skip, no threads.
     pub fn plain(format: PcmFormat) -> Self {
         Self { format, skip: 0, gaps: None, workers: None }
     }
 }
 
-/// Runs one stream: fills gaps, filters, drops the latency, counts.
+/// Runs one stream: fills gaps, filters, drops the latency and counts.
 #[derive(Debug)]
 pub struct Pipeline {
     stream: Stream,
@@ -48,7 +48,7 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// A stream of `plan` at its beginning; `plan` is that of `bank`.
+    /// A new stream of `plan`, which must be the plan of `bank`.
     ///
     /// # Errors
     /// [`PipelineError::Build`] for a bank without outputs or inputs whose gaps are to be filled.
@@ -80,18 +80,18 @@ impl Pipeline {
         self.samples
     }
 
-    /// Takes frames: the channels are those of all `parts` one after another.
+    /// Processes frames. The channels are those of all `parts`, one part after another.
     ///
     /// # Errors
-    /// [`PipelineError::Process`] if the channels are not those of the bank, or those of the output.
+    /// [`PipelineError::Process`] if the channels do not match the bank, or the errors of the output.
     pub fn push(&mut self, parts: &[PcmFrames<'_>], output: &mut impl Output) -> Result<(), PipelineError> {
         self.push_at_most(parts, u64::MAX, output)
     }
 
-    /// Takes frames of zeros until `samples` samples have come out since the beginning.
+    /// Processes frames of zeros until `samples` samples have been written since the beginning.
     ///
     /// # Errors
-    /// Those of the output.
+    /// The errors of the output.
     pub fn flush(&mut self, samples: u64, output: &mut impl Output) -> Result<(), PipelineError> {
         let layout = SampleLayout::packed(PcmFormat::F32Le);
         let (channels, ratio) = (self.stream.channels(), self.stream.ratio() as u64);
@@ -105,7 +105,7 @@ impl Pipeline {
         Ok(())
     }
 
-    /// Ends the gaps that are open, and says what happened.
+    /// Ends the open gaps and returns the outcome.
     pub fn finish(mut self) -> Outcome {
         let gaps = self.gaps.as_mut().map(|(filler, _)| {
             filler.finish();
@@ -200,12 +200,12 @@ impl Engine<'_> {
     ) -> Result<(), ProcessError> {
         let ratio = self.stream.ratio();
         let frames = bytes.len() / self.format.bytes() / ratio;
-        // Floats do not clip, and mostly all samples are kept.
+        // Floats do not clip; in most steps all samples are kept.
         if self.format.is_float() || kept == (0..frames * ratio) {
             *self.clipped += self.run_frames(parts, bytes)?;
             return Ok(());
         }
-        // Whole frames before, in and behind what is kept, and between them frames of which a part is kept.
+        // Whole frames before, within and after the kept samples, and between them partly kept frames.
         let whole = kept.start.div_ceil(ratio)..(kept.end / ratio).max(kept.start.div_ceil(ratio));
         let bounds = [0, kept.start / ratio, whole.start, whole.end, kept.end.div_ceil(ratio), frames];
         let mut first = 0;

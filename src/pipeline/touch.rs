@@ -1,11 +1,11 @@
 //! Which outputs of an FIR bank a missing sample affects.
 //!
-//! Output p of frame k is y\[kM + p\] = sum_i sum_j f_i\[p + jM\] x_i\[k - j\], so a missing x_i\[t\] affects it if and
-//! only if f_i\[p + (k - t)M\] is not zero. The nonzero lags of one channel and phase are a few intervals, for
-//! ordinary filters a single one. A gap that has ended, x_i\[s\] .. x_i\[e - 1\], affects the frames s + a .. e - 1 + b
-//! for each interval a ..= b: two changes of a count, at the first frame and behind the last. The counts of all
-//! phases run along with the frames, so a frame costs M additions, whatever the length of the filters, and a gap
-//! costs two additions for each interval, once.
+//! Output p of frame k is y\[kM + p\] = sum_i sum_j f_i\[p + jM\] x_i\[k - j\], so a missing x_i\[t\]
+//! affects it if and only if f_i\[p + (k - t)M\] is not zero. The nonzero lags of one channel and phase are
+//! a few intervals, for ordinary filters a single one. A gap that has ended, x_i\[s\] .. x_i\[e - 1\],
+//! affects the frames s + a .. e - 1 + b for each interval a ..= b. So a count changes twice: at the first
+//! of these frames and after the last. The counts of all phases are updated per frame. A frame takes M
+//! additions for filters of any length, and a gap takes two additions per interval.
 
 use super::Gap;
 
@@ -16,20 +16,20 @@ struct Lags {
     last: usize,
 }
 
-/// The nonzero lags of a bank, and the outputs ahead that ended gaps affect.
+/// The nonzero lags of a bank, and the future outputs that ended gaps affect.
 #[derive(Debug, Clone)]
 pub(super) struct Touch {
     ratio: usize,
     /// `lags[i][p]` in ascending order.
     lags: Vec<Vec<Vec<Lags>>>,
-    /// For each frame ahead, a ring of [`Touch::span`] frames, and each phase: by how much the count changes there.
+    /// The change of the count at each future frame and phase; a ring buffer of [`Touch::span`] frames.
     changes: Vec<i32>,
     span: usize,
     /// Ended gaps that affect output p of the current frame.
     counts: Vec<i32>,
     /// All changes lie before this frame.
     settled: u64,
-    /// Additions so far, the measure of work in tests.
+    /// Number of additions so far; tests use it as the measure of work.
     #[cfg(test)]
     pub(super) additions: u64,
 }
@@ -55,7 +55,7 @@ impl Touch {
         frame >= self.settled
     }
 
-    /// Notes a gap that ended before `frame`, which has not been marked yet.
+    /// Records a gap that ended before `frame`, which has not been marked yet.
     pub(super) fn end(&mut self, gap: &Gap, frame: u64) {
         let mut additions = 0;
         for (p, lags) in self.lags[gap.channel - 1].iter().enumerate() {

@@ -112,7 +112,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// Lower bound on gamma. From `0 <= <Z, S>`: `gamma (tr Zuu + tr Zyy) >= -2 <T, k0> - 2 (U'T)'y`, and
-    /// unknowns that reach a gamma below the present one have `|y|^2 <= m gamma^2`, because m gamma^2
+    /// unknowns that achieve a gamma below the present one have `|y|^2 <= m gamma^2`, because m gamma^2
     /// bounds the squared H2 norm `1 + |y|^2`.
     fn dual_value(&self) -> f64 {
         let residual = self.border.tr_mul(&Mat::from_column_slice(self.w.len(), 1, &self.w));

@@ -5,10 +5,10 @@ use crate::lmi::settings::{SettingError, check_settings};
 /// Limits and tolerances of the KYP solver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Most predictor-corrector steps (default 80).
+    /// Maximum number of predictor-corrector steps (default 80).
     pub max_iterations: usize,
-    /// Duality gap to reach, relative to gamma (default 1e-7). Rounding errors in the Newton matrix end the
-    /// progress near 1e-9.
+    /// Duality gap at which the iteration ends, relative to gamma (default 1e-7). Rounding errors in the
+    /// Newton matrix end the progress near 1e-9.
     pub tol_gap_rel: f64,
     /// Duality gap that counts as zero, relative to the norm of the data (default 1e-13).
     pub tol_gap_abs: f64,

@@ -7,7 +7,7 @@ use crate::lmi::settings::{SettingError, check_settings};
 pub struct Settings {
     /// Most predictor-corrector steps (default 80).
     pub max_iterations: usize,
-    /// Duality gap to reach, relative to gamma (default 1e-9).
+    /// Duality gap at which the iteration ends, relative to gamma (default 1e-9).
     pub tol_gap_rel: f64,
     /// Duality gap that counts as zero, relative to the largest `sigma_max(W_l)` (default 1e-13).
     pub tol_gap_abs: f64,

@@ -164,7 +164,7 @@ impl Run<'_> {
         Ok((outcome, steps))
     }
 
-    /// Exact norm of the taps and proven bound of the dual matrices of the iterate.
+    /// Computed norm of the taps of the iterate, and the lower bound that its dual matrices give.
     fn judge(&self, engine: &Engine<'_>, best: &mut Best<'_>) -> Result<(), SampledError> {
         let x: Vec<f64> = self.start.iter().zip(&engine.x).map(|(a, b)| a + self.scale * b).collect();
         best.offer_taps(self.reduced.taps(&x))?;

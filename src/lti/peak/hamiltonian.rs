@@ -7,8 +7,8 @@ use nalgebra::{ComplexField, DMatrix};
 use std::f64::consts::PI;
 
 /// The Hamiltonian matrix whose eigenvalue j tan(w / 2) marks gain(w) = level, w counted from the point
-/// opposite to the centre of the Cayley transform, which is 0 or pi. The outputs from `measurements` on are
-/// those whose gain counts, as far as the outputs before do not explain them.
+/// opposite to the centre of the Cayley transform, which is 0 or pi. The gain is that of the outputs from
+/// `measurements` on, after subtraction of the part that the outputs before explain.
 pub(super) fn about_real(
     system: &StateSpace,
     measurements: usize,
@@ -20,7 +20,7 @@ pub(super) fn about_real(
     hamiltonian(&cayley(parts, linalg::solve), measurements, level, linalg::solve)
 }
 
-/// As [`about_real`] for any centre, which costs complex numbers.
+/// As [`about_real`] for any centre, in complex arithmetic.
 pub(super) fn about_any(
     system: &StateSpace,
     measurements: usize,
@@ -49,7 +49,8 @@ fn cayley<T: ComplexField>((a, b, c, d): Parts<T>, solve: Solve<T>) -> Parts<T> 
 }
 
 /// The Hamiltonian matrix of a continuous-time system whose eigenvalues on the imaginary axis mark gain =
-/// `level` of the outputs from `measurements` on, as far as those before do not explain them.
+/// `level`. The gain is that of the outputs from `measurements` on, after subtraction of the part that the
+/// outputs before explain.
 fn hamiltonian<T: ComplexField>(
     (a, b, c, d): &Parts<T>,
     measurements: usize,

@@ -1,14 +1,14 @@
-//! Peak gains over the unit circle: the H-infinity norm, and the peak of what measurements
-//! cannot explain.
+//! Peak gains over the unit circle: the H-infinity norm, and the peak of the part of the references that
+//! measurements cannot explain.
 //!
-//! Both are largest values over w of sigma_max(L_z(w)), where an LQ factorisation of the response
-//! [G_y; G_z] = [L_y 0; L_zy L_z] Q splits off what the measurements y say about the references
-//! z. Without measurements this is sigma_max(G_z) and its peak the H-infinity norm.
+//! Both are the maximum over w of sigma_max(L_z(w)). The LQ factorisation of the response [G_y; G_z] = [L_y
+//! 0; L_zy L_z] Q separates the part L_zy of the references z that the measurements y explain. Without
+//! measurements L_z is G_z, and the peak is the H-infinity norm.
 //!
 //! Method: level sets (Boyd & Balakrishnan 1990, Bruinsma & Steinbuch 1990). gamma is the gain at some
 //! frequency exactly where G G* - gamma^2 J, J = diag(0, I), is singular; after a Cayley transform these
-//! are the imaginary eigenvalues of one Hamiltonian matrix (`hamiltonian`). Eigenvalues only ever *suggest*
-//! frequencies: each value that is reported was evaluated from the response itself, and refined between its
+//! are the imaginary eigenvalues of one Hamiltonian matrix (`hamiltonian`). Eigenvalues only *suggest*
+//! frequencies. Each reported value is evaluated from the response itself and refined between its
 //! neighbours (`refine`).
 
 mod hamiltonian;
@@ -22,13 +22,14 @@ use std::f64::consts::PI;
 
 /// Relative accuracy of the returned peak.
 pub const PEAK_ACCURACY: f64 = 1e-9;
-/// Distances from the angle of a pole, in those of the pole from the unit circle.
+/// Distances from the angle of a pole, relative to the distance of the pole from the unit circle.
 const WIDTHS: [f64; 5] = [-1.5, -0.5, 0.0, 0.5, 1.5];
 
 /// A peak gain and where it is attained.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// The largest gain, to [`PEAK_ACCURACY`] relative, attained at `frequency` (so never too large).
+    /// The largest gain, with relative accuracy [`PEAK_ACCURACY`]. It is attained at `frequency`, so it is
+    /// never too large.
     pub gain: f64,
     /// Radians per step, in [0, pi].
     pub frequency: f64,
@@ -60,8 +61,8 @@ pub fn hinf_norm_with_response(
     Search::new(&system.compress_inputs(), 0, response, initial).run()
 }
 
-/// The peaks of a stable system that rise above `level`: at least one of each range of frequencies that
-/// does.
+/// The peaks of a stable system above `level`: at least one in each frequency interval in which the gain
+/// exceeds it.
 pub fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiError> {
     let poles = stable_poles(system)?;
     let system = system.compress_inputs();
@@ -79,8 +80,8 @@ pub fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, LtiError> 
     if radius >= 1.0 { Err(LtiError::Unstable { radius }) } else { Ok(poles) }
 }
 
-/// Angles of the poles that may make a peak, and angles about them at distances of what they miss of the
-/// unit circle: the width of what they do to the gain.
+/// Angles of the poles that may cause a peak, and angles near them at multiples of the pole's distance from
+/// the unit circle, which is the width of its resonance.
 pub fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
     let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > 0.5);
     let about = |p: &Complex<f64>| WIDTHS.map(|width| p.arg() + width * (1.0 - p.norm()));

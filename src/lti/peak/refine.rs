@@ -4,9 +4,9 @@ use super::Peak;
 use crate::lti::LtiError;
 use std::f64::consts::PI;
 
-/// Relative differences of gains below this are no reason to go on refining.
+/// The refinement ends at relative differences of gains below this.
 const FLAT: f64 = 1e-11;
-/// Relative differences of gains below this are no differences.
+/// Gains with a relative difference below this count as equal.
 const ROUNDING: f64 = 1e-13;
 /// Steps of a refinement are at least this part of the width that is left.
 const LEAST_STEP: f64 = 1e-3;
@@ -25,9 +25,9 @@ pub(super) fn refine(
         let tried = at(w)?;
         let gained = tried.gain - best.gain;
         stalls = if gained < FLAT * best.gain { stalls + 1 } else { 0 };
-        // A try far below the best one says that the step was poor, not that the peak is reached.
+        // A gain far below the best one shows a poor step, not convergence.
         flats = if gained.abs() <= FLAT * best.gain { flats + 1 } else { 0 };
-        // Of equal gains the first stays: peaks at 0 and pi are there exactly.
+        // Of equal gains the first stays, so that peaks at 0 and pi are exactly there.
         if gained > ROUNDING * best.gain {
             if w < best.frequency {
                 high = best
@@ -77,8 +77,8 @@ pub(super) fn local_maxima(grid: &[Peak]) -> Vec<[Peak; 3]> {
     (0..=last).map(neighbours).filter(is_maximum).collect()
 }
 
-/// How high the gain may rise between `low` and `high`, of which `middle` is the highest that was evaluated: a
-/// gain that is concave there lies below the chords on either side of `middle`, extended to the other.
+/// An upper estimate of the gain between `low` and `high`; `middle` is the largest gain evaluated there. A
+/// gain that is concave there lies below the chords on each side of `middle`, extended to the other side.
 pub(super) fn upper_estimate(low: Peak, middle: Peak, high: Peak) -> f64 {
     let (left, right) = (middle.frequency - low.frequency, high.frequency - middle.frequency);
     let beyond_left = (middle.gain - low.gain) * right / left;

@@ -8,25 +8,26 @@ use crate::linalg::{self, CMat};
 use crate::lti::{LtiError, StateSpace};
 use std::f64::consts::PI;
 
-/// The level rises at least by [`PEAK_ACCURACY`] in each round; in practice two or three do.
+/// Limit on the rounds. The level rises at least by [`PEAK_ACCURACY`] in each; in practice two or three
+/// rounds suffice.
 const ROUND_LIMIT: usize = 60;
 /// Uniform initial frequencies.
 const FIRST_GRID: usize = 32;
 /// At least so many uniform frequencies per state: |G|^2 has at most a peak for each state between 0 and pi.
 const FREQUENCIES_PER_STATE: usize = 2;
-/// Frequencies nearer than this are one.
+/// Frequencies closer than this count as equal.
 const SAME_FREQUENCY: f64 = 1e-9;
 /// How far off the axis (relative) an eigenvalue may lie and still count as a crossing.
 const ON_AXIS: f64 = 1e-5;
-/// As [`ON_AXIS`] where a frequency is only suggested. Where the level all but touches a peak, two
-/// eigenvalues meet on the axis, and what rounding does to the matrix moves them by its square root: errors
-/// of 1e-4 are common where the gain is small against the parts that cancel. A false suggestion costs one
-/// evaluation, a missed one a peak.
+/// As [`ON_AXIS`], for frequencies that are only suggested. If the level almost touches a peak, two
+/// eigenvalues meet on the axis, and a rounding error of the matrix moves them by its square root. Errors
+/// of 1e-4 are common if the gain is small relative to terms that cancel. A false suggestion costs one
+/// evaluation; a missed one loses a peak.
 const NEAR_AXIS: f64 = 1e-2;
 
-/// A gain this near to the level (relative) is no good centre of the Cayley transform.
+/// A frequency whose gain is this close to the level (relative) is a bad centre of the Cayley transform.
 const NEAR_LEVEL: f64 = 1e-2;
-/// Frequencies tried for a better one.
+/// Number of frequencies tried for a better centre.
 const CENTRES: usize = 16;
 
 /// The search on one system.
@@ -36,8 +37,8 @@ pub(super) struct Search<'a> {
     response: &'a dyn Fn(f64) -> CMat,
     /// Initial frequencies beside the uniform ones.
     initial: Vec<f64>,
-    /// The level set squares the gain: below sqrt(eps) of what cancels it sees rounding only, and the
-    /// refined grid has to do.
+    /// The level set squares the gain. Below sqrt(eps) of the terms that cancel it consists of rounding
+    /// errors only, and the refined grid gives the result.
     floor: f64,
 }
 
@@ -71,8 +72,9 @@ impl<'a> Search<'a> {
         Err(LtiError::IterationLimit { what: "the level set", limit: ROUND_LIMIT, change: PEAK_ACCURACY })
     }
 
-    /// The highest of the local maxima on the grid, each refined that may be it. Minimax designs have many
-    /// peaks that differ by less than any level set tells apart, so that none can be left to it.
+    /// The highest local maximum. Each local maximum of the grid that may be the highest is refined.
+    /// Minimax designs have many nearly equal peaks that no level set can distinguish, so none of them is
+    /// left to the level sets.
     fn first_peak(&self) -> Result<Peak, LtiError> {
         let grid = self.grid()?;
         let mut maxima = local_maxima(&grid);
@@ -135,11 +137,12 @@ impl<'a> Search<'a> {
     /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`: those of
     /// eigenvalues that lie off the axis by at most `tolerance` (relative).
     ///
-    /// The Hamiltonian matrix is asked balanced and, where its scales differ by many decades, as it stands
-    /// too: large gains want the one, the smallest entries, which are rounding errors, the other.
+    /// The eigenvalues are computed for the balanced Hamiltonian matrix. If its scales differ by many
+    /// decades, they are also computed for the unbalanced one. Large gains need balancing; balancing may
+    /// amplify the smallest entries, which are rounding errors.
     ///
-    /// Measurements that are copies of one another leave no Hamiltonian matrix; then nothing is
-    /// suggested and the refined grid stands, still a value that is attained.
+    /// If measurements are copies of one another, there is no Hamiltonian matrix. Then no frequency is
+    /// suggested, and the result is that of the refined grid, which is still an attained value.
     fn crossings(&self, level: f64, tolerance: f64) -> Result<Vec<f64>, LtiError> {
         let mut crossings = vec![0.0, PI];
         let centre = self.centre(level)?;
