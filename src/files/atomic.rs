@@ -1,4 +1,4 @@
-//! A file that appears only when it is whole.
+//! A file that appears only when it is complete.
 
 use super::{FileError, place};
 use std::collections::BTreeSet;
@@ -7,7 +7,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Links that are followed one after another, as many as Linux follows.
+/// Maximum length of a chain of links, as in Linux.
 const MOST_LINKS: usize = 40;
 /// Characters of the target's name in that of the unfinished file, so that this is not too long for the file system.
 const NAME_PART: usize = 60;
@@ -21,14 +21,14 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// while others are writing.
 pub fn remove_unfinished() {
     for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
-        // There is nobody to tell.
+        // An error cannot be reported from here.
         let _ = fs::remove_file(path);
     }
 }
 
-/// A file that is written under a hidden name beside its target and gets its name by [`AtomicFile::commit`]; dropped
-/// without that, it leaves nothing behind. The hidden name is `.NAME.PROCESS-NUMBER.part`; a file that has it already is
-/// never touched.
+/// A file that is written under a hidden name beside its target and gets its name by
+/// [`AtomicFile::commit`]; if it is dropped before, it is removed. The hidden name is
+/// `.NAME.PROCESS-NUMBER.part`; an existing file of that name is never changed.
 #[derive(Debug)]
 pub struct AtomicFile {
     file: Option<File>,
@@ -38,14 +38,14 @@ pub struct AtomicFile {
     replace: bool,
 }
 
-/// How a file got its name, and so how that can be undone.
+/// How a file got its name; this determines how to undo it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Placed {
-    /// Nothing had the name.
+    /// The name was free.
     New,
     /// The hidden name is now that of the file that was replaced.
     Exchanged,
-    /// What had the name is gone.
+    /// The file that had the name is deleted.
     Replaced,
 }
 
@@ -82,8 +82,8 @@ impl AtomicFile {
     /// Gives the file its final name.
     ///
     /// # Errors
-    /// [`FileError::Exists`] if a file appeared under the name and must not be replaced, or the system's refusal to
-    /// store the bytes or to give the name; nothing is left behind then.
+    /// [`FileError::Exists`] if a file appeared under the name and must not be replaced, or the system's
+    /// refusal to store the bytes or to give the name; then no file remains.
     pub fn commit(mut self) -> Result<(), FileError> {
         self.seal()?;
         let placed = if self.replace {
@@ -141,7 +141,7 @@ impl AtomicFile {
         }
     }
 
-    /// Leaves the file under its name, for good.
+    /// Makes the new name final.
     pub(super) fn keep(mut self, placed: Placed) {
         if placed != Placed::Exchanged {
             self.forget();
@@ -171,7 +171,7 @@ impl AtomicFile {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if !self.beside.as_os_str().is_empty() {
-            // There is nobody to tell: the failure that led here is already on its way.
+            // A second error is not reported: the first one is already being returned.
             let _ = fs::remove_file(&self.beside);
             self.forget();
         }
@@ -238,7 +238,7 @@ fn follow(link: &Path) -> Result<(PathBuf, Metadata), &'static str> {
     Err("a link that leads back to itself; remove it")
 }
 
-/// Opens a new file next to `target`, under a name that nobody has; `private` until its permissions are set.
+/// Opens a new file next to `target`, under an unused name; `private` until its permissions are set.
 fn create_beside(target: &Path, private: bool) -> io::Result<(PathBuf, File)> {
     let name = target.file_name().ok_or(io::ErrorKind::InvalidFilename)?.to_string_lossy();
     let name: String = name.chars().take(NAME_PART).collect();

@@ -1,11 +1,11 @@
-//! Reading files whole, but no more of them than a sound input has: a device never ends.
+//! Reads whole files up to a maximum size. A device, for example, never ends.
 
 use super::FileError;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// How long a kind of file may be.
+/// Maximum size of a kind of file.
 #[derive(Debug, Clone, Copy)]
 pub struct Bound {
     /// The most bytes.

@@ -1,4 +1,4 @@
-//! Why a file could not be read or written as a whole.
+//! Errors of reading and writing whole files.
 
 use std::io;
 
@@ -10,7 +10,7 @@ pub enum FileError {
     System {
         /// Name of the file.
         file: String,
-        /// What was tried, as a phrase with a verb: `open it`.
+        /// The action that failed, as an imperative phrase: `open it`.
         action: &'static str,
         /// The system's reason.
         source: io::Error,
@@ -21,7 +21,7 @@ pub enum FileError {
         /// Name of the file.
         file: String,
     },
-    /// The output is something that must not be replaced by a plain file.
+    /// The output is not a plain file and must not be replaced by one.
     #[error("{file}: cannot replace it: it is {what}")]
     NotAFile {
         /// Name of the file.

@@ -1,16 +1,16 @@
-//! Which names are one file.
+//! Tests whether two names refer to the same file.
 
 use super::FileError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What makes a file the same one under another name.
+/// The identity of a file, independent of its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Identity {
-    /// A file that is there.
+    /// An existing file.
     #[cfg(unix)]
     Inode { device: u64, number: u64 },
-    /// The name of one that is not.
+    /// The name of a file that does not exist.
     Name(PathBuf),
 }
 

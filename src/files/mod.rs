@@ -2,14 +2,16 @@
 //!
 //! # What a file system allows
 //!
-//! An [`AtomicFile`] is written under a hidden name in the folder of its target, brought to the disk (`fsync`) and
-//! closed, and only then gets its final name; a disk that is full, or that fails late, shows before the name does. A
-//! file that appeared under the name in the meantime is not replaced unless replacing was asked for.
+//! An [`AtomicFile`] is written under a hidden name in the folder of its target, brought to the disk
+//! (`fsync`) and closed, and only then gets its final name; so an error of the disk is noticed before the
+//! file appears. A file that appeared under the name in the meantime is not replaced unless replacing was
+//! asked for.
 //!
-//! Several files can not get their names in one step. [`commit_all`] brings all of them to the disk first, gives
-//! the names one after the other, and takes them back if one of them is refused. What remains: for some microseconds a
-//! part of the set is visible, a power failure or `kill -9` in between leaves that part, and where the system
-//! cannot exchange two names (other systems than Linux, some network file systems) a replaced file is not brought back.
+//! Several files can not get their names in one step. [`commit_all`] brings all of them to the disk first,
+//! gives the names one after the other, and takes them back if one of them is refused. Three limits remain.
+//! For some microseconds only a part of the set is visible. A power failure or `kill -9` in that time
+//! leaves that part. If the system cannot exchange two names (systems other than Linux, some network file
+//! systems), a replaced file is not restored.
 //!
 //! A replaced file keeps its permission bits; other names of it (hard links) keep the old content, and extended
 //! attributes are not carried over. A symbolic link is followed: the file that it leads to is replaced, the link stays.

@@ -1,4 +1,4 @@
-//! What the system offers for giving files their names.
+//! System calls that rename files.
 
 use std::fs::{self, File};
 use std::io;
@@ -16,7 +16,8 @@ pub(super) fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
     match fs::hard_link(from, to) {
         Ok(()) => fs::remove_file(from),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
-        // The file system has neither of the two, so another process may come in between the look and the rename.
+        // The file system supports neither call, so another process may create the file between this check
+        // and the rename.
         Err(_) if to.symlink_metadata().is_ok() => Err(io::ErrorKind::AlreadyExists.into()),
         Err(_) => fs::rename(from, to),
     }

@@ -2,13 +2,13 @@
 
 use super::{AtomicFile, FileError};
 
-/// Gives several files their names: all of them, or, as far as the file system allows, none. What it cannot allow is
-/// said in the documentation of [this module](super).
+/// Renames several files to their final names: all of them or, as far as the file system allows, none. The
+/// documentation of [this module](super) describes the limits.
 ///
 /// # Errors
 /// As [`AtomicFile::commit`], for the first file that fails; the others are taken back.
 pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
-    // Whatever may fail late fails here, before the first name is given.
+    // Late disk errors occur here, before the first file gets its name.
     files.iter_mut().try_for_each(AtomicFile::seal)?;
     let mut placed = Vec::with_capacity(files.len());
     for mut file in files {

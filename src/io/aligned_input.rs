@@ -1,13 +1,13 @@
-//! One input as the consumer sees it: frames in the order of time, with NaN for the lost ones.
+//! One input for the consumer: frames in the order of time, with NaN for lost frames.
 //!
-//! Nothing is copied where nothing is lost: the frames are those of the block that was read.
+//! Frames are copied only where samples are lost; otherwise they refer to the block that was read.
 
 use super::lost::{Dropout, LostInInput};
 use super::timestamps::Segment;
 use super::{PcmFormat, PcmFrames, SampleLayout, StreamHeader};
 use std::collections::VecDeque;
 
-/// Lost frames that are handed out at a time.
+/// Maximum number of lost frames that are handed out at a time.
 const LOST_FRAMES: usize = 1024;
 
 /// Bytes that were read, whole frames.
@@ -17,14 +17,14 @@ pub(super) struct Block {
     pub(super) filled: usize,
 }
 
-/// What the next frames are.
+/// The kind of the next frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum View {
     /// Those of the block.
     Read,
     /// Those of the block, some channels invalid.
     Dropouts,
-    /// Lost; the block stays where it is.
+    /// Lost; the position in the block does not change.
     Lost,
     /// Lost, since the input is over.
     Over,
@@ -40,7 +40,7 @@ pub(super) struct AlignedInput {
     /// No block will follow.
     ended: bool,
     segments: VecDeque<Segment>,
-    /// Invalid samples ahead, and those that time is in.
+    /// Dropouts that lie ahead or contain the current frame.
     dropouts: VecDeque<Dropout>,
     active: Vec<Dropout>,
     /// Frames that are over.
@@ -69,14 +69,14 @@ impl AlignedInput {
         }
     }
 
-    /// Takes what is known of lost frames, before the first one is used.
+    /// Sets the lost frames; to be called before the first frame is used.
     pub(super) fn lose(&mut self, segments: VecDeque<Segment>, lost: LostInInput) {
         self.segments = segments;
         self.dropouts = lost.dropouts.into();
         self.enter_dropouts();
     }
 
-    /// Takes the next block, once the last one is used up; gives that one back.
+    /// Takes the next block when the last one is used up, and returns the used one.
     pub(super) fn refill(&mut self, block: Block) -> Block {
         self.used = 0;
         std::mem::replace(&mut self.block, block)
@@ -155,7 +155,7 @@ impl AlignedInput {
         }
     }
 
-    /// What was prepared.
+    /// The prepared frames.
     pub(super) fn view(&self, frames: usize) -> PcmFrames<'_> {
         let channels = self.header.channels;
         if self.view == View::Read {
@@ -166,7 +166,7 @@ impl AlignedInput {
         PcmFrames { layout, channels, bytes: &self.numbers[..frames * channels * 8] }
     }
 
-    /// Goes on by `frames` frames.
+    /// Advances by `frames` frames.
     pub(super) fn advance(&mut self, frames: usize) {
         self.time += frames as u64;
         if self.view == View::Over {
@@ -289,7 +289,7 @@ mod tests {
         short.prepare(2);
         short.advance(2);
         assert!(short.is_over() && short.has_unreached_segments() && short.seen() == 2);
-        // From here on it is lost for as long as anybody asks.
+        // From here on all frames are lost.
         short.prepare(5);
         assert_eq!(short.view(5).frames(), 5);
         short.advance(5);

@@ -1,4 +1,4 @@
-//! Why samples could not be read or written.
+//! Errors of reading and writing samples.
 
 use crate::files::FileError;
 use std::io;
@@ -11,7 +11,7 @@ pub enum IoError {
     System {
         /// Name of the file or stream.
         file: String,
-        /// What was tried, as a phrase with a verb: `open it`.
+        /// The action that failed, as an imperative phrase: `open it`.
         action: &'static str,
         /// The system's reason.
         source: io::Error,
@@ -19,7 +19,7 @@ pub enum IoError {
     /// A file could not be read or written as a whole.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The thread that read an input ended before the input did; a fault of this program.
+    /// The thread that read an input ended before the input did. This is a bug of this program.
     #[error(
         "{file}: its reader ended before the input did, so the rest is not known; this is a fault of hybank, please report it"
     )]
@@ -47,7 +47,7 @@ pub enum IoError {
         /// The bytes found, printable.
         found: String,
     },
-    /// The header ends before it is whole.
+    /// The header is truncated.
     #[error(
         "{file}: the header ends at byte {offset} inside {place}; the file is truncated, record or copy it again"
     )]
@@ -73,7 +73,7 @@ pub enum IoError {
         /// What it may hold, and the remedy.
         rule: &'static str,
     },
-    /// The samples are coded in a way that is not plain PCM.
+    /// The samples are not plain PCM.
     #[error(
         "{file}: samples are coded as format tag {tag:#06x} with {bits} bits; convert to integer PCM or float first (for example: sox {file} -e float out.wav)"
     )]
@@ -85,7 +85,7 @@ pub enum IoError {
         /// Bits per sample.
         bits: u16,
     },
-    /// A SigMF recording that is not one of plain real samples.
+    /// A SigMF recording that does not hold plain real samples.
     #[error("{file}: not a SigMF recording that can be read: {problem}")]
     Sigmf {
         /// Name of the metadata file.
@@ -93,7 +93,7 @@ pub enum IoError {
         /// What is wrong, and the remedy.
         problem: String,
     },
-    /// A file of lost samples that does not say what it should, or does not fit the inputs.
+    /// A file of lost samples that is malformed or does not fit the inputs.
     #[error("{file}: {problem}")]
     Lost {
         /// Name of the file.

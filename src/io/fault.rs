@@ -5,14 +5,14 @@ use std::fmt;
 /// A fault that was tolerated; complete when the input has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InputFault {
-    /// The file ends before the header's promise: bytes that are not there.
+    /// The file is shorter than its header says.
     Truncated {
-        /// Promised bytes that did not come.
+        /// Number of missing bytes.
         missing_bytes: u64,
     },
     /// The last frame was cut and left out.
     CutFrame {
-        /// Its bytes that were there.
+        /// Number of its bytes that were present.
         bytes: usize,
     },
     /// The input ended before the last sample whose number at the converter is given.
@@ -21,7 +21,7 @@ pub enum InputFault {
     Unused {
         /// Frames that were not used.
         frames: u64,
-        /// There may be more, which were not read.
+        /// There may be more frames, which were not read.
         at_least: bool,
     },
 }

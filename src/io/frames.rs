@@ -1,8 +1,8 @@
-//! Whole frames out of a byte stream that may be cut anywhere.
+//! Reads whole frames from a byte stream that may be split anywhere.
 
 use std::io::{self, Read};
 
-/// Hands out whole frames of `frame` bytes and keeps the rest of a cut one for the next call.
+/// Returns whole frames of `frame` bytes and keeps the rest of an incomplete one for the next call.
 #[derive(Debug)]
 pub struct FrameReader<R> {
     inner: R,
@@ -35,7 +35,7 @@ impl<R: Read> FrameReader<R> {
         Ok(filled)
     }
 
-    /// Waits until there is at least one whole frame, and takes what one read gives; 0 only at the end.
+    /// Waits for at least one whole frame and returns the bytes of one read; 0 only at the end.
     ///
     /// # Errors
     /// What the underlying reader reports.

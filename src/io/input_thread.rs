@@ -10,12 +10,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// What is to be opened, and how.
+/// An input to open, with its settings.
 #[derive(Debug, Clone)]
 pub(super) struct InputSource {
     pub(super) path: PathBuf,
     pub(super) coding: Coding,
-    /// Channels, where no header says.
+    /// Number of channels if the input has no header.
     pub(super) channels: usize,
     /// Bytes of a block.
     pub(super) block: usize,
@@ -23,7 +23,7 @@ pub(super) struct InputSource {
 
 /// What the thread of an input sends.
 pub(super) enum Message {
-    /// What its frames are, and when they were taken; always first.
+    /// The header and the timestamps; always the first message.
     Header { header: StreamHeader, timestamps: Timestamps },
     /// Whole frames.
     Frames { bytes: Vec<u8>, filled: usize },
@@ -49,7 +49,7 @@ impl InputSource {
     }
 }
 
-/// Reads until the end, or until nobody receives any more. Blocks to fill come from `pool`.
+/// Reads until the end, or until the receiver is dropped. Blocks to fill come from `pool`.
 pub(super) fn read(source: InputSource, messages: Sender<Result<Message, IoError>>, pool: Receiver<Vec<u8>>) {
     let reader = Reader { name: source.name(), source, messages, pool };
     let end = match reader.source.coding {
@@ -57,7 +57,7 @@ pub(super) fn read(source: InputSource, messages: Sender<Result<Message, IoError
         Coding::Raw(_) => reader.read_raw(),
         Coding::Wav => reader.read_wav(),
     };
-    // If nobody receives any more there is nobody to tell.
+    // If the receiver is gone, the message is not needed.
     let _ = reader.messages.send(end);
 }
 
@@ -124,7 +124,7 @@ impl Reader {
         Ok(Message::End { faults: cut_frame(frames.cut_bytes()) })
     }
 
-    /// Frames to the consumer until the end, or until the consumer is gone.
+    /// Sends frames to the consumer until the end, or until the consumer is gone.
     fn send_frames(&self, frames: &mut FrameReader<impl Read>) -> Result<(), IoError> {
         while let Ok(mut bytes) = self.pool.recv() {
             bytes.resize(self.source.block.max(frames.frame_bytes()), 0);

@@ -1,4 +1,4 @@
-//! What a file beside the samples says of those that were lost.
+//! The file that lists lost samples.
 
 use super::IoError;
 use super::timestamps::{MAX_LOST_AT_ONCE, Timestamp, Timestamps};
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
 
-/// How long a file of lost samples may be: a million lines.
+/// Maximum size of a file of lost samples: a million lines.
 const LOST_FILE: Bound = Bound {
     bytes: 64 << 20,
     kind: "a file of lost samples",
@@ -23,7 +23,7 @@ pub(super) struct Dropout {
     pub(super) frames: Range<u64>,
 }
 
-/// A file beside the samples that says which of them were lost.
+/// A file in addition to the samples that lists which of them were lost.
 ///
 /// JSON Lines: one object per line, empty lines are skipped. There are two kinds of line, which may be mixed:
 ///
@@ -32,13 +32,13 @@ pub(super) struct Dropout {
 /// {"channel": 2, "first": 40, "length": 3}
 /// ```
 ///
-/// The first kind is that of SigMF's captures: sample 5 (from 0) in the input of channel 1 was number 108 at the
-/// converter. Samples between two such lines follow each other; where the count runs ahead of them,
-/// samples were *left out* of the input. Time begins at the earliest number of any input; one without such
-/// lines begins there too.
+/// The first kind is that of SigMF's captures: sample 5 (from 0) in the input of channel 1 was number 108
+/// at the converter. Samples between two such lines are consecutive. If the numbers increase by more than
+/// the samples between two lines, samples were *left out* of the input. Time begins at the earliest number
+/// of any input; an input without such lines begins there too.
 ///
-/// The second kind is that of the report of gaps: from frame 40 on, 3 samples of channel 2 are *in* the
-/// input but invalid.
+/// The second kind is that of the gap report: from frame 40 on, 3 samples of channel 2 are present in the
+/// input but *invalid*.
 ///
 /// Channels count from 1; a line without `channel` holds for all of them. Channels that are interleaved
 /// in one input lose samples together, or have invalid ones.
@@ -63,7 +63,7 @@ struct Line {
     length: Option<u64>,
 }
 
-/// What is lost in one input.
+/// The lost samples of one input.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct LostInInput {
     pub(super) timestamps: Timestamps,
@@ -80,7 +80,7 @@ impl LostSamples {
         Self::parse(&read_text(path, LOST_FILE)?, &path.display().to_string())
     }
 
-    /// As [`LostSamples::read`], from text; `file` is the name for complaints.
+    /// As [`LostSamples::read`], from text; `file` is the name in error messages.
     ///
     /// # Errors
     /// [`IoError::Lost`] for a line that is neither of the two kinds.
@@ -163,13 +163,13 @@ impl LostSamples {
         dropouts
     }
 
-    /// A complaint about this file.
+    /// An error about this file.
     pub(super) fn fault(&self, problem: String) -> IoError {
         IoError::Lost { file: self.file.clone(), problem }
     }
 }
 
-/// Each line is a text of its own to the parser, so that its place says nothing.
+/// The parser reads each line as a separate text, so the location in its message is meaningless.
 fn without_place(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());

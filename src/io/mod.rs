@@ -1,7 +1,7 @@
-//! Samples in and out: WAV, SigMF, raw PCM, and what is known of lost samples.
+//! Input and output of samples: WAV, SigMF, raw PCM, and lists of lost samples.
 //!
-//! Words: a *frame* holds one sample of each channel of a file or stream; a sample is stored in
-//! one of the [`PcmFormat`]s; integer formats are full scale = 1.0.
+//! A *frame* holds one sample of each channel of a file or stream. A sample is stored in one of the
+//! [`PcmFormat`]s; the full scale of integer formats is 1.0.
 
 mod aligned_input;
 mod error;

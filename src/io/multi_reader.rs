@@ -1,9 +1,8 @@
-//! Samples as they arrive: a thread for each input, whole frames to the consumer as soon as every
-//! input has its part. Raw standard input that is the only input needs no thread.
+//! Reads several inputs as their samples arrive, with one thread per input. The consumer gets a frame as
+//! soon as every input has its samples of it. If raw standard input is the only input, it needs no thread.
 //!
-//! Memory is bounded: each input has a pool of a few blocks that go round between its thread and the
-//! consumer. A consumer that does not keep up stops the reading, and thereby the writers of the
-//! pipes.
+//! Memory is bounded: each input has a pool of a few blocks that circulate between its thread and the
+//! consumer. If the consumer is slow, reading stops, and so do the writers of the pipes.
 
 use super::aligned_input::{AlignedInput, Block};
 use super::input_thread::{InputSource, Message, read};
@@ -17,7 +16,7 @@ use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::path::{Path, PathBuf};
 use std::thread;
 
-/// Blocks that go round for each input.
+/// Number of blocks in the pool of each input.
 const BLOCKS: usize = 4;
 /// Bytes of a block that suit one thread.
 pub const BLOCK_BYTES: usize = 128 << 10;
@@ -27,24 +26,24 @@ const ALL_BYTES: usize = 16 << 20;
 /// Which input decides where the reading ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Until {
-    /// The first one to end; what the others have left is not used.
+    /// The first one to end; the remaining frames of the others are not used.
     #[default]
     Shortest,
     /// The last one to end; samples of the others are lost from their end on.
     Longest,
 }
 
-/// How inputs are read.
+/// Settings of the reading.
 #[derive(Debug, Clone, Copy)]
 pub struct ReadOptions<'a> {
-    /// Of all inputs but SigMF recordings.
+    /// Coding of all inputs except SigMF recordings.
     pub coding: Coding,
     /// Channels of a raw input, if it is the only one; several have one each.
     pub channels: usize,
-    /// What is known of lost samples.
+    /// The lost samples, if a file lists them.
     pub lost: Option<&'a LostSamples>,
-    /// The most lost frames of one input, [`MAX_LOST`] unless asked for otherwise: a mistaken number would ask for
-    /// output without end.
+    /// Maximum number of lost frames of one input, by default [`MAX_LOST`]. Without a limit a wrong number
+    /// would lead to endless output.
     pub max_lost: u64,
     /// Which input decides where the reading ends.
     pub until: Until,
@@ -66,18 +65,18 @@ impl ReadOptions<'_> {
     }
 }
 
-/// What happened while waiting for frames.
+/// The result of waiting for frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arrival {
-    /// So many frames are there, at least 1.
+    /// This many frames are ready, at least 1.
     Frames(usize),
     /// The inputs have ended.
     End,
-    /// A stop was asked for.
+    /// A stop was requested.
     Stopped,
 }
 
-/// One input, seen from the consumer.
+/// One input on the side of the consumer.
 struct Input {
     name: String,
     aligned: AlignedInput,
@@ -87,7 +86,7 @@ struct Input {
     faults: Vec<InputFault>,
 }
 
-/// Where an input's frames come from.
+/// The source of an input's frames.
 enum Source {
     /// Its thread, to which blocks go back.
     Thread { messages: Receiver<Result<Message, IoError>>, pool: Sender<Vec<u8>> },
@@ -115,9 +114,9 @@ impl MultiReader {
     /// ends any wait.
     ///
     /// # Errors
-    /// [`IoError`] for what cannot be read or is not plain PCM, for a pipe that is given twice, for lost samples that
-    /// do not fit the inputs or are more than [`ReadOptions::max_lost`], and for a thread that cannot be started;
-    /// `Ok(None)` if a stop was asked for first.
+    /// [`IoError`] for an input that cannot be read or is not plain PCM, for a pipe that is given twice,
+    /// for lost samples that do not fit the inputs or are more than [`ReadOptions::max_lost`], and for a
+    /// thread that cannot be started; `Ok(None)` if a stop was requested first.
     pub fn start(
         paths: &[PathBuf],
         options: ReadOptions<'_>,
@@ -153,7 +152,7 @@ impl MultiReader {
         self.inputs.iter().map(|input| (input.name.as_str(), &input.aligned.header))
     }
 
-    /// Frames that the headers promise, if any of them says.
+    /// Number of frames according to the headers, if any header states it.
     pub fn promised_frames(&self) -> Option<u64> {
         self.headers().filter_map(|(_, header)| header.promised).min()
     }
@@ -182,12 +181,12 @@ impl MultiReader {
         Ok(Arrival::Frames(self.ready))
     }
 
-    /// The frames that are there, as many as [`MultiReader::wait`] said. Lost samples are NaN.
+    /// The ready frames, as many as [`MultiReader::wait`] returned. Lost samples are NaN.
     pub fn frames(&self) -> Vec<PcmFrames<'_>> {
         self.inputs.iter().map(|input| input.aligned.view(self.ready)).collect()
     }
 
-    /// Gives back the first `frames` frames, at most those that are there.
+    /// Releases the first `frames` frames, at most those that are ready.
     pub fn consume(&mut self, frames: usize) {
         let frames = frames.min(self.ready);
         self.inputs.iter_mut().for_each(|input| input.advance(frames));
@@ -200,7 +199,7 @@ impl MultiReader {
         self.consumed
     }
 
-    /// What had to be tolerated so far.
+    /// The faults tolerated so far.
     pub fn warnings(&self) -> Vec<InputWarning> {
         let one_ended = self.inputs.iter().any(|input| input.aligned.is_over());
         let of_input = |input: &Input| {
@@ -370,7 +369,7 @@ impl Input {
         self.faults.iter().copied().chain(beyond.then_some(InputFault::TimestampsBeyondEnd))
     }
 
-    /// Frames that nobody used.
+    /// Frames that were not used.
     fn unused(&self) -> Option<InputFault> {
         let seen = self.aligned.seen();
         let promised = if self.aligned.is_over() { None } else { self.aligned.header.promised };
@@ -380,7 +379,7 @@ impl Input {
     }
 }
 
-/// A pipe gives each of its bytes to one reader only.
+/// Two readers of one pipe would each get only some of its bytes.
 fn refuse_shared_pipes(paths: &[PathBuf]) -> Result<(), IoError> {
     let pipes: Vec<_> = paths.iter().filter(|path| is_pipe(path)).collect();
     for (i, second) in pipes.iter().enumerate() {

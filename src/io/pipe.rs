@@ -1,4 +1,4 @@
-//! Standard input and output as files, and pipes wide enough for two processors.
+//! Standard input and output as files, and pipes with buffers large enough for two processes.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -43,7 +43,7 @@ fn stdout_file() -> io::Result<io::Stdout> {
 static WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
 static CLOCK: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// Bytes of one write: of a longer one nobody could say whether it makes progress.
+/// Bytes of one write. During a longer one it would be unknown whether it makes progress.
 const WRITE_BYTES: usize = 64 << 10;
 
 /// Standard output for samples, without a buffer.
@@ -79,13 +79,13 @@ impl Write for Stdout {
     }
 }
 
-/// True if a write to a [`Stdout`] of this process has waited for so long: whoever reads it does not take more.
+/// True if a write to a [`Stdout`] of this process has waited for so long: its reader takes no more data.
 pub fn is_stdout_stalled(patience: Duration) -> bool {
     let began = WRITE_BEGAN.load(Ordering::Relaxed);
     began > 0 && CLOCK.elapsed() >= Duration::from_millis(began) + patience
 }
 
-/// Files that are no pipes, and systems that refuse, stay as they are.
+/// Other files are not changed, nor are pipes whose buffer the system refuses to enlarge.
 #[cfg(target_os = "linux")]
 pub(super) fn widen_pipe(file: &File) {
     let _ = rustix::pipe::fcntl_setpipe_size(file, PIPE_BYTES);

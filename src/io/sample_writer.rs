@@ -1,4 +1,5 @@
-//! One channel of output samples: to a file or SigMF recording that appears when whole, or to standard output.
+//! Writes one channel of samples to standard output, or to a file or SigMF recording that appears only when
+//! it is complete.
 
 use super::wav::{WavFile, stream_header};
 use super::{IoError, PcmFormat, SigmfMeta, Stdout};
@@ -6,7 +7,7 @@ use crate::files::AtomicFile;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// What surrounds the samples of an output.
+/// The container format of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Container {
     /// A WAV header.
@@ -15,7 +16,7 @@ pub enum Container {
     Raw,
 }
 
-/// The open end.
+/// The open destination.
 enum Target {
     Wav(WavFile<AtomicFile>),
     Raw(AtomicFile),
@@ -28,15 +29,15 @@ enum Target {
     },
 }
 
-/// One channel of encoded samples on their way out.
+/// A writer of one channel of encoded samples.
 pub struct SampleWriter {
     target: Target,
     name: String,
 }
 
 impl SampleWriter {
-    /// Begins an output at `rate` hertz. `-` is standard output, where a WAV header says no length; a name that ends in
-    /// sigmf-meta is a SigMF recording. `replace` allows files to be replaced.
+    /// Begins an output at `rate` hertz. `-` is standard output, where a WAV header states no length; a
+    /// name that ends in sigmf-meta is a SigMF recording. `replace` allows files to be replaced.
     ///
     /// # Errors
     /// [`IoError`] for files that exist or cannot be created, for samples or rates that WAV cannot hold, and for a standard
@@ -91,7 +92,8 @@ impl SampleWriter {
         written.map_err(IoError::system(&self.name, "write it"))
     }
 
-    /// Completes headers and metadata; the files, which have no names yet, are to be committed.
+    /// Completes headers and metadata. The caller must commit the returned files, which do not have their
+    /// final names yet.
     ///
     /// # Errors
     /// The system's refusal.
@@ -124,7 +126,7 @@ fn sigmf_target(path: &Path, format: PcmFormat, rate: f64, replace: bool) -> Res
     Ok(Target::Sigmf { data, meta, text: text.map_err(fault)? + "\n" })
 }
 
-/// The nearest rate that a WAV header can say.
+/// The nearest rate that a WAV header can state.
 fn wav_rate(file: &str, rate: f64) -> Result<u32, IoError> {
     if rate > f64::from(u32::MAX) {
         return Err(IoError::WavRate { file: file.to_owned(), rate });
@@ -132,7 +134,7 @@ fn wav_rate(file: &str, rate: f64) -> Result<u32, IoError> {
     Ok(rate.round().max(1.0) as u32)
 }
 
-/// Standard output for samples, which a terminal cannot show.
+/// Standard output for samples; refuses a terminal.
 fn stdout_target(header: &[u8]) -> io::Result<Target> {
     if io::stdout().is_terminal() {
         return Err(io::Error::other("it is a terminal; redirect it to a file or a pipe"));

@@ -1,7 +1,7 @@
-//! The metadata of SigMF recordings, which lies beside a file of raw samples.
+//! The metadata file of SigMF recordings, which accompanies a file of raw samples.
 //!
-//! Real samples only, one or several interleaved channels. Captures whose `core:global_index` runs
-//! ahead of their `core:sample_start` tell of samples that were lost.
+//! Real samples only, one or several interleaved channels. If `core:global_index` increases by more than
+//! `core:sample_start` between captures, samples were lost.
 
 use super::timestamps::{Timestamp, Timestamps};
 use super::{IoError, PcmFormat};
@@ -9,25 +9,25 @@ use crate::files::{Bound, read_text};
 use serde::{Deserialize, Serialize};
 use std::path::{Component, Path, PathBuf};
 
-/// Interleaved channels that are read at most, as many as a WAV header can say.
+/// Maximum number of interleaved channels, the same as in a WAV header.
 const MOST_CHANNELS: usize = 65_535;
 
-/// How long a metadata file may be.
+/// Maximum size of a metadata file.
 const META_FILE: Bound = Bound {
     bytes: 64 << 20,
     kind: "a SigMF metadata file",
     remedy: "give the file that was meant, or remove annotations from it",
 };
 
-/// The part of a SigMF metadata file that matters here; other keys are skipped.
+/// The supported part of a SigMF metadata file; other keys are ignored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SigmfMeta {
-    /// What holds for the whole recording.
+    /// Properties of the whole recording.
     pub global: SigmfGlobal,
-    /// Where samples without a break begin.
+    /// The starts of runs of consecutive samples.
     #[serde(default)]
     pub captures: Vec<SigmfCapture>,
-    /// Kept empty; other tools want the key.
+    /// Always empty; other tools require the key.
     #[serde(default, skip_deserializing)]
     pub annotations: [(); 0],
 }
@@ -61,7 +61,7 @@ pub struct SigmfCapture {
     /// Its first frame in the file.
     #[serde(rename = "core:sample_start")]
     pub sample_start: u64,
-    /// Its first frame counted at the converter, where lost ones count too.
+    /// Number of its first frame at the converter, which counts lost frames too.
     #[serde(rename = "core:global_index", default, skip_serializing_if = "Option::is_none")]
     pub global_index: Option<u64>,
     /// Bytes before the capture's first frame that are not samples; only 0 is read.
@@ -94,15 +94,15 @@ impl SigmfMeta {
     /// Reads a metadata file.
     ///
     /// # Errors
-    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Sigmf`] if it is not what it should be.
+    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Sigmf`] if it is malformed.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         Self::parse(&read_text(path, META_FILE)?, &path.display().to_string())
     }
 
-    /// As [`SigmfMeta::read`], from text; `file` is the name for complaints.
+    /// As [`SigmfMeta::read`], from text; `file` is the name in error messages.
     ///
     /// # Errors
-    /// [`IoError::Sigmf`] if it is not what it should be, down to data type and captures.
+    /// [`IoError::Sigmf`] if it is malformed, including its data type and captures.
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
         let fault = |problem| IoError::Sigmf { file: file.to_owned(), problem };
         let meta: Self = serde_json::from_str(text).map_err(|error| fault(error.to_string()))?;

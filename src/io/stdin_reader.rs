@@ -1,7 +1,8 @@
 //! Raw standard input, read on the thread that uses it.
 //!
-//! A thread of its own for an input that is the only one costs more than it gives: each block would wake it once and the
-//! consumer once. Waiting here must still end when a stop is asked for, so the pipe is polled with a timeout.
+//! A separate thread for a single input costs more time than it saves, because each block would wake both
+//! the thread and the consumer. A wait must still end when a stop is requested, so the pipe is polled with
+//! a timeout.
 
 use super::input_thread::{InputSource, Message, cut_frame};
 use super::pipe::stdin_file;
@@ -10,10 +11,10 @@ use crossbeam_channel::{Receiver, TryRecvError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::fs::File;
 
-/// How long a stop may have to wait.
+/// Maximum delay of a stop.
 const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
-/// The reading end, with the one block that goes to and fro.
+/// The reading end with its block.
 pub(super) struct StdinReader {
     name: String,
     pipe: File,
@@ -37,7 +38,7 @@ impl StdinReader {
         Ok(Self { pipe, frames, header, block: source.block, spare: Vec::new(), name })
     }
 
-    /// Waits for whole frames or the end; `None` if a stop was asked for first.
+    /// Waits for whole frames or the end; `None` if a stop was requested first.
     ///
     /// # Errors
     /// The system's refusal to read.

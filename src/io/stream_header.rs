@@ -1,26 +1,26 @@
-//! What the bytes of an input mean.
+//! The format of an input.
 
 use super::{PcmFormat, SampleLayout};
 
-/// How the bytes of the inputs are to be understood.
+/// The coding of the inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coding {
     /// Raw samples.
     Raw(PcmFormat),
-    /// A WAV header says.
+    /// As the WAV header states.
     Wav,
 }
 
-/// What the frames of an input are.
+/// The format of an input's frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StreamHeader {
-    /// How a sample lies in memory.
+    /// The layout of a sample in memory.
     pub layout: SampleLayout,
     /// Interleaved channels.
     pub channels: usize,
-    /// Frames per second, where the input says.
+    /// Frames per second, if the input states it.
     pub rate: Option<f64>,
-    /// Frames that the input is said to have.
+    /// Number of frames according to the header.
     pub promised: Option<u64>,
 }
 

@@ -1,16 +1,15 @@
-//! When the frames of an input were taken: which follow one another without a break, and how many
-//! were lost in between.
+//! Timestamps of the frames of an input: which frames are consecutive, and how many were lost in between.
 
 use std::collections::VecDeque;
 
-/// Frames that one break may lose at most, 2^36 (a minute at a gigahertz).
+/// Maximum number of frames lost at one break, 2^36 (a minute at a gigahertz).
 pub const MAX_LOST_AT_ONCE: u64 = 1 << 36;
 
-/// Frames that an input may lose in all unless more are allowed, 2^26 (23 minutes at 48 kHz, 256 MiB of 32-bit floats
-/// for each sample of an output frame): a mistaken number would otherwise ask for output without end.
+/// Default maximum number of lost frames of an input, 2^26 (23 minutes at 48 kHz, 256 MiB of 32-bit floats
+/// for each sample of an output frame): without a limit a wrong number would lead to endless output.
 pub const MAX_LOST: u64 = 1 << 26;
 
-/// Frame `frame` of the input was number `index` at the converter, where lost frames count too.
+/// Frame `frame` of the input was number `index` at the converter, which counts lost frames too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Timestamp {
     pub(super) frame: u64,
@@ -59,12 +58,12 @@ impl Timestamps {
         Ok(Self(timestamps))
     }
 
-    /// True if nothing is known.
+    /// True if there are no timestamps.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Index of the input's first frame, if anything is known.
+    /// Index of the input's first frame, if there are timestamps.
     pub(super) fn beginning(&self) -> Option<u64> {
         self.0.first().and_then(|first| first.beginning())
     }

@@ -5,9 +5,9 @@ use super::{LtiError, StateSpace};
 use crate::linalg::{self, Mat};
 
 /// The system in coordinates in which both Gramians are diag(sigma), the Hankel singular values in
-/// descending order, truncated after the state from which on all further states together change the
-/// transfer function by at most `floor` (twice the sum of their sigma bounds the H-infinity norm of the
-/// truncation error: Glover 1984).
+/// descending order, truncated: the last states are left out if together they change the transfer function
+/// by at most `floor` (twice the sum of their sigma bounds the H-infinity norm of the truncation error:
+/// Glover 1984).
 ///
 /// The algorithm works on square roots of the Gramians, so that small sigma keep their digits. States that
 /// are exactly uncontrollable or unobservable are always left out, even with `floor` = 0.

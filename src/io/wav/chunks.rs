@@ -1,4 +1,4 @@
-//! Chunk by chunk through a WAV header, without seeking.
+//! Reads a WAV header chunk by chunk, without seeking.
 
 use crate::io::IoError;
 use std::io::{self, Read};
@@ -33,7 +33,7 @@ pub(super) struct Chunk {
     pub(super) offset: u64,
 }
 
-/// A byte source that knows its name and place.
+/// A byte source with its name and offset.
 #[derive(Debug)]
 pub(super) struct Chunks<'a, R> {
     inner: R,
@@ -42,7 +42,7 @@ pub(super) struct Chunks<'a, R> {
     pub(super) family: Family,
     /// The size that the outermost chunk promises, counted from the first byte of the file.
     pub(super) promised: u64,
-    /// An odd chunk has just ended, so that a pad byte is due.
+    /// An odd chunk has just ended, so a pad byte should follow.
     pad_due: bool,
 }
 
@@ -129,14 +129,14 @@ impl<'a, R: Read> Chunks<'a, R> {
         Ok(())
     }
 
-    /// Exactly B bytes, or the complaint that the header ends in `place`.
+    /// Exactly B bytes, or the error that the header ends in `place`.
     pub(super) fn bytes<const B: usize>(&mut self, place: &'static str) -> Result<[u8; B], IoError> {
         let mut bytes = [0; B];
         self.exact(&mut bytes, place)?;
         Ok(bytes)
     }
 
-    /// Fills `bytes`, or complains that the header ends in `place`.
+    /// Fills `bytes`, or returns the error that the header ends in `place`.
     pub(super) fn exact(&mut self, bytes: &mut [u8], place: &'static str) -> Result<(), IoError> {
         if self.read_some(bytes)? == bytes.len() {
             return Ok(());
@@ -158,7 +158,7 @@ impl<'a, R: Read> Chunks<'a, R> {
         Ok(filled)
     }
 
-    /// A complaint about a field.
+    /// An error about a field.
     pub(super) fn bad(&self, field: &'static str, offset: u64, value: u64, rule: &'static str) -> IoError {
         IoError::BadField { file: self.file.to_owned(), field, offset, value, rule }
     }
@@ -168,7 +168,7 @@ impl<'a, R: Read> Chunks<'a, R> {
         self.offset
     }
 
-    /// Name of the file, for complaints.
+    /// Name of the file, for error messages.
     pub(super) fn file(&self) -> &str {
         self.file
     }

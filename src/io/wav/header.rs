@@ -1,4 +1,4 @@
-//! What a WAV header says about the samples.
+//! The contents of a WAV header.
 
 use super::chunks::{Chunk, Chunks, Family};
 use crate::io::{IoError, PcmFormat, SampleLayout};
@@ -11,9 +11,9 @@ const TAG_EXTENSIBLE: u16 = 0xFFFE;
 /// A checked header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WavHeader {
-    /// How samples are stored.
+    /// The layout of a sample.
     pub layout: SampleLayout,
-    /// Samples a frame, at least 1.
+    /// Samples per frame, at least 1.
     pub channels: usize,
     /// Frames per second, at least 1.
     pub rate: u32,
@@ -38,7 +38,7 @@ struct Fmt {
 }
 
 impl WavHeader {
-    /// Bytes a frame.
+    /// Bytes per frame.
     pub fn frame_bytes(&self) -> usize {
         self.layout.container * self.channels
     }
@@ -86,7 +86,7 @@ impl WavHeader {
     }
 }
 
-/// The data size, unless it is one of the numbers by which streaming writers say "until the end".
+/// The data size, unless it is one of the numbers with which streaming writers mean "until the end".
 /// `empty_possible`: the outer size promises chunks after the data, so that 0 may mean no samples.
 fn known_size(size: u64, frame: u64, empty_possible: bool) -> Option<u64> {
     // sox rounds its 0x7FFFF000 down to whole frames; others take the header off.
@@ -98,7 +98,7 @@ fn known_size(size: u64, frame: u64, empty_possible: bool) -> Option<u64> {
     (!streamed).then_some(size)
 }
 
-/// Where sizes have 64 bits, 0 or a number beyond any disk says that the writer did not know.
+/// In 64-bit size fields, 0 or a number larger than any disk means that the writer did not know the size.
 fn known_size_64(size: u64) -> Option<u64> {
     (size > 0 && size < 1 << 62).then_some(size)
 }
@@ -141,7 +141,7 @@ impl Fmt {
         let extensible = tag == TAG_EXTENSIBLE;
         Self {
             offset,
-            // An extensible header cut short says nothing else, so PCM is the best guess.
+            // A truncated extensible header has no format tag, so PCM is the best guess.
             tag: if extensible { word(24).max(TAG_PCM) } else { tag },
             channels: word(2),
             rate: u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]),

@@ -1,14 +1,14 @@
-//! Frames out of a WAV file or stream.
+//! Reads frames from a WAV file or stream.
 
 use super::chunks::Chunks;
 use super::header::WavHeader;
 use crate::io::{FrameReader, InputFault, IoError, PcmFormat, SampleLayout};
 use std::io::{Chain, Cursor, Read};
 
-/// Samples looked at to tell 24 high bits of 32 from 24 low ones.
+/// Number of samples used to distinguish 24 high bits of 32 from 24 low ones.
 const JUSTIFICATION_SAMPLES: usize = 16384;
 
-/// A WAV source, placed behind its header.
+/// A WAV source, positioned after its header.
 #[derive(Debug)]
 pub struct WavReader<R> {
     header: WavHeader,
@@ -16,7 +16,7 @@ pub struct WavReader<R> {
 }
 
 impl<R: Read> WavReader<R> {
-    /// Reads the header; `file` is the name for complaints.
+    /// Reads the header; `file` is the name in error messages.
     ///
     /// # Errors
     /// [`IoError`] for anything that is not plain PCM in RIFF, RF64, BW64 or W64.
@@ -33,7 +33,7 @@ impl<R: Read> WavReader<R> {
         Ok(Self { header, frames })
     }
 
-    /// What the header says.
+    /// The header.
     pub fn header(&self) -> &WavHeader {
         &self.header
     }
@@ -43,7 +43,7 @@ impl<R: Read> WavReader<R> {
         &mut self.frames
     }
 
-    /// What had to be tolerated; complete when the frames have ended.
+    /// The tolerated faults; complete when the frames have ended.
     pub fn faults(&self) -> Vec<InputFault> {
         let missing_bytes = self.frames.missing_bytes();
         let bytes = self.frames.cut_bytes();
@@ -62,8 +62,9 @@ fn peek<R: Read>(inner: &mut R, header: &WavHeader, file: &str) -> Result<Vec<u8
     Ok(bytes)
 }
 
-/// The rule says that 24 bits in 32 lie high, with a zero byte below; some writers put them low,
-/// with the sign above. Low it is only if the zero byte is not zero and the sign fits everywhere.
+/// The rule says that 24 bits in 32 lie high, with a zero byte below; some writers put them low, with the
+/// sign above. They count as low only if the zero byte is not zero and the sign extension fits in all
+/// samples.
 fn lies_low(bytes: &[u8]) -> bool {
     let mut samples = bytes.chunks_exact(4);
     let sign_above = samples.all(|b| b[3] == if b[2] & 0x80 == 0 { 0 } else { 0xFF });

@@ -1,4 +1,4 @@
-//! WAV out: RIFF, and RF64 once the samples outgrow 32-bit sizes.
+//! Writes WAV files: RIFF, or RF64 if the samples exceed 32-bit sizes.
 //!
 //! A file is begun as RIFF with a JUNK chunk where RF64's ds64 chunk would be; closing it writes
 //! either the two 32-bit sizes or, past 4 GiB, turns it into RF64 in place (EBU Tech 3306).
@@ -10,7 +10,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 const DS64_BYTES: u32 = 28;
 const DS64_OFFSET: u64 = 12;
 
-/// The samples' form, all that a header says.
+/// The sample format, which determines the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Shape {
     format: PcmFormat,
@@ -62,8 +62,8 @@ impl Shape {
     }
 }
 
-/// The header of a stream whose length nobody knows: sizes 0xFFFFFFFF, which readers of streams
-/// take as "until the end".
+/// The header of a stream of unknown length: sizes 0xFFFFFFFF, which readers of streams take as "until the
+/// end".
 ///
 /// # Errors
 /// `InvalidInput` if WAV has no such sample format.
