@@ -1,9 +1,10 @@
-//! What helps an eigenvalue routine: permutation to block triangular form, then diagonal balancing of each block.
+//! Preconditioning for eigenvalue routines: permutation to block triangular form, then diagonal balancing
+//! of each block.
 //!
-//! The error of a backward stable routine is relative to the norm of the matrix. Where states have units
-//! that differ by many decades, or one part drives another through a large gain, that norm says nothing
-//! about the eigenvalues. Both steps keep them exactly: block triangular form by a permutation, and a
-//! diagonal similarity by powers of two (Osborne 1960; Parlett and Reinsch 1969).
+//! The error of a backward stable routine is relative to the norm of the matrix. If states have units that
+//! differ by many decades, or one part drives another through a large gain, that norm may be far larger
+//! than the eigenvalues. Both steps keep the eigenvalues exactly: block triangular form by a permutation,
+//! and a diagonal similarity by powers of two (Osborne 1960; Parlett and Reinsch 1969).
 
 use super::Mat;
 use nalgebra::{ComplexField, DMatrix};
@@ -12,12 +13,12 @@ use nalgebra::{ComplexField, DMatrix};
 const WORD: usize = u64::BITS as usize;
 /// Sweeps over the rows of a matrix before [`scales`] gives up improving it.
 const MAX_SWEEPS: usize = 100;
-/// A factor has to bring the sum of a row and its column below this part of what it was.
+/// A factor is used only if it reduces the sum of a row and its column below this fraction.
 const WORTHWHILE: f64 = 0.95;
 
 /// The power of two near to `x` on a logarithmic scale; 1 for zero, NaN and infinity. Halves and roots of
-/// halves are common, so the border between two powers is put where no tidy number falls: otherwise
-/// rounding would decide, and the time unit with it.
+/// halves are common, so the border between two powers lies away from round numbers. Otherwise rounding,
+/// and with it the time unit, would decide.
 pub fn power_of_two(x: f64) -> f64 {
     if x > 0.0 && x.is_finite() { (x.log2() + 0.2).round().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
 }
@@ -49,9 +50,9 @@ fn balanced<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Balanced<T> {
     Balanced { matrix, condition: most / least }
 }
 
-/// The states in groups, each of which drives itself in a loop: the strongly connected components of the
-/// graph in which state j drives state i where m[i, j] is not zero. In this order a permuted `m` is block
-/// triangular up to the order of the groups.
+/// The states in groups that drive one another in a loop: the strongly connected components of the graph in
+/// which state j drives state i where m[i, j] is not zero. In this order a permuted `m` is block triangular
+/// up to the order of the groups.
 fn loops<T: ComplexField>(m: &DMatrix<T>) -> Vec<Vec<usize>> {
     let n = m.nrows();
     let drivers = drivers(m);
@@ -68,7 +69,7 @@ fn loops<T: ComplexField>(m: &DMatrix<T>) -> Vec<Vec<usize>> {
     groups
 }
 
-/// For each state the set of those that drive it, over whatever others, as bits (Warshall 1962).
+/// For each state the set of states that drive it, directly or through others, as bits (Warshall 1962).
 fn drivers<T: ComplexField>(m: &DMatrix<T>) -> Vec<Vec<u64>> {
     let n = m.nrows();
     let mut sets = vec![vec![0u64; n.div_ceil(WORD)]; n];
@@ -111,7 +112,7 @@ pub(super) fn scales(mut m: Mat) -> Vec<f64> {
     scales
 }
 
-/// The factor for column `i`, and its inverse for row `i`, that makes both alike; 1 if it would win next to
+/// The factor for column `i`, and its inverse for row `i`, that makes both alike; 1 if it would gain almost
 /// nothing.
 fn equalising(m: &Mat, i: usize) -> f64 {
     let off_diagonal = |k: &usize| *k != i;
@@ -121,9 +122,9 @@ fn equalising(m: &Mat, i: usize) -> f64 {
     if column * factor + row / factor < WORTHWHILE * (column + row) { factor } else { 1.0 }
 }
 
-/// Powers of two by which to divide the states of x+ = a x + b u, y = c x, so that what drives a state and
-/// what it drives are alike. Of b and c only the proportions count: their sizes change with the units of u
-/// and y, which are not to distort a.
+/// Powers of two by which to divide the states of x+ = a x + b u, y = c x, so that the gains into each
+/// state and out of it are alike. Of b and c only the proportions count: their sizes change with the units
+/// of u and y, which must not affect the scaling of a.
 pub fn state_scales(a: &Mat, b: &Mat, c: &Mat) -> Vec<f64> {
     let n = a.nrows();
     let share = |part: f64, whole: f64| if part > 0.0 { part / whole } else { 0.0 };
@@ -144,7 +145,7 @@ pub fn state_scales(a: &Mat, b: &Mat, c: &Mat) -> Vec<f64> {
 mod tests {
     use crate::{Complex, Mat, eigenvalues, eigenvalues_c, spectral_radius, to_complex};
 
-    /// A delay line of `n` behind a stable pair of states that drives it with `gain`.
+    /// A delay line of `n` states, driven with `gain` by a stable pair of states.
     fn driven_line(n: usize, gain: f64) -> Mat {
         let mut m = Mat::zeros(n + 2, n + 2);
         m.view_mut((0, 0), (2, 2)).copy_from_slice(&[0.6, 0.4, -0.5, 0.6]);

@@ -1,4 +1,4 @@
-//! Many small complex matrices of one size, side by side in one piece of memory.
+//! Many small complex matrices of one size, contiguous in memory.
 //!
 //! An interior-point method on sampled frequencies does the same few products and factorisations on
 //! hundreds of blocks of four to thirty rows, every iteration. The blocks live in one vector so that

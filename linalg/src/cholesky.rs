@@ -1,4 +1,4 @@
-//! Cholesky factorisations and what is solved by them.
+//! Cholesky factorisations and their solutions of linear systems.
 
 use super::{LinalgError, Mat, owned, view};
 use faer::Side;

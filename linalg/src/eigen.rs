@@ -38,13 +38,13 @@ pub fn eigenvalues_c(m: &CMat) -> Result<Vec<Complex<f64>>, LinalgError> {
     balanced_eigenvalues(m, raw_eigenvalues_c).map(|(values, _)| values)
 }
 
-/// Scales that differ by more than this may do harm: a change of coordinates magnifies errors by up to its
-/// condition, here to 2e-10. Eigenvalues that all but meet move by the square root of that.
+/// Scales that differ by more than this may reduce the accuracy: a change of coordinates magnifies errors
+/// by up to its condition, here to 2e-10. Eigenvalues that almost coincide move by the square root of that.
 const SAFE_CONDITION: f64 = 1e6;
 
-/// Candidates for the eigenvalues of a general real matrix, where a false one does no harm and a missed one
-/// does: those of [`eigenvalues`] and, where balancing changed scales by many decades, those of the matrix
-/// as it stands beside them.
+/// Candidates for the eigenvalues of a general real matrix, for callers to whom a false one does no harm
+/// but a missed one does. They are those of [`eigenvalues`] and, if balancing changed scales by many
+/// decades, also those of the unbalanced matrix.
 pub fn candidate_eigenvalues(m: &Mat) -> Result<Vec<Complex<f64>>, LinalgError> {
     check_finite("eigenvalues", m)?;
     both_ways(m, raw_eigenvalues)
@@ -109,12 +109,13 @@ pub fn eigen(m: &Mat) -> Result<(Vec<Complex<f64>>, CMat), LinalgError> {
     Ok((e.S().column_vector().iter().copied().collect(), owned(e.U())))
 }
 
-/// Rotations a row after which a Schur iteration is given up; one or two are usual.
+/// Rotations per row after which a Schur iteration is abandoned; one or two are usual.
 const SCHUR_SWEEPS: usize = 100;
 
-/// Real Schur form `m = q t q'`: q orthogonal, t zero below its diagonal but for 2 x 2 blocks.
+/// Real Schur form `m = q t q'`: q orthogonal, t zero below its diagonal except in 2 x 2 blocks.
 ///
-/// faer keeps its own private, so this one is nalgebra's, with a bound: it never ends on some delay lines.
+/// faer's Schur form is private, so this is nalgebra's, with a limit on the iterations, because it never
+/// ends on some delay lines.
 pub fn real_schur(m: &Mat) -> Result<(Mat, Mat), LinalgError> {
     check_finite("Schur", m)?;
     let n = m.nrows();

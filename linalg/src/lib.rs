@@ -1,12 +1,12 @@
-//! The one place that knows which crate does which decomposition.
+//! Matrix decompositions and Fourier transforms: one interface to nalgebra, faer and the FFT crates.
 //!
-//! Matrices are nalgebra's [`DMatrix`]; every decomposition of run-time size is faer's, because
-//! nalgebra's SVD is wrong on rank-deficient matrices and its Schur form may never end on delay
-//! lines. The two share memory (both are column-major), so nothing is copied on the way in.
-//! Everything here is sequential and therefore gives the same bits on every run.
+//! Matrices are nalgebra's [`DMatrix`]; every decomposition of run-time size is faer's, because nalgebra's
+//! SVD is wrong on rank-deficient matrices and its Schur form may never end on delay lines. Both libraries
+//! store matrices column-major, so faer reads nalgebra's memory without a copy. Everything here is
+//! sequential and therefore gives the same bits on every run.
 //!
-//! It is a crate of its own because the generic code of these libraries is compiled where it is first called with a
-//! type: here once, and not again with every change and every test of the crates above.
+//! It is a separate crate to save compile time: the generic code of these libraries is compiled here once,
+//! and not again with every change of the crates that use it.
 
 #![forbid(unsafe_code)]
 
@@ -40,7 +40,7 @@ pub type Mat = DMatrix<f64>;
 /// Complex matrix of run-time size.
 pub type CMat = DMatrix<Complex<f64>>;
 
-/// Why a decomposition could not be had.
+/// Why a decomposition failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LinalgError {
     /// A Cholesky factorisation met a pivot that is not positive.
@@ -59,12 +59,12 @@ pub enum LinalgError {
         /// Columns of the matrix.
         cols: usize,
     },
-    /// Matrices were put together whose sizes do not allow it.
+    /// The sizes of the matrices do not match.
     #[error("{operation} needs as many {shared} in each matrix, got {}x{} and {}x{}", first.0, first.1, other.0, other.1)]
     Sizes {
-        /// What was to be done with the matrices.
+        /// The operation.
         operation: &'static str,
-        /// What their sizes must share: rows or columns.
+        /// The size that must be equal: rows or columns.
         shared: &'static str,
         /// Rows and columns of the first matrix.
         first: (usize, usize),

@@ -1,9 +1,9 @@
-//! LQ factorisations: a square root is compressed without ever being squared.
+//! LQ factorisations, which compress a square root without squaring it.
 
 use super::{CMat, Mat, owned, view};
 
-/// Lower trapezoidal `L` (rows x min(rows, cols)) with `L L' = m m'`, by a QR factorisation of `m'`:
-/// a square root is compressed without ever being squared.
+/// Lower trapezoidal `L` (rows x min(rows, cols)) with `L L' = m m'`, by a QR factorisation of `m'`. It
+/// compresses a square root without squaring it.
 pub fn lq_factor(m: &Mat) -> Mat {
     if m.is_empty() {
         return Mat::zeros(m.nrows(), m.nrows().min(m.ncols()));

@@ -3,8 +3,8 @@
 use super::{CMat, Mat, owned, view};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 
-/// Solves the square system `m x = rhs` by LU with partial pivoting. A singular `m` gives
-/// infinities or NaN, which the caller has to look for.
+/// Solves the square system `m x = rhs` by LU with partial pivoting. A singular `m` gives infinities or
+/// NaN, for which the caller must check.
 pub fn solve(m: &Mat, rhs: &Mat) -> Mat {
     owned(view(m).partial_piv_lu().solve(view(rhs)).as_ref())
 }

@@ -1,4 +1,4 @@
-//! `hybank analyze`: how good a bank is, here or with other true delays.
+//! `hybank analyze`: the error of a bank, with its own delays or with others.
 
 use super::Failure;
 use super::bank_file::load;

@@ -1,4 +1,4 @@
-//! Reading specs and banks, writing text files.
+//! Reads specs and banks, and writes text files.
 
 use super::Failure;
 use crate::bank::{Bank, SynthesisFilters};
@@ -8,7 +8,7 @@ use crate::spec::{DesignOverrides, Spec, SpecProblem};
 use std::io::Write;
 use std::path::Path;
 
-/// How long a spec or bank file may be: a bank of the largest size with its proof has less.
+/// Maximum size of a spec or bank file; the largest bank with its proof is smaller.
 const TEXT_FILE: Bound =
     Bound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
 
@@ -24,7 +24,7 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
     Ok(bank)
 }
 
-/// An unstable filter would run to infinity in silence.
+/// Refuses unstable filters: their output would grow to infinity without a message.
 fn check_stable(bank: &Bank, path: &Path) -> Result<(), Failure> {
     if let SynthesisFilters::StateSpace(_) = &bank.filters {
         let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(path)));
@@ -90,7 +90,7 @@ pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Fai
     file.commit().map_err(Failure::input)
 }
 
-/// A file as messages call it.
+/// The name of a file in messages.
 pub(super) fn name(path: &Path) -> String {
     if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
 }

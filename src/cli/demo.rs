@@ -1,4 +1,4 @@
-//! `hybank demo`: design, capture, fuse and judge on one example, in comparison with other methods.
+//! `hybank demo`: designs, captures and fuses one example, and compares the error with other methods.
 
 use super::Failure;
 use super::bank_file::write_text;
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 const SPEC: &str = include_str!("../../filters/speech-2x.toml");
 const DURATION: Seconds = Seconds(2.0);
 const STEP_AT: Seconds = Seconds(1.000_01);
-/// Fast samples at the beginning that are not judged, while the history of the filters fills.
+/// Fast samples at the beginning that the error does not include, while the history of the filters fills.
 const SETTLING: usize = 200;
 /// Interval over which the error is averaged in the chart.
 const ERROR_INTERVAL: Seconds = Seconds(0.02);

@@ -11,17 +11,17 @@ pub enum Failure {
     Input(String),
     /// Wrong usage: exit code 2.
     Usage(String),
-    /// The reader of our output went away: end without a word.
+    /// The reader of the output closed the pipe: end without a message.
     ClosedPipe,
 }
 
 impl Failure {
-    /// A failure of the input, from anything that can say what is wrong.
+    /// A failure of the input with `message`.
     pub fn input(message: impl ToString) -> Self {
         Self::Input(message.to_string())
     }
 
-    /// A failure of a run; a reader of its output that went away is none.
+    /// A failure of a run. A closed output pipe is not reported as an error.
     pub(super) fn running(error: impl Into<PipelineError>) -> Self {
         match error.into() {
             error if error.is_closed_pipe() => Self::ClosedPipe,

@@ -1,4 +1,4 @@
-//! `hybank fuse`: slow recordings in, one fast recording out.
+//! `hybank fuse`: fuses slow recordings into one fast recording.
 
 use super::Failure;
 use super::gaps::GapArgs;
@@ -58,7 +58,7 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// What happened.
+/// The report of a run.
 #[derive(Debug, serde::Serialize)]
 struct Report<'a> {
     #[serde(flatten)]
@@ -67,8 +67,8 @@ struct Report<'a> {
     rate: u64,
     /// Input frames read.
     frames: u64,
-    /// Samples dropped at the beginning so that the output lines up with the inputs; with --keep-latency only those that
-    /// the algorithm adds.
+    /// Samples dropped at the beginning so that the output lines up with the inputs; with --keep-latency
+    /// only those that the algorithm adds.
     latency_dropped: u64,
     seconds: f64,
 }
@@ -98,7 +98,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl Args {
-    /// What cannot be, before any file is read.
+    /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
         match_bank::check_stdin(&self.bank, &self.inputs)?;
         self.gaps.check()?;
@@ -120,7 +120,7 @@ impl Args {
     }
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
-        // Outputs that no gap affects are to have the very bits of a whole recording.
+        // Outputs that no gap affects must have the same bits as without gaps.
         let auto = if self.gaps.policy().is_some() {
             Algorithm::Direct
         } else {
@@ -151,7 +151,7 @@ impl Args {
     }
 }
 
-/// All frames there are.
+/// Processes all frames.
 fn run_all(
     pipeline: &mut Pipeline,
     reader: &mut MultiReader,

@@ -1,4 +1,4 @@
-//! Missing samples on the command line: what stands in for them, the report, the mask file.
+//! Missing samples on the command line: their replacement, the report, the mask file.
 
 use super::Failure;
 use super::say::say_line;
@@ -7,7 +7,7 @@ use crate::io::{LostSamples, MAX_LOST, ReadOptions, Until};
 use crate::pipeline::{GapPolicy, GapSummary};
 use std::path::{Path, PathBuf};
 
-/// Gaps that are reported one by one on standard error.
+/// Maximum number of gaps that are listed on standard error.
 const REPORTED: usize = 10;
 
 /// Options of the commands that can fill gaps.
@@ -35,7 +35,7 @@ pub(super) struct GapArgs {
     longest: bool,
 }
 
-/// What stands in for a missing sample.
+/// The replacement of a missing sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Policy {
     /// The last good sample of the channel
@@ -47,7 +47,7 @@ enum Policy {
 }
 
 impl GapArgs {
-    /// What cannot be, before any file is read.
+    /// Refuses impossible combinations of options, before any file is read.
     pub(super) fn check(&self) -> Result<(), Failure> {
         if self.gaps == Some(Policy::Mask) && self.mask.is_none() {
             return Err(Failure::Usage("--gaps mask needs --mask FILE for the marks".into()));
@@ -59,7 +59,7 @@ impl GapArgs {
         Ok(())
     }
 
-    /// What is known of lost samples.
+    /// Reads the file of lost samples, if one is given.
     pub(super) fn lost_samples(&self) -> Result<Option<LostSamples>, Failure> {
         self.lost().map(LostSamples::read).transpose().map_err(Failure::input)
     }
@@ -84,7 +84,7 @@ impl GapArgs {
         ReadOptions { lost, until, max_lost: self.max_lost, ..options }
     }
 
-    /// What stands in for a missing sample, if gaps are to be filled.
+    /// The replacement of a missing sample, if gaps are to be filled.
     pub(super) fn policy(&self) -> Option<GapPolicy> {
         self.gaps.map(|policy| match policy {
             Policy::Hold => GapPolicy::Hold,

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the first one is a wish, the second an order.
+//! Ctrl-C and SIGTERM: the first one requests an orderly end, the second one ends the process at once.
 
 use crossbeam_channel::Receiver;
 
@@ -11,7 +11,7 @@ mod watch {
     use signal_hook::iterator::Signals;
     use std::time::Duration;
 
-    /// How long, after the first signal, whoever reads standard output may refuse to take more.
+    /// Time after the first signal for which a write to standard output may block.
     const PATIENCE: Duration = Duration::from_secs(2);
     const STEP: Duration = Duration::from_millis(50);
 
@@ -19,7 +19,7 @@ mod watch {
     pub(super) fn start() -> Receiver<()> {
         let (stop_sender, stop) = bounded(1);
         let (signal_sender, signals) = bounded::<Signals>(1);
-        // The thread first: where none can be started, signals keep their usual meaning.
+        // The thread is started first: if that fails, signals keep their default effect.
         let watch = move || {
             if let Ok(signals) = signals.recv() {
                 until_the_end(signals, &stop_sender);
@@ -46,7 +46,7 @@ mod watch {
             if let Some(second) = signals.pending().next() {
                 end(second);
             }
-            // The run waits for its reader and cannot see the wish.
+            // The run is blocked by the reader of its output and does not notice the request.
             if is_stdout_stalled(PATIENCE) {
                 end(first);
             }
@@ -60,8 +60,8 @@ mod watch {
     }
 }
 
-/// A channel with a message once the first interrupt has come. A second one ends the process, as does the first one
-/// if nobody takes what is written to standard output; unfinished files are removed.
+/// A channel that receives a message at the first interrupt. A second interrupt ends the process. The first
+/// one also ends it if the reader of standard output takes no data. Unfinished files are removed.
 #[cfg(unix)]
 pub(super) fn interrupts() -> Receiver<()> {
     watch::start()

@@ -1,4 +1,4 @@
-//! Do the inputs fit the bank?
+//! Checks that the inputs fit the bank.
 
 use super::Failure;
 use crate::bank::Bank;

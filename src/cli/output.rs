@@ -1,4 +1,4 @@
-//! How output samples are stored, and which files a run writes.
+//! The format of output samples, and the files that a run writes.
 
 use super::Failure;
 use crate::files::refuse_overlaps;
@@ -27,7 +27,7 @@ pub(super) enum Bits {
 }
 
 impl Bits {
-    /// How samples of this width are stored.
+    /// The sample format of this width.
     pub(super) fn format(self) -> PcmFormat {
         match self {
             Self::I16 => PcmFormat::S16Le,
@@ -39,13 +39,13 @@ impl Bits {
     }
 }
 
-/// Formats with more digits than f32 sums have want sums in f64.
+/// Formats with more digits than f32 need sums in f64.
 pub(super) fn precision(format: PcmFormat) -> Precision {
     use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
     if matches!(format, F64Be | F64Le | S32Be | S32Le) { Precision::Double } else { Precision::Single }
 }
 
-/// The files of a run are different ones: none of its outputs is an input, or another output.
+/// Checks that no output of a run is also an input or another output.
 pub(super) fn check_files(output: &Path, mask: Option<&Path>, inputs: &[&Path]) -> Result<(), Failure> {
     let mut outputs = SampleWriter::files(output);
     outputs.extend(mask.map(Path::to_owned));

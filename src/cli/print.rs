@@ -1,9 +1,9 @@
-//! Standard output: results.
+//! Prints results to standard output.
 
 use super::Failure;
 use std::io::{ErrorKind, Write};
 
-/// Results on standard output; a reader that went away ends the run quietly.
+/// Results on standard output; a closed pipe ends the run without a message.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))

@@ -1,4 +1,4 @@
-//! What `fuse` and `stream` share: options of the filters, the report, the end of a run.
+//! Code that `fuse` and `stream` share: options of the filters, the report, the end of a run.
 
 use super::Failure;
 use super::gaps::say_gaps;
@@ -35,8 +35,9 @@ impl AlgorithmArg {
 /// Threads of the filters.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct ThreadArgs {
-    /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any number. More
-    /// than one pays with many taps or channels; otherwise reading and writing take longer than filtering
+    /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any
+    /// number. More than one thread helps with many taps or channels; otherwise reading and writing take
+    /// longer than filtering
     #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
 }
@@ -122,8 +123,8 @@ impl RunReport {
     }
 }
 
-/// Judges the run, gives the outputs their names, and only then says what was tolerated: warnings that cannot be written
-/// cost nothing. `report` is printed if it is wanted.
+/// Checks the run, renames the outputs to their final names, and then prints the warnings, so that a
+/// warning that cannot be written loses no output. `report` is printed if requested.
 pub(super) fn finish(
     outputs: FileOutputs,
     run: &RunReport,

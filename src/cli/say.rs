@@ -1,8 +1,8 @@
-//! Standard error: everything that is no result.
+//! Prints messages to standard error.
 
 use std::io::Write;
 
-/// Text on standard error. One that cannot be written is no reason to lose a result.
+/// Prints text to standard error. Errors are ignored, so that no result is lost.
 pub(super) fn say(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }

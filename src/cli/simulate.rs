@@ -10,15 +10,15 @@ use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::path::{Path, PathBuf};
 
-/// The fast period that stands for normalised time: such a spec has no rate of its own.
+/// The fast period of a spec in normalised time, which has no rate.
 const NORMALISED: Seconds = Seconds(1.0);
 /// Fast rate in the WAV headers of captures in normalised time.
 const NORMALISED_RATE: Hertz = Hertz(48_000.0);
-/// Fewest fast samples of an analytic source unless `--samples` is given (thesis 5.6).
+/// Minimum number of fast samples of an analytic source unless `--samples` is given (thesis 5.6).
 const DEFAULT_SAMPLES: f64 = 200.0;
-/// Most fast samples of a simulation, since captures are held in memory.
+/// Maximum number of fast samples of a simulation, because captures are held in memory.
 const MOST_SAMPLES: usize = 1 << 28;
-/// Most quadrature panels of a chirp per converter, about ten seconds of work.
+/// Maximum number of quadrature panels of a chirp per converter, about ten seconds of computing.
 const MOST_PANELS: f64 = 2e7;
 
 /// Simulates what the slow converters capture

@@ -1,4 +1,4 @@
-//! `hybank stream`: slow samples in and fast samples out, as they come.
+//! `hybank stream`: fuses slow samples as they arrive.
 
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
@@ -49,8 +49,8 @@ pub(super) struct Args {
     /// sigmf-meta); `-` is standard output
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
-    /// Algorithm of FIR filters; auto is the faster one of direct and fast-fir, because overlap-save adds latency (--json
-    /// says how much), and direct where gaps are filled
+    /// Algorithm of FIR filters; auto is the faster one of direct and fast-fir, because overlap-save adds
+    /// latency (--json says how much), and direct where gaps are filled
     #[arg(long, value_enum, default_value_t = AlgorithmArg::Auto)]
     algorithm: AlgorithmArg,
     /// Output the last samples at the end, as many as the latency, with zeros for input
@@ -78,7 +78,7 @@ fn parse_coding(name: &str) -> Result<Coding, String> {
     PcmFormat::from_str(name).map(Coding::Raw).map_err(|error| format!("{error}, or wav"))
 }
 
-/// What happened.
+/// The report of a run.
 #[derive(Debug, serde::Serialize)]
 struct Report<'a> {
     #[serde(flatten)]
@@ -125,7 +125,7 @@ impl Args {
         if self.input.is_empty() { vec!["-".into()] } else { self.input.clone() }
     }
 
-    /// What cannot be, before any file is read.
+    /// Refuses impossible combinations of options, before any file is read.
     fn check(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
         match_bank::check_stdin(&self.bank, inputs)?;
         self.gaps.check()?;
@@ -138,7 +138,7 @@ impl Args {
         check_files(&self.output, self.gaps.mask(), &inputs)
     }
 
-    /// Raw inputs are one interleaved or one per channel; others say themselves what they hold.
+    /// Raw inputs are one interleaved or one per channel; other formats state their channels.
     fn check_inputs(&self, inputs: &[PathBuf], channels: usize) -> Result<(), Failure> {
         let raw = matches!(self.format, Coding::Raw(_)) && !inputs.iter().any(|path| is_sigmf(path));
         if raw && inputs.len() != 1 && inputs.len() != channels {
@@ -172,7 +172,7 @@ impl Args {
     }
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
-        // Outputs that no gap affects are to have the very bits of a whole recording.
+        // Outputs that no gap affects must have the same bits as without gaps.
         let auto = if self.gaps.policy().is_some() {
             Algorithm::Direct
         } else {

@@ -49,7 +49,7 @@ struct Report {
     certificate_in_file: bool,
     #[serde(skip)]
     taps: usize,
-    /// The taps are integers of so many bits.
+    /// Word lengths of integer taps.
     #[serde(skip)]
     words: String,
 }
@@ -86,7 +86,7 @@ fn taps(bank: &Bank) -> usize {
     }
 }
 
-/// Of what the taps are made; that they are was checked on reading.
+/// The word lengths as text; reading has checked them.
 fn words(bank: &Bank) -> String {
     let line = |words: &FixedPoint| {
         format!("taps       integers of {} times 2^{}\n", words.bits, -words.fraction_bits)
@@ -95,7 +95,7 @@ fn words(bank: &Bank) -> String {
 }
 
 impl Report {
-    /// Which banks the lower end holds for.
+    /// The class of banks for which the lower bound holds.
     fn scope(&self) -> String {
         match self.verified.lower_banks {
             BoundedBanks::Any => "no bank at all is better".to_owned(),
@@ -132,7 +132,7 @@ impl Report {
     }
 }
 
-/// All digits: rounding would move a bound.
+/// All digits, because rounding would change a bound.
 fn number(value: f64) -> String {
     if value >= 1e-4 || value == 0.0 { format!("{value}") } else { format!("{value:e}") }
 }

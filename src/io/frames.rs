@@ -25,7 +25,7 @@ impl<R: Read> FrameReader<R> {
     /// bytes filled, a multiple of the frame, short only at the end.
     ///
     /// # Errors
-    /// What the underlying reader reports.
+    /// The errors of the underlying reader.
     pub fn fill(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let capacity = bytes.len() / self.frame * self.frame;
         let mut filled = 0;
@@ -38,7 +38,7 @@ impl<R: Read> FrameReader<R> {
     /// Waits for at least one whole frame and returns the bytes of one read; 0 only at the end.
     ///
     /// # Errors
-    /// What the underlying reader reports.
+    /// The errors of the underlying reader.
     pub fn take_ready(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let capacity = bytes.len() / self.frame * self.frame;
         let mut filled = 0;

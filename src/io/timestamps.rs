@@ -93,7 +93,7 @@ fn lost_between(a: Timestamp, b: Timestamp) -> Result<u64, String> {
     let lost = b.frame.checked_sub(a.frame).zip(b.index.checked_sub(a.index));
     let lost = lost.and_then(|(frames, time)| time.checked_sub(frames)).ok_or_else(|| {
         format!(
-            "sample_start {} with global_index {} does not lie behind sample_start {} with global_index {}; captures must be in order and must not overlap",
+            "sample_start {} with global_index {} does not follow sample_start {} with global_index {}; captures must be in order and must not overlap",
             b.frame, b.index, a.frame, a.index
         )
     })?;

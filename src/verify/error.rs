@@ -41,7 +41,7 @@ pub enum VerifyError {
     },
     /// The file carries no certificate.
     #[error(
-        "proof.upper: the file carries no proof; `hybank design` writes one, and `hybank verify --search` looks for one"
+        "proof.upper: the file carries no proof; `hybank design` writes one, and `hybank verify --search` searches for one"
     )]
     NoCertificate,
     /// The certificate belongs to another system.

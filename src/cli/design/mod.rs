@@ -98,11 +98,11 @@ fn overrides(args: &Args) -> DesignOverrides {
     }
 }
 
-/// What is said of a bank of zeros.
-const SILENT: &str = "all integer taps are zero, the bank's output is silence: no integers of these bits were found that do \
-                      better; give more bits or another fraction_bits";
+/// Warning for a bank whose taps are all zero.
+const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no better integers of these bits were found; \
+                        give more bits or another fraction_bits";
 
-/// Runs the verb.
+/// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] with the one message for the user.
@@ -125,7 +125,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
     if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_silent) {
-        super::warn(SILENT);
+        super::warn(ALL_ZERO);
     }
     let report = Report::new(args.output.display().to_string(), &found, mean, seconds);
     if args.json {

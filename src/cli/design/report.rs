@@ -1,4 +1,4 @@
-//! What `hybank design` says of a finished bank, as text and as JSON.
+//! The report of `hybank design` on a finished bank, as text and as JSON.
 
 use crate::bank::{Gamma, SynthesisFilters};
 use crate::design::quantise::WordStudy;
@@ -35,7 +35,7 @@ pub(super) struct Report<'a> {
     proof: ProofReport,
 }
 
-/// What integer taps cost.
+/// The increase of the error by integer taps.
 #[derive(Debug, serde::Serialize)]
 struct Words<'a> {
     fraction_bits: i32,
@@ -73,7 +73,7 @@ impl<'a> Words<'a> {
     }
 }
 
-/// What `hybank verify` will say of the file.
+/// The bounds that `hybank verify` will prove for the file.
 #[derive(Debug, serde::Serialize)]
 struct ProofReport {
     proven: Option<Verified>,
@@ -187,10 +187,10 @@ impl<'a> Report<'a> {
     }
 }
 
-/// Rows of the table of orders; all of them are in the report of `--json`.
+/// Maximum number of rows of the table of orders; the report of `--json` has all of them.
 const TABLE_ROWS: usize = 32;
 
-/// Full and reduced order, and what each state is worth.
+/// Full and reduced order, and the error for each number of states.
 fn order_text(reduction: &OrderReduction, method: Method) -> String {
     let OrderReduction { full, reduced, orders } = reduction;
     let lost = if method == Method::H2 { "of H2 error" } else { "of gamma" };
