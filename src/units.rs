@@ -10,12 +10,13 @@
 //!                     W  = M w' = M h w      rad per slow period
 //! ```
 //!
-//! Specs, banks and reports hold the units on the left, the designer and the simulator those on the right. Each type
-//! holds one `f64` in its own unit. Any value is legal; ranges are checked where values are read. A conversion rounds once
-//! per multiplication or division in its equation, and overflows or underflows as f64 does.
+//! Specs, banks and reports hold the units on the left, the designer and the simulator those on the right.
+//! Each type holds one `f64` in its own unit. Any value is legal; ranges are checked where values are read.
+//! A conversion rounds once per multiplication or division in its equation, and overflows or underflows as
+//! f64 does.
 //!
-//! Sums, differences and multiples keep the unit, and the quotient of two values of one unit is a plain number. Every
-//! change of unit is a named conversion:
+//! Sums, differences and multiples keep the unit, and the quotient of two values of one unit is a plain
+//! number. Every change of unit is a named conversion:
 //!
 //! ```
 //! use hybank::units::{Hertz, Seconds};
@@ -135,7 +136,8 @@ pub trait Quantity: Copy + fmt::Debug + fmt::Display + PartialEq {
     fn value(self) -> f64;
 }
 
-/// A unit of time and the units of frequency that belong to it. A value generic over `Time` cannot mix two time bases.
+/// A unit of time and the units of frequency that belong to it. A value generic over `Time` cannot mix two
+/// time bases.
 pub trait Time: Quantity {
     /// Cycles per unit of this time.
     type Frequency: Quantity;
@@ -164,11 +166,13 @@ quantity! {
     RadiansPerSecond, "rad/s"
 }
 quantity! {
-    /// An angular frequency in radians per fast period, w' = w h; pi is the Nyquist frequency of the fast samples.
+    /// An angular frequency in radians per fast period, w' = w h; pi is the Nyquist frequency of the fast
+    /// samples.
     RadiansPerFastPeriod, "rad per fast period"
 }
 quantity! {
-    /// An angular frequency in radians per slow period, W = M h w; pi is the Nyquist frequency of one converter.
+    /// An angular frequency in radians per slow period, W = M h w; pi is the Nyquist frequency of one
+    /// converter.
     RadiansPerSlowPeriod, "rad per slow period"
 }
 quantity! {

@@ -29,7 +29,8 @@ pub enum AnalogError {
         /// Imaginary part in rad/s.
         im: f64,
     },
-    /// A pole so slow or so fast that samples do not distinguish it from an integrator or from a constant gain.
+    /// A pole so slow or so fast that samples do not distinguish it from an integrator or from a constant
+    /// gain.
     #[error(
         "the pole {re:e} {im:+e}j rad/s is {normalised:e}; the supported range is {MIN_NORMALISED_POLE:e} to \
          {MAX_NORMALISED_POLE:e}: slower poles look like integrators to the samples, faster ones like a constant gain. \

@@ -1,22 +1,24 @@
 //! Analog front ends: from a written filter to checked state equations in normalised time.
 //!
-//! From this module on, time is normalised by the fast period h: t' = t/h, s' = s h. A bank for nanoseconds and one for
-//! seconds therefore have the same numbers. Poles, zeros and coefficients are scaled *before* they are realised.
+//! From this module on, time is normalised by the fast period h: t' = t/h, s' = s h. A bank for nanoseconds
+//! and one for seconds therefore have the same numbers. Poles, zeros and coefficients are scaled *before*
+//! they are realised.
 //!
 //! - [`StrictlyProper`] is the type that the designer works with: stable, strictly proper, real, normalised.
 //! - [`families`] are the classical low-passes as [`Zpk`].
 //!
 //! # How a filter is realised
-//! Zeros and poles become a cascade of first- and second-order sections. Each pole pair gets the zeros nearest to it, and
-//! the most resonant pair comes last. A companion matrix would lose its roots to rounding from order six on.
+//! Zeros and poles become a cascade of first- and second-order sections. Each pole pair gets the zeros
+//! nearest to it, and the most resonant pair comes last. A companion matrix would lose its roots to
+//! rounding from order six on.
 //!
-//! Numerators and denominators are factored first. The computed roots of an m-fold pole are wrong by the m-th root of the
-//! rounding error, but their errors cancel in the product. This is checked: if the roots do not reproduce every
-//! coefficient to 1e-13, the polynomials are realised in controllable canonical form instead, with frequency measured
-//! relative to the natural frequency.
+//! Numerators and denominators are factored first. The computed roots of an m-fold pole are wrong by the
+//! m-th root of the rounding error, but their errors cancel in the product. This is checked: if the roots
+//! do not reproduce every coefficient to 1e-13, the polynomials are realised in controllable canonical form
+//! instead, with frequency measured relative to the natural frequency.
 //!
-//! Finally every state is scaled by a power of two so that its impulse response has unit energy up to rounding to that
-//! power: no state is large only because its pole is fast.
+//! Finally every state is scaled by a power of two so that its impulse response has unit energy up to
+//! rounding to that power: no state is large only because its pole is fast.
 
 mod balance;
 mod error;
@@ -33,12 +35,12 @@ pub use error::AnalogError;
 pub use strictly_proper::StrictlyProper;
 pub use zpk::{Cutoffs, Zpk};
 
-/// Least -Re(p)/|p| of a pole: a quality factor of 5e8. Eigenvalues of a realisation are not known to higher accuracy, so
-/// a pole closer to the imaginary axis might as well be unstable.
+/// Least -Re(p)/|p| of a pole: a quality factor of 5e8. Eigenvalues of a realisation are not known to
+/// higher accuracy, so a pole closer to the imaginary axis might as well be unstable.
 pub const MIN_DAMPING_RATIO: f64 = 1e-9;
 
-/// Least modulus of a pole, rad per fast period. A slower one decays over more than 1e9 samples: 1 - e^p keeps only
-/// seven digits there, and samples do not distinguish the pole from an integrator.
+/// Least modulus of a pole, rad per fast period. A slower one decays over more than 1e9 samples: 1 - e^p
+/// keeps only seven digits there, and samples do not distinguish the pole from an integrator.
 pub const MIN_NORMALISED_POLE: f64 = 1e-9;
 
 /// Largest modulus of a pole, rad per fast period. A faster one settles within 1e-9 fast periods.

@@ -5,8 +5,9 @@ use super::section::Section;
 
 /// Pairs zeros with poles and orders the sections, low quality first. Needs no more zeros than poles.
 ///
-/// In each step the pair with the least ratio of frequencies is joined. If the zeros of a section were far from its poles,
-/// its gain on one side of the spectrum would be tiny, and no later section could restore the digits lost to rounding.
+/// In each step the pair with the least ratio of frequencies is joined. If the zeros of a section were far
+/// from its poles, its gain on one side of the spectrum would be tiny, and no later section could restore
+/// the digits lost to rounding.
 pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
     let mut unpaired = UnpairedPoles { real: poles.real.clone(), upper: poles.upper.clone() };
     let mut pairs: Vec<Roots> = zeros.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im }).collect();
@@ -68,8 +69,9 @@ impl UnpairedPoles {
     }
 }
 
-/// Factor on the distance of a zero that is slower than its pole. With a faster zero the states amplify low frequencies,
-/// which is harmless. With a slower one the states have to cancel the direct term at low frequencies.
+/// Factor on the distance of a zero that is slower than its pole. With a faster zero the states amplify low
+/// frequencies, which is harmless. With a slower one the states have to cancel the direct term at low
+/// frequencies.
 const SLOW_ZERO_PENALTY: f64 = 4.0;
 
 /// Distance of two frequencies on a logarithmic scale. A zero at the origin counts as very slow, so that it

@@ -1,4 +1,5 @@
-//! Numerator over denominator: factored where the roots reproduce the coefficients, else kept as polynomials.
+//! Numerator over denominator: factored where the roots reproduce the coefficients, else kept as
+//! polynomials.
 
 use crate::linalg::{Complex, Mat, eigenvalues};
 
@@ -8,8 +9,9 @@ use super::section::Realisation;
 use super::zpk::{Zpk, times_power};
 use crate::units::{RadiansPerFastPeriod, Seconds};
 
-/// Largest relative error of any coefficient reproduced from the roots for which the polynomial is replaced by its roots.
-/// Single roots of a multiple pole have far larger errors (the m-th root of rounding), but these cancel in the product.
+/// Largest relative error of any coefficient reproduced from the roots for which the polynomial is replaced
+/// by its roots. Single roots of a multiple pole have far larger errors (the m-th root of rounding), but
+/// these cancel in the product.
 const FACTOR_TOLERANCE: f64 = 1e-13;
 
 /// `num(s) / den(s)` in normalised time, coefficients in descending powers, `den[0] = 1`.
@@ -20,8 +22,8 @@ pub(super) struct Rational {
 }
 
 impl Rational {
-    /// From coefficients for s in rad/s: strips leading zeros, divides by the leading coefficient of `den` and normalises
-    /// by the fast period `h`. Each list must hold a nonzero coefficient.
+    /// From coefficients for s in rad/s: strips leading zeros, divides by the leading coefficient of `den`
+    /// and normalises by the fast period `h`. Each list must hold a nonzero coefficient.
     pub(super) fn new(num: &[f64], den: &[f64], h: Seconds) -> Self {
         let (num, den) = (without_leading_zeros(num), without_leading_zeros(den));
         let (lead, n) = (den[0], den.len() - 1);

@@ -4,12 +4,12 @@ use crate::linalg::Complex;
 
 use super::AnalogError;
 
-/// Tolerance on conjugate roots, relative to their modulus: wide enough for values typed with 12 digits, and narrow enough
-/// not to pair distinct roots.
+/// Tolerance on conjugate roots, relative to their modulus: wide enough for values typed with 12 digits,
+/// and narrow enough not to pair distinct roots.
 const CONJUGATE_TOLERANCE: f64 = 1e-11;
 
-/// A monic real polynomial of degree at most two, stored by its roots: near a root, the product of differences is accurate
-/// while expanded coefficients cancel.
+/// A monic real polynomial of degree at most two, stored by its roots: near a root, the product of
+/// differences is accurate while expanded coefficients cancel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Roots {
     /// The constant 1.

@@ -4,8 +4,9 @@ use crate::linalg::{Complex, Mat};
 
 use super::roots::Roots;
 
-/// `w^(p-z) prod(s - zeros) / prod(s - poles)` with p = 1 or 2 poles, z <= p zeros, and w the natural frequency of the
-/// poles. The factor makes the section dimensionless, so its gain is about one in the pass band for any unit of s.
+/// `w^(p-z) prod(s - zeros) / prod(s - poles)` with p = 1 or 2 poles, z <= p zeros, and w the natural
+/// frequency of the poles. The factor makes the section dimensionless, so its gain is about one in the pass
+/// band for any unit of s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Section {
     pub(super) poles: Roots,
@@ -35,9 +36,9 @@ impl Section {
 
     /// Real state equations of one or two states.
     ///
-    /// With poles (s - m1)(s - m2) + v^2 the states are w k / den and w (s - m1) / den: one formula
-    /// covers a conjugate pair, two real poles and a double pole, and divides by nothing that could vanish. For a resonant
-    /// pair k = v, so that both off-diagonal entries are v and the pole is exact; otherwise k = w.
+    /// With poles (s - m1)(s - m2) + v^2 the states are w k / den and w (s - m1) / den: one formula covers
+    /// a conjugate pair, two real poles and a double pole, and divides by nothing that could vanish. For a
+    /// resonant pair k = v, so that both off-diagonal entries are v and the pole is exact; otherwise k = w.
     pub(super) fn realise(self) -> Realisation {
         let w = self.poles.natural_frequency();
         let (m1, m2, v) = match self.poles {
@@ -73,8 +74,8 @@ fn first_order(p: f64, zeros: Roots) -> Realisation {
     Realisation { a: scalar(p), b: scalar(w), c: scalar(c), d }
 }
 
-/// Output row of ((s - z1)(s - z2) + y^2) / ((s - m1)(s - m2) + v^2) - 1 for the states scaled by k and w. The difference
-/// of squares is factored, since it would cancel for zeros next to poles.
+/// Output row of ((s - z1)(s - z2) + y^2) / ((s - m1)(s - m2) + v^2) - 1 for the states scaled by k and w.
+/// The difference of squares is factored, since it would cancel for zeros next to poles.
 fn biproper_row([m1, m2, v]: [f64; 3], [z1, z2, y]: [f64; 3], [k, w]: [f64; 2]) -> [f64; 2] {
     let constant = ((m1 - z1) / k) * ((m1 - z2) / w) + ((y - v) / k) * ((y + v) / w);
     [constant, (m1 - z1) / w + (m2 - z2) / w]

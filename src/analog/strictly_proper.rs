@@ -11,10 +11,10 @@ use super::{AnalogError, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_NORMALISED_
 
 /// A stable, strictly proper, real filter Phi in normalised time t' = t/h.
 ///
-/// State equations dx/dt' = a x + b f, out = c x with a: n x n, b: n x 1, c: 1 x n, all dimensionless. The gain is that
-/// of the written filter: Phi'(s') = Phi(s'/h). Two filters are equal when their normalised poles, zeros and gains are
-/// (for state-space forms: their matrices), in whatever form they were written; channels with equal filters can share
-/// one state.
+/// State equations dx/dt' = a x + b f, out = c x with a: n x n, b: n x 1, c: 1 x n, all dimensionless. The
+/// gain is that of the written filter: Phi'(s') = Phi(s'/h). Two filters are equal when their normalised
+/// poles, zeros and gains are (for state-space forms: their matrices), in whatever form they were written;
+/// channels with equal filters can share one state.
 ///
 /// Source: thesis section 5.2 asks for exactly these properties (rational, stable, strictly proper).
 #[derive(Debug, Clone)]
@@ -34,9 +34,10 @@ impl StrictlyProper {
     /// Checks `filter` and realises it in normalised time t' = t / h, with h = `fast_period`.
     ///
     /// # Errors
-    /// [`AnalogError`]: a fast period that is not positive and finite; a written form that violates a rule; poles that
-    /// are unstable, without conjugate or outside [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a response that
-    /// is zero at all frequencies or beyond double precision.
+    /// [`AnalogError`]: a fast period that is not positive and finite; a written form that violates a rule;
+    /// poles that are unstable, without conjugate or outside
+    /// [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a response that is zero at all frequencies or
+    /// beyond double precision.
     pub fn new(filter: &FilterSpec, fast_period: Seconds) -> Result<Self, AnalogError> {
         let h = fast_period;
         if !(h.0.is_finite() && h.0 > 0.0) {

@@ -13,7 +13,8 @@ pub struct Cutoffs;
 /// `gain * prod(s - zeros) / prod(s - poles)` with s in the unit `U`: [`Cutoffs`] for prototypes,
 /// [`RadiansPerSecond`] for physical filters, [`RadiansPerFastPeriod`] for normalised ones.
 ///
-/// A plain value: [`StrictlyProper`](super::StrictlyProper) checks it. Complex values are listed with their conjugates.
+/// A plain value: [`StrictlyProper`](super::StrictlyProper) checks it. Complex values are listed with their
+/// conjugates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Zpk<U> {
     /// Finite zeros.
@@ -69,8 +70,8 @@ impl<U> Zpk<U> {
     }
 }
 
-/// `x * base^exponent` by repeated multiplication, so that no intermediate value overflows or underflows unless the
-/// result does.
+/// `x * base^exponent` by repeated multiplication, so that no intermediate value overflows or underflows
+/// unless the result does.
 pub(super) fn times_power(x: f64, base: f64, exponent: i64) -> f64 {
     let step = |y: f64| if exponent >= 0 { y * base } else { y / base };
     (0..exponent.unsigned_abs()).fold(x, |y, _| step(y))

@@ -7,7 +7,8 @@ use super::{
     LowerProof, SynthesisFilters,
 };
 
-/// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96 kHz.
+/// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
+/// kHz.
 pub const MAX_BANK_LATENCY: usize = 1 << 24;
 
 /// Relative difference between a number of the bank and the same number in the spec that counts as

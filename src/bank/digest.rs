@@ -1,11 +1,12 @@
 //! The digest of a bank file. It detects every change of the content, even one too small to invalidate the
 //! proof.
 //!
-//! It is the SHA-256 of a canonical form of the document, so that layout does not matter: a table is `{`, its members in
-//! the order of their keys' bytes, and `}`; a member is key and value; a list is `[`, its items and `]`; a text or key is `"`, its
-//! length in bytes as eight bytes and its bytes; a number is `#` and the eight bytes of the double that it reads as; true and false are
-//! `t` and `f`. Lengths and doubles are big-endian. Members that are null, and at the top `digest` and `meta`, are left out. The file
-//! holds `"digest": "sha256:<64 hexadecimal digits>"`.
+//! It is the SHA-256 of a canonical form of the document, so that layout does not matter: a table is `{`,
+//! its members in the order of their keys' bytes, and `}`; a member is key and value; a list is `[`, its
+//! items and `]`; a text or key is `"`, its length in bytes as eight bytes and its bytes; a number is `#`
+//! and the eight bytes of the double that it reads as; true and false are `t` and `f`. Lengths and doubles
+//! are big-endian. Members that are null, and at the top `digest` and `meta`, are left out. The file holds
+//! `"digest": "sha256:<64 hexadecimal digits>"`.
 
 use sha2::{Digest as _, Sha256};
 

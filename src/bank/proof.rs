@@ -51,11 +51,13 @@ pub struct Certificate {
     pub gamma: f64,
     /// The frequency and direction of the bank's largest gain.
     pub peak: DualWitness,
-    /// Lower triangular R, row by row, with P = R R' of the bounded-real lemma in the coordinates of [`crate::verify`].
+    /// Lower triangular R, row by row, with P = R R' of the bounded-real lemma in the coordinates of
+    /// [`crate::verify`].
     pub factor: Vec<Vec<f64>>,
 }
 
-/// Weights of the samples at the point e^{i w} = (c + i s)^2 / (c^2 + s^2) of the unit circle, w in radians per slow period.
+/// Weights of the samples at the point e^{i w} = (c + i s)^2 / (c^2 + s^2) of the unit circle, w in radians
+/// per slow period.
 ///
 /// A witness of weight zero proves nothing and is refused.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -41,8 +41,8 @@ pub(super) fn output_rate(bank: &Bank, reader: &MultiReader) -> Result<f64, Fail
     }
 }
 
-/// The common rate of the inputs, where they say it: 1 / (M h), to the hertz that a header can say, or any for a bank in
-/// normalised time.
+/// The common rate of the inputs, where they say it: 1 / (M h), to the hertz that a header can say, or any
+/// for a bank in normalised time.
 fn input_rate<'a>(
     bank: &Bank,
     inputs: impl Iterator<Item = (&'a str, Option<f64>)>,

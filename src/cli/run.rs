@@ -14,7 +14,8 @@ pub(super) enum AlgorithmArg {
     Auto,
     /// Every product; adds no latency
     Direct,
-    /// Frames by twos, three products instead of four; up to a quarter faster for long filters, adds no latency
+    /// Frames by twos, three products instead of four; up to a quarter faster for long filters, adds no
+    /// latency
     FastFir,
     /// Fourier transforms of blocks; faster for long filters, but adds latency
     OverlapSave,
@@ -102,7 +103,8 @@ pub(super) struct RunReport {
 }
 
 impl RunReport {
-    /// Of an outcome and what was tolerated before; `lossless` is the option that would have kept clipped samples.
+    /// Of an outcome and what was tolerated before; `lossless` is the option that would have kept clipped
+    /// samples.
     pub(super) fn new(outcome: Outcome, tolerated: Vec<Warning>, lossless: &str) -> Self {
         let text = |warning| match warning {
             Warning::Clipped(_) => format!("{warning}; {lossless} keeps them"),

@@ -49,7 +49,8 @@ pub(super) struct Args {
     /// The folder for the captures; created if missing
     #[arg(short, long)]
     output: PathBuf,
-    /// Fast samples to simulate, rounded up to whole frames [default: to the end of the source, at least 200]
+    /// Fast samples to simulate, rounded up to whole frames [default: to the end of the source, at least
+    /// 200]
     #[arg(long)]
     samples: Option<usize>,
     /// Factor by which the captures and the target are multiplied
@@ -144,7 +145,8 @@ impl Args {
         )))
     }
 
-    /// Applies the gain. A sample beyond the range of a 32-bit float is an error, not an infinity in the file.
+    /// Applies the gain. A sample beyond the range of a 32-bit float is an error, not an infinity in the
+    /// file.
     fn scale(&self, captured: &mut Captured) -> Result<(), Failure> {
         let recordings = captured.channels.iter_mut().chain(std::iter::once(&mut captured.target));
         for x in recordings.flatten() {

@@ -9,7 +9,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Maximum length of a chain of links, as in Linux.
 const MOST_LINKS: usize = 40;
-/// Characters of the target's name in that of the unfinished file, so that this is not too long for the file system.
+/// Characters of the target's name in that of the unfinished file, so that this is not too long for the
+/// file system.
 const NAME_PART: usize = 60;
 
 const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and redirect";
@@ -17,8 +18,8 @@ const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and
 /// Unfinished files of this process.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Removes all files of this process that have not been committed: for a thread that is about to end the process
-/// while others are writing.
+/// Removes all files of this process that have not been committed: for a thread that is about to end the
+/// process while others are writing.
 pub fn remove_unfinished() {
     for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
         // An error cannot be reported from here.
@@ -50,12 +51,13 @@ pub(super) enum Placed {
 }
 
 impl AtomicFile {
-    /// Starts a file that will be called `target`, with `replace` in the place of one that exists and with its
-    /// permission bits. A link is followed to the file that it leads to.
+    /// Starts a file that will be called `target`, with `replace` in the place of one that exists and with
+    /// its permission bits. A link is followed to the file that it leads to.
     ///
     /// # Errors
-    /// [`FileError::Exists`] if there is one already and `replace` is not set, [`FileError::NotAFile`] for what is no
-    /// plain file (a folder, device, pipe, socket, link to nothing or open descriptor), or the system's refusal.
+    /// [`FileError::Exists`] if there is one already and `replace` is not set, [`FileError::NotAFile`] for
+    /// what is no plain file (a folder, device, pipe, socket, link to nothing or open descriptor), or the
+    /// system's refusal.
     pub fn create(target: &Path, replace: bool) -> Result<Self, FileError> {
         let name = target.display().to_string();
         let (target, known) = destination(target)?;
@@ -96,8 +98,8 @@ impl AtomicFile {
         Ok(())
     }
 
-    /// Brings the bytes to the disk and closes the file, which has no name yet; later writes fail. Sets of many files need no
-    /// more than one open file this way.
+    /// Brings the bytes to the disk and closes the file, which has no name yet; later writes fail. Sets of
+    /// many files need no more than one open file this way.
     ///
     /// # Errors
     /// The system's refusal.

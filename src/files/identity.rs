@@ -36,8 +36,8 @@ impl Identity {
     }
 }
 
-/// True if both names lead to one file (the same device and inode), or to the same place where a file may come to be.
-/// `-` stands for what standard input is connected to.
+/// True if both names lead to one file (the same device and inode), or to the same place where a file may
+/// come to be. `-` stands for what standard input is connected to.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let identity = |path: &Path| {
         let input = path.as_os_str() == "-";
@@ -46,7 +46,8 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Refuses outputs that are also inputs, or that are the same file twice. Inputs may be `-`, outputs are files.
+/// Refuses outputs that are also inputs, or that are the same file twice. Inputs may be `-`, outputs are
+/// files.
 ///
 /// # Errors
 /// [`FileError::InputIsOutput`] and [`FileError::SameOutput`], with the names.

@@ -13,8 +13,9 @@
 //! leaves that part. If the system cannot exchange two names (systems other than Linux, some network file
 //! systems), a replaced file is not restored.
 //!
-//! A replaced file keeps its permission bits; other names of it (hard links) keep the old content, and extended
-//! attributes are not carried over. A symbolic link is followed: the file that it leads to is replaced, the link stays.
+//! A replaced file keeps its permission bits; other names of it (hard links) keep the old content, and
+//! extended attributes are not carried over. A symbolic link is followed: the file that it leads to is
+//! replaced, the link stays.
 
 mod atomic;
 mod bounded;

@@ -68,7 +68,8 @@ impl<R: Read> FrameReader<R> {
         self.ended
     }
 
-    /// One read, which may give no whole frame; whole frames into `bytes` (a multiple of the frame), the rest into the carry.
+    /// One read, which may give no whole frame; whole frames into `bytes` (a multiple of the frame), the
+    /// rest into the carry.
     pub(super) fn read_whole(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let carried = self.carry.len();
         bytes[..carried].copy_from_slice(&self.carry);

@@ -25,7 +25,8 @@ pub(super) struct Dropout {
 
 /// A file in addition to the samples that lists which of them were lost.
 ///
-/// JSON Lines: one object per line, empty lines are skipped. There are two kinds of line, which may be mixed:
+/// JSON Lines: one object per line, empty lines are skipped. There are two kinds of line, which may be
+/// mixed:
 ///
 /// ```text
 /// {"channel": 1, "sample_start": 5, "global_index": 108}
@@ -75,7 +76,8 @@ impl LostSamples {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Lost`] for a line that is neither of the two kinds.
+    /// [`IoError::File`] if it cannot be read or is too long, [`IoError::Lost`] for a line that is neither
+    /// of the two kinds.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         Self::parse(&read_text(path, LOST_FILE)?, &path.display().to_string())
     }

@@ -97,7 +97,8 @@ enum Source {
 
 /// Several inputs, read side by side into frames.
 ///
-/// [`MultiReader::wait`] until frames are there, use [`MultiReader::frames`], and [`MultiReader::consume`] them.
+/// [`MultiReader::wait`] until frames are there, use [`MultiReader::frames`], and [`MultiReader::consume`]
+/// them.
 pub struct MultiReader {
     inputs: Vec<Input>,
     stop: Receiver<()>,
@@ -109,9 +110,9 @@ pub struct MultiReader {
 
 impl MultiReader {
     /// Starts reading and waits for the headers. `-` is standard input. A name that ends in sigmf-meta or
-    /// sigmf-data is a SigMF recording, everything else is as [`ReadOptions::coding`] says. Time counts from the
-    /// earliest sample whose number is known: inputs that join late begin with lost samples. A message on `stop`
-    /// ends any wait.
+    /// sigmf-data is a SigMF recording, everything else is as [`ReadOptions::coding`] says. Time counts
+    /// from the earliest sample whose number is known: inputs that join late begin with lost samples. A
+    /// message on `stop` ends any wait.
     ///
     /// # Errors
     /// [`IoError`] for an input that cannot be read or is not plain PCM, for a pipe that is given twice,

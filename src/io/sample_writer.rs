@@ -40,8 +40,8 @@ impl SampleWriter {
     /// name that ends in sigmf-meta is a SigMF recording. `replace` allows files to be replaced.
     ///
     /// # Errors
-    /// [`IoError`] for files that exist or cannot be created, for samples or rates that WAV cannot hold, and for a standard
-    /// output that is a terminal.
+    /// [`IoError`] for files that exist or cannot be created, for samples or rates that WAV cannot hold,
+    /// and for a standard output that is a terminal.
     pub fn create(
         path: &Path,
         container: Container,

@@ -44,7 +44,8 @@ pub struct SigmfGlobal {
     /// Interleaved channels.
     #[serde(rename = "core:num_channels", default, skip_serializing_if = "Option::is_none")]
     pub num_channels: Option<usize>,
-    /// Name of the sample file in the same folder, if it is not the metadata's own with the ending sigmf-data.
+    /// Name of the sample file in the same folder, if it is not the metadata's own with the ending
+    /// sigmf-data.
     #[serde(rename = "core:dataset", default, skip_serializing_if = "Option::is_none")]
     pub dataset: Option<String>,
     /// Number of the file's first frame, where a recording was split into several files.

@@ -27,8 +27,8 @@ pub struct FirWithTail {
 }
 
 impl FirWithTail {
-    /// The same transfer function, q being the length of the longest delay chain that drives only the output. The
-    /// tail is balanced, and its negligible states are left out.
+    /// The same transfer function, q being the length of the longest delay chain that drives only the
+    /// output. The tail is balanced, and its negligible states are left out.
     ///
     /// # Errors
     /// [`LtiError`] if the system is not stable.

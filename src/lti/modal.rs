@@ -232,8 +232,8 @@ mod tests {
         assert!(is_modal(made.a()) && gap(&given, &made) < 1e-14);
     }
 
-    /// A single delay is a section. The eigenvectors of a longer delay line are all the same one, and the QR iteration may
-    /// stall on it (3 states do): an error then, never a wrong triangle.
+    /// A single delay is a section. The eigenvectors of a longer delay line are all the same one, and the
+    /// QR iteration may stall on it (3 states do): an error then, never a wrong triangle.
     #[test]
     fn delay_lines_are_triangles_or_an_error() {
         for n in 1..18 {

@@ -16,8 +16,8 @@ pub enum Ending {
 /// This function does not flush.
 ///
 /// # Errors
-/// [`PipelineError`] for an input that cannot be read, frames that do not fit the bank, or an output that cannot be
-/// written.
+/// [`PipelineError`] for an input that cannot be read, frames that do not fit the bank, or an output that
+/// cannot be written.
 pub fn run(
     reader: &mut MultiReader,
     pipeline: &mut Pipeline,

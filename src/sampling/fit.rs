@@ -97,7 +97,8 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         self.accumulate(&sample, knot, &w, &d)
     }
 
-    /// Adds many samples in their order. The result has the same bits as [`Fit::add`] for each, in less time.
+    /// Adds many samples in their order. The result has the same bits as [`Fit::add`] for each, in less
+    /// time.
     ///
     /// Returns how many were added; the others have a spline outside the range.
     pub fn add_all(&mut self, samples: impl IntoIterator<Item = FitSample<C>>) -> usize {

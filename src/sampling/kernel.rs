@@ -33,7 +33,8 @@ fn floor(x: f64) -> i64 {
     toward_zero - i64::from(toward_zero as f64 > x)
 }
 
-/// The centred B-spline of degree ORDER - 1, as the weights at x of the ORDER splines that are nonzero there.
+/// The centred B-spline of degree ORDER - 1, as the weights at x of the ORDER splines that are nonzero
+/// there.
 ///
 /// `BSpline::<1>` is the box, `BSpline::<2>` the hat, `BSpline::<4>` the cubic.
 #[derive(Debug, Clone, Copy, Default)]
@@ -43,7 +44,8 @@ impl<const ORDER: usize> BSpline<ORDER> {
     /// The degree n = ORDER - 1.
     pub const DEGREE: usize = ORDER - 1;
 
-    /// First knot k with beta(x - k) possibly nonzero, and the position of x within the knot span, in \[0, 1).
+    /// First knot k with beta(x - k) possibly nonzero, and the position of x within the knot span, in \[0,
+    /// 1).
     #[inline]
     pub fn locate(x: f64) -> (i64, f64) {
         // Odd degrees have their breaks on the knots, even ones half-way between.
@@ -75,8 +77,8 @@ impl<const ORDER: usize> BSpline<ORDER> {
         (first, w.map(|[w]| w), d.map(|[d]| d))
     }
 
-    /// The same at N positions at once, with the positions innermost. They are independent of each other, so the
-    /// processor need not wait for each step of the recursion. The bits are those of single calls.
+    /// The same at N positions at once, with the positions innermost. They are independent of each other,
+    /// so the processor need not wait for each step of the recursion. The bits are those of single calls.
     // Not inlined, the arrays would pass through memory, which takes half of a fit's time.
     #[inline(always)]
     pub fn weights_and_slopes_of<const N: usize>(
@@ -89,8 +91,8 @@ impl<const ORDER: usize> BSpline<ORDER> {
     }
 }
 
-/// Weights of the `order` B-splines of degree `order` - 1 that are nonzero at the positions t of a knot span (Cox-de
-/// Boor recursion), for N positions at once; `order` 0 gives zeros, the slope of the box.
+/// Weights of the `order` B-splines of degree `order` - 1 that are nonzero at the positions t of a knot
+/// span (Cox-de Boor recursion), for N positions at once; `order` 0 gives zeros, the slope of the box.
 #[inline(always)]
 fn raise<const ORDER: usize, const N: usize>(t: &[f64; N], order: usize) -> [[f64; N]; ORDER] {
     let mut w = [[0.0; N]; ORDER];

@@ -21,8 +21,8 @@ pub struct Measured {
 impl Measured {
     /// Weight for a least-squares fit: 1 / (error^2 + (slope jitter)^2), `slope` a typical |f'|.
     ///
-    /// A displacement of the position has the effect of a value error of |f'| times the displacement. The floor keeps the
-    /// weight of a perfect sample finite: 1 / floor^2.
+    /// A displacement of the position has the effect of a value error of |f'| times the displacement. The
+    /// floor keeps the weight of a perfect sample finite: 1 / floor^2.
     pub fn weight(&self, slope: f64, floor: f64) -> f64 {
         1.0 / (self.error.powi(2) + (slope * self.jitter).powi(2) + floor.powi(2))
     }

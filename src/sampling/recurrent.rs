@@ -110,9 +110,9 @@ impl Recurrent {
 
     /// Mean power gain for independent errors of unit variance on all samples.
     ///
-    /// Equals (1/M) sum_i ||psi_i||^2: 1 for uniform offsets, more for all others. psi_i is sinc(u/M) times a
-    /// trigonometric polynomial with M lines. Each line shifts the box spectrum of the sinc; the shifted boxes are
-    /// disjoint, hence ||psi_i||^2 = M times the sum of the squared line amplitudes.
+    /// Equals (1/M) sum_i ||psi_i||^2: 1 for uniform offsets, more for all others. psi_i is sinc(u/M) times
+    /// a trigonometric polynomial with M lines. Each line shifts the box spectrum of the sinc; the shifted
+    /// boxes are disjoint, hence ||psi_i||^2 = M times the sum of the squared line amplitudes.
     pub fn noise_gain(&self) -> f64 {
         (0..self.period()).map(|set| self.line_power(set)).sum()
     }

@@ -26,8 +26,8 @@ pub struct Captured {
     pub target: Vec<f64>,
 }
 
-/// Captures `periods` slow periods of `signal`: slow samples k = 0 .. periods of each channel, and M times as many
-/// reference samples.
+/// Captures `periods` slow periods of `signal`: slow samples k = 0 .. periods of each channel, and M times
+/// as many reference samples.
 pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
     let ratio = problem.ratio;
     let read = |front_end: usize, first: FastPeriods, step: f64, count: usize| {
@@ -51,8 +51,8 @@ impl Analog {
     }
 }
 
-/// Plain interleaving, for comparison: output n is the slow sample whose instant lies nearest to n - m0, as if all
-/// front ends were alike; 0 where that sample has not been captured.
+/// Plain interleaving, for comparison: output n is the slow sample whose instant lies nearest to n - m0, as
+/// if all front ends were alike; 0 where that sample has not been captured.
 pub fn interleaved(problem: &Problem, channels: &[Vec<f64>]) -> Vec<f64> {
     let periods = channels.iter().map(Vec::len).min().unwrap_or(0);
     let slow_period = problem.ratio as f64;

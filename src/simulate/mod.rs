@@ -1,8 +1,10 @@
-//! Virtual converters: what ideal samplers capture of an analog signal that has passed the analog front ends.
+//! Virtual converters: what ideal samplers capture of an analog signal that has passed the analog front
+//! ends.
 //!
-//! Channel i captures (phi_i * f)(k M - D_i), time in fast periods. The response to an analytic [`Source`] is computed
-//! by closed forms, matrix exponentials and quadrature that is exact to rounding; the response to a [`Recording`] by
-//! Fourier synthesis. No time grid is involved, so the result at an instant does not depend on the other instants.
+//! Channel i captures (phi_i * f)(k M - D_i), time in fast periods. The response to an analytic [`Source`]
+//! is computed by closed forms, matrix exponentials and quadrature that is exact to rounding; the response
+//! to a [`Recording`] by Fourier synthesis. No time grid is involved, so the result at an instant does not
+//! depend on the other instants.
 
 mod capture;
 mod parse;

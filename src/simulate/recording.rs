@@ -6,8 +6,8 @@ use crate::linalg::{Complex, fourier};
 use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
-/// L samples with a spacing of T fast periods, continued with period L T and interpolated by the trigonometric
-/// polynomial of least degree: f(t) = Re sum_k c_k e^{2 pi j k t / (L T)}, k = 0 .. L/2.
+/// L samples with a spacing of T fast periods, continued with period L T and interpolated by the
+/// trigonometric polynomial of least degree: f(t) = Re sum_k c_k e^{2 pi j k t / (L T)}, k = 0 .. L/2.
 #[derive(Debug, Clone)]
 pub struct Recording {
     /// X_k / L for k = 0 .. L/2, the last halved when L is even.
@@ -18,7 +18,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// `samples` taken at the instants 0, T, 2 T, .. with T = `spacing` > 0. An empty recording is the zero signal.
+    /// `samples` taken at the instants 0, T, 2 T, .. with T = `spacing` > 0. An empty recording is the zero
+    /// signal.
     pub fn new(samples: &[f64], spacing: FastPeriods) -> Self {
         let length = samples.len();
         let mut spectrum = fourier::real_spectrum(samples);
@@ -38,8 +39,8 @@ impl Recording {
 
     /// (phi * f)(t) at the given instants.
     ///
-    /// The sum over the L/2 harmonics at equally spaced instants is a chirp-z transform (Bluestein, 1970): exact to
-    /// rounding for any ratio of the two rates, in O(n log n).
+    /// The sum over the L/2 harmonics at equally spaced instants is a chirp-z transform (Bluestein, 1970):
+    /// exact to rounding for any ratio of the two rates, in O(n log n).
     pub fn sample(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
         if instants.count == 0 || self.length == 0 {
             return vec![0.0; instants.count];

@@ -25,8 +25,9 @@ impl Instants {
 
 /// (phi * f)(t) at the given instants, accurate to rounding.
 ///
-/// Steps and tones have closed forms. A chirp costs one small matrix product per panel of its quadrature; ask
-/// [`panels`] for their number first, since beyond a million panels between two instants digits are lost.
+/// Steps and tones have closed forms. A chirp costs one small matrix product per panel of its quadrature;
+/// ask [`panels`] for their number first, since beyond a million panels between two instants digits are
+/// lost.
 pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Instants) -> Vec<f64> {
     match source {
         Source::Step { at, height } => step(filter, at.0, *height, instants),
@@ -57,8 +58,8 @@ fn tones(filter: &StrictlyProper, tones: &[Tone<FastPeriods>], instants: Instant
     (0..instants.count).map(|n| value(instants.at(n))).collect()
 }
 
-/// The state and the constant input form one autonomous system, (x, u)' = [A B; 0 0] (x, u), so A need not be inverted
-/// and nothing cancels.
+/// The state and the constant input form one autonomous system, (x, u)' = [A B; 0 0] (x, u), so A need not
+/// be inverted and nothing cancels.
 fn step(filter: &StrictlyProper, at: f64, height: f64, instants: Instants) -> Vec<f64> {
     let n = filter.order();
     let mut generator = Mat::zeros(n + 1, n + 1);
@@ -77,8 +78,8 @@ fn step(filter: &StrictlyProper, at: f64, height: f64, instants: Instants) -> Ve
     output
 }
 
-/// Sixteen-point Gauss-Legendre rule on [0, 1]: abscissae below one half (the others mirror them) and weights
-/// (Abramowitz & Stegun, table 25.4).
+/// Sixteen-point Gauss-Legendre rule on [0, 1]: abscissae below one half (the others mirror them) and
+/// weights (Abramowitz & Stegun, table 25.4).
 const HALF_NODES: [(f64, f64); 8] = [
     (0.005299532504175031, 0.013576229705877088),
     (0.0277124884633837, 0.031126761969323728),
@@ -90,12 +91,12 @@ const HALF_NODES: [(f64, f64); 8] = [
     (0.4524937450811813, 0.09472530522753432),
 ];
 
-/// The response to a smooth source that is zero outside `support` (fast periods) and has no frequency above `band`
-/// (cycles per fast period).
+/// The response to a smooth source that is zero outside `support` (fast periods) and has no frequency above
+/// `band` (cycles per fast period).
 ///
-/// x(t + l) = e^{A l} x(t) + int_0^l e^{A (l - s)} B f(t + s) ds. The integral is taken by a Gauss-Legendre rule on
-/// panels in which the phase of the source and the exponents of the filter change by about one radian at most; the rule
-/// is then exact to rounding.
+/// x(t + l) = e^{A l} x(t) + int_0^l e^{A (l - s)} B f(t + s) ds. The integral is taken by a Gauss-Legendre
+/// rule on panels in which the phase of the source and the exponents of the filter change by about one
+/// radian at most; the rule is then exact to rounding.
 fn smooth(
     filter: &StrictlyProper,
     source: &NormalisedSource,
@@ -129,7 +130,8 @@ fn smooth(
     output
 }
 
-/// Panels of the quadrature per fast period, for a source with no frequency above `band` (cycles per fast period).
+/// Panels of the quadrature per fast period, for a source with no frequency above `band` (cycles per fast
+/// period).
 fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
     (filter.a().norm() + std::f64::consts::TAU * band).max(f64::MIN_POSITIVE)
 }
@@ -143,7 +145,8 @@ pub fn panels(filter: &StrictlyProper, source: &NormalisedSource, span: FastPeri
     }
 }
 
-/// The quadrature over an interval of `length` fast periods in equal panels; reused for intervals of equal length.
+/// The quadrature over an interval of `length` fast periods in equal panels; reused for intervals of equal
+/// length.
 struct Panels {
     length: f64,
     count: usize,

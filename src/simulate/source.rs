@@ -3,10 +3,12 @@
 use crate::units::{FastPeriods, Hertz, Quantity, RadiansPerSecond, Seconds, Time};
 use std::f64::consts::TAU;
 
-/// An analog signal f(t) on the time base `T`: [`Seconds`] as it is written down, [`FastPeriods`] as it is simulated.
+/// An analog signal f(t) on the time base `T`: [`Seconds`] as it is written down, [`FastPeriods`] as it is
+/// simulated.
 ///
-/// Frequencies follow the time base ([`Time::Frequency`]): hertz and rad/s go with seconds, cycles and radians per fast
-/// period with fast periods. [`Source::normalised`] is the one way from the first to the second.
+/// Frequencies follow the time base ([`Time::Frequency`]): hertz and rad/s go with seconds, cycles and
+/// radians per fast period with fast periods. [`Source::normalised`] is the one way from the first to the
+/// second.
 ///
 /// ```
 /// use hybank::simulate::{Analog, Source};
@@ -63,7 +65,8 @@ pub struct Tone<T: Time = Seconds> {
 }
 
 impl Source {
-    /// The same signal in normalised time: t' = t / h, f' = f h, w' = w h. Values do not change: f'(t / h) = f(t).
+    /// The same signal in normalised time: t' = t / h, f' = f h, w' = w h. Values do not change: f'(t / h)
+    /// = f(t).
     pub fn normalised(&self, fast_period: Seconds) -> NormalisedSource {
         let time = |t: Seconds| t.in_fast_periods(fast_period);
         let frequency = |f: Hertz| f.per_fast_period(fast_period);
@@ -88,8 +91,8 @@ impl Source {
 }
 
 impl<T: Time> Source<T> {
-    /// The instant after which the signal no longer changes its law: the end of a chirp, the instant of a step, the
-    /// latest of a sum. `None` for tones alone, which go on for ever.
+    /// The instant after which the signal no longer changes its law: the end of a chirp, the instant of a
+    /// step, the latest of a sum. `None` for tones alone, which go on for ever.
     pub fn duration(&self) -> Option<T> {
         match self {
             Self::Chirp { length, .. } => Some(*length),
@@ -157,7 +160,8 @@ mod tests {
 
     #[test]
     fn a_chirp_has_its_frequencies_at_both_ends() {
-        // The instantaneous frequency is the slope of the phase: count the zero crossings of one half second each.
+        // The instantaneous frequency is the slope of the phase: count the zero crossings of one half
+        // second each.
         let chirp: Source = "chirp:10Hz..90Hz@8s".parse().unwrap();
         let crossings = |from: f64| {
             let value = |n: usize| chirp.value(Seconds(from + n as f64 * 0.5 / 4096.0));

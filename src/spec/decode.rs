@@ -186,7 +186,8 @@ fn blamed(overrides: &DesignOverrides, key: &'static str, problem: &SpecProblem)
     overrides.gives(cause).then_some(cause)
 }
 
-/// One number of bits, or a list of them. The length of the list is checked where that of the filters is known.
+/// One number of bits, or a list of them. The length of the list is checked where that of the filters is
+/// known.
 pub(crate) fn word_lengths(value: &Value<'_>) -> Result<WordLengths, Fault> {
     // A number that does not fit u32 is out of range in any case.
     let bits = |v: &Value<'_>| v.count("bits").map(|bits| u32::try_from(bits).unwrap_or(u32::MAX));

@@ -226,7 +226,8 @@ impl DesignOverrides {
         }
     }
 
-    /// Values of the command line take precedence. Keys of the file that a new method does not read are dropped.
+    /// Values of the command line take precedence. Keys of the file that a new method does not read are
+    /// dropped.
     pub(super) fn over(self, file: Self) -> Self {
         let replaced = self.method;
         let kept = |has: fn(Method) -> bool| replaced.is_none_or(has);

@@ -1,5 +1,5 @@
-//! Rules for a written filter that need no linear algebra: sizes, finite numbers, family parameters, degrees.
-//! [`crate::analog`] checks the poles.
+//! Rules for a written filter that need no linear algebra: sizes, finite numbers, family parameters,
+//! degrees. [`crate::analog`] checks the poles.
 
 use super::filter_problem::MAX_ORDER;
 use super::{Family, FilterProblem, FilterSpec};

@@ -1,7 +1,7 @@
 //! Errors of a written filter.
 
-/// Most poles of a filter. Real front ends have fewer than a dozen. The product of 32 poles, each of at most 1e9 rad per
-/// fast period, still fits a double.
+/// Most poles of a filter. Real front ends have fewer than a dozen. The product of 32 poles, each of at
+/// most 1e9 rad per fast period, still fits a double.
 pub const MAX_ORDER: usize = 32;
 
 /// The rule that a written filter violates.

@@ -26,9 +26,9 @@ pub const MAX_STATES: usize = 65_536;
 /// Largest loss by order reduction of a spec; a larger one would leave no state.
 pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
 
-/// Distance to a whole number of fast periods within which a delay is rounded to it, relative to its size (at least one
-/// period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; without rounding, the fraction would become a channel
-/// state of size 1e-16.
+/// Distance to a whole number of fast periods within which a delay is rounded to it, relative to its size
+/// (at least one period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; without rounding, the
+/// fraction would become a channel state of size 1e-16.
 const WHOLE_DELAY_TOLERANCE: f64 = 1e-13;
 
 /// D / h, exactly whole where it is whole up to rounding.

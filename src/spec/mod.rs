@@ -212,8 +212,8 @@ impl Spec {
     /// without taps is complete when the command line gives them.
     ///
     /// # Errors
-    /// As [`Spec::from_toml`]; [`SpecError::overridden`] distinguishes errors in `overrides` from errors in the
-    /// file.
+    /// As [`Spec::from_toml`]; [`SpecError::overridden`] distinguishes errors in `overrides` from errors in
+    /// the file.
     pub fn from_toml_with(
         text: &str,
         file_name: &str,

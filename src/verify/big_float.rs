@@ -1,9 +1,10 @@
 //! Numbers of 512 bits, for proofs in which 106 bits are not enough.
 //!
-//! A number is `sign * m * 2^(exponent - 512)` with an integer m of eight 64-bit words whose top bit is set, so that
-//! `2^(exponent - 1) <= |x| < 2^exponent`. Every operation works on integers and drops what does not fit; its relative error is
-//! below [`BigFloat::ROUNDING`] = 2^-506. Division and square root take Newton's iteration with the exact residual in the last
-//! step, and are tested to the same bound. The exponent has 64 bits, so that nothing overflows or underflows in practice.
+//! A number is `sign * m * 2^(exponent - 512)` with an integer m of eight 64-bit words whose top bit is
+//! set, so that `2^(exponent - 1) <= |x| < 2^exponent`. Every operation works on integers and drops what
+//! does not fit; its relative error is below [`BigFloat::ROUNDING`] = 2^-506. Division and square root take
+//! Newton's iteration with the exact residual in the last step, and are tested to the same bound. The
+//! exponent has 64 bits, so that nothing overflows or underflows in practice.
 
 use super::number::Number;
 use std::cmp::Ordering;
@@ -74,7 +75,8 @@ impl BigFloat {
 
     /// |self| + |other| for |self| >= |other| > 0, or the difference, with the sign of `self`.
     fn combined(&self, other: &Self, subtract: bool) -> Self {
-        // One word below the mantissa keeps 64 more bits of the smaller number, and one above takes the carry.
+        // One word below the mantissa keeps 64 more bits of the smaller number, and one above takes the
+        // carry.
         let mut sum = [0; WORDS + 2];
         sum[1..=WORDS].copy_from_slice(&self.words);
         let distance = self.exponent - other.exponent;

@@ -21,17 +21,18 @@
 //! H) W'b is such an input.
 //!
 //! # The recursion
-//! The block pivots of Delta, period by period, are those of the a-posteriori filtering Riccati difference equation from P = 0
-//! (B. Hassibi, A. H. Sayed, T. Kailath, *Indefinite-Quadratic Estimation and Control*, SIAM 1999, section 4.2): with
-//! `[xi+; y; z] = [A; C_2; C_1] xi + [J; L_2; L_1] u` and the Gram matrix S of u,
+//! The block pivots of Delta, period by period, are those of the a-posteriori filtering Riccati difference
+//! equation from P = 0 (B. Hassibi, A. H. Sayed, T. Kailath, *Indefinite-Quadratic Estimation and Control*,
+//! SIAM 1999, section 4.2): with `[xi+; y; z] = [A; C_2; C_1] xi + [J; L_2; L_1] u` and the Gram matrix S
+//! of u,
 //!
 //! ```text
 //! G = [A; C_2; C_1] P [A; C_2; C_1]' + [J; L_2; L_1] S [J; L_2; L_1]' - diag(0, 0, gamma^2 I),
 //! P+ = the Schur complement of the block of y and z in G.
 //! ```
 //!
-//! By Sylvester's law the pivots of y are positive and those of z negative as long as the inertia of Delta is right; the first z
-//! pivot that is not negative refutes gamma.
+//! By Sylvester's law the pivots of y are positive and those of z negative as long as the inertia of Delta
+//! is right; the first z pivot that is not negative refutes gamma.
 //!
 //! # Enclosures that do not grow
 //! While the inertia is right, a' P+ a is the largest over b_z of the least over b_y of `[a; b]' G [a; b]`;

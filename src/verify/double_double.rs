@@ -1,10 +1,11 @@
 //! Numbers of 106 bits: an unevaluated sum of two doubles, with a proven error for each operation.
 //!
-//! The algorithms are those of M. Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for basic building
-//! blocks of double-word arithmetic*, ACM TOMS 44 (2017): AccurateDWPlusDW (error 3 u^2), DWTimesDW3 (5 u^2), DWDivDW2
-//! (15 u^2 + 56 u^3) with u = 2^-53, and the square root of V. Lefevre, N. Louvet, J.-M. Muller, J. Picot, L. Rideau,
-//! *Accurate calculation of Euclidean norms using double-word arithmetic*, ACM TOMS 49 (2023) (25/8 u^2). All of them
-//! are below [`ROUNDING`] relative, unless a result underflows.
+//! The algorithms are those of M. Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for
+//! basic building blocks of double-word arithmetic*, ACM TOMS 44 (2017): AccurateDWPlusDW (error 3 u^2),
+//! DWTimesDW3 (5 u^2), DWDivDW2 (15 u^2 + 56 u^3) with u = 2^-53, and the square root of V. Lefevre, N.
+//! Louvet, J.-M. Muller, J. Picot, L. Rideau, *Accurate calculation of Euclidean norms using double-word
+//! arithmetic*, ACM TOMS 49 (2023) (25/8 u^2). All of them are below [`ROUNDING`] relative, unless a result
+//! underflows.
 
 use super::number::Number;
 use std::ops::{Add, Div, Mul, Neg, Sub};

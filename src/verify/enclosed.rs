@@ -49,7 +49,8 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// Encloses the error system of `bank`.
     ///
     /// # Errors
-    /// [`VerifyError::NoSpec`], [`VerifyError::FrontEnd`], [`VerifyError::TooManyFilters`], [`VerifyError::TooLarge`].
+    /// [`VerifyError::NoSpec`], [`VerifyError::FrontEnd`], [`VerifyError::TooManyFilters`],
+    /// [`VerifyError::TooLarge`].
     pub fn new(bank: &'a Bank) -> Result<Self, VerifyError> {
         let (front_ends, samples) = FrontEnds::new(bank)?;
         let analog = front_ends.order();
@@ -170,7 +171,8 @@ impl<'a> EnclosedErrorSystem<'a> {
         })
     }
 
-    /// Gram matrix of the M reference and N measured samples at a point of the unit circle, in double precision.
+    /// Gram matrix of the M reference and N measured samples at a point of the unit circle, in double
+    /// precision.
     pub fn gram_at(&self, half: [f64; 2]) -> crate::linalg::CMat {
         let gram = spectrum::gram(&self.period, &spectrum::ComplexMatrix::unit(half));
         gram.re.zip_map(&gram.im, |re, im| crate::linalg::Complex::new(re.nearest(), im.nearest()))

@@ -1,5 +1,5 @@
-//! The error system K = W - F H of a bank in state-space form: xi+ = A xi + J u, e = C xi + L u, where u has the Gram
-//! matrix of a [`SlowPeriod`].
+//! The error system K = W - F H of a bank in state-space form: xi+ = A xi + J u, e = C xi + L u, where u
+//! has the Gram matrix of a [`SlowPeriod`].
 //!
 //! The state xi is, in this order: the analog state at the beginning of the period (the distinct filters in
 //! the order target, channels); the delay line, latest first, of each sample that is counted whole periods

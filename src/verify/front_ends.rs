@@ -18,7 +18,8 @@ pub(super) struct FrontEnds {
 }
 
 impl FrontEnds {
-    /// Realises the filters of the bank's spec, and lists its samples: the M reference samples, then the N measured ones.
+    /// Realises the filters of the bank's spec, and lists its samples: the M reference samples, then the N
+    /// measured ones.
     ///
     /// # Errors
     /// [`VerifyError::NoSpec`], [`VerifyError::FrontEnd`].

@@ -1,8 +1,9 @@
 //! Lower bounds that hold for every bank, proven by dual witnesses at frequencies where the samples do not
 //! determine the reference.
 //!
-//! At a point z of the unit circle let Gamma = [G_w; G_h] [..]* be the Gram matrix of the M reference and the N measured samples'
-//! responses, and K = G_w - F G_h. For every direction a of the reference samples and every combination b of all samples,
+//! At a point z of the unit circle let Gamma = [G_w; G_h] [..]* be the Gram matrix of the M reference and
+//! the N measured samples' responses, and K = G_w - F G_h. For every direction a of the reference samples
+//! and every combination b of all samples,
 //!
 //! ```text
 //! ||a|| ||b* G|| ||K|| >= Re a* K G* b = Re a* (Gamma b)_w - Re a* F (Gamma b)_h.

@@ -5,12 +5,14 @@
 //! found does not matter.
 //!
 //! # What is proven
-//! For the error system K of the bank's own coefficients (thesis Props. 5.1-5.3), in normalised time (h = 1):
+//! For the error system K of the bank's own coefficients (thesis Props. 5.1-5.3), in normalised time (h =
+//! 1):
 //!
-//! - `attained <= ||K|| <= upper`: from below by the gain at one frequency, from above by the bounded-real lemma with the
-//!   certificate P = R R'; the same certificate proves that the bank is stable;
+//! - `attained <= ||K|| <= upper`: from below by the gain at one frequency, from above by the bounded-real
+//!   lemma with the certificate P = R R'; the same certificate proves that the bank is stable;
 //! - no FIR bank of this length has a gamma below `lower`, by dual witnesses that together bind all taps; or
-//! - no causal bank has a gamma below `lower`, by the inertia of a finite-horizon Riccati recursion ([`Recursion`]);
+//! - no causal bank has a gamma below `lower`, by the inertia of a finite-horizon Riccati recursion
+//!   ([`Recursion`]);
 //! - no bank at all, causal or not, has a gamma below `noncausal`, by one dual witness.
 //!
 //! Each gamma that the file states is compared with these bounds. A file that states more than they prove
@@ -94,7 +96,8 @@ pub struct Verified {
 /// Proves the gammas of a bank with the certificate and the witnesses that it carries.
 ///
 /// # Errors
-/// [`VerifyError`] naming what does not fit; [`VerifyError::NoCertificate`] at once for a bank that carries no proof.
+/// [`VerifyError`] naming what does not fit; [`VerifyError::NoCertificate`] at once for a bank that carries
+/// no proof.
 pub fn verify(bank: &Bank) -> Result<Verified, VerifyError> {
     let none = Proof::default();
     let proof = bank.proof.as_ref().unwrap_or(&none);

@@ -1,9 +1,10 @@
 //! Proves that every matrix in an enclosure of a symmetric matrix is positive definite.
 //!
-//! If a Cholesky factorisation in floating point runs to its end, the matrix it was given differs from a positive
-//! semidefinite one by at most g tr in the spectral norm, g = (n + 2) u / (1 - (n + 2) u), u the relative error of an operation
-//! (Demmel's bound; S. M. Rump, *Verification of positive definiteness*, BIT 46, 2006; N. J. Higham, *Accuracy and
-//! Stability of Numerical Algorithms*, theorems 10.3 and 10.5). So the midpoint less (radii + g tr + margin) I is factored.
+//! If a Cholesky factorisation in floating point runs to its end, the matrix it was given differs from a
+//! positive semidefinite one by at most g tr in the spectral norm, g = (n + 2) u / (1 - (n + 2) u), u the
+//! relative error of an operation (Demmel's bound; S. M. Rump, *Verification of positive definiteness*, BIT
+//! 46, 2006; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, theorems 10.3 and 10.5). So
+//! the midpoint less (radii + g tr + margin) I is factored.
 
 use super::ball::{self, Ball, Matrix};
 use super::double_double::{DoubleDouble, ROUNDING};

@@ -13,7 +13,8 @@ use super::number::Number;
 use super::state_transition::{StateTransition, state_transition};
 use super::timeline::{SamplingInstant, Timeline};
 
-/// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `periods_late` slow periods later.
+/// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `periods_late` slow periods
+/// later.
 #[derive(Debug, Clone)]
 pub(super) struct SlowPeriod<F = DoubleDouble> {
     /// e^{A M}.

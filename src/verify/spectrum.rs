@@ -1,5 +1,6 @@
-//! Frequency responses, enclosed. Points of the unit circle are rational: e^{i w} = (c + i s)^2 / (c^2 + s^2) for any two
-//! doubles c, s (about cos(w/2) and sin(w/2)), so that no transcendental function is needed.
+//! Frequency responses, enclosed. Points of the unit circle are rational: e^{i w} = (c + i s)^2 / (c^2 +
+//! s^2) for any two doubles c, s (about cos(w/2) and sin(w/2)), so that no transcendental function is
+//! needed.
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::BlockForm;
@@ -162,8 +163,8 @@ fn resolved(a: &Matrix, z: &ComplexMatrix, right: &ComplexMatrix) -> ComplexMatr
     ComplexMatrix { re: part(0), im: part(n) }
 }
 
-/// A bound on the row sums of B^-1 from an approximate inverse R: ||R|| / (1 - q) with q = ||I - R B|| < 1/2, else NaN. The product
-/// R B is taken in double precision; its rounding is at most n eps |R| |B|.
+/// A bound on the row sums of B^-1 from an approximate inverse R: ||R|| / (1 - q) with q = ||I - R B|| <
+/// 1/2, else NaN. The product R B is taken in double precision; its rounding is at most n eps |R| |B|.
 fn inverse_norm(matrix: &Matrix, inverse: &Mat) -> f64 {
     let n = matrix.nrows();
     let near = ball::nearest(matrix);
@@ -174,7 +175,8 @@ fn inverse_norm(matrix: &Matrix, inverse: &Mat) -> f64 {
     if 1.01 * q < 0.5 { 1.01 * sums(inverse) / (1.0 - 1.01 * q) } else { f64::NAN }
 }
 
-/// Gram matrix of all samples of a slow period at the point z of the unit circle: G G* of their responses G to the input.
+/// Gram matrix of all samples of a slow period at the point z of the unit circle: G G* of their responses G
+/// to the input.
 pub(super) fn gram(period: &SlowPeriod, z: &ComplexMatrix) -> ComplexMatrix {
     let (n, samples) = (period.order(), period.samples());
     let from_state = ComplexMatrix::real(period.outputs.clone()).product(&resolved(

@@ -1,4 +1,5 @@
-//! The state transition over a given time: e^{A t} and the Gramian G(t) = int_0^t e^{A s} B B' e^{A' s} ds, enclosed.
+//! The state transition over a given time: e^{A t} and the Gramian G(t) = int_0^t e^{A s} B B' e^{A' s} ds,
+//! enclosed.
 //!
 //! Both are computed from their Taylor series over a time that is short relative to the dynamics, with the
 //! remainder of the series in the radius, and then by doubling: e^{2 A t} = (e^{A t})^2, G(2 t) = G(t) +

@@ -3,7 +3,8 @@
 use super::{Verified, VerifyError};
 use crate::bank::Gamma;
 
-/// Relative excess of a certificate's gamma over the norm for which the stated number still counts as the same.
+/// Relative excess of a certificate's gamma over the norm for which the stated number still counts as the
+/// same.
 const CERTIFICATE_WIDTH: f64 = 1e-8;
 /// Relative distance by which a stated lower bound may lie below the proven one. A larger distance shows
 /// that a number was altered.

@@ -175,7 +175,8 @@ fn the_interval_of_the_thesis_example_is_known() {
     }
 }
 
-/// Ten taps are too few (G3): the bound comes from witnesses that bind the taps together, far above the noncausal one.
+/// Ten taps are too few (G3): the bound comes from witnesses that bind the taps together, far above the
+/// noncausal one.
 #[test]
 fn short_filters_are_bound_by_several_witnesses() {
     for (latency, taps, golden) in [(10, 10, 0.0934525), (1, 12, 0.069447031)] {
@@ -227,7 +228,8 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
     }
 }
 
-/// Whatever P is tried: below the norm nothing may pass. Scaled, shifted and true certificates of other gammas.
+/// Whatever P is tried: below the norm nothing may pass. Scaled, shifted and true certificates of other
+/// gammas.
 #[test]
 fn no_certificate_passes_below_the_norm() {
     let (bank, proven) = designed(Method::Fir, 10, 22);

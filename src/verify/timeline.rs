@@ -43,8 +43,8 @@ pub(super) struct Timeline {
     periods_late: Vec<usize>,
 }
 
-/// Sign of a sum of three numbers of at most 106 bits: exact, because the two largest are added first, without rounding where
-/// they cancel.
+/// Sign of a sum of three numbers of at most 106 bits: exact, because the two largest are added first,
+/// without rounding where they cancel.
 fn sign(mut terms: [BigFloat; 3]) -> Ordering {
     terms.sort_by(|a, b| b.compare_moduli(a));
     (terms[0] + terms[1] + terms[2]).sign()

@@ -8,9 +8,9 @@
 //! [ 0  gamma^2 I ] - [C] P [C]  - [L] S [L]   > 0.
 //! ```
 //!
-//! The first block says P - A P A' > 0, so all eigenvalues of A lie inside the unit circle; and with Psi = C (zI - A)^-1 the
-//! product [Psi, I] (..) [Psi, I]* is gamma^2 I - K(z) K(z)* on it. So ||K|| < gamma. The certificate in the file is a lower
-//! triangular factor of P = R R'.
+//! The first block says P - A P A' > 0, so all eigenvalues of A lie inside the unit circle; and with Psi =
+//! C (zI - A)^-1 the product [Psi, I] (..) [Psi, I]* is gamma^2 I - K(z) K(z)* on it. So ||K|| < gamma. The
+//! certificate in the file is a lower triangular factor of P = R R'.
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::ErrorSystem;

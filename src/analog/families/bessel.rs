@@ -13,8 +13,8 @@ use crate::linalg::{Complex, LinalgError};
 /// Most simultaneous Newton steps; order 32 takes about 20.
 const MAX_STEPS: usize = 200;
 
-/// Bessel with `norm="phase"`: the magnitude falls asymptotically as a Butterworth filter of the same
-/// order and cutoff; the phase at the cutoff is half of its total change. DC gain and leading coefficient are 1.
+/// Bessel with `norm="phase"`: the magnitude falls asymptotically as a Butterworth filter of the same order
+/// and cutoff; the phase at the cutoff is half of its total change. DC gain and leading coefficient are 1.
 ///
 /// # Errors
 /// [`AnalogError::Numerical`] if the roots do not converge. The tests cover all orders up to
@@ -41,7 +41,8 @@ fn reverse_bessel_roots(n: usize) -> Result<Vec<Complex<f64>>, AnalogError> {
     let mut roots = starting_values(n);
     for _ in 0..MAX_STEPS {
         let corrections: Vec<Complex<f64>> = (0..roots.len()).map(|i| correction(n, &roots, i)).collect();
-        // Convergence is quadratic: after a step this small only rounding errors are left. NaN compares as not small.
+        // Convergence is quadratic: after a step this small only rounding errors are left. NaN compares as
+        // not small.
         let done = corrections.iter().zip(&roots).all(|(d, r)| d.norm() <= 1e-13 * r.norm());
         roots.iter_mut().zip(&corrections).for_each(|(r, d)| *r -= d);
         if done {
@@ -51,8 +52,8 @@ fn reverse_bessel_roots(n: usize) -> Result<Vec<Complex<f64>>, AnalogError> {
     Err(LinalgError::NoConvergence { routine: "Bessel polynomial root", rows: n, cols: 1 }.into())
 }
 
-/// Points on a circle whose radius is the mean modulus of the roots, rotated by a small angle: from a set that is its own
-/// mirror image, two real estimates could never become a conjugate pair.
+/// Points on a circle whose radius is the mean modulus of the roots, rotated by a small angle: from a set
+/// that is its own mirror image, two real estimates could never become a conjugate pair.
 fn starting_values(n: usize) -> Vec<Complex<f64>> {
     let log_product: f64 = (1..=n).map(|k| (2.0 * k as f64 - 1.0).ln()).sum();
     let radius = (log_product / n.max(1) as f64).exp();
@@ -81,7 +82,8 @@ fn newton_step(n: usize, s: Complex<f64>) -> Complex<f64> {
     theta / (theta - s * before)
 }
 
-/// Upper roots with their exact conjugates; the real root of an odd order without its imaginary rounding error.
+/// Upper roots with their exact conjugates; the real root of an odd order without its imaginary rounding
+/// error.
 fn symmetric(roots: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
     let is_real = |r: &Complex<f64>| r.im.abs() <= 1e-9 * r.norm();
     let mut upper: Vec<Complex<f64>> = roots.iter().copied().filter(|r| !is_real(r) && r.im > 0.0).collect();

@@ -4,7 +4,8 @@ use super::{excess_power, left_half, product_of_negatives};
 use crate::analog::{Cutoffs, Zpk};
 use crate::linalg::Complex;
 
-/// Chebyshev 1: poles on an ellipse. The gain ripples by `ripple_db` (> 0 dB) below the cutoff and falls above it.
+/// Chebyshev 1: poles on an ellipse. The gain ripples by `ripple_db` (> 0 dB) below the cutoff and falls
+/// above it.
 pub fn chebyshev1(order: usize, ripple_db: f64) -> Zpk<Cutoffs> {
     let ripple = excess_power(ripple_db);
     let poles = ellipse(order, (1.0 / ripple.sqrt()).asinh() / order as f64);
@@ -13,8 +14,8 @@ pub fn chebyshev1(order: usize, ripple_db: f64) -> Zpk<Cutoffs> {
     Zpk::new(Vec::new(), poles, gain)
 }
 
-/// Chebyshev 2 (inverse Chebyshev): the attenuation is at least `attenuation_db` (> 0 dB) from the cutoff on. An even
-/// order has as many zeros as poles.
+/// Chebyshev 2 (inverse Chebyshev): the attenuation is at least `attenuation_db` (> 0 dB) from the cutoff
+/// on. An even order has as many zeros as poles.
 pub fn chebyshev2(order: usize, attenuation_db: f64) -> Zpk<Cutoffs> {
     let poles: Vec<Complex<f64>> = ellipse(order, excess_power(attenuation_db).sqrt().asinh() / order as f64)
         .iter()

@@ -9,8 +9,9 @@ use super::{excess_power, product_of_negatives};
 use crate::analog::{Cutoffs, Zpk};
 use crate::linalg::Complex;
 
-/// Elliptic: ripple of `ripple_db` up to the cutoff, attenuation of at least `attenuation_db` (> `ripple_db` > 0) beyond
-/// the stop-band edge, which follows from order and ripples. An even order has as many zeros as poles.
+/// Elliptic: ripple of `ripple_db` up to the cutoff, attenuation of at least `attenuation_db` (>
+/// `ripple_db` > 0) beyond the stop-band edge, which follows from order and ripples. An even order has as
+/// many zeros as poles.
 pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk<Cutoffs> {
     let ripple = excess_power(ripple_db);
     if order == 1 {

@@ -1,5 +1,5 @@
-//! Elliptic integrals and Jacobi functions of real argument. Modulus k and complementary modulus k' are stored together,
-//! so that no digits are lost for k near 0 or near 1.
+//! Elliptic integrals and Jacobi functions of real argument. Modulus k and complementary modulus k' are
+//! stored together, so that no digits are lost for k near 0 or near 1.
 //!
 //! Sources: Abramowitz and Stegun, chapters 16 and 17; Carlson, "Numerical computation of real or
 //! complex elliptic integrals", Numerical Algorithms 10 (1995).

@@ -1,8 +1,9 @@
 //! Classical low-pass families as zeros, poles and gain.
 //!
-//! Every function returns the prototype with its cutoff at |s| = 1. "Cutoff" means what scipy.signal means by it (`buttap`,
-//! `cheb1ap`, `cheb2ap`, `ellipap`, `besselap` with `norm="phase"`); [`Zpk::low_pass`](super::Zpk::low_pass) moves it. The
-//! DC gain also follows scipy: 1, except `-ripple_db` for Chebyshev 1 and elliptic filters of even order.
+//! Every function returns the prototype with its cutoff at |s| = 1. "Cutoff" means what scipy.signal means
+//! by it (`buttap`, `cheb1ap`, `cheb2ap`, `ellipap`, `besselap` with `norm="phase"`);
+//! [`Zpk::low_pass`](super::Zpk::low_pass) moves it. The DC gain also follows scipy: 1, except `-ripple_db`
+//! for Chebyshev 1 and elliptic filters of even order.
 //!
 //! All are closed formulas or convergent series, evaluated to double precision.
 
@@ -31,8 +32,9 @@ pub fn rc() -> Zpk<Cutoffs> {
     butterworth(1)
 }
 
-/// `root` at the angles (2 i - n + 1)/n * 90 degrees, i = 0..n: those of the Butterworth poles, counted from the negative
-/// real axis. Conjugate angles give exactly conjugate roots, and the middle angle of an odd order is exactly zero.
+/// `root` at the angles (2 i - n + 1)/n * 90 degrees, i = 0..n: those of the Butterworth poles, counted
+/// from the negative real axis. Conjugate angles give exactly conjugate roots, and the middle angle of an
+/// odd order is exactly zero.
 fn left_half(order: usize, root: impl Fn(f64) -> Complex<f64>) -> Vec<Complex<f64>> {
     let angle = |i: usize| FRAC_PI_2 * (2.0 * i as f64 - order as f64 + 1.0) / order as f64;
     (0..order).map(|i| root(angle(i))).collect()

@@ -124,7 +124,8 @@ fn a_bessel_polynomial_beyond_double_precision_ends_in_an_error() {
 
 #[test]
 fn bessel_delay_is_maximally_flat() {
-    // The group delay of theta_n(0)/theta_n(s) is 1 + O(w^2n); the phase norm stretches it by theta_n(0)^(1/n).
+    // The group delay of theta_n(0)/theta_n(s) is 1 + O(w^2n); the phase norm stretches it by
+    // theta_n(0)^(1/n).
     for order in 3..=32 {
         let poles = bessel(order).unwrap().poles;
         let delay =

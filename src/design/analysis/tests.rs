@@ -32,7 +32,8 @@ fn noise_gains_are_sums_of_squared_taps() {
     assert!((mean.output_noise - want).abs() < 1e-13, "{} {want}", mean.output_noise);
 }
 
-/// The mean square over time is that over frequencies (Parseval), and the worst case is no smaller than any of them.
+/// The mean square over time is that over frequencies (Parseval), and the worst case is no smaller than any
+/// of them.
 #[test]
 fn the_error_is_that_of_its_frequency_response() {
     let bank = bank();

@@ -1,5 +1,5 @@
-//! The lifted system against a closed form: white noise through one pole a has the autocorrelation (a/2) e^{-a |t|}, so all
-//! covariances of samples are known from their times alone.
+//! The lifted system against a closed form: white noise through one pole a has the autocorrelation (a/2)
+//! e^{-a |t|}, so all covariances of samples are known from their times alone.
 
 use super::*;
 use crate::design::problem::Channel;

@@ -1,10 +1,10 @@
 //! FIR design: the taps of least gamma (thesis 5.4), and among these the ones of least mean-square error.
 //!
 //! The bounded-real LMI of thesis 5.4 in the frequency domain is the semi-infinite problem min over taps of
-//! max over w of sigma_max(W(w) - F(w) H(w)), which [`Exchange`] solves: its lower bound holds for all taps of
-//! that length. The norm of the taps found is the upper bound. While taps still change, their norm is only
-//! estimated, from the peaks between the points of a fine grid; the taps that are returned have the computed
-//! one.
+//! max over w of sigma_max(W(w) - F(w) H(w)), which [`Exchange`] solves: its lower bound holds for all taps
+//! of that length. The norm of the taps found is the upper bound. While taps still change, their norm is
+//! only estimated, from the peaks between the points of a fine grid; the taps that are returned have the
+//! computed one.
 
 use super::{Filters, GAMMA_ACCURACY, Settings, Synthesis};
 use crate::design::DesignError;
@@ -27,7 +27,8 @@ const SURPRISE_LIMIT: usize = 8;
 /// converters' noise at the output: `||K||_2^2 + sum_i noise_i ||f_i||^2`.
 ///
 /// # Errors
-/// [`DesignError::Lti`] for unstable plants; [`DesignError::NoTaps`] if the interior-point method found none.
+/// [`DesignError::Lti`] for unstable plants; [`DesignError::NoTaps`] if the interior-point method found
+/// none.
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;

@@ -1,7 +1,7 @@
 //! FIR design by the bounded-real LMI of thesis 5.4.
 //!
-//! The error system of FIR filters has the states of the plant and of a delay line of its measurements. Its A and
-//! B are fixed, C and D are affine in the taps:
+//! The error system of FIR filters has the states of the plant and of a delay line of its measurements. Its
+//! A and B are fixed, C and D are affine in the taps:
 //!
 //! ```text
 //! [u; z] = [y[k-J]; ..; y[k]; z[k]]    delay line behind the plant

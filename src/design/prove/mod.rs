@@ -75,8 +75,8 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
 /// `dual` is the dual solution of an FIR design. It proves the lower end if the noncausal bound does not.
 ///
 /// # Errors
-/// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found; [`DesignError::Verify`] if the proof
-/// refutes a gamma of the bank.
+/// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found;
+/// [`DesignError::Verify`] if the proof refutes a gamma of the bank.
 pub(crate) fn prove(bank: &Bank, dual: &[DualPoint]) -> Result<(Proof, Verified), DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
     let upper = certificate(&error, bank)?;
@@ -169,8 +169,8 @@ fn shortest(factor: Vec<Vec<f64>>, proves: impl Fn(&[Vec<f64>]) -> bool) -> Opti
     DIGITS.iter().map(|&digits| rounded(digits - 1)).find(|short| proves(short))
 }
 
-/// The bounded-real Riccati equation of the transposed error system, in coordinates in which its controllability Gramian (the
-/// observability Gramian of the system) is the identity.
+/// The bounded-real Riccati equation of the transposed error system, in coordinates in which its
+/// controllability Gramian (the observability Gramian of the system) is the identity.
 struct Search {
     a: Mat,
     b: Mat,
@@ -277,7 +277,8 @@ struct Service<'a> {
     channels: usize,
     ratio: usize,
     length: usize,
-    /// For each direction the lower triangular root of the measured samples' Gram matrix, and a* W in its coordinates.
+    /// For each direction the lower triangular root of the measured samples' Gram matrix, and a* W in its
+    /// coordinates.
     targets: Vec<(CMat, CMat)>,
     taps: Vec<f64>,
 }

@@ -1,7 +1,7 @@
 //! Units for the search for a certificate. They make the search independent of the gains of the front ends.
 //!
-//! With xi = T eta, T diagonal, and e counted in units of s, a P that proves ||K|| <= gamma for [A, J; C, L] is T Q T' where
-//! Q proves ||K|| / s <= gamma / s for [T^-1 A T, T^-1 J; C T / s, L / s].
+//! With xi = T eta, T diagonal, and e counted in units of s, a P that proves ||K|| <= gamma for [A, J; C,
+//! L] is T Q T' where Q proves ||K|| / s <= gamma / s for [T^-1 A T, T^-1 J; C T / s, L / s].
 
 use crate::linalg::{Mat, power_of_two};
 use crate::lti::LtiError;

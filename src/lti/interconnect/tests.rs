@@ -1,4 +1,5 @@
-//! The identities of block diagrams, on systems with structure: delay lines, Jordan blocks, entries from 1e-9 to 1e9.
+//! The identities of block diagrams, on systems with structure: delay lines, Jordan blocks, entries from
+//! 1e-9 to 1e9.
 
 use super::*;
 use crate::linalg::{CMat, Complex};

@@ -1,5 +1,5 @@
-//! The Riccati equation of the thesis, in the plant's own matrices: the code never forms it, since D2 D2' may be nearly
-//! singular. On mild plants it can be formed, and the covariances found must solve it.
+//! The Riccati equation of the thesis, in the plant's own matrices: the code never forms it, since D2 D2'
+//! may be nearly singular. On mild plants it can be formed, and the covariances found must solve it.
 
 use super::*;
 use crate::design::problem::Problem;
@@ -23,8 +23,9 @@ fn plants() -> [LiftedPlant; 3] {
     ]
 }
 
-/// P - (A P A' + B B' - M Re^-1 M') with M = A P C' + B D' and Re = D D' + C P C' - gamma^2 diag(0, I), over the norm of P.
-/// Without gamma the references are left out, which is the equation of the Kalman filter.
+/// P - (A P A' + B B' - M Re^-1 M') with M = A P C' + B D' and Re = D D' + C P C' - gamma^2 diag(0, I),
+/// over the norm of P. Without gamma the references are left out, which is the equation of the Kalman
+/// filter.
 fn residual(plant: &LiftedPlant, p: &Mat, gamma: Option<f64>) -> f64 {
     let system = match gamma {
         Some(_) => plant.system().clone(),
