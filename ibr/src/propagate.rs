@@ -166,8 +166,8 @@ pub fn survey(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> (
 
 /// All samples of calibrated views, view by view and row by row (eq. 2.2 and 2.3).
 ///
-/// Runs in parallel over the rows. A first pass counts; a second pass writes every row at its offset, so that the list
-/// is allocated once and does not depend on the number of threads.
+/// Runs in parallel over the rows. A first pass counts; a second pass writes every row at its offset, so
+/// that the list is allocated once and does not depend on the number of threads.
 pub fn calibrated<const C: usize>(
     views: &[CalibratedView<'_>],
     camera: &Camera,

@@ -54,8 +54,8 @@ pub type Model = BTreeMap<String, ModelCamera>;
 
 /// Reads the model in `folder`.
 ///
-/// Accepts pinhole models and models with up to two radial and two tangential coefficients ([`Lens`]). Images of other
-/// models have to be undistorted first, so these are refused.
+/// Accepts pinhole models and models with up to two radial and two tangential coefficients ([`Lens`]).
+/// Images of other models have to be undistorted first, so these are refused.
 ///
 /// # Errors
 /// [`ColmapError`], with file and line.

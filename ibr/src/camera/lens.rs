@@ -1,4 +1,5 @@
-//! Lens distortion: radial with two coefficients and tangential with two (Brown 1966, as in OpenCV and COLMAP).
+//! Lens distortion: radial with two coefficients and tangential with two (Brown 1966, as in OpenCV and
+//! COLMAP).
 //!
 //! With u = ((x - cx) / fx, (y - cy) / fy) the undistorted position and r = |u|, the distorted position is
 //!
@@ -10,7 +11,8 @@ use nalgebra::{Matrix2, Vector2};
 
 /// Most steps of Newton's method; real lenses need three or four.
 const STEPS: usize = 30;
-/// Residual, in units of the focal length, at which the iteration has converged: about a billionth of a pixel.
+/// Residual, in units of the focal length, at which the iteration has converged: about a billionth of a
+/// pixel.
 const RESIDUAL: f64 = 1e-12;
 
 /// The distortion of a lens, with the calibration that defines its coordinates.
@@ -31,13 +33,15 @@ impl Lens {
         Self { focal, centre, radial, tangential, reach: reach(radial) }
     }
 
-    /// The distorted position of an undistorted one, in pixels; `None` beyond the radius where the image folds back.
+    /// The distorted position of an undistorted one, in pixels; `None` beyond the radius where the image
+    /// folds back.
     pub fn record(&self, ideal: Vector2<f64>) -> Option<Vector2<f64>> {
         let u = (ideal - self.centre).component_div(&self.focal);
         (u.norm_squared() < self.reach).then(|| self.bend(&u).0.component_mul(&self.focal) + self.centre)
     }
 
-    /// The undistorted position of a distorted one, in pixels, by Newton's method; `None` where there is none.
+    /// The undistorted position of a distorted one, in pixels, by Newton's method; `None` where there is
+    /// none.
     pub fn ideal(&self, recorded: Vector2<f64>) -> Option<Vector2<f64>> {
         let goal = (recorded - self.centre).component_div(&self.focal);
         let mut u = goal;
@@ -75,7 +79,8 @@ impl Lens {
     }
 }
 
-/// The least positive root s of d/dr r (1 + k1 r^2 + k2 r^4) = 1 + 3 k1 s + 5 k2 s^2, s = r^2; infinite if none.
+/// The least positive root s of d/dr r (1 + k1 r^2 + k2 r^4) = 1 + 3 k1 s + 5 k2 s^2, s = r^2; infinite if
+/// none.
 fn reach([k1, k2]: [f64; 2]) -> f64 {
     let (b, a) = (3.0 * k1, 5.0 * k2);
     let square = b * b - 4.0 * a;

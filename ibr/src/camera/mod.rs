@@ -111,8 +111,8 @@ impl Camera {
         self.inverse * (Vector3::new(x, y, 1.0) * d - self.matrix.column(3))
     }
 
-    /// Pixel and depth (x, y, d) of a point (eq. 2.3); d <= 0 means behind the camera, the pixel is NaN outside
-    /// the domain of the lens.
+    /// Pixel and depth (x, y, d) of a point (eq. 2.3); d <= 0 means behind the camera, the pixel is NaN
+    /// outside the domain of the lens.
     pub fn project(&self, point: &Vector3<f64>) -> (f64, f64, f64) {
         let p = self.matrix * point.push(1.0);
         let (x, y) = through(self.lens.as_ref(), p.x / p.z, p.y / p.z, Lens::record);
@@ -153,7 +153,8 @@ pub struct Relative {
 }
 
 impl Relative {
-    /// Pixel and depth at the other camera of pixel (x, y) with depth d; the pixel is NaN outside the domain of a lens.
+    /// Pixel and depth at the other camera of pixel (x, y) with depth d; the pixel is NaN outside the
+    /// domain of a lens.
     #[inline]
     pub fn map(&self, x: f64, y: f64, d: f64) -> (f64, f64, f64) {
         let (x, y) = through(self.from.as_ref(), x, y, Lens::ideal);

@@ -17,8 +17,8 @@ use std::process::ExitCode;
 /// More threads than cores would only use memory for stacks.
 const MOST_THREADS: usize = 1024;
 
-/// Reads the arguments, runs the command and maps its outcome to an exit code: 0 success, 1 input error, 2 usage
-/// error.
+/// Reads the arguments, runs the command and maps its outcome to an exit code: 0 success, 1 input error, 2
+/// usage error.
 pub fn run() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
@@ -42,7 +42,8 @@ fn show(message: &clap::Error) -> ExitCode {
     }
 }
 
-/// Runs the work on the given number of threads, by default on all cores; on this thread if none can be started.
+/// Runs the work on the given number of threads, by default on all cores; on this thread if none can be
+/// started.
 fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
     let Some(threads) = threads else {
         let builder = || rayon::ThreadPoolBuilder::new();

@@ -36,7 +36,8 @@ pub enum Cover {
     Seen,
     /// Crack: a hole in a stretched surface, with the same depth on both sides.
     Crack,
-    /// Disocclusion: no view saw this region. The depth differs across the hole, or the hole touches the border.
+    /// Disocclusion: no view saw this region. The depth differs across the hole, or the hole touches the
+    /// border.
     Disocclusion,
 }
 

@@ -40,7 +40,8 @@ pub struct FitSettings {
     pub degree: Degree,
     /// Weight of the squared slope at the samples, in px^2.
     pub lambda: f64,
-    /// Weight of the squared differences of neighbouring coefficients; determines coefficients without samples.
+    /// Weight of the squared differences of neighbouring coefficients; determines coefficients without
+    /// samples.
     pub tau: f64,
     /// How lambda follows the depth.
     pub variation: Variation,

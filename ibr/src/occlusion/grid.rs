@@ -1,4 +1,5 @@
-//! Occlusion removal in the plane: a grid of cells of the size of the radius, nearest samples first in each cell.
+//! Occlusion removal in the plane: a grid of cells of the size of the radius, nearest samples first in each
+//! cell.
 
 use super::DepthTest;
 use crate::sample::Sample;
@@ -9,9 +10,10 @@ const CELLS_A_SAMPLE: usize = 4;
 
 /// Removes the hidden samples and keeps the order of the others; returns how many were removed.
 ///
-/// The ball of a sample meets at most nine cells. Each cell lists its samples from the nearest, so the search in it ends
-/// at the first sample that lies in the ball or is too deep to hide this one. O(n log n) for the sort, then O(k) per sample, k the number of samples in a cell. Parallel, with the same
-/// bits for any number of threads.
+/// The ball of a sample meets at most nine cells. Each cell lists its samples from the nearest, so the
+/// search in it ends at the first sample that lies in the ball or is too deep to hide this one. O(n log n)
+/// for the sort, then O(k) per sample, k the number of samples in a cell. Parallel, with the same bits for
+/// any number of threads.
 pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
     let hidden = hidden(samples, test);
     let before = samples.len();
@@ -103,8 +105,8 @@ impl Grid {
 
     /// Whether any sample hides `s`.
     fn hides<const C: usize>(&self, samples: &[Sample<C>], s: &Sample<C>, test: &DepthTest) -> bool {
-        // The cell size is at least epsilon, so only neighbouring cells matter; the bound guards against rounding of
-        // the quotient.
+        // The cell size is at least epsilon, so only neighbouring cells matter; the bound guards against
+        // rounding of the quotient.
         let column = ((s.x - self.left) / self.edge) as usize;
         let row = ((s.y - self.top) / self.edge) as usize;
         let columns = column.saturating_sub(1)..(column + 2).min(self.columns);

@@ -1,4 +1,5 @@
-//! Stage two, occlusion removal: a sample behind another one at nearly the same position is removed (thesis 2.3.2).
+//! Stage two, occlusion removal: a sample behind another one at nearly the same position is removed (thesis
+//! 2.3.2).
 //!
 //! With P the set of propagated samples, x in P is removed if and only if there is a y in P with
 //!
@@ -6,9 +7,10 @@
 //! ||x - y||_2 <= epsilon   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
 //! ```
 //!
-//! Every test is against all of P, not against the samples that are left, so the result does not depend on any order.
-//! sigma grows with d(y). Hence if any sample in the ball hides x, then the nearest one does, and comparing with the least
-//! depth suffices; this also holds in floating point, since both sides are monotone.
+//! Every test is against all of P, not against the samples that are left, so the result does not depend on
+//! any order. sigma grows with d(y). Hence if any sample in the ball hides x, then the nearest one does,
+//! and comparing with the least depth suffices; this also holds in floating point, since both sides are
+//! monotone.
 
 mod grid;
 mod row;
@@ -30,8 +32,9 @@ pub struct DepthTest {
 }
 
 impl Default for DepthTest {
-    /// 5 % of the nearer depth within 0.7 px: the samples of one camera on a surface lie about a pixel apart, so
-    /// a hidden sample nearly always has a nearer one in its ball; below 1 px neighbouring rows do not interact.
+    /// 5 % of the nearer depth within 0.7 px: the samples of one camera on a surface lie about a pixel
+    /// apart, so a hidden sample nearly always has a nearer one in its ball; below 1 px neighbouring rows
+    /// do not interact.
     fn default() -> Self {
         Self { epsilon: 0.7, relative: 0.05, absolute: 0.0 }
     }

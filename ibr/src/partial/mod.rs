@@ -55,7 +55,8 @@ pub enum PartialError {
 /// Makes a map with one value every `step` pixels (the first at pixel (0, 0)) as large as its image.
 ///
 /// Unknown samples take the nearest known one first. Pixels right of or below the last samples use the last
-/// column or row. Disparity is interpolated as it is and depth by its reciprocal, in which planes are affine.
+/// column or row. Disparity is interpolated as it is and depth by its reciprocal, in which planes are
+/// affine.
 ///
 /// # Errors
 /// [`PartialError`]: a map that does not fit the image, settings outside their range.

@@ -1,8 +1,8 @@
 //! Segmentwise interpolation (thesis 2.4.2, Fig. 2.6).
 //!
 //! In each unit square of four depth samples: bilinear if all four belong to one depth segment; otherwise a
-//! pixel takes the depth of the closest vertex in its own intensity segment. Pixels without such a vertex are marked and
-//! filled from their neighbours.
+//! pixel takes the depth of the closest vertex in its own intensity segment. Pixels without such a vertex
+//! are marked and filled from their neighbours.
 
 use super::Segmentwise;
 use super::grid::{Grid, Square, around};

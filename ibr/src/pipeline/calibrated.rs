@@ -75,7 +75,8 @@ fn render_with<const C: usize>(
 }
 
 /// The first two stages for some rows of the virtual image. The band is widened by epsilon on both sides,
-/// so that it contains every sample that can hide one of the band; only visible samples of the band itself are added.
+/// so that it contains every sample that can hide one of the band; only visible samples of the band itself
+/// are added.
 fn add_band<const C: usize>(
     problem: &mut PlaneProblem<C>,
     views: &[CalibratedView<'_>],

@@ -41,7 +41,8 @@ pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, SceneError> {
     })
 }
 
-/// The known key most similar to the unknown key that the parser's message quotes first, if any is similar enough.
+/// The known key most similar to the unknown key that the parser's message quotes first, if any is similar
+/// enough.
 fn nearest_key(message: &str) -> Option<&str> {
     let mut quoted = message.strip_prefix("unknown field ")?.split('`').skip(1).step_by(2);
     let unknown = quoted.next()?;

@@ -63,8 +63,8 @@ impl MeanShift {
     /// Segments an image: filter, link, merge.
     ///
     /// Pixels move to the mode of the density of (x/h_s, y/h_s, L/h_r, u/h_r, v/h_r) with a flat kernel;
-    /// neighbours whose modes differ by less than h_r / 2 in colour (and h_s in position) belong to one segment.
-    /// Parallel over rows, same result for any number of threads.
+    /// neighbours whose modes differ by less than h_r / 2 in colour (and h_s in position) belong to one
+    /// segment. Parallel over rows, same result for any number of threads.
     ///
     /// # Errors
     /// [`SegmentError`].

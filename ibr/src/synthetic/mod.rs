@@ -1,7 +1,7 @@
 //! A synthetic scene with exact depth: a reference for renderings without a photograph.
 //!
-//! Curved and slanted textured surfaces in front of a wall, seen by any pinhole camera. Colours are averaged over
-//! 3 x 3 rays per pixel, depth is that of the central ray.
+//! Curved and slanted textured surfaces in front of a wall, seen by any pinhole camera. Colours are
+//! averaged over 3 x 3 rays per pixel, depth is that of the central ray.
 
 use crate::camera::Camera;
 use crate::depth::{DepthMap, Measure};
@@ -83,7 +83,8 @@ impl Default for SyntheticScene {
 }
 
 impl SyntheticScene {
-    /// Image (RGB) and depth of the scene for a metric camera. The wall fills every view that looks along +z.
+    /// Image (RGB) and depth of the scene for a metric camera. The wall fills every view that looks along
+    /// +z.
     pub fn view(&self, camera: &Camera, (width, height): (usize, usize)) -> (Image, DepthMap) {
         let mut colours = vec![0.0_f32; width * height * 3];
         let mut depths = vec![f32::NAN; width * height];

@@ -1,22 +1,24 @@
 //! Projective depth, chi and its order along the viewing rays (thesis eq. 2.6-2.9).
 //!
-//! With X_p = H X scaled to last coordinate 1 the projective depth is d_p = d / t_p, and chi = -1 / d_p. On the
-//! ray of a pixel chi is an affine function of 1/d with one slope for the whole image,
+//! With X_p = H X scaled to last coordinate 1 the projective depth is d_p = d / t_p, and chi = -1 / d_p. On
+//! the ray of a pixel chi is an affine function of 1/d with one slope for the whole image,
 //!
 //! ```text
 //! chi = -(h4 . C~) / d - h4 . (r, 0),      h4 the last row of H, C the centre, r the ray of unit depth,
 //! ```
 //!
-//! so chi orders depth correctly on the whole image or reverses it on the whole image, while d_p passes through infinity.
+//! so chi orders depth correctly on the whole image or reverses it on the whole image, while d_p passes
+//! through infinity.
 //!
-//! No change of frame is needed. A linear program could move the plane at infinity off the scene, which would make all chi
-//! negative and all det M positive. But the sign of [`order_sign`] holds in every frame, and the position to which a pixel
-//! with given chi propagates does not depend on the frame. Only a camera centre on the plane t = 0 (det M = 0) has no order
-//! of depth and is refused.
+//! No change of frame is needed. A linear program could move the plane at infinity off the scene, which
+//! would make all chi negative and all det M positive. But the sign of [`order_sign`] holds in every frame,
+//! and the position to which a pixel with given chi propagates does not depend on the frame. Only a camera
+//! centre on the plane t = 0 (det M = 0) has no order of depth and is refused.
 //!
-//! For the canonical pair this does not happen: its plane t = 0 is the best fit to the matches, so it lies within the
-//! scene, far from any camera that sees the scene from the front. With this plane chi is also small on the whole image,
-//! so that a share of its range is a depth threshold; in other frames chi would mostly vary with the pixel.
+//! For the canonical pair this does not happen: its plane t = 0 is the best fit to the matches, so it lies
+//! within the scene, far from any camera that sees the scene from the front. With this plane chi is also
+//! small on the whole image, so that a share of its range is a depth threshold; in other frames chi would
+//! mostly vary with the pixel.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector4};
 
@@ -31,8 +33,8 @@ pub fn depth(camera: &Matrix3x4<f64>, point: &Vector4<f64>) -> f64 {
 }
 
 /// Flips signs so that pi3_i . X_j > 0: each point by the first camera, then each other camera by the
-/// majority of the points that it sees according to `seen` (of all points if it sees none). Returns the number of
-/// pairs that remain negative.
+/// majority of the points that it sees according to `seen` (of all points if it sees none). Returns the
+/// number of pairs that remain negative.
 pub fn orient(
     cameras: &mut [Matrix3x4<f64>],
     points: &mut [Vector4<f64>],
@@ -87,7 +89,8 @@ impl Handedness {
     }
 }
 
-/// s such that s chi orders the points of an oriented camera by depth, smaller nearer: sign(det H) sign(det M).
+/// s such that s chi orders the points of an oriented camera by depth, smaller nearer: sign(det H) sign(det
+/// M).
 ///
 /// The slope of chi against 1 / d has the opposite sign (see the module documentation).
 pub fn order_sign(camera: &Matrix3x4<f64>, hand: Handedness) -> f64 {
@@ -193,7 +196,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
-        /// A pixel with given chi propagates to the same position in every frame, even if the plane t = 0 cuts the scene.
+        /// A pixel with given chi propagates to the same position in every frame, even if the plane t = 0
+        /// cuts the scene.
         #[test]
         fn positions_do_not_depend_on_the_frame(entries in prop::collection::vec(-1.0..1.0_f64, 16), flips: u64) {
             let Some(mut f) = frame(&entries, flips) else { return Ok(()) };

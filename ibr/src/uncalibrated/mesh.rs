@@ -32,8 +32,8 @@ impl HasPosition for Vertex {
 
 /// chi at every pixel centre within the convex hull of the features, NaN outside; rows from the top.
 ///
-/// Features that are not finite, or too far out for the triangulation's exact predicates, are left out. A pixel
-/// on an edge belongs to the triangles on both sides, which agree there.
+/// Features that are not finite, or too far out for the triangulation's exact predicates, are left out. A
+/// pixel on an edge belongs to the triangles on both sides, which agree there.
 pub fn dense_chi(features: &[Feature], (width, height): (usize, usize)) -> Vec<f64> {
     let mut chi = vec![f64::NAN; width * height];
     let triangulation = triangulate(features);
@@ -54,7 +54,8 @@ fn triangulate(features: &[Feature]) -> DelaunayTriangulation<Vertex> {
             },
         );
         if f.chi.is_finite() && apart {
-            // The library refuses coordinates beyond the range of its exact predicates; such features are skipped.
+            // The library refuses coordinates beyond the range of its exact predicates; such features are
+            // skipped.
             let _ = triangulation.insert(Vertex { position, chi: f.chi });
         }
     }

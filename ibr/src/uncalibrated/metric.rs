@@ -1,7 +1,7 @@
 //! A metric guess: a calibration with the principal point at the image centre and a guessed focal length.
 //!
-//! It is too coarse for measurements, but sufficient to decide the order of depth (one bit) and to place a virtual camera
-//! between two views.
+//! It is too coarse for measurements, but sufficient to decide the order of depth (one bit) and to place a
+//! virtual camera between two views.
 
 use super::chirality::{self, Handedness};
 use super::triangulate::triangulate;
@@ -35,7 +35,8 @@ fn calibration(focal: f64, (width, height): (usize, usize)) -> Matrix3<f64> {
     Matrix3::new(focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0)
 }
 
-/// The guess for one focal length: E = K2^T F K1, the decomposition with most points in front of both cameras.
+/// The guess for one focal length: E = K2^T F K1, the decomposition with most points in front of both
+/// cameras.
 pub fn guess(
     f: &Matrix3<f64>,
     matches: &[Match],
@@ -88,8 +89,8 @@ pub fn guesses(f: &Matrix3<f64>, matches: &[Match], sizes: [(usize, usize); 2]) 
 /// The order of depth by the majority of the guesses: the sign of the slope of chi_1 against 1 / z in
 /// chi_1 ~ (1/z, x, y, 1).
 ///
-/// `points` are the oriented projective points of the matches and `camera` the oriented first camera. Returns
-/// it and the share of the guesses that agree; `None` when no guess could be made.
+/// `points` are the oriented projective points of the matches and `camera` the oriented first camera.
+/// Returns it and the share of the guesses that agree; `None` when no guess could be made.
 pub fn handedness(
     guesses: &[MetricGuess],
     matches: &[Match],
@@ -125,9 +126,9 @@ pub fn best(guesses: &[MetricGuess]) -> Option<&MetricGuess> {
     guesses.iter().max_by(|a, b| a.fit.total_cmp(&b.fit))
 }
 
-/// The image points of the matches behind `guess` in a camera between the two views. Rotation and centre are
-/// interpolated, and the residuals of the guess in the two views are blended in, so that `between` = 0 and 1 reproduce the
-/// views exactly.
+/// The image points of the matches behind `guess` in a camera between the two views. Rotation and centre
+/// are interpolated, and the residuals of the guess in the two views are blended in, so that `between` = 0
+/// and 1 reproduce the views exactly.
 pub fn images_between(guess: &MetricGuess, matches: &[Match], between: f64) -> Vec<Option<Point>> {
     let turn = UnitQuaternion::from_rotation_matrix(&guess.r);
     let r = UnitQuaternion::identity().slerp(&turn, between);

@@ -3,8 +3,9 @@
 //! matches -> F (eight points, RANSAC) -> a pair of projective cameras -> points, chi and its order ->
 //! chi on a Delaunay triangulation in each view -> the virtual camera -> the view.
 //!
-//! All geometry happens in a projective frame X_p = H X with an unknown 4 x 4 matrix H. Depth is replaced by
-//! chi = -(X_p)_4 / (pi3_p . X_p), which along every viewing ray is an affine function of the true inverse depth.
+//! All geometry happens in a projective frame X_p = H X with an unknown 4 x 4 matrix H. Depth is replaced
+//! by chi = -(X_p)_4 / (pi3_p . X_p), which along every viewing ray is an affine function of the true
+//! inverse depth.
 
 pub mod canonical;
 pub mod chirality;

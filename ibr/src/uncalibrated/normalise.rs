@@ -30,8 +30,8 @@ impl Normalisation {
         self.scale
     }
 
-    /// T with T x~ the normalised point; its third row is (0, 0, 1), so that third coordinates, and with them
-    /// depth and chi, are the same in both coordinates.
+    /// T with T x~ the normalised point; its third row is (0, 0, 1), so that third coordinates, and with
+    /// them depth and chi, are the same in both coordinates.
     pub fn matrix(&self) -> Matrix3<f64> {
         let (s, c) = (self.scale, self.centroid);
         Matrix3::new(s, 0.0, -s * c.x, 0.0, s, -s * c.y, 0.0, 0.0, 1.0)

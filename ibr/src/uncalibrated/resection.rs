@@ -27,7 +27,8 @@ pub struct Resection {
 }
 
 const NEEDED: usize = 6;
-/// Below this ratio of singular values the sightings do not determine the camera, for example points on a plane.
+/// Below this ratio of singular values the sightings do not determine the camera, for example points on a
+/// plane.
 const DEGENERATE: f64 = 1e-9;
 /// Steps of the refinement.
 const STEPS: usize = 10;

@@ -80,7 +80,8 @@ impl Tracks {
                 lines.push((i + 1, words));
             }
         }
-        // One dash per point, unless only one dash per coordinate gives all lines the same number of columns.
+        // One dash per point, unless only one dash per coordinate gives all lines the same number of
+        // columns.
         let single = columns(&lines, one_dash);
         let rows = match columns(&lines, two_dashes) {
             Ok(rows) if single.is_err() => rows,

@@ -9,8 +9,8 @@ const STEPS: usize = 2;
 
 /// The homogeneous point, of unit norm, seen at `images` by `cameras`; `None` if it is not determined.
 ///
-/// Each image gives the rows x pi3 - pi1 and y pi3 - pi2, scaled to unit norm; their null vector is refined by
-/// two Gauss-Newton steps on the reprojection error.
+/// Each image gives the rows x pi3 - pi1 and y pi3 - pi2, scaled to unit norm; their null vector is refined
+/// by two Gauss-Newton steps on the reprojection error.
 pub fn triangulate(observed: &[(&Matrix3x4<f64>, Point)]) -> Option<Vector4<f64>> {
     let rows = observed.iter().flat_map(|(camera, p)| {
         let row = |k: usize, v: f64| {

@@ -197,7 +197,7 @@ impl<'a> Iterate<'a> {
         let x: Vec<f64> = self.x.iter().zip(&d.x).map(|(a, b)| a + primal * b).collect();
         let gamma = self.gamma + primal * d.gamma;
         let w: Vec<f64> = self.w.iter().zip(&d.w).map(|(a, b)| a + dual * b).collect();
-        // From the unknowns and parameters, not from the steps: rounding errors do not pile up.
+        // From the unknowns and parameters, not from the steps, so that rounding errors do not accumulate.
         let (s, z) = (self.slack(&p, &x, gamma, 1.0), self.map.expand(&w));
         if linalg::cholesky(&s).is_err() || linalg::cholesky(&z).is_err() {
             return false;

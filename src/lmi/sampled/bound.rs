@@ -7,8 +7,8 @@
 //! r_{p,i,j} = sum_l Re <Y_l, e^{-i omega_l j} E_{p,i} H_l>.
 //! ```
 //!
-//! Dual matrices of an optimum have r = 0. The rest that rounding errors leave is subtracted for all taps
-//! within a stated radius.
+//! Dual matrices of an optimum have r = 0. The residual that rounding errors leave is subtracted for all
+//! taps within a stated radius.
 
 use super::basis::Basis;
 use super::prepare::Reduced;
@@ -24,8 +24,8 @@ const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
 const RADIUS_FACTOR: f64 = 1e3;
 /// Safety on a radius that was computed in floating point from the data.
 const RADIUS_SAFETY: f64 = 1.01;
-/// Units of the machine precision charged for each operation of a sum besides its length: products,
-/// phases, singular values.
+/// Rounding errors per operation of a sum, in units of the machine precision, in addition to its length:
+/// products, phases, singular values.
 const ROUNDING: f64 = 16.0;
 
 /// A proven lower bound.
@@ -39,11 +39,11 @@ pub struct LowerBound {
     pub covered: Covered,
 }
 
-/// Which taps a lower bound speaks of. The size of taps is `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with
+/// The taps for which a lower bound holds. The size of taps is `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with
 /// `s_i` the largest row norm of channel i over the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Covered {
-    /// All: larger taps have a larger worst case by themselves.
+    /// All taps: larger taps have a larger worst case in any case.
     All,
     /// Taps of at most this size.
     Within(f64),
@@ -56,9 +56,9 @@ impl LowerBound {
     }
 }
 
-/// Proves a lower bound on the optimum of `problem` from any dual matrices, one for each point (each
-/// M x q), for all taps within `radius` (see [`Covered`]). Uses nothing but the data and the
-/// inequality in the module's text; sums are charged with their rounding errors.
+/// Proves a lower bound on the optimum of `problem` from any dual matrices, one for each point (each M x
+/// q), for all taps within `radius` (see [`Covered`]). Uses nothing but the data and the inequality in the
+/// module's text; the rounding errors of the sums are included.
 ///
 /// Fails if the number or the size of the matrices does not fit.
 pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, SampledError> {
@@ -81,7 +81,7 @@ pub fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<Lowe
     Ok(LowerBound { value, residual, covered: Covered::Within(radius) })
 }
 
-/// Sum by halves: its rounding error grows with the logarithm of the number of terms only.
+/// Pairwise summation: its rounding error grows only with the logarithm of the number of terms.
 fn pairwise<T: std::ops::Add<Output = T>>(range: std::ops::Range<usize>, term: &impl Fn(usize) -> T) -> T {
     let middle = range.start + range.len() / 2;
     if middle == range.start {
@@ -110,7 +110,7 @@ fn check_shape(problem: &Problem, l: usize, y: &CMat) -> Result<(), SampledError
     })
 }
 
-/// Norm of `r_{p,i,j} / s_i` plus what rounding may hide in it.
+/// Norm of `r_{p,i,j} / s_i` plus a bound of its rounding error.
 fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
     let (m, lags) = (problem.rows(), problem.max_lags());
     if lags == 0 {
@@ -156,10 +156,10 @@ fn size(problem: &Problem, taps: &Taps) -> f64 {
     taps.iter().map(square).sum::<f64>().sqrt()
 }
 
-/// The radius to prove the bound for. Taps with a worst case below `gamma` satisfy
-/// `sum_l ||F H_l||_F^2 <= sum_l (||W_l||_F + sqrt(M) gamma)^2`, which confines them if the map from
-/// taps to responses is injective: then no others matter. Otherwise, or if that says little, far
-/// beyond the taps found and beyond unit gain.
+/// The radius for which the bound is proved. Taps with a worst case below `gamma` satisfy `sum_l ||F
+/// H_l||_F^2 <= sum_l (||W_l||_F + sqrt(M) gamma)^2`, which confines them if the map from taps to responses
+/// is injective: then no others matter. Otherwise, or if that radius is very large, the radius is a large
+/// multiple of the taps found and of unit gain.
 pub(super) fn cover(
     problem: &Problem,
     reduced: &Reduced,

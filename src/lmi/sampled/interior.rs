@@ -13,7 +13,7 @@ use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
 use crate::lmi::factor::RegularisedCholesky;
 
-/// What is minimised over the LMIs.
+/// The objective.
 #[derive(Debug, Clone)]
 pub(super) enum Objective {
     /// `t`, itself an unknown.
@@ -58,7 +58,7 @@ struct Direction {
 }
 
 impl<'a> Engine<'a> {
-    /// Starts at the taps `x` with `t`, which must be above every `sigma_max(K_l)^2`. None if it is not.
+    /// Starts at the taps `x` with `t`, which must be above every `sigma_max(K_l)^2`; `None` otherwise.
     pub(super) fn new(reduced: &'a Reduced, objective: Objective, x: Vec<f64>, t: f64) -> Option<Self> {
         let (count, m, k1) = (reduced.count(), reduced.layout.rows, reduced.h.cols());
         let (n, order) = (reduced.layout.channels, m + k1);
@@ -234,7 +234,7 @@ impl<'a> Engine<'a> {
             *x += primal * dx;
         }
         self.cone.t += primal * d.slack.t;
-        // From the unknowns, not from the step: rounding errors do not pile up.
+        // From the unknowns, not from the step, so that rounding errors do not accumulate.
         self.cone.k = self.reduced.error(&self.x);
         self.cone.z.add_scaled(dual, dz);
         true

@@ -1,4 +1,4 @@
-//! The sampled worst-case norm problem: the engine of FIR design.
+//! The sampled worst-case norm problem, which FIR design solves.
 //!
 //! Over real taps `F_0 .. F_{J-1}` (each M x N) minimise
 //!
@@ -6,12 +6,12 @@
 //! gamma = max_l sigma_max(K_l),   K_l = W_l - sum_j e^{-i omega_l j} F_j H_l
 //! ```
 //!
-//! with given complex `W_l` (M x q), `H_l` (N x q) at frequencies `omega_l`. Row p of the taps has
-//! its own number of lags `J_p <= J`. Conjugate symmetry makes frequencies in `[0, pi]` enough for
-//! real filters. Several scenarios that share the taps are simply more points.
+//! with given complex `W_l` (M x q), `H_l` (N x q) at frequencies `omega_l`. Row p of the taps has its own
+//! number of lags `J_p <= J`. Conjugate symmetry makes frequencies in `[0, pi]` enough for real filters.
+//! Several scenarios with the same taps are further points.
 //!
-//! The method: an LQ factorisation at each point splits `K_l K_l* = (W1 - F H1)(W1 - F H1)* + G`
-//! into the part the taps can reach and a constant; with `t = gamma^2` each point is one small LMI
+//! The method: an LQ factorisation at each point splits `K_l K_l* = (W1 - F H1)(W1 - F H1)* + G` into a
+//! part that depends on the taps and a constant. With `t = gamma^2` each point is one small LMI
 //!
 //! ```text
 //! [ t I - G_l   K1_l ]

@@ -10,7 +10,7 @@ use crate::linalg::{self, CMat, Mat};
 /// dropped.
 const CHANNEL_RANK: f64 = 1e-14;
 
-/// The problem in coordinates fit for iterating.
+/// The problem in well-conditioned coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct Reduced {
     /// Mixed channels, n x k1.

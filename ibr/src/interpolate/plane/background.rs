@@ -48,8 +48,8 @@ fn distance(p: usize, q: u32, width: usize) -> usize {
     (p % width).abs_diff(q % width) + (p / width).abs_diff(q / width)
 }
 
-/// For every unknown pixel the known pixel to continue from: the farthest in depth of its four neighbours, and of equal
-/// depths the closest.
+/// For every unknown pixel the known pixel to continue from: the farthest in depth of its four neighbours,
+/// and of equal depths the closest.
 pub(super) fn farthest(depth: &[f32], width: usize) -> Vec<Option<u32>> {
     let mut sources = vec![None; depth.len()];
     for_holes(depth, width, |p, around| {
@@ -62,8 +62,8 @@ pub(super) fn farthest(depth: &[f32], width: usize) -> Vec<Option<u32>> {
     sources
 }
 
-/// A pixel of known depth is seen. A hole is a crack if known pixels of one depth lie on both sides of it in a row or
-/// column and no neighbour has another depth, else a disocclusion.
+/// A pixel of known depth is seen. A hole is a crack if known pixels of one depth lie on both sides of it
+/// in a row or column and no neighbour has another depth, else a disocclusion.
 pub(super) fn classify(depth: &[f32], width: usize, test: &DepthTest) -> Vec<Cover> {
     let mut mask = vec![Cover::Seen; depth.len()];
     for_holes(depth, width, |p, around| {

@@ -4,10 +4,12 @@ use super::stencil::Stencil;
 use super::{Convergence, PlaneSettings};
 use rayon::prelude::*;
 
-/// Entries per chunk. Partial sums of a dot product follow the chunks, not the threads, so the bits do not depend on them.
+/// Entries per chunk. Partial sums of a dot product follow the chunks, not the threads, so the bits do not
+/// depend on them.
 const CHUNK: usize = 8192;
 
-/// Solves A u = rhs for every channel; returns the values interleaved, in the memory of the right-hand sides.
+/// Solves A u = rhs for every channel; returns the values interleaved, in the memory of the right-hand
+/// sides.
 pub(super) fn solve<const C: usize>(
     stencil: &Stencil,
     mut rhs: Vec<[f32; C]>,

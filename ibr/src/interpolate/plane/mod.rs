@@ -1,4 +1,5 @@
-//! The plane fit: the whole virtual image at once, for samples at any position (the row fit in two dimensions).
+//! The plane fit: the whole virtual image at once, for samples at any position (the row fit in two
+//! dimensions).
 //!
 //! With u the pixels, B_s the bilinear weights of sample s and g_pq the stiffness of the edge between
 //! neighbouring pixels p and q, minimise
@@ -8,9 +9,10 @@
 //! g_pq = stiffness / (1 + ((D_p - D_q) / k)^2) + edge_stiffness,   h_pqr = bending / (1 + (range D / k)^2)
 //! ```
 //!
-//! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in units
-//! of the depth test's sigma. The bending term smooths like a cubic spline: it removes noise and keeps slopes.
-//! Each equation has thirteen unknowns; conjugate gradients with diagonal preconditioner solve them channel by channel.
+//! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in
+//! units of the depth test's sigma. The bending term smooths like a cubic spline: it removes noise and
+//! keeps slopes. Each equation has thirteen unknowns; conjugate gradients with diagonal preconditioner
+//! solve them channel by channel.
 
 mod background;
 mod conjugate;
@@ -98,8 +100,8 @@ impl<const C: usize> PlaneProblem<C> {
         })
     }
 
-    /// Adds visible samples. Samples more than half a pixel outside the image are ignored; samples less far outside are
-    /// moved to its border.
+    /// Adds visible samples. Samples more than half a pixel outside the image are ignored; samples less far
+    /// outside are moved to its border.
     ///
     /// # Errors
     /// [`InterpolationError::NotFinite`].
@@ -136,7 +138,8 @@ impl<const C: usize> PlaneProblem<C> {
         }
     }
 
-    /// Records the depth of the sample at the pixels within half a gap of it, unless another sample is closer.
+    /// Records the depth of the sample at the pixels within half a gap of it, unless another sample is
+    /// closer.
     fn register(&mut self, s: &Sample<C>) {
         let half = self.settings.holes.gap / 2.0;
         let range = |centre: f64, length: usize| {
@@ -191,8 +194,8 @@ impl<const C: usize> PlaneProblem<C> {
         for p in (0..mask.len()).filter(|p| mask[*p] != Cover::Seen && inside(*p)) {
             let Some(source) = sources[p].map(|s| s as usize) else { continue };
             self.depth[p] = self.depth[source];
-            // The value of a seen pixel before the fit: its share of the right-hand side. A sample on a pixel
-            // centre affects that pixel only, so no source changes in this loop.
+            // The value of a seen pixel before the fit: its share of the right-hand side. A sample on a
+            // pixel centre affects that pixel only, so no source changes in this loop.
             let weight = self.stencil.sample_weight(source).max(f32::MIN_POSITIVE);
             let value = self.rhs[source].map(|r| r / weight);
             self.splat((p % self.width) as f64, (p / self.width) as f64, &value);

@@ -1,12 +1,13 @@
-//! The symmetric matrix of the plane fit: a stencil of nine pixels and four more two steps away, one half stored.
+//! The symmetric matrix of the plane fit: a stencil of nine pixels and four more two steps away, one half
+//! stored.
 
 use rayon::prelude::*;
 
 /// Entries of one pixel: its diagonal and the couplings to the right, down, down-right and down-left, and to
 /// the pixels two to the right and two down.
 ///
-/// f32 suffices: rounding an entry changes the fit by parts in 10^7 of the grey range, and these entries take most of
-/// the memory of the plane fit. All arithmetic is in f64.
+/// f32 suffices: rounding an entry changes the fit by parts in 10^7 of the grey range, and these entries
+/// take most of the memory of the plane fit. All arithmetic is in f64.
 #[derive(Debug, Clone, Copy, Default)]
 struct Couplings {
     own: f32,
@@ -76,7 +77,8 @@ impl Stencil {
         }
     }
 
-    /// Row sum of the sample part, the total weight of the samples at a pixel. Valid before any edge is added.
+    /// Row sum of the sample part, the total weight of the samples at a pixel. Valid before any edge is
+    /// added.
     pub(super) fn sample_weight(&self, p: usize) -> f32 {
         let at = |q: Option<usize>| q.and_then(|q| self.entries.get(q)).copied().unwrap_or_default();
         let e = self.entries[p];

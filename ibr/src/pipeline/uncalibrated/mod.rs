@@ -25,11 +25,12 @@ pub struct UncalibratedSettings {
     pub robust: RobustSettings,
     /// The order of depth, if it is known; otherwise the metric guess decides.
     pub handedness: Option<Handedness>,
-    /// Depth threshold of the occlusion test as a share of the range of chi. The meshes of two views interpolate
-    /// depth edges differently; a threshold below their difference would remove visible samples.
+    /// Depth threshold of the occlusion test as a share of the range of chi. The meshes of two views
+    /// interpolate depth edges differently; a threshold below their difference would remove visible
+    /// samples.
     pub sigma_share: f64,
-    /// The plane fit. Positions from a mesh are wrong by fractions of a pixel, differently in each view, which acts like
-    /// noise on the values; so bending has more weight than for measured depth.
+    /// The plane fit. Positions from a mesh are wrong by fractions of a pixel, differently in each view,
+    /// which acts like noise on the values; so bending has more weight than for measured depth.
     pub plane: PlaneSettings,
 }
 
@@ -86,7 +87,8 @@ pub struct GeometryReport {
     pub order_agreement: f64,
 }
 
-/// A rendered view and the region that could be rendered: the convex hull of the features in the virtual view.
+/// A rendered view and the region that could be rendered: the convex hull of the features in the virtual
+/// view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UncalibratedRendering {
     /// The view; black outside the region.
@@ -101,7 +103,8 @@ pub struct UncalibratedRendering {
 
 /// Renders a view of `size` from images and `tracks[track][image]`.
 ///
-/// The scene is reconstructed from the first two images; the cameras of further images are resected from the tracks.
+/// The scene is reconstructed from the first two images; the cameras of further images are resected from
+/// the tracks.
 ///
 /// # Errors
 /// [`UncalibratedError`].
