@@ -10,19 +10,19 @@ use crate::runtime::{Algorithm, PlanSummary, ThreadPool};
 /// How FIR filters are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum AlgorithmArg {
-    /// The fastest one that suits the command
+    /// The fastest algorithm that suits the command
     Auto,
-    /// Every product; adds no latency
+    /// Computes every product; adds no latency
     Direct,
-    /// Frames by twos, three products instead of four; up to a quarter faster for long filters, adds no
-    /// latency
+    /// Two frames at a time with three products instead of four; up to a quarter faster for long filters,
+    /// adds no latency
     FastFir,
-    /// Fourier transforms of blocks; faster for long filters, but adds latency
+    /// Fourier transforms of blocks; faster for long filters, adds latency
     OverlapSave,
 }
 
 impl AlgorithmArg {
-    /// `auto` is what leaving the choice to the command means.
+    /// The algorithm to run; `auto` replaces `Auto`.
     pub(super) fn resolve(self, auto: Algorithm) -> Algorithm {
         match self {
             Self::Auto => auto,

@@ -2,8 +2,8 @@
 //!
 //! | method | minimises | filters | lower end |
 //! |---|---|---|---|
-//! | [`fir`] | the norm of the error, over taps of given length (thesis 5.4) | FIR | dual of the sampled problem |
-//! | [`iir`] | the norm of the error, over all causal filters (thesis 5.3) | state space | Riccati equation without solution |
+//! | [`fir`] | the norm of the error, for given length (thesis 5.4) | FIR | dual of the sampled problem |
+//! | [`iir`] | the norm of the error (thesis 5.3) | state space | unsolvable Riccati equation |
 //! | [`h2`] | the mean-square error: `iir` at gamma = infinity | state space | noncausal bound |
 //! | [`sinc`] | nothing: Yen's interpolation, truncated (thesis 5.6.3) | FIR | noncausal bound |
 //! | [`separation`] | delays and bank one after the other (thesis 5.6.3) | FIR | noncausal bound |
