@@ -186,7 +186,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "circles are being opened"]
     fn this_workspace_keeps_its_arrows() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let faults = Survey::new(&root).unwrap().faults();
