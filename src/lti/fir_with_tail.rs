@@ -17,7 +17,7 @@ use crate::linalg::{self, Mat};
 /// the effect of rounding the taps.
 const NEGLIGIBLE: f64 = f64::EPSILON / 4.0;
 
-/// An FIR head with a recursive tail: y[k] = sum h_j u[k - j] + c x[k], x[k + 1] = a x[k] + b u[k - q].
+/// An FIR head with a recursive tail: `y[k] = sum h_j u[k - j] + c x[k]`, `x[k + 1] = a x[k] + b u[k - q]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirWithTail {
     /// h_0 .. h_q, p x m each.

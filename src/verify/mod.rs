@@ -1,7 +1,7 @@
 //! Proves a bank's gammas from its file alone, in arithmetic that bounds every rounding error.
 //!
 //! This module shares no code with the designer: it neither searches nor optimises; it checks. The file
-//! holds the certificate and the witnesses of the proof ([`Proof`](crate::bank::Proof)). How they were
+//! holds the certificate and the witnesses of the proof ([`Proof`]). How they were
 //! found does not matter.
 //!
 //! # What is proven

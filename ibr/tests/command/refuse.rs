@@ -102,7 +102,7 @@ fn hostile_arguments_are_refused_by_name() {
         (&["-o", "o.png", "--mask", "o.png"], 2, "both name o.png"),
         (&["-o", "o.png", "--depth-step", "x"], 2, "depth-step"),
         (&["-o", "folder.png"], 1, "folder.png exists"),
-        (&["-o", "folder.png", "--force"], 1, "folder.png: it is a folder"),
+        (&["-o", "folder.png", "--force"], 1, "it is a folder"),
         (&["-o", "nowhere/o.png"], 1, "nowhere/o.png"),
         (&["-o", "o.png", "--view", "middle"], 1, "the views are left, right"),
         (&["-o", "o.png", "--truth", "nowhere.png"], 1, "nowhere.png"),
