@@ -3,7 +3,7 @@
 //! `cargo bench --bench algorithm_crossover` measures all three along a ladder of K for several N and M, overlap-save with the four shortest
 //! transforms that hold a block of K ticks, in nanoseconds a tick (best of many repeats), and sets beside them
 //! what the plan chooses, first among the forms that are not late. The constants of the plan's cost model
-//! (`src/runtime/form.rs`) were fitted to this table. Words after `--`: `f64` for double precision, `prompt` without
+//! (`runtime/src/algorithms/choice.rs`) were fitted to this table. Words after `--`: `f64` for double precision, `prompt` without
 //! overlap-save.
 
 use hybank::bank::{Bank, SynthesisFilters};

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Fits the cost model of src/runtime/form.rs to the table of `cargo bench --bench algorithm_crossover`.
+"""Fits the cost model of runtime/src/algorithms/choice.rs to the table of `cargo bench --bench algorithm_crossover`.
 
 usage: form_costs.py LANES < table      (LANES of 32 bytes: 8 for f32, 4 for f64; needs numpy and scipy)
 
