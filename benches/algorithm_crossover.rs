@@ -1,7 +1,7 @@
 //! From how many taps a phase on do the fast form and overlap-save take less time than the direct form?
 //!
 //! `cargo bench --bench algorithm_crossover` measures all three along a ladder of K for several N and M, overlap-save with the four shortest
-//! transforms that hold a block of K ticks, in nanoseconds a tick (best of many repeats), and sets beside them
+//! transforms that hold a block of K frames, in nanoseconds a frame (best of many repeats), and sets beside them
 //! what the plan chooses, first among the forms that are not late. The constants of the plan's cost model
 //! (`runtime/src/algorithms/choice.rs`) were fitted to this table. Words after `--`: `f64` for double precision, `prompt` without
 //! overlap-save.
@@ -25,7 +25,7 @@ fn fir(n: usize, m: usize, taps: usize) -> Bank {
     Bank::bare(SynthesisFilters::Fir((0..n).map(f).collect()), m)
 }
 
-/// Nanoseconds a tick, in numbers of the kernels' own type.
+/// Nanoseconds a frame, in numbers of the kernels' own type.
 fn measure(bank: &Bank, options: Options) -> f64 {
     let mut stream = Stream::new(&bank.plan(options).unwrap());
     let (n, m) = (stream.channels(), stream.ratio());

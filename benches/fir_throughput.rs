@@ -3,7 +3,7 @@
 //! `cargo bench --bench fir_throughput` prints a table of the public [`Stream`]; a word after `--` picks the rows
 //! that contain it, the name of an instruction set (`portable`, `avx2`, `avx512`) that set instead of the widest one.
 //! Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
-//! of many repeats, and so is the peak, which is measured anew beside each row.
+//! of many repeats, and so is the peak, which is measured again beside each row.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
@@ -215,7 +215,7 @@ impl Table {
         }
     }
 
-    /// Recursions have no peak to compare with: ticks are what counts.
+    /// Recursions have no peak to compare with: frames are what counts.
     fn recursions(&self) {
         let mut stream = Stream::new(&recursion().plan(self.options()).unwrap());
         let x = input(4, TICKS);

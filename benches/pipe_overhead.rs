@@ -1,5 +1,5 @@
 //! What the way in and out costs: `hybank stream` and `hybank fuse` beside `cat | cat` and sox on the same bytes in
-//! the same run, and how long the first output takes when ticks come one by one.
+//! the same run, and how long the first output takes when frames come one by one.
 //!
 //! `cargo bench --bench pipe_overhead`; set TMPDIR to a folder in memory to leave the disk out. Bank A: N = M = 2, 24 taps.
 
@@ -134,7 +134,7 @@ fn files(table: &Table) {
     );
 }
 
-/// One tick at a time, a thousand a second: from writing its inputs to reading its outputs.
+/// One frame at a time, a thousand a second: from writing its inputs to reading its outputs.
 fn latency(folder: &Path) {
     const PERIOD: Duration = Duration::from_millis(1);
     const TICKS: u32 = 3000;

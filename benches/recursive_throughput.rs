@@ -17,7 +17,7 @@ struct Case {
     name: String,
     filter: BlockFilter,
     sections: usize,
-    /// Multiply-adds a tick that the matrices ask for, zeros and delay lines left out.
+    /// Multiply-adds a frame that the matrices ask for, zeros and delay lines left out.
     work: usize,
 }
 
@@ -86,7 +86,7 @@ fn full(states: usize, n: usize, m: usize) -> Case {
     }
 }
 
-/// As `design` writes them: a delay line of `line` ticks with sections at its end.
+/// As `design` writes them: a delay line of `line` frames with sections at its end.
 fn designed(sections: usize, line: usize, n: usize, m: usize) -> Case {
     let (core, order) = (2 * sections, 2 * sections + line * n);
     let a = matrix(order, order, |i, j| match () {

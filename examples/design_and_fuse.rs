@@ -1,5 +1,5 @@
 //! From a spec to fused samples without any file: design a bank, let virtual converters capture a signal, fuse the captures
-//! tick by tick, and compare with what an ideal fast converter gives.
+//! frame by frame, and compare with what an ideal fast converter gives.
 //!
 //! `cargo run --release --example design_and_fuse`
 
@@ -25,7 +25,7 @@ taps = 24
 "#;
 
 const TICKS: usize = 1000;
-/// Ticks a call, as if they came from a sound card.
+/// Frames a call, as if they came from a sound card.
 const BLOCK: usize = 64;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -136,7 +136,7 @@ impl Engine {
             (Self::OverlapSaveF64(pair), Self::OverlapSaveF64(other)) => pair.take_over(other),
             (Self::RecursiveF32(pair), Self::RecursiveF32(other)) => pair.take_over(other),
             (Self::RecursiveF64(pair), Self::RecursiveF64(other)) => pair.take_over(other),
-            // The others are told by their history.
+            // The history distinguishes the others.
             _ => false,
         }
     }

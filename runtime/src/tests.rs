@@ -62,7 +62,7 @@ pub(super) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Ve
     (0..channels).map(|_| (0..taps).map(|_| noise.next()).collect()).collect()
 }
 
-/// The outputs of a stream that gets `input` in pieces of so many ticks, for N inputs and M outputs a tick.
+/// The outputs of a stream that gets `input` in pieces of so many frames, for N inputs and M outputs a frame.
 pub(super) fn in_pieces(stream: &mut Stream, [n, m]: [usize; 2], input: &[f32], cuts: &[usize]) -> Vec<f32> {
     let mut pieces = vec![0.0; input.len() / n * m];
     let (mut from, mut to) = (input, &mut pieces[..]);
@@ -90,7 +90,7 @@ fn order(n: usize, ratio: usize, depth: usize, steps: usize) -> Vec<usize> {
     order
 }
 
-/// The scalar twin: the same sums in the same order, fused if the kernels fuse. The window of a tick
+/// The scalar twin: the same sums in the same order, fused if the kernels fuse. The window of a frame
 /// is cut into steps of D samples; each of D lanes sums its place of the steps, and the lanes are added as a tree.
 fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32> {
     let n = taps.len();
@@ -181,7 +181,7 @@ fn many_channels_and_many_phases_work() {
     }
 }
 
-/// Calls of one thread and of several have the same bits, about calls of `long` ticks, and count the same.
+/// Calls of one thread and of several have the same bits, about calls of `long` frames, and count the same.
 pub(super) fn spans_agree(
     bank: &Bank,
     options: Options,

@@ -77,7 +77,7 @@ fn fuse_takes_the_faster_form_and_gives_the_same_samples() {
         same(&pairs, &direct);
         let plan = &report["plan"];
         assert_eq!((&plan["algorithm"], &plan["extra_latency"]), (&"fast-fir".into(), &0.into()));
-        // Three filters of 150 ticks on two channels, and means and outputs.
+        // Three filters of 150 frames on two channels, and means and outputs.
         assert_eq!(plan["multiply_adds"], 3.0 * 150.0 + 1.0 + 2.0);
         assert_eq!(report["latency_dropped"], if latency.is_empty() { 7 } else { 0 });
         assert_eq!(report["replaced"], 21);

@@ -396,7 +396,7 @@ fn gaps_are_bridged_reported_and_masked() {
         assert_eq!(report["gaps"]["list"][0], serde_json::json!({ "channel": 1, "first": 10, "length": 3 }));
         let mut filled = clean.clone();
         filled[10..13].fill(value);
-        // Two ticks of zeros flush the last three samples.
+        // Two frames of zeros flush the last three samples.
         let causal = |x: &[f32]| fused([&[x, &[0.0; 2]].concat(), &[&b[..], &[0.0; 2]].concat()], 42);
         let got = samples(&bench.path("out.wav")).1;
         assert_eq!(got, causal(&filled)[3..83]);

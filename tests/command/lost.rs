@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 const COUNT: usize = 3000;
 
-/// Channel 1 joins two ticks late and loses tick 7 and ticks 100..1500; channel 2 is whole.
+/// Channel 1 joins two frames late and loses frame 7 and frames 100..1500; channel 2 is whole.
 const SEQUENCE: &str = r#"
 {"channel": 1, "sample_start": 0, "global_index": 1002}
 {"channel": 1, "sample_start": 5, "global_index": 1008}
@@ -24,7 +24,7 @@ fn gaps(list: &[(u64, u64, u64)]) -> Value {
     Value::Array(list.iter().map(gap).collect())
 }
 
-/// Ticks with channel 1 replaced by `stand_in(last good sample)` where it was lost.
+/// Frames with channel 1 replaced by `stand_in(last good sample)` where it was lost.
 fn filled(whole: &[f32], stand_in: impl Fn(f32) -> f32) -> Vec<f32> {
     let mut ticks = whole.to_vec();
     let mut last = 0.0;

@@ -46,7 +46,7 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
     Case { problem, taps }
 }
 
-/// e[n] for each pulse, rows n = 0 .. ticks M, columns pulses of width 1 / fineness over the same time.
+/// e[n] for each pulse, rows n = 0 .. frames M, columns pulses of width 1 / fineness over the same time.
 fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
     let Problem { ratio, latency, .. } = case.problem;
     let width = 1.0 / fineness as f64;

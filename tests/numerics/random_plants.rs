@@ -22,7 +22,7 @@ fn front_end(dice: &mut Random) -> FilterSpec {
     }
 }
 
-/// Equal, nearly equal, or anywhere within two ticks.
+/// Equal, nearly equal, or anywhere within two frames.
 fn delays(dice: &mut Random, channels: usize, ratio: usize) -> Vec<f64> {
     let (kind, first) = (dice.count(0, 3), 2.0 * ratio as f64 * dice.part());
     let delay = |dice: &mut Random| match kind {

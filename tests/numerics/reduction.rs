@@ -18,7 +18,7 @@ fn block(bank: &Bank) -> &BlockFilter {
     }
 }
 
-/// Numbers of the matrices that are not zero: multiply-adds a tick.
+/// Numbers of the matrices that are not zero: multiply-adds a frame.
 fn cost(block: &BlockFilter) -> usize {
     let all = [&block.a, &block.b, &block.c, &block.d];
     all.into_iter().flatten().flatten().filter(|x| **x != 0.0 && **x != 1.0).count()
@@ -124,7 +124,7 @@ fn nasty_front_ends_end_as_banks_of_that_order() {
         thesis(5, &[0.4]),
         alike(&butterworth(3, 1.5), 2, 6, &[0.2, 0.9, 1.6]),
         alike(&butterworth(4, 1.2), 3, 6, &[0.2, 1.9]),
-        // No latency, whole ticks of delay, a slow front end.
+        // No latency, whole frames of delay, a slow front end.
         thesis(0, &[1.2, 0.6]),
         thesis(8, &[4.0, 7.0]),
         alike(&butterworth(2, 0.05), 2, 4, &[0.3, 1.1]),

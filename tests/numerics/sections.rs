@@ -56,7 +56,7 @@ fn designs_are_sections_behind_delay_lines() {
             let mut stream = Stream::new(&bank.plan(Options::default()).unwrap());
             assert_eq!(stream.plan().summary().algorithm, "parallel-form", "{method} {filter} {latency}");
             assert_eq!(stream.plan().summary().numbers, "f64");
-            // Two inputs a tick of the line, and no more recursive states than the front end has.
+            // Two inputs a frame of the line, and no more recursive states than the front end has.
             let states = block(&bank).a.len();
             assert!(states <= order + 2 * (latency / 2 + 1), "{method} {filter} {latency}: {states}");
             let input = samples(2 * 500);

@@ -122,7 +122,7 @@ pub(crate) fn ticks(count: usize) -> Vec<f32> {
     (0..2 * count).map(|i| ((i * 7) % 23) as f32 - 11.0).collect()
 }
 
-/// Channel i of interleaved ticks.
+/// Channel i of interleaved frames.
 pub(crate) fn channel(ticks: &[f32], i: usize) -> Vec<f32> {
     ticks.iter().skip(i).step_by(2).copied().collect()
 }

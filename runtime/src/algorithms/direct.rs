@@ -86,7 +86,7 @@ impl<T: Sample> Direct<T> {
     }
 
     /// Frames at the beginning of a call that go through the state's history although the others need not: those whose
-    /// history lies there, and as many as it takes for the others to fill vectors. `None` if all had better go there.
+    /// history is there, and as many as it takes for the others to fill vectors. `None` if all had better go there.
     fn head(&self, frames: usize) -> Option<usize> {
         let vector = self.filters.tiling().vector;
         let head = self.history_frames + (frames.wrapping_sub(self.history_frames) & (vector - 1));

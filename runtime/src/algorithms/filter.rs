@@ -11,7 +11,7 @@ pub(crate) trait Filter: Debug + Send + Sync {
     /// What one stream needs besides.
     type State: Clone + Debug + Send + Sync;
 
-    /// What users are told.
+    /// Facts for users.
     fn facts(&self) -> Facts;
 
     /// The state before the first frame.

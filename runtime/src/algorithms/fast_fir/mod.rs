@@ -225,7 +225,7 @@ impl<T: Sample> FastFir<T> {
         }
     }
 
-    /// Outputs that are not finite, anew.
+    /// Computes outputs that are not finite once more.
     #[cold]
     fn repair(&self, pairs: &Pairs<T>, parity: Parity, out: &mut [T]) {
         for (frame, out) in (parity.late..).zip(out.chunks_exact_mut(self.ratio)) {

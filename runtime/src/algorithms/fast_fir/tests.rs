@@ -47,7 +47,7 @@ macro_rules! twin {
             let even = bank(lags.div_ceil(2), &|f, t| tap(f, t, 0));
             let odd = bank(lags / 2, &|f, t| tap(f, t, 1));
             let mean = bank(lags.div_ceil(2), &|f, t| (tap(f, t, 0) + tap(f, t, 1)) / 2.0);
-            // A second tick that is not there does not matter.
+            // A second frame that is not there does not matter.
             let mut padded = input.to_vec();
             padded.resize(input.len().next_multiple_of(2 * n), 0.0);
             let ticks: Vec<&[$sample]> = padded.chunks(n).collect();
@@ -130,7 +130,7 @@ fn relative_error(taps: &[Vec<f64>], m: usize, input: &[f32], algorithm: Algorit
         / f64::from(f32::EPSILON)
 }
 
-/// Inputs of which a sum of neighbours is a poor summand: a large constant, channels and ticks of very different size.
+/// Inputs of which a sum of neighbours is a poor summand: a large constant, channels and frames of very different size.
 fn nasty_inputs(n: usize, ticks: usize, noise: &mut Noise) -> [Vec<f32>; 4] {
     let white = noise.samples(n * ticks);
     let scaled = |scale: &dyn Fn(usize, usize) -> f32| {
@@ -237,7 +237,7 @@ fn sums_that_overflow_do_not_make_the_output_overflow() {
         for (t, (a, b)) in definition(&taps, m, &input).iter().zip(&out).enumerate() {
             assert!((a - f64::from(*b)).abs() <= 1e-5 * 3.4e38, "N {n} M {m}, output {t}: {b} for {a}");
         }
-        // And the same bits tick by tick, also behind them.
+        // And the same bits frame by frame, also after them.
         let mut stream = fast(&bank, Precision::Single);
         let mut slow = vec![0.0; out.len()];
         for (x, y) in input.chunks(n).zip(slow.chunks_mut(m)) {

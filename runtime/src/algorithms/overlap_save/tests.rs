@@ -160,7 +160,7 @@ fn options(len: usize, precision: Precision) -> Options {
     Options { algorithm: Algorithm::OverlapSave { transform: Some(len) }, precision, ..Options::default() }
 }
 
-/// All outputs of an input, the first of them for its first tick.
+/// All outputs of an input, the first of them for its first frame.
 fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
     let mut stream = start(bank, options).unwrap();
     let late = stream.extra_latency();

@@ -80,7 +80,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         }
         // SAFETY: the caller's.
         unsafe {
-            // Where frames of a whole group follow each other the compiler is told so.
+            // Where frames of a whole group follow each other the compiler can see it.
             let sums = match self.job.tiling.hop {
                 hop if V::GROUPS > 1 && D == V::GROUP && hop == D => self.multiply::<R>(first, D),
                 hop => self.multiply::<R>(first, hop),
