@@ -28,6 +28,8 @@ pub use hybank_linalg as linalg;
 #[cfg(feature = "design")]
 pub mod analog;
 #[cfg(feature = "design")]
+pub(crate) mod arithmetic;
+#[cfg(feature = "design")]
 pub mod design;
 #[cfg(feature = "design")]
 pub mod lmi;

@@ -2,8 +2,7 @@
 //! adds a bound of its rounding error to the radius. A result encloses the exact result for all values in
 //! the operands.
 
-use super::double_double::DoubleDouble;
-use super::number::Number;
+use crate::arithmetic::{DoubleDouble, Number};
 use nalgebra::DMatrix;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -47,8 +47,8 @@
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::{Layout, Rows, sampled};
-use super::number::Number;
 use super::slow_period::SlowPeriod;
+use crate::arithmetic::Number;
 
 /// Maximum number of states, including delay lines.
 const MAX_STATES: usize = 128;

@@ -2,9 +2,7 @@
 //! witnesses.
 
 use super::ball::{self, Matrix};
-use super::big_float::BigFloat;
 use super::causal::{CausalPlant, Precision, Recursion};
-use super::double_double::DoubleDouble;
 use super::error_system::{self, BlockForm, ErrorSystem};
 use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
@@ -13,6 +11,7 @@ use super::{
     BoundedBanks, MAX_ANALOG_STATES, MAX_STATES, MAX_WORK, Strictness, Verified, VerifyError, lower,
     positive, spectrum, statements, upper,
 };
+use crate::arithmetic::{BigFloat, DoubleDouble};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, Proof, SynthesisFilters};
 use crate::linalg::Mat;
 use crate::units::Seconds;

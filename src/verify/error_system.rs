@@ -8,8 +8,8 @@
 //! block filter it is the filter's own state.
 
 use super::ball::{self, Ball, Matrix};
-use super::number::Number;
 use super::slow_period::SlowPeriod;
+use crate::arithmetic::Number;
 use crate::bank::{BlockFilter, SynthesisFilters};
 use std::ops::Range;
 

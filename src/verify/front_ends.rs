@@ -3,9 +3,9 @@
 
 use super::VerifyError;
 use super::ball::{self, Matrix};
-use super::number::Number;
 use super::timeline::{Instant, SamplingInstant};
 use crate::analog::StrictlyProper;
+use crate::arithmetic::Number;
 use crate::bank::Bank;
 use crate::spec::FilterSpec;
 use crate::units::Seconds;

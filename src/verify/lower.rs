@@ -20,10 +20,10 @@
 //! that the taps of one output weight (for white noise at the input).
 
 use super::ball::{self, Ball, Matrix};
-use super::double_double::DoubleDouble;
 use super::positive;
 use super::slow_period::SlowPeriod;
 use super::spectrum::{self, ComplexMatrix};
+use crate::arithmetic::DoubleDouble;
 use crate::bank::{DualWitness, SynthesisFilters};
 
 /// A lower bound of the norm of this bank, from its gain at a frequency: `||K|| >= ||a* K(z)|| / ||a||`.

@@ -30,15 +30,12 @@
 //! Not proven: that the spec describes the hardware.
 
 mod ball;
-mod big_float;
 mod causal;
-mod double_double;
 mod enclosed;
 mod error;
 mod error_system;
 mod front_ends;
 mod lower;
-mod number;
 mod positive;
 mod slow_period;
 mod spectrum;

@@ -7,8 +7,7 @@
 //! the midpoint less (radii + g tr + margin) I is factored.
 
 use super::ball::{self, Ball, Matrix};
-use super::double_double::{DoubleDouble, ROUNDING};
-use super::number::Number;
+use crate::arithmetic::{DoubleDouble, Number};
 use nalgebra::DMatrix;
 
 /// Lower triangular.
@@ -95,7 +94,7 @@ pub(super) fn is_positive_definite(m: &Matrix) -> bool {
 pub(super) fn exceeds(m: &Matrix, least: f64) -> bool {
     let n = m.nrows();
     let trace: f64 = (0..n).map(|i| m[(i, i)].magnitude()).sum();
-    let factoring = 2.0 * (n + 2) as f64 * ROUNDING * (trace + n as f64 * least.abs());
+    let factoring = 2.0 * (n + 2) as f64 * DoubleDouble::ROUNDING * (trace + n as f64 * least.abs());
     let shift = (ball::radius_sum(m) + factoring) * 1.001 + least;
     let shifted = DMatrix::from_fn(n, n, |i, j| {
         let (i, j) = (i.max(j), i.min(j));

@@ -7,11 +7,10 @@
 //! are counted whole periods later.
 
 use super::ball::{self, Matrix};
-use super::double_double::DoubleDouble;
 use super::front_ends::FrontEnds;
-use super::number::Number;
 use super::state_transition::{StateTransition, state_transition};
 use super::timeline::{SamplingInstant, Timeline};
+use crate::arithmetic::{DoubleDouble, Number};
 
 /// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `periods_late` slow periods
 /// later.

@@ -6,8 +6,7 @@
 //! e^{A t} G(t) e^{A' t}. Only sums and products occur.
 
 use super::ball::{self, Ball, Matrix};
-use super::double_double::DoubleDouble;
-use super::number::Number;
+use crate::arithmetic::{DoubleDouble, Number};
 
 /// Maximum number of halvings of the time: ||A|| t up to 1e18.
 const MAX_HALVINGS: i32 = 64;
@@ -72,8 +71,8 @@ fn factorial(n: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::big_float::BigFloat;
     use super::*;
+    use crate::arithmetic::BigFloat;
     use crate::linalg::Mat;
 
     fn enclosed(a: &Mat, b: &Mat, t: f64) -> StateTransition {

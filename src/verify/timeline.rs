@@ -6,8 +6,7 @@
 
 use super::VerifyError;
 use super::ball::Ball;
-use super::big_float::BigFloat;
-use super::number::Number;
+use crate::arithmetic::{BigFloat, Number};
 use crate::units::Seconds;
 use std::cmp::Ordering;
 

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use super::double_double::ComplexDoubleDouble;
+use super::complex::ComplexDoubleDouble;
 use super::product_of_negatives;
 use crate::analog::{AnalogError, Cutoffs, Zpk};
 use crate::linalg::{Complex, LinalgError};

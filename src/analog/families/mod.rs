@@ -9,7 +9,7 @@
 
 mod bessel;
 mod chebyshev;
-mod double_double;
+mod complex;
 mod elliptic;
 mod jacobi;
 

@@ -3,7 +3,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A floating-point number whose operations have a proven relative error.
-pub(super) trait Number:
+pub(crate) trait Number:
     Copy
     + std::fmt::Debug
     + Default

@@ -16,7 +16,7 @@ const BITS: i64 = 64 * WORDS as i64;
 
 /// A floating-point number with a mantissa of 512 bits; zero has no mantissa, NaN is an unknown number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BigFloat {
+pub(crate) struct BigFloat {
     /// Least significant word first; the top bit is set unless the number is zero.
     words: [u64; WORDS],
     exponent: i64,
@@ -52,7 +52,7 @@ impl BigFloat {
     }
 
     /// Sign of a number that is not NaN.
-    pub(super) fn sign(&self) -> Ordering {
+    pub(crate) fn sign(&self) -> Ordering {
         match (self.is_zero(), self.negative) {
             (true, _) => Ordering::Equal,
             (_, true) => Ordering::Less,
@@ -61,7 +61,7 @@ impl BigFloat {
     }
 
     /// |self| against |other|, neither NaN.
-    pub(super) fn compare_moduli(&self, other: &Self) -> Ordering {
+    pub(crate) fn compare_moduli(&self, other: &Self) -> Ordering {
         if self.is_zero() || other.is_zero() {
             return other.is_zero().cmp(&self.is_zero());
         }

@@ -11,11 +11,11 @@ use super::number::Number;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// 2^-100: bounds the relative error of every operation on [`DoubleDouble`], with room to spare.
-pub(super) const ROUNDING: f64 = 1.0 / (1u128 << 100) as f64;
+const ROUNDING: f64 = 1.0 / (1u128 << 100) as f64;
 
 /// `high + low` with `|low| <= ulp(high) / 2`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct DoubleDouble {
+pub(crate) struct DoubleDouble {
     high: f64,
     low: f64,
 }
