@@ -1,17 +1,18 @@
-//! From how many taps a phase on do the fast form and overlap-save take less time than the direct form?
+//! From how many taps per phase on do fast FIR and overlap-save take less time than the direct algorithm?
 //!
-//! `cargo bench --bench algorithm_crossover` measures all three along a ladder of K for several N and M, overlap-save with the four shortest
-//! transforms that hold a block of K frames, in nanoseconds a frame (best of many repeats), and sets beside them
-//! what the plan chooses, first among the forms that are not late. The constants of the plan's cost model
-//! (`runtime/src/algorithms/choice.rs`) were fitted to this table. Words after `--`: `f64` for double precision, `prompt` without
-//! overlap-save.
+//! `cargo bench --bench algorithm_crossover` measures all three along a ladder of K for several N and M,
+//! overlap-save with the four shortest transforms that hold a block of K frames, in nanoseconds per frame
+//! (best of many repeats), and sets beside them what the plan chooses, first among the algorithms that add
+//! no latency. The constants of the plan's cost model (`runtime/src/algorithms/choice.rs`) were fitted to
+//! this table. Words after `--`: `f64` for double precision, `prompt` without overlap-save, and the name of
+//! an instruction set (`portable`, `avx2`, `avx512`) for that set instead of the widest one.
 
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::runtime::{Algorithm, Options, Precision, Stream};
+use hybank::runtime::{Algorithm, Isa, Options, Precision, Stream};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-const TICKS: usize = 16_384;
+const FRAMES: usize = 16_384;
 /// Batches of overlap-save that one figure takes at least.
 const BATCHES: usize = 4;
 /// Time for the repeats of one figure.
@@ -25,15 +26,15 @@ fn fir(n: usize, m: usize, taps: usize) -> Bank {
     Bank::bare(SynthesisFilters::Fir((0..n).map(f).collect()), m)
 }
 
-/// Nanoseconds a frame, in numbers of the kernels' own type.
+/// Nanoseconds per frame, in numbers of the kernels' own type.
 fn measure(bank: &Bank, options: Options) -> f64 {
     let mut stream = Stream::new(&bank.plan(options).unwrap());
     let (n, m) = (stream.channels(), stream.ratio());
-    let x: Vec<f64> = (0..n * TICKS).map(|i| ((i * 7919) % 1000) as f64 / 1000.0 - 0.5).collect();
+    let x: Vec<f64> = (0..n * FRAMES).map(|i| ((i * 7919) % 1000) as f64 / 1000.0 - 0.5).collect();
     let narrow: Vec<f32> = x.iter().map(|&x| x as f32).collect();
-    let (mut y, mut narrow_y) = (vec![0.0; m * TICKS], vec![0.0; m * TICKS]);
+    let (mut y, mut narrow_y) = (vec![0.0; m * FRAMES], vec![0.0; m * FRAMES]);
     // A batch is made by the call that completes it, and may be longer than a call.
-    let calls = (BATCHES * stream.extra_latency() / m).div_ceil(TICKS).max(1);
+    let calls = (BATCHES * stream.extra_latency() / m).div_ceil(FRAMES).max(1);
     let mut best = f64::MAX;
     let begin = Instant::now();
     while begin.elapsed() < EACH {
@@ -47,21 +48,22 @@ fn measure(bank: &Bank, options: Options) -> f64 {
         }
         best = best.min(start.elapsed().as_secs_f64());
     }
-    best / (calls * TICKS) as f64 * 1e9
+    best / (calls * FRAMES) as f64 * 1e9
 }
 
 fn main() {
     let asked = |wanted: &str| std::env::args().any(|word| word == wanted);
     let (double, prompt) = (asked("f64"), asked("prompt"));
+    let isa = Isa::available().find(|isa| asked(isa.name())).unwrap_or_else(Isa::detect);
     let precision = if double { Precision::Double } else { Precision::Single };
     println!(
-        "| N | M | K | direct, ns a tick | fast | overlap-save, F: ns a tick | the plan, not late | the plan |"
+        "| N | M | K | direct, ns per frame | fast FIR | overlap-save, F: ns per frame | the plan, no added latency | the plan |"
     );
     println!("|---|---|---|---|---|---|---|---|");
     for (n, m) in SHAPES {
         for k in LAGS {
             let bank = fir(n, m, k * m);
-            let options = |algorithm| Options { precision, algorithm, ..Options::default() };
+            let options = |algorithm| Options { precision, algorithm, isa, ..Options::default() };
             let direct = measure(&bank, options(Algorithm::Direct));
             let fast = measure(&bank, options(Algorithm::FastFir));
             let shortest = (2 * k).next_power_of_two().max(16);
@@ -75,13 +77,13 @@ fn main() {
                 })
                 .collect();
             let plan = |algorithm| Stream::new(&bank.plan(options(algorithm)).unwrap()).plan().summary();
-            let (not_late, plan) = (
+            let (prompt_plan, plan) = (
                 plan(Algorithm::Auto { added_latency: false }).algorithm,
                 plan(Algorithm::Auto { added_latency: true }),
             );
             let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
             println!(
-                "| {n} | {m} | {k} | {direct:.2} | {fast:.2} | {} | {not_late} | {}{length} |",
+                "| {n} | {m} | {k} | {direct:.2} | {fast:.2} | {} | {prompt_plan} | {}{length} |",
                 others.join(", "),
                 plan.algorithm
             );

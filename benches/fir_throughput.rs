@@ -1,9 +1,9 @@
-//! How many fast samples a second one core makes, and what share of its multiply-add peak that is.
+//! How many fast samples per second one core makes, and what share of its multiply-add peak that is.
 //!
-//! `cargo bench --bench fir_throughput` prints a table of the public [`Stream`]; a word after `--` picks the rows
-//! that contain it, the name of an instruction set (`portable`, `avx2`, `avx512`) that set instead of the widest one.
-//! Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best
-//! of many repeats, and so is the peak, which is measured again beside each row.
+//! `cargo bench --bench fir_throughput` prints a table of the public [`Stream`]; a word after `--` picks the
+//! rows that contain it, the name of an instruction set (`portable`, `avx2`, `avx512`) that set instead of
+//! the widest one. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best of many
+//! repeats, and so is the peak, which is measured again beside each row.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
@@ -13,7 +13,7 @@ use hybank::runtime::{
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-const TICKS: usize = 16_384;
+const FRAMES: usize = 16_384;
 const CASES: [(&str, usize, usize, usize); 3] = [("A", 2, 2, 24), ("B", 4, 4, 64), ("C", 8, 8, 128)];
 /// Time for the repeats of a row.
 const ROW: Duration = Duration::from_millis(100);
@@ -23,7 +23,7 @@ fn fir(n: usize, m: usize, taps: usize) -> Bank {
     Bank::bare(SynthesisFilters::Fir((0..n).map(f).collect()), m)
 }
 
-/// 16 pairs of states in modal algorithm, four channels.
+/// 16 second-order sections in parallel, four channels.
 fn recursion() -> Bank {
     let n = 32;
     let entry = |i: usize, j: usize| match () {
@@ -45,17 +45,17 @@ fn recursion() -> Bank {
     )
 }
 
-fn input(n: usize, ticks: usize) -> Vec<f32> {
-    (0..n * ticks).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect()
+fn input(n: usize, frames: usize) -> Vec<f32> {
+    (0..n * frames).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect()
 }
 
-/// Least seconds of one turn, and the peak of one core in multiply-adds a second of the same while.
-fn measure(isa: Isa, mut turn: impl FnMut()) -> (f64, f64) {
+/// Least seconds of one iteration, and the peak of one core in multiply-adds per second of the same while.
+fn measure(isa: Isa, mut iteration: impl FnMut()) -> (f64, f64) {
     let (mut best, mut peak) = (f64::MAX, 0f64);
     let begin = Instant::now();
     while begin.elapsed() < ROW {
         let start = Instant::now();
-        turn();
+        iteration();
         best = best.min(start.elapsed().as_secs_f64());
         let start = Instant::now();
         let (count, sum) = multiply_add_chains(isa, 10_000);
@@ -80,12 +80,12 @@ impl Table {
         self.wanted.as_ref().is_none_or(|word| name.contains(word))
     }
 
-    /// One row: `samples` fast samples a turn of `products` multiply-adds each.
-    fn row(&self, name: &str, samples: usize, products: f64, turn: impl FnMut()) {
+    /// One row: `samples` fast samples per iteration of `products` multiply-adds each.
+    fn row(&self, name: &str, samples: usize, products: f64, iteration: impl FnMut()) {
         if !self.wants(name) {
             return;
         }
-        let (seconds, peak) = measure(self.isa, turn);
+        let (seconds, peak) = measure(self.isa, iteration);
         let rate = samples as f64 / seconds;
         let macs = rate * products;
         println!(
@@ -96,13 +96,14 @@ impl Table {
         );
     }
 
-    /// The products are those of the direct algorithm, so that the share of the peak may pass 100 % in others.
+    /// The products are those of the direct algorithm, so that the share of the peak may pass 100 % in
+    /// others.
     fn fir(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm, call: usize) {
         let options = Options { algorithm, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-        let x = input(n, TICKS);
-        let mut y = vec![0.0; m * TICKS];
-        self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
+        let x = input(n, FRAMES);
+        let mut y = vec![0.0; m * FRAMES];
+        self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
             for (x, y) in x.chunks(call * n).zip(y.chunks_mut(call * m)) {
                 stream.process(black_box(x), y).unwrap();
             }
@@ -111,28 +112,57 @@ impl Table {
 
     fn cases(&self) {
         for (name, n, m, taps) in CASES {
-            self.fir(&format!("{name}: f32"), n, m, taps, Algorithm::Direct, TICKS);
-            self.fir(&format!("{name}: f32, 64 ticks a call"), n, m, taps, Algorithm::Direct, 64);
-            self.fir(&format!("{name}: f32, fast"), n, m, taps, Algorithm::FastFir, TICKS);
-            self.fir(&format!("{name}: f32, fast, 64 ticks a call"), n, m, taps, Algorithm::FastFir, 64);
+            self.fir(&format!("{name}: f32"), n, m, taps, Algorithm::Direct, FRAMES);
+            self.fir(&format!("{name}: f32, 64 frames per call"), n, m, taps, Algorithm::Direct, 64);
+            self.fir(&format!("{name}: f32, fast FIR"), n, m, taps, Algorithm::FastFir, FRAMES);
+            self.fir(
+                &format!("{name}: f32, fast FIR, 64 frames per call"),
+                n,
+                m,
+                taps,
+                Algorithm::FastFir,
+                64,
+            );
             self.doubles(&format!("{name}: f64"), n, m, taps, Algorithm::Direct);
-            self.doubles(&format!("{name}: f64, fast"), n, m, taps, Algorithm::FastFir);
+            self.doubles(&format!("{name}: f64, fast FIR"), n, m, taps, Algorithm::FastFir);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
             self.threads(&format!("{name}: f32, two threads"), n, m, taps, Algorithm::Direct);
-            self.threads(&format!("{name}: f32, fast, two threads"), n, m, taps, Algorithm::FastFir);
+            self.threads(&format!("{name}: f32, fast FIR, two threads"), n, m, taps, Algorithm::FastFir);
             self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
+            self.worst(name, n, m, taps);
         }
     }
 
-    /// Overlap-save; the products are those of the direct form.
+    /// Input that may cost time: NaN in all samples, NaN in one of a thousand frames, denormals.
+    fn worst(&self, name: &str, n: usize, m: usize, taps: usize) {
+        let numbers = input(n, FRAMES);
+        let with = |every: usize, value: fn(f32) -> f32| {
+            let value = |(i, &x): (usize, &f32)| if i % every == 0 { value(x) } else { x };
+            numbers.iter().enumerate().map(value).collect::<Vec<f32>>()
+        };
+        let inputs = [
+            ("NaN", with(1, |_| f32::NAN)),
+            ("NaN, 1 in 1000 frames", with(1000 * n, |_| f32::NAN)),
+            ("denormals", with(1, |x| 1e-38 * x)),
+        ];
+        for (what, x) in inputs {
+            let mut stream = Stream::new(&fir(n, m, taps).plan(self.options()).unwrap());
+            let mut y = vec![0.0; m * FRAMES];
+            self.row(&format!("{name}: f32, {what}"), m * FRAMES, (n * taps) as f64 / m as f64, || {
+                stream.process(black_box(&x), &mut y).unwrap();
+            });
+        }
+    }
+
+    /// Overlap-save; the products are those of the direct algorithm.
     fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
         for len in [None, Some(64), Some(128), Some(256)] {
             let options = Options { algorithm: Algorithm::OverlapSave { transform: len }, ..self.options() };
             let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-            let x = input(n, TICKS);
-            let mut y = vec![0.0; m * TICKS];
+            let x = input(n, FRAMES);
+            let mut y = vec![0.0; m * FRAMES];
             let name = format!("{name} {}", len.map_or("best".into(), |len| len.to_string()));
-            self.row(&name, m * TICKS, (n * taps) as f64 / m as f64, || {
+            self.row(&name, m * FRAMES, (n * taps) as f64 / m as f64, || {
                 stream.process(black_box(&x), &mut y).unwrap();
             });
         }
@@ -142,36 +172,37 @@ impl Table {
     fn doubles(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm) {
         let options = Options { precision: Precision::Double, algorithm, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-        let x: Vec<f64> = input(n, TICKS).into_iter().map(f64::from).collect();
-        let mut y = vec![0.0; m * TICKS];
-        self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
+        let x: Vec<f64> = input(n, FRAMES).into_iter().map(f64::from).collect();
+        let mut y = vec![0.0; m * FRAMES];
+        self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
             stream.process(black_box(&x), &mut y).unwrap();
         });
     }
 
     fn pcm(&self, name: &str, n: usize, m: usize, taps: usize) {
         let mut stream = Stream::new(&fir(n, m, taps).plan(self.options()).unwrap());
-        let bytes: Vec<u8> = (0..2 * n * TICKS).map(|i| (i * 31) as u8).collect();
-        let mut out = vec![0; 2 * m * TICKS];
+        let bytes: Vec<u8> = (0..2 * n * FRAMES).map(|i| (i * 31) as u8).collect();
+        let mut out = vec![0; 2 * m * FRAMES];
         let layout = SampleLayout::packed(PcmFormat::S16Le);
-        self.row(name, m * TICKS, (n * taps) as f64 / m as f64, || {
+        self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
             let frames = PcmFrames { layout, channels: n, bytes: black_box(&bytes) };
             let mut output = PcmOutput { format: PcmFormat::S16Le, bytes: &mut out, clipped: 0 };
             stream.process_pcm(&[frames], &mut output).unwrap();
         });
     }
 
-    /// Longer calls, as for files, by two threads; how many times one thread's speed that is, from turns about.
+    /// Longer calls, as for files, by two threads; how many times one thread's speed that is, from alternate
+    /// iterations.
     fn threads(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm) {
         if !self.wants(name) {
             return;
         }
         let options = Options { algorithm, ..self.options() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-        let workers = ThreadPool::new(2).unwrap();
-        let ticks = 16 * TICKS;
-        let x = input(n, ticks);
-        let mut y = vec![0.0; m * ticks];
+        let pool = ThreadPool::new(2).unwrap();
+        let frames = 16 * FRAMES;
+        let x = input(n, frames);
+        let mut y = vec![0.0; m * frames];
         let (mut one, mut two) = (Duration::MAX, Duration::MAX);
         let begin = Instant::now();
         while begin.elapsed() < 5 * ROW {
@@ -179,11 +210,11 @@ impl Table {
             stream.process(black_box(&x), &mut y).unwrap();
             one = one.min(start.elapsed());
             let start = Instant::now();
-            stream.process_parallel(black_box(&x), &mut y, &workers).unwrap();
+            stream.process_parallel(black_box(&x), &mut y, &pool).unwrap();
             two = two.min(start.elapsed());
         }
         let (one, two) = (one.as_secs_f64(), two.as_secs_f64());
-        let (rate, products) = ((m * ticks) as f64 / two, (n * taps) as f64 / m as f64);
+        let (rate, products) = ((m * frames) as f64 / two, (n * taps) as f64 / m as f64);
         println!(
             "| {name:<34} | {:>8.1} | {:>6.2} | {:.2} x 1 |",
             rate / 1e6,
@@ -192,35 +223,42 @@ impl Table {
         );
     }
 
-    /// 16 taps a phase for every small N and M, then more and more taps.
+    /// 16 taps per phase for every small N and M, then more and more taps.
     fn ladder(&self) {
         for n in 1..=16 {
             for m in 1..=16 {
                 self.fir(
-                    &format!("ladder: N {n} M {m}, 16 taps a phase"),
+                    &format!("ladder: N {n} M {m}, 16 taps per phase"),
                     n,
                     m,
                     16 * m,
                     Algorithm::Direct,
-                    TICKS,
+                    FRAMES,
                 );
             }
         }
         for taps in [2, 8, 32, 128, 512, 2048] {
-            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Algorithm::Direct, TICKS);
+            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Algorithm::Direct, FRAMES);
         }
         for taps in [256, 512, 1024] {
-            self.fir(&format!("taps: N 8 M 8, {taps} taps"), 8, 8, taps, Algorithm::Direct, TICKS);
-            self.fir(&format!("taps: N 8 M 8, {taps} taps, fast"), 8, 8, taps, Algorithm::FastFir, TICKS);
+            self.fir(&format!("taps: N 8 M 8, {taps} taps"), 8, 8, taps, Algorithm::Direct, FRAMES);
+            self.fir(
+                &format!("taps: N 8 M 8, {taps} taps, fast FIR"),
+                8,
+                8,
+                taps,
+                Algorithm::FastFir,
+                FRAMES,
+            );
         }
     }
 
     /// Recursions have no peak to compare with: frames are what counts.
     fn recursions(&self) {
         let mut stream = Stream::new(&recursion().plan(self.options()).unwrap());
-        let x = input(4, TICKS);
-        let mut y = vec![0.0; 4 * TICKS];
-        self.row("state space: 32 states, N 4 M 4", 4 * TICKS, 0.0, || {
+        let x = input(4, FRAMES);
+        let mut y = vec![0.0; 4 * FRAMES];
+        self.row("state space: 32 states, N 4 M 4", 4 * FRAMES, 0.0, || {
             stream.process(black_box(&x), &mut y).unwrap();
         });
     }

@@ -1,7 +1,8 @@
-//! What the way in and out costs: `hybank stream` and `hybank fuse` beside `cat | cat` and sox on the same bytes in
-//! the same run, and how long the first output takes when frames come one by one.
+//! What the way in and out costs: `hybank stream` and `hybank fuse` beside `cat | cat` and sox on the same
+//! bytes in the same run, and how long the first output takes when frames come one by one.
 //!
-//! `cargo bench --bench pipe_overhead`; set TMPDIR to a folder in memory to leave the disk out. Bank A: N = M = 2, 24 taps.
+//! `cargo bench --bench pipe_overhead`; set TMPDIR to a folder in memory to leave the disk out. Bank A: N =
+//! M = 2, 24 taps.
 
 use hybank::io::PcmFormat;
 use hybank::io::wav::WavFile;
@@ -134,10 +135,10 @@ fn files(table: &Table) {
     );
 }
 
-/// One frame at a time, a thousand a second: from writing its inputs to reading its outputs.
+/// One frame at a time, a thousand per second: from writing its inputs to reading its outputs.
 fn latency(folder: &Path) {
     const PERIOD: Duration = Duration::from_millis(1);
-    const TICKS: u32 = 3000;
+    const FRAMES: u32 = 3000;
     let mut child = Command::new(env!("CARGO_BIN_EXE_hybank"))
         .current_dir(folder)
         .args(["stream", "bank.json"])
@@ -150,7 +151,7 @@ fn latency(folder: &Path) {
     sleep(200 * PERIOD);
     let begin = Instant::now();
     let mut waits = Vec::new();
-    for k in 0..TICKS {
+    for k in 0..FRAMES {
         sleep((begin + k * PERIOD).saturating_duration_since(Instant::now()));
         let sent = Instant::now();
         stdin.write_all(&[0; 8]).unwrap();
@@ -163,6 +164,6 @@ fn latency(folder: &Path) {
     waits.sort_by(f64::total_cmp);
     let (median, late, most) =
         (waits[waits.len() / 2], waits[waits.len() * 99 / 100], waits[waits.len() - 1]);
-    println!("\nticks from input to output at 1,000 ticks/s: first {first:.3}, median {median:.3},");
+    println!("\nframe periods from input to output at 1,000 frames/s: first {first:.3}, median {median:.3},");
     println!("99 of 100 below {late:.3}, most {most:.3}");
 }

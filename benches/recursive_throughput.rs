@@ -1,15 +1,17 @@
-//! How fast state-space banks run: one core, public `Stream`, beside the f32 multiply-add peak of the same moment.
+//! How fast state-space banks run: one core, public `Stream`, beside the f32 multiply-add peak of the same
+//! moment.
 //!
-//! `cargo bench --bench recursive_throughput`. A section is a pair of states. With N inputs and M outputs it takes 4 + 2 N + 2 M
-//! multiply-adds, or 4 + 2 + 2 where it has one input and one output of its own; a biquad of the usual kind takes 5. So
-//! three rates stand side by side: sections, multiply-adds by five ("biquads"), and the share of the peak.
+//! `cargo bench --bench recursive_throughput`. A section is a pair of states. With N inputs and M outputs it
+//! takes 4 + 2 N + 2 M multiply-adds, or 4 + 2 + 2 where it has one input and one output of its own; a
+//! biquad of the usual kind takes 5. So three rates stand side by side: sections, multiply-adds by five
+//! ("biquads"), and the share of the peak.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::runtime::{Isa, Options, Precision, Stream, multiply_add_chains};
 use std::hint::black_box;
 use std::time::Instant;
 
-const TICKS: usize = 16_384;
+const FRAMES: usize = 16_384;
 const REPEATS: usize = 60;
 
 /// A bank and what it costs.
@@ -17,7 +19,7 @@ struct Case {
     name: String,
     filter: BlockFilter,
     sections: usize,
-    /// Multiply-adds a frame that the matrices ask for, zeros and delay lines left out.
+    /// Multiply-adds per frame that the matrices ask for, zeros and delay lines left out.
     work: usize,
 }
 
@@ -97,7 +99,7 @@ fn designed(sections: usize, line: usize, n: usize, m: usize) -> Case {
     });
     let b = matrix(order, n, |i, j| f64::from(u8::from(i == order - n + j)));
     Case {
-        name: format!("{sections} sections behind {line} ticks, N = {n}, M = {m}"),
+        name: format!("{sections} sections after {line} frames, N = {n}, M = {m}"),
         filter: BlockFilter { a, b, c: matrix(m, order, entry), d: matrix(m, n, entry) },
         sections,
         work: sections * (4 + 2 * n + 2 * m) + (line + 1) * n * m,
@@ -120,7 +122,7 @@ fn least_seconds(mut job: impl FnMut()) -> f64 {
     (0..REPEATS).map(timed).fold(f64::INFINITY, f64::min)
 }
 
-/// f32 multiply-adds a second.
+/// f32 multiply-adds per second.
 fn peak() -> f64 {
     let (count, _) = multiply_add_chains(Isa::detect(), 50_000);
     count as f64
@@ -133,23 +135,23 @@ fn measure(case: &Case, recursion: Precision, call: usize) {
     let options = Options { recursion, ..Options::default() };
     let mut stream = Stream::new(&bank(case.filter.clone()).plan(options).expect("a sound bank"));
     let (n, m) = (stream.channels(), stream.ratio());
-    let x: Vec<f32> = (0..n * TICKS).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect();
-    let mut y = vec![0.0; m * TICKS];
+    let x: Vec<f32> = (0..n * FRAMES).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect();
+    let mut y = vec![0.0; m * FRAMES];
     let seconds = least_seconds(|| {
         for (x, y) in x.chunks(call * n).zip(y.chunks_mut(call * m)) {
-            stream.process(black_box(x), y).expect("whole ticks");
+            stream.process(black_box(x), y).expect("whole frames");
         }
     });
-    let (ticks, peak) = (TICKS as f64 / seconds, peak());
-    let (plan, work) = (stream.plan().summary(), ticks * case.work as f64);
+    let (rate, peak) = (FRAMES as f64 / seconds, peak());
+    let (plan, work) = (stream.plan().summary(), rate * case.work as f64);
     println!(
         "| {} | {} {} | {call} | {:.1} | {:.1} | {:.2} | {:.2} | {:.1} | {:.0} % |",
         case.name,
         plan.algorithm,
         plan.numbers,
-        1e-6 * ticks,
-        1e-6 * ticks * m as f64,
-        1e-9 * ticks * case.sections as f64,
+        1e-6 * rate,
+        1e-6 * rate * m as f64,
+        1e-9 * rate * case.sections as f64,
         1e-9 * work / 5.0,
         1e-9 * work,
         100.0 * work / peak
@@ -159,7 +161,7 @@ fn measure(case: &Case, recursion: Precision, call: usize) {
 fn main() {
     println!("{}, f32 peak {:.1} GMAC/s\n", Isa::detect(), 1e-9 * peak());
     println!(
-        "| bank | algorithm | ticks a call | M ticks/s | M outputs/s | G sections/s | G biquads/s | GMAC/s | of f32 peak |"
+        "| bank | algorithm | frames per call | M frames/s | M outputs/s | G sections/s | G biquads/s | GMAC/s | of f32 peak |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for recursion in [Precision::Double, Precision::Single] {
@@ -171,13 +173,13 @@ fn main() {
             apart(4, 4),
             apart(8, 8),
         ] {
-            measure(&case, recursion, TICKS);
+            measure(&case, recursion, FRAMES);
         }
         for case in [designed(1, 5, 2, 2), designed(2, 3, 4, 4), designed(3, 3, 8, 8)] {
-            measure(&case, recursion, TICKS);
+            measure(&case, recursion, FRAMES);
         }
         measure(&parallel(16, 4, 4), recursion, 64);
-        measure(&full(8, 2, 2), recursion, TICKS);
-        measure(&full(32, 4, 4), recursion, TICKS);
+        measure(&full(8, 2, 2), recursion, FRAMES);
+        measure(&full(32, 4, 4), recursion, FRAMES);
     }
 }

@@ -5,8 +5,8 @@ use crate::{Plan, ProcessError, Sample, Stream, SwapError};
 
 /// Filters complex samples: real and imaginary parts are two real [streams](Stream) through one plan.
 ///
-/// A complex sample is an array of its real and its imaginary part; N of them are a frame. All that is said of real
-/// streams holds for each part.
+/// A complex sample is an array of its real and its imaginary part; N of them are a frame. All that is said
+/// of real streams holds for each part.
 ///
 /// ```
 /// use hybank_runtime::{ComplexStream, Options, Plan};
@@ -34,7 +34,8 @@ impl ComplexStream {
         self.real.plan()
     }
 
-    /// Real numbers of the input, two per sample, that were NaN or infinite and became 0, since the beginning.
+    /// Real numbers of the input, two per sample, that were NaN or infinite and became 0, since the
+    /// beginning.
     pub fn replaced(&self) -> u64 {
         self.real.replaced() + self.imaginary.replaced()
     }
@@ -45,8 +46,8 @@ impl ComplexStream {
         self.imaginary.reset();
     }
 
-    /// As [`Stream::process`]: frame k is `input[k N..][..N]`, its output `output[k M..][..M]`. Returns the complex samples
-    /// written. Does not allocate.
+    /// As [`Stream::process`]: frame k is `input[k N..][..N]`, its output `output[k M..][..M]`. Returns the
+    /// complex samples written. Does not allocate.
     ///
     /// # Errors
     /// As [`Stream::process`].

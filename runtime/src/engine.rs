@@ -1,7 +1,8 @@
-//! One of the algorithms in one of the number types: coefficients alone, and coefficients with the state of a stream.
+//! One of the algorithms in one of the number types: coefficients alone, and coefficients with the state of
+//! a stream.
 //!
-//! A state stands beside the coefficients that made it and is never apart from them, so that no call can meet the state of
-//! another algorithm.
+//! A state stands beside the coefficients that made it and is never apart from them, so that no call can
+//! meet the state of another algorithm.
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
@@ -121,8 +122,8 @@ impl Engine {
         each!(Self, self, pair => pair.resets())
     }
 
-    /// The state becomes that of a stream which has had the input of `running`, `position` frames of it; false, with the
-    /// state as before, if that cannot be told.
+    /// The state becomes that of a stream which has had the input of `running`, `position` frames of it;
+    /// false, with the state as before, if that cannot be told.
     pub(crate) fn continue_from(&mut self, running: &Self, position: u64) -> bool {
         self.take_over(running)
             || running.past().is_some_and(

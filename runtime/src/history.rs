@@ -3,8 +3,8 @@
 use crate::aligned::Aligned;
 use crate::sample::Sample;
 
-/// The last samples before the next frame, then room for frames to come. Short calls move along in the room; only when
-/// it is used up are the last samples copied to the front.
+/// The last samples before the next frame, then room for frames to come. Short calls move along in the room;
+/// only when it is used up are the last samples copied to the front.
 #[derive(Debug, Clone)]
 pub(crate) struct History<T: Sample> {
     samples: Aligned<T>,
@@ -19,7 +19,7 @@ pub(crate) struct History<T: Sample> {
 }
 
 impl<T: Sample> History<T> {
-    /// Zeros: `len` samples, room for blocks of at most `block` samples, and `padding` behind them.
+    /// Zeros: `len` samples, room for blocks of at most `block` samples, and `padding` after it.
     pub(crate) fn new(channels: usize, len: usize, block: usize, padding: usize) -> Self {
         let samples = Aligned::new(len + block + block / 4 + padding);
         Self { samples, channels, len, padding, next: len }
@@ -42,7 +42,7 @@ impl<T: Sample> History<T> {
         &mut self.samples[self.next..][..len]
     }
 
-    /// The history of the next frame, and what was written behind it.
+    /// The history of the next frame, and what was written after it.
     pub(crate) fn view(&self) -> &[T] {
         &self.samples[self.next - self.len..]
     }
@@ -63,7 +63,8 @@ impl<T: Sample> History<T> {
         self.next = self.len;
     }
 
-    /// The history is that of `value(a, i)`, the sample of channel i that came a frames before the next one, a = 1, 2, ..
+    /// The history is that of `value(a, i)`, the sample of channel i that came a frames before the next one,
+    /// a = 1, 2, ..
     pub(crate) fn fill(&mut self, value: impl Fn(usize, usize) -> T) {
         let n = self.channels;
         for (place, slot) in self.samples[..self.len].iter_mut().rev().enumerate() {
@@ -72,7 +73,8 @@ impl<T: Sample> History<T> {
         self.next = self.len;
     }
 
-    /// The sample of `channel` that came `age` >= 1 frames before the next one; 0 where the history does not reach.
+    /// The sample of `channel` that came `age` >= 1 frames before the next one; 0 where the history does not
+    /// reach.
     pub(crate) fn past(&self, age: usize, channel: usize) -> T {
         let back = age.saturating_mul(self.channels) - channel;
         if back > self.len { T::default() } else { self.samples[self.next - back] }

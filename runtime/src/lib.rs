@@ -1,16 +1,16 @@
 //! Runs hybrid multirate filter banks: N slow streams in, one stream M times as fast out.
 //!
-//! Frame k of the input is one sample of each of N channels, x_1\[k\] .. x_N\[k\], taken in one slow period. Each frame gives M
-//! output samples, p = 0..M - 1:
+//! Frame k of the input is one sample of each of N channels, x_1\[k\] .. x_N\[k\], taken in one slow period.
+//! Each frame gives M output samples, p = 0..M - 1:
 //!
 //! ```text
 //! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j]          FIR: taps f_i[n] at the fast rate
 //! s[k + 1] = a s[k] + b x[k],  y[kM..] = c s[k] + d x[k]  recursive: a state space, one step per frame
 //! ```
 //!
-//! A [`Plan`] holds the coefficients in the order in which the kernels use them, and never changes; a [`Stream`] is a plan with
-//! the state of one stream. Its calls allocate nothing, lock nothing, and give the same bits however the frames are cut
-//! into calls and whatever the instruction set.
+//! A [`Plan`] holds the coefficients in the order in which the kernels use them, and never changes; a
+//! [`Stream`] is a plan with the state of one stream. Its calls allocate nothing, lock nothing, and give the
+//! same bits however the frames are cut into calls and whatever the instruction set.
 //!
 //! ```
 //! use hybank_runtime::{Options, Plan, Stream};
@@ -31,8 +31,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Samples need not be interleaved f32: [`Stream::process_planar`] takes a slice per channel, [`Stream::process_pcm`] recordings as they
-//! lie in files, [`ComplexStream`] complex samples, and [`Stream::run`] any [`Input`] and [`Output`].
+//! Samples need not be interleaved f32: [`Stream::process_planar`] takes a slice per channel,
+//! [`Stream::process_pcm`] recordings as they lie in files, [`ComplexStream`] complex samples, and
+//! [`Stream::run`] any [`Input`] and [`Output`].
 //!
 //! | [`Algorithm`] | latency | work per output sample | [`history`](Plan::history) |
 //! |---|---|---|---|

@@ -1,19 +1,21 @@
 //! Calls on several threads.
 //!
-//! A call is halved until its chunks are short, or many; each chunk has a state of its own, made from the history before it,
-//! so its outputs have the bits that one thread would give them. There are more chunks than threads: a thread that is done
-//! takes the next one, so that a thread that was held up does not hold up all.
+//! A call is halved until its chunks are short, or many; each chunk has a state of its own, made from the
+//! history before it, so its outputs have the bits that one thread would give them. There are more chunks
+//! than threads: a thread that is done takes the next one, so that a thread that was held up does not hold
+//! up all.
 
 use crate::adapters::{Input, SplitOutput};
 use crate::algorithms::Filter;
 use crate::{Isa, Sample, ThreadPool};
 use std::ops::Range;
 
-/// Multiply-adds that are worth a chunk: some tens of microseconds, many times what it costs to hand it over.
+/// Multiply-adds that are worth a chunk: some tens of microseconds, many times what it costs to hand it
+/// over.
 const CHUNK_MULTIPLY_ADDS: usize = 1 << 20;
 
-/// Chunks of a long call for each thread, at most: enough for those that are faster to help out, and each long against making
-/// its state.
+/// Chunks of a long call for each thread, at most: enough for those that are faster to help out, and each
+/// long against making its state.
 const CHUNKS_PER_THREAD: usize = 8;
 
 /// A filter whose calls can be cut into chunks.
@@ -32,7 +34,8 @@ pub(crate) trait Chunked: Filter {
     fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> Self::State;
 }
 
-/// Runs a call on all threads and leaves the state after its last frame; returns how many samples were not finite.
+/// Runs a call on all threads and leaves the state after its last frame; returns how many samples were not
+/// finite.
 pub(crate) fn process<F: Chunked>(
     filter: &F,
     state: &mut F::State,
@@ -65,8 +68,9 @@ struct Call<'a, F, I: ?Sized> {
 }
 
 impl<F: Chunked, I: Input + Sync + ?Sized> Call<'_, F, I> {
-    /// The frames of a range to an output of their own. The first chunk has the stream's `state`, the others make theirs;
-    /// returns how many samples were not finite, and the state after the last chunk if it is not the stream's.
+    /// The frames of a range to an output of their own. The first chunk has the stream's `state`, the others
+    /// make theirs; returns how many samples were not finite, and the state after the last chunk if it is
+    /// not the stream's.
     fn chunks(
         &self,
         frames: Range<usize>,

@@ -11,11 +11,11 @@ use std::sync::Arc;
 pub struct Options {
     /// Number type of the FIR kernels.
     pub precision: Precision,
-    /// Number type of recursions, [`Precision::Double`] unless asked for otherwise: a recursion feeds its rounding
-    /// errors back, and in f32 the error is about 1e-7 of full scale divided by 1 - |pole|.
+    /// Number type of recursions, [`Precision::Double`] unless asked for otherwise: a recursion feeds its
+    /// rounding errors back, and in f32 the error is about 1e-7 of full scale divided by 1 - |pole|.
     pub recursion: Precision,
-    /// How FIR filters are computed, [`Algorithm::Direct`] unless asked for otherwise, because the others round otherwise or
-    /// add latency.
+    /// How FIR filters are computed, [`Algorithm::Direct`] unless asked for otherwise, because the others
+    /// round otherwise or add latency.
     pub algorithm: Algorithm,
     /// Instruction set, the widest one unless asked for otherwise.
     pub isa: Isa,
@@ -35,8 +35,8 @@ impl Default for Options {
 /// How a bank runs, for reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanSummary {
-    /// `direct`, `fast-fir` or `overlap-save` (FIR), `parallel-form` (delay lines and second-order sections side by side) or
-    /// `dense` (delay lines and any other states).
+    /// `direct`, `fast-fir` or `overlap-save` (FIR), `parallel-form` (delay lines and second-order sections
+    /// side by side) or `dense` (delay lines and any other states).
     pub algorithm: &'static str,
     /// Number type of the sums: `f32` or `f64`.
     pub numbers: &'static str,
@@ -48,12 +48,13 @@ pub struct PlanSummary {
     pub block: Option<usize>,
     /// Output samples by which the algorithm is later than the bank's own latency.
     pub extra_latency: usize,
-    /// Multiply-adds for each output sample; additions of fast FIR and of transforms count as such. `None` for recursions.
+    /// Multiply-adds for each output sample; additions of fast FIR and of transforms count as such. `None`
+    /// for recursions.
     pub multiply_adds: Option<f64>,
 }
 
-/// A bank made ready to run. It never changes; a clone shares the coefficients, and any number of [streams](crate::Stream) on
-/// any threads may use it at the same time.
+/// A bank made ready to run. It never changes; a clone shares the coefficients, and any number of
+/// [streams](crate::Stream) on any threads may use it at the same time.
 #[derive(Debug, Clone)]
 pub struct Plan {
     coefficients: Coefficients,
@@ -65,12 +66,13 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// FIR filters: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], where `taps[i][n]` = f_i\[n\] at the fast rate,
-    /// i = 1..N, of any lengths, and M = `ratio`. `latency` = m0: the output samples by which the filters were designed to
-    /// be late.
+    /// FIR filters: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], where `taps[i][n]` = f_i\[n\] at the
+    /// fast rate, i = 1..N, of any lengths, and M = `ratio`. `latency` = m0: the output samples by which the
+    /// filters were designed to be late.
     ///
     /// # Errors
-    /// [`BuildError`] if N or M is 0, a tap is not finite, or the filters are too long, for the chosen algorithm or at all.
+    /// [`BuildError`] if N or M is 0, a tap is not finite, or the filters are too long, for the chosen
+    /// algorithm or at all.
     pub fn from_taps(
         taps: &[Vec<f64>],
         ratio: usize,
@@ -106,8 +108,8 @@ impl Plan {
     /// Recursive filters for N = `channels` and M = `ratio`; `latency` as in [`Plan::from_taps`].
     ///
     /// # Errors
-    /// [`BuildError`] if N or M is 0, the matrices do not fit together, an entry is not finite, or an algorithm for FIR
-    /// filters is asked for.
+    /// [`BuildError`] if N or M is 0, the matrices do not fit together, an entry is not finite, or an
+    /// algorithm for FIR filters is asked for.
     pub fn from_state_space(
         filter: &StateSpace,
         [channels, ratio]: [usize; 2],
@@ -148,28 +150,29 @@ impl Plan {
         self.ratio
     }
 
-    /// m0 and what the algorithm adds to it, in output samples: output sample n belongs to the time of fast sample
-    /// n - latency.
+    /// m0 and what the algorithm adds to it, in output samples: output sample n belongs to the time of fast
+    /// sample n - latency.
     pub fn latency(&self) -> usize {
         self.latency
     }
 
-    /// The part of the latency that is due to the algorithm, in output samples: y\[n\] of the equation comes as sample
-    /// n + extra.
+    /// The part of the latency that is due to the algorithm, in output samples: y\[n\] of the equation comes
+    /// as sample n + extra.
     pub fn extra_latency(&self) -> usize {
         self.facts.delay * self.ratio
     }
 
-    /// Frames after which an input is forgotten: K - 1, and for fast FIR K if that is odd. `None` for a recursion, which
-    /// never forgets.
+    /// Frames after which an input is forgotten: K - 1, and for fast FIR K if that is odd. `None` for a
+    /// recursion, which never forgets.
     pub fn history(&self) -> Option<usize> {
         self.facts.history
     }
 
-    /// Frames by which a stream is processed: two streams of the same input, one begun a multiple of so many frames after the
-    /// other and with its [history](Plan::history) before that, have the same bits. 1 for the direct algorithm, 2 for fast FIR, the
-    /// 2 S B frames of a batch for overlap-save. For recursions 64: denormals are flushed so often, and the bits are the
-    /// same only if the state is. How a stream is cut into calls never matters.
+    /// Frames by which a stream is processed: two streams of the same input, one begun a multiple of so many
+    /// frames after the other and with its [history](Plan::history) before that, have the same bits. 1 for
+    /// the direct algorithm, 2 for fast FIR, the 2 S B frames of a batch for overlap-save. For recursions
+    /// 64: denormals are flushed so often, and the bits are the same only if the state is. How a stream is
+    /// cut into calls never matters.
     pub fn alignment(&self) -> usize {
         self.facts.alignment
     }

@@ -5,7 +5,8 @@ use crate::simd::Element;
 /// f32 or f64: what kernels compute in, and what samples in memory are. No other type can be one.
 #[allow(private_bounds, reason = "the private bound closes the trait")]
 pub trait Sample: Element + PartialOrd {
-    /// States of recursions below this become zero, before they are denormal and slow: 1e-30 (f32), 1e-280 (f64).
+    /// States of recursions below this become zero, before they are denormal and slow: 1e-30 (f32), 1e-280
+    /// (f64).
     const NEGLIGIBLE: Self;
     /// Rounds to the nearest.
     fn from_f64(value: f64) -> Self;

@@ -6,18 +6,35 @@ use crate::adapters::{Input, Interleaved, Output, Planar, Zeros};
 use crate::engine::Engine;
 use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, SwapError};
 
-/// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the first frame.
+/// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
+/// first frame.
 ///
-/// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls take whole frames
-/// and return the samples written. They allocate nothing and lock nothing (except those of a [`ThreadPool`](crate::ThreadPool)),
-/// and the same frames give the same bits however they are cut into calls.
+/// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls
+/// take whole frames and return the samples written. They allocate nothing and lock nothing (except those of
+/// a [`ThreadPool`](crate::ThreadPool)), and the same frames give the same bits however they are cut into
+/// calls.
 ///
 /// # Worst case of a call
-/// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. The direct algorithm and overlap-save
-/// notice them, and sums that overflow, in their outputs: each frame is filtered at most twice, so that such a call does at
-/// most twice the multiply-adds of any other. Fast FIR and recursions look at the input first, and filter each frame once; fast FIR
-/// computes outputs that overflow once more from the definition in f64 (N K multiply-adds, not vectorised). FIR filters
-/// take no notice of denormals beyond what the processor does; recursions flush them from their state every 64 frames.
+/// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. Whatever the input
+/// holds, a frame is filtered at most twice, so that a call does at most twice the multiply-adds of any
+/// other call of its length:
+///
+/// | | NaN or infinity in the input | sums that overflow |
+/// |---|---|---|
+/// | direct | seen in the outputs; filtered again with zeros | filtered again at most once |
+/// | fast FIR | replaced first; filtered once | each such output once more by the definition in f64: N K multiply-adds |
+/// | overlap-save | replaced first; filtered once | the batch once more, from smaller numbers |
+/// | recursive | replaced first; filtered once | filtered once; the state becomes 0 and is [counted](Stream::state_resets) |
+///
+/// Only the repair of fast FIR may cost more than filtering twice, because it is not vectorised. The search
+/// for what is not finite passes over the input at most three times.
+///
+/// Denormals change none of these counts. FIR filters flush nothing: a denormal is a number like any other,
+/// and the floating-point mode of the thread is neither changed nor asked for. Where the processor handles
+/// denormals in microcode, each instruction that meets one takes some hundred cycles more; a thread that
+/// cannot afford this sets its flush-to-zero mode. Recursions flush their states every 64 frames: those
+/// below 1e-30 (f32) or 1e-280 (f64) become 0, so that a state that fades away is denormal for less than 64
+/// frames.
 ///
 /// A clone is a second stream at the same place.
 #[derive(Debug, Clone)]
@@ -91,9 +108,9 @@ impl Stream {
         (self.position, self.replaced) = (0, 0);
     }
 
-    /// Filters interleaved samples in f32 or f64 (whatever the precision of the kernels): sample of channel i in frame k at
-    /// `input[k N + i]`, output sample p of that frame at `output[k M + p]`. Returns the samples written,
-    /// `input.len() / N * M`.
+    /// Filters interleaved samples in f32 or f64 (whatever the precision of the kernels): sample of channel
+    /// i in frame k at `input[k N + i]`, output sample p of that frame at `output[k M + p]`. Returns the
+    /// samples written, `input.len() / N * M`.
     ///
     /// # Errors
     /// [`ProcessError`] if the slices do not fit; nothing is processed then.
@@ -101,7 +118,8 @@ impl Stream {
         self.run(&Interleaved::new(input, self.channels())?, output)
     }
 
-    /// As [`Stream::process`], from a slice for each channel: sample of channel i in frame k at `input[i][k]`.
+    /// As [`Stream::process`], from a slice for each channel: sample of channel i in frame k at
+    /// `input[i][k]`.
     ///
     /// # Errors
     /// As [`Stream::process`], and if the channels differ in length.
@@ -113,9 +131,9 @@ impl Stream {
         self.run(&Planar::new(input)?, output)
     }
 
-    /// As [`Stream::process`], from and to samples as they lie in files and pipes: the channels are those of all `input`
-    /// recordings one after another, the frames those that all of them have. Outputs that do not fit an integer format
-    /// saturate and are counted.
+    /// As [`Stream::process`], from and to samples as they lie in files and pipes: the channels are those of
+    /// all `input` recordings one after another, the frames those that all of them have. Outputs that do not
+    /// fit an integer format saturate and are counted.
     ///
     /// # Errors
     /// As [`Stream::process`].
@@ -142,9 +160,10 @@ impl Stream {
         Ok(samples)
     }
 
-    /// As [`Stream::run`], on all threads of `pool` at once, with the same bits: each takes chunks of frames and begins with
-    /// the history before them. Recursions, overlap-save, and calls of less than some two million multiply-adds stay on
-    /// this thread. Unlike `run` it allocates (the states of the chunks) and waits for the threads.
+    /// As [`Stream::run`], on all threads of `pool` at once, with the same bits: each takes chunks of frames
+    /// and begins with the history before them. Recursions, overlap-save, and calls of less than some two
+    /// million multiply-adds stay on this thread. Unlike `run` it allocates (the states of the chunks) and
+    /// waits for the threads.
     ///
     /// # Errors
     /// As [`Stream::process`].
@@ -189,8 +208,8 @@ impl Stream {
         self.run_parallel(input, output, pool)
     }
 
-    /// Brings out the last samples by [`Plan::flush_frames`] frames of zeros, which are part of the stream like any others.
-    /// Returns the samples written, that many frames times M; `output` needs room for them.
+    /// Brings out the last samples by [`Plan::flush_frames`] frames of zeros, which are part of the stream
+    /// like any others. Returns the samples written, that many frames times M; `output` needs room for them.
     ///
     /// # Errors
     /// [`ProcessError::OutputTooShort`]; nothing is processed then.
@@ -199,8 +218,8 @@ impl Stream {
         self.run(&zeros, output)
     }
 
-    /// Goes on by other coefficients of the same N and M, with the history kept: for a bank that was redesigned while the
-    /// stream runs. Allocates the new state; [`Stream::continue_from`] does not.
+    /// Goes on by other coefficients of the same N and M, with the history kept: for a bank that was
+    /// redesigned while the stream runs. Allocates the new state; [`Stream::continue_from`] does not.
     ///
     /// # Errors
     /// [`SwapError`]; the stream is as before then.
@@ -211,18 +230,19 @@ impl Stream {
         Ok(())
     }
 
-    /// Makes this stream, whatever it was, the continuation of `running` by its own plan, at the same frame and with the same counts.
-    /// Does not allocate: make the new stream on another thread, and call this at a frame boundary on the thread
-    /// that runs.
+    /// Makes this stream, whatever it was, the continuation of `running` by its own plan, at the same frame
+    /// and with the same counts. Does not allocate: make the new stream on another thread, and call this at
+    /// a frame boundary on the thread that runs.
     ///
-    /// From one FIR plan without added latency (direct, fast FIR; any K, any precision) to another, the outputs are
-    /// those that the new plan would have given from the beginning, bit for bit: at once if the [history](Plan::history) of
-    /// the new plan is no longer than that of the old one, else as many frames later as the new one looks back. What the
-    /// old plan had forgotten counts as 0 in between.
+    /// From one FIR plan without added latency (direct, fast FIR; any K, any precision) to another, the
+    /// outputs are those that the new plan would have given from the beginning, bit for bit: at once if the
+    /// [history](Plan::history) of the new plan is no longer than that of the old one, else as many frames
+    /// later as the new one looks back. What the old plan had forgotten counts as 0 in between.
     ///
-    /// From one overlap-save plan to another of the same K, transform and precision, outputs of complete batches are still those of the old
-    /// plan; the new one makes all batches from the running one on, so that it has taken over after one
-    /// [alignment](Plan::alignment). A recursion can only go on by its own plan: its state means nothing to other coefficients.
+    /// From one overlap-save plan to another of the same K, transform and precision, outputs of complete
+    /// batches are still those of the old plan; the new one makes all batches from the running one on, so
+    /// that it has taken over after one [alignment](Plan::alignment). A recursion can only go on by its own
+    /// plan: its state means nothing to other coefficients.
     ///
     /// # Errors
     /// [`SwapError`]; the stream is as before then.

@@ -1,83 +1,185 @@
-//! Calls of a stream allocate nothing, whatever the algorithm, the precision and the form of the samples.
+//! Calls of a stream allocate nothing, whatever the algorithm, the precision, the entry point and the form
+//! of the samples.
 
 use hybank_runtime::{
-    Algorithm, ComplexStream, Options, PcmFormat, PcmOutput, Plan, Precision, StateSpace, Stream,
+    Algorithm, ComplexStream, Input, Interleaved, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan,
+    Planar, Precision, SampleLayout, StateSpace, Stream, Zeros,
 };
 
 const N: usize = 2;
 const M: usize = 3;
 const FRAMES: usize = 700;
+/// Frames per call: one, more than a block of a recursion, many.
+const CALLS: [usize; 3] = [1, 65, FRAMES];
 
+/// Every algorithm in both precisions, and all of one channel, which planar input has as it lies.
 fn plans() -> Vec<Plan> {
-    let taps = vec![vec![0.25; 20 * M]; N];
-    let system = StateSpace {
-        a: vec![vec![0.5, 0.25], vec![-0.25, 0.5]],
-        b: vec![vec![1.0; N]; 2],
-        c: vec![vec![1.0, -1.0]; M],
-        d: vec![vec![0.5; N]; M],
-    };
+    let both = [Precision::Single, Precision::Double];
+    let plans = |channels| both.into_iter().flat_map(move |precision| plans_of(channels, precision));
+    plans(N).chain(plans(1)).collect()
+}
+
+fn plans_of(channels: usize, precision: Precision) -> Vec<Plan> {
+    let options = |algorithm| Options { algorithm, precision, recursion: precision, ..Options::default() };
     let fir = [Algorithm::Direct, Algorithm::FastFir, Algorithm::OverlapSave { transform: Some(64) }];
-    let options = |precision| Options { precision, recursion: precision, ..Options::default() };
-    let both = [Precision::Single, Precision::Double].map(options);
-    let fir = both.iter().flat_map(|&options| fir.map(|algorithm| Options { algorithm, ..options }));
-    fir.map(|options| Plan::from_taps(&taps, M, 0, options).unwrap())
-        .chain(both.map(|options| Plan::from_state_space(&system, [N, M], 0, options).unwrap()))
-        .collect()
+    let taps = vec![vec![0.25; 20 * M]; channels];
+    let by = |algorithm| Plan::from_taps(&taps, M, 4, options(algorithm)).unwrap();
+    // Two states side by side, which run as a section, and five that all depend on one another.
+    let recursive = |order: usize| {
+        let system = StateSpace {
+            a: (0..order).map(|i| (0..order).map(|j| 0.25 / (1 + i + j) as f64).collect()).collect(),
+            b: vec![vec![1.0; channels]; order],
+            c: vec![vec![1.0; order]; M],
+            d: vec![vec![0.5; channels]; M],
+        };
+        Plan::from_state_space(&system, [channels, M], 4, options(Algorithm::Direct)).unwrap()
+    };
+    fir.map(by).into_iter().chain([2, 5].map(recursive)).collect()
 }
 
 /// Fails if `call` allocates.
-fn quiet(plan: &Plan, form: &str, call: impl FnOnce()) {
-    let count = allocation_counter::measure(call).count_total;
+fn quiet<R>(plan: &Plan, form: &str, call: impl FnOnce() -> R) -> R {
+    let mut result = None;
+    let count = allocation_counter::measure(|| result = Some(call())).count_total;
     assert_eq!(count, 0, "{form} by {:?}", plan.summary());
+    result.unwrap()
+}
+
+/// An input and an output through [`Stream::run`].
+fn quiet_run(
+    stream: &mut Stream,
+    form: &str,
+    input: &(impl Input + ?Sized),
+    output: &mut (impl Output + ?Sized),
+) {
+    let plan = stream.plan().clone();
+    let wanted = input.frames() * M;
+    assert_eq!(quiet(&plan, form, || stream.run(input, output)), Ok(wanted), "{form}");
 }
 
 #[test]
-fn no_call_allocates() {
-    // The counter counts.
+fn the_counter_counts() {
     assert!(allocation_counter::measure(|| drop(Stream::new(&plans()[0]))).count_total > 0);
+}
+
+#[test]
+fn all_algorithms_are_among_the_plans() {
+    let names: std::collections::BTreeSet<_> = plans().iter().map(Plan::algorithm).collect();
+    assert_eq!(Vec::from_iter(names), ["dense", "direct", "fast-fir", "overlap-save", "parallel-form"]);
+}
+
+#[test]
+fn samples_in_memory() {
     for plan in plans() {
-        let (single, double) = ([0.5f32; FRAMES * N], [0.5f64; FRAMES * N]);
-        let (mut out, mut wide) = ([0.0f32; FRAMES * M], [0.0f64; FRAMES * M]);
+        let n = plan.channels();
+        let (single, double) = (vec![0.5f32; FRAMES * n], vec![0.5f64; FRAMES * n]);
+        let (mut out, mut wide) = (vec![0f32; FRAMES * M], vec![0f64; FRAMES * M]);
         let mut stream = Stream::new(&plan);
-        for part in [1, 65, FRAMES] {
-            quiet(&plan, "f32", || {
-                stream.process(&single[..part * N], &mut out).unwrap();
-            });
-            quiet(&plan, "f64", || {
-                stream.process(&double[..part * N], &mut wide).unwrap();
-            });
-            let channels = [&single[..part], &single[FRAMES..FRAMES + part]];
-            quiet(&plan, "planar", || {
-                stream.process_planar(&channels, &mut out).unwrap();
-            });
+        for frames in CALLS {
+            let (single, double) = (&single[..frames * n], &double[..frames * n]);
+            quiet(&plan, "f32", || stream.process(single, &mut out)).unwrap();
+            quiet(&plan, "f64", || stream.process(double, &mut wide)).unwrap();
+            let channels = vec![&single[..frames]; n];
+            quiet(&plan, "planar f32", || stream.process_planar(&channels, &mut out)).unwrap();
+            let channels = vec![&double[..frames]; n];
+            quiet(&plan, "planar f64", || stream.process_planar(&channels, &mut wide)).unwrap();
+            let input = Interleaved::new(single, n).unwrap();
+            quiet_run(&mut stream, "f32 to f64", &input, &mut wide[..]);
+            let input = Planar::new(&channels).unwrap();
+            quiet_run(&mut stream, "planar f64 to f32", &input, &mut out[..]);
+            quiet_run(&mut stream, "zeros", &Zeros { channels: n, frames }, &mut out[..]);
         }
-        let mut bytes = [0; FRAMES * M * 2];
-        let mut pcm = PcmOutput { format: PcmFormat::S16Le, bytes: &mut bytes, clipped: 0 };
-        let input = hybank_runtime::Interleaved::new(&single, N).unwrap();
-        quiet(&plan, "PCM", || {
-            stream.run(&input, &mut pcm).unwrap();
-        });
-        let broken = [f32::NAN; FRAMES * N];
-        quiet(&plan, "NaN", || {
-            stream.process(&broken, &mut out).unwrap();
-        });
-        assert_eq!(stream.replaced(), broken.len() as u64);
-        quiet(&plan, "reset", || stream.reset());
-        let complex = [[0.5f32, -0.5]; FRAMES * N];
-        let mut output = [[0.0f32; 2]; FRAMES * M];
-        let mut stream = ComplexStream::new(&plan);
-        quiet(&plan, "complex", || {
-            stream.process(&complex, &mut output).unwrap();
-        });
     }
 }
 
 #[test]
-fn going_on_by_another_plan_does_not_allocate() {
+fn samples_as_they_lie_in_files() {
+    for plan in plans() {
+        let n = plan.channels();
+        let mut stream = Stream::new(&plan);
+        for (from, to) in PcmFormat::ALL.into_iter().zip(PcmFormat::ALL.into_iter().rev()) {
+            let bytes = vec![1; FRAMES * n * 8];
+            let mut out = vec![0; FRAMES * M * 8];
+            // A recording of all channels, one for each, and samples in containers of more bytes.
+            let packed = SampleLayout::packed(from);
+            let wide = SampleLayout { container: 8, ..packed };
+            for (layout, channels, frames) in [packed, wide]
+                .into_iter()
+                .flat_map(|layout| [(layout, n), (layout, 1)])
+                .flat_map(|(layout, channels)| CALLS.map(|frames| (layout, channels, frames)))
+            {
+                let bytes = &bytes[..frames * channels * layout.container];
+                let recordings = vec![PcmFrames { layout, channels, bytes }; n / channels];
+                let mut output = PcmOutput { format: to, bytes: &mut out, clipped: 0 };
+                let form = format!("{from} to {to}");
+                let written = quiet(&plan, &form, || stream.process_pcm(&recordings, &mut output));
+                assert_eq!(written, Ok(frames * M));
+            }
+        }
+    }
+}
+
+#[test]
+fn flush_reset_and_calls_that_are_refused() {
+    for plan in plans() {
+        let n = plan.channels();
+        let mut stream = Stream::new(&plan);
+        let samples = plan.flush_frames() * M;
+        assert!(samples > 0);
+        let (mut out, mut bytes) = (vec![0f32; samples], vec![0; 2 * samples]);
+        assert_eq!(quiet(&plan, "flush", || stream.flush(&mut out[..])), Ok(samples));
+        let mut pcm = PcmOutput { format: PcmFormat::S16Le, bytes: &mut bytes, clipped: 0 };
+        assert_eq!(quiet(&plan, "flush to PCM", || stream.flush(&mut pcm)), Ok(samples));
+        quiet(&plan, "no frames", || stream.process::<f32>(&[], &mut out)).unwrap();
+        let input = vec![0f32; n * FRAMES];
+        assert!(quiet(&plan, "too short", || stream.process(&input, &mut [])).is_err());
+        quiet(&plan, "reset", || stream.reset());
+    }
+}
+
+#[test]
+fn samples_that_are_not_finite_or_overflow() {
+    for plan in plans() {
+        let mut stream = Stream::new(&plan);
+        let mut out = vec![0f32; FRAMES * M];
+        for (value, replaced) in [(f32::NAN, 1), (f32::INFINITY, 1), (f32::MAX, 0), (1e-40, 0)] {
+            let input = vec![value; FRAMES * plan.channels()];
+            let before = stream.replaced();
+            quiet(&plan, &format!("{value:e}"), || stream.process(&input, &mut out)).unwrap();
+            assert_eq!(stream.replaced() - before, replaced * input.len() as u64, "{value:e}");
+        }
+    }
+}
+
+#[test]
+fn complex_samples() {
+    for plan in plans() {
+        let input = vec![[0.5f32, -0.5]; FRAMES * plan.channels()];
+        let wide = vec![[0.5f64, -0.5]; FRAMES * plan.channels()];
+        let (mut out, mut wide_out) = (vec![[0f32; 2]; FRAMES * M], vec![[0f64; 2]; FRAMES * M]);
+        let (mut stream, mut next) = (ComplexStream::new(&plan), ComplexStream::new(&plan));
+        for frames in CALLS {
+            let input = &input[..frames * plan.channels()];
+            quiet(&plan, "complex f32", || stream.process(input, &mut out)).unwrap();
+            let input = &wide[..frames * plan.channels()];
+            quiet(&plan, "complex f64", || stream.process(input, &mut wide_out)).unwrap();
+        }
+        quiet(&plan, "complex continuation", || next.continue_from(&stream)).unwrap();
+        let mut tail = vec![[0f32; 2]; plan.flush_frames() * M];
+        quiet(&plan, "complex flush", || stream.flush(&mut tail)).unwrap();
+        quiet(&plan, "complex reset", || stream.reset());
+    }
+}
+
+#[test]
+fn going_on_by_another_plan() {
     let (old, new) = (plans(), plans());
-    let pairs = old.iter().zip(&new).filter(|(plan, _)| plan.history().is_some());
-    for (old, new) in pairs {
-        let (running, mut next) = (Stream::new(old), Stream::new(new));
-        quiet(new, "continuation", || next.continue_from(&running).unwrap());
+    for (old, new) in old.iter().zip(&new) {
+        // A recursion goes on by its own plan only.
+        let new = if old.history().is_some() { new } else { old };
+        let (mut running, mut next) = (Stream::new(old), Stream::new(new));
+        running.process(&vec![0.5f32; 77 * old.channels()], &mut vec![0.0; 77 * M]).unwrap();
+        quiet(new, "continuation", || next.continue_from(&running)).unwrap();
+        assert_eq!(next.position(), 77);
     }
 }

@@ -21,8 +21,8 @@ fn samples(count: usize) -> Vec<f64> {
     (0..count).map(|i| (i * i * 7919 % 2003) as f64 / 1001.0 - 1.0).collect()
 }
 
-/// The outputs of a stream for two calls of unequal length, without those that the algorithm adds at the beginning;
-/// zeros after the input bring out the last ones.
+/// The outputs of a stream for two calls of unequal length, without those that the algorithm adds at the
+/// beginning; zeros after the input bring out the last ones.
 fn run(plan: &Plan, input: &[f64]) -> Vec<f64> {
     let (n, m) = (plan.channels(), plan.ratio());
     let frames = input.len() / n + plan.extra_latency() / m;

@@ -23,7 +23,7 @@ impl FixedPoint {
     }
 
     /// Whether all integers are zero.
-    pub fn is_silent(&self) -> bool {
+    pub fn is_zero(&self) -> bool {
         self.integers.iter().flatten().all(|&integer| integer == 0)
     }
 

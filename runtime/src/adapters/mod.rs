@@ -1,8 +1,10 @@
-//! Samples of a call, wherever and however they lie: to and from interleaved frames of the kernels' number type.
+//! Samples of a call, wherever and however they lie: to and from interleaved frames of the kernels' number
+//! type.
 //!
-//! A stream takes any [`Input`] and gives to any [`Output`]; those here are [`Interleaved`] and [`Planar`] samples in
-//! memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)), [`Zeros`], slices of samples and
-//! [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one by one, so that no adapter needs memory of its own.
+//! A stream takes any [`Input`] and gives to any [`Output`]; those here are [`Interleaved`] and [`Planar`]
+//! samples in memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)), [`Zeros`], slices
+//! of samples and [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one by one, so that no
+//! adapter needs memory of its own.
 
 mod complex;
 mod interleaved;
@@ -25,13 +27,15 @@ pub trait Input {
     /// Frames of the call.
     fn frames(&self) -> usize;
 
-    /// All samples, frame after frame, if they lie so in memory and are of type `T`. The kernels read them there.
+    /// All samples, frame after frame, if they lie so in memory and are of type `T`. The kernels read them
+    /// there.
     fn in_memory<T: Sample>(&self) -> Option<&[T]> {
         None
     }
 
-    /// Copies frames from frame `first` on to `samples`, frame after frame: `samples.len() / N` frames, all of which are
-    /// there. NaN and infinity are copied as they are. `isa` is the instruction set for conversions.
+    /// Copies frames from frame `first` on to `samples`, frame after frame: `samples.len() / N` frames, all
+    /// of which are there. NaN and infinity are copied as they are. `isa` is the instruction set for
+    /// conversions.
     fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]);
 }
 
@@ -40,8 +44,8 @@ pub trait Output {
     /// Samples that fit.
     fn capacity(&self) -> usize;
 
-    /// Room for the samples of a range, if samples lie one after another in memory and are of type `T`. The kernels write
-    /// them there; some may be written more than once.
+    /// Room for the samples of a range, if samples lie one after another in memory and are of type `T`. The
+    /// kernels write them there; some may be written more than once.
     fn slots<T: Sample>(&mut self, _samples: Range<usize>) -> Option<&mut [T]> {
         None
     }
@@ -102,8 +106,8 @@ fn convert<S: Sample, T: Sample>(from: &[S], to: &mut [T]) {
     }
 }
 
-/// Frames of f32 from rows, a row for each of N <= 128 channels: `row(i, k, samples)` copies samples of channel i from frame k
-/// on.
+/// Frames of f32 from rows, a row for each of N <= 128 channels: `row(i, k, samples)` copies samples of
+/// channel i from frame k on.
 fn interleave_rows(isa: Isa, n: usize, samples: &mut [f32], row: impl Fn(usize, usize, &mut [f32])) {
     let frames = samples.len() / n;
     let mut rows = [0f32; SCRATCH];

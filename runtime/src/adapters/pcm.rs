@@ -5,7 +5,8 @@ use crate::pcm::for_pcm_format;
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample};
 
-/// Room for output samples as they lie in files and pipes. Those beyond the full scale of an integer format saturate.
+/// Room for output samples as they lie in files and pipes. Those beyond the full scale of an integer format
+/// saturate.
 #[derive(Debug)]
 pub struct PcmOutput<'a> {
     /// How samples are to be stored.
@@ -68,7 +69,7 @@ fn load_each<T: Sample>(recordings: &[PcmFrames<'_>], first: usize, samples: &mu
 }
 
 /// The channels of a recording to the first columns of frames of `n` samples (the last
-/// frame may end behind them).
+/// frame may end after them).
 fn load_columns<T: Sample>(recording: &PcmFrames<'_>, first: usize, n: usize, samples: &mut [T]) {
     let container = recording.layout.container;
     let bytes = recording.bytes.chunks_exact(recording.frame_bytes()).skip(first);

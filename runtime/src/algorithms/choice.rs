@@ -1,8 +1,9 @@
 //! Which algorithm FIR filters run by, and what it costs.
 //!
-//! The cost of a frame is counted in multiply-adds of whole vectors. Its constants were fitted by `tools/form_costs.py` to what
-//! `cargo bench --bench algorithm_crossover` measured (see `benches/README.md`), in f32 and f64 alike. They depend on the bank and the
-//! number type only, not on the processor, its load or the length of calls: a bank gives the same bits everywhere.
+//! The cost of a frame is counted in multiply-adds of whole vectors. Its constants were fitted by
+//! `tools/algorithm_costs.py` to what `cargo bench --bench algorithm_crossover` measured (see
+//! `benches/README.md`), in f32 and f64 alike. They depend on the bank and the number type only, not on the
+//! processor, its load or the length of calls: a bank gives the same bits everywhere.
 
 use super::filter::phase_taps;
 use super::overlap_save::Shape;
@@ -15,13 +16,14 @@ pub enum Algorithm {
     /// Every product is computed; no sample is later than the bank's latency.
     #[default]
     Direct,
-    /// Two-parallel fast FIR: pairs of frames through three filters of half the length in place of four (Karatsuba), for
-    /// filters of K >= 2 taps per phase. Up to a quarter less work for long ones, and no sample is later. The error is
-    /// relative to the norms of each channel's filter and of the inputs in its history and not to each product: a few eps,
-    /// for white noise up to 1.4 times that of the direct algorithm.
+    /// Two-parallel fast FIR: pairs of frames through three filters of half the length in place of four
+    /// (Karatsuba), for filters of K >= 2 taps per phase. Up to a quarter less work for long ones, and no
+    /// sample is later. The error is relative to the norms of each channel's filter and of the inputs in its
+    /// history and not to each product: a few eps, for white noise up to 1.4 times that of the direct
+    /// algorithm.
     FastFir,
-    /// Fourier transforms of `transform` = F frames, a power of two from 16 on that is at least K, or of the best such
-    /// length. For long filters a fraction of the work, but the output is later by
+    /// Fourier transforms of `transform` = F frames, a power of two from 16 on that is at least K, or of the
+    /// best such length. For long filters a fraction of the work, but the output is later by
     /// [`extra_latency`](crate::Plan::extra_latency).
     OverlapSave {
         /// F; `None` for the best length.
@@ -59,7 +61,7 @@ const PAIR_OUTPUTS: f64 = 12.0;
 const PAIR_INPUTS: f64 = 10.0;
 /// Each input of overlap-save, and each frame.
 const BLOCK_INPUT: f64 = 0.5;
-const BLOCK_TICK: f64 = 1.0;
+const BLOCK_FRAME: f64 = 1.0;
 
 /// A longer transform must be cheaper by this factor: it makes outputs later.
 const WORTH_LENGTH: f64 = 0.93;
@@ -70,8 +72,8 @@ impl Algorithm {
     /// The algorithm that filters are to run by.
     ///
     /// # Errors
-    /// [`BuildError::Transform`] if no transform, or not the given one, can hold the filters; [`BuildError::TooShort`]
-    /// if there are no pairs of taps to halve.
+    /// [`BuildError::Transform`] if no transform, or not the given one, can hold the filters;
+    /// [`BuildError::TooShort`] if there are no pairs of taps to halve.
     pub(crate) fn choose(
         self,
         taps: &[Vec<f64>],
@@ -168,7 +170,7 @@ impl Size {
         let (inputs, outputs) = (shape.inputs() as f64, shape.outputs() as f64);
         let transforms = ROW_LEVEL * (inputs + outputs) * f64::from(len.ilog2());
         let products = 4.0 * outputs * self.channels as f64;
-        let samples = BLOCK_OUTPUT * self.ratio as f64 + BLOCK_INPUT * self.channels as f64 + BLOCK_TICK;
+        let samples = BLOCK_OUTPUT * self.ratio as f64 + BLOCK_INPUT * self.channels as f64 + BLOCK_FRAME;
         len as f64 / shape.batch() as f64 * (transforms + products) + samples
     }
 
@@ -212,7 +214,8 @@ mod tests {
 
     #[test]
     fn long_filters_are_transformed_and_short_ones_are_not() {
-        // Measured: the direct algorithm wins at the first K, overlap-save at the second by a third at least.
+        // Measured: the direct algorithm wins at the first K, overlap-save at the second by a third at
+        // least.
         for (n, m, short, long) in
             [(1, 1, 16, 512), (2, 2, 8, 128), (4, 4, 4, 64), (8, 8, 4, 16), (16, 16, 2, 8)]
         {

@@ -1,11 +1,14 @@
 //! The direct polyphase algorithm for FIR filters.
 //!
-//! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], as one product of a frame's history (the last K frames as they lie)
-//! with a vector of coefficients for each phase p. The order of the sum is that of the [kernels](crate::simd); it is the
-//! same wherever the frame stands in its call.
+//! y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], as one product of a frame's history (the last K frames as
+//! they lie) with a vector of coefficients for each phase p. The order of the sum is that of the
+//! [kernels](crate::simd); it is the same wherever the frame stands in its call.
 //!
-//! NaN and infinity are detected in the output sums, not by a pass over the input. A block in which they are found is
-//! filtered again with zeros in their place, so that each frame is filtered at most twice.
+//! NaN and infinity are detected in the output sums, not by a pass over the input. A block in which they are
+//! found is filtered again with zeros in their place, so that each frame is filtered at most twice.
+
+#[cfg(test)]
+mod tests;
 
 use super::filter::{Facts, Filter, Past, check_finite, phase_taps, replace_not_finite};
 use crate::adapters::{Input, Output};
@@ -85,8 +88,9 @@ impl<T: Sample> Direct<T> {
         History::new(n, past + more * n, block * n, vector * n)
     }
 
-    /// Frames at the beginning of a call that go through the state's history although the others need not: those whose
-    /// history is there, and as many as it takes for the others to fill vectors. `None` if all had better go there.
+    /// Frames at the beginning of a call that go through the state's history although the others need not:
+    /// those whose history is there, and as many as it takes for the others to fill vectors. `None` if all
+    /// had better go there.
     fn head(&self, frames: usize) -> Option<usize> {
         let vector = self.filters.tiling().vector;
         let head = self.history_frames + (frames.wrapping_sub(self.history_frames) & (vector - 1));
@@ -94,10 +98,12 @@ impl<T: Sample> Direct<T> {
         (pays && head <= self.block).then_some(head)
     }
 
-    /// Filters samples in the caller's memory to outputs there, segment by segment, until one may not be finite; returns
-    /// the frames before that segment, all of them if there is none, with the history that follows them.
+    /// Filters samples in the caller's memory to outputs there, segment by segment, until one may not be
+    /// finite; returns the frames before that segment, all of them if there is none, with the history that
+    /// follows them.
     ///
-    /// The head is filtered last in its segment: its loads would straddle recent stores, and store forwarding would stall.
+    /// The head is filtered last in its segment: its loads would straddle recent stores, and store
+    /// forwarding would stall.
     fn process_in_memory(
         &self,
         history: &mut History<T>,
@@ -114,7 +120,7 @@ impl<T: Sample> Direct<T> {
             Segment { x, first, frames: end - first }
         };
         let len = if self.filters.reads_once() { SEGMENT_BLOCKS * self.block } else { self.block };
-        // Whole vectors, so that all segments behind it are whole vectors too.
+        // Whole vectors, so that all segments after it are whole vectors too.
         let first = frames.min(head + ((len - head) & !(vector - 1)));
         if !self.run(&[segment(head, first), begin], out) {
             return 0;
@@ -131,8 +137,8 @@ impl<T: Sample> Direct<T> {
         done
     }
 
-    /// Filters at most a block through the state's history; returns how many samples were not finite and were taken
-    /// as 0. If that is `expected`, they are looked for before filtering and not after it.
+    /// Filters at most a block through the state's history; returns how many samples were not finite and
+    /// were taken as 0. If that is `expected`, they are looked for before filtering and not after it.
     fn process_block(
         &self,
         state: &mut DirectState<T>,
@@ -159,8 +165,8 @@ impl<T: Sample> Direct<T> {
         known + found
     }
 
-    /// Filters the frames in the history's room; returns how many samples were not finite and were taken as 0, if it is not
-    /// known that there are none.
+    /// Filters the frames in the history's room; returns how many samples were not finite and were taken as
+    /// 0, if it is not known that there are none.
     fn filter_room(&self, history: &mut History<T>, frames: usize, out: &mut [T], known_finite: bool) -> u64 {
         // Filtered first: hardly ever is there anything to replace.
         if self.run(&[Segment { x: history.view(), first: 0, frames }], out) || known_finite {

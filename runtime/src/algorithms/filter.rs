@@ -20,7 +20,8 @@ pub(crate) trait Filter: Debug + Send + Sync {
     /// Makes a state what [`Filter::state`] gives, without allocating.
     fn reset(state: &mut Self::State);
 
-    /// Filters all frames of the input; returns how many samples were not finite and were taken as 0. Does not allocate.
+    /// Filters all frames of the input; returns how many samples were not finite and were taken as 0. Does
+    /// not allocate.
     fn process(
         &self,
         state: &mut Self::State,
@@ -50,14 +51,15 @@ pub(crate) trait Filter: Debug + Send + Sync {
         None
     }
 
-    /// Makes the state what it would be after `position` frames, of which the last ones are `past`. Does not allocate;
-    /// false, with the state as before, if the past does not tell.
+    /// Makes the state what it would be after `position` frames, of which the last ones are `past`. Does not
+    /// allocate; false, with the state as before, if the past does not tell.
     fn load(&self, _state: &mut Self::State, _past: &dyn Past, _position: u64) -> bool {
         false
     }
 
-    /// Takes over the state of another stream, if it means the same to these coefficients. Does not allocate; false, with
-    /// the state as before, if it does not. `same` if the coefficients are the other stream's own.
+    /// Takes over the state of another stream, if it means the same to these coefficients. Does not
+    /// allocate; false, with the state as before, if it does not. `same` if the coefficients are the other
+    /// stream's own.
     fn take_over(&self, _state: &mut Self::State, _other: (&Self, &Self::State), _same: bool) -> bool {
         false
     }
@@ -75,7 +77,7 @@ pub(crate) struct Facts {
     pub(crate) name: &'static str,
     /// Frames after which an input is forgotten; `None` if it never is.
     pub(crate) history: Option<usize>,
-    /// Frames by which outputs are later than the direct form's.
+    /// Frames by which outputs are later than the direct algorithm's.
     pub(crate) delay: usize,
     /// Frames that the stream is processed by.
     pub(crate) alignment: usize,

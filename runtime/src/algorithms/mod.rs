@@ -1,6 +1,7 @@
 //! The ways to compute y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], one module each.
 //!
-//! Each is a pair of values: coefficients in the order of use, which streams share, and the state of one stream.
+//! Each is a pair of values: coefficients in the order of use, which streams share, and the state of one
+//! stream.
 
 pub(crate) mod choice;
 pub(crate) mod direct;

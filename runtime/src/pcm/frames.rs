@@ -24,14 +24,14 @@ impl SampleLayout {
 pub struct PcmFrames<'a> {
     /// How a frame lies in memory.
     pub layout: SampleLayout,
-    /// Samples a frame, at least 1.
+    /// Samples per frame, at least 1.
     pub channels: usize,
     /// The frames, close together.
     pub bytes: &'a [u8],
 }
 
 impl<'a> PcmFrames<'a> {
-    /// Bytes a frame.
+    /// Bytes per frame.
     pub fn frame_bytes(&self) -> usize {
         (self.layout.container * self.channels).max(1)
     }

@@ -81,7 +81,7 @@ impl PcmFormat {
         }
     }
 
-    /// Bytes a sample.
+    /// Bytes per sample.
     pub const fn bytes(self) -> usize {
         match self {
             Self::S8 | Self::U8 => 1,

@@ -2,8 +2,8 @@
 
 use std::arch::x86_64::*;
 
-/// Hides where a value comes from, or else the compiler makes horizontal adds of two shuffles and an add, which
-/// processors split into four slow operations.
+/// Hides where a value comes from, or else the compiler makes horizontal adds of two shuffles and an add,
+/// which processors split into four slow operations.
 macro_rules! opaque {
     ($value:expr) => {{
         #[allow(unused_mut)]
@@ -134,8 +134,8 @@ pub(super) unsafe fn store_both(halves: __m256d, out: [*mut f64; 2]) {
     }
 }
 
-/// [`Vector::store_frames`](super::vector::Vector::store_frames). Halves are stored as they are: a store takes either half of a register, while moving lanes
-/// across halves would compete with the multiply-adds.
+/// [`Vector::store_frames`](super::vector::Vector::store_frames). Halves are stored as they are: a store
+/// takes either half of a register, while moving lanes across halves would compete with the multiply-adds.
 ///
 /// # Safety
 /// As there.
@@ -252,7 +252,7 @@ pub(super) unsafe fn store_frames_f64<const P: usize, const D: usize>(
                 store_both(_mm256_unpackhi_pd(a, b), [at(1), at(3)]);
             }
             (_, 1) => {
-                // In order, because of the place behind three.
+                // In order, because of the place after three.
                 let even = frames(_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
                 let odd = frames(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
                 for (t, quad) in [even[0], odd[0], even[1], odd[1]].into_iter().enumerate() {

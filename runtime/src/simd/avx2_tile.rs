@@ -1,11 +1,11 @@
 //! The loop of the tile that fills the registers of AVX2, in assembly.
 //!
-//! 4 phases times 3 vectors are twelve sums; with three inputs and a coefficient they are exactly its sixteen registers.
-//! The compiler's own order of instructions spills some.
+//! 4 phases times 3 vectors are twelve sums; with three inputs and a coefficient they are exactly its
+//! sixteen registers. The compiler's own order of instructions spills some.
 
 use std::arch::x86_64::*;
 
-/// One step of the tile, the one `$s` steps behind that at the pointers.
+/// One step of the tile, the one `$s` steps after that at the pointers.
 macro_rules! step {
     ($s:literal, $load:literal, $broadcast:literal, $fma:literal, $bytes:literal) => {
         concat!(

@@ -1,4 +1,5 @@
-//! AVX-512: two lane groups are one register, and outputs are stored as whole registers where frames follow each other.
+//! AVX-512: two lane groups are one register, and outputs are stored as whole registers where frames follow
+//! each other.
 
 use super::avx2::{Avx2F32, Avx2F64, register};
 use super::vector::Vector;
@@ -67,7 +68,8 @@ fn zip_pairs_f32(a: __m512, b: __m512) -> [__m512; 2] {
     zip_f64(_mm512_castps_pd(a), _mm512_castps_pd(b)).map(|x| _mm512_castpd_ps(x))
 }
 
-/// [`Vector::store_frames`] for the shapes whose outputs fill registers; false, with nothing done, for the others.
+/// [`Vector::store_frames`] for the shapes whose outputs fill registers; false, with nothing done, for the
+/// others.
 ///
 /// # Safety
 /// As there.

@@ -1,7 +1,7 @@
 //! From an [`Isa`] to compiled code: the one place where the instruction set is chosen.
 //!
-//! A kernel is one body that is generic over the [`Vector`] type. [`compiled`] returns the function that was compiled
-//! for an instruction set. Plans keep these functions, so that a call does not ask again.
+//! A kernel is one body that is generic over the [`Vector`] type. [`compiled`] returns the function that was
+//! compiled for an instruction set. Plans keep these functions, so that a call does not ask again.
 
 #[cfg(target_arch = "x86_64")]
 use super::avx2::{Avx2F32, Avx2F64};
@@ -54,12 +54,12 @@ pub(crate) trait Kernel {
     /// The result.
     type Output;
 
-    /// The body. It and all that it calls must be `#[inline(always)]`: what is not inlined is not compiled for the
-    /// instruction set.
+    /// The body. It and all that it calls must be `#[inline(always)]`: what is not inlined is not compiled
+    /// for the instruction set.
     ///
     /// # Safety
-    /// The caller is compiled for the instruction set of `V`, the processor has it, and the job's memory is there, as
-    /// said for each kernel.
+    /// The caller is compiled for the instruction set of `V`, the processor has it, and the job's memory is
+    /// there, as said for each kernel.
     unsafe fn run<V: Vector<Sample = Self::Sample>>(job: Self::Job<'_>) -> Self::Output;
 }
 
@@ -98,8 +98,8 @@ macro_rules! instruction_sets {
             #[cfg(target_arch = $arch)]
             #[target_feature(enable = $features)]
             unsafe fn $function<K: Kernel>(job: K::Job<'_>) -> K::Output {
-                // SAFETY: this function is compiled for the set, and `compiled` returns it only for an `Isa` that is it;
-                // the rest is the caller's.
+                // SAFETY: this function is compiled for the set, and `compiled` returns it only for an `Isa`
+                // that is it; the rest is the caller's.
                 unsafe { K::run::<<K::Sample as Element>::$kind>(job) }
             }
         )*
@@ -117,8 +117,8 @@ unsafe fn portable<K: Kernel>(job: K::Job<'_>) -> K::Output {
     unsafe { K::run::<<K::Sample as Element>::Portable>(job) }
 }
 
-/// Keeps the compiler from computing both sides of a branch and choosing afterwards, where that costs more than the
-/// branch: an empty instruction, which only one side has.
+/// Keeps the compiler from computing both sides of a branch and choosing afterwards, where that costs more
+/// than the branch: an empty instruction, which only one side has.
 #[inline(always)]
 pub(super) fn keep_branch() {
     #[cfg(all(any(target_arch = "x86_64", target_arch = "aarch64"), not(miri)))]

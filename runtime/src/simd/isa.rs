@@ -4,8 +4,8 @@ use std::fmt;
 
 /// An instruction set of this processor that the kernels are compiled for.
 ///
-/// A value is the proof that the processor has it: only [`Isa::detect`], [`Isa::available`] and [`Isa::portable`]
-/// make one.
+/// A value is the proof that the processor has it: only [`Isa::detect`], [`Isa::available`] and
+/// [`Isa::portable`] make one.
 ///
 /// ```
 /// use hybank_runtime::{Isa, Options};
@@ -97,7 +97,8 @@ impl Isa {
         }
     }
 
-    /// The set with vectors of one lane group that this one includes: for kernels that gain nothing from wider ones.
+    /// The set with vectors of one lane group that this one includes: for kernels that gain nothing from
+    /// wider ones.
     pub(super) const fn narrow(self) -> Self {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
@@ -106,8 +107,9 @@ impl Isa {
         }
     }
 
-    /// True if a multiply-add rounds once. The portable kernels round the product as well on processors without a
-    /// fused multiply-add (x86-64 before 2013), so that their bits differ from those of all other sets.
+    /// True if a multiply-add rounds once. The portable kernels round the product as well on processors
+    /// without a fused multiply-add (x86-64 before 2013), so that their bits differ from those of all other
+    /// sets.
     pub fn fuses(self) -> bool {
         self.0 != Kind::Portable || super::vector::FUSED
     }

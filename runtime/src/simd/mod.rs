@@ -8,14 +8,14 @@
 //! fir  recursion  transform  pairs  pcm  finite  peak      the kernels
 //! ```
 //!
-//! Each kernel is one body that is generic over the vector type, compiled once for each instruction set. `unsafe` is needed
-//! for two things only: to call such a function after the processor was asked, and to load and store
-//! vectors at addresses whose bounds the safe wrapper has checked once for the whole call.
+//! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
+//! `unsafe` is needed for two things only: to call such a function after the processor was asked, and to
+//! load and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call.
 //!
 //! Bits: an output is a sum of a fixed shape, lanes of fused multiply-adds and a tree over the lanes (see
-//! `vector`), the same for every instruction set. So it does not depend on vector width, block size, address or
-//! thread count. Only on an x86 processor without FMA (before 2013) the portable body rounds the
-//! product as well, because a fused multiply-add in software is forty times slower.
+//! `vector`), the same for every instruction set. So it does not depend on vector width, block size, address
+//! or thread count. Only on an x86 processor without FMA (before 2013) the portable body rounds the product
+//! as well, because a fused multiply-add in software is forty times slower.
 #![allow(unsafe_code)]
 #![deny(clippy::undocumented_unsafe_blocks)]
 
@@ -40,6 +40,8 @@ mod portable;
 mod recursion;
 mod transform;
 mod vector;
+#[cfg(test)]
+pub(crate) mod work;
 
 pub(crate) use dispatch::Element;
 pub(crate) use finite::all_finite;

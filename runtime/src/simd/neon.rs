@@ -1,5 +1,6 @@
-//! NEON: one lane group is two registers. Arithmetic has instructions of its own; what else the trait has goes by its
-//! defaults, which the compiler knows how to vectorise, because every aarch64 processor has NEON.
+//! NEON: one lane group is two registers. Arithmetic has instructions of its own; what else the trait has
+//! goes by its defaults, which the compiler knows how to vectorise, because every aarch64 processor has
+//! NEON.
 
 use super::vector::Vector;
 use std::arch::aarch64::*;

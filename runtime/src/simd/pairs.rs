@@ -1,8 +1,9 @@
 //! Frames by twos for two-parallel fast FIR: even frames apart from odd ones, and products together again.
 //!
-//! Nothing but plain loops, compiled for each instruction set: arithmetic on numbers in a row, and copies of frames, which the
-//! compiler would turn into slow shuffles of single numbers if both were one loop. Each number is made by the same few
-//! operations, none of which could be fused, so the bits are the same everywhere.
+//! Nothing but plain loops, compiled for each instruction set: arithmetic on numbers in a row, and copies of
+//! frames, which the compiler would turn into slow shuffles of single numbers if both were one loop. Each
+//! number is made by the same few operations, none of which could be fused, so the bits are the same
+//! everywhere.
 
 use super::dispatch::{Element, Kernel, compiled};
 use super::isa::Isa;

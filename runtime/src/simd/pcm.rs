@@ -10,7 +10,8 @@ use std::marker::PhantomData;
 /// Lanes of a group.
 const GROUP: usize = 8;
 
-/// Decodes samples from the first on as far as there is a fast way; returns how many. The caller does the rest.
+/// Decodes samples from the first on as far as there is a fast way; returns how many. The caller does the
+/// rest.
 pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32]) -> usize {
     let isa = isa.narrow();
     // SAFETY: the kernels ask nothing of their jobs.
@@ -56,7 +57,7 @@ pub(crate) fn interleave(
 
 /// A format that has a fast way.
 trait Format {
-    /// Bytes a sample.
+    /// Bytes per sample.
     const BYTES: usize;
     /// # Safety
     /// As for [`Vector`]; a group of samples is at `at`.
@@ -173,7 +174,7 @@ impl Kernel for Interleave {
 
     #[inline(always)]
     unsafe fn run<V: Vector<Sample = f32>>(Rows { rows, stride, m, frames, out }: Rows) -> usize {
-        // Of three samples a frame the place behind is written too.
+        // Of three samples per frame the place after them is written too.
         let whole = frames.saturating_sub(usize::from(m == 3)) / GROUP * GROUP;
         for first in (0..whole).step_by(GROUP) {
             for (sample, width) in widths(m) {

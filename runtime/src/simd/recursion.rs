@@ -1,7 +1,7 @@
 //! State recursions x+ = A x + B u, states in lanes.
 //!
-//! Inputs are frames as they lie; the states become frames of their own, so that the FIR kernels can
-//! read both. Sections (two states that depend on one another at most) take 2 + 2 multiply-adds and two for each
+//! Inputs are frames as they lie; the states become frames of their own, so that the FIR kernels can read
+//! both. Sections (two states that depend on one another at most) take 2 + 2 multiply-adds and two for each
 //! input; any other A is a sum of its columns, one broadcast of a state serving all states.
 //!
 //! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
@@ -26,7 +26,7 @@ pub(crate) struct Recursion<T: Copy + Default> {
 /// How the states depend on one another.
 #[derive(Debug)]
 pub(crate) enum Form<T: Copy + Default> {
-    /// By twos: states 2 v L + l and 2 v L + L + l, L lanes a vector, belong to section v L + l.
+    /// By twos: states 2 v L + l and 2 v L + L + l, L lanes per vector, belong to section v L + l.
     Sections(Vec<SectionVector<T>>),
     /// In any way.
     Dense(Vec<ColumnTile<T>>),
@@ -55,7 +55,7 @@ pub(crate) struct ColumnTile<T: Copy + Default> {
 }
 
 impl<T: Copy + Default> ColumnTile<T> {
-    /// Sums that keep two multiply-adds a cycle busy.
+    /// Sums that keep two multiply-adds per cycle busy.
     pub(crate) const WIDEST: usize = 8;
 }
 
@@ -77,14 +77,14 @@ pub(crate) struct RecursionKernel<T: Element> {
 }
 
 impl<T: Element> RecursionKernel<T> {
-    /// The kernel for an instruction set, in vectors of one group: the few sections of a usual bank would leave wider
-    /// ones empty.
+    /// The kernel for an instruction set, in vectors of one group: the few sections of a usual bank would
+    /// leave wider ones empty.
     pub(crate) fn new(isa: Isa) -> Self {
         Self { lanes: group_lanes::<T>(), run: compiled::<Body<T>>(isa.narrow()) }
     }
 
-    /// Goes on by `frames` frames: row 0 of `rows` (rows of S states) is the state before them, row t + 1 becomes that
-    /// after frame t. An input of frame t is `window[place + t * hop]` for the input's place.
+    /// Goes on by `frames` frames: row 0 of `rows` (rows of S states) is the state before them, row t + 1
+    /// becomes that after frame t. An input of frame t is `window[place + t * hop]` for the input's place.
     ///
     /// # Panics
     /// If anything is too short for that.
@@ -102,6 +102,8 @@ impl<T: Element> RecursionKernel<T> {
         assert!((frames + 1) * recursion.states <= rows.len());
         assert!((frames - 1) * hop < window.len());
         recursion.form.check(recursion.states, self.lanes, window.len() - (frames - 1) * hop);
+        #[cfg(test)]
+        super::work::add(frames * recursion.form.coefficients());
         let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
         // SAFETY: all loads and stores lie within the bounds asserted above.
         unsafe { (self.run)(&Job { recursion, rows, window, hop, frames }) }
@@ -109,6 +111,15 @@ impl<T: Element> RecursionKernel<T> {
 }
 
 impl<T: Copy + Default> Form<T> {
+    /// Coefficients, one multiply-add per frame each.
+    #[cfg(test)]
+    fn coefficients(&self) -> usize {
+        match self {
+            Self::Sections(vectors) => vectors.iter().map(|vector| vector.coefficients.len()).sum(),
+            Self::Dense(tiles) => tiles.iter().map(|tile| tile.coefficients.len()).sum(),
+        }
+    }
+
     /// Everything that the kernels rely on; places lie before `end`.
     fn check(&self, states: usize, lanes: usize, end: usize) {
         let inside = |places: &[u32]| places.iter().all(|&place| (place as usize) < end);
@@ -163,8 +174,8 @@ impl<T: Element> Kernel for Body<T> {
     }
 }
 
-/// T frames from frame t on. One vector of sections after the other: while one waits for its own states, the next
-/// can begin.
+/// T frames from frame t on. One vector of sections after the other: while one waits for its own states, the
+/// next can begin.
 #[inline(always)]
 unsafe fn sections<V: Vector, const T: usize>(
     job: &Job<'_, V::Sample>,

@@ -1,13 +1,14 @@
 //! The vector trait: all that algorithms know of an instruction set.
 //!
-//! A *lane group* is 32 bytes: 8 lanes of f32, 4 of f64. A vector is one group or two. Its lanes hold samples as they lie
-//! in memory, D lanes for each frame or segment, where D divides the group.
+//! A *lane group* is 32 bytes: 8 lanes of f32, 4 of f64. A vector is one group or two. Its lanes hold
+//! samples as they lie in memory, D lanes for each frame or segment, where D divides the group.
 //!
-//! Sums over the D lanes of a frame are trees of a fixed shape: (l0 + l2) + (l1 + l3) for four lanes, the sum of the lower
-//! half plus that of the upper half for eight. They do not depend on the instruction set.
+//! Sums over the D lanes of a frame are trees of a fixed shape: (l0 + l2) + (l1 + l3) for four lanes, the
+//! sum of the lower half plus that of the upper half for eight. They do not depend on the instruction set.
 //!
-//! Two or four phases lie along diagonals: lane l of the p-th sum belongs to phase (l + p) mod 2 or 4. So the sums
-//! come out in the order of the phases and fewer lanes have to be blended. Of three phases the first two do.
+//! Two or four phases lie along diagonals: lane l of the p-th sum belongs to phase (l + p) mod 2 or 4. So
+//! the sums come out in the order of the phases and fewer lanes have to be blended. Of three phases the
+//! first two do.
 
 use std::fmt::Debug;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -36,8 +37,8 @@ pub(crate) trait Number:
     fn from_i32(value: i32) -> Self;
 }
 
-/// True where a fused multiply-add is an instruction of every processor of the target. In software it would be forty
-/// times slower.
+/// True where a fused multiply-add is an instruction of every processor of the target. In software it would
+/// be forty times slower.
 pub(super) const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
 macro_rules! number {
@@ -74,15 +75,15 @@ const MOST_LANES: usize = 16;
 
 /// A vector of samples: one lane group or two.
 ///
-/// A value exists only in code that is compiled for its instruction set and runs on a processor that has it, because
-/// all that makes a value of nothing is unsafe. So arithmetic on values is safe.
+/// A value exists only in code that is compiled for its instruction set and runs on a processor that has it,
+/// because all that makes a value of nothing is unsafe. So arithmetic on values is safe.
 ///
-/// An instruction set must implement memory access and arithmetic. All else has a default that goes through memory, and
-/// a set overrides it where it has an instruction for it.
+/// An instruction set must implement memory access and arithmetic. All else has a default that goes through
+/// memory, and a set overrides it where it has an instruction for it.
 ///
 /// # Safety
-/// Functions that are unsafe may run only in code compiled for the instruction set, on a processor that has it. Those
-/// that take pointers touch memory as said for each.
+/// Functions that are unsafe may run only in code compiled for the instruction set, on a processor that has
+/// it. Those that take pointers touch memory as said for each.
 pub(crate) trait Vector: Copy {
     /// The type of a lane.
     type Sample: Number;
@@ -154,8 +155,8 @@ pub(crate) trait Vector: Copy {
         unsafe { Self::from_fn(|l| *at.add(l % D)) }
     }
 
-    /// Frames of D lanes, the first at `at`: a group of them, then, if there is a second group, those that follow if D is
-    /// less than a group, or else the frame at `at + hop`.
+    /// Frames of D lanes, the first at `at`: a group of them, then, if there is a second group, those that
+    /// follow if D is less than a group, or else the frame at `at + hop`.
     #[inline(always)]
     unsafe fn frames<const D: usize>(at: *const Self::Sample, _hop: usize) -> Self {
         const { assert!(Self::GROUPS == 1) };
@@ -171,7 +172,8 @@ pub(crate) trait Vector: Copy {
         unsafe { Self::from_fn(|l| a[l] + b[l ^ 1]) }
     }
 
-    /// For each four lanes: the sum of those of a, b, c and d that are 0, 1, 2 and 3 lanes before, around the four.
+    /// For each four lanes: the sum of those of a, b, c and d that are 0, 1, 2 and 3 lanes before, around
+    /// the four.
     #[inline(always)]
     fn diagonal_quads(sums: [Self; 4]) -> Self {
         let [a, b, c, d] = sums.map(Self::to_array);
@@ -210,9 +212,10 @@ pub(crate) trait Vector: Copy {
         }
     }
 
-    /// The outputs of one vector to frames: phase p of its t-th frame to `out[t * hop + p]`. The sums are those of P = 2, 3
-    /// or 4 phases with D <= 4 lanes a frame, along diagonals; P = 2 with D = 4 is left to
-    /// [`Vector::store_halves`]. Of three phases the place behind them may be written as well, before the next frame is.
+    /// The outputs of one vector to frames: phase p of its t-th frame to `out[t * hop + p]`. The sums are
+    /// those of P = 2, 3 or 4 phases with D <= 4 lanes a frame, along diagonals; P = 2 with D = 4 is left to
+    /// [`Vector::store_halves`]. Of three phases the place after them may be written as well, before the
+    /// next frame is.
     #[inline(always)]
     unsafe fn store_frames<const P: usize, const D: usize>(
         sums: [Self; 4],
@@ -241,7 +244,8 @@ pub(crate) trait Vector: Copy {
         }
     }
 
-    /// The same for P = 2 and D = 4: the two sums of one vector, then those of another, each to an output of its own.
+    /// The same for P = 2 and D = 4: the two sums of one vector, then those of another, each to an output of
+    /// its own.
     #[inline(always)]
     unsafe fn store_halves(sums: [Self; 4], out: [*mut Self::Sample; 2], hop: usize) {
         let pairs = Self::diagonal_halves(sums).to_array();
@@ -251,8 +255,9 @@ pub(crate) trait Vector: Copy {
         }
     }
 
-    /// Both halves of each group added, for the groups of `vectors` vectors from `sums` on: four outputs each, to
-    /// `out`, `out + hop` and so on. The place behind the last frame's outputs up to four is written too, in order.
+    /// Both halves of each group added, for the groups of `vectors` vectors from `sums` on: four outputs
+    /// each, to `out`, `out + hop` and so on. The place after the last frame's outputs up to four is written
+    /// too, in order.
     #[inline(always)]
     unsafe fn add_halves(sums: *const Self::Sample, vectors: usize, out: *mut Self::Sample, hop: usize) {
         for index in 0..vectors * Self::GROUPS {
@@ -265,8 +270,8 @@ pub(crate) trait Vector: Copy {
         }
     }
 
-    /// The loop of a tile of P phases times R vectors, for tiles that have one in assembly: `steps` >= 1 steps from the
-    /// newest window on, vectors `stride` samples apart. `None` leaves it to the compiler.
+    /// The loop of a tile of P phases times R vectors, for tiles that have one in assembly: `steps` >= 1
+    /// steps from the newest window on, vectors `stride` samples apart. `None` leaves it to the compiler.
     #[inline(always)]
     unsafe fn tile<const D: usize, const P: usize, const R: usize>(
         _x: *const Self::Sample,
@@ -311,8 +316,8 @@ pub(crate) trait Vector: Copy {
         unsafe { Self::from_fn(|l| Self::Sample::from_i32(integer(l)) * scale) }
     }
 
-    /// Samples times 2^15 to the nearest little-endian 16-bit integers, ties to even; NaN becomes 0. Returns how many
-    /// were clipped: those that do not round to a 16-bit integer.
+    /// Samples times 2^15 to the nearest little-endian 16-bit integers, ties to even; NaN becomes 0. Returns
+    /// how many were clipped: those that do not round to a 16-bit integer.
     #[inline(always)]
     unsafe fn store_i16(self, at: *mut u8) -> u32 {
         let mut clipped = 0;

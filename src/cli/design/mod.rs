@@ -124,7 +124,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_silent) {
+    if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero) {
         super::warn(ALL_ZERO);
     }
     let report = Report::new(args.output.display().to_string(), &found, mean, seconds);

@@ -37,7 +37,7 @@ const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
 /// [`DesignError::NoTaps`] if `bits` are out of their range, and [`DesignError::AllZero`] if all taps are
-/// zero at the given scale. Without a given scale all taps may be zero, too: see [`FixedPoint::is_silent`].
+/// zero at the given scale. Without a given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
 pub fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,
@@ -58,7 +58,7 @@ pub fn quantise(
     let asked = found.into_iter().find(|found| found.fixed_point.bits == *bits).ok_or(DesignError::NoTaps)?;
     match fraction_bits {
         Some(fraction_bits)
-            if asked.fixed_point.is_silent() && problem.taps.iter().flatten().any(|&tap| tap != 0.0) =>
+            if asked.fixed_point.is_zero() && problem.taps.iter().flatten().any(|&tap| tap != 0.0) =>
         {
             Err(DesignError::AllZero { fraction_bits, fitting: quantiser.finest_that_fits(bits) })
         }

@@ -1,27 +1,31 @@
-//! The two-parallel fast FIR algorithm: filters of K / 2 taps per phase at half the rate do three quarters of the work.
+//! The two-parallel fast FIR algorithm: filters of K / 2 taps per phase at half the rate do three quarters
+//! of the work.
 //!
-//! With the lags H[j] of a bank (M by N matrices) and the frames of the stream apart,
-//! H0[j] = H[2j], H1[j] = H[2j + 1], u0[n] = x[2n], u1[n] = x[2n + 1], a pair of frames is (Karatsuba's identity; Mou and
-//! Duhamel, *Short-length FIR filters and their use in fast nonrecursive filtering*, 1991)
+//! With the lags H[j] of a bank (M by N matrices) and the frames of the stream apart, H0[j] = H[2j], H1[j] =
+//! H[2j + 1], u0[n] = x[2n], u1[n] = x[2n + 1], a pair of frames is (Karatsuba's identity; Mou and Duhamel,
+//! *Short-length FIR filters and their use in fast nonrecursive filtering*, 1991)
 //!
 //! ```text
 //! y[2n]     = A[n] + B[n - 1]          A = H0 * u0     B = H1 * u1
 //! y[2n + 1] = 4 C[n] - A[n] - B[n]     C = (H0 + H1)/2 * (u0 + u1)/2
 //! ```
 //!
-//! three filters for four. Means stand in place of sums, because they are finite wherever the inputs are. The first frame of
-//! a pair does not wait for the second one, so that no output is late; pairs are counted from the beginning of the
-//! stream, and A, B and C have the same bits however calls are cut (they are made by the [direct algorithm](super::direct)),
-//! so outputs have, too.
+//! three filters for four. Means stand in place of sums, because they are finite wherever the inputs are.
+//! The first frame of a pair does not wait for the second one, so that no output is late; pairs are counted
+//! from the beginning of the stream, and A, B and C have the same bits however calls are cut (they are made
+//! by the [direct algorithm](super::direct)), so outputs have, too.
 //!
-//! The sums never mix channels, but they mix lags: the error of an output is about that of the direct algorithm for filters
+//! The sums never mix channels, but they mix lags: the error of an output is about that of the direct
+//! algorithm for filters
 //! |H0| + |H1| and inputs |u0| + |u1|, so relative to the norms of filters and inputs and not of each product: below 6 eps
-//! times the sum over channels of the norm of the phase's filter times that of the inputs in its memory. For white noise
-//! through taps of like size it is 1.0 to 1.4 times that of the direct algorithm. With K odd a lag that is not in the
-//! filters enters C and A and cancels up to rounding, and so does any lag whose coefficient is 0.
+//! times the sum over channels of the norm of the phase's filter times that of the inputs in its memory. For
+//! white noise through taps of like size it is 1.0 to 1.4 times that of the direct algorithm. With K odd a
+//! lag that is not in the filters enters C and A and cancels up to rounding, and so does any lag whose
+//! coefficient is 0.
 //!
-//! The worst case of a call: inputs are checked and NaN and infinity replaced before filtering, so no frame is filtered
-//! twice. Outputs whose sums overflow are computed once more from the definition in f64, N K multiply-adds each.
+//! The worst case of a call: inputs are checked and NaN and infinity replaced before filtering, so no frame
+//! is filtered twice. Outputs whose sums overflow are computed once more from the definition in f64, N K
+//! multiply-adds each.
 
 #[cfg(test)]
 mod tests;
@@ -34,15 +38,16 @@ use crate::history::History;
 use crate::simd::{Halves, Products, Segment, all_finite, join, split};
 use crate::{BuildError, Isa, Sample};
 
-/// Samples of the inputs and products of a block, which should stay in the first-level cache beside the coefficients.
+/// Samples of the inputs and products of a block, which should stay in the first-level cache beside the
+/// coefficients.
 const CACHE_SAMPLES: usize = 6144;
 /// Pairs of a block are a multiple of this, and so of most tiles.
 const BLOCK_UNIT: usize = 48;
 /// Most pairs of a block in these units.
 const BLOCK_UNITS: usize = 8;
 
-/// Frames that histories keep beside those of the filters: the second frame of a pair looks back on them from a
-/// history that is already past its first one.
+/// Frames that histories keep beside those of the filters: the second frame of a pair looks back on them
+/// from a history that is already past its first one.
 const MORE: usize = 1;
 /// Frames of a pair.
 const PAIR: usize = 2;
@@ -82,7 +87,8 @@ struct Pairs<T: Sample> {
     mean: HalfRate<T>,
     /// 1 after the first frame of a pair.
     phase_offset: usize,
-    /// The first frame of a pair whose second one is still to come, and room for that one and for the first again.
+    /// The first frame of a pair whose second one is still to come, and room for that one and for the first
+    /// again.
     samples: Aligned<T>,
     /// Outputs of a pair.
     outputs: Aligned<T>,
@@ -242,6 +248,8 @@ impl<T: Sample> FastFir<T> {
             let taps = f.iter().skip(phase).step_by(self.ratio).enumerate();
             taps.map(|(lag, tap)| tap.to_f64() * input(lag, i)).sum::<f64>()
         };
+        #[cfg(test)]
+        crate::simd::work::add(self.channels * self.phase_taps);
         self.taps.iter().enumerate().map(filter).sum()
     }
 
@@ -401,7 +409,8 @@ impl<T: Sample> Past for Frames<'_, T> {
 
 impl<T: Sample> Past for Pairs<T> {
     fn sample(&self, age: usize, channel: usize) -> f64 {
-        // Frames since the end of the last whole pair; the first frame of the next one is among the even ones already.
+        // Frames since the end of the last whole pair; the first frame of the next one is among the even
+        // ones already.
         let back = age - self.phase_offset;
         let half = if back.is_multiple_of(2) {
             self.even.history.past(self.phase_offset + back / 2, channel)
@@ -413,7 +422,8 @@ impl<T: Sample> Past for Pairs<T> {
 }
 
 impl<T: Sample> Pairs<T> {
-    /// The sample of a channel at a frame of the block or before, counted from the first one of the first pair.
+    /// The sample of a channel at a frame of the block or before, counted from the first one of the first
+    /// pair.
     fn input(&self, parity: Parity, frame: isize, channel: usize) -> T {
         let pair = frame.div_euclid(2);
         let (half, frame) = match frame.rem_euclid(2) {

@@ -1,77 +1,54 @@
 //! Fast FIR against the definition of the sum, and against three direct filters with the same bits.
 
 use super::*;
-use crate::tests::{
-    Bank, Noise, definition, fir_bank, in_pieces, random_taps, recursive_bank, spans_agree, start,
+use crate::tests::support::{
+    Bank, Noise, by, definition, fir_bank, norm, precise, random_taps, recursive_bank, run, start, worst,
 };
-use crate::{Algorithm, Options, PcmOutput, Precision, StateSpace, Stream, ThreadPool};
-use crate::{PcmFormat, PcmFrames, SampleLayout};
-use proptest::prelude::*;
+use crate::{Algorithm, Options, Precision, StateSpace, Stream};
 
 fn options(precision: Precision) -> Options {
-    Options { algorithm: Algorithm::FastFir, precision, ..Options::default() }
+    precise(Algorithm::FastFir, precision)
 }
 
-fn fast(bank: &Bank, precision: Precision) -> Stream {
-    start(bank, options(precision)).unwrap()
+fn fast(bank: &Bank) -> Stream {
+    start(bank, by(Algorithm::FastFir)).unwrap()
 }
 
-fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
-    let mut stream = start(bank, options).unwrap();
-    let mut out = vec![0.0; input.len() / stream.channels() * stream.ratio()];
-    assert_eq!(stream.process(input, &mut out).unwrap(), out.len());
-    out
-}
-
-/// In numbers of f64.
-fn run_wide(bank: &Bank, options: Options, input: &[f64]) -> Vec<f64> {
-    let mut stream = start(bank, options).unwrap();
-    let mut out = vec![0.0; input.len() / stream.channels() * stream.ratio()];
-    stream.process(input, &mut out).unwrap();
-    out
+/// A bank of `lags` lags per phase whose tap t is `tap(f, t)`.
+fn mapped(taps: &[Vec<f64>], lags: usize, m: usize, tap: impl Fn(&[f64], usize) -> f64) -> Bank {
+    fir_bank(taps.iter().map(|f| (0..lags * m).map(|t| tap(f, t)).collect()).collect(), m)
 }
 
 /// The scalar twin: three banks of every second lag, their outputs put together one by one.
-macro_rules! twin {
-    ($name:ident, $sample:ty, $run:ident) => {
-        fn $name(taps: &[Vec<f64>], m: usize, input: &[$sample], options: Options) -> Vec<$sample> {
-            let n = taps.len();
-            let lags = phase_taps(taps, m);
-            // Lag 2 j + parity of a filter.
-            let tap = |f: &[f64], t: usize, parity: usize| {
-                f.get((2 * (t / m) + parity) * m + t % m).copied().unwrap_or(0.0)
-            };
-            let bank = |len: usize, of: &dyn Fn(&[f64], usize) -> f64| {
-                fir_bank(taps.iter().map(|f| (0..len * m).map(|t| of(f, t)).collect()).collect(), m)
-            };
-            let even = bank(lags.div_ceil(2), &|f, t| tap(f, t, 0));
-            let odd = bank(lags / 2, &|f, t| tap(f, t, 1));
-            let mean = bank(lags.div_ceil(2), &|f, t| (tap(f, t, 0) + tap(f, t, 1)) / 2.0);
-            // A second frame that is not there does not matter.
-            let mut padded = input.to_vec();
-            padded.resize(input.len().next_multiple_of(2 * n), 0.0);
-            let ticks: Vec<&[$sample]> = padded.chunks(n).collect();
-            let half = |parity: usize| ticks.iter().skip(parity).step_by(2).copied().flatten().copied();
-            let means: Vec<$sample> = half(0).zip(half(1)).map(|(a, b)| (a + b) / 2.0).collect();
-            let direct = Options { algorithm: Algorithm::Direct, ..options };
-            let a = $run(&even, direct, &half(0).collect::<Vec<_>>());
-            let b = $run(&odd, direct, &half(1).collect::<Vec<_>>());
-            let c = $run(&mean, direct, &means);
-            let mut out = vec![0.0; input.len() / n * m];
-            for (t, y) in out.iter_mut().enumerate() {
-                let (tick, at) = (t / m, t / m / 2 * m + t % m);
-                *y = match tick % 2 {
-                    0 => a[at] + at.checked_sub(m).map_or(0.0, |before| b[before]),
-                    _ => 4.0 * c[at] - a[at] - b[at],
-                };
-            }
-            out
+fn twin<S: Sample>(taps: &[Vec<f64>], m: usize, input: &[S], options: Options) -> Vec<S> {
+    let n = taps.len();
+    let lags = phase_taps(taps, m);
+    // Lag 2 j + parity of a filter.
+    let tap = |f: &[f64], t: usize, parity: usize| {
+        f.get((2 * (t / m) + parity) * m + t % m).copied().unwrap_or(0.0)
+    };
+    let even = mapped(taps, lags.div_ceil(2), m, |f, t| tap(f, t, 0));
+    let odd = mapped(taps, lags / 2, m, |f, t| tap(f, t, 1));
+    let mean = mapped(taps, lags.div_ceil(2), m, |f, t| (tap(f, t, 0) + tap(f, t, 1)) / 2.0);
+    // A second frame that is not there does not matter.
+    let mut padded = input.to_vec();
+    padded.resize(input.len().next_multiple_of(2 * n), S::default());
+    let frames: Vec<&[S]> = padded.chunks(n).collect();
+    let half =
+        |parity: usize| frames.iter().skip(parity).step_by(2).copied().flatten().copied().collect::<Vec<_>>();
+    let (first, second) = (half(0), half(1));
+    let means: Vec<S> = first.iter().zip(&second).map(|(&a, &b)| (a + b) * S::from_f64(0.5)).collect();
+    let direct = Options { algorithm: Algorithm::Direct, ..options };
+    let [a, b, c] = [(even, first), (odd, second), (mean, means)].map(|(bank, x)| run(&bank, direct, &x));
+    let output = |t: usize| {
+        let at = t / m / 2 * m + t % m;
+        match t / m % 2 {
+            0 => a[at] + at.checked_sub(m).map_or(S::default(), |before| b[before]),
+            _ => S::from_f64(4.0) * c[at] - a[at] - b[at],
         }
     };
+    (0..input.len() / n * m).map(output).collect()
 }
-
-twin!(twin, f32, run);
-twin!(twin_wide, f64, run_wide);
 
 #[test]
 fn every_small_shape_has_the_bits_of_three_direct_filters() {
@@ -85,8 +62,8 @@ fn every_small_shape_has_the_bits_of_three_direct_filters() {
             let single = Options { isa, ..options(Precision::Single) };
             assert_eq!(run(&bank, single, &input), twin(&taps, m, &input, single), "N {n} M {m} {isa}");
             let double = Options { isa, ..options(Precision::Double) };
-            let want = twin_wide(&taps, m, &wide, double);
-            assert_eq!(run_wide(&bank, double, &wide), want, "f64: N {n} M {m} {isa}");
+            let want = twin(&taps, m, &wide, double);
+            assert_eq!(run(&bank, double, &wide), want, "f64: N {n} M {m} {isa}");
         }
     }
 }
@@ -103,15 +80,12 @@ fn every_tap_count_has_the_bits_of_three_direct_filters() {
     }
 }
 
-fn norm(values: impl Iterator<Item = f64>) -> f64 {
-    values.map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// For each output the sum over channels of the norm of the phase's filter times the norm of the inputs in its memory.
+/// For each output the sum over channels of the norm of the phase's filter times the norm of the inputs in
+/// its history.
 fn scales(taps: &[Vec<f64>], m: usize, input: &[f32]) -> Vec<f64> {
-    let (n, memory) = (taps.len(), phase_taps(taps, m).next_multiple_of(2));
+    let (n, history) = (taps.len(), phase_taps(taps, m).next_multiple_of(2));
     let scale = |t: usize| {
-        let from = (t / m + 1).saturating_sub(memory);
+        let from = (t / m + 1).saturating_sub(history);
         let inputs =
             |i: usize| norm(input[from * n..(t / m + 1) * n].iter().skip(i).step_by(n).map(|&x| x.into()));
         let filter = |i: usize| norm(taps[i].iter().skip(t % m).step_by(m).copied());
@@ -130,9 +104,10 @@ fn relative_error(taps: &[Vec<f64>], m: usize, input: &[f32], algorithm: Algorit
         / f64::from(f32::EPSILON)
 }
 
-/// Inputs of which a sum of neighbours is a poor summand: a large constant, channels and frames of very different size.
-fn nasty_inputs(n: usize, ticks: usize, noise: &mut Noise) -> [Vec<f32>; 4] {
-    let white = noise.samples(n * ticks);
+/// Inputs of which a sum of neighbours is a poor summand: a large constant, channels and frames of very
+/// different size.
+fn nasty_inputs(n: usize, frames: usize, noise: &mut Noise) -> [Vec<f32>; 4] {
+    let white = noise.samples(n * frames);
     let scaled = |scale: &dyn Fn(usize, usize) -> f32| {
         white.iter().enumerate().map(|(t, x)| x * scale(t / n, t % n)).collect()
     };
@@ -140,7 +115,7 @@ fn nasty_inputs(n: usize, ticks: usize, noise: &mut Noise) -> [Vec<f32>; 4] {
         white.clone(),
         white.iter().map(|x| x + 1000.0).collect(),
         scaled(&|_, i| [1e-9, 1e9, 1.0][i % 3]),
-        scaled(&|tick, _| [1e9, 1e-9][tick % 2]),
+        scaled(&|frame, _| [1e9, 1e-9][frame % 2]),
     ]
 }
 
@@ -167,7 +142,7 @@ fn the_error_is_within_the_stated_bound() {
 }
 
 #[test]
-fn the_error_of_noise_is_hardly_more_than_that_of_the_direct_form() {
+fn the_error_of_noise_is_hardly_more_than_that_of_the_direct_algorithm() {
     let mut noise = Noise(54);
     for (n, m, lags) in [(1, 1, 16), (2, 2, 64), (4, 4, 16), (8, 8, 32)] {
         let taps = random_taps(n, m * lags, &mut noise);
@@ -185,18 +160,6 @@ fn the_error_of_noise_is_hardly_more_than_that_of_the_direct_form() {
 }
 
 #[test]
-fn double_precision_is_double() {
-    let mut noise = Noise(55);
-    let taps = random_taps(4, 500, &mut noise);
-    let input = noise.samples(4 * 1000);
-    let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
-    let out = run_wide(&fir_bank(taps.clone(), 4), options(Precision::Double), &wide);
-    let worst = definition(&taps, 4, &input).iter().zip(&out).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    // 6 eps as in f32; the sums of 500 products below 1 have norms below 500.
-    assert!(worst < 6.0 * 500.0 * f64::EPSILON, "{worst:e}");
-}
-
-#[test]
 fn a_channel_whose_taps_are_zero_leaves_no_trace() {
     let mut noise = Noise(56);
     let mut taps = random_taps(3, 40, &mut noise);
@@ -206,21 +169,6 @@ fn a_channel_whose_taps_are_zero_leaves_no_trace() {
     let want = run(&bank, options(Precision::Single), &input);
     input.iter_mut().skip(1).step_by(3).for_each(|x| *x *= 1e30);
     assert_eq!(run(&bank, options(Precision::Single), &input), want);
-}
-
-#[test]
-fn an_impulse_anywhere_brings_out_the_taps_and_nothing_else() {
-    let taps = vec![(1..=11).map(f64::from).collect(), (1..=7).map(|i| -f64::from(i)).collect()];
-    let bank = fir_bank(taps.clone(), 3);
-    for place in 0..2 * 30 {
-        let mut input = vec![0.0; 2 * 40];
-        input[place] = 1.0;
-        // Small integers, halves and quarters: nothing is rounded.
-        for (t, y) in run(&bank, options(Precision::Single), &input).into_iter().enumerate() {
-            let tap = t.checked_sub(place / 2 * 3).and_then(|t| taps[place % 2].get(t));
-            assert_eq!(f64::from(y), *tap.unwrap_or(&0.0), "impulse at {place}, output {t}");
-        }
-    }
 }
 
 #[test]
@@ -234,30 +182,28 @@ fn sums_that_overflow_do_not_make_the_output_overflow() {
         input[n * 300..n * 400].fill(3.3e38);
         input[n * 500..n * 503].fill(-f32::MAX);
         let out = run(&bank, options(Precision::Single), &input);
-        for (t, (a, b)) in definition(&taps, m, &input).iter().zip(&out).enumerate() {
-            assert!((a - f64::from(*b)).abs() <= 1e-5 * 3.4e38, "N {n} M {m}, output {t}: {b} for {a}");
-        }
+        let error = worst(&definition(&taps, m, &input), &out);
+        assert!(error <= 1e-5 * 3.4e38, "N {n} M {m}: {error:e}");
         // And the same bits frame by frame, also after them.
-        let mut stream = fast(&bank, Precision::Single);
+        let mut stream = fast(&bank);
         let mut slow = vec![0.0; out.len()];
         for (x, y) in input.chunks(n).zip(slow.chunks_mut(m)) {
             stream.process(x, y).unwrap();
         }
         assert_eq!(slow, out, "N {n} M {m}");
     }
-    let wide = vec![f64::MAX; 2 * 100];
-    let out = run_wide(&fir_bank(vec![vec![0.019; 50]; 2], 2), options(Precision::Double), &wide);
+    let out = run(&fir_bank(vec![vec![0.019; 50]; 2], 2), options(Precision::Double), &[f64::MAX; 2 * 100]);
     assert!(out[100..].iter().all(|y| (y / f64::MAX - 0.95).abs() < 1e-12), "{out:?}");
 }
 
 #[test]
-fn no_output_waits_for_the_second_tick_of_its_pair() {
+fn no_output_waits_for_the_second_frame_of_its_pair() {
     let mut noise = Noise(58);
     for (n, m) in [(1, 1), (1, 3), (3, 1), (2, 2), (5, 4)] {
         let bank = fir_bank(random_taps(n, 11 * m, &mut noise), m);
         let input = noise.samples(n * 501);
         let want = run(&bank, options(Precision::Single), &input);
-        let mut stream = fast(&bank, Precision::Single);
+        let mut stream = fast(&bank);
         assert_eq!((stream.extra_latency(), stream.latency()), (0, bank.latency));
         assert_eq!(
             stream.plan().flush_frames(),
@@ -272,61 +218,17 @@ fn no_output_waits_for_the_second_tick_of_its_pair() {
 }
 
 #[test]
-fn an_input_is_forgotten_after_the_memory() {
+fn an_input_is_forgotten_after_the_history() {
     let mut noise = Noise(59);
-    for (count, memory) in [(2, 1), (3, 3), (16, 15), (17, 17)] {
+    for (count, history) in [(2, 1), (3, 3), (16, 15), (17, 17)] {
         let bank = fir_bank(random_taps(1, count, &mut noise), 1);
-        assert_eq!(fast(&bank, Precision::Single).history(), Some(memory));
+        assert_eq!(fast(&bank).history(), Some(history));
         for place in 0..2 {
             let mut input = noise.samples(100);
             let want = run(&bank, options(Precision::Single), &input);
             input[place] += 1e4;
             let out = run(&bank, options(Precision::Single), &input);
-            assert_eq!(out[place + memory + 1..], want[place + memory + 1..], "{count} taps");
-        }
-    }
-}
-
-#[test]
-fn resets_fresh_streams_and_clones_have_the_bits_of_a_new_one() {
-    let mut noise = Noise(60);
-    for (n, m) in [(3, 4), (1, 2)] {
-        let bank = fir_bank(random_taps(n, 50, &mut noise), m);
-        let input = noise.samples(n * 777);
-        let want = run(&bank, options(Precision::Single), &input);
-        let mut stream = fast(&bank, Precision::Single);
-        let mut out = vec![0.0; want.len()];
-        for cut in [100, 101, 102, 103] {
-            stream.process(&noise.samples(n * 333), &mut out).unwrap();
-            stream.fresh().process(&input, &mut out).unwrap();
-            assert_eq!(out, want);
-            stream.reset();
-            stream.process(&input[..n * cut], &mut out).unwrap();
-            let mut twin = stream.clone();
-            for stream in [&mut stream, &mut twin] {
-                stream.process(&input[n * cut..], &mut out).unwrap();
-                assert_eq!(out[..m * (777 - cut)], want[m * cut..]);
-            }
-        }
-    }
-}
-
-#[test]
-fn threads_do_not_change_a_bit() {
-    let mut noise = Noise(61);
-    let pools: Vec<_> = [1, 2, 3].into_iter().map(|threads| ThreadPool::new(threads).unwrap()).collect();
-    // Long enough for several spans of a million multiply-adds each.
-    for (n, m, taps, long) in [
-        (1, 1, 33, 120_000),
-        (1, 4, 64, 70_000),
-        (2, 2, 24, 130_001),
-        (3, 1, 41, 80_001),
-        (5, 3, 50, 25_000),
-        (2, 2, 9000, 40_000),
-    ] {
-        for precision in [Precision::Single, Precision::Double] {
-            let bank = fir_bank(random_taps(n, taps, &mut noise), m);
-            spans_agree(&bank, options(precision), &pools, long, &mut noise);
+            assert_eq!(out[place + history + 1..], want[place + history + 1..], "{count} taps");
         }
     }
 }
@@ -369,61 +271,4 @@ fn the_largest_taps_have_a_mean() {
         out.iter().zip(want).all(|(y, want)| (f64::from(*y) - want).abs() < 1e-6 * 1e-3 * largest),
         "{out:?}"
     );
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
-
-    #[test]
-    fn cuts_do_not_change_a_bit(
-        n in 1usize..10, m in 1usize..10, count in 1usize..60, seed: u64,
-        cuts in prop::collection::vec(prop_oneof![0usize..20, 0usize..1200], 1..16), double: bool,
-        lost in prop::collection::vec(0usize..100_000, 0..4),
-    ) {
-        let mut noise = Noise(seed);
-        let precision = if double { Precision::Double } else { Precision::Single };
-        let bank = fir_bank(random_taps(n, m + count, &mut noise), m);
-        let mut stream = fast(&bank, precision);
-        let mut input = noise.samples(n * cuts.iter().sum::<usize>());
-        // Zero for what is lost gives the same.
-        for place in &lost {
-            if let Some(x) = input.get_mut(*place) { *x = 0.0; }
-        }
-        let mut whole = vec![0.0; input.len() / n * m];
-        stream.process(&input, &mut whole).unwrap();
-        stream.reset();
-        for place in &lost {
-            if let Some(x) = input.get_mut(*place) { *x = f32::NAN; }
-        }
-        let mut marked = vec![0.0; whole.len()];
-        stream.process(&input, &mut marked).unwrap();
-        prop_assert_eq!(marked.iter().zip(&whole).position(|(a, b)| a != b), None);
-        let replaced = stream.replaced();
-        prop_assert_eq!(replaced as usize, input.iter().filter(|x| x.is_nan()).count());
-        stream.reset();
-        let pieces = in_pieces(&mut stream, [n, m], &input, &cuts);
-        prop_assert_eq!(pieces.iter().zip(&whole).position(|(a, b)| a != b), None);
-        prop_assert_eq!(stream.replaced(), replaced);
-    }
-
-    #[test]
-    fn bytes_give_the_same_samples(
-        n in 1usize..5, m in 1usize..5, which in 0usize..12, seed: u64, ticks in 0usize..900,
-    ) {
-        let format = PcmFormat::ALL[which];
-        let mut noise = Noise(seed);
-        let bank = fir_bank(random_taps(n, 13, &mut noise), m);
-        let mut bytes = vec![0; n * ticks * format.bytes()];
-        for slot in bytes.chunks_exact_mut(format.bytes()) {
-            format.encode(noise.next(), slot);
-        }
-        let input: Vec<f32> = bytes.chunks_exact(format.bytes()).map(|b| format.decode(b) as f32).collect();
-        let want = run(&bank, options(Precision::Single), &input);
-        let frames = PcmFrames { layout: SampleLayout::packed(format), channels: n, bytes: &bytes };
-        let mut out = vec![0; 4 * want.len()];
-        let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut out, clipped: 0 };
-        fast(&bank, Precision::Single).process_pcm(&[frames], &mut output).unwrap();
-        let got: Vec<f32> = out.chunks_exact(4).map(|b| PcmFormat::F32Le.decode(b) as f32).collect();
-        prop_assert_eq!(got, want);
-    }
 }

@@ -1,15 +1,19 @@
 //! Overlap-save: FIR filtering by Fourier transforms, for long filters.
 //!
-//! The F frames up to the end of a block of B = F - (K - 1) frames are transformed, multiplied by the M by N spectra of
-//! the filters, and transformed back; the last B of them are outputs of the sum (Oppenheim and Schafer,
-//! section 8.7). Channels lie in lanes, and so do S segments of the stream where a vector has room for them, see
-//! [`simd`](crate::simd). Two blocks are the two parts of a complex one, so that a *batch* of 2 S B frames is made
-//! at once.
+//! The F frames up to the end of a block of B = F - (K - 1) frames are transformed, multiplied by the M by N
+//! spectra of the filters, and transformed back; the last B of them are outputs of the sum (Oppenheim and
+//! Schafer, section 8.7). Channels lie in lanes, and so do S segments of the stream where a vector has room
+//! for them, see [`simd`](crate::simd). Two blocks are the two parts of a complex one, so that a *batch* of
+//! 2 S B frames is made at once.
 //!
-//! Batches are counted from the beginning of the stream and not of a call, so that cuts do not change a bit. An output
-//! is there when its batch is complete: all are late by 2 S B - 1 frames. The error of an output is about
-//! eps log2 F times the norm of its filters times that of the inputs of its two blocks, and not only of those in
-//! the filter memory.
+//! Batches are counted from the beginning of the stream and not of a call, so that cuts do not change a bit.
+//! An output is there when its batch is complete: all are late by 2 S B - 1 frames. The error of an output
+//! is about eps log2 F times the norm of its filters times that of the inputs of its two blocks, and not
+//! only of those in the filter's history.
+//!
+//! The worst case of a call: inputs are checked, and NaN and infinity replaced, before filtering. A batch
+//! whose transforms overflow is filtered once more with smaller numbers, so no frame is filtered more than
+//! twice.
 
 #[cfg(test)]
 mod tests;
@@ -79,8 +83,8 @@ impl Shape {
 
     /// Operations on single lanes for each fast sample.
     pub(crate) fn multiply_adds(&self) -> f64 {
-        // A level of radix 2 takes 3 multiply-adds and 2 additions for each complex lane of half of the rows, as one
-        // half of a pass of radix 4: 17 operations a row in two levels, 8.5 in one.
+        // A level of radix 2 takes 3 multiply-adds and 2 additions for each complex lane of half of the
+        // rows, as one half of a pass of radix 4: 17 operations per row in two levels, 8.5 in one.
         let transforms = (self.inputs() + self.outputs()) as f64 * 3.5 * f64::from(self.len.ilog2());
         let products = (4 * self.channels * self.outputs()) as f64;
         let lanes = (self.len * self.depth * self.segments) as f64 * (transforms + products);
@@ -138,8 +142,8 @@ struct Work<T: Sample> {
 }
 
 impl<T: Sample> OverlapSave<T> {
-    /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters, in transforms of length F = `len`, a power
-    /// of two from 16 on that is longer than the filters' memory.
+    /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters, in transforms of length F =
+    /// `len`, a power of two from 16 on that is longer than the filters' memory.
     pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, len: usize, isa: Isa) -> Result<Self, BuildError> {
         check_finite::<T>(taps)?;
         let history = phase_taps(taps, ratio) - 1;
@@ -156,7 +160,8 @@ impl<T: Sample> OverlapSave<T> {
         })
     }
 
-    /// The next frames of the batch: where they lie in the caller's memory (as a whole batch), or into the state.
+    /// The next frames of the batch: where they lie in the caller's memory (as a whole batch), or into the
+    /// state.
     fn take<'a>(
         &self,
         state: &mut OverlapSaveState<T>,
@@ -208,20 +213,20 @@ impl<T: Sample> OverlapSave<T> {
         }
     }
 
-    /// Makes the batch, whose first output belongs to frame `frame` of the call, `behind` frames before its end. Returns the
-    /// frame up to which outputs are in the output: all of them, if there is room.
+    /// Makes the batch, whose first output belongs to frame `frame` of the call, `left` frames before its
+    /// end. Returns the frame up to which outputs are in the output: all of them, if there is room.
     fn complete(
         &self,
         state: &mut OverlapSaveState<T>,
         outside: Option<&[T]>,
         output: &mut (impl Output + ?Sized),
         frame: usize,
-        behind: usize,
+        left: usize,
     ) -> usize {
         let m = self.shape.ratio;
         // Whole lanes are written: somewhat more than the batch, which is still to come.
         let needed = self.shape.batch() + group_lanes::<T>();
-        if needed <= behind
+        if needed <= left
             && let Some(slots) = output.slots(frame * m..(frame + needed) * m)
         {
             self.batch(state, outside, Some(slots));
@@ -283,7 +288,7 @@ impl<T: Sample> OverlapSave<T> {
         *filled = 0;
     }
 
-    /// From frames to the outputs of a batch, and to a group of lanes behind it.
+    /// From frames to the outputs of a batch, and to a group of lanes after it.
     fn filter(&self, work: &mut Work<T>, samples: &[T], output: &mut [T]) {
         let Shape { channels, ratio, depth, len, .. } = self.shape;
         let plane = len * row_samples::<T>();
@@ -358,8 +363,8 @@ impl<T: Sample> Filter for OverlapSave<T> {
             self.pass_on(state, output, first, progress.written.max(first)..late);
             state.filled += end - first;
             if complete {
-                let behind = input.frames() - late;
-                progress.written = self.complete(state, outside, output, late, behind);
+                let left = input.frames() - late;
+                progress.written = self.complete(state, outside, output, late, left);
             }
             first = end;
         }
@@ -367,8 +372,8 @@ impl<T: Sample> Filter for OverlapSave<T> {
         progress.replaced
     }
 
-    /// A batch means the same to all coefficients of one shape: outputs of complete batches are still those of the other
-    /// ones.
+    /// A batch means the same to all coefficients of one shape: outputs of complete batches are still those
+    /// of the other coefficients.
     fn take_over(
         &self,
         state: &mut OverlapSaveState<T>,

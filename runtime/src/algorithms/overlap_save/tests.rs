@@ -1,10 +1,10 @@
 //! Overlap-save against the definition of the sum, and against a scalar twin with the same bits.
 
 use super::*;
-use crate::tests::{Bank, Noise, definition, fir_bank, in_pieces, random_taps, recursive_bank, start};
-use crate::{Algorithm, Options, PcmOutput, Precision};
-use crate::{PcmFormat, PcmFrames, SampleLayout};
-use proptest::prelude::*;
+use crate::tests::support::{
+    Noise, by, definition, fir_bank, norm, precise, random_taps, recursive_bank, run, start, worst,
+};
+use crate::{Algorithm, Options, Precision};
 use std::f64::consts::TAU;
 use std::ops::{Add, Mul, Sub};
 
@@ -119,17 +119,17 @@ impl Twin {
         };
         let spectra: Vec<Vec<_>> =
             taps.iter().map(|f| (0..ratio).map(|p| spectrum(f, p)).collect()).collect();
-        let at = |tick: isize, i: usize| match usize::try_from(tick) {
-            Ok(tick) => input.get(tick * n + i).copied().unwrap_or_default(),
+        let at = |frame: isize, i: usize| match usize::try_from(frame) {
+            Ok(frame) => input.get(frame * n + i).copied().unwrap_or_default(),
             Err(_) => T::default(),
         };
         let mut out = vec![];
         for first in (0..input.len() / n).step_by(2 * block) {
             let x: Vec<_> = (0..n)
                 .map(|i| {
-                    let tick = |t: usize| (first + t) as isize - (lags - 1) as isize;
-                    let frame = |t| [at(tick(t), i), at(tick(t + block), i)];
-                    self.forward(&(0..len).map(frame).collect::<Vec<_>>())
+                    let frame = |t: usize| (first + t) as isize - (lags - 1) as isize;
+                    let pair = |t| [at(frame(t), i), at(frame(t + block), i)];
+                    self.forward(&(0..len).map(pair).collect::<Vec<_>>())
                 })
                 .collect();
             let y: Vec<_> = (0..ratio)
@@ -157,18 +157,7 @@ impl Twin {
 }
 
 fn options(len: usize, precision: Precision) -> Options {
-    Options { algorithm: Algorithm::OverlapSave { transform: Some(len) }, precision, ..Options::default() }
-}
-
-/// All outputs of an input, the first of them for its first frame.
-fn run(bank: &Bank, options: Options, input: &[f32]) -> Vec<f32> {
-    let mut stream = start(bank, options).unwrap();
-    let late = stream.extra_latency();
-    let mut padded = input.to_vec();
-    padded.resize(input.len() + late / stream.ratio() * stream.channels(), 0.0);
-    let mut out = vec![0.0; padded.len() / stream.channels() * stream.ratio()];
-    assert_eq!(stream.process(&padded, &mut out).unwrap(), out.len());
-    out.split_off(late)
+    precise(Algorithm::OverlapSave { transform: Some(len) }, precision)
 }
 
 #[test]
@@ -193,19 +182,16 @@ fn every_small_shape_has_the_bits_of_the_scalar_twin() {
     }
 }
 
-/// The largest error in units of eps log2 F times the norm of a phase's filters times the norm of the inputs of two
-/// blocks.
+/// The largest error in units of eps log2 F times the norm of a phase's filters times the norm of the inputs
+/// of two blocks.
 fn relative_error(taps: &[Vec<f64>], m: usize, len: usize, input: &[f32], eps: f64, got: &[f32]) -> f64 {
     let n = taps.len();
-    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
     let filters = (0..m)
-        .map(|p| norm(&mut taps.iter().flat_map(|f| f.iter().skip(p).step_by(m).copied())))
+        .map(|p| norm(taps.iter().flat_map(|f| f.iter().skip(p).step_by(m).copied())))
         .fold(0.0, f64::max);
-    let inputs =
-        input.chunks(n * 2 * len).map(|x| norm(&mut x.iter().map(|&x| f64::from(x)))).fold(0.0, f64::max);
+    let inputs = input.chunks(n * 2 * len).map(|x| norm(x.iter().map(|&x| f64::from(x)))).fold(0.0, f64::max);
     let scale = eps * f64::from(len.ilog2()) * filters * inputs;
-    let worst = definition(taps, m, input).into_iter().zip(got).map(|(a, &b)| (a - f64::from(b)).abs());
-    worst.fold(0.0, f64::max) / scale
+    worst(&definition(taps, m, input), got) / scale
 }
 
 #[test]
@@ -229,49 +215,15 @@ fn the_error_is_within_the_stated_bound() {
 }
 
 #[test]
-fn double_precision_is_double() {
-    let mut noise = Noise(43);
-    let taps = random_taps(4, 500, &mut noise);
-    let input = noise.samples(4 * 3000);
-    let wide: Vec<f64> = input.iter().map(|&x| f64::from(x)).collect();
-    let mut stream = start(&fir_bank(taps.clone(), 4), options(512, Precision::Double)).unwrap();
-    let mut out = vec![0.0; wide.len()];
-    stream.process(&wide, &mut out).unwrap();
-    let want = definition(&taps, 4, &input);
-    let worst =
-        want.iter().zip(&out[stream.extra_latency()..]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    // eps log2 F ||h|| ||x||, as for f32: norms of 500 taps and of 1024 frames of numbers below 1.
-    assert!(worst < f64::EPSILON * 9.0 * 500f64.sqrt() * 4096f64.sqrt(), "{worst:e}");
-}
-
-#[test]
-fn an_impulse_anywhere_brings_out_the_taps_and_nothing_else() {
-    let taps = vec![(1..=11).map(f64::from).collect(), (1..=7).map(|i| -f64::from(i)).collect()];
-    let bank = fir_bank(taps.clone(), 3);
-    for place in 0..2 * 130 {
-        let mut input = vec![0.0; 2 * 140];
-        input[place] = 1.0;
-        let out = run(&bank, options(16, Precision::Single), &input);
-        for (t, y) in out.iter().enumerate() {
-            let tap = t.checked_sub(place / 2 * 3).and_then(|t| taps[place % 2].get(t));
-            assert!((f64::from(*y) - tap.unwrap_or(&0.0)).abs() < 1e-5, "impulse at {place}: {y} at {t}");
-        }
-    }
-}
-
-#[test]
 fn long_prime_and_empty_filters_work() {
     let mut noise = Noise(44);
     for count in [0, 1, 2, 509, 4001] {
         let taps = random_taps(2, count, &mut noise);
         let input = noise.samples(2 * 3000);
         let bank = fir_bank(taps.clone(), 2);
-        let algorithm = Algorithm::OverlapSave { transform: None };
-        let got = run(&bank, Options { algorithm, ..Options::default() }, &input);
-        let scale = 1e-6 * (count as f64 + 1.0).sqrt() * 100.0;
-        for (t, (a, b)) in definition(&taps, 2, &input).iter().zip(&got).enumerate() {
-            assert!((a - f64::from(*b)).abs() < scale, "{count} taps, output {t}: {b} for {a}");
-        }
+        let got = run(&bank, by(Algorithm::OverlapSave { transform: None }), &input);
+        let error = worst(&definition(&taps, 2, &input), &got);
+        assert!(error < 1e-4 * (count as f64 + 1.0).sqrt(), "{count} taps: {error:e}");
     }
 }
 
@@ -281,72 +233,15 @@ fn input_that_makes_a_transform_overflow_does_not_make_the_output_overflow() {
     // Alternating signs: each output is small, the spectrum at half the rate is not.
     let input: Vec<f32> = (0..2 * 500).map(|i| if i / 2 % 2 == 0 { 2e38 } else { -2e38 }).collect();
     let got = run(&fir_bank(taps.clone(), 2), options(64, Precision::Single), &input);
-    for (a, b) in definition(&taps, 2, &input).iter().zip(&got) {
-        assert!((a - f64::from(*b)).abs() < 1e-5 * 2e38, "{b} for {a}");
-    }
-}
-
-#[test]
-fn resets_fresh_streams_and_clones_have_the_bits_of_a_new_one() {
-    let mut noise = Noise(45);
-    let bank = fir_bank(random_taps(3, 50, &mut noise), 4);
-    let options = options(32, Precision::Single);
-    let input = noise.samples(3 * 777);
-    let mut stream = start(&bank, options).unwrap();
-    let mut want = vec![0.0; 4 * 777];
-    stream.process(&input, &mut want).unwrap();
-    let mut out = vec![0.0; want.len()];
-    stream.fresh().process(&input, &mut out).unwrap();
-    assert_eq!(out, want);
-    stream.reset();
-    stream.process(&input[..3 * 100], &mut out).unwrap();
-    let mut twin = stream.clone();
-    for stream in [&mut stream, &mut twin] {
-        stream.process(&input[3 * 100..], &mut out).unwrap();
-        assert_eq!(out[..4 * 677], want[4 * 100..]);
-    }
-}
-
-#[test]
-fn latency_is_exact_and_flushing_brings_everything_out() {
-    let mut noise = Noise(46);
-    for (n, m, count) in [(1, 1, 9), (2, 3, 30), (5, 2, 64)] {
-        let taps = random_taps(n, count, &mut noise);
-        let bank = fir_bank(taps.clone(), m);
-        let mut stream = start(&bank, options(64, Precision::Single)).unwrap();
-        assert_eq!(stream.latency(), bank.latency + stream.extra_latency());
-        assert_eq!(stream.history(), Some(phase_taps(&taps, m) - 1));
-        let input = noise.samples(n * 150);
-        let mut out = vec![0.0; m * 150];
-        stream.process(&input, &mut out).unwrap();
-        let mut tail = vec![0.0; m * stream.plan().flush_frames()];
-        stream.process(&vec![0.0; n * stream.plan().flush_frames()], &mut tail).unwrap();
-        out.extend(tail);
-        let (late, all) = out.split_at(stream.extra_latency());
-        assert!(late.iter().all(|&y| y == 0.0));
-        assert!(all.len() >= m * 150 && all.len() < m * 150 + m + bank.latency);
-        assert_eq!(all[..m * 150], run(&bank, options(64, Precision::Single), &input));
-    }
-}
-
-#[test]
-fn threads_do_not_change_a_bit() {
-    let mut noise = Noise(47);
-    let bank = fir_bank(random_taps(2, 90, &mut noise), 2);
-    let mut one = start(&bank, options(128, Precision::Single)).unwrap();
-    let mut many = one.fresh();
-    let input = noise.samples(2 * 20_000);
-    let mut out = [vec![0.0; 2 * 20_000], vec![0.0; 2 * 20_000]];
-    one.process(&input, &mut out[0]).unwrap();
-    many.process_parallel(&input, &mut out[1], &crate::ThreadPool::new(3).unwrap()).unwrap();
-    assert_eq!(out[0], out[1]);
+    let error = worst(&definition(&taps, 2, &input), &got);
+    assert!(error < 1e-5 * 2e38, "{error:e}");
 }
 
 #[test]
 fn recursive_banks_have_no_transforms() {
     let filter = crate::StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
     let bank = recursive_bank(filter);
-    let refused = |algorithm| start(&bank, Options { algorithm, ..Options::default() }).err();
+    let refused = |algorithm| start(&bank, by(algorithm)).err();
     assert_eq!(
         refused(Algorithm::OverlapSave { transform: None }),
         Some(BuildError::Recursive { algorithm: "overlap-save" })
@@ -358,64 +253,8 @@ fn recursive_banks_have_no_transforms() {
 fn spectra_that_would_fill_the_memory_are_refused_or_not_chosen() {
     let taps = vec![vec![1.0; 1024]; 1024];
     let bank = fir_bank(taps, 1024);
-    let made = |algorithm| start(&bank, Options { algorithm, ..Options::default() });
+    let made = |algorithm| start(&bank, by(algorithm));
     let len = 1 << 20;
     let refused = BuildError::Spectra { channels: 1024, ratio: 1024, len };
     assert_eq!(made(Algorithm::OverlapSave { transform: Some(len) }).err(), Some(refused));
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
-
-    #[test]
-    fn cuts_do_not_change_a_bit(
-        n in 1usize..10, m in 1usize..10, count in 1usize..60, more in 0usize..3, seed: u64,
-        cuts in prop::collection::vec(prop_oneof![0usize..20, 0usize..900], 1..16), double: bool,
-        lost in prop::collection::vec(0usize..100_000, 0..4),
-    ) {
-        let mut noise = Noise(seed);
-        let precision = if double { Precision::Double } else { Precision::Single };
-        let taps = random_taps(n, count, &mut noise);
-        let len = phase_taps(&taps, m).next_power_of_two().max(16) << more;
-        let bank = fir_bank(taps, m);
-        let mut stream = start(&bank, options(len, precision)).unwrap();
-        let mut input = noise.samples(n * cuts.iter().sum::<usize>());
-        // Zero for what is lost gives the same.
-        for place in &lost {
-            if let Some(x) = input.get_mut(*place) { *x = 0.0; }
-        }
-        let mut whole = vec![0.0; input.len() / n * m];
-        stream.process(&input, &mut whole).unwrap();
-        stream.reset();
-        for place in &lost {
-            if let Some(x) = input.get_mut(*place) { *x = f32::NAN; }
-        }
-        let mut marked = vec![0.0; whole.len()];
-        stream.process(&input, &mut marked).unwrap();
-        prop_assert_eq!(marked.iter().zip(&whole).position(|(a, b)| a != b), None);
-        let replaced = stream.replaced();
-        prop_assert_eq!(replaced as usize, input.iter().filter(|x| x.is_nan()).count());
-        stream.reset();
-        let pieces = in_pieces(&mut stream, [n, m], &input, &cuts);
-        prop_assert_eq!(pieces.iter().zip(&whole).position(|(a, b)| a != b), None);
-        prop_assert_eq!(stream.replaced(), replaced);
-    }
-
-    #[test]
-    fn bytes_give_the_same_samples(n in 1usize..5, m in 1usize..5, seed: u64, ticks in 0usize..900) {
-        let mut noise = Noise(seed);
-        let bank = fir_bank(random_taps(n, 13, &mut noise), m);
-        let input = noise.samples(n * ticks);
-        let mut stream = start(&bank, options(16, Precision::Single)).unwrap();
-        let mut want = vec![0.0; m * ticks];
-        stream.process(&input, &mut want).unwrap();
-        stream.reset();
-        let bytes: Vec<u8> = input.iter().flat_map(|x| x.to_le_bytes()).collect();
-        let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: n, bytes: &bytes };
-        let mut out = vec![0; 4 * want.len()];
-        let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut out, clipped: 0 };
-        stream.process_pcm(&[frames], &mut output).unwrap();
-        let got: Vec<f32> = out.chunks_exact(4).map(|b| PcmFormat::F32Le.decode(b) as f32).collect();
-        prop_assert_eq!(got, want);
-    }
 }

@@ -50,8 +50,8 @@ impl DelayLines {
         self.taps.keys().chain(self.b.keys()).map(|&(_, frames)| frames).max().unwrap_or(0)
     }
 
-    /// The states by twos such that each depends on the other one of its two at most; one may be alone. `None` if
-    /// the states depend on one another in another way.
+    /// The states by twos such that each depends on the other one of its two at most; one may be alone.
+    /// `None` if the states depend on one another in another way.
     pub(crate) fn sections(&self) -> Option<Vec<(usize, Option<usize>)>> {
         let n = self.a.len();
         let coupled = |i: usize, j: usize| i != j && (self.a[i][j] != 0.0 || self.a[j][i] != 0.0);

@@ -1,13 +1,13 @@
 //! Recursive filters in state space: x+ = a x + b u, y = c x + d u, once per frame.
 //!
-//! Delay lines are taken out of the states and become the history of the input, as with FIR banks; the other states run
-//! as a recursion whose values are one row per frame. Then the output is the sum of two FIR filters, one over the
-//! inputs and one over the states.
+//! Delay lines are taken out of the states and become the history of the input, as with FIR banks; the other
+//! states run as a recursion whose values are one row per frame. Then the output is the sum of two FIR
+//! filters, one over the inputs and one over the states.
 //!
-//! Every 64 frames from the beginning of the stream, and not of a call, denormals are flushed: states below 1e-30 (f32)
-//! or 1e-280 (f64) become zero, so that a recursion that fades out does not slow down. A state that is not finite (the
-//! recursion overflowed) becomes zero there too, and is counted. NaN and infinity in the input are replaced before
-//! filtering, so they never reach a state, and no frame is filtered twice.
+//! Every 64 frames from the beginning of the stream, and not of a call, denormals are flushed: states below
+//! 1e-30 (f32) or 1e-280 (f64) become zero, so that a recursion that fades out does not slow down. A state
+//! that is not finite (the recursion overflowed) becomes zero there too, and is counted. NaN and infinity in
+//! the input are replaced before filtering, so they never reach a state, and no frame is filtered twice.
 
 mod delay_lines;
 mod layout;
@@ -23,7 +23,8 @@ use crate::history::History;
 use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, all_finite};
 use crate::{BuildError, Isa, Sample, StateSpace};
 
-/// Frames per block. Blocks are counted from the beginning of the stream, so that cuts into calls do not change a bit.
+/// Frames per block. Blocks are counted from the beginning of the stream, so that cuts into calls do not
+/// change a bit.
 pub(crate) const BLOCK: usize = 64;
 
 /// Coefficients in the order of use.

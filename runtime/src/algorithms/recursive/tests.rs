@@ -1,18 +1,8 @@
+//! Recursions against their state equations.
+
 use super::*;
 use crate::adapters::Interleaved;
-use crate::tests::Noise;
-
-/// The definition, row by row.
-fn definition(filter: &StateSpace, input: &[f64], channels: usize) -> Vec<f64> {
-    let dot = |row: &[f64], v: &[f64]| row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
-    let mut x = vec![0.0; filter.a.len()];
-    let mut out = Vec::new();
-    for u in input.chunks_exact(channels) {
-        out.extend(filter.c.iter().zip(&filter.d).map(|(c, d)| dot(c, &x) + dot(d, u)));
-        x = filter.a.iter().zip(&filter.b).map(|(a, b)| dot(a, &x) + dot(b, u)).collect();
-    }
-    out
-}
+use crate::tests::support::{Noise, state_space_definition, worst};
 
 fn run<T: Sample>(
     filter: &StateSpace,
@@ -56,29 +46,25 @@ fn every_shape_follows_its_definition_with_the_same_bits_for_every_cut() {
         for (n, m) in [(1, 1), (2, 3), (4, 4), (3, 9)] {
             let filter = random(order, n, m, blocks, &mut noise);
             let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
-            let want = definition(&filter, &input, n);
+            let want = state_space_definition(&filter, &input);
             let (whole, is_parallel) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
             // Small dense matrices are block-diagonal too.
             assert!(is_parallel || (blocks.is_none() && order > 2), "{order} {blocks:?}");
-            let worst = whole.iter().zip(&want).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(worst < 1e-12, "order {order} N {n} M {m}: {worst:e}");
+            let error = worst(&want, &whole);
+            assert!(error < 1e-12, "order {order} N {n} M {m}: {error:e}");
             for cut in [1, 7, 63, 64, 65, 129] {
                 assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
             }
             let portable = run::<f64>(&filter, n, m, Isa::portable(), &input, 300).0;
-            let apart = whole.iter().zip(&portable).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let apart = worst(&whole, &portable);
             assert!(apart < 1e-12, "{apart:e}");
         }
     }
 }
 
-fn worst(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
-/// The same filter with its inputs `frames` frames late, in a delay line that the output reads too: the form of
-/// designed banks.
-fn behind(core: &StateSpace, frames: usize, noise: &mut Noise) -> StateSpace {
+/// The same filter with its inputs `frames` frames late, in a delay line that the output reads too: the form
+/// of designed banks.
+fn delayed(core: &StateSpace, frames: usize, noise: &mut Noise) -> StateSpace {
     let (states, n) = (core.a.len(), core.d[0].len());
     let order = states + frames * n;
     let mut a = vec![vec![0.0; order]; order];
@@ -103,12 +89,12 @@ fn delay_lines_before_the_states_follow_the_definition() {
     let mut noise = Noise(22);
     for (order, blocks) in [(0, None), (2, Some(&[2][..])), (5, Some(&[2, 1, 2])), (4, None)] {
         for (n, m, frames) in [(1, 1, 3), (1, 3, 1), (2, 2, 5), (3, 2, 4), (4, 4, 17), (5, 9, 2)] {
-            let filter = behind(&random(order, n, m, blocks, &mut noise), frames, &mut noise);
+            let filter = delayed(&random(order, n, m, blocks, &mut noise), frames, &mut noise);
             let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
             let (whole, is_parallel) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
             assert!(is_parallel || (blocks.is_none() && order > 2));
-            let error = worst(&whole, &definition(&filter, &input, n));
-            assert!(error < 1e-12, "order {order} N {n} M {m} behind {frames}: {error:e}");
+            let error = worst(&whole, &state_space_definition(&filter, &input));
+            assert!(error < 1e-12, "order {order} N {n} M {m} delayed by {frames}: {error:e}");
             for cut in [1, 63, 65] {
                 assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
             }
@@ -127,7 +113,7 @@ fn in_single_precision_the_error_is_what_the_poles_make_of_rounding() {
             (pair[1][2 * k], pair[1][2 * k + 1]) = (-radius * s, radius * c);
         }
         let input: Vec<f64> = (0..2 * 3000).map(|_| f64::from(noise.next() as f32)).collect();
-        let want = definition(&filter, &input, 2);
+        let want = state_space_definition(&filter, &input);
         let single = run::<f32>(&filter, 2, 3, Isa::detect(), &input, 3000).0;
         let size = want.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
         let error = worst(&single, &want) / size;
@@ -151,7 +137,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
     assert!(columns[1..].iter().all(|&count| count < 24), "{columns:?}");
     let input: Vec<f64> = (0..300).map(|_| noise.next()).collect();
     let got = run::<f64>(&filter, 1, 2, Isa::detect(), &input, 300).0;
-    assert!(worst(&got, &definition(&filter, &input, 1)) < 1e-12);
+    assert!(worst(&got, &state_space_definition(&filter, &input)) < 1e-12);
 }
 
 #[test]

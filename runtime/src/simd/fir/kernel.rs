@@ -22,7 +22,7 @@ impl<T: Element, const D: usize, const P: usize> Kernel for Fir<T, D, P> {
     #[inline(always)]
     unsafe fn run<V: Vector<Sample = T>>(job: &Job<'_, T>) -> bool {
         if const { D > group_lanes::<T>() } {
-            unreachable!("a step is a group at most");
+            unreachable!("a step is at most a group");
         }
         // SAFETY: the caller's.
         unsafe {
@@ -49,7 +49,8 @@ impl<T: Element> FirKernel<T> {
         Self { isa, sample: PhantomData }
     }
 
-    /// Windows of at least `len` samples (no less than a hop) for frames of `hop` samples and `phases` phases.
+    /// Windows of at least `len` samples (no less than a hop) for frames of `hop` samples and `phases`
+    /// phases.
     pub(crate) fn tiling(self, hop: usize, len: usize, phases: usize) -> Tiling {
         Tiling::new([hop, len, phases], group_lanes::<T>(), vector_lanes::<T>(self.isa))
     }

@@ -1,10 +1,11 @@
 //! Direct FIR for two to four phases: P phases times R vectors of frames in registers.
 //!
-//! Steps are taken from the newest on: one input vector serves P phases, one vector of coefficients R vectors of input.
+//! Steps are taken from the newest on: one input vector serves P phases, one vector of coefficients R
+//! vectors of input.
 //!
-//! Where a frame has eight lanes the end of a tile is done in two parts, because its sums are ready all at once and a long
-//! chain of shuffles and stores behind them would stop the multiply-adds: the first lanes are added in
-//! registers and go to scratch memory; from there they are brought into order after the next tile.
+//! Where a frame has eight lanes the end of a tile is done in two parts, because its sums are ready all at
+//! once and a long chain of shuffles and stores after them would stop the multiply-adds: the first lanes are
+//! added in registers and go to scratch memory; from there they are brought into order after the next tile.
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
@@ -152,8 +153,8 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
                 return sums;
             }
             let mut sums = [[V::zero(); R]; P];
-            // Two steps an iteration: half the loop's own work, and an end that is foreseen more often. The pointers
-            // may leave the slices after the last step, where nothing is read.
+            // Two steps an iteration: half the loop's own work, and an end that is foreseen more often. The
+            // pointers may leave the slices after the last step, where nothing is read.
             if steps % 2 == 1 {
                 Self::step(x, w, hop, &mut sums);
                 (x, w) = (x.wrapping_sub(D), w.wrapping_add(P * D));

@@ -2,6 +2,8 @@
 
 use super::super::dispatch::Element;
 use super::super::vector::group_lanes;
+#[cfg(test)]
+use super::super::work;
 use super::kernel::{FirFn, FirKernel};
 use super::tiling::{Chunk, Job, SCRATCH, Tiling};
 use crate::aligned::Aligned;
@@ -26,7 +28,8 @@ struct PhaseGroup<T: Element> {
     first: usize,
     /// P; 1 only where there is no other phase.
     width: usize,
-    /// Coefficient of lane d in the step that comes s-th for the p-th sum ([`Tiling::phase`]) at (s P + p) D + d.
+    /// Coefficient of lane d in the step that comes s-th for the p-th sum ([`Tiling::phase`]) at (s P + p) D
+    /// + d.
     coefficients: Aligned<T>,
     kernel: FirFn<T>,
 }
@@ -72,11 +75,12 @@ impl<T: Element> Polyphase<T> {
         self.groups.len() == 1
     }
 
-    /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at `x[tiling.past + t * tiling.hop]`;
-    /// frames past the last one, up to whole vectors, are read too and mean nothing.
+    /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at `x[tiling.past + t *
+    /// tiling.hop]`; frames past the last one, up to whole vectors, are read too and mean nothing.
     ///
-    /// Returns false if an input of these frames is not finite: it makes all outputs of its frame so, whatever the
-    /// coefficients. It is false also where finite inputs led to sums, or to a total of sums, that are not.
+    /// Returns false if an input of these frames is not finite: it makes all outputs of its frame so,
+    /// whatever the coefficients. It is false also where finite inputs led to sums, or to a total of sums,
+    /// that are not.
     ///
     /// # Panics
     /// If a segment or `out` is too short for that, or if there are more than two segments.
@@ -87,6 +91,8 @@ impl<T: Element> Polyphase<T> {
         for (chunk, segment) in chunks[..segments.len()].iter_mut().zip(segments) {
             *chunk = self.chunk(segment, room, out.len());
             whole &= chunk.frames == segment.frames;
+            #[cfg(test)]
+            work::add(segment.frames * self.tiling.steps * self.tiling.depth * self.ratio);
         }
         let mut scratch = std::mem::MaybeUninit::<Scratch<T>>::uninit();
         let mut finite = true;
@@ -99,8 +105,8 @@ impl<T: Element> Polyphase<T> {
                 out_hop: self.ratio,
                 scratch: scratch.as_mut_ptr().cast(),
             };
-            // SAFETY: the coefficients were made for the kernel and the tiling, and all loads and stores lie within the
-            // bounds that `chunk` asserts.
+            // SAFETY: the coefficients were made for the kernel and the tiling, and all loads and stores lie
+            // within the bounds that `chunk` asserts.
             finite &= unsafe { (group.kernel)(&job) };
             if !whole {
                 for (chunk, segment) in chunks.iter().zip(segments) {
@@ -112,8 +118,9 @@ impl<T: Element> Polyphase<T> {
         finite
     }
 
-    /// The whole vectors of a segment, and with three phases without its last frame: of three phases the kernels
-    /// write to the place behind them too, which belongs to the same frame, to a later one, or to none.
+    /// The whole vectors of a segment, and with three phases without its last frame: of three phases the
+    /// kernels write to the place after them too, which belongs to the same frame, to a later one, or to
+    /// none.
     #[inline(always)]
     fn chunk(&self, segment: &Segment<'_, T>, room: *mut T, len: usize) -> Chunk<T> {
         let Segment { x, first, frames } = *segment;
@@ -128,8 +135,8 @@ impl<T: Element> Polyphase<T> {
     }
 }
 
-/// The frames of a segment, a vector at most, that are left of its chunk: all outputs of the vector go to scratch, and
-/// those that are wanted from there.
+/// The frames of a segment, a vector at most, that are left of its chunk: all outputs of the vector go to
+/// scratch, and those that are wanted from there.
 ///
 /// # Safety
 /// The job, the chunk and the segment are those of a checked call, whose outputs begin at `room`.
@@ -159,8 +166,9 @@ unsafe fn remainder<T: Element>(
     }
 }
 
-/// M phases in groups of 4, before them one of 3 if M is odd, behind them one of 2 if that is not enough; 1 only if M is 1. Those
-/// of 3 may write to the place behind them, and those behind them then write over it.
+/// M phases in groups of 4, before them one of 3 if M is odd, after them one of 2 if that is not enough; 1
+/// only if M is
+/// 1. A group of 3 may write to the place after it, and the next group then writes over that.
 pub(crate) fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
     let mut first = 0;
     std::iter::from_fn(move || {

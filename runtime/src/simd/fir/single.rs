@@ -1,12 +1,12 @@
 //! Direct FIR for a single phase: too few products share an input, so pairs of steps share them.
 //!
-//! Vector r of a tile holds frames that are c D samples after those of vector r - 1. What it reads for step s + c is
-//! then what vector r - 1 reads for step s: one load serves both. Steps are taken in pairs, s + c before s, for s =
-//! 0 .. c - 1, then the next 2 c steps; where a step has no partner it comes alone, after the pairs. This order is the
-//! same for every tile and every instruction set.
+//! Vector r of a tile holds frames that are c D samples after those of vector r - 1. What it reads for step
+//! s + c is then what vector r - 1 reads for step s: one load serves both. Steps are taken in pairs, s + c
+//! before s, for s = 0 .. c - 1, then the next 2 c steps; where a step has no partner it comes alone, after
+//! the pairs. This order is the same for every tile and every instruction set.
 //!
-//! If a frame fills a group (D = group), c D must be a whole number of hops: then q = c D / N frames lie between
-//! those of neighbouring vectors, and q tiles are needed to cover all frames.
+//! If a frame fills a group (D = group), c D must be a whole number of hops: then q = c D / N frames lie
+//! between those of neighbouring vectors, and q tiles are needed to cover all frames.
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
@@ -46,7 +46,8 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
     unsafe fn chunk(&mut self, &Chunk { x, out, frames }: &Chunk<V::Sample>) {
         let Job { tiling, scratch, .. } = *self.job;
         let pairing = tiling.pairing;
-        // Vectors of a block in each of the tiles, and blocks at once: of twelve sums three blocks of 8 are two tiles.
+        // Vectors of a block in each of the tiles, and blocks at once: of twelve sums three blocks of 8 are
+        // two tiles.
         let vectors = if D < V::GROUP { D } else { V::GROUP / pairing.tiles };
         let most = if D < V::GROUP { V::SUMS / D } else { (2 * V::SUMS / vectors).min(V::SUMS) };
         let (mut first, mut left) = (0, frames / V::GROUP);
@@ -110,8 +111,8 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         sized!(vectors, R => unsafe { self.tile::<R>(x, to) });
     }
 
-    /// R vectors, the newest step of whose first one is at `x`. Their outputs go to `to`, or if D fills a group their
-    /// sums, as far apart as their frames.
+    /// R vectors, the newest step of whose first one is at `x`. Their outputs go to `to`, or if D fills a
+    /// group their sums, as far apart as their frames.
     #[inline(always)]
     unsafe fn tile<const R: usize>(&mut self, mut x: *const V::Sample, to: *mut V::Sample) {
         // The compiler is spared the tiles that no call asks for.
@@ -120,7 +121,8 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         }
         let Pairing { apart, blocks, pairs, singles, tiles } = self.job.tiling.pairing;
         let mut w = self.job.coefficients;
-        // SAFETY: the caller's. The pointers may leave the slices after the last step, where nothing is read.
+        // SAFETY: the caller's. The pointers may leave the slices after the last step, where nothing is
+        // read.
         unsafe {
             let mut sums = [V::zero(); R];
             for _ in 0..blocks {

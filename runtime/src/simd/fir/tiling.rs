@@ -20,8 +20,8 @@ pub(crate) struct Tiling {
 }
 
 impl Tiling {
-    /// Windows of at least `len` samples (no less than a hop) for frames of `hop` samples and `phases` phases, in groups of
-    /// `group` lanes and vectors of `lanes`.
+    /// Windows of at least `len` samples (no less than a hop) for frames of `hop` samples and `phases`
+    /// phases, in groups of `group` lanes and vectors of `lanes`.
     pub(super) fn new([hop, len, phases]: [usize; 3], group: usize, lanes: usize) -> Self {
         let depth = if hop < group && hop.is_power_of_two() { hop } else { group };
         let steps = len.max(hop).div_ceil(depth);
@@ -54,8 +54,8 @@ impl Tiling {
     }
 }
 
-/// The vectors of a tile that must be checked, if an input that is not finite shows in all outputs of `reach` frames and a
-/// vector holds `frames` of them: every one, every second, every fourth ...
+/// The vectors of a tile that must be checked, if an input that is not finite shows in all outputs of
+/// `reach` frames and a vector holds `frames` of them: every one, every second, every fourth ...
 fn checked_vectors(reach: usize, frames: usize) -> u32 {
     match (reach >> frames.trailing_zeros()).checked_ilog2().unwrap_or(0) {
         0 => !0,
@@ -125,16 +125,16 @@ pub(super) struct Job<'a, T> {
     /// The first phase.
     pub(super) first: usize,
     pub(super) out_hop: usize,
-    /// Room for the sums of a tile, [`SCRATCH`] samples. It comes from outside, or else the compiler keeps it in registers,
-    /// which brings back what it is to avoid.
+    /// Room for the sums of a tile, [`SCRATCH`] samples. It comes from outside, or else the compiler keeps
+    /// it in registers, which brings back what it is to avoid.
     pub(super) scratch: *mut T,
 }
 
 /// Samples of the largest scratch: the sums of the largest tile, in the largest vectors.
 pub(super) const SCRATCH: usize = 768;
 
-/// Vectors of the next tile if `left` of them are left: the most, or half of what is less than two such tiles, and one
-/// of the sizes of [`sized`].
+/// Vectors of the next tile if `left` of them are left: the most, or half of what is less than two such
+/// tiles, and one of the sizes of [`sized`].
 #[inline(always)]
 pub(super) fn tile_size(left: usize, most: usize) -> usize {
     let size = if left >= 2 * most || left == most {
@@ -152,7 +152,8 @@ pub(super) fn tile_size(left: usize, most: usize) -> usize {
     }
 }
 
-/// Runs `$body` with `$R`, the vectors of a tile, as a constant. Few sizes are compiled: the others are sums of two.
+/// Runs `$body` with `$R`, the vectors of a tile, as a constant. Few sizes are compiled: the others are sums
+/// of two.
 macro_rules! sized {
     ($size:expr, $R:ident => $body:expr) => {
         sized!(@ $size, $R => $body; 1 2 3 4 6 8 12)

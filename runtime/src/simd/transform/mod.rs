@@ -1,19 +1,18 @@
 //! Fourier transforms across channels, and the product with a matrix of spectra between them.
 //!
 //! A *row* is a lane group (see [`vector`](super::vector)) of real parts and one of imaginary parts, in
-//! structure-of-arrays order; a transform of length F
-//! takes F rows to F rows, every lane for itself. That is why it is written here and not taken from a crate: those
-//! transform one stream, and frames of N channels would have to be brought into N streams and back. Here they
-//! are transformed as they lie.
+//! structure-of-arrays order; a transform of length F takes F rows to F rows, every lane for itself. That is
+//! why it is written here and not taken from a crate: those transform one stream, and frames of N channels
+//! would have to be brought into N streams and back. Here they are transformed as they lie.
 //!
-//! Forward is decimation in frequency, X(f) = sum_t x(t) exp(-2 pi i f t / F), in passes of radix 4 and one of
-//! radix 2 if log2 F is odd; it leaves the rows in the order of reversed digits, in which the product is made, and
-//! the inverse (decimation in time, without the factor 1 / F) takes them in that order (Gentleman and Sande
-//! 1966; Cooley and Tukey 1965).
+//! Forward is decimation in frequency, X(f) = sum_t x(t) exp(-2 pi i f t / F), in passes of radix 4 and one
+//! of radix 2 if log2 F is odd; it leaves the rows in the order of reversed digits, in which the product is
+//! made, and the inverse (decimation in time, without the factor 1 / F) takes them in that order (Gentleman
+//! and Sande 1966; Cooley and Tukey 1965).
 //!
-//! Two real blocks a and b are one complex block a + ib. As the filters are real, the product with their spectra
-//! gives y_a + i y_b: the parts need not be told apart. Spectra at f and F - f are conjugate, so both
-//! frequencies are made together from one load.
+//! Two real blocks a and b are one complex block a + ib. As the filters are real, the product with their
+//! spectra gives y_a + i y_b: the parts need not be told apart. Spectra at f and F - f are conjugate, so
+//! both frequencies are made together from one load.
 //!
 //! Bits: all lanes do the same in the same order, whatever the instruction set.
 
@@ -64,6 +63,12 @@ impl<T: Element> Transform<T> {
         Self { len, factors: Aligned::from_slice(&factors), pairs }
     }
 
+    /// Counts one transform: a multiply-add for each sample of a row in each level.
+    #[cfg(test)]
+    fn count(&self) {
+        super::work::add(self.len * self.len.ilog2() as usize * row_samples::<T>());
+    }
+
     /// The row of each frequency 0 <= f <= F / 2.
     pub(crate) fn half_rows(&self) -> impl Iterator<Item = usize> {
         self.pairs.iter().map(|&[row, _]| row as usize)
@@ -97,7 +102,8 @@ pub(crate) struct Spectra<'a, T> {
     pub(crate) rows: &'a [T],
 }
 
-/// Where rows go: the last rows of each segment's real parts, then of its imaginary parts, segment after segment.
+/// Where rows go: the last rows of each segment's real parts, then of its imaginary parts, segment after
+/// segment.
 #[derive(Debug)]
 pub(crate) struct Frames<'a, T> {
     pub(crate) samples: &'a mut [T],
@@ -143,6 +149,8 @@ impl<T: Element> TransformKernel<T> {
             factors: transform.factors.as_ptr(),
             rows: rows.as_mut_ptr(),
         };
+        #[cfg(test)]
+        transform.count();
         // SAFETY: the bounds are asserted above.
         unsafe { self.forward[depth.ilog2() as usize](&job) };
     }
@@ -154,14 +162,16 @@ impl<T: Element> TransformKernel<T> {
     pub(crate) fn inverse(&self, transform: &Transform<T>, rows: &mut [T]) {
         assert!(rows.len() >= transform.len * row_samples::<T>());
         let factors = transform.factors.as_ptr_range().end;
+        #[cfg(test)]
+        transform.count();
         let job = InverseJob { len: transform.len, factors, rows: rows.as_mut_ptr() };
         // SAFETY: as above.
         unsafe { (self.inverse)(&job) };
     }
 
-    /// Brings rows to where they belong, `depth` lanes to a frame from each of its groups. Each frame is written as
-    /// whole lanes and what is too much overwritten by the next one, which also goes for what follows the
-    /// last one.
+    /// Brings rows to where they belong, `depth` lanes to a frame from each of its groups. Each frame is
+    /// written as whole lanes and what is too much overwritten by the next one, which also goes for what
+    /// follows the last one.
     ///
     /// # Panics
     /// If slices do not fit: the last frame needs whole lanes.
@@ -211,12 +221,14 @@ impl<T: Element> TransformKernel<T> {
             output: output.as_mut_ptr(),
             outputs,
         };
+        #[cfg(test)]
+        super::work::add(2 * transform.pairs.len() * outputs * spectra.channels * row);
         // SAFETY: as above; the pairs are rows below F, see `Transform::new`.
         unsafe { self.product[depth.ilog2() as usize](&job) };
     }
 }
 
-/// A kernel for D = 1, 2, 4 and 8 lanes a segment.
+/// A kernel for D = 1, 2, 4 and 8 lanes per segment.
 macro_rules! by_depth {
     ($kernel:ident, $isa:expr) => {
         [

@@ -33,7 +33,8 @@ fn butterfly<V: Vector, const INVERSE: bool>([a, b, c, d]: [Complex<V>; 4]) -> [
     [even.add(odd), first, even.sub(odd), third]
 }
 
-/// Where a pass takes its rows from. No closure: what is not inlined is not compiled for the instruction set.
+/// Where a pass takes its rows from. No closure: what is not inlined is not compiled for the instruction
+/// set.
 ///
 /// # Safety
 /// As for [`Vector`], and the rows exist.

@@ -18,7 +18,7 @@ pub(super) struct ProductJob<'a, T> {
     pub(super) outputs: usize,
 }
 
-/// The product at all frequencies, with D channels a row.
+/// The product at all frequencies, with D channels per row.
 pub(super) struct Product<T, const D: usize>(PhantomData<T>);
 
 impl<T: Element, const D: usize> Kernel for Product<T, D> {

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Fits the cost model of runtime/src/algorithms/choice.rs to the table of `cargo bench --bench algorithm_crossover`.
 
-usage: form_costs.py LANES < table      (LANES of 32 bytes: 8 for f32, 4 for f64; needs numpy and scipy)
+usage: algorithm_costs.py LANES < table      (LANES of 32 bytes: 8 for f32, 4 for f64; needs numpy and scipy)
 
-Prints nanoseconds for each term of a tick, and quantiles of measured / fitted. Divided by the time of a vector of
+Prints nanoseconds for each term of a frame, and quantiles of measured / fitted. Divided by the time of a vector of
 products and rounded they are the constants of the model. Where overlap-save was not measured, its column is empty.
 """
 
@@ -17,7 +17,7 @@ GROUP = int(sys.argv[1])
 
 
 def blocks(n, m, k, length):
-    """Terms of overlap-save: rows x levels, vectors of products, outputs, inputs, ticks."""
+    """Terms of overlap-save: rows x levels, vectors of products, outputs, inputs, frames."""
     depth = min(1 << (max(n, m) - 1).bit_length(), GROUP)
     batch = 2 * (GROUP // depth) * (length - k + 1)
     inputs, outputs = -(-n // depth), -(-m // depth)
@@ -26,14 +26,14 @@ def blocks(n, m, k, length):
 
 
 def direct(n, m, k):
-    """Terms of the direct form: vectors of products, vectors of sums, outputs, ticks."""
+    """Terms of the direct algorithm: vectors of products, vectors of sums, outputs, frames."""
     depth = n if n < GROUP and n & (n - 1) == 0 else GROUP
     steps = -(-k * n // depth)
     return [steps * depth * m / GROUP, depth * m / GROUP, m, 1]
 
 
 def halves(costs, n, m, k):
-    """Terms of the fast form: half a tick of each of three direct filters at their costs, vectors of outputs, of inputs."""
+    """Terms of fast FIR: half a frame of each of three direct filters at their costs, vectors of outputs, of inputs."""
     filters = [direct(n, m, -(-k // 2))] * 2 + [direct(n, m, k // 2)]
     return [np.sum(filters, axis=0) @ costs / 2, m / GROUP, n / GROUP]
 
@@ -54,7 +54,7 @@ rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line i
 rows = [row for row in rows if len(row) == 8 and row[0].isdigit()]
 sizes = [tuple(map(int, row[:3])) for row in rows]
 costs = fit("direct", [(direct(*size), float(row[3])) for size, row in zip(sizes, rows)])
-fit("fast", [(halves(costs, *size), float(row[4])) for size, row in zip(sizes, rows)])
+fit("fast FIR", [(halves(costs, *size), float(row[4])) for size, row in zip(sizes, rows)])
 pairs = [(size, part.split(":")) for size, row in zip(sizes, rows) for part in row[5].split(",") if part]
 if pairs:
     fit("overlap-save", [(blocks(*size, int(length)), float(time)) for size, (length, time) in pairs])

@@ -1,0 +1,35 @@
+//! Calls and banks that are refused.
+
+use super::support::{Bank, Filters, fir_bank, rotation_bank, start};
+use crate::{BuildError, Options, PcmFormat, PcmOutput, ProcessError};
+
+#[test]
+fn calls_and_banks_that_do_not_fit_are_refused() {
+    let bank = fir_bank(vec![vec![1.0], vec![1.0]], 2);
+    let mut stream = start(&bank, Options::default()).unwrap();
+    let mut out = [0.0; 3];
+    assert_eq!(
+        stream.process(&[0.0; 3], &mut out),
+        Err(ProcessError::PartialFrame { samples: 3, channels: 2 })
+    );
+    assert_eq!(
+        stream.process(&[0.0; 4], &mut out),
+        Err(ProcessError::OutputTooShort { given: 3, wanted: 4 })
+    );
+    assert_eq!(stream.process(&[], &mut out), Ok(0));
+    let mut output = PcmOutput { format: PcmFormat::S8, bytes: &mut [], clipped: 0 };
+    assert_eq!(stream.process_pcm(&[], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
+
+    let refused = |bank: Bank| start(&bank, Options::default()).unwrap_err();
+    assert_eq!(refused(Bank { ratio: 0, ..bank.clone() }), BuildError::NoRatio);
+    assert_eq!(refused(fir_bank(vec![], 2)), BuildError::NoChannels);
+    // Finite in f64, infinite in f32.
+    assert!(matches!(refused(fir_bank(vec![vec![0.0, 1e300]], 2)), BuildError::NotFinite { index: 1, .. }));
+    let mut wrong = rotation_bank();
+    if let Filters::StateSpace(filter) = &mut wrong.filters {
+        filter.c.pop();
+    }
+    assert!(
+        refused(wrong).to_string().contains("matrix c of the state-space filters is 2 x 2; 3 x 2 is needed")
+    );
+}

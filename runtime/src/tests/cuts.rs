@@ -1,0 +1,71 @@
+//! How a stream is cut into calls changes no bit, and neither does NaN in place of zero.
+
+use super::support::{Noise, fir_bank, in_pieces, precise, random_taps, start};
+use crate::algorithms::filter::phase_taps;
+use crate::{Algorithm, Precision, Stream};
+use proptest::prelude::*;
+
+/// Asserts that marked samples give what zeros in their place give, in one call and in calls of `cuts`
+/// frames.
+fn check_cuts(stream: &mut Stream, input: &[f32], lost: &[usize], cuts: &[usize]) {
+    let algorithm = stream.plan().algorithm();
+    let with = |value: f32| {
+        let mut input = input.to_vec();
+        lost.iter()
+            .filter(|&&index| index < input.len())
+            .copied()
+            .collect::<Vec<_>>()
+            .into_iter()
+            .for_each(|i| input[i] = value);
+        input
+    };
+    let (zeros, marked) = (with(0.0), with(f32::NAN));
+    let mut whole = vec![0.0; input.len() / stream.channels() * stream.ratio()];
+    stream.process(&zeros, &mut whole).unwrap();
+    assert_eq!(stream.replaced(), 0);
+    let count = marked.iter().filter(|x| x.is_nan()).count() as u64;
+    for cuts in [&[cuts.iter().sum()][..], cuts] {
+        stream.reset();
+        let pieces = in_pieces(stream, &marked, cuts);
+        let different = pieces.iter().zip(&whole).position(|(a, b)| a != b);
+        assert_eq!((different, stream.replaced()), (None, count), "{algorithm}, calls of {cuts:?} frames");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
+
+    #[test]
+    fn cuts_do_not_change_a_bit(
+        n in 1usize..10, m in 1usize..10, count in 1usize..60, more in 0usize..3, seed: u64,
+        cuts in prop::collection::vec(prop_oneof![0usize..20, 0usize..1200], 1..16), double: bool,
+        lost in prop::collection::vec(0usize..100_000, 0..4),
+    ) {
+        let mut noise = Noise(seed);
+        // Two taps per phase at least, which fast FIR needs.
+        let taps = random_taps(n, m + count, &mut noise);
+        let input = noise.samples(n * cuts.iter().sum::<usize>());
+        let len = phase_taps(&taps, m).next_power_of_two().max(16) << more;
+        let bank = fir_bank(taps, m);
+        let precision = if double { Precision::Double } else { Precision::Single };
+        for algorithm in [Algorithm::Direct, Algorithm::FastFir, Algorithm::OverlapSave { transform: Some(len) }] {
+            check_cuts(&mut start(&bank, precise(algorithm, precision)).unwrap(), &input, &lost, &cuts);
+        }
+    }
+
+    /// One tap per phase: no history at all.
+    #[test]
+    fn cuts_do_not_change_a_bit_of_filters_without_history(
+        n in 1usize..10, m in 1usize..10, seed: u64,
+        cuts in prop::collection::vec(prop_oneof![0usize..20, 0usize..900], 1..16),
+        lost in prop::collection::vec(0usize..100_000, 0..4),
+    ) {
+        let mut noise = Noise(seed);
+        let bank = fir_bank(random_taps(n, m, &mut noise), m);
+        let input = noise.samples(n * cuts.iter().sum::<usize>());
+        for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(16) }] {
+            let mut stream = start(&bank, precise(algorithm, Precision::Single)).unwrap();
+            check_cuts(&mut stream, &input, &lost, &cuts);
+        }
+    }
+}

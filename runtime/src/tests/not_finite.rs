@@ -1,0 +1,109 @@
+//! NaN, infinity and sums that overflow: replaced, counted and never passed on.
+
+use super::support::{Filters, Noise, fir_bank, random_taps, rotation_bank, run, start};
+use crate::{Options, PcmFormat, PcmFrames, PcmOutput, SampleLayout};
+
+#[test]
+fn samples_that_are_not_finite_do_not_spread_in_long_calls() {
+    let mut noise = Noise(32);
+    for (n, m, taps) in [(1, 1, 30), (2, 2, 24), (3, 4, 70)] {
+        let taps = random_taps(n, taps, &mut noise);
+        let mut input = noise.samples(n * 9000);
+        let indices = [0, n * 3000 + 1, n * 3000 + 2, n * 8999];
+        indices.iter().for_each(|&index| input[index] = 0.0);
+        let want = run(&fir_bank(taps.clone(), m), Options::default(), &input);
+        indices.iter().for_each(|&index| input[index] = f32::INFINITY);
+        let mut stream = start(&fir_bank(taps, m), Options::default()).unwrap();
+        let mut out = vec![0.0; want.len()];
+        stream.process(&input, &mut out).unwrap();
+        assert_eq!((out, stream.replaced()), (want, 4), "N {n} M {m}");
+    }
+}
+
+#[test]
+fn what_is_not_finite_is_found_wherever_it_is() {
+    let mut noise = Noise(77);
+    for (n, m) in (1..=9).flat_map(|n| (1..=5).map(move |m| (n, m))) {
+        for lags in [1, 2, 3, 7, 20] {
+            // Every second filter is zero: what it multiplies by nothing must be found all the same.
+            let mut taps = random_taps(n, lags * m, &mut noise);
+            taps.iter_mut().step_by(2).for_each(|f| f.fill(0.0));
+            let bank = fir_bank(taps, m);
+            let mut input = noise.samples(n * 420);
+            let index = (noise.0 >> 33) as usize % input.len();
+            input[index] = 0.0;
+            let want = run(&bank, Options::default(), &input);
+            input[index] = if lags % 2 == 0 { f32::NAN } else { f32::NEG_INFINITY };
+            for call in [420, 60, 7] {
+                let mut stream = start(&bank, Options::default()).unwrap();
+                let mut out = vec![0.0; want.len()];
+                for (x, y) in input.chunks(call * n).zip(out.chunks_mut(call * m)) {
+                    stream.process(x, y).unwrap();
+                }
+                assert_eq!(
+                    (&out, stream.replaced()),
+                    (&want, 1),
+                    "N {n} M {m} K {lags}, sample {index}, {call}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_not_finite_never_reaches_a_state() {
+    let mut noise = Noise(7);
+    for bank in [rotation_bank(), fir_bank(random_taps(1, 9, &mut noise), 1)] {
+        let mut input = noise.samples(100);
+        input[40] = 0.0;
+        let want = run(&bank, Options::default(), &input);
+        input[40] = f32::NAN;
+        let mut stream = start(&bank, Options::default()).unwrap();
+        let mut out = vec![0.0; want.len()];
+        stream.process(&input, &mut out).unwrap();
+        assert_eq!((out, stream.replaced(), stream.state_resets()), (want, 1, 0));
+    }
+}
+
+#[test]
+fn a_recursion_that_overflows_starts_again_and_is_counted() {
+    let mut bank = rotation_bank();
+    if let Filters::StateSpace(filter) = &mut bank.filters {
+        filter.a = vec![vec![1e200, 0.0], vec![0.0, 0.5]];
+    }
+    let mut stream = start(&bank, Options::default()).unwrap();
+    let mut input = [0.0; crate::algorithms::recursive::BLOCK];
+    input[0] = 1.0;
+    stream.process(&input, &mut [0.0; 3 * crate::algorithms::recursive::BLOCK]).unwrap();
+    assert_eq!(stream.state_resets(), 1);
+    let mut out = [0.0; 3];
+    stream.process(&[2.0], &mut out).unwrap();
+    assert_eq!(out, [1.0, 0.0, -2.0]);
+}
+
+#[test]
+fn bytes_that_are_not_finite_become_zero_and_are_counted() {
+    let bank = fir_bank(vec![vec![1.0]], 1);
+    let bytes: Vec<u8> =
+        [1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 2.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let mut stream = start(&bank, Options::default()).unwrap();
+    let mut out = vec![0; 20];
+    let layout = SampleLayout::packed(PcmFormat::F32Le);
+    let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut out, clipped: 0 };
+    stream.process_pcm(&[PcmFrames { layout, channels: 1, bytes: &bytes }], &mut output).unwrap();
+    assert_eq!(stream.replaced(), 3);
+    assert_eq!(out, [1f32, 0.0, 0.0, 0.0, 2.0].map(f32::to_le_bytes).concat());
+}
+
+#[test]
+fn what_is_clipped_is_counted_once_also_beside_what_is_not_finite() {
+    let mut stream = start(&fir_bank(vec![vec![1.0]], 1), Options::default()).unwrap();
+    let mut samples = vec![0.25f32; 100];
+    (samples[3], samples[50], samples[60]) = (2.0, f32::NAN, f32::INFINITY);
+    let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let mut out = [0; 200];
+    let mut output = PcmOutput { format: PcmFormat::S16Le, bytes: &mut out, clipped: 0 };
+    let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: 1, bytes: &bytes };
+    stream.process_pcm(&[frames], &mut output).unwrap();
+    assert_eq!((output.clipped, stream.replaced()), (1, 2));
+}

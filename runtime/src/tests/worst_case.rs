@@ -1,0 +1,234 @@
+//! The worst case of a call, whatever the input holds: how much it filters, and what becomes of denormals.
+//! Multiply-adds are counted, because times would depend on the machine.
+
+use super::support::{
+    Bank, FIR_ALGORITHMS, Noise, by, fir_bank, precise, random_taps, recursive_bank, rotation_bank, run,
+    start,
+};
+use crate::algorithms::recursive::BLOCK;
+use crate::simd::{group_lanes, work};
+use crate::{Algorithm, Options, Precision, Sample, StateSpace, Stream};
+
+const FRAMES: usize = 1280;
+/// Frames per call.
+const CALLS: [usize; 6] = [1, 2, 5, 64, 320, FRAMES];
+/// N, M, K; calls of the last one are filtered in several segments.
+const SHAPES: [(usize, usize, usize); 5] = [(1, 1, 9), (2, 2, 8), (3, 2, 33), (4, 4, 16), (8, 5, 12)];
+
+/// What an input holds besides numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Nasty {
+    AllNan,
+    /// Of changing sign.
+    AllInfinite,
+    /// In one sample of every k-th frame.
+    Nan(usize),
+    NanAtCallBegin,
+    NanAtCallEnd,
+    /// All of them, or every second one.
+    Denormal(usize),
+    /// The largest numbers, whose sums overflow.
+    Largest,
+    /// All of these in turn.
+    Everything,
+}
+
+impl Nasty {
+    const ALL: [Self; 12] = [
+        Self::AllNan,
+        Self::AllInfinite,
+        Self::Nan(2),
+        Self::Nan(7),
+        Self::Nan(64),
+        Self::Nan(97),
+        Self::NanAtCallBegin,
+        Self::NanAtCallEnd,
+        Self::Denormal(1),
+        Self::Denormal(2),
+        Self::Largest,
+        Self::Everything,
+    ];
+
+    /// False if some sums of finite samples overflow.
+    fn sums_are_finite(self) -> bool {
+        !matches!(self, Self::Largest | Self::Everything)
+    }
+
+    /// Sample `index` of an input of N channels in calls of `call` frames, in place of the number `x`.
+    fn sample<S: Sample>(self, x: f64, index: usize, [n, call]: [usize; 2]) -> S {
+        let (denormal, largest) =
+            if size_of::<S>() == 4 { (1e-40, f64::from(f32::MAX)) } else { (1e-310, f64::MAX) };
+        let (frame, first) = (index / n, index % n == 0);
+        let value = match self {
+            Self::AllNan => f64::NAN,
+            Self::AllInfinite => f64::INFINITY.copysign(x),
+            Self::Nan(k) if first && frame % k == 0 => f64::NAN,
+            Self::NanAtCallBegin if first && frame % call == 0 => f64::NAN,
+            Self::NanAtCallEnd if first && frame % call == call - 1 => f64::NAN,
+            Self::Denormal(k) if index % k == 0 => denormal * x,
+            Self::Largest => largest.copysign(x),
+            Self::Everything => [f64::NAN, f64::NEG_INFINITY, denormal, largest, x][index % 5],
+            _ => x,
+        };
+        S::from_f64(value)
+    }
+}
+
+/// Multiply-adds of each call of `call` frames, and all outputs.
+fn work_of<S: Sample>(stream: &mut Stream, input: &[S], call: usize) -> (Vec<usize>, Vec<S>) {
+    let (n, m) = (stream.channels(), stream.ratio());
+    let mut out = vec![S::default(); FRAMES * m];
+    let calls = input.chunks(call * n).zip(out.chunks_mut(call * m));
+    let work = calls.map(|(x, y)| work::of(|| assert_eq!(stream.process(x, y), Ok(y.len())))).collect();
+    (work, out)
+}
+
+/// Multiply-adds of the calls of a stream for numbers and for each nasty input.
+fn each_work<S: Sample>(stream: &Stream, mut check: impl FnMut(Nasty, usize, &[usize], &[usize])) {
+    let n = stream.channels();
+    for call in CALLS {
+        let mut noise = Noise(70);
+        let numbers: Vec<f64> = (0..n * FRAMES).map(|_| noise.next()).collect();
+        let clean: Vec<S> = numbers.iter().map(|&x| S::from_f64(x)).collect();
+        let (usual, _) = work_of(&mut stream.fresh(), &clean, call);
+        for nasty in Nasty::ALL {
+            let sample = |(index, &x): (usize, &f64)| nasty.sample::<S>(x, index, [n, call]);
+            let input: Vec<S> = numbers.iter().enumerate().map(sample).collect();
+            let (work, out) = work_of(&mut stream.fresh(), &input, call);
+            if nasty.sums_are_finite() {
+                assert!(out.iter().all(|y| y.finite()), "{nasty:?} in calls of {call} frames");
+            }
+            check(nasty, call, &usual, &work);
+        }
+    }
+}
+
+/// For streams of either precision and samples of either type: in memory as the kernels take them, or to be
+/// converted.
+fn every_work(bank: &Bank, algorithm: Algorithm, mut check: impl FnMut(Nasty, usize, &[usize], &[usize])) {
+    for precision in [Precision::Single, Precision::Double] {
+        let stream = start(bank, precise(algorithm, precision)).unwrap();
+        each_work::<f32>(&stream, &mut check);
+        each_work::<f64>(&stream, &mut check);
+    }
+}
+
+#[test]
+fn direct_and_overlap_save_filter_a_frame_twice_at_most() {
+    let mut noise = Noise(71);
+    for (n, m, k) in SHAPES {
+        let bank = fir_bank(random_taps(n, m * k, &mut noise), m);
+        for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(64) }] {
+            let mut twice = false;
+            every_work(&bank, algorithm, |nasty, call, usual, work| {
+                let case = format!("{algorithm:?} N {n} M {m} K {k}, {nasty:?} in calls of {call} frames");
+                assert!(
+                    usual.iter().zip(work).all(|(&usual, &work)| (usual..=2 * usual).contains(&work)),
+                    "{case}"
+                );
+                if matches!(nasty, Nasty::Denormal(_)) {
+                    assert_eq!(usual, work, "{case}");
+                }
+                twice |= usual.iter().zip(work).any(|(&usual, &work)| usual > 0 && work == 2 * usual);
+            });
+            assert!(twice, "{algorithm:?}: the bound is reached");
+        }
+    }
+}
+
+#[test]
+fn fast_fir_filters_a_frame_once_and_computes_outputs_that_overflow_once_more() {
+    let mut noise = Noise(72);
+    for (n, m, k) in SHAPES {
+        let bank = fir_bank(random_taps(n, m * k, &mut noise), m);
+        let mut repaired = false;
+        every_work(&bank, Algorithm::FastFir, |nasty, call, usual, work| {
+            for (&usual, &work) in usual.iter().zip(work) {
+                let case =
+                    format!("N {n} M {m} K {k}, {nasty:?} in calls of {call} frames: {work} for {usual}");
+                let more = if nasty.sums_are_finite() { 0 } else { call * m * n * k };
+                assert!((usual..=usual + more).contains(&work), "{case}");
+                repaired |= work > usual;
+            }
+        });
+        assert!(repaired, "N {n} M {m} K {k}: nothing overflowed");
+    }
+}
+
+#[test]
+fn recursions_filter_a_frame_once() {
+    let dense = StateSpace {
+        a: (0..5).map(|i| (0..5).map(|j| 0.1 / (1 + i + j) as f64).collect()).collect(),
+        b: vec![vec![1.0, -1.0]; 5],
+        c: vec![vec![1.0; 5]; 3],
+        d: vec![vec![0.5, 0.25]; 3],
+    };
+    for bank in [rotation_bank(), recursive_bank(dense)] {
+        every_work(&bank, Algorithm::Direct, |nasty, call, usual, work| {
+            assert!(usual.iter().all(|&work| work > 0));
+            assert_eq!(usual, work, "{nasty:?} in calls of {call} frames");
+        });
+    }
+}
+
+#[test]
+fn the_direct_algorithm_does_the_multiply_adds_of_the_definition() {
+    let mut noise = Noise(73);
+    for (n, m, k) in SHAPES {
+        let bank = fir_bank(random_taps(n, m * k, &mut noise), m);
+        // Windows of other than 1, 2 or 4 channels are padded to whole groups.
+        let group = group_lanes::<f32>();
+        let window = if n < group && n.is_power_of_two() { n * k } else { (n * k).next_multiple_of(group) };
+        let mut stream = start(&bank, Options::default()).unwrap();
+        for call in CALLS {
+            let (work, _) = work_of(&mut stream, &noise.samples(n * FRAMES), call);
+            assert!(work.iter().all(|&work| work == call * window * m), "N {n} M {m} K {k}: {work:?}");
+        }
+    }
+}
+
+#[test]
+fn fir_filters_keep_denormals() {
+    // An even number of the smallest ones, so that halves are exact.
+    let (tiny, narrow) = (f64::from_bits(1000), f32::from_bits(1000));
+    for algorithm in [Algorithm::Direct, Algorithm::FastFir] {
+        let bank = fir_bank(vec![vec![1.0, -2.0]], 1);
+        assert_eq!(run(&bank, by(algorithm), &[narrow, 0.0, 0.0])[..2], [narrow, -2.0 * narrow]);
+        let options = precise(algorithm, Precision::Double);
+        assert_eq!(run(&bank, options, &[tiny, 0.0, 0.0])[..2], [tiny, -2.0 * tiny]);
+    }
+    // Transforms round them as they round sums of other small numbers: to multiples of the smallest one.
+    let bank = fir_bank(vec![vec![1.0; 3]], 1);
+    let out = run(&bank, by(FIR_ALGORITHMS[2]), &[narrow; 40]);
+    let error = out[2..].iter().map(|y| (y - 3.0 * narrow).abs()).fold(0.0, f32::max);
+    assert!(error > 0.0 && error <= f32::from_bits(64 * 6), "{error:e}");
+}
+
+/// The state of x[k + 1] = pole x[k] + u[k] after an impulse.
+fn fading<S: Sample>(pole: f64, precision: Precision, frames: usize) -> Vec<S> {
+    let filter =
+        StateSpace { a: vec![vec![pole]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
+    let mut input = vec![S::default(); frames];
+    input[0] = S::from_f64(1.0);
+    run(&recursive_bank(filter), precise(Algorithm::Direct, precision), &input)
+}
+
+/// States below the limit are there between two flushes only.
+fn check_fading<S: Sample>(precision: Precision) {
+    let limit = S::NEGLIGIBLE.to_f64();
+    for pole in [0.01f64, 0.1, 0.5, -0.5, 0.9, 0.99] {
+        let above = (limit.ln() / pole.abs().ln()) as usize;
+        let gone = above + 2 * BLOCK;
+        let states = fading::<S>(pole, precision, gone + 200);
+        let small = states.iter().filter(|x| (1e-320..limit).contains(&x.to_f64().abs())).count();
+        assert!(small < BLOCK, "{precision:?}, pole {pole}: {small} frames");
+        assert!(states[gone..].iter().all(|x| x.to_f64() == 0.0), "{precision:?}, pole {pole}");
+        assert!(states[1..above].iter().all(|x| x.to_f64() != 0.0), "{precision:?}, pole {pole}");
+    }
+}
+
+#[test]
+fn a_state_that_fades_away_is_denormal_for_less_than_a_block() {
+    check_fading::<f32>(Precision::Single);
+    check_fading::<f64>(Precision::Double);
+}
