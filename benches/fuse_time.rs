@@ -3,10 +3,13 @@
 //!
 //! `cargo bench --bench fuse_time`; set TMPDIR to a folder in memory to leave the disk out.
 
+#[path = "../tests/support/random.rs"]
+mod random;
 mod stopwatch;
 
 use hybank::io::PcmFormat;
 use hybank::io::wav::WavFile;
+use random::Random;
 use std::fs::File;
 use std::path::Path;
 use std::process::Command;
@@ -14,12 +17,11 @@ use std::process::Command;
 const RATE: u32 = 24_000;
 const SECONDS: usize = 600;
 
-fn write_channel(path: &Path, seed: u32) {
-    let mut state = seed;
+fn write_channel(path: &Path, seed: u64) {
+    let mut random = Random(seed);
     let mut second = Vec::with_capacity(4 * RATE as usize);
     for _ in 0..RATE {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let sample = state as f32 / u32::MAX as f32 - 0.5;
+        let sample = 0.5 * random.sample() as f32;
         second.extend(sample.to_le_bytes());
     }
     let mut wav = WavFile::new(File::create(path).unwrap(), PcmFormat::F32Le, 1, RATE).unwrap();

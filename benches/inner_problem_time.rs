@@ -2,11 +2,11 @@
 //!
 //! Run with `cargo bench --bench inner_problem_time`. Data: sampled hybrid filter banks, the same on every run.
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use hybank::lmi::kyp;
 use hybank::lmi::sampled::{self, Point, Problem};
 use nalgebra::DMatrix;
 
+mod stopwatch;
 #[path = "../src/lmi/testbank.rs"]
 mod testbank;
 
@@ -18,35 +18,38 @@ fn problem(bank: &TestBank, taps: usize, points: usize) -> Problem {
     Problem::new(points, bank.lags(taps)).expect("the bank's own samples fit together")
 }
 
-/// Seconds to a proven gap of 1e-9.
-fn sampled_worst_case(c: &mut Criterion) {
-    let mut group = c.benchmark_group("sampled worst case");
-    group.sample_size(10);
+fn main() {
+    // `cargo test --benches` runs this too; it wants no figures.
+    if std::env::args().any(|arg| arg == "--bench") {
+        sampled_worst_case();
+        mean_square_under_cap();
+        kyp_thesis();
+    }
+}
+
+/// Time to a proven gap of 1e-9.
+fn sampled_worst_case() {
     let four = {
         let (a, b, c) = testbank::low_pass(&testbank::butterworth(4, 1.2));
         TestBank { a, b, c, delays: vec![0.0, 1.3, 2.1, 2.95], ratio: 4, latency: 12 }
     };
-    let cases = [
+    for (name, bank, taps, points) in [
         ("N = M = 2, 22 taps, 65 points", testbank::thesis(), 22, 65),
         ("N = M = 2, 22 taps, 129 points", testbank::thesis(), 22, 129),
         ("N = M = 4, 24 taps, 129 points", four, 24, 129),
         ("N = M = 8, 32 taps, 129 points", testbank::eight_channels(12), 32, 129),
         ("N = M = 8, 128 taps, 257 points", testbank::eight_channels(40), 128, 257),
         ("N = M = 8, 128 taps, 513 points", testbank::eight_channels(40), 128, 513),
-    ];
-    for (name, bank, taps, points) in &cases {
-        let problem = problem(bank, *taps, *points);
-        group.bench_with_input(BenchmarkId::from_parameter(name), &problem, |b, p| {
-            b.iter(|| sampled::minimise(p, &sampled::Settings::default()));
+    ] {
+        let problem = problem(&bank, taps, points);
+        stopwatch::time(&format!("sampled worst case, {name}"), || {
+            sampled::minimise(&problem, &sampled::Settings::default())
         });
     }
-    group.finish();
 }
 
-/// Seconds for the least mean square under a cap of 1.001 gamma, after the worst case is known.
-fn mean_square_under_cap(c: &mut Criterion) {
-    let mut group = c.benchmark_group("mean square under cap");
-    group.sample_size(10);
+/// Time for the least mean square under a cap of 1.001 gamma, after the worst case is known.
+fn mean_square_under_cap() {
     for (name, bank, taps, points) in [
         ("N = M = 2, 10 taps, 129 points", testbank::thesis(), 10, 129),
         ("N = M = 8, 32 taps, 129 points", testbank::eight_channels(12), 32, 129),
@@ -55,21 +58,16 @@ fn mean_square_under_cap(c: &mut Criterion) {
         let settings = sampled::Settings::default();
         let best = sampled::minimise(&problem, &settings).expect("settings are the defaults");
         let square = sampled::MeanSquareObjective::noiseless(vec![1.0; points], problem.channels());
-        group.bench_with_input(BenchmarkId::from_parameter(name), &problem, |b, p| {
-            b.iter(|| sampled::mean_square_under_cap(p, &square, 1.001 * best.gamma, &best.taps, &settings));
+        stopwatch::time(&format!("mean square under cap, {name}"), || {
+            sampled::mean_square_under_cap(&problem, &square, 1.001 * best.gamma, &best.taps, &settings)
         });
     }
-    group.finish();
 }
 
 /// The thesis's own form: bounded real lemma with P, 35 states and 44 taps.
-fn kyp_thesis(c: &mut Criterion) {
+fn kyp_thesis() {
     let problem = kyp_problem(&testbank::thesis(), 11);
-    let mut group = c.benchmark_group("KYP");
-    group.sample_size(10);
-    group
-        .bench_function("thesis, 22 taps", |b| b.iter(|| kyp::minimise(&problem, &kyp::Settings::default())));
-    group.finish();
+    stopwatch::time("KYP, thesis, 22 taps", || kyp::minimise(&problem, &kyp::Settings::default()));
 }
 
 /// Taps on a register of `lags` slow samples of all channels.
@@ -99,6 +97,3 @@ fn kyp_problem(bank: &TestBank, lags: usize) -> kyp::Problem {
     c.view_mut((0, 0), (m, n)).copy_from(&cw);
     kyp::Problem::new(a, b, c, dw, terms).expect("a stable bank makes a problem")
 }
-
-criterion_group!(benches, sampled_worst_case, mean_square_under_cap, kyp_thesis);
-criterion_main!(benches);

@@ -4,8 +4,12 @@
 //! `cargo bench --bench pipe_overhead`; set TMPDIR to a folder in memory to leave the disk out. Bank A: N =
 //! M = 2, 24 taps.
 
+#[path = "../tests/support/random.rs"]
+mod random;
+
 use hybank::io::PcmFormat;
 use hybank::io::wav::WavFile;
+use random::Random;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
@@ -32,12 +36,8 @@ fn main() {
 }
 
 fn write_inputs(folder: &Path) {
-    let mut state = 1u32;
-    let mut noise = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        state as f32 / u32::MAX as f32 - 0.5
-    };
-    let block: Vec<f32> = (0..1 << 18).map(|_| noise()).collect();
+    let mut random = Random(1);
+    let block: Vec<f32> = (0..1 << 18).map(|_| 0.5 * random.sample() as f32).collect();
     let floats: Vec<u8> = block.iter().flat_map(|x| x.to_le_bytes()).collect();
     let integers: Vec<u8> = block.iter().flat_map(|x| ((x * 32768.0) as i16).to_le_bytes()).collect();
     let mut raw = File::create(folder.join("in.f32")).unwrap();

@@ -45,3 +45,7 @@ pub mod plot;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+
+#[cfg(test)]
+#[path = "../tests/support/random.rs"]
+mod random;

@@ -1,30 +1,17 @@
 //! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and never
 //! panics. `fuzz/` looks deeper with the same checks.
 
+#[path = "../../tests/support/random.rs"]
+mod random;
+
 use hybank_ibr::camera::colmap::parse_model;
 use hybank_ibr::image::pfm;
 use hybank_ibr::scene::parse;
 use hybank_ibr::uncalibrated::tracks::Tracks;
+use random::Random;
 use std::path::Path;
 
 const ROUNDS: u64 = 3000;
-
-/// SplitMix64 (Steele, Lea and Flood, 2014): the same mutations on every machine.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n.max(1) as u64) as usize
-    }
-}
 
 /// What breaks number and structure readers.
 const NASTY: [&[u8]; 12] = [

@@ -228,34 +228,21 @@ fn decode_frame(parts: &[PcmFrames<'_>], k: usize, numbers: &mut Vec<f64>) {
 mod tests {
     use super::*;
     use crate::bank::BlockFilter;
+    use crate::random::Random;
     use crate::runtime::{Options, Stream};
-
-    /// A generator whose stream never changes (Knuth's MMIX), uniform in -1 .. 1.
-    struct Noise(u64);
-
-    impl Noise {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-
-        fn below(&mut self, count: usize) -> usize {
-            ((self.next() + 1.0) / 2.0 * count as f64) as usize
-        }
-    }
 
     fn fir_bank(taps: Vec<Vec<f64>>, ratio: usize) -> Bank {
         let delays = vec![0.0; taps.len()];
         Bank { latency: 3, delays, ..Bank::bare(SynthesisFilters::Fir(taps), ratio) }
     }
 
-    fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Vec<Vec<f64>> {
-        (0..channels).map(|_| (0..taps).map(|_| noise.next()).collect()).collect()
+    fn random_taps(channels: usize, taps: usize, random: &mut Random) -> Vec<Vec<f64>> {
+        (0..channels).map(|_| (0..taps).map(|_| random.sample()).collect()).collect()
     }
 
     /// Frames of N channels with a few runs of NaN.
-    fn with_gaps(n: usize, frames: usize, noise: &mut Noise) -> Vec<f64> {
-        let mut samples: Vec<f64> = (0..n * frames).map(|_| noise.next() + 2.0).collect();
+    fn with_gaps(n: usize, frames: usize, random: &mut Random) -> Vec<f64> {
+        let mut samples: Vec<f64> = (0..n * frames).map(|_| random.sample() + 2.0).collect();
         for (channel, first, length) in [(0, 0, 3), (1, 40, 1), (0, 41, 20), (1, 190, 10)] {
             (first..first + length).for_each(|k| samples[k * n + channel] = f64::NAN);
         }
@@ -271,9 +258,9 @@ mod tests {
 
     #[test]
     fn gaps_are_found_and_filled() {
-        let mut noise = Noise(11);
-        let bank = fir_bank(random_taps(2, 7, &mut noise), 3);
-        let samples = with_gaps(2, 200, &mut noise);
+        let mut random = Random(11);
+        let bank = fir_bank(random_taps(2, 7, &mut random), 3);
+        let samples = with_gaps(2, 200, &mut random);
         for policy in [GapPolicy::Zero, GapPolicy::Hold] {
             let mut filler = GapFiller::new(&bank, policy).unwrap();
             let mut filled = samples.clone();
@@ -296,10 +283,10 @@ mod tests {
 
     #[test]
     fn the_mask_marks_exactly_the_outputs_that_a_missing_sample_can_change() {
-        let mut noise = Noise(12);
+        let mut random = Random(12);
         for (taps, m) in [(24, 2), (7, 3), (1, 1), (64, 4), (5, 8)] {
-            let bank = fir_bank(random_taps(2, taps, &mut noise), m);
-            let samples = with_gaps(2, 200, &mut noise);
+            let bank = fir_bank(random_taps(2, taps, &mut random), m);
+            let samples = with_gaps(2, 200, &mut random);
             let variant = |value: f64| -> Vec<f64> {
                 samples.iter().map(|x| if x.is_finite() { *x } else { value }).collect()
             };
@@ -331,8 +318,8 @@ mod tests {
 
     #[test]
     fn stored_samples_pass_untouched_or_as_the_same_numbers() {
-        let mut noise = Noise(13);
-        let samples = with_gaps(2, 200, &mut noise);
+        let mut random = Random(13);
+        let samples = with_gaps(2, 200, &mut random);
         let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_be_bytes()).collect();
         let layout = SampleLayout::packed(PcmFormat::F64Be);
         let numbers = |parts: &[PcmFrames<'_>]| {
@@ -340,7 +327,7 @@ mod tests {
             (0..parts[0].frames()).for_each(|k| decode_frame(parts, k, &mut numbers));
             numbers
         };
-        let fir = fir_bank(random_taps(2, 7, &mut noise), 3);
+        let fir = fir_bank(random_taps(2, 7, &mut random), 3);
         let (b, c, d) = Default::default();
         let filter = BlockFilter { a: vec![vec![0.5]], b, c, d };
         let recursion = Bank { filters: SynthesisFilters::StateSpace(filter), ..fir.clone() };
@@ -380,29 +367,29 @@ mod tests {
 
     #[test]
     fn the_mask_is_that_of_the_definition_for_filters_with_zeros_and_any_gaps() {
-        let mut noise = Noise(14);
+        let mut random = Random(14);
         for trial in 0..200 {
-            let (n, m, length) = (1 + noise.below(3), 1 + noise.below(4), 1 + noise.below(40));
-            let mut taps = random_taps(n, length, &mut noise);
+            let (n, m, length) = (1 + random.below(3), 1 + random.below(4), 1 + random.below(40));
+            let mut taps = random_taps(n, length, &mut random);
             // From none to nearly all taps are zero, in runs too.
-            let zeros = noise.below(10);
+            let zeros = random.below(10);
             for tap in taps.iter_mut().flatten() {
-                if noise.below(10) < zeros {
+                if random.below(10) < zeros {
                     *tap = 0.0;
                 }
             }
-            let start = noise.below(length);
+            let start = random.below(length);
             taps[0][..start].fill(0.0);
-            let mut samples: Vec<f64> = (0..n * 150).map(|_| noise.next()).collect();
-            for _ in 0..noise.below(12) {
-                let (i, first, run) = (noise.below(n), noise.below(150), 1 + noise.below(30));
+            let mut samples: Vec<f64> = (0..n * 150).map(|_| random.sample()).collect();
+            for _ in 0..random.below(12) {
+                let (i, first, run) = (random.below(n), random.below(150), 1 + random.below(30));
                 (first..(first + run).min(150)).for_each(|k| samples[k * n + i] = f64::NAN);
             }
             let mut filler = GapFiller::new(&fir_bank(taps.clone(), m), GapPolicy::Hold).unwrap();
             let (mut got, mut mask) = (Vec::new(), Vec::new());
             let mut rest = &samples[..];
             while !rest.is_empty() {
-                let (piece, behind) = rest.split_at(rest.len().min(n * (1 + noise.below(40))));
+                let (piece, behind) = rest.split_at(rest.len().min(n * (1 + random.below(40))));
                 let bytes: Vec<u8> = piece.iter().flat_map(|x| x.to_le_bytes()).collect();
                 let layout = SampleLayout::packed(PcmFormat::F64Le);
                 filler.fill_pcm(&[PcmFrames { layout, channels: n, bytes: &bytes }], &mut mask);

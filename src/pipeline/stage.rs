@@ -270,16 +270,13 @@ fn ranges<'a>(parts: &[PcmFrames<'a>], frames: Range<usize>) -> Vec<PcmFrames<'a
 mod tests {
     use super::*;
     use crate::bank::SynthesisFilters;
+    use crate::random::Random;
     use crate::runtime::{Algorithm, Options};
 
     /// Samples in -1.5 .. 1.5, so that a third of them clips.
     fn noise(count: usize) -> Vec<f32> {
-        let mut state = 1u64;
-        let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((state >> 40) as f32 / (1u64 << 24) as f32 - 0.5) * 3.0
-        };
-        (0..count).map(|_| next()).collect()
+        let mut random = Random(1);
+        (0..count).map(|_| 1.5 * random.sample() as f32).collect()
     }
 
     /// The whole output as numbers, by the plan itself.

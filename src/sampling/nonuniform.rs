@@ -121,15 +121,7 @@ pub fn superposed_interval_moment(sets: usize, k: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A small generator for the tests: the high bits of a 64-bit congruential sequence.
-    struct Uniform(u64);
-    impl Uniform {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-        }
-    }
+    use crate::random::Random;
 
     fn exact(x: f64, value: f64) -> Measured {
         Measured { x, value, error: 0.0, jitter: 0.0 }
@@ -147,19 +139,19 @@ mod tests {
 
     #[test]
     fn the_bound_holds_and_is_nearly_reached() {
-        let mut random = Uniform(7);
+        let mut random = Random(7);
         let mut worst: f64 = 0.0;
         for _ in 0..4000 {
-            let (scale, error, jitter) = (0.2 + random.next(), 0.1 * random.next(), 0.05 * random.next());
+            let (scale, error, jitter) = (0.2 + random.part(), 0.1 * random.part(), 0.05 * random.part());
             let f = |x: f64| scale * x * x / 2.0;
             let mut take = |x: f64| {
-                let e = if random.next() < 0.5 { -error } else { error };
-                let mu = if random.next() < 0.5 { -jitter } else { jitter };
+                let e = if random.part() < 0.5 { -error } else { error };
+                let mu = if random.part() < 0.5 { -jitter } else { jitter };
                 Measured { x, value: f(x - mu) + e, error, jitter }
             };
             let (a, b) = (take(0.3), take(1.1));
             let line = PiecewiseLinear::new(vec![a, b]).unwrap();
-            let x = 0.3 + 0.8 * random.next();
+            let x = 0.3 + 0.8 * random.part();
             let limits = Smoothness { slope: scale * (1.1 + jitter), curvature: scale };
             let bound = line.error_bound(x, limits).unwrap();
             let miss = (line.value(x) - f(x)).abs();
@@ -175,11 +167,11 @@ mod tests {
         for (k, want) in [(1, 1.0), (2, 0.9091), (3, 0.7576), (4, 0.5828)] {
             assert!((superposed_interval_moment(10, k) - want).abs() < 5e-5);
         }
-        let mut random = Uniform(3);
+        let mut random = Random(3);
         let (mut sums, mut draws) = ([0.0; 4], 0.0);
         for _ in 0..2000 {
             let samples: Vec<Measured> = (0..10)
-                .map(|_| random.next())
+                .map(|_| random.part())
                 .flat_map(|phase| (0..5).map(move |k| exact(k as f64 + phase, 0.0)))
                 .collect();
             let line = PiecewiseLinear::new(samples).unwrap();

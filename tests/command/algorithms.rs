@@ -1,7 +1,7 @@
 //! Forms of FIR filters, as a user chooses them: all give the same samples at the same time.
 //! The direct form is the measure of the others.
 
-use crate::support::{Desk, bytes, channel, floats};
+use crate::support::{Desk, bytes, channel, floats, wav};
 use serde_json::Value;
 
 const COUNT: usize = 3000;
@@ -21,15 +21,7 @@ fn desk() -> Desk {
     desk.write("long.json", bank.to_string());
     desk.write("ticks", bytes(&input()));
     for (i, name) in ["a.wav", "b.wav"].into_iter().enumerate() {
-        let spec = hound::WavSpec {
-            channels: 1,
-            sample_rate: 24_000,
-            bits_per_sample: 32,
-            sample_format: hound::SampleFormat::Float,
-        };
-        let mut writer = hound::WavWriter::create(desk.path(name), spec).unwrap();
-        channel_of(i).into_iter().for_each(|x| writer.write_sample(x).unwrap());
-        writer.finalize().unwrap();
+        wav::write(&desk, name, 1, 24_000, &channel_of(i));
     }
     desk
 }
@@ -48,8 +40,7 @@ fn channel_of(i: usize) -> Vec<f32> {
 
 fn fuse(desk: &Desk, more: &[&str]) -> (Vec<f32>, Value) {
     let report = desk.report(&[&["fuse", "long.json", "a.wav", "b.wav", "-o", "out.wav"], more].concat());
-    let mut wav = hound::WavReader::open(desk.path("out.wav")).unwrap();
-    (wav.samples().map(Result::unwrap).collect(), report)
+    (wav::samples(desk, "out.wav"), report)
 }
 
 fn stream(desk: &Desk, more: &[&str]) -> (Vec<f32>, Value) {

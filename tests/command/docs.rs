@@ -1,6 +1,7 @@
 //! The snippets of README.md and docs/ work as they stand: specs and banks can be read, and command lines run in the order
 //! of the text.
 
+use crate::support::Desk;
 use hybank::bank::Bank;
 use hybank::spec::Spec;
 use std::fs;
@@ -52,18 +53,16 @@ fn pages() -> Vec<PathBuf> {
 /// A folder in which the snippets of one page run, with the spec of the README in it.
 struct Folder {
     page: PathBuf,
-    folder: tempfile::TempDir,
+    desk: Desk,
 }
 
 impl Folder {
     fn new(page: &Path) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
         let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
         let readme = fs::read_to_string(readme).expect("README.md");
         let spec = snippets(&readme).into_iter().find(|snippet| snippet.language == "toml");
-        fs::write(folder.path().join("spec.toml"), spec.expect("a spec in README.md").text)
-            .expect("spec.toml");
-        Self { page: page.to_owned(), folder }
+        let desk = Desk::with_spec(&spec.expect("a spec in README.md").text);
+        Self { page: page.to_owned(), desk }
     }
 
     fn check(&self, snippet: &Snippet) {
@@ -87,7 +86,7 @@ impl Folder {
         let name = name.unwrap_or_else(|| panic!("{}: the first line names no file", self.place(snippet)));
         let spec = Spec::from_toml(&snippet.text, name);
         assert!(spec.is_ok(), "{}: {spec:?}", self.place(snippet));
-        fs::write(self.folder.path().join(name), &snippet.text).expect("the spec");
+        self.desk.write(name, &snippet.text);
     }
 
     fn check_bank(&self, snippet: &Snippet) {
@@ -103,7 +102,7 @@ impl Folder {
             let output = Command::new("sh")
                 .args(["-e", "-c", line])
                 .env("PATH", path.expect("a search path"))
-                .current_dir(self.folder.path())
+                .current_dir(self.desk.path(""))
                 .output()
                 .expect("a shell");
             let stderr = String::from_utf8_lossy(&output.stderr);

@@ -1,7 +1,6 @@
 //! Samples that were lost: what tells of them, what stands in for them, what they touch. As a user runs it.
 
-use crate::support::{Desk, bytes, channel, floats, fused, ticks};
-use hound::{SampleFormat, WavSpec, WavWriter};
+use crate::support::{Desk, bytes, channel, floats, fused, ticks, wav};
 use serde_json::{Value, json};
 
 const COUNT: usize = 3000;
@@ -57,22 +56,14 @@ fn whole() -> Vec<f32> {
     (0..2 * COUNT).map(|i| (1 + i % 1021) as f32).collect()
 }
 
-fn wav(desk: &Desk, name: &str, samples: &[f32]) {
-    let spec =
-        WavSpec { channels: 1, sample_rate: 24_000, bits_per_sample: 32, sample_format: SampleFormat::Float };
-    let mut writer = WavWriter::create(desk.path(name), spec).unwrap();
-    samples.iter().for_each(|&x| writer.write_sample(x).unwrap());
-    writer.finalize().unwrap();
-}
-
 #[test]
 fn samples_that_were_left_out_are_bridged_reported_and_masked() {
     let desk = Desk::new();
     let whole = whole();
     desk.write("a", bytes(&kept(&whole)));
     desk.write("b", bytes(&channel(&whole, 1)));
-    wav(&desk, "a.wav", &kept(&whole));
-    wav(&desk, "b.wav", &channel(&whole, 1));
+    wav::write(&desk, "a.wav", 1, 24_000, &kept(&whole));
+    wav::write(&desk, "b.wav", 1, 24_000, &channel(&whole, 1));
     desk.write("lost.jsonl", SEQUENCE);
     let told = ["--lost", "lost.jsonl", "--mask", "mask"];
     let stream = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out"];
@@ -89,11 +80,7 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
             assert_eq!(report["replaced"], 0);
             let got = match verb[0] {
                 "stream" => floats(&desk.read("out")),
-                _ => hound::WavReader::open(desk.path("out.wav"))
-                    .unwrap()
-                    .samples()
-                    .map(Result::unwrap)
-                    .collect(),
+                _ => wav::samples(&desk, "out.wav"),
             };
             assert!(got == want, "{policy}");
             check_mask(&desk.read("mask"), &got, &fused(&whole));

@@ -17,7 +17,9 @@ mod long_files;
 mod lost;
 #[cfg(unix)]
 mod outputs;
+mod simulate;
 mod snapshots;
 #[cfg(unix)]
 mod stream;
+mod usage;
 mod verify;

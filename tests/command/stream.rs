@@ -1,4 +1,4 @@
-//! The verb stream, as a user runs it.
+//! The command stream, as a user runs it.
 
 use crate::support::{Desk, bytes, floats, fused, text, ticks};
 use std::fs;

@@ -3,8 +3,8 @@
 //! A mutation is any change of the text after which it no longer says the same: another number, key, text or structure.
 //! Changes of layout, and of digits beyond the precision of a double, are none. `HYBANK_MUTATIONS=100000` runs that many.
 
-use crate::support::THESIS;
 use crate::support::random::Random;
+use crate::support::{Desk, THESIS};
 use hybank::bank::{Bank, Proof, check_digest};
 use hybank::design::{analyze, design, prove};
 use hybank::spec::Spec;
@@ -12,7 +12,6 @@ use hybank::verify::{BoundedBanks, verify};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 /// The thesis example with so little latency that gamma lies above the noncausal bound.
 fn hurried() -> String {
@@ -222,41 +221,18 @@ fn a_bank_made_elsewhere_is_proven_afresh() {
     }
 }
 
-struct Desk {
-    folder: tempfile::TempDir,
+/// A folder with the bank of [`hurried`], designed by the program.
+fn desk() -> Desk {
+    let desk = Desk::with_spec(&hurried());
+    assert!(desk.run(&["design", "spec.toml", "-o", "bank.json"], &[]).status.success());
+    desk
 }
 
-impl Desk {
-    fn new() -> Self {
-        let desk = Self { folder: tempfile::tempdir().unwrap() };
-        fs::write(desk.path("spec.toml"), hurried()).unwrap();
-        assert!(desk.run(&["design", "spec.toml", "-o", "bank.json"]).status.success());
-        desk
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        let program = env!("CARGO_BIN_EXE_hybank");
-        Command::new(program).current_dir(self.folder.path()).args(args).output().unwrap()
-    }
-
-    fn good(&self, args: &[&str]) -> String {
-        let output = self.run(args);
-        assert!(output.status.success() && output.stderr.is_empty(), "{args:?}: {output:?}");
-        String::from_utf8(output.stdout).unwrap()
-    }
-
-    fn refused(&self, text: &str, parts: &[&str]) {
-        fs::write(self.path("bad.json"), text).unwrap();
-        let output = self.run(&["verify", "bad.json"]);
-        let message = String::from_utf8(output.stderr).unwrap();
-        assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{message}");
-        assert!(message.starts_with("hybank: bad.json: ") && message.lines().count() == 1, "{message}");
-        assert!(parts.iter().all(|part| message.contains(part)), "{parts:?} in {message}");
-    }
+/// Verifies an altered file and wants it refused in one line.
+fn refused(desk: &Desk, altered: &str, parts: &[&str]) {
+    desk.write("bad.json", altered);
+    let message = desk.refused(1, &["verify", "bad.json"], parts);
+    assert!(message.starts_with("hybank: bad.json: ") && message.lines().count() == 1, "{message}");
 }
 
 fn json(text: &str) -> Value {
@@ -269,7 +245,7 @@ fn pretty(value: &Value) -> String {
 
 #[test]
 fn a_designed_bank_verifies() {
-    let desk = Desk::new();
+    let desk = desk();
     let out = desk.good(&["verify", "bank.json"]);
     for part in [
         "proven, gamma in [0.0694",
@@ -279,22 +255,22 @@ fn a_designed_bank_verifies() {
     ] {
         assert!(out.contains(part), "{part} in {out}");
     }
-    let report = json(&desk.good(&["verify", "bank.json", "--json"]));
-    let bank = json(&fs::read_to_string(desk.path("bank.json")).unwrap());
+    let report = desk.json(&["verify", "bank.json", "--json"]);
+    let bank = desk.read_json("bank.json");
     let norm = bank["gamma"]["norm"].as_f64().unwrap();
     assert!(report["lower"].as_f64() <= Some(norm) && report["upper"].as_f64() >= Some(norm), "{report}");
     assert_eq!(report["upper"], bank["gamma"]["upper"]);
     assert_eq!((&report["digest"], &report["certificate_in_file"]), (&Value::Bool(true), &Value::Bool(true)));
     assert!(desk.good(&["verify", "--help"]).contains("Examples:"));
     // Another layout of the same content is the same bank.
-    fs::write(desk.path("loose.json"), pretty(&bank)).unwrap();
+    desk.write("loose.json", pretty(&bank));
     assert!(desk.good(&["verify", "loose.json"]).contains("digest     matches"));
 }
 
 #[test]
 fn altered_files_are_refused_with_the_place() {
-    let desk = Desk::new();
-    let bank = json(&fs::read_to_string(desk.path("bank.json")).unwrap());
+    let desk = desk();
+    let bank = desk.read_json("bank.json");
     let change = |pointer: &str, value: Value, digest: bool| {
         let mut changed = bank.clone();
         *changed.pointer_mut(pointer).unwrap() = value;
@@ -306,37 +282,51 @@ fn altered_files_are_refused_with_the_place() {
     let tap = bank["channels"][0]["taps"][3].as_f64().unwrap();
     let upper = bank["gamma"]["upper"].as_f64().unwrap();
     let lower = bank["gamma"]["lower"].as_f64().unwrap();
-    desk.refused(&change("/channels/0/taps/3", (tap * (1.0 + 1e-15)).into(), true), &["digest: ", "altered"]);
-    desk.refused(&change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["proof.upper: "]);
-    desk.refused(&change("/gamma/upper", (upper * (1.0 - 1e-7)).into(), false), &["gamma.upper: "]);
-    desk.refused(&change("/gamma/norm", (upper * (1.0 - 1e-6)).into(), false), &["gamma.norm: "]);
-    desk.refused(&change("/gamma/lower", (lower * 1.001).into(), false), &["gamma.lower: "]);
-    desk.refused(&change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["proof.upper: "]);
-    desk.refused(
+    refused(
+        &desk,
+        &change("/channels/0/taps/3", (tap * (1.0 + 1e-15)).into(), true),
+        &["digest: ", "altered"],
+    );
+    refused(&desk, &change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["proof.upper: "]);
+    refused(&desk, &change("/gamma/upper", (upper * (1.0 - 1e-7)).into(), false), &["gamma.upper: "]);
+    refused(&desk, &change("/gamma/norm", (upper * (1.0 - 1e-6)).into(), false), &["gamma.norm: "]);
+    refused(&desk, &change("/gamma/lower", (lower * 1.001).into(), false), &["gamma.lower: "]);
+    refused(&desk, &change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["proof.upper: "]);
+    refused(
+        &desk,
         &change("/proof/upper/factor/2/1", 0.5.into(), false),
         &["proof.upper: ", "design the bank again"],
     );
-    desk.refused(&change("/proof/upper/factor/2", Value::Array(vec![]), false), &["proof.upper.factor[2]: "]);
-    desk.refused(&change("/proof/upper/peak/half", json("[0.0, 0.0]"), false), &["proof.upper.peak.half: "]);
-    desk.refused(
+    refused(
+        &desk,
+        &change("/proof/upper/factor/2", Value::Array(vec![]), false),
+        &["proof.upper.factor[2]: "],
+    );
+    refused(
+        &desk,
+        &change("/proof/upper/peak/half", json("[0.0, 0.0]"), false),
+        &["proof.upper.peak.half: "],
+    );
+    refused(
+        &desk,
         &change("/proof/lower/0/measured", json("[[0.0, 1.0]]"), false),
         &["proof.lower[0].measured: "],
     );
-    desk.refused(&change("/digest", "sha256:12".into(), true), &["digest: ", "64 hexadecimal"]);
-    desk.refused(&change("/spec", Value::Null, false), &["spec: ", "null"]);
-    desk.refused("{", &["line 1"]);
+    refused(&desk, &change("/digest", "sha256:12".into(), true), &["digest: ", "64 hexadecimal"]);
+    refused(&desk, &change("/spec", Value::Null, false), &["spec: ", "null"]);
+    refused(&desk, "{", &["line 1"]);
 }
 
 #[test]
 fn a_bank_without_proof_is_proven_afresh_by_the_verb() {
-    let desk = Desk::new();
-    let mut bank = json(&fs::read_to_string(desk.path("bank.json")).unwrap());
+    let desk = desk();
+    let mut bank = desk.read_json("bank.json");
     (bank["proof"], bank["digest"], bank["gamma"]) = (Value::Null, Value::Null, Value::Null);
-    fs::write(desk.path("bare.json"), pretty(&bank)).unwrap();
+    desk.write("bare.json", pretty(&bank));
     let out = desk.good(&["verify", "bare.json", "--search"]);
     assert!(out.contains("found now") && out.contains("the file has none"), "{out}");
-    let report = json(&desk.good(&["verify", "bare.json", "--search", "--json"]));
-    let known = json(&desk.good(&["verify", "bank.json", "--json"]));
+    let report = desk.json(&["verify", "bare.json", "--search", "--json"]);
+    let known = desk.json(&["verify", "bank.json", "--json"]);
     let upper = |report: &Value| report["upper"].as_f64().unwrap();
     assert!((upper(&report) / upper(&known) - 1.0).abs() < 1e-6, "{report} {known}");
     // It runs and is analysed as before.

@@ -1,5 +1,6 @@
 //! What `verify` must not say: delays next to whole numbers against a closed form, and files whose gammas are false.
 
+use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
 use hybank::bank::{Bank, CausalWitness, Gamma, LowerProof, SynthesisFilters};
 use hybank::design::{certify, design};
@@ -73,11 +74,8 @@ fn delays_next_to_whole_numbers_are_not_rounded() {
 /// The same for random poles, latencies, fast periods and distances from a whole number.
 #[test]
 fn no_interval_excludes_the_true_norm_for_any_delay() {
-    let mut state = 2026u64;
-    let mut uniform = |from: f64, to: f64| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        from + (to - from) * (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = Random(2026);
+    let mut uniform = |from: f64, to: f64| from + (to - from) * random.part();
     let (mut proven, mut refused) = (0, 0);
     for _ in 0..400 {
         let fast_period = [1.0, 1.0 / 48_000.0, 1.0 / 44_100.0, 4e-9][uniform(0.0, 4.0) as usize];
@@ -222,19 +220,15 @@ fn files_whose_gammas_are_false_are_refused() {
 /// Random factors on any of the numbers: what passes is true.
 #[test]
 fn statements_that_pass_are_true() {
-    let mut state = 7u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let mut random = Random(7);
     let (mut passed, mut refused) = (0, 0);
     for bank in examples() {
         let truth = verify(&bank).unwrap();
         for _ in 0..200 {
             let mut forged = bank.clone();
-            let size = 10f64.powf(-14.0 * uniform());
-            let factor = 1.0 + if uniform() < 0.5 { -size } else { size };
-            let target = (uniform() * 5.0) as usize;
+            let size = 10f64.powf(-14.0 * random.part());
+            let factor = 1.0 + if random.part() < 0.5 { -size } else { size };
+            let target = (random.part() * 5.0) as usize;
             let gamma = &mut forged.gamma;
             let number = match target {
                 0 => &mut gamma.norm,

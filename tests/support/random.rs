@@ -1,4 +1,6 @@
-//! One seeded generator for all tests.
+//! One seeded generator for all tests: unit tests, test programs and benchmarks include this file.
+// Each of them uses a part of it.
+#![allow(dead_code)]
 
 /// SplitMix64 (Steele, Lea and Flood, 2014): the same numbers on every machine and with every version.
 pub(crate) struct Random(pub(crate) u64);

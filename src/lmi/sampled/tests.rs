@@ -9,6 +9,7 @@ use super::*;
 use crate::linalg::{CMat, Complex};
 use crate::lmi::testbank::{self, TestBank};
 use crate::lmi::{Outcome, SettingError};
+use crate::random::Random;
 
 fn bank_problem(bank: &TestBank, omegas: &[f64], taps: usize) -> Problem {
     let points = bank.samples(omegas).into_iter().map(|(omega, w, h)| Point { omega, w, h }).collect();
@@ -69,26 +70,16 @@ fn wavy_problem((m, n, q): (usize, usize, usize), omegas: &[f64], lags: &[usize]
     Problem::new(omegas.iter().enumerate().map(point).collect(), lags.to_vec()).unwrap()
 }
 
-/// Own generator, so that the stream never changes (Knuth's MMIX constants).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn matrix(&mut self, rows: usize, cols: usize) -> CMat {
-        CMat::from_fn(rows, cols, |_, _| Complex::new(self.next(), self.next()))
-    }
+fn random_matrix(random: &mut Random, rows: usize, cols: usize) -> CMat {
+    CMat::from_fn(rows, cols, |_, _| Complex::new(random.sample(), random.sample()))
 }
 
 fn random_problem(seed: u64, (m, n, q): (usize, usize, usize), points: usize, lags: &[usize]) -> Problem {
     let mut r = Random(seed);
     let mut point = || Point {
-        omega: std::f64::consts::FRAC_PI_2 * (1.0 + r.next()),
-        w: r.matrix(m, q),
-        h: r.matrix(n, q),
+        omega: std::f64::consts::FRAC_PI_2 * (1.0 + r.sample()),
+        w: random_matrix(&mut r, m, q),
+        h: random_matrix(&mut r, n, q),
     };
     Problem::new((0..points).map(|_| point()).collect(), lags.to_vec()).unwrap()
 }

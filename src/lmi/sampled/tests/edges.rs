@@ -26,7 +26,7 @@ fn exactly_reproducible_targets_give_zero() {
         let problem = random_problem(seed, sizes, 30, &vec![4; sizes.0]);
         let mut r = Random(99 + seed);
         let taps: Taps =
-            (0..4).map(|_| crate::linalg::Mat::from_fn(sizes.0, sizes.1, |_, _| r.next())).collect();
+            (0..4).map(|_| crate::linalg::Mat::from_fn(sizes.0, sizes.1, |_, _| r.sample())).collect();
         let zero = changed(&problem, |_, p| p.w.fill(Complex::default()));
         let reachable = changed(&problem, |l, p| p.w = -zero.error_at(l, &taps));
         let s = solve("reachable", &reachable);

@@ -145,16 +145,13 @@ fn lower_bounds_hold_for_any_taps_and_any_dual() {
         let step = 10f64.powi(-(k % 8));
         let mut taps = s.taps.clone();
         for (j, f) in taps.iter_mut().enumerate() {
-            *f +=
-                crate::linalg::Mat::from_fn(
-                    2,
-                    2,
-                    |p, _| if j < problem.lags()[p] { step * r.next() } else { 0.0 },
-                );
+            *f += crate::linalg::Mat::from_fn(2, 2, |p, _| {
+                if j < problem.lags()[p] { step * r.sample() } else { 0.0 }
+            });
         }
         assert!(problem.worst(&taps).unwrap().0 >= s.lower.value);
         let dual: Vec<CMat> =
-            s.dual.iter().map(|y| y + r.matrix(2, 3) * Complex::new(step * 0.1, 0.0)).collect();
+            s.dual.iter().map(|y| y + random_matrix(&mut r, 2, 3) * Complex::new(step * 0.1, 0.0)).collect();
         let bound = lower_bound(&problem, &dual, 10.0).unwrap();
         assert!(bound.value <= s.gamma, "step {step}: {bound:?}");
     }

@@ -1,0 +1,28 @@
+//! WAV files of floats, written and read by a crate that is not ours.
+
+use super::Desk;
+use hound::{SampleFormat, WavReader, WavSpec, WavWriter};
+use std::path::Path;
+
+pub(crate) fn write(desk: &Desk, name: &str, channels: u16, sample_rate: u32, samples: &[f32]) {
+    let spec = WavSpec { channels, sample_rate, bits_per_sample: 32, sample_format: SampleFormat::Float };
+    let mut writer = WavWriter::create(desk.path(name), spec).unwrap();
+    samples.iter().for_each(|&x| writer.write_sample(x).unwrap());
+    writer.finalize().unwrap();
+}
+
+/// Two files of one channel at 24 kHz, `a.wav` and `b.wav`.
+pub(crate) fn write_pair(desk: &Desk, a: &[f32], b: &[f32]) {
+    write(desk, "a.wav", 1, 24_000, a);
+    write(desk, "b.wav", 1, 24_000, b);
+}
+
+pub(crate) fn read(path: &Path) -> (WavSpec, Vec<f32>) {
+    let mut reader = WavReader::open(path).unwrap();
+    let samples = reader.samples::<f32>().map(Result::unwrap).collect();
+    (reader.spec(), samples)
+}
+
+pub(crate) fn samples(desk: &Desk, name: &str) -> Vec<f32> {
+    read(&desk.path(name)).1
+}
