@@ -24,7 +24,7 @@ method = "fir"
 taps = 24
 "#;
 
-const TICKS: usize = 1000;
+const FRAMES: usize = 1000;
 /// Frames a call, as if they came from a sound card.
 const BLOCK: usize = 64;
 
@@ -35,13 +35,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let source: Source = "tones:440Hz,3kHz".parse()?;
     let signal = Analog::Known(source.normalised(spec.fast_period));
-    let captured = capture(&Problem::new(&spec, bank.latency)?, &signal, TICKS);
-    let ticks: Vec<f64> = (0..TICKS).flat_map(|k| captured.channels.iter().map(move |x| x[k])).collect();
+    let captured = capture(&Problem::new(&spec, bank.latency)?, &signal, FRAMES);
+    let frames: Vec<f64> = (0..FRAMES).flat_map(|k| captured.channels.iter().map(move |x| x[k])).collect();
 
     let mut fuse = Stream::new(&bank.plan(Options::default())?);
-    let mut fast = vec![0.0; TICKS * fuse.ratio()];
+    let mut fast = vec![0.0; FRAMES * fuse.ratio()];
     let mut written = 0;
-    for block in ticks.chunks(BLOCK * fuse.channels()) {
+    for block in frames.chunks(BLOCK * fuse.channels()) {
         written += fuse.process(block, &mut fast[written..])?;
     }
 

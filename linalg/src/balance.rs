@@ -161,7 +161,7 @@ mod tests {
             for n in [1, 2, 9, 40] {
                 let m = driven_line(n, gain);
                 let found = spectral_radius(&m).unwrap();
-                assert!((found - radius).abs() < 1e-14, "{n} states behind {gain:e}: {found}");
+                assert!((found - radius).abs() < 1e-14, "{n} states after a gain of {gain:e}: {found}");
                 // The other way round, and complex.
                 let found = spectral_radius(&m.transpose()).unwrap();
                 assert!((found - radius).abs() < 1e-14, "{n} states before {gain:e}: {found}");

@@ -287,7 +287,7 @@ fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: 
         return out_of_range(format!("{path}.half"), 0.0, "", rule);
     }
     for (key, list, expected) in
-        [("wanted", &witness.wanted, reference), ("measured", &witness.measured, measured)]
+        [("reference", &witness.reference, reference), ("measured", &witness.measured, measured)]
     {
         let path = format!("{path}.{key}");
         if list.len() != expected {
@@ -298,9 +298,9 @@ fn check_witness(path: &str, witness: &DualWitness, reference: usize, measured: 
             check_finite(&format!("{path}[{i}]"), pair)?;
         }
     }
-    if witness.wanted.iter().flatten().all(|&x| x == 0.0) {
+    if witness.reference.iter().flatten().all(|&x| x == 0.0) {
         let rule = "a witness of weight zero shows nothing";
-        return out_of_range(format!("{path}.wanted"), 0.0, "", rule);
+        return out_of_range(format!("{path}.reference"), 0.0, "", rule);
     }
     Ok(())
 }

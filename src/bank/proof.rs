@@ -65,7 +65,7 @@ pub struct DualWitness {
     /// `[c, s]`, about cos(w/2) and sin(w/2).
     pub half: [f64; 2],
     /// Weights of the M reference samples of a slow period, `[re, im]`.
-    pub wanted: Vec<[f64; 2]>,
+    pub reference: Vec<[f64; 2]>,
     /// Weights of the N measured samples of a slow period; empty if they follow from the other numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub measured: Vec<[f64; 2]>,

@@ -198,11 +198,11 @@ fn certificate(value: &Value<'_>) -> Result<Certificate, Fault> {
 }
 
 fn witness(value: &Value<'_>) -> Result<DualWitness, Fault> {
-    let fields = value.fields(&["half", "wanted", "measured"])?;
+    let fields = value.fields(&["half", "reference", "measured"])?;
     let measured = fields.optional("measured").map(|v| pairs(&v)).transpose()?;
     Ok(DualWitness {
         half: pair(&fields.required("half", WITNESS)?)?,
-        wanted: pairs(&fields.required("wanted", WITNESS)?)?,
+        reference: pairs(&fields.required("reference", WITNESS)?)?,
         measured: measured.unwrap_or_default(),
     })
 }

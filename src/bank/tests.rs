@@ -99,7 +99,7 @@ fn the_file_looks_as_the_format_says() {
 fn with_proof() -> Bank {
     let witness = |measured: Vec<[f64; 2]>| DualWitness {
         half: [0.8, -0.6],
-        wanted: vec![[1.0, 0.5], [-0.0, 0.25]],
+        reference: vec![[1.0, 0.5], [-0.0, 0.25]],
         measured,
     };
     let factor = vec![vec![0.1], vec![0.2, 1.0 / 3.0], vec![1e-9, -2.5, 7.0]];
@@ -136,7 +136,7 @@ fn every_mistake_in_a_proof_names_its_place() {
         ("\"gamma\": 0.04", "\"gamma\": -0.04", "proof.upper.gamma", "zero or more"),
         ("\"half\": [0.8, -0.6]", "\"half\": [0, 0]", "proof.upper.peak.half", "cannot be zero"),
         ("\"half\": [0.8, -0.6]", "\"half\": [0.8]", "proof.upper.peak.half", "a pair of numbers"),
-        ("[[1.0, 0.5], [-0.0, 0.25]]", "[[1.0, 0.5]]", "proof.upper.peak.wanted", "1 weights"),
+        ("[[1.0, 0.5], [-0.0, 0.25]]", "[[1.0, 0.5]]", "proof.upper.peak.reference", "1 weights"),
         ("[1.5e-300, 2.0]", "[null, 2.0]", "proof.lower[0].measured[1][0]", "expected a number"),
         ("\"factor\"", "\"faktor\"", "proof.upper", "did you mean \"factor\""),
         ("\"digest\": \"sha256:", "\"digest\": \"sha1:", "digest", "64 hexadecimal digits"),

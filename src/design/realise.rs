@@ -14,7 +14,7 @@ use crate::lti::{FirWithTail, StateSpace};
 use crate::spec::{Method, Spec};
 
 /// A change of coordinates may increase gamma by this fraction.
-const FORM_ACCURACY: f64 = 1e-9;
+const REALISATION_ACCURACY: f64 = 1e-9;
 
 /// A bank's filters as they are written to the file, with the results of order reduction and quantisation.
 pub(super) struct Realised {
@@ -26,13 +26,13 @@ pub(super) struct Realised {
 }
 
 /// Filters with the norm of their error system.
-struct Judged {
+struct Evaluated {
     filters: SynthesisFilters,
     peak: Peak,
 }
 
-impl From<Judged> for Realised {
-    fn from(Judged { filters, peak }: Judged) -> Self {
+impl From<Evaluated> for Realised {
+    fn from(Evaluated { filters, peak }: Evaluated) -> Self {
         Self { filters, peak, reduction: None, integers: None }
     }
 }
@@ -66,15 +66,15 @@ struct Realisation<'a> {
 }
 
 impl Realisation<'_> {
-    fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Judged, DesignError> {
+    fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Evaluated, DesignError> {
         if self.merged.are_all() {
-            return Ok(Judged { filters: SynthesisFilters::Fir(taps.to_vec()), peak });
+            return Ok(Evaluated { filters: SynthesisFilters::Fir(taps.to_vec()), peak });
         }
-        judged(self.whole, SynthesisFilters::Fir(self.merged.share_taps(taps)))
+        evaluate(self.whole, SynthesisFilters::Fir(self.merged.share_taps(taps)))
     }
 
     /// Quantises the taps if the spec asks for integer taps.
-    fn with_integers(&self, real: Judged) -> Result<Realised, DesignError> {
+    fn with_integers(&self, real: Evaluated) -> Result<Realised, DesignError> {
         let (SynthesisFilters::Fir(taps), Some(bits)) = (&real.filters, &self.spec.design.bits) else {
             return Ok(real.into());
         };
@@ -85,14 +85,14 @@ impl Realisation<'_> {
             gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
         };
         let (integers, study) = quantise(problem, real.peak.gain, bits, self.spec.design.fraction_bits)?;
-        let judged = judged(self.whole, SynthesisFilters::Fir(integers.taps()))?;
-        Ok(Realised { integers: Some((integers, study)), ..judged.into() })
+        let evaluated = evaluate(self.whole, SynthesisFilters::Fir(integers.taps()))?;
+        Ok(Realised { integers: Some((integers, study)), ..evaluated.into() })
     }
 
     /// A recursive bank of the order that the spec asks for; `norm` is the norm of the error of `system`
     /// with the merged channels.
     fn state_space(&self, system: &StateSpace, norm: f64) -> Result<Realised, DesignError> {
-        let full = self.fastest_form(&system.map_inputs(&self.merged.shares())?, norm)?;
+        let full = self.fastest_realisation(&system.map_inputs(&self.merged.shares())?, norm)?;
         let (Some(reduction), SynthesisFilters::StateSpace(block)) =
             (self.spec.design.reduction, &full.filters)
         else {
@@ -107,37 +107,37 @@ impl Realisation<'_> {
             gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
         };
         let (smaller, record) = reduce(&problem, reduction)?;
-        let judged = match smaller {
+        let evaluated = match smaller {
             None => full,
-            Some(smaller) => self.reduced_form(&smaller, record.reduced.figures.gamma)?,
+            Some(smaller) => self.reduced_realisation(&smaller, record.reduced.figures.gamma)?,
         };
-        Ok(Realised { reduction: Some(record), ..judged.into() })
+        Ok(Realised { reduction: Some(record), ..evaluated.into() })
     }
 
     /// A reduced bank for all channels, in a fast realisation if one keeps the norm `promised`.
-    fn reduced_form(&self, reduced: &FirWithTail, promised: f64) -> Result<Judged, DesignError> {
+    fn reduced_realisation(&self, reduced: &FirWithTail, promised: f64) -> Result<Evaluated, DesignError> {
         let whole = reduced.map_inputs(&self.merged.shares())?;
-        match self.fast_form(&whole, promised)? {
+        match self.fast_realisation(&whole, promised)? {
             Some(found) => Ok(found),
-            None => judged(self.whole, block_filters(&whole.realise()?)),
+            None => evaluate(self.whole, block_filters(&whole.realise()?)),
         }
     }
 
     /// The filters in the cheapest realisation that keeps the norm `promised`: an FIR head followed by
     /// parallel sections, an FIR head followed by a triangular state matrix, or the filters as they are.
-    fn fastest_form(&self, system: &StateSpace, promised: f64) -> Result<Judged, DesignError> {
-        match self.fast_form(&FirWithTail::new(system)?, promised)? {
+    fn fastest_realisation(&self, system: &StateSpace, promised: f64) -> Result<Evaluated, DesignError> {
+        match self.fast_realisation(&FirWithTail::new(system)?, promised)? {
             Some(found) => Ok(found),
-            None => judged(self.whole, block_filters(system)),
+            None => evaluate(self.whole, block_filters(system)),
         }
     }
 
     /// The first of the fast realisations that keeps the norm, if any does.
-    fn fast_form(&self, split: &FirWithTail, promised: f64) -> Result<Option<Judged>, DesignError> {
-        let forms = [split.modal(), split.triangular().map(Some)];
-        for form in forms.into_iter().filter_map(|form| form.ok().flatten()) {
-            let found = judged(self.whole, block_filters(&form.realise()?))?;
-            if found.peak.gain <= promised * (1.0 + FORM_ACCURACY) {
+    fn fast_realisation(&self, split: &FirWithTail, promised: f64) -> Result<Option<Evaluated>, DesignError> {
+        let candidates = [split.parallel_form(), split.triangular_form().map(Some)];
+        for candidate in candidates.into_iter().filter_map(|form| form.ok().flatten()) {
+            let found = evaluate(self.whole, block_filters(&candidate.realise()?))?;
+            if found.peak.gain <= promised * (1.0 + REALISATION_ACCURACY) {
                 return Ok(Some(found));
             }
         }
@@ -149,7 +149,7 @@ fn block_filters(system: &StateSpace) -> SynthesisFilters {
     SynthesisFilters::StateSpace(filters::to_block(system))
 }
 
-fn judged(plant: &LiftedPlant, filters: SynthesisFilters) -> Result<Judged, DesignError> {
+fn evaluate(plant: &LiftedPlant, filters: SynthesisFilters) -> Result<Evaluated, DesignError> {
     let peak = plant.bank_norm(&filters)?;
-    Ok(Judged { filters, peak })
+    Ok(Evaluated { filters, peak })
 }

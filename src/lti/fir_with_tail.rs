@@ -1,7 +1,7 @@
 //! An FIR head with a recursive tail.
 //!
 //! Filters with latency contain delay chains: states that only pass values on. Together these states form
-//! one large defective eigenvalue at zero, which has no modal form. Their response has finitely many taps.
+//! one large defective eigenvalue at zero, which has no parallel form. Their response has finitely many taps.
 //! The first q + 1 taps of the response are therefore realised as the FIR head. A recursion without the
 //! chains, the tail, produces the rest:
 //!
@@ -9,7 +9,7 @@
 
 use super::balanced::balanced;
 use super::gramian::h2_norm;
-use super::modal::{modal, triangular};
+use super::parallel_form::{parallel_form, triangular_form};
 use super::{LtiError, StateSpace, StateSpaceError};
 use crate::linalg::{self, Mat};
 
@@ -82,21 +82,21 @@ impl FirWithTail {
         &self.tail
     }
 
-    /// The tail as parallel sections, see [`modal`].
+    /// The tail as parallel sections, see [`parallel_form`].
     ///
     /// # Errors
-    /// As [`modal`].
-    pub fn modal(&self) -> Result<Option<Self>, LtiError> {
-        let tail = modal(&self.tail)?;
+    /// As [`parallel_form`].
+    pub fn parallel_form(&self) -> Result<Option<Self>, LtiError> {
+        let tail = parallel_form(&self.tail)?;
         Ok(tail.map(|tail| Self { head: self.head.clone(), tail }))
     }
 
-    /// The tail as a triangle, see [`triangular`].
+    /// The tail as a triangle, see [`triangular_form`].
     ///
     /// # Errors
-    /// As [`triangular`].
-    pub fn triangular(&self) -> Result<Self, LtiError> {
-        Ok(Self { head: self.head.clone(), tail: triangular(&self.tail)? })
+    /// As [`triangular_form`].
+    pub fn triangular_form(&self) -> Result<Self, LtiError> {
+        Ok(Self { head: self.head.clone(), tail: triangular_form(&self.tail)? })
     }
 
     /// q, the steps by which the input of the tail is delayed.
@@ -199,9 +199,9 @@ mod tests {
             let system = with_chains(long, short);
             let split = FirWithTail::new(&system).unwrap();
             assert_eq!((split.head_length(), split.tail.order()), (long, 2));
-            let modal = split.modal().unwrap().unwrap();
-            let triangular = split.triangular().unwrap();
-            for form in [split, modal, triangular] {
+            let parallel = split.parallel_form().unwrap().unwrap();
+            let triangular = split.triangular_form().unwrap();
+            for form in [split, parallel, triangular] {
                 let made = form.realise().unwrap();
                 assert_eq!(made.order(), 2 + 2 * long);
                 check_same(&system, &made, 1e-12);
@@ -213,7 +213,7 @@ mod tests {
     fn the_matrix_has_nothing_but_its_section_and_the_line() {
         let a = FirWithTail::new(&with_chains(3, 2))
             .unwrap()
-            .modal()
+            .parallel_form()
             .unwrap()
             .unwrap()
             .realise()
@@ -249,7 +249,7 @@ mod tests {
         let system = StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap();
         let split = FirWithTail::new(&system).unwrap();
         assert_eq!((split.head_length(), split.tail.order()), (0, 3));
-        check_same(&system, &split.modal().unwrap().unwrap().realise().unwrap(), 1e-13);
+        check_same(&system, &split.parallel_form().unwrap().unwrap().realise().unwrap(), 1e-13);
     }
 
     #[test]

@@ -10,7 +10,7 @@ pub mod exponential;
 mod fir_with_tail;
 pub mod gramian;
 mod interconnect;
-pub mod modal;
+pub mod parallel_form;
 pub mod peak;
 mod response;
 pub mod riccati;

@@ -10,7 +10,7 @@ use crate::linalg::{self, Mat};
 /// error only halves per step. Sixty doublings are 2^60 steps of the underlying recursion.
 const DOUBLING_LIMIT: usize = 60;
 /// Steps of the plain recursion after the doubling.
-const POLISHING_LIMIT: usize = 4;
+const REFINEMENT_LIMIT: usize = 4;
 /// Relative change at which the doubling has converged.
 const CONVERGED: f64 = 1e-14;
 /// A relative residual above this is not a solution; below it the caller decides.
@@ -69,9 +69,8 @@ impl Iterate {
     /// One doubling; returns the relative change of x.
     fn double(&mut self) -> f64 {
         let n = self.f.nrows();
-        let mut right = Mat::zeros(n, 2 * n);
-        right.columns_mut(0, n).copy_from(&self.f);
-        right.columns_mut(n, n).copy_from(&self.g);
+        // Matrices of different sizes are in no equation, so they have no solution.
+        let Ok(right) = linalg::hstack(&[&self.f, &self.g]) else { return f64::NAN };
         let solved = linalg::solve(&identity_plus(&self.g, &self.x), &right);
         let (wf, wg) = (solved.columns(0, n), solved.columns(n, n));
         let dx = linalg::symmetric_part(&(self.f.transpose() * (&self.x * wf)));
@@ -93,7 +92,7 @@ fn identity_plus(g: &Mat, x: &Mat) -> Mat {
 }
 
 fn verify(f: &Mat, g: &Mat, h: &Mat, x: Mat, steps: usize) -> RiccatiOutcome {
-    let (x, residual) = polish(f, g, h, x);
+    let (x, residual) = refined(f, g, h, x);
     let closed_loop = linalg::solve(&identity_plus(g, &x), f);
     let stable = linalg::spectral_radius(&closed_loop).is_ok_and(|radius| radius < 1.0);
     if residual <= RESIDUAL_LIMIT * x.norm() && stable {
@@ -104,14 +103,14 @@ fn verify(f: &Mat, g: &Mat, h: &Mat, x: Mat, steps: usize) -> RiccatiOutcome {
 
 /// A few steps of the plain recursion, which contracts about its stabilising solution, as long as they help.
 /// Returns the solution and its residual.
-fn polish(f: &Mat, g: &Mat, h: &Mat, x: Mat) -> (Mat, f64) {
+fn refined(f: &Mat, g: &Mat, h: &Mat, x: Mat) -> (Mat, f64) {
     let step = |weight: Mat| linalg::symmetric_part(&(f.transpose() * weight * f + h));
     let gap = |a: &Mat, b: &Mat| Some((a - b).norm()).filter(|gap| gap.is_finite()).unwrap_or(f64::INFINITY);
     let (plain, inverse) = (step(plain_weight(g, &x)), step(inverse_weight(g, &x)));
     let by_inverse = gap(&inverse, &x) < gap(&plain, &x);
     let (mut best, mut next) = (x, if by_inverse { inverse } else { plain });
     let mut residual = gap(&next, &best);
-    for _ in 0..POLISHING_LIMIT {
+    for _ in 0..REFINEMENT_LIMIT {
         let after = step(if by_inverse { inverse_weight(g, &next) } else { plain_weight(g, &next) });
         let change = gap(&after, &next);
         if change >= residual {

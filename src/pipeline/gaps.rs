@@ -389,12 +389,12 @@ mod tests {
             let (mut got, mut mask) = (Vec::new(), Vec::new());
             let mut rest = &samples[..];
             while !rest.is_empty() {
-                let (piece, behind) = rest.split_at(rest.len().min(n * (1 + random.below(40))));
+                let (piece, after) = rest.split_at(rest.len().min(n * (1 + random.below(40))));
                 let bytes: Vec<u8> = piece.iter().flat_map(|x| x.to_le_bytes()).collect();
                 let layout = SampleLayout::packed(PcmFormat::F64Le);
                 filler.fill_pcm(&[PcmFrames { layout, channels: n, bytes: &bytes }], &mut mask);
                 got.extend_from_slice(&mask);
-                rest = behind;
+                rest = after;
             }
             assert_eq!(got, affected(&taps, m, &samples), "trial {trial}: {taps:?}");
         }

@@ -62,11 +62,11 @@ impl Touch {
             additions += 2 * lags.len();
             for lags in lags {
                 let first = (gap.first + lags.first as u64).max(frame);
-                let behind = gap.first + gap.length + lags.last as u64;
-                if behind > first {
+                let end = gap.first + gap.length + lags.last as u64;
+                if end > first {
                     self.changes[(first % self.span as u64) as usize * self.ratio + p] += 1;
-                    self.changes[(behind % self.span as u64) as usize * self.ratio + p] -= 1;
-                    self.settled = self.settled.max(behind + 1);
+                    self.changes[(end % self.span as u64) as usize * self.ratio + p] -= 1;
+                    self.settled = self.settled.max(end + 1);
                 }
             }
         }

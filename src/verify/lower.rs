@@ -34,7 +34,7 @@ pub(super) fn gain(
     witness: &DualWitness,
 ) -> Option<f64> {
     let z = ComplexMatrix::unit(witness.half);
-    let reference = ComplexMatrix::column(&witness.wanted);
+    let reference = ComplexMatrix::column(&witness.reference);
     let through = spectrum::filter_response(filters, ratio, &z).adjoint().product(&reference);
     let all = reference.above(&ComplexMatrix::zeros(through.re.nrows(), 1).minus(&through));
     root_of_quotient(energy(&spectrum::gram(period, &z), &all), reference.square())
@@ -67,7 +67,7 @@ pub(super) fn unexplained(
     let gram = spectrum::gram(period, &ComplexMatrix::unit(witness.half));
     let measured: Vec<usize> = channels.iter().map(|i| ratio + i).collect();
     let all: Vec<usize> = (0..ratio).chain(measured.iter().copied()).collect();
-    let reference = ComplexMatrix::column(&witness.wanted);
+    let reference = ComplexMatrix::column(&witness.reference);
     let known = gram.select(&measured, &measured).realified();
     let cross = gram.select(&measured, &(0..ratio).collect::<Vec<_>>()).product(&reference);
     let least = least_eigenvalue(&known)?;
@@ -134,7 +134,7 @@ impl BindingSums {
 
     fn add(&mut self, period: &SlowPeriod, witness: &DualWitness) {
         let z = ComplexMatrix::unit(witness.half);
-        let a = ComplexMatrix::column(&witness.wanted);
+        let a = ComplexMatrix::column(&witness.reference);
         let b = a.above(&ComplexMatrix::column(&witness.measured));
         let image = spectrum::gram(period, &z).product(&b);
         self.value = self.value + a.inner(&image.rows(0, self.ratio));

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 const COUNT: usize = 3000;
 
-/// N = M = 2, 600 taps a channel, m0 = 7: long enough for the fast form and for overlap-save to win.
+/// N = M = 2, 600 taps per channel, m0 = 7: long enough for the fast form and for overlap-save to win.
 fn desk() -> Desk {
     let desk = Desk::new();
     let taps = |seed: usize| -> Vec<f64> {
@@ -19,7 +19,7 @@ fn desk() -> Desk {
         "gamma": { "upper": null, "lower": null, "noncausal": null }
     });
     desk.write("long.json", bank.to_string());
-    desk.write("ticks", bytes(&input()));
+    desk.write("frames", bytes(&input()));
     for (i, name) in ["a.wav", "b.wav"].into_iter().enumerate() {
         wav::write(&desk, name, 1, 24_000, &channel_of(i));
     }
@@ -28,10 +28,10 @@ fn desk() -> Desk {
 
 /// With two gaps.
 fn input() -> Vec<f32> {
-    let mut ticks: Vec<f32> = (0..2 * COUNT).map(|i| (i * 7919 % 1009) as f32 / 1009.0 - 0.5).collect();
-    (500..520).for_each(|k| ticks[2 * k] = f32::NAN);
-    ticks[2 * 2000 + 1] = f32::INFINITY;
-    ticks
+    let mut frames: Vec<f32> = (0..2 * COUNT).map(|i| (i * 7919 % 1009) as f32 / 1009.0 - 0.5).collect();
+    (500..520).for_each(|k| frames[2 * k] = f32::NAN);
+    frames[2 * 2000 + 1] = f32::INFINITY;
+    frames
 }
 
 fn channel_of(i: usize) -> Vec<f32> {
@@ -44,7 +44,7 @@ fn fuse(desk: &Desk, more: &[&str]) -> (Vec<f32>, Value) {
 }
 
 fn stream(desk: &Desk, more: &[&str]) -> (Vec<f32>, Value) {
-    let report = desk.report(&[&["stream", "long.json", "--input", "ticks", "-o", "out"], more].concat());
+    let report = desk.report(&[&["stream", "long.json", "--input", "frames", "-o", "out"], more].concat());
     (floats(&desk.read("out")), report)
 }
 

@@ -56,10 +56,10 @@ fn run(stream: &mut Stream, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u
     let mut out = Vec::new();
     let mut rest = input;
     for &piece in pieces {
-        let (ticks, after) = rest.split_at(piece * n);
+        let (frames, after) = rest.split_at(piece * n);
         rest = after;
         if pcm {
-            let coded: Vec<u8> = ticks.iter().flat_map(|x| ((x * 32767.0) as i16).to_le_bytes()).collect();
+            let coded: Vec<u8> = frames.iter().flat_map(|x| ((x * 32767.0) as i16).to_le_bytes()).collect();
             let layout = SampleLayout::packed(PcmFormat::S16Le);
             let mut fast = vec![0; piece * m * 3];
             let mut output = PcmOutput { format: PcmFormat::S24Be, bytes: &mut fast, clipped: 0 };
@@ -67,7 +67,7 @@ fn run(stream: &mut Stream, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u
             out.extend(fast);
         } else {
             let mut fast = vec![0.0; piece * m];
-            stream.process(ticks, &mut fast).unwrap();
+            stream.process(frames, &mut fast).unwrap();
             out.extend(fast.iter().flat_map(|y| y.to_bits().to_le_bytes()));
         }
     }
@@ -76,7 +76,7 @@ fn run(stream: &mut Stream, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u
 
 #[test]
 fn ten_thousand_random_cuts_give_the_same_bits() {
-    const TICKS: usize = 300;
+    const FRAMES: usize = 300;
     let banks =
         [fir(2, 2, 24), fir(3, 4, 37), fir(1, 5, 9), fir(8, 8, 128), recursion(2, 2, 6), recursion(3, 2, 5)];
     let mut cuts = Random(1);
@@ -98,10 +98,10 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
         })
         .map(|(bank, options)| {
             let mut stream = Stream::new(&bank.plan(options).unwrap());
-            let input: Vec<f32> = (0..TICKS * bank.delays.len()).map(|_| noise() as f32).collect();
+            let input: Vec<f32> = (0..FRAMES * bank.delays.len()).map(|_| noise() as f32).collect();
             let whole = [false, true].map(|pcm| {
                 stream.reset();
-                run(&mut stream, &input, pcm, &[TICKS])
+                run(&mut stream, &input, pcm, &[FRAMES])
             });
             (stream, input, whole)
         })
@@ -110,7 +110,7 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
         let count = streams.len();
         let (stream, input, whole) = &mut streams[turn % count];
         let pcm = turn / count % 4 == 3;
-        let pieces = pieces(&mut cuts, TICKS);
+        let pieces = pieces(&mut cuts, FRAMES);
         stream.reset();
         assert!(run(stream, input, pcm, &pieces) == whole[usize::from(pcm)], "turn {turn}: {pieces:?}");
     }

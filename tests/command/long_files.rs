@@ -18,7 +18,7 @@ fn recording_bytes() -> u64 {
     192 << 20
 }
 
-/// A file of `bytes` zeros behind `header`, which takes no room on the disk.
+/// A file of `bytes` zeros after `header`, which takes no room on the disk.
 fn sparse(desk: &Desk, name: &str, header: &[u8], bytes: u64) {
     let mut file = File::create(desk.path(name)).unwrap();
     file.write_all(header).unwrap();

@@ -14,8 +14,8 @@ const SEQUENCE: &str = r#"
 {"channel": 2, "sample_start": 0, "global_index": 1000}
 "#;
 
-fn lost_ticks(tick: usize) -> bool {
-    tick < 2 || tick == 7 || (100..1500).contains(&tick)
+fn is_lost(frame: usize) -> bool {
+    frame < 2 || frame == 7 || (100..1500).contains(&frame)
 }
 
 fn gaps(list: &[(u64, u64, u64)]) -> Value {
@@ -25,20 +25,20 @@ fn gaps(list: &[(u64, u64, u64)]) -> Value {
 
 /// Frames with channel 1 replaced by `stand_in(last good sample)` where it was lost.
 fn filled(whole: &[f32], stand_in: impl Fn(f32) -> f32) -> Vec<f32> {
-    let mut ticks = whole.to_vec();
+    let mut frames = whole.to_vec();
     let mut last = 0.0;
-    for (k, tick) in ticks.chunks_exact_mut(2).enumerate() {
-        if lost_ticks(k) {
-            tick[0] = stand_in(last);
+    for (k, frame) in frames.chunks_exact_mut(2).enumerate() {
+        if is_lost(k) {
+            frame[0] = stand_in(last);
         } else {
-            last = tick[0];
+            last = frame[0];
         }
     }
-    ticks
+    frames
 }
 
 fn kept(whole: &[f32]) -> Vec<f32> {
-    let kept = channel(whole, 0).into_iter().enumerate().filter(|(k, _)| !lost_ticks(*k));
+    let kept = channel(whole, 0).into_iter().enumerate().filter(|(k, _)| !is_lost(*k));
     kept.map(|(_, x)| x).collect()
 }
 
@@ -129,7 +129,7 @@ fn channels_that_end_early_may_be_bridged_to_the_end_of_the_longest() {
     assert_eq!((report["frames"].as_u64(), &report["warnings"]), (Some(5000), &json!([])));
     assert_eq!(report["gaps"]["list"], gaps(&[(1, 4000, 1000)]));
     let mut zeros = whole.clone();
-    zeros.chunks_exact_mut(2).skip(4000).for_each(|tick| tick[0] = 0.0);
+    zeros.chunks_exact_mut(2).skip(4000).for_each(|frame| frame[0] = 0.0);
     assert!(floats(&desk.read("out")) == fused(&zeros));
     desk.refused(2, &["stream", "bank.json", "--longest"], &["--gaps"]);
 }

@@ -42,7 +42,7 @@ fn interleaved_floats_are_the_default() {
         let input = ticks(count);
         let output = bench.run(&[], &bytes(&input));
         assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-        assert!(floats(&output.stdout) == fused(&input), "{count} ticks");
+        assert!(floats(&output.stdout) == fused(&input), "{count} frames");
     }
 }
 
@@ -88,17 +88,17 @@ fn every_format_goes_in_and_out() {
 }
 
 #[test]
-fn a_tick_comes_out_as_soon_as_it_is_in() {
+fn a_frame_comes_out_as_soon_as_it_is_in() {
     let bench = Bench::new();
     let mut child = bench.spawn(&[]);
     let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
     let input = ticks(50);
     let want = fused(&input);
-    for (tick, want) in input.chunks_exact(2).zip(want.chunks_exact(2)) {
+    for (frame, want) in input.chunks_exact(2).zip(want.chunks_exact(2)) {
         // In two pieces, cut inside a sample.
-        let tick = bytes(tick);
-        stdin.write_all(&tick[..3]).unwrap();
-        stdin.write_all(&tick[3..]).unwrap();
+        let frame = bytes(frame);
+        stdin.write_all(&frame[..3]).unwrap();
+        stdin.write_all(&frame[3..]).unwrap();
         let mut got = [0; 8];
         // An output that waits for a block would never come.
         stdout.read_exact(&mut got).unwrap();
@@ -188,7 +188,7 @@ fn cut_frames_and_unequal_channels_are_told() {
 }
 
 #[test]
-fn an_interrupt_ends_after_whole_ticks_and_reports() {
+fn an_interrupt_ends_after_whole_frames_and_reports() {
     let bench = Bench::new();
     let mut child = bench.spawn(&["-o", "out.raw", "--json"]);
     let mut stdin = child.stdin.take().unwrap();

@@ -47,10 +47,10 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
 }
 
 /// e[n] for each pulse, rows n = 0 .. frames M, columns pulses of width 1 / fineness over the same time.
-fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
+fn pulse_errors(case: &Case, frames: usize, fineness: usize) -> Mat {
     let Problem { ratio, latency, .. } = case.problem;
     let width = 1.0 / fineness as f64;
-    let columns = ticks * ratio * fineness;
+    let columns = frames * ratio * fineness;
     let scale = 1.0 / width.sqrt();
     // (phi * pulse_c)(t) for t = k step + offset is a difference of step responses on a lattice of `width`.
     let responses = |front_end: usize, offset: f64| -> Vec<f64> {
@@ -63,11 +63,11 @@ fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
         let at = columns + steps - c;
         scale * (table[at] - table[at - 1])
     };
-    let wanted = responses(case.problem.target, -(latency as f64));
-    let mut errors = Mat::from_fn(ticks * ratio, columns, |n, c| pulse(&wanted, n * fineness, c));
+    let reference = responses(case.problem.target, -(latency as f64));
+    let mut errors = Mat::from_fn(frames * ratio, columns, |n, c| pulse(&reference, n * fineness, c));
     for (channel, taps) in case.problem.channels.iter().zip(&case.taps) {
         let table = responses(channel.front_end, -channel.delay.0);
-        for n in 0..ticks * ratio {
+        for n in 0..frames * ratio {
             for k in 0..=n / ratio {
                 let Some(tap) = taps.get(n - k * ratio) else { continue };
                 for c in 0..columns {
@@ -79,8 +79,8 @@ fn pulse_errors(case: &Case, ticks: usize, fineness: usize) -> Mat {
     errors
 }
 
-fn brute_force(case: &Case, ticks: usize, fineness: usize) -> f64 {
-    let errors = pulse_errors(case, ticks, fineness);
+fn brute_force(case: &Case, frames: usize, fineness: usize) -> f64 {
+    let errors = pulse_errors(case, frames, fineness);
     singular_values(&(&errors * errors.transpose())).unwrap()[0].sqrt()
 }
 

@@ -84,7 +84,7 @@ fn four_channels_behind_elliptic_filters() {
 }
 
 #[test]
-fn channels_whole_ticks_late() {
+fn channels_late_by_whole_slow_periods() {
     for (latency, delays) in
         [(0, vec![1.2, 0.6]), (1, vec![0.2, 5.1]), (3, vec![0.2, 9.1]), (6, vec![7.0, 0.0, 3.3])]
     {

@@ -18,7 +18,7 @@ fn block(bank: &Bank) -> &BlockFilter {
     }
 }
 
-/// Numbers of the matrices that are not zero: multiply-adds a frame.
+/// Numbers of the matrices that are not zero: multiply-adds per frame.
 fn cost(block: &BlockFilter) -> usize {
     let all = [&block.a, &block.b, &block.c, &block.d];
     all.into_iter().flatten().flatten().filter(|x| **x != 0.0 && **x != 1.0).count()
@@ -96,7 +96,7 @@ fn it_is_worth_its_cost_beside_taps() {
     taps.design = DesignSpec::new(Method::Fir, Some(macs.div_ceil(2)));
     let fir = design(&taps).unwrap().bank.gamma.norm.unwrap();
     let iir = found.bank.gamma.norm.unwrap();
-    println!("{macs} multiply-adds a tick: recursive {iir}, taps {fir}");
+    println!("{macs} multiply-adds per frame: recursive {iir}, taps {fir}");
     assert!(iir < 0.1 * fir, "{iir} {fir}");
 }
 

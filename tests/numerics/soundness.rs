@@ -129,7 +129,7 @@ fn forged(bank: &Bank, trick: usize) -> (&'static str, Bank) {
     let name = match trick {
         0 => {
             *gamma = Gamma { upper: Some(0.0), norm: Some(0.0), lower: None, noncausal: None };
-            certificate.peak.wanted.iter_mut().for_each(|pair| *pair = [0.0; 2]);
+            certificate.peak.reference.iter_mut().for_each(|pair| *pair = [0.0; 2]);
             "gammas of zero with a witness of weight zero"
         }
         1 => {
@@ -166,7 +166,7 @@ fn forged(bank: &Bank, trick: usize) -> (&'static str, Bank) {
             "an invented recursion"
         }
         7 => {
-            proof.noncausal.as_mut().unwrap().wanted.iter_mut().for_each(|pair| *pair = [0.0; 2]);
+            proof.noncausal.as_mut().unwrap().reference.iter_mut().for_each(|pair| *pair = [0.0; 2]);
             "a noncausal witness of weight zero"
         }
         8 => {

@@ -41,8 +41,8 @@ pub(crate) fn ticks(count: usize) -> Vec<f32> {
 }
 
 /// Channel i of interleaved frames.
-pub(crate) fn channel(ticks: &[f32], i: usize) -> Vec<f32> {
-    ticks.iter().skip(i).step_by(2).copied().collect()
+pub(crate) fn channel(frames: &[f32], i: usize) -> Vec<f32> {
+    frames.iter().skip(i).step_by(2).copied().collect()
 }
 
 /// Frames of two channels.

@@ -32,7 +32,7 @@ pub(crate) fn butterworth(order: usize, omega: f64) -> FilterSpec {
     low_pass(Family::Butterworth, order, omega)
 }
 
-/// All channels behind the target's filter; method `iir`.
+/// Every channel has the filter of the target; method `iir`.
 pub(crate) fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> Spec {
     let channel = |&delay: &f64| ChannelSpec { delay: Seconds(delay), filter: filter.clone(), noise: 0.0 };
     Spec {
@@ -46,7 +46,7 @@ pub(crate) fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &
     }
 }
 
-/// Two fast samples for each slow one behind [`thesis_filter`].
+/// Two fast samples for each slow one, all after [`thesis_filter`].
 pub(crate) fn thesis(latency: usize, delays: &[f64]) -> Spec {
     alike(&thesis_filter(), 2, latency, delays)
 }

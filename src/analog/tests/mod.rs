@@ -28,7 +28,7 @@ fn family(family: Family, order: usize, cutoff: f64) -> FilterSpec {
     }
 }
 
-/// The family member, behind the pole of a switch where it needs one.
+/// The family member, followed by the pole of a switch where it needs one.
 fn sampled_family(kind: Family, order: usize, cutoff: f64) -> FilterSpec {
     let filter = family(kind, order, cutoff);
     if filter.check().is_ok() {

@@ -138,15 +138,15 @@ fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certifica
     let peak = hinf_norm(&system)?;
     // The norm in the file may differ from the one computed here in the last digits; if the difference is
     // larger, the stated number is not the norm.
-    let stated = bank.gamma.norm.map(|stated| stated / units.wanted);
+    let stated = bank.gamma.norm.map(|stated| stated / units.reference);
     let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
     let norm = credible.unwrap_or(0.0).max(peak.gain);
     let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
     let peak_witness = witness(peak.frequency, &leading_direction(&response)?);
-    let floor = FLOOR * error.scale() / units.wanted;
+    let floor = FLOOR * error.scale() / units.reference;
     let relative: &[f64] = if norm > floor { &EXCESSES } else { &FLOOR_EXCESSES };
     for excess in relative.iter().map(|excess| excess * norm.max(floor)) {
-        let gamma = (norm + excess) * units.wanted;
+        let gamma = (norm + excess) * units.reference;
         let Ok(search) = Search::new(&middle, STATE_NOISE * (excess * (norm + excess)).sqrt()) else {
             continue;
         };
@@ -185,9 +185,8 @@ impl Search {
     fn new(middle: &Midpoint, noise: f64) -> Result<Self, DesignError> {
         let Midpoint { a, b, c, d } = middle;
         let (n, m) = (a.nrows(), c.nrows());
-        let mut inputs = Mat::zeros(n, m + n);
-        inputs.columns_mut(0, m).copy_from(&c.transpose());
-        inputs.columns_mut(m, n).fill_diagonal(noise / (n.max(1) as f64).sqrt());
+        let state_noise = Mat::from_diagonal_element(n, n, noise / (n.max(1) as f64).sqrt());
+        let inputs = linalg::hstack(&[&c.transpose(), &state_noise])?;
         let k = GramianCoordinates::new(&a.transpose(), &inputs, 0.0)?;
         let outputs = k.b.columns(0, m).into_owned();
         Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: outputs, d: d.transpose(), inverse: k.inverse })
@@ -220,9 +219,9 @@ fn leading_direction(response: &CMat) -> Result<CMat, DesignError> {
     Ok(linalg::svd_c(response)?.u.columns(0, 1).into_owned())
 }
 
-fn witness(frequency: f64, wanted: &CMat) -> DualWitness {
+fn witness(frequency: f64, reference: &CMat) -> DualWitness {
     let (s, c) = (0.5 * frequency).sin_cos();
-    DualWitness { half: [c, s], wanted: pairs(wanted), measured: Vec::new() }
+    DualWitness { half: [c, s], reference: pairs(reference), measured: Vec::new() }
 }
 
 fn pairs(column: &CMat) -> Vec<[f64; 2]> {

@@ -12,7 +12,7 @@ use crate::verify::Midpoint;
 pub(super) struct Units {
     states: Vec<f64>,
     /// Unit of the reference samples, and so of gamma.
-    pub(super) wanted: f64,
+    pub(super) reference: f64,
 }
 
 impl Units {
@@ -23,7 +23,7 @@ impl Units {
     pub(super) fn of(system: &Midpoint, scale: f64) -> Result<Self, LtiError> {
         let root = controllability_root(&system.a, &system.b)?;
         let states = root.row_iter().map(|row| power_of_two(row.norm())).collect();
-        Ok(Self { states, wanted: power_of_two(scale) })
+        Ok(Self { states, reference: power_of_two(scale) })
     }
 
     /// The system in these units.
@@ -31,12 +31,13 @@ impl Units {
         let entry = |m: &Mat, row: &dyn Fn(usize) -> f64, column: &dyn Fn(usize) -> f64| {
             Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / row(i) * column(j))
         };
-        let (state, wanted, input) = (|i: usize| self.states[i], |_: usize| self.wanted, |_: usize| 1.0);
+        let (state, reference, input) =
+            (|i: usize| self.states[i], |_: usize| self.reference, |_: usize| 1.0);
         Midpoint {
             a: entry(&system.a, &state, &state),
             b: entry(&system.b, &state, &input),
-            c: entry(&system.c, &wanted, &state),
-            d: entry(&system.d, &wanted, &input),
+            c: entry(&system.c, &reference, &state),
+            d: entry(&system.d, &reference, &input),
         }
     }
 

@@ -42,11 +42,8 @@ pub(super) fn mean_square(plant: &LiftedPlant, dynamics: &Dynamics) -> Result<(M
 fn covariance_roots(plant: &LiftedPlant, dynamics: &Dynamics) -> Result<(Mat, Mat), DesignError> {
     let driven = plant.driving(&dynamics.regressors()?)?;
     let root = controllability_root(driven.a(), driven.b())?;
-    let (rows, inputs) = (driven.outputs(), driven.inputs());
-    let mut t = Mat::zeros(rows, root.ncols() + inputs);
-    t.columns_mut(0, root.ncols()).copy_from(&(driven.c() * &root));
-    t.columns_mut(root.ncols(), inputs).copy_from(driven.d());
-    let regressors = rows - plant.ratio();
+    let t = linalg::hstack(&[&(driven.c() * &root), driven.d()])?;
+    let regressors = driven.outputs() - plant.ratio();
     Ok((t.rows(0, regressors).into_owned(), t.rows(regressors, plant.ratio()).into_owned()))
 }
 

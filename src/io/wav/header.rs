@@ -160,7 +160,7 @@ impl Fmt {
             return Err(chunks.bad("the sample rate", at(4), 0, "a rate is at least 1 Hz"));
         }
         if !self.block_align.is_multiple_of(self.channels) {
-            let rule = "bytes a frame must be a multiple of the channel count";
+            let rule = "bytes per frame must be a multiple of the channel count";
             return Err(chunks.bad("the frame size", at(12), self.block_align.into(), rule));
         }
         Ok(())

@@ -95,7 +95,7 @@ fn hound_writes_and_we_read_the_same() {
                 if sample_format == hound::SampleFormat::Int { 2f64.powi(i32::from(bits) - 1) } else { 1.0 };
             assert_eq!(samples, values.iter().map(|&v| f64::from(v) / full).collect::<Vec<_>>());
             assert_eq!((header.channels, header.rate, notes), (usize::from(channels), 12_345, vec![]));
-            // In this layout hound leaves nothing behind the data, so all bytes are accounted for.
+            // In this layout hound writes nothing after the data, so all bytes are accounted for.
             assert_eq!(header.data_offset + header.data_bytes.unwrap(), file.get_ref().len() as u64);
         }
     }

@@ -176,7 +176,7 @@ impl Parser<'_> {
         self.import(path, name.or(Some(last)));
     }
 
-    /// Attributes and, where one of them is `cfg(test)`, the item behind them.
+    /// Attributes and, where one of them is `cfg(test)`, the item after them.
     fn attributes(&mut self) {
         let (mut test, mut file) = (false, None);
         while self.peek(0).is_some_and(|token| token.is('#')) {

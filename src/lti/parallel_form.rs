@@ -14,11 +14,11 @@ const CONDITION_LIMIT: f64 = 1e4;
 /// In each section the traces of the controllability and the observability Gramian are equal up to a power
 /// of 16. So for white input no state is much larger or smaller than its effect on the output.
 ///
-/// `None` if the eigenvectors are nearly dependent (repeated and close poles): see [`triangular`].
+/// `None` if the eigenvectors are nearly dependent (repeated and close poles): see [`triangular_form`].
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable or its eigenvectors cannot be computed.
-pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
+pub fn parallel_form(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
     let modes = modes(system.a())?;
     // Complex poles of a real matrix come in pairs. If rounding has separated a pair, there is no real
     // basis.
@@ -43,7 +43,7 @@ pub fn modal(system: &StateSpace) -> Result<Option<StateSpace>, LtiError> {
 ///
 /// # Errors
 /// [`LtiError`] if the iteration does not converge.
-pub fn triangular(system: &StateSpace) -> Result<StateSpace, LtiError> {
+pub fn triangular_form(system: &StateSpace) -> Result<StateSpace, LtiError> {
     let (q, t) = linalg::real_schur(system.a())?;
     Ok(StateSpace::new(t, q.transpose() * system.b(), system.c() * q, system.d().clone())?)
 }
@@ -139,7 +139,7 @@ mod tests {
         &t * blocks * linalg::inverse(&t)
     }
 
-    fn is_modal(a: &Mat) -> bool {
+    fn is_parallel(a: &Mat) -> bool {
         let n = a.nrows();
         let mut i = 0;
         let mut all = true;
@@ -169,8 +169,8 @@ mod tests {
         for n in 1..14 {
             let raw = Mat::from_fn(n, n, |i, j| ((i * 37 + j * 11 + 5 * n) as f64).sin());
             let given = system(&raw * (0.97 / linalg::spectral_radius(&raw).unwrap()));
-            let made = modal(&given).unwrap().unwrap();
-            assert!(is_modal(made.a()), "{}", made.a());
+            let made = parallel_form(&given).unwrap().unwrap();
+            assert!(is_parallel(made.a()), "{}", made.a());
             assert!(gap(&given, &made) < 1e-12, "{n}: {:e}", gap(&given, &made));
         }
     }
@@ -179,8 +179,8 @@ mod tests {
     fn poles_from_fast_to_slow_keep_their_digits() {
         let moduli = [1.0 - 1e-9, 0.999, 0.5, -0.7, 1e-3, -1e-6, 1e-12];
         let given = system(hidden(&Mat::from_diagonal(&nalgebra::DVector::from_row_slice(&moduli))));
-        let made = modal(&given).unwrap().unwrap();
-        assert!(is_modal(made.a()) && gap(&given, &made) < 1e-6, "{:e}", gap(&given, &made));
+        let made = parallel_form(&given).unwrap().unwrap();
+        assert!(is_parallel(made.a()) && gap(&given, &made) < 1e-6, "{:e}", gap(&given, &made));
         let off_dc = |z: Complex<f64>| (given.response_at(z) - made.response_at(z)).norm();
         assert!(off_dc(Complex::new(0.0, 1.0)) < 1e-12, "only the pole at one magnifies rounding");
     }
@@ -190,7 +190,7 @@ mod tests {
         let a = Mat::from_row_slice(3, 3, &[0.5, 0.8, 0.0, -0.8, 0.5, 0.0, 0.0, 0.0, 0.3]);
         let b = Mat::from_column_slice(3, 1, &[1e30, 1e30, 1e-40]);
         let c = Mat::from_row_slice(1, 3, &[1e-25, 0.0, 1e40]);
-        let made = modal(&StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap()).unwrap().unwrap();
+        let made = parallel_form(&StateSpace::new(a, b, c, Mat::zeros(1, 1)).unwrap()).unwrap().unwrap();
         for (first, size) in [(0, 2), (2, 1)] {
             let a = made.a().view((first, first), (size, size)).into_owned();
             let p = controllability_root(&a, &made.b().rows(first, size).into_owned()).unwrap().norm();
@@ -218,8 +218,8 @@ mod tests {
             Mat::from_row_slice(4, 4, &pair),
         ] {
             let given = system(hidden(&blocks));
-            assert_eq!(modal(&given).unwrap(), None, "{blocks}");
-            let made = triangular(&given).unwrap();
+            assert_eq!(parallel_form(&given).unwrap(), None, "{blocks}");
+            let made = triangular_form(&given).unwrap();
             assert!(is_quasi_triangular(made.a()), "{}", made.a());
             assert!(gap(&given, &made) < 1e-12, "{:e}", gap(&given, &made));
         }
@@ -228,8 +228,8 @@ mod tests {
     #[test]
     fn equal_poles_with_eigenvectors_of_their_own_stay_right() {
         let given = system(Mat::from_diagonal_element(5, 5, 0.75));
-        let made = modal(&given).unwrap().unwrap();
-        assert!(is_modal(made.a()) && gap(&given, &made) < 1e-14);
+        let made = parallel_form(&given).unwrap().unwrap();
+        assert!(is_parallel(made.a()) && gap(&given, &made) < 1e-14);
     }
 
     /// A single delay is a section. The eigenvectors of a longer delay line are all the same one, and the
@@ -238,8 +238,8 @@ mod tests {
     fn delay_lines_are_triangles_or_an_error() {
         for n in 1..18 {
             let given = system(Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1))));
-            assert_eq!(modal(&given).unwrap().is_some(), n == 1, "{n}");
-            match triangular(&given) {
+            assert_eq!(parallel_form(&given).unwrap().is_some(), n == 1, "{n}");
+            match triangular_form(&given) {
                 Ok(made) => assert!(is_quasi_triangular(made.a()) && gap(&given, &made) < 1e-12, "{n}"),
                 Err(error) => assert_eq!(error, LtiError::Linalg(stalled(n))),
             }
@@ -250,7 +250,7 @@ mod tests {
     fn no_state_is_no_trouble() {
         let empty =
             StateSpace::new(Mat::zeros(0, 0), Mat::zeros(0, 2), Mat::zeros(3, 0), Mat::zeros(3, 2)).unwrap();
-        assert_eq!(modal(&empty).unwrap(), Some(empty.clone()));
-        assert_eq!(triangular(&empty).unwrap(), empty);
+        assert_eq!(parallel_form(&empty).unwrap(), Some(empty.clone()));
+        assert_eq!(triangular_form(&empty).unwrap(), empty);
     }
 }
