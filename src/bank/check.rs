@@ -1,6 +1,7 @@
 //! The invariants of every bank, read or designed.
 
 use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits};
+use crate::units::Seconds;
 
 use super::{
     Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma,
@@ -104,9 +105,9 @@ impl Bank {
     }
 
     fn check_scalars(&self) -> Checked {
-        if !(self.fast_period.is_normal() && self.fast_period > 0.0) {
+        if !(self.fast_period.0.is_normal() && self.fast_period > Seconds(0.0)) {
             let rule = "h must be a positive, finite number of seconds";
-            return out_of_range("fast_period", self.fast_period, "s", rule);
+            return out_of_range("fast_period", self.fast_period.0, "s", rule);
         }
         if !(1..=MAX_RATIO).contains(&self.ratio) {
             let rule =
@@ -132,7 +133,7 @@ impl Bank {
     fn check_spec(&self, spec: &Spec) -> Checked {
         let inside = |problem: SpecProblem| BankError::new("", "spec".into(), problem);
         spec.check().map_err(inside)?;
-        agree("spec.fast_period", self.fast_period, spec.fast_period.0, self.fast_period)?;
+        agree("spec.fast_period", self.fast_period.0, spec.fast_period.0, self.fast_period.0)?;
         agree("spec.ratio", self.ratio as f64, spec.ratio as f64, 0.0)?;
         if let Some(latency) = spec.latency {
             agree("spec.latency", self.latency as f64, latency as f64, 0.0)?;
@@ -143,7 +144,12 @@ impl Bank {
             return refuse("spec.channel", BankProblem::Length { found, expected, unit: "channels", rule });
         }
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
-            agree(format!("spec.channel[{i}].delay"), delay, channel.delay.0, self.fast_period + delay)?;
+            agree(
+                format!("spec.channel[{i}].delay"),
+                delay.0,
+                channel.delay.0,
+                (self.fast_period + delay).0,
+            )?;
         }
         match (&self.fixed_point, &spec.design.bits) {
             (Some(FixedPoint { bits, .. }), Some(asked)) if bits != asked => refuse(
@@ -162,15 +168,15 @@ fn agree(path: impl Into<String>, bank: f64, spec: f64, size: f64) -> Checked {
     refuse(path, BankProblem::SpecDiffers { bank, spec })
 }
 
-fn check_delays(delays: &[f64]) -> Checked {
+fn check_delays(delays: &[Seconds]) -> Checked {
     if !(1..=MAX_CHANNELS).contains(&delays.len()) {
         let rule = format!("a bank has 1 to {MAX_CHANNELS} channels");
         return out_of_range("channels", delays.len() as f64, "channels", rule);
     }
-    match delays.iter().position(|d| !(d.is_finite() && *d >= 0.0)) {
+    match delays.iter().position(|d| !(d.0.is_finite() && *d >= Seconds(0.0))) {
         Some(i) => {
             let rule = "a delay is zero or more, and finite";
-            out_of_range(format!("channels[{i}].delay"), delays[i], "s", rule)
+            out_of_range(format!("channels[{i}].delay"), delays[i].0, "s", rule)
         }
         None => Ok(()),
     }

@@ -36,16 +36,16 @@ pub const VERSION: usize = 1;
 pub struct Bank {
     /// The spec it was designed for, with all defaults filled in; `None` for a bank made elsewhere.
     pub spec: Option<Spec>,
-    /// The fast period h in seconds.
-    pub fast_period: f64,
+    /// The fast period h.
+    pub fast_period: Seconds,
     /// M, the number of fast samples per slow sample.
     pub ratio: usize,
     /// The latency m0 in fast samples.
     pub latency: usize,
     /// The design method.
     pub method: Method,
-    /// The delay D_i of each channel in seconds.
-    pub delays: Vec<f64>,
+    /// The delay D_i of each channel.
+    pub delays: Vec<Seconds>,
     /// The synthesis filters F_1 .. F_N.
     pub filters: SynthesisFilters,
     /// The integers of the taps, if the taps are fixed-point numbers.
@@ -124,11 +124,11 @@ impl Bank {
         };
         Self {
             spec: None,
-            fast_period: 1.0,
+            fast_period: Seconds(1.0),
             ratio,
             latency: 0,
             method,
-            delays: vec![0.0; channels],
+            delays: vec![Seconds(0.0); channels],
             filters,
             fixed_point: None,
             gamma: Gamma::default(),
@@ -141,15 +141,15 @@ impl Bank {
         self.delays.len()
     }
 
-    /// The slow period M h in seconds.
-    pub fn slow_period(&self) -> f64 {
+    /// The slow period M h.
+    pub fn slow_period(&self) -> Seconds {
         self.fast_period * self.ratio as f64
     }
 
     /// D_i / h of every channel. A value that is whole up to rounding becomes exactly whole.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
-        let h = Seconds(self.fast_period);
-        self.delays.iter().map(|&delay| crate::spec::delay_in_fast_periods(Seconds(delay), h)).collect()
+        let h = self.fast_period;
+        self.delays.iter().map(|&delay| crate::spec::delay_in_fast_periods(delay, h)).collect()
     }
 }
 

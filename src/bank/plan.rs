@@ -32,12 +32,13 @@ impl Bank {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Seconds;
 
     #[test]
     fn a_bank_needs_as_many_filters_as_delays() {
         let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0], vec![1.0]]), 2);
         assert_eq!(bank.plan(Options::default()).unwrap().channels(), 2);
-        let refused = Bank { delays: vec![0.0], ..bank }.plan(Options::default()).unwrap_err();
+        let refused = Bank { delays: vec![Seconds(0.0)], ..bank }.plan(Options::default()).unwrap_err();
         assert_eq!(refused, BuildError::FilterCount { delays: 1, filters: 2 });
     }
 }

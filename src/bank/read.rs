@@ -4,6 +4,7 @@ use crate::spec::Fault;
 use crate::spec::document::Node;
 use crate::spec::reader::{Fields, Value};
 use crate::spec::{DesignOverrides, Method, SpecProblem, decode};
+use crate::units::Seconds;
 
 use super::digest::{digest, is_digest};
 use super::{
@@ -91,11 +92,14 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
     let channels = channels.iter().map(|c| c.fields(&["delay", "taps"])).collect::<Result<Vec<_>, _>>()?;
     Ok(Bank {
         spec,
-        fast_period: top.required("fast_period", REWRITE)?.number()?,
+        fast_period: Seconds(top.required("fast_period", REWRITE)?.number()?),
         ratio: top.required("ratio", REWRITE)?.count("fast samples")?,
         latency: top.required("latency", REWRITE)?.count("fast samples")?,
         method: top.required("method", REWRITE)?.name("method", &method)?,
-        delays: channels.iter().map(|c| c.required("delay", REWRITE)?.number()).collect::<Result<_, _>>()?,
+        delays: channels
+            .iter()
+            .map(|c| c.required("delay", REWRITE)?.number().map(Seconds))
+            .collect::<Result<_, _>>()?,
         filters: filters(&top, &channels)?,
         fixed_point: top.optional("fixed_point").map(|v| fixed_point(&v)).transpose()?,
         gamma: top.optional("gamma").map(|v| gamma(&v)).transpose()?.unwrap_or_default(),

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::spec::WordLengths;
+use crate::units::Seconds;
 
 fn spec() -> Spec {
     let text = "fast_period = 1.0\nratio = 2\nlatency = 10\n[target]\nfilter = { num = [0.25], den = [1.0, 1.0, 0.25] }\n\
@@ -14,11 +15,11 @@ fn spec() -> Spec {
 fn fir() -> Bank {
     Bank {
         spec: Some(spec()),
-        fast_period: 1.0,
+        fast_period: Seconds(1.0),
         ratio: 2,
         latency: 10,
         method: Method::Fir,
-        delays: vec![1.2, 0.6],
+        delays: vec![Seconds(1.2), Seconds(0.6)],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
         gamma: Gamma { norm: None, upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
         proof: None,
@@ -168,7 +169,7 @@ fn a_bank_made_elsewhere_reads() {
                 \"method\":\"sinc\",\"channels\":[{\"delay\":0,\"taps\":[1,12345678901234567890]}],\
                 \"meta\":{\"made_by\":[\"anything\",null]}}";
     let bank = Bank::from_json(text, "b.json").unwrap();
-    assert_eq!((bank.spec.is_none(), bank.gamma, bank.slow_period()), (true, Gamma::default(), 3.0));
+    assert_eq!((bank.spec.is_none(), bank.gamma, bank.slow_period()), (true, Gamma::default(), Seconds(3.0)));
     assert_eq!(bank.filters, SynthesisFilters::Fir(vec![vec![1.0, 12345678901234567890.0]]));
 }
 
@@ -352,7 +353,7 @@ fn what_json_cannot_say_is_not_written() {
         assert_eq!((error.path(), error.file()), ("channels[1].taps[1]", ""));
         let gamma = Bank { gamma: Gamma { lower: Some(value), ..Gamma::default() }, ..fir() };
         assert_eq!(gamma.to_json().unwrap_err().path(), "gamma.lower");
-        let delay = Bank { delays: vec![value, 0.6], ..fir() };
+        let delay = Bank { delays: vec![Seconds(value), Seconds(0.6)], ..fir() };
         assert_eq!(delay.to_json().unwrap_err().path(), "channels[0].delay");
         let mut block = state_space();
         if let SynthesisFilters::StateSpace(filter) = &mut block.filters {
@@ -383,9 +384,9 @@ proptest! {
         fast_period in 1e-300..1e300f64,
         latency in 0usize..1000,
     ) {
-        let delays: Vec<f64> = taps.iter().map(|list| list[0].abs()).collect();
+        let delays = taps.iter().map(|list| Seconds(list[0].abs())).collect();
         let gamma = Gamma { upper: gamma, ..Gamma::default() };
-        let bank = Bank { spec: None, fast_period, latency, delays, filters: SynthesisFilters::Fir(taps.clone()), gamma, ..fir() };
+        let bank = Bank { spec: None, fast_period: Seconds(fast_period), latency, delays, filters: SynthesisFilters::Fir(taps.clone()), gamma, ..fir() };
         let back = Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap();
         let SynthesisFilters::Fir(read) = &back.filters else { panic!("taps expected") };
         let bits = |lists: &[Vec<f64>]| lists.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();

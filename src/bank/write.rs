@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::ser::Formatter;
 
 use crate::spec::{Method, Spec};
+use crate::units::Seconds;
 
 use super::digest::digest;
 use super::read::parse;
@@ -19,7 +20,7 @@ struct Document<'a> {
     format: &'static str,
     version: usize,
     spec: Option<&'a Spec>,
-    fast_period: f64,
+    fast_period: Seconds,
     ratio: usize,
     latency: usize,
     method: Method,
@@ -36,7 +37,7 @@ struct Document<'a> {
 
 #[derive(Serialize)]
 struct Channel<'a> {
-    delay: f64,
+    delay: Seconds,
     #[serde(skip_serializing_if = "Option::is_none")]
     taps: Option<&'a [f64]>,
 }

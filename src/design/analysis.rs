@@ -49,15 +49,15 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
         return Err(DesignError::DelayErrorCount { given: delay_errors.len(), channels: count });
     }
     let normalised: Vec<FastPeriods> =
-        delay_errors.iter().map(|error| error.in_fast_periods(Seconds(bank.fast_period))).collect();
-    let moved = problem.with_delay_errors(&normalised);
-    moved.check_size()?;
-    let plant = LiftedPlant::new(&moved)?;
+        delay_errors.iter().map(|error| error.in_fast_periods(bank.fast_period)).collect();
+    let shifted = problem.with_delay_errors(&normalised);
+    shifted.check_size()?;
+    let plant = LiftedPlant::new(&shifted)?;
     let peak = plant.bank_norm(&bank.filters)?;
-    let merged = LiftedPlant::new(&moved.merge_channels().problem)?;
+    let merged = LiftedPlant::new(&shifted.merge_channels().problem)?;
     Ok(Analysis {
         gamma: peak.gain,
-        peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(Seconds(bank.slow_period())),
+        peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
         noncausal: merged.noncausal_bound()?.gain.min(peak.gain),
         mean: mean_of(bank, &plant)?,
     })

@@ -98,11 +98,11 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
     let Realised { filters, peak, reduction, integers } = realised;
     let (fixed_point, words) = integers.unzip();
     let bank = Bank {
-        fast_period: complete.fast_period.0,
+        fast_period: complete.fast_period,
         ratio: complete.ratio,
         latency: complete.latency.unwrap_or_default(),
         method: complete.design.method,
-        delays: complete.channels.iter().map(|channel| channel.delay.0).collect(),
+        delays: complete.channels.iter().map(|channel| channel.delay).collect(),
         filters,
         gamma: Gamma::computed(peak.gain, synthesis.lower, synthesis.noncausal),
         proof: None,

@@ -230,9 +230,10 @@ mod tests {
     use crate::bank::BlockFilter;
     use crate::random::Random;
     use crate::runtime::{Options, Stream};
+    use crate::units::Seconds;
 
     fn fir_bank(taps: Vec<Vec<f64>>, ratio: usize) -> Bank {
-        let delays = vec![0.0; taps.len()];
+        let delays = vec![Seconds(0.0); taps.len()];
         Bank { latency: 3, delays, ..Bank::bare(SynthesisFilters::Fir(taps), ratio) }
     }
 

@@ -272,6 +272,7 @@ mod tests {
     use crate::bank::SynthesisFilters;
     use crate::random::Random;
     use crate::runtime::{Algorithm, Options};
+    use crate::units::Seconds;
 
     /// Samples in -1.5 .. 1.5, so that a third of them clips.
     fn noise(count: usize) -> Vec<f32> {
@@ -301,7 +302,7 @@ mod tests {
             (2, 5, 700, Algorithm::OverlapSave { transform: None }),
         ] {
             let taps = vec![noise(4 * m).iter().map(|&x| f64::from(x)).collect(), vec![0.7; 2 * m]];
-            let bank = Bank { delays: vec![0.0; 2], ..Bank::bare(SynthesisFilters::Fir(taps), m) };
+            let bank = Bank { delays: vec![Seconds(0.0); 2], ..Bank::bare(SynthesisFilters::Fir(taps), m) };
             let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
             let input = noise(2 * frames);
             let samples = frames * m;

@@ -14,7 +14,6 @@ use super::{
 use crate::arithmetic::{BigFloat, DoubleDouble};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, Proof, SynthesisFilters};
 use crate::linalg::Mat;
-use crate::units::Seconds;
 use std::sync::OnceLock;
 
 /// The error system of a bank, enclosed.
@@ -56,7 +55,7 @@ impl<'a> EnclosedErrorSystem<'a> {
         if analog > MAX_ANALOG_STATES || samples.len() * analog.pow(3) > MAX_WORK {
             return Err(VerifyError::TooManyFilters { states: analog, samples: samples.len() });
         }
-        let fast_period = bank.spec.as_ref().map_or(Seconds(bank.fast_period), |spec| spec.fast_period);
+        let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
         let timeline = Timeline::new(&samples, fast_period, bank.ratio)?;
         let states = error_system::order(analog, timeline.periods_late(), &bank.filters, bank.ratio);
         if states > MAX_STATES {

@@ -47,11 +47,11 @@ fn bank(
     };
     Bank {
         spec: Some(spec),
-        fast_period: 1.0,
+        fast_period: Seconds(1.0),
         ratio,
         latency,
         method: Method::Fir,
-        delays: delays.to_vec(),
+        delays: delays.iter().copied().map(Seconds).collect(),
         filters: SynthesisFilters::Fir((0..delays.len()).map(made_up).collect()),
         gamma: Gamma::default(),
         proof: None,

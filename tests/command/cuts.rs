@@ -5,6 +5,7 @@ use crate::support::{Desk, bytes, ticks};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{Algorithm, Options, PcmOutput, Precision, Stream};
+use hybank::units::Seconds;
 use std::io::{Read, Write};
 
 /// Lengths that add up to `total`, short and long ones, with zeros among them.
@@ -21,7 +22,7 @@ fn pieces(random: &mut Random, total: usize) -> Vec<usize> {
 }
 
 fn bank(channels: usize, ratio: usize, filters: SynthesisFilters) -> Bank {
-    Bank { latency: 3, delays: vec![0.0; channels], ..Bank::bare(filters, ratio) }
+    Bank { latency: 3, delays: vec![Seconds(0.0); channels], ..Bank::bare(filters, ratio) }
 }
 
 fn noise(seed: u64) -> impl FnMut() -> f64 {

@@ -110,7 +110,7 @@ fn silent(spec: &Spec) -> Bank {
     Bank {
         spec: Some(spec.clone()),
         latency: spec.latency.unwrap(),
-        delays: spec.channels.iter().map(|channel| channel.delay.0).collect(),
+        delays: spec.channels.iter().map(|channel| channel.delay).collect(),
         ..Bank::bare(filters, spec.ratio)
     }
 }

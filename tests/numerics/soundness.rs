@@ -24,9 +24,9 @@ impl OnePole {
         let mut spec = alike(&filter, 1, self.latency, &[self.delay]);
         (spec.fast_period, spec.design) = (Seconds(self.fast_period), DesignSpec::new(Method::Fir, Some(1)));
         Bank {
-            fast_period: self.fast_period,
+            fast_period: Seconds(self.fast_period),
             latency: self.latency,
-            delays: vec![self.delay],
+            delays: vec![Seconds(self.delay)],
             spec: Some(spec),
             ..Bank::bare(SynthesisFilters::Fir(vec![vec![1.0]]), 1)
         }

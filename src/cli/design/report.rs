@@ -4,7 +4,7 @@ use crate::bank::{Gamma, SynthesisFilters};
 use crate::design::quantise::WordStudy;
 use crate::design::{Design, MeanAnalysis, OrderErrorPoint, OrderReduction};
 use crate::spec::Method;
-use crate::units::{Hertz, Seconds};
+use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
 
 /// The report; serialised it is that of `--json`.
@@ -134,7 +134,7 @@ impl<'a> Report<'a> {
             gamma: &bank.gamma,
             words: Words::of(design),
             mean,
-            peak_hertz: design.peak_frequency.in_hertz(Seconds(bank.slow_period())),
+            peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             iterations: design.iterations,
             seconds,
             proof: ProofReport::of(design),

@@ -2,6 +2,7 @@ use super::*;
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, Complex};
 use crate::spec::Spec;
+use crate::units::Seconds;
 use std::f64::consts::PI;
 
 /// A bank of arbitrary taps on the thesis example; the second channel has noise.
@@ -14,7 +15,13 @@ fn bank() -> Bank {
     let tap = |i: usize, n: usize| ((1 + i * 5 + n * 3) as f64).sin() * 0.4;
     let taps = (0..2).map(|i| (0..7).map(|n| tap(i, n)).collect()).collect();
     let bare = Bank::bare(SynthesisFilters::Fir(taps), 2);
-    Bank { fast_period: 0.5, latency: 4, delays: vec![0.6, 0.3], spec: Some(spec), ..bare }
+    Bank {
+        fast_period: Seconds(0.5),
+        latency: 4,
+        delays: vec![Seconds(0.6), Seconds(0.3)],
+        spec: Some(spec),
+        ..bare
+    }
 }
 
 fn power(taps: &[f64]) -> f64 {
