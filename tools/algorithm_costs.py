@@ -4,7 +4,9 @@
 usage: algorithm_costs.py LANES < table      (LANES of 32 bytes: 8 for f32, 4 for f64; needs numpy and scipy)
 
 Prints nanoseconds for each term of a frame, and quantiles of measured / fitted. Divided by the time of a vector of
-products and rounded they are the constants of the model. Where overlap-save was not measured, its column is empty.
+products and rounded they are the constants of the model. Then prints how much longer the choices of the plan take
+than the fastest algorithm: run it for the table of each instruction set, because one model serves them all. Where
+overlap-save was not measured, its column is empty.
 """
 
 import sys
@@ -50,6 +52,22 @@ def fit(name, rows):
     return costs
 
 
+def losses(name, rows, column):
+    """How much longer the plan's choice takes than the fastest measured algorithm; overlap-save only with `plan`."""
+    ratios = []
+    for row in rows:
+        times = {"direct": float(row[3]), "fast-fir": float(row[4])}
+        if column == "plan":
+            times |= {f"overlap-save {f}": float(t) for f, t in (part.split(":") for part in row[5].split(",") if part)}
+        chosen = row[7 if column == "plan" else 6]
+        if chosen in times:
+            ratios.append((times[chosen] / min(times.values()), "N {} M {} K {}".format(*row[:3]), chosen))
+    values = [ratio for ratio, *_ in ratios]
+    wrong = sum(value > 1.1 for value in values)
+    print(f"{name}: {len(values)} sizes, {wrong} lose more than a tenth; median and 95 %:",
+          np.round(np.percentile(values, [50, 95]), 2), "worst:", *max(ratios))
+
+
 rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in sys.stdin]
 rows = [row for row in rows if len(row) == 8 and row[0].isdigit()]
 sizes = [tuple(map(int, row[:3])) for row in rows]
@@ -58,3 +76,5 @@ fit("fast FIR", [(halves(costs, *size), float(row[4])) for size, row in zip(size
 pairs = [(size, part.split(":")) for size, row in zip(sizes, rows) for part in row[5].split(",") if part]
 if pairs:
     fit("overlap-save", [(blocks(*size, int(length)), float(time)) for size, (length, time) in pairs])
+    losses("auto with added latency", rows, "plan")
+losses("auto without added latency", rows, "prompt")

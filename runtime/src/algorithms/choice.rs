@@ -3,7 +3,8 @@
 //! The cost of a frame is counted in multiply-adds of whole vectors. Its constants were fitted by
 //! `tools/algorithm_costs.py` to what `cargo bench --bench algorithm_crossover` measured (see
 //! `benches/README.md`), in f32 and f64 alike. They depend on the bank and the number type only, not on the
-//! processor, its load or the length of calls: a bank gives the same bits everywhere.
+//! processor, its load or the length of calls: a bank gives the same bits everywhere. The algorithms round
+//! differently, so a model for each instruction set would let the processor choose the bits.
 
 use super::filter::phase_taps;
 use super::overlap_save::Shape;
