@@ -57,6 +57,12 @@ impl StrictlyProper {
         Self { chain, poles, realisation }.transmitting()
     }
 
+    /// g with Phi = g times `other`, if the two have the same poles and zeros.
+    pub fn ratio_to(&self, other: &Self) -> Option<f64> {
+        let ratio = self.chain.gain / other.chain.gain;
+        (self.chain.blocks == other.chain.blocks && ratio.is_normal()).then_some(ratio)
+    }
+
     /// Refuses a filter whose response is zero or not a number where its poles are.
     fn transmitting(self) -> Result<Self, AnalogError> {
         let probes = self.poles.iter().map(|p| p.norm()).chain([0.0]);

@@ -86,8 +86,9 @@ pub struct BlockFilter {
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gamma {
-    /// Norm computed from the coefficients of this bank; its relative error is at most
-    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY).
+    /// Norm computed from the coefficients of this bank. Its relative error is at most
+    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), and rounding in the products of filters and front ends adds
+    /// an absolute one.
     pub norm: Option<f64>,
     /// An upper bound of the true norm of these coefficients: proven if the bank carries a proof, else the
     /// computed norm plus its stated error.
@@ -102,9 +103,10 @@ impl Gamma {
     /// Relative error of a computed norm.
     pub const NORM_ACCURACY: f64 = 1e-9;
 
-    /// The bounds of a bank with the computed `norm`. No lower bound exceeds the upper bound.
-    pub fn computed(norm: f64, lower: f64, noncausal: f64) -> Self {
-        let upper = norm * (1.0 + Self::NORM_ACCURACY);
+    /// The bounds of a bank with the computed `norm`, whose absolute error from rounding is `rounding`. No
+    /// lower bound exceeds the upper bound.
+    pub fn computed(norm: f64, rounding: f64, lower: f64, noncausal: f64) -> Self {
+        let upper = norm * (1.0 + Self::NORM_ACCURACY) + rounding;
         Self {
             norm: Some(norm),
             upper: Some(upper),

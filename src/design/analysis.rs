@@ -54,11 +54,10 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     shifted.check_size()?;
     let plant = LiftedPlant::new(&shifted)?;
     let peak = plant.bank_norm(&bank.filters)?;
-    let merged = LiftedPlant::new(&shifted.merge_channels().problem)?;
     Ok(Analysis {
         gamma: peak.gain,
         peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
-        noncausal: merged.noncausal_bound()?.gain.min(peak.gain),
+        noncausal: plant.noncausal_bound()?.gain.min(peak.gain),
         mean: mean_of(bank, &plant)?,
     })
 }

@@ -1,6 +1,7 @@
 //! Defaults for what a spec leaves open: the latency, and the number of taps of the comparison methods.
 
 use super::DesignError;
+use super::merging::Repeats;
 use super::methods::{Settings, iir};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -53,7 +54,7 @@ fn optima(spec: &Spec, base: usize) -> Result<Vec<(usize, f64)>, DesignError> {
     let mut ladder = Vec::new();
     for periods in LATENCY_LADDER {
         let latency = base + periods * spec.ratio;
-        let merged = Problem::new(spec, latency)?.merge_channels();
+        let merged = Problem::new(spec, latency)?.merge_channels(Repeats::AtWholePeriods);
         let optimum = iir::synthesise(&LiftedPlant::new(&merged.problem)?, &Settings::default())?;
         ladder.push((latency, optimum.peak.gain));
         if optimum.peak.gain <= optimum.noncausal * (1.0 + WORTHWHILE) {

@@ -1,6 +1,7 @@
 //! The steps from a spec to a finished bank.
 
 use super::choices::completed;
+use super::merging::Repeats;
 use super::methods::{self, DualPoint, Settings, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -63,7 +64,7 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
 pub fn design_with(spec: &Spec, search: ProofSearch) -> Result<Design, DesignError> {
     spec.check()?;
     let (complete, problem) = normalise(spec)?;
-    let merged = problem.merge_channels();
+    let merged = problem.merge_channels(Repeats::of(spec.design.method));
     let plant = LiftedPlant::new(&merged.problem)?;
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings(&complete)?)?;
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis)?;
@@ -81,7 +82,7 @@ fn normalise(spec: &Spec) -> Result<(Spec, Problem), DesignError> {
 fn settings(spec: &Spec) -> Result<Settings, DesignError> {
     let at_slow_rate = || {
         let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
-        Ok::<_, DesignError>(Problem::new(&slow, 0)?.merge_channels().problem)
+        Ok::<_, DesignError>(Problem::new(&slow, 0)?.merge_channels(Repeats::AtOneInstant).problem)
     };
     let separate = spec.design.method == Method::Separation;
     Ok(Settings {
@@ -95,7 +96,7 @@ fn settings(spec: &Spec) -> Result<Settings, DesignError> {
 /// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that
 /// norm.
 fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis) -> Design {
-    let Realised { filters, peak, reduction, integers } = realised;
+    let Realised { filters, peak, rounding, reduction, integers } = realised;
     let (fixed_point, words) = integers.unzip();
     let bank = Bank {
         fast_period: complete.fast_period,
@@ -104,7 +105,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         method: complete.design.method,
         delays: complete.channels.iter().map(|channel| channel.delay).collect(),
         filters,
-        gamma: Gamma::computed(peak.gain, synthesis.lower, synthesis.noncausal),
+        gamma: Gamma::computed(peak.gain, rounding, synthesis.lower, synthesis.noncausal),
         proof: None,
         fixed_point,
         spec: Some(complete),

@@ -23,7 +23,7 @@ use std::ops::Range;
 
 /// Instants closer than this (in fast periods) are treated as equal. It is far below the resolution of any
 /// converter and far above the rounding error of delay / period.
-const SAME_INSTANT: f64 = 1e-11;
+pub(super) const SAME_INSTANT: f64 = 1e-11;
 
 /// The lifted analysis side.
 pub(super) struct Lifted {
@@ -38,6 +38,8 @@ pub(super) struct Lifted {
 struct SamplingInstant {
     /// Index of the filter that is sampled.
     front_end: usize,
+    /// The sample over that filter's output.
+    gain: f64,
     /// Fast periods after the beginning of the slow period, in (0, M].
     time: f64,
     /// Whole slow periods by which the sample is delayed in addition.
@@ -63,20 +65,21 @@ pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
 /// the period.
 fn schedule(problem: &Problem) -> Vec<SamplingInstant> {
     let period = problem.ratio as f64;
-    let measurements = problem.channels.iter().map(|channel| (channel.front_end, -channel.delay.0));
-    let references = (0..problem.ratio).map(|p| (problem.target, p as f64 - problem.latency as f64));
-    let times: Vec<(usize, f64)> = measurements.chain(references).collect();
+    let measurements = problem.channels.iter().map(|c| ((c.front_end, c.gain), -c.delay.0));
+    let target = (problem.target, 1.0);
+    let references = (0..problem.ratio).map(|p| (target, p as f64 - problem.latency as f64));
+    let times: Vec<((usize, f64), f64)> = measurements.chain(references).collect();
     let latest = times.iter().map(|&(_, time)| time).fold(f64::NEG_INFINITY, f64::max);
-    times.iter().map(|&(front_end, time)| before_the_end(front_end, latest - time, period)).collect()
+    times.iter().map(|&(what, time)| before_the_end(what, latest - time, period)).collect()
 }
 
 /// The instant that lies `age` fast periods before the end of the slow period.
-fn before_the_end(front_end: usize, age: f64, period: f64) -> SamplingInstant {
+fn before_the_end((front_end, gain): (usize, f64), age: f64, period: f64) -> SamplingInstant {
     let nearest = (age / period).round();
     let on_a_boundary = (age - nearest * period).abs() < SAME_INSTANT;
     let delay = if on_a_boundary { nearest } else { (age / period).floor() };
     let time = if on_a_boundary { period } else { period - (age - delay * period) };
-    SamplingInstant { front_end, time, delay: delay as usize }
+    SamplingInstant { front_end, gain, time, delay: delay as usize }
 }
 
 /// Propagates the joint analog state through one period. The outputs of the returned system are the
@@ -90,13 +93,13 @@ fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<State
     let mut state = Mat::identity(joint.order(), joint.order());
     let mut input = Mat::zeros(joint.order(), 0);
     for index in order {
-        let SamplingInstant { front_end, time, .. } = instants[index];
+        let SamplingInstant { front_end, gain, time, .. } = instants[index];
         if time - now >= SAME_INSTANT {
             (state, input) = joint.advance(&state, &input, time - now)?;
             now = time;
         }
-        let output = joint.c.rows(front_end, 1);
-        rows[index] = (output * &state, output * &input);
+        let output = joint.c.rows(front_end, 1) * gain;
+        rows[index] = (&output * &state, &output * &input);
     }
     // The latest sample ends the period by construction; a remainder below SAME_INSTANT is ignored.
     debug_assert!(problem.ratio as f64 - now < SAME_INSTANT);

@@ -9,6 +9,7 @@ mod error_grid;
 mod exchange;
 pub mod filters;
 mod lifting;
+mod merging;
 mod methods;
 pub mod plant;
 pub mod problem;

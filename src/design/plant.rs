@@ -4,9 +4,11 @@
 use super::DesignError;
 use super::filters;
 use super::lifting::{Lifted, lift};
+use super::merging::Repeats;
 use super::problem::Problem;
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, CMat, Mat};
+use crate::lti::gramian::h2_norm;
 use crate::lti::peak::{
     Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
 };
@@ -44,6 +46,7 @@ pub struct LiftedPlant {
     chains: Vec<Range<usize>>,
     response: OnceLock<FrequencyResponse>,
     resonances: OnceLock<Vec<f64>>,
+    measurement_size: OnceLock<f64>,
 }
 
 impl LiftedPlant {
@@ -54,7 +57,14 @@ impl LiftedPlant {
     pub fn new(problem: &Problem) -> Result<Self, DesignError> {
         let Lifted { system, chains } = lift(problem)?;
         let problem = problem.clone();
-        Ok(Self { problem, system, chains, response: OnceLock::new(), resonances: OnceLock::new() })
+        Ok(Self {
+            problem,
+            system,
+            chains,
+            response: OnceLock::new(),
+            resonances: OnceLock::new(),
+            measurement_size: OnceLock::new(),
+        })
     }
 
     /// The problem in normalised time from which the plant was made.
@@ -170,13 +180,38 @@ impl LiftedPlant {
         }
     }
 
+    /// The absolute error that rounding may cause in the norm of the error system of `filters`: eps ||F||_2
+    /// ||H||_2. A norm that is not larger is unresolved.
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] if the plant or `filters` are not stable.
+    pub fn rounding(&self, filters: &StateSpace) -> Result<f64, DesignError> {
+        Ok(f64::EPSILON * h2_norm(filters)? * self.measurement_size()?)
+    }
+
+    /// ||H||_2.
+    fn measurement_size(&self) -> Result<f64, DesignError> {
+        match self.measurement_size.get() {
+            Some(&size) => Ok(size),
+            None => {
+                let size = h2_norm(&self.measurement()?)?;
+                Ok(*self.measurement_size.get_or_init(|| size))
+            }
+        }
+    }
+
     /// The part of the references that no filter can estimate from the measurements: max over omega of
-    /// sigma_max(W - W H* (H H*)^+ H). No filter, causal or not, has a smaller ||K||.
+    /// sigma_max(W - W H* (H H*)^+ H). No filter, causal or not, has a smaller ||K||. Channels that sample
+    /// proportional filters whole slow periods apart count as one: at each frequency they are multiples of
+    /// each other.
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable.
     pub fn noncausal_bound(&self) -> Result<Peak, DesignError> {
-        Ok(unexplained_peak(&self.system, self.channels())?)
+        let distinct = self.problem.merge_channels(Repeats::AtWholePeriods).representatives();
+        let references = self.channels()..self.channels() + self.ratio();
+        let system = self.system.select_outputs(distinct.iter().copied().chain(references))?;
+        Ok(unexplained_peak(&system, distinct.len())?)
     }
 
     fn frequency_response(&self) -> &FrequencyResponse {

@@ -2,7 +2,6 @@
 
 use super::DesignError;
 use crate::analog::StrictlyProper;
-use crate::linalg::Mat;
 use crate::spec::{FilterSpec, Spec};
 use crate::units::FastPeriods;
 
@@ -17,7 +16,7 @@ pub struct Problem {
     pub ratio: usize,
     /// The latency m0 in fast samples.
     pub latency: usize,
-    /// The distinct analog filters. Channels with equal filters share one filter and its state.
+    /// The distinct analog filters. Channels whose filters are proportional share one filter and its state.
     pub front_ends: Vec<StrictlyProper>,
     /// Index of Phi_0 in `front_ends`.
     pub target: usize,
@@ -30,8 +29,10 @@ pub struct Problem {
 /// One slow channel of a [`Problem`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Channel {
-    /// Index of Phi_i in [`Problem::front_ends`].
+    /// Index of a filter in [`Problem::front_ends`] to which Phi_i is proportional.
     pub front_end: usize,
+    /// Phi_i over that filter.
+    pub gain: f64,
     /// D_i.
     pub delay: FastPeriods,
 }
@@ -44,12 +45,12 @@ impl Problem {
             StrictlyProper::new(filter, spec.fast_period)
                 .map_err(|source| DesignError::Analog { place: place(), source })
         };
-        let target = intern(&mut front_ends, realise(&spec.target, &|| "target.filter".to_owned())?);
+        let (target, _) = intern(&mut front_ends, realise(&spec.target, &|| "target.filter".to_owned())?);
         let mut channels = Vec::with_capacity(spec.channels.len());
         for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays_in_fast_periods()).enumerate() {
             let filter = realise(&channel.filter, &|| format!("filter of channel {}", i + 1))?;
-            let front_end = intern(&mut front_ends, filter);
-            channels.push(Channel { front_end, delay });
+            let (front_end, gain) = intern(&mut front_ends, filter);
+            channels.push(Channel { front_end, gain, delay });
         }
         let noise = spec.channels.iter().map(|channel| channel.noise * channel.noise).collect();
         let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels, noise };
@@ -85,90 +86,18 @@ impl Problem {
         moved
     }
 
-    /// Replaces each group of identical channels (same filter, same delay) by one channel, their weighted
-    /// mean.
-    pub(super) fn merge_channels(&self) -> MergedChannels {
-        let mut merged = self.clone();
-        merged.channels.clear();
-        for channel in &self.channels {
-            if !merged.channels.contains(channel) {
-                merged.channels.push(*channel);
-            }
-        }
-        merged.noise = vec![0.0; merged.channels.len()];
-        let mut shares = vec![Share { representative: 0, share: 0.0 }; self.channels.len()];
-        for (representative, common) in merged.channels.iter().enumerate() {
-            let group: Vec<usize> = (0..shares.len()).filter(|&i| self.channels[i] == *common).collect();
-            let noise: Vec<f64> = group.iter().map(|&i| self.noise[i]).collect();
-            for (&i, share) in group.iter().zip(least_noise_shares(&noise)) {
-                shares[i] = Share { representative, share };
-                merged.noise[representative] += share * share * self.noise[i];
-            }
-        }
-        MergedChannels { problem: merged, shares }
-    }
-
     /// The largest delay.
     pub fn longest_delay(&self) -> FastPeriods {
         FastPeriods(self.channels.iter().map(|channel| channel.delay.0).fold(0.0, f64::max))
     }
 }
 
-/// A problem without identical channels, and the share of each original channel in its merged channel.
-#[derive(Debug, Clone)]
-pub(super) struct MergedChannels {
-    /// The problem with each distinct channel once.
-    pub(super) problem: Problem,
-    /// One for each of the original channels.
-    pub(super) shares: Vec<Share>,
-}
-
-/// The merged channel to which a channel belongs, and its weight there.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Share {
-    /// Index of the merged channel.
-    pub(super) representative: usize,
-    /// The shares of a group sum to 1.
-    pub(super) share: f64,
-}
-
-impl MergedChannels {
-    /// Whether the original channels were all distinct.
-    pub(super) fn are_all(&self) -> bool {
-        self.problem.channels.len() == self.shares.len()
-    }
-
-    /// Distributes each merged filter over its identical channels by their shares. The error stays the
-    /// same, and the noise is least.
-    pub(super) fn share_taps(&self, taps: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let share = |part: &Share| taps[part.representative].iter().map(|tap| tap * part.share).collect();
-        self.shares.iter().map(share).collect()
-    }
-
-    /// The matrix that maps the original channels to the merged ones: F of the merged channels times this
-    /// matrix is F of the original channels.
-    pub(super) fn shares(&self) -> Mat {
-        let entry = |merged: usize, channel: usize| {
-            let part = self.shares[channel];
-            if part.representative == merged { part.share } else { 0.0 }
-        };
-        Mat::from_fn(self.problem.channels.len(), self.shares.len(), entry)
-    }
-}
-
-/// Weights of sum 1 for the mean of equal signals with the least noise, given the noise power of each. They
-/// are inversely proportional to the powers. If any signals are noiseless, only these have weight.
-fn least_noise_shares(noise: &[f64]) -> Vec<f64> {
-    let least = noise.iter().copied().fold(f64::INFINITY, f64::min);
-    let weight = |power: f64| if least == 0.0 { f64::from(u8::from(power == 0.0)) } else { least / power };
-    let total: f64 = noise.iter().map(|&power| weight(power)).sum();
-    noise.iter().map(|&power| weight(power) / total).collect()
-}
-
-fn intern(front_ends: &mut Vec<StrictlyProper>, filter: StrictlyProper) -> usize {
-    if let Some(known) = front_ends.iter().position(|seen| *seen == filter) {
-        return known;
-    }
-    front_ends.push(filter);
-    front_ends.len() - 1
+/// The index of the filter to which `filter` is proportional, and the factor. A filter that is not
+/// proportional to any becomes the last one.
+fn intern(front_ends: &mut Vec<StrictlyProper>, filter: StrictlyProper) -> (usize, f64) {
+    let known = front_ends.iter().enumerate().find_map(|(i, seen)| Some((i, filter.ratio_to(seen)?)));
+    known.unwrap_or_else(|| {
+        front_ends.push(filter);
+        (front_ends.len() - 1, 1.0)
+    })
 }

@@ -2,9 +2,10 @@
 //! reduces the order or quantises the taps if the spec asks for it, and chooses the realisation that runs
 //! fastest.
 
+use super::merging::MergedChannels;
 use super::methods::{Filters, Synthesis};
 use super::plant::LiftedPlant;
-use super::problem::{MergedChannels, Problem};
+use super::problem::Problem;
 use super::quantise::{QuantisationProblem, WordStudy, quantise};
 use super::reduction::{Aim, OrderReduction, ReductionProblem, reduce};
 use super::{DesignError, filters};
@@ -21,6 +22,8 @@ pub(super) struct Realised {
     pub(super) filters: SynthesisFilters,
     /// The norm of the error system of the final coefficients.
     pub(super) peak: Peak,
+    /// The absolute error of `peak.gain` from rounding.
+    pub(super) rounding: f64,
     pub(super) reduction: Option<OrderReduction>,
     pub(super) integers: Option<(FixedPoint, WordStudy)>,
 }
@@ -33,7 +36,7 @@ struct Evaluated {
 
 impl From<Evaluated> for Realised {
     fn from(Evaluated { filters, peak }: Evaluated) -> Self {
-        Self { filters, peak, reduction: None, integers: None }
+        Self { filters, peak, rounding: 0.0, reduction: None, integers: None }
     }
 }
 
@@ -50,10 +53,12 @@ pub(super) fn realise(
 ) -> Result<Realised, DesignError> {
     let whole = if merged.are_all() { merged_plant.clone() } else { LiftedPlant::new(problem)? };
     let realisation = Realisation { spec, whole: &whole, merged, merged_plant };
-    match &synthesis.filters {
+    let realised = match &synthesis.filters {
         Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
         Filters::StateSpace(system) => realisation.state_space(system, synthesis.peak.gain),
-    }
+    }?;
+    let rounding = whole.rounding(&filters::lifted(&realised.filters, spec.ratio)?)?;
+    Ok(Realised { rounding, ..realised })
 }
 
 struct Realisation<'a> {

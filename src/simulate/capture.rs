@@ -34,7 +34,10 @@ pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
         let instants = Instants { first, step: FastPeriods(step), count };
         signal.filtered(&problem.front_ends[front_end], instants)
     };
-    let slow = |channel: &Channel| read(channel.front_end, -channel.delay, ratio as f64, periods);
+    let slow = |channel: &Channel| {
+        let samples = read(channel.front_end, -channel.delay, ratio as f64, periods);
+        samples.into_iter().map(|sample| channel.gain * sample).collect()
+    };
     let target_first = FastPeriods(-(problem.latency as f64));
     Captured {
         channels: problem.channels.iter().map(slow).collect(),

@@ -79,14 +79,27 @@ impl<'a> EnclosedErrorSystem<'a> {
         (n..n + self.bank.ratio).map(|i| self.period.gram[(i, i)].nearest()).sum::<f64>().sqrt()
     }
 
-    /// Whether two samples are always equal.
-    fn same(&self, i: usize, j: usize) -> bool {
-        self.same_later(i, j) && self.period.periods_late[i] == self.period.periods_late[j]
+    /// Whole slow periods by which sample `j` is taken before sample `i`, if the two are multiples of each
+    /// other up to that delay.
+    ///
+    /// Instants count as whole periods apart if they are so up to the rounding of the delays to doubles: a
+    /// bank that told them apart would need coefficients of 1e15.
+    fn periods_between(&self, i: usize, j: usize) -> Option<f64> {
+        let (a, b) = (self.samples[i], self.samples[j]);
+        let apart = self.timeline.between(b.time, a.time);
+        let periods = (apart / self.bank.ratio as f64).round();
+        let rest = (apart - periods * self.bank.ratio as f64).abs();
+        (a.filter == b.filter && rest <= self.timeline.resolution(a.time, b.time)).then_some(periods)
     }
 
-    /// Whether two samples are the same up to a delay by whole slow periods.
+    /// Whether two samples are always multiples of each other.
+    fn same(&self, i: usize, j: usize) -> bool {
+        self.periods_between(i, j) == Some(0.0)
+    }
+
+    /// Whether two samples are multiples of each other up to a delay by whole slow periods.
     fn same_later(&self, i: usize, j: usize) -> bool {
-        self.samples[i].filter == self.samples[j].filter && self.timeline.of(i) == self.timeline.of(j)
+        self.periods_between(i, j).is_some()
     }
 
     /// The channels that are not `equal` to an earlier one.
@@ -98,9 +111,9 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// Rows of the measured samples that a causal bank needs: of samples that are equal up to whole slow
     /// periods, only the earliest.
     fn earliest_samples(&self) -> Vec<usize> {
-        let late = |s: usize| self.period.periods_late[s];
         let measured = self.bank.ratio..self.samples.len();
-        let before = |i: usize, j: usize| self.same_later(i, j) && (late(i), i) < (late(j), j);
+        let newer = |periods: f64, i: usize, j: usize| periods > 0.0 || (periods == 0.0 && i < j);
+        let before = |i: usize, j: usize| self.periods_between(i, j).is_some_and(|p| newer(p, i, j));
         measured.clone().filter(|&j| measured.clone().all(|i| !before(i, j))).collect()
     }
 

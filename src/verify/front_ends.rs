@@ -2,7 +2,7 @@
 //! exact.
 
 use super::VerifyError;
-use super::ball::{self, Matrix};
+use super::ball::{self, Ball, Matrix};
 use super::timeline::{Instant, SamplingInstant};
 use crate::analog::StrictlyProper;
 use crate::arithmetic::Number;
@@ -13,7 +13,7 @@ use crate::units::Seconds;
 /// The distinct filters side by side, driven by the same input: dx/dt = a x + b f.
 #[derive(Debug, Clone)]
 pub(super) struct FrontEnds {
-    /// Each filter with the index of its first state.
+    /// Each filter with the index of its first state. Proportional filters count once.
     filters: Vec<(usize, StrictlyProper)>,
 }
 
@@ -29,22 +29,22 @@ impl FrontEnds {
         let mut index = |filter: &FilterSpec, name: String| {
             let made = StrictlyProper::new(filter, spec.fast_period)
                 .map_err(|source| VerifyError::FrontEnd { place: name, source })?;
-            if let Some(known) = filters.iter().position(|(_, seen)| *seen == made) {
+            let known = filters.iter().enumerate().find_map(|(i, (_, seen))| Some((i, made.ratio_to(seen)?)));
+            if let Some(known) = known {
                 return Ok(known);
             }
             let start = filters.last().map_or(0, |(start, last)| start + last.order());
             filters.push((start, made));
-            Ok(filters.len() - 1)
+            Ok((filters.len() - 1, 1.0))
         };
-        let target = index(&spec.target, "spec.target.filter".to_owned())?;
+        let (target, gain) = index(&spec.target, "spec.target.filter".to_owned())?;
         let reference = |p: usize| Instant { whole: p as f64 - bank.latency as f64, delay: Seconds(0.0) };
         let mut samples: Vec<SamplingInstant> =
-            (0..bank.ratio).map(|p| SamplingInstant { filter: target, time: reference(p) }).collect();
+            (0..bank.ratio).map(|p| SamplingInstant { filter: target, gain, time: reference(p) }).collect();
         for (i, channel) in spec.channels.iter().enumerate() {
-            samples.push(SamplingInstant {
-                filter: index(&channel.filter, format!("spec.channel[{i}].filter"))?,
-                time: Instant { whole: 0.0, delay: channel.delay },
-            });
+            let (filter, gain) = index(&channel.filter, format!("spec.channel[{i}].filter"))?;
+            let time = Instant { whole: 0.0, delay: channel.delay };
+            samples.push(SamplingInstant { filter, gain, time });
         }
         Ok((Self { filters }, samples))
     }
@@ -65,11 +65,11 @@ impl FrontEnds {
         (a, b)
     }
 
-    /// The row that reads a filter's output from the joint state.
-    pub(super) fn output<F: Number>(&self, filter: usize) -> Matrix<F> {
-        let (start, filter) = &self.filters[filter];
+    /// The row that reads a sample from the joint state.
+    pub(super) fn output<F: Number>(&self, sample: &SamplingInstant) -> Matrix<F> {
+        let (start, filter) = &self.filters[sample.filter];
         let mut row = ball::zeros(1, self.order());
         row.columns_mut(*start, filter.order()).copy_from(&ball::exact(filter.c()));
-        row
+        ball::scaled(&row, Ball::from(sample.gain))
     }
 }

@@ -32,7 +32,7 @@ impl<F: Number> SlowPeriod<F> {
         let (a, b) = front_ends.dynamics();
         let since_start: Vec<StateTransition<F>> =
             (0..timeline.len()).map(|k| state_transition(&a, &b, timeline.since_start(k))).collect();
-        let rows: Vec<Matrix<F>> = samples.iter().map(|sample| front_ends.output(sample.filter)).collect();
+        let rows: Vec<Matrix<F>> = samples.iter().map(|sample| front_ends.output(sample)).collect();
         let n = front_ends.order();
         let mut outputs = ball::zeros(samples.len(), n);
         for (i, row) in rows.iter().enumerate() {

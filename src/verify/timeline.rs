@@ -25,6 +25,8 @@ pub(super) struct Instant {
 pub(super) struct SamplingInstant {
     /// Index of the filter.
     pub(super) filter: usize,
+    /// The sample over that filter's output, not zero.
+    pub(super) gain: f64,
     pub(super) time: Instant,
 }
 
@@ -120,6 +122,18 @@ impl Timeline {
         })
     }
 
+    /// Time from `earlier` to `later` in fast periods, rounded to a double once.
+    pub(super) fn between(&self, earlier: Instant, later: Instant) -> f64 {
+        later.since::<BigFloat>(earlier, self.fast_period).nearest()
+    }
+
+    /// A bound on what the rounding of the delays of two instants to doubles may change in the time between
+    /// them, in fast periods.
+    pub(super) fn resolution(&self, a: Instant, b: Instant) -> f64 {
+        let size = |instant: Instant| instant.delay.0.abs() / self.fast_period.0;
+        4.0 * f64::EPSILON * (1.0 + size(a) + size(b))
+    }
+
     /// Number of different instants.
     pub(super) fn len(&self) -> usize {
         self.instants.len()
@@ -152,7 +166,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn sample(whole: f64, delay: f64) -> SamplingInstant {
-        SamplingInstant { filter: 0, time: Instant { whole, delay: Seconds(delay) } }
+        SamplingInstant { filter: 0, gain: 1.0, time: Instant { whole, delay: Seconds(delay) } }
     }
 
     proptest! {

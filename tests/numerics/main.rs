@@ -12,6 +12,8 @@ mod golden;
 mod hard_designs;
 mod random_plants;
 mod reduction;
+mod repeated_channels;
 mod second_opinion;
 mod sections;
 mod soundness;
+mod steep_front_ends;

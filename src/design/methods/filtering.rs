@@ -9,6 +9,7 @@ use crate::lti::gramian::controllability_root;
 use crate::lti::riccati::{self, RiccatiOutcome, RiccatiSolution};
 use crate::lti::{LtiError, StateSpace};
 use std::ops::Range;
+use std::rc::Rc;
 
 /// A feedthrough below this fraction of its measurement is a rounding error: the channel adds no
 /// information.
@@ -57,8 +58,8 @@ pub(super) struct Innovations {
     direct: Vec<usize>,
     delayed: Vec<DelayedChannel>,
     channels: usize,
-    /// A channel was left out because its feedthrough is rounding.
-    incomplete: bool,
+    /// Feedthrough of the channel with the least, given the channels before it, relative to its size.
+    least_feedthrough: f64,
     /// The result "impossible" may be accepted: the coordinates are balanced and no channel is left out.
     conclusive: bool,
     /// The same in the plant's own coordinates; `None` if the coordinates are already those of the plant.
@@ -99,12 +100,30 @@ pub(super) enum Trial {
     Unresolved,
 }
 
+/// Solves the filtering Riccati equation of a plant.
+pub(super) trait RiccatiSolver {
+    /// Tries one gamma.
+    fn h_infinity(&self, gamma: f64) -> Trial;
+}
+
+impl RiccatiSolver for Innovations {
+    fn h_infinity(&self, gamma: f64) -> Trial {
+        let Some((f, g, h)) = self.weights(gamma) else {
+            return if self.conclusive { Trial::Impossible } else { Trial::Unresolved };
+        };
+        match riccati::solve_doubling(&f.transpose(), &g, &h) {
+            RiccatiOutcome::Solved(solution) => self.judge(&solution),
+            RiccatiOutcome::Unresolved { .. } => Trial::Unresolved,
+        }
+    }
+}
+
 impl Innovations {
     /// The problem in balanced coordinates, if they exist, and in those of the plant. Near the limits of
     /// double precision sometimes only one of the two can be solved.
-    pub(super) fn in_all_coordinates(plant: &LiftedPlant) -> Result<Vec<Self>, DesignError> {
+    pub(super) fn in_all_coordinates(plant: &LiftedPlant) -> Result<Vec<Rc<Self>>, DesignError> {
         let plain = Self::new(plant)?;
-        Ok(plain.balanced().into_iter().chain([plain]).collect())
+        Ok(plain.balanced().into_iter().chain([plain]).map(Rc::new).collect())
     }
 
     /// Separates the measured inputs (w1) from the rest (w2) by one LQ factorisation.
@@ -116,16 +135,17 @@ impl Innovations {
             .into_iter()
             .map(|channel| DelayedChannel { channel, chain: plant.chain(channel), size: sizes[channel] })
             .collect();
-        let informative = independent(plant, &direct, &sizes);
-        let incomplete = informative.len() < direct.len();
-        Self::separate(plant, informative, delayed, incomplete)
+        let feedthroughs = relative_feedthroughs(plant, &direct, &sizes);
+        let least = feedthroughs.iter().map(|&(_, share)| share).fold(1.0, f64::min);
+        let informative = feedthroughs.into_iter().filter(|&(_, share)| share > INNOVATION_FLOOR);
+        Self::separate(plant, informative.map(|(channel, _)| channel).collect(), delayed, least)
     }
 
     fn separate(
         plant: &LiftedPlant,
         direct: Vec<usize>,
         delayed: Vec<DelayedChannel>,
-        incomplete: bool,
+        least_feedthrough: f64,
     ) -> Result<Self, DesignError> {
         let measurement = plant.system().select_outputs(direct.iter().copied())?;
         let reference = plant.reference()?;
@@ -160,10 +180,15 @@ impl Innovations {
             direct,
             delayed,
             channels,
-            incomplete,
+            least_feedthrough,
             conclusive,
             plant,
         })
+    }
+
+    /// Feedthrough of the channel with the least, relative to its size.
+    pub(super) fn least_feedthrough(&self) -> f64 {
+        self.least_feedthrough
     }
 
     /// F P0 F' - P0: what the substitution adds to Q.
@@ -196,7 +221,7 @@ impl Innovations {
             c1: &self.c1 * &forward,
             c2: &self.c2 * &forward,
             p0: linalg::symmetric_part(&(&back * &self.p0 * back.transpose())),
-            conclusive: !self.incomplete,
+            conclusive: self.least_feedthrough > INNOVATION_FLOOR,
             ..self.clone()
         })
     }
@@ -222,17 +247,6 @@ impl Innovations {
         match riccati::solve_doubling(&self.f.transpose(), &g, &h) {
             RiccatiOutcome::Solved(solution) => Some(solution.x + &self.p0),
             RiccatiOutcome::Unresolved { .. } => None,
-        }
-    }
-
-    /// Tries one gamma.
-    pub(super) fn h_infinity(&self, gamma: f64) -> Trial {
-        let Some((f, g, h)) = self.weights(gamma) else {
-            return if self.conclusive { Trial::Impossible } else { Trial::Unresolved };
-        };
-        match riccati::solve_doubling(&f.transpose(), &g, &h) {
-            RiccatiOutcome::Solved(solution) => self.judge(&solution),
-            RiccatiOutcome::Unresolved { .. } => Trial::Unresolved,
         }
     }
 
@@ -339,10 +353,11 @@ fn unwhiten(root: &Mat, m: &Mat) -> Mat {
     flipped(&linalg::solve_lower(&upper, &flipped(&m.transpose()))).transpose()
 }
 
-/// The channels whose feedthrough, given the channels before them, is larger than rounding errors.
-fn independent(plant: &LiftedPlant, direct: &[usize], sizes: &[f64]) -> Vec<usize> {
+/// The feedthrough of each channel, given the channels before it, relative to the channel's size. Channels
+/// whose feedthrough is rounding do not count for those after them.
+fn relative_feedthroughs(plant: &LiftedPlant, direct: &[usize], sizes: &[f64]) -> Vec<(usize, f64)> {
     let mut kept: Vec<usize> = Vec::with_capacity(direct.len());
-    for &channel in direct {
+    let mut share = |channel: usize| {
         kept.push(channel);
         let l = linalg::lq_factor(&plant.system().d().select_rows(&kept));
         let row = kept.len() - 1;
@@ -350,12 +365,13 @@ fn independent(plant: &LiftedPlant, direct: &[usize], sizes: &[f64]) -> Vec<usiz
         if innovation <= INNOVATION_FLOOR * sizes[channel] {
             kept.pop();
         }
-    }
-    kept
+        (channel, innovation / sizes[channel])
+    };
+    direct.iter().map(|&channel| share(channel)).collect()
 }
 
 /// RMS of each output for white inputs.
-fn output_sizes(system: &StateSpace) -> Result<Vec<f64>, LtiError> {
+pub(super) fn output_sizes(system: &StateSpace) -> Result<Vec<f64>, LtiError> {
     let history = system.c() * controllability_root(system.a(), system.b())?;
     let size = |i: usize| history.row(i).norm().hypot(system.d().row(i).norm());
     Ok((0..system.outputs()).map(size).collect())

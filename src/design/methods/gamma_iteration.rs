@@ -1,12 +1,13 @@
 //! Gamma-iteration: the search for the least gamma for which the filtering Riccati equation has a solution.
 
-use super::filtering::{Filter, Innovations, Trial};
+use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
 use super::{Filters, GAMMA_ACCURACY, Synthesis};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Complex};
 use crate::lti::LtiError;
 use crate::lti::peak::{Peak, hinf_norm};
+use std::rc::Rc;
 
 /// Gammas below this fraction of ||W|| count as zero: the references are reproduced up to rounding errors.
 const NEGLIGIBLE: f64 = 1e-12;
@@ -16,6 +17,8 @@ const TRIAL_LIMIT: usize = 80;
 const TRIALS_BELOW: usize = 8;
 /// Limit on the number of gamma-iterations; trials at smaller gammas come between them.
 const ROUND_LIMIT: usize = 4;
+/// Relative distance below the least gamma found at which a more precise solver must find no filter.
+const CONFIRMED_BELOW: f64 = 2e-6;
 /// Another gamma-iteration follows if the trials at smaller gammas reduced gamma to less than this
 /// fraction.
 const WORTHWHILE: f64 = 0.9;
@@ -39,9 +42,11 @@ enum Floor {
 /// The state of the search: [lower, best] with the filters that attain the upper end.
 pub(super) struct GammaIteration<'a> {
     plant: &'a LiftedPlant,
-    innovations: &'a [Innovations],
+    solvers: Vec<Rc<dyn RiccatiSolver>>,
     /// The noncausal bound and the frequency at which it is attained.
     noncausal: Peak,
+    /// The error that the inputs cause which no measurement contains in time.
+    feedthrough: f64,
     /// No causal filter achieves less.
     lower: f64,
     best: Option<Judged>,
@@ -51,14 +56,15 @@ pub(super) struct GammaIteration<'a> {
 }
 
 impl<'a> GammaIteration<'a> {
-    pub(super) fn new(plant: &'a LiftedPlant, innovations: &'a [Innovations]) -> Result<Self, DesignError> {
+    pub(super) fn new(plant: &'a LiftedPlant, innovations: &[Rc<Innovations>]) -> Result<Self, DesignError> {
         let noncausal = plant.noncausal_bound()?;
-        let feedthrough = innovations.first().map_or(Ok(0.0), Innovations::unmeasured_feedthrough)?;
+        let feedthrough = innovations.first().map_or(Ok(0.0), |form| form.unmeasured_feedthrough())?;
         let system = plant.system();
         Ok(Self {
             plant,
-            innovations,
+            solvers: innovations.iter().map(|form| Rc::clone(form) as Rc<dyn RiccatiSolver>).collect(),
             noncausal,
+            feedthrough,
             lower: noncausal.gain.max(feedthrough),
             best: None,
             trials: 0,
@@ -66,14 +72,38 @@ impl<'a> GammaIteration<'a> {
         })
     }
 
-    pub(super) fn innovations(&self) -> &'a [Innovations] {
-        self.innovations
+    /// Whether the least gamma found is that of a bound on all causal filters, up to the accuracy.
+    pub(super) fn attains_a_bound(&self) -> bool {
+        let bound = self.noncausal.gain.max(self.feedthrough);
+        self.done() && self.upper() * (1.0 - CONFIRMED_BELOW) <= bound
     }
 
-    /// The filters with their norm; `None` if rounding errors made the filters unstable.
+    /// Whether the search has ended and `solver`, which is more precise, finds no filter for a smaller
+    /// gamma.
+    pub(super) fn is_confirmed_by(&self, solver: &dyn RiccatiSolver) -> bool {
+        let below = self.upper() * (1.0 - CONFIRMED_BELOW);
+        self.done() && matches!(solver.h_infinity(below), Trial::Impossible)
+    }
+
+    /// The solvers that are tried, one after the other, for each gamma.
+    pub(super) fn solvers(&self) -> Vec<Rc<dyn RiccatiSolver>> {
+        self.solvers.clone()
+    }
+
+    /// Goes on with `solver` alone. What less precise ones found impossible may be possible.
+    pub(super) fn go_on_with(&mut self, solver: Rc<dyn RiccatiSolver>) {
+        self.solvers = vec![solver];
+        self.lower = self.noncausal.gain.max(self.feedthrough);
+    }
+
+    /// The filters with their norm; `None` if rounding errors made the filters unstable or are as large as
+    /// the norm.
     pub(super) fn judge(&self, filters: Filter) -> Result<Option<Judged>, DesignError> {
         match self.plant.norm(&filters) {
-            Ok(peak) => Ok(Some(Judged { filters, peak })),
+            Ok(peak) if self.plant.rounding(&filters)? < peak.gain || self.is_negligible(peak.gain) => {
+                Ok(Some(Judged { filters, peak }))
+            }
+            Ok(_) => Ok(None),
             Err(DesignError::Lti(LtiError::Unstable { .. })) => Ok(None),
             Err(other) => Err(other),
         }
@@ -123,9 +153,9 @@ impl<'a> GammaIteration<'a> {
 
     /// Tries one gamma. A filter counts as found only if its computed norm confirms gamma.
     fn attempt(&mut self, gamma: f64) -> Result<Trial, DesignError> {
-        for innovations in self.innovations {
+        for solver in self.solvers() {
             self.trials += 1;
-            match innovations.h_infinity(gamma) {
+            match solver.h_infinity(gamma) {
                 Trial::Achieved(filters) => {
                     let Some(found) = self.judge(filters.clone())? else { continue };
                     let promise_kept = found.peak.gain <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);

@@ -3,9 +3,17 @@
 
 use super::filtering::{Innovations, Trial};
 use super::gamma_iteration::{GammaIteration, Judged};
+use super::precise_filtering::PreciseFiltering;
 use super::{Settings, Synthesis};
+use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
+use std::rc::Rc;
+
+/// Maximum number of states of a plant for trials with 106 bits; one trial then takes about a second.
+const MOST_STATES_AT_106_BITS: usize = 96;
+/// Maximum number of states of a plant for trials with 512 bits; one trial then takes about a second.
+const MOST_STATES_AT_512_BITS: usize = 40;
 
 /// The least gamma within [`GAMMA_ACCURACY`](super::GAMMA_ACCURACY); with `settings.gamma_margin` > 0 the
 /// central filter at (1 + margin) times the optimum instead, which has the smaller error at all other
@@ -17,7 +25,7 @@ use crate::design::plant::LiftedPlant;
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let innovations = Innovations::in_all_coordinates(plant)?;
     let mut iteration = GammaIteration::new(plant, &innovations)?;
-    let mut mean_square = innovations.iter().filter_map(Innovations::h2).peekable();
+    let mut mean_square = innovations.iter().filter_map(|form| form.h2()).peekable();
     // The mean-square optimum is usually either the worst-case optimum too or far from it. The error at one
     // frequency distinguishes the two cases.
     let promising =
@@ -32,9 +40,29 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
         iteration.try_the_lower_bound()?;
     }
     iteration.bisect()?;
+    refine::<DoubleDouble>(plant, &mut iteration, MOST_STATES_AT_106_BITS)?;
+    refine::<BigFloat>(plant, &mut iteration, MOST_STATES_AT_512_BITS)?;
     let optimum = iteration.best()?;
     let relaxed = relaxed(&mut iteration, &optimum, settings.gamma_margin.unwrap_or(0.0))?;
     Ok(iteration.synthesis(relaxed.unwrap_or(optimum)))
+}
+
+/// Goes on in the precision of `F` where the search so far left the optimum open, for plants of at most
+/// `limit` states.
+fn refine<F: Number>(
+    plant: &LiftedPlant,
+    iteration: &mut GammaIteration<'_>,
+    limit: usize,
+) -> Result<(), DesignError> {
+    if iteration.attains_a_bound() || plant.system().order() > limit {
+        return Ok(());
+    }
+    let solver = Rc::new(PreciseFiltering::<F>::new(plant)?);
+    if iteration.is_confirmed_by(solver.as_ref()) {
+        return Ok(());
+    }
+    iteration.go_on_with(solver);
+    iteration.bisect()
 }
 
 /// A central filter whose norm is within `margin` of the optimum, if one is asked for and found.
@@ -47,8 +75,8 @@ fn relaxed(
         return Ok(None);
     }
     let cap = optimum.peak.gain * (1.0 + margin);
-    for innovations in iteration.innovations() {
-        let Trial::Achieved(filters) = innovations.h_infinity(cap) else { continue };
+    for solver in iteration.solvers() {
+        let Trial::Achieved(filters) = solver.h_infinity(cap) else { continue };
         let Some(relaxed) = iteration.judge(filters)? else { continue };
         if relaxed.peak.gain <= cap {
             return Ok(Some(relaxed));

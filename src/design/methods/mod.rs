@@ -14,6 +14,7 @@ pub(crate) mod fir_kyp;
 mod gamma_iteration;
 pub(crate) mod h2;
 pub(crate) mod iir;
+mod precise_filtering;
 pub(crate) mod separation;
 pub(crate) mod sinc;
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::design::filters::{lifted, polyphase};
+use crate::design::merging::Repeats;
 use crate::linalg::{self, CMat, Complex};
 use crate::spec::Spec;
 use crate::units::Seconds;
@@ -56,13 +57,13 @@ fn spec(case: &Case, method: Method) -> Spec {
 /// A plant without identical channels, as the designer passes it to a method.
 fn plant(case: &Case) -> LiftedPlant {
     let problem = Problem::new(&spec(case, Method::Iir), case.latency).unwrap();
-    LiftedPlant::new(&problem.merge_channels().problem).unwrap()
+    LiftedPlant::new(&problem.merge_channels(Repeats::AtOneInstant).problem).unwrap()
 }
 
 fn settings(case: &Case, method: Method) -> Settings {
     let spec = spec(case, method);
     let slow = Spec { fast_period: Seconds(case.ratio as f64), ..spec };
-    let at_slow_rate = Some(Problem::new(&slow, 0).unwrap().merge_channels().problem);
+    let at_slow_rate = Some(Problem::new(&slow, 0).unwrap().merge_channels(Repeats::AtOneInstant).problem);
     Settings { taps: 13, at_slow_rate, ..Settings::default() }
 }
 

@@ -4,6 +4,7 @@
 mod causal;
 mod units;
 
+use super::merging::Repeats;
 use super::methods::DualPoint;
 use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
@@ -205,7 +206,8 @@ impl Search {
 /// The frequency and direction in which the largest part of the reference samples cannot be estimated from
 /// the samples.
 fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
-    let plant = LiftedPlant::new(&analysis::bank_problem(bank)?.merge_channels().problem)?;
+    let plant =
+        LiftedPlant::new(&analysis::bank_problem(bank)?.merge_channels(Repeats::AtWholePeriods).problem)?;
     let (n, m) = (plant.channels(), plant.ratio());
     let frequency = plant.noncausal_bound()?.frequency;
     let l = linalg::lq_factor_c(&FrequencyResponse::new(plant.system()).at_frequency(frequency));
@@ -236,7 +238,7 @@ fn pairs(column: &CMat) -> Vec<[f64; 2]> {
 /// change of the taps, and this error gives the witnesses. Identical channels count once.
 fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
-    let merged = analysis::bank_problem(bank)?.merge_channels();
+    let merged = analysis::bank_problem(bank)?.merge_channels(Repeats::AtOneInstant);
     let plant = LiftedPlant::new(&merged.problem)?;
     let parts = &merged.shares;
     let directions = directions(dual)?;

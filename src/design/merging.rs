@@ -1,0 +1,146 @@
+//! Channels that measure the same thing are designed as one.
+//!
+//! Two channels whose filters are proportional and that sample at one instant carry one measurement. For
+//! recursive filters, so do two that sample whole slow periods apart: the later sample of one is the earlier
+//! sample of the other, which a filter with memory has seen. Kept apart, they would make the plant singular.
+
+use super::lifting::SAME_INSTANT;
+use super::problem::{Channel, Problem};
+use crate::linalg::Mat;
+use crate::spec::Method;
+
+/// Which channels count as one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Repeats {
+    /// Proportional filters that sample at the same instant.
+    AtOneInstant,
+    /// Proportional filters that sample at the same instant or whole slow periods apart. The newest sample
+    /// stands for all.
+    AtWholePeriods,
+}
+
+impl Repeats {
+    /// The repeats that carry no information for banks of `method`.
+    pub(super) fn of(method: Method) -> Self {
+        if method.has_taps() { Self::AtOneInstant } else { Self::AtWholePeriods }
+    }
+}
+
+/// A problem without repeated channels, and the share of each original channel in its merged channel.
+#[derive(Debug, Clone)]
+pub(super) struct MergedChannels {
+    /// The problem with each distinct channel once.
+    pub(super) problem: Problem,
+    /// One for each of the original channels.
+    pub(super) shares: Vec<Share>,
+}
+
+/// The merged channel to which a channel belongs, and its weight there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Share {
+    /// Index of the merged channel.
+    pub(super) representative: usize,
+    /// The merged measurement is the sum of the measurements times their shares. Zero for a channel that
+    /// repeats a newer sample.
+    pub(super) share: f64,
+}
+
+impl Problem {
+    /// Replaces each group of repeated channels by one channel, the weighted mean of those with the newest
+    /// sample.
+    pub(super) fn merge_channels(&self, repeats: Repeats) -> MergedChannels {
+        let mut merged = self.clone();
+        merged.channels.clear();
+        merged.noise.clear();
+        let mut shares = vec![Share { representative: 0, share: 0.0 }; self.channels.len()];
+        for group in self.groups(repeats) {
+            let (newest, noise) = self.newest(&group);
+            let reference = self.channels[newest[0]];
+            let gain = |i: usize| self.channels[i].gain / reference.gain;
+            // In units of the first channel of the group.
+            let relative: Vec<f64> = newest.iter().map(|&i| noise[i] / (gain(i) * gain(i))).collect();
+            let weights = least_noise_shares(&relative);
+            let representative = merged.channels.len();
+            group.iter().for_each(|&i| shares[i].representative = representative);
+            for (&i, weight) in newest.iter().zip(&weights) {
+                shares[i].share = weight / gain(i);
+            }
+            merged.noise.push(weights.iter().zip(&relative).map(|(w, power)| w * w * power).sum());
+            merged.channels.push(reference);
+        }
+        MergedChannels { problem: merged, shares }
+    }
+
+    /// The channels in groups that carry one measurement, in the order of their first channels.
+    fn groups(&self, repeats: Repeats) -> Vec<Vec<usize>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for (i, channel) in self.channels.iter().enumerate() {
+            let known =
+                groups.iter_mut().find(|group| self.repeats(channel, &self.channels[group[0]], repeats));
+            match known {
+                Some(group) => group.push(i),
+                None => groups.push(vec![i]),
+            }
+        }
+        groups
+    }
+
+    fn repeats(&self, a: &Channel, b: &Channel, repeats: Repeats) -> bool {
+        let apart = a.delay.0 - b.delay.0;
+        let period = self.ratio as f64;
+        let alike = match repeats {
+            Repeats::AtOneInstant => apart == 0.0,
+            Repeats::AtWholePeriods => (apart - period * (apart / period).round()).abs() < SAME_INSTANT,
+        };
+        a.front_end == b.front_end && alike
+    }
+
+    /// The channels of `group` with the least delay, and the noise of all channels.
+    fn newest(&self, group: &[usize]) -> (Vec<usize>, &[f64]) {
+        let delay = |i: usize| self.channels[i].delay.0;
+        let least = group.iter().map(|&i| delay(i)).fold(f64::INFINITY, f64::min);
+        (group.iter().copied().filter(|&i| delay(i) - least < SAME_INSTANT).collect(), &self.noise)
+    }
+}
+
+impl MergedChannels {
+    /// Whether the original channels were all distinct.
+    pub(super) fn are_all(&self) -> bool {
+        self.problem.channels.len() == self.shares.len()
+    }
+
+    /// For each merged channel the first of the original channels whose sample is the newest.
+    pub(super) fn representatives(&self) -> Vec<usize> {
+        let of = |merged: usize| {
+            let belongs = |share: &Share| share.representative == merged && share.share != 0.0;
+            self.shares.iter().position(belongs)
+        };
+        (0..self.problem.channels.len()).filter_map(of).collect()
+    }
+
+    /// Distributes each merged filter over its channels by their shares. The error stays the same, and the
+    /// noise is least.
+    pub(super) fn share_taps(&self, taps: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let share = |part: &Share| taps[part.representative].iter().map(|tap| tap * part.share).collect();
+        self.shares.iter().map(share).collect()
+    }
+
+    /// The matrix that maps the original channels to the merged ones: F of the merged channels times this
+    /// matrix is F of the original channels.
+    pub(super) fn shares(&self) -> Mat {
+        let entry = |merged: usize, channel: usize| {
+            let part = self.shares[channel];
+            if part.representative == merged { part.share } else { 0.0 }
+        };
+        Mat::from_fn(self.problem.channels.len(), self.shares.len(), entry)
+    }
+}
+
+/// Weights of sum 1 for the mean of equal signals with the least noise, given the noise power of each. They
+/// are inversely proportional to the powers. If any signals are noiseless, only these have weight.
+fn least_noise_shares(noise: &[f64]) -> Vec<f64> {
+    let least = noise.iter().copied().fold(f64::INFINITY, f64::min);
+    let weight = |power: f64| if least == 0.0 { f64::from(u8::from(power == 0.0)) } else { least / power };
+    let total: f64 = noise.iter().map(|&power| weight(power)).sum();
+    noise.iter().map(|&power| weight(power) / total).collect()
+}

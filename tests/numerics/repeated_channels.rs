@@ -1,0 +1,125 @@
+//! Channels that repeat what others measure: the same filter, up to a gain, sampled whole slow periods later.
+//! `HYBANK_SWEEP=200` tries so many random plants.
+
+use crate::support::random::Random;
+use crate::support::specs::{alike, amplify, low_pass, thesis};
+use hybank::design::{Design, analyze, design};
+use hybank::spec::{Family, FilterSpec, Method, Spec};
+use hybank::verify::verify;
+use std::f64::consts::TAU;
+
+/// A low-pass with its cutoff in cycles per fast sample.
+fn filter(family: Family, order: usize, cutoff: f64) -> FilterSpec {
+    low_pass(family, order, TAU * cutoff)
+}
+
+fn by(method: Method, mut spec: Spec) -> Spec {
+    spec.design.method = method;
+    spec
+}
+
+fn norm(design: &Design) -> f64 {
+    design.bank.gamma.norm.unwrap()
+}
+
+/// Two channels that carry the whole information, and two that repeat it a period later.
+#[test]
+fn a_channel_a_period_later_adds_nothing_and_harms_nothing() {
+    let front_end = filter(Family::Butterworth, 4, 0.2);
+    for method in [Method::Iir, Method::H2] {
+        let four = design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1, 2.2, 3.1]))).unwrap();
+        let two = design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1]))).unwrap();
+        assert!((norm(&four) / norm(&two) - 1.0).abs() < 1e-6, "{} {}", norm(&four), norm(&two));
+        let noise_gain = analyze(&four.bank, &[]).unwrap().mean.noise_gain;
+        assert!(noise_gain < 10.0, "{noise_gain}");
+        let proven = four.proof.as_ref().unwrap();
+        assert_eq!(&verify(&four.bank).unwrap(), proven);
+        // The optimum, of 64 taps too.
+        assert!((proven.noncausal / 0.01743 - 1.0).abs() < 1e-3, "{proven:?}");
+        if method == Method::Iir {
+            assert!(proven.upper / proven.lower < 1.0 + 1e-4, "{proven:?}");
+        }
+    }
+}
+
+#[test]
+fn one_converter_twice_is_one_converter() {
+    let front_end = filter(Family::Butterworth, 4, 0.2);
+    let two = design(&alike(&front_end, 2, 1, &[0.2, 2.2])).unwrap();
+    let one = design(&alike(&front_end, 2, 1, &[0.2])).unwrap();
+    assert!((norm(&two) / norm(&one) - 1.0).abs() < 1e-6, "{} {}", norm(&two), norm(&one));
+}
+
+#[test]
+fn four_interleaved_converters_at_half_the_ratio_are_designed() {
+    let front_end = filter(Family::Butterworth, 4, 0.2);
+    let four = design(&alike(&front_end, 2, 8, &[0.0, 1.0, 2.0, 3.0])).unwrap();
+    let two = design(&alike(&front_end, 2, 8, &[0.0, 1.0])).unwrap();
+    assert!(norm(&four) <= norm(&two) * (1.0 + 1e-6) + 1e-12, "{} {}", norm(&four), norm(&two));
+}
+
+/// thesis, and its second channel once more.
+#[test]
+fn the_noncausal_bound_counts_repeated_channels_once() {
+    for method in [Method::Iir, Method::Fir] {
+        let mut spec = by(method, thesis(10, &[0.6, 1.2, 2.6]));
+        spec.design.taps = (method == Method::Fir).then_some(22);
+        let three = design(&spec).unwrap();
+        assert!((three.bank.gamma.noncausal.unwrap() - 0.03993).abs() < 2e-5, "{:?}", three.bank.gamma);
+        assert!((norm(&three) / 0.03993 - 1.0).abs() < 1e-3, "{}", norm(&three));
+        verify(&three.bank).unwrap();
+    }
+}
+
+/// A preamplifier in front of one of two converters changes nothing but their taps.
+#[test]
+fn proportional_filters_are_one_measurement() {
+    for method in [Method::Iir, Method::Fir] {
+        let mut spec = by(method, thesis(10, &[1.2, 0.6, 0.6]));
+        spec.design.taps = (method == Method::Fir).then_some(22);
+        amplify(&mut spec.channels[2].filter, 3.7);
+        let three = design(&spec).unwrap();
+        assert!((norm(&three) / 0.03993 - 1.0).abs() < 1e-3, "{}", norm(&three));
+        let proven = verify(&three.bank).unwrap();
+        assert!(proven.upper / proven.lower < 1.0 + 1e-4, "{proven:?}");
+    }
+}
+
+/// A random plant of distinct channels, and the same with some of them again, whole periods later.
+fn plants(seed: u64) -> (Spec, Spec) {
+    let mut dice = Random(seed);
+    let family = dice.of(&[Family::Butterworth, Family::Bessel, Family::Chebyshev1]);
+    let front_end = filter(family, dice.count(1, 4), 0.05 + 0.3 * dice.part());
+    let (count, ratio) = (dice.count(1, 3), dice.count(1, 3));
+    let latency = dice.count(0, 12);
+    let distinct: Vec<f64> =
+        (0..count).map(|i| (i as f64 + 0.1 + 0.8 * dice.part()) * ratio as f64 / count as f64).collect();
+    let mut delays = distinct.clone();
+    for &delay in &distinct {
+        if delays.len() == count || dice.part() < 0.5 {
+            delays.push(delay + (dice.count(1, 3) * ratio) as f64);
+        }
+    }
+    let plain = alike(&front_end, ratio, latency, &distinct);
+    (plain, alike(&front_end, ratio, latency, &delays))
+}
+
+#[test]
+fn repeats_change_no_recursive_bank() {
+    let count = std::env::var("HYBANK_SWEEP").ok().and_then(|count| count.parse().ok()).unwrap_or(12);
+    let mut worst = 0.0_f64;
+    for seed in 0..count {
+        let (plain, repeated) = plants(seed);
+        for method in [Method::Iir, Method::H2] {
+            let [plain, repeated] =
+                [&plain, &repeated].map(|spec| design(&by(method, spec.clone())).unwrap());
+            let excess = norm(&repeated) / norm(&plain) - 1.0;
+            worst = worst.max(excess);
+            assert!(excess < 1e-5, "plant {seed}, {method:?}: {} {}", norm(&repeated), norm(&plain));
+            let proven =
+                repeated.proof.clone().unwrap_or_else(|error| panic!("plant {seed}, {method:?}: {error}"));
+            assert!(proven.lower <= norm(&repeated) * (1.0 + 1e-9), "plant {seed}: {proven:?}");
+        }
+    }
+    println!("{count} plants, largest excess {worst:.1e}");
+}
