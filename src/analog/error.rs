@@ -4,7 +4,7 @@ use crate::linalg::LinalgError;
 use crate::spec::FilterProblem;
 use crate::units::{RadiansPerFastPeriod, Seconds};
 
-use super::{MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_NORMALISED_POLE};
+use super::{MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_GAIN, MIN_NORMALISED_POLE};
 
 /// Why a filter was refused. Poles and zeros are given in rad/s, as the user wrote them.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -62,9 +62,10 @@ pub enum AnalogError {
         "the output of the filter does not depend on its input; check which states b drives and c observes"
     )]
     NoTransmission,
-    /// The gain leaves the range of double precision in normalised time.
+    /// The gain is so large or small that its square leaves the range of double precision.
     #[error(
-        "the gain is {value:e} once time is measured in fast periods; check the units of gain, poles and period"
+        "the gain is {value:e} once time is measured in fast periods; the supported range is {MIN_GAIN:e} to {MAX_GAIN:e}: \
+         check num, gain or c, and the units of poles and period"
     )]
     GainOutOfRange {
         /// The normalised gain.

@@ -7,7 +7,7 @@ use crate::units::{RadiansPerFastPeriod, Seconds};
 use super::balance::with_unit_states;
 use super::realise::Chain;
 use super::section::Realisation;
-use super::{AnalogError, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_NORMALISED_POLE};
+use super::{AnalogError, MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_GAIN, MIN_NORMALISED_POLE};
 
 /// A stable, strictly proper, real filter Phi in normalised time t' = t/h.
 ///
@@ -63,7 +63,7 @@ impl StrictlyProper {
         (self.chain.blocks == other.chain.blocks && ratio.is_normal()).then_some(ratio)
     }
 
-    /// Refuses a filter whose response is zero or not a number where its poles are.
+    /// Refuses a filter whose response is zero, out of range or not a number where its poles are.
     fn transmitting(self) -> Result<Self, AnalogError> {
         let probes = self.poles.iter().map(|p| p.norm()).chain([0.0]);
         let largest = probes.map(|w| self.response(RadiansPerFastPeriod(w)).norm()).fold(0.0, f64::max);
@@ -71,7 +71,14 @@ impl StrictlyProper {
         if !(largest.is_finite() && sum.is_finite()) {
             return Err(AnalogError::GainOutOfRange { value: self.chain.gain });
         }
-        if largest == 0.0 { Err(AnalogError::NoTransmission) } else { Ok(self) }
+        if largest == 0.0 {
+            return Err(AnalogError::NoTransmission);
+        }
+        if (MIN_GAIN..=MAX_GAIN).contains(&largest) {
+            Ok(self)
+        } else {
+            Err(AnalogError::GainOutOfRange { value: largest })
+        }
     }
 
     /// a, n x n.

@@ -1,9 +1,11 @@
-//! Ctrl-C and SIGTERM: the first one requests an orderly end, the second one ends the process at once.
+//! Ctrl-C and SIGTERM. In a run the first one requests an orderly end, and the second one ends the process at
+//! once. In a computation the first one ends it at once.
 
 use crossbeam_channel::Receiver;
 
 #[cfg(unix)]
 mod watch {
+    use crate::cli::say::say_line;
     use crate::files::remove_unfinished;
     use crate::io::is_stdout_stalled;
     use crossbeam_channel::{Receiver, Sender, bounded, never};
@@ -18,24 +20,34 @@ mod watch {
     /// See [`super::interrupts`].
     pub(super) fn start() -> Receiver<()> {
         let (stop_sender, stop) = bounded(1);
+        if watched(move |signals| until_the_end(signals, &stop_sender)) { stop } else { never() }
+    }
+
+    /// See [`super::end_at_interrupt`].
+    pub(super) fn end_at_first() {
+        watched(|mut signals| {
+            if signals.forever().next().is_some() {
+                say_line("interrupted; nothing was written");
+                remove_unfinished();
+                std::process::exit(1);
+            }
+        });
+    }
+
+    /// Whether a thread does `watch` with the signals.
+    fn watched(watch: impl FnOnce(Signals) + Send + 'static) -> bool {
         let (signal_sender, signals) = bounded::<Signals>(1);
         // The thread is started first: if that fails, signals keep their default effect.
-        let watch = move || {
+        let wait = move || {
             if let Ok(signals) = signals.recv() {
-                until_the_end(signals, &stop_sender);
+                watch(signals);
             }
         };
-        if std::thread::Builder::new().name("signals".into()).spawn(watch).is_err() {
-            return never();
+        if std::thread::Builder::new().name("signals".into()).spawn(wait).is_err() {
+            return false;
         }
-        match Signals::new([SIGINT, SIGTERM]) {
-            Ok(signals) => {
-                // The thread waits for them.
-                let _ = signal_sender.send(signals);
-                stop
-            }
-            Err(_) => never(),
-        }
+        // The thread waits for them.
+        Signals::new([SIGINT, SIGTERM]).is_ok_and(|signals| signal_sender.send(signals).is_ok())
     }
 
     fn until_the_end(mut signals: Signals, stop: &Sender<()>) {
@@ -66,6 +78,17 @@ mod watch {
 pub(super) fn interrupts() -> Receiver<()> {
     watch::start()
 }
+
+/// From now on an interrupt ends the process at once, with a message and exit code 1. Unfinished files are
+/// removed.
+#[cfg(unix)]
+pub(super) fn end_at_interrupt() {
+    watch::end_at_first();
+}
+
+/// Nothing, on a system without signals.
+#[cfg(not(unix))]
+pub(super) fn end_at_interrupt() {}
 
 /// Nothing, on a system without signals.
 #[cfg(not(unix))]

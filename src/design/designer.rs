@@ -1,8 +1,9 @@
 //! The steps from a spec to a finished bank.
 
-use super::choices::completed;
+use super::choices::{completed, settings, with_taps};
+use super::effort::{self, Effort, Limits, Observer, Stage, unobserved};
 use super::merging::Repeats;
-use super::methods::{self, DualPoint, Settings, Synthesis};
+use super::methods::{self, DualPoint, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use super::quantise::WordStudy;
@@ -10,7 +11,7 @@ use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
 use super::{DesignError, prove};
 use crate::bank::{Bank, Gamma};
-use crate::spec::{Method, Spec};
+use crate::spec::Spec;
 use crate::units::RadiansPerSlowPeriod;
 use crate::verify::Verified;
 use std::time::{Duration, Instant};
@@ -47,12 +48,31 @@ pub enum ProofSearch {
     Skip,
 }
 
+/// How a design runs.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// Whether a proof is searched.
+    pub proof: ProofSearch,
+    /// Whether a design that takes too long or needs too much memory is refused.
+    pub limits: Limits,
+    /// Told which step begins.
+    pub observer: Observer<'a>,
+}
+
+impl Default for Options<'_> {
+    /// With the search for a proof, limited and unobserved.
+    fn default() -> Self {
+        Self { proof: ProofSearch::Run, limits: Limits::Enforced, observer: &unobserved }
+    }
+}
+
 /// Designs the bank that `spec` asks for, with the proof of its gammas.
 ///
 /// # Errors
 /// [`DesignError`] if the spec breaks a rule of [`Spec::check`], a filter of the spec is not a valid front
-/// end, a comparison method does not apply, or no bank was found for numerical reasons. A bank without a
-/// proof is not an error: see [`Design::proof`].
+/// end, a comparison method does not apply, the design would take more than ten minutes or more memory than
+/// there is, or no bank was found for numerical reasons. A bank without a proof is not an error: see
+/// [`Design::proof`].
 pub fn design(spec: &Spec) -> Result<Design, DesignError> {
     design_with(spec, ProofSearch::Run)
 }
@@ -62,35 +82,50 @@ pub fn design(spec: &Spec) -> Result<Design, DesignError> {
 /// # Errors
 /// As [`design`].
 pub fn design_with(spec: &Spec, search: ProofSearch) -> Result<Design, DesignError> {
+    design_observed(spec, &Options { proof: search, ..Options::default() })
+}
+
+/// As [`design`]; `options` say how.
+///
+/// # Errors
+/// As [`design`].
+pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     spec.check()?;
-    let (complete, problem) = normalise(spec)?;
+    let (complete, problem, watch) = normalise(spec, options)?;
+    watch.begins(Stage::Filters);
     let merged = problem.merge_channels(Repeats::of(spec.design.method));
     let plant = LiftedPlant::new(&merged.problem)?;
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings(&complete)?)?;
+    watch.begins(Stage::Realisation);
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis)?;
-    Ok(judge(spec, complete, realised, &synthesis).proved(&synthesis.dual, search))
+    watch.begins(Stage::Proof);
+    Ok(judge(spec, complete, realised, &synthesis).proved(&synthesis.dual, options.proof))
 }
 
-/// The spec with all defaults filled in, and its problem in normalised time.
-fn normalise(spec: &Spec) -> Result<(Spec, Problem), DesignError> {
-    let complete = completed(spec)?;
+/// Tells the observer what is done, with the time that the design takes.
+struct Watch<'a> {
+    observer: Observer<'a>,
+    effort: Effort,
+}
+
+impl Watch<'_> {
+    fn begins(&self, stage: Stage) {
+        (self.observer)(stage, self.effort.seconds);
+    }
+}
+
+/// The spec with all defaults filled in, and its problem in normalised time. The effort is checked before
+/// the latency is chosen, and again with that latency.
+fn normalise<'a>(spec: &Spec, options: &Options<'a>) -> Result<(Spec, Problem, Watch<'a>), DesignError> {
+    let checked = |spec: &Spec| effort::check(spec, options.proof == ProofSearch::Run, options.limits);
+    let open = with_taps(spec)?;
+    let mut watch = Watch { observer: options.observer, effort: checked(&open)? };
+    let complete = completed(&open, &|designs| watch.begins(Stage::Latency { designs }))?;
+    if spec.latency.is_none() {
+        watch.effort = checked(&complete)?;
+    }
     let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
-    Ok((complete, problem))
-}
-
-/// The settings of the method, from a complete spec.
-fn settings(spec: &Spec) -> Result<Settings, DesignError> {
-    let at_slow_rate = || {
-        let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
-        Ok::<_, DesignError>(Problem::new(&slow, 0)?.merge_channels(Repeats::AtOneInstant).problem)
-    };
-    let separate = spec.design.method == Method::Separation;
-    Ok(Settings {
-        taps: spec.design.taps.unwrap_or_default(),
-        gamma_margin: spec.design.gamma_margin,
-        solver: spec.design.solver,
-        at_slow_rate: separate.then(at_slow_rate).transpose()?,
-    })
+    Ok((complete, problem, watch))
 }
 
 /// The bank with its complete spec and with the norm of its final coefficients. No lower bound exceeds that

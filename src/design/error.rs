@@ -1,5 +1,6 @@
 //! Errors of design and analysis.
 
+use super::effort::amount::{Effort, Rounded};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
 use crate::lmi::kyp::KypError;
@@ -124,6 +125,45 @@ pub enum DesignError {
         states: f64,
         /// Most states.
         limit: usize,
+    },
+    /// The design would take longer than ten minutes.
+    #[error(
+        "this design would take about {effort}, and ten minutes are allowed: {remedy}; --no-limit runs it all the same"
+    )]
+    TooLong {
+        /// The estimate.
+        effort: Effort,
+        /// The way out.
+        remedy: &'static str,
+    },
+    /// The design would need more memory than there is.
+    #[error(
+        "this design would take about {effort}, and this process may use {}: {remedy}; --no-limit tries it all the same",
+        Rounded::memory(*.memory)
+    )]
+    TooLarge {
+        /// The estimate.
+        effort: Effort,
+        /// Bytes of memory.
+        memory: f64,
+        /// The way out.
+        remedy: &'static str,
+    },
+    /// No tap sees a sample that has to do with the reference.
+    #[error(
+        "at latency {latency} the {taps} taps per channel see no samples that tell anything of the output: they reach \
+         latencies {shortest} to {longest}; choose one of these, leave the latency out to have the best one chosen, \
+         or give more taps"
+    )]
+    OutOfReach {
+        /// m0, fast samples.
+        latency: usize,
+        /// Taps per channel.
+        taps: usize,
+        /// The shortest latency that is reached.
+        shortest: usize,
+        /// The longest one.
+        longest: usize,
     },
     /// A bank's state-space matrices have rows of unequal lengths.
     #[error("the bank's state-space matrices do not fit: expected {rows} rows of {cols} numbers")]

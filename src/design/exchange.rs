@@ -30,10 +30,10 @@ pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
 /// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so even
 /// this margin lets the mean square improve.
 pub(super) const LEAST_MARGIN: f64 = 4e-7;
-/// Tolerance of the optimum on the points, relative to [`GAMMA_ACCURACY`].
+/// Tolerance of the optimum on the points, relative to the accuracy of gamma.
 const POINTS_ACCURACY: f64 = 0.1;
-/// Excess of a peak over the optimum on the points, relative to [`GAMMA_ACCURACY`], from which it becomes a
-/// point.
+/// Excess of a peak over the optimum on the points, relative to the accuracy of gamma, from which it becomes
+/// a point.
 const PEAK_EXCESS: f64 = 0.2;
 /// Fraction of the margin that the secondary objective may use at the points. The rest is left to the peaks
 /// between them.
@@ -139,8 +139,17 @@ impl<E: AffineError> Exchange<E> {
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
     pub(super) fn optimise(&mut self) -> Result<Candidate, DesignError> {
-        let least = self.minimise_gamma()?;
+        let least = self.minimise_gamma(GAMMA_ACCURACY, f64::INFINITY)?;
         self.minimise_mean_square(least)
+    }
+
+    /// Unknowns with gamma within `accuracy` of the optimum, without the secondary objective. Ends early
+    /// when the lower bound exceeds `hopeless`.
+    ///
+    /// # Errors
+    /// As [`Exchange::optimise`].
+    pub(super) fn compare(&mut self, accuracy: f64, hopeless: f64) -> Result<Candidate, DesignError> {
+        self.minimise_gamma(accuracy, hopeless)
     }
 
     /// Adds points at the given frequencies, except where there is one. Returns whether any was added.
@@ -158,13 +167,13 @@ impl<E: AffineError> Exchange<E> {
         Ok(!added.is_empty())
     }
 
-    fn minimise_gamma(&mut self) -> Result<Candidate, DesignError> {
-        let settings = Settings { tol_gap_rel: POINTS_ACCURACY * GAMMA_ACCURACY, ..Settings::default() };
+    fn minimise_gamma(&mut self, accuracy: f64, hopeless: f64) -> Result<Candidate, DesignError> {
+        let settings = Settings { tol_gap_rel: POINTS_ACCURACY * accuracy, ..Settings::default() };
         let mut best: Option<Candidate> = None;
         for _ in 0..ROUND_LIMIT {
             let solution = sampled::minimise(&self.problem, &settings)?;
             self.count_round(solution.steps.len());
-            let level = solution.gamma * (1.0 + PEAK_EXCESS * GAMMA_ACCURACY);
+            let level = solution.gamma * (1.0 + PEAK_EXCESS * accuracy);
             self.raise_lower_bound(solution.lower.value, solution.dual);
             let candidate = self.judge(solution.taps, solution.gamma, level)?;
             let above = candidate.peaks.above(level);
@@ -172,7 +181,8 @@ impl<E: AffineError> Exchange<E> {
                 best = Some(candidate);
             }
             let gamma = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
-            if gamma <= self.lower * (1.0 + GAMMA_ACCURACY) || !self.add(&above)? {
+            let decided = gamma <= self.lower * (1.0 + accuracy) || self.lower > hopeless;
+            if decided || !self.add(&above)? {
                 break;
             }
         }

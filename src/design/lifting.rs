@@ -31,6 +31,10 @@ pub(super) struct Lifted {
     pub(super) system: StateSpace,
     /// For each measurement the states of its delay chain; the first state holds the newest sample.
     pub(super) chains: Vec<Range<usize>>,
+    /// The system without the delays of its outputs by whole periods.
+    pub(super) prompt: StateSpace,
+    /// These delays, one for each output, in slow periods.
+    pub(super) delays: Vec<usize>,
 }
 
 /// When and where a sample is taken.
@@ -58,7 +62,7 @@ pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
     let chains = ends.zip(&delays).map(|(end, &delay)| if delay == 0 { 0..0 } else { end - delay..end });
     let chains = chains.take(problem.channels.len()).collect();
     let system = prompt.series(&StateSpace::delays(&delays))?.compress_inputs();
-    Ok(Lifted { system, chains })
+    Ok(Lifted { system, chains, prompt: prompt.compress_inputs(), delays })
 }
 
 /// The instants of all outputs, the measurements first, relabelled so that the latest lies at the end of
@@ -112,14 +116,14 @@ fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<State
 
 /// All distinct front ends side by side, driven by the same input: dx/dt = diag(A_i) x + B f, row i of C
 /// reads filter i.
-struct JointState {
+pub(super) struct JointState {
     transition: StateTransition,
     b: Mat,
     c: Mat,
 }
 
 impl JointState {
-    fn new(front_ends: &[StrictlyProper]) -> Result<Self, DesignError> {
+    pub(super) fn new(front_ends: &[StrictlyProper]) -> Result<Self, DesignError> {
         let b: Vec<&Mat> = front_ends.iter().map(StrictlyProper::b).collect();
         let c: Vec<&Mat> = front_ends.iter().map(StrictlyProper::c).collect();
         Ok(Self {
@@ -129,14 +133,23 @@ impl JointState {
         })
     }
 
-    fn order(&self) -> usize {
+    pub(super) fn order(&self) -> usize {
         self.b.nrows()
+    }
+
+    /// Row i reads front end i.
+    pub(super) fn c(&self) -> &Mat {
+        &self.c
+    }
+
+    /// (e^{A l}, S) of a segment of length l: x <- e^{A l} x + S w with S S* = G(l).
+    pub(super) fn over(&self, length: f64) -> Result<(Mat, Mat), DesignError> {
+        Ok((self.transition.over(length), gramian_root(&self.transition, &self.b, length)?))
     }
 
     /// x <- e^{A l} x + S w_new over a segment of length l: the new inputs become further columns.
     fn advance(&self, state: &Mat, input: &Mat, length: f64) -> Result<(Mat, Mat), DesignError> {
-        let transition = self.transition.over(length);
-        let root = gramian_root(&self.transition, &self.b, length)?;
+        let (transition, root) = self.over(length)?;
         Ok((&transition * state, linalg::hstack(&[&(&transition * input), &root])?))
     }
 }

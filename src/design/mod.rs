@@ -4,6 +4,7 @@
 pub mod analysis;
 mod choices;
 mod designer;
+pub mod effort;
 mod error;
 mod error_grid;
 mod exchange;
@@ -20,7 +21,8 @@ pub mod reduction;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use choices::latency;
-pub use designer::{Design, ProofSearch, design, design_with};
+pub use designer::{Design, Options, ProofSearch, design, design_observed, design_with};
+pub use effort::{Limits, Stage};
 pub use error::DesignError;
 pub use plant::LiftedPlant;
 pub use problem::Problem;

@@ -7,7 +7,7 @@ use super::lifting::{Lifted, lift};
 use super::merging::Repeats;
 use super::problem::Problem;
 use crate::bank::SynthesisFilters;
-use crate::linalg::{self, CMat, Mat};
+use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::{
     Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
@@ -44,6 +44,8 @@ pub struct LiftedPlant {
     problem: Problem,
     system: StateSpace,
     chains: Vec<Range<usize>>,
+    prompt: StateSpace,
+    delays: Vec<usize>,
     response: OnceLock<FrequencyResponse>,
     resonances: OnceLock<Vec<f64>>,
     measurement_size: OnceLock<f64>,
@@ -55,12 +57,13 @@ impl LiftedPlant {
     /// # Errors
     /// [`DesignError::Linalg`] or [`DesignError::Shapes`] never for a [`Problem`] made by [`Problem::new`].
     pub fn new(problem: &Problem) -> Result<Self, DesignError> {
-        let Lifted { system, chains } = lift(problem)?;
-        let problem = problem.clone();
+        let Lifted { system, chains, prompt, delays } = lift(problem)?;
         Ok(Self {
-            problem,
+            problem: problem.clone(),
             system,
             chains,
+            prompt,
+            delays,
             response: OnceLock::new(),
             resonances: OnceLock::new(),
             measurement_size: OnceLock::new(),
@@ -132,7 +135,7 @@ impl LiftedPlant {
     /// (H, W) at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N +
     /// M, which keeps `[H; W] [H; W]*`.
     pub fn response(&self, omega: f64) -> (CMat, CMat) {
-        let g = linalg::lq_factor_c(&self.frequency_response().at_frequency(omega));
+        let g = linalg::lq_factor_c(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
         (g.rows(0, n).into_owned(), g.rows(n, m).into_owned())
     }
@@ -156,9 +159,8 @@ impl LiftedPlant {
         let lags = filters::polyphase(taps, self.ratio());
         let system = self.error_system(&StateSpace::fir(&lags)?)?;
         let (n, m) = (self.channels(), self.ratio());
-        let plant = self.frequency_response();
         let response = |w: f64| {
-            let g = plant.at_frequency(w);
+            let g = self.at_frequency(w);
             g.rows(n, m) - filters::response(&lags, w) * g.rows(0, n)
         };
         // Between 0 and pi a polynomial in e^{-jw} has at most one peak per lag.
@@ -210,19 +212,28 @@ impl LiftedPlant {
     pub fn noncausal_bound(&self) -> Result<Peak, DesignError> {
         let distinct = self.problem.merge_channels(Repeats::AtWholePeriods).representatives();
         let references = self.channels()..self.channels() + self.ratio();
-        let system = self.system.select_outputs(distinct.iter().copied().chain(references))?;
-        Ok(unexplained_peak(&system, distinct.len())?)
+        // Delays by whole periods turn the rows of the response, which changes neither the span of the
+        // measurements nor the singular values.
+        let prompt = self.prompt.select_outputs(distinct.iter().copied().chain(references))?;
+        Ok(unexplained_peak(&prompt, distinct.len())?)
     }
 
-    fn frequency_response(&self) -> &FrequencyResponse {
-        self.response.get_or_init(|| FrequencyResponse::new(&self.system.compress_inputs()))
+    /// `[H; W]` at e^{j omega}. A delay by whole periods is a factor of its row, so the time does not depend
+    /// on the length of the delay chains.
+    fn at_frequency(&self, omega: f64) -> CMat {
+        let prompt = self.response.get_or_init(|| FrequencyResponse::new(&self.prompt));
+        let mut g = prompt.at_frequency(omega);
+        for (mut row, &delay) in g.row_iter_mut().zip(&self.delays).filter(|(_, delay)| **delay > 0) {
+            row *= Complex::from_polar(1.0, -omega * delay as f64);
+        }
+        g
     }
 
     /// The frequencies near the poles of the plant. Apart from poles at zero, every FIR error system has
     /// these poles.
     fn resonances(&self) -> Result<&[f64], DesignError> {
         if self.resonances.get().is_none() {
-            let found = resonances(&stable_poles(&self.system)?);
+            let found = resonances(&stable_poles(&self.prompt)?);
             return Ok(self.resonances.get_or_init(|| found));
         }
         Ok(self.resonances.get().map_or(&[], Vec::as_slice))

@@ -26,6 +26,9 @@ pub const MAX_STATES: usize = 65_536;
 /// Largest loss by order reduction of a spec; a larger one would leave no state.
 pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
 
+/// Largest share by which gamma may exceed its optimum; no bank that is worth anything is so far from it.
+const MAX_GAMMA_MARGIN: f64 = 1e6;
+
 /// Distance to a whole number of fast periods within which a delay is rounded to it, relative to its size
 /// (at least one period). A delay of 3 periods of 0.1 s is 0.30000000000000004 s; without rounding, the
 /// fraction would become a channel state of size 1e-16.
@@ -163,14 +166,14 @@ pub(crate) fn check_reduction_loss(db: f64) -> Result<(), SpecProblem> {
 
 /// Relative excess over the optimal gamma.
 pub(crate) fn check_gamma_margin(gamma_margin: f64) -> Result<(), SpecProblem> {
-    if gamma_margin >= 0.0 && gamma_margin.is_finite() {
+    if (0.0..=MAX_GAMMA_MARGIN).contains(&gamma_margin) {
         return Ok(());
     }
-    Err(range(
-        gamma_margin,
-        "(relative)",
-        "gamma_margin is the share by which gamma may exceed its optimum, zero or more",
-    ))
+    let rule = format!(
+        "gamma_margin is the share by which gamma may exceed its optimum, zero or more and at most {MAX_GAMMA_MARGIN}; \
+         0.01 is one per cent"
+    );
+    Err(range(gamma_margin, "(relative)", rule))
 }
 
 #[cfg(test)]

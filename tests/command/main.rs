@@ -8,6 +8,7 @@ mod algorithms;
 mod cuts;
 mod design;
 mod docs;
+mod effort;
 mod examples;
 #[cfg(target_os = "linux")]
 mod faults;

@@ -10,6 +10,7 @@ mod filters;
 mod gains;
 mod golden;
 mod hard_designs;
+mod latency;
 mod random_plants;
 mod reduction;
 mod repeated_channels;

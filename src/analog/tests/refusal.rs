@@ -56,6 +56,21 @@ fn what_cannot_be_sampled_is_refused_with_reason_and_remedy() {
     ));
 }
 
+/// Squares of such gains once ended in a decomposition that did not converge.
+#[test]
+fn gains_whose_squares_are_no_doubles_are_refused_by_their_key() {
+    for gain in [1e308, 1e200, 1e61, 1e-61, 1e-200, 1e-300] {
+        for filter in [tf(&[gain], &[1.0, 1.0]), zpk(&[], &[[-1.0, 0.0]], gain)] {
+            let error = refused(&filter, 1.0);
+            assert!(matches!(error, AnalogError::GainOutOfRange { .. }), "{gain:e}: {error}");
+            assert!(error.to_string().contains("check num, gain or c"), "{error}");
+        }
+    }
+    for gain in [1e59, 1e-59] {
+        assert!(realise(&tf(&[gain], &[1.0, 1.0]), 1.0).is_ok(), "{gain:e}");
+    }
+}
+
 #[test]
 fn an_edge_sharper_than_a_double_is_refused_by_its_order() {
     let filter = FilterSpec::Family {

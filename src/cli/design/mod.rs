@@ -1,12 +1,15 @@
 //! `hybank design`: from a spec file to a bank file.
 
+mod progress;
 mod report;
 
 use super::Failure;
 use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text};
+use super::interrupt::end_at_interrupt;
 use crate::bank::FixedPoint;
-use crate::design::{self, DesignError};
+use crate::design::{self, DesignError, Limits, Options};
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, WordLengths};
+use progress::Progress;
 use report::Report;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -62,6 +65,9 @@ pub(super) struct Args {
     /// iir and h2)
     #[arg(long, value_name = "DB", conflicts_with = "order")]
     reduction_loss_db: Option<f64>,
+    /// Design even if the estimate exceeds ten minutes or the memory of the machine
+    #[arg(long)]
+    no_limit: bool,
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
@@ -119,7 +125,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     spec.check().map_err(|problem| bad_flag("latency", &problem))?;
     let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
     let begin = Instant::now();
-    let found = design::design(&spec).map_err(named)?;
+    end_at_interrupt();
+    let progress = Progress::default();
+    let limits = if args.no_limit { Limits::Off } else { Limits::Enforced };
+    let options =
+        Options { limits, observer: &|stage, seconds| progress.note(stage, seconds), ..Options::default() };
+    let found = progress.during(|| design::design_observed(&spec, &options)).map_err(named)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
     let text = found.bank.to_json().map_err(Failure::input)?;

@@ -1,5 +1,6 @@
 use super::*;
 use crate::bank::SynthesisFilters;
+use crate::spec::Method;
 use crate::units::Seconds;
 
 fn spec(design: &str, channels: &str) -> Spec {

@@ -82,7 +82,7 @@ fn covariances_of_samples_are_those_of_their_times() {
 #[test]
 fn chains_are_read_at_their_ends() {
     let problem = one_pole(&[0.1, 4.0], 2, 0, &[(0, 0.0), (1, 4.0), (0, 7.3)]);
-    let Lifted { system, chains } = lift(&problem).unwrap();
+    let Lifted { system, chains, .. } = lift(&problem).unwrap();
     let lengths: Vec<usize> = chains.iter().map(ExactSizeIterator::len).collect();
     // The latest sample is the reference at time 1; the channels are 1, 5 and 8.3 fast periods older.
     assert_eq!(lengths, [0, 2, 4]);

@@ -111,3 +111,19 @@ fn filters_for_another_number_of_channels_are_refused() {
     assert!(matches!(error, DesignError::Shapes(_)), "{error}");
     assert!(plant.fir_norm(&[vec![1.0; 4]]).is_err());
 }
+
+/// The response of the prompt part times the delays is that of the whole system, and delays by whole periods
+/// change no bound.
+#[test]
+fn delays_by_whole_periods_are_factors_of_the_response() {
+    for plant in plants() {
+        for omega in [0.0, 0.3, 1.7, PI] {
+            let whole = plant.system().response_at(Complex::from_polar(1.0, omega));
+            let (found, wanted) = (plant.at_frequency(omega), &whole * whole.adjoint());
+            assert!((&found * found.adjoint() - &wanted).norm() < 1e-12 * wanted.norm(), "{omega}");
+        }
+        let direct = unexplained_peak(plant.system(), plant.channels()).unwrap().gain;
+        let found = plant.noncausal_bound().unwrap().gain;
+        assert!((found / direct - 1.0).abs() < 1e-8, "{found} {direct}");
+    }
+}

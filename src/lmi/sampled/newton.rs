@@ -64,8 +64,10 @@ pub(super) fn add_taps(
     let (n, count) = (layout.channels, x.uu.count());
     let mut toeplitz = Mat::zeros(n * n, 2 * count);
     let mut hankel = Mat::zeros(n * n, 2 * count);
-    for p in 0..layout.rows {
-        for p2 in 0..=p {
+    // Rows without lags have no taps.
+    let with_taps = |p: &usize| layout.lags[*p] > 0;
+    for p in (0..layout.rows).filter(with_taps) {
+        for p2 in (0..=p).filter(with_taps) {
             for l in 0..count {
                 let (xl, zl) = (ProjectionAt::new(x, l), ProjectionAt::new(z, l));
                 for i2 in 0..n {

@@ -1,0 +1,168 @@
+//! What a spec leaves open: the latency, and the number of taps of the comparison methods.
+//!
+//! The latency is the shortest one whose error is within 0.1 % of the least over all latencies, by the
+//! method and with the length of the spec. The error is what the method minimises: gamma for `fir` (of real
+//! taps, without regard to noise) and `iir`, the rms for `h2`; for `sinc` and `separation` it is their
+//! gamma.
+
+mod reach;
+mod recursive;
+mod search;
+mod window_errors;
+
+use super::DesignError;
+use super::effort::{self, Limits};
+use super::merging::Repeats;
+use super::methods::{self, Settings, fir, iir};
+use super::plant::LiftedPlant;
+use super::problem::{Channel, Problem};
+use crate::spec::{Method, Spec};
+use crate::units::FastPeriods;
+use reach::Reach;
+use recursive::{CausalErrors, NEGLIGIBLE};
+use search::Search;
+
+/// Relative accuracy of the gammas of `fir` that are compared.
+const ACCURACY: f64 = 1e-4;
+
+/// Told how many designs were compared.
+type Compared<'a> = &'a dyn Fn(usize);
+
+/// The spec with the number of taps that the methods which make FIR filters use, and with a latency that
+/// these taps reach or none.
+///
+/// # Errors
+/// [`DesignError::OutOfReach`] for a latency that the taps do not reach; [`DesignError`] if the spec has no
+/// [`Problem`].
+pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
+    let mut complete = spec.clone();
+    if spec.design.method.has_taps() {
+        complete.design.taps = Some(taps(spec));
+        if let Some(latency) = spec.latency {
+            reach::check(&Problem::new(spec, latency)?, taps(spec))?;
+        }
+    }
+    Ok(complete)
+}
+
+/// The spec of [`with_taps`] with nothing left open: a latency as well. `compared` is told how many designs
+/// were compared.
+///
+/// # Errors
+/// As [`latency`].
+pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, DesignError> {
+    let latency = spec.latency.map_or_else(|| choose_latency(spec, compared), Ok)?;
+    Ok(Spec { latency: Some(latency), ..spec.clone() })
+}
+
+/// Taps per channel: the number in the spec, or 12 M - 1 for the comparison methods (23 for M = 2, as in
+/// the thesis). The method `fir` has no default; [`Spec::check`] asks for the number.
+fn taps(spec: &Spec) -> usize {
+    spec.design.taps.unwrap_or(12 * spec.ratio - 1)
+}
+
+/// The latency m0 of a spec in fast samples: the number in the spec, or the designer's choice.
+///
+/// # Errors
+/// If it is to be chosen: [`DesignError`] if the spec has no [`Problem`]; [`DesignError::TooLong`] or
+/// [`DesignError::TooLarge`] if the design cannot be made.
+pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
+    if let Some(latency) = spec.latency {
+        return Ok(latency);
+    }
+    let open = with_taps(spec)?;
+    effort::check(&open, false, Limits::Enforced)?;
+    choose_latency(&open, &|_| ())
+}
+
+/// The settings of the method, from a spec with taps.
+///
+/// # Errors
+/// [`DesignError`] if the spec has no [`Problem`] at the slow rate.
+pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
+    let at_slow_rate = || {
+        let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
+        Ok::<_, DesignError>(Problem::new(&slow, 0)?.merge_channels(Repeats::AtOneInstant).problem)
+    };
+    let separate = spec.design.method == Method::Separation;
+    Ok(Settings {
+        taps: taps(spec),
+        gamma_margin: spec.design.gamma_margin,
+        solver: spec.design.solver,
+        at_slow_rate: separate.then(at_slow_rate).transpose()?,
+    })
+}
+
+fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignError> {
+    let repeats = Repeats::of(spec.design.method);
+    let problem = Problem::new(spec, 0)?.merge_channels(repeats).problem;
+    compared(0);
+    match spec.design.method {
+        Method::Fir => for_fir(&problem, taps(spec), compared),
+        Method::Iir => for_iir(&problem, compared),
+        Method::H2 => Ok(CausalErrors::new(&problem)?.shortest()),
+        Method::Sinc | Method::Separation => for_comparison(spec, &problem, compared),
+    }
+}
+
+/// The shortest latency whose least gamma with `taps` taps per channel is almost the best.
+fn for_fir(problem: &Problem, taps: usize, compared: Compared<'_>) -> Result<usize, DesignError> {
+    let latencies = reach::candidates(problem, taps);
+    let reach = Reach::new(problem, taps, &latencies)?;
+    let floor = floor(problem, reach.silence())?;
+    let search = Search::new(latencies.map(|latency| reach.lower_bound(latency)), floor);
+    search.shortest(compared, |latency, hopeless| {
+        fir::bracket(&plant(problem, latency)?, taps, ACCURACY, hopeless)
+    })
+}
+
+/// The shortest latency whose least gamma is almost the best. Where the designer fails, other latencies
+/// are tried.
+fn for_iir(problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignError> {
+    let errors = CausalErrors::new(problem)?;
+    let floor = floor(problem, errors.silence())?;
+    let mut designs = 0;
+    let gamma = |latency: usize| {
+        designs += 1;
+        compared(designs);
+        let designed =
+            plant(problem, latency).and_then(|plant| iir::synthesise(&plant, &Settings::default()));
+        designed.map_or(f64::INFINITY, |synthesis| synthesis.peak.gain)
+    };
+    Ok(recursive::shortest(&errors, problem.ratio, floor, gamma))
+}
+
+/// The shortest latency whose gamma is almost the best of a method that does not minimise it.
+fn for_comparison(spec: &Spec, problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignError> {
+    let settings = settings(spec)?;
+    let latencies = reach::candidates(problem, settings.taps);
+    let search = Search::new(latencies.map(|_| 0.0), 0.0);
+    search.shortest(compared, |latency, _| {
+        let synthesis = methods::synthesise(spec.design.method, &plant(problem, latency)?, &settings)?;
+        Ok((synthesis.peak.gain, synthesis.peak.gain))
+    })
+}
+
+/// The plant with another latency.
+fn plant(problem: &Problem, latency: usize) -> Result<LiftedPlant, DesignError> {
+    let problem = Problem { latency, ..problem.clone() };
+    problem.check_size()?;
+    LiftedPlant::new(&problem)
+}
+
+/// A lower bound of gamma for all filters of any latency: the noncausal bound. Delays by whole slow periods
+/// do not change it, so it is computed without them. Gammas that are [`NEGLIGIBLE`] relative to `silence`
+/// count as equal.
+fn floor(problem: &Problem, silence: f64) -> Result<f64, DesignError> {
+    let within_a_period = |channel: &Channel| Channel {
+        delay: FastPeriods(channel.delay.0.rem_euclid(problem.ratio as f64)),
+        ..*channel
+    };
+    let channels = problem.channels.iter().map(within_a_period).collect();
+    let prompt = Problem { latency: problem.ratio - 1, channels, ..problem.clone() };
+    let noncausal = LiftedPlant::new(&prompt)?.noncausal_bound()?.gain;
+    Ok(noncausal.max(NEGLIGIBLE * silence))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,58 @@
+//! Costs that several methods share.
+
+use super::amount::Effort;
+use super::sizes::Sizes;
+
+/// Bytes of a real and of a complex number.
+pub(super) const REAL: f64 = 8.0;
+pub(super) const COMPLEX: f64 = 16.0;
+
+/// Seconds per operation in factorisations and products of large real matrices.
+pub(super) const PRODUCT: f64 = 6e-11;
+/// Seconds per operation in loops over small matrices, and over the columns of a triangular solution.
+pub(super) const SMALL: f64 = 4e-10;
+const SOLUTION: f64 = 1.2e-10;
+/// Seconds per n^3 of the decompositions of complex n x n matrices, at n = `BLOCK`. Larger matrices are
+/// decomposed at a higher rate.
+const COMPLEX_CUBE: f64 = 4.4e-9;
+const BLOCK: f64 = 66.0;
+const GROWTH: f64 = 0.9;
+/// Seconds per n^3 of the search for certificates of a system with n states, with their proof.
+const CERTIFICATE: f64 = 9e-8;
+/// Larger systems get no proof.
+const MOST_PROVEN: f64 = 512.0;
+
+/// All eigenvalues of a real matrix of this order.
+pub(super) fn eigenvalues(order: f64) -> Effort {
+    Effort { seconds: 10.0 * PRODUCT * order.powi(3), bytes: 5.0 * REAL * order * order }
+}
+
+/// Factorisations and products of one complex matrix of this order in an interior-point iteration, or the
+/// largest singular value of such a matrix.
+pub(super) fn complex_cube(order: f64) -> f64 {
+    COMPLEX_CUBE * order.powi(3) * (BLOCK / order.max(1.0)).powf(GROWTH)
+}
+
+/// The response of the plant at one frequency, compressed to a triangular factor. Delays by whole periods
+/// are factors of it.
+pub(super) fn response(sizes: &Sizes) -> Effort {
+    let (n, p) = (sizes.front_end_states, sizes.outputs());
+    let w = n + p;
+    let seconds = SOLUTION * (8.0 * n * n * (1.0 + p) + 4.0 * p * n * w) + 0.2 * complex_cube(p);
+    Effort { seconds, bytes: COMPLEX * (n * n + p * w) }
+}
+
+/// The peak gain of a system: eigenvalues of a matrix twice as large for two levels, and the gains on a grid
+/// with two frequencies per state, each of which takes `gain`.
+pub(super) fn peak(states: f64, gain: Effort) -> Effort {
+    let grid = gain.times(2.0 * states.max(16.0));
+    grid.then(eigenvalues(2.0 * states).times(2.0))
+}
+
+/// The search for a proof of the norm of an error system with so many states.
+pub(super) fn proof(states: f64) -> Effort {
+    if states > MOST_PROVEN {
+        return Effort::default();
+    }
+    Effort { seconds: CERTIFICATE * states.powi(3), bytes: 30.0 * REAL * states * states }
+}

@@ -1,0 +1,120 @@
+//! The effort of FIR designs.
+
+use super::amount::Effort;
+use super::cost::{COMPLEX, PRODUCT, REAL, SMALL, complex_cube, peak, proof, response};
+use super::sizes::Sizes;
+
+/// The grid on which peaks are looked for is finer by this factor.
+const FINE: f64 = 8.0;
+/// Interior-point iterations and rounds of the exchange of one design.
+const ITERATIONS: f64 = 25.0;
+const ROUNDS: f64 = 4.0;
+/// Share of them that a comparison of latencies needs.
+const COARSE: f64 = 0.4;
+/// Norms of one design: of the taps, and of those after a peak that the grid missed.
+const NORMS: f64 = 2.0;
+
+/// A design by the exchange of frequencies.
+pub(super) fn design(sizes: &Sizes) -> Effort {
+    let exchange = grid(sizes).with(iteration(sizes).times(ITERATIONS)).with(errors(sizes).times(ROUNDS));
+    exchange.then(norm(sizes).times(NORMS)).then(noncausal(sizes))
+}
+
+/// A design that is only exact enough to be compared, without norms.
+pub(super) fn comparison(sizes: &Sizes) -> Effort {
+    grid(sizes).with(iteration(sizes).times(COARSE * ITERATIONS)).with(errors(sizes).times(COARSE * ROUNDS))
+}
+
+/// The plant at all frequencies of the fine grid, with a copy of the coarse one.
+fn grid(sizes: &Sizes) -> Effort {
+    let kept = COMPLEX * sizes.outputs() * sizes.outputs().min(sizes.inputs());
+    let points = FINE * sizes.points();
+    let Effort { seconds, bytes } = response(sizes).times(points);
+    Effort { seconds, bytes: bytes + (points + 2.0 * sizes.points()) * kept }
+}
+
+/// An interior-point iteration: blocks of order M + N at each frequency, and the Newton matrix of the taps.
+fn iteration(sizes: &Sizes) -> Effort {
+    let (n, m, u, points, lags) =
+        (sizes.channels, sizes.ratio, sizes.unknowns(), sizes.points(), sizes.lags());
+    let order = m + n.min(sizes.inputs());
+    let blocks = points * complex_cube(order);
+    let rows = m.min(sizes.taps);
+    let sums = 0.5 * rows * rows * n * n * points;
+    let products = 12.0 * lags * sums;
+    let factor = u.powi(3) / 3.0;
+    Effort {
+        seconds: blocks + SMALL * (32.0 * sums + 2.0 * u * u) + PRODUCT * (products + factor),
+        bytes: COMPLEX * points * order * order * 9.0 + REAL * u * u * 3.0,
+    }
+}
+
+/// The error of taps on the fine grid.
+fn errors(sizes: &Sizes) -> Effort {
+    gain(sizes).times(FINE * sizes.points())
+}
+
+/// The error of taps at one frequency and its largest singular value.
+fn gain(sizes: &Sizes) -> Effort {
+    let (n, m) = (sizes.channels, sizes.ratio);
+    let columns = sizes.outputs().min(sizes.inputs());
+    let response = 8.0 * m * n * sizes.lags();
+    changed(sizes).with(Effort { seconds: SMALL * response, bytes: COMPLEX * m * columns })
+}
+
+/// The same after a change of one tap.
+fn changed(sizes: &Sizes) -> Effort {
+    let columns = sizes.outputs().min(sizes.inputs());
+    let product = 8.0 * sizes.ratio * sizes.channels * columns;
+    Effort { seconds: SMALL * product + 0.45 * complex_cube(sizes.ratio), bytes: 0.0 }
+}
+
+/// The norm of the error of taps.
+fn norm(sizes: &Sizes) -> Effort {
+    peak(sizes.fir_error_states(), response(sizes).with(gain(sizes)))
+}
+
+/// The search for a proof: of the norm, and of the lower bound by the taps that up to 64 directions need.
+pub(super) fn proven(sizes: &Sizes) -> Effort {
+    let (rows, unknowns) = (128.0 * sizes.channels, sizes.unknowns());
+    let certificate = proof(sizes.fir_error_states());
+    if certificate == Effort::default() {
+        return certificate;
+    }
+    let seconds = 4.0 * 2.2e-10 * rows * unknowns * rows.min(unknowns);
+    certificate.then(Effort { seconds: 0.5 * seconds, bytes: 5.0 * REAL * rows * unknowns })
+}
+
+/// The noncausal bound.
+fn noncausal(sizes: &Sizes) -> Effort {
+    peak(sizes.front_end_states, response(sizes))
+}
+
+/// Taps of a method that minimises nothing: their norm and the noncausal bound.
+pub(super) fn judged(sizes: &Sizes) -> Effort {
+    norm(sizes).then(noncausal(sizes))
+}
+
+/// A bank for whole delays and a fractional delay for each channel.
+pub(super) fn separation(sizes: &Sizes) -> Effort {
+    let alone = Sizes { channels: 1.0, ratio: 1.0, taps: (0.5 * sizes.lags()).ceil(), ..*sizes };
+    design(sizes).then(design(&alone).times(sizes.channels)).then(judged(sizes))
+}
+
+/// The bounded-real LMI: its time grows with the sixth power of the states.
+pub(super) fn by_lmi(sizes: &Sizes) -> Effort {
+    let states = sizes.fir_error_states().min(160.0);
+    let unknowns = 0.5 * states * states;
+    Effort { seconds: 40.0 * PRODUCT * unknowns.powi(3), bytes: 3.0 * REAL * unknowns * unknowns }
+}
+
+/// Integer taps of five word lengths: lattice points close to the optimum, then single steps, each judged
+/// on the fine grid.
+pub(super) fn integers(sizes: &Sizes) -> Effort {
+    let phase = sizes.unknowns() / sizes.ratio;
+    let lattice = sizes.ratio * (phase.powi(3) / 3.0 * PRODUCT + 130.0 * phase * phase * SMALL) * 60.0;
+    let change = FINE * sizes.points() * changed(sizes).seconds;
+    let descent = 0.5 * sizes.unknowns() * change * 5.0;
+    let grid = grid(sizes);
+    grid.with(Effort { seconds: lattice + descent, bytes: 3.0 * REAL * phase * phase })
+}

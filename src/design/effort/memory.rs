@@ -1,0 +1,33 @@
+//! The memory that this process may use.
+
+use std::fs;
+
+/// Bytes of memory of the machine, or fewer where the process is limited (`ulimit -v`, a control group);
+/// `None` where the system does not tell.
+pub(super) fn machine_memory() -> Option<f64> {
+    [physical(), control_group(), address_space()].into_iter().flatten().reduce(f64::min)
+}
+
+/// MemTotal of /proc/meminfo, in kB there.
+fn physical() -> Option<f64> {
+    let text = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
+    Some(1024.0 * number(line.split_whitespace().nth(1)?)?)
+}
+
+/// The limit of the control group (version 2) at the root of the file system, as containers see it.
+fn control_group() -> Option<f64> {
+    number(fs::read_to_string("/sys/fs/cgroup/memory.max").ok()?.trim())
+}
+
+/// The soft limit of the address space.
+fn address_space() -> Option<f64> {
+    let text = fs::read_to_string("/proc/self/limits").ok()?;
+    let line = text.lines().find(|line| line.starts_with("Max address space"))?;
+    number(line.split_whitespace().nth(3)?)
+}
+
+/// A positive number; "max" and "unlimited" are none.
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|bytes| *bytes > 0.0)
+}

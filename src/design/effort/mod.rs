@@ -1,0 +1,142 @@
+//! Time and memory of a design, estimated before it starts.
+//!
+//! Every step of a design is dense linear algebra on matrices whose sizes follow from the spec. The
+//! estimates count their operations and multiply them by rates that were measured on one core of a current
+//! server processor (docs/figures.md). They are right within a factor of about two where a design takes
+//! more than a few seconds.
+
+pub(super) mod amount;
+mod cost;
+mod fir;
+mod memory;
+mod progress;
+mod recursive;
+mod sizes;
+
+pub use amount::Effort;
+pub use progress::{Observer, Stage, unobserved};
+
+use super::DesignError;
+use super::merging::Repeats;
+use super::problem::Problem;
+use crate::spec::{Method, Solver, Spec};
+use memory::machine_memory;
+use sizes::Sizes;
+
+/// A design that takes longer is refused, in seconds.
+pub const MOST_SECONDS: f64 = 600.0;
+/// Memory of the program itself and of everything that does not grow with the sizes, in bytes.
+const BASE_BYTES: f64 = 10e6;
+
+/// Designs that the choice of a latency compares, usually and at most.
+const COMPARISONS: f64 = 12.0;
+const MOST_COMPARISONS: f64 = 40.0;
+
+/// Whether a design is refused when its estimate exceeds ten minutes or the memory of the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Limits {
+    /// It is refused.
+    #[default]
+    Enforced,
+    /// It runs all the same.
+    Off,
+}
+
+/// The effort of the design of a spec with taps and, unless it is still to be chosen, a latency; with the
+/// search for a proof if `proving`.
+///
+/// # Errors
+/// [`DesignError`] if the spec has no [`Problem`].
+pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
+    let taps = spec.design.taps.unwrap_or_default();
+    let guess = |problem: &Problem| problem.longest_delay().0.ceil() as usize + taps / 4;
+    let repeats = Repeats::of(spec.design.method);
+    let problem = Problem::new(spec, spec.latency.unwrap_or_default())?.merge_channels(repeats).problem;
+    let latency = spec.latency.unwrap_or_else(|| guess(&problem));
+    let sizes = Sizes::new(&Problem { latency, ..problem }, taps);
+    let design = synthesis(spec, &sizes);
+    let finished = design.then(finishing(spec, &sizes)).then(if proving {
+        proven(spec, &sizes)
+    } else {
+        Effort::default()
+    });
+    let total = if spec.latency.is_none() { finished.then(chosen(spec, &sizes, design)) } else { finished };
+    Ok(Effort { bytes: total.bytes + BASE_BYTES, ..total })
+}
+
+/// The method itself.
+fn synthesis(spec: &Spec, sizes: &Sizes) -> Effort {
+    match spec.design.method {
+        Method::Fir if spec.design.solver == Some(Solver::Kyp) => fir::by_lmi(sizes),
+        Method::Fir => fir::design(sizes),
+        Method::Iir => recursive::design(sizes),
+        Method::H2 => recursive::mean_square(sizes),
+        Method::Sinc => fir::judged(sizes),
+        Method::Separation => fir::separation(sizes),
+    }
+}
+
+/// The search for a proof.
+fn proven(spec: &Spec, sizes: &Sizes) -> Effort {
+    if spec.design.method.has_taps() { fir::proven(sizes) } else { recursive::proven(sizes) }
+}
+
+/// The choice of the latency, for a method of which one design takes `design`.
+fn chosen(spec: &Spec, sizes: &Sizes, design: Effort) -> Effort {
+    match spec.design.method {
+        Method::Fir => fir::comparison(sizes).times(COMPARISONS),
+        Method::Iir => design.times(COMPARISONS),
+        Method::H2 => recursive::smoother(sizes),
+        Method::Sinc | Method::Separation => {
+            design.times((sizes.taps + sizes.longest_delay).min(MOST_COMPARISONS))
+        }
+    }
+}
+
+/// Integer taps or order reduction.
+fn finishing(spec: &Spec, sizes: &Sizes) -> Effort {
+    let integers = if spec.design.bits.is_some() { fir::integers(sizes) } else { Effort::default() };
+    let reduction =
+        if spec.design.reduction.is_some() { recursive::reduction(sizes) } else { Effort::default() };
+    integers.then(reduction)
+}
+
+/// Refuses what cannot end in ten minutes or needs more memory than the machine has.
+///
+/// # Errors
+/// [`DesignError::TooLong`] or [`DesignError::TooLarge`], with the figures and the way out.
+pub(super) fn check(spec: &Spec, proving: bool, limits: Limits) -> Result<Effort, DesignError> {
+    let effort = estimate(spec, proving)?;
+    let memory = machine_memory();
+    let remedy = remedy(spec);
+    match limits {
+        Limits::Off => Ok(effort),
+        Limits::Enforced if memory.is_some_and(|memory| effort.bytes > memory) => {
+            Err(DesignError::TooLarge { effort, memory: memory.unwrap_or_default(), remedy })
+        }
+        Limits::Enforced if effort.seconds > MOST_SECONDS => Err(DesignError::TooLong { effort, remedy }),
+        Limits::Enforced => Ok(effort),
+    }
+}
+
+/// The way out.
+fn remedy(spec: &Spec) -> &'static str {
+    match spec.design.method {
+        Method::Fir if spec.design.bits.is_some() => {
+            "use fewer taps, leave out bits, take a smaller ratio or fewer channels"
+        }
+        Method::Fir => "use fewer taps, a smaller ratio or fewer channels",
+        Method::Iir | Method::H2 if spec.design.reduction.is_some() => {
+            "use a shorter latency, leave out the order reduction, or use the method fir"
+        }
+        Method::Iir | Method::H2 => {
+            "use a shorter latency, a smaller ratio, fewer channels, or the method fir"
+        }
+        Method::Sinc | Method::Separation => {
+            "use fewer taps, a smaller ratio or fewer channels, or set the latency"
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,52 @@
+use super::*;
+
+fn spec(text: &str) -> Spec {
+    let whole = format!(
+        "fast_period = 1.0\ntarget = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n{text}"
+    );
+    Spec::from_toml(&whole, "spec.toml").unwrap()
+}
+
+const PAIR: &str = "channel = [{ delay = 1.2 }, { delay = 0.6 }]";
+
+#[test]
+fn efforts_are_said_in_units_for_people() {
+    let said = |seconds: f64, bytes: f64| Effort { seconds, bytes }.to_string();
+    assert_eq!(said(0.05, 2.4e6), "50 ms and 2.4 MB");
+    assert_eq!(said(75.0, 31e6), "75 seconds and 31 MB");
+    assert_eq!(said(2100.0, 8.7e9), "35 minutes and 8.7 GB");
+    assert_eq!(said(3.6e7, 1e13), "417 days and 10 TB");
+}
+
+#[test]
+fn more_of_anything_takes_longer() {
+    let base = ("ratio = 2", "latency = 10", "taps = 22");
+    let of = |(ratio, latency, taps): (&str, &str, &str)| {
+        let text = format!("{ratio}\n{latency}\n{PAIR}\ndesign = {{ method = \"fir\", {taps} }}");
+        estimate(&spec(&text), true).unwrap().seconds
+    };
+    let small = of(base);
+    assert!(small < 1.0, "{small}");
+    assert!(of(("ratio = 4", base.1, "taps = 44")) > small);
+    assert!(of((base.0, "latency = 100", "taps = 220")) > 2.0 * small);
+    assert!(of((base.0, "", base.2)) > 2.0 * small);
+}
+
+#[test]
+fn what_cannot_end_is_refused_with_the_figure_and_the_way_out() {
+    let huge =
+        spec(&format!("ratio = 2\nlatency = 1000\n{PAIR}\ndesign = {{ method = \"fir\", taps = 8000 }}"));
+    let refused = check(&huge, true, Limits::Enforced).unwrap_err();
+    let DesignError::TooLong { effort, .. } = &refused else { panic!("{refused}") };
+    assert!(effort.seconds > MOST_SECONDS && refused.to_string().contains("fewer taps"), "{refused}");
+    assert!(check(&huge, true, Limits::Off).is_ok());
+    let small = spec(&format!("ratio = 2\nlatency = 10\n{PAIR}\ndesign = {{ method = \"fir\", taps = 22 }}"));
+    assert!(check(&small, true, Limits::Enforced).is_ok());
+}
+
+#[test]
+fn the_memory_of_this_machine_is_known_where_it_is_told() {
+    if cfg!(target_os = "linux") {
+        assert!(machine_memory().is_some_and(|bytes| bytes > 1e8));
+    }
+}

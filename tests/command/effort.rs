@@ -1,0 +1,124 @@
+//! Designs that cannot be: a latency out of reach, too long, too large, numbers too large; and long ones that are interrupted.
+
+use crate::support::{THESIS, names, text};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+fn design(folder: &Path, spec: &str, args: &[&str]) -> Command {
+    fs::write(folder.join("spec.toml"), spec).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hybank"));
+    command.current_dir(folder).args(["design", "spec.toml", "-o", "bank.json"]).args(args);
+    command
+}
+
+/// Wants exit code 1, one message with all of `parts`, no file, and all of that at once.
+fn refused(spec: &str, args: &[&str], parts: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let begin = Instant::now();
+    let Output { status, stdout, stderr } = design(folder.path(), spec, args).output().unwrap();
+    let (elapsed, message) = (begin.elapsed(), text(&stderr));
+    assert_eq!((status.code(), text(&stdout).as_str()), (Some(1), ""), "{message}");
+    assert_eq!(message.matches("hybank: ").count(), 1, "one message only: {message}");
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is missing in: {message}");
+    }
+    assert_eq!(names(folder.path()), ["spec.toml"]);
+    assert!(elapsed < Duration::from_secs(20), "{elapsed:?}");
+    message
+}
+
+/// Channels in a circle around the ratio, all behind the filter of the target.
+fn spec(channels: usize, ratio: usize, design: &str) -> String {
+    let delay =
+        |i: usize| format!("[[channel]]\ndelay_samples = {}\n", (i * ratio) as f64 / channels as f64 + 0.1);
+    let channels: String = (0..channels).map(delay).collect();
+    format!(
+        "fast_rate = 48000.0\nratio = {ratio}\n[target]\n\
+         filter = {{ family = \"butterworth\", order = 4, cutoff = 9000.0 }}\n{channels}[design]\n{design}\n"
+    )
+}
+
+#[test]
+fn a_latency_out_of_reach_is_refused_before_anything_is_computed() {
+    let parts =
+        ["at latency 1000 the 32 taps", "they reach latencies 0 to 4", "leave the latency out", "more taps"];
+    refused(&spec(4, 4, "taps = 32"), &["--latency", "1000"], &parts);
+    refused(
+        &spec(2, 2, "taps = 24"),
+        &["--latency", "1025"],
+        &["at latency 1025", "they reach latencies 0 to 3"],
+    );
+    for method in ["sinc", "separation"] {
+        refused(
+            &spec(2, 2, "method = \"fir\"\ntaps = 24"),
+            &["--latency", "500", "--method", method],
+            &["at latency 500"],
+        );
+    }
+}
+
+/// Each of these once ran for minutes or ate the memory of the machine, in silence.
+#[test]
+fn what_cannot_end_is_refused_with_the_figures_and_the_way_out() {
+    let out = ["this design would take about", "ten minutes are allowed", "--no-limit"];
+    let with = |more: &'static str| [&out[..], &[more]].concat();
+    refused(&spec(256, 256, "taps = 64"), &["--latency", "32"], &["--no-limit", "fewer channels"]);
+    refused(&spec(1024, 8, "taps = 16"), &[], &["--no-limit", "fewer channels"]);
+    refused(&spec(2, 2, "taps = 8000"), &["--latency", "4000"], &with("fewer taps"));
+    refused(&spec(2, 2, "method = \"h2\""), &["--latency", "3000"], &with("a shorter latency"));
+    refused(&spec(2, 2, "taps = 2048\nbits = 12"), &["--latency", "1024"], &["--no-limit", "leave out bits"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_the_process_is_a_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("spec.toml"), spec(8, 8, "taps = 256")).unwrap();
+    let script = format!(
+        "ulimit -v 300000; exec {} design spec.toml -o b.json --latency 128",
+        env!("CARGO_BIN_EXE_hybank")
+    );
+    let output = Command::new("sh").current_dir(folder.path()).args(["-c", &script]).output().unwrap();
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("this process may use 307 MB"), "{message}");
+}
+
+#[test]
+fn numbers_near_the_end_of_double_precision_are_refused_by_their_key() {
+    let swapped = |from: &str, to: &str| {
+        assert!(THESIS.contains(from));
+        THESIS.replacen(from, to, 1)
+    };
+    let huge = "{ zeros = [], poles = [[-0.5, 0.0], [-0.5, 0.0]], gain = 1e308 }";
+    let target = swapped("num = [0.25]", "num = [1e307]");
+    refused(&target, &[], &["target.filter: the gain is", "check num, gain or c"]);
+    let channel = swapped("delay = 0.6", &format!("delay = 0.6\nfilter = {huge}"));
+    refused(&channel, &[], &["filter of channel 2: the gain is"]);
+    let tiny = swapped("num = [0.25]", "num = [1e-300]");
+    refused(&tiny, &[], &["target.filter: the gain is"]);
+    refused(THESIS, &["--gamma-margin", "1e308"], &["--gamma-margin", "at most 1000000"]);
+}
+
+/// Interrupted long before its end, with and without a terminal's patience.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_a_design_at_once_and_leaves_no_file() {
+    for signal in ["INT", "TERM"] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command =
+            design(folder.path(), &spec(2, 2, "taps = 900"), &["--latency", "400", "--no-limit"]);
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(700));
+        let begin = Instant::now();
+        let pid = child.id().to_string();
+        assert!(Command::new("kill").args(["-s", signal, &pid]).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        assert!(begin.elapsed() < Duration::from_secs(2), "{:?}", begin.elapsed());
+        assert_eq!(output.status.code(), Some(1), "{output:?}");
+        assert_eq!(text(&output.stderr), "hybank: interrupted; nothing was written\n");
+        assert_eq!(names(folder.path()), ["spec.toml"]);
+    }
+}
