@@ -1,17 +1,19 @@
 //! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and never
 //! panics. `fuzz/` looks deeper with the same checks.
 
+#[path = "../../tests/support/campaign.rs"]
+mod campaign;
 #[path = "../../tests/support/random.rs"]
 mod random;
 
 use hybank_ibr::camera::colmap::parse_model;
-use hybank_ibr::image::pfm;
+use hybank_ibr::image::{Image, encode, pfm, read_image, read_map};
 use hybank_ibr::scene::parse;
 use hybank_ibr::uncalibrated::tracks::Tracks;
 use random::Random;
 use std::path::Path;
 
-const ROUNDS: u64 = 3000;
+const ROUNDS: usize = 3000;
 
 /// What breaks number and structure readers.
 const NASTY: [&[u8]; 12] = [
@@ -50,8 +52,13 @@ fn mutated(seed: &[u8], round: u64) -> Vec<u8> {
 /// Runs `check` on every mutation of the seeds; it says whether the input was accepted. Both must occur, or the
 /// mutations would test nothing.
 fn survive(seeds: &[&[u8]], check: impl Fn(&[u8]) -> bool) {
-    let accepted = (0..ROUNDS).filter(|r| check(&mutated(seeds[*r as usize % seeds.len()], *r))).count();
-    assert!(accepted > 0 && accepted < ROUNDS as usize, "{accepted} of {ROUNDS} were accepted");
+    survive_rounds(campaign::rounds(ROUNDS), seeds, check);
+}
+
+fn survive_rounds(rounds: usize, seeds: &[&[u8]], check: impl Fn(&[u8]) -> bool) {
+    let accepted = (0..rounds).filter(|&r| check(&mutated(seeds[r % seeds.len()], r as u64))).count();
+    println!("{rounds} damaged inputs, {accepted} accepted");
+    assert!(accepted > 0 && accepted < rounds, "{accepted} of {rounds} were accepted");
 }
 
 /// Whether a result is a value; a message must say something.
@@ -106,4 +113,30 @@ fn scenes() {
         b"matches = \"t\"\n[[view]]\nimage = \"a\"\ncamera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n[virtual]\nsize = [4, 3]\n",
     ];
     survive(&seeds, |bytes| accepted(parse(&String::from_utf8_lossy(bytes), Path::new("s.toml"))));
+}
+
+/// Images of every format, as files.
+#[test]
+fn images() {
+    let dir = tempfile::tempdir().unwrap();
+    let colour = Image::new(9, 7, 3, (0..189).map(|i| (i * 31 % 256) as f32).collect()).unwrap();
+    for name in ["a.png", "a.jpg", "a.ppm", "a.pgm", "a.pfm"] {
+        let path = dir.path().join(name);
+        let seed = encode(&colour, &path).unwrap();
+        survive_rounds(campaign::rounds(300), &[&seed], |bytes| {
+            std::fs::write(&path, bytes).unwrap();
+            let named = |error: hybank_ibr::image::ImageError| {
+                let message = error.to_string();
+                assert!(message.contains(name), "{message}");
+            };
+            if let Ok((width, height, values)) = read_map(&path).map_err(named) {
+                assert_eq!(values.len(), width * height);
+            }
+            read_image(&path).map_err(named).is_ok_and(|image| {
+                let (width, height) = image.size();
+                assert_eq!(image.data().len(), width * height * image.channels());
+                true
+            })
+        });
+    }
 }

@@ -1,6 +1,8 @@
 //! Reads specs and banks, and writes text files.
 
 use super::Failure;
+use super::interrupt::remove_unfinished;
+use super::say::name_leftovers;
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::filters;
 use crate::files::{self, AtomicFile, Bound};
@@ -71,12 +73,14 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<Spec, Failure> {
     Ok(Spec { latency, ..spec })
 }
 
-/// Refuses an output file that is also the input.
+/// Refuses an output file that is also the input, and names what a killed run left beside it.
 pub(super) fn refuse_overlap(output: &Path, input: &Path) -> Result<(), Failure> {
     if is_dash(output) {
         return Ok(());
     }
-    files::refuse_overlaps(&[output], &[input]).map_err(Failure::input)
+    files::refuse_overlaps(&[output], &[input]).map_err(Failure::input)?;
+    name_leftovers(&[output]);
+    Ok(())
 }
 
 /// Writes a text file that appears when it is whole; `-` is standard output.
@@ -84,6 +88,7 @@ pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Fai
     if is_dash(path) {
         return super::print(text);
     }
+    remove_unfinished();
     let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
     file.write_all(text.as_bytes())
         .map_err(|error| Failure::Input(format!("{}: cannot write it: {error}", name(path))))?;

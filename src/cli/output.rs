@@ -1,8 +1,9 @@
 //! The format of output samples, and the files that a run writes.
 
 use super::Failure;
+use super::say::name_leftovers;
 use crate::files::refuse_overlaps;
-use crate::io::{PcmFormat, SampleWriter};
+use crate::io::{PcmFormat, SampleWriter, is_sigmf, sigmf_files};
 use crate::runtime::Precision;
 use std::path::Path;
 
@@ -50,12 +51,11 @@ pub(super) fn check_files(output: &Path, mask: Option<&Path>, inputs: &[&Path]) 
     let mut outputs = SampleWriter::files(output);
     outputs.extend(mask.map(Path::to_owned));
     let outputs: Vec<_> = outputs.iter().map(|path| path.as_path()).collect();
-    // The samples of a SigMF recording lie beside the file that is named.
-    let data: Vec<_> = inputs
-        .iter()
-        .filter(|path| crate::io::is_sigmf(path))
-        .flat_map(|path| ["sigmf-meta", "sigmf-data"].map(|extension| path.with_extension(extension)))
-        .collect();
-    let inputs: Vec<_> = inputs.iter().copied().chain(data.iter().map(|path| path.as_path())).collect();
-    refuse_overlaps(&outputs, &inputs).map_err(Failure::input)
+    // A SigMF recording has two files, and only one of them is named.
+    let pairs: Vec<_> =
+        inputs.iter().filter(|path| is_sigmf(path)).flat_map(|path| sigmf_files(path)).collect();
+    let inputs: Vec<_> = inputs.iter().copied().chain(pairs.iter().map(|path| path.as_path())).collect();
+    refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
+    name_leftovers(&outputs);
+    Ok(())
 }

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 
 /// Results on standard output; a closed pipe ends the run without a message.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout().lock();
+    let mut stdout = crate::io::stdout();
     stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
 }
 

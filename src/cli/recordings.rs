@@ -1,6 +1,7 @@
 //! Whole mono recordings in memory, for the commands that work on short ones.
 
 use super::Failure;
+use super::interrupt::remove_unfinished;
 use crate::files::{AtomicFile, commit_all};
 use crate::io::wav::WavFile;
 use crate::io::{Arrival, MultiReader, PcmFormat, ReadOptions};
@@ -54,6 +55,9 @@ pub(super) struct Mono<'a> {
     pub(super) rate: u32,
 }
 
+/// Samples that are encoded at a time.
+const CHUNK: usize = 1 << 16;
+
 /// Writes mono WAV files with 32-bit floats, which appear together when they are whole.
 pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Result<(), Failure> {
     let begin = |(path, mono): &(&Path, Mono<'_>)| begin_recording(path, *mono, force);
@@ -61,22 +65,28 @@ pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Resu
     commit_all(files).map_err(Failure::input)
 }
 
-/// A recording that is whole but has no name yet.
-fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<AtomicFile, Failure> {
-    let format = PcmFormat::F32Le;
+/// A mono WAV file with 32-bit floats that is whole but has no name yet.
+pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<AtomicFile, Failure> {
+    remove_unfinished();
     let file = AtomicFile::create(path, force).map_err(Failure::input)?;
-    let size = format.bytes();
-    let mut bytes = vec![0; mono.samples.len() * size];
-    for (slot, &x) in bytes.chunks_exact_mut(size).zip(mono.samples) {
-        format.encode(x, slot);
-    }
-    let written = WavFile::new(file, format, 1, mono.rate).and_then(|mut wav| {
-        wav.write_bytes(&bytes)?;
-        wav.finish()
-    });
+    let written =
+        WavFile::new(file, PcmFormat::F32Le, 1, mono.rate).and_then(|wav| encode(wav, mono.samples));
     let cannot = |error: io::Error| Failure::Input(format!("{}: cannot write it: {error}", path.display()));
     let mut file = written.map_err(cannot)?;
     // One open file at a time, however many there are.
     file.seal().map_err(Failure::input)?;
     Ok(file)
+}
+
+fn encode(mut wav: WavFile<AtomicFile>, samples: &[f64]) -> io::Result<AtomicFile> {
+    let format = PcmFormat::F32Le;
+    let mut bytes = vec![0; samples.len().min(CHUNK) * format.bytes()];
+    for chunk in samples.chunks(CHUNK) {
+        let bytes = &mut bytes[..chunk.len() * format.bytes()];
+        for (slot, &x) in bytes.chunks_exact_mut(format.bytes()).zip(chunk) {
+            format.encode(x, slot);
+        }
+        wav.write_bytes(bytes)?;
+    }
+    wav.finish()
 }

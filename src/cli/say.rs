@@ -1,10 +1,12 @@
 //! Prints messages to standard error.
 
+use crate::files::leftovers;
 use std::io::Write;
+use std::path::Path;
 
 /// Prints text to standard error. Errors are ignored, so that no result is lost.
 pub(super) fn say(text: &str) {
-    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+    let _ = crate::io::stderr().write_all(text.as_bytes());
 }
 
 /// A line on standard error with the program's name before it.
@@ -15,4 +17,12 @@ pub(super) fn say_line(line: &str) {
 /// A warning on standard error.
 pub(super) fn warn(warning: &str) {
     say_line(&format!("warning: {warning}"));
+}
+
+/// Names the unfinished files that killed runs left beside `outputs`.
+pub(super) fn name_leftovers(outputs: &[&Path]) {
+    for left in leftovers(outputs) {
+        let (path, process) = (left.path.display(), left.process);
+        warn(&format!("{path}: an unfinished output of process {process}, which no longer runs; remove it"));
+    }
 }

@@ -2,10 +2,11 @@
 
 use super::Failure;
 use super::bank_file::load_spec_or_bank;
-use super::recordings::{Mono, read_mono, write_recordings};
+use super::recordings::{Mono, begin_recording, read_mono};
+use super::say::name_leftovers;
 use crate::design::{self, Problem};
-use crate::files::refuse_overlaps;
-use crate::simulate::{Analog, Captured, Recording, Source, capture, panels};
+use crate::files::{commit_all, refuse_overlaps};
+use crate::simulate::{Analog, Recording, Source, panels, recordings};
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::path::{Path, PathBuf};
@@ -16,7 +17,7 @@ const NORMALISED: Seconds = Seconds(1.0);
 const NORMALISED_RATE: Hertz = Hertz(48_000.0);
 /// Minimum number of fast samples of an analytic source unless `--samples` is given (thesis 5.6).
 const DEFAULT_SAMPLES: f64 = 200.0;
-/// Maximum number of fast samples of a simulation, because captures are held in memory.
+/// Maximum number of fast samples of a simulation: the target, in memory, then takes 2 GiB.
 const MOST_SAMPLES: usize = 1 << 28;
 /// Maximum number of quadrature panels of a chirp per converter, about ten seconds of computing.
 const MOST_PANELS: f64 = 2e7;
@@ -93,17 +94,19 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let (signal, samples) = args.signal(&spec)?;
     let frames = args.frames(samples, spec.ratio)?;
     args.check_work(&problem, &signal, frames)?;
-    let mut captured = capture(&problem, &signal, frames);
-    args.scale(&mut captured)?;
-    let mut files = vec![];
-    for (i, samples) in captured.channels.iter().enumerate() {
-        files.push((format!("ch{}.wav", i + 1), samples, rates.slow));
-    }
-    files.push(("target.wav".to_owned(), &captured.target, rates.fast));
-    write_all(&args.output, &files, &[&args.spec, Path::new(&args.source)], args.force)?;
-    let names = files.iter().map(|(name, ..)| args.output.join(name).display().to_string()).collect();
+    let files = args.files(&rates, spec.channels.len())?;
+    let recordings = recordings(&problem, &signal, frames).map(|samples| args.scaled(samples));
+    write_all(&args.output, &files, recordings, args.force)?;
+    let names = files.iter().map(|file| file.path.display().to_string()).collect();
     Report { files: names, frames, slow_rate: rates.slow, fast_rate: rates.fast, latency, warnings }
         .print(args.json)
+}
+
+/// A file to be written.
+struct Output {
+    path: PathBuf,
+    /// Hertz.
+    rate: u32,
 }
 
 impl Args {
@@ -130,10 +133,21 @@ impl Args {
         Ok((Analog::Known(source), self.samples.unwrap_or(length as usize)))
     }
 
-    /// Refuses a chirp or a front end so fast that the quadrature would take too long.
+    /// Refuses a chirp or a front end so fast that the quadrature would take too long, and captures that the
+    /// memory cannot hold.
     fn check_work(&self, problem: &Problem, signal: &Analog, frames: usize) -> Result<(), Failure> {
+        let samples = frames * problem.ratio;
+        let bytes = signal.work_bytes(samples);
+        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+            return Err(Failure::Input(format!(
+                "{}: {samples} fast samples take {:.1} GB of memory, more than the system gives; ask for fewer with \
+                 --samples",
+                self.source,
+                bytes as f64 / 1e9
+            )));
+        }
         let Analog::Known(source) = signal else { return Ok(()) };
-        let span = FastPeriods(frames as f64 * problem.ratio as f64);
+        let span = FastPeriods(samples as f64);
         let work = problem.front_ends.iter().map(|filter| panels(filter, source, span)).fold(0.0, f64::max);
         if work <= MOST_PANELS {
             return Ok(());
@@ -145,11 +159,21 @@ impl Args {
         )))
     }
 
+    /// The channels' files and the target's; none of them may be an input.
+    fn files(&self, rates: &Rates, channels: usize) -> Result<Vec<Output>, Failure> {
+        let slow = (1..=channels).map(|i| (format!("ch{i}.wav"), rates.slow));
+        let names = slow.chain([("target.wav".to_owned(), rates.fast)]);
+        let files: Vec<_> = names.map(|(name, rate)| Output { path: self.output.join(name), rate }).collect();
+        let outputs: Vec<_> = files.iter().map(|file| file.path.as_path()).collect();
+        refuse_overlaps(&outputs, &[&self.spec, Path::new(&self.source)]).map_err(Failure::input)?;
+        name_leftovers(&outputs);
+        Ok(files)
+    }
+
     /// Applies the gain. A sample beyond the range of a 32-bit float is an error, not an infinity in the
     /// file.
-    fn scale(&self, captured: &mut Captured) -> Result<(), Failure> {
-        let recordings = captured.channels.iter_mut().chain(std::iter::once(&mut captured.target));
-        for x in recordings.flatten() {
+    fn scaled(&self, mut samples: Vec<f64>) -> Result<Vec<f64>, Failure> {
+        for x in &mut samples {
             *x *= self.gain;
             if x.is_nan() || x.abs() > f64::from(f32::MAX) {
                 return Err(Failure::Input(format!(
@@ -158,7 +182,7 @@ impl Args {
                 )));
             }
         }
-        Ok(())
+        Ok(samples)
     }
 
     /// `samples` fast samples as whole frames.
@@ -214,21 +238,29 @@ impl Rates {
     }
 }
 
+/// Writes the recordings, each as soon as it is known; they appear together. A folder that was made for them
+/// goes if they do not.
 fn write_all(
     folder: &Path,
-    files: &[(String, &Vec<f64>, u32)],
-    inputs: &[&Path],
+    files: &[Output],
+    recordings: impl Iterator<Item = Result<Vec<f64>, Failure>>,
     force: bool,
 ) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        Failure::Input(format!("{}: cannot create the folder: {error}", folder.display()))
-    })?;
-    let paths: Vec<_> = files.iter().map(|(name, ..)| folder.join(name)).collect();
-    let outputs: Vec<_> = paths.iter().map(|path| path.as_path()).collect();
-    refuse_overlaps(&outputs, inputs).map_err(Failure::input)?;
-    let recordings = files.iter().map(|(_, samples, rate)| Mono { samples: samples.as_slice(), rate: *rate });
-    let recordings: Vec<_> = outputs.into_iter().zip(recordings).collect();
-    write_recordings(&recordings, force)
+    let is_new = !folder.exists();
+    let begin = |(file, samples): (&Output, Result<Vec<f64>, Failure>)| {
+        let samples = samples?;
+        std::fs::create_dir_all(folder).map_err(|error| {
+            Failure::Input(format!("{}: cannot create the folder: {error}", folder.display()))
+        })?;
+        begin_recording(&file.path, Mono { samples: &samples, rate: file.rate }, force)
+    };
+    let begun = files.iter().zip(recordings).map(begin).collect::<Result<Vec<_>, _>>();
+    let written = begun.and_then(|files| commit_all(files).map_err(Failure::input));
+    if written.is_err() && is_new {
+        // It is empty, or somebody else uses it.
+        let _ = std::fs::remove_dir(folder);
+    }
+    written
 }
 
 impl Report {

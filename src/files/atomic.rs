@@ -1,6 +1,6 @@
 //! A file that appears only when it is complete.
 
-use super::{FileError, place};
+use super::{FileError, hidden, place};
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -9,9 +9,6 @@ use std::sync::{Mutex, PoisonError};
 
 /// Maximum length of a chain of links, as in Linux.
 const MOST_LINKS: usize = 40;
-/// Characters of the target's name in that of the unfinished file, so that this is not too long for the
-/// file system.
-const NAME_PART: usize = 60;
 
 const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and redirect";
 
@@ -242,8 +239,6 @@ fn follow(link: &Path) -> Result<(PathBuf, Metadata), &'static str> {
 
 /// Opens a new file next to `target`, under an unused name; `private` until its permissions are set.
 fn create_beside(target: &Path, private: bool) -> io::Result<(PathBuf, File)> {
-    let name = target.file_name().ok_or(io::ErrorKind::InvalidFilename)?.to_string_lossy();
-    let name: String = name.chars().take(NAME_PART).collect();
     let mut options = OpenOptions::new();
     options.write(true).read(true).create_new(true);
     #[cfg(unix)]
@@ -251,7 +246,8 @@ fn create_beside(target: &Path, private: bool) -> io::Result<(PathBuf, File)> {
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     }
     for number in 0..1000u32 {
-        let beside = target.with_file_name(format!(".{name}.{}-{number}.part", std::process::id()));
+        let beside = hidden::beside(target, std::process::id(), number);
+        let beside = beside.ok_or(io::ErrorKind::InvalidFilename)?;
         match options.open(&beside) {
             Ok(file) => return Ok((beside, file)),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}

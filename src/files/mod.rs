@@ -16,16 +16,26 @@
 //! A replaced file keeps its permission bits; other names of it (hard links) keep the old content, and
 //! extended attributes are not carried over. A symbolic link is followed: the file that it leads to is
 //! replaced, the link stays.
+//!
+//! A run that is killed (`kill -9`) leaves its unfinished files. [`leftovers`] finds them for the next run,
+//! which names them. `remove_unfinished_on_signals` (feature `signals`) removes them where a signal can be
+//! caught.
 
 mod atomic;
 mod bounded;
 mod error;
+mod hidden;
 mod identity;
 mod place;
 mod set;
+#[cfg(all(unix, feature = "signals"))]
+pub(crate) mod signals;
 
 pub use atomic::{AtomicFile, remove_unfinished};
 pub use bounded::{Bound, read_bytes, read_text, text_of};
 pub use error::FileError;
+pub use hidden::{Leftover, leftovers};
 pub use identity::{is_same_file, refuse_overlaps};
 pub use set::commit_all;
+#[cfg(all(unix, feature = "signals"))]
+pub use signals::remove_unfinished_on_signals;

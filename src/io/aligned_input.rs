@@ -2,7 +2,8 @@
 //!
 //! Frames are copied only where samples are lost; otherwise they refer to the block that was read.
 
-use super::lost::{Dropout, LostInInput};
+use super::dropouts::Dropouts;
+use super::lost::LostInInput;
 use super::timestamps::Segment;
 use super::{PcmFormat, PcmFrames, SampleLayout, StreamHeader};
 use std::collections::VecDeque;
@@ -40,11 +41,7 @@ pub(super) struct AlignedInput {
     /// No block will follow.
     ended: bool,
     segments: VecDeque<Segment>,
-    /// Dropouts that lie ahead or contain the current frame.
-    dropouts: VecDeque<Dropout>,
-    active: Vec<Dropout>,
-    /// Frames that are over.
-    time: u64,
+    dropouts: Dropouts,
     /// Frames of the input that are over.
     frames: u64,
     view: View,
@@ -60,9 +57,7 @@ impl AlignedInput {
             used: 0,
             ended: false,
             segments: [Segment::Frames(u64::MAX)].into(),
-            dropouts: VecDeque::new(),
-            active: Vec::new(),
-            time: 0,
+            dropouts: Dropouts::default(),
             frames: 0,
             view: View::Read,
             numbers: Vec::new(),
@@ -72,8 +67,7 @@ impl AlignedInput {
     /// Sets the lost frames; to be called before the first frame is used.
     pub(super) fn lose(&mut self, segments: VecDeque<Segment>, lost: LostInInput) {
         self.segments = segments;
-        self.dropouts = lost.dropouts.into();
-        self.enter_dropouts();
+        self.dropouts = Dropouts::new(lost.dropouts, self.header.channels);
     }
 
     /// Takes the next block when the last one is used up, and returns the used one.
@@ -127,13 +121,13 @@ impl AlignedInput {
     pub(super) fn ready(&self) -> usize {
         let (frames, most) = match self.segments.front() {
             Some(&Segment::Lost(count)) => (clamp(count), LOST_FRAMES),
-            Some(&Segment::Frames(count)) if self.active.is_empty() => {
+            Some(&Segment::Frames(count)) if !self.dropouts.any() => {
                 (self.left().min(clamp(count)), usize::MAX)
             }
             Some(&Segment::Frames(count)) => (self.left().min(clamp(count)), LOST_FRAMES),
             None => (0, 0),
         };
-        frames.min(most).min(clamp(self.next_border() - self.time))
+        frames.min(most).min(clamp(self.dropouts.until_change()))
     }
 
     /// Makes `frames` frames visible: at most those that are ready, or any number once the input is over.
@@ -141,7 +135,7 @@ impl AlignedInput {
         self.view = match self.segments.front() {
             _ if self.is_over() => View::Over,
             Some(Segment::Lost(_)) => View::Lost,
-            _ if self.active.is_empty() => View::Read,
+            _ if !self.dropouts.any() => View::Read,
             _ => View::Dropouts,
         };
         match self.view {
@@ -168,7 +162,7 @@ impl AlignedInput {
 
     /// Advances by `frames` frames.
     pub(super) fn advance(&mut self, frames: usize) {
-        self.time += frames as u64;
+        self.dropouts.advance(frames as u64);
         if self.view == View::Over {
             return;
         }
@@ -182,21 +176,6 @@ impl AlignedInput {
                 self.segments.pop_front();
             }
         }
-        self.enter_dropouts();
-    }
-
-    fn enter_dropouts(&mut self) {
-        let time = self.time;
-        self.active.retain(|dropout| dropout.frames.end > time);
-        while self.dropouts.front().is_some_and(|dropout| dropout.frames.start <= time) {
-            self.active.extend(self.dropouts.pop_front().filter(|dropout| dropout.frames.end > time));
-        }
-    }
-
-    /// The next frame at which a dropout begins or ends.
-    fn next_border(&self) -> u64 {
-        let ends = self.active.iter().map(|dropout| dropout.frames.end);
-        ends.chain(self.dropouts.front().map(|dropout| dropout.frames.start)).min().unwrap_or(u64::MAX)
     }
 
     fn decode_with_dropouts(&mut self, frames: usize) {
@@ -204,7 +183,7 @@ impl AlignedInput {
         let bytes = &self.block.bytes[self.used..self.used + frames * self.header.frame_bytes()];
         self.numbers.clear();
         for (index, sample) in bytes.chunks_exact(layout.container).enumerate() {
-            let invalid = self.active.iter().any(|dropout| dropout.channel == index % channels);
+            let invalid = self.dropouts.covers(index % channels);
             let value = if invalid { f64::NAN } else { layout.format.decode(sample) };
             self.numbers.extend(value.to_le_bytes());
         }
@@ -217,6 +196,7 @@ fn clamp(count: u64) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lost::Dropout;
     use super::*;
 
     /// Frames of big-endian 16-bit samples 0, 1, 2, ..
@@ -228,7 +208,7 @@ mod tests {
         let layout = SampleLayout::packed(PcmFormat::S16Be);
         let mut input = AlignedInput::new(StreamHeader { layout, channels, rate: None, promised: None });
         let dropout = |(channel, frames): &(usize, std::ops::Range<u64>)| Dropout {
-            channel: *channel,
+            channel: Some(*channel),
             frames: frames.clone(),
         };
         let lost = LostInInput { dropouts: dropouts.iter().map(dropout).collect(), ..LostInInput::default() };

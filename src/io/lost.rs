@@ -4,6 +4,7 @@ use super::IoError;
 use super::timestamps::{MAX_LOST_AT_ONCE, Timestamp, Timestamps};
 use crate::files::{Bound, read_text};
 use serde::Deserialize;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
 
@@ -14,11 +15,14 @@ const LOST_FILE: Bound = Bound {
     remedy: "give the file that was meant, or fuse the recording in parts",
 };
 
-/// Invalid samples of one channel.
+/// Maximum number of lines of all inputs together, where a line for all channels counts once per input.
+const MOST_LINES: usize = 1 << 24;
+
+/// Invalid samples of one channel, or of all.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Dropout {
-    /// The channel, from 0.
-    pub(super) channel: usize,
+    /// The channel, from 0; `None` for all channels of the input.
+    pub(super) channel: Option<usize>,
     /// Frames.
     pub(super) frames: Range<u64>,
 }
@@ -125,42 +129,56 @@ impl LostSamples {
         if let Some(channel) = named.flatten().find(|&&channel| channel >= all) {
             return Err(self.fault(format!("channel {} is named, but there are {all}", channel + 1)));
         }
+        let lines = self.timestamps.len() + self.dropouts.len();
+        if channels.len() > 1 && lines.saturating_mul(channels.len()) > MOST_LINES {
+            return Err(self.fault(format!(
+                "{lines} lines for {} inputs are more than {MOST_LINES} in all; fuse the recording in parts",
+                channels.len()
+            )));
+        }
+        let named = self.named_channels();
         let mut first = 0;
         let of_input = |&count: &usize| {
             first += count;
-            self.of_input(first - count..first)
+            self.of_input(first - count..first, &named)
         };
         channels.iter().map(of_input).collect()
     }
 
-    fn of_input(&self, channels: Range<usize>) -> Result<LostInInput, IoError> {
+    /// The channels that a timestamp names.
+    fn named_channels(&self) -> BTreeSet<usize> {
+        self.timestamps.iter().filter_map(|&(channel, _)| channel).collect()
+    }
+
+    fn of_input(&self, channels: Range<usize>, named: &BTreeSet<usize>) -> Result<LostInInput, IoError> {
         let timestamps = |wanted: usize| -> Vec<Timestamp> {
             let lines = self.timestamps.iter().filter(|(channel, _)| channel.is_none_or(|c| c == wanted));
             lines.map(|&(_, timestamp)| timestamp).collect()
         };
+        // Channels that no line names have the same timestamps, so one of them stands for all.
+        let unnamed = channels.clone().find(|channel| !named.contains(channel));
+        let distinct: BTreeSet<usize> = named.range(channels.clone()).copied().chain(unnamed).collect();
         let mut given =
-            channels.clone().map(|channel| (channel, timestamps(channel))).filter(|(_, a)| !a.is_empty());
+            distinct.into_iter().map(|channel| (channel, timestamps(channel))).filter(|(_, a)| !a.is_empty());
         let (channel, timestamps) = given.next().unwrap_or_default();
         if let Some((other, _)) = given.find(|(_, others)| *others != timestamps) {
             return Err(self.fault(format!(
-                "channels {} and {} are interleaved in one input but lose different samples; dropout invalid samples with first and length",
+                "channels {} and {} are interleaved in one input but lose different samples; give invalid samples with first and length",
                 channel + 1,
                 other + 1
             )));
         }
         let timestamps = Timestamps::new(timestamps).map_err(|problem| self.fault(problem))?;
-        Ok(LostInInput { timestamps, dropouts: self.dropouts_of(channels) })
+        Ok(LostInInput { timestamps, dropouts: self.dropouts_of(&channels) })
     }
 
-    fn dropouts_of(&self, channels: Range<usize>) -> Vec<Dropout> {
-        let named = |&(channel, ref frames): &(Option<usize>, Range<u64>)| {
-            let here = channels.clone().filter(move |&c| channel.is_none_or(|channel| channel == c));
-            let first = channels.start;
-            let frames = frames.clone();
-            here.map(move |c| Dropout { channel: c - first, frames: frames.clone() })
+    fn dropouts_of(&self, channels: &Range<usize>) -> Vec<Dropout> {
+        let here = |&(channel, ref frames): &(Option<usize>, Range<u64>)| {
+            let inside = channel.is_none_or(|channel| channels.contains(&channel)) && !frames.is_empty();
+            let channel = channel.map(|channel| channel - channels.start);
+            inside.then(|| Dropout { channel, frames: frames.clone() })
         };
-        let mut dropouts: Vec<_> =
-            self.dropouts.iter().flat_map(named).filter(|dropout| !dropout.frames.is_empty()).collect();
+        let mut dropouts: Vec<_> = self.dropouts.iter().filter_map(here).collect();
         dropouts.sort_by_key(|dropout| (dropout.frames.start, dropout.channel));
         dropouts
     }
@@ -191,7 +209,7 @@ mod tests {
         {"channel": 2, "first": 7, "length": 0}
     "#;
 
-    fn dropout(channel: usize, frames: Range<u64>) -> Dropout {
+    fn dropout(channel: Option<usize>, frames: Range<u64>) -> Dropout {
         Dropout { channel, frames }
     }
 
@@ -202,8 +220,8 @@ mod tests {
         let timestamp = |frame, index| Timestamp { frame, index };
         assert_eq!(inputs[0].timestamps, Timestamps::new(vec![timestamp(0, 10), timestamp(5, 18)]).unwrap());
         assert_eq!(inputs[1].timestamps, Timestamps::new(vec![timestamp(5, 18)]).unwrap());
-        assert_eq!(inputs[0].dropouts, [dropout(0, 20..21)]);
-        assert_eq!(inputs[1].dropouts, [dropout(0, 20..21), dropout(1, 20..21), dropout(1, 40..43)]);
+        assert_eq!(inputs[0].dropouts, [dropout(None, 20..21)]);
+        assert_eq!(inputs[1].dropouts, [dropout(None, 20..21), dropout(Some(1), 40..43)]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! [`PcmFormat`]s; the full scale of integer formats is 1.0.
 
 mod aligned_input;
+mod dropouts;
 mod error;
 mod fault;
 mod frames;
@@ -25,8 +26,8 @@ pub use fault::{InputFault, InputWarning};
 pub use frames::FrameReader;
 pub use lost::LostSamples;
 pub use multi_reader::{Arrival, BLOCK_BYTES, MultiReader, ReadOptions, Until};
-pub use pipe::{Stdout, is_stdout_stalled};
+pub use pipe::{Stdout, Watched, is_output_stalled, stderr, stdout};
 pub use sample_writer::{Container, SampleWriter};
-pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf};
+pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
 pub use stream_header::{Coding, StreamHeader};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};

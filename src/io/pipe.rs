@@ -39,50 +39,79 @@ fn stdout_file() -> io::Result<io::Stdout> {
     Ok(io::stdout())
 }
 
-/// When the write to standard output that is under way began, in milliseconds since [`CLOCK`]; 0 for none.
-static WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
+/// When the write to a stream that is under way began, in milliseconds since [`CLOCK`]; 0 for none.
+static STDOUT_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
+static STDERR_WRITE_BEGAN: AtomicU64 = AtomicU64::new(0);
 static CLOCK: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// Bytes of one write. During a longer one it would be unknown whether it makes progress.
 const WRITE_BYTES: usize = 64 << 10;
 
-/// Standard output for samples, without a buffer.
-pub struct Stdout {
-    #[cfg(unix)]
-    file: File,
-    #[cfg(not(unix))]
-    file: io::Stdout,
+/// A standard stream; [`is_output_stalled`] knows how long its writes wait.
+pub struct Watched<W> {
+    stream: W,
+    began: &'static AtomicU64,
 }
+
+/// Standard output for samples, without a buffer.
+#[cfg(unix)]
+pub type Stdout = Watched<File>;
+/// Standard output for samples.
+#[cfg(not(unix))]
+pub type Stdout = Watched<io::Stdout>;
 
 impl Stdout {
     /// Standard output, with a wide pipe where the system allows it.
     ///
     /// # Errors
     /// The system's refusal to duplicate the descriptor.
-    pub fn new() -> io::Result<Self> {
-        LazyLock::force(&CLOCK);
-        Ok(Self { file: stdout_file()? })
+    pub fn for_samples() -> io::Result<Self> {
+        Ok(Watched::new(stdout_file()?, &STDOUT_WRITE_BEGAN))
     }
 }
 
-impl Write for Stdout {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+/// Standard output for text.
+pub fn stdout() -> Watched<impl Write> {
+    Watched::new(io::stdout().lock(), &STDOUT_WRITE_BEGAN)
+}
+
+/// Standard error.
+pub fn stderr() -> Watched<impl Write> {
+    Watched::new(io::stderr().lock(), &STDERR_WRITE_BEGAN)
+}
+
+impl<W> Watched<W> {
+    fn new(stream: W, began: &'static AtomicU64) -> Self {
+        LazyLock::force(&CLOCK);
+        Self { stream, began }
+    }
+
+    fn timed<R>(&mut self, act: impl FnOnce(&mut W) -> R) -> R {
         let now = CLOCK.elapsed().as_millis() as u64;
-        WRITE_BEGAN.store(now.max(1), Ordering::Relaxed);
-        let written = self.file.write(&bytes[..bytes.len().min(WRITE_BYTES)]);
-        WRITE_BEGAN.store(0, Ordering::Relaxed);
-        written
+        self.began.store(now.max(1), Ordering::Relaxed);
+        let result = act(&mut self.stream);
+        self.began.store(0, Ordering::Relaxed);
+        result
+    }
+}
+
+impl<W: Write> Write for Watched<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.timed(|stream| stream.write(&bytes[..bytes.len().min(WRITE_BYTES)]))
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
+        self.timed(Write::flush)
     }
 }
 
-/// True if a write to a [`Stdout`] of this process has waited for so long: its reader takes no more data.
-pub fn is_stdout_stalled(patience: Duration) -> bool {
-    let began = WRITE_BEGAN.load(Ordering::Relaxed);
-    began > 0 && CLOCK.elapsed() >= Duration::from_millis(began) + patience
+/// True if a write of this process to standard output or standard error has waited for so long: its reader
+/// takes no more data.
+pub fn is_output_stalled(patience: Duration) -> bool {
+    [&STDOUT_WRITE_BEGAN, &STDERR_WRITE_BEGAN].into_iter().any(|began| {
+        let began = began.load(Ordering::Relaxed);
+        began > 0 && CLOCK.elapsed() >= Duration::from_millis(began) + patience
+    })
 }
 
 /// Other files are not changed, nor are pipes whose buffer the system refuses to enlarge.

@@ -139,7 +139,7 @@ fn stdout_target(header: &[u8]) -> io::Result<Target> {
     if io::stdout().is_terminal() {
         return Err(io::Error::other("it is a terminal; redirect it to a file or a pipe"));
     }
-    let mut stdout = Stdout::new()?;
+    let mut stdout = Stdout::for_samples()?;
     stdout.write_all(header)?;
     Ok(Target::Stdout(stdout))
 }

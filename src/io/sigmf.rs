@@ -189,6 +189,15 @@ pub(super) fn file_pair(path: &Path, meta: Option<&SigmfMeta>) -> (PathBuf, Path
     (path.with_extension("sigmf-meta"), data)
 }
 
+/// The two files of the recording that `path` names, metadata and samples. The samples lie in the file that
+/// the metadata name, if they can be read.
+pub fn sigmf_files(path: &Path) -> [PathBuf; 2] {
+    let meta = path.with_extension("sigmf-meta");
+    // What a pipe holds can be read only once.
+    let meta = meta.is_file().then(|| SigmfMeta::read(&meta).ok()).flatten();
+    file_pair(path, meta.as_ref()).into()
+}
+
 /// True for the names of SigMF's two files.
 pub fn is_sigmf(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "sigmf-meta" || extension == "sigmf-data")

@@ -1,7 +1,7 @@
 //! The captures of all converters of a problem, and the samples of the ideal fast converter.
 
 use super::recording::Recording;
-use super::response::{Instants, sample};
+use super::response::{self, Instants, sample};
 use super::source::NormalisedSource;
 use crate::analog::StrictlyProper;
 use crate::design::Problem;
@@ -29,23 +29,40 @@ pub struct Captured {
 /// Captures `periods` slow periods of `signal`: slow samples k = 0 .. periods of each channel, and M times
 /// as many reference samples.
 pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
+    let mut channels: Vec<_> = recordings(problem, signal, periods).collect();
+    let target = channels.pop().unwrap_or_default();
+    Captured { channels, target }
+}
+
+/// As [`capture`], one converter after another, so that only one recording is in memory: the channels in
+/// their order, and the target last.
+pub fn recordings<'a>(
+    problem: &'a Problem,
+    signal: &'a Analog,
+    periods: usize,
+) -> impl Iterator<Item = Vec<f64>> + 'a {
     let ratio = problem.ratio;
     let read = |front_end: usize, first: FastPeriods, step: f64, count: usize| {
         let instants = Instants { first, step: FastPeriods(step), count };
         signal.filtered(&problem.front_ends[front_end], instants)
     };
-    let slow = |channel: &Channel| {
+    let slow = move |channel: &Channel| {
         let samples = read(channel.front_end, -channel.delay, ratio as f64, periods);
         samples.into_iter().map(|sample| channel.gain * sample).collect()
     };
-    let target_first = FastPeriods(-(problem.latency as f64));
-    Captured {
-        channels: problem.channels.iter().map(slow).collect(),
-        target: read(problem.target, target_first, 1.0, periods * ratio),
-    }
+    let target = move || read(problem.target, FastPeriods(-(problem.latency as f64)), 1.0, periods * ratio);
+    problem.channels.iter().map(slow).chain(std::iter::once_with(target))
 }
 
 impl Analog {
+    /// Bytes of work memory for `count` samples of one converter, the result included.
+    pub fn work_bytes(&self, count: usize) -> usize {
+        match self {
+            Self::Known(source) => response::work_bytes(source, count),
+            Self::Recorded(recording) => recording.work_bytes(count),
+        }
+    }
+
     fn filtered(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
         match self {
             Self::Known(source) => sample(filter, source, instants),

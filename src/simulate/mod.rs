@@ -12,7 +12,7 @@ mod recording;
 mod response;
 mod source;
 
-pub use capture::{Analog, Captured, capture, interleaved};
+pub use capture::{Analog, Captured, capture, interleaved, recordings};
 pub use parse::ParseSourceError;
 pub use recording::Recording;
 pub use response::{Instants, panels, sample};

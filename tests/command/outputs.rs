@@ -60,6 +60,63 @@ fn an_input_is_never_replaced_even_by_force() {
     assert_eq!((desk.read("a.wav"), desk.read("b.wav"), desk.read("bank.json")), before);
 }
 
+/// The samples of a SigMF recording may lie in a file of any name.
+#[test]
+fn the_samples_of_a_sigmf_recording_are_an_input_too() {
+    let desk = desk();
+    let meta = |dataset: &str| {
+        format!(
+            r#"{{ "global": {{ "core:datatype": "rf32_le", "core:num_channels": 2, "core:version": "1.0.0"{dataset} }} }}"#
+        )
+    };
+    desk.write("both.sigmf-meta", meta(""));
+    desk.write("named.sigmf-meta", meta(r#", "core:dataset": "samples.bin""#));
+    for data in ["both.sigmf-data", "samples.bin"] {
+        desk.write(data, bytes(&ticks(10)));
+    }
+    for (input, output) in [("both.sigmf-meta", "both.sigmf-data"), ("named.sigmf-meta", "samples.bin")] {
+        for output in [input, output] {
+            let args = ["stream", "bank.json", "--input", input, "-o", output, "--force"];
+            desk.refused(1, &args, &[output, "also the input"]);
+        }
+    }
+    assert_eq!(desk.read("samples.bin"), bytes(&ticks(10)));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_killed_run_left_is_named() {
+    let desk = desk();
+    desk.write("spec.toml", crate::support::THESIS);
+    fs::create_dir(desk.path("captures")).unwrap();
+    let stream = ["stream", "bank.json", "--input", "a.wav", "--format", "wav"];
+    for (args, output) in [
+        (&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav"][..], "out.wav"),
+        (&["fuse", "bank.json", "a.wav", "b.wav", "-o", "o.wav", "--gaps", "zero", "--mask", "mask"], "mask"),
+        (&[&stream[..], &["--input", "b.wav", "-o", "out.sigmf-meta"]].concat(), "out.sigmf-data"),
+        (&["design", "spec.toml", "-o", "new.json"], "new.json"),
+        (&["simulate", "spec.toml", "--source", "step@3", "-o", "captures"], "captures/target.wav"),
+    ] {
+        // Above the largest number that Linux gives to a process; this run is alive.
+        let hidden = |process: u32| {
+            let path = desk.path(output);
+            let name = path.file_name().unwrap().to_str().unwrap();
+            path.with_file_name(format!(".{name}.{process}-0.part"))
+        };
+        let (stale, alive) = (hidden((1 << 22) + 1), hidden(std::process::id()));
+        [&stale, &alive].map(|path| fs::write(path, "half").unwrap());
+        let done = desk.run(args, &[]);
+        let message = text(&done.stderr);
+        assert!(done.status.success() && message.lines().count() == 1, "{args:?}: {message}");
+        let name = stale.file_name().unwrap().to_str().unwrap();
+        assert!(
+            message.contains(name) && message.contains("no longer runs; remove it"),
+            "{args:?}: {message}"
+        );
+        assert!(stale.exists() && alive.exists(), "{args:?}");
+    }
+}
+
 #[test]
 fn output_and_mask_are_two_files() {
     let desk = desk();

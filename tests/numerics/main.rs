@@ -4,7 +4,6 @@
 mod support;
 
 mod causal_optima;
-mod damaged_files;
 mod equivalence;
 mod filters;
 mod gains;

@@ -2,7 +2,9 @@
 // Each test program uses a part of it.
 #![allow(dead_code, unused_imports)]
 
+pub(crate) mod campaign;
 mod desk;
+pub(crate) mod jobs;
 pub(crate) mod random;
 pub(crate) mod specs;
 pub(crate) mod wav;

@@ -123,6 +123,10 @@ pub(super) struct RenderArguments {
     /// Exchange near and far (scenes without cameras).
     #[arg(long)]
     pub(super) reverse_order: bool,
+    /// Most pixels of the virtual view, and of each image and map. A rendering takes up to 64 bytes of
+    /// memory per pixel.
+    #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
+    pub(super) max_pixels: usize,
     /// Number of threads [default: all cores]. The result has the same bits for every number.
     #[arg(long, value_name = "N")]
     pub(super) threads: Option<usize>,

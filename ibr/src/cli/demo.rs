@@ -35,6 +35,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
             "-o - and --json both write to standard output; write the sheet to a file".into(),
         ));
     }
+    output::name_leftovers(&[&arguments.output]);
     let progress = Progress::new(4);
     progress.step("drawing the scene");
     let (left, left_map) = view(0.0, arguments.size)?;

@@ -1,6 +1,6 @@
 //! Writing results: files that are not overwritten by accident, and standard output.
 
-use super::failure::Failure;
+use super::failure::{self, Failure};
 use crate::image::{Image, begin, encode};
 use hybank::files::commit_all;
 use std::io::Write;
@@ -19,6 +19,17 @@ pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Names the unfinished files that killed runs left beside `outputs`.
+pub(super) fn name_leftovers(outputs: &[&Path]) {
+    for left in hybank::files::leftovers(outputs) {
+        failure::say(&format!(
+            "hybank-ibr: warning: {}: an unfinished output of process {}, which no longer runs; remove it\n",
+            left.path.display(),
+            left.process
+        ));
+    }
+}
+
 /// Refuses a file name whose extension is not an image format, before any work is done.
 pub(super) fn refuse_format(path: &Path) -> Result<(), Failure> {
     if is_standard(path) {
@@ -30,6 +41,8 @@ pub(super) fn refuse_format(path: &Path) -> Result<(), Failure> {
 /// Writes images to files, which appear together, or as PNG to standard output.
 pub(super) fn write_images(images: &[(&Image, &Path)], force: bool) -> Result<(), Failure> {
     let (to_output, to_files): (Vec<_>, Vec<_>) = images.iter().partition(|(_, path)| is_standard(path));
+    #[cfg(unix)]
+    hybank::files::remove_unfinished_on_signals();
     let files = to_files.iter().map(|(image, path)| begin(image, path, force));
     let files = files.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
     to_output.iter().try_for_each(|(image, _)| print_image(image))?;

@@ -6,7 +6,7 @@ use super::output;
 use super::progress::Progress;
 use super::summary::{Figures, Summary};
 use crate::files;
-use crate::image::{Image, quality, read_image};
+use crate::image::{Image, quality, read_image_within};
 use crate::interpolate::Cover;
 use crate::pipeline::uncalibrated::{UncalibratedRendering, UncalibratedSettings};
 use crate::pipeline::{RenderSettings, Rendering, calibrated, rectified, uncalibrated};
@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let start = Instant::now();
     let scene = read(arguments)?;
     let preparation = start.elapsed().as_secs_f64();
-    let truth = arguments.truth.as_deref().map(read_image).transpose().map_err(Failure::input)?;
+    let truth = truth(arguments)?;
     progress.step("rendering");
     let start = Instant::now();
     let done = render(&scene, arguments).map_err(|e| e.in_file(&arguments.scene))?;
@@ -71,7 +71,9 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
             "-o and --mask both name {path}; give the mask a file of its own"
         )));
     }
-    refuse_overlaps(arguments)?;
+    let inputs = [Some(arguments.scene.as_path()), arguments.truth.as_deref()];
+    refuse_overlaps(arguments, &inputs.into_iter().flatten().collect::<Vec<_>>())?;
+    output::name_leftovers(&outputs(arguments));
     for path in [Some(&arguments.output), arguments.mask.as_ref()].into_iter().flatten() {
         output::refuse_existing(path, arguments.force)?;
         output::refuse_format(path)?;
@@ -79,13 +81,20 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Outputs are different files, and none of them is the scene or the true view.
-fn refuse_overlaps(arguments: &RenderArguments) -> Result<(), Failure> {
+/// Outputs are different files, and none of them is an input.
+fn refuse_overlaps(arguments: &RenderArguments, inputs: &[&Path]) -> Result<(), Failure> {
+    hybank::files::refuse_overlaps(&outputs(arguments), inputs).map_err(Failure::input)
+}
+
+/// The files that are written.
+fn outputs(arguments: &RenderArguments) -> Vec<&Path> {
     let outputs = [Some(arguments.output.as_path()), arguments.mask.as_deref()];
-    let outputs: Vec<_> = outputs.into_iter().flatten().filter(|path| !output::is_standard(path)).collect();
-    let inputs = [Some(arguments.scene.as_path()), arguments.truth.as_deref()];
-    let inputs: Vec<_> = inputs.into_iter().flatten().collect();
-    hybank::files::refuse_overlaps(&outputs, &inputs).map_err(Failure::input)
+    outputs.into_iter().flatten().filter(|path| !output::is_standard(path)).collect()
+}
+
+fn truth(arguments: &RenderArguments) -> Result<Option<Image>, Failure> {
+    let read = |path| read_image_within(path, arguments.max_pixels);
+    arguments.truth.as_deref().map(read).transpose().map_err(Failure::input)
 }
 
 fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
@@ -104,8 +113,11 @@ fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
         depth_step: arguments.depth_step,
         densify: arguments.densify(),
         fill: !arguments.drop_unknown,
+        max_pixels: arguments.max_pixels,
     };
     let spec = scene::parse(&text, &path).map_err(Failure::input)?;
+    let files = spec.files(path.parent().unwrap_or(Path::new("")));
+    refuse_overlaps(arguments, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     scene::load(&spec, &path, &options).map_err(Failure::input)
 }
 

@@ -6,7 +6,8 @@ pub mod quality;
 mod read;
 mod write;
 
-pub use read::{MOST_PIXELS, read_image, read_map};
+pub(crate) use read::unavailable_memory;
+pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
 pub use write::{begin, encode, save};
 
 use std::path::PathBuf;
@@ -31,7 +32,7 @@ pub enum ImageError {
         reason: String,
     },
     /// The file has too many pixels.
-    #[error("{}: {width} x {height} pixels are more than the limit of {most}; crop or shrink the image", path.display())]
+    #[error("{}: {width} x {height} pixels are more than the limit of {most}; crop or shrink the image, or allow so many with --max-pixels", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -41,6 +42,18 @@ pub enum ImageError {
         height: usize,
         /// Most pixels.
         most: usize,
+    },
+    /// The system has no memory for the work on so many pixels.
+    #[error("{}: a rendering of {width} x {height} pixels takes {:.1} GB of memory, more than the system gives; crop or shrink the image", path.display(), *bytes as f64 / 1e9)]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Width in pixels.
+        width: usize,
+        /// Height in pixels.
+        height: usize,
+        /// Bytes that the work would take.
+        bytes: usize,
     },
     /// The file cannot be created or get its name.
     #[error(transparent)]

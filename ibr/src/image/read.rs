@@ -2,20 +2,40 @@
 
 use super::{Image, ImageError, pfm};
 use crate::files;
-use image::DynamicImage;
+use image::{DynamicImage, ImageReader};
+use std::io::Cursor;
 use std::path::Path;
 
-/// Most pixels of an image or map: 8192 x 8192, which takes some gigabytes of work memory.
-pub const MOST_PIXELS: usize = 1 << 26;
+/// Default of the most pixels of an image or map: 5792 x 5792, whose rendering takes about two gigabytes.
+pub const MOST_PIXELS: usize = 1 << 25;
 
-/// Reads a grey or RGB image; 16-bit values are scaled to 0..255, PFM values (white = 1) times 255.
+/// Bytes of work memory per pixel of a rendering, at most.
+const PIXEL_BYTES: usize = 64;
+
+/// Bytes that the work on so many pixels takes, if the system refuses them.
+pub(crate) fn unavailable_memory(pixels: usize) -> Option<usize> {
+    let bytes = pixels.saturating_mul(PIXEL_BYTES);
+    Vec::<u8>::new().try_reserve_exact(bytes).is_err().then_some(bytes)
+}
+
+/// Reads a grey or RGB image of at most [`MOST_PIXELS`] pixels; 16-bit values are scaled to 0..255, PFM
+/// values (white = 1) times 255.
 ///
 /// An alpha channel is ignored.
 ///
 /// # Errors
-/// [`ImageError::Read`] and [`ImageError::Decode`], naming the file.
+/// [`ImageError::Read`], [`ImageError::Decode`], [`ImageError::TooLarge`] and [`ImageError::Memory`], naming
+/// the file.
 pub fn read_image(path: &Path) -> Result<Image, ImageError> {
-    match load(path)? {
+    read_image_within(path, MOST_PIXELS)
+}
+
+/// As [`read_image`], for at most `most` pixels.
+///
+/// # Errors
+/// As [`read_image`].
+pub fn read_image_within(path: &Path, most: usize) -> Result<Image, ImageError> {
+    match load(path, most)? {
         Loaded::Float(map) => {
             let data = map.data.iter().map(|v| v * 255.0).collect();
             Image::new(map.width, map.height, map.channels, data)
@@ -29,10 +49,17 @@ pub fn read_image(path: &Path) -> Result<Image, ImageError> {
 /// Returns width, height and the values, rows from the top.
 ///
 /// # Errors
-/// [`ImageError::Read`], [`ImageError::Decode`], and [`ImageError::ColouredMap`] for an RGB file
-/// whose channels differ.
+/// As [`read_image`], and [`ImageError::ColouredMap`] for an RGB file whose channels differ.
 pub fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), ImageError> {
-    let image = match load(path)? {
+    read_map_within(path, MOST_PIXELS)
+}
+
+/// As [`read_map`], for at most `most` pixels.
+///
+/// # Errors
+/// As [`read_map`].
+pub fn read_map_within(path: &Path, most: usize) -> Result<(usize, usize, Vec<f32>), ImageError> {
+    let image = match load(path, most)? {
         Loaded::Float(map) => Image::new(map.width, map.height, map.channels, map.data)?,
         Loaded::Whole(picture) => {
             // Back from 0..255 to the stored numbers: 65535 / 255 = 257 exactly.
@@ -60,23 +87,32 @@ enum Loaded {
     Whole(DynamicImage),
 }
 
-fn load(path: &Path) -> Result<Loaded, ImageError> {
+fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
     let bytes = files::read(path).map_err(|source| ImageError::Read { path: path.into(), source })?;
     let decode = |reason: String| ImageError::Decode { path: path.into(), reason };
     if bytes.starts_with(b"PF") || bytes.starts_with(b"Pf") {
         let map = pfm::decode(&bytes).map_err(decode)?;
-        return not_too_large(path, map.width, map.height).map(|()| Loaded::Float(map));
+        return check_size(path, (map.width, map.height), most).map(|()| Loaded::Float(map));
     }
-    let picture = image::load_from_memory(&bytes).map_err(|e| decode(e.to_string()))?;
-    not_too_large(path, picture.width() as usize, picture.height() as usize)?;
+    let open = || ImageReader::new(Cursor::new(&bytes)).with_guessed_format();
+    // Before the pixels are unpacked.
+    let (width, height) =
+        open().map_err(|e| decode(e.to_string()))?.into_dimensions().map_err(|e| decode(e.to_string()))?;
+    check_size(path, (width as usize, height as usize), most)?;
+    let picture = open().map_err(|e| decode(e.to_string()))?.decode().map_err(|e| decode(e.to_string()))?;
     Ok(Loaded::Whole(picture))
 }
 
-fn not_too_large(path: &Path, width: usize, height: usize) -> Result<(), ImageError> {
-    if width.saturating_mul(height) > MOST_PIXELS {
-        return Err(ImageError::TooLarge { path: path.into(), width, height, most: MOST_PIXELS });
+/// Refuses too many pixels, and such that the system has no memory for.
+fn check_size(path: &Path, (width, height): (usize, usize), most: usize) -> Result<(), ImageError> {
+    let pixels = width.saturating_mul(height);
+    if pixels > most {
+        return Err(ImageError::TooLarge { path: path.into(), width, height, most });
     }
-    Ok(())
+    match unavailable_memory(pixels) {
+        Some(bytes) => Err(ImageError::Memory { path: path.into(), width, height, bytes }),
+        None => Ok(()),
+    }
 }
 
 fn is_deep(picture: &DynamicImage) -> bool {
@@ -130,11 +166,13 @@ mod tests {
 
     #[test]
     fn what_is_too_large_is_refused_before_it_is_converted() {
-        let mut bytes = b"P5 67108865 1 255\n".to_vec();
+        let mut bytes = b"P5 33554433 1 255\n".to_vec();
         bytes.resize(bytes.len() + MOST_PIXELS + 1, 7);
         let (_dir, path) = temporary("wide.pgm", &bytes);
         let message = read_image(&path).unwrap_err().to_string();
-        assert!(message.contains("67108865 x 1") && message.contains("67108864"), "{message}");
+        assert!(message.contains("33554433 x 1") && message.contains("--max-pixels"), "{message}");
+        assert!(matches!(read_map(&path), Err(ImageError::TooLarge { most: MOST_PIXELS, .. })));
+        assert_eq!(read_image_within(&path, MOST_PIXELS + 1).unwrap().width(), MOST_PIXELS + 1);
     }
 
     #[test]

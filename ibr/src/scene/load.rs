@@ -7,7 +7,7 @@ mod uncalibrated;
 use super::spec::{SceneSpec, TargetSpec, ViewSpec};
 use super::{Scene, SceneError};
 use crate::depth::{DepthMap, Measure, fill_unknown};
-use crate::image::{Image, MOST_PIXELS, read_image, read_map};
+use crate::image::{Image, MOST_PIXELS, read_image_within, read_map_within, unavailable_memory};
 use crate::partial::{Densify, densify};
 use std::path::{Path, PathBuf};
 
@@ -22,11 +22,13 @@ pub struct LoadOptions {
     pub densify: Densify,
     /// Whether unknown depths are filled from the farther neighbour in their row.
     pub fill: bool,
+    /// The most pixels of the virtual view, and of each image and map.
+    pub max_pixels: usize,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { view: None, depth_step: 1, densify: Densify::default(), fill: true }
+        Self { view: None, depth_step: 1, densify: Densify::default(), fill: true, max_pixels: MOST_PIXELS }
     }
 }
 
@@ -136,19 +138,39 @@ impl Loader<'_> {
         self.folder.join(path)
     }
 
+    fn image(&self, path: &Path) -> Loaded<Image> {
+        Ok(read_image_within(&self.file(path), self.options.max_pixels)?)
+    }
+
     fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {
         let reason =
             || format!("view {:?} has no `{key}`, which every view of a {kind} scene needs", view.label());
         value.ok_or_else(|| self.incomplete(reason()))
     }
 
-    /// The size in the scene, or the default.
+    /// The size of the virtual view: that of the scene, or the default.
     fn size(&self, target: &TargetSpec, own: (usize, usize)) -> Loaded<(usize, usize)> {
-        match target.size {
-            Some([w, h]) if w == 0 || h == 0 || w.saturating_mul(h) > MOST_PIXELS => Err(self
-                .incomplete(format!("[virtual] size = [{w}, {h}]: both sides must be at least one pixel, and it may have at most {MOST_PIXELS} pixels"))),
-            Some([w, h]) => Ok((w, h)),
-            None => Ok(own),
+        let (w, h) = target.size.map_or(own, |[w, h]| (w, h));
+        let pixels = w.saturating_mul(h);
+        let refused =
+            |reason: String| Err(self.incomplete(format!("the virtual view has {w} x {h} pixels: {reason}")));
+        if pixels == 0 {
+            return refused("both sides of its size must be at least one pixel".into());
+        }
+        if pixels > self.options.max_pixels {
+            let most = self.options.max_pixels;
+            return refused(format!(
+                "more than the limit of {most}; make it smaller, or allow so many with --max-pixels"
+            ));
+        }
+        match unavailable_memory(pixels) {
+            Some(bytes) => {
+                let gigabytes = bytes as f64 / 1e9;
+                refused(format!(
+                    "they take {gigabytes:.1} GB of memory, more than the system gives; make it smaller"
+                ))
+            }
+            None => Ok((w, h)),
         }
     }
 
@@ -161,8 +183,8 @@ impl Loader<'_> {
         measure: Measure,
     ) -> Loaded<(Image, DepthMap, usize)> {
         let path = self.file(map);
-        let image = read_image(&self.file(&view.image))?;
-        let (width, height, stored) = read_map(&path)?;
+        let image = self.image(&view.image)?;
+        let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
         let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
         let map = DepthMap::new((width, height), stored, scale, measure).map_err(depth_error)?;
         let given = view.step.unwrap_or(1);
@@ -300,8 +322,17 @@ mod tests {
         let singular = text.replace("[0.0, 0.0, 1.0, 0.0]", "[0.0, 0.0, 0.0, 1.0]");
         let message = read(&singular, &LoadOptions::default()).unwrap_err();
         assert!(message.contains("view \"a.pgm\"") && message.contains("singular"), "{message}");
-        let empty = text.replace("[6, 3]", "[0, 3]");
-        assert!(read(&empty, &LoadOptions::default()).unwrap_err().contains("at least one pixel"));
+        let sized = |size: &str, options: &LoadOptions| read(&text.replace("[6, 3]", size), options);
+        let defaults = LoadOptions::default();
+        assert!(sized("[0, 3]", &defaults).unwrap_err().contains("at least one pixel"));
+        let message = sized("[8192, 8192]", &defaults).unwrap_err();
+        assert!(message.contains("8192 x 8192") && message.contains("--max-pixels"), "{message}");
+        let message = sized("[6, 3]", &LoadOptions { max_pixels: 17, ..defaults.clone() }).unwrap_err();
+        assert!(message.contains("limit of 17"), "{message}");
+        // More than any address space.
+        let boundless = LoadOptions { max_pixels: usize::MAX, ..defaults };
+        let message = sized("[4294967296, 2147483648]", &boundless).unwrap_err();
+        assert!(message.contains("GB of memory"), "{message}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A scene file as written.
 
 use serde::Deserialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A scene file.
 #[derive(Debug, Clone, Deserialize)]
@@ -70,6 +70,20 @@ pub struct TargetSpec {
     pub offset: Option<f64>,
     /// File of tracks, unless given at the top.
     pub matches: Option<PathBuf>,
+}
+
+impl SceneSpec {
+    /// Every file that the scene names; relative paths start in `folder`.
+    pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
+        let images = self.view.iter().map(|view| &view.image);
+        let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();
+        let tracks = [Some(&self.matches), self.target.as_ref().map(|target| &target.matches)];
+        let tracks = tracks.into_iter().flatten().flatten();
+        let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
+        let models = models.flat_map(|model| ["cameras.txt", "images.txt"].map(|file| model.join(file)));
+        let files = images.chain(maps).chain(tracks).cloned().chain(models);
+        files.map(|file| folder.join(file)).collect()
+    }
 }
 
 impl ViewSpec {

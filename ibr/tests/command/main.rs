@@ -7,8 +7,12 @@ use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use std::path::Path;
 use std::process::{Command, Output};
 
+#[cfg(unix)]
+mod disturbed;
 mod refuse;
 mod render;
+#[cfg(unix)]
+mod support;
 
 const SIZE: (usize, usize) = (120, 90);
 

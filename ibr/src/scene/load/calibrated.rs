@@ -3,7 +3,6 @@
 use super::{Loaded, Loader, in_order};
 use crate::camera::{Camera, colmap};
 use crate::depth::Measure;
-use crate::image::read_image;
 use crate::scene::{CalibratedSource, Kind, SceneError, TargetSpec, ViewSpec};
 use nalgebra::Matrix3x4;
 use rayon::prelude::*;
@@ -31,7 +30,7 @@ impl Loader<'_> {
         let sources = in_order(views.par_iter().map(one).collect())?;
         let first = sources[0].0.image.size();
         let (camera, own) = match left_out {
-            Some(view) => (self.camera_of(view)?, Some(read_image(&self.file(&view.image))?.size())),
+            Some(view) => (self.camera_of(view)?, Some(self.image(&view.image)?.size())),
             None => self.target_camera(target)?,
         };
         let size = self.size(target, own.unwrap_or(first))?;

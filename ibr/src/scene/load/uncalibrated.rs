@@ -1,9 +1,8 @@
 //! Scenes without cameras: images and tracks.
 
 use super::{Loaded, Loader, in_order};
-use crate::image::read_image;
 use crate::pipeline::uncalibrated::Target;
-use crate::scene::{Kind, SceneError, TargetSpec, ViewSpec};
+use crate::scene::{Kind, TargetSpec, ViewSpec};
 use crate::uncalibrated::Point;
 use crate::uncalibrated::tracks::Tracks;
 use rayon::prelude::*;
@@ -23,9 +22,7 @@ impl Loader<'_> {
             None => target.from_tracks,
         };
         let columns = self.columns(views, virtual_column, tracks.columns())?;
-        let images = in_order(
-            views.par_iter().map(|v| read_image(&self.file(&v.image)).map_err(SceneError::from)).collect(),
-        )?;
+        let images = in_order(views.par_iter().map(|v| self.image(&v.image)).collect())?;
         let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
         let goal = match (virtual_column, target.between) {
             (Some(column), _) => Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect()),
@@ -37,7 +34,7 @@ impl Loader<'_> {
             }
         };
         let own = match left_out {
-            Some(view) => read_image(&self.file(&view.image))?.size(),
+            Some(view) => self.image(&view.image)?.size(),
             None => images[0].size(),
         };
         let size = self.size(target, own)?;

@@ -1,0 +1,93 @@
+//! Runs that are disturbed: killed, without threads, without memory, beside what a killed run left.
+
+use super::*;
+use crate::support::campaign::rounds;
+use crate::support::jobs::Job;
+use crate::support::kills::campaign;
+use crate::support::random::Random;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_hybank-ibr");
+
+#[test]
+fn a_killed_run_leaves_old_or_whole_files_and_the_next_one_names_the_rest() {
+    let dir = rig();
+    let render = ["render", "scene.toml", "-o", "out.png", "--mask", "mask.png", "--force"];
+    let demo = ["demo", "--size", "64x64", "-o", "demo.png", "--force"];
+    let mut dice = Random(1200);
+    for (args, outputs) in [(&render[..], &["out.png", "mask.png"][..]), (&demo, &["demo.png"])] {
+        let job = Job::new(PROGRAM, dir.path(), args, outputs);
+        let seen = campaign(&job, rounds(8), &mut dice);
+        println!("{}: {seen}", args.join(" "));
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_killed_run_left_is_named() {
+    let dir = rig();
+    // Above the largest number that Linux gives to a process.
+    let stale = dir.path().join(".out.png.4194305-0.part");
+    std::fs::write(&stale, "half").unwrap();
+    let done = run(dir.path(), &["render", "scene.toml", "-o", "out.png"]);
+    let message = stderr(&done);
+    assert!(code(&done) == 0 && message.contains(".out.png.4194305-0.part"), "{message}");
+    assert!(message.contains("4194305, which no longer runs") && stale.exists(), "{message}");
+}
+
+#[test]
+fn no_file_of_the_scene_is_replaced_even_by_force() {
+    let dir = rig();
+    let read = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
+    std::fs::hard_link(dir.path().join("left.png"), dir.path().join("same.png")).unwrap();
+    let before = ["left.png", "right.png", "left.pfm", "middle.png"].map(read);
+    for output in ["left.png", "./right.png", "left.pfm", "same.png", "middle.png"] {
+        let truth = ["--truth", "middle.png", "--force"];
+        for names in [["-o", output].to_vec(), ["-o", "new.png", "--mask", output].to_vec()] {
+            let refused = run(dir.path(), &[&["render", "scene.toml"], &names[..], &truth].concat());
+            let message = stderr(&refused);
+            assert_eq!(code(&refused), 1, "{names:?}: {message}");
+            assert!(
+                message.contains("also the input") && message.lines().count() == 1,
+                "{names:?}: {message}"
+            );
+        }
+    }
+    assert_eq!(["left.png", "right.png", "left.pfm", "middle.png"].map(read), before);
+    assert!(!dir.path().join("new.png").exists());
+}
+
+#[cfg(unix)]
+fn shell(dir: &Path, script: &str) -> Output {
+    Command::new("sh").current_dir(dir).env("H", PROGRAM).args(["-c", script]).output().unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn without_threads_the_work_is_done_or_refused_in_one_line() {
+    let dir = rig();
+    // More than any address space: no thread with such a stack can be started.
+    let without = |line: &str| shell(dir.path(), &format!("RUST_MIN_STACK=1000000000000000 $H {line}"));
+    let done = without("render scene.toml -o out.png");
+    assert_eq!(code(&done), 0, "{}", stderr(&done));
+    let refused = without("render scene.toml -o more.png --threads 3");
+    assert_eq!((code(&refused), stderr(&refused).lines().count()), (1, 1), "{}", stderr(&refused));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn too_many_pixels_are_refused_before_any_work() {
+    let dir = rig();
+    let pixels = [b"P5 20000 2000 255\n".to_vec(), vec![7; 40_000_000]].concat();
+    std::fs::write(dir.path().join("wide.pgm"), pixels).unwrap();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    std::fs::write(dir.path().join("wide.toml"), scene.replace("left.png", "wide.pgm")).unwrap();
+    let refused = run(dir.path(), &["render", "wide.toml", "-o", "out.png"]);
+    let message = stderr(&refused);
+    assert!(message.contains("20000 x 2000") && message.contains("--max-pixels"), "{message}");
+    // With the limit lifted, but not that of the memory.
+    let refused =
+        shell(dir.path(), "ulimit -v 2000000; $H render wide.toml -o out.png --max-pixels 50000000");
+    let message = stderr(&refused);
+    assert_eq!((code(&refused), message.lines().count()), (1, 1), "{message}");
+    assert!(message.contains("wide.pgm") && message.contains("GB of memory"), "{message}");
+}

@@ -1,0 +1,116 @@
+//! Names of unfinished files, and the unfinished files that killed runs have left.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Characters of the target's name in that of the unfinished file, so that this is not too long for the
+/// file system.
+const NAME_PART: usize = 60;
+
+/// An unfinished file whose process no longer runs.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Leftover {
+    /// The file.
+    pub path: PathBuf,
+    /// The process that wrote it.
+    pub process: u32,
+}
+
+/// `.NAME.`, the beginning of the names of all unfinished files of `target`.
+fn beginning(target: &Path) -> Option<String> {
+    let name = target.file_name()?.to_string_lossy();
+    Some(format!(".{}.", name.chars().take(NAME_PART).collect::<String>()))
+}
+
+/// `.NAME.PROCESS-NUMBER.part` beside `target`.
+pub(super) fn beside(target: &Path, process: u32, number: u32) -> Option<PathBuf> {
+    Some(target.with_file_name(format!("{}{process}-{number}.part", beginning(target)?)))
+}
+
+/// The unfinished files beside `targets` whose processes no longer run: such a run was killed before it could
+/// remove them. An output may be a link; then its folder is that of the file it leads to.
+pub fn leftovers(targets: &[&Path]) -> Vec<Leftover> {
+    let mut searches: Vec<(PathBuf, BTreeSet<String>)> = Vec::new();
+    for target in targets {
+        let target = target.canonicalize().unwrap_or_else(|_| target.to_path_buf());
+        let Some(name) = beginning(&target) else { continue };
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        match searches.iter_mut().find(|(known, _)| known == folder) {
+            Some((_, names)) => drop(names.insert(name)),
+            None => searches.push((folder.to_owned(), BTreeSet::from([name]))),
+        }
+    }
+    let found = searches.iter().flat_map(|(folder, names)| in_folder(folder, names));
+    found.collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+fn in_folder(folder: &Path, names: &BTreeSet<String>) -> Vec<Leftover> {
+    // A folder that cannot be listed is no reason to stop: this is only a notice.
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let leftover = |entry: fs::DirEntry| {
+        let name = entry.file_name();
+        let (beginning, process) = writer(name.to_str()?)?;
+        (names.contains(beginning) && !is_running(process))
+            .then(|| Leftover { path: folder.join(&name), process })
+    };
+    entries.filter_map(leftover).collect()
+}
+
+/// Splits the name of an unfinished file into `.NAME.` and the process that wrote it.
+fn writer(name: &str) -> Option<(&str, u32)> {
+    let (process, number) = name.strip_suffix(".part")?.rsplit_once('-')?;
+    let start = process.rfind('.')? + 1;
+    number.parse::<u32>().ok()?;
+    Some((&name[..start], process[start..].parse().ok()?))
+}
+
+#[cfg(target_os = "linux")]
+fn is_running(process: u32) -> bool {
+    // Without /proc nothing is known, and a file that may still be written is not called a leftover.
+    !Path::new("/proc/self").exists() || Path::new("/proc").join(process.to_string()).exists()
+}
+
+/// Elsewhere nothing is known about other processes.
+#[cfg(not(target_os = "linux"))]
+fn is_running(_: u32) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_taken_apart() {
+        for target in ["out.wav", "a-b.7-1.part", &"x".repeat(250)] {
+            let path = beside(Path::new(target), 4321, 7).unwrap();
+            let (name, process) = writer(path.to_str().unwrap()).unwrap();
+            assert_eq!((name, process), (beginning(Path::new(target)).unwrap().as_str(), 4321));
+        }
+        for name in [".out.wav.12.part", ".out.wav.12-0", "12-0.part", ".out.wav.x-0.part", ".out.12-x.part"]
+        {
+            assert_eq!(writer(name), None, "{name}");
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn only_files_of_dead_processes_and_of_the_same_output_are_leftovers() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        // Above the largest number that Linux gives to a process.
+        let dead = (1 << 22) + 1;
+        let stale = beside(&path("out"), dead, 0).unwrap();
+        for file in [
+            stale.clone(),
+            beside(&path("other"), dead, 0).unwrap(),
+            beside(&path("out"), std::process::id(), 0).unwrap(),
+            path(".out.part"),
+        ] {
+            fs::write(file, "").unwrap();
+        }
+        assert_eq!(leftovers(&[&path("out"), &path("none/out")]), [Leftover { path: stale, process: dead }]);
+    }
+}

@@ -1,0 +1,148 @@
+//! Forged banks: stated numbers are changed, the digest is computed again, and what `verify` then proves must be true.
+
+use crate::norm::norm;
+use crate::support::campaign::rounds;
+use crate::support::random::Random;
+use crate::support::specs::{alike, tf, thesis, with_taps};
+use hybank::bank::{Bank, check_digest};
+use hybank::design::design;
+use hybank::spec::Spec;
+use hybank::verify::{Verified, verify};
+use serde_json::Value;
+use std::f64::consts::SQRT_2;
+
+/// Relative error of the oracle: its sum over aliases ends, and it may miss the top of a peak by a little.
+const ORACLE: f64 = 1e-6;
+
+/// A proven bank as a document, with its true norm.
+struct Example {
+    name: &'static str,
+    bank: Bank,
+    document: Value,
+    norm: f64,
+}
+
+fn examples() -> Vec<Example> {
+    let butterworth = tf(&[0.36], &[1.0, 0.6 * SQRT_2, 0.36]);
+    let list: [(&str, Spec); 5] = [
+        ("FIR, latency 10", with_taps(thesis(10, &[1.2, 0.6]), 12)),
+        ("FIR, latency 1", with_taps(thesis(1, &[1.2, 0.6]), 8)),
+        ("FIR, three channels", with_taps(alike(&butterworth, 3, 6, &[0.0, 1.1, 2.3]), 12)),
+        ("FIR, one channel", with_taps(alike(&butterworth, 1, 2, &[0.4]), 6)),
+        ("recursive, latency 3", thesis(3, &[1.2, 0.6])),
+    ];
+    let example = |(name, spec): (&'static str, Spec)| {
+        let bank = design(&spec).unwrap().bank;
+        verify(&bank).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let document = serde_json::from_str(&bank.to_json().unwrap()).unwrap();
+        Example { name, norm: norm(&bank), bank, document }
+    };
+    list.into_iter().map(example).collect()
+}
+
+/// Every number in a document, in its order.
+fn numbers(value: &mut Value) -> Vec<&mut Value> {
+    match value {
+        Value::Number(_) => vec![value],
+        Value::Array(items) => items.iter_mut().flat_map(numbers).collect(),
+        Value::Object(members) => members.values_mut().flat_map(numbers).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The parts of a file that hold numbers; gamma, spec and coefficients would be rare among the numbers of the proof.
+fn parts(document: &mut Value) -> Vec<&mut Value> {
+    let mut parts = Vec::new();
+    for (key, value) in document.as_object_mut().unwrap() {
+        if key == "proof" && value.is_object() {
+            parts.extend(value.as_object_mut().unwrap().values_mut());
+        } else {
+            parts.push(value);
+        }
+    }
+    parts.into_iter().filter_map(|part| if numbers(part).is_empty() { None } else { Some(part) }).collect()
+}
+
+/// Another number, near or far.
+fn forged(dice: &mut Random, value: &Value) -> Value {
+    if let Some(whole) = value.as_u64() {
+        return match dice.below(3) {
+            0 => (whole + 1).into(),
+            1 => whole.saturating_sub(1).into(),
+            _ => (whole * 2).into(),
+        };
+    }
+    let x = value.as_f64().unwrap();
+    let near = 10f64.powf(-16.0 * dice.part()) * dice.of(&[-1.0, 1.0]);
+    let y = match dice.below(8) {
+        0 => 0.0,
+        1 => -x,
+        2 => 50.0 * x,
+        3 => x.next_up(),
+        _ => x * (1.0 + near),
+    };
+    y.into()
+}
+
+/// The forged document as a file whose digest is right, read as any other.
+fn read(document: &Value) -> Option<Bank> {
+    let bank = Bank::from_json(&document.to_string(), "forged").ok()?;
+    let text = bank.to_json().ok()?;
+    check_digest(&text, "forged").unwrap();
+    Bank::from_json(&text, "forged").ok()
+}
+
+/// Everything that was proven or stated is true of the forged bank.
+fn check(example: &Example, forged: &Bank, proven: &Verified, what: &str) {
+    let true_norm = norm(forged);
+    let what = format!("{what}: norm {true_norm:e}, {proven:?}, {:?}", forged.gamma);
+    let (above, below) = (true_norm * (1.0 + ORACLE) + 1e-9, true_norm * (1.0 - ORACLE) - 1e-9);
+    assert!(proven.attained <= above && below <= proven.upper, "{what}");
+    assert!(proven.lower <= above && proven.noncausal <= above, "{what}");
+    // On the same front ends and with as many taps the original is a bank of the class that the bounds speak of.
+    let same_class = |a: &Bank, b: &Bank| a.spec == b.spec && a.latency == b.latency;
+    if same_class(&example.bank, forged) {
+        assert!(proven.lower <= example.norm * (1.0 + ORACLE), "{what}");
+    }
+    let stated = forged.gamma;
+    assert!(stated.norm.is_none_or(|norm| below <= norm && norm <= above), "{what}");
+    assert!(stated.upper.is_none_or(|upper| below <= upper && proven.upper <= upper), "{what}");
+    assert!(stated.lower.is_none_or(|lower| lower <= proven.lower), "{what}");
+    assert!(stated.noncausal.is_none_or(|noncausal| noncausal <= proven.noncausal), "{what}");
+}
+
+#[test]
+fn what_verify_proves_of_forged_banks_is_true() {
+    let mut dice = Random(2008);
+    for example in examples() {
+        let trials = rounds(150);
+        let (mut unreadable, mut refused, mut true_ones) = (0, 0, 0);
+        for trial in 0..trials {
+            let mut document = example.document.clone();
+            for _ in 0..=dice.below(3) {
+                let mut parts = parts(&mut document);
+                let count = parts.len();
+                let mut numbers = numbers(parts[dice.below(count)]);
+                let count = numbers.len();
+                let number = &mut *numbers[dice.below(count)];
+                *number = forged(&mut dice, number);
+            }
+            let Some(bank) = read(&document) else {
+                unreadable += 1;
+                continue;
+            };
+            match verify(&bank) {
+                Err(_) => refused += 1,
+                Ok(proven) => {
+                    true_ones += 1;
+                    check(&example, &bank, &proven, &format!("{}, trial {trial}", example.name));
+                }
+            }
+        }
+        println!(
+            "{}: {trials} forgeries, {unreadable} not read, {refused} refused, {true_ones} proven and true",
+            example.name
+        );
+        assert!(refused > 0 && true_ones > 0, "{}", example.name);
+    }
+}

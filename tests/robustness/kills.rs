@@ -1,0 +1,16 @@
+//! Runs that are killed at random times.
+
+use crate::kill_campaign::campaign;
+use crate::support::campaign::rounds;
+use crate::support::random::Random;
+use crate::work::{desk, jobs};
+
+#[test]
+fn a_killed_run_leaves_old_or_whole_files_and_the_next_one_names_the_rest() {
+    let desk = desk(100_000);
+    let mut dice = Random(1200);
+    for job in jobs(&desk) {
+        let seen = campaign(&job, rounds(8), &mut dice);
+        println!("{}: {seen}", job.args.join(" "));
+    }
+}

@@ -1,0 +1,24 @@
+//! Campaigns of random trials: killed runs, failing system calls, full disks, forged banks, damaged inputs.
+//!
+//! Every run makes a short campaign with the same seeds. `HYBANK_CAMPAIGN=50 cargo test --release --test robustness
+//! -- --nocapture` makes 50 times as many trials; the counts are printed. `docs/robustness.md` has them.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+#[cfg(unix)]
+#[path = "../support/kills.rs"]
+mod kill_campaign;
+
+#[cfg(target_os = "linux")]
+mod disks;
+mod forged;
+mod inputs;
+#[cfg(unix)]
+mod kills;
+mod norm;
+mod parsers;
+#[cfg(target_os = "linux")]
+mod system_calls;
+#[cfg(unix)]
+mod work;

@@ -1,0 +1,115 @@
+//! System calls that fail: one error at a time, injected by strace at any call of a run.
+
+use crate::support::campaign::rounds;
+use crate::support::jobs::Job;
+use crate::support::random::Random;
+use crate::support::text;
+use crate::work::{desk, jobs};
+use std::fs;
+use std::process::Command;
+
+/// Calls with the errors that they may give.
+const CALLS: [(&str, &[&str]); 11] = [
+    ("openat", &["EMFILE", "EACCES", "EIO"]),
+    ("read", &["EIO", "EINTR"]),
+    ("write", &["EIO", "ENOSPC", "EINTR"]),
+    ("lseek", &["EIO"]),
+    ("fsync", &["EIO", "ENOSPC"]),
+    ("close", &["EIO", "ENOSPC"]),
+    ("renameat2", &["EIO", "ENOSPC", "EXDEV"]),
+    ("unlink", &["EIO"]),
+    ("fchmod", &["EPERM"]),
+    ("mkdir", &["ENOSPC"]),
+    ("clone3", &["EAGAIN"]),
+];
+
+/// The job under strace with these options.
+fn strace(job: &Job, options: &[&str]) -> Command {
+    let mut command = Command::new("strace");
+    command.current_dir(&job.folder).args(["-f", "-qq"]).args(options);
+    command.arg(job.program).args(&job.args);
+    command
+}
+
+fn is_there() -> bool {
+    Command::new("strace").args(["-o", "/dev/null", "true"]).status().is_ok_and(|status| status.success())
+}
+
+/// How often the busiest thread of an undisturbed run makes each call.
+fn counts(job: &Job) -> Vec<usize> {
+    let names: Vec<_> = CALLS.iter().map(|(name, _)| *name).collect();
+    let log = job.folder.join("strace.log");
+    job.prepare(true);
+    let trace = format!("trace={}", names.join(","));
+    let status = strace(job, &["-o", log.to_str().unwrap(), "-e", &trace]).output().unwrap().status;
+    assert!(status.success());
+    let log = fs::read_to_string(log).unwrap();
+    names.iter().map(|name| log.lines().filter(|line| line.contains(&format!(" {name}("))).count()).collect()
+}
+
+#[derive(Default)]
+struct Seen {
+    errors: usize,
+    /// The run succeeded all the same, with whole outputs.
+    done: usize,
+    /// The run failed with one message and left everything as it was.
+    refused: usize,
+    /// The system could not even start the program.
+    not_started: usize,
+}
+
+#[test]
+fn a_failing_call_is_an_error_of_one_line_or_none_at_all() {
+    if !is_there() {
+        println!("skipped: strace is not there or may not trace");
+        return;
+    }
+    let desk = desk(20_000);
+    let mut dice = Random(76);
+    for job in jobs(&desk) {
+        let counts = counts(&job);
+        let called: Vec<_> = (0..CALLS.len()).filter(|&call| counts[call] > 0).collect();
+        let mut seen = Seen::default();
+        for round in 0..rounds(12) {
+            let call = called[round % called.len()];
+            let (name, errors) = CALLS[call];
+            let when = 1 + dice.below(counts[call]);
+            fail(&job, name, dice.of(errors), when, dice.below(2) == 0, &mut seen);
+        }
+        let Seen { errors, done, refused, not_started } = seen;
+        println!(
+            "{}: {errors} errors, {done} done all the same, {refused} refused, {not_started} not started",
+            job.args.join(" ")
+        );
+    }
+}
+
+/// One run whose call number `when` of this name fails.
+fn fail(job: &Job, call: &str, error: &str, when: usize, old: bool, seen: &mut Seen) {
+    let before = job.prepare(old);
+    let inject = format!("inject={call}:error={error}:when={when}");
+    let trace = format!("trace={call}");
+    let output = strace(job, &["-o", "/dev/null", "-e", &trace, "-e", &inject]).output().unwrap();
+    let message = text(&output.stderr);
+    let what = format!("{:?}, {inject}, old {old}: {message}", job.args);
+    seen.errors += 1;
+    match output.status.code() {
+        Some(0) => {
+            seen.done += 1;
+            assert_eq!(job.judge(&before, &what), Some(true), "{what}");
+        }
+        Some(1) => {
+            seen.refused += 1;
+            assert_eq!(job.judge(&before, &what), Some(false), "{what}");
+            // The message itself may be what could not be written.
+            let lines = message.lines().filter(|line| !line.starts_with("hybank: warning")).count();
+            assert!(lines == 1 || (lines == 0 && call == "write"), "{what}");
+            assert!(message.starts_with("hybank: ") || call == "write", "{what}");
+        }
+        Some(127) if message.contains("shared librar") => seen.not_started += 1,
+        _ => panic!("{:?}: {what}", output.status),
+    }
+    let unfinished = job.unfinished();
+    assert!(unfinished.is_empty() || call == "unlink", "{what}: {unfinished:?}");
+    unfinished.iter().for_each(|path| fs::remove_file(path).unwrap());
+}

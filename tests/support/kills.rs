@@ -1,0 +1,91 @@
+//! Kills at random times: no half-written file under a final name, and leftovers that the next run names.
+
+use crate::support::jobs::Job;
+use crate::support::random::Random;
+use std::fmt;
+use std::fs;
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// What a campaign saw.
+#[derive(Default)]
+pub(crate) struct Seen {
+    kills: usize,
+    /// The signal came before the end.
+    during: usize,
+    /// Runs whose outputs were whole.
+    whole: usize,
+    /// Of a set of files some were whole and some as before.
+    parts_of_sets: usize,
+    /// Unfinished files after SIGKILL, all of them named by the next run.
+    leftovers: usize,
+}
+
+impl fmt::Display for Seen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kills, during, whole, parts_of_sets, leftovers } = self;
+        write!(f, "{kills} kills, {during} before the end; {whole} whole, {parts_of_sets} sets in part; ")?;
+        write!(f, "{leftovers} unfinished files, all named by the next run")
+    }
+}
+
+/// Kills `job` so often, with SIGKILL and SIGTERM by turns, at times from its start to a little after its end.
+pub(crate) fn campaign(job: &Job, kills: usize, dice: &mut Random) -> Seen {
+    let begin = Instant::now();
+    assert!(job.command().stdout(Stdio::null()).status().unwrap().success());
+    let longest = begin.elapsed().mul_f64(1.1);
+    let mut seen = Seen { kills, ..Seen::default() };
+    for kill in 0..kills {
+        let (hard, old) = (kill % 2 == 0, kill % 4 < 2);
+        let before = job.prepare(old);
+        let (status, during) = killed(job.command(), longest.mul_f64(dice.part()), hard);
+        let what = format!("{:?}, kill {kill}: {status}", job.args);
+        check_status(status, hard, &what);
+        seen.during += usize::from(during);
+        match job.judge(&before, &what) {
+            Some(whole) => seen.whole += usize::from(whole),
+            None => seen.parts_of_sets += 1,
+        }
+        let leftovers = job.unfinished();
+        assert!(hard || leftovers.is_empty(), "{what}: {leftovers:?}");
+        if !leftovers.is_empty() {
+            let next = job.command().output().unwrap();
+            let said = String::from_utf8(next.stderr).unwrap();
+            assert!(next.status.success(), "{what}: {said}");
+            for path in &leftovers {
+                let name = path.file_name().unwrap().to_str().unwrap();
+                assert!(said.contains(name), "{what}: {name} is not named in: {said}");
+                fs::remove_file(path).unwrap();
+            }
+            assert_eq!(job.judge(&before, &what), Some(true), "{what}");
+            assert!(job.unfinished().is_empty(), "{what}");
+            seen.leftovers += leftovers.len();
+        }
+    }
+    seen
+}
+
+/// Ends a run by a signal after `delay`; true if the run had not ended before.
+fn killed(mut command: Command, delay: Duration, hard: bool) -> (ExitStatus, bool) {
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(delay);
+    let during = child.try_wait().unwrap().is_none();
+    if hard {
+        child.kill().unwrap();
+    } else if during {
+        let _ = Command::new("kill").args(["-TERM", &child.id().to_string()]).stderr(Stdio::null()).status();
+    }
+    (child.wait().unwrap(), during)
+}
+
+/// Done, killed, or ended by SIGTERM: at once, in order (1), or after removing files (128 + 15).
+fn check_status(status: ExitStatus, hard: bool, what: &str) {
+    let signal = if hard { 9 } else { 15 };
+    let fits = match status.code() {
+        Some(0) => true,
+        Some(code) => !hard && (code == 1 || code == 143),
+        None => status.signal() == Some(signal),
+    };
+    assert!(fits, "{what}");
+}
