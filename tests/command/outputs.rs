@@ -104,7 +104,7 @@ fn what_a_killed_run_left_is_named() {
             path.with_file_name(format!(".{name}.{process}-0.part"))
         };
         let (stale, alive) = (hidden((1 << 22) + 1), hidden(std::process::id()));
-        [&stale, &alive].map(|path| fs::write(path, "half").unwrap());
+        [&stale, &alive].into_iter().for_each(|path| fs::write(path, "half").unwrap());
         let done = desk.run(args, &[]);
         let message = text(&done.stderr);
         assert!(done.status.success() && message.lines().count() == 1, "{args:?}: {message}");
