@@ -179,22 +179,3 @@ fn captures_that_no_memory_holds_are_refused() {
     assert!(message.contains("2.1 GB of memory") && message.contains("--samples"), "{message}");
     assert!(!desk.path("captures").exists());
 }
-
-#[test]
-fn numbers_next_to_the_largest_are_refused_by_name() {
-    let desk = Desk::new();
-    for (from, to) in [("num = [0.25]", "num = [1e300]"), ("num = [0.25]", "num = [-1e307]")] {
-        for method in ["fir", "iir", "h2"] {
-            desk.write("spec.toml", crate::support::THESIS.replace(from, to));
-            let output =
-                desk.run(&["design", "spec.toml", "-o", "big.json", "--force", "--method", method], &[]);
-            let message = text(&output.stderr);
-            assert_eq!(output.status.code(), Some(1), "{method} {to}: {message}");
-            assert!(
-                message.starts_with("hybank: spec.toml: ") && message.contains("e30"),
-                "{method} {to}: {message}"
-            );
-            assert!(!message.contains("svd"), "{method} {to}: {message}");
-        }
-    }
-}
