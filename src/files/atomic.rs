@@ -16,12 +16,15 @@ const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Removes all files of this process that have not been committed: for a thread that is about to end the
-/// process while others are writing.
+/// process while others are writing. Other threads can neither begin nor drop a file afterwards; they wait for
+/// the end.
 pub fn remove_unfinished() {
-    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+    let files = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in files.iter() {
         // An error cannot be reported from here.
         let _ = fs::remove_file(path);
     }
+    std::mem::forget(files);
 }
 
 /// A file that is written under a hidden name beside its target and gets its name by
@@ -62,9 +65,12 @@ impl AtomicFile {
             return Err(FileError::Exists { file: name });
         }
         let begin = || {
-            let (beside, file) = create_beside(&target, known.is_some())?;
+            let (beside, file) = unfinished(|files| {
+                let created = create_beside(&target, known.is_some())?;
+                files.insert(created.0.clone());
+                io::Result::Ok(created)
+            })?;
             let begun = Self { file: Some(file), beside, target, name: name.clone(), replace };
-            unfinished(|files| files.insert(begun.beside.clone()));
             if let (Some(file), Some(known)) = (&begun.file, known) {
                 file.set_permissions(known.permissions())?;
             }

@@ -1,7 +1,6 @@
 //! Names of unfinished files, and the unfinished files that killed runs have left.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Characters of the target's name in that of the unfinished file, so that this is not too long for the
@@ -33,7 +32,8 @@ pub(super) fn beside(target: &Path, process: u32, number: u32) -> Option<PathBuf
 pub fn leftovers(targets: &[&Path]) -> Vec<Leftover> {
     let mut searches: Vec<(PathBuf, BTreeSet<String>)> = Vec::new();
     for target in targets {
-        let target = target.canonicalize().unwrap_or_else(|_| target.to_path_buf());
+        let end = target.is_symlink().then(|| target.canonicalize().ok()).flatten();
+        let target = end.unwrap_or_else(|| target.to_path_buf());
         let Some(name) = beginning(&target) else { continue };
         let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new("."));
@@ -47,15 +47,29 @@ pub fn leftovers(targets: &[&Path]) -> Vec<Leftover> {
 }
 
 fn in_folder(folder: &Path, names: &BTreeSet<String>) -> Vec<Leftover> {
-    // A folder that cannot be listed is no reason to stop: this is only a notice.
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let leftover = |entry: fs::DirEntry| {
-        let name = entry.file_name();
-        let (beginning, process) = writer(name.to_str()?)?;
+    let leftover = |name: String| {
+        let (beginning, process) = writer(&name)?;
         (names.contains(beginning) && !is_running(process))
             .then(|| Leftover { path: folder.join(&name), process })
     };
-    entries.filter_map(leftover).collect()
+    names_in(folder).into_iter().filter_map(leftover).collect()
+}
+
+/// The names in a folder. One that cannot be listed is no reason to stop: this is only for a notice.
+#[cfg(target_os = "linux")]
+fn names_in(folder: &Path) -> Vec<String> {
+    use rustix::fs::{Dir, Mode, OFlags, open};
+    // `std::fs::ReadDir` panics where a folder cannot be closed.
+    let folder = open(folder, OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC, Mode::empty());
+    let Ok(entries) = folder.and_then(Dir::new) else { return Vec::new() };
+    let name = |entry: rustix::fs::DirEntry| Some(entry.file_name().to_str().ok()?.to_owned());
+    entries.flatten().filter_map(name).collect()
+}
+
+/// Elsewhere it is unknown which process still runs, so no file is called a leftover.
+#[cfg(not(target_os = "linux"))]
+fn names_in(_: &Path) -> Vec<String> {
+    Vec::new()
 }
 
 /// Splits the name of an unfinished file into `.NAME.` and the process that wrote it.
@@ -66,16 +80,9 @@ fn writer(name: &str) -> Option<(&str, u32)> {
     Some((&name[..start], process[start..].parse().ok()?))
 }
 
-#[cfg(target_os = "linux")]
 fn is_running(process: u32) -> bool {
     // Without /proc nothing is known, and a file that may still be written is not called a leftover.
     !Path::new("/proc/self").exists() || Path::new("/proc").join(process.to_string()).exists()
-}
-
-/// Elsewhere nothing is known about other processes.
-#[cfg(not(target_os = "linux"))]
-fn is_running(_: u32) -> bool {
-    true
 }
 
 #[cfg(test)]
@@ -109,7 +116,7 @@ mod tests {
             beside(&path("out"), std::process::id(), 0).unwrap(),
             path(".out.part"),
         ] {
-            fs::write(file, "").unwrap();
+            std::fs::write(file, "").unwrap();
         }
         assert_eq!(leftovers(&[&path("out"), &path("none/out")]), [Leftover { path: stale, process: dead }]);
     }

@@ -10,9 +10,9 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 
 /// Aliases on each side; the front ends here fall by 12 dB per octave or more.
-const ALIASES: i32 = 400;
+const ALIASES: i32 = 150;
 /// Points on half the unit circle, next to those close to 0.
-const GRID: usize = 300;
+const GRID: usize = 150;
 
 /// The greatest gain at any frequency tried, a lower bound of ||K|| up to rounding.
 pub(crate) fn norm(bank: &Bank) -> f64 {
@@ -40,7 +40,7 @@ fn proven_peak(bank: &Bank) -> Option<f64> {
 fn peak(value: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     let mut best = 0.0f64;
-    for _ in 0..30 {
+    for _ in 0..20 {
         let (left, right) = (b - ratio * (b - a), a + ratio * (b - a));
         let (at_left, at_right) = (value(left), value(right));
         best = best.max(at_left).max(at_right);
@@ -54,20 +54,21 @@ fn gain(bank: &Bank, omega: f64) -> f64 {
     let spec = bank.spec.as_ref().unwrap();
     let (m, h) = (bank.ratio, bank.fast_period);
     let filters = synthesis(bank, omega);
+    let delays: Vec<f64> = spec.channels.iter().map(|channel| channel.delay.0 / h).collect();
     let mut square = DMatrix::<Complex<f64>>::zeros(m, m);
+    let mut error = DVector::<Complex<f64>>::zeros(m);
     for k in -ALIASES..=ALIASES {
         let nu = (omega + TAU * f64::from(k)) / m as f64;
-        let channel = |i: usize| {
-            let delay = spec.channels[i].delay.0 / h;
-            response(&spec.channels[i].filter, nu / h) * Complex::from_polar(1.0, -nu * delay)
-        };
-        let measured = DVector::from_fn(bank.channel_count(), |i, _| channel(i));
         let target = response(&spec.target, nu / h);
-        let wanted = |p: usize| target * Complex::from_polar(1.0, nu * (p as f64 - bank.latency as f64));
-        let error = DVector::from_fn(m, |p, _| wanted(p)) - &filters * measured;
-        square += &error * error.adjoint();
+        for (p, error) in error.iter_mut().enumerate() {
+            *error = target * Complex::from_polar(1.0, nu * (p as f64 - bank.latency as f64));
+        }
+        for (i, channel) in spec.channels.iter().enumerate() {
+            let measured = response(&channel.filter, nu / h) * Complex::from_polar(1.0, -nu * delays[i]);
+            error.iter_mut().enumerate().for_each(|(p, error)| *error -= filters[(p, i)] * measured);
+        }
+        square.gerc(Complex::from(1.0 / m as f64), &error, &error, Complex::from(1.0));
     }
-    let square = square.map(|x| x / m as f64);
     if square.iter().any(|x| !(x.re.is_finite() && x.im.is_finite())) {
         return f64::INFINITY;
     }
