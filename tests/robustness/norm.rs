@@ -52,7 +52,7 @@ fn peak(value: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 /// sqrt of the greatest eigenvalue of K K* at z = e^{j omega}.
 fn gain(bank: &Bank, omega: f64) -> f64 {
     let spec = bank.spec.as_ref().unwrap();
-    let (m, h) = (bank.ratio, bank.fast_period);
+    let (m, h) = (bank.ratio, bank.fast_period.0);
     let filters = synthesis(bank, omega);
     let delays: Vec<f64> = spec.channels.iter().map(|channel| channel.delay.0 / h).collect();
     let mut square = DMatrix::<Complex<f64>>::zeros(m, m);
