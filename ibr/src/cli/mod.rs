@@ -53,6 +53,6 @@ fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + 
     if !(1..=MOST_THREADS).contains(&threads) {
         return Err(Failure::Usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}")));
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(Failure::input)?;
-    pool.install(work)
+    let refused = |error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"));
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(refused)?.install(work)
 }

@@ -71,6 +71,7 @@ fn without_threads_the_work_is_done_or_refused_in_one_line() {
     assert_eq!(code(&done), 0, "{}", stderr(&done));
     let refused = without("render scene.toml -o more.png --threads 3");
     assert_eq!((code(&refused), stderr(&refused).lines().count()), (1, 1), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("--threads 3"), "{}", stderr(&refused));
 }
 
 #[cfg(target_os = "linux")]
