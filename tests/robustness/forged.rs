@@ -60,7 +60,8 @@ fn parts(document: &mut Value) -> Vec<&mut Value> {
             parts.push(value);
         }
     }
-    parts.into_iter().filter_map(|part| if numbers(part).is_empty() { None } else { Some(part) }).collect()
+    parts.retain_mut(|part| !numbers(part).is_empty());
+    parts
 }
 
 /// Another number, near or far.
