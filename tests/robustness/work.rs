@@ -9,7 +9,7 @@ const HYBANK: &str = env!("CARGO_BIN_EXE_hybank");
 /// Two recordings of so many samples, a spec and its bank.
 pub(crate) fn desk(samples: usize) -> Desk {
     let desk = Desk::new();
-    desk.write("spec.toml", THESIS.replace("fast_period = 1.0", "fast_rate = 48000.0"));
+    desk.write("spec.toml", THESIS);
     let mut dice = Random(18);
     let mut noise = || (0..samples).map(|_| dice.sample() as f32).collect::<Vec<_>>();
     wav::write_pair(&desk, &noise(), &noise());
