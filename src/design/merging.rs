@@ -144,3 +144,59 @@ fn least_noise_shares(noise: &[f64]) -> Vec<f64> {
     let total: f64 = noise.iter().map(|&power| weight(power)).sum();
     noise.iter().map(|&power| weight(power) / total).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::Spec;
+
+    /// M = 2; each channel by its numerator, delay and noise, behind num / (s + 1).
+    fn problem(channels: &[(f64, f64, f64)]) -> Problem {
+        let channel = |&(num, delay, noise): &(f64, f64, f64)| {
+            format!(
+                "{{ delay = {delay:?}, noise = {noise:?}, filter = {{ num = [{num:?}], den = [1.0, 1.0] }} }}"
+            )
+        };
+        let list: Vec<String> = channels.iter().map(channel).collect();
+        let text = format!(
+            "fast_period = 1.0\nratio = 2\nlatency = 4\nchannel = [{}]\n\
+             target = {{ filter = {{ num = [1.0], den = [1.0, 1.0] }} }}\ndesign = {{ method = \"iir\" }}",
+            list.join(", ")
+        );
+        Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 4).unwrap()
+    }
+
+    fn shares(merged: &MergedChannels) -> Vec<(usize, f64)> {
+        merged.shares.iter().map(|share| (share.representative, share.share)).collect()
+    }
+
+    #[test]
+    fn equal_channels_share_by_their_gains_and_noise() {
+        // Referred to the input, the second channel has a quarter of the first one's noise power.
+        let two = problem(&[(1.0, 0.5, 0.1), (2.0, 0.5, 0.1)]);
+        let merged = two.merge_channels(Repeats::AtOneInstant);
+        let found = shares(&merged);
+        assert!((found[0].1 - 0.2).abs() < 1e-15 && (found[1].1 - 0.4).abs() < 1e-15, "{found:?}");
+        // 0.2^2 0.01 + 0.4^2 0.01.
+        assert!((merged.problem.noise[0] - 0.002).abs() < 1e-15);
+        // The merged measurement of a unit signal is one, whatever the gains are.
+        assert!(((merged.shares() * Mat::from_column_slice(2, 1, &[1.0, 2.0]))[0] - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_newest_sample_stands_for_those_whole_periods_older() {
+        let three = problem(&[(1.0, 4.3, 0.0), (1.0, 0.9, 0.0), (3.0, 0.3, 0.0)]);
+        let recursive = three.merge_channels(Repeats::AtWholePeriods);
+        assert_eq!(shares(&recursive), [(0, 0.0), (1, 1.0), (0, 1.0)]);
+        assert_eq!(recursive.representatives(), [2, 1]);
+        assert_eq!(recursive.problem.channels[0].delay.0, 0.3);
+        // Taps reach only so far back, so an older sample adds to a newer one.
+        assert!(three.merge_channels(Repeats::AtOneInstant).are_all());
+    }
+
+    #[test]
+    fn channels_that_differ_stay_apart() {
+        let apart = problem(&[(1.0, 0.3, 0.0), (1.0, 1.3, 0.0), (1.0, 0.3 + 1e-9, 0.0)]);
+        assert!(apart.merge_channels(Repeats::AtWholePeriods).are_all());
+    }
+}
