@@ -46,7 +46,8 @@ fn assert_close(got: &[f64], want: &[f64], eps: f64, case: &str) {
     }
 }
 
-/// N and M of FIR filters. Miri takes a thousand times as long: there each number of lanes per frame and of phases once.
+/// N and M of FIR filters. Miri takes a thousand times as long: there each number of lanes per frame and of
+/// phases once.
 fn shapes() -> Vec<(usize, usize)> {
     if cfg!(miri) {
         return vec![(1, 1), (1, 4), (2, 3), (3, 2), (4, 1), (8, 5)];

@@ -12,13 +12,13 @@ fn an_impulse_anywhere_brings_out_the_taps_and_nothing_else() {
     for algorithm in FIR_ALGORITHMS {
         // Small integers, halves and quarters: only transforms round anything.
         let bound = if matches!(algorithm, Algorithm::OverlapSave { .. }) { 1e-5 } else { 0.0 };
-        for place in 0..2 * 130 {
+        for index in 0..2 * 130 {
             let mut input = vec![0f32; 2 * 140];
-            input[place] = 1.0;
+            input[index] = 1.0;
             for (t, y) in run(&bank, by(algorithm), &input).into_iter().enumerate() {
-                let tap = t.checked_sub(place / 2 * 3).and_then(|t| taps[place % 2].get(t));
+                let tap = t.checked_sub(index / 2 * 3).and_then(|t| taps[index % 2].get(t));
                 let error = (f64::from(y) - tap.unwrap_or(&0.0)).abs();
-                assert!(error <= bound, "{algorithm:?}: impulse at {place}: {y} at {t}");
+                assert!(error <= bound, "{algorithm:?}: impulse at {index}: {y} at {t}");
             }
         }
     }

@@ -16,12 +16,11 @@
 //! by the [direct algorithm](super::direct)), so outputs have, too.
 //!
 //! The sums never mix channels, but they mix lags: the error of an output is about that of the direct
-//! algorithm for filters
-//! |H0| + |H1| and inputs |u0| + |u1|, so relative to the norms of filters and inputs and not of each product: below 6 eps
-//! times the sum over channels of the norm of the phase's filter times that of the inputs in its memory. For
-//! white noise through taps of like size it is 1.0 to 1.4 times that of the direct algorithm. With K odd a
-//! lag that is not in the filters enters C and A and cancels up to rounding, and so does any lag whose
-//! coefficient is 0.
+//! algorithm for filters |H0| + |H1| and inputs |u0| + |u1|, so relative to the norms of filters and inputs
+//! and not of each product: below 6 eps times the sum over channels of the norm of the phase's filter times
+//! that of the inputs in its history. For white noise through taps of like size it is 1.0 to 1.4 times that
+//! of the direct algorithm. With K odd a lag that is not in the filters enters C and A and cancels up to
+//! rounding, and so does any lag whose coefficient is 0.
 //!
 //! The worst case of a call: inputs are checked and NaN and infinity replaced before filtering, so no frame
 //! is filtered twice. Outputs whose sums overflow are computed once more from the definition in f64, N K

@@ -132,10 +132,10 @@ fn the_error_is_within_the_stated_bound() {
             for (which, input) in nasty_inputs(n, 150, &mut noise).iter().enumerate() {
                 let [fast, direct] = [Algorithm::FastFir, Algorithm::Direct]
                     .map(|algorithm| relative_error(&taps, m, input, algorithm));
-                let place = format!("N {n} M {m} {count} taps, input {which}");
+                let case = format!("N {n} M {m} {count} taps, input {which}");
                 // Taps, means and products are rounded, and three sums in place of one: a few eps each.
-                assert!(fast < 6.0, "{place}: {fast} eps");
-                assert!(direct < 3.0, "{place}: {direct} eps, direct");
+                assert!(fast < 6.0, "{case}: {fast} eps");
+                assert!(direct < 3.0, "{case}: {direct} eps, direct");
             }
         }
     }
@@ -223,12 +223,12 @@ fn an_input_is_forgotten_after_the_history() {
     for (count, history) in [(2, 1), (3, 3), (16, 15), (17, 17)] {
         let bank = fir_bank(random_taps(1, count, &mut noise), 1);
         assert_eq!(fast(&bank).history(), Some(history));
-        for place in 0..2 {
+        for index in 0..2 {
             let mut input = noise.samples(100);
             let want = run(&bank, options(Precision::Single), &input);
-            input[place] += 1e4;
+            input[index] += 1e4;
             let out = run(&bank, options(Precision::Single), &input);
-            assert_eq!(out[place + history + 1..], want[place + history + 1..], "{count} taps");
+            assert_eq!(out[index + history + 1..], want[index + history + 1..], "{count} taps");
         }
     }
 }
