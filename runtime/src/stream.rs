@@ -16,8 +16,8 @@ use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, SwapError};
 ///
 /// # Worst case of a call
 /// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. Whatever the input
-/// holds, a frame is filtered at most twice, so that a call does at most twice the multiply-adds of any
-/// other call of its length:
+/// holds, a frame is filtered at most twice, so that a call does at most twice the multiply-adds that it
+/// would do for ordinary numbers:
 ///
 /// | | NaN or infinity in the input | sums that overflow |
 /// |---|---|---|

@@ -10,14 +10,8 @@ use proptest::prelude::*;
 fn check_cuts(stream: &mut Stream, input: &[f32], lost: &[usize], cuts: &[usize]) {
     let algorithm = stream.plan().algorithm();
     let with = |value: f32| {
-        let mut input = input.to_vec();
-        lost.iter()
-            .filter(|&&index| index < input.len())
-            .copied()
-            .collect::<Vec<_>>()
-            .into_iter()
-            .for_each(|i| input[i] = value);
-        input
+        let sample = |(index, &x): (usize, &f32)| if lost.contains(&index) { value } else { x };
+        input.iter().enumerate().map(sample).collect::<Vec<f32>>()
     };
     let (zeros, marked) = (with(0.0), with(f32::NAN));
     let mut whole = vec![0.0; input.len() / stream.channels() * stream.ratio()];
