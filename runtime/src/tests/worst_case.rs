@@ -58,14 +58,14 @@ impl Nasty {
     fn sample<S: Sample>(self, x: f64, index: usize, [n, call]: [usize; 2]) -> S {
         let (denormal, largest) =
             if size_of::<S>() == 4 { (1e-40, f64::from(f32::MAX)) } else { (1e-310, f64::MAX) };
-        let (frame, first) = (index / n, index % n == 0);
+        let (frame, first) = (index / n, index.is_multiple_of(n));
         let value = match self {
             Self::AllNan => f64::NAN,
             Self::AllInfinite => f64::INFINITY.copysign(x),
-            Self::Nan(k) if first && frame % k == 0 => f64::NAN,
-            Self::NanAtCallBegin if first && frame % call == 0 => f64::NAN,
+            Self::Nan(k) if first && frame.is_multiple_of(k) => f64::NAN,
+            Self::NanAtCallBegin if first && frame.is_multiple_of(call) => f64::NAN,
             Self::NanAtCallEnd if first && frame % call == call - 1 => f64::NAN,
-            Self::Denormal(k) if index % k == 0 => denormal * x,
+            Self::Denormal(k) if index.is_multiple_of(k) => denormal * x,
             Self::Largest => largest.copysign(x),
             Self::Everything => [f64::NAN, f64::NEG_INFINITY, denormal, largest, x][index % 5],
             _ => x,

@@ -245,7 +245,7 @@ fn filters_that_cannot_be_halved_are_refused() {
     // One filter is enough.
     let bank = fir_bank(vec![vec![1.0; 4], vec![], vec![2.0]], 3);
     assert_eq!(
-        run(&bank, options(Precision::Single), &[1.0; 9]),
+        run(&bank, options(Precision::Single), &[1f32; 9]),
         [3.0, 1.0, 1.0, 4.0, 1.0, 1.0, 4.0, 1.0, 1.0]
     );
     let filter = StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
@@ -265,7 +265,7 @@ fn filters_that_cannot_be_halved_are_refused() {
 fn the_largest_taps_have_a_mean() {
     let largest = f64::from(f32::MAX);
     let bank = fir_bank(vec![vec![largest; 2]], 1);
-    let out = run(&bank, options(Precision::Single), &[1e-3, 0.0, 0.0, 1e-3, 0.0]);
+    let out = run(&bank, options(Precision::Single), &[1e-3f32, 0.0, 0.0, 1e-3, 0.0]);
     let want = [1.0, 1.0, 0.0, 1.0, 1.0].map(|y| y * 1e-3 * largest);
     assert!(
         out.iter().zip(want).all(|(y, want)| (f64::from(*y) - want).abs() < 1e-6 * 1e-3 * largest),
