@@ -110,7 +110,7 @@ fn for_fir(problem: &Problem, taps: usize, compared: Compared<'_>) -> Result<usi
     let latencies = reach::candidates(problem, taps);
     let reach = Reach::new(problem, taps, &latencies)?;
     let floor = floor(problem, reach.silence())?;
-    let search = Search::new(latencies.map(|latency| reach.lower_bound(latency)), floor);
+    let search = Search::new(latencies.map(|latency| reach.bound_of_choice(latency)), floor);
     search.shortest(compared, |latency, hopeless| {
         fir::bracket(&plant(problem, latency)?, taps, ACCURACY, hopeless)
     })
@@ -136,7 +136,8 @@ fn for_iir(problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignErr
 fn for_comparison(spec: &Spec, problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignError> {
     let settings = settings(spec)?;
     let latencies = reach::candidates(problem, settings.taps);
-    let search = Search::new(latencies.map(|_| 0.0), 0.0);
+    let reach = Reach::new(problem, settings.taps, &latencies)?;
+    let search = Search::new(latencies.map(|latency| reach.bound_of_choice(latency)), 0.0);
     search.shortest(compared, |latency, _| {
         let synthesis = methods::synthesise(spec.design.method, &plant(problem, latency)?, &settings)?;
         Ok((synthesis.peak.gain, synthesis.peak.gain))

@@ -70,6 +70,11 @@ impl Reach {
         })
     }
 
+    /// A lower bound of gamma; infinite for a latency out of reach, which would be refused.
+    pub(super) fn bound_of_choice(&self, latency: usize) -> f64 {
+        if self.is_reached(latency) { self.lower_bound(latency) } else { f64::INFINITY }
+    }
+
     /// A lower bound of gamma.
     pub(super) fn lower_bound(&self, latency: usize) -> f64 {
         let least = self.errors(latency).fold(0.0, f64::max).sqrt();
