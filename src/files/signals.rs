@@ -12,8 +12,11 @@ use std::sync::mpsc::sync_channel;
 pub fn remove_unfinished_on_signals() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        let end_at_first = |mut signals: Signals| signals.forever().take(1).for_each(|signal| end(signal));
-        watch(end_at_first);
+        watch(|mut signals| {
+            if let Some(signal) = signals.forever().next() {
+                end(signal);
+            }
+        });
     });
 }
 
