@@ -1,7 +1,7 @@
 //! The same bits however a stream is cut.
 
 use crate::support::random::Random;
-use crate::support::{Desk, bytes, ticks};
+use crate::support::{Desk, bytes, frames};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{Algorithm, Options, PcmOutput, Precision, Stream};
@@ -120,7 +120,7 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
 #[test]
 fn pipes_that_drip_give_the_same_bytes() {
     let desk = Desk::new();
-    let input = bytes(&ticks(700));
+    let input = bytes(&frames(700));
     let whole = desk.run(&["stream", "bank.json"], &input).stdout;
     let mut cuts = Random(3);
     for turn in 0..30 {

@@ -1,6 +1,6 @@
 //! Systems that refuse: standard streams that cannot be written, threads that cannot be started, inputs without end.
 
-use crate::support::{Desk, bytes, fused, names, text, ticks};
+use crate::support::{Desk, bytes, frames, fused, names, text};
 use std::io::Write;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -18,8 +18,8 @@ fn shell(desk: &Desk, script: &str) -> Output {
 #[test]
 fn warnings_that_cannot_be_written_cost_nothing() {
     let desk = Desk::new();
-    desk.write("in", [bytes(&ticks(50)), vec![1, 2, 3]].concat());
-    let want = bytes(&fused(&ticks(50)));
+    desk.write("in", [bytes(&frames(50)), vec![1, 2, 3]].concat());
+    let want = bytes(&fused(&frames(50)));
     for refusal in ["2>/dev/full", "2>&-"] {
         let output = shell(&desk, &format!("$H stream bank.json --input in -o out --force {refusal}"));
         assert_eq!(output.status.code(), Some(0), "{refusal}");
@@ -36,7 +36,7 @@ fn a_full_standard_output_is_an_error_of_one_line() {
     let desk = Desk::new();
     desk.write("spec.toml", crate::support::THESIS);
     desk.report(&["design", "spec.toml", "-o", "thesis.json"]);
-    desk.write("in", bytes(&ticks(50)));
+    desk.write("in", bytes(&frames(50)));
     for args in [
         "--help",
         "--version",
@@ -62,13 +62,13 @@ fn a_full_standard_output_is_an_error_of_one_line() {
 fn without_threads_the_work_is_done_or_refused_in_one_line() {
     let desk = Desk::new();
     desk.write("spec.toml", crate::support::THESIS);
-    let input = bytes(&ticks(50));
+    let input = bytes(&frames(50));
     desk.write("in", &input);
     let run = |args: &str| shell(&desk, &format!("RUST_MIN_STACK={IMPOSSIBLE_STACK} $H {args}"));
     // Raw standard input needs no thread, and an interrupt then has its usual meaning.
     let output = run("stream bank.json <in");
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-    assert!(output.stdout == bytes(&fused(&ticks(50))));
+    assert!(output.stdout == bytes(&fused(&frames(50))));
     for args in ["design spec.toml -o thesis.json", "verify thesis.json"] {
         let output = run(args);
         assert!(output.status.success() && output.stderr.is_empty(), "{args}: {output:?}");
@@ -88,7 +88,7 @@ fn without_threads_the_work_is_done_or_refused_in_one_line() {
 fn a_signal_ends_a_run_whose_output_nobody_takes() {
     let desk = Desk::new();
     // More than any pipe holds.
-    desk.write("in", bytes(&ticks(1 << 20)));
+    desk.write("in", bytes(&frames(1 << 20)));
     let before = names(&desk.path(""));
     let mut child = Command::new(env!("CARGO_BIN_EXE_hybank"))
         .current_dir(desk.path(""))
@@ -141,7 +141,7 @@ fn full_pipe() -> (std::io::PipeReader, std::io::PipeWriter) {
 #[test]
 fn a_signal_ends_a_run_whose_messages_nobody_takes() {
     let desk = Desk::new();
-    desk.write("in", [bytes(&ticks(50)), vec![1, 2, 3]].concat());
+    desk.write("in", [bytes(&frames(50)), vec![1, 2, 3]].concat());
     let (reader, writer) = full_pipe();
     let mut child = Command::new(env!("CARGO_BIN_EXE_hybank"))
         .current_dir(desk.path(""))
@@ -162,7 +162,7 @@ fn a_signal_ends_a_run_whose_messages_nobody_takes() {
         std::thread::sleep(Duration::from_millis(20));
     }
     assert_eq!(child.wait().unwrap().code(), Some(128 + 15));
-    assert!(desk.read("out") == bytes(&fused(&ticks(50))));
+    assert!(desk.read("out") == bytes(&fused(&frames(50))));
     assert_eq!(names(&desk.path("")), ["bank.json", "in", "out"]);
     drop(reader);
 }

@@ -1,6 +1,6 @@
 //! Samples that were lost: what tells of them, what stands in for them, what they touch. As a user runs it.
 
-use crate::support::{Desk, bytes, channel, floats, fused, ticks, wav};
+use crate::support::{Desk, bytes, channel, floats, frames, fused, wav};
 use serde_json::{Value, json};
 
 const COUNT: usize = 3000;
@@ -91,7 +91,7 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
 #[test]
 fn void_samples_of_an_interleaved_stream_are_told_by_the_report_of_another_run() {
     let desk = Desk::new();
-    let clean = ticks(500);
+    let clean = frames(500);
     let mut marked = clean.clone();
     for (channel, range) in [(0, 0..1), (1, 40..43), (0, 41..300), (1, 499..500)] {
         range.for_each(|k: usize| marked[2 * k + channel] = f32::NAN);
@@ -118,7 +118,7 @@ fn void_samples_of_an_interleaved_stream_are_told_by_the_report_of_another_run()
 #[test]
 fn channels_that_end_early_may_be_bridged_to_the_end_of_the_longest() {
     let desk = Desk::new();
-    let whole = ticks(5000);
+    let whole = frames(5000);
     desk.write("a", bytes(&channel(&whole, 0)[..4000]));
     desk.write("b", bytes(&channel(&whole, 1)));
     let args = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out", "--gaps", "zero"];
@@ -149,7 +149,7 @@ fn sigmf_goes_through_stream_in_every_type() {
         "small.json",
         String::from_utf8(desk.read("bank.json")).unwrap().replace("[10, 20, 30, 0]", "[1, 0, 0, 2]"),
     );
-    let input: Vec<f32> = ticks(300).iter().map(|x| x / 128.0).collect();
+    let input: Vec<f32> = frames(300).iter().map(|x| x / 128.0).collect();
     let want = desk.run(&["stream", "small.json"], &bytes(&input)).stdout;
     let encode = |name: &str, x: f64| match name {
         "ri8" => vec![(x * 128.0) as i8 as u8],

@@ -1,6 +1,6 @@
 //! Which files a run may write, when they appear, and what becomes of what was there.
 
-use crate::support::{Desk, bytes, channel, fused, names, text, ticks};
+use crate::support::{Desk, bytes, channel, frames, fused, names, text};
 use std::fs;
 use std::io::Write;
 use std::os::unix::fs::{PermissionsExt, symlink};
@@ -9,7 +9,7 @@ use std::process::{Child, Command};
 /// A desk with the recordings a.wav and b.wav of two channels.
 fn desk() -> Desk {
     let desk = Desk::new();
-    let frames = ticks(100);
+    let frames = frames(100);
     wav(&desk, "a.wav", &channel(&frames, 0));
     wav(&desk, "b.wav", &channel(&frames, 1));
     desk
@@ -26,7 +26,7 @@ fn wav(desk: &Desk, name: &str, samples: &[f32]) {
 /// `hybank stream`, with more arguments, that has begun its output and waits for the rest of its input.
 fn waiting(desk: &Desk, more: &[&str], unfinished: usize) -> Child {
     let mut child = desk.spawn(&[&["stream", "bank.json"], more].concat());
-    child.stdin.as_mut().unwrap().write_all(&bytes(&ticks(10))).unwrap();
+    child.stdin.as_mut().unwrap().write_all(&bytes(&frames(10))).unwrap();
     while names(&desk.path("")).iter().filter(|name| name.ends_with(".part")).count() < unfinished {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
@@ -72,7 +72,7 @@ fn the_samples_of_a_sigmf_recording_are_an_input_too() {
     desk.write("both.sigmf-meta", meta(""));
     desk.write("named.sigmf-meta", meta(r#", "core:dataset": "samples.bin""#));
     for data in ["both.sigmf-data", "samples.bin"] {
-        desk.write(data, bytes(&ticks(10)));
+        desk.write(data, bytes(&frames(10)));
     }
     for (input, output) in [("both.sigmf-meta", "both.sigmf-data"), ("named.sigmf-meta", "samples.bin")] {
         for output in [input, output] {
@@ -80,7 +80,7 @@ fn the_samples_of_a_sigmf_recording_are_an_input_too() {
             desk.refused(1, &args, &[output, "also the input"]);
         }
     }
-    assert_eq!(desk.read("samples.bin"), bytes(&ticks(10)));
+    assert_eq!(desk.read("samples.bin"), bytes(&frames(10)));
 }
 
 #[cfg(target_os = "linux")]
@@ -172,7 +172,7 @@ fn output_and_mask_appear_together_or_not_at_all() {
     assert_eq!(desk.read("mask"), b"another's");
     let child = waiting(&desk, &[&args[..], &["--force"]].concat(), 2);
     assert_eq!(end(child).0, Some(0));
-    assert_eq!((desk.read("out"), desk.read("mask")), (bytes(&fused(&ticks(10))), vec![0; 20]));
+    assert_eq!((desk.read("out"), desk.read("mask")), (bytes(&fused(&frames(10))), vec![0; 20]));
     assert_eq!(names(&desk.path("")), ["bank.json", "mask", "out"]);
 }
 

@@ -1,6 +1,6 @@
 //! The command stream, as a user runs it.
 
-use crate::support::{Desk, bytes, floats, fused, text, ticks};
+use crate::support::{Desk, bytes, floats, frames, fused, text};
 use std::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
@@ -39,7 +39,7 @@ impl Bench {
 fn interleaved_floats_are_the_default() {
     let bench = Bench::new();
     for count in [0, 1, 7, 100_000] {
-        let input = ticks(count);
+        let input = frames(count);
         let output = bench.run(&[], &bytes(&input));
         assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
         assert!(floats(&output.stdout) == fused(&input), "{count} frames");
@@ -49,7 +49,7 @@ fn interleaved_floats_are_the_default() {
 #[test]
 fn every_format_goes_in_and_out() {
     let bench = Bench::new();
-    let input: Vec<f32> = ticks(50).iter().map(|x| x / 128.0).collect();
+    let input: Vec<f32> = frames(50).iter().map(|x| x / 128.0).collect();
     // Sums reach 70 * 11 / 128, so integers would clip: floats out.
     let want = fused(&input);
     for (name, encode) in [
@@ -92,7 +92,7 @@ fn a_frame_comes_out_as_soon_as_it_is_in() {
     let bench = Bench::new();
     let mut child = bench.spawn(&[]);
     let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
-    let input = ticks(50);
+    let input = frames(50);
     let want = fused(&input);
     for (frame, want) in input.chunks_exact(2).zip(want.chunks_exact(2)) {
         // In two pieces, cut inside a sample.
@@ -111,7 +111,7 @@ fn a_frame_comes_out_as_soon_as_it_is_in() {
 #[test]
 fn one_fifo_a_channel_in_any_order_of_opening() {
     let bench = Bench::new();
-    let input = ticks(20_000);
+    let input = frames(20_000);
     for name in ["a", "b"] {
         assert!(Command::new("mkfifo").arg(bench.path(name)).status().unwrap().success());
     }
@@ -133,7 +133,7 @@ fn one_fifo_a_channel_in_any_order_of_opening() {
 #[test]
 fn wav_goes_through_with_its_rate() {
     let bench = Bench::new();
-    let input = ticks(300);
+    let input = frames(300);
     let spec = hound::WavSpec {
         channels: 2,
         sample_rate: 24_000,
@@ -159,7 +159,7 @@ fn wav_goes_through_with_its_rate() {
 #[test]
 fn flushing_brings_out_the_last_samples() {
     let bench = Bench::new();
-    let mut input = ticks(40);
+    let mut input = frames(40);
     let output = bench.run(&["--flush"], &bytes(&input));
     input.extend([0.0; 4]);
     assert_eq!(floats(&output.stdout), fused(&input));
@@ -168,7 +168,7 @@ fn flushing_brings_out_the_last_samples() {
 #[test]
 fn cut_frames_and_unequal_channels_are_told() {
     let bench = Bench::new();
-    let input = ticks(10);
+    let input = frames(10);
     let mut cut = bytes(&input);
     cut.extend([1, 2, 3, 4, 5]);
     let output = bench.run(&[], &cut);
@@ -192,7 +192,7 @@ fn an_interrupt_ends_after_whole_frames_and_reports() {
     let bench = Bench::new();
     let mut child = bench.spawn(&["-o", "out.raw", "--json"]);
     let mut stdin = child.stdin.take().unwrap();
-    let input = ticks(100);
+    let input = frames(100);
     stdin.write_all(&bytes(&input)).unwrap();
     stdin.flush().unwrap();
     // The pipe stays open: only the signal can end this, once all samples are written.

@@ -38,7 +38,7 @@ pub(crate) fn text(bytes: &[u8]) -> String {
 }
 
 /// Small integers, so that every sum is exact in any order and precision.
-pub(crate) fn ticks(count: usize) -> Vec<f32> {
+pub(crate) fn frames(count: usize) -> Vec<f32> {
     (0..2 * count).map(|i| ((i * 7) % 23) as f32 - 11.0).collect()
 }
 
