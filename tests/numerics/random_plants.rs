@@ -2,13 +2,11 @@
 //! holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many, `HYBANK_PLANTS=124..125` that one.
 
 use crate::support::random::Random;
+use crate::support::sweep::{each, wanted};
 use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, analyze, design};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
 use hybank::units::{RadiansPerSecond, Seconds};
-use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::ScopedJoinHandle;
 
 /// A low-pass of order 1 to 6 with its cutoff between 0.03 and 3 radians a fast sample.
 fn front_end(dice: &mut Random) -> FilterSpec {
@@ -134,33 +132,9 @@ fn refused(seed: u64, refusal: &DesignError, end: End) -> End {
     end
 }
 
-/// The plants to try: so many, or a range.
-fn wanted() -> std::ops::Range<u64> {
-    let Ok(text) = std::env::var("HYBANK_PLANTS") else { return 0..12 };
-    let (first, end) = text.split_once("..").unwrap_or(("0", &text));
-    let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("HYBANK_PLANTS={text}: not a number"));
-    number(first)..number(end)
-}
-
-/// The results for all numbers of a range, from as many threads as there are processors.
-fn each<T: Send>(range: std::ops::Range<u64>, task: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let next = AtomicU64::new(range.start);
-    let work = || -> Vec<T> {
-        let mine = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
-        mine.take_while(|&number| number < range.end).map(&task).collect()
-    };
-    std::thread::scope(|scope| {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        let join =
-            |worker: ScopedJoinHandle<'_, Vec<T>>| worker.join().unwrap_or_else(|fault| resume_unwind(fault));
-        workers.into_iter().flat_map(join).collect()
-    })
-}
-
 #[test]
 fn every_plant_ends_as_a_proven_bank_or_as_a_refusal() {
-    let plants = wanted();
+    let plants = wanted("HYBANK_PLANTS", 12);
     let ends = each(plants.clone(), end_of);
     let count = |end: End| ends.iter().filter(|&&other| other == end).count();
     let (proven, unproven, refused) = (count(End::Proven), count(End::Unproven), count(End::Refused));

@@ -8,6 +8,7 @@ pub(crate) mod jobs;
 pub(crate) mod random;
 pub(crate) mod specs;
 pub(crate) mod wav;
+pub(crate) mod sweep;
 
 pub(crate) use desk::{Desk, names};
 

@@ -9,15 +9,20 @@
 //! 2. A descent on gamma itself, from the best of these points (`descent`).
 //!
 //! The scale is the finest power of two at which the taps fit their bits, or one step finer with the largest
-//! taps clipped. Among all candidates with about the least gamma, the one with the least mean-square error
+//! taps clipped. Where that costs more than 0.05 dB, taps that are smaller than the optimal ones and still
+//! have almost their gamma are tried with finer steps (`smaller_taps`), and banks of few taps are searched
+//! through at all scales (`enumeration`). Silence is always a candidate. Among all candidates with about the least gamma, the one with the least mean-square error
 //! and converter noise at the output is chosen.
 
 mod descent;
+mod enumeration;
 mod forms;
 mod lattice;
 mod problem;
+mod quadratic_bound;
 mod quantiser;
 mod search;
+mod smaller_taps;
 mod study;
 
 pub use problem::QuantisationProblem;

@@ -1,15 +1,23 @@
 //! The search at all scales in question, and the choice among its candidates.
 
+use super::enumeration::Enumeration;
 use super::lattice::Span;
 use super::problem::{Candidate, QuantisationProblem, TapError};
 use super::search::Search;
+use super::smaller_taps::{SmallerTaps, smaller_taps};
 use super::study::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::{MAX_FRACTION_BITS, WordLengths};
+use std::ops::RangeInclusive;
+use std::sync::OnceLock;
 
 /// Relative difference of gamma below which the mean square decides: 0.001 dB.
 pub(super) const INDIFFERENT: f64 = 1e-4;
+/// Relative excess over the gamma of the real taps from which more scales are searched: 0.05 dB.
+const WORTH_MORE: f64 = 5.8e-3;
+/// Scales of few taps that are searched beyond the finest one that holds the optimal taps.
+const MOST_SCALES: i32 = 40;
 
 /// The integers chosen, with their error.
 #[derive(Debug, Clone)]
@@ -36,6 +44,8 @@ impl Quantised {
 /// The search for integers near the taps of one bank.
 pub(super) struct Quantiser<'a> {
     pub(super) error: TapError<'a>,
+    /// Computed when first needed.
+    smaller: OnceLock<Vec<SmallerTaps>>,
 }
 
 impl<'a> Quantiser<'a> {
@@ -44,7 +54,7 @@ impl<'a> Quantiser<'a> {
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn new(problem: QuantisationProblem<'a>) -> Result<Self, DesignError> {
-        Ok(Self { error: TapError::new(problem)? })
+        Ok(Self { error: TapError::new(problem)?, smaller: OnceLock::new() })
     }
 
     /// The best integers of the given bits; `fraction_bits` fixes their scale.
@@ -59,16 +69,71 @@ impl<'a> Quantiser<'a> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
         let fitting = Search::new(&self.error, bits, finest);
         let rounded = self.error.gamma(&fitting.rounded())?;
-        let mut found = fitting.run()?;
+        let mut found = vec![self.error.candidate(fitting.silence())?];
+        found.extend(fitting.run()?);
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
             found.extend(Search::new(&self.error, bits, finest + 1).run()?);
         }
-        let least = found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min);
-        let cap = least * (1.0 + self.error.problem.gamma_margin.max(INDIFFERENT));
+        if least_gamma(&found) > self.error.real_gamma * (1.0 + WORTH_MORE) {
+            match fraction_bits {
+                None => self.search_finer_scales(bits, finest, &mut found)?,
+                Some(scale) => self.search_few_taps(bits, scale..=scale, &mut found)?,
+            }
+        }
+        let cap = least_gamma(&found) * (1.0 + self.error.problem.gamma_margin.max(INDIFFERENT));
         let good = found.into_iter().filter(|found| found.gamma <= cap);
         let least_mean_square = good.min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
         let Candidate { fixed_point, gamma, mean_square } = least_mean_square.ok_or(DesignError::NoTaps)?;
         Ok(Quantised { fixed_point, gamma, mean_square, rounded })
+    }
+
+    /// Adds candidates with steps finer than those that hold the optimal taps: near smaller taps, and from
+    /// the enumeration of few taps.
+    fn search_finer_scales(
+        &self,
+        bits: &WordLengths,
+        finest: i32,
+        found: &mut Vec<Candidate>,
+    ) -> Result<(), DesignError> {
+        let mut last = finest;
+        for smaller in self.smaller.get_or_init(|| smaller_taps(&self.error)) {
+            let scale = self.finest_that_holds(&smaller.taps, bits);
+            if least_gamma(found) <= smaller.gamma {
+                break;
+            }
+            if scale > last {
+                for scale in [scale, scale + 1].into_iter().filter(|&scale| scale <= MAX_FRACTION_BITS) {
+                    found.extend(Search::around(&smaller.taps, &self.error, bits, scale).run()?);
+                }
+                last = scale;
+            }
+        }
+        let coarsest = (finest - 1).max(-MAX_FRACTION_BITS);
+        self.search_few_taps(bits, coarsest..=(finest + MOST_SCALES).min(MAX_FRACTION_BITS), found)
+    }
+
+    /// Adds the best integers of a bank of few taps.
+    fn search_few_taps(
+        &self,
+        bits: &WordLengths,
+        scales: RangeInclusive<i32>,
+        found: &mut Vec<Candidate>,
+    ) -> Result<(), DesignError> {
+        let Some(enumeration) = Enumeration::new(&self.error, bits) else { return Ok(()) };
+        for fraction_bits in scales {
+            let bar = least_gamma(found);
+            if !enumeration.may_reach(fraction_bits, bar) {
+                break;
+            }
+            for integers in enumeration.better_than(bar, fraction_bits) {
+                found.push(self.error.candidate(FixedPoint {
+                    bits: bits.clone(),
+                    fraction_bits,
+                    integers,
+                })?);
+            }
+        }
+        Ok(())
     }
 
     /// [`Self::quantise`] for each word length, on one thread each.
@@ -98,7 +163,12 @@ impl<'a> Quantiser<'a> {
     /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are
     /// zero at every scale, because of their bits, do not count.
     pub(super) fn finest_that_fits(&self, bits: &WordLengths) -> i32 {
-        let spans = self.error.problem.taps.iter().flat_map(|filter| {
+        self.finest_that_holds(self.error.problem.taps, bits)
+    }
+
+    /// [`Self::finest_that_fits`] for other taps.
+    fn finest_that_holds(&self, taps: &[Vec<f64>], bits: &WordLengths) -> i32 {
+        let spans = taps.iter().flat_map(|filter| {
             filter
                 .iter()
                 .enumerate()
@@ -110,7 +180,7 @@ impl<'a> Quantiser<'a> {
             let factor = f64::from(scale).exp2();
             nonzero.iter().all(|(tap, span)| span.contains((tap * factor).round_ties_even()))
         };
-        let widest = (0..self.error.problem.taps[0].len()).map(|n| bits.bits(n)).max().unwrap_or(0) as i32;
+        let widest = (0..taps[0].len()).map(|n| bits.bits(n)).max().unwrap_or(0) as i32;
         let most = nonzero.iter().fold(0.0f64, |most, (tap, _)| most.max(tap.abs()));
         let magnitude = if most == 0.0 { 0 } else { most.log2().floor() as i32 };
         let within = |scale: i32| scale.clamp(-MAX_FRACTION_BITS, MAX_FRACTION_BITS);
@@ -118,4 +188,8 @@ impl<'a> Quantiser<'a> {
         let (coarsest, finest) = (within(-2 - magnitude), within(widest - 1 - magnitude));
         (coarsest..=finest).rev().find(|&scale| fits(scale)).unwrap_or(coarsest)
     }
+}
+
+fn least_gamma(found: &[Candidate]) -> f64 {
+    found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min)
 }

@@ -25,16 +25,27 @@ pub(super) struct Search<'a> {
     error: &'a TapError<'a>,
     bits: &'a WordLengths,
     fraction_bits: i32,
-    /// The real taps in units of the step.
+    /// The real taps searched around, in units of the step.
     centre: Integers,
     spans: Vec<Span>,
 }
 
 impl<'a> Search<'a> {
+    /// The search near the taps of the problem.
     pub(super) fn new(error: &'a TapError<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
+        Self::around(error.problem.taps, error, bits, fraction_bits)
+    }
+
+    /// The search near other taps.
+    pub(super) fn around(
+        taps: &[Vec<f64>],
+        error: &'a TapError<'a>,
+        bits: &'a WordLengths,
+        fraction_bits: i32,
+    ) -> Self {
         let factor = f64::from(fraction_bits).exp2();
         let centre: Integers =
-            error.problem.taps.iter().map(|filter| filter.iter().map(|tap| tap * factor).collect()).collect();
+            taps.iter().map(|filter| filter.iter().map(|tap| tap * factor).collect()).collect();
         let spans = (0..centre[0].len()).map(|n| Span::of(bits, n)).collect();
         Self { error, bits, fraction_bits, centre, spans }
     }
@@ -56,6 +67,11 @@ impl<'a> Search<'a> {
         let real = self.error.real_gamma;
         let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
         Ok(self.fixed_point(&descent.run(NEGLIGIBLE)?))
+    }
+
+    /// All taps zero.
+    pub(super) fn silence(&self) -> FixedPoint {
+        self.fixed_point(&self.centre.iter().map(|list| vec![0.0; list.len()]).collect())
     }
 
     /// The taps rounded one by one, clipped to their bits.

@@ -1,0 +1,191 @@
+//! Banks of few taps: a search through all integers of a scale that leaves out what cannot be better
+//! (branch and bound).
+//!
+//! The integers are decided one after the other. A partial decision is given up if one of several quadratic
+//! lower bounds of gamma, minimised over the real values of the undecided taps, reaches the best gamma known
+//! (Fincke and Pohst, Math. Comp. 44, 1985, with several forms in place of one). The work is limited; within
+//! the limit the result is the best of all integers.
+
+use super::lattice::{Span, closest};
+use super::problem::TapError;
+use super::quadratic_bound::{AffineErrors, QuadraticBound, Unknown};
+use crate::linalg;
+use crate::spec::WordLengths;
+
+/// Most taps that may differ from zero, in all channels.
+const MOST_UNKNOWNS: usize = 16;
+/// Decisions at each scale.
+const DECISIONS: usize = 30_000;
+/// A comparison of all integers of a bank costs as much as so many decisions.
+const COMPARISON: usize = 8;
+/// Integers of one tap on each side of the middle of its interval: all of 8 bits.
+const BRANCHES: f64 = 128.0;
+/// Bounds at each scale.
+const BOUNDS: usize = 8;
+/// Integers must be better by this fraction.
+const BETTER: f64 = 1e-4;
+
+/// Integers, one list per channel.
+pub(super) type Integers = Vec<Vec<i64>>;
+
+/// The search for the integers of a bank of few taps.
+pub(super) struct Enumeration<'a> {
+    error: &'a TapError<'a>,
+    errors: AffineErrors,
+    spans: Vec<Span>,
+}
+
+impl<'a> Enumeration<'a> {
+    /// None if the bank has too many taps.
+    pub(super) fn new(error: &'a TapError<'a>, bits: &WordLengths) -> Option<Self> {
+        let filters = error.problem.taps;
+        let unknowns: Vec<Unknown> = (0..filters[0].len())
+            .filter(|&tap| bits.span(tap) != (0, 0))
+            .flat_map(|tap| (0..filters.len()).map(move |channel| Unknown { channel, tap }))
+            .collect();
+        if unknowns.len() > MOST_UNKNOWNS {
+            return None;
+        }
+        let spans = unknowns.iter().map(|unknown| Span::of(bits, unknown.tap)).collect();
+        Some(Self { error, errors: AffineErrors::new(error, unknowns), spans })
+    }
+
+    /// Whether integers of this scale are large enough for a gamma below `bar`.
+    pub(super) fn may_reach(&self, fraction_bits: i32, bar: f64) -> bool {
+        let most = self.spans.iter().map(|span| span.most.max(-span.least)).fold(0.0, f64::max);
+        let taps = most * (-f64::from(fraction_bits)).exp2();
+        let silence = vec![0.0; self.spans.len()];
+        (0..self.errors.count()).all(|k| {
+            let gain = linalg::largest_singular_value_c(&self.errors.at(k, &silence));
+            gain.is_ok_and(|gain| gain - self.errors.reach(k, taps) < bar)
+        })
+    }
+
+    /// Integers with a smaller gamma than `bar`, the best last.
+    pub(super) fn better_than(&self, bar: f64, fraction_bits: i32) -> Vec<Integers> {
+        let step = (-f64::from(fraction_bits)).exp2();
+        let mut tree = Tree::new(&self.errors, &self.spans, step, bar);
+        tree.find_bounds(self.error.real_gamma);
+        if !tree.bounds.is_empty() {
+            let costs: Vec<f64> = tree.bounds.iter().map(|bound| bound.least).collect();
+            tree.decide(self.spans.len(), &mut vec![0.0; self.spans.len()], &costs);
+        }
+        tree.found.iter().map(|values| self.integers(values, step)).collect()
+    }
+
+    fn integers(&self, values: &[f64], step: f64) -> Integers {
+        let filters = self.error.problem.taps;
+        let mut integers = vec![vec![0; filters[0].len()]; filters.len()];
+        for (unknown, value) in self.errors.unknowns.iter().zip(values) {
+            integers[unknown.channel][unknown.tap] = (value / step).round() as i64;
+        }
+        integers
+    }
+}
+
+/// The tree of decisions at one scale. Values are taps, that is, integers times `step`.
+struct Tree<'a> {
+    errors: &'a AffineErrors,
+    spans: &'a [Span],
+    step: f64,
+    bounds: Vec<QuadraticBound>,
+    /// gamma that is to be undercut.
+    bar: f64,
+    found: Vec<Vec<f64>>,
+    /// Decisions left.
+    left: usize,
+    /// The points, those first that rejected last.
+    order: Vec<usize>,
+}
+
+impl<'a> Tree<'a> {
+    fn new(errors: &'a AffineErrors, spans: &'a [Span], step: f64, bar: f64) -> Self {
+        let order = (0..errors.count()).collect();
+        let bar = bar * (1.0 - BETTER);
+        Self { errors, spans, step, bounds: Vec::new(), bar, found: Vec::new(), left: DECISIONS, order }
+    }
+
+    /// Bounds with weights on the frequencies where the integers closest to the last bound's centre are
+    /// worst. These integers are candidates, too.
+    fn find_bounds(&mut self, floor: f64) {
+        let mut weights = self.errors.uniform();
+        for _ in 0..BOUNDS {
+            let Some(bound) = self.errors.bound(&weights) else { break };
+            let centre: Vec<f64> = bound.centre.iter().map(|value| value / self.step).collect();
+            let near: Vec<f64> =
+                closest(&bound.factor, &centre, self.spans).iter().map(|x| x * self.step).collect();
+            self.compare(&near);
+            self.bounds.push(bound);
+            let Some(moved) = self.errors.emphasise(&weights, &near, floor) else { break };
+            weights = moved;
+        }
+    }
+
+    /// Decides the taps below `undecided`, those from there on being decided. `costs` are the bounds so far.
+    fn decide(&mut self, undecided: usize, values: &mut Vec<f64>, costs: &[f64]) {
+        let Some(i) = undecided.checked_sub(1) else {
+            self.compare(values);
+            return;
+        };
+        let bests: Vec<f64> = self.bounds.iter().map(|bound| bound.best(i, values)).collect();
+        for integer in self.within_bounds(i, &bests, costs) {
+            if self.left == 0 {
+                return;
+            }
+            self.left -= 1;
+            let value = integer * self.step;
+            let after: Vec<f64> = self
+                .bounds
+                .iter()
+                .zip(bests.iter().zip(costs))
+                .map(|(bound, (best, cost))| cost + (bound.factor[(i, i)] * (value - best)).powi(2))
+                .collect();
+            if after.iter().all(|cost| *cost < self.bar * self.bar) {
+                values[i] = value;
+                self.decide(i, values, &after);
+            }
+        }
+    }
+
+    /// The integers of tap i that no bound excludes, from the middle of their interval outward.
+    fn within_bounds(&self, i: usize, bests: &[f64], costs: &[f64]) -> Vec<f64> {
+        let (mut low, mut high) = (self.spans[i].least, self.spans[i].most);
+        for (bound, (best, cost)) in self.bounds.iter().zip(bests.iter().zip(costs)) {
+            let radius = (self.bar * self.bar - cost).max(0.0).sqrt() / bound.factor[(i, i)];
+            low = low.max(((best - radius) / self.step).ceil());
+            high = high.min(((best + radius) / self.step).floor());
+        }
+        let middle = 0.5 * (low + high);
+        let first = low.max((middle - BRANCHES).ceil());
+        let count = if high >= low { (high.min(middle + BRANCHES) - first) as usize + 1 } else { 0 };
+        let mut integers: Vec<f64> = (0..count).map(|k| first + k as f64).collect();
+        integers.sort_by(|a, b| (a - middle).abs().total_cmp(&(b - middle).abs()));
+        integers
+    }
+
+    /// Keeps the values if their gamma is below the bar.
+    fn compare(&mut self, values: &[f64]) {
+        self.left = self.left.saturating_sub(COMPARISON);
+        let mut worst = 0.0f64;
+        for at in 0..self.order.len() {
+            let gain = linalg::largest_singular_value_c(&self.errors.at(self.order[at], values));
+            let gain = gain.unwrap_or(f64::INFINITY);
+            if gain >= self.bar {
+                self.order[..=at].rotate_right(1);
+                return;
+            }
+            worst = worst.max(gain);
+        }
+        self.bar = worst * (1.0 - BETTER);
+        self.found.push(values.to_vec());
+    }
+}
+
+impl QuadraticBound {
+    /// The real value of tap i at which the bound is least, given the taps after it.
+    fn best(&self, i: usize, values: &[f64]) -> f64 {
+        let column = self.factor.column(i);
+        let pull: f64 = (i + 1..values.len()).map(|l| column[l] * (values[l] - self.centre[l])).sum();
+        self.centre[i] - pull / column[i]
+    }
+}

@@ -1,0 +1,114 @@
+//! Integer taps of small banks against all integers at all scales. `HYBANK_INTEGER_CASES=926` tries that many random
+//! banks, `HYBANK_INTEGER_CASES=12..13` that one.
+
+mod brute_force;
+
+use crate::support::random::Random;
+use crate::support::specs::{alike, butterworth, with_taps};
+use crate::support::sweep::{each, wanted};
+use brute_force::BruteForce;
+use hybank::bank::SynthesisFilters;
+use hybank::design::{LiftedPlant, Problem, ProofSearch, design_with};
+use hybank::spec::{Spec, WordLengths};
+
+/// Bits of all taps together: the brute force tries two to this power at each scale.
+const MOST_BITS: usize = 14;
+
+/// A bank of integer taps beside the best one.
+#[derive(Debug)]
+struct Judged {
+    name: String,
+    /// gamma of the integers found over that of the best integers, in decibels.
+    above_db: f64,
+    /// gamma of the integers found over that of silence, in decibels.
+    above_silence_db: f64,
+    /// Time of the design.
+    seconds: f64,
+}
+
+/// One to three channels, whose delays may nearly coincide, and one to four taps of 2 to 8 bits.
+fn case(number: u64) -> (Spec, u32) {
+    let mut dice = Random(number);
+    loop {
+        let (channels, ratio, taps) = (dice.count(1, 3), dice.count(1, 3), dice.count(1, 4));
+        let bits = dice.count(2, 8);
+        let filter = butterworth(dice.count(1, 4), 0.05 * 40f64.powf(dice.part()));
+        let latency = dice.count(0, taps);
+        let first = ratio as f64 * dice.part();
+        let apart = 10f64.powf(-1.0 - 3.0 * dice.part());
+        let nearly_equal = dice.part() < 0.4;
+        let delays: Vec<f64> = (0..channels)
+            .map(|i| if nearly_equal { first + apart * i as f64 } else { ratio as f64 * dice.part() })
+            .collect();
+        if bits * channels * taps <= MOST_BITS {
+            let mut spec = with_taps(alike(&filter, ratio, latency, &delays), taps);
+            spec.name = format!(
+                "case {number}: M = {ratio}, latency {latency}, {delays:?}, {taps} taps, {bits} bits"
+            );
+            return (spec, bits as u32);
+        }
+    }
+}
+
+fn judged(spec: &Spec, bits: u32) -> Judged {
+    let mut spec = spec.clone();
+    spec.design.bits = Some(WordLengths::Same(bits));
+    let begin = std::time::Instant::now();
+    let found = design_with(&spec, ProofSearch::Skip).unwrap_or_else(|error| panic!("{}: {error}", spec.name));
+    let seconds = begin.elapsed().as_secs_f64();
+    let plant = LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()).unwrap();
+    let SynthesisFilters::Fir(taps) = &found.bank.filters else { panic!("no taps") };
+    let gamma = found.bank.gamma.norm.unwrap();
+    let best = match BruteForce::new(&plant, taps[0].len(), bits).better_than(gamma) {
+        Some(best) => plant.fir_norm(&best).unwrap().gain,
+        None => gamma,
+    };
+    let zeros = vec![vec![0.0; taps[0].len()]; taps.len()];
+    let silence = plant.fir_norm(&zeros).unwrap().gain;
+    let db = |ratio: f64| 20.0 * ratio.log10();
+    Judged {
+        name: spec.name.clone(),
+        above_db: db(gamma / best),
+        above_silence_db: db(gamma / silence),
+        seconds,
+    }
+}
+
+#[test]
+fn small_banks_are_within_a_tenth_of_a_decibel_of_all_integers() {
+    let cases = wanted("HYBANK_INTEGER_CASES", 40);
+    let all = each(cases, |number| {
+        let (spec, bits) = case(number);
+        judged(&spec, bits)
+    });
+    let above = |db: f64| all.iter().filter(|case| case.above_db > db).count();
+    for Judged { name, above_db, above_silence_db, .. } in &all {
+        if *above_db > 0.1 || *above_silence_db > 1e-6 {
+            println!("{name}: {above_db:.3} dB above the best, {above_silence_db:.3} dB above silence");
+        }
+    }
+    let worst = all.iter().map(|case| case.above_db).fold(0.0, f64::max);
+    let worse_than_silence = all.iter().filter(|case| case.above_silence_db > 1e-6).count();
+    let seconds: f64 = all.iter().map(|case| case.seconds).sum();
+    println!(
+        "{} cases: {} more than 0.1 dB above the best integers, {} more than 3 dB, worst {worst:.2} dB, \
+         {worse_than_silence} worse than silence; {seconds:.1} s of design",
+        all.len(),
+        above(0.1),
+        above(3.0)
+    );
+    assert_eq!(worse_than_silence, 0);
+    assert!(above(0.1) * 100 <= all.len(), "{} of {}", above(0.1), all.len());
+}
+
+/// Nearly equal delays make real taps of opposite sign that no scale of few bits holds. Much smaller taps are nearly as good.
+#[test]
+fn nearly_equal_channels_find_a_scale() {
+    for apart in [1e-2, 1e-4, 1e-6] {
+        let spec = with_taps(alike(&butterworth(2, 0.5), 2, 1, &[0.6, 0.6 + apart]), 1);
+        for bits in [3, 4, 8] {
+            let judged = judged(&Spec { name: format!("{apart} apart, {bits} bits"), ..spec.clone() }, bits);
+            assert!(judged.above_db < 0.1 && judged.above_silence_db < -1.0, "{judged:?}");
+        }
+    }
+}
