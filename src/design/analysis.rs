@@ -3,6 +3,7 @@
 
 use super::plant::LiftedPlant;
 use super::problem::Problem;
+use super::resolution::resolves_delays;
 use super::{DesignError, filters};
 use crate::bank::Bank;
 use crate::lti::gramian::h2_norm;
@@ -16,7 +17,8 @@ pub struct Analysis {
     /// Frequency of the worst case in hertz, from 0 to 1/(2 M h). All higher frequencies alias to one of
     /// these in the slow samples.
     pub peak_hertz: Hertz,
-    /// The noncausal bound: no bank has a smaller norm with these front ends and delays.
+    /// The noncausal bound: no bank has a smaller norm with these front ends and delays. Zero where delays
+    /// differ by less than doubles resolve.
     pub noncausal: f64,
     /// Averages over time and inputs.
     #[serde(flatten)]
@@ -54,10 +56,12 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     shifted.check_size()?;
     let plant = LiftedPlant::new(&shifted)?;
     let peak = plant.bank_norm(&bank.filters)?;
+    // Below the resolution of delays only zero is a bound.
+    let noncausal = if resolves_delays(&shifted) { plant.noncausal_bound()?.gain } else { 0.0 };
     Ok(Analysis {
         gamma: peak.gain,
         peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
-        noncausal: plant.noncausal_bound()?.gain.min(peak.gain),
+        noncausal: noncausal.min(peak.gain),
         mean: mean_of(bank, &plant)?,
     })
 }

@@ -9,6 +9,7 @@ use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
+use super::resolution::resolves_delays;
 use super::{DesignError, prove};
 use crate::bank::{Bank, Gamma};
 use crate::spec::Spec;
@@ -99,7 +100,8 @@ pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, Des
     watch.begins(Stage::Realisation);
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis)?;
     watch.begins(Stage::Proof);
-    Ok(judge(spec, complete, realised, &synthesis).proved(&synthesis.dual, options.proof))
+    let judged = judge(spec, complete, realised, &synthesis).without_unresolved_bounds(&problem);
+    Ok(judged.proved(&synthesis.dual, options.proof))
 }
 
 /// Tells the observer what is done, with the time that the design takes.
@@ -159,6 +161,15 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
 }
 
 impl Design {
+    /// Leaves out the bounds that rest on differences which doubles do not resolve. `verify` may still prove
+    /// some.
+    fn without_unresolved_bounds(mut self, problem: &Problem) -> Self {
+        if !resolves_delays(problem) {
+            self.bank.gamma = Gamma { lower: None, noncausal: None, ..self.bank.gamma };
+        }
+        self
+    }
+
     /// Adds the proof to the bank, if `search` asks for one and it is found.
     fn proved(mut self, dual: &[DualPoint], search: ProofSearch) -> Self {
         if search == ProofSearch::Run {

@@ -18,6 +18,7 @@ mod prove;
 pub mod quantise;
 mod realise;
 pub mod reduction;
+mod resolution;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use choices::latency;

@@ -155,7 +155,7 @@ impl<'a> Report<'a> {
             "{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
              gamma      {} (computed norm of this bank; worst at {:.4} modulo the slow rate)\n\
              lower      {} ({})\n\
-             noncausal  {} (no latency is better)\n\
+             noncausal  {} ({})\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
              {}{}designed in {:.1} ms, {} iterations\n{}",
@@ -168,6 +168,7 @@ impl<'a> Report<'a> {
             self.peak_hertz,
             number(self.gamma.lower),
             match self.method {
+                _ if self.gamma.lower.is_none() => UNRESOLVED,
                 Method::Fir => "no bank of this length is better",
                 Method::Iir => "no causal bank is better",
                 _ if self.proof.causal() => "no causal bank is better; this method does not aim at gamma",
@@ -175,6 +176,7 @@ impl<'a> Report<'a> {
                     "no bank at all is better; this method does not aim at gamma",
             },
             number(self.gamma.noncausal),
+            if self.gamma.noncausal.is_none() { UNRESOLVED } else { "no latency is better" },
             number(Some(self.mean.rms_error)),
             number(Some(self.mean.noise_gain)),
             self.mean.output_noise,
@@ -186,6 +188,9 @@ impl<'a> Report<'a> {
         )
     }
 }
+
+/// Why no bound is stated.
+const UNRESOLVED: &str = "two delays differ by less than double precision resolves";
 
 /// Maximum number of rows of the table of orders; the report of `--json` has all of them.
 const TABLE_ROWS: usize = 32;
