@@ -87,8 +87,9 @@ pub struct BlockFilter {
 #[serde(deny_unknown_fields)]
 pub struct Gamma {
     /// Norm computed from the coefficients of this bank. Its relative error is at most
-    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), and rounding in the products of filters and front ends adds
-    /// an absolute one.
+    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), below [`TINY`](Self::TINY) at most
+    /// [`TINY_ACCURACY`](Self::TINY_ACCURACY), and rounding in the products of filters and front ends adds an
+    /// absolute one.
     pub norm: Option<f64>,
     /// An upper bound of the true norm of these coefficients: proven if the bank carries a proof, else the
     /// computed norm plus its stated error.
@@ -100,13 +101,18 @@ pub struct Gamma {
 }
 
 impl Gamma {
-    /// Relative error of a computed norm.
+    /// Relative error of a computed norm of at least [`TINY`](Self::TINY).
     pub const NORM_ACCURACY: f64 = 1e-9;
+    /// Norms below this are computed with less accuracy.
+    pub const TINY: f64 = 1e-9;
+    /// Relative error of a computed norm below [`TINY`](Self::TINY). The largest one observed is 7 %.
+    pub const TINY_ACCURACY: f64 = 0.1;
 
     /// The bounds of a bank with the computed `norm`, whose absolute error from rounding is `rounding`. No
     /// lower bound exceeds the upper bound.
     pub fn computed(norm: f64, rounding: f64, lower: f64, noncausal: f64) -> Self {
-        let upper = norm * (1.0 + Self::NORM_ACCURACY) + rounding;
+        let accuracy = if norm < Self::TINY { Self::TINY_ACCURACY } else { Self::NORM_ACCURACY };
+        let upper = norm * (1.0 + accuracy) + rounding;
         Self {
             norm: Some(norm),
             upper: Some(upper),

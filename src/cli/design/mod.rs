@@ -108,6 +108,21 @@ fn overrides(args: &Args) -> DesignOverrides {
 const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no better integers of these bits were found; \
                         give more bits or another fraction_bits";
 
+/// Noise gains above this are worth a warning.
+const LARGE_NOISE_GAIN: f64 = 1e3;
+
+/// Warning for a bank with large taps of opposite sign.
+fn large_noise_gain(method: Method, noise_gain: f64) -> String {
+    let rounding = match method {
+        Method::Iir | Method::H2 => "",
+        _ => ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)",
+    };
+    format!(
+        "noise gain {noise_gain:.1e}: the bank amplifies the converters' noise that much{rounding}; \
+         set `noise` to limit it, or move nearly equal delays apart"
+    )
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -137,6 +152,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     write_text(&args.output, &text, args.force)?;
     if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero) {
         super::warn(ALL_ZERO);
+    }
+    if mean.noise_gain > LARGE_NOISE_GAIN {
+        super::warn(&large_noise_gain(found.bank.method, mean.noise_gain));
     }
     let report = Report::new(args.output.display().to_string(), &found, mean, seconds);
     if args.json {
