@@ -91,7 +91,7 @@ fn a_large_noise_gain_is_warned_of_and_unresolved_delays_have_no_bounds() {
     let apart = |by: f64| THESIS.replace("delay = 1.2", &format!("delay = {:?}", 0.6 + by));
     let designed = |by: f64| {
         fs::write(desk.path("near.toml"), apart(by)).unwrap();
-        let output = desk.run(&["design", "near.toml", "-o", "near.json", "--force", "--taps", "4"]);
+        let output = desk.run(&["design", "near.toml", "-o", "near.json", "--force", "--taps", "4", "--latency", "2"]);
         assert!(output.status.success(), "{output:?}");
         (text(&output.stdout), text(&output.stderr))
     };
