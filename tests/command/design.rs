@@ -87,11 +87,12 @@ fn banks_flow_through_pipes() {
 /// Delays that nearly coincide need large taps of opposite sign.
 #[test]
 fn a_large_noise_gain_is_warned_of_and_unresolved_delays_have_no_bounds() {
-    let desk = Desk::new();
+    let desk = Desk::with_spec(THESIS);
     let apart = |by: f64| THESIS.replace("delay = 1.2", &format!("delay = {:?}", 0.6 + by));
     let designed = |by: f64| {
-        fs::write(desk.path("near.toml"), apart(by)).unwrap();
-        let output = desk.run(&["design", "near.toml", "-o", "near.json", "--force", "--taps", "4", "--latency", "2"]);
+        desk.write("near.toml", apart(by));
+        let flags = ["--force", "--taps", "4", "--latency", "2"];
+        let output = desk.run(&[&["design", "near.toml", "-o", "near.json"][..], &flags].concat(), &[]);
         assert!(output.status.success(), "{output:?}");
         (text(&output.stdout), text(&output.stderr))
     };
