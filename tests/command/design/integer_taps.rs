@@ -1,6 +1,6 @@
 //! Taps of few bits, by `bits`, `fraction_bits` and their flags.
 
-use crate::support::{Desk, THESIS, number, text};
+use crate::support::{Desk, THESIS, number};
 
 #[test]
 fn integer_taps_are_designed_proven_and_run() {
