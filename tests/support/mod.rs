@@ -7,8 +7,8 @@ mod desk;
 pub(crate) mod jobs;
 pub(crate) mod random;
 pub(crate) mod specs;
-pub(crate) mod wav;
 pub(crate) mod sweep;
+pub(crate) mod wav;
 
 pub(crate) use desk::{Desk, names};
 

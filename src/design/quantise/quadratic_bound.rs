@@ -105,7 +105,8 @@ impl AffineErrors {
         if !(worst > floor && total.is_finite()) {
             return None;
         }
-        let mut moved: Vec<CMat> = weights.0.iter().map(|weight| weight * Complex::from(1.0 - PACE)).collect();
+        let mut moved: Vec<CMat> =
+            weights.0.iter().map(|weight| weight * Complex::from(1.0 - PACE)).collect();
         for (k, share) in shares.iter().enumerate().filter(|(_, share)| **share > NEGLIGIBLE) {
             let direction = linalg::svd_c(&errors[k]).ok()?.u.column(0).into_owned();
             moved[k] += &direction * direction.adjoint() * Complex::from(PACE * share / total);

@@ -151,7 +151,8 @@ impl<'a> Phase<'a> {
         let mut found = Vec::new();
         let mut first = 0;
         for code in 0..count.pow(cells as u32) {
-            let value = |cell: usize| (least + ((code / count.pow(cell as u32)) % count) as i64) as f64 * step;
+            let value =
+                |cell: usize| (least + ((code / count.pow(cell as u32)) % count) as i64) as f64 * step;
             let taps: Vec<f64> = (0..cells).map(value).collect();
             // The frequency that rejected the last taps probably rejects these, too.
             if self.square(first, &taps) > bar * bar {

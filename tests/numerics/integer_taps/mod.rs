@@ -54,7 +54,8 @@ fn judged(spec: &Spec, bits: u32) -> Judged {
     let mut spec = spec.clone();
     spec.design.bits = Some(WordLengths::Same(bits));
     let begin = std::time::Instant::now();
-    let found = design_with(&spec, ProofSearch::Skip).unwrap_or_else(|error| panic!("{}: {error}", spec.name));
+    let found =
+        design_with(&spec, ProofSearch::Skip).unwrap_or_else(|error| panic!("{}: {error}", spec.name));
     let seconds = begin.elapsed().as_secs_f64();
     let plant = LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()).unwrap();
     let SynthesisFilters::Fir(taps) = &found.bank.filters else { panic!("no taps") };
