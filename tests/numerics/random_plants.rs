@@ -123,6 +123,7 @@ fn refused(seed: u64, refusal: &DesignError, end: End) -> End {
         refusal,
         DesignError::NotCertified
             | DesignError::NotSearched { .. }
+            | DesignError::OutOfReach { .. }
             | DesignError::RiccatiFailed { .. }
             | DesignError::Lti(_)
             | DesignError::Linalg(_)
