@@ -54,11 +54,11 @@ impl Problem {
         merged.noise.clear();
         let mut shares = vec![Share { representative: 0, share: 0.0 }; self.channels.len()];
         for group in self.groups(repeats) {
-            let (newest, noise) = self.newest(&group);
+            let newest = self.newest(&group);
             let reference = self.channels[newest[0]];
             let gain = |i: usize| self.channels[i].gain / reference.gain;
             // In units of the first channel of the group.
-            let relative: Vec<f64> = newest.iter().map(|&i| noise[i] / (gain(i) * gain(i))).collect();
+            let relative: Vec<f64> = newest.iter().map(|&i| self.noise[i] / (gain(i) * gain(i))).collect();
             let weights = least_noise_shares(&relative);
             let representative = merged.channels.len();
             group.iter().for_each(|&i| shares[i].representative = representative);
@@ -95,11 +95,11 @@ impl Problem {
         a.front_end == b.front_end && alike
     }
 
-    /// The channels of `group` with the least delay, and the noise of all channels.
-    fn newest(&self, group: &[usize]) -> (Vec<usize>, &[f64]) {
+    /// The channels of `group` with the least delay.
+    fn newest(&self, group: &[usize]) -> Vec<usize> {
         let delay = |i: usize| self.channels[i].delay.0;
         let least = group.iter().map(|&i| delay(i)).fold(f64::INFINITY, f64::min);
-        (group.iter().copied().filter(|&i| delay(i) - least < SAME_INSTANT).collect(), &self.noise)
+        group.iter().copied().filter(|&i| delay(i) - least < SAME_INSTANT).collect()
     }
 }
 

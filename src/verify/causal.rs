@@ -41,7 +41,7 @@
 //! P+. So if it makes a pivot of z nonnegative, the pivot is also nonnegative for P+.
 //!
 //! A measured sample counts from the first period in which it may differ from zero. If the same filter is
-//! sampled at instants a whole number of periods apart, only the earliest sample is used. R = L_2 S L_2'
+//! sampled at instants a whole number of periods apart, only the newest sample is used. R = L_2 S L_2'
 //! may be singular (delayed channels are noise-free measurements of delay-line states); the argument still
 //! holds, because the pivots of y are variances given the past.
 

@@ -82,8 +82,9 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// Whole slow periods by which sample `j` is taken before sample `i`, if the two are multiples of each
     /// other up to that delay.
     ///
-    /// Instants count as whole periods apart if they are so up to the rounding of the delays to doubles: a
-    /// bank that told them apart would need coefficients of 1e15.
+    /// Instants count as whole periods apart if they are so up to the rounding of the delays to doubles
+    /// ([`Timeline::resolution`]). A bank that told them apart would need coefficients as large as the
+    /// reciprocal of that.
     fn periods_between(&self, i: usize, j: usize) -> Option<f64> {
         let (a, b) = (self.samples[i], self.samples[j]);
         let apart = self.timeline.between(b.time, a.time);
@@ -102,19 +103,32 @@ impl<'a> EnclosedErrorSystem<'a> {
         self.periods_between(i, j).is_some()
     }
 
-    /// The channels that are not `equal` to an earlier one.
+    /// The channels that are not `equal` to one that is kept before them.
     fn first_channels(&self, equal: impl Fn(usize, usize) -> bool) -> Vec<usize> {
         let m = self.bank.ratio;
-        (0..self.bank.channel_count()).filter(|&i| (0..i).all(|j| !equal(m + i, m + j))).collect()
+        let mut kept: Vec<usize> = Vec::new();
+        for i in 0..self.bank.channel_count() {
+            if kept.iter().all(|&j| !equal(m + i, m + j)) {
+                kept.push(i);
+            }
+        }
+        kept
     }
 
-    /// Rows of the measured samples that a causal bank needs: of samples that are equal up to whole slow
-    /// periods, only the earliest.
-    fn earliest_samples(&self) -> Vec<usize> {
-        let measured = self.bank.ratio..self.samples.len();
-        let newer = |periods: f64, i: usize, j: usize| periods > 0.0 || (periods == 0.0 && i < j);
-        let before = |i: usize, j: usize| self.periods_between(i, j).is_some_and(|p| newer(p, i, j));
-        measured.clone().filter(|&j| measured.clone().all(|i| !before(i, j))).collect()
+    /// Rows of the measured samples that a causal bank needs: of samples that are multiples of each other up
+    /// to whole slow periods, only the newest.
+    fn newest_samples(&self) -> Vec<usize> {
+        let mut rows: Vec<usize> = (self.bank.ratio..self.samples.len()).collect();
+        let delay = |s: usize| self.samples[s].time.delay.0;
+        rows.sort_by(|&i, &j| delay(i).total_cmp(&delay(j)));
+        let mut kept: Vec<usize> = Vec::new();
+        for row in rows {
+            if kept.iter().all(|&newer| !self.same_later(newer, row)) {
+                kept.push(row);
+            }
+        }
+        kept.sort_unstable();
+        kept
     }
 
     /// Whether `factor` proves ||K|| <= `gamma`.
@@ -142,7 +156,7 @@ impl<'a> EnclosedErrorSystem<'a> {
 
     /// Runs the recursion for causal banks at `gamma` over `periods` slow periods.
     pub fn causal_recursion(&self, gamma: f64, periods: usize, precision: Precision) -> Recursion {
-        let (m, measured) = (self.bank.ratio, || self.earliest_samples());
+        let (m, measured) = (self.bank.ratio, || self.newest_samples());
         match precision {
             Precision::Short => {
                 let plant = self.short.get_or_init(|| CausalPlant::new(&self.period, m, &measured()));

@@ -27,6 +27,9 @@
 //! responses are bounded by a residual. A Cholesky factorisation in double-double arithmetic shows positive
 //! definiteness (Rump, 2006). Everything else is computed in intervals of 106 or 512 bits.
 //!
+//! For the lower bounds, samples of proportional filters count as one if their instants agree, or lie whole
+//! slow periods apart, within 4 eps (1 + D_1 / h + D_2 / h) fast periods: the rounding of the delays.
+//!
 //! Not proven: that the spec describes the hardware.
 
 mod ball;

@@ -3,6 +3,7 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{butterworth, low_pass, with_taps};
+use crate::support::sweep::wanted;
 use hybank::design::{DesignError, ProofSearch, analyze_mean, design_with, latency};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, Method, Spec};
 use hybank::units::Seconds;
@@ -74,17 +75,11 @@ fn fault(errors: &[f64], chosen: usize) -> Option<String> {
     Some(format!("latency {shorter} has {:e}, {chosen} has {:e}", errors[shorter], errors[chosen]))
 }
 
-fn plants(few: u64) -> std::ops::Range<u64> {
-    let Ok(asked) = std::env::var("HYBANK_LATENCIES") else { return 0..few };
-    let number = |text: &str| text.parse::<u64>().unwrap();
-    asked.split_once("..").map_or_else(|| 0..number(&asked), |(from, to)| number(from)..number(to))
-}
-
 /// The faults of many random plants, and the time of the choice relative to that of a design.
 fn faults(method: Method, few: u64) -> Vec<String> {
     let mut faults = Vec::new();
     let (mut choices, mut designs) = (Duration::ZERO, Duration::ZERO);
-    for seed in plants(few) {
+    for seed in wanted("HYBANK_LATENCIES", few) {
         let spec = plant(seed, method);
         let begin = Instant::now();
         let chosen = latency(&spec).unwrap_or_else(|error| panic!("plant {seed}: {error}"));

@@ -3,6 +3,7 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
+use crate::support::sweep::wanted;
 use hybank::design::{Design, ProofSearch, analyze, design, design_with};
 use hybank::spec::{Family, FilterSpec, Method, Spec};
 use hybank::verify::{EnclosedErrorSystem, Precision, Recursion};
@@ -79,9 +80,9 @@ fn plant(seed: u64) -> Spec {
 
 #[test]
 fn no_causal_bank_does_better_than_iir() {
-    let count = std::env::var("HYBANK_SWEEP").ok().and_then(|count| count.parse().ok()).unwrap_or(10);
+    let seeds = wanted("HYBANK_SWEEP", 10);
     let (mut worst, mut beyond) = (0.0_f64, Vec::new());
-    for seed in 0..count {
+    for seed in seeds.clone() {
         let begin = std::time::Instant::now();
         let bank =
             design_with(&plant(seed), ProofSearch::Skip).unwrap_or_else(|error| panic!("{seed}: {error}"));
@@ -92,6 +93,6 @@ fn no_causal_bank_does_better_than_iir() {
             beyond.push((seed, loss));
         }
     }
-    println!("{count} plants, worst {worst:e}, beyond 1e-5: {beyond:?}");
+    println!("plants {seeds:?}, worst {worst:e}, beyond 1e-5: {beyond:?}");
     assert!(beyond.is_empty(), "{beyond:?}");
 }

@@ -5,6 +5,7 @@ use crate::support::jobs::Job;
 use crate::support::random::Random;
 use crate::support::text;
 use crate::work::{desk, jobs};
+use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
 
@@ -45,7 +46,14 @@ fn counts(job: &Job) -> Vec<usize> {
     let status = strace(job, &["-o", log.to_str().unwrap(), "-e", &trace]).output().unwrap().status;
     assert!(status.success());
     let log = fs::read_to_string(log).unwrap();
-    names.iter().map(|name| log.lines().filter(|line| line.contains(&format!(" {name}("))).count()).collect()
+    let calls = |name: &&str| {
+        let mut of_thread = BTreeMap::new();
+        let made = log.lines().filter(|line| line.contains(&format!(" {name}(")));
+        made.filter_map(|line| line.split_whitespace().next())
+            .for_each(|thread| *of_thread.entry(thread).or_insert(0) += 1);
+        of_thread.into_values().max().unwrap_or(0)
+    };
+    names.iter().map(calls).collect()
 }
 
 #[derive(Default)]

@@ -172,7 +172,9 @@ mod tests {
         let message = read_image(&path).unwrap_err().to_string();
         assert!(message.contains("33554433 x 1") && message.contains("--max-pixels"), "{message}");
         assert!(matches!(read_map(&path), Err(ImageError::TooLarge { most: MOST_PIXELS, .. })));
-        assert_eq!(read_image_within(&path, MOST_PIXELS + 1).unwrap().width(), MOST_PIXELS + 1);
+        let (_dir, small) = temporary("small.pgm", b"P5 3 1 255\n\x01\x02\x03");
+        assert!(matches!(read_image_within(&small, 2), Err(ImageError::TooLarge { most: 2, .. })));
+        assert_eq!(read_image_within(&small, 3).unwrap().width(), 3);
     }
 
     #[test]

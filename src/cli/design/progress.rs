@@ -101,9 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn the_result_of_the_work_comes_back_at_once() {
-        let begin = Instant::now();
+    fn the_result_of_the_work_comes_back() {
         assert_eq!(Progress::default().during(|| 7), 7);
-        assert!(begin.elapsed() < PATIENCE);
     }
 }

@@ -186,6 +186,11 @@ impl Innovations {
         })
     }
 
+    /// Whether the feedthrough of a channel is rounding, so that the channel was left out.
+    fn leaves_out_a_channel(&self) -> bool {
+        self.least_feedthrough <= INNOVATION_FLOOR
+    }
+
     /// Feedthrough of the channel with the least, relative to its size.
     pub(super) fn least_feedthrough(&self) -> f64 {
         self.least_feedthrough
@@ -221,15 +226,17 @@ impl Innovations {
             c1: &self.c1 * &forward,
             c2: &self.c2 * &forward,
             p0: linalg::symmetric_part(&(&back * &self.p0 * back.transpose())),
-            conclusive: self.least_feedthrough > INNOVATION_FLOOR,
+            conclusive: !self.leaves_out_a_channel(),
             ..self.clone()
         })
     }
 
     /// sigma_max(Y), a lower bound of the error of every causal filter: no measurement that is available in
     /// time depends on these inputs.
+    ///
+    /// Zero if a channel was left out, because it measures some of these inputs.
     pub(super) fn unmeasured_feedthrough(&self) -> Result<f64, DesignError> {
-        if self.y.is_empty() {
+        if self.y.is_empty() || self.leaves_out_a_channel() {
             return Ok(0.0);
         }
         Ok(linalg::singular_values(&self.y)?[0])

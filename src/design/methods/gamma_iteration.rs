@@ -72,10 +72,10 @@ impl<'a> GammaIteration<'a> {
         })
     }
 
-    /// Whether the least gamma found is that of a bound on all causal filters, up to the accuracy.
+    /// Whether the least gamma found is zero or that of a bound on all causal filters, up to the accuracy.
     pub(super) fn attains_a_bound(&self) -> bool {
         let bound = self.noncausal.gain.max(self.feedthrough);
-        self.done() && self.upper() * (1.0 - CONFIRMED_BELOW) <= bound
+        self.is_negligible(self.upper()) || (self.done() && self.upper() * (1.0 - CONFIRMED_BELOW) <= bound)
     }
 
     /// Whether the search has ended and `solver`, which is more precise, finds no filter for a smaller

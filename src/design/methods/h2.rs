@@ -3,9 +3,9 @@
 
 use super::filtering::{Filter, Innovations};
 use super::gamma_iteration::GammaIteration;
-use super::precise_filtering::PreciseFiltering;
+use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
 use super::{Settings, Synthesis};
-use crate::arithmetic::{BigFloat, DoubleDouble};
+use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::lti::gramian::h2_norm;
@@ -25,13 +25,21 @@ pub(crate) fn synthesise(plant: &LiftedPlant, _: &Settings) -> Result<Synthesis,
     let mut candidates: Vec<Filter> = innovations.iter().filter_map(|form| form.h2()).collect();
     let doubtful = innovations.iter().any(|form| form.least_feedthrough() < FAINT_FEEDTHROUGH);
     if doubtful || candidates.is_empty() {
-        candidates.extend(PreciseFiltering::<DoubleDouble>::new(plant)?.h2());
-        candidates.extend(PreciseFiltering::<BigFloat>::new(plant)?.h2());
+        candidates.extend(precise::<DoubleDouble>(plant, MOST_STATES_AT_106_BITS)?);
+        candidates.extend(precise::<BigFloat>(plant, MOST_STATES_AT_512_BITS)?);
         sort_by_mean_square(plant, &mut candidates);
     }
     iteration.start_from(candidates.into_iter())?;
     let optimum = iteration.best().map_err(|_| DesignError::RiccatiFailed { gamma: f64::INFINITY })?;
     Ok(iteration.synthesis(optimum))
+}
+
+/// The mean-square optimal filter in the precision of `F`, for plants of at most `limit` states.
+fn precise<F: Number>(plant: &LiftedPlant, limit: usize) -> Result<Option<Filter>, DesignError> {
+    if plant.system().order() > limit {
+        return Ok(None);
+    }
+    Ok(PreciseFiltering::<F>::new(plant)?.h2())
 }
 
 /// Sorts `filters` by the mean-square error that they have, least first. Filters that rounding made unstable

@@ -3,17 +3,12 @@
 
 use super::filtering::{Innovations, Trial};
 use super::gamma_iteration::{GammaIteration, Judged};
-use super::precise_filtering::PreciseFiltering;
+use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
 use super::{Settings, Synthesis};
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use std::rc::Rc;
-
-/// Maximum number of states of a plant for trials with 106 bits; one trial then takes about a second.
-const MOST_STATES_AT_106_BITS: usize = 96;
-/// Maximum number of states of a plant for trials with 512 bits; one trial then takes about a second.
-const MOST_STATES_AT_512_BITS: usize = 40;
 
 /// The least gamma within [`GAMMA_ACCURACY`](super::GAMMA_ACCURACY); with `settings.gamma_margin` > 0 the
 /// central filter at (1 + margin) times the optimum instead, which has the smaller error at all other

@@ -33,9 +33,19 @@ use std::ops::Range;
 
 /// Rounding moves no eigenvalue of a scaled semidefinite matrix this far below zero.
 const SEMIDEFINITE: f64 = 1e-15;
-/// Share of white noise in the filter's states in the choice of coordinates. With it no state is
-/// unreachable.
+/// Share of white noise in the filter's states in the choice of coordinates, or 100 roundings if these are
+/// more. With it no driven state is unreachable.
 const STATE_NOISE: f64 = 1e-40;
+/// Maximum number of states of a plant for 106 bits; a step then takes tens of milliseconds, and a trial about
+/// a second unless a channel is delayed by many periods.
+pub(super) const MOST_STATES_AT_106_BITS: usize = 96;
+/// The same for 512 bits.
+pub(super) const MOST_STATES_AT_512_BITS: usize = 40;
+/// Relative change of the covariance in one more step of the difference equation beyond which digits were
+/// lost.
+const SETTLED: f64 = 1e-7;
+/// Part of a state's power per period below which its covariance counts as zero there.
+const KNOWN: f64 = 1e-10;
 
 /// The plant in extended precision.
 pub(super) struct PreciseFiltering<F> {
@@ -141,13 +151,20 @@ impl<F: Number> PreciseFiltering<F> {
     }
 
     /// Whether the covariance is semidefinite and the innovations have the inertia of an estimate that
-    /// achieves gamma: positive for the measurements, negative for the references given these.
-    fn is_right(&self, covariance: &Matrix<F>, gamma: f64) -> bool {
-        let Some(step) = self.step(covariance, Some(gamma)) else { return false };
-        let signs = |k: usize| if k < self.measured { 1.0 } else { -1.0 };
-        let pivots = step.innovation.pivots();
-        pivots.iter().enumerate().all(|(k, pivot)| signs(k) * pivot.nearest() > 0.0)
-            && is_semidefinite(covariance)
+    /// achieves gamma: positive for the measurements, negative for the references given these. `None` if
+    /// digits were lost on the way, so that the signs say nothing.
+    fn is_right(&self, covariance: &Matrix<F>, gamma: f64) -> Option<bool> {
+        let Step { next, innovation, .. } = self.step(covariance, Some(gamma))?;
+        let change = |i: usize| (next[(i, i)] - covariance[(i, i)]).nearest().abs();
+        let size = |i: usize| covariance[(i, i)].nearest().abs() + KNOWN * self.fresh[(i, i)].nearest();
+        let settled = self.states().all(|i| change(i) <= SETTLED * size(i));
+        let pivots: Vec<f64> = innovation.pivots().into_iter().map(Number::nearest).collect();
+        if !settled || !pivots.iter().all(|pivot| pivot.is_finite()) {
+            return None;
+        }
+        let sign = |k: usize| if k < self.measured { 1.0 } else { -1.0 };
+        let inertia = pivots.iter().enumerate().all(|(k, pivot)| sign(k) * pivot > 0.0);
+        Some(inertia && is_semidefinite(covariance))
     }
 
     /// The central filter of a covariance: x+ = A x + K (y - C_2 x), z = C_1 x + D (y - C_2 x) with
@@ -175,7 +192,7 @@ impl<F: Number> PreciseFiltering<F> {
     fn realised(&self, a: &Matrix<F>, b: &Matrix<F>, c: &Matrix<F>, d: &Matrix<F>) -> Option<StateSpace> {
         let driven = Matrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * F::from(self.sizes[j]));
         let mut gramian = gramian(a, &driven)?;
-        let noise = F::from(STATE_NOISE);
+        let noise = F::from(STATE_NOISE.max(100.0 * F::ROUNDING));
         (0..gramian.nrows()).for_each(|i| gramian[(i, i)] = gramian[(i, i)] + gramian[(i, i)] * noise);
         let root = gramian.cholesky()?;
         let (a, b) = (root.solve_lower(&(a * &root)), root.solve_lower(b));
@@ -187,10 +204,11 @@ impl<F: Number> PreciseFiltering<F> {
 impl<F: Number> RiccatiSolver for PreciseFiltering<F> {
     fn h_infinity(&self, gamma: f64) -> Trial {
         let Some(covariance) = self.covariance(Some(gamma)) else { return Trial::Unresolved };
-        if !self.is_right(&covariance, gamma) {
-            return Trial::Impossible;
+        match self.is_right(&covariance, gamma) {
+            None => Trial::Unresolved,
+            Some(false) => Trial::Impossible,
+            Some(true) => self.filter(&covariance).map_or(Trial::Unresolved, Trial::Achieved),
         }
-        self.filter(&covariance).map_or(Trial::Unresolved, Trial::Achieved)
     }
 }
 
