@@ -46,8 +46,8 @@ pub const MIN_NORMALISED_POLE: f64 = 1e-9;
 /// Largest modulus of a pole, rad per fast period. A faster one settles within 1e-9 fast periods.
 pub const MAX_NORMALISED_POLE: f64 = 1e9;
 
-/// Least and largest gain of a filter, the modulus of its response at 0 or at a pole's frequency. Products of
-/// the gains of a target and two channels stay within double precision.
+/// Least and largest gain of a filter, the modulus of its response at 0 or at a pole's frequency.
+/// Products of the gains of a target and two channels stay within double precision.
 pub const MIN_GAIN: f64 = 1e-60;
 /// See [`MIN_GAIN`].
 pub const MAX_GAIN: f64 = 1e60;

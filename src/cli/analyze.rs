@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Computes the gamma of a bank, with the delays of its spec or with others
 ///
 /// gamma is the worst-case gain from the analog input to the error. The command builds the error system from
-/// the coefficients and the spec in the bank file and computes its H-infinity norm (relative error 1e-9).
+/// the coefficients and the spec in the bank file and computes its H-infinity norm (relative error about 1e-9, more where large coefficients of opposite sign cancel).
 /// The gammas that the file states are not used.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

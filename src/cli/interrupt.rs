@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM. In a run the first one requests an orderly end, and the second one ends the process at
-//! once. In a computation the first one ends it at once.
+//! Ctrl-C and SIGTERM. In a run the first one requests an orderly end, and the second one ends the
+//! process at once. In a computation the first one ends it at once.
 
 use crossbeam_channel::Receiver;
 

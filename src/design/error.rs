@@ -86,8 +86,8 @@ pub enum DesignError {
     NoTaps,
     /// The sinc comparison needs the Nyquist rate: as many channels as the ratio.
     #[error(
-        "method = \"sinc\" needs as many channels as the ratio (N = M), got {channels} channels and ratio {ratio}: \
-         use \"fir\", \"iir\" or \"h2\""
+        "method = \"sinc\" needs as many distinct channels as the ratio (N = M), got {channels} and ratio {ratio}; \
+         channels that sample at the same instant count as one: use \"fir\", \"iir\" or \"h2\""
     )]
     SincNeedsNyquist {
         /// N.
@@ -151,8 +151,8 @@ pub enum DesignError {
     },
     /// No tap sees a sample that has to do with the reference.
     #[error(
-        "at latency {latency} the {taps} taps per channel see no samples that tell anything of the output: they reach \
-         latencies {shortest} to {longest}; choose one of these, leave the latency out to have the best one chosen, \
+        "at latency {latency} the {taps} taps per channel see no samples that tell anything of the output: latencies \
+         {shortest} to {longest} suit them; choose one of these, leave the latency out to have the best one chosen, \
          or give more taps"
     )]
     OutOfReach {

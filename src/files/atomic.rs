@@ -16,8 +16,8 @@ const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Removes all files of this process that have not been committed: for a thread that is about to end the
-/// process while others are writing. Other threads can neither begin nor drop a file afterwards; they wait for
-/// the end.
+/// process while others are writing. Other threads can neither begin nor drop a file afterwards; they
+/// wait for the end.
 pub fn remove_unfinished() {
     let files = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     for path in files.iter() {

@@ -27,8 +27,8 @@ pub(super) fn beside(target: &Path, process: u32, number: u32) -> Option<PathBuf
     Some(target.with_file_name(format!("{}{process}-{number}.part", beginning(target)?)))
 }
 
-/// The unfinished files beside `targets` whose processes no longer run: such a run was killed before it could
-/// remove them. An output may be a link; then its folder is that of the file it leads to.
+/// The unfinished files beside `targets` whose processes no longer run: such a run was killed before it
+/// could remove them. An output may be a link; then its folder is that of the file it leads to.
 pub fn leftovers(targets: &[&Path]) -> Vec<Leftover> {
     let mut searches: Vec<(PathBuf, BTreeSet<String>)> = Vec::new();
     for target in targets {

@@ -1,7 +1,7 @@
 //! Which channels of an input are invalid at the current frame.
 //!
-//! Each channel needs only the frame at which its validity returns, so overlapping dropouts cost no more than
-//! others: a dropout that begins while its channel is invalid moves that frame.
+//! Each channel needs only the frame at which its validity returns, so overlapping dropouts cost no more
+//! than others: a dropout that begins while its channel is invalid moves that frame.
 
 use super::lost::Dropout;
 use std::collections::VecDeque;

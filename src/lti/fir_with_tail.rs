@@ -1,9 +1,9 @@
 //! An FIR head with a recursive tail.
 //!
 //! Filters with latency contain delay chains: states that only pass values on. Together these states form
-//! one large defective eigenvalue at zero, which has no parallel form. Their response has finitely many taps.
-//! The first q + 1 taps of the response are therefore realised as the FIR head. A recursion without the
-//! chains, the tail, produces the rest:
+//! one large defective eigenvalue at zero, which has no parallel form. Their response has finitely many
+//! taps. The first q + 1 taps of the response are therefore realised as the FIR head. A recursion without
+//! the chains, the tail, produces the rest:
 //!
 //! y[k] = sum_{j = 0..q} h_j u[k - j] + c x[k],  x[k + 1] = a x[k] + b u[k - q].
 

@@ -89,7 +89,7 @@ pub(crate) fn check_delay(delay: FastPeriods, written: f64, unit: &'static str) 
         return Err(range(
             written,
             unit,
-            "a delay cannot be negative; add the same amount to the delays of all channels and to the latency",
+            "a delay cannot be negative; add the same whole number of fast periods to the delays of all channels and to the latency",
         ));
     }
     // Written so that NaN is refused too.

@@ -111,15 +111,19 @@ const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no bet
 /// Noise gains above this are worth a warning.
 const LARGE_NOISE_GAIN: f64 = 1e3;
 
-/// Warning for a bank with large taps of opposite sign.
+/// Warning for a bank with large coefficients.
 fn large_noise_gain(method: Method, noise_gain: f64) -> String {
     let rounding = match method {
         Method::Iir | Method::H2 => "",
         _ => ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)",
     };
+    let weighed = match method {
+        Method::Fir => "; `noise` with a large `gamma_margin` trades gamma for less noise",
+        _ => "",
+    };
     format!(
-        "noise gain {noise_gain:.1e}: the bank amplifies the converters' noise that much{rounding}; \
-         set `noise` to limit it, or move nearly equal delays apart"
+        "noise gain {noise_gain:.1e}: the bank amplifies the converters' noise that much{rounding}{weighed}; \
+         look for nearly equal delays and for front ends of little gain"
     )
 }
 

@@ -1,9 +1,9 @@
 //! What FIR filters of a given length can reach: the least mean-square error at each latency, before any
 //! filter is designed.
 //!
-//! Phase p of the output has `J_p = ceil((taps - p) / M)` lags, so it sees the newest `J_p` frames. Its least
-//! mean-square error depends only on the instant `p - m0` of the target relative to these frames: see
-//! [`WindowErrors`].
+//! Phase p of the output has `J_p = ceil((taps - p) / M)` lags, so it sees the newest `J_p` frames. Its
+//! least mean-square error depends only on the instant `p - m0` of the target relative to these frames:
+//! see [`WindowErrors`].
 //!
 //! The errors bound gamma from below. White noise of unit density has the error `||K_p||_2^2` at phase p,
 //! the mean over frequency of a square that is nowhere above gamma^2, so gamma^2 is at least the largest of

@@ -21,7 +21,7 @@ pub(super) const NEGLIGIBLE: f64 = 1e-9;
 pub(super) struct CausalErrors {
     /// The root mean square over all phases of the output.
     rms: Vec<f64>,
-    /// The root of the largest mean square of any phase: a lower bound of gamma.
+    /// The root of the largest mean square of any phase: a lower bound of gamma, up to [`SAME_ERROR`].
     worst: Vec<f64>,
     /// The rms of the target, the error of a bank that outputs zeros.
     silence: f64,
@@ -40,7 +40,8 @@ impl CausalErrors {
             frames *= 2;
             let more = Self::with_history(problem, longest, frames)?;
             let same = |(a, b): (&f64, &f64)| a - b <= SAME_ERROR * a;
-            let done = errors.rms.iter().zip(&more.rms).all(same);
+            let pairs = errors.rms.iter().zip(&more.rms).chain(errors.worst.iter().zip(&more.worst));
+            let done = pairs.into_iter().all(same);
             errors = more;
             if done {
                 break;

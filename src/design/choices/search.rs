@@ -61,9 +61,9 @@ impl Search {
         Self { candidates: guides.map(candidate).collect() }
     }
 
-    /// The shortest latency whose gamma is within [`WORTHWHILE`] of the least. `design(latency, hopeless)`
-    /// gives bounds of gamma; it may end early with a lower bound above `hopeless`. `compared` is told the number of
-    /// designs so far.
+    /// The shortest latency whose gamma is within [`WORTHWHILE`] of the least. `design(latency,
+    /// hopeless)` gives bounds of gamma; it may end early with a lower bound above `hopeless`. `compared`
+    /// is told the number of designs so far.
     ///
     /// # Errors
     /// The first error of `design`, if it succeeds for no latency.

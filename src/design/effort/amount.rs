@@ -1,4 +1,4 @@
-//! Time and memory, and how they are said.
+//! Time and memory, and how they are written.
 
 use std::fmt;
 

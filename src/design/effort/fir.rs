@@ -3,6 +3,7 @@
 use super::amount::Effort;
 use super::cost::{COMPLEX, PRODUCT, REAL, SMALL, complex_cube, peak, proof, response};
 use super::sizes::Sizes;
+use crate::design::methods::fir_kyp::MAX_STATES;
 
 /// The grid on which peaks are looked for is finer by this factor.
 const FINE: f64 = 8.0;
@@ -101,9 +102,13 @@ pub(super) fn separation(sizes: &Sizes) -> Effort {
     design(sizes).then(design(&alone).times(sizes.channels)).then(judged(sizes))
 }
 
-/// The bounded-real LMI: its time grows with the sixth power of the states.
+/// The bounded-real LMI: its time grows with the sixth power of the states. The method itself refuses more
+/// than [`MAX_STATES`], at once.
 pub(super) fn by_lmi(sizes: &Sizes) -> Effort {
-    let states = sizes.fir_error_states().min(160.0);
+    let states = sizes.fir_error_states();
+    if states > MAX_STATES as f64 {
+        return Effort::default();
+    }
     let unknowns = 0.5 * states * states;
     Effort { seconds: 40.0 * PRODUCT * unknowns.powi(3), bytes: 3.0 * REAL * unknowns * unknowns }
 }

@@ -85,7 +85,7 @@ fn proven(spec: &Spec, sizes: &Sizes) -> Effort {
 fn chosen(spec: &Spec, sizes: &Sizes, design: Effort) -> Effort {
     match spec.design.method {
         Method::Fir => fir::comparison(sizes).times(COMPARISONS),
-        Method::Iir => design.times(COMPARISONS),
+        Method::Iir => design.times(COMPARISONS).then(recursive::smoother(sizes)),
         Method::H2 => recursive::smoother(sizes),
         Method::Sinc | Method::Separation => {
             design.times((sizes.taps + sizes.longest_delay).min(MOST_COMPARISONS))

@@ -19,7 +19,7 @@ use crate::lmi::kyp::{self, Problem};
 use crate::lti::StateSpace;
 
 /// Maximum number of states of the error system; the time grows with its sixth power.
-const MAX_STATES: usize = 160;
+pub(crate) const MAX_STATES: usize = 160;
 
 /// The `settings.taps` taps per channel of least gamma, without a secondary objective.
 ///

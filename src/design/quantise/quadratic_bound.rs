@@ -6,8 +6,8 @@
 //! gamma(f)^2 >= sum_k tr( Lambda_k K_k K_k* ) = least + |L' (f - c)|^2,   K_k = W_k - sum_u f_u G_u(k),
 //! ```
 //!
-//! because the largest singular value bounds every weighted mean of the error. G_u is the response of a tap of
-//! value one. All phases are coupled, in contrast to `forms`.
+//! because the largest singular value bounds every weighted mean of the error. G_u is the response of a
+//! tap of value one. All phases are coupled, in contrast to `forms`.
 
 use super::problem::TapError;
 use crate::linalg::{self, CMat, Complex, Mat};

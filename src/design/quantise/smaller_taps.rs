@@ -1,4 +1,5 @@
-//! Real taps that are smaller than the optimal ones and cost some gamma. Few bits hold them with a finer step.
+//! Real taps that are smaller than the optimal ones and cost some gamma. Few bits hold them with a finer
+//! step.
 
 use super::problem::TapError;
 use crate::design::filters::{impulse_responses, polyphase};

@@ -63,7 +63,7 @@ fn every_mistake_has_its_line_and_its_message() {
         ("[target]\nfilter", "[target]\nfliter", 8, "did you mean \"filter\""),
         ("delay = 1.2", "delay = 1.2\ndelay_samples = 1.2", 12, "both delay and delay_samples"),
         ("delay = 1.2", "", 10, "the key delay is missing"),
-        ("delay = 1.2", "delay = -0.1", 11, "cannot be negative; add the same amount"),
+        ("delay = 1.2", "delay = -0.1", 11, "cannot be negative; add the same whole number"),
         ("delay = 1.2", "delay = nan", 11, "must be finite"),
         ("delay = 1.2", "delay = 1e6", 11, "check its unit"),
         ("delay = 1.2", "delay_samples = -3", 11, "-3 fast periods is out of range"),

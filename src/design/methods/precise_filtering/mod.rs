@@ -36,8 +36,8 @@ const SEMIDEFINITE: f64 = 1e-15;
 /// Share of white noise in the filter's states in the choice of coordinates, or 100 roundings if these are
 /// more. With it no driven state is unreachable.
 const STATE_NOISE: f64 = 1e-40;
-/// Maximum number of states of a plant for 106 bits; a step then takes tens of milliseconds, and a trial about
-/// a second unless a channel is delayed by many periods.
+/// Maximum number of states of a plant for 106 bits; a step then takes tens of milliseconds, and a trial
+/// about a second unless a channel is delayed by many periods.
 pub(super) const MOST_STATES_AT_106_BITS: usize = 96;
 /// The same for 512 bits.
 pub(super) const MOST_STATES_AT_512_BITS: usize = 40;
