@@ -86,7 +86,7 @@ pub enum DesignError {
     NoTaps,
     /// The sinc comparison needs the Nyquist rate: as many channels as the ratio.
     #[error(
-        "method = \"sinc\" needs as many distinct channels as the ratio (N = M), got {channels} and ratio {ratio}; \
+        "method = \"sinc\" needs as many distinct channels as the ratio (N = M), got {channels} channels and ratio {ratio}; \
          channels that sample at the same instant count as one: use \"fir\", \"iir\" or \"h2\""
     )]
     SincNeedsNyquist {
