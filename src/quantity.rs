@@ -1,0 +1,256 @@
+//! Quantities as text: a number, an SI prefix and a unit, as in `10ps`, `0.3 samples`, `48 kHz`, `1%`.
+//!
+//! The prefix moves the decimal point of the number before it is rounded, so `10ps` is the double nearest
+//! to 1e-11: the same bits as `1e-11`.
+//!
+//! ```
+//! use hybank::quantity::{self, Time};
+//! use hybank::units::Seconds;
+//! assert_eq!(quantity::time("10ps"), Ok(Time::Seconds(Seconds(1e-11))));
+//! assert_eq!(quantity::time("0.01 samples").map(|time| time.in_seconds(Seconds(1e-9))), Ok(Seconds(1e-11)));
+//! assert_eq!(quantity::relative("0.5%"), Ok(0.005));
+//! ```
+
+use crate::units::{FastPeriods, Hertz, Seconds};
+
+/// A time as it is written: in seconds, or in units of the fast period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Time {
+    /// In seconds: `10ps`, `1e-11`.
+    Seconds(Seconds),
+    /// In fast samples: `0.01 samples`.
+    Samples(FastPeriods),
+}
+
+impl Time {
+    /// The time in seconds, with the fast period h.
+    pub fn in_seconds(self, fast_period: Seconds) -> Seconds {
+        match self {
+            Self::Seconds(time) => time,
+            Self::Samples(time) => time.in_seconds(fast_period),
+        }
+    }
+}
+
+/// A text that is not the quantity it should be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum QuantityError {
+    /// There is no number at the beginning.
+    #[error("\"{text}\" does not begin with a number; write {example}")]
+    NoNumber {
+        /// The text.
+        text: String,
+        /// What to write.
+        example: &'static str,
+    },
+    /// The number does not fit a double.
+    #[error("\"{text}\" does not fit a double; write a number below 1e308")]
+    TooLarge {
+        /// The text.
+        text: String,
+    },
+    /// The unit is not known here.
+    #[error("\"{text}\" has the unit \"{unit}\", which is not known here; write {example}")]
+    Unit {
+        /// The text.
+        text: String,
+        /// What stands after the number.
+        unit: String,
+        /// What to write.
+        example: &'static str,
+    },
+}
+
+/// SI prefixes with their power of ten. Mu has two code points.
+const PREFIXES: [(&str, i32); 13] = [
+    ("", 0),
+    ("a", -18),
+    ("f", -15),
+    ("p", -12),
+    ("n", -9),
+    ("u", -6),
+    ("\u{b5}", -6),
+    ("\u{3bc}", -6),
+    ("m", -3),
+    ("k", 3),
+    ("M", 6),
+    ("G", 9),
+    ("T", 12),
+];
+const RELATIVE_UNITS: [(&str, i32); 3] = [("", 0), ("%", -2), ("ppm", -6)];
+const TIMES: &str = "a time such as 10ps, 2.5e-9 (seconds) or 0.01samples";
+const FREQUENCIES: &str = "a frequency such as 9kHz, 1.2GHz or 48000 (hertz)";
+const SHARES: &str = "a share such as 1%, 540ppm or 0.01";
+
+/// A time: seconds with an SI prefix, or fast samples. A number without unit is in seconds.
+///
+/// # Errors
+/// [`QuantityError`]. Any finite time is legal, negative ones too.
+pub fn time(text: &str) -> Result<Time, QuantityError> {
+    let written = Written::split(text, TIMES)?;
+    if matches!(written.unit, "samples" | "sample") {
+        return written.scaled(0).map(|value| Time::Samples(FastPeriods(value)));
+    }
+    written.with_prefix("s", TIMES).map(|value| Time::Seconds(Seconds(value)))
+}
+
+/// A frequency: hertz with an SI prefix. A number without unit is in hertz.
+///
+/// # Errors
+/// [`QuantityError`]. Any finite frequency is legal, negative ones too.
+pub fn frequency(text: &str) -> Result<Hertz, QuantityError> {
+    Written::split(text, FREQUENCIES)?.with_prefix("Hz", FREQUENCIES).map(Hertz)
+}
+
+/// A share of something: per cent, parts per million, or a number without unit.
+///
+/// # Errors
+/// [`QuantityError`]. Any finite share is legal, negative ones too.
+pub fn relative(text: &str) -> Result<f64, QuantityError> {
+    let written = Written::split(text, SHARES)?;
+    match RELATIVE_UNITS.iter().find(|(unit, _)| *unit == written.unit) {
+        Some(&(_, exponent)) => written.scaled(exponent),
+        None => Err(written.unknown_unit(SHARES)),
+    }
+}
+
+/// A text cut into the parts of a quantity.
+struct Written<'a> {
+    text: &'a str,
+    /// Sign, digits and point.
+    mantissa: &'a str,
+    /// Digits after the `e`, empty without one.
+    exponent: &'a str,
+    unit: &'a str,
+}
+
+impl<'a> Written<'a> {
+    fn split(text: &'a str, example: &'static str) -> Result<Self, QuantityError> {
+        let trimmed = text.trim();
+        let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+        let unsigned = trimmed.strip_prefix(['+', '-']).unwrap_or(trimmed);
+        let sign = trimmed.len() - unsigned.len();
+        let digits = unsigned.find(|c| !is_digit(c)).unwrap_or(unsigned.len());
+        let (mantissa, rest) = trimmed.split_at(sign + digits);
+        if mantissa.parse::<f64>().is_err() {
+            return Err(QuantityError::NoNumber { text: text.to_owned(), example });
+        }
+        let length = exponent_length(rest);
+        let exponent = rest[..length].trim_start_matches(['e', 'E']);
+        Ok(Self { text, mantissa, exponent, unit: rest[length..].trim() })
+    }
+
+    /// The number times a power of ten, rounded once.
+    fn scaled(&self, power: i32) -> Result<f64, QuantityError> {
+        let too_large = || QuantityError::TooLarge { text: self.text.to_owned() };
+        let written = if self.exponent.is_empty() { "0" } else { self.exponent };
+        let exponent = written.parse::<i32>().map_err(|_| too_large())?.saturating_add(power);
+        let value: f64 = format!("{}e{exponent}", self.mantissa).parse().map_err(|_| too_large())?;
+        if value.is_finite() { Ok(value) } else { Err(too_large()) }
+    }
+
+    /// The number in `unit`; without any unit it stands for the same.
+    fn with_prefix(&self, unit: &str, example: &'static str) -> Result<f64, QuantityError> {
+        let prefix = match self.unit {
+            "" => Some(""),
+            written => written.strip_suffix(unit),
+        };
+        let known = prefix.and_then(|prefix| PREFIXES.iter().find(|(name, _)| *name == prefix));
+        known.map_or_else(|| Err(self.unknown_unit(example)), |&(_, power)| self.scaled(power))
+    }
+
+    fn unknown_unit(&self, example: &'static str) -> QuantityError {
+        QuantityError::Unit { text: self.text.to_owned(), unit: self.unit.to_owned(), example }
+    }
+}
+
+/// Length of `e`, sign and digits at the beginning of `rest`; zero if they are not all there.
+fn exponent_length(rest: &str) -> usize {
+    let Some(after) = rest.strip_prefix(['e', 'E']) else { return 0 };
+    let unsigned = after.strip_prefix(['+', '-']).unwrap_or(after);
+    let digits = unsigned.find(|c: char| !c.is_ascii_digit()).unwrap_or(unsigned.len());
+    if digits == 0 { 0 } else { rest.len() - unsigned.len() + digits }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn seconds(text: &str) -> Result<f64, QuantityError> {
+        time(text).map(|time| time.in_seconds(Seconds(1.0)).0)
+    }
+
+    #[test]
+    fn prefixes_move_the_decimal_point_exactly() {
+        for (text, value) in [
+            ("10ps", 1e-11),
+            ("10 ps", 1e-11),
+            (" -0.1ns ", -1e-10),
+            ("+7.3fs", 7.3e-15),
+            ("3us", 3e-6),
+            ("3\u{b5}s", 3e-6),
+            ("3\u{3bc}s", 3e-6),
+            (".5ms", 5e-4),
+            ("5.e3 as", 5e-15),
+            ("1E2s", 100.0),
+            ("1e-11", 1e-11),
+            ("0", 0.0),
+            ("1e-400ks", 0.0),
+        ] {
+            assert_eq!(seconds(text), Ok(value), "{text}");
+        }
+        assert_eq!(frequency("1.2GHz"), Ok(Hertz(1.2e9)));
+        assert_eq!(frequency("9 kHz"), Ok(Hertz(9000.0)));
+        assert_eq!(frequency("50"), Ok(Hertz(50.0)));
+        assert_eq!(relative("1%"), Ok(0.01));
+        assert_eq!(relative("540 ppm"), Ok(540e-6));
+        assert_eq!(relative("-0.02"), Ok(-0.02));
+    }
+
+    #[test]
+    fn samples_are_fast_periods() {
+        assert_eq!(time("0.25 samples"), Ok(Time::Samples(FastPeriods(0.25))));
+        assert_eq!(time("1sample").map(|time| time.in_seconds(Seconds(4.0))), Ok(Seconds(4.0)));
+    }
+
+    #[test]
+    fn refusals_name_the_text_and_the_remedy() {
+        for text in ["", "ps", "inf", "nan", "-", ".", "e3", "--1", "1.2.3s", "\u{b5}s"] {
+            let error = time(text).unwrap_err();
+            assert!(matches!(error, QuantityError::NoNumber { .. }), "{text}: {error}");
+        }
+        for text in ["10 p", "1Hz", "1e", "1e+", "3 seconds", "1 %", "1kss", "1 0ps", "1sps"] {
+            let error = time(text).unwrap_err();
+            assert!(matches!(error, QuantityError::Unit { .. }), "{text}: {error}");
+            assert!(error.to_string().contains("such as 10ps"), "{error}");
+        }
+        for text in ["1e999", "1e99999999999999", "9e306Ts"] {
+            assert_eq!(time(text), Err(QuantityError::TooLarge { text: text.into() }));
+        }
+        assert!(relative("1s").is_err() && relative("1 k%").is_err() && frequency("1ms").is_err());
+    }
+
+    proptest! {
+        /// A double as Rust prints it is the same double with the prefix of one.
+        #[test]
+        fn numbers_keep_their_bits(x in any::<f64>().prop_filter("finite", |x| x.is_finite())) {
+            prop_assert_eq!(seconds(&format!("{x}s")).map(f64::to_bits), Ok(x.to_bits()));
+            prop_assert_eq!(seconds(&format!("{x:e}")).map(f64::to_bits), Ok(x.to_bits()));
+        }
+
+        /// Against the decimal text with the exponent written out.
+        #[test]
+        fn scaling_rounds_once(digits in 1u64..1_000_000_000_000, k in 0usize..13) {
+            let (prefix, power) = PREFIXES[k];
+            let exact: f64 = format!("{digits}e{power}").parse().unwrap();
+            prop_assert_eq!(seconds(&format!("{digits}{prefix}s")), Ok(exact));
+        }
+
+        /// Any text is read or refused.
+        #[test]
+        fn any_text_is_read_or_refused(text in "\\PC{0,12}") {
+            let _ = (time(&text), frequency(&text), relative(&text));
+        }
+    }
+}
