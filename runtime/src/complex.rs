@@ -6,7 +6,7 @@ use crate::{Plan, ProcessError, Sample, Stream, SwapError};
 /// Filters complex samples: real and imaginary parts are two real [streams](Stream) through one plan.
 ///
 /// A complex sample is an array of its real and its imaginary part; N of them are a frame. All that is said
-/// of real streams holds for each part.
+/// of real streams holds for each part; the offset of a channel is subtracted from both.
 ///
 /// ```
 /// use hybank_runtime::{ComplexStream, Options, Plan};

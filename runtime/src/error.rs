@@ -17,6 +17,14 @@ pub enum BuildError {
         /// Filters in the bank.
         filters: usize,
     },
+    /// The offsets do not fit the channels.
+    #[error("{offsets} offsets are given for {channels} channels; each channel has one, 0 for none")]
+    OffsetCount {
+        /// Offsets given.
+        offsets: usize,
+        /// N.
+        channels: usize,
+    },
     /// A matrix of the state-space form has the wrong shape.
     #[error(
         "matrix {name} of the state-space filters is {rows} x {cols}; {wanted_rows} x {wanted_cols} is needed (N = {channels} channels, M = {ratio})"

@@ -1,5 +1,6 @@
 //! A bank made ready to run: coefficients in the order of use, shared by any number of streams.
 
+use crate::adapters::Offsets;
 use crate::algorithms::choice::{Choice, check_recursive};
 use crate::algorithms::{Direct, Facts, FastFir, OverlapSave, Recursive};
 use crate::engine::{Coefficients, Engine};
@@ -62,6 +63,8 @@ pub struct Plan {
     channels: usize,
     ratio: usize,
     latency: usize,
+    /// Of the converters, if any is not zero.
+    offsets: Option<Arc<Offsets>>,
     isa: Isa,
 }
 
@@ -130,9 +133,36 @@ impl Plan {
         Ok(Self::new(coefficients, [channels, ratio], latency, isa))
     }
 
+    /// The same plan for converters whose samples contain offsets: `offsets[i]` is subtracted from each sample
+    /// of channel i, in the number type of the kernels, before anything else happens to it.
+    ///
+    /// The sum is then over x_i - o_i. Samples before the first frame, samples that are not finite, and the
+    /// frames of [`Stream::flush`](crate::Stream::flush) are 0 after the subtraction. If all offsets are 0,
+    /// nothing is subtracted and nothing is slower.
+    ///
+    /// # Errors
+    /// [`BuildError::OffsetCount`] unless there is one for each channel; [`BuildError::NotFinite`].
+    pub fn with_offsets(self, offsets: &[f64]) -> Result<Self, BuildError> {
+        let offsets = Offsets::new(offsets, self.channels)?.map(Arc::new);
+        Ok(Self { offsets, ..self })
+    }
+
     fn new(coefficients: Coefficients, [channels, ratio]: [usize; 2], latency: usize, isa: Isa) -> Self {
         let facts = coefficients.facts();
-        Self { coefficients, facts, channels, ratio, latency: latency + facts.delay * ratio, isa }
+        Self {
+            coefficients,
+            facts,
+            channels,
+            ratio,
+            latency: latency + facts.delay * ratio,
+            offsets: None,
+            isa,
+        }
+    }
+
+    /// What is subtracted from samples; `None` for nothing.
+    pub(crate) fn offsets(&self) -> Option<&Offsets> {
+        self.offsets.as_deref()
     }
 
     /// With a state at its beginning.

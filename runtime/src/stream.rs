@@ -2,12 +2,12 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{Input, Interleaved, Output, Planar, Zeros};
+use crate::adapters::{Input, Interleaved, Output, Planar, WithoutOffsets, Zeros};
 use crate::engine::Engine;
 use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, SwapError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
-/// first frame.
+/// first frame, and x_i the samples without the [offsets](Plan::with_offsets) of their converters.
 ///
 /// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls
 /// take whole frames and return the samples written. They allocate nothing and lock nothing (except those of
@@ -15,6 +15,9 @@ use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, SwapError};
 /// calls.
 ///
 /// # Worst case of a call
+/// [Offsets](Plan::with_offsets) are subtracted where the samples are copied, which all algorithms do with
+/// samples that are not in memory as they need them; a plan without offsets copies no more than before.
+///
 /// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. Whatever the input
 /// holds, a frame is filtered at most twice, so that a call does at most twice the multiply-adds that it
 /// would do for ordinary numbers:
@@ -155,7 +158,10 @@ impl Stream {
         output: &mut (impl Output + ?Sized),
     ) -> Result<usize, ProcessError> {
         let samples = self.check(input, output)?;
-        self.replaced += self.engine.process(input, output);
+        self.replaced += match self.plan.offsets() {
+            Some(offsets) => self.engine.process(&WithoutOffsets { input, offsets }, output),
+            None => self.engine.process(input, output),
+        };
         self.position += input.frames() as u64;
         Ok(samples)
     }
@@ -175,7 +181,10 @@ impl Stream {
         pool: &crate::ThreadPool,
     ) -> Result<usize, ProcessError> {
         let samples = self.check(input, output)?;
-        self.replaced += self.engine.process_parallel(input, output, pool);
+        self.replaced += match self.plan.offsets() {
+            Some(offsets) => self.engine.process_parallel(&WithoutOffsets { input, offsets }, output, pool),
+            None => self.engine.process_parallel(input, output, pool),
+        };
         self.position += input.frames() as u64;
         Ok(samples)
     }
@@ -215,7 +224,11 @@ impl Stream {
     /// [`ProcessError::OutputTooShort`]; nothing is processed then.
     pub fn flush(&mut self, output: &mut (impl Output + ?Sized)) -> Result<usize, ProcessError> {
         let zeros = Zeros { channels: self.channels(), frames: self.plan.flush_frames() };
-        self.run(&zeros, output)
+        let samples = self.check(&zeros, output)?;
+        // Zeros without offsets: what no converter delivered.
+        self.engine.process(&zeros, output);
+        self.position += zeros.frames as u64;
+        Ok(samples)
     }
 
     /// Goes on by other coefficients of the same N and M, with the history kept: for a bank that was
@@ -233,6 +246,8 @@ impl Stream {
     /// Makes this stream, whatever it was, the continuation of `running` by its own plan, at the same frame
     /// and with the same counts. Does not allocate: make the new stream on another thread, and call this at
     /// a frame boundary on the thread that runs.
+    ///
+    /// Samples of the past stay as they are: the offsets of the new plan hold for the frames to come.
     ///
     /// From one FIR plan without added latency (direct, fast FIR; any K, any precision) to another, the
     /// outputs are those that the new plan would have given from the beginning, bit for bit: at once if the

@@ -12,11 +12,17 @@ const FRAMES: usize = 700;
 /// Frames per call: one, more than a block of a recursion, many.
 const CALLS: [usize; 3] = [1, 65, FRAMES];
 
-/// Every algorithm in both precisions, and all of one channel, which planar input has as it lies.
+/// Every algorithm in both precisions, and all of one channel, which planar input has as it lies; and all of
+/// them with offsets to subtract.
 fn plans() -> Vec<Plan> {
     let both = [Precision::Single, Precision::Double];
     let plans = |channels| both.into_iter().flat_map(move |precision| plans_of(channels, precision));
-    plans(N).chain(plans(1)).collect()
+    let plain: Vec<Plan> = plans(N).chain(plans(1)).collect();
+    let subtracting = plain.iter().map(|plan| {
+        let offsets = [0.25, -0.5];
+        plan.clone().with_offsets(&offsets[..plan.channels()]).unwrap()
+    });
+    plain.iter().cloned().chain(subtracting).collect()
 }
 
 fn plans_of(channels: usize, precision: Precision) -> Vec<Plan> {

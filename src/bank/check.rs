@@ -1,6 +1,8 @@
 //! The invariants of every bank, read or designed.
 
-use crate::spec::{MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits};
+use crate::spec::{
+    MAX_CHANNELS, MAX_RATIO, Spec, SpecProblem, check_fraction_bits, check_gain, check_offset,
+};
 use crate::units::Seconds;
 
 use super::{
@@ -37,6 +39,8 @@ impl Bank {
     pub fn check(&self) -> Result<(), BankError> {
         self.check_scalars()?;
         check_delays(&self.delays)?;
+        check_converters("gain", &self.gains, self.channel_count(), check_gain)?;
+        check_converters("offset", &self.offsets, self.channel_count(), check_offset)?;
         check_gamma(&self.gamma)?;
         self.check_method()?;
         match &self.filters {
@@ -144,12 +148,10 @@ impl Bank {
             return refuse("spec.channel", BankProblem::Length { found, expected, unit: "channels", rule });
         }
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
-            agree(
-                format!("spec.channel[{i}].delay"),
-                delay.0,
-                channel.delay.0,
-                (self.fast_period + delay).0,
-            )?;
+            let path = |key: &str| format!("spec.channel[{i}].{key}");
+            agree(path("delay"), delay.0, channel.delay.0, (self.fast_period + delay).0)?;
+            agree(path("gain"), self.gains[i], channel.gain, channel.gain.abs())?;
+            agree(path("offset"), self.offsets[i], channel.offset, channel.offset.abs())?;
         }
         match (&self.fixed_point, &spec.design.bits) {
             (Some(FixedPoint { bits, .. }), Some(asked)) if bits != asked => refuse(
@@ -180,6 +182,23 @@ fn check_delays(delays: &[Seconds]) -> Checked {
         }
         None => Ok(()),
     }
+}
+
+/// One number for each converter, by the rule for specs.
+fn check_converters(
+    key: &str,
+    values: &[f64],
+    channels: usize,
+    check: fn(f64) -> Result<(), SpecProblem>,
+) -> Checked {
+    if values.len() != channels {
+        let (found, expected, rule) = (values.len(), channels, "every channel has a gain and an offset");
+        return refuse("channels", BankProblem::Length { found, expected, unit: "gains or offsets", rule });
+    }
+    for (i, &value) in values.iter().enumerate() {
+        check(value).or_else(|problem| refuse(format!("channels[{i}].{key}"), problem))?;
+    }
+    Ok(())
 }
 
 fn check_gamma(gamma: &Gamma) -> Checked {

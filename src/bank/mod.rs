@@ -46,6 +46,11 @@ pub struct Bank {
     pub method: Method,
     /// The delay D_i of each channel.
     pub delays: Vec<Seconds>,
+    /// The gain g_i of each converter relative to nominal. The filters are designed for it.
+    pub gains: Vec<f64>,
+    /// The offset o_i of each converter, relative to full scale. It is subtracted from the samples before the
+    /// filters.
+    pub offsets: Vec<f64>,
     /// The synthesis filters F_1 .. F_N.
     pub filters: SynthesisFilters,
     /// The integers of the taps, if the taps are fixed-point numbers.
@@ -123,8 +128,8 @@ impl Gamma {
 }
 
 impl Bank {
-    /// A bank of filters that were designed elsewhere: h = 1, no latency, no delays, unknown front ends and
-    /// gammas.
+    /// A bank of filters that were designed elsewhere: h = 1, no latency, no delays, gains of one, no
+    /// offsets, unknown front ends and gammas.
     pub fn bare(filters: SynthesisFilters, ratio: usize) -> Self {
         let (method, channels) = match &filters {
             SynthesisFilters::Fir(taps) => (Method::Fir, taps.len()),
@@ -137,6 +142,8 @@ impl Bank {
             latency: 0,
             method,
             delays: vec![Seconds(0.0); channels],
+            gains: vec![1.0; channels],
+            offsets: vec![0.0; channels],
             filters,
             fixed_point: None,
             gamma: Gamma::default(),

@@ -4,14 +4,15 @@ use super::{Bank, SynthesisFilters};
 use crate::runtime::{BuildError, Options, Plan, StateSpace};
 
 impl Bank {
-    /// Compiles the bank into a plan, which any number of streams of the runtime may share.
+    /// Compiles the bank into a plan, which any number of streams of the runtime may share. Its streams
+    /// subtract the offsets of the converters.
     ///
     /// # Errors
     /// [`BuildError`] if the bank's parts do not fit together, hold values that are not finite, or cannot
     /// run with `options`.
     pub fn plan(&self, options: Options) -> Result<Plan, BuildError> {
         let channels = self.channel_count();
-        match &self.filters {
+        let plan = match &self.filters {
             SynthesisFilters::Fir(taps) if taps.len() != channels => {
                 Err(BuildError::FilterCount { delays: channels, filters: taps.len() })
             }
@@ -25,7 +26,8 @@ impl Bank {
                     options,
                 )
             }
-        }
+        };
+        plan?.with_offsets(&self.offsets)
     }
 }
 
@@ -40,5 +42,15 @@ mod tests {
         assert_eq!(bank.plan(Options::default()).unwrap().channels(), 2);
         let refused = Bank { delays: vec![Seconds(0.0)], ..bank }.plan(Options::default()).unwrap_err();
         assert_eq!(refused, BuildError::FilterCount { delays: 1, filters: 2 });
+    }
+
+    #[test]
+    fn offsets_are_subtracted_before_the_filters() {
+        let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0, 2.0], vec![10.0, 20.0]]), 2);
+        let bank = Bank { offsets: vec![0.5, -1.0], ..bank };
+        let mut stream = crate::runtime::Stream::new(&bank.plan(Options::default()).unwrap());
+        let mut out = [0.0; 2];
+        stream.process(&[1.5, 0.0], &mut out).unwrap();
+        assert_eq!(out, [11.0, 22.0]);
     }
 }

@@ -28,6 +28,7 @@ const KEYS: [&str; 14] = [
     "digest",
     "meta",
 ];
+const CHANNEL_KEYS: [&str; 4] = ["delay", "gain", "offset", "taps"];
 const REWRITE: &str = "a bank without it cannot be run; give a file written by `hybank design`";
 
 impl Bank {
@@ -89,7 +90,10 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
     let spec = top.optional("spec").map(|v| decode::spec(&v, DesignOverrides::default())).transpose()?;
     let method = Method::ALL.map(|m| (m.name(), m));
     let channels = top.required("channels", REWRITE)?.items("a list of channels")?;
-    let channels = channels.iter().map(|c| c.fields(&["delay", "taps"])).collect::<Result<Vec<_>, _>>()?;
+    let channels = channels.iter().map(|c| c.fields(&CHANNEL_KEYS)).collect::<Result<Vec<_>, _>>()?;
+    let of_channels = |key, default| -> Result<Vec<f64>, Fault> {
+        channels.iter().map(|c| c.optional(key).map_or(Ok(default), |v| v.number())).collect()
+    };
     Ok(Bank {
         spec,
         fast_period: Seconds(top.required("fast_period", REWRITE)?.number()?),
@@ -100,6 +104,8 @@ fn read(document: &Value<'_>) -> Result<Bank, BankError> {
             .iter()
             .map(|c| c.required("delay", REWRITE)?.number().map(Seconds))
             .collect::<Result<_, _>>()?,
+        gains: of_channels("gain", 1.0)?,
+        offsets: of_channels("offset", 0.0)?,
         filters: filters(&top, &channels)?,
         fixed_point: top.optional("fixed_point").map(|v| fixed_point(&v)).transpose()?,
         gamma: top.optional("gamma").map(|v| gamma(&v)).transpose()?.unwrap_or_default(),

@@ -20,6 +20,8 @@ fn fir() -> Bank {
         latency: 10,
         method: Method::Fir,
         delays: vec![Seconds(1.2), Seconds(0.6)],
+        gains: vec![1.0; 2],
+        offsets: vec![0.0; 2],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
         gamma: Gamma { norm: None, upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
         proof: None,
@@ -385,8 +387,12 @@ proptest! {
         latency in 0usize..1000,
     ) {
         let delays = taps.iter().map(|list| Seconds(list[0].abs())).collect();
+        let gains = taps.iter().map(|list| -1.0 - (list[1] % 1.0).abs()).collect();
+        let offsets = taps.iter().map(|list| list[2] % 1.0).collect();
         let gamma = Gamma { upper: gamma, ..Gamma::default() };
-        let bank = Bank { spec: None, fast_period: Seconds(fast_period), latency, delays, filters: SynthesisFilters::Fir(taps.clone()), gamma, ..fir() };
+        let filters = SynthesisFilters::Fir(taps.clone());
+        let fast_period = Seconds(fast_period);
+        let bank = Bank { spec: None, fast_period, latency, delays, gains, offsets, filters, gamma, ..fir() };
         let back = Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap();
         let SynthesisFilters::Fir(read) = &back.filters else { panic!("taps expected") };
         let bits = |lists: &[Vec<f64>]| lists.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
@@ -401,5 +407,47 @@ proptest! {
         if let Err(error) = Bank::from_json(&damaged, "b.json") {
             prop_assert!(error.to_string().starts_with("b.json: "));
         }
+    }
+}
+
+/// The second converter of [`fir`] is two per cent too strong and has an offset.
+fn imperfect() -> Bank {
+    let mut bank = fir();
+    (bank.gains, bank.offsets) = (vec![1.0, 1.02], vec![0.0, -1.0 / 3.0]);
+    let channel = &mut bank.spec.as_mut().unwrap().channels[1];
+    (channel.gain, channel.offset) = (1.02, -1.0 / 3.0);
+    bank
+}
+
+#[test]
+fn gains_and_offsets_survive_the_file_and_are_in_its_digest() {
+    let text = imperfect().to_json().unwrap();
+    assert_eq!(Bank::from_json(&text, "b.json").unwrap(), imperfect());
+    assert_eq!(check_digest(&text, "b.json"), Ok(true));
+    let changed = [("1.02", "1.03"), ("-0.3333333333333333", "-0.25")];
+    for (from, to) in changed {
+        assert!(text.contains(from), "{text}");
+        let altered = text.replace(from, to);
+        // In the spec and in the channel, so that they agree.
+        assert!(Bank::from_json(&altered, "b.json").is_ok(), "{from}");
+        let error = check_digest(&altered, "b.json").unwrap_err();
+        assert_eq!((error.path(), error.problem()), ("digest", &BankProblem::Altered), "{from}");
+    }
+}
+
+#[test]
+fn gains_and_offsets_that_do_not_fit_are_refused() {
+    for (bank, path) in [
+        (Bank { gains: vec![1.0], ..fir() }, "channels"),
+        (Bank { offsets: vec![0.0; 3], ..fir() }, "channels"),
+        (Bank { gains: vec![1.0, 0.0], ..fir() }, "channels[1].gain"),
+        (Bank { gains: vec![f64::NAN, 1.0], ..fir() }, "channels[0].gain"),
+        (Bank { offsets: vec![0.0, 1.5], ..fir() }, "channels[1].offset"),
+        // The spec says otherwise.
+        (Bank { gains: vec![1.0, 1.02], ..fir() }, "spec.channel[1].gain"),
+        (Bank { offsets: vec![1e-9, 0.0], ..fir() }, "spec.channel[0].offset"),
+    ] {
+        let error = bank.check().unwrap_err();
+        assert_eq!(error.path(), path, "{error}");
     }
 }

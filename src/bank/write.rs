@@ -39,6 +39,10 @@ struct Document<'a> {
 struct Channel<'a> {
     delay: Seconds,
     #[serde(skip_serializing_if = "Option::is_none")]
+    gain: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     taps: Option<&'a [f64]>,
 }
 
@@ -60,6 +64,14 @@ impl Bank {
             SynthesisFilters::StateSpace(block) => (None, Some(block)),
         };
         let taps_of = |i: usize| taps.and_then(|lists| lists.get(i)).map(Vec::as_slice);
+        // What a reader takes for granted is left out.
+        let unless = |value: f64, default: f64| (value != default).then_some(value);
+        let channel = |i: usize| Channel {
+            delay: self.delays[i],
+            gain: unless(self.gains[i], 1.0),
+            offset: unless(self.offsets[i], 0.0),
+            taps: taps_of(i),
+        };
         Document {
             format: FORMAT,
             version: VERSION,
@@ -68,12 +80,7 @@ impl Bank {
             ratio: self.ratio,
             latency: self.latency,
             method: self.method,
-            channels: self
-                .delays
-                .iter()
-                .enumerate()
-                .map(|(i, &delay)| Channel { delay, taps: taps_of(i) })
-                .collect(),
+            channels: (0..self.channel_count()).map(channel).collect(),
             state_space,
             fixed_point: self.fixed_point.as_ref(),
             gamma: self.gamma,

@@ -95,7 +95,10 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let frames = args.frames(samples, spec.ratio)?;
     args.check_work(&problem, &signal, frames)?;
     let files = args.files(&rates, spec.channels.len())?;
-    let recordings = recordings(&problem, &signal, frames).map(|samples| args.scaled(samples));
+    // The target's converter is ideal.
+    let offsets = spec.channels.iter().map(|channel| channel.offset).chain([0.0]);
+    let recordings = recordings(&problem, &signal, frames).zip(offsets);
+    let recordings = recordings.map(|(samples, offset)| args.delivered(samples, offset));
     write_all(&args.output, &files, recordings, args.force)?;
     let names = files.iter().map(|file| file.path.display().to_string()).collect();
     Report { files: names, frames, slow_rate: rates.slow, fast_rate: rates.fast, latency, warnings }
@@ -170,11 +173,14 @@ impl Args {
         Ok(files)
     }
 
-    /// Applies the gain. A sample beyond the range of a 32-bit float is an error, not an infinity in the
+    /// Applies the gain of the signal, then the converter's offset. A sample beyond the range of a 32-bit float is an error, not an infinity in the
     /// file.
-    fn scaled(&self, mut samples: Vec<f64>) -> Result<Vec<f64>, Failure> {
+    fn delivered(&self, mut samples: Vec<f64>, offset: f64) -> Result<Vec<f64>, Failure> {
         for x in &mut samples {
             *x *= self.gain;
+            if offset != 0.0 {
+                *x += offset;
+            }
             if x.is_nan() || x.abs() > f64::from(f32::MAX) {
                 return Err(Failure::Input(format!(
                     "{}: a captured sample is {x:e}, beyond the range of a 32-bit float; use a smaller --gain",

@@ -141,6 +141,8 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         latency: complete.latency.unwrap_or_default(),
         method: complete.design.method,
         delays: complete.channels.iter().map(|channel| channel.delay).collect(),
+        gains: complete.channels.iter().map(|channel| channel.gain).collect(),
+        offsets: complete.channels.iter().map(|channel| channel.offset).collect(),
         filters,
         gamma: Gamma::computed(peak.gain, rounding, synthesis.lower, synthesis.noncausal),
         proof: None,

@@ -31,8 +31,10 @@ pub struct Problem {
 pub struct Channel {
     /// Index of a filter in [`Problem::front_ends`] to which Phi_i is proportional.
     pub front_end: usize,
-    /// Phi_i over that filter.
+    /// The samples over that filter's output: Phi_i over that filter, times `converter_gain`.
     pub gain: f64,
+    /// g_i, the converter's own gain.
+    pub converter_gain: f64,
     /// D_i.
     pub delay: FastPeriods,
 }
@@ -49,8 +51,9 @@ impl Problem {
         let mut channels = Vec::with_capacity(spec.channels.len());
         for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays_in_fast_periods()).enumerate() {
             let filter = realise(&channel.filter, &|| format!("filter of channel {}", i + 1))?;
-            let (front_end, gain) = intern(&mut front_ends, filter);
-            channels.push(Channel { front_end, gain, delay });
+            let (front_end, proportion) = intern(&mut front_ends, filter);
+            let converter_gain = channel.gain;
+            channels.push(Channel { front_end, gain: proportion * converter_gain, converter_gain, delay });
         }
         let noise = spec.channels.iter().map(|channel| channel.noise * channel.noise).collect();
         let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels, noise };

@@ -14,18 +14,21 @@ use std::borrow::Cow;
 /// Maximum number of gaps that a report lists; further gaps are only counted, so that memory stays bounded.
 const LISTED: usize = 65_536;
 
-/// The replacement of a missing sample.
+/// The replacement of a missing sample. What is replaced are the samples as the converters deliver them, so a
+/// converter without a signal delivers its offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GapPolicy {
-    /// Zero.
+    /// Zero after the offset is subtracted: the channel's offset.
     Zero,
-    /// The channel's last good sample (zero before the first).
+    /// The channel's last good sample (as [`GapPolicy::Zero`] before the first).
     Hold,
 }
 
 /// The state of a channel.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Channel {
+    /// What the converter delivers without a signal.
+    offset: f64,
     /// The last good sample.
     last: f64,
     /// The gap that has not ended.
@@ -69,7 +72,11 @@ impl GapFiller {
             policy,
             ratio,
             touch: nonzero_phases(bank).map(|nonzero| Touch::new(ratio, &nonzero)),
-            channels: vec![Channel::default(); channels],
+            channels: bank
+                .offsets
+                .iter()
+                .map(|&offset| Channel { offset, last: offset, open: None })
+                .collect(),
             gaps: Vec::new(),
             total: 0,
             missing: 0,
@@ -164,7 +171,8 @@ impl GapFiller {
                 self.channels[i].last = *sample;
                 continue;
             }
-            *sample = if self.policy == GapPolicy::Hold { self.channels[i].last } else { 0.0 };
+            let Channel { offset, last, .. } = self.channels[i];
+            *sample = if self.policy == GapPolicy::Hold { last } else { offset };
             let new = Gap { channel: i + 1, first: self.frame, length: 0 };
             self.channels[i].open.get_or_insert(new).length += 1;
             self.missing += 1;
@@ -302,6 +310,20 @@ mod tests {
             let mut filled = samples.clone();
             GapFiller::new(&bank, GapPolicy::Zero).unwrap().fill(&mut filled, &mut mask);
             assert_eq!(mask, differs, "{taps} taps, M = {m}");
+        }
+    }
+
+    #[test]
+    fn a_missing_sample_is_zero_or_held_after_the_offset_is_subtracted() {
+        let bank = Bank { offsets: vec![0.5, -0.25], ..fir_bank(vec![vec![1.0]; 2], 1) };
+        let frames = [f64::NAN, 1.0, 2.0, f64::NAN, f64::NAN, f64::NAN];
+        for (policy, want) in [
+            (GapPolicy::Zero, [0.5, 1.0, 2.0, -0.25, 0.5, -0.25]),
+            (GapPolicy::Hold, [0.5, 1.0, 2.0, 1.0, 2.0, 1.0]),
+        ] {
+            let mut filled = frames;
+            GapFiller::new(&bank, policy).unwrap().fill(&mut filled, &mut Vec::new());
+            assert_eq!(filled, want, "{policy:?}");
         }
     }
 

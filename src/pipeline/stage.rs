@@ -45,6 +45,8 @@ pub struct Pipeline {
     samples: u64,
     clipped: u64,
     buffer: Vec<u8>,
+    /// What the converters deliver without a signal.
+    offsets: Vec<f64>,
 }
 
 impl Pipeline {
@@ -67,6 +69,7 @@ impl Pipeline {
             samples: 0,
             clipped: 0,
             buffer: Vec::new(),
+            offsets: bank.offsets.clone(),
         })
     }
 
@@ -88,18 +91,21 @@ impl Pipeline {
         self.push_at_most(parts, u64::MAX, output)
     }
 
-    /// Processes frames of zeros until `samples` samples have been written since the beginning.
+    /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples have
+    /// been written since the beginning.
     ///
     /// # Errors
     /// The errors of the output.
     pub fn flush(&mut self, samples: u64, output: &mut impl Output) -> Result<(), PipelineError> {
-        let layout = SampleLayout::packed(PcmFormat::F32Le);
+        let layout = SampleLayout::packed(PcmFormat::F64Le);
         let (channels, ratio) = (self.stream.channels(), self.stream.ratio() as u64);
-        let zeros = vec![0; FLUSH_FRAMES * channels * 4];
+        let silence: Vec<u8> = self.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
+        let silence = silence.repeat(FLUSH_FRAMES);
         while self.samples < samples {
             let wanted = samples - self.samples;
             let frames = (wanted + self.skip).div_ceil(ratio).min(FLUSH_FRAMES as u64) as usize;
-            let part = PcmFrames { layout, channels, bytes: &zeros[..frames * channels * 4] };
+            let part =
+                PcmFrames { layout, channels, bytes: &silence[..frames * channels * layout.container] };
             self.push_at_most(&[part], wanted, output)?;
         }
         Ok(())

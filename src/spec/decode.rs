@@ -6,8 +6,8 @@ use super::Fault;
 use super::design::DesignOverrides;
 use super::design::KeyProblem;
 use super::limits::{
-    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_gamma_margin, check_latency,
-    check_noise, check_order, check_ratio, check_reduction_loss, check_taps,
+    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_gain, check_gamma_margin,
+    check_latency, check_noise, check_offset, check_order, check_ratio, check_reduction_loss, check_taps,
 };
 use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
@@ -15,7 +15,7 @@ use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Solver, Spec, Sp
 
 const TOP_KEYS: [&str; 8] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
-const CHANNEL_KEYS: [&str; 4] = ["delay", "delay_samples", "filter", "noise"];
+const CHANNEL_KEYS: [&str; 6] = ["delay", "delay_samples", "filter", "noise", "gain", "offset"];
 const DESIGN_KEYS: [&str; 9] = [
     "method",
     "taps",
@@ -116,9 +116,12 @@ fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<ChannelSpec, Fault> 
         Some(value) => filter(&value)?,
         None => common.target.clone(),
     };
-    // Noise of -0.0 is noise of 0.0.
+    // Noise of -0.0 is noise of 0.0, and so is an offset.
     let noise = noise(Some(&fields))?.unwrap_or(common.noise) + 0.0;
-    Ok(ChannelSpec { delay, filter, noise })
+    let number = |key, check| fields.optional(key).map(|v| checked_number(&v, check)).transpose();
+    let gain = number("gain", check_gain)?.unwrap_or(1.0);
+    let offset = number("offset", check_offset)?.unwrap_or(0.0) + 0.0;
+    Ok(ChannelSpec { delay, filter, noise, gain, offset })
 }
 
 /// D_i, from one of its two spellings.

@@ -141,6 +141,33 @@ pub(crate) fn check_noise(noise: f64) -> Result<(), SpecProblem> {
     ))
 }
 
+/// Largest and, inverted, smallest size of a converter's gain. 120 dB from nominal a 24-bit converter has
+/// four bits left or clips nearly always, so such a number is in the wrong unit.
+const MAX_GAIN: f64 = 1e6;
+
+/// g_i.
+pub(crate) fn check_gain(gain: f64) -> Result<(), SpecProblem> {
+    if (1.0 / MAX_GAIN..=MAX_GAIN).contains(&gain.abs()) {
+        return Ok(());
+    }
+    let rule = format!(
+        "gain is the factor of the converter's samples relative to nominal, {:e} to {MAX_GAIN:e} in size and \
+         negative if it inverts; 1.01 is one per cent too much",
+        1.0 / MAX_GAIN
+    );
+    Err(range(gain, "(factor)", rule))
+}
+
+/// o_i: a converter whose offset exceeds full scale delivers nothing but clipped samples.
+pub(crate) fn check_offset(offset: f64) -> Result<(), SpecProblem> {
+    if (-1.0..=1.0).contains(&offset) {
+        return Ok(());
+    }
+    let rule = "offset is what the converter adds to its samples relative to full scale, -1 to 1; 5 steps of a \
+                12-bit converter are 5 / 2048";
+    Err(range(offset, "of full scale", rule))
+}
+
 /// States of a recursive bank.
 pub(crate) fn check_order(order: usize) -> Result<(), SpecProblem> {
     if order <= MAX_STATES {

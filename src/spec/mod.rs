@@ -22,6 +22,7 @@ pub use filter::{MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
+pub(crate) use limits::{check_gain, check_offset};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
@@ -59,10 +60,28 @@ pub struct ChannelSpec {
     /// sigma_i: rms of the converter's own white noise, relative to full scale.
     #[serde(skip_serializing_if = "is_zero")]
     pub noise: f64,
+    /// g_i: the converter's gain relative to nominal. With y the output of Phi_i at the sampling instant, the
+    /// converter delivers the sample g_i y + o_i.
+    #[serde(skip_serializing_if = "is_one")]
+    pub gain: f64,
+    /// o_i: the converter's offset, relative to full scale.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub offset: f64,
 }
 
-fn is_zero(noise: &f64) -> bool {
-    *noise == 0.0
+impl ChannelSpec {
+    /// A converter without noise, gain error and offset.
+    pub fn new(delay: Seconds, filter: FilterSpec) -> Self {
+        Self { delay, filter, noise: 0.0, gain: 1.0, offset: 0.0 }
+    }
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+fn is_one(gain: &f64) -> bool {
+    *gain == 1.0
 }
 
 /// An analog filter as written; stability is checked by [`crate::analog`].
@@ -250,6 +269,8 @@ impl Spec {
             limits::check_delay(channel.delay.in_fast_periods(self.fast_period), channel.delay.0, "s")?;
             channel.filter.check()?;
             limits::check_noise(channel.noise)?;
+            limits::check_gain(channel.gain)?;
+            limits::check_offset(channel.offset)?;
         }
         self.design.check(self.channels.len())
     }

@@ -39,12 +39,13 @@ impl FrontEnds {
         };
         let (target, gain) = index(&spec.target, "spec.target.filter".to_owned())?;
         let reference = |p: usize| Instant { whole: p as f64 - bank.latency as f64, delay: Seconds(0.0) };
-        let mut samples: Vec<SamplingInstant> =
-            (0..bank.ratio).map(|p| SamplingInstant { filter: target, gain, time: reference(p) }).collect();
+        let mut samples: Vec<SamplingInstant> = (0..bank.ratio)
+            .map(|p| SamplingInstant { filter: target, gain, converter_gain: 1.0, time: reference(p) })
+            .collect();
         for (i, channel) in spec.channels.iter().enumerate() {
             let (filter, gain) = index(&channel.filter, format!("spec.channel[{i}].filter"))?;
             let time = Instant { whole: 0.0, delay: channel.delay };
-            samples.push(SamplingInstant { filter, gain, time });
+            samples.push(SamplingInstant { filter, gain, converter_gain: channel.gain, time });
         }
         Ok((Self { filters }, samples))
     }
@@ -70,6 +71,8 @@ impl FrontEnds {
         let (start, filter) = &self.filters[sample.filter];
         let mut row = ball::zeros(1, self.order());
         row.columns_mut(*start, filter.order()).copy_from(&ball::exact(filter.c()));
-        ball::scaled(&row, Ball::from(sample.gain))
+        let row = ball::scaled(&row, Ball::from(sample.gain));
+        // A factor of one would only widen the enclosure.
+        if sample.converter_gain == 1.0 { row } else { ball::scaled(&row, Ball::from(sample.converter_gain)) }
     }
 }

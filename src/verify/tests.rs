@@ -35,7 +35,7 @@ fn bank(
     taps: usize,
 ) -> Bank {
     let made_up = |i: usize| (0..taps).map(|n| ((7 * n + 3 * i) % 11) as f64 / 11.0 - 0.4).collect();
-    let channel = |(filter, &delay)| ChannelSpec { delay: Seconds(delay), filter, noise: 0.0 };
+    let channel = |(filter, &delay)| ChannelSpec::new(Seconds(delay), filter);
     let spec = Spec {
         name: String::new(),
         fast_period: Seconds(1.0),
@@ -52,6 +52,8 @@ fn bank(
         latency,
         method: Method::Fir,
         delays: delays.iter().copied().map(Seconds).collect(),
+        gains: vec![1.0; delays.len()],
+        offsets: vec![0.0; delays.len()],
         filters: SynthesisFilters::Fir((0..delays.len()).map(made_up).collect()),
         gamma: Gamma::default(),
         proof: None,

@@ -25,8 +25,10 @@ pub(super) struct Instant {
 pub(super) struct SamplingInstant {
     /// Index of the filter.
     pub(super) filter: usize,
-    /// The sample over that filter's output, not zero.
+    /// The output of the sample's own filter over that filter's, not zero.
     pub(super) gain: f64,
+    /// The sample over the output of its own filter, not zero.
+    pub(super) converter_gain: f64,
     pub(super) time: Instant,
 }
 
@@ -166,7 +168,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn sample(whole: f64, delay: f64) -> SamplingInstant {
-        SamplingInstant { filter: 0, gain: 1.0, time: Instant { whole, delay: Seconds(delay) } }
+        SamplingInstant {
+            filter: 0,
+            gain: 1.0,
+            converter_gain: 1.0,
+            time: Instant { whole, delay: Seconds(delay) },
+        }
     }
 
     proptest! {

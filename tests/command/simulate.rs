@@ -91,6 +91,83 @@ fn a_recording_is_a_source() {
     desk.refused(1, &["simulate", "spec.toml", "--source", "none.wav", "-o", "c2"], &["none.wav"]);
 }
 
+/// [`THESIS`] with the gains and offsets of two converters.
+fn imperfect(gains: [f64; 2], offsets: [f64; 2]) -> String {
+    let channel = |delay: &str, i: usize| {
+        format!("delay = {delay}\ngain = {:?}\noffset = {:?}\n", gains[i], offsets[i])
+    };
+    THESIS.replace("delay = 1.2\n", &channel("1.2", 0)).replace("delay = 0.6\n", &channel("0.6", 1))
+}
+
+#[test]
+fn gains_and_offsets_of_converters_are_undone() {
+    let desk = Desk::with_spec(THESIS);
+    desk.write("real.toml", imperfect([1.01, -0.97], [0.02, -0.011]));
+    desk.good(&["design", "spec.toml", "-o", "ideal.json"]);
+    desk.good(&["design", "real.toml", "-o", "real.json"]);
+    desk.good(&["verify", "real.json"]);
+    let simulate = |spec: &str, folder: &str| {
+        desk.good(&["simulate", spec, "--source", "tones:0.3,0.8", "-o", folder, "--samples", "4000"]);
+    };
+    simulate("spec.toml", "ideal");
+    simulate("real.json", "real");
+    let capture = |folder: &str, name: &str| recording(&desk.path(folder).join(name)).1;
+    for (name, gain, offset) in
+        [("ch1.wav", 1.01, 0.02), ("ch2.wav", -0.97, -0.011), ("target.wav", 1.0, 0.0)]
+    {
+        for (real, ideal) in capture("real", name).iter().zip(capture("ideal", name)) {
+            assert!((real - (gain * ideal + offset)).abs() < 1e-6, "{name}: {real} {ideal}");
+        }
+    }
+    let snr = |bank: &str, folder: &str| {
+        let [first, second] = ["ch1.wav", "ch2.wav"].map(|name| format!("{folder}/{name}"));
+        desk.good(&["fuse", bank, &first, &second, "-o", "y.wav", "--keep-latency", "--force"]);
+        snr_db(&capture("", "y.wav"), &capture(folder, "target.wav"), 60)
+    };
+    let [ideal, real, unaware] = [("ideal.json", "ideal"), ("real.json", "real"), ("ideal.json", "real")]
+        .map(|(bank, folder)| snr(bank, folder));
+    assert!((ideal - real).abs() < 0.1 && ideal > 45.0, "{ideal:.2} dB, {real:.2} dB");
+    assert!(unaware < 10.0, "{unaware:.2} dB");
+}
+
+/// Converters without a signal deliver their offsets. The output is silence from the first sample to the last
+/// one of the flush, and where samples are missing.
+#[test]
+fn converters_without_a_signal_give_silence() {
+    let desk = Desk::with_spec(&imperfect([1.0, 1.0], [0.01, -0.3]));
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    desk.good(&["simulate", "bank.json", "--source", "tones:1", "-o", "cap", "--gain", "0"]);
+    let (rate, mut first) = recording(&desk.path("cap/ch1.wav"));
+    assert!(first.iter().all(|&x| (x - 0.01).abs() < 1e-9), "{first:?}");
+    first[40] = f64::NAN;
+    first[0] = f64::NAN;
+    let lossy: Vec<f32> = first.iter().map(|&x| x as f32).collect();
+    wav::write(&desk, "lossy.wav", 1, rate, &lossy);
+    for more in
+        [&[][..], &["--keep-latency"], &["--gaps", "hold"], &["--gaps", "zero"], &["--algorithm", "fast-fir"]]
+    {
+        let args =
+            [&["fuse", "bank.json", "lossy.wav", "cap/ch2.wav", "-o", "y.wav", "--force"], more].concat();
+        desk.good(&args);
+        let fused = recording(&desk.path("y.wav")).1;
+        assert!(fused.len() == 200 && fused.iter().all(|&y| y == 0.0), "{more:?}: {fused:?}");
+    }
+    desk.good(&[
+        "stream",
+        "bank.json",
+        "--input",
+        "cap/ch1.wav",
+        "--input",
+        "cap/ch2.wav",
+        "--format",
+        "wav",
+        "--flush",
+        "-o",
+        "live.wav",
+    ]);
+    assert!(recording(&desk.path("live.wav")).1.iter().all(|&y| y == 0.0));
+}
+
 /// Two captures of a speech recording with the wanted signal, made elsewhere in the frequency domain.
 #[test]
 fn captures_made_elsewhere_are_fused() {

@@ -35,7 +35,12 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
         target: 0,
         channels: channels
             .iter()
-            .map(|&(front_end, delay)| Channel { front_end, gain: 1.0, delay: FastPeriods(delay) })
+            .map(|&(front_end, delay)| Channel {
+                front_end,
+                gain: 1.0,
+                converter_gain: 1.0,
+                delay: FastPeriods(delay),
+            })
             .collect(),
         noise: vec![0.0; channels.len()],
     };

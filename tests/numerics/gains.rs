@@ -68,6 +68,49 @@ fn a_gain_of_a_channel_is_undone_by_its_filter() {
     }
 }
 
+/// A converter's gain is a gain of the filter in front of it, which knows nothing of it.
+#[test]
+fn a_gain_of_a_converter_is_undone_by_its_filter() {
+    for method in [Method::Fir, Method::Iir, Method::H2] {
+        for gain in [1e-6, 0.97, -1.0, 1.03, 1e6] {
+            let mut spec = example(method);
+            spec.channels[0].gain = gain;
+            check(&format!("{method:?}, converter 1 {gain:e}"), &spec, GAMMA);
+        }
+    }
+}
+
+#[test]
+fn the_methods_for_comparison_know_the_gains_of_converters() {
+    for method in [Method::Sinc, Method::Separation] {
+        let mut spec = Spec { design: DesignSpec::new(method, Some(22)), ..example(Method::Fir) };
+        let plain = design(&spec).unwrap().bank;
+        (spec.channels[0].gain, spec.channels[1].gain) = (0.5, -2.0);
+        let bank = design(&spec).unwrap().bank;
+        let [plain_gamma, gamma] = [&plain, &bank].map(|bank| bank.gamma.norm.unwrap());
+        assert!((gamma / plain_gamma - 1.0).abs() < 1e-6, "{method:?}: {gamma} {plain_gamma}");
+        assert_eq!(bank.gains, [0.5, -2.0]);
+    }
+}
+
+/// The gain is a part of what is proven: a file with another one has another norm.
+#[test]
+fn a_proof_holds_for_its_gains_only() {
+    let mut spec = example(Method::Fir);
+    spec.channels[1].gain = 1.02;
+    let bank = check("converter 2", &spec, GAMMA);
+    let mut other = bank.clone();
+    other.gains[1] = 1.021;
+    other.spec.as_mut().unwrap().channels[1].gain = 1.021;
+    other.check().unwrap();
+    assert!(verify(&bank).is_ok() && verify(&other).is_err());
+    // The offset does not enter the norm.
+    let mut shifted = bank;
+    shifted.offsets[0] = 0.125;
+    shifted.spec.as_mut().unwrap().channels[0].offset = 0.125;
+    assert!(verify(&shifted).is_ok());
+}
+
 #[test]
 fn taps_follow_the_gains() {
     let taps = |bank: Bank| match bank.filters {

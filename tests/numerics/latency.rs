@@ -23,14 +23,10 @@ fn plant(seed: u64, method: Method) -> Spec {
     let filter = low_pass(dice.of(&families), dice.count(1, 6), TAU * (0.05 + 0.35 * dice.part()));
     let spread = if dice.part() < 0.2 { 8.0 } else { ratio as f64 };
     let alike = dice.part() < 0.7;
-    let channel = |dice: &mut Random| ChannelSpec {
-        delay: Seconds(spread * dice.part()),
-        filter: if alike {
-            filter.clone()
-        } else {
-            butterworth(dice.count(1, 4), TAU * (0.1 + 0.3 * dice.part()))
-        },
-        noise: 0.0,
+    let channel = |dice: &mut Random| {
+        let delay = Seconds(spread * dice.part());
+        let another = |dice: &mut Random| butterworth(dice.count(1, 4), TAU * (0.1 + 0.3 * dice.part()));
+        ChannelSpec::new(delay, if alike { filter.clone() } else { another(dice) })
     };
     let channels = (0..channels).map(|_| channel(&mut dice)).collect();
     let taps = dice.count(1, 6 * ratio);
@@ -132,7 +128,7 @@ fn comparison_methods_take_the_shortest_latency_that_is_almost_the_best() {
 /// 48 kHz from four 12 kHz converters.
 fn four_at_48_khz(taps: usize) -> Spec {
     let filter = butterworth(6, TAU * 9.0 / 48.0);
-    let channel = |&delay: &f64| ChannelSpec { delay: Seconds(delay), filter: filter.clone(), noise: 0.0 };
+    let channel = |&delay: &f64| ChannelSpec::new(Seconds(delay), filter.clone());
     Spec {
         name: String::new(),
         fast_period: Seconds(1.0),

@@ -52,7 +52,7 @@ fn unreduced(seed: u64) -> Spec {
         .into_iter()
         .map(|delay| {
             let filter = if alike { target.clone() } else { front_end(&mut dice) };
-            ChannelSpec { delay: Seconds(delay), filter, noise: 0.0 }
+            ChannelSpec::new(Seconds(delay), filter)
         })
         .collect();
     let taps = dice.count(1, 4) * ratio;

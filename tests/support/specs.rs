@@ -34,7 +34,7 @@ pub(crate) fn butterworth(order: usize, omega: f64) -> FilterSpec {
 
 /// Every channel has the filter of the target; method `iir`.
 pub(crate) fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &[f64]) -> Spec {
-    let channel = |&delay: &f64| ChannelSpec { delay: Seconds(delay), filter: filter.clone(), noise: 0.0 };
+    let channel = |&delay: &f64| ChannelSpec::new(Seconds(delay), filter.clone());
     Spec {
         name: String::new(),
         fast_period: Seconds(1.0),

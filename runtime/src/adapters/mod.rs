@@ -8,11 +8,13 @@
 
 mod complex;
 mod interleaved;
+mod offsets;
 mod pcm;
 mod planar;
 
 pub(crate) use complex::{ComplexInput, ComplexOutput, Part};
 pub use interleaved::Interleaved;
+pub(crate) use offsets::{Offsets, WithoutOffsets};
 pub use pcm::PcmOutput;
 pub use planar::Planar;
 

@@ -4,6 +4,7 @@ mod calls;
 mod cuts;
 mod flush;
 mod not_finite;
+mod offsets;
 mod pcm;
 mod resets;
 mod response;

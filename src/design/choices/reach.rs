@@ -97,7 +97,9 @@ fn manageable(problem: &Problem) -> (Problem, bool) {
     let mut alike = problem.clone();
     alike.front_ends = vec![problem.front_ends[problem.target].clone()];
     alike.target = 0;
-    alike.channels.iter_mut().for_each(|channel| (channel.front_end, channel.gain) = (0, 1.0));
+    for channel in &mut alike.channels {
+        (channel.front_end, channel.gain) = (0, channel.converter_gain);
+    }
     (alike.merge_channels(Repeats::AtOneInstant).problem, false)
 }
 

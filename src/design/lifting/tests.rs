@@ -19,7 +19,12 @@ fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64
         target: 0,
         channels: channels
             .iter()
-            .map(|&(front_end, delay)| Channel { front_end, gain: 1.0, delay: FastPeriods(delay) })
+            .map(|&(front_end, delay)| Channel {
+                front_end,
+                gain: 1.0,
+                converter_gain: 1.0,
+                delay: FastPeriods(delay),
+            })
             .collect(),
         noise: vec![0.0; channels.len()],
     }

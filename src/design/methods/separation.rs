@@ -56,7 +56,7 @@ fn alone(slow: &Problem, i: usize, shift: FastPeriods, latency: usize) -> Proble
         ratio: 1,
         latency,
         target: channel.front_end,
-        channels: vec![Channel { delay: channel.delay - shift, gain: 1.0, ..channel }],
+        channels: vec![Channel { delay: channel.delay - shift, gain: 1.0, converter_gain: 1.0, ..channel }],
         ..slow.clone()
     }
 }

@@ -5,8 +5,8 @@ use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::sampling::Recurrent;
 
-/// Yen's interpolation of the recurrent nonuniform samples, for ideal front ends, truncated to
-/// `settings.taps` taps per channel.
+/// Yen's interpolation of the recurrent nonuniform samples, for ideal front ends and the gains of the
+/// converters, truncated to `settings.taps` taps per channel.
 ///
 /// # Errors
 /// [`DesignError::SincNeedsNyquist`] unless N = M; [`DesignError::Sampling`] for delays that coincide
@@ -18,6 +18,10 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     }
     let offsets: Vec<f64> = problem.channels.iter().map(|channel| -channel.delay.0).collect();
     let sets = Recurrent::new(&offsets, ratio)?;
-    let taps = |i: usize| sets.taps(i, problem.latency as f64, settings.taps);
+    let taps = |i: usize| {
+        let mut taps = sets.taps(i, problem.latency as f64, settings.taps);
+        taps.iter_mut().for_each(|tap| *tap /= problem.channels[i].converter_gain);
+        taps
+    };
     Synthesis::of_taps(plant, (0..channels).map(taps).collect())
 }

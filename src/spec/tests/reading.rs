@@ -13,13 +13,18 @@ fn the_thesis_example_is_read() {
         ratio: 2,
         latency: Some(10),
         target: thesis.clone(),
-        channels: vec![
-            ChannelSpec { delay: Seconds(1.2), filter: thesis, noise: 0.0 },
-            ChannelSpec { delay: Seconds(0.6), filter: zpk, noise: 0.0 },
-        ],
+        channels: vec![ChannelSpec::new(Seconds(1.2), thesis), ChannelSpec::new(Seconds(0.6), zpk)],
         design: DesignSpec::new(Method::Fir, Some(22)),
     };
     assert_eq!(spec, expected);
+}
+
+#[test]
+fn converters_have_gains_and_offsets() {
+    let text = thesis_with("delay = 1.2", "delay = 1.2\ngain = -1.01\noffset = 0.0025");
+    let channels = read(&text).channels;
+    let found: Vec<_> = channels.iter().map(|channel| (channel.gain, channel.offset)).collect();
+    assert_eq!(found, [(-1.01, 0.0025), (1.0, 0.0)]);
 }
 
 #[test]

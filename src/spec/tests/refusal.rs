@@ -67,6 +67,11 @@ fn every_mistake_has_its_line_and_its_message() {
         ("delay = 1.2", "delay = nan", 11, "must be finite"),
         ("delay = 1.2", "delay = 1e6", 11, "check its unit"),
         ("delay = 1.2", "delay_samples = -3", 11, "-3 fast periods is out of range"),
+        ("delay = 1.2", "delay = 1.2\ngain = 0", 12, "gain is the factor of the converter's samples"),
+        ("delay = 1.2", "delay = 1.2\ngain = -1e7", 12, "1e-6 to 1e6 in size"),
+        ("delay = 1.2", "delay = 1.2\ngain = inf", 12, "must be finite"),
+        ("delay = 1.2", "delay = 1.2\noffset = 5", 12, "5 steps of a 12-bit converter are 5 / 2048"),
+        ("delay = 1.2", "delay = 1.2\noffest = 0.1", 12, "did you mean \"offset\""),
         ("delay = 1.2", "delay = [1.2]", 11, "expected a number, found a list"),
         // Design.
         ("method = \"fir\"", "method = \"fri\"", 17, "did you mean \"fir\""),

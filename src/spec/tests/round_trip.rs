@@ -64,7 +64,7 @@ prop_compose! {
     ) -> Spec {
         Spec {
             name, fast_period, ratio, latency, target,
-            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { delay: fast_period * d, filter, noise: 1e-4 * d.fract() }).collect(),
+            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
             design: DesignSpec {
                 method,
                 taps: method.has_taps().then_some(taps),

@@ -1,0 +1,73 @@
+//! The offsets of the converters, subtracted from the samples on their way to the kernels.
+
+use super::Input;
+use crate::{BuildError, Isa, Sample};
+use std::ops::Sub;
+
+/// Samples after which the pattern of offsets repeats, at least: long enough for whole vectors.
+const PATTERN: usize = 256;
+
+/// The offsets of N channels, frame after frame, in both number types.
+#[derive(Debug)]
+pub(crate) struct Offsets {
+    single: Vec<f32>,
+    double: Vec<f64>,
+}
+
+impl Offsets {
+    /// `None` if all offsets are zero.
+    ///
+    /// # Errors
+    /// [`BuildError::OffsetCount`] unless there is one for each of N = `channels`;
+    /// [`BuildError::NotFinite`].
+    pub(crate) fn new(offsets: &[f64], channels: usize) -> Result<Option<Self>, BuildError> {
+        if offsets.len() != channels {
+            return Err(BuildError::OffsetCount { offsets: offsets.len(), channels });
+        }
+        if let Some(index) = offsets.iter().position(|&offset| !f32::from_f64(offset).finite()) {
+            let location = "the offsets of the channels".to_owned();
+            return Err(BuildError::NotFinite { location, index, value: offsets[index] });
+        }
+        if offsets.iter().all(|&offset| offset == 0.0) {
+            return Ok(None);
+        }
+        let double = offsets.repeat(PATTERN.div_ceil(channels));
+        Ok(Some(Self { single: double.iter().map(|&offset| f32::from_f64(offset)).collect(), double }))
+    }
+
+    /// Subtracts the offsets from whole frames.
+    fn subtract_from<T: Sample>(&self, samples: &mut [T]) {
+        if let Some(samples) = T::as_f32_mut(samples) {
+            subtract(samples, &self.single);
+        } else if let Some(samples) = T::as_f64_mut(samples) {
+            subtract(samples, &self.double);
+        }
+    }
+}
+
+fn subtract<T: Copy + Sub<Output = T>>(samples: &mut [T], pattern: &[T]) {
+    for part in samples.chunks_mut(pattern.len()) {
+        part.iter_mut().zip(pattern).for_each(|(sample, &offset)| *sample = *sample - offset);
+    }
+}
+
+/// The frames of an input without the offsets. What is not finite stays so.
+pub(crate) struct WithoutOffsets<'a, I: ?Sized> {
+    pub(crate) input: &'a I,
+    pub(crate) offsets: &'a Offsets,
+}
+
+impl<I: Input + ?Sized> Input for WithoutOffsets<'_, I> {
+    fn channels(&self) -> usize {
+        self.input.channels()
+    }
+
+    fn frames(&self) -> usize {
+        self.input.frames()
+    }
+
+    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
+        self.input.load(isa, first, samples);
+        self.offsets.subtract_from(samples);
+    }
+}

@@ -1,0 +1,196 @@
+//! A stream that subtracts offsets gives, bit for bit, what the samples without them give to a plan without
+//! offsets.
+
+use super::support::{FIR_ALGORITHMS, Noise, fir_bank, precise, random_taps, recursive_bank};
+use crate::{
+    Algorithm, BuildError, ComplexStream, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Precision,
+    SampleLayout, StateSpace, Stream,
+};
+
+/// Frames of a test: more than two batches of overlap-save with transforms of 64 frames.
+const FRAMES: usize = 1500;
+
+/// Dyadic, so that adding them to samples of a few bits is exact.
+fn offsets(channels: usize) -> Vec<f64> {
+    (0..channels).map(|i| [0.25, -0.5, 0.0, 0.125][i % 4]).collect()
+}
+
+/// Multiples of 1/256 from -0.5 to 0.5.
+fn samples(channels: usize, noise: &mut Noise) -> Vec<f32> {
+    (0..FRAMES * channels).map(|_| ((noise.next() * 128.0).round() / 256.0) as f32).collect()
+}
+
+/// The samples as the converters deliver them.
+fn delivered(samples: &[f32], offsets: &[f64]) -> Vec<f32> {
+    samples.iter().zip(offsets.iter().cycle()).map(|(&x, &offset)| x + offset as f32).collect()
+}
+
+/// Plans of every algorithm in both precisions, each with its twin that subtracts offsets.
+fn plans(channels: usize, ratio: usize, noise: &mut Noise) -> Vec<[Plan; 2]> {
+    let fir = fir_bank(random_taps(channels, 9 * ratio, noise), ratio);
+    let order = 3;
+    let recursion = recursive_bank(StateSpace {
+        a: (0..order).map(|i| (0..order).map(|j| 0.25 / (1 + i + j) as f64).collect()).collect(),
+        b: random_taps(order, channels, noise),
+        c: random_taps(ratio, order, noise),
+        d: random_taps(ratio, channels, noise),
+    });
+    let ways = FIR_ALGORITHMS.map(|algorithm| (&fir, algorithm)).into_iter();
+    ways.chain([(&recursion, Algorithm::Direct)])
+        .flat_map(|(bank, way)| [Precision::Single, Precision::Double].map(|p| (bank, precise(way, p))))
+        .map(|(bank, options)| {
+            let plain = bank.plan(options).unwrap();
+            [plain.clone(), plain.with_offsets(&offsets(channels)).unwrap()]
+        })
+        .collect()
+}
+
+/// Output of interleaved frames in calls of so many frames, over and over, and of the flush after them.
+fn outputs(plan: &Plan, input: &[f32], cuts: &[usize]) -> Vec<f32> {
+    let (n, m) = (plan.channels(), plan.ratio());
+    let mut stream = Stream::new(plan);
+    let mut out = vec![0.0; (input.len() / n + plan.flush_frames()) * m];
+    let (mut from, mut done) = (input, 0);
+    for &cut in cuts.iter().cycle() {
+        let part = &from[..from.len().min(cut * n)];
+        done += stream.process(part, &mut out[done..]).unwrap();
+        from = &from[part.len()..];
+        if from.is_empty() {
+            break;
+        }
+    }
+    done += stream.flush(&mut out[done..]).unwrap();
+    assert_eq!((done, stream.replaced()), (out.len(), 0));
+    out
+}
+
+#[test]
+fn offsets_are_subtracted_whatever_the_algorithm_and_the_cuts() {
+    let mut noise = Noise(5);
+    for (n, m) in [(1, 1), (2, 2), (3, 4), (5, 2), (300, 1)] {
+        let x = samples(n, &mut noise);
+        let with = delivered(&x, &offsets(n));
+        for [plain, subtracting] in plans(n, m, &mut noise) {
+            let want = outputs(&plain, &x, &[FRAMES]);
+            for cuts in [&[FRAMES][..], &[1, 7, 130], &[64, 640, 3]] {
+                let got = outputs(&subtracting, &with, cuts);
+                assert!(got == want, "{} {n} {m} {cuts:?}", plain.algorithm());
+            }
+        }
+    }
+}
+
+#[test]
+fn offsets_are_subtracted_in_every_form_of_the_samples() {
+    let mut noise = Noise(6);
+    let (n, m) = (3, 2);
+    let x = samples(n, &mut noise);
+    let with = delivered(&x, &offsets(n));
+    for [plain, subtracting] in plans(n, m, &mut noise) {
+        let mut want = vec![0f32; FRAMES * m];
+        Stream::new(&plain).process(&x, &mut want).unwrap();
+        let mut got = vec![0f32; FRAMES * m];
+        let channels: Vec<Vec<f32>> =
+            (0..n).map(|i| with.iter().skip(i).step_by(n).copied().collect()).collect();
+        let planar: Vec<&[f32]> = channels.iter().map(Vec::as_slice).collect();
+        Stream::new(&subtracting).process_planar(&planar, &mut got).unwrap();
+        assert!(got == want, "planar, {}", plain.algorithm());
+        for (format, whole) in [PcmFormat::S16Le, PcmFormat::F32Be, PcmFormat::F64Le]
+            .into_iter()
+            .flat_map(|format| [(format, true), (format, false)])
+        {
+            let encode = |samples: &[f32]| -> Vec<u8> {
+                let mut bytes = vec![0; samples.len() * format.bytes()];
+                let slots = bytes.chunks_exact_mut(format.bytes());
+                samples.iter().zip(slots).for_each(|(&x, slot)| {
+                    format.encode(x.into(), slot);
+                });
+                bytes
+            };
+            let stored = if whole { vec![encode(&with)] } else { planar.iter().map(|x| encode(x)).collect() };
+            let layout = SampleLayout::packed(format);
+            let count = n / stored.len();
+            let parts: Vec<_> =
+                stored.iter().map(|bytes| PcmFrames { layout, channels: count, bytes }).collect();
+            let mut bytes = vec![0; 4 * FRAMES * m];
+            let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut bytes, clipped: 0 };
+            Stream::new(&subtracting).process_pcm(&parts, &mut output).unwrap();
+            let got = bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
+            // Doubles are rounded once, where they are stored.
+            let close = got.zip(&want).all(|(a, &b)| (a - b).abs() <= 1e-6);
+            assert!(close, "{format}, {}", plain.algorithm());
+        }
+    }
+}
+
+#[cfg(feature = "rayon")]
+#[test]
+fn offsets_are_subtracted_on_all_threads() {
+    let mut noise = Noise(7);
+    let bank = fir_bank(random_taps(2, 1024, &mut noise), 2);
+    let x = noise.samples(2 * 40_000);
+    let pool = crate::ThreadPool::new(3).unwrap();
+    for algorithm in [Algorithm::Direct, Algorithm::FastFir] {
+        let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
+        let plan = plan.with_offsets(&[0.3, -0.01]).unwrap();
+        let [mut alone, mut together] = [vec![0f32; 80_000], vec![0f32; 80_000]];
+        Stream::new(&plan).process(&x, &mut alone).unwrap();
+        Stream::new(&plan).process_parallel(&x, &mut together, &pool).unwrap();
+        assert!(alone == together, "{}", plan.algorithm());
+    }
+}
+
+#[test]
+fn a_sample_that_is_not_finite_is_zero_after_the_subtraction() {
+    let mut noise = Noise(8);
+    for [plain, subtracting] in plans(2, 3, &mut noise) {
+        let mut x = samples(2, &mut noise);
+        let mut with = delivered(&x, &offsets(2));
+        for (index, value) in [(0, f32::NAN), (999, f32::INFINITY), (2000, f32::NEG_INFINITY)] {
+            (x[index], with[index]) = (0.0, value);
+        }
+        let [mut want, mut got] = [vec![0f32; FRAMES * 3], vec![0f32; FRAMES * 3]];
+        Stream::new(&plain).process(&x, &mut want).unwrap();
+        let mut stream = Stream::new(&subtracting);
+        stream.process(&with, &mut got).unwrap();
+        assert!(got == want, "{}", plain.algorithm());
+        assert_eq!(stream.replaced(), 3);
+    }
+}
+
+#[test]
+fn a_continued_stream_keeps_its_past_and_takes_the_new_offsets() {
+    let mut noise = Noise(9);
+    let plan = fir_bank(random_taps(2, 8, &mut noise), 2).plan(Options::default()).unwrap();
+    let x = samples(2, &mut noise);
+    let mut want = vec![0f32; FRAMES * 2];
+    Stream::new(&plan).process(&x, &mut want).unwrap();
+    let (first, second) = x.split_at(200);
+    let (old, new) = ([0.25, 0.5], [-0.125, 0.0]);
+    let mut stream = Stream::new(&plan.clone().with_offsets(&old).unwrap());
+    let mut got = vec![0f32; FRAMES * 2];
+    stream.process(&delivered(first, &old), &mut got).unwrap();
+    stream.swap(&plan.with_offsets(&new).unwrap()).unwrap();
+    stream.process(&delivered(second, &new), &mut got[200..]).unwrap();
+    assert!(got == want);
+}
+
+#[test]
+fn complex_samples_lose_the_offset_in_both_parts() {
+    let plan = Plan::from_taps(&[vec![2.0]], 1, 0, Options::default()).unwrap().with_offsets(&[0.5]).unwrap();
+    let mut out = [[0f32; 2]];
+    ComplexStream::new(&plan).process(&[[1.0, 0.25]], &mut out).unwrap();
+    assert_eq!(out, [[1.0, -0.5]]);
+}
+
+#[test]
+fn offsets_that_do_not_fit_are_refused() {
+    let plan = || Plan::from_taps(&[vec![1.0], vec![1.0]], 1, 0, Options::default()).unwrap();
+    let refused = plan().with_offsets(&[0.5]).unwrap_err();
+    assert_eq!(refused, BuildError::OffsetCount { offsets: 1, channels: 2 });
+    for value in [f64::NAN, f64::INFINITY, 1e39] {
+        let refused = plan().with_offsets(&[0.0, value]).unwrap_err();
+        assert!(matches!(refused, BuildError::NotFinite { index: 1, .. }), "{refused}");
+    }
+    assert!(plan().with_offsets(&[0.0, -0.0]).unwrap().offsets().is_none());
+}
