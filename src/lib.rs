@@ -39,6 +39,8 @@ pub mod lti;
 #[cfg(feature = "design")]
 pub mod simulate;
 #[cfg(feature = "design")]
+pub mod sine_fit;
+#[cfg(feature = "design")]
 pub mod verify;
 
 #[cfg(feature = "plot")]

@@ -176,6 +176,10 @@ quantity! {
     RadiansPerSlowPeriod, "rad per slow period"
 }
 quantity! {
+    /// An angle or a phase in radians.
+    Radians, "rad"
+}
+quantity! {
     /// A ratio of amplitudes, 20 log10(ratio).
     Decibels, "dB"
 }

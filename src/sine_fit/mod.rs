@@ -1,0 +1,96 @@
+//! Least-squares fits of sines to records: IEEE Std 1057-2017 and 1241-2023 (three and four parameters), sums
+//! of several tones, and one frequency fitted jointly over the channels of a converter.
+//!
+//! Sample n of channel i is taken at the instant t = t_i + n T, with T the period of the samples and t_i the
+//! known [`Channel::offset`]. K tones are fitted to it:
+//!
+//! ```text
+//! x_i[n] = c_i + sum over k = 1..K of  A_ik cos(2 pi f_k t + phi_ik) + noise
+//! ```
+//!
+//! The constant c_i, the amplitudes A_ik and the phases phi_ik belong to a channel; the frequencies f_k are
+//! common to all. [`fit_known`] keeps the frequencies (three parameters per tone and channel), [`fit`] finds
+//! them too (Gauss-Newton, each step a least-squares problem). A frequency may lie in any Nyquist zone of the
+//! sample rate: the fit starts there and stays there.
+//!
+//! # Errors of the estimates
+//!
+//! Every value is an [`Estimate`] with its standard deviation sigma: the Cramer-Rao bound for independent
+//! Gaussian noise whose variance per channel is that of the residual. One tone, N samples, noise of variance
+//! s^2, SNR = A^2 / (2 s^2) (Rife and Boorstyn, 1974):
+//!
+//! ```text
+//! sigma(c) = s / sqrt(N)        sigma(A) / A = 1 / sqrt(N SNR)
+//! sigma(2 pi f T)^2 = 12 / (SNR N (N^2 - 1))
+//! ```
+//!
+//! The frequency of C joint channels has 1/C of that variance. Noise that repeats with the tone, such as the
+//! quantisation of few distinct phases, is not independent, and sigma is then too small.
+//!
+//! # Cost
+//!
+//! A pass over the samples accumulates the normal equations of all columns in blocks; nothing of the size of
+//! samples times parameters is stored. Time counts from the centre of each record in units of half the longest
+//! one, which makes the columns nearly orthogonal.
+
+mod columns;
+mod error;
+mod estimate;
+mod gauss_newton;
+mod normal;
+mod result;
+mod search;
+#[cfg(test)]
+mod tests;
+
+pub use error::SineFitError;
+pub use estimate::Estimate;
+pub use gauss_newton::{fit, fit_known};
+pub use result::{ChannelFit, SineFit, ToneFit};
+pub use search::{find_tones, locate};
+
+use crate::units::Seconds;
+
+/// The record of one converter.
+#[derive(Debug, Clone, Copy)]
+pub struct Channel<'a> {
+    /// The samples. NaN and infinities are left out.
+    pub samples: &'a [f64],
+    /// Instant of sample 0.
+    pub offset: Seconds,
+    /// False where a sample is left out, for example because it is clipped; as long as the samples.
+    pub keep: Option<&'a [bool]>,
+}
+
+impl<'a> Channel<'a> {
+    /// All finite `samples`, the first of them taken at the instant 0.
+    pub fn new(samples: &'a [f64]) -> Self {
+        Self { samples, offset: Seconds(0.0), keep: None }
+    }
+
+    /// True if sample `n` takes part in the fit.
+    pub(crate) fn uses(&self, n: usize) -> bool {
+        self.samples[n].is_finite() && self.keep.is_none_or(|keep| keep[n])
+    }
+
+    /// The number of samples that take part in the fit.
+    pub fn used(&self) -> usize {
+        (0..self.samples.len()).filter(|&n| self.uses(n)).count()
+    }
+}
+
+/// For [`Channel::keep`]: true where a sample is strictly between the rails of the converter.
+pub fn unclipped(samples: &[f64], lowest: f64, highest: f64) -> Vec<bool> {
+    samples.iter().map(|&x| lowest < x && x < highest).collect()
+}
+
+/// Distance of a frequency in cycles per sample to the nearest multiple of 1/2, where sine and cosine
+/// coincide.
+fn distance_to_edge(cycles: f64) -> f64 {
+    0.5 * (2.0 * cycles - (2.0 * cycles).round()).abs()
+}
+
+/// The frequency in 0 ..= 1/2 cycles per sample at which samples show `cycles`.
+fn alias(cycles: f64) -> f64 {
+    (cycles - cycles.round()).abs()
+}
