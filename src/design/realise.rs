@@ -15,7 +15,7 @@ use crate::lti::{FirWithTail, StateSpace};
 use crate::spec::{Method, Spec};
 
 /// A change of coordinates may increase gamma by this fraction.
-const REALISATION_ACCURACY: f64 = 1e-9;
+const REALISATION_ACCURACY: f64 = 1e-8;
 
 /// A bank's filters as they are written to the file, with the results of order reduction and quantisation.
 pub(super) struct Realised {

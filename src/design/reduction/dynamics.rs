@@ -4,9 +4,13 @@ use crate::design::DesignError;
 use crate::linalg::{self, Mat};
 use crate::lti::balanced::balanced_when_driven;
 use crate::lti::{FirWithTail, StateSpace};
+use rand_core::Rng;
+use rand_pcg::Pcg64;
 
 /// States below this share of the output are rounding errors.
 const NEGLIGIBLE: f64 = 1e-12;
+/// Slower poles than this rarely belong to a good bank of low order.
+const LARGEST_RANDOM_POLE: f64 = 0.9;
 
 /// The recursion `x+ = a x + b u[k - lags]` after a delay line of `lags` inputs.
 #[derive(Debug, Clone)]
@@ -28,6 +32,16 @@ impl Dynamics {
         let floor = NEGLIGIBLE * (tail.c() * state_root).norm();
         let tail = balanced_when_driven(&tail, state_root, floor)?;
         Ok(Self { lags, a: tail.a().clone(), b: tail.b().clone() })
+    }
+
+    /// `r` states with random couplings and poles of modulus at most [`LARGEST_RANDOM_POLE`].
+    pub(super) fn random(lags: usize, r: usize, inputs: usize, generator: &mut Pcg64) -> Self {
+        let mut uniform = || 2.0 * (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 1.0;
+        let radius = LARGEST_RANDOM_POLE * 0.5 * (1.0 + uniform());
+        let a = Mat::from_fn(r, r, |_, _| uniform());
+        let b = Mat::from_fn(r, inputs, |_, _| uniform());
+        let size = linalg::spectral_radius(&a).unwrap_or(a.norm()).max(f64::MIN_POSITIVE);
+        Self { lags, a: a * (radius / size), b }
     }
 
     /// Only the first `r` states of the tail, or all if there are fewer.

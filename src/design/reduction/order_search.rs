@@ -4,12 +4,14 @@
 use super::dynamics::Dynamics;
 use super::output_matrices::{mean_square, state_covariance_root};
 use super::plant_samples::PlantSamples;
-use super::pole_refinement::refined;
+use super::pole_refinement::{Refined, refined};
 use super::problem::{Aim, ReductionProblem};
 use super::trade_off::{Figures, OrderErrorPoint, OrderReduction};
 use crate::design::DesignError;
 use crate::lti::FirWithTail;
 use crate::lti::gramian::h2_norm;
+use rand_core::SeedableRng;
+use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 
 /// Lengths of the FIR head that are tried.
@@ -23,8 +25,14 @@ const HEAD_PREFERENCE: f64 = 1e-4;
 const CHEAP: f64 = 1e5;
 /// Limit on the evaluations of a pole refinement, and the effort (evaluations times squared unknowns) that
 /// lowers it.
-const EVALUATIONS: f64 = 80.0;
+const EVALUATIONS: usize = 80;
 const EFFORT: f64 = 4e5;
+/// Random poles from which a refinement starts, and the evaluations that rank them. The best ones go on.
+const STARTS: usize = 10;
+const SCREENING: usize = 16;
+/// Evaluations of all starts.
+const MULTI_START: usize = STARTS * SCREENING + 2 * EVALUATIONS;
+const SEED: u64 = 2007;
 /// Poles of a reduced bank keep this distance from the unit circle.
 const MARGIN: f64 = 1e-9;
 /// Losses below this are rounding errors, in decibels.
@@ -208,19 +216,59 @@ impl<'a> OrderSearch<'a> {
         Ok(ReducedBank { dynamics, bank, figures, samples })
     }
 
-    /// Improves the bank of `order` states by pole refinement.
+    /// Improves the bank of `order` states by pole refinement. That is a local search: it starts from the
+    /// truncation and, as far as the effort allows, from random poles.
     fn refine_poles(&mut self, order: usize) -> Result<(), DesignError> {
-        let Some(start) = self.banks.get(&order) else { return Ok(()) };
-        let budget = (EFFORT / self.unknowns(order).powi(2)).clamp(0.0, EVALUATIONS) as usize;
-        if self.merit(&start.figures) <= self.merit(&self.full).max(self.zero) {
+        let Some(truncation) = self.banks.get(&order) else { return Ok(()) };
+        if self.merit(&truncation.figures) <= self.merit(&self.full).max(self.zero) {
             return Ok(());
         }
-        let dynamics = refined(self.problem.aim, &start.samples, &start.dynamics, budget)?;
-        let found = self.with_best_outputs(dynamics, &start.samples)?;
-        if self.merit(&found.figures) < self.merit(&self.banks[&order].figures) {
-            self.banks.insert(order, found);
+        let affordable = (EFFORT / self.unknowns(order).powi(2)) as usize;
+        let refine = |start: &Dynamics| {
+            refined(self.problem.aim, &truncation.samples, start, affordable.min(EVALUATIONS))
+        };
+        let mut ends = vec![refine(&truncation.dynamics)?.dynamics];
+        if affordable >= MULTI_START {
+            let promising = self.promising_start(order, &truncation.samples.coarse())?;
+            ends.extend(promising.map(|start| refine(&start)).transpose()?.map(|end| end.dynamics));
         }
+        let mut best = truncation.clone();
+        for dynamics in ends {
+            let found = self.with_best_outputs(dynamics, &truncation.samples)?;
+            if self.merit(&found.figures) < self.merit(&best.figures) {
+                best = found;
+            }
+        }
+        self.banks.insert(order, best);
         Ok(())
+    }
+
+    /// The best of the random dynamics after a short refinement.
+    fn promising_start(
+        &self,
+        order: usize,
+        samples: &PlantSamples<'_>,
+    ) -> Result<Option<Dynamics>, DesignError> {
+        let screened: Result<Vec<Refined>, _> = self
+            .random_starts(order)
+            .iter()
+            .map(|start| refined(self.problem.aim, samples, start, SCREENING))
+            .collect();
+        let best = screened?.into_iter().min_by(|a, b| a.error.total_cmp(&b.error));
+        Ok(best.map(|found| found.dynamics))
+    }
+
+    /// Random dynamics of `order` states, in turn for each head that leaves a tail of two states or more.
+    fn random_starts(&self, order: usize) -> Vec<Dynamics> {
+        let tail = |lags: usize| order.checked_sub(lags * self.problem.width).filter(|&r| r > 1);
+        let shapes: Vec<(usize, usize)> =
+            self.splits.iter().filter_map(|split| Some((split.lags, tail(split.lags)?))).collect();
+        let mut generator = Pcg64::seed_from_u64(SEED);
+        let inputs = self.problem.plant.channels();
+        (0..STARTS)
+            .zip(shapes.iter().cycle())
+            .map(|(_, &(lags, r))| Dynamics::random(lags, r, inputs, &mut generator))
+            .collect()
     }
 
     fn point(&self, order: usize, figures: Figures) -> OrderErrorPoint {

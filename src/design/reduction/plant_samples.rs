@@ -17,6 +17,8 @@ const GRID: usize = 32;
 const TOWARDS_ZERO: usize = 6;
 /// Relative accuracy of a gamma that only ranks candidates.
 const RANKING_ACCURACY: f64 = 1e-4;
+/// See [`PlantSamples::coarse`].
+const COARSE: usize = 4;
 /// Frequencies closer than this are one, in radians.
 const LEAST_DISTANCE: f64 = 1e-9;
 
@@ -24,7 +26,7 @@ const LEAST_DISTANCE: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(super) struct PlantSamples<'a> {
     pub(super) plant: &'a LiftedPlant,
-    /// The first GRID + 1 are uniform.
+    /// The first GRID + 1 are uniform, unless the samples are coarse.
     pub(super) samples: Vec<PlantSample>,
 }
 
@@ -61,6 +63,11 @@ impl<'a> PlantSamples<'a> {
             samples.add(omega);
         }
         Ok(samples)
+    }
+
+    /// One frequency in [`COARSE`], enough to rank candidates by their worst case.
+    pub(super) fn coarse(&self) -> Self {
+        Self { plant: self.plant, samples: self.samples.iter().step_by(COARSE).cloned().collect() }
     }
 
     /// Adds a frequency, unless it is known.

@@ -24,15 +24,22 @@ const ACCURACY: f64 = 1e-6;
 /// Poles keep this distance from the unit circle, unless the start is closer.
 const MARGIN: f64 = 1e-3;
 
+/// Dynamics with the error of their best output matrices at the sampled frequencies, infinite if unknown.
+#[derive(Debug, Clone)]
+pub(super) struct Refined {
+    pub(super) dynamics: Dynamics,
+    pub(super) error: f64,
+}
+
 /// Dynamics with a smaller error of the best output matrices, by at most `budget` evaluations.
 pub(super) fn refined(
     aim: Aim,
     samples: &PlantSamples<'_>,
     start: &Dynamics,
     budget: usize,
-) -> Result<Dynamics, DesignError> {
+) -> Result<Refined, DesignError> {
     if start.tail_order() == 0 || budget == 0 {
-        return Ok(start.clone());
+        return Ok(Refined { dynamics: start.clone(), error: f64::INFINITY });
     }
     let (start, sizes) = normalised(samples.plant, start)?;
     let largest_radius = (1.0 - MARGIN).max(start.spectral_radius());
@@ -50,9 +57,11 @@ pub(super) fn refined(
         Some((value, gradient.component_div(&units)))
     };
     let x = packed(&start.a, &start.b).component_mul(&units);
-    let Some((value, gradient)) = f(&x) else { return Ok(start) };
+    let Some((value, gradient)) = f(&x) else {
+        return Ok(Refined { dynamics: start, error: f64::INFINITY });
+    };
     let end = descend(&mut f, Evaluated { x, value, gradient }, budget);
-    Ok(unpacked(&start, &end.x.component_div(&units)))
+    Ok(Refined { dynamics: unpacked(&start, &end.x.component_div(&units)), error: end.value })
 }
 
 fn packed(a: &Mat, b: &Mat) -> Mat {
