@@ -17,7 +17,7 @@ fn frames(bytes: &[u8], buffer: usize) -> Option<Vec<u8>> {
     let frame = header.frame_bytes();
     let mut all = Vec::new();
     let mut block = vec![0; frame * buffer];
-    while let filled @ 1.. = reader.frames().fill(&mut block).expect("memory can be read") {
+    while let Ok(filled @ 1..) = reader.frames().fill(&mut block) {
         assert_eq!(filled % frame, 0);
         all.extend_from_slice(&block[..filled]);
     }

@@ -29,7 +29,7 @@ mod watch {
             if signals.forever().next().is_some() {
                 // The message may wait for its reader, the files must not.
                 remove_unfinished();
-                say_line("interrupted; nothing was written");
+                say_line("interrupted; no unfinished file is left");
                 std::process::exit(1);
             }
         });

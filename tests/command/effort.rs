@@ -112,7 +112,7 @@ fn an_interrupt_ends_a_design_at_once_and_leaves_no_file() {
         assert!(Command::new("kill").args(["-s", signal, &pid]).status().unwrap().success());
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1), "{output:?}");
-        assert_eq!(text(&output.stderr), "hybank: interrupted; nothing was written\n");
+        assert_eq!(text(&output.stderr), "hybank: interrupted; no unfinished file is left\n");
         assert_eq!(names(folder.path()), ["spec.toml"]);
     }
 }

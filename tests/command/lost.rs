@@ -70,15 +70,15 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
     let fuse = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"];
     for (policy, hold) in [("zero", 0.0), ("mask", 0.0), ("hold", 1.0)] {
         let want = fused(&filled(&whole, |last| hold * last));
-        for verb in [&stream[..], &fuse] {
-            let report = desk.report(&[verb, &told, &["--gaps", policy]].concat());
+        for command in [&stream[..], &fuse] {
+            let report = desk.report(&[command, &told, &["--gaps", policy]].concat());
             assert_eq!(report["gaps"]["list"], gaps(&[(1, 0, 2), (1, 7, 1), (1, 100, 1400)]));
             assert_eq!(
                 (report["gaps"]["missing"].as_u64(), report["frames"].as_u64()),
                 (Some(1403), Some(3000))
             );
             assert_eq!(report["replaced"], 0);
-            let got = match verb[0] {
+            let got = match command[0] {
                 "stream" => floats(&desk.read("out")),
                 _ => wav::samples(&desk, "out.wav"),
             };

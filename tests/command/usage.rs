@@ -51,8 +51,8 @@ fn completions_know_the_verbs() {
 fn help_and_version() {
     let desk = Desk::with_spec(THESIS);
     assert_eq!(desk.good(&["--version"]), format!("hybank {}\n", env!("CARGO_PKG_VERSION")));
-    for verb in ["design", "analyze", "simulate", "fuse", "stream", "demo", "completions"] {
-        let help = desk.good(&[verb, "--help"]);
-        assert!(help.contains("Examples:") && help.contains("Usage:"), "{verb}");
+    for command in ["design", "analyze", "simulate", "fuse", "stream", "demo", "completions"] {
+        let help = desk.good(&[command, "--help"]);
+        assert!(help.contains("Examples:") && help.contains("Usage:"), "{command}");
     }
 }

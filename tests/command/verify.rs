@@ -41,7 +41,7 @@ fn files() -> Vec<(String, String)> {
     made.into_iter().chain(ready.into_iter().map(named)).collect()
 }
 
-/// What the verb does with a file that has a digest and a certificate.
+/// What the command does with a file that has a digest and a certificate.
 fn accepted(text: &str) -> Result<(), String> {
     let bank = Bank::from_json(text, "b.json").map_err(|error| error.to_string())?;
     match check_digest(text, "b.json") {

@@ -105,7 +105,7 @@ fn table() -> Vec<Case> {
 }
 
 /// A bank of zeros on the case's front ends: the recursion does not ask for the filters.
-fn silent(spec: &Spec) -> Bank {
+fn zero_output(spec: &Spec) -> Bank {
     let filters = SynthesisFilters::Fir(vec![vec![0.0]; spec.channels.len()]);
     Bank {
         spec: Some(spec.clone()),
@@ -122,7 +122,7 @@ fn the_recursion_refutes_what_no_causal_bank_reaches_and_nothing_else() {
     let mut reached = [0usize; 7];
     let cases: Vec<Case> = golden().into_iter().chain(table()).collect();
     for Case { name, spec, optimum, noncausal } in &cases {
-        let bank = silent(spec);
+        let bank = zero_output(spec);
         let error = EnclosedErrorSystem::new(&bank).unwrap();
         let begin = std::time::Instant::now();
         for precision in [Precision::Short, Precision::Long] {

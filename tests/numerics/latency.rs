@@ -182,8 +182,8 @@ fn a_latency_that_the_taps_do_not_reach_is_refused() {
     assert_eq!(latency(&late), Ok(55));
     let refused = refusal(&late, 5);
     let DesignError::OutOfReach { shortest, .. } = refused else { panic!("{refused}") };
-    // At the edge of what is reached, gamma is nearly that of silence already.
-    let silence = error(&Spec { design: DesignSpec::new(Method::Iir, None), ..late.clone() }, 0);
+    // At the edge of what is reached, gamma is nearly that of zero output already.
+    let zero_output = error(&Spec { design: DesignSpec::new(Method::Iir, None), ..late.clone() }, 0);
     let reached = error(&late, shortest);
-    assert!(reached > 0.9 * silence, "{reached} of {silence}");
+    assert!(reached > 0.9 * zero_output, "{reached} of {zero_output}");
 }

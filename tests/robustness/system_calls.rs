@@ -57,7 +57,7 @@ fn counts(job: &Job) -> Vec<usize> {
 }
 
 #[derive(Default)]
-struct Seen {
+struct Tally {
     errors: usize,
     /// The run succeeded all the same, with whole outputs.
     done: usize,
@@ -78,14 +78,14 @@ fn a_failing_call_is_an_error_of_one_line_or_none_at_all() {
     for job in jobs(&desk) {
         let counts = counts(&job);
         let called: Vec<_> = (0..CALLS.len()).filter(|&call| counts[call] > 0).collect();
-        let mut seen = Seen::default();
+        let mut tally = Tally::default();
         for round in 0..rounds(12) {
             let call = called[round % called.len()];
             let (name, errors) = CALLS[call];
             let when = 1 + dice.below(counts[call]);
-            fail(&job, name, dice.of(errors), when, dice.below(2) == 0, &mut seen);
+            fail(&job, name, dice.of(errors), when, dice.below(2) == 0, &mut tally);
         }
-        let Seen { errors, done, refused, not_started } = seen;
+        let Tally { errors, done, refused, not_started } = tally;
         println!(
             "{}: {errors} errors, {done} done all the same, {refused} refused, {not_started} not started",
             job.args.join(" ")
@@ -94,21 +94,21 @@ fn a_failing_call_is_an_error_of_one_line_or_none_at_all() {
 }
 
 /// One run whose call number `when` of this name fails.
-fn fail(job: &Job, call: &str, error: &str, when: usize, old: bool, seen: &mut Seen) {
+fn fail(job: &Job, call: &str, error: &str, when: usize, old: bool, tally: &mut Tally) {
     let before = job.prepare(old);
     let inject = format!("inject={call}:error={error}:when={when}");
     let trace = format!("trace={call}");
     let output = strace(job, &["-o", "/dev/null", "-e", &trace, "-e", &inject]).output().unwrap();
     let message = text(&output.stderr);
     let what = format!("{:?}, {inject}, old {old}: {message}", job.args);
-    seen.errors += 1;
+    tally.errors += 1;
     match output.status.code() {
         Some(0) => {
-            seen.done += 1;
+            tally.done += 1;
             assert_eq!(job.judge(&before, &what), Some(true), "{what}");
         }
         Some(1) => {
-            seen.refused += 1;
+            tally.refused += 1;
             // A report that cannot be printed comes after the outputs.
             let reported = message.contains("standard output: cannot write it");
             assert_eq!(job.judge(&before, &what), Some(reported), "{what}");
@@ -117,7 +117,7 @@ fn fail(job: &Job, call: &str, error: &str, when: usize, old: bool, seen: &mut S
             assert!(lines == 1 || (lines == 0 && call == "write"), "{what}");
             assert!(message.starts_with("hybank: ") || call == "write", "{what}");
         }
-        Some(127) if message.contains("shared librar") => seen.not_started += 1,
+        Some(127) if message.contains("shared librar") => tally.not_started += 1,
         _ => panic!("{:?}: {what}", output.status),
     }
     let unfinished = job.unfinished();

@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 
 /// Shorter designs say nothing on a terminal.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Time between two looks at the clock.
-const TICK: Duration = Duration::from_millis(125);
+/// Time between two updates of the display on a terminal.
+const REDRAW_INTERVAL: Duration = Duration::from_millis(125);
 /// Time between two lines where stderr is no terminal.
 const LINE: Duration = Duration::from_secs(30);
 
@@ -29,21 +29,21 @@ impl Progress {
         *self.now.lock().unwrap_or_else(PoisonError::into_inner) = Some((stage, seconds));
     }
 
-    /// Runs `work` and tells meanwhile what it does. Without a thread for that, nothing is told.
+    /// Runs `work` and shows meanwhile what it does. Without a thread for that, nothing is shown.
     pub(super) fn during<T>(&self, work: impl FnOnce() -> T) -> T {
         thread::scope(|scope| {
             let (done_sender, done): (Sender<()>, _) = bounded(0);
             // A thread that cannot be started is no reason to fail.
-            let told =
-                thread::Builder::new().name("progress".into()).spawn_scoped(scope, move || self.tell(&done));
+            let display =
+                thread::Builder::new().name("progress".into()).spawn_scoped(scope, move || self.report(&done));
             let result = work();
             drop(done_sender);
-            drop(told);
+            drop(display);
             result
         })
     }
 
-    fn tell(&self, done: &Receiver<()>) {
+    fn report(&self, done: &Receiver<()>) {
         let begin = Instant::now();
         if std::io::stderr().is_terminal() {
             self.draw(begin, done);
@@ -61,7 +61,7 @@ impl Progress {
         let bar = ProgressBar::new_spinner();
         let bar = ProgressStyle::with_template("{spinner} {msg}")
             .map_or(bar.clone(), |style| bar.with_style(style));
-        while wait(done, TICK) {
+        while wait(done, REDRAW_INTERVAL) {
             bar.set_message(self.text(begin).unwrap_or_default());
             bar.tick();
         }

@@ -8,7 +8,7 @@
 mod reach;
 mod recursive;
 mod search;
-mod window_errors;
+mod history_errors;
 
 use super::DesignError;
 use super::effort::{self, Limits};
@@ -45,8 +45,8 @@ pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
     Ok(complete)
 }
 
-/// The spec of [`with_taps`] with nothing left open: a latency as well. `compared` is told how many designs
-/// were compared.
+/// The spec of [`with_taps`] with nothing left open: a latency as well. `compared` receives the number of
+/// designs that were compared.
 ///
 /// # Errors
 /// As [`latency`].
@@ -109,7 +109,7 @@ fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignEr
 fn for_fir(problem: &Problem, taps: usize, compared: Compared<'_>) -> Result<usize, DesignError> {
     let latencies = reach::candidates(problem, taps);
     let reach = Reach::new(problem, taps, &latencies)?;
-    let floor = floor(problem, reach.silence())?;
+    let floor = floor(problem, reach.zero_output())?;
     let search = Search::new(latencies.map(|latency| reach.bound_of_choice(latency)), floor);
     search.shortest(compared, |latency, hopeless| {
         fir::bracket(&plant(problem, latency)?, taps, ACCURACY, hopeless)
@@ -120,7 +120,7 @@ fn for_fir(problem: &Problem, taps: usize, compared: Compared<'_>) -> Result<usi
 /// are tried.
 fn for_iir(problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignError> {
     let errors = CausalErrors::new(problem)?;
-    let floor = floor(problem, errors.silence())?;
+    let floor = floor(problem, errors.zero_output())?;
     let mut designs = 0;
     let gamma = |latency: usize| {
         designs += 1;
@@ -152,9 +152,9 @@ fn plant(problem: &Problem, latency: usize) -> Result<LiftedPlant, DesignError> 
 }
 
 /// A lower bound of gamma for all filters of any latency: the noncausal bound. Delays by whole slow periods
-/// do not change it, so it is computed without them. Gammas that are [`NEGLIGIBLE`] relative to `silence`
+/// do not change it, so it is computed without them. Gammas that are [`NEGLIGIBLE`] relative to `zero_output`
 /// count as equal.
-fn floor(problem: &Problem, silence: f64) -> Result<f64, DesignError> {
+fn floor(problem: &Problem, zero_output: f64) -> Result<f64, DesignError> {
     let within_a_period = |channel: &Channel| Channel {
         delay: FastPeriods(channel.delay.0.rem_euclid(problem.ratio as f64)),
         ..*channel
@@ -162,7 +162,7 @@ fn floor(problem: &Problem, silence: f64) -> Result<f64, DesignError> {
     let channels = problem.channels.iter().map(within_a_period).collect();
     let prompt = Problem { latency: problem.ratio - 1, channels, ..problem.clone() };
     let noncausal = LiftedPlant::new(&prompt)?.noncausal_bound()?.gain;
-    Ok(noncausal.max(NEGLIGIBLE * silence))
+    Ok(noncausal.max(NEGLIGIBLE * zero_output))
 }
 
 #[cfg(test)]

@@ -3,13 +3,13 @@
 //!
 //! Phase p of the output has `J_p = ceil((taps - p) / M)` lags, so it sees the newest `J_p` frames. Its
 //! least mean-square error depends only on the instant `p - m0` of the target relative to these frames:
-//! see [`WindowErrors`].
+//! see [`HistoryErrors`].
 //!
 //! The errors bound gamma from below. White noise of unit density has the error `||K_p||_2^2` at phase p,
 //! the mean over frequency of a square that is nowhere above gamma^2, so gamma^2 is at least the largest of
 //! them.
 
-use super::window_errors::WindowErrors;
+use super::history_errors::HistoryErrors;
 use crate::design::DesignError;
 use crate::design::merging::Repeats;
 use crate::design::problem::Problem;
@@ -17,7 +17,7 @@ use crate::spec::MAX_LATENCY;
 use crate::units::FastPeriods;
 use std::ops::RangeInclusive;
 
-/// Share of the target's power that some phase must be able to remove. Below it gamma is that of silence.
+/// Share of the target's power that some phase must be able to remove. Below it gamma is that of zero output.
 const LEAST_REMOVED: f64 = 1e-3;
 /// Front ends with more states in all are replaced by the target's, so that the errors cost little.
 const MOST_STATES: usize = 64;
@@ -30,8 +30,8 @@ pub(super) struct Reach {
     ratio: usize,
     taps: usize,
     /// For the phases with the most lags, and for those with one lag less.
-    long: WindowErrors,
-    short: WindowErrors,
+    long: HistoryErrors,
+    short: HistoryErrors,
     /// The errors are those of the given front ends.
     exact: bool,
 }
@@ -40,7 +40,7 @@ impl Reach {
     /// Of `taps` taps per channel.
     ///
     /// # Errors
-    /// As [`WindowErrors::new`].
+    /// As [`HistoryErrors::new`].
     pub(super) fn new(
         problem: &Problem,
         taps: usize,
@@ -49,14 +49,14 @@ impl Reach {
         let (problem, exact) = manageable(problem);
         let ratio = problem.ratio;
         let instants = -(*latencies.end() as i64)..=(ratio as i64 - 1 - *latencies.start() as i64);
-        let errors = |frames: usize| WindowErrors::new(&problem, frames, instants.clone());
+        let errors = |frames: usize| HistoryErrors::new(&problem, frames, instants.clone());
         let long = errors(taps.div_ceil(ratio))?;
         let short = if taps.is_multiple_of(ratio) { long.clone() } else { errors(taps / ratio)? };
         Ok(Self { ratio, taps, long, short, exact })
     }
 
     /// The rms of the target, the error of a bank that outputs zeros.
-    pub(super) fn silence(&self) -> f64 {
+    pub(super) fn zero_output(&self) -> f64 {
         self.long.power.sqrt()
     }
 
@@ -65,8 +65,8 @@ impl Reach {
         let most = self.taps.div_ceil(self.ratio);
         (0..self.ratio).map(move |p| {
             let has_most = self.taps.saturating_sub(p).div_ceil(self.ratio) == most;
-            let window = if has_most { &self.long } else { &self.short };
-            window.at(p as i64 - latency as i64)
+            let history = if has_most { &self.long } else { &self.short };
+            history.at(p as i64 - latency as i64)
         })
     }
 

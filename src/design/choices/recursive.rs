@@ -2,7 +2,7 @@
 //! sample is a bank of one more sample of latency, so neither error grows with the latency.
 
 use super::search::WORTHWHILE;
-use super::window_errors::WindowErrors;
+use super::history_errors::HistoryErrors;
 use crate::design::DesignError;
 use crate::design::problem::Problem;
 use std::collections::BTreeMap;
@@ -24,14 +24,14 @@ pub(super) struct CausalErrors {
     /// The root of the largest mean square of any phase: a lower bound of gamma, up to [`SAME_ERROR`].
     worst: Vec<f64>,
     /// The rms of the target, the error of a bank that outputs zeros.
-    silence: f64,
+    zero_output: f64,
 }
 
 impl CausalErrors {
     /// Up to [`LONGEST_PERIODS`] beyond the longest delay.
     ///
     /// # Errors
-    /// As [`WindowErrors::new`].
+    /// As [`HistoryErrors::new`].
     pub(super) fn new(problem: &Problem) -> Result<Self, DesignError> {
         let longest = problem.longest_delay().0.ceil() as usize + LONGEST_PERIODS * problem.ratio;
         let mut frames = longest.div_ceil(problem.ratio) + HISTORY.0;
@@ -52,20 +52,20 @@ impl CausalErrors {
 
     fn with_history(problem: &Problem, longest: usize, frames: usize) -> Result<Self, DesignError> {
         let ratio = problem.ratio as i64;
-        let window = WindowErrors::new(problem, frames, -(longest as i64)..=ratio - 1)?;
-        let least = NEGLIGIBLE * NEGLIGIBLE * window.power;
+        let history = HistoryErrors::new(problem, frames, -(longest as i64)..=ratio - 1)?;
+        let least = NEGLIGIBLE * NEGLIGIBLE * history.power;
         let errors = |latency: usize| (0..ratio).map(move |p| p - latency as i64);
-        let square = |latency: usize| errors(latency).map(|at| window.at(at).max(least));
+        let square = |latency: usize| errors(latency).map(|at| history.at(at).max(least));
         Ok(Self {
             rms: (0..=longest).map(|m| (square(m).sum::<f64>() / ratio as f64).sqrt()).collect(),
             worst: (0..=longest).map(|m| square(m).fold(0.0, f64::max).sqrt()).collect(),
-            silence: window.power.sqrt(),
+            zero_output: history.power.sqrt(),
         })
     }
 
     /// The rms of the target.
-    pub(super) fn silence(&self) -> f64 {
-        self.silence
+    pub(super) fn zero_output(&self) -> f64 {
+        self.zero_output
     }
 
     /// The shortest latency whose rms error is within [`WORTHWHILE`] of the least.
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     fn errors(rms: Vec<f64>) -> CausalErrors {
-        CausalErrors { worst: rms.clone(), rms, silence: 1.0 }
+        CausalErrors { worst: rms.clone(), rms, zero_output: 1.0 }
     }
 
     #[test]

@@ -63,7 +63,7 @@ impl Search {
 
     /// The shortest latency whose gamma is within [`WORTHWHILE`] of the least. `design(latency,
     /// hopeless)` gives bounds of gamma; it may end early with a lower bound above `hopeless`. `compared`
-    /// is told the number of designs so far.
+    /// receives the number of designs so far.
     ///
     /// # Errors
     /// The first error of `design`, if it succeeds for no latency.

@@ -1,4 +1,4 @@
-use super::window_errors::WindowErrors;
+use super::history_errors::HistoryErrors;
 use super::*;
 use crate::lmi::sampled;
 
@@ -22,7 +22,7 @@ fn one_pole_has_closed_forms() {
     let p = 0.3;
     let problem = problem("{ num = [0.3], den = [1.0, 0.3] }", 4, &[1.5]);
     // Samples at -1.5, -5.5, -9.5.
-    let errors = WindowErrors::new(&problem, 3, -30..=6).unwrap();
+    let errors = HistoryErrors::new(&problem, 3, -30..=6).unwrap();
     let power = 0.5 * p;
     assert!((errors.power / power - 1.0).abs() < 1e-12);
     let apart = |t: f64| power * (1.0 - (-2.0 * p * t).exp());

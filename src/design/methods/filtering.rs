@@ -112,7 +112,7 @@ impl RiccatiSolver for Innovations {
             return if self.conclusive { Trial::Impossible } else { Trial::Unresolved };
         };
         match riccati::solve_doubling(&f.transpose(), &g, &h) {
-            RiccatiOutcome::Solved(solution) => self.judge(&solution),
+            RiccatiOutcome::Solved(solution) => self.evaluate(&solution),
             RiccatiOutcome::Unresolved { .. } => Trial::Unresolved,
         }
     }
@@ -129,9 +129,9 @@ impl Innovations {
     /// Separates the measured inputs (w1) from the rest (w2) by one LQ factorisation.
     pub(super) fn new(plant: &LiftedPlant) -> Result<Self, DesignError> {
         let sizes = output_sizes(plant.system())?;
-        let (direct, behind): (Vec<usize>, Vec<usize>) =
+        let (direct, delayed): (Vec<usize>, Vec<usize>) =
             (0..plant.channels()).partition(|&channel| plant.chain(channel).is_empty());
-        let delayed = behind
+        let delayed = delayed
             .into_iter()
             .map(|channel| DelayedChannel { channel, chain: plant.chain(channel), size: sizes[channel] })
             .collect();
@@ -276,7 +276,7 @@ impl Innovations {
     /// decreases through the optimum, that margin closes, and an eigenvalue of P goes through infinity and
     /// becomes negative. Only such an eigenvalue counts as a proof that gamma is impossible. Rounding
     /// errors affect the margin, so the caller computes the norm of the error system of the filter.
-    fn judge(&self, solution: &RiccatiSolution) -> Trial {
+    fn evaluate(&self, solution: &RiccatiSolution) -> Trial {
         let p = &solution.x + &self.p0;
         let Ok(eigenvalues) = linalg::symmetric_eigenvalues(&p) else { return Trial::Unresolved };
         let largest = eigenvalues.iter().fold(0.0_f64, |m, e| m.max(e.abs()));

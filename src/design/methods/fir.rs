@@ -75,7 +75,7 @@ fn usual_margin(noise: &[f64]) -> f64 {
 }
 
 /// Taps with their norm.
-struct Judged {
+struct Evaluated {
     taps: Vec<Vec<f64>>,
     /// Their norm, estimated on the grid.
     estimate: f64,
@@ -88,7 +88,7 @@ fn least_gamma(
     plant: &LiftedPlant,
     length: usize,
     exchange: &mut Exchange<ErrorGrid<'_>>,
-) -> Result<Judged, DesignError> {
+) -> Result<Evaluated, DesignError> {
     let mut best = judged(plant, length, exchange)?;
     for _ in 0..SURPRISE_LIMIT {
         let missed = best.peak.gain > best.estimate * (1.0 + GAMMA_ACCURACY);
@@ -107,9 +107,9 @@ fn judged(
     plant: &LiftedPlant,
     length: usize,
     exchange: &mut Exchange<ErrorGrid<'_>>,
-) -> Result<Judged, DesignError> {
+) -> Result<Evaluated, DesignError> {
     let found = exchange.optimise()?;
     let taps = impulse_responses(&found.taps, length);
     let peak = plant.fir_norm(&taps)?;
-    Ok(Judged { taps, estimate: found.peaks.estimate, peak })
+    Ok(Evaluated { taps, estimate: found.peaks.estimate, peak })
 }

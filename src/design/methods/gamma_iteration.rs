@@ -25,7 +25,7 @@ const WORTHWHILE: f64 = 0.9;
 
 /// Filters with the norm of their error system.
 #[derive(Debug, Clone)]
-pub(super) struct Judged {
+pub(super) struct Evaluated {
     filters: Filter,
     pub(super) peak: Peak,
 }
@@ -49,7 +49,7 @@ pub(super) struct GammaIteration<'a> {
     feedthrough: f64,
     /// No causal filter achieves less.
     lower: f64,
-    best: Option<Judged>,
+    best: Option<Evaluated>,
     /// Riccati equations solved.
     trials: usize,
     negligible: f64,
@@ -98,10 +98,10 @@ impl<'a> GammaIteration<'a> {
 
     /// The filters with their norm; `None` if rounding errors made the filters unstable or are as large as
     /// the norm.
-    pub(super) fn judge(&self, filters: Filter) -> Result<Option<Judged>, DesignError> {
+    pub(super) fn evaluate(&self, filters: Filter) -> Result<Option<Evaluated>, DesignError> {
         match self.plant.norm(&filters) {
             Ok(peak) if self.plant.rounding(&filters)? < peak.gain || self.is_negligible(peak.gain) => {
-                Ok(Some(Judged { filters, peak }))
+                Ok(Some(Evaluated { filters, peak }))
             }
             Ok(_) => Ok(None),
             Err(DesignError::Lti(LtiError::Unstable { .. })) => Ok(None),
@@ -109,7 +109,7 @@ impl<'a> GammaIteration<'a> {
         }
     }
 
-    fn keep(&mut self, found: Judged) {
+    fn keep(&mut self, found: Evaluated) {
         if self.best.as_ref().is_none_or(|best| found.peak.gain < best.peak.gain) {
             self.best = Some(found);
         }
@@ -131,7 +131,7 @@ impl<'a> GammaIteration<'a> {
     ) -> Result<(), DesignError> {
         self.trials += 1;
         for filters in mean_square {
-            if let Some(found) = self.judge(filters)? {
+            if let Some(found) = self.evaluate(filters)? {
                 self.keep(found);
                 break;
             }
@@ -157,7 +157,7 @@ impl<'a> GammaIteration<'a> {
             self.trials += 1;
             match solver.h_infinity(gamma) {
                 Trial::Achieved(filters) => {
-                    let Some(found) = self.judge(filters.clone())? else { continue };
+                    let Some(found) = self.evaluate(filters.clone())? else { continue };
                     let promise_kept = found.peak.gain <= gamma * (1.0 + 0.1 * GAMMA_ACCURACY);
                     self.keep(found);
                     if promise_kept {
@@ -255,13 +255,13 @@ impl<'a> GammaIteration<'a> {
     ///
     /// # Errors
     /// [`DesignError::RiccatiFailed`] if there are none.
-    pub(super) fn best(&self) -> Result<Judged, DesignError> {
+    pub(super) fn best(&self) -> Result<Evaluated, DesignError> {
         self.best.clone().ok_or_else(|| DesignError::RiccatiFailed { gamma: self.zero_output_norm() })
     }
 
     /// `chosen` with the bounds that were found.
-    pub(super) fn synthesis(&self, chosen: Judged) -> Synthesis {
-        let Judged { filters, peak } = chosen;
+    pub(super) fn synthesis(&self, chosen: Evaluated) -> Synthesis {
+        let Evaluated { filters, peak } = chosen;
         Synthesis {
             filters: Filters::StateSpace(filters),
             peak,

@@ -2,7 +2,7 @@
 //! gamma-iteration (thesis 5.3).
 
 use super::filtering::{Innovations, Trial};
-use super::gamma_iteration::{GammaIteration, Judged};
+use super::gamma_iteration::{GammaIteration, Evaluated};
 use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
 use super::{Settings, Synthesis};
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
@@ -63,16 +63,16 @@ fn refine<F: Number>(
 /// A central filter whose norm is within `margin` of the optimum, if one is asked for and found.
 fn relaxed(
     iteration: &mut GammaIteration<'_>,
-    optimum: &Judged,
+    optimum: &Evaluated,
     margin: f64,
-) -> Result<Option<Judged>, DesignError> {
+) -> Result<Option<Evaluated>, DesignError> {
     if margin <= 0.0 || iteration.is_negligible(optimum.peak.gain) {
         return Ok(None);
     }
     let cap = optimum.peak.gain * (1.0 + margin);
     for solver in iteration.solvers() {
         let Trial::Achieved(filters) = solver.h_infinity(cap) else { continue };
-        let Some(relaxed) = iteration.judge(filters)? else { continue };
+        let Some(relaxed) = iteration.evaluate(filters)? else { continue };
         if relaxed.peak.gain <= cap {
             return Ok(Some(relaxed));
         }

@@ -54,9 +54,9 @@ impl<'a> Enumeration<'a> {
     pub(super) fn may_reach(&self, fraction_bits: i32, bar: f64) -> bool {
         let most = self.spans.iter().map(|span| span.most.max(-span.least)).fold(0.0, f64::max);
         let taps = most * (-f64::from(fraction_bits)).exp2();
-        let silence = vec![0.0; self.spans.len()];
+        let zero_output = vec![0.0; self.spans.len()];
         (0..self.errors.count()).all(|k| {
-            let gain = linalg::largest_singular_value_c(&self.errors.at(k, &silence));
+            let gain = linalg::largest_singular_value_c(&self.errors.at(k, &zero_output));
             gain.is_ok_and(|gain| gain - self.errors.reach(k, taps) < bar)
         })
     }

@@ -69,7 +69,7 @@ impl<'a> Quantiser<'a> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
         let fitting = Search::new(&self.error, bits, finest);
         let rounded = self.error.gamma(&fitting.rounded())?;
-        let mut found = vec![self.error.candidate(fitting.silence())?];
+        let mut found = vec![self.error.candidate(fitting.zero_output())?];
         found.extend(fitting.run()?);
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
             found.extend(Search::new(&self.error, bits, finest + 1).run()?);

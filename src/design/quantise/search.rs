@@ -70,7 +70,7 @@ impl<'a> Search<'a> {
     }
 
     /// All taps zero.
-    pub(super) fn silence(&self) -> FixedPoint {
+    pub(super) fn zero_output(&self) -> FixedPoint {
         self.fixed_point(&self.centre.iter().map(|list| vec![0.0; list.len()]).collect())
     }
 

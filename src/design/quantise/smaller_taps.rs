@@ -18,15 +18,15 @@ pub(super) struct SmallerTaps {
     pub(super) taps: Vec<Vec<f64>>,
 }
 
-/// For each of some gammas below that of silence the taps of least Euclidean norm, the largest taps first.
+/// For each of some gammas below that of zero output the taps of least Euclidean norm, the largest taps first.
 pub(super) fn smaller_taps(error: &TapError<'_>) -> Vec<SmallerTaps> {
-    let silence = silence(error);
+    let zero_output = zero_output(error);
     let caps = LOSSES_DB.map(|db| error.real_gamma * 10f64.powf(db / 20.0));
-    caps.into_iter().take_while(|cap| *cap < silence).map_while(|cap| under_cap(error, cap)).collect()
+    caps.into_iter().take_while(|cap| *cap < zero_output).map_while(|cap| under_cap(error, cap)).collect()
 }
 
 /// An upper bound of the gamma of zero taps.
-fn silence(error: &TapError<'_>) -> f64 {
+fn zero_output(error: &TapError<'_>) -> f64 {
     error.grid.points().iter().map(|point| point.w.norm()).fold(0.0, f64::max)
 }
 

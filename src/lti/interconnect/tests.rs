@@ -177,21 +177,21 @@ fn fir_filters_are_their_polynomial() {
 #[test]
 fn what_does_not_fit_is_told_with_both_sizes() {
     let (g, h) = (StateSpace::gain(Mat::zeros(3, 2)), StateSpace::gain(Mat::zeros(4, 5)));
-    let told = |error: StateSpaceError, sizes: [&str; 2]| {
+    let refused = |error: StateSpaceError, sizes: [&str; 2]| {
         let text = error.to_string();
         assert!(sizes.iter().all(|size| text.contains(size)), "{text}");
     };
-    told(g.series(&h).unwrap_err(), ["3x2", "4x5"]);
-    told(g.parallel(&h).unwrap_err(), ["3x2", "4x5"]);
-    told(g.subtract(&h).unwrap_err(), ["3x2", "4x5"]);
-    told(g.stack(&h).unwrap_err(), ["3x2", "4x5"]);
-    told(g.cascade(0..2, &h).unwrap_err(), ["2x2", "4x5"]);
-    told(g.map_inputs(&Mat::zeros(3, 1)).unwrap_err(), ["2 inputs", "3x1"]);
-    told(g.map_outputs(&Mat::zeros(3, 1)).unwrap_err(), ["3 outputs", "3x1"]);
-    told(g.scale_inputs(&[1.0]).unwrap_err(), ["2 inputs", "1x1"]);
-    told(g.scale_outputs(&[1.0]).unwrap_err(), ["3 outputs", "1x1"]);
-    told(g.select_outputs([0, 3]).unwrap_err(), ["number 3", "3 outputs"]);
-    told(g.select_inputs(1..9).unwrap_err(), ["number 2", "2 inputs"]);
-    told(g.select_states([0]).unwrap_err(), ["number 0", "0 states"]);
-    told(StateSpace::fir(&[Mat::zeros(1, 2), Mat::zeros(2, 2)]).unwrap_err(), ["1x2", "2x2"]);
+    refused(g.series(&h).unwrap_err(), ["3x2", "4x5"]);
+    refused(g.parallel(&h).unwrap_err(), ["3x2", "4x5"]);
+    refused(g.subtract(&h).unwrap_err(), ["3x2", "4x5"]);
+    refused(g.stack(&h).unwrap_err(), ["3x2", "4x5"]);
+    refused(g.cascade(0..2, &h).unwrap_err(), ["2x2", "4x5"]);
+    refused(g.map_inputs(&Mat::zeros(3, 1)).unwrap_err(), ["2 inputs", "3x1"]);
+    refused(g.map_outputs(&Mat::zeros(3, 1)).unwrap_err(), ["3 outputs", "3x1"]);
+    refused(g.scale_inputs(&[1.0]).unwrap_err(), ["2 inputs", "1x1"]);
+    refused(g.scale_outputs(&[1.0]).unwrap_err(), ["3 outputs", "1x1"]);
+    refused(g.select_outputs([0, 3]).unwrap_err(), ["number 3", "3 outputs"]);
+    refused(g.select_inputs(1..9).unwrap_err(), ["number 2", "2 inputs"]);
+    refused(g.select_states([0]).unwrap_err(), ["number 0", "0 states"]);
+    refused(StateSpace::fir(&[Mat::zeros(1, 2), Mat::zeros(2, 2)]).unwrap_err(), ["1x2", "2x2"]);
 }

@@ -120,10 +120,10 @@ fn empty_recordings_give_an_empty_one_with_a_warning() {
         let args =
             [&["fuse", "bank.json", "empty.wav", "empty.wav", "-o", "out.wav", "--force"], more].concat();
         let output = desk.run(&args, &[]);
-        let told = text(&output.stderr);
-        assert!(output.status.success() && output.stdout.is_empty(), "{args:?}: {told}");
-        assert!(told.starts_with("hybank: warning: empty.wav") && told.contains("length is zero"), "{told}");
-        assert_eq!(told.trim_end().lines().count(), 1, "{told}");
+        let stderr = text(&output.stderr);
+        assert!(output.status.success() && output.stdout.is_empty(), "{args:?}: {stderr}");
+        assert!(stderr.starts_with("hybank: warning: empty.wav") && stderr.contains("length is zero"), "{stderr}");
+        assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
         let (spec, samples) = wav::read(&desk.path("out.wav"));
         assert_eq!((spec.sample_rate, spec.channels, samples.len()), (48_000, 1, 0), "{args:?}");
     }
@@ -140,7 +140,7 @@ fn a_truncated_file_gives_what_is_whole() {
     desk.write("a.wav", &bytes[..bytes.len() - 41]);
     let output = desk.run(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"], &[]);
     assert!(output.status.success());
-    let told = text(&output.stderr);
-    assert!(told.contains("41 bytes") && told.contains("3 bytes of it"), "{told}");
+    let stderr = text(&output.stderr);
+    assert!(stderr.contains("41 bytes") && stderr.contains("3 bytes of it"), "{stderr}");
     assert_eq!(wav::samples(&desk, "out.wav"), fused(&interleaved(&a[..89], &b[..89])));
 }

@@ -16,12 +16,12 @@ const MOST_BITS: usize = 14;
 
 /// A bank of integer taps beside the best one.
 #[derive(Debug)]
-struct Judged {
+struct Outcome {
     name: String,
     /// gamma of the integers found over that of the best integers, in decibels.
     above_db: f64,
-    /// gamma of the integers found over that of silence, in decibels.
-    above_silence_db: f64,
+    /// gamma of the integers found over that of zero output, in decibels.
+    above_zero_output_db: f64,
     /// Time of the design.
     seconds: f64,
 }
@@ -50,7 +50,7 @@ fn case(number: u64) -> (Spec, u32) {
     }
 }
 
-fn judged(spec: &Spec, bits: u32) -> Judged {
+fn outcome(spec: &Spec, bits: u32) -> Outcome {
     let mut spec = spec.clone();
     spec.design.bits = Some(WordLengths::Same(bits));
     let begin = std::time::Instant::now();
@@ -65,12 +65,12 @@ fn judged(spec: &Spec, bits: u32) -> Judged {
         None => gamma,
     };
     let zeros = vec![vec![0.0; taps[0].len()]; taps.len()];
-    let silence = plant.fir_norm(&zeros).unwrap().gain;
+    let zero_output = plant.fir_norm(&zeros).unwrap().gain;
     let db = |ratio: f64| 20.0 * ratio.log10();
-    Judged {
+    Outcome {
         name: spec.name.clone(),
         above_db: db(gamma / best),
-        above_silence_db: db(gamma / silence),
+        above_zero_output_db: db(gamma / zero_output),
         seconds,
     }
 }
@@ -80,25 +80,25 @@ fn small_banks_are_within_a_tenth_of_a_decibel_of_all_integers() {
     let cases = wanted("HYBANK_INTEGER_CASES", 40);
     let all = each(cases, |number| {
         let (spec, bits) = case(number);
-        judged(&spec, bits)
+        outcome(&spec, bits)
     });
     let above = |db: f64| all.iter().filter(|case| case.above_db > db).count();
-    for Judged { name, above_db, above_silence_db, .. } in &all {
-        if *above_db > 0.1 || *above_silence_db > 1e-6 {
-            println!("{name}: {above_db:.3} dB above the best, {above_silence_db:.3} dB above silence");
+    for Outcome { name, above_db, above_zero_output_db, .. } in &all {
+        if *above_db > 0.1 || *above_zero_output_db > 1e-6 {
+            println!("{name}: {above_db:.3} dB above the best, {above_zero_output_db:.3} dB above zero output");
         }
     }
     let worst = all.iter().map(|case| case.above_db).fold(0.0, f64::max);
-    let worse_than_silence = all.iter().filter(|case| case.above_silence_db > 1e-6).count();
+    let worse_than_zero_output = all.iter().filter(|case| case.above_zero_output_db > 1e-6).count();
     let seconds: f64 = all.iter().map(|case| case.seconds).sum();
     println!(
         "{} cases: {} more than 0.1 dB above the best integers, {} more than 3 dB, worst {worst:.2} dB, \
-         {worse_than_silence} worse than silence; {seconds:.1} s of design",
+         {worse_than_zero_output} worse than zero output; {seconds:.1} s of design",
         all.len(),
         above(0.1),
         above(3.0)
     );
-    assert_eq!(worse_than_silence, 0);
+    assert_eq!(worse_than_zero_output, 0);
     assert!(above(0.1) * 100 <= all.len(), "{} of {}", above(0.1), all.len());
 }
 
@@ -108,8 +108,8 @@ fn nearly_equal_channels_find_a_scale() {
     for apart in [1e-2, 1e-4, 1e-6] {
         let spec = with_taps(alike(&butterworth(2, 0.5), 2, 1, &[0.6, 0.6 + apart]), 1);
         for bits in [3, 4, 8] {
-            let judged = judged(&Spec { name: format!("{apart} apart, {bits} bits"), ..spec.clone() }, bits);
-            assert!(judged.above_db < 0.1 && judged.above_silence_db < -1.0, "{judged:?}");
+            let outcome = outcome(&Spec { name: format!("{apart} apart, {bits} bits"), ..spec.clone() }, bits);
+            assert!(outcome.above_db < 0.1 && outcome.above_zero_output_db < -1.0, "{outcome:?}");
         }
     }
 }

@@ -129,12 +129,12 @@ mod tests {
     use std::fs;
     use std::path::Path;
 
-    /// A workspace of so many files, with the rules `a -> b`, `b -> nobody`.
+    /// A workspace of so many files, with the rules `a -> b`, `b -> nothing`.
     fn faults(files: &[(&str, &str)]) -> Vec<String> {
         let name =
             format!("arrows-{}-{}", std::process::id(), files.iter().map(|f| f.1.len()).sum::<usize>());
         let folder = std::env::temp_dir().join(name);
-        let rules = "## Who may import whom\n```text\na -> b   b -> nobody\n```\n";
+        let rules = "## Who may import whom\n```text\na -> b   b -> nothing\n```\n";
         for (path, text) in
             [("ARCHITECTURE.md", rules), ("src/lib.rs", "pub mod a; pub mod b;")].iter().chain(files)
         {

@@ -1,6 +1,6 @@
 //! The arrows that ARCHITECTURE.md allows, read from the first block of code below "Who may import whom".
 //!
-//! One or more statements a line, two spaces apart: `rooms -> rooms`, both separated by commas; `everything` and `nobody`
+//! One or more statements a line, two spaces apart: `rooms -> rooms`, both separated by commas; `everything` and `nothing`
 //! are rooms, and what stands in parentheses is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -38,7 +38,7 @@ impl Rules {
     /// All rooms that the text names.
     pub(crate) fn rooms(&self) -> BTreeSet<&str> {
         let right =
-            self.allowed.values().flatten().filter(|room| !matches!(room.as_str(), "everything" | "nobody"));
+            self.allowed.values().flatten().filter(|room| !matches!(room.as_str(), "everything" | "nothing"));
         self.allowed.keys().chain(right).map(String::as_str).collect()
     }
 
@@ -79,7 +79,7 @@ mod tests {
     use super::Rules;
 
     const TEXT: &str = "## Who may import whom\n\n```text\na -> everything\nb, c -> d (as, such), e    \
-        d -> nobody\ne -> nobody  b-f -> hybank::d\n```\n";
+        d -> nothing\ne -> nothing  b-f -> hybank::d\n```\n";
 
     #[test]
     fn statements_are_read() {

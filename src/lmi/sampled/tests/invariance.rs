@@ -46,11 +46,11 @@ fn equal_channels_count_once() {
         assert!(s.outcome == Outcome::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
         assert!(s.taps.iter().all(|f| f.norm() < 1e2 / factor.abs().min(1.0)));
     }
-    let silent = changed(&single, |_, p| {
+    let zeroed = changed(&single, |_, p| {
         let h = p.h.clone();
         p.h = CMat::from_fn(2, 3, |i, j| if i == 0 { h[(0, j)] } else { Complex::default() });
     });
-    let s = solve("silent second channel", &silent);
+    let s = solve("zero second channel", &zeroed);
     assert!(s.outcome == Outcome::Solved && (s.gamma - gamma).abs() < 2e-9 * gamma);
     assert!(s.taps.iter().all(|f| f.column(1).norm() == 0.0));
 }

@@ -1,4 +1,4 @@
-//! The least mean-square error with which a window of slow samples determines one sample of the target, for
+//! The least mean-square error with which a history of slow samples determines one sample of the target, for
 //! white noise of unit density at the analog input: a fixed-point smoother in square-root form.
 //!
 //! Frame 0 is the newest of J frames: sample j of channel i is taken at `-j M - D_i`. The joint analog state
@@ -23,9 +23,9 @@ const SETTLED: f64 = 1e-6;
 /// A sample whose innovation is below this, relative to the terms that cancel, is known already.
 const KNOWN: f64 = 1e-15;
 
-/// Least mean-square errors of the target's samples at whole instants, from one window of samples.
+/// Least mean-square errors of the target's samples at whole instants, from one history of samples.
 #[derive(Debug, Clone)]
-pub(super) struct WindowErrors {
+pub(super) struct HistoryErrors {
     first: i64,
     /// The errors at the instants `first`, `first` + 1, ..
     squares: Vec<f64>,
@@ -33,7 +33,7 @@ pub(super) struct WindowErrors {
     pub(super) power: f64,
 }
 
-impl WindowErrors {
+impl HistoryErrors {
     /// The errors at `instants` (fast periods) for the newest `frames` frames of all channels.
     ///
     /// # Errors
@@ -93,7 +93,7 @@ enum Source {
     Target(i64),
 }
 
-/// All instants of the window and of the targets, in ascending order.
+/// All instants of the history and of the targets, in ascending order.
 struct Timetable {
     ratio: i64,
     slots: Vec<Slot>,
