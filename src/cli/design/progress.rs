@@ -34,8 +34,9 @@ impl Progress {
         thread::scope(|scope| {
             let (done_sender, done): (Sender<()>, _) = bounded(0);
             // A thread that cannot be started is no reason to fail.
-            let display =
-                thread::Builder::new().name("progress".into()).spawn_scoped(scope, move || self.report(&done));
+            let display = thread::Builder::new()
+                .name("progress".into())
+                .spawn_scoped(scope, move || self.report(&done));
             let result = work();
             drop(done_sender);
             drop(display);

@@ -5,10 +5,10 @@
 //! taps, without regard to noise) and `iir`, the rms for `h2`; for `sinc` and `separation` it is their
 //! gamma.
 
+mod history_errors;
 mod reach;
 mod recursive;
 mod search;
-mod history_errors;
 
 use super::DesignError;
 use super::effort::{self, Limits};

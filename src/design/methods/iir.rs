@@ -2,7 +2,7 @@
 //! gamma-iteration (thesis 5.3).
 
 use super::filtering::{Innovations, Trial};
-use super::gamma_iteration::{GammaIteration, Evaluated};
+use super::gamma_iteration::{Evaluated, GammaIteration};
 use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
 use super::{Settings, Synthesis};
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};

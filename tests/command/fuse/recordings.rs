@@ -122,7 +122,10 @@ fn empty_recordings_give_an_empty_one_with_a_warning() {
         let output = desk.run(&args, &[]);
         let stderr = text(&output.stderr);
         assert!(output.status.success() && output.stdout.is_empty(), "{args:?}: {stderr}");
-        assert!(stderr.starts_with("hybank: warning: empty.wav") && stderr.contains("length is zero"), "{stderr}");
+        assert!(
+            stderr.starts_with("hybank: warning: empty.wav") && stderr.contains("length is zero"),
+            "{stderr}"
+        );
         assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
         let (spec, samples) = wav::read(&desk.path("out.wav"));
         assert_eq!((spec.sample_rate, spec.channels, samples.len()), (48_000, 1, 0), "{args:?}");

@@ -85,7 +85,9 @@ fn small_banks_are_within_a_tenth_of_a_decibel_of_all_integers() {
     let above = |db: f64| all.iter().filter(|case| case.above_db > db).count();
     for Outcome { name, above_db, above_zero_output_db, .. } in &all {
         if *above_db > 0.1 || *above_zero_output_db > 1e-6 {
-            println!("{name}: {above_db:.3} dB above the best, {above_zero_output_db:.3} dB above zero output");
+            println!(
+                "{name}: {above_db:.3} dB above the best, {above_zero_output_db:.3} dB above zero output"
+            );
         }
     }
     let worst = all.iter().map(|case| case.above_db).fold(0.0, f64::max);
@@ -108,7 +110,8 @@ fn nearly_equal_channels_find_a_scale() {
     for apart in [1e-2, 1e-4, 1e-6] {
         let spec = with_taps(alike(&butterworth(2, 0.5), 2, 1, &[0.6, 0.6 + apart]), 1);
         for bits in [3, 4, 8] {
-            let outcome = outcome(&Spec { name: format!("{apart} apart, {bits} bits"), ..spec.clone() }, bits);
+            let outcome =
+                outcome(&Spec { name: format!("{apart} apart, {bits} bits"), ..spec.clone() }, bits);
             assert!(outcome.above_db < 0.1 && outcome.above_zero_output_db < -1.0, "{outcome:?}");
         }
     }
