@@ -80,6 +80,7 @@ const PREFIXES: [(&str, i32); 13] = [
 const RELATIVE_UNITS: [(&str, i32); 3] = [("", 0), ("%", -2), ("ppm", -6)];
 const TIMES: &str = "a time such as 10ps, 2.5e-9 (seconds) or 0.01samples";
 const FREQUENCIES: &str = "a frequency such as 9kHz, 1.2GHz or 48000 (hertz)";
+const RATES: &str = "a rate such as 1GS/s, 48kHz or 48000 (hertz)";
 const SHARES: &str = "a share such as 1%, 540ppm or 0.01";
 
 /// A time: seconds with an SI prefix, or fast samples. A number without unit is in seconds.
@@ -100,6 +101,32 @@ pub fn time(text: &str) -> Result<Time, QuantityError> {
 /// [`QuantityError`]. Any finite frequency is legal, negative ones too.
 pub fn frequency(text: &str) -> Result<Hertz, QuantityError> {
     Written::split(text, FREQUENCIES)?.with_prefix("Hz", FREQUENCIES).map(Hertz)
+}
+
+/// A rate of samples: `S/s` or hertz with an SI prefix, as in `1 GS/s`. A number without unit is in hertz.
+///
+/// # Errors
+/// [`QuantityError`]. Any finite rate is legal, negative ones too.
+pub fn rate(text: &str) -> Result<Hertz, QuantityError> {
+    let written = Written::split(text, RATES)?;
+    let unit = if written.unit.ends_with("S/s") { "S/s" } else { "Hz" };
+    written.with_prefix(unit, RATES).map(Hertz)
+}
+
+/// A value with an SI prefix and its unit, in at most six digits, for people: `250 MHz`.
+pub fn readable(value: f64, unit: &str) -> String {
+    let scientific = format!("{value:.5e}");
+    let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let power = 3 * exponent.div_euclid(3);
+    let prefix = PREFIXES.iter().find(|(_, known)| *known == power);
+    let (Some((prefix, _)), Ok(mantissa)) = (prefix, mantissa.parse::<f64>()) else {
+        return format!("{} {unit}", scientific);
+    };
+    let shift = exponent - power;
+    let digits = format!("{:.*}", (5 - shift) as usize, mantissa * 10f64.powi(shift));
+    let digits = digits.trim_end_matches('0').trim_end_matches('.');
+    format!("{digits} {prefix}{unit}")
 }
 
 /// A share of something: per cent, parts per million, or a number without unit.
@@ -206,6 +233,29 @@ mod tests {
         assert_eq!(relative("1%"), Ok(0.01));
         assert_eq!(relative("540 ppm"), Ok(540e-6));
         assert_eq!(relative("-0.02"), Ok(-0.02));
+    }
+
+    #[test]
+    fn rates_are_samples_per_second_or_hertz() {
+        assert_eq!(rate("1 GS/s"), Ok(Hertz(1e9)));
+        assert_eq!(rate("48kHz"), Ok(Hertz(48e3)));
+        assert_eq!(rate("250e6"), Ok(Hertz(250e6)));
+        assert!(rate("1 GB/s").is_err());
+    }
+
+    #[test]
+    fn people_read_six_digits_and_a_prefix() {
+        for (value, text) in [
+            (249_999_999.999_999_97, "250 MHz"),
+            (89_651_060_300.120_67, "89.6511 GHz"),
+            (999_999.9, "1 MHz"),
+            (-3.0062e-9, "-3.0062 nHz"),
+            (0.0, "0 Hz"),
+            (12.345_678, "12.3457 Hz"),
+            (1e30, "1.00000e30 Hz"),
+        ] {
+            assert_eq!(readable(value, "Hz"), text);
+        }
     }
 
     #[test]

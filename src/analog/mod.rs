@@ -23,6 +23,7 @@
 mod balance;
 mod error;
 pub mod families;
+mod half_power;
 mod pairing;
 mod rational;
 mod realise;

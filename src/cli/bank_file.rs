@@ -1,6 +1,7 @@
 //! Reads specs and banks, and writes text files.
 
 use super::Failure;
+use super::file_kind::FileKind;
 use super::interrupt::remove_unfinished;
 use super::say::name_leftovers;
 use crate::bank::{Bank, SynthesisFilters};
@@ -21,9 +22,21 @@ pub(super) fn is_dash(path: &Path) -> bool {
 
 /// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
-    let bank = Bank::from_json(&read_text(path)?, &name(path)).map_err(Failure::input)?;
+    let text = read_text(path)?;
+    if FileKind::of(&text) == FileKind::Spec {
+        return Err(is_a_spec(path));
+    }
+    let bank = Bank::from_json(&text, &name(path)).map_err(Failure::input)?;
     check_stable(&bank, path)?;
     Ok(bank)
+}
+
+/// A spec was given in place of a bank.
+pub(super) fn is_a_spec(path: &Path) -> Failure {
+    let name = name(path);
+    Failure::Input(format!(
+        "{name}: this is a spec, and a bank is needed; design it first: hybank design {name} -o bank.json"
+    ))
 }
 
 /// Refuses unstable filters: their output would grow to infinity without a message.
@@ -44,11 +57,14 @@ fn check_stable(bank: &Bank, path: &Path) -> Result<(), Failure> {
 
 /// Reads a spec file; `-` is standard input.
 pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
-    Spec::from_toml_with(&read_text(path)?, &name(path), overrides).map_err(|error| {
-        match error.overridden() {
-            Some(key) => bad_flag(key, error.problem()),
-            None => Failure::input(error),
-        }
+    let text = read_text(path)?;
+    if FileKind::of(&text) == FileKind::Bank {
+        let message = "this is a bank, and a spec is needed; its spec is the table \"spec\" in the file";
+        return Err(Failure::Input(format!("{}: {message}", name(path))));
+    }
+    Spec::from_toml_with(&text, &name(path), overrides).map_err(|error| match error.overridden() {
+        Some(key) => bad_flag(key, error.problem()),
+        None => Failure::input(error),
     })
 }
 

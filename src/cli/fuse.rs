@@ -5,6 +5,7 @@ use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Bits, check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
+use super::understood::say_understood;
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{BLOCK_BYTES, Container, MultiReader, ReadOptions, SampleWriter};
@@ -81,6 +82,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
+    say_understood(bank.spec.as_ref());
     let Some(mut reader) = args.start_reader()? else { return Err(interrupted(0)) };
     match_bank::check_channels(&bank, &args.bank, &reader)?;
     let rate = match_bank::output_rate(&bank, &reader)?;

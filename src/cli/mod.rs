@@ -9,8 +9,11 @@ mod completions;
 mod demo;
 mod design;
 mod failure;
+mod file_kind;
 mod fuse;
 mod gaps;
+mod help;
+mod init;
 mod interrupt;
 mod match_bank;
 mod output;
@@ -20,6 +23,7 @@ mod run;
 mod say;
 mod simulate;
 mod stream;
+mod understood;
 mod verify;
 
 use clap::{Parser, Subcommand};
@@ -36,9 +40,12 @@ use std::process::ExitCode;
 #[command(
     name = "hybank",
     version,
+    disable_help_subcommand = true,
     after_help = "\
 Examples:
   hybank demo
+  hybank init -o spec.toml
+  hybank help spec
   hybank design spec.toml -o bank.json
   hybank verify bank.json
   hybank simulate bank.json --source chirp:50Hz..8kHz@1s -o captures
@@ -53,6 +60,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::Args),
     Design(design::Args),
     Analyze(analyze::Args),
     Verify(verify::Args),
@@ -61,6 +69,7 @@ enum Command {
     Stream(stream::Args),
     Demo(demo::Args),
     Completions(completions::Args),
+    Help(help::Args),
 }
 
 /// Runs the command that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
@@ -85,6 +94,7 @@ fn show(message: &clap::Error) -> ExitCode {
 
 fn dispatch(command: Command) -> Result<(), Failure> {
     match command {
+        Command::Init(args) => init::run(&args),
         Command::Design(args) => design::run(&args),
         Command::Analyze(args) => analyze::run(&args),
         Command::Verify(args) => verify::run(&args),
@@ -93,5 +103,6 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Stream(args) => stream::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Completions(args) => completions::run(&args),
+        Command::Help(args) => help::run(&args),
     }
 }

@@ -46,8 +46,25 @@ pub(super) fn precision(format: PcmFormat) -> Precision {
     if matches!(format, F64Be | F64Le | S32Be | S32Le) { Precision::Double } else { Precision::Single }
 }
 
+/// Encoded formats, which are not written.
+const ENCODED: [&str; 9] = ["flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff"];
+
+/// Refuses a name that promises another format than the one written.
+fn check_extension(output: &Path) -> Result<(), Failure> {
+    let extension = output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let extension = extension.to_ascii_lowercase();
+    if !ENCODED.contains(&extension.as_str()) {
+        return Ok(());
+    }
+    let name = output.display();
+    Err(Failure::Usage(format!(
+        "{name}: the output is WAV or raw samples, not {extension}; write it to a pipe: hybank fuse .. -o - | sox -t wav - {name}"
+    )))
+}
+
 /// Checks that no output of a run is also an input or another output.
 pub(super) fn check_files(output: &Path, mask: Option<&Path>, inputs: &[&Path]) -> Result<(), Failure> {
+    check_extension(output)?;
     let mut outputs = SampleWriter::files(output);
     outputs.extend(mask.map(Path::to_owned));
     let outputs: Vec<_> = outputs.iter().map(|path| path.as_path()).collect();

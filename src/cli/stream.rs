@@ -5,6 +5,7 @@ use super::interrupt::interrupts;
 use super::output::{check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
 use super::say::say_line;
+use super::understood::say_understood;
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
@@ -97,6 +98,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let inputs = args.inputs();
     args.check(&inputs)?;
     let bank = bank_file::load(&args.bank)?;
+    say_understood(bank.spec.as_ref());
     args.check_inputs(&inputs, bank.channel_count())?;
     let plan = args.plan(&bank)?;
     let Some(mut reader) = args.start_reader(&inputs, bank.channel_count())? else { return Ok(()) };

@@ -13,12 +13,14 @@ mod lifting;
 mod merging;
 mod methods;
 pub mod plant;
+mod plausibility;
 pub mod problem;
 mod prove;
 pub mod quantise;
 mod realise;
 pub mod reduction;
 mod resolution;
+mod scale;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use choices::latency;
@@ -26,9 +28,11 @@ pub use designer::{Design, Options, ProofSearch, design, design_observed, design
 pub use effort::{Limits, Stage};
 pub use error::DesignError;
 pub use plant::LiftedPlant;
+pub use plausibility::{Implausible, implausible};
 pub use problem::Problem;
 pub use prove::{Certified, certify};
 pub use reduction::{OrderErrorPoint, OrderReduction};
+pub use scale::GammaScale;
 
 use crate::bank::{Bank, Proof};
 use crate::verify::Verified;

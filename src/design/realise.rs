@@ -11,7 +11,7 @@ use super::reduction::{Aim, OrderReduction, ReductionProblem, reduce};
 use super::{DesignError, filters};
 use crate::bank::{FixedPoint, SynthesisFilters};
 use crate::lti::peak::Peak;
-use crate::lti::{FirWithTail, StateSpace};
+use crate::lti::{FirWithTail, LtiError, StateSpace};
 use crate::spec::{Method, Spec};
 
 /// A change of coordinates may increase gamma by this fraction.
@@ -141,9 +141,13 @@ impl Realisation<'_> {
     fn fast_realisation(&self, split: &FirWithTail, promised: f64) -> Result<Option<Evaluated>, DesignError> {
         let candidates = [split.parallel_form(), split.triangular_form().map(Some)];
         for candidate in candidates.into_iter().filter_map(|form| form.ok().flatten()) {
-            let found = evaluate(self.whole, block_filters(&candidate.realise()?))?;
-            if found.peak.gain <= promised * (1.0 + REALISATION_ACCURACY) {
-                return Ok(Some(found));
+            match evaluate(self.whole, block_filters(&candidate.realise()?)) {
+                Ok(found) if found.peak.gain <= promised * (1.0 + REALISATION_ACCURACY) => {
+                    return Ok(Some(found));
+                }
+                // Rounding may move a pole across the unit circle.
+                Ok(_) | Err(DesignError::Lti(LtiError::Unstable { .. })) => {}
+                Err(other) => return Err(other),
             }
         }
         Ok(None)

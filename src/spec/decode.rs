@@ -1,6 +1,6 @@
 //! Turns a document into a [`Spec`]: resolves units, fills in omitted filters, checks all rules.
 
-use crate::units::{FastPeriods, Hertz, Seconds};
+use crate::units::{FastPeriods, Seconds};
 
 use super::Fault;
 use super::design::DesignOverrides;
@@ -12,6 +12,7 @@ use super::limits::{
 use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Solver, Spec, SpecProblem};
+use crate::quantity::Time;
 
 const TOP_KEYS: [&str; 8] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
@@ -64,13 +65,27 @@ fn fast_period(top: &Fields<'_>) -> Result<Seconds, Fault> {
             let remedy = "they have the same meaning, keep one of them";
             Err(rate.fault(SpecProblem::Conflict { first: "fast_period", second: "fast_rate", remedy }))
         }
-        (Some(period), None) => checked_number(&period, |h| check_fast_period(Seconds(h))).map(Seconds),
-        (None, Some(rate)) => checked_number(&rate, |f| check_fast_rate(Hertz(f))).map(|f| Hertz(f).period()),
+        (Some(period), None) => seconds(&period),
+        (None, Some(rate)) => {
+            let written = rate.rate()?;
+            check_fast_rate(written).map_err(|problem| rate.fault(problem))?;
+            Ok(written.period())
+        }
         (None, None) => {
             let remedy = "give fast_period in seconds or fast_rate in hertz";
             Err(top.whole().fault(SpecProblem::MissingKey { key: "fast_period", remedy }))
         }
     }
+}
+
+/// The fast period itself cannot be given in samples.
+fn seconds(period: &Value<'_>) -> Result<Seconds, Fault> {
+    let Time::Seconds(h) = period.time()? else {
+        let expected = "the fast period in seconds, as in 1e-9 or \"1 ns\"";
+        return Err(period.fault(SpecProblem::WrongType { expected, found: "a number of samples" }));
+    };
+    check_fast_period(h).map_err(|problem| period.fault(problem))?;
+    Ok(h)
 }
 
 fn checked_number(value: &Value<'_>, check: fn(f64) -> Result<(), SpecProblem>) -> Result<f64, Fault> {
@@ -126,28 +141,31 @@ fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<ChannelSpec, Fault> 
 
 /// D_i, from one of its two spellings.
 fn delay(fields: &Fields<'_>, fast_period: Seconds) -> Result<Seconds, Fault> {
-    let (value, in_seconds, unit): (_, fn(f64, Seconds) -> Seconds, _) =
-        match (fields.optional("delay"), fields.optional("delay_samples")) {
-            (Some(_), Some(samples)) => {
-                let remedy = "they have the same meaning, keep one of them";
-                return Err(samples.fault(SpecProblem::Conflict {
-                    first: "delay",
-                    second: "delay_samples",
-                    remedy,
-                }));
-            }
-            (Some(delay), None) => (delay, |written, _| Seconds(written), "s"),
-            (None, Some(samples)) => {
-                (samples, |written, h| FastPeriods(written).in_seconds(h), "fast periods")
-            }
-            (None, None) => {
-                let remedy = "give delay in seconds or delay_samples in fast periods (0 for none)";
-                return Err(fields.whole().fault(SpecProblem::MissingKey { key: "delay", remedy }));
-            }
-        };
-    let written = value.number()?;
-    let delay = in_seconds(written, fast_period);
-    check_delay(delay.in_fast_periods(fast_period), written, unit).map_err(|problem| value.fault(problem))?;
+    let (value, written) = match (fields.optional("delay"), fields.optional("delay_samples")) {
+        (Some(_), Some(samples)) => {
+            let remedy = "they have the same meaning, keep one of them";
+            let problem = SpecProblem::Conflict { first: "delay", second: "delay_samples", remedy };
+            return Err(samples.fault(problem));
+        }
+        (Some(delay), None) => {
+            let written = delay.time()?;
+            (delay, written)
+        }
+        (None, Some(samples)) => {
+            let written = Time::Samples(FastPeriods(samples.number()?));
+            (samples, written)
+        }
+        (None, None) => {
+            let remedy = "give delay in seconds or delay_samples in fast periods (0 for none)";
+            return Err(fields.whole().fault(SpecProblem::MissingKey { key: "delay", remedy }));
+        }
+    };
+    let delay = written.in_seconds(fast_period);
+    let (number, unit) = match written {
+        Time::Seconds(time) => (time.0, "s"),
+        Time::Samples(periods) => (periods.0, "fast periods"),
+    };
+    check_delay(delay.in_fast_periods(fast_period), number, unit).map_err(|problem| value.fault(problem))?;
     // A delay of -0.0 is a delay of 0.0.
     Ok(delay + Seconds(0.0))
 }
@@ -274,7 +292,7 @@ fn family(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
     Ok(FilterSpec::Family {
         family: named.name("filter family", &Family::ALL.map(|f| (f.name(), f)))?,
         order: fields.optional("order").map(|v| v.count("poles")).transpose()?,
-        cutoff: Hertz(fields.required("cutoff", "give the cutoff in hertz")?.number()?),
+        cutoff: fields.required("cutoff", "give the cutoff in hertz")?.frequency()?,
         ripple_db: number("ripple_db")?,
         attenuation_db: number("attenuation_db")?,
     })

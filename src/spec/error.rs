@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 
 use super::FilterProblem;
+use crate::quantity::QuantityError;
 
 /// The error of a spec that cannot be used: the file, the location in it, and the problem.
 ///
@@ -135,6 +136,9 @@ pub enum SpecProblem {
         "the filter is empty; give num and den, or poles and gain, or a, b and c, or family and cutoff, or cascade"
     )]
     EmptyFilter,
+    /// A text that is not the quantity it should be.
+    #[error(transparent)]
+    Quantity(#[from] QuantityError),
     /// A filter that violates a rule for filters.
     #[error(transparent)]
     Filter(#[from] FilterProblem),

@@ -4,6 +4,8 @@ use super::Fault;
 use super::SpecProblem;
 use super::document::{Entry, Kind, Node};
 use super::nearest::nearest;
+use crate::quantity::{self, QuantityError, Time};
+use crate::units::{Hertz, Seconds};
 
 /// A value and its path.
 #[derive(Debug, Clone)]
@@ -61,6 +63,34 @@ impl<'a> Value<'a> {
         }
         let rule = "every number must be finite and fit a double".into();
         Err(self.fault(SpecProblem::Range { value, unit: "(read as a double)", rule }))
+    }
+
+    /// A number, or a text that `parse` turns into the quantity.
+    fn quantity<T>(
+        &self,
+        parse: fn(&str) -> Result<T, QuantityError>,
+        bare: fn(f64) -> T,
+    ) -> Result<T, Fault> {
+        match &self.node.kind {
+            Kind::Text(text) => parse(text).map_err(|problem| self.fault(problem)),
+            Kind::Number(_) | Kind::Integer(_) => self.number().map(bare),
+            _ => Err(self.wrong_type("a number, or a text with a number and its unit")),
+        }
+    }
+
+    /// A time: a number of seconds, or a text such as `\"3 ns\"` or `\"0.3 samples\"`.
+    pub(crate) fn time(&self) -> Result<Time, Fault> {
+        self.quantity(quantity::time, |seconds| Time::Seconds(Seconds(seconds)))
+    }
+
+    /// A frequency: a number of hertz, or a text such as `\"9 kHz\"`.
+    pub(crate) fn frequency(&self) -> Result<Hertz, Fault> {
+        self.quantity(quantity::frequency, Hertz)
+    }
+
+    /// A rate: a number of hertz, or a text such as `\"1 GS/s\"`.
+    pub(crate) fn rate(&self) -> Result<Hertz, Fault> {
+        self.quantity(quantity::rate, Hertz)
     }
 
     /// A whole number >= 0; `unit` names what is counted.

@@ -67,7 +67,7 @@ fn equal_delays_are_legal() {
     for method in ["fir", "iir"] {
         let taps: &[&str] = if method == "fir" { &["--taps", "22"] } else { &[] };
         let args = ["design", "equal.toml", "-o", "b.json", "--force", "--json", "--method", method];
-        let report = desk.json(&[&args, taps].concat());
+        let report = desk.report(&[&args[..4], &args[6..], taps].concat());
         let (upper, lower) = (number(&report, "/gamma/upper"), number(&report, "/gamma/lower"));
         assert!(lower <= upper && upper < 1.01 * lower, "{report}");
     }
@@ -99,7 +99,7 @@ fn a_large_noise_gain_is_warned_of_and_unresolved_delays_have_no_bounds() {
     let (_, message) = designed(1e-4);
     assert!(message.contains("warning: noise gain") && message.contains("rounding of f32"), "{message}");
     let (report, message) = designed(3e-12);
-    assert_eq!(message, "");
+    assert!(message.contains("channels 1 and 2 sample 3.0e-12") && message.lines().count() == 1, "{message}");
     // A bound may still be proven, but none is computed.
     assert!(report.contains("proven     [") || report.contains("lower      unknown (two delays"), "{report}");
 }

@@ -22,5 +22,6 @@ mod simulate;
 mod snapshots;
 #[cfg(unix)]
 mod stream;
+mod understanding;
 mod usage;
 mod verify;

@@ -7,8 +7,8 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 8] =
-    ["design", "analyze", "verify", "simulate", "fuse", "stream", "demo", "completions"];
+const COMMANDS: [&str; 10] =
+    ["init", "design", "analyze", "verify", "simulate", "fuse", "stream", "demo", "completions", "help"];
 
 /// Numbers as `#`, of whatever length, and runs of spaces as one.
 fn redacted(text: &str) -> String {

@@ -149,12 +149,13 @@ fn steep_front_ends_of_much_gain_are_designed() {
 fn orders_are_reduced_alike() {
     let reduced = |gain: f64| {
         let mut spec = amplified(example(Method::Iir), gain);
-        spec.design.reduction = Some(Reduction::Order(4));
+        spec.design.reduction = Some(Reduction::Order(2));
         let found = design(&spec).unwrap();
         found.bank.gamma.norm.unwrap() / gain
     };
     let plain = reduced(1.0);
     for gain in [1e-9, 1e9] {
-        assert!((reduced(gain) / plain - 1.0).abs() < 1e-3, "{gain:e}: {} {plain}", reduced(gain));
+        let amplified = reduced(gain);
+        assert!((amplified / plain - 1.0).abs() < 1e-3, "{gain:e}: {amplified} {plain}");
     }
 }

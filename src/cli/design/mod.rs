@@ -6,12 +6,14 @@ mod report;
 use super::Failure;
 use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text};
 use super::interrupt::end_at_interrupt;
+use super::understood::say_understood;
 use crate::bank::FixedPoint;
-use crate::design::{self, DesignError, Limits, Options};
-use crate::spec::{DesignOverrides, Method, Reduction, Solver, WordLengths};
+use crate::design::{self, Design, DesignError, GammaScale, Limits, MeanAnalysis, Options};
+use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, WordLengths};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use progress::Progress;
 use report::Report;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Designs the synthesis filters for a spec
@@ -36,8 +38,8 @@ pub(super) struct Args {
     /// The bank file (JSON); `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
-    /// Design method, in place of that of the spec: fir, iir, h2, sinc or separation
-    #[arg(long, value_parser = parse_method)]
+    /// Design method, in place of that of the spec
+    #[arg(long, value_parser = methods())]
     method: Option<Method>,
     /// Taps per channel, in place of those of the spec
     #[arg(long)]
@@ -50,7 +52,7 @@ pub(super) struct Args {
     gamma_margin: Option<f64>,
     /// Solver of FIR designs: sampled (on a grid of frequencies, fast) or kyp (bounded-real LMI, a second
     /// opinion)
-    #[arg(long, value_parser = parse_solver)]
+    #[arg(long, value_parser = solvers())]
     solver: Option<Solver>,
     /// Integer taps of this many bits, sign included; or a list with the bits of each tap (4,6,8,6,4)
     #[arg(long)]
@@ -68,6 +70,9 @@ pub(super) struct Args {
     /// Design even if the estimate exceeds ten minutes or the memory of the machine
     #[arg(long)]
     no_limit: bool,
+    /// Make every warning about the spec and the bank an error
+    #[arg(long)]
+    strict: bool,
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
@@ -76,20 +81,21 @@ pub(super) struct Args {
     json: bool,
 }
 
-fn parse_method(text: &str) -> Result<Method, String> {
-    let known = Method::ALL.map(Method::name).join(", ");
-    Method::ALL
-        .into_iter()
-        .find(|method| method.name() == text)
-        .ok_or_else(|| format!("the methods are {known}"))
+/// By name, so that completions know the names.
+fn methods() -> impl TypedValueParser<Value = Method> {
+    named(Method::ALL.map(|method| (method.name(), method)))
 }
 
-fn parse_solver(text: &str) -> Result<Solver, String> {
-    let known = Solver::ALL.map(Solver::name).join(", ");
-    Solver::ALL
-        .into_iter()
-        .find(|solver| solver.name() == text)
-        .ok_or_else(|| format!("the solvers are {known}"))
+fn solvers() -> impl TypedValueParser<Value = Solver> {
+    named(Solver::ALL.map(|solver| (solver.name(), solver)))
+}
+
+fn named<T: Copy + Send + Sync + 'static, const K: usize>(
+    known: [(&'static str, T); K],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(known.map(|(name, _)| name)).try_map(move |given| {
+        known.iter().find(|(name, _)| *name == given).map(|&(_, value)| value).ok_or("unknown name")
+    })
 }
 
 fn overrides(args: &Args) -> DesignOverrides {
@@ -108,8 +114,14 @@ fn overrides(args: &Args) -> DesignOverrides {
 const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no better integers of these bits were found; \
                         give more bits or another fraction_bits";
 
-/// Noise gains above this are worth a warning.
-const LARGE_NOISE_GAIN: f64 = 1e3;
+/// Warning for a bank that reaches nothing.
+const USELESS_BANK: &str = "gamma is no better than that of zero output: the front ends or the delays leave nothing to \
+                            reconstruct, or the latency does not suit the taps";
+
+/// Noise gains above this are worth a warning: 20 dB.
+const LARGE_NOISE_GAIN: f64 = 10.0;
+/// A gamma above this share of that of zero output is no better than zero output.
+const USELESS: f64 = 0.99;
 
 /// Warning for a bank with large coefficients.
 fn large_noise_gain(method: Method, noise_gain: f64) -> String {
@@ -142,6 +154,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     spec.latency = args.latency.or(spec.latency);
     // Everything else was checked on reading.
     spec.check().map_err(|problem| bad_flag("latency", &problem))?;
+    say_understood(Some(&spec));
+    warn_or_refuse(&spec_warnings(&spec, &args.spec), args.strict)?;
     let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.spec.display()));
     let begin = Instant::now();
     end_at_interrupt();
@@ -152,15 +166,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let found = progress.during(|| design::design_observed(&spec, &options)).map_err(named)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
+    let scale = GammaScale::new(&found.bank).map_err(named)?;
+    warn_or_refuse(&bank_warnings(&found, &mean, &scale), args.strict)?;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    if found.bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero) {
-        super::warn(ALL_ZERO);
-    }
-    if mean.noise_gain > LARGE_NOISE_GAIN {
-        super::warn(&large_noise_gain(found.bank.method, mean.noise_gain));
-    }
-    let report = Report::new(args.output.display().to_string(), &found, mean, seconds);
+    let report = Report::new(args.output.display().to_string(), &found, mean, scale, seconds);
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {
@@ -168,5 +178,34 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         Ok(())
     } else {
         super::print(&report.text())
+    }
+}
+
+/// What in the spec is probably not meant. A spec that is wrong is refused by the design.
+fn spec_warnings(spec: &Spec, path: &Path) -> Vec<String> {
+    let found = design::implausible(spec).unwrap_or_default();
+    found.iter().map(|problem| format!("{}: {problem}", path.display())).collect()
+}
+
+/// What a user of the bank should know.
+fn bank_warnings(design: &Design, mean: &MeanAnalysis, scale: &GammaScale) -> Vec<String> {
+    let bank = &design.bank;
+    let is_useless = bank.gamma.norm.is_some_and(|gamma| gamma > USELESS * scale.zero_output);
+    let warnings = [
+        bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero).then(|| ALL_ZERO.to_owned()),
+        is_useless.then(|| USELESS_BANK.to_owned()),
+        (mean.noise_gain > LARGE_NOISE_GAIN).then(|| large_noise_gain(bank.method, mean.noise_gain)),
+    ];
+    warnings.into_iter().flatten().collect()
+}
+
+/// Prints the warnings; with `strict` the first one is an error.
+fn warn_or_refuse(warnings: &[String], strict: bool) -> Result<(), Failure> {
+    match warnings.first() {
+        Some(first) if strict => Err(Failure::Input(format!("{first} (an error because of --strict)"))),
+        _ => {
+            warnings.iter().for_each(|warning| super::warn(warning));
+            Ok(())
+        }
     }
 }

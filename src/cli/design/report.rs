@@ -1,8 +1,9 @@
 //! The report of `hybank design` on a finished bank, as text and as JSON.
 
 use crate::bank::{Gamma, SynthesisFilters};
+use crate::cli::understood::understood;
 use crate::design::quantise::WordStudy;
-use crate::design::{Design, MeanAnalysis, OrderErrorPoint, OrderReduction};
+use crate::design::{Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -11,6 +12,8 @@ use crate::verify::{BoundedBanks, Verified};
 #[derive(Debug, serde::Serialize)]
 pub(super) struct Report<'a> {
     bank: String,
+    /// The spec in units of the user.
+    understood: String,
     method: Method,
     channels: usize,
     ratio: usize,
@@ -27,6 +30,7 @@ pub(super) struct Report<'a> {
     words: Option<Words<'a>>,
     #[serde(flatten)]
     mean: MeanAnalysis,
+    scale: GammaScale,
     /// Hertz, at the slow rate to which all frequencies alias.
     peak_hertz: Hertz,
     iterations: usize,
@@ -114,7 +118,13 @@ impl ProofReport {
 
 impl<'a> Report<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(super) fn new(output: String, design: &'a Design, mean: MeanAnalysis, seconds: f64) -> Self {
+    pub(super) fn new(
+        output: String,
+        design: &'a Design,
+        mean: MeanAnalysis,
+        scale: GammaScale,
+        seconds: f64,
+    ) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
@@ -122,6 +132,7 @@ impl<'a> Report<'a> {
         };
         Self {
             bank: output,
+            understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
             method: bank.method,
             channels: bank.channel_count(),
             ratio: bank.ratio,
@@ -134,6 +145,7 @@ impl<'a> Report<'a> {
             gamma: &bank.gamma,
             words: Words::of(design),
             mean,
+            scale,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             iterations: design.iterations,
             seconds,
@@ -152,13 +164,15 @@ impl<'a> Report<'a> {
         };
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
         format!(
-            "{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
+            "{}\n{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
              gamma      {} (computed norm of this bank; worst at {:.4} modulo the slow rate)\n\
-             lower      {} ({})\n\
+             {}lower      {} ({})\n\
              noncausal  {} ({})\n\
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
+             SNR        {} for a signal with the target's spectrum\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
              {}{}designed in {:.1} ms, {} iterations\n{}",
+            self.understood,
             self.bank,
             self.method.name(),
             self.channels,
@@ -166,6 +180,7 @@ impl<'a> Report<'a> {
             self.latency,
             number(self.gamma.norm),
             self.peak_hertz,
+            self.scale_text(),
             number(self.gamma.lower),
             match self.method {
                 _ if self.gamma.lower.is_none() => UNRESOLVED,
@@ -178,6 +193,7 @@ impl<'a> Report<'a> {
             number(self.gamma.noncausal),
             if self.gamma.noncausal.is_none() { UNRESOLVED } else { "no latency is better" },
             number(Some(self.mean.rms_error)),
+            decibels(self.scale.rms_reference, self.mean.rms_error),
             number(Some(self.mean.noise_gain)),
             self.mean.output_noise,
             self.words.as_ref().map(Words::text).unwrap_or_default(),
@@ -186,6 +202,30 @@ impl<'a> Report<'a> {
             self.iterations,
             self.proof.text(),
         )
+    }
+}
+
+impl Report<'_> {
+    /// gamma beside that of the simplest banks.
+    fn scale_text(&self) -> String {
+        let Some(gamma) = self.gamma.norm else { return String::new() };
+        let GammaScale { zero_output, interleaving, .. } = self.scale;
+        format!(
+            "           {} against zero output ({}), {} against plain interleaving ({})\n",
+            decibels(gamma, zero_output),
+            number(Some(zero_output)),
+            decibels(gamma, interleaving),
+            number(Some(interleaving))
+        )
+    }
+}
+
+/// A ratio in decibels.
+fn decibels(value: f64, reference: f64) -> String {
+    if reference == 0.0 {
+        "inf dB".to_owned()
+    } else {
+        format!("{:.1} dB", 20.0 * (value / reference).log10())
     }
 }
 

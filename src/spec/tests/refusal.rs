@@ -21,7 +21,7 @@ fn refused(text: &str, line: usize, words: &str) {
 fn an_unknown_key_is_named_with_line_neighbour_and_all_known_keys() {
     let text = message(&thesis_with("delay = 1.2", "dealy = 1.2"));
     let expected = "spec.toml:11:1: channel[0]: unknown key \"dealy\", did you mean \"delay\"?; the keys here are delay, \
-                    delay_samples, filter, noise\n   |\n11 | dealy = 1.2\n   | ^^^^^";
+                    delay_samples, filter, noise, gain, offset\n   |\n11 | dealy = 1.2\n   | ^^^^^";
     assert_eq!(text, expected);
 }
 
@@ -43,7 +43,9 @@ fn every_mistake_has_its_line_and_its_message() {
         ("fast_period = 1.0", "fast_rate = inf", 3, "must be finite"),
         ("fast_period = 1.0", "fast_rate = 0.0", 3, "0 Hz is out of range"),
         ("fast_period = 1.0", "fast_period = 1e-300", 3, "between 1e-100 and 1e100"),
-        ("fast_period = 1.0", "fast_period = \"1 us\"", 3, "expected a number, found a text"),
+        ("fast_period = 1.0", "fast_period = \"1 Hz\"", 3, "the unit \"Hz\", which is not known here; write a time"),
+        ("fast_period = 1.0", "fast_period = \"1 us\"", 11, "1.2 s is out of range: the delay is 1.2e6 fast"),
+        ("fast_period = 1.0", "fast_period = true", 3, "expected a number, or a text with a number and its unit"),
         ("ratio = 2", "", 1, "the key ratio is missing; give M"),
         ("ratio = 2", "ratio = 0", 4, "must be 1 to 1024"),
         ("ratio = 2", "ratio = 1_000_000", 4, "must be 1 to 1024"),
@@ -72,7 +74,7 @@ fn every_mistake_has_its_line_and_its_message() {
         ("delay = 1.2", "delay = 1.2\ngain = inf", 12, "must be finite"),
         ("delay = 1.2", "delay = 1.2\noffset = 5", 12, "5 steps of a 12-bit converter are 5 / 2048"),
         ("delay = 1.2", "delay = 1.2\noffest = 0.1", 12, "did you mean \"offset\""),
-        ("delay = 1.2", "delay = [1.2]", 11, "expected a number, found a list"),
+        ("delay = 1.2", "delay = [1.2]", 11, "expected a number, or a text with a number and its unit, found a list"),
         // Design.
         ("method = \"fir\"", "method = \"fri\"", 17, "did you mean \"fir\""),
         ("method = \"fir\"", "method = \"kalman\"", 17, "choose one of fir, iir, h2, sinc, separation"),

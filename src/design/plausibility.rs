@@ -1,0 +1,202 @@
+//! Warnings about specs that are legal but probably not meant.
+
+use super::DesignError;
+use super::problem::Problem;
+use crate::quantity::readable;
+use crate::spec::{FilterSpec, Spec};
+use crate::units::Hertz;
+use std::f64::consts::{PI, TAU};
+
+/// Bandwidths below this share of the output's Nyquist frequency are implausible.
+const NARROW: f64 = 0.01;
+/// Samples nearer to each other than this (in fast periods) hardly differ.
+const NEAR: f64 = 1e-3;
+/// Bandwidths in rad/s between these look as if one sample were the unit of time.
+const NORMALISED: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
+
+/// Something in a spec that is probably not meant.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Implausible {
+    /// A front end far slower than the output.
+    #[error(
+        "{place}: -3 dB at {}, {:.2e} of the output's Nyquist frequency {}; {remedy}",
+        readable(.edge.0, "Hz"), .edge.0 / .nyquist.0, readable(.nyquist.0, "Hz")
+    )]
+    Narrow {
+        /// `the target` or the channel.
+        place: String,
+        /// Its -3 dB frequency.
+        edge: Hertz,
+        /// Half the fast rate.
+        nyquist: Hertz,
+        /// What may have been meant.
+        remedy: &'static str,
+    },
+    /// A target that passes more than the output can carry.
+    #[error(
+        "{place}: -3 dB at {}, above the output's Nyquist frequency {}; what lies above it aliases, also in the ideal \
+         converter",
+        readable(.edge.0, "Hz"), readable(.nyquist.0, "Hz")
+    )]
+    Wide {
+        /// `the target` or the channel.
+        place: String,
+        /// Its -3 dB frequency.
+        edge: Hertz,
+        /// Half the fast rate.
+        nyquist: Hertz,
+    },
+    /// Two channels that sample almost at one instant.
+    #[error(
+        "channels {first} and {second} sample {apart:.1e} fast periods apart; channels that sample at one instant \
+         lower the noise and nothing else"
+    )]
+    SameInstant {
+        /// Number of the channel, from 1.
+        first: usize,
+        /// Number of the other.
+        second: usize,
+        /// Distance of their samples in fast periods.
+        apart: f64,
+    },
+    /// Delays that differ by more than a slow period.
+    #[error(
+        "the delays span {span:.6} fast periods, more than the ratio {ratio}; a channel that is a whole slow period \
+         late adds nothing but latency"
+    )]
+    LongSpan {
+        /// Largest minus least delay in fast periods.
+        span: f64,
+        /// M.
+        ratio: usize,
+    },
+}
+
+/// What in `spec` is probably not meant, the target first.
+///
+/// # Errors
+/// [`DesignError::Analog`] for a filter that is not stable or not strictly proper.
+pub fn implausible(spec: &Spec) -> Result<Vec<Implausible>, DesignError> {
+    let problem = Problem::new(spec, spec.latency.unwrap_or(0))?;
+    let mut found: Vec<Implausible> = band(spec, &problem, None).into_iter().collect();
+    let other = |i: &usize| spec.channels[*i].filter != spec.target;
+    found.extend((0..spec.channels.len()).filter(other).filter_map(|i| band(spec, &problem, Some(i))));
+    found.extend(same_instants(&problem));
+    found.extend(long_span(&problem));
+    Ok(found)
+}
+
+/// The band of the target (`None`) or of a channel.
+fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<Implausible> {
+    let (filter, front_end) = match channel {
+        Some(i) => (&spec.channels[i].filter, problem.channels[i].front_end),
+        None => (&spec.target, problem.target),
+    };
+    let place = channel.map_or_else(|| "the target".to_owned(), |i| format!("channel {}", i + 1));
+    let normalised = problem.front_ends[front_end].half_power_frequency().0;
+    let edge = Hertz(normalised / TAU / spec.fast_period.0);
+    let nyquist = Hertz(0.5 / spec.fast_period.0);
+    if normalised < NARROW * PI {
+        return Some(Implausible::Narrow { place, edge, nyquist, remedy: remedy(filter, edge) });
+    }
+    // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not.
+    (normalised > PI && channel.is_none()).then_some(Implausible::Wide { place, edge, nyquist })
+}
+
+fn remedy(filter: &FilterSpec, edge: Hertz) -> &'static str {
+    match filter {
+        FilterSpec::Family { .. } => "a bare number is in Hz; write the unit, as in cutoff = \"9 kHz\"",
+        _ if NORMALISED.contains(&(edge.0 * TAU)) => {
+            "coefficients are in rad/s, and these look normalised to one sample; scale them to seconds, or give \
+             fast_period = 1.0"
+        }
+        _ => "coefficients are in rad/s",
+    }
+}
+
+/// The first pair of channels whose samples nearly coincide.
+fn same_instants(problem: &Problem) -> Option<Implausible> {
+    let period = problem.ratio as f64;
+    let phase = |i: usize| problem.channels[i].delay.0.rem_euclid(period);
+    let mut order: Vec<usize> = (0..problem.channels.len()).collect();
+    order.sort_by(|&i, &j| phase(i).total_cmp(&phase(j)).then(i.cmp(&j)));
+    let pairs = order.iter().copied().zip(order.iter().copied().cycle().skip(1));
+    let apart = |i: usize, j: usize| {
+        let gap = (phase(j) - phase(i)).rem_euclid(period);
+        gap.min(period - gap)
+    };
+    pairs
+        .filter(|&(i, j)| i != j && apart(i, j) < NEAR)
+        .map(|(i, j)| (i.min(j) + 1, i.max(j) + 1, apart(i, j)))
+        .min_by_key(|&(first, second, _)| (first, second))
+        .map(|(first, second, apart)| Implausible::SameInstant { first, second, apart })
+}
+
+fn long_span(problem: &Problem) -> Option<Implausible> {
+    let delays = problem.channels.iter().map(|channel| channel.delay.0);
+    let least = delays.clone().fold(f64::INFINITY, f64::min);
+    let span = delays.fold(0.0, f64::max) - least;
+    (span >= problem.ratio as f64).then_some(Implausible::LongSpan { span, ratio: problem.ratio })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(text: &str) -> Vec<Implausible> {
+        implausible(&Spec::from_toml(text, "spec.toml").unwrap()).unwrap()
+    }
+
+    fn audio(cutoff: &str, delays: [f64; 2]) -> Vec<Implausible> {
+        let [first, second] = delays;
+        found(&format!(
+            "fast_rate = 48e3\nratio = 2\nlatency = 12\n\
+             target = {{ filter = {{ family = \"butterworth\", order = 4, cutoff = {cutoff} }} }}\n\
+             channel = [{{ delay_samples = {first} }}, {{ delay_samples = {second} }}]\n\
+             design = {{ method = \"iir\" }}"
+        ))
+    }
+
+    #[test]
+    fn a_plausible_spec_gives_none() {
+        assert_eq!(audio("9000.0", [1.2, 0.6]), []);
+        assert_eq!(audio("23999.0", [1.0, 0.0]), []);
+        assert_eq!(audio("240.1", [1.998, 0.0]), []);
+    }
+
+    #[test]
+    fn cutoffs_in_the_wrong_unit_are_named() {
+        let narrow = audio("9.0", [1.2, 0.6]);
+        assert_eq!(narrow.len(), 1);
+        let text = narrow[0].to_string();
+        assert!(
+            text.starts_with("the target: -3 dB at 9 Hz, 3.75e-4 of the output's Nyquist frequency 24 kHz"),
+            "{text}"
+        );
+        assert!(text.ends_with("cutoff = \"9 kHz\""), "{text}");
+        let wide = audio("9e6", [1.2, 0.6]);
+        assert!(matches!(&wide[..], [Implausible::Wide { place, .. }] if place == "the target"), "{wide:?}");
+    }
+
+    #[test]
+    fn coefficients_for_one_sample_are_named() {
+        let found = found(
+            "fast_rate = 48e3\nratio = 2\nchannel = [{ delay_samples = 1.2 }, { delay_samples = 0.6 }]\n\
+             target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\ndesign = { method = \"iir\" }",
+        );
+        assert_eq!(found.len(), 1);
+        assert!(found[0].to_string().contains("look normalised to one sample"), "{}", found[0]);
+    }
+
+    #[test]
+    fn samples_at_one_instant_and_late_ones_are_named() {
+        for (delays, apart) in [([0.6, 0.6], 0.0), ([1.9995, 0.0], 5e-4), ([0.6, 0.6009], 9e-4)] {
+            let found = audio("9000.0", delays);
+            let [Implausible::SameInstant { first: 1, second: 2, apart: got }] = found[..] else {
+                panic!("{found:?}")
+            };
+            assert!((got - apart).abs() < 1e-9, "{delays:?}: {got}");
+        }
+        assert_eq!(audio("9000.0", [2.5, 0.3]), [Implausible::LongSpan { span: 2.2, ratio: 2 }]);
+    }
+}

@@ -1,0 +1,135 @@
+//! What the user meant: units, implausible specs, the scale of gamma, files of the wrong kind, specs to begin with.
+
+use crate::support::{Desk, THESIS, number, text};
+
+/// Two audio converters; the words in braces are replaced.
+const AUDIO: &str = "\
+fast_rate = 48000.0
+ratio = 2
+latency = 12
+[target]
+filter = { family = \"butterworth\", order = 4, cutoff = 9000.0 }
+[[channel]]
+delay = 25e-6
+[[channel]]
+delay = 12.5e-6
+[design]
+method = \"fir\"
+taps = 24
+";
+
+fn designed(desk: &Desk, spec: &str, flags: &[&str]) -> (Option<i32>, String) {
+    desk.write("spec.toml", spec);
+    let args = [&["design", "spec.toml", "-o", "b.json", "--force"][..], flags].concat();
+    let output = desk.run(&args, &[]);
+    (output.status.code(), text(&output.stderr))
+}
+
+#[test]
+fn units_in_a_spec_are_those_of_bare_numbers() {
+    let desk = Desk::with_spec(AUDIO);
+    desk.good(&["design", "spec.toml", "-o", "bare.json"]);
+    let with_units = AUDIO
+        .replace("48000.0", "\"48 kS/s\"")
+        .replace("9000.0", "\"9 kHz\"")
+        .replace("25e-6", "\"25us\"")
+        .replace("12.5e-6", "\"12.5 us\"");
+    desk.write("units.toml", &with_units);
+    desk.good(&["design", "units.toml", "-o", "units.json"]);
+    assert!(desk.read("bare.json") == desk.read("units.json"), "the banks differ");
+    for (unit, parts) in [
+        ("\"9 kHz \"", &[][..]),
+        ("\"9 ks\"", &["target.filter.cutoff", "unit \"ks\"", "9kHz"]),
+        ("\"nine\"", &["target.filter.cutoff", "does not begin with a number"]),
+        ("true", &["target.filter.cutoff", "a number and its unit"]),
+    ] {
+        desk.write("odd.toml", AUDIO.replace("9000.0", unit));
+        let args = ["design", "odd.toml", "-o", "odd.json"];
+        if parts.is_empty() { drop(desk.good(&args)) } else { drop(desk.refused(1, &args, parts)) }
+    }
+    desk.write("odd.toml", AUDIO.replace("fast_rate = 48000.0", "fast_period = \"1 samples\""));
+    desk.refused(1, &["design", "odd.toml", "-o", "odd.json"], &["fast_period", "\"1 ns\""]);
+}
+
+/// Each of these once gave exit code 0 and a proud report.
+#[test]
+fn slips_are_warned_of_and_refused_with_strict() {
+    let desk = Desk::with_spec(AUDIO);
+    let thesis = "{ num = [0.25], den = [1.0, 1.0, 0.25] }";
+    let family = "{ family = \"butterworth\", order = 4, cutoff = 9000.0 }";
+    for (spec, part) in [
+        (AUDIO.replace("9000.0", "9.0"), "write the unit, as in cutoff = \"9 kHz\""),
+        (AUDIO.replace("9000.0", "9e6"), "above the output's Nyquist frequency 24 kHz"),
+        (AUDIO.replace(family, thesis), "look normalised to one sample"),
+        (AUDIO.replace("= 25e-6", "= 12.501e-6"), "channels 1 and 2 sample 4.8e-5 fast periods apart"),
+        (AUDIO.replace("= 25e-6", "= 250e-6"), "more than the ratio 2"),
+        (AUDIO.replace("= 25e-6", "= 12.6e-6"), "noise gain"),
+    ] {
+        let (code, message) = designed(&desk, &spec, &[]);
+        assert!(code == Some(0) && message.contains(part), "{part}: {code:?} {message}");
+        let before = desk.read("b.json");
+        let (code, message) = designed(&desk, &spec, &["--strict"]);
+        assert!(code == Some(1) && message.contains("--strict"), "{part}: {code:?} {message}");
+        assert!(desk.read("b.json") == before, "{part}");
+    }
+    assert_eq!(designed(&desk, AUDIO, &["--strict"]), (Some(0), String::new()));
+}
+
+#[test]
+fn a_bank_that_reaches_nothing_is_named() {
+    let desk = Desk::with_spec(THESIS);
+    let flags = ["--method", "sinc", "--taps", "2", "--latency", "10"];
+    let (code, message) = designed(&desk, THESIS, &flags);
+    assert!(code == Some(0) && message.contains("no better than that of zero output"), "{message}");
+}
+
+#[test]
+fn gamma_has_a_scale_and_the_spec_is_echoed() {
+    let desk = Desk::with_spec(AUDIO);
+    let report = desk.json(&["design", "spec.toml", "-o", "b.json", "--json"]);
+    assert_eq!(
+        report["understood"],
+        "48 kS/s from 2 x 24 kS/s; target -3 dB at 9 kHz (0.37 of Nyquist); delays 1.2, 0.6 samples; \
+         latency 12 samples = 250 us"
+    );
+    let (zero, plain) = (number(&report, "/scale/zero_output"), number(&report, "/scale/interleaving"));
+    assert!(number(&report, "/gamma/norm") < 0.1 * plain && plain < zero, "{report}");
+    assert!((zero - 1.0).abs() < 1e-3, "the target has unit gain: {report}");
+}
+
+#[test]
+fn files_of_the_wrong_kind_are_named_for_what_they_are() {
+    let desk = Desk::with_spec(AUDIO);
+    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    desk.refused(1, &["design", "b.json", "-o", "c.json"], &["b.json", "this is a bank", "a spec is needed"]);
+    for command in [&["analyze", "spec.toml"][..], &["verify", "spec.toml"]] {
+        desk.refused(1, command, &["spec.toml", "this is a spec", "hybank design spec.toml"]);
+    }
+    desk.refused(2, &["fuse", "b.json", "a.wav", "-o", "out.flac"], &["out.flac", "sox -t wav - out.flac"]);
+    desk.refused(2, &["stream", "b.json", "-o", "out.MP3"], &["out.MP3", "not mp3"]);
+}
+
+#[test]
+fn every_spec_to_begin_with_is_designed_as_it_is() {
+    let desk = Desk::with_spec(AUDIO);
+    for example in ["ti-adc", "audio-2x", "sensor-array", "oversampled", "thesis"] {
+        desk.good(&["init", "--example", example, "-o", "new.toml", "--force"]);
+        let text = String::from_utf8(desk.read("new.toml")).unwrap();
+        assert!(text.starts_with('#') && text.contains("[[channel]]"), "{example}: {text}");
+        assert_eq!(desk.good(&["init", "--example", example]), text);
+        desk.good(&["design", "new.toml", "-o", "new.json", "--force", "--strict"]);
+    }
+    desk.refused(1, &["init", "-o", "new.toml"], &["new.toml", "exists", "--force"]);
+    desk.refused(2, &["init", "--example", "adc"], &["ti-adc"]);
+}
+
+#[test]
+fn help_has_the_reference_of_specs() {
+    let desk = Desk::with_spec(AUDIO);
+    let reference = desk.good(&["help", "spec"]);
+    for key in ["fast_rate", "delay_samples", "butterworth", "gamma_margin", "cascade"] {
+        assert!(reference.contains(key), "{key}");
+    }
+    assert_eq!(desk.good(&["help", "design"]), desk.good(&["design", "--help"]));
+    desk.refused(2, &["help", "dezign"], &["dezign", "spec, init, design"]);
+}
