@@ -5,6 +5,7 @@ use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Bits, check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
+use super::turns::TurnArgs;
 use super::understood::say_understood;
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
@@ -18,13 +19,14 @@ use std::time::Instant;
 /// Fuses slow recordings into one fast recording
 ///
 /// The recordings are one mono WAV file per channel, in the order of the bank, or one N-channel WAV
-/// file. The output lines up with the time axis of the inputs and has exactly M samples per input frame: the
+/// file, or with --interleaved one mono file in which the converters take turns. The output lines up with the time axis of the inputs and has exactly M samples per input frame: the
 /// first m0 samples, the latency of the bank, are dropped, and the end is flushed with zeros.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   hybank fuse bank.json left.wav right.wav -o fused.wav
   hybank fuse bank.json both.wav -o fused.wav --bits 24 --force
+  hybank fuse bank.json capture.wav -o fused.wav --interleaved 4
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
@@ -44,6 +46,8 @@ pub(super) struct Args {
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
+    #[command(flatten)]
+    turns: TurnArgs,
     #[command(flatten)]
     gaps: GapArgs,
     #[command(flatten)]
@@ -83,7 +87,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
-    let Some(mut reader) = args.start_reader()? else { return Err(interrupted(0)) };
+    let Some(mut reader) = args.start_reader(&bank)? else { return Err(interrupted(0)) };
     match_bank::check_channels(&bank, &args.bank, &reader)?;
     let rate = match_bank::output_rate(&bank, &reader)?;
     let plan = args.plan(&bank)?;
@@ -104,6 +108,7 @@ impl Args {
     fn check(&self) -> Result<(), Failure> {
         match_bank::check_stdin(&self.bank, &self.inputs)?;
         self.gaps.check()?;
+        self.turns.check(self.inputs.len())?;
         if self.json && self.output.as_os_str() == "-" {
             let message = "--json and `-o -` both want standard output; write the samples to a file";
             return Err(Failure::Usage(message.into()));
@@ -114,9 +119,11 @@ impl Args {
     }
 
     /// `None` if an interrupt came first.
-    fn start_reader(&self) -> Result<Option<MultiReader>, Failure> {
+    fn start_reader(&self, bank: &Bank) -> Result<Option<MultiReader>, Failure> {
         let lost = self.gaps.lost_samples()?;
-        let files = ReadOptions { block_bytes: self.threads.bytes(BLOCK_BYTES), ..ReadOptions::files() };
+        let turns = self.turns.turns(bank, &self.bank)?;
+        let block_bytes = self.threads.bytes(BLOCK_BYTES);
+        let files = ReadOptions { block_bytes, turns: turns.as_ref(), ..ReadOptions::files() };
         let options = self.gaps.read_options(lost.as_ref(), files);
         MultiReader::start(&self.inputs, options, interrupts()).map_err(Failure::input)
     }

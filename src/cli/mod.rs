@@ -23,6 +23,7 @@ mod run;
 mod say;
 mod simulate;
 mod stream;
+mod turns;
 mod understood;
 mod verify;
 

@@ -5,6 +5,7 @@ use super::interrupt::interrupts;
 use super::output::{check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
 use super::say::say_line;
+use super::turns::TurnArgs;
 use super::understood::say_understood;
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
@@ -30,6 +31,7 @@ Examples:
   capture | hybank stream bank.json --format s16le > fast.raw
   hybank stream bank.json --input ch1.fifo --input ch2.fifo --format f32le | analyse
   hybank stream bank.json --input ch1.sigmf-meta --input ch2.sigmf-meta -o fast.sigmf-meta
+  capture | hybank stream bank.json --format s16le --interleaved 4 > fast.raw
   sox both.flac -t wav - | hybank stream bank.json --format wav | play -t wav -
 
 An interrupt (Ctrl-C) ends the stream after whole frames; a second one ends it at once.")]
@@ -57,6 +59,8 @@ pub(super) struct Args {
     /// Output the last samples at the end, as many as the latency, with zeros for input
     #[arg(long)]
     flush: bool,
+    #[command(flatten)]
+    turns: TurnArgs,
     #[command(flatten)]
     gaps: GapArgs,
     #[command(flatten)]
@@ -101,7 +105,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     say_understood(bank.spec.as_ref());
     args.check_inputs(&inputs, bank.channel_count())?;
     let plan = args.plan(&bank)?;
-    let Some(mut reader) = args.start_reader(&inputs, bank.channel_count())? else { return Ok(()) };
+    let Some(mut reader) = args.start_reader(&inputs, &bank)? else { return Ok(()) };
     match_bank::check_channels(&bank, &args.bank, &reader)?;
     let rate = match_bank::output_rate(&bank, &reader)?;
     let mut pipeline = args.pipeline(&bank, &plan)?;
@@ -131,6 +135,7 @@ impl Args {
     fn check(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
         match_bank::check_stdin(&self.bank, inputs)?;
         self.gaps.check()?;
+        self.turns.check(inputs.len())?;
         if self.json && self.output.as_os_str() == "-" {
             let message = "--json needs --output: standard output carries the samples";
             return Err(Failure::Usage(message.into()));
@@ -153,10 +158,12 @@ impl Args {
     }
 
     /// `None` if an interrupt came first.
-    fn start_reader(&self, inputs: &[PathBuf], channels: usize) -> Result<Option<MultiReader>, Failure> {
+    fn start_reader(&self, inputs: &[PathBuf], bank: &Bank) -> Result<Option<MultiReader>, Failure> {
         let lost = self.gaps.lost_samples()?;
-        let block_bytes = self.threads.bytes(BLOCK_BYTES);
-        let raw = ReadOptions { coding: self.format, channels, block_bytes, ..ReadOptions::files() };
+        let turns = self.turns.turns(bank, &self.bank)?;
+        let (channels, block_bytes) = (bank.channel_count(), self.threads.bytes(BLOCK_BYTES));
+        let turns = turns.as_ref();
+        let raw = ReadOptions { coding: self.format, channels, turns, block_bytes, ..ReadOptions::files() };
         let options = self.gaps.read_options(lost.as_ref(), raw);
         MultiReader::start(inputs, options, interrupts()).map_err(Failure::input)
     }

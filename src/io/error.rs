@@ -93,6 +93,17 @@ pub enum IoError {
         /// What is wrong, and the remedy.
         problem: String,
     },
+    /// An input in which converters take turns has more than one channel.
+    #[error(
+        "{file}: {channels} channels, but converters that take turns share one; read it without --interleaved, or \
+         extract that channel first"
+    )]
+    TurnsInChannels {
+        /// Name of the input.
+        file: String,
+        /// Channels of the input.
+        channels: usize,
+    },
     /// A file of lost samples that is malformed or does not fit the inputs.
     #[error("{file}: {problem}")]
     Lost {

@@ -48,6 +48,11 @@ impl<R: Read> FrameReader<R> {
         Ok(filled)
     }
 
+    /// Makes `count` >= 1 frames in a row one, before anything is read.
+    pub fn group(&mut self, count: usize) {
+        self.frame *= count;
+    }
+
     /// Bytes a frame.
     pub fn frame_bytes(&self) -> usize {
         self.frame

@@ -4,7 +4,7 @@ use super::pipe::{stdin_file, widen_pipe};
 use super::sigmf::{SigmfMeta, file_pair, is_sigmf};
 use super::timestamps::Timestamps;
 use super::wav::WavReader;
-use super::{Coding, FrameReader, InputFault, IoError, PcmFormat, SampleLayout, StreamHeader};
+use super::{Coding, FrameReader, InputFault, IoError, PcmFormat, SampleLayout, StreamHeader, Turns};
 use crossbeam_channel::{Receiver, Sender};
 use std::fs::File;
 use std::io::Read;
@@ -15,8 +15,10 @@ use std::path::{Path, PathBuf};
 pub(super) struct InputSource {
     pub(super) path: PathBuf,
     pub(super) coding: Coding,
-    /// Number of channels if the input has no header.
+    /// Number of channels if the input has no header and no converters take turns in it.
     pub(super) channels: usize,
+    /// The converters that take turns in the input, if they do.
+    pub(super) turns: Option<Turns>,
     /// Bytes of a block.
     pub(super) block: usize,
 }
@@ -41,7 +43,33 @@ impl InputSource {
     pub(super) fn raw_header(&self) -> StreamHeader {
         let format = if let Coding::Raw(format) = self.coding { format } else { PcmFormat::F32Le };
         let layout = SampleLayout::packed(format);
-        StreamHeader { layout, channels: self.channels, rate: None, promised: None }
+        let channels = self.turns.as_ref().map_or(self.channels, Turns::converters);
+        StreamHeader { layout, channels, rate: None, promised: None }
+    }
+
+    /// Samples in a row that belong to one frame.
+    fn turn(&self) -> usize {
+        self.turns.as_ref().map_or(1, Turns::converters)
+    }
+
+    /// What the header of the input itself says, with each turn as one frame of all converters.
+    fn in_turns(&self, header: StreamHeader) -> Result<StreamHeader, IoError> {
+        let Some(turns) = &self.turns else { return Ok(header) };
+        if header.channels != 1 {
+            return Err(IoError::TurnsInChannels { file: self.name(), channels: header.channels });
+        }
+        let converters = turns.converters();
+        Ok(StreamHeader {
+            layout: header.layout,
+            channels: converters,
+            rate: header.rate.map(|rate| rate / converters as f64),
+            promised: header.promised.map(|samples| samples / converters as u64),
+        })
+    }
+
+    /// Puts the samples of whole frames into the order of the channels.
+    pub(super) fn reorder(&self, frames: &mut [u8], layout: SampleLayout) {
+        self.turns.iter().for_each(|turns| turns.reorder(frames, layout.container));
     }
 
     pub(super) fn is_stdin(&self) -> bool {
@@ -91,8 +119,9 @@ impl Reader {
         let promised = wav.data_bytes.map(|bytes| bytes / wav.frame_bytes() as u64);
         let rate = Some(f64::from(wav.rate));
         let header = StreamHeader { layout: wav.layout, channels: wav.channels, rate, promised };
-        self.send_header(header, Timestamps::default());
-        self.send_frames(reader.frames())?;
+        self.send_header(self.source.in_turns(header)?, Timestamps::default());
+        reader.frames().group(self.source.turn());
+        self.send_frames(reader.frames(), header.layout)?;
         Ok(Message::End { faults: reader.faults() })
     }
 
@@ -110,7 +139,10 @@ impl Reader {
         };
         let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
         let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
-        self.send_header(StreamHeader { promised, ..header }, meta.timestamps(&meta_name)?);
+        let header = self.source.in_turns(StreamHeader { promised, ..header })?;
+        let broken = |problem| IoError::Sigmf { file: meta_name.clone(), problem };
+        let timestamps = meta.timestamps(&meta_name)?.in_turns(self.source.turn()).map_err(broken)?;
+        self.send_header(header, timestamps);
         self.send_raw_frames(file, header)
     }
 
@@ -120,16 +152,17 @@ impl Reader {
 
     fn send_raw_frames(&self, bytes: impl Read, header: StreamHeader) -> Result<Message, IoError> {
         let mut frames = FrameReader::new(bytes, header.frame_bytes(), None);
-        self.send_frames(&mut frames)?;
+        self.send_frames(&mut frames, header.layout)?;
         Ok(Message::End { faults: cut_frame(frames.cut_bytes()) })
     }
 
     /// Sends frames to the consumer until the end, or until the consumer is gone.
-    fn send_frames(&self, frames: &mut FrameReader<impl Read>) -> Result<(), IoError> {
+    fn send_frames(&self, frames: &mut FrameReader<impl Read>, layout: SampleLayout) -> Result<(), IoError> {
         while let Ok(mut bytes) = self.pool.recv() {
             bytes.resize(self.source.block.max(frames.frame_bytes()), 0);
             let filled =
                 frames.take_ready(&mut bytes).map_err(IoError::system(&self.name, "read the samples"))?;
+            self.source.reorder(&mut bytes[..filled], layout);
             if filled == 0 || self.messages.send(Ok(Message::Frames { bytes, filled })).is_err() {
                 break;
             }

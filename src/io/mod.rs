@@ -18,6 +18,7 @@ mod sigmf;
 mod stdin_reader;
 mod stream_header;
 mod timestamps;
+mod turns;
 pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
@@ -31,3 +32,4 @@ pub use sample_writer::{Container, SampleWriter};
 pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
 pub use stream_header::{Coding, StreamHeader};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};
+pub use turns::Turns;

@@ -10,7 +10,7 @@ use super::lost::{LostInInput, LostSamples};
 #[cfg(target_os = "linux")]
 use super::stdin_reader::StdinReader;
 use super::timestamps::{MAX_LOST, Segment, Timestamps};
-use super::{Coding, InputFault, InputWarning, IoError, PcmFrames, StreamHeader};
+use super::{Coding, InputFault, InputWarning, IoError, PcmFrames, StreamHeader, Turns};
 use crate::files::is_same_file;
 use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::path::{Path, PathBuf};
@@ -40,6 +40,9 @@ pub struct ReadOptions<'a> {
     pub coding: Coding,
     /// Channels of a raw input, if it is the only one; several have one each.
     pub channels: usize,
+    /// The converters that take turns in the only input, which has one channel then. Its frames are those of
+    /// an input of M channels, at an M-th of its rate.
+    pub turns: Option<&'a Turns>,
     /// The lost samples, if a file lists them.
     pub lost: Option<&'a LostSamples>,
     /// Maximum number of lost frames of one input, by default [`MAX_LOST`]. Without a limit a wrong number
@@ -57,6 +60,7 @@ impl ReadOptions<'_> {
         Self {
             coding: Coding::Wav,
             channels: 1,
+            turns: None,
             lost: None,
             max_lost: MAX_LOST,
             until: Until::Shortest,
@@ -126,8 +130,14 @@ impl MultiReader {
         refuse_shared_pipes(paths)?;
         let channels = if paths.len() == 1 { options.channels } else { 1 };
         let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).min(options.block_bytes).max(4096);
-        let source =
-            |path: &PathBuf| InputSource { path: path.clone(), coding: options.coding, channels, block };
+        let turns = options.turns.filter(|_| paths.len() == 1);
+        let source = |path: &PathBuf| InputSource {
+            path: path.clone(),
+            coding: options.coding,
+            channels,
+            turns: turns.cloned(),
+            block,
+        };
         let inputs = match paths {
             [path] => vec![Input::alone(source(path))?],
             // All threads first: opening a FIFO waits for its writer, in whatever order they come.
@@ -418,7 +428,8 @@ mod tests {
         send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Vec<u8>>) + Send + 'static,
     ) -> MultiReader {
         let header =
-            InputSource { path: "x".into(), coding: raw(1).coding, channels: 1, block: 4 }.raw_header();
+            InputSource { path: "x".into(), coding: raw(1).coding, channels: 1, turns: None, block: 4 }
+                .raw_header();
         let input = Input::on_thread_of("dying".into(), header, send_all).unwrap();
         let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
         MultiReader { inputs: vec![input], stop, until, ready: 0, consumed: 0 }
@@ -446,6 +457,27 @@ mod tests {
     fn an_input_that_ends_is_no_error() {
         let mut reader = reader(|messages, _| messages.send(Ok(Message::End { faults: vec![] })).unwrap());
         assert_eq!(reader.wait().unwrap(), Arrival::End);
+    }
+
+    #[test]
+    fn converters_in_turn_are_the_channels_of_one_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.raw");
+        // Four turns of three converters, and two samples of a fifth.
+        std::fs::write(&path, (0u8..14).collect::<Vec<_>>()).unwrap();
+        let turns = Turns::by_delay(&[0.0, 2.0, 1.0]);
+        let options = ReadOptions { turns: Some(&turns), ..raw(1) };
+        let started = MultiReader::start(&[path], options, crossbeam_channel::never()).unwrap();
+        let mut reader = started.unwrap();
+        assert_eq!(reader.channels(), 3);
+        let mut bytes: Vec<u8> = Vec::new();
+        while let Arrival::Frames(frames) = reader.wait().unwrap() {
+            bytes.extend(reader.frames()[0].bytes);
+            reader.consume(frames);
+        }
+        assert_eq!(bytes, [2, 0, 1, 5, 3, 4, 8, 6, 7, 11, 9, 10]);
+        let faults: Vec<_> = reader.warnings().into_iter().map(|warning| warning.fault).collect();
+        assert_eq!(faults, [InputFault::CutFrame { bytes: 2 }]);
     }
 
     #[test]

@@ -17,10 +17,10 @@ const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 /// The reading end with its block.
 pub(super) struct StdinReader {
     name: String,
+    source: InputSource,
     pipe: File,
     frames: FrameReader<File>,
     pub(super) header: StreamHeader,
-    block: usize,
     spare: Vec<u8>,
 }
 
@@ -35,7 +35,7 @@ impl StdinReader {
         let pipe = stdin_file().map_err(refused())?;
         let header = source.raw_header();
         let frames = FrameReader::new(pipe.try_clone().map_err(refused())?, header.frame_bytes(), None);
-        Ok(Self { pipe, frames, header, block: source.block, spare: Vec::new(), name })
+        Ok(Self { pipe, frames, header, source: source.clone(), spare: Vec::new(), name })
     }
 
     /// Waits for whole frames or the end; `None` if a stop was requested first.
@@ -45,7 +45,7 @@ impl StdinReader {
     pub(super) fn receive(&mut self, stop: &Receiver<()>) -> Result<Option<Message>, IoError> {
         let mut bytes = std::mem::take(&mut self.spare);
         let frame = self.frames.frame_bytes();
-        bytes.resize((self.block / frame).max(1) * frame, 0);
+        bytes.resize((self.source.block / frame).max(1) * frame, 0);
         while !self.frames.ended() {
             if !matches!(stop.try_recv(), Err(TryRecvError::Empty)) {
                 return Ok(None);
@@ -56,6 +56,7 @@ impl StdinReader {
             let got = self.frames.read_whole(&mut bytes);
             let filled = got.map_err(self.refused())?;
             if filled > 0 {
+                self.source.reorder(&mut bytes[..filled], self.header.layout);
                 return Ok(Some(Message::Frames { bytes, filled }));
             }
         }

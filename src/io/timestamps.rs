@@ -58,6 +58,20 @@ impl Timestamps {
         Ok(Self(timestamps))
     }
 
+    /// The same timestamps counted in turns of M = `converters` samples.
+    pub(super) fn in_turns(self, converters: usize) -> Result<Self, String> {
+        let m = converters as u64;
+        if let Some(broken) = self.0.iter().find(|t| t.frame % m != 0 || t.index % m != 0) {
+            return Err(format!(
+                "sample_start {} with global_index {} is not at the beginning of a turn of {m} converters, so that \
+                 other converters would follow; cut the capture to whole turns",
+                broken.frame, broken.index
+            ));
+        }
+        let turn = |t: Timestamp| Timestamp { frame: t.frame / m, index: t.index / m };
+        Ok(Self(self.0.into_iter().map(turn).collect()))
+    }
+
     /// True if there are no timestamps.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
@@ -133,6 +147,13 @@ mod tests {
         // Lost at the very beginning, said twice.
         assert_eq!(segments(&[(0, 5), (0, 6)], 5), [Lost(1), rest]);
         assert_eq!(timestamps(&[(4, 14)]).unwrap().beginning(), Some(10));
+    }
+
+    #[test]
+    fn turns_begin_with_their_first_converter() {
+        assert_eq!(timestamps(&[(0, 8), (4, 16)]).unwrap().in_turns(4), timestamps(&[(0, 2), (1, 4)]));
+        let broken = timestamps(&[(0, 0), (4, 9)]).unwrap().in_turns(4).unwrap_err();
+        assert!(broken.contains("global_index 9 is not at the beginning of a turn of 4"), "{broken}");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod gaps;
 mod recordings;
+mod turns;
 
 use crate::support::{Desk, TAPS, bytes, fused, interleaved, names, text, wav};
 use serde_json::json;

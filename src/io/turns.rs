@@ -1,0 +1,73 @@
+//! Captures in which several converters write their samples in turn into one file.
+//!
+//! Sample k of the file, counted from 0, comes from converter k mod M. M samples in a row, one of each
+//! converter, are a frame.
+
+/// M converters that take turns, and the channel that each of them is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Turns {
+    /// The channel, from 0, of each converter.
+    channels: Vec<usize>,
+}
+
+impl Turns {
+    /// Converter j is channel j: for captures of which nothing else is known.
+    pub fn in_order(converters: usize) -> Self {
+        Self { channels: (0..converters).collect() }
+    }
+
+    /// The converters in the order in which they sample. Channel i takes sample k at the time k M - `delays[i]`,
+    /// so converter 0 is the channel with the largest delay. Channels of equal delay stay in their order.
+    pub fn by_delay(delays: &[f64]) -> Self {
+        let mut channels: Vec<usize> = (0..delays.len()).collect();
+        channels.sort_by(|&a, &b| delays[b].total_cmp(&delays[a]));
+        Self { channels }
+    }
+
+    /// M.
+    pub fn converters(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// The channel, from 0, of each converter.
+    pub fn channels(&self) -> &[usize] {
+        &self.channels
+    }
+
+    /// Puts the samples of whole frames, of `container` bytes each, into the order of the channels.
+    pub(super) fn reorder(&self, bytes: &mut [u8], container: usize) {
+        if self.channels.is_sorted() {
+            return;
+        }
+        let mut frame = vec![0; container * self.converters()];
+        for samples in bytes.chunks_exact_mut(frame.len()) {
+            frame.copy_from_slice(samples);
+            for (&channel, sample) in self.channels.iter().zip(frame.chunks_exact(container)) {
+                samples[channel * container..][..container].copy_from_slice(sample);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_converter_is_the_one_with_the_largest_delay() {
+        assert_eq!(Turns::by_delay(&[3.1, 1.9, 1.0, 0.0]), Turns::in_order(4));
+        assert_eq!(Turns::by_delay(&[0.0, 1.0, 2.5]).channels(), [2, 1, 0]);
+        assert_eq!(Turns::by_delay(&[0.5, 1.0, 0.5]).channels(), [1, 0, 2]);
+    }
+
+    #[test]
+    fn whole_frames_come_into_the_order_of_the_channels() {
+        let turns = Turns::by_delay(&[0.0, 2.0, 1.0]);
+        // Two bytes a sample, two frames; converters are the channels 1, 2 and 0.
+        let mut bytes = *b"1a2b0c1d2e0f";
+        turns.reorder(&mut bytes, 2);
+        assert_eq!(&bytes, b"0c1a2b0f1d2e");
+        Turns::in_order(3).reorder(&mut bytes, 2);
+        assert_eq!(&bytes, b"0c1a2b0f1d2e");
+    }
+}

@@ -1,0 +1,135 @@
+//! One file or pipe in which converters take turns.
+
+use crate::support::{Desk, bytes, interleaved, wav};
+use serde_json::json;
+
+/// A bank of three converters with the delays 0, 2 and 1 of a slow period of 3, whose channels go unchanged to
+/// the phases: they sample in the order channel 2, 3, 1.
+fn write_bank(desk: &Desk, delays: [f64; 3]) {
+    let channel = |i: usize| {
+        let tap = |n: usize| f64::from(u8::from(n == i));
+        json!({ "delay": delays[i], "taps": [tap(0), tap(1), tap(2)] })
+    };
+    let bank = json!({
+        "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 3, "latency": 0,
+        "method": "fir", "channels": [channel(0), channel(1), channel(2)], "state_space": null,
+        "gamma": { "upper": null, "lower": null, "noncausal": null }
+    });
+    desk.write("three.json", bank.to_string());
+}
+
+/// Sample k of the capture is k.
+fn capture(turns: usize) -> Vec<f32> {
+    (0..3 * turns).map(|k| k as f32).collect()
+}
+
+/// The capture with each turn in the order of the channels.
+fn by_channel(turns: usize) -> Vec<f32> {
+    (0..turns).flat_map(|turn| [2, 0, 1].map(|j| (3 * turn + j) as f32)).collect()
+}
+
+#[test]
+fn the_converter_that_samples_first_comes_first() {
+    let desk = Desk::empty();
+    write_bank(&desk, [0.0, 2.0, 1.0]);
+    // Less than a block, and several.
+    for turns in [1, 5, 100_000] {
+        wav::write(&desk, "capture.wav", 1, 48_000, &capture(turns));
+        let args = ["fuse", "three.json", "capture.wav", "-o", "y.wav", "--interleaved", "3", "--force"];
+        assert_eq!(desk.good(&args), "");
+        let (spec, fused) = wav::read(&desk.path("y.wav"));
+        assert_eq!(spec.sample_rate, 48_000);
+        assert!(fused == by_channel(turns), "{turns} turns");
+    }
+}
+
+#[test]
+fn one_file_gives_the_bytes_of_a_file_per_channel() {
+    let desk = Desk::new();
+    let (a, b) = (
+        (0..30_000).map(|k| ((k * 31) % 97) as f32 / 97.0).collect::<Vec<f32>>(),
+        (0..30_000).map(|k| ((k * 17) % 89) as f32 / 89.0).collect::<Vec<f32>>(),
+    );
+    wav::write_pair(&desk, &a, &b);
+    wav::write(&desk, "capture.wav", 1, 48_000, &interleaved(&a, &b));
+    desk.good(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "1.wav"]);
+    // Equal delays: the channels take turns in their order.
+    desk.good(&["fuse", "bank.json", "capture.wav", "-o", "2.wav", "--interleaved", "2"]);
+    assert!(desk.read("1.wav") == desk.read("2.wav"));
+}
+
+#[test]
+fn pipes_are_read_in_turns_too() {
+    let desk = Desk::empty();
+    write_bank(&desk, [0.0, 2.0, 1.0]);
+    let input = bytes(&capture(20_000));
+    desk.write("capture.raw", &input);
+    let args = ["stream", "three.json", "--interleaved", "3"];
+    let piped = desk.run(&args, &input);
+    assert!(piped.status.success() && piped.stderr.is_empty(), "{piped:?}");
+    assert!(piped.stdout == bytes(&by_channel(20_000)));
+    let file = desk.run(&[&args[..], &["--input", "capture.raw"]].concat(), &[]);
+    assert!(file.stdout == piped.stdout);
+    // A turn that is not whole is left out and told.
+    let cut = desk.run(&args, &input[..12 * 7 + 5]);
+    assert!(cut.stdout == bytes(&by_channel(7)), "{cut:?}");
+    assert!(
+        String::from_utf8(cut.stderr).unwrap().contains("the last frame is cut (5 bytes of it are there)")
+    );
+}
+
+#[test]
+fn timestamps_count_whole_turns() {
+    let desk = Desk::empty();
+    write_bank(&desk, [0.0, 2.0, 1.0]);
+    desk.write("capture.sigmf-data", bytes(&capture(4)));
+    let meta = |index: u64| {
+        let captures = json!([
+            { "core:sample_start": 0, "core:global_index": 0 },
+            { "core:sample_start": 6, "core:global_index": index }
+        ]);
+        let global =
+            json!({ "core:datatype": "rf32_le", "core:sample_rate": 3000.0, "core:version": "1.0.0" });
+        desk.write("capture.sigmf-meta", json!({ "global": global, "captures": captures }).to_string());
+    };
+    let args = [
+        "fuse",
+        "three.json",
+        "capture.sigmf-meta",
+        "-o",
+        "y.wav",
+        "--interleaved",
+        "3",
+        "--gaps",
+        "zero",
+        "--force",
+    ];
+    meta(9);
+    // The gap is told.
+    assert!(desk.run(&args, &[]).status.success());
+    let mut want = by_channel(4);
+    want.splice(6..6, [0.0; 3]);
+    assert_eq!(wav::samples(&desk, "y.wav"), want);
+    meta(8);
+    desk.refused(1, &args, &["capture.sigmf-meta", "global_index 8", "beginning of a turn of 3 converters"]);
+}
+
+#[test]
+fn what_cannot_take_turns_is_refused() {
+    let desk = Desk::empty();
+    write_bank(&desk, [0.0, 2.0, 1.0]);
+    wav::write(&desk, "capture.wav", 1, 48_000, &capture(4));
+    wav::write(&desk, "wide.wav", 3, 16_000, &capture(4));
+    let fuse =
+        |args: &[&'static str]| [&["fuse", "three.json", "-o", "y.wav", "--interleaved"], args].concat();
+    desk.refused(2, &fuse(&["2", "capture.wav"]), &["has 3 channels", "give --interleaved 3"]);
+    desk.refused(
+        2,
+        &fuse(&["3", "capture.wav", "wide.wav"]),
+        &["2 inputs are given", "leave out --interleaved"],
+    );
+    desk.refused(2, &fuse(&["0", "capture.wav"]), &["--interleaved"]);
+    desk.refused(1, &fuse(&["3", "wide.wav"]), &["wide.wav: 3 channels", "without --interleaved"]);
+    write_bank(&desk, [0.0, 3.0, 1.0]);
+    desk.refused(1, &fuse(&["3", "capture.wav"]), &["3 fast periods apart", "one recording per channel"]);
+}
