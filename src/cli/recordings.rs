@@ -1,30 +1,42 @@
-//! Whole mono recordings in memory, for the commands that work on short ones.
+//! Whole recordings of one channel in memory, for the commands that work on short ones.
 
 use super::Failure;
 use super::interrupt::remove_unfinished;
 use crate::files::{AtomicFile, commit_all};
 use crate::io::wav::WavFile;
-use crate::io::{Arrival, MultiReader, PcmFormat, ReadOptions};
+use crate::io::{Arrival, MultiReader, PcmFormat, ReadOptions, SampleLayout};
 use std::io;
 use std::path::Path;
 
-/// The samples and the rate (hertz) of a mono WAV file or SigMF recording.
-pub(super) fn read_mono(path: &Path) -> Result<(Vec<f64>, u32), Failure> {
+/// The samples and the rate (hertz) of one channel, counted from 1, of a WAV file or SigMF recording; a mono
+/// recording needs no number.
+pub(super) fn read_channel(path: &Path, channel: Option<usize>) -> Result<(Vec<f64>, u32), Failure> {
     let reader = MultiReader::start(&[path.to_owned()], ReadOptions::files(), crossbeam_channel::never());
     let mut reader = reader.map_err(Failure::input)?.ok_or_else(|| Failure::input("interrupted"))?;
-    if reader.channels() != 1 {
-        return Err(Failure::Input(format!(
-            "{}: {} channels, but a source is mono; extract one channel first",
-            path.display(),
-            reader.channels()
-        )));
-    }
+    let channels = reader.channels();
+    let index = match channel {
+        None if channels == 1 => 0,
+        Some(channel) if (1..=channels).contains(&channel) => channel - 1,
+        None => {
+            return Err(Failure::Input(format!(
+                "{}: {channels} channels, but a source is one of them; give its number, --channel 1 to {channels}",
+                path.display()
+            )));
+        }
+        Some(channel) => {
+            return Err(Failure::Input(format!(
+                "--channel {channel}: {} has {channels} channels, counted from 1",
+                path.display()
+            )));
+        }
+    };
     let rate = reader.headers().find_map(|(_, header)| header.rate).unwrap_or(0.0).round() as u32;
     let mut samples = Vec::new();
     while let Arrival::Frames(count) = reader.wait().map_err(Failure::input)? {
         for frames in reader.frames() {
-            let format = frames.layout.format;
-            samples.extend(frames.bytes.chunks_exact(frames.frame_bytes()).map(|b| format.decode(b)));
+            let SampleLayout { format, container } = frames.layout;
+            let sample = |frame: &[u8]| format.decode(&frame[index * container..][..container]);
+            samples.extend(frames.bytes.chunks_exact(frames.frame_bytes()).map(sample));
         }
         reader.consume(count);
     }

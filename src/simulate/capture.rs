@@ -3,6 +3,7 @@
 use super::recording::Recording;
 use super::response::{self, Instants, sample};
 use super::source::NormalisedSource;
+use super::walk::sample_at;
 use crate::analog::StrictlyProper;
 use crate::design::Problem;
 use crate::design::problem::Channel;
@@ -41,17 +42,21 @@ pub fn recordings<'a>(
     signal: &'a Analog,
     periods: usize,
 ) -> impl Iterator<Item = Vec<f64>> + 'a {
-    let ratio = problem.ratio;
-    let read = |front_end: usize, first: FastPeriods, step: f64, count: usize| {
-        let instants = Instants { first, step: FastPeriods(step), count };
-        signal.filtered(&problem.front_ends[front_end], instants)
-    };
     let slow = move |channel: &Channel| {
-        let samples = read(channel.front_end, -channel.delay, ratio as f64, periods);
+        let step = FastPeriods(problem.ratio as f64);
+        let instants = Instants { first: -channel.delay, step, count: periods };
+        let samples = signal.filtered(&problem.front_ends[channel.front_end], instants);
         samples.into_iter().map(|sample| channel.gain * sample).collect()
     };
-    let target = move || read(problem.target, FastPeriods(-(problem.latency as f64)), 1.0, periods * ratio);
+    let target = move || target(problem, signal, periods);
     problem.channels.iter().map(slow).chain(std::iter::once_with(target))
+}
+
+/// The reference samples of [`capture`].
+pub fn target(problem: &Problem, signal: &Analog, periods: usize) -> Vec<f64> {
+    let (first, step) = (FastPeriods(-(problem.latency as f64)), FastPeriods(1.0));
+    let instants = Instants { first, step, count: periods * problem.ratio };
+    signal.filtered(&problem.front_ends[problem.target], instants)
 }
 
 impl Analog {
@@ -63,10 +68,28 @@ impl Analog {
         }
     }
 
-    fn filtered(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
+    /// (phi * f)(t) at the given instants.
+    pub(super) fn filtered(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
         match self {
             Self::Known(source) => sample(filter, source, instants),
             Self::Recorded(recording) => recording.sample(filter, instants),
+        }
+    }
+
+    /// (phi * f)(t) at the given instants, each later by its shift.
+    pub(super) fn filtered_near(
+        &self,
+        filter: &StrictlyProper,
+        instants: Instants,
+        shifts: &[FastPeriods],
+    ) -> Vec<f64> {
+        match self {
+            Self::Known(source) => {
+                let times: Vec<_> =
+                    shifts.iter().enumerate().map(|(n, &shift)| instants.at(n) + shift).collect();
+                sample_at(filter, source, &times)
+            }
+            Self::Recorded(recording) => recording.sample_near(filter, instants, shifts),
         }
     }
 }

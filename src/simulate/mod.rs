@@ -4,16 +4,24 @@
 //! Channel i captures (phi_i * f)(k M - D_i), time in fast periods. The response to an analytic [`Source`]
 //! is computed by closed forms, matrix exponentials and quadrature that is exact to rounding; the response
 //! to a [`Recording`] by Fourier synthesis. No time grid is involved, so the result at an instant does not
-//! depend on the other instants.
+//! depend on the other instants. A [`Converter`] adds errors of delay, gain, offset and clock, jitter, noise and
+//! rounding.
 
 mod capture;
+mod converter;
+mod normal;
 mod parse;
+mod quantiser;
 mod recording;
 mod response;
 mod source;
+mod walk;
 
-pub use capture::{Analog, Captured, capture, interleaved, recordings};
+pub use capture::{Analog, Captured, capture, interleaved, recordings, target};
+pub use converter::{Converter, Delivered};
 pub use parse::ParseSourceError;
+pub use quantiser::Quantiser;
 pub use recording::Recording;
 pub use response::{Instants, panels, sample};
 pub use source::{NormalisedSource, Source, Tone};
+pub use walk::sample_at;

@@ -6,6 +6,13 @@ use crate::linalg::{Complex, fourier};
 use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
+/// A Taylor series ends where its terms are below this, relative to the first one.
+const NEGLIGIBLE: f64 = 1e-17;
+/// Terms of a Taylor series, at most; shifts up to [`Recording::most_shift`] take half of them.
+const MOST_TERMS: u32 = 128;
+/// Largest pi |shift| / T: e to this power is what rounding errors grow by.
+const MOST_EXPONENT: f64 = 12.0;
+
 /// L samples with a spacing of T fast periods, continued with period L T and interpolated by the
 /// trigonometric polynomial of least degree: f(t) = Re sum_k c_k e^{2 pi j k t / (L T)}, k = 0 .. L/2.
 #[derive(Debug, Clone)]
@@ -52,19 +59,66 @@ impl Recording {
         if instants.count == 0 || self.length == 0 {
             return vec![0.0; instants.count];
         }
-        let omega = TAU / self.duration().0;
-        let (first, step) = (instants.first / self.duration(), instants.step / self.duration());
-        let filtered: Vec<Complex<f64>> = self
-            .spectrum
-            .iter()
-            .enumerate()
-            .map(|(k, bin)| {
-                let w = RadiansPerFastPeriod(k as f64 * omega);
-                let weight = if k == 0 { 1.0 } else { 2.0 };
-                bin * filter.response(w) * Complex::from_polar(weight, phase(k, first))
-            })
-            .collect();
-        chirp_z(&filtered, step, instants.count)
+        chirp_z(&self.filtered(filter, instants.first), instants.step / self.duration(), instants.count)
+    }
+
+    /// (phi * f)(t) at the given instants, each later by its shift: the Taylor series around the instants, each
+    /// of whose terms is a sum as in [`Recording::sample`].
+    ///
+    /// Its error relative to the largest value is some 1e-16 e^z with z = pi |shift| / T; keep the shifts below
+    /// [`Recording::most_shift`].
+    pub fn sample_near(
+        &self,
+        filter: &StrictlyProper,
+        instants: Instants,
+        shifts: &[FastPeriods],
+    ) -> Vec<f64> {
+        let mut output = self.sample(filter, instants);
+        if output.is_empty() || self.length == 0 {
+            return output;
+        }
+        let largest = shifts.iter().fold(0.0f64, |most, shift| most.max(shift.0.abs()));
+        let (turn, step) = (PI / self.spacing.0, instants.step / self.duration());
+        let mut derivative = self.filtered(filter, instants.first);
+        let mut powers = vec![1.0; output.len()];
+        let mut bound = 1.0;
+        for order in (1..=MOST_TERMS).map(f64::from) {
+            bound *= largest * turn / order;
+            // In units of the highest frequency, so that no power overflows.
+            for (k, bin) in derivative.iter_mut().enumerate() {
+                *bin *= Complex::new(0.0, self.omega(k) / turn);
+            }
+            let term = chirp_z(&derivative, step, output.len());
+            for (((y, power), shift), term) in output.iter_mut().zip(&mut powers).zip(shifts).zip(term) {
+                *power *= shift.0 * turn / order;
+                *y += *power * term;
+            }
+            if bound < NEGLIGIBLE && order > largest * turn {
+                break;
+            }
+        }
+        output
+    }
+
+    /// The largest shift of [`Recording::sample_near`] that keeps its digits.
+    pub fn most_shift(&self) -> FastPeriods {
+        self.spacing * (MOST_EXPONENT / PI)
+    }
+
+    /// Angular frequency of harmonic k, rad per fast period.
+    fn omega(&self, k: usize) -> f64 {
+        k as f64 * (TAU / self.duration().0)
+    }
+
+    /// Coefficients of the filtered harmonics, with their phases at `first`.
+    fn filtered(&self, filter: &StrictlyProper, first: FastPeriods) -> Vec<Complex<f64>> {
+        let first = first / self.duration();
+        let coefficient = |(k, bin): (usize, &Complex<f64>)| {
+            let weight = if k == 0 { 1.0 } else { 2.0 };
+            bin * filter.response(RadiansPerFastPeriod(self.omega(k)))
+                * Complex::from_polar(weight, phase(k, first))
+        };
+        self.spectrum.iter().enumerate().map(coefficient).collect()
     }
 }
 

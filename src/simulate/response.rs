@@ -17,9 +17,9 @@ pub struct Instants {
 }
 
 impl Instants {
-    /// Instant `n`, fast periods.
-    fn at(&self, n: usize) -> f64 {
-        self.first.0 + n as f64 * self.step.0
+    /// Instant `n`.
+    pub fn at(&self, n: usize) -> FastPeriods {
+        FastPeriods(self.first.0 + n as f64 * self.step.0)
     }
 }
 
@@ -57,14 +57,10 @@ pub(super) fn work_bytes(source: &NormalisedSource, count: usize) -> usize {
 
 /// Steady state: amplitude |Phi(j omega)| cos(omega t + phase + arg Phi(j omega)).
 fn tones(filter: &StrictlyProper, tones: &[Tone<FastPeriods>], instants: Instants) -> Vec<f64> {
-    let phasors: Vec<(f64, Complex<f64>)> = tones
-        .iter()
-        .map(|tone| {
-            (tone.omega.0, filter.response(tone.omega) * Complex::from_polar(tone.amplitude, tone.phase))
-        })
-        .collect();
+    let phasors: Vec<(f64, Complex<f64>)> =
+        tones.iter().map(|tone| (tone.omega.0, tone.response(filter))).collect();
     let value = |t: f64| phasors.iter().map(|(omega, p)| (p * Complex::from_polar(1.0, omega * t)).re).sum();
-    (0..instants.count).map(|n| value(instants.at(n))).collect()
+    (0..instants.count).map(|n| value(instants.at(n).0)).collect()
 }
 
 /// The state and the constant input form one autonomous system, (x, u)' = [A B; 0 0] (x, u), so A need not
@@ -75,10 +71,10 @@ fn step(filter: &StrictlyProper, at: f64, height: f64, instants: Instants) -> Ve
     generator.view_mut((0, 0), (n, n)).copy_from(filter.a());
     generator.view_mut((0, n), (n, 1)).copy_from(filter.b());
     let mut output = vec![0.0; instants.count];
-    let Some(first) = (0..instants.count).find(|&k| instants.at(k) >= at) else { return output };
+    let Some(first) = (0..instants.count).find(|&k| instants.at(k).0 >= at) else { return output };
     let mut state = Mat::zeros(n + 1, 1);
     state[n] = height;
-    state = linalg::expm(&(&generator * (instants.at(first) - at))) * state;
+    state = linalg::expm(&(&generator * (instants.at(first).0 - at))) * state;
     let advance = linalg::expm(&(generator * instants.step.0));
     for sample in &mut output[first..] {
         *sample = (filter.c() * state.rows(0, n))[0];
@@ -119,7 +115,7 @@ fn smooth(
     let mut output = Vec::with_capacity(instants.count);
     let mut cached: Option<Panels> = None;
     for k in 0..instants.count {
-        let target = instants.at(k);
+        let target = instants.at(k).0;
         // The source is not smooth at the ends of its support, so panels end there.
         for corner in [support.0, support.1, target] {
             let length = corner - now;
@@ -139,17 +135,32 @@ fn smooth(
     output
 }
 
+/// The whole rule on [0, 1]: abscissae and weights.
+pub(super) const RULE: [(f64, f64); 16] = {
+    let mut rule = [(0.0, 0.0); 16];
+    let mut k = 0;
+    while k < 8 {
+        let (abscissa, weight) = HALF_NODES[k];
+        rule[k] = (abscissa, weight);
+        rule[15 - k] = (1.0 - abscissa, weight);
+        k += 1;
+    }
+    rule
+};
+
 /// Panels of the quadrature per fast period, for a source with no frequency above `band` (cycles per fast
 /// period).
-fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
+pub(super) fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
     (filter.a().norm() + std::f64::consts::TAU * band).max(f64::MIN_POSITIVE)
 }
 
-/// Number of quadrature panels that [`sample`] needs over `span`; 0 for sources with a closed form.
-pub fn panels(filter: &StrictlyProper, source: &NormalisedSource, span: FastPeriods) -> f64 {
+/// Number of quadrature panels that [`sample`] needs over `span`; 0 for sources with a closed form. At
+/// instants without a common distance (`jittered`, [`sample_at`](super::sample_at)) a step needs them too.
+pub fn panels(filter: &StrictlyProper, source: &NormalisedSource, span: FastPeriods, jittered: bool) -> f64 {
     match source {
         Source::Chirp { start, end, .. } => span.0 * panel_rate(filter, start.0.abs().max(end.0.abs())),
-        Source::Sum(terms) => terms.iter().map(|term| panels(filter, term, span)).sum(),
+        Source::Step { .. } if jittered => span.0 * panel_rate(filter, 0.0),
+        Source::Sum(terms) => terms.iter().map(|term| panels(filter, term, span, jittered)).sum(),
         Source::Step { .. } | Source::Tones(_) => 0.0,
     }
 }
@@ -230,7 +241,7 @@ mod tests {
     #[test]
     fn the_step_response_has_its_closed_form() {
         for (n, y) in sample(&thesis(), &source("step@0.3"), GRID).into_iter().enumerate() {
-            let t = GRID.at(n) - 0.3;
+            let t = GRID.at(n).0 - 0.3;
             let exact = if t < 0.0 { 0.0 } else { 1.0 - (1.0 + 0.5 * t) * (-0.5 * t).exp() };
             assert!((y - exact).abs() < 1e-13, "{n}: {y} {exact}");
         }
@@ -239,7 +250,7 @@ mod tests {
     #[test]
     fn tones_are_in_the_steady_state() {
         for (n, y) in sample(&rc(2.0), &source("tones:0.8"), GRID).into_iter().enumerate() {
-            let t = GRID.at(n);
+            let t = GRID.at(n).0;
             let exact = (2.0 * (0.8 * t).cos() + 0.8 * (0.8 * t).sin()) * 2.0 / (4.0 + 0.64);
             assert!((y - exact).abs() < 1e-13, "{n}: {y} {exact}");
         }
@@ -258,7 +269,7 @@ mod tests {
                 if t <= 0.0 { 0.0 } else { steady(t) - steady(0.0) * (-pole * t).exp() }
             };
             for (n, y) in sample(&rc(pole), &chirp, GRID).into_iter().enumerate() {
-                let t = GRID.at(n);
+                let t = GRID.at(n).0;
                 let exact = if t <= length { on(t) } else { on(length) * (-pole * (t - length)).exp() };
                 assert!((y - exact).abs() < 1e-12, "{pole} {n}: {y} {exact}");
             }

@@ -1,5 +1,7 @@
 //! Analytic sources: analog signals known in closed form.
 
+use crate::analog::StrictlyProper;
+use crate::linalg::Complex;
 use crate::units::{FastPeriods, Hertz, Quantity, RadiansPerSecond, Seconds, Time};
 use std::f64::consts::TAU;
 
@@ -125,6 +127,13 @@ impl<T: Time> Source<T> {
             }
             Self::Sum(terms) => terms.iter().map(|term| term.value(t)).sum(),
         }
+    }
+}
+
+impl Tone<FastPeriods> {
+    /// The phasor of the steady state behind a filter: amplitude Phi(j omega) e^{j phase}.
+    pub(super) fn response(&self, filter: &StrictlyProper) -> Complex<f64> {
+        filter.response(self.omega) * Complex::from_polar(self.amplitude, self.phase)
     }
 }
 

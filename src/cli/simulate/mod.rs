@@ -1,12 +1,15 @@
 //! `hybank simulate`: the captures of virtual slow converters.
 
+mod converters;
+
+use self::converters::{CommonReport, ConverterArgs, ConverterReport, Converters};
 use super::Failure;
 use super::bank_file::load_spec_or_bank;
-use super::recordings::{Mono, begin_recording, read_mono};
+use super::recordings::{Mono, begin_recording, read_channel};
 use super::say::name_leftovers;
 use crate::design::{self, Problem};
 use crate::files::{commit_all, refuse_overlaps};
-use crate::simulate::{Analog, Recording, Source, panels, recordings};
+use crate::simulate::{Analog, Delivered, Recording, Source, panels, target};
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::path::{Path, PathBuf};
@@ -26,7 +29,8 @@ const MOST_PANELS: f64 = 2e7;
 ///
 /// Writes ch1.wav, ch2.wav, .. at the slow rate, and target.wav: the samples of the ideal fast converter,
 /// delayed by the latency. The samples of a step, tone or chirp are exact to rounding. A WAV recording is
-/// treated as a periodic, band-limited analog signal.
+/// treated as a periodic, band-limited analog signal. The converters have the gains and offsets of the spec,
+/// and the errors that are asked for; the target is ideal.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sources:
@@ -35,18 +39,23 @@ Sources:
   tones:440Hz,1kHz          the same, frequencies in hertz
   chirp:50Hz..8kHz@2s       a linear sweep from 50 Hz to 8 kHz in 2 s
   step@1+tones:440Hz        a sum
-  FILE.wav                  a mono recording
+  FILE.wav                  a mono recording, or with --channel K one channel of a recording
 
 Examples:
   hybank simulate spec.toml --source step@0.3 -o captures
   hybank simulate bank.json --source speech.wav -o captures
-  hybank simulate bank.json --source tones:440Hz,1kHz --samples 96000 -o captures")]
+  hybank simulate bank.json --source tones:440Hz,1kHz --samples 96000 -o captures
+  hybank simulate spec.toml --source music.wav --channel 2 -o captures
+  hybank simulate spec.toml --source tones:440Hz -o captures --bits 12 --delay-error 10ns,-10ns")]
 pub(super) struct Args {
     /// A spec (TOML) or a bank (JSON)
     spec: PathBuf,
     /// The analog signal
     #[arg(long)]
     source: String,
+    /// Channel of the WAV recording, counted from 1; a mono recording needs none
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    channel: Option<u16>,
     /// The folder for the captures; created if missing
     #[arg(short, long)]
     output: PathBuf,
@@ -54,7 +63,7 @@ pub(super) struct Args {
     /// 200]
     #[arg(long)]
     samples: Option<usize>,
-    /// Factor by which the captures and the target are multiplied
+    /// Factor by which the analog signal is multiplied
     #[arg(long, default_value_t = 1.0, allow_hyphen_values = true)]
     gain: f64,
     /// Replace existing files
@@ -63,6 +72,8 @@ pub(super) struct Args {
     /// Print a report as one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    converters: ConverterArgs,
 }
 
 #[derive(Debug, serde::Serialize)]
@@ -72,6 +83,9 @@ struct Report {
     slow_rate: u32,
     fast_rate: u32,
     latency: usize,
+    #[serde(flatten)]
+    common: CommonReport,
+    converters: Vec<ConverterReport>,
     warnings: Vec<String>,
 }
 
@@ -92,17 +106,30 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         warnings.push(format!("the spec gives no latency; {latency} fast samples are used"));
     }
     let (signal, samples) = args.signal(&spec)?;
+    let Converters { common, each } = args.converters.converters(&spec, &signal)?;
     let frames = args.frames(samples, spec.ratio)?;
     args.check_work(&problem, &signal, frames)?;
     let files = args.files(&rates, spec.channels.len())?;
-    // The target's converter is ideal.
-    let offsets = spec.channels.iter().map(|channel| channel.offset).chain([0.0]);
-    let recordings = recordings(&problem, &signal, frames).zip(offsets);
-    let recordings = recordings.map(|(samples, offset)| args.delivered(samples, offset));
+    let (converters, mut reports): (Vec<_>, Vec<_>) = each.into_iter().unzip();
+    let captures = converters.iter().zip(&mut reports).enumerate().map(|(i, (converter, report))| {
+        let Delivered { samples, clipped } = converter.capture(&problem, i, (&signal, args.gain), frames);
+        report.clipped = clipped;
+        samples
+    });
+    let reference = std::iter::once_with(|| args.amplified(target(&problem, &signal, frames)));
+    let recordings = captures.chain(reference).map(|samples| args.checked(samples));
     write_all(&args.output, &files, recordings, args.force)?;
-    let names = files.iter().map(|file| file.path.display().to_string()).collect();
-    Report { files: names, frames, slow_rate: rates.slow, fast_rate: rates.fast, latency, warnings }
+    let files: Vec<String> = files.iter().map(|file| file.path.display().to_string()).collect();
+    warnings.extend(clipping(&files, &reports));
+    let (slow_rate, fast_rate) = (rates.slow, rates.fast);
+    Report { files, frames, slow_rate, fast_rate, latency, common, converters: reports, warnings }
         .print(args.json)
+}
+
+/// Warnings of converters that clipped.
+fn clipping<'a>(files: &'a [String], reports: &'a [ConverterReport]) -> impl Iterator<Item = String> + 'a {
+    let clipped = files.iter().zip(reports).filter(|(_, report)| report.clipped > 0);
+    clipped.map(|(file, report)| format!("{file}: {} samples were clipped at full scale", report.clipped))
 }
 
 /// A file to be written.
@@ -117,7 +144,7 @@ impl Args {
     fn signal(&self, spec: &Spec) -> Result<(Analog, usize), Failure> {
         let path = Path::new(&self.source);
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("wav")) {
-            let (samples, rate) = read_mono(path)?;
+            let (samples, rate) = read_channel(path, self.channel.map(usize::from))?;
             let rate = Hertz(f64::from(rate));
             // In normalised time the recording's own rate is the fast rate.
             let fast = if spec.fast_period == NORMALISED { rate } else { spec.fast_period.rate() };
@@ -127,6 +154,12 @@ impl Args {
                 Analog::Recorded(recording),
                 self.samples.unwrap_or(length / spec.ratio * spec.ratio),
             ));
+        }
+        if let Some(channel) = self.channel {
+            return Err(Failure::Usage(format!(
+                "--channel {channel}: the source {} is no WAV recording; leave the option out",
+                self.source
+            )));
         }
         let source: Source =
             self.source.parse().map_err(|error| Failure::Usage(format!("--source: {error}")))?;
@@ -140,7 +173,9 @@ impl Args {
     /// memory cannot hold.
     fn check_work(&self, problem: &Problem, signal: &Analog, frames: usize) -> Result<(), Failure> {
         let samples = frames * problem.ratio;
-        let bytes = signal.work_bytes(samples);
+        let jittered = self.converters.is_jittered();
+        // Jitter, instants, their order, and a power of each jitter.
+        let bytes = signal.work_bytes(samples).saturating_add(if jittered { 32 * samples } else { 0 });
         if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
             return Err(Failure::Input(format!(
                 "{}: {samples} fast samples take {:.1} GB of memory, more than the system gives; ask for fewer with \
@@ -151,7 +186,11 @@ impl Args {
         }
         let Analog::Known(source) = signal else { return Ok(()) };
         let span = FastPeriods(samples as f64);
-        let work = problem.front_ends.iter().map(|filter| panels(filter, source, span)).fold(0.0, f64::max);
+        let work = problem
+            .front_ends
+            .iter()
+            .map(|filter| panels(filter, source, span, jittered))
+            .fold(0.0, f64::max);
         if work <= MOST_PANELS {
             return Ok(());
         }
@@ -173,22 +212,20 @@ impl Args {
         Ok(files)
     }
 
-    /// Applies the gain of the signal, then the converter's offset. A sample beyond the range of a 32-bit float is an error, not an infinity in the
-    /// file.
-    fn delivered(&self, mut samples: Vec<f64>, offset: f64) -> Result<Vec<f64>, Failure> {
-        for x in &mut samples {
-            *x *= self.gain;
-            if offset != 0.0 {
-                *x += offset;
-            }
-            if x.is_nan() || x.abs() > f64::from(f32::MAX) {
-                return Err(Failure::Input(format!(
-                    "{}: a captured sample is {x:e}, beyond the range of a 32-bit float; use a smaller --gain",
-                    self.source
-                )));
-            }
+    fn amplified(&self, mut samples: Vec<f64>) -> Vec<f64> {
+        samples.iter_mut().for_each(|x| *x *= self.gain);
+        samples
+    }
+
+    /// A sample beyond the range of a 32-bit float is an error, not an infinity in the file.
+    fn checked(&self, samples: Vec<f64>) -> Result<Vec<f64>, Failure> {
+        match samples.iter().find(|x| x.is_nan() || x.abs() > f64::from(f32::MAX)) {
+            None => Ok(samples),
+            Some(x) => Err(Failure::Input(format!(
+                "{}: a captured sample is {x:e}, beyond the range of a 32-bit float; use a smaller --gain",
+                self.source
+            ))),
         }
-        Ok(samples)
     }
 
     /// `samples` fast samples as whole frames.
@@ -275,13 +312,16 @@ impl Report {
         if json {
             return super::print_json(self);
         }
+        let each = self.converters.iter().zip(1..).map(|(converter, channel)| converter.text(channel));
+        let each: String = each.collect();
         super::print(&format!(
-            "{} frames at {} Hz, target at {} Hz with a latency of {} samples:\n  {}\n",
+            "{} frames at {} Hz, target at {} Hz with a latency of {} samples:\n  {}\n{}{each}",
             self.frames,
             self.slow_rate,
             self.fast_rate,
             self.latency,
-            self.files.join("\n  ")
+            self.files.join("\n  "),
+            self.common.text()
         ))
     }
 }

@@ -1,0 +1,267 @@
+//! A virtual converter with errors of its own.
+
+use super::capture::Analog;
+use super::normal::{Normal, Purpose};
+use super::quantiser::Quantiser;
+use super::response::Instants;
+use crate::design::Problem;
+use crate::units::FastPeriods;
+
+/// How a converter differs from the ideal sampler of a channel. Sample k of channel i, with the front end Phi_i
+/// and the gain g_i of the problem, is
+///
+/// ```text
+/// q(level g_i (1 + gain error) (phi_i * f)(t_k) + offset + noise n_k)
+/// t_k = k M / (1 + drift) - D_i - delay error + jitter j_k
+/// ```
+///
+/// with independent normal numbers n_k and j_k of variance 1 and the quantiser q. The numbers depend on the
+/// seed, the channel and k only.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converter {
+    /// The true delay minus D_i.
+    pub delay_error: FastPeriods,
+    /// Relative error of the gain.
+    pub gain_error: f64,
+    /// What is added to each sample, relative to full scale.
+    pub offset: f64,
+    /// By how much the clock is too fast, relatively.
+    pub drift: f64,
+    /// Rms of the aperture jitter.
+    pub jitter: FastPeriods,
+    /// Rms of white noise, relative to full scale.
+    pub noise: f64,
+    /// `None` does not round.
+    pub quantiser: Option<Quantiser>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// What a converter delivered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Delivered {
+    /// Sample k.
+    pub samples: Vec<f64>,
+    /// Samples that saturated.
+    pub clipped: usize,
+}
+
+impl Converter {
+    /// Largest modulus of a jitter's random number: no sample is taken further than this times the rms from
+    /// its instant.
+    pub const MOST_SIGMAS: f64 = Normal::MOST;
+
+    /// The ideal sampler.
+    pub fn ideal() -> Self {
+        Self {
+            delay_error: FastPeriods(0.0),
+            gain_error: 0.0,
+            offset: 0.0,
+            drift: 0.0,
+            jitter: FastPeriods(0.0),
+            noise: 0.0,
+            quantiser: None,
+            seed: 0,
+        }
+    }
+
+    /// Captures `periods` samples of channel `channel` of `problem`, from 0, with the signal times `level`.
+    pub fn capture(
+        &self,
+        problem: &Problem,
+        channel: usize,
+        (signal, level): (&Analog, f64),
+        periods: usize,
+    ) -> Delivered {
+        let Problem { ratio, channels, front_ends, .. } = problem;
+        let front_end = &front_ends[channels[channel].front_end];
+        let instants = Instants {
+            first: -(channels[channel].delay + self.delay_error),
+            step: FastPeriods(*ratio as f64 / (1.0 + self.drift)),
+            count: periods,
+        };
+        let analog = match self.shifts(channel, periods) {
+            Some(shifts) => signal.filtered_near(front_end, instants, &shifts),
+            None => signal.filtered(front_end, instants),
+        };
+        let gain = level * channels[channel].gain * (1.0 + self.gain_error);
+        self.convert(channel, analog, gain)
+    }
+
+    /// The jitter of each sample.
+    fn shifts(&self, channel: usize, periods: usize) -> Option<Vec<FastPeriods>> {
+        let normal = Normal::new(self.seed, channel, Purpose::Jitter);
+        let shifts = || (0..periods).map(|k| self.jitter * normal.at(k)).collect();
+        (self.jitter.0 > 0.0).then(shifts)
+    }
+
+    /// From voltages to samples.
+    fn convert(&self, channel: usize, mut samples: Vec<f64>, gain: f64) -> Delivered {
+        let normal = Normal::new(self.seed, channel, Purpose::Noise);
+        let mut clipped = 0;
+        for (k, x) in samples.iter_mut().enumerate() {
+            *x *= gain;
+            if self.offset != 0.0 {
+                *x += self.offset;
+            }
+            if self.noise > 0.0 {
+                *x += self.noise * normal.at(k);
+            }
+            if let Some(quantiser) = self.quantiser {
+                let (code, saturated) = quantiser.quantise(*x);
+                *x = code;
+                clipped += usize::from(saturated);
+            }
+        }
+        Delivered { samples, clipped }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{Recording, Source, capture};
+    use crate::spec::Spec;
+    use crate::units::Seconds;
+    use std::f64::consts::TAU;
+
+    /// 0.25 / (s + 0.5)^2, M = 2; the second channel has a gain.
+    fn problem() -> Problem {
+        let text = "fast_period = 1.0\nratio = 2\nlatency = 3\n\
+             channel = [{ delay = 1.2 }, { delay = 0.6, gain = -2.0 }]\n\
+             target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n";
+        Problem::new(&Spec::from_toml(text, "spec.toml").unwrap(), 3).unwrap()
+    }
+
+    fn tone(omega: f64) -> Analog {
+        let source: Source = format!("tones:{omega}").parse().unwrap();
+        Analog::Known(source.normalised(Seconds(1.0)))
+    }
+
+    /// The response of the front end to cos(omega t) at t.
+    fn exact(omega: f64, t: f64) -> f64 {
+        0.25 / (omega * omega + 0.25) * (omega * t - 2.0 * (omega / 0.5).atan()).cos()
+    }
+
+    fn rms(values: impl Iterator<Item = f64> + Clone) -> f64 {
+        let count = values.clone().count();
+        (values.map(|x| x * x).sum::<f64>() / count as f64).sqrt()
+    }
+
+    fn differences<'a>(a: &'a [f64], b: &'a [f64]) -> impl Iterator<Item = f64> + Clone + 'a {
+        a.iter().zip(b).map(|(a, b)| a - b)
+    }
+
+    #[test]
+    fn an_ideal_converter_captures_what_the_problem_says() {
+        let signal = tone(0.7);
+        let want = capture(&problem(), &signal, 50);
+        for (channel, want) in want.channels.iter().enumerate() {
+            let got = Converter::ideal().capture(&problem(), channel, (&signal, 1.0), 50);
+            assert_eq!((&got.samples, got.clipped), (want, 0));
+        }
+    }
+
+    #[test]
+    fn errors_of_delay_gain_offset_and_clock_have_their_closed_form() {
+        let converter = Converter {
+            delay_error: FastPeriods(0.03),
+            gain_error: 0.01,
+            offset: -0.2,
+            drift: 1e-4,
+            ..Converter::ideal()
+        };
+        let got = converter.capture(&problem(), 1, (&tone(0.7), 3.0), 4000);
+        for (k, x) in got.samples.iter().enumerate() {
+            let t = k as f64 * 2.0 / 1.0001 - 0.63;
+            let want = 3.0 * -2.0 * 1.01 * exact(0.7, t) - 0.2;
+            assert!((x - want).abs() < 1e-11, "{k}: {x} {want}");
+        }
+    }
+
+    #[test]
+    fn noise_has_its_rms_and_is_white() {
+        let converter = Converter { noise: 0.003, seed: 5, ..Converter::ideal() };
+        let count = 200_000;
+        let captured: Vec<Vec<f64>> =
+            (0..2).map(|i| converter.capture(&problem(), i, (&tone(0.7), 0.0), count).samples).collect();
+        for noise in &captured {
+            // Five standard deviations of the estimate, 1 / sqrt(2 N) = 0.16 %.
+            let found = rms(noise.iter().copied());
+            assert!((found / 0.003 - 1.0).abs() < 0.008, "{found}");
+        }
+        let product = |lag: usize| {
+            captured[0].iter().zip(&captured[1][lag..]).map(|(a, b)| a * b).sum::<f64>()
+                / (count - lag) as f64
+        };
+        assert!((0..3).all(|lag| product(lag).abs() < 0.012 * 0.003 * 0.003));
+    }
+
+    /// -20 log10(omega sigma), omega = 2 pi f: the slope of the sine times the jitter, both independent.
+    #[test]
+    fn jitter_has_the_snr_of_its_formula() {
+        for (omega, sigma) in [(0.3, 0.01), (1.1, 0.003), (2.5, 1e-5)] {
+            let converter = Converter { jitter: FastPeriods(sigma), seed: 9, ..Converter::ideal() };
+            let count = 100_000;
+            let [ideal, jittered] = [Converter::ideal(), converter]
+                .map(|c| c.capture(&problem(), 0, (&tone(omega), 1.0), count).samples);
+            let error = rms(differences(&ideal, &jittered));
+            let snr = 20.0 * (rms(ideal.iter().copied()) / error).log10();
+            let formula = -20.0 * (omega * sigma).log10();
+            assert!((snr - formula).abs() < 0.1, "{omega} {sigma}: {snr:.3} dB, formula {formula:.3} dB");
+        }
+    }
+
+    #[test]
+    fn a_quantised_full_scale_sine_has_the_snr_of_its_formula() {
+        let omega = TAU * (5f64.sqrt() - 1.0) / 4.0;
+        let full_scale = (1.0 - 0.5f64.powi(12)) * (omega * omega + 0.25) / 0.25;
+        let capture = |quantiser| {
+            let converter = Converter { quantiser, ..Converter::ideal() };
+            converter.capture(&problem(), 0, (&tone(omega), full_scale), 100_000)
+        };
+        let (ideal, rounded) = (capture(None), capture(Quantiser::new(12)));
+        let error = rms(differences(&ideal.samples, &rounded.samples));
+        let snr = 20.0 * (rms(ideal.samples.iter().copied()) / error).log10();
+        assert!((snr - (6.0206 * 12.0 + 1.7609)).abs() < 0.05, "{snr}");
+        let clipped = Converter { quantiser: Quantiser::new(12), ..Converter::ideal() };
+        let clipped = clipped.capture(&problem(), 0, (&tone(omega), 2.0 * full_scale), 30_000).clipped;
+        // A sine of twice the full scale is beyond it for two thirds of its period.
+        assert!((clipped as f64 / 30_000.0 - 2.0 / 3.0).abs() < 1e-3, "{clipped}");
+    }
+
+    /// Every kind of signal is taken at the very instants of the jitter, and recordings in any rate.
+    #[test]
+    fn jittered_samples_are_those_of_their_instants() {
+        let length = 401;
+        let omega = TAU * 90.0 / f64::from(length);
+        let recorded: Vec<f64> = (0..length).map(|n| (omega * f64::from(n)).cos()).collect();
+        for (signal, omega) in [
+            (tone(omega), omega),
+            (Analog::Recorded(Recording::new(&recorded, FastPeriods(1.0))), omega),
+            (Analog::Recorded(Recording::new(&recorded, FastPeriods(0.4))), omega / 0.4),
+            (Analog::Recorded(Recording::new(&recorded, FastPeriods(2.5))), omega / 2.5),
+        ] {
+            let converter =
+                Converter { jitter: FastPeriods(0.1), drift: -3e-5, seed: 2, ..Converter::ideal() };
+            let shifts = converter.shifts(0, 300).unwrap();
+            let got = converter.capture(&problem(), 0, (&signal, 1.0), 300).samples;
+            for (k, x) in got.iter().enumerate() {
+                let want = exact(omega, k as f64 * 2.0 / (1.0 - 3e-5) - 1.2 + shifts[k].0);
+                assert!((x - want).abs() < 1e-11, "{omega} {k}: {x} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn samples_depend_on_seed_channel_and_number_only() {
+        let converter = Converter { jitter: FastPeriods(0.01), noise: 0.1, seed: 3, ..Converter::ideal() };
+        let capture = |converter: Converter, channel, periods| {
+            converter.capture(&problem(), channel, (&tone(0.4), 1.0), periods).samples
+        };
+        let long = capture(converter, 1, 500);
+        assert_eq!(capture(converter, 1, 200), long[..200]);
+        assert_ne!(capture(Converter { seed: 4, ..converter }, 1, 200), long[..200]);
+        assert_ne!(capture(converter, 0, 200), long[..200]);
+    }
+}
