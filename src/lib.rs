@@ -10,6 +10,8 @@ pub mod units;
 
 #[cfg(feature = "runtime")]
 pub mod bank;
+#[cfg(feature = "export")]
+pub mod export;
 #[cfg(feature = "runtime")]
 pub mod io;
 #[cfg(feature = "runtime")]

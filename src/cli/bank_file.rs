@@ -3,6 +3,7 @@
 use super::Failure;
 use super::file_kind::FileKind;
 use super::interrupt::remove_unfinished;
+use super::print::print_bytes;
 use super::say::name_leftovers;
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::filters;
@@ -101,12 +102,17 @@ pub(super) fn refuse_overlap(output: &Path, input: &Path) -> Result<(), Failure>
 
 /// Writes a text file that appears when it is whole; `-` is standard output.
 pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Failure> {
+    write_bytes(path, text.as_bytes(), force)
+}
+
+/// As [`write_text`], for any bytes.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8], force: bool) -> Result<(), Failure> {
     if is_dash(path) {
-        return super::print(text);
+        return print_bytes(bytes);
     }
     remove_unfinished();
     let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
-    file.write_all(text.as_bytes())
+    file.write_all(bytes)
         .map_err(|error| Failure::Input(format!("{}: cannot write it: {error}", name(path))))?;
     file.commit().map_err(Failure::input)
 }

@@ -8,6 +8,7 @@ mod bank_file;
 mod completions;
 mod demo;
 mod design;
+mod export;
 mod failure;
 mod file_kind;
 mod fuse;
@@ -65,6 +66,7 @@ enum Command {
     Design(design::Args),
     Analyze(analyze::Args),
     Verify(verify::Args),
+    Export(export::Args),
     Simulate(simulate::Args),
     Fuse(fuse::Args),
     Stream(stream::Args),
@@ -99,6 +101,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Design(args) => design::run(&args),
         Command::Analyze(args) => analyze::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Fuse(args) => fuse::run(&args),
         Command::Stream(args) => stream::run(&args),

@@ -5,8 +5,13 @@ use std::io::{ErrorKind, Write};
 
 /// Results on standard output; a closed pipe ends the run without a message.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
+    print_bytes(text.as_bytes())
+}
+
+/// As [`print`], for any bytes.
+pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut stdout = crate::io::stdout();
-    stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
+    stdout.write_all(bytes).and_then(|()| stdout.flush()).map_err(|error| print_failure(&error))
 }
 
 /// One JSON object on standard output.

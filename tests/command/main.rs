@@ -11,6 +11,7 @@ mod docs;
 mod effort;
 mod examples;
 #[cfg(target_os = "linux")]
+mod export;
 mod faults;
 mod fuse;
 #[cfg(target_os = "linux")]

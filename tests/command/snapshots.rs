@@ -7,8 +7,19 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 10] =
-    ["init", "design", "analyze", "verify", "simulate", "fuse", "stream", "demo", "completions", "help"];
+const COMMANDS: [&str; 11] = [
+    "init",
+    "design",
+    "analyze",
+    "verify",
+    "export",
+    "simulate",
+    "fuse",
+    "stream",
+    "demo",
+    "completions",
+    "help",
+];
 
 /// Numbers as `#`, of whatever length, and runs of spaces as one.
 fn redacted(text: &str) -> String {

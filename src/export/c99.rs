@@ -1,0 +1,233 @@
+//! A C99 header with the coefficients of a bank and a streaming function.
+
+use super::ExportError;
+use super::layout::{PolyphaseTaps, SparseBlock};
+use crate::bank::{Bank, FixedPoint, SynthesisFilters};
+use std::fmt::Display;
+
+/// Numbers per line of a table.
+const PER_LINE: usize = 4;
+
+/// The header. `name` is the prefix of its identifiers.
+pub(super) fn header(bank: &Bank, name: &str) -> Result<String, ExportError> {
+    check_name(name)?;
+    let body = match (&bank.filters, &bank.fixed_point) {
+        (SynthesisFilters::Fir(_), Some(words)) => integer_fir(bank, words, name)?,
+        (SynthesisFilters::Fir(taps), None) => real_fir(bank, &PolyphaseTaps::new(taps, bank.ratio), name),
+        (SynthesisFilters::StateSpace(block), _) => recursive(bank, &SparseBlock::new(block), name),
+    };
+    let guard = format!("{}_H", name.to_ascii_uppercase());
+    Ok(format!("{}#ifndef {guard}\n#define {guard}\n\n{body}\n#endif\n", about(bank, name)))
+}
+
+fn check_name(name: &str) -> Result<(), ExportError> {
+    let legal = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(legal) {
+        return Ok(());
+    }
+    Err(ExportError::Name { name: name.to_owned() })
+}
+
+/// What the header is, as a comment.
+fn about(bank: &Bank, name: &str) -> String {
+    let title = bank.spec.as_ref().map(|spec| spec.name.replace("*/", "* /")).unwrap_or_default();
+    let title: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let bound = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:e}"));
+    format!(
+        "/* {title}\n   Written by hybank. C99, no allocation, no library.\n\n   \
+         {name}_reset clears a state. {name}_process takes the samples of one slow period, one of each of the {}\n   \
+         channels, and writes the {} output samples of that period. The output is {} samples late.\n   \
+         gamma of these coefficients in exact arithmetic: {}, upper bound {}, lower bound {}.\n   \
+         Sums are taken in the order written; -ffp-contract=off gives the same bits with every compiler. */\n",
+        bank.channel_count(),
+        bank.ratio,
+        bank.latency,
+        bound(bank.gamma.norm),
+        bound(bank.gamma.upper),
+        bound(bank.gamma.lower),
+    )
+}
+
+fn table<T>(values: &[T], write: impl Fn(&T) -> String) -> String {
+    let lines: Vec<String> =
+        values.chunks(PER_LINE).map(|line| line.iter().map(&write).collect::<Vec<_>>().join(", ")).collect();
+    format!("{{\n    {}\n}}", lines.join(",\n    "))
+}
+
+fn double(value: &f64) -> String {
+    format!("{value:e}")
+}
+
+fn decimal(value: &impl Display) -> String {
+    value.to_string()
+}
+
+fn real_fir(bank: &Bank, taps: &PolyphaseTaps<f64>, name: &str) -> String {
+    fir(&Fir {
+        name,
+        sizes: [taps.channels, taps.ratio, taps.lags],
+        comment: format!("{} taps, {} not zero", taps.values.len(), taps.nonzero()),
+        include: "#include <string.h>",
+        number: "double",
+        sample: "double",
+        tap: "double",
+        taps: table(&taps.values, double),
+        offsets: Some(table(&bank.offsets, double)),
+        helper: String::new(),
+        finish: "sum".to_owned(),
+    })
+}
+
+fn integer_fir(bank: &Bank, words: &FixedPoint, name: &str) -> Result<String, ExportError> {
+    let nonzero = |(_, offset): &(usize, &f64)| **offset != 0.0;
+    if let Some((i, &offset)) = bank.offsets.iter().enumerate().find(nonzero) {
+        return Err(ExportError::Offset { channel: i + 1, offset });
+    }
+    let taps = PolyphaseTaps::new(&words.integers, bank.ratio);
+    let sum = largest_sum(&taps);
+    if sum >= 1 << 31 {
+        return Err(ExportError::Accumulator { sum });
+    }
+    let growth = u64::BITS - sum.leading_zeros();
+    Ok(fir(&Fir {
+        name,
+        sizes: [taps.channels, taps.ratio, taps.lags],
+        comment: format!(
+            "{} integer taps times 2^{}, {} not zero. Sums of B-bit samples need B + {growth} bits; 64 are used.\n   \
+             Each sum is rounded to the nearest integer, halves upwards, and saturates at 32 bits",
+            taps.values.len(),
+            -words.fraction_bits,
+            taps.nonzero()
+        ),
+        include: "#include <stdint.h>\n#include <string.h>",
+        number: "int64_t",
+        sample: "int32_t",
+        tap: "int32_t",
+        taps: table(&taps.values, decimal),
+        offsets: None,
+        helper: rounding(name, words.fraction_bits),
+        finish: format!("{name}_rounded(sum)"),
+    }))
+}
+
+/// Largest sum of the moduli of the taps of a phase.
+fn largest_sum(taps: &PolyphaseTaps<i64>) -> u64 {
+    let of_phase = |p: usize| -> u64 {
+        let entries = (0..taps.channels).flat_map(|i| (0..taps.lags).map(move |j| (i, j)));
+        entries.map(|(i, j)| taps.get(i, p, j).unsigned_abs()).sum()
+    };
+    (0..taps.ratio).map(of_phase).max().unwrap_or(0)
+}
+
+/// The function that turns a sum into an output sample.
+fn rounding(name: &str, fraction_bits: i32) -> String {
+    let scaled = match fraction_bits {
+        bits if bits > 62 => "0".to_owned(),
+        bits if bits > 0 => {
+            let half = 1_i64 << (bits - 1);
+            // A shift of a negative number is not portable; the complement of one is never negative there.
+            format!("sum >= -INT64_C({half}) ? (sum + {half}) >> {bits} : ~(~(sum + {half}) >> {bits})")
+        }
+        bits if bits >= -31 => {
+            let factor = 1_i64 << -bits;
+            let limit = i64::from(i32::MAX) / factor + 1;
+            format!("sum > {limit} ? INT32_MAX : sum < -{limit} ? INT32_MIN : sum * {factor}")
+        }
+        _ => "sum > 0 ? INT32_MAX : sum < 0 ? INT32_MIN : 0".to_owned(),
+    };
+    format!(
+        "static int32_t {name}_rounded(int64_t sum) {{\n    int64_t y = {scaled};\n    \
+         return (int32_t)(y > INT32_MAX ? INT32_MAX : y < INT32_MIN ? INT32_MIN : y);\n}}\n\n"
+    )
+}
+
+/// The parts of a header for FIR filters.
+struct Fir<'a> {
+    name: &'a str,
+    /// N, M and the lags.
+    sizes: [usize; 3],
+    comment: String,
+    include: &'a str,
+    /// Type of the sums.
+    number: &'a str,
+    /// Type of the samples.
+    sample: &'a str,
+    tap: &'a str,
+    taps: String,
+    offsets: Option<String>,
+    helper: String,
+    /// The output sample of a sum.
+    finish: String,
+}
+
+fn fir(parts: &Fir<'_>) -> String {
+    let Fir {
+        name, sizes: [n, m, lags], comment, include, number, sample, tap, taps, helper, finish, ..
+    } = parts;
+    let offsets = parts
+        .offsets
+        .as_ref()
+        .map_or_else(String::new, |table| format!("static const double {name}_offsets[{n}] = {table};\n\n"));
+    let centred =
+        if parts.offsets.is_some() { format!("input[i] - {name}_offsets[i]") } else { "input[i]".into() };
+    format!(
+        "{include}\n\n\
+         /* {comment}.\n   taps[channel][phase][lag]: tap phase + lag * {m} of the channel's filter. */\n\
+         static const {tap} {name}_taps[{count}] = {taps};\n\n{offsets}\
+         typedef struct {{\n    {sample} history[{lags}][{n}]; /* a ring of slow periods */\n    int newest;\n}} {name}_state;\n\n\
+         static void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n}}\n\n{helper}\
+         static void {name}_process({name}_state *state, const {sample} input[{n}], {sample} output[{m}]) {{\n    \
+         state->newest = state->newest == 0 ? {last} : state->newest - 1;\n    \
+         for (int i = 0; i < {n}; i++) state->history[state->newest][i] = {centred};\n    \
+         for (int p = 0; p < {m}; p++) {{\n        {number} sum = 0;\n        \
+         for (int j = 0; j < {lags}; j++) {{\n            \
+         int k = state->newest + j;\n            if (k >= {lags}) k -= {lags};\n            \
+         for (int i = 0; i < {n}; i++)\n                \
+         sum += ({number}){name}_taps[(i * {m} + p) * {lags} + j] * state->history[k][i];\n        }}\n        \
+         output[p] = {finish};\n    }}\n}}\n",
+        count = n * m * lags,
+        last = lags - 1,
+    )
+}
+
+fn recursive(bank: &Bank, block: &SparseBlock, name: &str) -> String {
+    let SparseBlock { states, inputs, outputs, rows } = block;
+    let starts: Vec<usize> = std::iter::once(0)
+        .chain(rows.iter().scan(0, |end, row| {
+            *end += row.len();
+            Some(*end)
+        }))
+        .collect();
+    let (columns, values): (Vec<usize>, Vec<f64>) = rows.iter().flatten().copied().unzip();
+    // C has no arrays of length zero.
+    let (columns, values) = if values.is_empty() { (vec![0], vec![0.0]) } else { (columns, values) };
+    format!(
+        "#include <string.h>\n\n\
+         /* x+ = a x + b u, y = c x + d u with {states} states; the {count} coefficients of the rows of [a b; c d] that are\n   \
+         not zero, with their columns of [x; u]. */\n\
+         static const double {name}_values[{length}] = {values};\n\
+         static const int {name}_columns[{length}] = {columns};\n\
+         static const int {name}_starts[{boundaries}] = {starts};\n\
+         static const double {name}_offsets[{inputs}] = {offsets};\n\n\
+         typedef struct {{\n    double x[{width}];\n}} {name}_state;\n\n\
+         static void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n}}\n\n\
+         static double {name}_row(const double *z, int row) {{\n    double sum = 0;\n    \
+         for (int k = {name}_starts[row]; k < {name}_starts[row + 1]; k++) sum += {name}_values[k] * z[{name}_columns[k]];\n    \
+         return sum;\n}}\n\n\
+         static void {name}_process({name}_state *state, const double input[{inputs}], double output[{outputs}]) {{\n    \
+         double z[{all}];\n    \
+         for (int i = 0; i < {states}; i++) z[i] = state->x[i];\n    \
+         for (int i = 0; i < {inputs}; i++) z[{states} + i] = input[i] - {name}_offsets[i];\n    \
+         for (int p = 0; p < {outputs}; p++) output[p] = {name}_row(z, {states} + p);\n    \
+         for (int i = 0; i < {states}; i++) state->x[i] = {name}_row(z, i);\n}}\n",
+        count = block.nonzero(),
+        length = columns.len(),
+        values = table(&values, double),
+        columns = table(&columns, decimal),
+        boundaries = starts.len(),
+        starts = table(&starts, decimal),
+        offsets = table(&bank.offsets, double),
+        width = (*states).max(1),
+        all = states + inputs,
+    )
+}

@@ -1,0 +1,41 @@
+//! Why a bank cannot be exported.
+
+/// A format that cannot hold a bank.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The format holds integers.
+    #[error("{format} files hold integer taps, and this bank has none; design it with --bits")]
+    NoIntegers {
+        /// Name of the format.
+        format: &'static str,
+    },
+    /// Integer code has no full scale to which an offset is relative.
+    #[error(
+        "channel {channel} has the offset {offset}, which integer code cannot subtract: its full scale is unknown; \
+         subtract the offset from the samples and set it to 0 in the spec"
+    )]
+    Offset {
+        /// Number of the channel, from 1.
+        channel: usize,
+        /// The offset relative to full scale.
+        offset: f64,
+    },
+    /// Sums of 32-bit samples could exceed 64 bits.
+    #[error(
+        "the integer taps of one output phase sum to {sum} in size; sums of 32-bit samples may not fit 64 bits, give \
+         fewer bits"
+    )]
+    Accumulator {
+        /// Largest sum of the moduli of a phase.
+        sum: u64,
+    },
+    /// A name that C does not allow.
+    #[error("\"{name}\" is no C identifier; use letters, digits and underscores, a letter first")]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// The archive could not be put together.
+    #[error("the archive cannot be written: {0}")]
+    Archive(String),
+}

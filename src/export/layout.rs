@@ -1,0 +1,68 @@
+//! The coefficients in the order in which every format has them.
+
+use crate::bank::BlockFilter;
+
+/// FIR taps by channel, phase and lag.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PolyphaseTaps<T> {
+    /// N.
+    pub channels: usize,
+    /// M.
+    pub ratio: usize,
+    /// Slow periods that the filters span; shorter phases end in zeros.
+    pub lags: usize,
+    /// Entry (i, p, j) at `(i M + p) lags + j`.
+    pub values: Vec<T>,
+}
+
+impl<T: Copy + Default + PartialEq> PolyphaseTaps<T> {
+    /// Of `taps[i][n]`, n counting fast samples.
+    pub fn new(taps: &[Vec<T>], ratio: usize) -> Self {
+        let lags = taps.iter().map(Vec::len).max().unwrap_or(0).div_ceil(ratio).max(1);
+        let tap = |i: usize, p: usize, j: usize| taps[i].get(p + j * ratio).copied().unwrap_or_default();
+        let index = |i: usize| (0..ratio).flat_map(move |p| (0..lags).map(move |j| (i, p, j)));
+        let values = (0..taps.len()).flat_map(index).map(|(i, p, j)| tap(i, p, j)).collect();
+        Self { channels: taps.len(), ratio, lags, values }
+    }
+
+    /// Entry (i, p, j).
+    pub fn get(&self, channel: usize, phase: usize, lag: usize) -> T {
+        self.values[(channel * self.ratio + phase) * self.lags + lag]
+    }
+
+    /// Taps that are not zero: the multiplications of a slow period.
+    pub fn nonzero(&self) -> usize {
+        self.values.iter().filter(|value| **value != T::default()).count()
+    }
+}
+
+/// The rows of `[a b; c d]` without their zeros.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparseBlock {
+    /// n.
+    pub states: usize,
+    /// N.
+    pub inputs: usize,
+    /// M.
+    pub outputs: usize,
+    /// For each row, states first, the columns of `[x; u]` with their coefficients.
+    pub rows: Vec<Vec<(usize, f64)>>,
+}
+
+impl SparseBlock {
+    /// Of a bank's state-space filters.
+    pub fn new(block: &BlockFilter) -> Self {
+        let states = block.a.len();
+        let row = |(left, right): (&Vec<f64>, &Vec<f64>)| {
+            left.iter().chain(right).copied().enumerate().filter(|&(_, value)| value != 0.0).collect()
+        };
+        let state_rows = block.a.iter().zip(&block.b);
+        let rows: Vec<_> = state_rows.chain(block.c.iter().zip(&block.d)).map(row).collect();
+        Self { states, inputs: block.d.first().map_or(0, Vec::len), outputs: block.d.len(), rows }
+    }
+
+    /// Coefficients that are not zero.
+    pub fn nonzero(&self) -> usize {
+        self.rows.iter().map(Vec::len).sum()
+    }
+}

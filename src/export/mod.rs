@@ -1,0 +1,54 @@
+//! Banks for other tools: C99, tables, memory images of FPGAs, NumPy and MATLAB files.
+//!
+//! The order of FIR taps is the same in every format: channel, then phase p of the output, then lag j in
+//! slow periods. Entry (i, p, j) is the tap `f_i[p + j M]`, so
+//!
+//! ```text
+//! y[kM+p] = sum over j and i of  f_i[p + j M] (x_i[k - j] - offset_i).
+//! ```
+
+mod arrays;
+mod c99;
+mod error;
+mod layout;
+mod tables;
+
+pub use error::ExportError;
+pub use layout::{PolyphaseTaps, SparseBlock};
+
+use crate::bank::Bank;
+
+/// A format of [`export`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// A C99 header with the coefficients and a streaming function.
+    C99,
+    /// Comma-separated values, one coefficient a line.
+    Csv,
+    /// A NumPy archive: `taps` (N, M, lags), or the matrices `a`, `b`, `c`, `d`.
+    Npz,
+    /// A MATLAB file, level 4, with the same variables; `taps` is N x M lags.
+    Mat,
+    /// A coefficient file of Xilinx tools; integer taps only.
+    Coe,
+    /// Hexadecimal words for `$readmemh`; integer taps only.
+    Mem,
+}
+
+/// The bytes of `bank` in `format`. `name` is the prefix of the C identifiers.
+///
+/// # Errors
+/// [`ExportError`] if the format cannot hold the bank.
+pub fn export(bank: &Bank, format: Format, name: &str) -> Result<Vec<u8>, ExportError> {
+    match format {
+        Format::C99 => c99::header(bank, name).map(String::into_bytes),
+        Format::Csv => Ok(tables::csv(bank).into_bytes()),
+        Format::Npz => arrays::npz(bank),
+        Format::Mat => arrays::mat(bank),
+        Format::Coe => tables::coe(bank).map(String::into_bytes),
+        Format::Mem => tables::mem(bank).map(String::into_bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,76 @@
+//! The formats against the bank's own coefficients.
+
+use super::*;
+use crate::bank::{FixedPoint, SynthesisFilters};
+use crate::spec::WordLengths;
+use std::io::{Cursor, Read};
+
+/// Two channels, M = 2, three taps each: the phases have two lags and one.
+fn fir() -> Bank {
+    Bank::bare(SynthesisFilters::Fir(vec![vec![0.5, -0.25, 1.0], vec![0.0, 2.0, -1.5]]), 2)
+}
+
+fn integers(bits: u32, list: Vec<Vec<i64>>) -> Bank {
+    let words = FixedPoint { bits: WordLengths::Same(bits), fraction_bits: 2, integers: list };
+    let mut bank = Bank::bare(SynthesisFilters::Fir(words.taps()), 2);
+    bank.fixed_point = Some(words);
+    bank
+}
+
+fn text(bank: &Bank, format: Format) -> String {
+    String::from_utf8(export(bank, format, "bank").unwrap()).unwrap()
+}
+
+#[test]
+fn taps_are_ordered_by_channel_phase_and_lag() {
+    let csv = text(&fir(), Format::Csv);
+    let want = "channel,phase,lag,value\n1,0,0,5e-1\n1,0,1,1e0\n1,1,0,-2.5e-1\n1,1,1,0e0\n\
+                2,0,0,0e0\n2,0,1,-1.5e0\n2,1,0,2e0\n2,1,1,0e0\n";
+    assert_eq!(csv, want);
+}
+
+#[test]
+fn integers_are_written_as_words_of_their_bits() {
+    let bank = integers(6, vec![vec![2, -1, 31], vec![0, -32, 5]]);
+    assert!(text(&bank, Format::Coe).ends_with("radix=10;\ncoefdata=\n2,\n31,\n-1,\n0,\n0,\n5,\n-32,\n0;\n"));
+    let mem = text(&bank, Format::Mem);
+    let words: Vec<&str> = mem.lines().filter(|line| !line.starts_with("//")).collect();
+    assert_eq!(words, ["02", "1f", "3f", "00", "00", "05", "20", "00"]);
+    assert!(text(&bank, Format::Csv).contains("2,1,0,-8e0,-32\n"));
+    assert!(mem.contains("integers of 6 bits times 2^-2, 5 not zero"), "{mem}");
+}
+
+#[test]
+fn archives_hold_the_same_numbers() {
+    let bank = fir();
+    let bytes = export(&bank, Format::Npz, "bank").unwrap();
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
+    let mut taps = Vec::new();
+    archive.by_name("taps.npy").unwrap().read_to_end(&mut taps).unwrap();
+    let array = npyz::NpyFile::new(&taps[..]).unwrap();
+    assert_eq!(array.shape(), [2, 2, 2]);
+    assert_eq!(array.into_vec::<f64>().unwrap(), [0.5, 1.0, -0.25, 0.0, 0.0, -1.5, 2.0, 0.0]);
+    let mat = export(&bank, Format::Mat, "bank").unwrap();
+    // Type, rows, columns, no imaginary part, length of the name; then the first column.
+    let header: Vec<u32> = mat[..20].chunks(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
+    assert_eq!(header, [0, 2, 4, 0, 5]);
+    assert_eq!(&mat[20..25], b"taps\0");
+    assert_eq!(&mat[25..41], [0.5_f64.to_le_bytes(), 0.0_f64.to_le_bytes()].concat());
+}
+
+#[test]
+fn what_a_format_cannot_hold_is_refused() {
+    for format in [Format::Coe, Format::Mem] {
+        assert!(matches!(export(&fir(), format, "b"), Err(ExportError::NoIntegers { .. })));
+    }
+    for name in ["", "1a", "a-b", "a b", "_", "é"] {
+        assert!(matches!(export(&fir(), Format::C99, name), Err(ExportError::Name { .. })), "{name}");
+    }
+    let mut bank = integers(6, vec![vec![1], vec![1]]);
+    bank.offsets[1] = 0.5;
+    assert!(matches!(export(&bank, Format::C99, "b"), Err(ExportError::Offset { channel: 2, .. })));
+    let large = integers(32, vec![vec![1 << 30], vec![-(1 << 30)]]);
+    assert!(
+        matches!(export(&large, Format::C99, "b"), Err(ExportError::Accumulator { sum }) if sum == 1 << 31)
+    );
+}

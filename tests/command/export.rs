@@ -1,0 +1,221 @@
+//! Exported banks as their users take them: C compiled by the system's compiler, arrays read by NumPy and SciPy.
+
+use crate::support::{Desk, THESIS};
+use hybank::bank::{Bank, SynthesisFilters};
+use hybank::export::{PolyphaseTaps, SparseBlock};
+use std::process::Command;
+
+/// Compiles the header `bank.h` of the desk with a program that pipes samples of `sample` through it.
+fn compiled(desk: &Desk, sample: &str, channels: usize, ratio: usize) -> bool {
+    let program = format!(
+        "#include <stdio.h>\n#include <stdint.h>\n#include \"bank.h\"\n\
+         int main(void) {{\n    static bank_state state;\n    {sample} input[{channels}], output[{ratio}];\n    \
+         bank_reset(&state);\n    while (fread(input, sizeof *input, {channels}, stdin) == {channels}) {{\n        \
+         bank_process(&state, input, output);\n        fwrite(output, sizeof *output, {ratio}, stdout);\n    }}\n    \
+         return 0;\n}}\n"
+    );
+    desk.write("main.c", program);
+    let flags = [
+        "-std=c99",
+        "-pedantic",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-O2",
+        "-ffp-contract=off",
+        "-o",
+        "run",
+        "main.c",
+    ];
+    match Command::new("cc").args(flags).current_dir(desk.path("")).output() {
+        Ok(output) => {
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            true
+        }
+        Err(error) => {
+            println!("SKIPPED: no C compiler: {error}");
+            false
+        }
+    }
+}
+
+fn piped(desk: &Desk, input: Vec<u8>) -> Vec<u8> {
+    desk.write("in.raw", input);
+    let stdin = std::fs::File::open(desk.path("in.raw")).unwrap();
+    Command::new(desk.path("run")).stdin(stdin).output().unwrap().stdout
+}
+
+fn bank(desk: &Desk) -> Bank {
+    Bank::from_json(&String::from_utf8(desk.read("b.json")).unwrap(), "b.json").unwrap()
+}
+
+/// Samples in [-1, 1] without structure.
+fn samples(count: usize) -> Vec<f64> {
+    (0..count).map(|i| ((i * i * 31 + 7 * i) % 1009) as f64 / 504.5 - 1.0).collect()
+}
+
+fn bytes(samples: &[f64]) -> Vec<u8> {
+    samples.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+fn doubles(bytes: &[u8]) -> Vec<f64> {
+    bytes.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect()
+}
+
+/// y[kM+p] = sum over j and i, in this order.
+fn fir_by_definition<T: Copy + Default, S: Copy + Default + std::ops::AddAssign>(
+    taps: &PolyphaseTaps<T>,
+    input: &[S],
+    product: impl Fn(T, S) -> S,
+) -> Vec<S>
+where
+    T: PartialEq,
+{
+    let n = taps.channels;
+    let of = |k: usize, p: usize| {
+        let mut sum = S::default();
+        for j in 0..taps.lags {
+            for i in 0..n {
+                let x = if j <= k { input[(k - j) * n + i] } else { S::default() };
+                sum += product(taps.get(i, p, j), x);
+            }
+        }
+        sum
+    };
+    (0..input.len() / n).flat_map(|k| (0..taps.ratio).map(move |p| (k, p))).map(|(k, p)| of(k, p)).collect()
+}
+
+fn worst_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// The output of `hybank stream` in double precision.
+fn streamed(desk: &Desk, input: &[f64]) -> Vec<f64> {
+    let args = ["stream", "b.json", "--format", "f64le"];
+    doubles(&desk.run(&args, &bytes(input)).stdout)
+}
+
+#[test]
+fn c_of_real_taps_has_the_bits_of_its_definition() {
+    let desk = Desk::with_spec(&THESIS.replace("delay = 1.2", "delay = 1.2\noffset = 0.125"));
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "23"]);
+    desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h"]);
+    if !compiled(&desk, "double", 2, 2) {
+        return;
+    }
+    let input = samples(2 * 700);
+    let got = doubles(&piped(&desk, bytes(&input)));
+    let SynthesisFilters::Fir(taps) = bank(&desk).filters else { panic!("taps") };
+    let centred: Vec<f64> =
+        input.iter().enumerate().map(|(i, x)| if i % 2 == 0 { x - 0.125 } else { *x }).collect();
+    let want = fir_by_definition(&PolyphaseTaps::new(&taps, 2), &centred, |tap, x| tap * x);
+    assert!(got.iter().zip(&want).all(|(a, b)| a.to_bits() == b.to_bits()) && got.len() == want.len());
+    assert!(worst_difference(&got, &streamed(&desk, &input)) < 1e-14);
+}
+
+/// Sums of integers are exact, so there is one right output: the nearest integer, halves upwards, saturated.
+#[test]
+fn c_of_integer_taps_has_no_differing_bit() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "22", "--bits", "8"]);
+    let original = bank(&desk);
+    for fraction_bits in [6, 0, -2] {
+        let mut designed = original.clone();
+        let words = designed.fixed_point.as_mut().unwrap();
+        words.fraction_bits = fraction_bits;
+        let taps = words.integers.iter_mut().flatten().enumerate();
+        taps.for_each(|(k, tap)| *tap = ((k * 37) % 255) as i64 - 127);
+        designed.filters = SynthesisFilters::Fir(words.taps());
+        (designed.proof, designed.gamma) = (None, Default::default());
+        desk.write("b.json", designed.to_json().unwrap());
+        desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h", "--force"]);
+        if !compiled(&desk, "int32_t", 2, 2) {
+            return;
+        }
+        let mut input: Vec<i32> = samples(2 * 900).iter().map(|x| (x * f64::from(1 << 23)) as i32).collect();
+        input.extend([i32::MAX, i32::MIN, i32::MIN, i32::MAX, i32::MIN, i32::MIN, i32::MIN, 0]);
+        let got = piped(&desk, input.iter().flat_map(|x| x.to_le_bytes()).collect());
+        let got: Vec<i32> = got.chunks_exact(4).map(|b| i32::from_le_bytes(b.try_into().unwrap())).collect();
+        let words = designed.fixed_point.unwrap();
+        let wide: Vec<i128> = input.iter().map(|&x| i128::from(x)).collect();
+        let sums =
+            fir_by_definition(&PolyphaseTaps::new(&words.integers, 2), &wide, |tap, x| i128::from(tap) * x);
+        let rounded = |sum: i128| match u32::try_from(words.fraction_bits) {
+            Ok(0) => sum,
+            Ok(bits) => (sum + (1 << (bits - 1))).div_euclid(1 << bits),
+            Err(_) => sum << -words.fraction_bits,
+        };
+        let want: Vec<i32> =
+            sums.into_iter().map(|sum| rounded(sum).clamp(i32::MIN.into(), i32::MAX.into()) as i32).collect();
+        assert!(got == want, "{fraction_bits}");
+        assert!(want.contains(&i32::MAX) || fraction_bits == 6, "{fraction_bits}: nothing saturates");
+    }
+}
+
+#[test]
+fn c_of_recursive_banks_has_the_bits_of_its_definition() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--method", "iir"]);
+    desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h", "--name", "bank"]);
+    if !compiled(&desk, "double", 2, 2) {
+        return;
+    }
+    let input = samples(2 * 500);
+    let got = doubles(&piped(&desk, bytes(&input)));
+    let SynthesisFilters::StateSpace(block) = bank(&desk).filters else { panic!("a recursive bank") };
+    let sparse = SparseBlock::new(&block);
+    let mut x = vec![0.0; sparse.states];
+    let mut want = Vec::new();
+    for u in input.chunks_exact(2) {
+        let z = [&x[..], u].concat();
+        let row = |k: usize| sparse.rows[k].iter().fold(0.0, |sum, &(j, value)| sum + value * z[j]);
+        want.extend((0..2).map(|p| row(sparse.states + p)));
+        x = (0..sparse.states).map(row).collect();
+    }
+    assert!(got.iter().zip(&want).all(|(a, b)| a.to_bits() == b.to_bits()) && got.len() == want.len());
+    assert!(worst_difference(&got, &streamed(&desk, &input)) < 1e-12);
+}
+
+#[test]
+fn numpy_and_scipy_read_the_arrays() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--method", "iir"]);
+    for format in ["npz", "mat"] {
+        desk.good(&["export", "b.json", "--to", format, "-o", &format!("b.{format}")]);
+    }
+    let script = "\
+import json, numpy as np, scipy.io
+b = json.load(open('b.json'))['state_space']
+z, m = np.load('b.npz'), scipy.io.loadmat('b.mat')
+for key in 'abcd':
+    assert np.array_equal(z[key], b[key]) and np.array_equal(m[key], b[key]), key
+assert z['ratio'].item() == m['ratio'].item() == 2
+";
+    desk.write("read.py", script);
+    let probe = Command::new("python3").args(["-c", "import numpy, scipy"]).output();
+    if !probe.is_ok_and(|output| output.status.success()) {
+        println!("SKIPPED: no python3 with numpy and scipy");
+        return;
+    }
+    let output = Command::new("python3").arg("read.py").current_dir(desk.path("")).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn refusals_name_the_remedy() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    desk.refused(1, &["export", "b.json", "--to", "coe", "-o", "x.coe"], &["b.json", "--bits"]);
+    desk.refused(
+        1,
+        &["export", "b.json", "--to", "c", "-o", "x.h", "--name", "1x"],
+        &["\"1x\"", "C identifier"],
+    );
+    desk.refused(1, &["export", "spec.toml", "--to", "csv", "-o", "x.csv"], &["this is a spec"]);
+    desk.refused(1, &["export", "b.json", "--to", "csv", "-o", "b.json", "--force"], &["b.json"]);
+    assert!(
+        desk.good(&["export", "b.json", "--to", "csv", "-o", "-"])
+            .starts_with("channel,phase,lag,value\n1,0,0,")
+    );
+}
