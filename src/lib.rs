@@ -33,6 +33,8 @@ pub mod analog;
 #[cfg(feature = "design")]
 pub(crate) mod arithmetic;
 #[cfg(feature = "design")]
+pub mod calibrate;
+#[cfg(feature = "design")]
 pub mod design;
 #[cfg(feature = "design")]
 pub mod lmi;

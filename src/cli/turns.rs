@@ -3,6 +3,7 @@
 use super::Failure;
 use crate::bank::Bank;
 use crate::io::Turns;
+use crate::units::FastPeriods;
 use std::path::Path;
 
 /// The option of the commands that read captures of a bank.
@@ -29,8 +30,19 @@ impl TurnArgs {
 
     /// The channels of `bank` in the order in which they sample, if they take turns.
     pub(super) fn turns(self, bank: &Bank, path: &Path) -> Result<Option<Turns>, Failure> {
+        self.by_delay(&bank.delays_in_fast_periods(), bank.ratio, path)
+    }
+
+    /// Channels of the given delays, with `ratio` fast periods per slow period, in the order in which they
+    /// sample, if they take turns. `path` is the file that says so.
+    pub(super) fn by_delay(
+        self,
+        delays: &[FastPeriods],
+        ratio: usize,
+        path: &Path,
+    ) -> Result<Option<Turns>, Failure> {
         let Some(converters) = self.interleaved else { return Ok(None) };
-        let channels = bank.channel_count();
+        let channels = delays.len();
         if channels != usize::from(converters) {
             return Err(Failure::Usage(format!(
                 "--interleaved {converters}: {} has {channels} channels, and each of them is one converter; \
@@ -38,15 +50,15 @@ impl TurnArgs {
                 path.display()
             )));
         }
-        let delays: Vec<f64> = bank.delays_in_fast_periods().iter().map(|delay| delay.0).collect();
+        let delays: Vec<f64> = delays.iter().map(|delay| delay.0).collect();
         let apart = delays.iter().copied().fold(f64::NEG_INFINITY, f64::max)
             - delays.iter().copied().fold(f64::INFINITY, f64::min);
-        if apart >= bank.ratio as f64 {
+        if apart >= ratio as f64 {
             return Err(Failure::Input(format!(
                 "{}: the delays lie {apart} fast periods apart, so converters with a slow period of {} do not \
                  sample in turn; give one recording per channel",
                 path.display(),
-                bank.ratio
+                ratio
             )));
         }
         Ok(Some(Turns::by_delay(&delays)))

@@ -11,11 +11,14 @@ use super::limits::{
 };
 use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
-use super::{ChannelSpec, Family, FilterSpec, Method, Reduction, Solver, Spec, SpecProblem};
+use super::{
+    ChannelSpec, Family, FilterSpec, Method, PerChannel, Reduction, Solver, Spec, SpecProblem,
+    UncertaintySpec,
+};
 use crate::quantity::Time;
 
-const TOP_KEYS: [&str; 8] =
-    ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "design"];
+const TOP_KEYS: [&str; 9] =
+    ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "uncertainty", "design"];
 const CHANNEL_KEYS: [&str; 6] = ["delay", "delay_samples", "filter", "noise", "gain", "offset"];
 const DESIGN_KEYS: [&str; 9] = [
     "method",
@@ -28,6 +31,8 @@ const DESIGN_KEYS: [&str; 9] = [
     "reduction_loss_db",
     "noise",
 ];
+const UNCERTAINTY_KEYS: [&str; 7] =
+    ["delay", "delay_samples", "gain", "cutoff", "offset", "reference", "jitter"];
 
 /// The keys of each written form of a filter; the first one names the form.
 const FILTER_FORMS: [&[&str]; 5] = [
@@ -54,8 +59,10 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
     let table = top.optional("design").map(|table| table.fields(&DESIGN_KEYS)).transpose()?;
     let common = Common { fast_period, target: &target, noise: noise(table.as_ref())?.unwrap_or(0.0) };
     let channels = channels(&top, &common)?;
+    let uncertainty =
+        top.optional("uncertainty").map(|v| uncertainty(&v, channels.len(), fast_period)).transpose()?;
     let design = design(table.as_ref(), &top, overrides, channels.len())?;
-    Ok(Spec { name, fast_period, ratio, latency, target, channels, design })
+    Ok(Spec { name, fast_period, ratio, latency, target, channels, uncertainty, design })
 }
 
 /// h, from one of its two spellings.
@@ -168,6 +175,47 @@ fn delay(fields: &Fields<'_>, fast_period: Seconds) -> Result<Seconds, Fault> {
     check_delay(delay.in_fast_periods(fast_period), number, unit).map_err(|problem| value.fault(problem))?;
     // A delay of -0.0 is a delay of 0.0.
     Ok(delay + Seconds(0.0))
+}
+
+/// The `[uncertainty]` table.
+fn uncertainty(item: &Value<'_>, channels: usize, h: Seconds) -> Result<UncertaintySpec, Fault> {
+    let fields = item.fields(&UNCERTAINTY_KEYS)?;
+    let times = |key| per_channel(&fields, key, |v| Ok(v.time()?.in_seconds(h)));
+    let shares = |key| per_channel(&fields, key, Value::share);
+    let samples =
+        per_channel(&fields, "delay_samples", |v| v.number().map(|n| FastPeriods(n).in_seconds(h)))?;
+    if let (Some(_), Some(samples)) = (fields.optional("delay"), fields.optional("delay_samples")) {
+        let remedy = "they have the same meaning, keep one of them";
+        return Err(samples.fault(SpecProblem::Conflict { first: "delay", second: "delay_samples", remedy }));
+    }
+    let is_in_samples = samples.is_some();
+    let table = UncertaintySpec {
+        delay: if is_in_samples { samples } else { times("delay")? },
+        gain: shares("gain")?,
+        offset: shares("offset")?,
+        cutoff: shares("cutoff")?,
+        reference: fields.optional("reference").map(|v| v.count("(channel)")).transpose()?,
+        jitter: times("jitter")?,
+    };
+    table.check_by_key(channels, h).map_err(|(key, problem)| {
+        let key = if key == "delay" && is_in_samples { "delay_samples" } else { key };
+        fields.fault_at(Some(key), problem)
+    })?;
+    Ok(table)
+}
+
+/// One value for all channels, or a list of values. The length of the list is checked where that of the
+/// channels is known.
+fn per_channel<'a, T>(
+    fields: &Fields<'a>,
+    key: &str,
+    read: impl Fn(&Value<'a>) -> Result<T, Fault>,
+) -> Result<Option<PerChannel<T>>, Fault> {
+    let Some(value) = fields.optional(key) else { return Ok(None) };
+    Ok(Some(match value.items("a number, or a list of numbers") {
+        Ok(items) => PerChannel::Each(items.iter().map(read).collect::<Result<_, _>>()?),
+        Err(_) => PerChannel::Same(read(&value)?),
+    }))
 }
 
 fn design(

@@ -79,6 +79,40 @@ impl FilterSpec {
         }
     }
 
+    /// Phi(s / `factor`): every frequency of the filter, the cut-off among them, is multiplied by `factor`, and
+    /// the gain at 0 stays. The written form stays too.
+    #[must_use]
+    pub fn with_cutoff_scaled(&self, factor: f64) -> Self {
+        let scaled = |list: &[[f64; 2]]| list.iter().map(|x| x.map(|part| part * factor)).collect();
+        // A coefficient of s^k is divided by factor^k.
+        let polynomial = |list: &[f64]| {
+            let power = |i: usize| factor.powi((list.len() - 1 - i) as i32);
+            list.iter().enumerate().map(|(i, c)| c / power(i)).collect()
+        };
+        let rows = |m: &[Vec<f64>]| m.iter().map(|row| row.iter().map(|x| x * factor).collect()).collect();
+        match self {
+            Self::TransferFunction { num, den } => {
+                Self::TransferFunction { num: polynomial(num), den: polynomial(den) }
+            }
+            Self::ZeroPoleGain { zeros, poles, gain } => Self::ZeroPoleGain {
+                zeros: scaled(zeros),
+                poles: scaled(poles),
+                gain: gain * factor.powi(poles.len() as i32 - zeros.len() as i32),
+            },
+            Self::StateSpace { a, b, c } => Self::StateSpace { a: rows(a), b: rows(b), c: c.clone() },
+            Self::Family { family, order, cutoff, ripple_db, attenuation_db } => Self::Family {
+                family: *family,
+                order: *order,
+                cutoff: *cutoff * factor,
+                ripple_db: *ripple_db,
+                attenuation_db: *attenuation_db,
+            },
+            Self::Cascade { cascade } => Self::Cascade {
+                cascade: cascade.iter().map(|stage| stage.with_cutoff_scaled(factor)).collect(),
+            },
+        }
+    }
+
     /// The checks on the single entries of the table.
     fn check_parts(&self) -> Result<(), FilterProblem> {
         match self {

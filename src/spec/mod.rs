@@ -6,12 +6,14 @@
 pub(crate) mod decode;
 mod design;
 pub(crate) mod document;
+mod edit;
 mod error;
 mod filter;
 mod filter_problem;
 mod limits;
 mod nearest;
 pub(crate) mod reader;
+mod uncertainty;
 mod word_lengths;
 mod write;
 
@@ -23,6 +25,7 @@ pub use filter_problem::{FilterProblem, MAX_ORDER};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub(crate) use limits::{check_gain, check_noise, check_offset};
+pub use uncertainty::{PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
@@ -46,6 +49,8 @@ pub struct Spec {
     pub target: FilterSpec,
     /// The real channels, in the order of the recordings.
     pub channels: Vec<ChannelSpec>,
+    /// How well the values of the channels are known, if the spec says so.
+    pub uncertainty: Option<UncertaintySpec>,
     /// The design settings.
     pub design: DesignSpec,
 }
@@ -271,6 +276,9 @@ impl Spec {
             limits::check_noise(channel.noise)?;
             limits::check_gain(channel.gain)?;
             limits::check_offset(channel.offset)?;
+        }
+        if let Some(uncertainty) = &self.uncertainty {
+            uncertainty.check(self.channels.len(), self.fast_period)?;
         }
         self.design.check(self.channels.len())
     }

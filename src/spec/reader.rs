@@ -88,6 +88,11 @@ impl<'a> Value<'a> {
         self.quantity(quantity::frequency, Hertz)
     }
 
+    /// A share of something: a number, or a text such as `\"1%\"`.
+    pub(crate) fn share(&self) -> Result<f64, Fault> {
+        self.quantity(quantity::relative, |share| share)
+    }
+
     /// A rate: a number of hertz, or a text such as `\"1 GS/s\"`.
     pub(crate) fn rate(&self) -> Result<Hertz, Fault> {
         self.quantity(quantity::rate, Hertz)

@@ -37,6 +37,7 @@ fn plant(seed: u64, method: Method) -> Spec {
         latency: None,
         target: filter,
         channels,
+        uncertainty: None,
         design: DesignSpec::new(method, method.has_taps().then_some(taps)),
     }
 }
@@ -136,6 +137,7 @@ fn four_at_48_khz(taps: usize) -> Spec {
         latency: None,
         target: filter.clone(),
         channels: [3.1, 1.9, 1.05, 0.0].iter().map(channel).collect(),
+        uncertainty: None,
         design: DesignSpec::new(Method::Fir, Some(taps)),
     }
 }

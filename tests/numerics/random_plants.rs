@@ -65,6 +65,7 @@ fn unreduced(seed: u64) -> Spec {
         latency: Some(dice.count(0, 3 * ratio)),
         target,
         channels,
+        uncertainty: None,
         design,
     }
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 
+mod edit;
 mod overrides;
 mod reading;
 mod refusal;

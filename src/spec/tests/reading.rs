@@ -14,6 +14,7 @@ fn the_thesis_example_is_read() {
         latency: Some(10),
         target: thesis.clone(),
         channels: vec![ChannelSpec::new(Seconds(1.2), thesis), ChannelSpec::new(Seconds(0.6), zpk)],
+        uncertainty: None,
         design: DesignSpec::new(Method::Fir, Some(22)),
     };
     assert_eq!(spec, expected);
@@ -117,4 +118,26 @@ fn every_filter_form_is_read() {
         "[target.filter]\nnum = [0.25]\nden = [1, 1, 0.25]",
     );
     assert_eq!(read(&table), read(THESIS));
+}
+
+#[test]
+fn half_widths_are_numbers_or_lists_and_the_reference_is_exact() {
+    let table = "[uncertainty]\ndelay_samples = 0.01\ngain = [0.1, \"20 %\"]\nreference = 2\n[design]";
+    let text = thesis_with("fast_period = 1.0", "fast_rate = 100.0").replace("[design]", table);
+    let uncertainty = read(&text).uncertainty.unwrap();
+    assert_eq!(uncertainty.delays(2), [Seconds(1e-4), Seconds(0.0)]);
+    assert_eq!(uncertainty.gains(2), [0.1, 0.0]);
+    assert_eq!((uncertainty.reference_channel(), uncertainty.offsets(2)), (Some(1), vec![0.0; 2]));
+    let all = UncertaintySpec { reference: Some(0), ..uncertainty };
+    assert_eq!(all.gains(2), [0.1, 0.2]);
+}
+
+#[test]
+fn half_widths_have_units() {
+    let table =
+        "[uncertainty]\ndelay = [0.0, \"10 ms\"]\njitter = \"0.5 samples\"\ncutoff = \"2%\"\n[design]";
+    let uncertainty = read(&THESIS.replace("[design]", table)).uncertainty.unwrap();
+    assert_eq!(uncertainty.delay, Some(PerChannel::Each(vec![Seconds(0.0), Seconds(0.01)])));
+    assert_eq!(uncertainty.jitter, Some(PerChannel::Same(Seconds(0.5))));
+    assert_eq!(uncertainty.cutoff, Some(PerChannel::Same(0.02)));
 }

@@ -90,6 +90,14 @@ fn every_mistake_has_its_line_and_its_message() {
             11,
             "expected a number, or a text with a number and its unit, found a list",
         ),
+        // Uncertainty.
+        ("[design]", "[uncertainty]\ndelay = -0.1\n[design]", 17, "zero or more"),
+        ("[design]", "[uncertainty]\ndelay_samples = 2e3\n[design]", 17, "at most 1024 fast periods"),
+        ("[design]", "[uncertainty]\ndelay = 1\ndelay_samples = 1\n[design]", 18, "the same meaning"),
+        ("[design]", "[uncertainty]\ngain = [0.1]\n[design]", 17, "one for each of the 2"),
+        ("[design]", "[uncertainty]\ncutoff = 2\n[design]", 17, "0.01 is one per cent"),
+        ("[design]", "[uncertainty]\nreference = 3\n[design]", 17, "one of the channels 1 to 2"),
+        ("[design]", "[uncertainty]\ndely = 0.1\n[design]", 17, "did you mean \"delay\""),
         // Design.
         ("method = \"fir\"", "method = \"fri\"", 17, "did you mean \"fir\""),
         ("method = \"fir\"", "method = \"kalman\"", 17, "choose one of fir, iir, h2, sinc, separation"),

@@ -61,10 +61,19 @@ prop_compose! {
         reduction in prop::option::of(prop_oneof![
             (0usize..99).prop_map(Reduction::Order), (0.0..9.0f64).prop_map(Reduction::Loss)
         ]),
+        uncertainty in prop::option::of((0.0..1.0f64, 0usize..2, prop::bool::ANY)),
     ) -> Spec {
+        let uncertainty = uncertainty.map(|(x, reference, each)| UncertaintySpec {
+            delay: Some(if each { PerChannel::Each(vec![fast_period * x; channels.len()]) } else { PerChannel::Same(fast_period * x) }),
+            cutoff: (x < 0.5).then_some(PerChannel::Same(x)),
+            reference: Some(reference),
+            jitter: each.then_some(PerChannel::Same(fast_period * x)),
+            ..UncertaintySpec::default()
+        });
         Spec {
             name, fast_period, ratio, latency, target,
             channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
+            uncertainty,
             design: DesignSpec {
                 method,
                 taps: method.has_taps().then_some(taps),

@@ -1,0 +1,107 @@
+//! Spectral matrices of the captures.
+
+use crate::linalg::{CMat, Complex, fourier};
+use std::f64::consts::{PI, TAU};
+
+/// Share of the record at each end over which the window rises from 0 to 1. Its variance of 1.03 and its
+/// side lobes, which fall by 18 dB per octave, are both small.
+const TAPER: f64 = 0.05;
+/// The lowest bins hold the constant and what is left of it.
+const FIRST_BIN: usize = 3;
+/// Bins per band, if the record is long enough, and the most bands.
+const BINS_PER_BAND: usize = 32;
+const MOST_BANDS: usize = 128;
+
+/// The transforms of the windowed captures.
+///
+/// The window belongs to the analog signal: channel i takes its values at the instants k M - D_i. The
+/// product of signal and window is then sampled late by D_i like the signal itself, and the ends of the
+/// record cause no error.
+pub(super) struct Spectra {
+    /// X_i[b] at W = 2 pi b / K, per channel.
+    bins: Vec<Vec<Complex<f64>>>,
+    /// K.
+    frames: usize,
+    ratio: f64,
+    /// K sum w^4 / (sum w^2)^2, by which neighbouring bins of windowed noise raise every variance.
+    pub(super) variance_factor: f64,
+    /// The window's mean of each channel.
+    pub(super) means: Vec<f64>,
+    /// sum w^2 / (sum w)^2.
+    pub(super) mean_variance: f64,
+}
+
+/// The mean spectral matrix of neighbouring frequencies.
+pub(super) struct Band {
+    /// W at the centre, rad per slow period.
+    pub(super) w: f64,
+    /// Bins.
+    pub(super) count: usize,
+    /// N x N, with the phases e^{-j W D_i / M} of the delays removed.
+    pub(super) matrix: CMat,
+}
+
+impl Spectra {
+    /// Of captures of equal length, taken at k M - `delays`.
+    pub(super) fn new(captures: &[&[f64]], delays: &[f64], ratio: usize) -> Self {
+        let frames = captures.first().map_or(0, |capture| capture.len());
+        let m = ratio as f64;
+        let latest = delays.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let earliest = delays.iter().copied().fold(f64::INFINITY, f64::min);
+        let span = (frames as f64 - 1.0) * m + (latest - earliest);
+        let window = |delay: f64| -> Vec<f64> {
+            (0..frames).map(|k| taper((k as f64 * m + latest - delay) / span)).collect()
+        };
+        let power = |w: &[f64], n: i32| w.iter().map(|w| w.powi(n)).sum::<f64>();
+        let (mut bins, mut means) = (Vec::new(), Vec::new());
+        let (mut variance_factor, mut mean_variance) = (1.0, 0.0);
+        for (capture, &delay) in captures.iter().zip(delays) {
+            let window = window(delay);
+            let (sum, squares) = (power(&window, 1), power(&window, 2));
+            variance_factor = frames as f64 * power(&window, 4) / (squares * squares);
+            mean_variance = squares / (sum * sum);
+            let mean = capture.iter().zip(&window).map(|(x, w)| x * w).sum::<f64>() / sum;
+            let windowed: Vec<f64> = capture.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
+            let scale = squares.sqrt().recip();
+            bins.push(fourier::real_spectrum(&windowed).into_iter().map(|x| x * scale).collect());
+            means.push(mean);
+        }
+        Self { bins, frames, ratio: m, variance_factor, means, mean_variance }
+    }
+
+    /// The spectral matrices with the phases of `delays` removed.
+    pub(super) fn bands(&self, delays: &[f64]) -> Vec<Band> {
+        let end = self.frames.div_ceil(2).saturating_sub(FIRST_BIN);
+        let all = end.saturating_sub(FIRST_BIN);
+        let count = (all / BINS_PER_BAND).clamp(1, MOST_BANDS);
+        let edge = |b: usize| FIRST_BIN + all * b / count;
+        (0..count).map(|b| self.band(edge(b), edge(b + 1), delays)).collect()
+    }
+
+    fn band(&self, first: usize, end: usize, delays: &[f64]) -> Band {
+        let n = self.bins.len();
+        let mut matrix = CMat::zeros(n, n);
+        let mut column = vec![Complex::ZERO; n];
+        let step = TAU / self.frames as f64;
+        for b in first..end {
+            let w = b as f64 * step;
+            for ((slot, bins), delay) in column.iter_mut().zip(&self.bins).zip(delays) {
+                *slot = bins[b] * Complex::from_polar(1.0, w * delay / self.ratio);
+            }
+            for i in 0..n {
+                for j in 0..n {
+                    matrix[(i, j)] += column[i] * column[j].conj();
+                }
+            }
+        }
+        let count = end - first;
+        let w = 0.5 * (first + end).saturating_sub(1) as f64 * step;
+        Band { w, count, matrix: matrix / Complex::from(count.max(1) as f64) }
+    }
+}
+
+/// The window at the share `x` of its length: 1 in the middle, half a cosine at both ends.
+fn taper(x: f64) -> f64 {
+    let share = (x.min(1.0 - x) / TAPER).clamp(0.0, 1.0);
+    0.5 - 0.5 * (PI * share).cos()
+}

@@ -1,0 +1,157 @@
+//! Blind fits of band-limited noise: coverage, efficiency, and what is refused.
+
+use crate::calibrate::testbench::{assert_covers, gaussian, trials};
+use crate::calibrate::{CalibrateError, Calibration, Evidence, Fit, Record, Settings, calibrate};
+use crate::random::Random;
+use crate::simulate::{Instants, Recording};
+use crate::spec::Spec;
+use crate::units::FastPeriods;
+use std::f64::consts::PI;
+use std::path::Path;
+
+const BLIND: Settings =
+    Settings { fit: Fit { delay: true, gain: true, offset: true, cutoff: false }, reference: 0 };
+
+fn spec(ratio: usize, delays: &[f64]) -> Spec {
+    let channels: String = delays.iter().map(|d| format!("[[channel]]\ndelay = {d:?}\n")).collect();
+    let head = format!(
+        "fast_period = 1.0\nratio = {ratio}\nlatency = 8\n[target]\n\
+         filter = {{ family = \"rc\", cutoff = 0.3 }}\n"
+    );
+    Spec::from_toml(&(head + &channels), "spec.toml").unwrap()
+}
+
+/// Gaussian noise of `samples` fast samples below `band` rad per fast period: a sum over neighbours with a
+/// windowed sinc.
+fn band_limited(samples: usize, band: f64, dice: &mut Random) -> Vec<f64> {
+    let reach = 64i64;
+    let tap = |n: i64| {
+        let x = n as f64;
+        let sinc = if n == 0 { band / PI } else { (band * x).sin() / (PI * x) };
+        sinc * (0.5 + 0.5 * (PI * x / (reach as f64 + 1.0)).cos())
+    };
+    let taps: Vec<f64> = (-reach..=reach).map(tap).collect();
+    let white: Vec<f64> = (0..samples + taps.len()).map(|_| gaussian(dice)).collect();
+    (0..samples).map(|n| taps.iter().zip(&white[n..]).map(|(a, b)| a * b).sum()).collect()
+}
+
+/// The captures of `truth`, with noise relative to the signal.
+fn captures(truth: &Spec, signal: &[f64], frames: usize, noise: f64, dice: &mut Random) -> Vec<Record> {
+    let recording = Recording::new(signal, FastPeriods(1.0));
+    let one = |channel: &crate::spec::ChannelSpec| {
+        let filter = crate::analog::StrictlyProper::new(&channel.filter, truth.fast_period).unwrap();
+        // From the middle of the periodic signal, so that the record itself is not periodic.
+        let first = FastPeriods(100.0 - channel.delay.0);
+        let step = FastPeriods(truth.ratio as f64);
+        recording.sample(&filter, Instants { first, step, count: frames })
+    };
+    let clean: Vec<Vec<f64>> = truth.channels.iter().map(one).collect();
+    let power = clean[0].iter().map(|x| x * x).sum::<f64>() / frames as f64;
+    let noisy = |(samples, channel): (Vec<f64>, &crate::spec::ChannelSpec)| {
+        let noisy = |x: f64| channel.gain * x + channel.offset + noise * power.sqrt() * gaussian(dice);
+        Record::new(samples.into_iter().map(noisy).collect())
+    };
+    clean.into_iter().zip(&truth.channels).map(noisy).collect()
+}
+
+fn with_errors(spec: &Spec, dice: &mut Random) -> Spec {
+    let mut truth = spec.clone();
+    for channel in &mut truth.channels {
+        channel.delay.0 += 0.02 * dice.part();
+        channel.gain = 1.0 + 0.01 * dice.sample();
+    }
+    truth
+}
+
+/// Errors over standard deviations.
+fn scaled(truth: &Spec, nominal: &Spec, found: &Calibration) -> Vec<f64> {
+    let mut scaled = Vec::new();
+    let (own, first) = (&truth.channels, &nominal.channels[0]);
+    for (estimate, channel) in found.channels.iter().zip(own).skip(1) {
+        let (delay, gain) = (estimate.delay.unwrap(), estimate.gain.unwrap());
+        let expected = channel.delay.0 - own[0].delay.0 + first.delay.0;
+        scaled.push((delay.value.0 - expected) / delay.sigma.0);
+        scaled.push((gain.value - channel.gain / own[0].gain) / gain.sigma);
+    }
+    scaled
+}
+
+#[test]
+fn intervals_cover_with_one_alias_and_with_three() {
+    for (ratio, delays, band, noise) in [
+        (2, vec![1.0, 0.0], 0.45 * PI, 1e-3),
+        (2, vec![1.0, 0.0], 0.45 * PI, 0.1),
+        (4, vec![3.0, 2.0, 1.0, 0.0], 0.7 * PI, 1e-3),
+    ] {
+        let spec = spec(ratio, &delays);
+        let (mut dice, mut all, trials) = (Random(ratio as u64), Vec::new(), trials(60));
+        for _ in 0..trials {
+            let truth = with_errors(&spec, &mut dice);
+            let frames = 2048;
+            let signal = band_limited(2 * frames * ratio, band, &mut dice);
+            let records = captures(&truth, &signal, frames, noise, &mut dice);
+            let found = calibrate(&spec, &records, Evidence::AnySignal, BLIND).unwrap();
+            all.extend(scaled(&truth, &spec, &found));
+        }
+        assert_covers(&all, trials.min(100));
+        let rms = (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt();
+        assert!((0.8..1.15).contains(&rms), "{ratio}: rms error over sigma {rms}");
+    }
+}
+
+#[test]
+fn a_signal_that_fills_all_aliases_is_refused() {
+    let (spec, mut dice) = (spec(2, &[1.0, 0.0]), Random(1));
+    let signal: Vec<f64> = (0..8192).map(|_| gaussian(&mut dice)).collect();
+    let records = captures(&spec, &signal, 2048, 1e-4, &mut dice);
+    let refused = calibrate(&spec, &records, Evidence::AnySignal, BLIND).unwrap_err();
+    assert_eq!(refused, CalibrateError::AllAliasesOccupied { channels: 2 });
+    let few = calibrate(&spec, &captures(&spec, &signal, 100, 0.0, &mut dice), Evidence::AnySignal, BLIND);
+    assert_eq!(few.unwrap_err(), CalibrateError::TooShort { frames: 100, needed: 256 });
+}
+
+#[test]
+fn swapped_captures_are_recognised() {
+    let (spec, mut dice) = (spec(2, &[1.2, 0.6]), Random(2));
+    let signal = band_limited(8192, 0.4 * PI, &mut dice);
+    let mut records = captures(&spec, &signal, 2048, 1e-3, &mut dice);
+    records.swap(0, 1);
+    let refused = calibrate(&spec, &records, Evidence::AnySignal, BLIND).unwrap_err();
+    assert_eq!(refused, CalibrateError::WrongOrder { order: vec![2, 1] });
+}
+
+#[test]
+fn offsets_are_relative_to_the_reference() {
+    let (spec, mut dice) = (spec(2, &[1.2, 0.6]), Random(4));
+    let mut truth = spec.clone();
+    truth.channels[1].offset = 0.02;
+    let signal = band_limited(8192, 0.4 * PI, &mut dice);
+    let records = captures(&truth, &signal, 2048, 1e-3, &mut dice);
+    let found = calibrate(&spec, &records, Evidence::AnySignal, BLIND).unwrap();
+    let offset = found.channels[1].offset.unwrap();
+    assert!((offset.value - 0.02).abs() < 5.0 * offset.sigma && offset.sigma < 1e-4, "{offset:?}");
+    assert_eq!(found.channels[0].offset.unwrap().sigma, 0.0);
+}
+
+/// Speech, captured elsewhere in the frequency domain: 1.2 and 0.6 fast periods.
+#[test]
+fn speech_gives_its_delay_to_1e_5_fast_periods() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/captures/speech-2x");
+    let Ok(text) = std::fs::read_to_string(folder.join("spec.toml")) else {
+        println!("skipped: no data in {}", folder.display());
+        return;
+    };
+    let records = ["ch1.wav", "ch2.wav"].map(|name| {
+        let mut wav = hound::WavReader::open(folder.join(name)).unwrap();
+        Record::new(wav.samples::<f32>().map(|x| f64::from(x.unwrap())).collect())
+    });
+    for off in [0.0, 0.05, -0.3] {
+        let mut spec = Spec::from_toml(&text, "spec.toml").unwrap();
+        spec.channels[1].delay.0 += off / 48_000.0;
+        let found = calibrate(&spec, &records, Evidence::AnySignal, BLIND).unwrap();
+        let delay = found.channels[1].delay.unwrap();
+        println!("speech: error {:.1e}, sigma {:.1e} fast periods", delay.value.0 - 0.6, delay.sigma.0);
+        assert!((delay.value.0 - 0.6).abs() < 1e-5, "{delay:?}");
+        assert!(delay.sigma.0 < 1e-5 && (delay.value.0 - 0.6).abs() < 4.0 * delay.sigma.0, "{delay:?}");
+    }
+}

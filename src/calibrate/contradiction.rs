@@ -1,0 +1,199 @@
+//! Captures that contradict the spec: the same recording twice, another order, other delays.
+//!
+//! The blind estimator looks at the bands that hold one alias each. Something is reported only where the
+//! evidence is clear: with the delays found, the signal leaves at most a tenth of the power unexplained
+//! that it leaves with those of the spec, whatever Nyquist zone each band may belong to.
+
+use super::blind::Blind;
+use super::model::Model;
+use super::order::order_of_delays;
+use super::parameters::Fit;
+use super::record::{Record, repeated};
+use super::result::ChannelEstimate;
+use crate::sine_fit::Estimate;
+use crate::spec::Spec;
+use crate::units::FastPeriods;
+use std::fmt;
+
+/// Least frames of a record that is judged, and the number that suffices.
+pub const LEAST_FRAMES: usize = 1024;
+/// See [`LEAST_FRAMES`].
+pub const ENOUGH_FRAMES: usize = 16_384;
+/// Most channels: the work grows with their cube.
+const MOST_CHANNELS: usize = 32;
+/// Share of the unexplained power that other delays must take away to count: all but this.
+const LEFT: f64 = 0.1;
+/// A delay contradicts when it is this many standard deviations beyond its interval. The interval and its
+/// own error are then both exhausted.
+const CLEAR: f64 = 6.0;
+/// The interval of a delay of which the spec says nothing, in fast periods.
+const UNSTATED: f64 = 0.02;
+/// Low and high frequencies that disagree by more than this (in units of their noise) do not see a delay.
+const WORST_MISFIT: f64 = 3.0;
+
+/// In what captures contradict a spec.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Contradiction {
+    /// Two captures hold the same samples.
+    Repeated {
+        /// From 1.
+        first: usize,
+        /// From 1.
+        second: usize,
+    },
+    /// The captures are those of the channels in another order.
+    WrongOrder {
+        /// The channel that each capture belongs to, from 1.
+        order: Vec<usize>,
+    },
+    /// A delay is outside its interval.
+    Delay {
+        /// From 1.
+        channel: usize,
+        /// From 1.
+        reference: usize,
+        /// Found delay minus that of the spec.
+        deviation: Estimate<FastPeriods>,
+        /// Half-width of the interval of the spec.
+        half_width: FastPeriods,
+    },
+}
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Repeated { first, second } => write!(
+                f,
+                "channels {first} and {second} hold the same samples, but the spec gives them different delays; was one recording given twice?"
+            ),
+            Self::WrongOrder { order } => {
+                let order: Vec<_> = order.iter().map(usize::to_string).collect();
+                write!(
+                    f,
+                    "the channels seem to be in the wrong order: their delays are those of the channels {}",
+                    order.join(", ")
+                )
+            }
+            Self::Delay { channel, reference, deviation, half_width } => write!(
+                f,
+                "the delay of channel {channel} relative to channel {reference} differs from that of the spec by {:.4} fast periods (± {:.1e}), \
+                 more than the {:.1e} that the spec allows; measure it with `hybank calibrate`",
+                deviation.value.0,
+                2.0 * deviation.sigma.0,
+                half_width.0
+            ),
+        }
+    }
+}
+
+/// What clearly contradicts `spec` in the first frames of captures; nothing where they do not tell.
+pub fn contradictions(spec: &Spec, records: &[Record]) -> Vec<Contradiction> {
+    let channels = spec.channels.len();
+    if records.len() != channels || !(2..=MOST_CHANNELS).contains(&channels) {
+        return Vec::new();
+    }
+    let delays = spec.delays_in_fast_periods();
+    if let Some((i, j)) = repeated(records).filter(|&(i, j)| delays[i] != delays[j]) {
+        return vec![Contradiction::Repeated { first: i + 1, second: j + 1 }];
+    }
+    let shortest = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
+    if shortest < LEAST_FRAMES {
+        return Vec::new();
+    }
+    by_delays(spec, records).unwrap_or_default()
+}
+
+/// `None` where the captures do not tell.
+fn by_delays(spec: &Spec, records: &[Record]) -> Option<Vec<Contradiction>> {
+    let uncertainty = spec.uncertainty.clone().unwrap_or_default();
+    let reference = uncertainty.reference_channel().unwrap_or(0);
+    let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
+    let model = Model::new(spec).ok()?;
+    let blind = Blind::of_single_aliases(&model, records).ok()?;
+    let maximum = blind.maximise(fit, reference).ok()?;
+    let (nominal, found) = blind.unexplained(&maximum);
+    let is_clear = found <= LEFT * nominal;
+    if !is_clear {
+        return None;
+    }
+    let fitted = blind.finish(&maximum, reference, fit).ok()?;
+    if fitted.misfit.is_some_and(|misfit| misfit > WORST_MISFIT) {
+        return None;
+    }
+    let nominal: Vec<f64> = model.delays.iter().map(|delay| delay.0).collect();
+    if let Some(order) = order_of_delays(&nominal, &fitted.point.delays, reference) {
+        return Some(vec![Contradiction::WrongOrder { order: order.into_iter().map(|j| j + 1).collect() }]);
+    }
+    let half_widths = uncertainty.delays(records.len());
+    let channel = |(i, estimate): (usize, ChannelEstimate)| {
+        let delay = estimate.delay?;
+        let value = FastPeriods(delay.value.0 - nominal[i]);
+        let allowed = match uncertainty.delay {
+            Some(_) => half_widths[i].in_fast_periods(spec.fast_period),
+            None => FastPeriods(UNSTATED),
+        };
+        let is_clear = value.0.abs() > allowed.0 + CLEAR * delay.sigma.0;
+        let (channel, reference) = (i + 1, reference + 1);
+        let deviation = Estimate { value, sigma: delay.sigma };
+        is_clear.then_some(Contradiction::Delay { channel, reference, deviation, half_width: allowed })
+    };
+    Some(fitted.channels(&model).into_iter().enumerate().filter_map(channel).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibrate::testbench::{gaussian, interleaved, tones, with_errors};
+    use crate::random::Random;
+    use crate::units::Hertz;
+
+    const LIST: [f64; 5] = [11e3, 37e3, 58e3, 83e3, 104e3];
+
+    fn captured(truth: &Spec, list: &[f64], dice: &mut Random) -> Vec<Record> {
+        let list: Vec<Hertz> = list.iter().map(|&f| Hertz(f)).collect();
+        tones(truth, &list, 4096, 1e-3, dice)
+    }
+
+    #[test]
+    fn captures_of_the_spec_contradict_nothing_in_any_zone() {
+        let (spec, mut dice) = (interleaved(), Random(31));
+        for list in [&LIST[..], &[203e3], &[301e3, 467e3, 41e3], &[83e3]] {
+            assert_eq!(contradictions(&spec, &captured(&spec, list, &mut dice)), [], "{list:?}");
+        }
+        let noise = |dice: &mut Random| Record::new((0..4096).map(|_| gaussian(dice)).collect());
+        let records: Vec<Record> = (0..4).map(|_| noise(&mut dice)).collect();
+        assert_eq!(contradictions(&spec, &records), []);
+    }
+
+    #[test]
+    fn swapped_channels_repeated_ones_and_wrong_delays_are_told() {
+        let (spec, mut dice) = (interleaved(), Random(32));
+        let mut records = captured(&spec, &LIST, &mut dice);
+        records.swap(1, 3);
+        let order = Contradiction::WrongOrder { order: vec![1, 4, 3, 2] };
+        assert_eq!(contradictions(&spec, &records), [order]);
+        records[2] = records[0].clone();
+        assert_eq!(contradictions(&spec, &records), [Contradiction::Repeated { first: 1, second: 3 }]);
+        let shift = |delay| [delay, 1.0, 0.0, 1.0];
+        let truth = with_errors(&spec, &[shift(0.0), shift(0.0), shift(0.2), shift(0.0)]);
+        let found = contradictions(&spec, &captured(&truth, &LIST, &mut dice));
+        let [Contradiction::Delay { channel: 3, reference: 1, deviation, .. }] = &found[..] else {
+            panic!("{found:?}")
+        };
+        assert!((deviation.value.0 - 0.2).abs() < 0.01, "{found:?}");
+        assert!(found[0].to_string().contains("hybank calibrate"), "{}", found[0]);
+    }
+
+    #[test]
+    fn a_delay_within_its_stated_interval_is_no_contradiction() {
+        let (mut spec, mut dice) = (interleaved(), Random(33));
+        let shift = |delay| [delay, 1.0, 0.0, 1.0];
+        let truth = with_errors(&spec, &[shift(0.0), shift(0.0), shift(0.2), shift(0.0)]);
+        let records = captured(&truth, &LIST, &mut dice);
+        spec.uncertainty = Some(crate::spec::UncertaintySpec {
+            delay: Some(crate::spec::PerChannel::Same(spec.fast_period * 0.3)),
+            ..Default::default()
+        });
+        assert_eq!(contradictions(&spec, &records), []);
+    }
+}

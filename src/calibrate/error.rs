@@ -1,0 +1,178 @@
+//! Why a calibration is refused.
+
+use crate::analog::AnalogError;
+use crate::sine_fit::SineFitError;
+use crate::units::{FastPeriods, Hertz};
+
+/// Why captures do not calibrate a spec.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CalibrateError {
+    /// A filter of the spec cannot be realised.
+    #[error("filter of channel {channel}: {source}")]
+    Analog {
+        /// The channel, from 1.
+        channel: usize,
+        /// Why.
+        source: Box<AnalogError>,
+    },
+    /// Not one record per channel.
+    #[error(
+        "the spec has {channels} channels, but there are {records} captures; give one per channel, in the order of the spec"
+    )]
+    ChannelCount {
+        /// Channels of the spec.
+        channels: usize,
+        /// Captures.
+        records: usize,
+    },
+    /// Nothing to compare with.
+    #[error(
+        "the spec has one channel; delays and gains are relative to a reference channel, so at least two are needed"
+    )]
+    OneChannel,
+    /// A reference beyond the channels.
+    #[error("channel {reference} cannot be the reference: the channels are 1 to {channels}")]
+    NoSuchReference {
+        /// As given, from 1.
+        reference: usize,
+        /// Channels of the spec.
+        channels: usize,
+    },
+    /// All values keep those of the spec.
+    #[error("nothing is to be fitted; name at least one of delay, gain, offset and cutoff")]
+    NothingToFit,
+    /// The same samples twice.
+    #[error("captures {first} and {second} hold the same samples; give each channel its own recording")]
+    Repeated {
+        /// From 1.
+        first: usize,
+        /// From 1.
+        second: usize,
+    },
+    /// The captures belong to other channels than the order says.
+    #[error(
+        "the captures are in the wrong order: their delays are those of the channels {}; give them in the order of the spec",
+        list(.order)
+    )]
+    WrongOrder {
+        /// The channel that each capture belongs to, from 1.
+        order: Vec<usize>,
+    },
+    /// Too few frames in a row that are neither clipped nor lost.
+    #[error(
+        "{frames} frames in a row are neither clipped nor lost; at least {needed} are needed, record more"
+    )]
+    TooShort {
+        /// Frames of the longest run.
+        frames: usize,
+        /// Frames needed.
+        needed: usize,
+    },
+    /// No frequency leaves a direction without signal.
+    #[error(
+        "at every frequency either all {channels} channels are needed to explain the signal or there is none, so a blind fit has \
+         nothing to go by; capture a signal of less bandwidth, or use tones or a known waveform"
+    )]
+    AllAliasesOccupied {
+        /// N.
+        channels: usize,
+    },
+    /// Parameters with the same effect on the captures.
+    #[error(
+        "the captures do not tell the fitted values apart: delay and cut-off have the same effect on these frequencies; fit fewer \
+         of them with --fit, or use a signal of more bandwidth"
+    )]
+    NotIdentifiable,
+    /// A cut-off that the tones do not determine.
+    #[error(
+        "channel {channel}: the tones determine the cut-off to {sigma:.1e} of itself only, because a change of the cut-off looks like \
+         one of the delay there; add tones near and above the cut-off, or leave cutoff out of --fit"
+    )]
+    CutoffLooksLikeDelay {
+        /// From 1.
+        channel: usize,
+        /// Relative standard deviation.
+        sigma: f64,
+    },
+    /// Too few tones for a cut-off.
+    #[error(
+        "a tone gives the delay at its own frequency only, where a change of the cut-off looks like one of the delay; fitting the \
+         cut-off needs at least 3 tones, and there are {tones}"
+    )]
+    TooFewTones {
+        /// Number of tones.
+        tones: usize,
+    },
+    /// A tone at a multiple of half the slow rate.
+    #[error(
+        "the tone at {tone} lies within {cycles:.1} cycles per record of a multiple of half the slow rate ({half}), where sine and \
+         cosine (or tone and offset) cannot be told apart; choose another frequency"
+    )]
+    TonePosition {
+        /// The tone.
+        tone: Hertz,
+        /// Distance in cycles per record.
+        cycles: f64,
+        /// Half the slow rate.
+        half: Hertz,
+    },
+    /// The Nyquist zone of a tone does not follow from the nominal delays.
+    #[error(
+        "the tone that appears at {alias} could be at {best} or at {other}: the delays of the spec are too far from the true ones, or \
+         too symmetric, to tell; give the frequency with --tone"
+    )]
+    AmbiguousZone {
+        /// Where it appears, below half the slow rate.
+        alias: Hertz,
+        /// The best candidate.
+        best: Hertz,
+        /// The second best.
+        other: Hertz,
+    },
+    /// A sine fit failed.
+    #[error(transparent)]
+    Tones(#[from] SineFitError),
+    /// The iteration did not settle.
+    #[error(
+        "the fit did not settle within {steps} steps; check the order of the captures, the front ends and the delays of the spec"
+    )]
+    NoConvergence {
+        /// Steps taken.
+        steps: usize,
+    },
+    /// The waveform is not in the captures.
+    #[error(
+        "channel {channel}: the training waveform explains only {percent:.0} % of its power; check that this waveform was played, at \
+         this rate, and that the front ends are those of the spec"
+    )]
+    NotTheWaveform {
+        /// From 1.
+        channel: usize,
+        /// Share of the power in per cent.
+        percent: f64,
+    },
+    /// The waveform and the captures overlap too little.
+    #[error(
+        "the training waveform and the captures have {frames} frames in common; at least {needed} are needed"
+    )]
+    ShortOverlap {
+        /// Common frames.
+        frames: usize,
+        /// Frames needed.
+        needed: usize,
+    },
+    /// A waveform without samples or spacing.
+    #[error(
+        "the training waveform has {samples} samples at a spacing of {spacing}; it needs at least 64 finite ones"
+    )]
+    Waveform {
+        /// Number of samples.
+        samples: usize,
+        /// T.
+        spacing: FastPeriods,
+    },
+}
+
+fn list(order: &[usize]) -> String {
+    order.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+}

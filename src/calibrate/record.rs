@@ -1,0 +1,94 @@
+//! The captured samples of one channel.
+
+use crate::sine_fit::Channel;
+
+/// Least share of equal samples in two records of the same recording.
+const SAME: f64 = 0.999;
+
+/// The samples of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// The samples; the full scale of integer formats is 1.
+    pub samples: Vec<f64>,
+    /// False where a sample is clipped or not finite.
+    pub keep: Vec<bool>,
+    /// Number of clipped samples.
+    pub clipped: usize,
+}
+
+impl Record {
+    /// A record without clipped samples, unless some are not finite.
+    pub fn new(samples: Vec<f64>) -> Self {
+        Self::within(samples, f64::NEG_INFINITY, f64::INFINITY)
+    }
+
+    /// A record whose converter cannot deliver values outside `lowest` ..= `highest`: samples at either end
+    /// are clipped.
+    pub fn within(samples: Vec<f64>, lowest: f64, highest: f64) -> Self {
+        let clips = |x: f64| x.is_finite() && (x <= lowest || x >= highest);
+        let clipped = samples.iter().filter(|&&x| clips(x)).count();
+        let keep = samples.iter().map(|&x| x.is_finite() && !clips(x)).collect();
+        Self { samples, keep, clipped }
+    }
+
+    /// The kept samples, for a sine fit.
+    pub(super) fn channel(&self) -> Channel<'_> {
+        Channel { keep: Some(&self.keep), ..Channel::new(&self.samples) }
+    }
+
+    /// Samples that are not clipped and finite.
+    pub fn used(&self) -> usize {
+        self.keep.iter().filter(|&&keep| keep).count()
+    }
+
+    /// Whether nearly all samples are those of `other`: two converters have noise of their own and sample at
+    /// other instants.
+    pub(super) fn repeats(&self, other: &Self) -> bool {
+        let length = self.samples.len().min(other.samples.len());
+        let equal = self.samples.iter().zip(&other.samples).filter(|(a, b)| a == b).count();
+        let changes = self.samples.windows(2).any(|pair| pair[0] != pair[1]);
+        length > 16 && changes && equal as f64 >= SAME * length as f64
+    }
+}
+
+/// The first and the longest run of frames that every record has, as first frame and length.
+pub(super) fn longest_run(records: &[Record]) -> (usize, usize) {
+    let length = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
+    let (mut best, mut begin) = ((0, 0), 0);
+    for k in 0..=length {
+        let whole = k < length && records.iter().all(|record| record.keep[k]);
+        if !whole {
+            if k - begin > best.1 {
+                best = (begin, k - begin);
+            }
+            begin = k + 1;
+        }
+    }
+    best
+}
+
+/// Two records that hold the same samples, as indices.
+pub(super) fn repeated(records: &[Record]) -> Option<(usize, usize)> {
+    let pairs = (0..records.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
+    pairs.into_iter().find(|&(j, i)| records[j].repeats(&records[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clipped_samples_and_samples_that_are_not_finite_are_left_out() {
+        let record = Record::within(vec![-1.0, 0.5, f64::NAN, 0.999, 1.0, 0.0], -1.0, 0.999);
+        assert_eq!(record.keep, [false, true, false, false, false, true]);
+        assert_eq!((record.clipped, record.used()), (3, 2));
+        assert_eq!(longest_run(&[record, Record::new(vec![0.0; 6])]), (1, 1));
+    }
+
+    #[test]
+    fn a_recording_given_twice_is_found_and_silence_is_not() {
+        let wave = |phase: f64| Record::new((0..100).map(|n| (0.3 * n as f64 + phase).sin()).collect());
+        assert_eq!(repeated(&[wave(0.0), wave(0.1), wave(0.0)]), Some((0, 2)));
+        assert_eq!(repeated(&[Record::new(vec![0.0; 100]), Record::new(vec![0.0; 100])]), None);
+    }
+}

@@ -1,0 +1,196 @@
+//! New values in the text of a spec file, with everything else kept: comments, layout, units.
+
+use std::ops::Range;
+
+use super::document::{Entry, Kind, Node};
+use super::{ChannelSpec, PerChannel, Spec, SpecProblem, UncertaintySpec};
+use crate::units::Seconds;
+
+/// Relative difference of two delays that are equal but for the rounding of their unit.
+const ROUNDING: f64 = 1e-12;
+
+/// Replacements of ranges of a text.
+struct Edits<'a> {
+    text: &'a str,
+    list: Vec<(Range<usize>, String)>,
+}
+
+impl Spec {
+    /// The text of a spec file with the delays, gains, offsets and filters of the channels, the latency and
+    /// the uncertainty of this spec. Everything else of `text` is kept as it is. Delays have the unit that
+    /// the file gives them.
+    ///
+    /// Where the text cannot be edited (it describes another spec, or writes channels in an unusual way),
+    /// the whole spec is written anew.
+    ///
+    /// # Errors
+    /// As [`Spec::to_toml`].
+    pub fn to_toml_like(&self, text: &str) -> Result<String, SpecProblem> {
+        self.check()?;
+        let edited = self.edited(text).filter(|edited| self.is_what(edited));
+        edited.map_or_else(|| self.to_toml(), Ok)
+    }
+
+    /// Whether `text` reads as this spec, up to the rounding of delays.
+    fn is_what(&self, text: &str) -> bool {
+        let Ok(mut read) = Self::from_toml(text, "") else { return false };
+        if read.channels.len() != self.channels.len() {
+            return false;
+        }
+        for (own, read) in self.channels.iter().zip(&mut read.channels) {
+            read.delay = rounded_to(read.delay, own.delay);
+        }
+        if let (Some(own), Some(read)) = (&self.uncertainty, &mut read.uncertainty)
+            && let (Some(PerChannel::Each(own)), Some(PerChannel::Each(read))) = (&own.delay, &mut read.delay)
+        {
+            read.iter_mut().zip(own).for_each(|(read, own)| *read = rounded_to(*read, *own));
+        }
+        read == *self
+    }
+
+    fn edited(&self, text: &str) -> Option<String> {
+        let document = Node::from_toml(text).ok()?;
+        let mut edits = Edits { text, list: Vec::new() };
+        let top = entries(&document)?;
+        if let Some(latency) = self.latency {
+            edits.replace(find(top, "latency")?, latency.to_string());
+        }
+        let channels = list(&find(top, "channel")?.value)?;
+        if channels.len() != self.channels.len() {
+            return None;
+        }
+        let in_samples = entries(channels.first()?).is_some_and(|keys| find(keys, "delay_samples").is_some());
+        let old = Self::from_toml(text, "").ok()?;
+        for ((node, channel), old) in channels.iter().zip(&self.channels).zip(&old.channels) {
+            edits.channel(self, node, (old, channel))?;
+        }
+        if let Some(uncertainty) = &self.uncertainty {
+            let h = in_samples.then_some(self.fast_period);
+            edits.uncertainty(find(top, "uncertainty"), &lines(uncertainty, h))?;
+        }
+        Some(edits.apply())
+    }
+}
+
+fn rounded_to(read: Seconds, own: Seconds) -> Seconds {
+    if (read.0 - own.0).abs() <= ROUNDING * own.0.abs() { own } else { read }
+}
+
+fn entries(node: &Node) -> Option<&[Entry]> {
+    if let Kind::Table(entries) = &node.kind { Some(entries) } else { None }
+}
+
+fn list(node: &Node) -> Option<&[Node]> {
+    if let Kind::List(items) = &node.kind { Some(items) } else { None }
+}
+
+fn find<'a>(entries: &'a [Entry], key: &str) -> Option<&'a Entry> {
+    entries.iter().find(|entry| entry.key == key)
+}
+
+impl Edits<'_> {
+    fn replace(&mut self, entry: &Entry, value: String) {
+        if let Some(span) = &entry.value.span {
+            self.list.push((span.clone(), value));
+        }
+    }
+
+    fn channel(
+        &mut self,
+        spec: &Spec,
+        node: &Node,
+        (old, channel): (&ChannelSpec, &ChannelSpec),
+    ) -> Option<()> {
+        let keys = entries(node)?;
+        let delay = match (find(keys, "delay"), find(keys, "delay_samples")) {
+            (Some(entry), _) => (entry, channel.delay.0),
+            (None, entry) => (entry?, channel.delay / spec.fast_period),
+        };
+        self.replace(delay.0, number(delay.1));
+        let before = delay.0.key_span.as_ref()?.start;
+        let is_inline = self.text.get(node.span.clone()?)?.starts_with('{');
+        let mut put = |key: &str, value: String, is_default: bool| match find(keys, key) {
+            Some(entry) => self.replace(entry, value),
+            None if is_default => {}
+            None => {
+                let end = if is_inline { ", " } else { "\n" };
+                self.list.push((before..before, format!("{key} = {value}{end}")));
+            }
+        };
+        put("gain", number(channel.gain), channel.gain == 1.0);
+        put("offset", number(channel.offset), channel.offset == 0.0);
+        if channel.filter != old.filter {
+            put("filter", toml::Value::try_from(&channel.filter).ok()?.to_string(), false);
+        }
+        Some(())
+    }
+
+    /// The table as `lines`, in the place of the old one or at the end.
+    fn uncertainty(&mut self, old: Option<&Entry>, lines: &[String]) -> Option<()> {
+        let Some(old) = old else {
+            let end = self.text.len();
+            let gap = if self.text.ends_with('\n') { "\n" } else { "\n\n" };
+            self.list.push((end..end, format!("{gap}[uncertainty]\n{}\n", lines.join("\n"))));
+            return Some(());
+        };
+        let span = old.value.span.clone()?;
+        if self.text.get(span.clone())?.starts_with('{') {
+            self.list.push((span, format!("{{ {} }}", lines.join(", "))));
+            return Some(());
+        }
+        let keys = entries(&old.value)?;
+        for (number, entry) in keys.iter().enumerate() {
+            let start = self.text[..entry.key_span.as_ref()?.start].rfind('\n').map_or(0, |at| at + 1);
+            let end = entry.value.span.as_ref()?.end;
+            let end = self.text[end..].find('\n').map_or(self.text.len(), |at| end + at + 1);
+            let new = if number == 0 { lines.join("\n") + "\n" } else { String::new() };
+            self.list.push((start..end, new));
+        }
+        (!keys.is_empty()).then_some(())
+    }
+
+    fn apply(mut self) -> String {
+        // A stable sort: insertions at one place keep their order.
+        self.list.sort_by_key(|(range, _)| range.start);
+        let mut text = self.text.to_owned();
+        for (range, new) in self.list.iter().rev() {
+            text.replace_range(range.clone(), new);
+        }
+        text
+    }
+}
+
+/// A number as TOML reads it back to the same bits.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// The keys of the table; delays in fast periods if the fast period `h` is given.
+fn lines(table: &UncertaintySpec, h: Option<Seconds>) -> Vec<String> {
+    let line =
+        |key: &str, value: Option<PerChannel<f64>>| value.map(|value| format!("{key} = {}", written(&value)));
+    let seconds = |list: &Option<PerChannel<Seconds>>| list.as_ref().map(|list| list.map(|time| time.0));
+    let delay = match h {
+        Some(h) => line("delay_samples", table.delay.as_ref().map(|list| list.map(|time| *time / h))),
+        None => line("delay", seconds(&table.delay)),
+    };
+    let reference = table.reference.map(|reference| format!("reference = {reference}"));
+    let all = [
+        delay,
+        line("gain", table.gain.clone()),
+        line("offset", table.offset.clone()),
+        line("cutoff", table.cutoff.clone()),
+        reference,
+        line("jitter", seconds(&table.jitter)),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+fn written(value: &PerChannel<f64>) -> String {
+    match value {
+        PerChannel::Same(value) => number(*value),
+        PerChannel::Each(list) => {
+            format!("[{}]", list.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "))
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! New values in the text of a spec file.
+
+use super::*;
+use crate::units::FastPeriods;
+
+fn calibrated(text: &str) -> Spec {
+    let mut spec = read(text);
+    spec.channels[0].delay = FastPeriods(1.234).in_seconds(spec.fast_period);
+    spec.channels[1].delay = FastPeriods(0.1 + 0.2).in_seconds(spec.fast_period);
+    spec.channels[1].gain = 1.01;
+    spec.channels[1].offset = -1e-3;
+    let half_width = FastPeriods(1e-5).in_seconds(spec.fast_period);
+    spec.uncertainty = Some(UncertaintySpec {
+        delay: Some(PerChannel::Each(vec![Seconds(0.0), half_width])),
+        reference: Some(1),
+        ..spec.uncertainty.unwrap_or_default()
+    });
+    spec
+}
+
+#[test]
+fn comments_and_layout_stay() {
+    let text = THESIS.replace("delay = 1.2", "  delay = 1.2 # measured in spring");
+    let edited = calibrated(&text).to_toml_like(&text).unwrap();
+    assert!(edited.contains("fast_period = 1.0          # h in seconds"), "{edited}");
+    assert!(edited.contains("  delay = 1.234 # measured in spring\n"), "{edited}");
+    assert!(edited.contains("gain = 1.01\noffset = -0.001\ndelay = 0.30000000000000004\n"), "{edited}");
+    assert!(edited.ends_with("\n[uncertainty]\ndelay = [0.0, 1e-5]\nreference = 1\n"), "{edited}");
+    assert_eq!(read(&edited), calibrated(&text));
+    // Again, over the table that is there now.
+    let again = calibrated(&edited).to_toml_like(&edited).unwrap();
+    assert_eq!(again, edited);
+}
+
+#[test]
+fn delays_keep_their_unit() {
+    let text = thesis_with("fast_period = 1.0", "fast_rate = 48_000").replace("delay = ", "delay_samples = ");
+    let edited = calibrated(&text).to_toml_like(&text).unwrap();
+    assert!(edited.contains("delay_samples = 1.234\n") && edited.contains("fast_rate = 48_000"), "{edited}");
+    assert!(edited.contains("[uncertainty]\ndelay_samples = [0.0, "), "{edited}");
+}
+
+#[test]
+fn inline_channels_and_filters_are_edited() {
+    let text = "fast_period = 1.0\nratio = 2\nlatency = 10 # samples\n\
+                target = { filter = { family = \"rc\", cutoff = 0.1 } }\n\
+                uncertainty = { jitter = 1e-3 }\nchannel = [{ delay = 1.2 }, { delay = 0.6, gain = 2 }]\n";
+    let mut spec = calibrated(text);
+    spec.channels[0].filter = spec.channels[0].filter.with_cutoff_scaled(1.25);
+    spec.latency = Some(12);
+    let edited = spec.to_toml_like(text).unwrap();
+    assert_eq!(read(&edited), spec);
+    assert!(edited.contains("latency = 12 # samples\n"), "{edited}");
+    assert!(edited.contains("cutoff = 0.125") && edited.contains("gain = 1.01 }"), "{edited}");
+    assert!(edited.contains("jitter = 0.001"), "{edited}");
+}
+
+#[test]
+fn what_cannot_be_edited_is_written_anew() {
+    let text = THESIS.replace("[[channel]]\ndelay = 1.2", "[[channel]]\n\"delay\" = 1.2");
+    let spec = calibrated(&text);
+    assert_eq!(read(&spec.to_toml_like(&text).unwrap()), spec);
+    assert_eq!(read(&spec.to_toml_like("nothing").unwrap()), spec);
+}
+
+#[test]
+fn a_scaled_cutoff_is_the_same_in_every_form() {
+    use crate::analog::StrictlyProper;
+    use crate::units::RadiansPerFastPeriod;
+    for filter in [
+        "{ num = [0.25], den = [1.0, 1.0, 0.25] }",
+        "{ zeros = [[0.0, 3.0], [0.0, -3.0]], poles = [[-0.5, 0.0], [-0.5, 1.0], [-0.5, -1.0]], gain = 0.25 }",
+        "{ a = [[-1.0, 0.5], [0.0, -2.0]], b = [[1.0], [1.0]], c = [[1.0, 1.0]] }",
+        "{ family = \"elliptic\", order = 3, cutoff = 0.1, ripple_db = 0.5, attenuation_db = 40.0 }",
+        "{ cascade = [{ family = \"rc\", cutoff = 0.2 }, { num = [1.0, 2.0], den = [1.0, 1.0] }] }",
+    ] {
+        let filter = read(&thesis_with_target(filter)).target;
+        let response = |filter: &FilterSpec, w: f64| {
+            StrictlyProper::new(filter, Seconds(1.0)).unwrap().response(RadiansPerFastPeriod(w))
+        };
+        for w in [0.0, 0.3, 1.7] {
+            let (scaled, same) = (response(&filter.with_cutoff_scaled(1.3), 1.3 * w), response(&filter, w));
+            assert!((scaled - same).norm() < 1e-12 * same.norm(), "{filter:?}: {scaled} {same}");
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The `[uncertainty]` table: how well the values of the channels are known.
+
+use serde::Serialize;
+
+use super::SpecProblem;
+use super::limits::range;
+use crate::units::{FastPeriods, Seconds};
+
+/// Largest half-width of a delay in fast periods; nothing is known of a delay that may be off by more.
+const MAX_DELAY: f64 = 1024.0;
+
+/// How well the values of the channels are known: half-widths of 95 % intervals beside the values of the
+/// `[[channel]]` tables.
+///
+/// A channel's delay, gain and cut-off are relative to the reference channel: a delay or a gain that all
+/// channels have in common cannot be observed.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct UncertaintySpec {
+    /// Half-width of D_i in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay: Option<PerChannel<Seconds>>,
+    /// Half-width of g_i, as a factor: 0.01 for a gain of 1 that may be 0.99 or 1.01.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gain: Option<PerChannel<f64>>,
+    /// Half-width of o_i relative to full scale.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<PerChannel<f64>>,
+    /// Half-width of the cut-off frequency as a share of it: 0.02 is 2 %. Phi_i(s) may be Phi_i(s / (1 + x))
+    /// for all |x| up to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cutoff: Option<PerChannel<f64>>,
+    /// The channel to which delays, gains and cut-offs are relative, from 1; 0 if every channel has an error
+    /// of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference: Option<usize>,
+    /// Largest distance of a sampling instant from its nominal one in seconds, other in each period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jitter: Option<PerChannel<Seconds>>,
+}
+
+/// One value for every channel, or one value each.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum PerChannel<T> {
+    /// The same for all.
+    Same(T),
+    /// One each, in the order of the channels.
+    Each(Vec<T>),
+}
+
+impl<T: Copy + Default> PerChannel<T> {
+    /// The value of channel `i`, from 0; zero beyond the end of a list.
+    pub fn of(&self, i: usize) -> T {
+        match self {
+            Self::Same(value) => *value,
+            Self::Each(list) => list.get(i).copied().unwrap_or_default(),
+        }
+    }
+}
+
+impl<T> PerChannel<T> {
+    /// The values that were written.
+    pub fn values(&self) -> &[T] {
+        match self {
+            Self::Same(value) => std::slice::from_ref(value),
+            Self::Each(list) => list,
+        }
+    }
+
+    /// The same list with other values.
+    pub(super) fn map<U>(&self, other: impl Fn(&T) -> U) -> PerChannel<U> {
+        match self {
+            Self::Same(value) => PerChannel::Same(other(value)),
+            Self::Each(list) => PerChannel::Each(list.iter().map(other).collect()),
+        }
+    }
+}
+
+impl UncertaintySpec {
+    /// The reference channel from 0: the first one unless the table names another; `None` where every
+    /// channel has an error of its own.
+    pub fn reference_channel(&self) -> Option<usize> {
+        self.reference.unwrap_or(1).checked_sub(1)
+    }
+
+    /// Half-widths of all `channels` delays, 0 for the reference channel.
+    pub fn delays(&self, channels: usize) -> Vec<Seconds> {
+        self.relative(self.delay.as_ref(), channels)
+    }
+
+    /// Half-widths of all `channels` gains, 0 for the reference channel.
+    pub fn gains(&self, channels: usize) -> Vec<f64> {
+        self.relative(self.gain.as_ref(), channels)
+    }
+
+    /// Half-widths of all `channels` cut-offs, 0 for the reference channel.
+    pub fn cutoffs(&self, channels: usize) -> Vec<f64> {
+        self.relative(self.cutoff.as_ref(), channels)
+    }
+
+    /// Half-widths of all `channels` offsets.
+    pub fn offsets(&self, channels: usize) -> Vec<f64> {
+        (0..channels).map(|i| self.offset.as_ref().map_or(0.0, |offset| offset.of(i))).collect()
+    }
+
+    fn relative<T: Copy + Default>(&self, written: Option<&PerChannel<T>>, channels: usize) -> Vec<T> {
+        let exact = self.reference_channel();
+        let of = |i| written.filter(|_| exact != Some(i)).map_or_else(T::default, |value| value.of(i));
+        (0..channels).map(of).collect()
+    }
+
+    /// Checks all numbers for a spec of `channels` channels.
+    pub(super) fn check(&self, channels: usize, fast_period: Seconds) -> Result<(), SpecProblem> {
+        self.check_by_key(channels, fast_period).map_err(|(_, problem)| problem)
+    }
+
+    /// As [`Self::check`], with the key whose value is wrong.
+    pub(super) fn check_by_key(
+        &self,
+        channels: usize,
+        h: Seconds,
+    ) -> Result<(), (&'static str, SpecProblem)> {
+        let times = [("delay", &self.delay), ("jitter", &self.jitter)];
+        for (key, times) in times {
+            let time = |value: &Seconds| check_time(value.in_fast_periods(h), *value);
+            check_list(times.as_ref(), channels, time).map_err(|problem| (key, problem))?;
+        }
+        let shares =
+            [("gain", &self.gain, 1e6), ("offset", &self.offset, 1.0), ("cutoff", &self.cutoff, 0.5)];
+        for (key, shares, most) in shares {
+            let share = |value: &f64| check_share(*value, most);
+            check_list(shares.as_ref(), channels, share).map_err(|problem| (key, problem))?;
+        }
+        self.reference
+            .map_or(Ok(()), |reference| check_reference(reference, channels))
+            .map_err(|p| ("reference", p))
+    }
+}
+
+/// A list has one entry per channel.
+fn check_list<T>(
+    written: Option<&PerChannel<T>>,
+    channels: usize,
+    check: impl Fn(&T) -> Result<(), SpecProblem>,
+) -> Result<(), SpecProblem> {
+    let Some(written) = written else { return Ok(()) };
+    if let PerChannel::Each(list) = written
+        && list.len() != channels
+    {
+        let rule = format!("give one number for all channels or a list with one for each of the {channels}");
+        return Err(range(list.len() as f64, "entries", rule));
+    }
+    written.values().iter().try_for_each(check)
+}
+
+fn check_time(periods: FastPeriods, written: Seconds) -> Result<(), SpecProblem> {
+    if (0.0..=MAX_DELAY).contains(&periods.0) {
+        return Ok(());
+    }
+    let rule = format!("a half-width is zero or more and at most {MAX_DELAY} fast periods; check its unit");
+    Err(range(written.0, "s", rule))
+}
+
+fn check_share(value: f64, most: f64) -> Result<(), SpecProblem> {
+    if (0.0..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(range(
+        value,
+        "(half-width)",
+        format!("a half-width is zero or more and here at most {most}; 0.01 is one per cent"),
+    ))
+}
+
+fn check_reference(reference: usize, channels: usize) -> Result<(), SpecProblem> {
+    if reference <= channels {
+        return Ok(());
+    }
+    let rule = format!("the reference is one of the channels 1 to {channels}, or 0 for none");
+    Err(range(reference as f64, "(channel)", rule))
+}
