@@ -203,7 +203,10 @@ fn check_converters(
 
 fn check_gamma(gamma: &Gamma) -> Checked {
     let bounds = [("lower", gamma.lower), ("noncausal", gamma.noncausal)];
-    for (key, value) in [("norm", gamma.norm), ("upper", gamma.upper)].into_iter().chain(bounds) {
+    for (key, value) in [("norm", gamma.norm), ("upper", gamma.upper), ("worst_case", gamma.worst_case)]
+        .into_iter()
+        .chain(bounds)
+    {
         if let Some(value) = value.filter(|x| !(x.is_finite() && *x >= 0.0)) {
             let rule = "a norm is zero or more, and finite; null says that it is not known";
             return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);

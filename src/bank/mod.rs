@@ -103,6 +103,10 @@ pub struct Gamma {
     pub lower: Option<f64>,
     /// A lower bound for all banks, of any latency.
     pub noncausal: Option<f64>,
+    /// No errors within the spec's `[uncertainty]` make the norm larger. Proven by `verify`; without such a
+    /// table `None`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worst_case: Option<f64>,
 }
 
 impl Gamma {
@@ -123,6 +127,7 @@ impl Gamma {
             upper: Some(upper),
             lower: Some(lower.min(norm)),
             noncausal: Some(noncausal.min(norm)),
+            worst_case: None,
         }
     }
 }

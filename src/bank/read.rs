@@ -166,13 +166,14 @@ fn fixed_point(value: &Value<'_>) -> Result<FixedPoint, Fault> {
 }
 
 fn gamma(value: &Value<'_>) -> Result<Gamma, Fault> {
-    let fields = value.fields(&["norm", "upper", "lower", "noncausal"])?;
+    let fields = value.fields(&["norm", "upper", "lower", "noncausal", "worst_case"])?;
     let bound = |key| fields.optional(key).map(|v| v.number()).transpose();
     Ok(Gamma {
         norm: bound("norm")?,
         upper: bound("upper")?,
         lower: bound("lower")?,
         noncausal: bound("noncausal")?,
+        worst_case: bound("worst_case")?,
     })
 }
 

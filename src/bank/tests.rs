@@ -23,7 +23,13 @@ fn fir() -> Bank {
         gains: vec![1.0; 2],
         offsets: vec![0.0; 2],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e308]]),
-        gamma: Gamma { norm: None, upper: Some(0.0399320), lower: None, noncausal: Some(0.03) },
+        gamma: Gamma {
+            norm: None,
+            upper: Some(0.0399320),
+            lower: None,
+            noncausal: Some(0.03),
+            worst_case: None,
+        },
         proof: None,
         fixed_point: None,
     }

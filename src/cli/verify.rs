@@ -5,6 +5,7 @@ use super::bank_file::{is_a_spec, name, read_text};
 use super::file_kind::FileKind;
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
+use crate::verify::uncertainty::check_stated;
 use crate::verify::{BoundedBanks, Verified, verify};
 use std::path::PathBuf;
 
@@ -53,6 +54,9 @@ struct Report {
     /// Word lengths of integer taps.
     #[serde(skip)]
     words: String,
+    /// No errors within the spec's uncertainty make gamma larger.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_case: Option<f64>,
 }
 
 /// Runs the command.
@@ -75,11 +79,22 @@ fn report(args: &Args) -> Result<Report, Failure> {
     let digest = check_digest(&text, &file).map_err(Failure::input)?;
     let certificate_in_file = bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());
     let verified = if args.search && !certificate_in_file {
-        design::prove(&bank).map_err(|error| named(&error))?.1
+        let verified = design::prove(&bank).map_err(|error| named(&error))?.1;
+        check_stated(&bank).map_err(|error| named(&error))?;
+        verified
     } else {
         verify(&bank).map_err(|error| named(&error))?
     };
-    Ok(Report { taps: taps(&bank), words: words(&bank), bank: file, verified, digest, certificate_in_file })
+    let worst_case = bank.gamma.worst_case;
+    Ok(Report {
+        taps: taps(&bank),
+        words: words(&bank),
+        worst_case,
+        bank: file,
+        verified,
+        digest,
+        certificate_in_file,
+    })
 }
 
 /// Taps per channel; zero for recursive filters.
@@ -122,7 +137,7 @@ impl Report {
              attained   {}   this bank's own gain at one frequency\n\
              lower      {}   {}\n\
              noncausal  {}   no bank at all is better\n\
-             {}digest     {digest}\n",
+             {}{}digest     {digest}\n",
             self.bank,
             number(lower),
             number(upper),
@@ -131,6 +146,12 @@ impl Report {
             number(lower),
             self.scope(),
             number(noncausal),
+            self.worst_case.map_or_else(String::new, |bound| {
+                format!(
+                    "worst case {}   no errors within the spec's uncertainty make gamma larger\n",
+                    number(bound)
+                )
+            }),
             self.words,
         )
     }

@@ -17,9 +17,9 @@ pub struct Analysis {
     /// Frequency of the worst case in hertz, from 0 to 1/(2 M h). All higher frequencies alias to one of
     /// these in the slow samples.
     pub peak_hertz: Hertz,
-    /// The noncausal bound: no bank has a smaller norm with these front ends and delays. Zero where delays
-    /// differ by less than doubles resolve.
-    pub noncausal: f64,
+    /// The noncausal bound: no bank has a smaller norm with these front ends and delays. `None` where delays
+    /// differ by less than doubles resolve: the bound is unknown there.
+    pub noncausal: Option<f64>,
     /// Averages over time and inputs.
     #[serde(flatten)]
     pub mean: MeanAnalysis,
@@ -56,12 +56,11 @@ pub fn analyze(bank: &Bank, delay_errors: &[Seconds]) -> Result<Analysis, Design
     shifted.check_size()?;
     let plant = LiftedPlant::new(&shifted)?;
     let peak = plant.bank_norm(&bank.filters)?;
-    // Below the resolution of delays only zero is a bound.
-    let noncausal = if resolves_delays(&shifted) { plant.noncausal_bound()?.gain } else { 0.0 };
+    let noncausal = if resolves_delays(&shifted) { Some(plant.noncausal_bound()?.gain) } else { None };
     Ok(Analysis {
         gamma: peak.gain,
         peak_hertz: RadiansPerSlowPeriod(peak.frequency).in_hertz(bank.slow_period()),
-        noncausal: noncausal.min(peak.gain),
+        noncausal: noncausal.map(|bound| bound.min(peak.gain)),
         mean: mean_of(bank, &plant)?,
     })
 }

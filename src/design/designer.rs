@@ -3,6 +3,7 @@
 use super::choices::{completed, settings, with_taps};
 use super::effort::{self, Effort, Limits, Observer, Stage, unobserved};
 use super::merging::Repeats;
+use super::methods::robust_fir::RobustStudy;
 use super::methods::{self, DualPoint, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -10,11 +11,12 @@ use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
 use super::resolution::resolves_delays;
-use super::{DesignError, prove};
+use super::{DesignError, prove, uncertainty};
 use crate::bank::{Bank, Gamma};
 use crate::spec::Spec;
 use crate::units::RadiansPerSlowPeriod;
 use crate::verify::Verified;
+use crate::verify::uncertainty::{ErrorBox, keeps_within};
 use std::time::{Duration, Instant};
 
 /// A bank with the record of its design.
@@ -34,6 +36,8 @@ pub struct Design {
     pub words: Option<WordStudy>,
     /// The result of the order reduction, if the spec asks for fewer states.
     pub reduction: Option<OrderReduction>,
+    /// The comparison with a nominal bank, if the spec has an `[uncertainty]`.
+    pub robust: Option<RobustStudy>,
     /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
     /// Time that the search for the proof took.
@@ -94,9 +98,12 @@ pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, Des
     spec.check()?;
     let (complete, problem, watch) = normalise(spec, options)?;
     watch.begins(Stage::Filters);
-    let merged = problem.merge_channels(Repeats::of(spec.design.method));
+    let settings = settings(&complete)?;
+    let repeats = Repeats::of(spec.design.method);
+    let merged =
+        if settings.robust.is_some() { problem.keep_channels() } else { problem.merge_channels(repeats) };
     let plant = LiftedPlant::new(&merged.problem)?;
-    let synthesis = methods::synthesise(spec.design.method, &plant, &settings(&complete)?)?;
+    let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
     watch.begins(Stage::Realisation);
     let realised = realise(&complete, &problem, &merged, &plant, &synthesis)?;
     watch.begins(Stage::Proof);
@@ -156,6 +163,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         iterations: synthesis.iterations,
         words,
         reduction,
+        robust: synthesis.robust.clone(),
         proof: Err(DesignError::ProofSkipped),
         proof_time: Duration::ZERO,
         bank,
@@ -177,10 +185,24 @@ impl Design {
         if search == ProofSearch::Run {
             let begin = Instant::now();
             self.proof = prove::attach_proof(&mut self.bank, dual);
+            if let Some(study) = &self.robust {
+                self.bank.gamma.worst_case = proven_worst_case(&self.bank, &study.errors);
+            }
             self.proof_time = begin.elapsed();
         }
         self
     }
+}
+
+/// Accuracy of the proven end of the worst case, and the margin for the rounding of its number.
+const WORST_CASE_ACCURACY: f64 = 0.005;
+const STATED_ABOVE: f64 = 1e-9;
+
+/// A worst case over `errors` that `verify` proves; `None` if it does not.
+fn proven_worst_case(bank: &Bank, errors: &ErrorBox) -> Option<f64> {
+    let found = uncertainty::worst_case(bank, errors, WORST_CASE_ACCURACY).ok()?;
+    let stated = found.upper * (1.0 + STATED_ABOVE);
+    keeps_within(bank, errors, stated).ok()?.then_some(stated)
 }
 
 #[cfg(test)]

@@ -139,7 +139,15 @@ impl<E: AffineError> Exchange<E> {
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
     pub(super) fn optimise(&mut self) -> Result<Candidate, DesignError> {
-        let least = self.minimise_gamma(GAMMA_ACCURACY, f64::INFINITY)?;
+        self.optimise_to(GAMMA_ACCURACY)
+    }
+
+    /// As [`Exchange::optimise`], with gamma within `accuracy` of the optimum before the margin is spent.
+    ///
+    /// # Errors
+    /// As [`Exchange::optimise`].
+    pub(super) fn optimise_to(&mut self, accuracy: f64) -> Result<Candidate, DesignError> {
+        let least = self.minimise_gamma(accuracy, f64::INFINITY)?;
         self.minimise_mean_square(least)
     }
 

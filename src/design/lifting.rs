@@ -48,6 +48,8 @@ struct SamplingInstant {
     time: f64,
     /// Whole slow periods by which the sample is delayed in addition.
     delay: usize,
+    /// Whether the derivative with respect to time is sampled.
+    slope: bool,
 }
 
 /// The exactly equivalent lifted system of `problem`.
@@ -63,6 +65,20 @@ pub(super) fn lift(problem: &Problem) -> Result<Lifted, DesignError> {
     let chains = chains.take(problem.channels.len()).collect();
     let system = prompt.series(&StateSpace::delays(&delays))?.compress_inputs();
     Ok(Lifted { system, chains, prompt: prompt.compress_inputs(), delays })
+}
+
+/// The outputs [y; y'; z] without their delays by whole periods, and these delays. y' are the derivatives of
+/// the measurements with respect to time, so -y' those with respect to the delays. Front ends of relative
+/// degree 1 have none: their slope contains the input itself, which is left out here.
+pub(super) fn lift_with_slopes(problem: &Problem) -> Result<(StateSpace, Vec<usize>), DesignError> {
+    let mut instants = schedule(problem);
+    let references = instants.split_off(problem.channels.len());
+    let slopes: Vec<SamplingInstant> =
+        instants.iter().map(|&instant| SamplingInstant { slope: true, ..instant }).collect();
+    instants.extend(slopes);
+    instants.extend(references);
+    let delays = instants.iter().map(|instant| instant.delay).collect();
+    Ok((follow_state(problem, &instants)?.compress_inputs(), delays))
 }
 
 /// The instants of all outputs, the measurements first, relabelled so that the latest lies at the end of
@@ -83,7 +99,7 @@ fn before_the_end((front_end, gain): (usize, f64), age: f64, period: f64) -> Sam
     let on_a_boundary = (age - nearest * period).abs() < SAME_INSTANT;
     let delay = if on_a_boundary { nearest } else { (age / period).floor() };
     let time = if on_a_boundary { period } else { period - (age - delay * period) };
-    SamplingInstant { front_end, gain, time, delay: delay as usize }
+    SamplingInstant { front_end, gain, time, delay: delay as usize, slope: false }
 }
 
 /// Propagates the joint analog state through one period. The outputs of the returned system are the
@@ -97,12 +113,12 @@ fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<State
     let mut state = Mat::identity(joint.order(), joint.order());
     let mut input = Mat::zeros(joint.order(), 0);
     for index in order {
-        let SamplingInstant { front_end, gain, time, .. } = instants[index];
+        let SamplingInstant { front_end, gain, time, slope, .. } = instants[index];
         if time - now >= SAME_INSTANT {
             (state, input) = joint.advance(&state, &input, time - now)?;
             now = time;
         }
-        let output = joint.c.rows(front_end, 1) * gain;
+        let output = (if slope { &joint.slopes } else { &joint.c }).rows(front_end, 1) * gain;
         rows[index] = (&output * &state, &output * &input);
     }
     // The latest sample ends the period by construction; a remainder below SAME_INSTANT is ignored.
@@ -120,16 +136,20 @@ pub(super) struct JointState {
     transition: StateTransition,
     b: Mat,
     c: Mat,
+    /// C_i A_i: the derivatives of the outputs, as far as the state determines them.
+    slopes: Mat,
 }
 
 impl JointState {
     pub(super) fn new(front_ends: &[StrictlyProper]) -> Result<Self, DesignError> {
         let b: Vec<&Mat> = front_ends.iter().map(StrictlyProper::b).collect();
         let c: Vec<&Mat> = front_ends.iter().map(StrictlyProper::c).collect();
+        let slopes: Vec<Mat> = front_ends.iter().map(|filter| filter.c() * filter.a()).collect();
         Ok(Self {
             transition: StateTransition::new(front_ends.iter().map(|filter| filter.a().clone()).collect()),
             b: linalg::vstack(&b)?,
             c: linalg::block_diagonal(&c),
+            slopes: linalg::block_diagonal(&slopes.iter().collect::<Vec<_>>()),
         })
     }
 

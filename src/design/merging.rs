@@ -71,6 +71,13 @@ impl Problem {
         MergedChannels { problem: merged, shares }
     }
 
+    /// Each channel for itself: channels that carry one measurement without errors do not with them.
+    pub(super) fn keep_channels(&self) -> MergedChannels {
+        let shares =
+            (0..self.channels.len()).map(|representative| Share { representative, share: 1.0 }).collect();
+        MergedChannels { problem: self.clone(), shares }
+    }
+
     /// The channels in groups that carry one measurement, in the order of their first channels.
     fn groups(&self, repeats: Repeats) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();

@@ -21,12 +21,14 @@ mod realise;
 pub mod reduction;
 mod resolution;
 mod scale;
+pub mod uncertainty;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use choices::latency;
 pub use designer::{Design, Options, ProofSearch, design, design_observed, design_with};
 pub use effort::{Limits, Stage};
 pub use error::DesignError;
+pub use methods::robust_fir::{RobustNorms, RobustStudy};
 pub use plant::LiftedPlant;
 pub use plausibility::{Implausible, implausible};
 pub use problem::Problem;

@@ -4,6 +4,7 @@ use super::DesignError;
 use crate::analog::StrictlyProper;
 use crate::spec::{FilterSpec, Spec};
 use crate::units::FastPeriods;
+use crate::verify::uncertainty::ErrorPoint;
 
 /// Maximum number of states of the delay chains of the lifted system. Its matrices are dense: at this size
 /// one matrix takes 128 MiB. A norm needs several of them, and its time grows with the cube of the states.
@@ -87,6 +88,27 @@ impl Problem {
             channel.delay += error;
         }
         moved
+    }
+
+    /// The problem of `spec` with errors of its channels; the delays may become negative.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn with_errors(spec: &Spec, latency: usize, point: &ErrorPoint) -> Result<Self, DesignError> {
+        let mut moved = spec.clone();
+        for (channel, cutoff) in moved.channels.iter_mut().zip(&point.cutoffs) {
+            if *cutoff != 0.0 {
+                channel.filter = channel.filter.with_cutoff_scaled(1.0 + cutoff);
+            }
+        }
+        let mut problem = Self::new(&moved, latency)?;
+        for ((channel, delay), gain) in problem.channels.iter_mut().zip(&point.delays).zip(&point.gains) {
+            channel.delay += delay.in_fast_periods(spec.fast_period);
+            channel.gain *= 1.0 + gain;
+            channel.converter_gain *= 1.0 + gain;
+        }
+        problem.check_size()?;
+        Ok(problem)
     }
 
     /// The largest delay.

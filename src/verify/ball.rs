@@ -33,7 +33,7 @@ impl<F: Number> Ball<F> {
         self.mid.nearest()
     }
 
-    #[cfg(test)]
+    /// The radius.
     pub(super) fn radius(self) -> f64 {
         self.radius
     }

@@ -8,8 +8,7 @@ use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
 use super::timeline::{SamplingInstant, Timeline};
 use super::{
-    BoundedBanks, MAX_ANALOG_STATES, MAX_STATES, MAX_WORK, Strictness, Verified, VerifyError, lower,
-    positive, spectrum, statements, upper,
+    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, lower, positive, spectrum, statements, upper,
 };
 use crate::arithmetic::{BigFloat, DoubleDouble};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, Proof, SynthesisFilters};
@@ -51,10 +50,8 @@ impl<'a> EnclosedErrorSystem<'a> {
     /// [`VerifyError::TooLarge`].
     pub fn new(bank: &'a Bank) -> Result<Self, VerifyError> {
         let (front_ends, samples) = FrontEnds::new(bank)?;
+        front_ends.check_work(samples.len())?;
         let analog = front_ends.order();
-        if analog > MAX_ANALOG_STATES || samples.len() * analog.pow(3) > MAX_WORK {
-            return Err(VerifyError::TooManyFilters { states: analog, samples: samples.len() });
-        }
         let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
         let timeline = Timeline::new(&samples, fast_period, bank.ratio)?;
         let states = error_system::order(analog, timeline.periods_late(), &bank.filters, bank.ratio);

@@ -98,6 +98,32 @@ pub enum VerifyError {
         /// The proven number.
         proven: f64,
     },
+    /// The stated worst case is not proven.
+    #[error(
+        "gamma.worst_case: it is not proven that the errors of spec.uncertainty keep gamma within {stated}: a coefficient, the \
+         spec or the number was altered; design the bank again"
+    )]
+    WorstCase {
+        /// The number in the file.
+        stated: f64,
+    },
+    /// A box of errors that does not fit the bank.
+    #[error("the box of errors cannot be judged: {rule}")]
+    ErrorBox {
+        /// What is wrong with it, and the rule.
+        rule: String,
+    },
+    /// The error system remembers its input for too long to be judged frequency by frequency.
+    #[error(
+        "the front ends or the filters remember their input for more slow periods than the proof of a worst case follows; \
+         use an FIR bank, or front ends with more damping"
+    )]
+    LongMemory,
+    /// No upper end was proven.
+    #[error(
+        "no upper end of the worst case was proven: the box is too wide for the work that is allowed; give smaller errors"
+    )]
+    WideBox,
     /// A witness proves nothing.
     #[error("{place}: this witness proves nothing; the file was altered, design the bank again")]
     Void {

@@ -1,9 +1,9 @@
 //! The analog side of a bank in normalised time: state equations in doubles, which the proof takes as
 //! exact.
 
-use super::VerifyError;
 use super::ball::{self, Ball, Matrix};
 use super::timeline::{Instant, SamplingInstant};
+use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
 use crate::analog::StrictlyProper;
 use crate::arithmetic::Number;
 use crate::bank::Bank;
@@ -15,6 +15,8 @@ use crate::units::Seconds;
 pub(super) struct FrontEnds {
     /// Each filter with the index of its first state. Proportional filters count once.
     filters: Vec<(usize, StrictlyProper)>,
+    /// The factor of each filter's cut-off: Phi(s / x) has the state equations x a, x b, c.
+    speeds: Vec<f64>,
 }
 
 impl FrontEnds {
@@ -47,7 +49,7 @@ impl FrontEnds {
             let time = Instant { whole: 0.0, delay: channel.delay };
             samples.push(SamplingInstant { filter, gain, converter_gain: channel.gain, time });
         }
-        Ok((Self { filters }, samples))
+        Ok((Self { speeds: vec![1.0; filters.len()], filters }, samples))
     }
 
     /// Number of states.
@@ -55,13 +57,49 @@ impl FrontEnds {
         self.filters.last().map_or(0, |(start, last)| start + last.order())
     }
 
+    /// The filter with this index; see [`FrontEnds::with_speed`] for the factor of its cut-off.
+    pub(super) fn filter(&self, index: usize) -> &StrictlyProper {
+        &self.filters[index].1
+    }
+
+    /// Gain of a sample over the output of its filter.
+    pub(super) fn gain(sample: &SamplingInstant) -> f64 {
+        sample.gain * sample.converter_gain
+    }
+
+    /// Index of the filter `index` with its cut-off multiplied by `speed`, which is added if it is not there.
+    pub(super) fn with_speed(&mut self, index: usize, speed: f64) -> usize {
+        if speed == self.speeds[index] {
+            return index;
+        }
+        let start = self.order();
+        self.filters.push((start, self.filters[index].1.clone()));
+        self.speeds.push(speed);
+        self.filters.len() - 1
+    }
+
+    /// Checks that the matrices of a slow period with `samples` samples are not too large.
+    ///
+    /// # Errors
+    /// [`VerifyError::TooManyFilters`].
+    pub(super) fn check_work(&self, samples: usize) -> Result<(), VerifyError> {
+        let states = self.order();
+        if states > MAX_ANALOG_STATES || samples * states.pow(3) > MAX_WORK {
+            return Err(VerifyError::TooManyFilters { states, samples });
+        }
+        Ok(())
+    }
+
     /// a and b.
     pub(super) fn dynamics<F: Number>(&self) -> (Matrix<F>, Matrix<F>) {
         let order = self.order();
         let (mut a, mut b) = (ball::zeros(order, order), ball::zeros(order, 1));
-        for (start, filter) in &self.filters {
-            a.view_mut((*start, *start), filter.a().shape()).copy_from(&ball::exact(filter.a()));
-            b.rows_mut(*start, filter.order()).copy_from(&ball::exact(filter.b()));
+        for ((start, filter), &speed) in self.filters.iter().zip(&self.speeds) {
+            let fast = |m| {
+                if speed == 1.0 { ball::exact(m) } else { ball::scaled(&ball::exact(m), Ball::from(speed)) }
+            };
+            a.view_mut((*start, *start), filter.a().shape()).copy_from(&fast(filter.a()));
+            b.rows_mut(*start, filter.order()).copy_from(&fast(filter.b()));
         }
         (a, b)
     }

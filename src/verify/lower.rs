@@ -158,16 +158,16 @@ impl BindingSums {
 }
 
 /// Second moments of the samples for white noise of unit density at the input.
-struct Covariance {
+pub(super) struct Covariance {
     /// Of the analog state.
-    state: Matrix,
+    pub(super) state: Matrix,
     /// e^{A M}.
     transition: Matrix,
 }
 
 impl Covariance {
     /// X = E X E' + G by doubling; the remainder after 2^k steps is at most ||E^(2^k)||^2 of the whole.
-    fn new(period: &SlowPeriod) -> Option<Self> {
+    pub(super) fn new(period: &SlowPeriod) -> Option<Self> {
         let n = period.order();
         let mut state = period.gram.view((0, 0), (n, n)).into_owned();
         let mut power = period.transition.clone();

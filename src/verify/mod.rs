@@ -47,6 +47,7 @@ mod statements;
 #[cfg(test)]
 mod tests;
 mod timeline;
+pub mod uncertainty;
 mod upper;
 
 pub use self::causal::{Precision, Recursion};
@@ -104,5 +105,7 @@ pub fn verify(bank: &Bank) -> Result<Verified, VerifyError> {
     if proof.upper.is_none() {
         return Err(if bank.spec.is_none() { VerifyError::NoSpec } else { VerifyError::NoCertificate });
     }
-    EnclosedErrorSystem::new(bank)?.judge(proof, Strictness::Proven)
+    let verified = EnclosedErrorSystem::new(bank)?.judge(proof, Strictness::Proven)?;
+    uncertainty::check_stated(bank)?;
+    Ok(verified)
 }

@@ -5,6 +5,7 @@ mod support;
 
 mod abuse;
 mod algorithms;
+mod analyze;
 mod cuts;
 mod design;
 mod docs;

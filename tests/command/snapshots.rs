@@ -100,6 +100,7 @@ fn reports_are_what_they_were() {
         "iir.toml",
         THESIS.replace("latency = 10", "latency = 4").replace("\"fir\"\ntaps = 22", "\"iir\""),
     );
+    desk.write("robust.toml", format!("{THESIS}\n[uncertainty]\ndelay_samples = 0.1\nreference = 0\n"));
     for (name, args) in [
         ("design-fir", &["design", "spec.toml", "-o", "fir.json"][..]),
         ("design-bits", &["design", "spec.toml", "-o", "bits.json", "--bits", "8"]),
@@ -107,6 +108,22 @@ fn reports_are_what_they_were() {
         ("design-reduced", &["design", "iir.toml", "-o", "two.json", "--order", "2"]),
         ("analyze", &["analyze", "fir.json"]),
         ("analyze-certify", &["analyze", "fir.json", "--certify"]),
+        (
+            "analyze-box",
+            &[
+                "analyze",
+                "fir.json",
+                "--delay-box",
+                "0.05samples",
+                "--gain-box",
+                "0,1%",
+                "--jitter",
+                "1ms",
+                "--sensitivity",
+            ],
+        ),
+        ("design-robust", &["design", "robust.toml", "-o", "robust.json"]),
+        ("verify-robust", &["verify", "robust.json"]),
         ("verify-fir", &["verify", "fir.json"]),
         ("verify-iir", &["verify", "iir.json"]),
         ("simulate", &["simulate", "spec.toml", "--source", "step@0.3", "-o", "cap"]),

@@ -3,7 +3,7 @@
 use crate::bank::{Gamma, SynthesisFilters};
 use crate::cli::understood::understood;
 use crate::design::quantise::WordStudy;
-use crate::design::{Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction};
+use crate::design::{Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction, RobustStudy};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -28,6 +28,9 @@ pub(super) struct Report<'a> {
     /// For integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
     words: Option<Words<'a>>,
+    /// For a spec with `[uncertainty]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robust: Option<&'a RobustStudy>,
     #[serde(flatten)]
     mean: MeanAnalysis,
     scale: GammaScale,
@@ -144,6 +147,7 @@ impl<'a> Report<'a> {
             reduction: design.reduction.as_ref(),
             gamma: &bank.gamma,
             words: Words::of(design),
+            robust: design.robust.as_ref(),
             mean,
             scale,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
@@ -171,7 +175,7 @@ impl<'a> Report<'a> {
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              SNR        {} for a signal with the target's spectrum\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
-             {}{}designed in {:.1} ms, {} iterations\n{}",
+             {}{}{}designed in {:.1} ms, {} iterations\n{}",
             self.understood,
             self.bank,
             self.method.name(),
@@ -198,6 +202,7 @@ impl<'a> Report<'a> {
             self.mean.output_noise,
             self.words.as_ref().map(Words::text).unwrap_or_default(),
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
+            self.robust.map(|study| robust_text(study, self.gamma.worst_case)).unwrap_or_default(),
             self.seconds * 1e3,
             self.iterations,
             self.proof.text(),
@@ -227,6 +232,35 @@ fn decibels(value: f64, reference: f64) -> String {
     } else {
         format!("{:.1} dB", 20.0 * (value / reference).log10())
     }
+}
+
+/// A robust bank pays if it lowers the worst case by this share.
+const WORTHWHILE: f64 = 0.01;
+
+/// The bank and the nominal one, without errors and at worst over the spec's uncertainty.
+fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
+    let RobustStudy { robust, nominal, lower, .. } = study;
+    let proven =
+        proven.map_or("not proven".to_owned(), |proven| format!("proven: at most {}", number(Some(proven))));
+    let gain = 100.0 * study.gain();
+    let advice = if study.gain() < WORTHWHILE {
+        format!(
+            "           the robust design lowers the worst case by {gain:.2} % only: what helps is to know the channels better; \
+             measure them\n"
+        )
+    } else {
+        format!("           the robust design lowers the worst case by {gain:.2} %\n")
+    };
+    format!(
+        "robust     {} at worst over the spec's uncertainty ({proven}), {} without errors\n\
+         nominal    {} at worst, {} without errors, for the bank that takes the errors for zero\n\
+         least      {} at worst for all banks of this length (lower bound, computed)\n{advice}",
+        number(Some(robust.worst)),
+        number(Some(robust.nominal)),
+        number(Some(nominal.worst)),
+        number(Some(nominal.nominal)),
+        number(Some(*lower)),
+    )
 }
 
 /// Why no bound is stated.

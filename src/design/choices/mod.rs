@@ -13,11 +13,13 @@ mod search;
 use super::DesignError;
 use super::effort::{self, Limits};
 use super::merging::Repeats;
+use super::methods::robust_fir::RobustProblem;
 use super::methods::{self, Settings, fir, iir};
 use super::plant::LiftedPlant;
 use super::problem::{Channel, Problem};
 use crate::spec::{Method, Spec};
 use crate::units::FastPeriods;
+use crate::verify::uncertainty::ErrorBox;
 use reach::Reach;
 use recursive::{CausalErrors, NEGLIGIBLE};
 use search::Search;
@@ -85,8 +87,11 @@ pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
         Ok::<_, DesignError>(Problem::new(&slow, 0)?.merge_channels(Repeats::AtOneInstant).problem)
     };
     let separate = spec.design.method == Method::Separation;
+    let errors = spec.uncertainty.as_ref().map(|table| ErrorBox::of(table, spec.channels.len()));
+    let errors = errors.filter(|errors| spec.design.method == Method::Fir && !errors.is_point());
     Ok(Settings {
         taps: taps(spec),
+        robust: errors.map(|errors| RobustProblem { spec: spec.clone(), errors }),
         gamma_margin: spec.design.gamma_margin,
         solver: spec.design.solver,
         at_slow_rate: separate.then(at_slow_rate).transpose()?,

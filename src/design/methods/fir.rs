@@ -40,6 +40,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
         noncausal: noncausal.min(best.peak.gain),
         dual: exchange.dual,
         iterations: exchange.iterations,
+        robust: None,
     })
 }
 

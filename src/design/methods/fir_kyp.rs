@@ -45,6 +45,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
         noncausal: noncausal.min(peak.gain),
         dual: Vec::new(),
         iterations: solution.steps.len(),
+        robust: None,
     })
 }
 

@@ -269,6 +269,7 @@ impl<'a> GammaIteration<'a> {
             noncausal: self.noncausal.gain.min(peak.gain),
             dual: Vec::new(),
             iterations: self.trials,
+            robust: None,
         }
     }
 }

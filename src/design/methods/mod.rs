@@ -15,6 +15,7 @@ mod gamma_iteration;
 pub(crate) mod h2;
 pub(crate) mod iir;
 mod precise_filtering;
+pub(crate) mod robust_fir;
 pub(crate) mod separation;
 pub(crate) mod sinc;
 
@@ -36,6 +37,8 @@ pub(crate) struct Settings {
     pub(crate) gamma_margin: Option<f64>,
     /// Solver of `fir`; `None` is the sampled worst-case solver.
     pub(crate) solver: Option<Solver>,
+    /// The errors that `fir` has to expect; `None` if there are none.
+    pub(crate) robust: Option<robust_fir::RobustProblem>,
     /// The channels of the plant in units of the slow period, for `separation`.
     pub(crate) at_slow_rate: Option<Problem>,
 }
@@ -64,6 +67,8 @@ pub(crate) struct Synthesis {
     pub(crate) dual: Vec<DualPoint>,
     /// Number of interior-point iterations or of Riccati equations solved.
     pub(crate) iterations: usize,
+    /// For a robust design.
+    pub(crate) robust: Option<robust_fir::RobustStudy>,
 }
 
 impl Synthesis {
@@ -72,7 +77,7 @@ impl Synthesis {
         let peak = plant.fir_norm(&taps)?;
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
         let filters = Filters::Fir(taps);
-        Ok(Self { filters, peak, lower: noncausal, noncausal, dual: Vec::new(), iterations: 0 })
+        Ok(Self { filters, peak, lower: noncausal, noncausal, dual: Vec::new(), iterations: 0, robust: None })
     }
 }
 
@@ -85,6 +90,9 @@ pub(crate) fn synthesise(
     plant: &LiftedPlant,
     settings: &Settings,
 ) -> Result<Synthesis, DesignError> {
+    if let (Method::Fir, Some(problem)) = (method, &settings.robust) {
+        return robust_fir::synthesise(plant, settings, problem);
+    }
     match method {
         Method::Fir if settings.solver == Some(Solver::Kyp) => fir_kyp::synthesise(plant, settings),
         Method::Fir => fir::synthesise(plant, settings),

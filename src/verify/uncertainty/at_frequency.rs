@@ -1,0 +1,282 @@
+//! The largest gain of the error system at one frequency, over a box of errors.
+//!
+//! At a fixed frequency K = W - sum_i F_i h_i with the columns F_i of the filters and the rows h_i of the
+//! channels. For a delay error between two points of the grid, h_i is a convex mix of the rows at the points
+//! plus a remainder of norm at most c_i ([`super::aliases::Weight::Chord`]). The gain is convex, so over a
+//! box
+//!
+//! ```text
+//! sigma(K) <= max over the vertices of sigma(K_v) + sum_i |F_i| c_i.
+//! ```
+//!
+//! Gains enter h_i as factors, so their box adds vertices and no remainder. Where the bound is too large,
+//! the box is halved along the channel with the largest remainder.
+//!
+//! The vertices form a tree, channel by channel. With channel i still free, h_i lies within r_i of the mean
+//! of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch.
+
+use super::super::ball::{self, Ball, Matrix};
+use super::super::positive;
+use super::super::spectrum::ComplexMatrix;
+use super::grid::ChannelGrid;
+use crate::linalg;
+
+/// Relative margins over a computed eigenvalue at which a proof that it is an upper bound is tried.
+const MARGINS: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
+/// Maximum number of boxes at one frequency.
+const MAX_BOXES: usize = 4096;
+
+/// The Gram matrix of all samples of a grid at one frequency, with the filters.
+#[derive(Debug)]
+pub(super) struct AtFrequency<'a> {
+    pub(super) gram: ComplexMatrix,
+    /// F, M x N.
+    pub(super) filters: ComplexMatrix,
+    /// Bounds of |F_i|.
+    pub(super) columns: Vec<f64>,
+    pub(super) channels: &'a [ChannelGrid],
+    /// Largest relative error of the gain of each channel.
+    pub(super) gains: &'a [f64],
+    /// Bounds of the remainder of each channel, by the number of halvings; those of gains included.
+    pub(super) remainders: Vec<Vec<f64>>,
+}
+
+/// A row h as a sum of rows of the Gram matrix.
+pub(super) type Mix = Vec<(usize, f64)>;
+
+/// One vertex of a channel's set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Vertex {
+    /// Index of the delay error.
+    pub(super) error: usize,
+    /// Index of the factor of the cut-off.
+    pub(super) speed: usize,
+    /// Factor of the gain.
+    pub(super) gain: f64,
+}
+
+/// A gain that is attained at a vertex.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Attained {
+    /// Proven from below.
+    pub(super) lower: f64,
+    /// Proven from above.
+    pub(super) upper: f64,
+    pub(super) vertices: Vec<Vertex>,
+}
+
+/// What is known of the gains over the box.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Verdict {
+    /// None is above the threshold.
+    Below,
+    /// One is.
+    Above(Attained),
+    /// The remainders are too large for a decision on this grid. The vertex is the worst of those seen.
+    Open(Attained),
+}
+
+/// A part of the delays of a channel: the points `first..=last` of its grid, after `level` halvings.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    first: usize,
+    last: usize,
+    level: usize,
+}
+
+impl AtFrequency<'_> {
+    /// Compares the largest gain over the whole box with `threshold`. Counts the gains computed in `work`.
+    pub(super) fn compare(&self, threshold: f64, work: &mut usize) -> Verdict {
+        let whole = |channel: &ChannelGrid| Part { first: 0, last: channel.errors.len() - 1, level: 0 };
+        let mut boxes: Vec<Vec<Part>> = vec![self.channels.iter().map(whole).collect()];
+        for _ in 0..MAX_BOXES {
+            let Some(parts) = boxes.pop() else { return Verdict::Below };
+            let remainder = self.remainder(&parts);
+            let Some(found) = self.above(&parts, threshold - remainder, work) else { continue };
+            if found.lower > threshold {
+                return Verdict::Above(found);
+            }
+            match self.halved(&parts) {
+                Some(halves) => boxes.extend(halves),
+                None => return Verdict::Open(found),
+            }
+        }
+        Verdict::Open(Attained { lower: 0.0, upper: f64::INFINITY, vertices: Vec::new() })
+    }
+
+    fn term(&self, i: usize, part: &Part) -> f64 {
+        self.columns[i] * self.remainders[i][part.level]
+    }
+
+    fn remainder(&self, parts: &[Part]) -> f64 {
+        super::angle::outward(parts.iter().enumerate().map(|(i, part)| self.term(i, part)).sum())
+    }
+
+    /// The halves along the channel with the largest remainder that can be halved.
+    fn halved(&self, parts: &[Part]) -> Option<[Vec<Part>; 2]> {
+        let can = |i: &usize| parts[*i].last > parts[*i].first + 1;
+        let size = |i: usize| self.term(i, &parts[i]);
+        let i = (0..parts.len()).filter(can).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+        let Part { first, last, level } = parts[i];
+        let middle = (first + last) / 2;
+        let with = |first, last| {
+            let mut half = parts.to_vec();
+            half[i] = Part { first, last, level: level + 1 };
+            half
+        };
+        Some([with(first, middle), with(middle, last)])
+    }
+
+    /// The vertices of a channel.
+    fn vertices(&self, i: usize, part: &Part) -> Vec<Vertex> {
+        let ends = if part.first == part.last { vec![part.first] } else { vec![part.first, part.last] };
+        let gain = self.gains[i];
+        let gains = if gain == 0.0 { vec![1.0] } else { vec![1.0 - gain, 1.0 + gain] };
+        let speeds = 0..self.channels[i].speeds.len();
+        let all = ends.iter().flat_map(|&error| speeds.clone().map(move |speed| (error, speed)));
+        all.flat_map(|(error, speed)| gains.iter().map(move |&gain| Vertex { error, speed, gain })).collect()
+    }
+
+    fn mix(&self, i: usize, vertex: &Vertex) -> Mix {
+        vec![(self.channels[i].rows[vertex.error][vertex.speed], vertex.gain)]
+    }
+
+    /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none.
+    fn above(&self, parts: &[Part], limit: f64, work: &mut usize) -> Option<Attained> {
+        let sets: Vec<Vec<Vertex>> =
+            parts.iter().enumerate().map(|(i, part)| self.vertices(i, part)).collect();
+        let means: Vec<Mix> = sets.iter().enumerate().map(|(i, set)| self.mean(i, set)).collect();
+        let radii = sets
+            .iter()
+            .zip(&means)
+            .enumerate()
+            .map(|(i, (set, mean))| self.columns[i] * self.radius(i, set, mean));
+        // spread[i] bounds what the channels from i on may add to their means.
+        let mut spread = vec![0.0; sets.len() + 1];
+        for (i, radius) in radii.collect::<Vec<f64>>().into_iter().enumerate().rev() {
+            spread[i] = super::angle::outward(spread[i + 1] + radius);
+        }
+        let mut tree = Tree { at: self, sets: &sets, spread: &spread, limit, work };
+        tree.search(&mut means.clone(), &mut Vec::new())
+    }
+
+    /// The mean of the rows of a set of vertices.
+    fn mean(&self, i: usize, set: &[Vertex]) -> Mix {
+        let mut mean: Mix = Vec::new();
+        for (row, gain) in set.iter().flat_map(|vertex| self.mix(i, vertex)) {
+            let share = gain / set.len() as f64;
+            match mean.iter_mut().find(|(known, _)| *known == row) {
+                Some((_, weight)) => *weight += share,
+                None => mean.push((row, share)),
+            }
+        }
+        mean
+    }
+
+    /// A bound of the distance of the rows of a set from their mean.
+    fn radius(&self, i: usize, set: &[Vertex], mean: &Mix) -> f64 {
+        if set.len() == 1 {
+            return 0.0;
+        }
+        let distance = |vertex: &Vertex| {
+            let mut difference = mean.clone();
+            difference.extend(self.mix(i, vertex).into_iter().map(|(row, gain)| (row, -gain)));
+            let square = difference.iter().fold(Ball::ZERO, |sum, &(a, x)| {
+                difference
+                    .iter()
+                    .fold(sum, |sum, &(b, y)| sum + Ball::from(x) * Ball::from(y) * self.gram.re[(a, b)])
+            });
+            square.upper().max(0.0).sqrt() * (1.0 + 1e-15)
+        };
+        set.iter().map(distance).fold(0.0, ball::nan_max)
+    }
+
+    /// K K*, M x M, of the rows `mixes`.
+    pub(super) fn square(&self, mixes: &[Mix]) -> ComplexMatrix {
+        let outputs = self.filters.re.nrows();
+        let terms: Vec<(usize, usize, f64)> = mixes
+            .iter()
+            .enumerate()
+            .flat_map(|(i, mix)| mix.iter().map(move |&(row, weight)| (i, row, -weight)))
+            .collect();
+        let rows: Vec<usize> = (0..outputs).chain(terms.iter().map(|&(_, row, _)| row)).collect();
+        let part = |filters: &Matrix, unit: f64| {
+            Matrix::from_fn(outputs, rows.len(), |p, c| match c.checked_sub(outputs) {
+                None if p == c && unit != 0.0 => Ball::from(unit),
+                None => Ball::ZERO,
+                Some(t) => filters[(p, terms[t].0)] * Ball::from(terms[t].2),
+            })
+        };
+        let map = ComplexMatrix { re: part(&self.filters.re, 1.0), im: part(&self.filters.im, 0.0) };
+        map.product(&self.gram.select(&rows, &rows)).product(&map.adjoint())
+    }
+}
+
+/// The search among the vertices of one box.
+struct Tree<'a, 'b> {
+    at: &'a AtFrequency<'b>,
+    sets: &'a [Vec<Vertex>],
+    spread: &'a [f64],
+    limit: f64,
+    work: &'a mut usize,
+}
+
+impl Tree<'_, '_> {
+    /// `mixes` are the chosen vertices of the first channels and the means of the others.
+    fn search(&mut self, mixes: &mut [Mix], chosen: &mut Vec<Vertex>) -> Option<Attained> {
+        let channel = chosen.len();
+        *self.work += 1;
+        let square = self.at.square(mixes);
+        let upper = upper_gain(&square, self.limit - self.spread[channel]);
+        if upper + self.spread[channel] <= self.limit {
+            return None;
+        }
+        if channel == self.sets.len() {
+            return Some(Attained { lower: lower_gain(&square), upper, vertices: chosen.clone() });
+        }
+        let mean = mixes[channel].clone();
+        for vertex in &self.sets[channel] {
+            mixes[channel] = self.at.mix(channel, vertex);
+            chosen.push(*vertex);
+            let found = self.search(mixes, chosen);
+            chosen.pop();
+            if found.is_some() {
+                return found;
+            }
+        }
+        mixes[channel] = mean;
+        None
+    }
+}
+
+/// A proven upper bound of the root of the largest eigenvalue; at least tries to prove `wanted` if the
+/// eigenvalue is below.
+pub(super) fn upper_gain(square: &ComplexMatrix, wanted: f64) -> f64 {
+    let real = square.realified();
+    let Ok(values) = linalg::symmetric_eigenvalues(&ball::nearest(&real)) else { return f64::INFINITY };
+    let largest = values.into_iter().fold(0.0, f64::max);
+    let exceeds = |bound: f64| {
+        let shifted = Matrix::from_fn(real.nrows(), real.nrows(), |i, j| {
+            let entry = -real[(i, j)];
+            if i == j { entry + Ball::from(bound) } else { entry }
+        });
+        positive::exceeds(&shifted, 0.0)
+    };
+    let tight = wanted * wanted * (1.0 - 1e-14);
+    let tried = MARGINS.iter().map(|margin| largest * (1.0 + margin) + f64::MIN_POSITIVE);
+    let enough = (wanted > 0.0 && largest < tight).then_some(tight);
+    let proven = enough.into_iter().chain(tried).find(|&bound| exceeds(bound));
+    proven.map_or(f64::INFINITY, |bound| bound.sqrt() * (1.0 + 1e-15))
+}
+
+/// A proven lower bound of the same: the quotient of a direction near the eigenvector.
+pub(super) fn lower_gain(square: &ComplexMatrix) -> f64 {
+    let real = square.realified();
+    let Ok((values, vectors)) = linalg::symmetric_eigen(&ball::nearest(&real)) else { return 0.0 };
+    let Some(k) = (0..values.len()).max_by(|&a, &b| values[a].total_cmp(&values[b])) else { return 0.0 };
+    let direction: Matrix = ball::exact(&vectors.columns(k, 1).into_owned());
+    let transposed = direction.transpose();
+    let energy = ball::product(&transposed, &ball::product(&real, &direction))[(0, 0)];
+    let quotient = (energy / ball::product(&transposed, &direction)[(0, 0)]).lower();
+    if quotient > 0.0 { quotient.sqrt() * (1.0 - 1e-15) } else { 0.0 }
+}

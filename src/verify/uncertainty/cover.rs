@@ -1,0 +1,375 @@
+//! Covers all frequencies with cells and proves a bound in each of them.
+
+use super::super::VerifyError;
+use super::super::ball::Ball;
+use super::super::front_ends::FrontEnds;
+use super::super::lower::Covariance;
+use super::super::spectrum;
+use super::aliases::{Aliases, Weight};
+use super::angle::{Frequency, cosine_below, outward};
+use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, lower_gain};
+use super::grid::Grid;
+use super::memory::{Lags, Memory, growth};
+use super::transfer::Transfer;
+use super::{ErrorBox, ErrorPoint, WorstCase};
+use crate::bank::Bank;
+use crate::units::RadiansPerSlowPeriod;
+use std::f64::consts::PI;
+
+/// Most halvings of the delays.
+const MAX_LEVEL: u32 = 5;
+/// Most rows of a Gram matrix.
+const MAX_ROWS: usize = 160;
+/// Factors by which the accuracy is relaxed until the work allows it.
+const RELAXED: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 30.0, 100.0, 1e4];
+/// Limit on the cells of one attempt.
+const MAX_CELLS: usize = 20_000;
+/// Limit on the gains computed in one attempt.
+const MAX_GAINS: usize = 400_000;
+/// Cells whose bound exceeds the value at their centre by less than the square of this are not halved
+/// further for the sake of remainders.
+const NARROW: f64 = 0.02;
+/// Share of the accuracy that the cut of the memory may use.
+const TAIL_SHARE: f64 = 1e-3;
+/// Relative size of the tails of recursive filters.
+const FILTER_TAIL: f64 = 1e-12;
+/// Worst cases below this, relative to the reference samples, are zero up to rounding.
+const FLOOR: f64 = 1e-10;
+
+/// The proof of one worst case.
+pub(super) struct Cover<'a> {
+    bank: &'a Bank,
+    errors: &'a ErrorBox,
+    /// By level; made when needed.
+    grids: Vec<Grid>,
+    channels: Vec<Channel>,
+    reference: Memory,
+    lags: Lags,
+    /// Size of the reference samples.
+    scale: f64,
+    best: Option<Best>,
+    /// The upper end that is to be proven; without it one relative to the best lower end.
+    goal: Option<f64>,
+    work: usize,
+}
+
+/// The bounds of one channel.
+struct Channel {
+    transfer: Transfer,
+    /// Second derivative in the cut-off, if that is uncertain.
+    curvature: Option<Transfer>,
+    memory: Memory,
+    /// Largest factor of the cut-off over the least.
+    speed_ratio: f64,
+    /// D_i in fast periods, for the rounding of delays.
+    delay: f64,
+}
+
+/// The largest gain found.
+struct Best {
+    lower: f64,
+    point: ErrorPoint,
+    frequency: f64,
+}
+
+impl<'a> Cover<'a> {
+    /// # Errors
+    /// See [`super::worst_case`].
+    pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox) -> Result<Self, VerifyError> {
+        let grid = Grid::new(bank, errors, 0)?;
+        let slow = || VerifyError::LongMemory;
+        let covariance = Covariance::new(&grid.period).ok_or_else(slow)?;
+        let growth = growth(&grid.period.transition).ok_or_else(slow)?;
+        let memory = |sample: usize| {
+            let row = grid.front_ends.output(&grid.samples[sample]);
+            Memory::new(&row, &grid.period.transition, &covariance.state, growth)
+        };
+        let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
+        let channel = |i: usize| {
+            let sample = &grid.samples[grid.channels[i].rows[0][0]];
+            let filter = grid.front_ends.filter(sample.filter);
+            let transfer = Transfer::new(filter, FrontEnds::gain(sample));
+            let cutoff = errors.cutoffs[i];
+            Channel {
+                curvature: (cutoff > 0.0).then(|| transfer.curvature()),
+                transfer,
+                // The row of the slowest variant is the first one.
+                memory: memory(grid.channels[i].rows[0][0]),
+                speed_ratio: outward((1.0 + cutoff) / (1.0 - cutoff)),
+                delay: sample.time.delay.in_fast_periods(fast_period).0.abs(),
+            }
+        };
+        let channels = (0..bank.channel_count()).map(channel).collect();
+        let reference = memory(0);
+        let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or_else(slow)?;
+        let n = grid.period.order();
+        let scale = (n..n + bank.ratio).map(|i| grid.period.gram[(i, i)].nearest()).sum::<f64>().sqrt();
+        Ok(Self {
+            bank,
+            errors,
+            grids: vec![grid],
+            channels,
+            reference,
+            lags,
+            scale,
+            best: None,
+            goal: None,
+            work: 0,
+        })
+    }
+
+    /// Proves the gain of one point at a frequency, and keeps it if it is the largest so far.
+    ///
+    /// # Errors
+    /// As [`Grid::at`].
+    pub(super) fn try_point(
+        &mut self,
+        point: &ErrorPoint,
+        frequency: RadiansPerSlowPeriod,
+    ) -> Result<(), VerifyError> {
+        let grid = Grid::at(self.bank, point)?;
+        let near = Frequency::near(frequency.0);
+        let at = self.plain(&grid, &near);
+        let mixes: Vec<Mix> = (0..self.channels.len())
+            .map(|i| vec![(grid.channels[i].rows[0][0], 1.0 + point.gains[i])])
+            .collect();
+        let lower = lower_gain(&at.square(&mixes));
+        self.offer(Best { lower, point: point.clone(), frequency: frequency.0 });
+        Ok(())
+    }
+
+    /// Both ends, as close as the work allows.
+    ///
+    /// # Errors
+    /// [`VerifyError::WideBox`] if no upper end is proven.
+    pub(super) fn prove(mut self, accuracy: f64) -> Result<WorstCase, VerifyError> {
+        let mut spent = 0;
+        for factor in RELAXED {
+            self.work = 0;
+            let upper = self.attempt(accuracy * factor)?;
+            spent += self.work;
+            if let (Some(upper), Some(best)) = (upper, &self.best) {
+                return Ok(WorstCase {
+                    lower: best.lower,
+                    upper,
+                    point: best.point.clone(),
+                    frequency: RadiansPerSlowPeriod(best.frequency),
+                    gains_computed: spent,
+                });
+            }
+        }
+        Err(VerifyError::WideBox)
+    }
+
+    /// Whether it is proven that no norm in the box exceeds `gamma`.
+    ///
+    /// # Errors
+    /// As [`super::worst_case`].
+    pub(super) fn proves(mut self, gamma: f64) -> Result<bool, VerifyError> {
+        self.goal = Some(gamma);
+        // The cut of the memory is to cost as little as with an accuracy of a per cent.
+        Ok(self.attempt(0.01)?.is_some())
+    }
+
+    /// The upper end that is to be proven.
+    fn target(&self, accuracy: f64) -> f64 {
+        if let Some(goal) = self.goal {
+            return goal;
+        }
+        let lower = self.best.as_ref().map_or(0.0, |best| best.lower);
+        (lower * (1.0 + accuracy)).max(FLOOR * self.scale)
+    }
+
+    fn offer(&mut self, found: Best) {
+        if self.best.as_ref().is_none_or(|best| best.lower < found.lower) {
+            self.best = Some(found);
+        }
+    }
+
+    /// Covers all frequencies; `None` if the work does not suffice.
+    fn attempt(&mut self, accuracy: f64) -> Result<Option<f64>, VerifyError> {
+        let (degree, tail) = self.polynomial(TAIL_SHARE * accuracy * self.target(accuracy));
+        let count = ((1.6 * degree).ceil() as usize).max(4);
+        if count > MAX_CELLS {
+            return Err(VerifyError::LongMemory);
+        }
+        // The last cell ends beyond pi.
+        let end = |k: usize| PI * (1.0 + 1e-15) * k as f64 / count as f64;
+        let mut cells: Vec<(f64, f64)> = (0..count).map(|k| (end(k), end(k + 1))).collect();
+        for _ in 0..MAX_CELLS {
+            let Some((begin, end)) = cells.pop() else { return Ok(Some(self.target(accuracy))) };
+            let refuted =
+                self.goal.is_some_and(|goal| self.best.as_ref().is_some_and(|best| best.lower > goal));
+            if refuted || self.work > MAX_GAINS {
+                break;
+            }
+            // The centre is not exactly the frequency that is judged.
+            let x = 0.5 * degree * (0.5 * (end - begin) + 1e-13);
+            let threshold = (self.target(accuracy) - tail) * cosine_below(x) - tail;
+            let centre = 0.5 * (begin + end);
+            let narrow = match self.judge(centre, threshold)? {
+                Verdict::Below => continue,
+                Verdict::Above(_) => x < 1e-6,
+                Verdict::Open(_) => x < NARROW,
+            };
+            if narrow {
+                break;
+            }
+            cells.extend([(begin, centre), (centre, end)]);
+        }
+        Ok(None)
+    }
+
+    /// Degree d and tail for a memory whose tail is at most `wanted`, if it gets there.
+    fn polynomial(&self, wanted: f64) -> (f64, f64) {
+        let mut periods = 0;
+        let mut tail = self.tail(0);
+        while tail > wanted && periods < MAX_CELLS {
+            let shorter = tail;
+            periods += 1;
+            tail = self.tail(periods);
+            // What is left are the tails of the filters.
+            if periods > 8 && tail > 0.999 * shorter {
+                break;
+            }
+        }
+        let late = &self.grids[0].period.periods_late;
+        let (references, channels) = late.split_at(self.bank.ratio);
+        let most = |list: &[usize]| list.iter().copied().max().unwrap_or(0);
+        let last = (most(references)).max(most(channels) + self.lags.last);
+        let first = late.iter().copied().min().unwrap_or(0);
+        ((last - first + periods) as f64, tail)
+    }
+
+    /// Bounds ||K - K_J|| for all errors in the box, J = `periods`.
+    fn tail(&self, periods: usize) -> f64 {
+        let reference = (self.bank.ratio as f64).sqrt() * self.reference.tail(periods);
+        let channels = self.channels.iter().enumerate().map(|(i, channel)| {
+            let factor = (1.0 + self.errors.gains[i]) * channel.speed_ratio.sqrt();
+            factor
+                * (self.lags.sizes[i] * channel.memory.tail(periods)
+                    + self.lags.tails[i] * channel.memory.whole())
+        });
+        outward(reference + channels.sum::<f64>())
+    }
+
+    /// Judges one frequency on coarse grids first.
+    fn judge(&mut self, centre: f64, threshold: f64) -> Result<Verdict, VerifyError> {
+        let near = Frequency::near(centre);
+        let rows = self.remainders(&near)?;
+        let mut verdict = Verdict::Below;
+        for level in 0..=MAX_LEVEL {
+            if !self.make_grid(level)? {
+                break;
+            }
+            let (judged, work, best) = self.judge_on(&self.grids[level as usize], &near, &rows, threshold);
+            self.work += work;
+            if let Some(best) = best {
+                self.offer(Best { frequency: centre.min(PI), ..best });
+            }
+            verdict = judged;
+            if !matches!(verdict, Verdict::Open(_)) {
+                break;
+            }
+        }
+        Ok(verdict)
+    }
+
+    /// The verdict on one grid, the number of gains computed and the largest gain seen.
+    fn judge_on(
+        &self,
+        grid: &Grid,
+        near: &Frequency,
+        remainders: &[Vec<f64>],
+        threshold: f64,
+    ) -> (Verdict, usize, Option<Best>) {
+        let at = AtFrequency { remainders: remainders.to_vec(), ..self.plain(grid, near) };
+        let mut work = 0;
+        let verdict = at.compare(threshold, &mut work);
+        let best = match &verdict {
+            Verdict::Below => None,
+            Verdict::Above(attained) | Verdict::Open(attained) => Some(best_of(grid, attained)),
+        };
+        (verdict, work, best)
+    }
+
+    /// Makes the grid of `level` if it is missing; false if it would be too large.
+    fn make_grid(&mut self, level: u32) -> Result<bool, VerifyError> {
+        let known = self.grids.len() > level as usize;
+        let sides = (0..self.channels.len()).filter(|&i| self.errors.delays[i].0 > 0.0);
+        let points = |i: usize| ((1usize << level) + 1) * self.errors.speeds(i).len();
+        let rows = self.bank.ratio + self.channels.len() + sides.map(points).sum::<usize>();
+        if known || rows > MAX_ROWS {
+            return Ok(known);
+        }
+        self.grids.push(Grid::new(self.bank, self.errors, level)?);
+        Ok(true)
+    }
+
+    /// The Gram matrix and the filters at a frequency, without remainders.
+    fn plain<'b>(&'b self, grid: &'b Grid, near: &Frequency) -> AtFrequency<'b> {
+        let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
+        let column = |i: usize| {
+            let square = filters
+                .re
+                .column(i)
+                .iter()
+                .chain(filters.im.column(i).iter())
+                .fold(Ball::ZERO, |sum, &x| sum + x * x);
+            square.upper().max(0.0).sqrt() * (1.0 + 1e-15)
+        };
+        AtFrequency {
+            gram: spectrum::gram(&grid.period, &near.z),
+            columns: (0..self.channels.len()).map(column).collect(),
+            filters,
+            channels: &grid.channels,
+            gains: &self.errors.gains,
+            remainders: vec![vec![0.0; MAX_LEVEL as usize + 1]; self.channels.len()],
+        }
+    }
+
+    /// The remainder of each channel, by the number of halvings.
+    fn remainders(&self, near: &Frequency) -> Result<Vec<Vec<f64>>, VerifyError> {
+        let fast_period = self.bank.spec.as_ref().map_or(self.bank.fast_period, |spec| spec.fast_period);
+        (0..self.channels.len())
+            .map(|i| {
+                let (channel, cutoff) = (&self.channels[i], self.errors.cutoffs[i]);
+                let half = self.errors.delays[i].in_fast_periods(fast_period).0;
+                if half == 0.0 && cutoff == 0.0 {
+                    return Ok(vec![0.0; MAX_LEVEL as usize + 1]);
+                }
+                let range = [1.0 - cutoff, 1.0 + cutoff];
+                let sum = |transfer: &Transfer| {
+                    Aliases::new(transfer, near.angle, self.bank.ratio, range).ok_or(VerifyError::LongMemory)
+                };
+                let aliases = sum(&channel.transfer)?;
+                // The chord over 2 x of a function with second derivative at most curvature / (1 - x)^2.
+                let bend = match &channel.curvature {
+                    Some(curvature) => {
+                        0.5 * (cutoff / (1.0 - cutoff)).powi(2) * sum(curvature)?.norm(Weight::One)
+                    }
+                    None => 0.0,
+                };
+                // The grid points are rounded.
+                let rounding =
+                    if half > 0.0 { 8.0 * f64::EPSILON * (1.0 + channel.delay + half) } else { 0.0 };
+                let level = |level: u32| {
+                    let half = half / f64::from(1u32 << level) + rounding;
+                    outward((aliases.norm(Weight::Chord(half)) + bend) * (1.0 + self.errors.gains[i]))
+                };
+                Ok((0..=MAX_LEVEL).map(level).collect())
+            })
+            .collect()
+    }
+}
+
+/// The errors at a vertex of `grid`.
+fn best_of(grid: &Grid, attained: &Attained) -> Best {
+    let vertices = attained.vertices.iter().zip(&grid.channels);
+    let point = ErrorPoint {
+        delays: vertices.clone().map(|(vertex, channel)| channel.errors[vertex.error]).collect(),
+        gains: vertices.clone().map(|(vertex, _)| vertex.gain - 1.0).collect(),
+        cutoffs: vertices.map(|(vertex, channel)| channel.speeds[vertex.speed] - 1.0).collect(),
+    };
+    Best { lower: attained.lower, point, frequency: 0.0 }
+}

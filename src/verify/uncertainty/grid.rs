@@ -1,0 +1,86 @@
+//! The analog side of a bank whose channels may be sampled at several instants and with several cut-offs:
+//! one slow period that holds all these samples together, so that all their Gram matrices are parts of one.
+
+use super::super::VerifyError;
+use super::super::front_ends::FrontEnds;
+use super::super::slow_period::SlowPeriod;
+use super::super::timeline::{Instant, SamplingInstant, Timeline};
+use super::{ErrorBox, ErrorPoint};
+use crate::bank::Bank;
+use crate::units::Seconds;
+
+/// The samples of a bank, those of each channel at equidistant delays.
+#[derive(Debug, Clone)]
+pub(super) struct Grid {
+    pub(super) front_ends: FrontEnds,
+    /// The M reference samples, then the variants of each channel.
+    pub(super) samples: Vec<SamplingInstant>,
+    pub(super) period: SlowPeriod,
+    pub(super) channels: Vec<ChannelGrid>,
+}
+
+/// The variants of one channel.
+#[derive(Debug, Clone)]
+pub(super) struct ChannelGrid {
+    /// Errors of the delay, ascending; one if the delay is certain.
+    pub(super) errors: Vec<Seconds>,
+    /// Factors of the cut-off, ascending; one if it is certain.
+    pub(super) speeds: Vec<f64>,
+    /// Row of the Gram matrix, by the index of the delay error and of the factor.
+    pub(super) rows: Vec<Vec<usize>>,
+}
+
+impl Grid {
+    /// The box with each side of the delays cut into 2^`level` equal parts.
+    ///
+    /// # Errors
+    /// As [`super::super::EnclosedErrorSystem::new`].
+    pub(super) fn new(bank: &Bank, errors: &ErrorBox, level: u32) -> Result<Self, VerifyError> {
+        let parts = 1usize << level;
+        let steps = |i: usize| -> Vec<Seconds> {
+            let half = errors.delays[i].0;
+            let at = |k: usize| Seconds(half * (2.0 * k as f64 / parts as f64 - 1.0));
+            if half == 0.0 { vec![Seconds(0.0)] } else { (0..=parts).map(at).collect() }
+        };
+        let channels = (0..bank.channel_count()).map(|i| (steps(i), errors.speeds(i))).collect();
+        Self::of(bank, channels)
+    }
+
+    /// One point.
+    ///
+    /// # Errors
+    /// As [`Grid::new`].
+    pub(super) fn at(bank: &Bank, point: &ErrorPoint) -> Result<Self, VerifyError> {
+        let channel = |i: usize| (vec![point.delays[i]], vec![1.0 + point.cutoffs[i]]);
+        Self::of(bank, (0..bank.channel_count()).map(channel).collect())
+    }
+
+    fn of(bank: &Bank, variants: Vec<(Vec<Seconds>, Vec<f64>)>) -> Result<Self, VerifyError> {
+        let (mut front_ends, nominal) = FrontEnds::new(bank)?;
+        let mut samples: Vec<SamplingInstant> = nominal[..bank.ratio].to_vec();
+        let mut channels = Vec::with_capacity(variants.len());
+        for ((errors, speeds), sample) in variants.into_iter().zip(&nominal[bank.ratio..]) {
+            let filters: Vec<usize> =
+                speeds.iter().map(|&speed| front_ends.with_speed(sample.filter, speed)).collect();
+            let mut rows = Vec::with_capacity(errors.len());
+            for &error in &errors {
+                let time = Instant { delay: sample.time.delay + error, ..sample.time };
+                rows.push(
+                    filters
+                        .iter()
+                        .map(|&filter| {
+                            samples.push(SamplingInstant { filter, time, ..*sample });
+                            samples.len() - 1
+                        })
+                        .collect(),
+                );
+            }
+            channels.push(ChannelGrid { errors, speeds, rows });
+        }
+        front_ends.check_work(samples.len())?;
+        let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
+        let timeline = Timeline::new(&samples, fast_period, bank.ratio)?;
+        let period = SlowPeriod::new(&front_ends, &timeline, &samples);
+        Ok(Self { front_ends, samples, period, channels })
+    }
+}

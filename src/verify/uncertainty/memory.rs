@@ -1,0 +1,125 @@
+//! How long the analog side and the filters remember: with their responses cut off after some periods the
+//! error system is a polynomial in z^-1, and its distance from the true one is bounded.
+//!
+//! A sample is a convolution of the input with a kernel phi. The part of the kernel beyond T contributes at
+//! most sum_k q_k over the slow periods k beyond T, with q_k^2 = int_{kM}^inf phi^2: each period of the
+//! kernel maps one period of the input to one sample, and different samples read different periods. The
+//! bound does not depend on the instant of the sample within its period.
+
+use super::super::ball::{self, Matrix};
+use super::super::error_system::BlockForm;
+use super::angle::outward;
+use crate::bank::SynthesisFilters;
+
+/// Maximum number of slow periods that are followed.
+const MAX_PERIODS: usize = 20_000;
+/// Relative size of the energy at which the explicit sum ends.
+const NEGLIGIBLE: f64 = 1e-22;
+
+/// Bounds of sum_{j >= 0} ||E^j|| in row sums; `None` if the powers do not fall below 1/2 in time.
+pub(super) fn growth(transition: &Matrix) -> Option<f64> {
+    let (mut power, mut sum) = (ball::identity(transition.nrows()), 0.0);
+    for _ in 0..MAX_PERIODS {
+        let size = if power.nrows() == 0 { 0.0 } else { ball::row_sum(&power) };
+        if size < 0.5 {
+            // The powers from here on: at most `size` times the whole.
+            return Some(outward(sum / (1.0 - size)));
+        }
+        sum += size;
+        power = ball::product(transition, &power);
+    }
+    None
+}
+
+/// The tails of a kernel.
+#[derive(Debug, Clone)]
+pub(super) struct Memory {
+    /// q_k.
+    energies: Vec<f64>,
+    /// Bounds the sum of all later ones.
+    rest: f64,
+}
+
+impl Memory {
+    /// Of the kernel read by `row` from states with the given `transition` over a slow period, stationary
+    /// `covariance` and `growth` (see [`growth`]).
+    pub(super) fn new(row: &Matrix, transition: &Matrix, covariance: &Matrix, growth: f64) -> Self {
+        let mut row = row.clone();
+        let mut energies: Vec<f64> = Vec::new();
+        while energies.len() < MAX_PERIODS {
+            let square = ball::product_transposed(&ball::product(&row, covariance), &row)[(0, 0)];
+            energies.push(outward(square.magnitude().sqrt()));
+            row = ball::product(&row, transition);
+            if energies[energies.len() - 1] <= NEGLIGIBLE * energies[0] {
+                break;
+            }
+        }
+        // sqrt(v X v') <= |v|_1 sqrt(||X||), and |v E^j|_1 <= |v|_1 ||E^j||.
+        let size = row.iter().fold(0.0, |sum, x| sum + x.magnitude());
+        let rest = outward(size * ball::row_sum(covariance).sqrt() * growth);
+        Self { energies, rest }
+    }
+
+    /// Bounds the norm of the part of the kernel from `periods` slow periods on.
+    pub(super) fn tail(&self, periods: usize) -> f64 {
+        outward(self.energies.iter().skip(periods).sum::<f64>() + self.rest)
+    }
+
+    /// Bounds the norm of the whole sampled filter.
+    pub(super) fn whole(&self) -> f64 {
+        // The part of the period in which the sample is taken has at most the energy of the whole kernel.
+        outward(self.tail(0) + self.energies.first().copied().unwrap_or(0.0))
+    }
+}
+
+/// The synthesis filters cut off after some lags.
+#[derive(Debug, Clone)]
+pub(super) struct Lags {
+    /// The last lag that is kept, in slow periods.
+    pub(super) last: usize,
+    /// Bounds the norm of each channel's column.
+    pub(super) sizes: Vec<f64>,
+    /// Bounds the norm of what is cut off each column.
+    pub(super) tails: Vec<f64>,
+}
+
+impl Lags {
+    /// FIR filters are kept whole; of recursive ones, the lags up to a tail of `negligible` relative to the
+    /// whole. `None` if that takes too many.
+    pub(super) fn new(filters: &SynthesisFilters, ratio: usize, negligible: f64) -> Option<Self> {
+        match filters {
+            SynthesisFilters::Fir(taps) => {
+                let size = |list: &Vec<f64>| outward(list.iter().map(|x| x.abs()).sum());
+                Some(Self {
+                    last: taps[0].len().div_ceil(ratio) - 1,
+                    sizes: taps.iter().map(size).collect(),
+                    tails: vec![0.0; taps.len()],
+                })
+            }
+            SynthesisFilters::StateSpace(_) => Self::recursive(&BlockForm::new(filters, ratio), negligible),
+        }
+    }
+
+    /// F = d + sum_k c a^k b z^-(k+1).
+    fn recursive(form: &BlockForm, negligible: f64) -> Option<Self> {
+        let growth = growth(&form.a)?;
+        let columns = |m: &Matrix| -> Vec<f64> {
+            m.column_iter().map(|column| column.iter().fold(0.0, |sum, x| sum + x.magnitude())).collect()
+        };
+        let output = ball::row_sum(&form.c) * form.c.nrows() as f64;
+        let (mut sizes, mut moved) = (columns(&form.d), form.b.clone());
+        for last in 0..MAX_PERIODS {
+            let tails: Vec<f64> = columns(&moved).iter().map(|x| outward(x * output * growth)).collect();
+            let small =
+                tails.iter().zip(&sizes).all(|(tail, size)| *tail <= negligible * size.max(negligible));
+            if small {
+                let sizes = sizes.iter().zip(&tails).map(|(size, tail)| outward(size + tail)).collect();
+                return Some(Self { last, sizes, tails });
+            }
+            let lag = columns(&ball::product(&form.c, &moved));
+            sizes.iter_mut().zip(lag).for_each(|(size, lag)| *size += lag);
+            moved = ball::product(&form.a, &moved);
+        }
+        None
+    }
+}

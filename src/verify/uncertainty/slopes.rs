@@ -1,0 +1,119 @@
+//! Proven bounds of how fast the error can change with the delays.
+
+use super::super::VerifyError;
+use super::super::ball::{self, Ball};
+use super::super::front_ends::FrontEnds;
+use super::super::lower::Covariance;
+use super::super::spectrum;
+use super::ErrorBox;
+use super::aliases::{Aliases, Weight};
+use super::angle::{Frequency, cosine_below, outward};
+use super::grid::Grid;
+use super::memory::{Lags, Memory, growth};
+use super::transfer::Transfer;
+use crate::bank::Bank;
+use crate::units::Seconds;
+use std::f64::consts::PI;
+
+/// Cells per degree of the polynomials: the bounds are 0.3 % too large at most.
+const CELLS_PER_DEGREE: f64 = 10.0;
+/// Relative size of the tails.
+const TAIL: f64 = 1e-6;
+const MAX_DEGREE: usize = 4096;
+
+/// How fast the error of a bank can change with the delays. The bounds hold for all delays.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Slopes {
+    /// L_i per fast period: `|gamma(delta) - gamma(delta')| <= sum_i L_i |delta_i - delta'_i|`. `L_i = max
+    /// over omega of |F_i| g_i`, `g_i^2 = (1/M) sum_k nu_k^2 |Phi_i(j nu_k)|^2`. Infinite for front ends of
+    /// relative degree 1.
+    pub lipschitz: Vec<f64>,
+    /// max over omega of |F_i|.
+    pub columns: Vec<f64>,
+    /// max over omega of g_i.
+    pub steepness: Vec<f64>,
+}
+
+impl Slopes {
+    /// A bound of `||K_jittered - K||` for sampling instants that are off by at most `jitter[i]`, differently
+    /// at each sample: `sqrt(2) sum_i jitter_i ||F_i|| max g_i`.
+    ///
+    /// A sample is off by the integral of v' over at most jitter_i, so by Cauchy-Schwarz its square is at most
+    /// jitter_i times the integral of v'^2 over both sides; and for every shift the samples of v' have at most
+    /// g_i^2 times the energy of the input.
+    pub fn jitter(&self, jitter: &[Seconds], fast_period: Seconds) -> f64 {
+        let terms = jitter.iter().zip(&self.columns).zip(&self.steepness);
+        let term = |((time, column), steep): ((&Seconds, &f64), &f64)| {
+            let time = time.in_fast_periods(fast_period).0;
+            if time == 0.0 { 0.0 } else { time * column * steep }
+        };
+        outward(std::f64::consts::SQRT_2 * (1.0 + 1e-15) * terms.map(term).sum::<f64>())
+    }
+}
+
+/// The slopes of `bank`, for all gains and cut-offs in the box `errors`.
+///
+/// # Errors
+/// As [`super::worst_case`].
+pub fn slopes(bank: &Bank, errors: &ErrorBox) -> Result<Slopes, VerifyError> {
+    errors.check(bank.channel_count())?;
+    let grid =
+        Grid::new(bank, &ErrorBox { delays: vec![Seconds(0.0); bank.channel_count()], ..errors.clone() }, 0)?;
+    let covariance = Covariance::new(&grid.period).ok_or(VerifyError::LongMemory)?;
+    let growth = growth(&grid.period.transition).ok_or(VerifyError::LongMemory)?;
+    let lags = Lags::new(&bank.filters, bank.ratio, 1e-12).ok_or(VerifyError::LongMemory)?;
+    let mut found = Slopes { lipschitz: Vec::new(), columns: Vec::new(), steepness: Vec::new() };
+    for i in 0..bank.channel_count() {
+        let sample = &grid.samples[grid.channels[i].rows[0][0]];
+        let filter = grid.front_ends.filter(sample.filter);
+        let transfer = Transfer::new(filter, FrontEnds::gain(sample));
+        let (a, _) = grid.front_ends.dynamics();
+        let row = ball::product(&grid.front_ends.output(sample), &a);
+        let memory = Memory::new(&row, &grid.period.transition, &covariance.state, growth);
+        let cutoff = errors.cutoffs[i];
+        let range = [1.0 - cutoff, 1.0 + cutoff];
+        let factor = (range[1] / range[0]).powf(1.5) * (1.0 + 1e-12);
+        let whole = memory.whole();
+        let periods =
+            (0..MAX_DEGREE).find(|&periods| memory.tail(periods) <= TAIL * whole).unwrap_or(MAX_DEGREE);
+        let tail = outward(factor * memory.tail(periods));
+        let cut = [outward(lags.sizes[i] * tail + lags.tails[i] * factor * whole), lags.tails[i], tail];
+        let degrees = [periods + lags.last, lags.last, periods];
+        let gain = 1.0 + errors.gains[i];
+        let values = |near: &Frequency| {
+            let filters = spectrum::filter_response(&bank.filters, bank.ratio, &near.z);
+            let square = filters
+                .re
+                .column(i)
+                .iter()
+                .chain(filters.im.column(i).iter())
+                .fold(Ball::ZERO, |sum, &x| sum + x * x);
+            let column = square.upper().max(0.0).sqrt() * (1.0 + 1e-15);
+            let aliases = Aliases::new(&transfer, near.angle, bank.ratio, range)?;
+            let steep = aliases.norm(Weight::Slope);
+            Some([column * steep, column, steep])
+        };
+        let [lipschitz, column, steep] = largest(degrees, cut, values).ok_or(VerifyError::LongMemory)?;
+        found.lipschitz.push(outward(gain * lipschitz));
+        found.columns.push(column);
+        found.steepness.push(outward(gain * steep));
+    }
+    Ok(found)
+}
+
+/// Bounds the maxima over all frequencies of three norms, whose polynomials have these degrees and tails.
+fn largest(
+    degrees: [usize; 3],
+    tails: [f64; 3],
+    values: impl Fn(&Frequency) -> Option<[f64; 3]>,
+) -> Option<[f64; 3]> {
+    let cells = ((CELLS_PER_DEGREE * degrees[0] as f64) as usize).max(16);
+    let mut most = [0.0; 3];
+    for k in 0..cells {
+        let found = values(&Frequency::near(PI * (k as f64 + 0.5) / cells as f64))?;
+        most.iter_mut().zip(found).for_each(|(most, value)| *most = ball::nan_max(*most, value));
+    }
+    let y = 0.5 * PI / cells as f64 + 1e-13;
+    let bound = |j: usize| (most[j] + tails[j]) / cosine_below(0.5 * degrees[j] as f64 * y) + tails[j];
+    Some([0, 1, 2].map(|j| outward(bound(j))))
+}
