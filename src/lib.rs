@@ -10,8 +10,8 @@ pub mod units;
 
 #[cfg(feature = "runtime")]
 pub mod bank;
-#[cfg(feature = "export")]
-pub mod export;
+#[cfg(feature = "interchange")]
+pub mod interchange;
 #[cfg(feature = "runtime")]
 pub mod io;
 #[cfg(feature = "runtime")]

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::bank_file::{load, refuse_overlap, write_bytes};
-use crate::export::{Format, export};
+use crate::interchange::{Format, export};
 use std::path::PathBuf;
 
 /// Writes a bank for other tools: C99, CSV, NumPy, MATLAB, FPGA memory

@@ -14,6 +14,7 @@ mod file_kind;
 mod fuse;
 mod gaps;
 mod help;
+mod import;
 mod init;
 mod interrupt;
 mod match_bank;
@@ -66,6 +67,7 @@ enum Command {
     Design(design::Args),
     Analyze(analyze::Args),
     Verify(verify::Args),
+    Import(import::Args),
     Export(export::Args),
     Simulate(simulate::Args),
     Fuse(fuse::Args),
@@ -101,6 +103,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Design(args) => design::run(&args),
         Command::Analyze(args) => analyze::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Fuse(args) => fuse::run(&args),

@@ -11,9 +11,9 @@ use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
 use super::resolution::resolves_delays;
-use super::{DesignError, prove, uncertainty};
-use crate::bank::{Bank, Gamma};
-use crate::spec::Spec;
+use super::{DesignError, filters, prove, uncertainty};
+use crate::bank::{Bank, Gamma, SynthesisFilters};
+use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
 use crate::verify::Verified;
 use crate::verify::uncertainty::{ErrorBox, keeps_within};
@@ -109,6 +109,35 @@ pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, Des
     watch.begins(Stage::Proof);
     let judged = judge(spec, complete, realised, &synthesis).without_unresolved_bounds(&problem);
     Ok(judged.proved(&synthesis.dual, options.proof))
+}
+
+/// Judges FIR filters that were designed elsewhere, `taps[i][n]` = `f_i[n]`, with the front ends, the delays
+/// and the latency of `spec`. What the spec says of the design does not matter.
+///
+/// # Errors
+/// [`DesignError::Spec`] for a spec without latency or with other numbers of channels and taps, else as
+/// [`design`].
+pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Result<Design, DesignError> {
+    let length = taps.first().map_or(0, Vec::len);
+    let complete = Spec { design: DesignSpec::new(Method::Fir, Some(length)), ..spec.clone() };
+    complete.check()?;
+    let latency = spec.latency.ok_or(SpecProblem::MissingKey {
+        key: "latency",
+        remedy: "filters that are not designed here have one; give it",
+    })?;
+    let problem = Problem::new(&complete, latency)?;
+    let channels = problem.channels.len();
+    if taps.len() != channels || taps.iter().any(|list| list.len() != length) {
+        return Err(DesignError::TapCount { lists: taps.len(), channels });
+    }
+    let plant = LiftedPlant::new(&problem)?;
+    let synthesis = Synthesis::of_taps(&plant, taps.clone())?;
+    let filters = SynthesisFilters::Fir(taps);
+    let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio)?)?;
+    let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
+    Ok(judge(&complete, complete.clone(), realised, &synthesis)
+        .without_unresolved_bounds(&problem)
+        .proved(&[], search))
 }
 
 /// Tells the observer what is done, with the time that the design takes.

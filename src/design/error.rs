@@ -111,6 +111,16 @@ pub enum DesignError {
         /// N.
         channels: usize,
     },
+    /// One filter per channel, all of one length.
+    #[error(
+        "{lists} filters were given for {channels} channels: give one of the same length for each channel"
+    )]
+    TapCount {
+        /// Filters given.
+        lists: usize,
+        /// N.
+        channels: usize,
+    },
     /// Latency and delays are so far apart that the lifted system is too large.
     #[error(
         "latency {latency} and delays up to {longest_delay} need delay chains of {states} states, at most \

@@ -25,7 +25,7 @@ pub mod uncertainty;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};
 pub use choices::latency;
-pub use designer::{Design, Options, ProofSearch, design, design_observed, design_with};
+pub use designer::{Design, Options, ProofSearch, design, design_observed, design_with, judge_taps};
 pub use effort::{Limits, Stage};
 pub use error::DesignError;
 pub use methods::robust_fir::{RobustNorms, RobustStudy};

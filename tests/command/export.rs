@@ -1,8 +1,8 @@
 //! Exported banks as their users take them: C compiled by the system's compiler, arrays read by NumPy and SciPy.
 
-use crate::support::{Desk, THESIS};
+use crate::support::{Desk, THESIS, number};
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::export::{PolyphaseTaps, SparseBlock};
+use hybank::interchange::{PolyphaseTaps, SparseBlock};
 use std::process::Command;
 
 /// Compiles the header `bank.h` of the desk with a program that pipes samples of `sample` through it.
@@ -218,4 +218,27 @@ fn refusals_name_the_remedy() {
         desk.good(&["export", "b.json", "--to", "csv", "-o", "-"])
             .starts_with("channel,phase,lag,value\n1,0,0,")
     );
+}
+
+/// What was exported comes back with the gamma that it had, proven anew.
+#[test]
+fn taps_of_other_tools_are_judged() {
+    let desk = Desk::with_spec(THESIS);
+    let own = desk.json(&["design", "spec.toml", "-o", "b.json", "--json"]);
+    desk.good(&["export", "b.json", "--to", "csv", "-o", "taps.csv"]);
+    let foreign = desk.json(&["import", "spec.toml", "taps.csv", "-o", "back.json", "--json"]);
+    let gamma = |report: &serde_json::Value| number(report, "/gamma/norm");
+    assert!((gamma(&own) / gamma(&foreign) - 1.0).abs() < 1e-9, "{foreign}");
+    assert!(desk.good(&["verify", "back.json"]).contains("proven"));
+    // Nearest samples, as anyone would interleave two converters: gamma is that of the scale.
+    desk.write("plain.csv", "a,b\n1,0\n0,1\n");
+    let late = ["--latency", "1", "-o", "plain.json", "--json"];
+    let plain = desk.json(&[&["import", "spec.toml", "plain.csv"][..], &late].concat());
+    assert!((gamma(&plain) / number(&plain, "/scale/interleaving") - 1.0).abs() < 1e-9, "{plain}");
+    desk.refused(1, &["import", "spec.toml", "none.csv", "-o", "x.json"], &["none.csv", "cannot read"]);
+    desk.write("three.csv", "1,2,3\n");
+    desk.refused(1, &["import", "spec.toml", "three.csv", "-o", "x.json"], &["3 filters", "2 channels"]);
+    desk.refused(2, &["import", "spec.toml", "taps.txt", "-o", "x.json"], &["taps.txt", ".csv and .npy"]);
+    desk.write("bad.csv", "1,2\n3,four\n");
+    desk.refused(1, &["import", "spec.toml", "bad.csv", "-o", "x.json"], &["bad.csv", "line 2, column 2"]);
 }

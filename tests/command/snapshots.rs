@@ -7,11 +7,12 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 11] = [
+const COMMANDS: [&str; 12] = [
     "init",
     "design",
     "analyze",
     "verify",
+    "import",
     "export",
     "simulate",
     "fuse",

@@ -1,7 +1,7 @@
 //! `hybank design`: from a spec file to a bank file.
 
 mod progress;
-mod report;
+pub(super) mod report;
 
 use super::Failure;
 use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text};

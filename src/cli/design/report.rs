@@ -10,7 +10,7 @@ use crate::verify::{BoundedBanks, Verified};
 
 /// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Report<'a> {
+pub(in crate::cli) struct Report<'a> {
     bank: String,
     /// The spec in units of the user.
     understood: String,
@@ -121,7 +121,7 @@ impl ProofReport {
 
 impl<'a> Report<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(super) fn new(
+    pub(in crate::cli) fn new(
         output: String,
         design: &'a Design,
         mean: MeanAnalysis,
@@ -157,7 +157,7 @@ impl<'a> Report<'a> {
         }
     }
 
-    pub(super) fn text(&self) -> String {
+    pub(in crate::cli) fn text(&self) -> String {
         let size = match (self.taps, self.states) {
             (Some(taps), _) if self.taps_chosen => {
                 format!("{taps} taps per channel (chosen; set `taps` to change it)")

@@ -73,7 +73,7 @@ pub(crate) struct Synthesis {
 
 impl Synthesis {
     /// FIR filters of a method that minimises nothing. The only lower bound is the one for all filters.
-    fn of_taps(plant: &LiftedPlant, taps: Vec<Vec<f64>>) -> Result<Self, DesignError> {
+    pub(crate) fn of_taps(plant: &LiftedPlant, taps: Vec<Vec<f64>>) -> Result<Self, DesignError> {
         let peak = plant.fir_norm(&taps)?;
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
         let filters = Filters::Fir(taps);

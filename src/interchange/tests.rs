@@ -74,3 +74,57 @@ fn what_a_format_cannot_hold_is_refused() {
         matches!(export(&large, Format::C99, "b"), Err(ExportError::Accumulator { sum }) if sum == 1 << 31)
     );
 }
+
+fn csv(text: &str) -> Result<Vec<Vec<f64>>, TapsError> {
+    taps_of_csv(text.as_bytes())
+}
+
+#[test]
+fn taps_are_read_by_column_or_as_they_were_exported() {
+    let want = vec![vec![0.5, -0.25, 1.0], vec![0.0, 2.0, -1.5]];
+    assert_eq!(csv("0.5,0\n-0.25,2\n1,-1.5\n"), Ok(want.clone()));
+    assert_eq!(csv("left, right\n0.5 ,0e0\n-.25,+2\n1,-1.5"), Ok(want.clone()));
+    // The export has whole slow periods.
+    let padded: Vec<Vec<f64>> = want.iter().map(|list| [&list[..], &[0.0]].concat()).collect();
+    assert_eq!(csv(&text(&fir(), Format::Csv)), Ok(padded));
+}
+
+#[test]
+fn damaged_tables_are_refused_with_their_line() {
+    let no_number = |line, column, text: &str| TapsError::NoNumber { line, column, text: text.to_owned() };
+    assert_eq!(csv("1,2\n3,x\n"), Err(no_number(2, 2, "x")));
+    assert_eq!(csv("a,b\n1,2\n3,nan\n"), Err(no_number(3, 2, "nan")));
+    assert_eq!(csv("1,1e999\n"), Err(no_number(1, 2, "1e999")));
+    for empty in ["", "\n\n", "a,b\n"] {
+        assert_eq!(csv(empty), Err(TapsError::Empty), "{empty:?}");
+    }
+    assert!(matches!(csv("1,2\n3\n"), Err(TapsError::Broken(_))));
+    let export = text(&fir(), Format::Csv);
+    for damaged in [export.replace("1,1,0,", "1,1,5,"), export.replace("2,1,1,0e0\n", "")] {
+        assert!(matches!(csv(&damaged), Err(TapsError::Broken(_))), "{damaged}");
+    }
+}
+
+fn npy(shape: &[u64], order: npyz::Order, values: &[f64]) -> Vec<u8> {
+    use npyz::WriterBuilder;
+    let mut bytes = Vec::new();
+    let options = npyz::WriteOptions::new().default_dtype().shape(shape).order(order);
+    let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
+    writer.extend(values.iter().copied()).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+#[test]
+fn arrays_are_read_in_both_orders() {
+    let want = vec![vec![1.0, 2.0, 3.0], vec![4.0, 5.0, 6.0]];
+    assert_eq!(taps_of_npy(&npy(&[2, 3], npyz::Order::C, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])), Ok(want.clone()));
+    assert_eq!(taps_of_npy(&npy(&[2, 3], npyz::Order::Fortran, &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0])), Ok(want));
+    let phases = npy(&[1, 2, 2], npyz::Order::C, &[1.0, 3.0, 2.0, 4.0]);
+    assert_eq!(taps_of_npy(&phases), Ok(vec![vec![1.0, 2.0, 3.0, 4.0]]));
+    assert!(matches!(taps_of_npy(&npy(&[3], npyz::Order::C, &[1.0; 3])), Err(TapsError::Shape { .. })));
+    assert_eq!(taps_of_npy(&npy(&[2, 0], npyz::Order::C, &[])), Err(TapsError::Empty));
+    assert!(matches!(taps_of_npy(b"RIFF"), Err(TapsError::Broken(_))));
+    let cut = npy(&[2, 3], npyz::Order::C, &[1.0; 6]);
+    assert!(matches!(taps_of_npy(&cut[..cut.len() - 3]), Err(TapsError::Broken(_))));
+}

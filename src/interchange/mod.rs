@@ -1,4 +1,4 @@
-//! Banks for other tools: C99, tables, memory images of FPGAs, NumPy and MATLAB files.
+//! Banks for other tools (C99, tables, memory images of FPGAs, NumPy and MATLAB files), and taps of other tools.
 //!
 //! The order of FIR taps is the same in every format: channel, then phase p of the output, then lag j in
 //! slow periods. Entry (i, p, j) is the tap `f_i[p + j M]`, so
@@ -11,10 +11,12 @@ mod arrays;
 mod c99;
 mod error;
 mod layout;
+mod read_taps;
 mod tables;
 
 pub use error::ExportError;
 pub use layout::{PolyphaseTaps, SparseBlock};
+pub use read_taps::{TapsError, taps_of_csv, taps_of_npy};
 
 use crate::bank::Bank;
 

@@ -1,0 +1,81 @@
+//! `hybank import`: filters of other tools, judged like our own.
+
+use super::Failure;
+use super::bank_file::{load_spec_or_bank, refuse_overlap, write_text};
+use super::design::report::Report;
+use crate::design::{self, DesignError, GammaScale, ProofSearch};
+use crate::files::{Bound, read_bytes};
+use crate::interchange::{TapsError, taps_of_csv, taps_of_npy};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Largest file of taps: those of the largest bank, written out.
+const TAPS_FILE: Bound =
+    Bound { bytes: 1 << 31, kind: "a file of taps", remedy: "give the file that was meant" };
+
+/// Makes a bank of FIR filters from another tool, with its gamma and the proof
+///
+/// The spec gives the front ends, the delays, the rates and the latency; its design settings do not matter.
+/// The taps are those of a filter at the fast rate per channel: columns of a CSV file (headings or not), or
+/// the rows of a .npy array of the shape (channels, taps).
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank import spec.toml taps.csv -o bank.json
+  hybank import spec.toml taps.npy --latency 16 -o bank.json")]
+pub(super) struct Args {
+    /// The spec (TOML), or a bank (JSON) that carries one
+    spec: PathBuf,
+    /// The taps (.csv or .npy)
+    taps: PathBuf,
+    /// The bank file (JSON)
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Latency in fast samples, in place of that of the spec
+    #[arg(long)]
+    latency: Option<usize>,
+    /// Replace an existing bank file
+    #[arg(long)]
+    force: bool,
+    /// Print a report as one JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] with the one message for the user.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    refuse_overlap(&args.output, &args.spec)?;
+    refuse_overlap(&args.output, &args.taps)?;
+    let mut spec = load_spec_or_bank(&args.spec)?;
+    spec.latency = args.latency.or(spec.latency);
+    let taps = read(&args.taps)?;
+    let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.taps.display()));
+    let begin = Instant::now();
+    let found = design::judge_taps(&spec, taps, ProofSearch::Run).map_err(named)?;
+    let mean = design::analyze_mean(&found.bank).map_err(named)?;
+    let scale = GammaScale::new(&found.bank).map_err(named)?;
+    write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
+    let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
+    let report = Report::new(args.output.display().to_string(), &found, mean, scale, seconds);
+    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
+}
+
+/// The taps of a file, by its extension.
+fn read(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let parse: fn(&[u8]) -> Result<Vec<Vec<f64>>, TapsError> = match extension.to_ascii_lowercase().as_str() {
+        "csv" => taps_of_csv,
+        "npy" => taps_of_npy,
+        _ => {
+            return Err(Failure::Usage(format!(
+                "{}: taps are read from .csv and .npy files",
+                path.display()
+            )));
+        }
+    };
+    let bytes = read_bytes(path, TAPS_FILE).map_err(Failure::input)?;
+    parse(&bytes).map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+}
