@@ -9,6 +9,7 @@
 
 mod capture;
 mod converter;
+mod describe;
 mod normal;
 mod parse;
 mod quantiser;

@@ -1,6 +1,7 @@
 //! How sources are written on the command line: `step@0.3+tones:440Hz,1kHz+chirp:100Hz..8kHz@2s`.
 
 use super::source::{Source, Tone};
+use crate::quantity::{self, Time};
 use crate::units::{RadiansPerSecond, Seconds};
 use std::f64::consts::TAU;
 use std::str::FromStr;
@@ -58,31 +59,24 @@ fn parse_term(text: &str, term: &str) -> Result<Source, ParseSourceError> {
     Err(ParseSourceError::Unknown { text: text.to_owned() })
 }
 
-/// Seconds, with an optional unit s, ms, us or ns.
+/// Seconds, with an optional unit such as ms or ns.
 fn seconds(text: &str, number: &str) -> Result<Seconds, ParseSourceError> {
-    let units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("s", 1.0)];
-    scaled(text, number, &units, " (seconds, or with the unit ms, us or ns)").map(Seconds)
-}
-
-/// rad/s without a unit, or hertz with the unit Hz, kHz or MHz.
-fn angular(text: &str, number: &str) -> Result<RadiansPerSecond, ParseSourceError> {
-    let units = [("kHz", TAU * 1e3), ("MHz", TAU * 1e6), ("Hz", TAU)];
-    scaled(text, number, &units, " (rad/s, or with the unit Hz, kHz or MHz)").map(RadiansPerSecond)
-}
-
-fn scaled(
-    text: &str,
-    number: &str,
-    units: &[(&str, f64)],
-    hint: &'static str,
-) -> Result<f64, ParseSourceError> {
-    let number = number.trim();
-    let unit = units.iter().find_map(|&(name, factor)| number.strip_suffix(name).map(|bare| (bare, factor)));
-    let (bare, factor) = unit.unwrap_or((number, 1.0));
-    match bare.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value * factor),
-        _ => Err(ParseSourceError::Number { text: text.to_owned(), number: number.to_owned(), hint }),
+    match quantity::time(number) {
+        Ok(Time::Seconds(time)) => Ok(time),
+        _ => Err(not_a_number(text, number, " (seconds, or with a unit such as ms, us or ns)")),
     }
+}
+
+/// rad/s without a unit, or hertz with a unit such as Hz or kHz.
+fn angular(text: &str, number: &str) -> Result<RadiansPerSecond, ParseSourceError> {
+    let hint = " (rad/s, or with a unit such as Hz, kHz or MHz)";
+    let Ok(frequency) = quantity::frequency(number) else { return Err(not_a_number(text, number, hint)) };
+    let is_bare = number.trim().parse::<f64>().is_ok();
+    Ok(RadiansPerSecond(if is_bare { frequency.0 } else { frequency.0 * TAU }))
+}
+
+fn not_a_number(text: &str, number: &str, hint: &'static str) -> ParseSourceError {
+    ParseSourceError::Number { text: text.to_owned(), number: number.trim().to_owned(), hint }
 }
 
 #[cfg(test)]

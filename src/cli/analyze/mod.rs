@@ -6,8 +6,10 @@ mod worst_case;
 
 use super::Failure;
 use super::bank_file::{is_dash, load, refuse_overlap};
+use super::design::report::{against, decibels};
+use super::understood::understood;
 use crate::bank::Bank;
-use crate::design::{self, Analysis, Certified, DesignError, MeanAnalysis};
+use crate::design::{self, Analysis, Certified, DesignError, GammaScale, MeanAnalysis};
 use crate::quantity;
 use crate::units::Seconds;
 use std::path::PathBuf;
@@ -97,7 +99,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             return Ok(());
         }
     }
-    let report = Report { analysis, certified, errors };
+    let report = Report {
+        understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
+        scale: GammaScale::new(&bank).map_err(named)?,
+        analysis,
+        certified,
+        errors,
+    };
     if args.json { super::print_json(&report) } else { super::print(&report.text()) }
 }
 
@@ -137,6 +145,9 @@ impl Args {
 
 #[derive(Debug, serde::Serialize)]
 struct Report {
+    /// The spec in units of the user.
+    understood: String,
+    scale: GammaScale,
     #[serde(flatten)]
     analysis: Analysis,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -160,12 +171,19 @@ impl Report {
         );
         let MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
         format!(
-            "gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n{proof}\
+            "{}\n\
+             gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n\
+             scale        {}, {}\n{proof}\
              worst at     {peak_hertz:.6} modulo the slow rate\n\
              noncausal    {noncausal}\n\
              rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
+             SNR          {} for a signal with the target's spectrum\n\
              noise gain   {noise_gain:.6}      for independent noise on the slow samples\n\
              output noise {output_noise:.6e}  of full scale, for the converters' noise in the spec\n{}",
+            self.understood,
+            against(gamma, self.scale.zero_output, "zero output"),
+            against(gamma, self.scale.interleaving, "plain interleaving"),
+            decibels(self.scale.rms_reference, rms_error),
             self.errors.text()
         )
     }

@@ -215,18 +215,18 @@ impl Report<'_> {
     fn scale_text(&self) -> String {
         let Some(gamma) = self.gamma.norm else { return String::new() };
         let GammaScale { zero_output, interleaving, .. } = self.scale;
-        format!(
-            "           {} against zero output ({}), {} against plain interleaving ({})\n",
-            decibels(gamma, zero_output),
-            number(Some(zero_output)),
-            decibels(gamma, interleaving),
-            number(Some(interleaving))
-        )
+        let zero = against(gamma, zero_output, "zero output");
+        format!("           {zero}, {}\n", against(gamma, interleaving, "plain interleaving"))
     }
 }
 
+/// gamma beside that of another bank.
+pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
+    format!("{} against {what} ({})", decibels(gamma, other), number(Some(other)))
+}
+
 /// A ratio in decibels.
-fn decibels(value: f64, reference: f64) -> String {
+pub(in crate::cli) fn decibels(value: f64, reference: f64) -> String {
     if reference == 0.0 {
         "inf dB".to_owned()
     } else {

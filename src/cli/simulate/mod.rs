@@ -7,6 +7,7 @@ use super::Failure;
 use super::bank_file::load_spec_or_bank;
 use super::recordings::{Mono, begin_recording, read_channel};
 use super::say::name_leftovers;
+use super::understood::understood;
 use crate::design::{self, Problem};
 use crate::files::{commit_all, refuse_overlaps};
 use crate::simulate::{Analog, Delivered, Recording, Source, panels, target};
@@ -78,6 +79,10 @@ pub(super) struct Args {
 
 #[derive(Debug, serde::Serialize)]
 struct Report {
+    /// The spec in units of the user.
+    understood: String,
+    /// The analog signal, in hertz and seconds.
+    source: String,
     files: Vec<String>,
     frames: usize,
     slow_rate: u32,
@@ -122,8 +127,19 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let files: Vec<String> = files.iter().map(|file| file.path.display().to_string()).collect();
     warnings.extend(clipping(&files, &reports));
     let (slow_rate, fast_rate) = (rates.slow, rates.fast);
-    Report { files, frames, slow_rate, fast_rate, latency, common, converters: reports, warnings }
-        .print(args.json)
+    Report {
+        understood: understood(&Spec { latency: Some(latency), ..spec }),
+        source: args.source_text(),
+        files,
+        frames,
+        slow_rate,
+        fast_rate,
+        latency,
+        common,
+        converters: reports,
+        warnings,
+    }
+    .print(args.json)
 }
 
 /// Warnings of converters that clipped.
@@ -140,6 +156,11 @@ struct Output {
 }
 
 impl Args {
+    /// The source as it was understood.
+    fn source_text(&self) -> String {
+        self.source.parse().map_or_else(|_| self.source.clone(), |source: Source| source.to_string())
+    }
+
     /// The signal in normalised time and its length in fast samples.
     fn signal(&self, spec: &Spec) -> Result<(Analog, usize), Failure> {
         let path = Path::new(&self.source);
@@ -315,7 +336,9 @@ impl Report {
         let each = self.converters.iter().zip(1..).map(|(converter, channel)| converter.text(channel));
         let each: String = each.collect();
         super::print(&format!(
-            "{} frames at {} Hz, target at {} Hz with a latency of {} samples:\n  {}\n{}{each}",
+            "{}\nsource: {}\n{} frames at {} Hz, target at {} Hz with a latency of {} samples:\n  {}\n{}{each}",
+            self.understood,
+            self.source,
             self.frames,
             self.slow_rate,
             self.fast_rate,
