@@ -45,6 +45,8 @@ pub mod simulate;
 #[cfg(feature = "design")]
 pub mod sine_fit;
 #[cfg(feature = "design")]
+pub mod track;
+#[cfg(feature = "design")]
 pub mod verify;
 
 #[cfg(feature = "plot")]

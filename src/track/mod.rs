@@ -1,0 +1,31 @@
+//! Delays that drift, followed while a bank runs.
+//!
+//! Each channel's delay relative to the reference changes: the delay itself walks at random, and so does the
+//! rate at which it changes (two free-running clocks). A [`DelayFilter`] is the Kalman filter of one delay and
+//! its rate: measurements of block fits enter with their variance, silence lets the variance grow. A
+//! [`DelayTracker`] holds the filters of all channels, refuses measurements that contradict them, and says
+//! whether it is locked. [`Coincidence`] warns ahead of delays that come together, where no bank recovers the
+//! signal.
+//!
+//! ```
+//! use hybank::track::{DelayFilter, DelayMeasurement, DriftModel, DelayState};
+//! use hybank::units::Seconds;
+//! // Clocks whose rate walks by 1e-9 in a second; delays known to 1 ns at the beginning, rates to 10 ppm.
+//! let model = DriftModel { delay_walk: 0.0, rate_walk: 1e-18 };
+//! let mut filter = DelayFilter::new(DelayState::known(Seconds(3e-9), 1e-9, 1e-5), model);
+//! for block in 0..100 {
+//!     filter.advance(Seconds(0.01));
+//!     // The delay grows by 2 ppm.
+//!     let delay = Seconds(3e-9 + 2e-6 * 0.01 * f64::from(block + 1));
+//!     filter.update(DelayMeasurement { delay, variance: 1e-24 });
+//! }
+//! assert!((filter.state().rate - 2e-6).abs() < 1e-9);
+//! ```
+
+mod coincidence;
+mod filter;
+mod tracker;
+
+pub use coincidence::Coincidence;
+pub use filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel, Innovation};
+pub use tracker::{DelayTracker, Lock};
