@@ -61,7 +61,8 @@ impl Timestamps {
     /// The same timestamps counted in turns of M = `converters` samples.
     pub(super) fn in_turns(self, converters: usize) -> Result<Self, String> {
         let m = converters as u64;
-        if let Some(broken) = self.0.iter().find(|t| t.frame % m != 0 || t.index % m != 0) {
+        if let Some(broken) = self.0.iter().find(|t| !t.frame.is_multiple_of(m) || !t.index.is_multiple_of(m))
+        {
             return Err(format!(
                 "sample_start {} with global_index {} is not at the beginning of a turn of {m} converters, so that \
                  other converters would follow; cut the capture to whole turns",

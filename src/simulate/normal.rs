@@ -30,7 +30,7 @@ impl Normal {
         let pair = index as u64 / 2;
         let radius = (-2.0 * self.uniform(2 * pair).ln()).sqrt();
         let angle = TAU * self.uniform(2 * pair + 1);
-        radius * if index % 2 == 0 { angle.cos() } else { angle.sin() }
+        radius * if index.is_multiple_of(2) { angle.cos() } else { angle.sin() }
     }
 
     /// In (0, 1], by SplitMix64 (Steele, Lea and Flood, 2014).

@@ -252,7 +252,7 @@ mod tests {
         let mut random = Random(12);
         let (t, deviation, acceleration) = (0.4e-3, 6e-15, 1e-5);
         // The rate moves by a t between two measurements.
-        let model = DriftModel { delay_walk: 0.0, rate_walk: (acceleration * t).powi(2) / t };
+        let model = DriftModel { delay_walk: 0.0, rate_walk: acceleration * acceleration * t };
         let mut filter = DelayFilter::new(DelayState::known(Seconds(0.0), 1e-12, 1e-6), model);
         let (mut square, mut predicted) = (0.0, 0.0);
         for block in 1..=5000 {
