@@ -113,6 +113,15 @@ pub fn rate(text: &str) -> Result<Hertz, QuantityError> {
     written.with_prefix(unit, RATES).map(Hertz)
 }
 
+/// The SI prefix for values up to `most`: the factor that brings them to it, and the unit with the prefix.
+pub fn scale_of(most: f64, unit: &str) -> (f64, String) {
+    let power = 3.0 * (most.abs().log10() / 3.0).floor();
+    match PREFIXES.iter().find(|(_, known)| f64::from(*known) == power) {
+        Some((prefix, power)) => (10f64.powi(-power), format!("{prefix}{unit}")),
+        None => (1.0, unit.to_owned()),
+    }
+}
+
 /// A value with an SI prefix and its unit, in at most six digits, for people: `250 MHz`.
 pub fn readable(value: f64, unit: &str) -> String {
     let scientific = format!("{value:.5e}");
@@ -241,6 +250,16 @@ mod tests {
         assert_eq!(rate("48kHz"), Ok(Hertz(48e3)));
         assert_eq!(rate("250e6"), Ok(Hertz(250e6)));
         assert!(rate("1 GB/s").is_err());
+    }
+
+    #[test]
+    fn axes_have_prefixes() {
+        assert_eq!(scale_of(500e6, "Hz"), (1e-6, "MHz".to_owned()));
+        assert_eq!(scale_of(0.5, "Hz"), (1e3, "mHz".to_owned()));
+        assert_eq!(scale_of(1e3, "Hz"), (1e-3, "kHz".to_owned()));
+        for odd in [0.0, 1e99, f64::NAN] {
+            assert_eq!(scale_of(odd, "Hz"), (1.0, "Hz".to_owned()));
+        }
     }
 
     #[test]

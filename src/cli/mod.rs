@@ -19,6 +19,7 @@ mod init;
 mod interrupt;
 mod match_bank;
 mod output;
+mod plot;
 mod print;
 mod recordings;
 mod run;
@@ -67,6 +68,7 @@ enum Command {
     Design(design::Args),
     Analyze(analyze::Args),
     Verify(verify::Args),
+    Plot(plot::Args),
     Import(import::Args),
     Export(export::Args),
     Simulate(simulate::Args),
@@ -103,6 +105,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Design(args) => design::run(&args),
         Command::Analyze(args) => analyze::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Plot(args) => plot::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Simulate(args) => simulate::run(&args),

@@ -7,11 +7,12 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 13] = [
     "init",
     "design",
     "analyze",
     "verify",
+    "plot",
     "import",
     "export",
     "simulate",

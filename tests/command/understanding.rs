@@ -133,3 +133,27 @@ fn help_has_the_reference_of_specs() {
     assert_eq!(desk.good(&["help", "design"]), desk.good(&["design", "--help"]));
     desk.refused(2, &["help", "dezign"], &["dezign", "spec, init, design"]);
 }
+
+/// The curve that must be in a picture is there, and no number is missing.
+#[test]
+fn a_bank_is_drawn_in_five_pictures() {
+    let desk = Desk::with_spec(AUDIO);
+    for flags in [&[][..], &["--method", "iir"]] {
+        let spec = if flags.is_empty() { AUDIO.to_owned() } else { AUDIO.replace("taps = 24\n", "") };
+        assert_eq!(designed(&desk, &spec, flags), (Some(0), String::new()));
+        let files = desk.good(&["plot", "b.json", "-o", "pictures", "--force"]);
+        assert_eq!(files.lines().count(), 5);
+        for (name, words) in [
+            ("front-ends", &["target", "channel 2", "kHz"][..]),
+            ("filters", &["channel 1", "channel 2", "dB"]),
+            ("group-delay", &["fast samples"]),
+            ("impulse-responses", &["channel 2"]),
+            ("error", &["upper bound", "lower bound", "modulo the slow rate"]),
+        ] {
+            let picture = String::from_utf8(desk.read(&format!("pictures/{name}.svg"))).unwrap();
+            assert!(picture.starts_with("<svg") && !picture.contains("NaN"), "{name}");
+            assert!(words.iter().all(|word| picture.contains(word)), "{name}: {words:?}");
+        }
+    }
+    desk.refused(1, &["plot", "b.json", "-o", "pictures"], &["exists", "--force"]);
+}

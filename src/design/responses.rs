@@ -1,0 +1,134 @@
+//! Impulse responses and frequency responses of synthesis filters and front ends, for those who look at them.
+
+use super::analysis::bank_problem;
+use super::{DesignError, filters};
+use crate::bank::{Bank, SynthesisFilters};
+use crate::linalg::{Complex, Mat};
+use crate::units::{Hertz, RadiansPerFastPeriod};
+use std::f64::consts::TAU;
+
+/// Energy of a recursive filter's response beyond which it counts as over, relative to all of it.
+const TAIL: f64 = 1e-12;
+/// Slow periods of a recursive filter's response that are computed at most.
+const MOST_PERIODS: usize = 4096;
+
+/// The impulse responses f_i[n] of the synthesis filters at the fast rate, all of one length. That of a
+/// recursive filter ends where 1e-12 of its energy is left, or after 4,096 slow periods.
+///
+/// # Errors
+/// [`DesignError::RaggedStateSpace`] for matrices with rows of unequal lengths.
+pub fn impulse_responses(bank: &Bank) -> Result<Vec<Vec<f64>>, DesignError> {
+    let lags = match &bank.filters {
+        SynthesisFilters::Fir(taps) => return Ok(taps.clone()),
+        SynthesisFilters::StateSpace(_) => lags_of_recursion(bank)?,
+    };
+    Ok(filters::impulse_responses(&lags, lags.len() * bank.ratio))
+}
+
+/// F_0 = D, F_j = C A^(j-1) B.
+fn lags_of_recursion(bank: &Bank) -> Result<Vec<Mat>, DesignError> {
+    let system = filters::lifted(&bank.filters, bank.ratio)?;
+    let mut lags = vec![system.d().clone()];
+    let mut state = system.b().clone();
+    let mut energies = vec![system.d().norm_squared()];
+    for _ in 1..MOST_PERIODS {
+        let lag = system.c() * &state;
+        energies.push(lag.norm_squared());
+        lags.push(lag);
+        state = system.a() * state;
+    }
+    let total: f64 = energies.iter().sum();
+    let mut left = 0.0;
+    let tail = energies.iter().rev().take_while(|&&energy| {
+        left += energy;
+        left <= TAIL * total
+    });
+    let kept = lags.len() - tail.count();
+    lags.truncate(kept.max(1));
+    Ok(lags)
+}
+
+/// F(e^{j w}) = sum_n f[n] e^{-j w n} and its group delay, -d arg F / d w, in fast samples.
+pub fn fir_response(taps: &[f64], w: RadiansPerFastPeriod) -> (Complex<f64>, f64) {
+    let term = |(n, tap): (usize, &f64)| {
+        let value = Complex::from_polar(*tap, -w.0 * n as f64);
+        (value, value * n as f64)
+    };
+    let sum =
+        taps.iter().enumerate().map(term).fold(
+            (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0)),
+            |(response, moment), (value, weighted)| (response + value, moment + weighted),
+        );
+    (sum.0, (sum.1 / sum.0).re)
+}
+
+/// |Phi(2 pi f)| of the target and of each channel, gains included, at `points` frequencies from 0 to
+/// 1/(2 h).
+///
+/// # Errors
+/// [`DesignError::NoSpec`] for a bank without front ends.
+pub fn front_end_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>)>, DesignError> {
+    let problem = bank_problem(bank)?;
+    let at = |k: usize| {
+        let cycles = 0.5 * k as f64 / points.saturating_sub(1).max(1) as f64;
+        let w = RadiansPerFastPeriod(TAU * cycles);
+        let gain = |front_end: usize| problem.front_ends[front_end].response(w).norm();
+        let channels = problem.channels.iter().map(|channel| channel.gain.abs() * gain(channel.front_end));
+        let gains = std::iter::once(gain(problem.target)).chain(channels).collect();
+        (Hertz(cycles / bank.fast_period.0), gains)
+    };
+    Ok((0..points).map(at).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bank::BlockFilter;
+
+    #[test]
+    fn a_recursion_has_the_impulse_response_of_its_closed_form() {
+        // y[k] = sum_j 0.5^j x[k - j] at phase 0, the input itself at phase 1.
+        let block = BlockFilter {
+            a: vec![vec![0.5]],
+            b: vec![vec![0.5]],
+            c: vec![vec![1.0], vec![0.0]],
+            d: vec![vec![1.0], vec![1.0]],
+        };
+        let bank = Bank::bare(SynthesisFilters::StateSpace(block), 2);
+        let responses = impulse_responses(&bank).unwrap();
+        let want = |n: usize| {
+            if n == 1 {
+                1.0
+            } else if n % 2 == 1 {
+                0.0
+            } else {
+                0.5_f64.powi(n as i32 / 2)
+            }
+        };
+        assert!(responses[0].iter().enumerate().all(|(n, x)| (x - want(n)).abs() < 1e-15), "{responses:?}");
+        // 0.25^20 is just below 1e-12.
+        assert!((38..=42).contains(&responses[0].len()), "{}", responses[0].len());
+    }
+
+    #[test]
+    fn a_delay_has_its_delay_at_every_frequency() {
+        for w in [0.0, 0.3, 3.0] {
+            let (response, delay) = fir_response(&[0.0, 0.0, -2.0], RadiansPerFastPeriod(w));
+            assert!((response.norm() - 2.0).abs() < 1e-12 && (delay - 2.0).abs() < 1e-12, "{w}");
+        }
+        // A symmetric filter has half its length.
+        let (_, delay) = fir_response(&[1.0, 2.0, 2.0, 1.0], RadiansPerFastPeriod(0.4));
+        assert!((delay - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn front_ends_have_their_cutoffs() {
+        let bank =
+            Bank::from_json(include_str!("../../filters/interleaved-4x250M.json"), "bank.json").unwrap();
+        let gains = front_end_gains(&bank, 3).unwrap();
+        // A quarter of the fast rate is the target's cutoff.
+        assert!((gains[1].0.0 - 250e6).abs() < 1.0 && gains[1].1.len() == 5);
+        assert!((gains[1].1[0] - 0.5_f64.sqrt()).abs() < 1e-9, "{gains:?}");
+        assert!(gains[0].1.iter().all(|gain| (gain - 1.0).abs() < 1e-9));
+    }
+}
