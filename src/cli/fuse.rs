@@ -7,9 +7,10 @@ use super::output::{Bits, check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
 use super::turns::TurnArgs;
 use super::understood::say_understood;
+use super::watch::Watch;
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{BLOCK_BYTES, Container, MultiReader, ReadOptions, SampleWriter};
+use crate::io::{BLOCK_BYTES, Container, MultiReader, PcmFrames, ReadOptions, SampleWriter};
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
 use crate::runtime::{Algorithm, Options, Plan};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -94,10 +95,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let skip = if args.keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
     let mut pipeline = args.pipeline(&bank, &plan, skip)?;
     let mut outputs = args.outputs(rate)?;
-    run_all(&mut pipeline, &mut reader, &mut outputs)?;
+    let mut watch = Watch::new(&bank);
+    run_all(&mut pipeline, &mut reader, &mut outputs, &mut watch)?;
     let frames = reader.consumed();
     pipeline.flush(frames * bank.ratio as u64, &mut outputs).map_err(Failure::running)?;
     let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
+    let run = run.with_warnings(watch.finish());
     let seconds = begin.elapsed().as_secs_f64();
     let report = Report { run: &run, rate: rate.round() as u64, frames, latency_dropped: skip, seconds };
     finish(outputs, &run, args.strict, args.json.then_some(&report))
@@ -165,9 +168,13 @@ fn run_all(
     pipeline: &mut Pipeline,
     reader: &mut MultiReader,
     outputs: &mut FileOutputs,
+    watch: &mut Watch,
 ) -> Result<(), Failure> {
     let progress = progress_bar(reader.promised_frames());
-    let ending = run_pipeline(reader, pipeline, outputs, |frames| progress.inc(frames as u64));
+    let ending = run_pipeline(reader, pipeline, outputs, |parts| {
+        watch.observe(parts);
+        progress.inc(parts.iter().map(PcmFrames::frames).min().unwrap_or(0) as u64);
+    });
     match ending.map_err(Failure::running)? {
         Ending::Inputs => progress.finish_and_clear(),
         Ending::Stopped => return Err(interrupted(reader.consumed())),

@@ -5,6 +5,7 @@
 
 mod analyze;
 mod bank_file;
+mod calibrate;
 mod completions;
 mod demo;
 mod design;
@@ -29,6 +30,7 @@ mod stream;
 mod turns;
 mod understood;
 mod verify;
+mod watch;
 
 use clap::{Parser, Subcommand};
 pub use failure::Failure;
@@ -72,6 +74,7 @@ enum Command {
     Import(import::Args),
     Export(export::Args),
     Simulate(simulate::Args),
+    Calibrate(calibrate::Args),
     Fuse(fuse::Args),
     Stream(stream::Args),
     Demo(demo::Args),
@@ -109,6 +112,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Import(args) => import::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Fuse(args) => fuse::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Demo(args) => demo::run(&args),

@@ -116,6 +116,12 @@ impl RunReport {
         Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings }
     }
 
+    /// With further warnings.
+    pub(super) fn with_warnings(mut self, more: Vec<String>) -> Self {
+        self.warnings.extend(more);
+        self
+    }
+
     /// With `strict` the first warning is an error.
     fn judge(&self, strict: bool) -> Result<(), Failure> {
         match self.warnings.first() {

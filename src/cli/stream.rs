@@ -7,6 +7,7 @@ use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
 use super::say::say_line;
 use super::turns::TurnArgs;
 use super::understood::say_understood;
+use super::watch::Watch;
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
@@ -110,13 +111,16 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let rate = match_bank::output_rate(&bank, &reader)?;
     let mut pipeline = args.pipeline(&bank, &plan)?;
     let mut outputs = args.outputs(rate)?;
-    let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |_| {}).map_err(Failure::running)?;
+    let mut watch = Watch::new(&bank).live();
+    let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |parts| watch.observe(parts));
+    let ending = ending.map_err(Failure::running)?;
     if args.flush {
         let samples = pipeline.stream().plan().flush_frames() * bank.ratio;
         pipeline.flush(pipeline.samples() + samples as u64, &mut outputs).map_err(Failure::running)?;
     }
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
     let run = RunReport::new(pipeline.finish(), tolerated, "--output-format f32le");
+    let run = run.with_warnings(watch.finish());
     let (frames, interrupted) = (reader.consumed(), ending == Ending::Stopped);
     let report = Report { run: &run, frames, interrupted };
     let finished = finish(outputs, &run, args.strict, args.json.then_some(&report));

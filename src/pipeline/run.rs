@@ -1,7 +1,7 @@
 //! Runs all frames of a reader through a pipeline.
 
 use super::{Output, Pipeline, PipelineError};
-use crate::io::{Arrival, MultiReader};
+use crate::io::{Arrival, MultiReader, PcmFrames};
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,8 +12,8 @@ pub enum Ending {
     Stopped,
 }
 
-/// Runs until the inputs end or a stop is requested. Each step calls `progress` with its number of frames.
-/// This function does not flush.
+/// Runs until the inputs end or a stop is requested. Each step calls `observe` with its frames, once they are
+/// processed. This function does not flush.
 ///
 /// # Errors
 /// [`PipelineError`] for an input that cannot be read, frames that do not fit the bank, or an output that
@@ -22,14 +22,16 @@ pub fn run(
     reader: &mut MultiReader,
     pipeline: &mut Pipeline,
     output: &mut impl Output,
-    mut progress: impl FnMut(usize),
+    mut observe: impl FnMut(&[PcmFrames<'_>]),
 ) -> Result<Ending, PipelineError> {
     loop {
         match reader.wait()? {
             Arrival::Frames(frames) => {
-                pipeline.push(&reader.frames(), output)?;
+                let parts = reader.frames();
+                pipeline.push(&parts, output)?;
+                observe(&parts);
+                drop(parts);
                 reader.consume(frames);
-                progress(frames);
             }
             Arrival::End => return Ok(Ending::Inputs),
             Arrival::Stopped => return Ok(Ending::Stopped),

@@ -24,3 +24,20 @@ fn every_example_runs() {
         assert!(text(&output.stdout).lines().count() > 1, "{name}: {output:?}");
     }
 }
+
+/// The loop of capture, calibration, bank and fused recording, as a user starts it.
+#[test]
+#[cfg(unix)]
+fn the_calibration_loop_runs() {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/calibrate/run.sh");
+    let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().unwrap();
+    let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new("sh").arg(script).arg(folder.path()).env("PATH", path).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let shown = text(&output.stdout);
+    assert!(shown.contains("held out   the captures agree"), "{shown}");
+    for name in ["measured.toml", "measured.json", "measured.wav"] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+}

@@ -6,6 +6,7 @@ mod support;
 mod abuse;
 mod algorithms;
 mod analyze;
+mod calibrate;
 mod cuts;
 mod design;
 mod docs;

@@ -7,7 +7,7 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "init",
     "design",
     "analyze",
@@ -16,6 +16,7 @@ const COMMANDS: [&str; 13] = [
     "import",
     "export",
     "simulate",
+    "calibrate",
     "fuse",
     "stream",
     "demo",

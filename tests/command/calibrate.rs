@@ -1,0 +1,256 @@
+//! `calibrate`: captures of virtual converters to a spec, to a bank, to a fused recording without spurs.
+
+use crate::support::random::Random;
+use crate::support::{Desk, number, text, wav};
+use hybank::analog::StrictlyProper;
+use hybank::design::{ProofSearch, design_with};
+use hybank::spec::Spec;
+use hybank::units::RadiansPerFastPeriod;
+use serde_json::Value;
+use std::f64::consts::TAU;
+
+/// Four interleaved 250 MS/s converters with nominal delays.
+const NOMINAL: &str = r#"# four converters
+fast_rate = 1.0e9          # Hz
+ratio = 4
+latency = 16
+
+[target]
+filter = { family = "butterworth", order = 4, cutoff = 250.0e6 }
+
+[[channel]]
+delay = 3.0e-9
+[[channel]]
+delay = 2.0e-9             # the second one
+[[channel]]
+delay = 1.0e-9
+[[channel]]
+delay = 0.0
+
+[design]
+method = "iir"
+"#;
+
+/// The true converters: skews of 1 % of the fast period, gains of 1 %, offsets of 5 steps of 12 bits.
+const SKEWS: [f64; 4] = [0.01, -0.008, 0.009, 0.0];
+const GAINS: [f64; 4] = [1.01, 0.992, 0.99, 1.0];
+const OFFSETS: [f64; 4] = [5.0, -4.0, 3.0, -5.0];
+const STEP: f64 = 1.0 / 2048.0;
+
+/// What 12-bit converters deliver of tones (hertz) of the given amplitude each, one row per channel.
+fn captured(tones: &[f64], amplitude: f64, frames: usize, dice: &mut Random) -> Vec<Vec<f32>> {
+    let spec = Spec::from_toml(NOMINAL, "spec.toml").unwrap();
+    let filter = StrictlyProper::new(&spec.target, spec.fast_period).unwrap();
+    let one = |i: usize, dice: &mut Random| {
+        let delay = spec.channels[i].delay / spec.fast_period + SKEWS[i];
+        let sample = |k: usize, dice: &mut Random| {
+            let wave = |(t, f): (usize, &f64)| {
+                let w = TAU * f * spec.fast_period.0;
+                let response = filter.response(RadiansPerFastPeriod(w));
+                let turns = (f * spec.fast_period.0 * 4.0 * k as f64).fract();
+                response.norm() * (TAU * turns + response.arg() - w * delay + t as f64).cos()
+            };
+            let x = amplitude * tones.iter().enumerate().map(wave).sum::<f64>();
+            // Thermal noise of half a step.
+            let noise = STEP * (dice.sample() + dice.sample()) / 2.0;
+            let code = ((GAINS[i] * x + noise) / STEP + OFFSETS[i]).round().clamp(-2048.0, 2047.0);
+            (code * STEP) as f32
+        };
+        (0..frames).map(|k| sample(k, dice)).collect::<Vec<f32>>()
+    };
+    (0..4).map(|i| one(i, dice)).collect()
+}
+
+fn write(desk: &Desk, prefix: &str, channels: &[Vec<f32>]) -> Vec<String> {
+    let names: Vec<String> = (1..=channels.len()).map(|i| format!("{prefix}{i}.wav")).collect();
+    for (name, samples) in names.iter().zip(channels) {
+        wav::write(desk, name, 1, 250_000_000, samples);
+    }
+    names
+}
+
+fn with<'a>(head: &[&'a str], names: &'a [String], tail: &[&'a str]) -> Vec<&'a str> {
+    head.iter().copied().chain(names.iter().map(String::as_str)).chain(tail.iter().copied()).collect()
+}
+
+/// `bank.json` for a spec, without the search for its proof.
+fn design(desk: &Desk, spec: &str) {
+    let text = String::from_utf8(desk.read(spec)).unwrap();
+    let bank = design_with(&Spec::from_toml(&text, spec).unwrap(), ProofSearch::Skip).unwrap().bank;
+    desk.write("bank.json", bank.to_json().unwrap());
+}
+
+/// Amplitude at `cycles` per sample of a stretch in which all tones have whole periods.
+fn amplitude(samples: &[f32], cycles: f64) -> f64 {
+    let (mut re, mut im) = (0.0, 0.0);
+    for (n, x) in samples.iter().enumerate() {
+        let angle = TAU * (cycles * n as f64).fract();
+        re += f64::from(*x) * angle.cos();
+        im += f64::from(*x) * angle.sin();
+    }
+    2.0 * re.hypot(im) / samples.len() as f64
+}
+
+/// The largest interleaving spur over the tone, in dBc: at k/4 and k/4 +- f.
+fn worst_spur(samples: &[f32], cycles: f64) -> f64 {
+    let tone = amplitude(samples, cycles);
+    let gain_spurs = (1..4).flat_map(|k| [0.25 * f64::from(k) + cycles, 0.25 * f64::from(k) - cycles]);
+    let spurs = gain_spurs.chain([0.25, 0.5]);
+    let worst = spurs.map(|f| amplitude(samples, f)).fold(0.0, f64::max);
+    20.0 * (worst / tone).log10()
+}
+
+/// Calibrated with tones, a bank leaves interleaving spurs below -75 dBc of a tone at another frequency.
+#[test]
+fn from_captures_to_a_recording_without_spurs() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(1));
+    let training = write(&desk, "t", &captured(&[37.1e6, 161.3e6, 211.7e6], 0.31, 16_384, &mut dice));
+    // Whole periods in 16,384 fast samples.
+    let held_out = 3001.0 / 16_384.0;
+    let held = write(&desk, "h", &captured(&[held_out * 1e9], 0.9, 8192, &mut dice));
+    let report = desk.json(&with(
+        &["calibrate", "spec.toml"],
+        &training,
+        &["-o", "measured.toml", "--tone", "37.1MHz,161.3MHz,211.7MHz", "--reference", "4", "--json"],
+    ));
+    for i in 0..3 {
+        let at = |key: &str| number(&report, &format!("/channels/{i}/{key}"));
+        let expected = 3.0 - i as f64 + SKEWS[i];
+        let error = at("delay_samples/value") - expected;
+        assert!(error.abs() < 2.5 * at("delay_samples/half_width") && error.abs() < 2e-4, "{report}");
+        assert!((at("gain/value") - GAINS[i]).abs() < 2.5 * at("gain/half_width"), "{report}");
+        assert!((at("offset/value") - OFFSETS[i] * STEP).abs() < 2.5 * at("offset/half_width"), "{report}");
+    }
+    let spurs = |spec: &str| {
+        design(&desk, spec);
+        let output = desk.run(&with(&["fuse", "bank.json"], &held, &["-o", "y.wav", "--force"]), &[]);
+        assert!(output.status.success(), "{output:?}");
+        worst_spur(&wav::samples(&desk, "y.wav")[8192..24_576], held_out)
+    };
+    let (before, after) = (spurs("spec.toml"), spurs("measured.toml"));
+    assert!(before > -50.0, "without calibration {before:.1} dBc");
+    assert!(after < -75.0, "{after:.1} dBc, without calibration {before:.1} dBc");
+    println!("spurs {before:.1} dBc before, {after:.1} dBc after");
+}
+
+#[test]
+fn the_spec_keeps_what_was_not_measured() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(2));
+    let names = write(&desk, "t", &captured(&[61.3e6], 0.9, 4096, &mut dice));
+    let shown = desk.run(&with(&["calibrate", "spec.toml"], &names, &["-o", "-", "--tone", "61.3MHz"]), &[]);
+    let spec = text(&shown.stdout);
+    assert!(shown.status.success() && text(&shown.stderr).is_empty(), "{shown:?}");
+    assert!(spec.starts_with("# four converters\nfast_rate = 1.0e9          # Hz\n"), "{spec}");
+    assert!(spec.contains("e-9             # the second one\n"), "{spec}");
+    let read = Spec::from_toml(&spec, "measured.toml").unwrap();
+    let uncertainty = read.uncertainty.unwrap();
+    assert_eq!((uncertainty.reference, uncertainty.delays(4)[0].0), (Some(1), 0.0));
+    assert!(uncertainty.delays(4)[1].0 > 1e-15 && uncertainty.offsets(4)[0] > 1e-7);
+    // Relative to channel 1, which keeps its nominal values. Channel 4 would then come 10 ps before 0, so all
+    // delays and the latency are a fast period longer.
+    assert!((read.channels[1].delay.0 - (3.0 + SKEWS[1] - SKEWS[0]) * 1e-9).abs() < 1e-12, "{spec}");
+    assert_eq!(read.latency, Some(17));
+    assert!((read.channels[1].gain - GAINS[1] / GAINS[0]).abs() < 1e-3);
+    // The second calibration starts from the first and finds the same.
+    desk.write("measured.toml", &spec);
+    let again = desk.json(&with(&["calibrate", "measured.toml"], &names, &["-o", "again.toml", "--json"]));
+    assert_eq!(again["tones"][0]["zone"], 1, "{again}");
+    assert!((number(&again, "/channels/1/delay/value") - read.channels[1].delay.0).abs() < 1e-14, "{again}");
+}
+
+#[test]
+fn held_out_captures_and_one_file_of_all_converters_are_checked() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(3));
+    let first = captured(&[161.3e6], 0.9, 8192, &mut dice);
+    let second = captured(&[83.9e6], 0.9, 8192, &mut dice);
+    for (name, channels) in [("one.wav", &first), ("two.wav", &second)] {
+        let turns: Vec<f32> = (0..4 * 8192).map(|n| channels[n % 4][n / 4]).collect();
+        wav::write(&desk, name, 1, 1_000_000_000, &turns);
+    }
+    let report = desk.json(&[
+        "calibrate",
+        "spec.toml",
+        "one.wav",
+        "--interleaved",
+        "4",
+        "-o",
+        "m.toml",
+        "--json",
+        "--check",
+        "two.wav",
+    ]);
+    assert_eq!(
+        (&report["check"]["agrees"], &report["tones"][0]["zone"]),
+        (&Value::Bool(true), &Value::from(2))
+    );
+    let shown = desk.good(&["calibrate", "spec.toml", "one.wav", "--interleaved", "4", "-o", "n.toml"]);
+    assert!(
+        shown.contains("relative to channel 1") && shown.contains("the cut-offs were not fitted"),
+        "{shown}"
+    );
+}
+
+#[test]
+fn what_cannot_be_calibrated_is_refused_with_the_reason() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(4));
+    let channels = captured(&[61.3e6], 0.9, 4096, &mut dice);
+    let names = write(&desk, "t", &channels);
+    let swapped: Vec<String> = [0, 2, 1, 3].map(|i| names[i].clone()).to_vec();
+    let refused = |names: &[String], tail: &[&str], code: i32, parts: &[&str]| {
+        desk.refused(code, &with(&["calibrate", "spec.toml", "-o", "x.toml"], names, tail), parts)
+    };
+    refused(&swapped, &["--tone", "61.3MHz"], 1, &["wrong order", "1, 3, 2, 4"]);
+    refused(&[0, 0, 2, 3].map(|i| names[i].clone()), &[], 1, &["captures 1 and 2 hold the same samples"]);
+    refused(
+        &names,
+        &["--tone", "125MHz"],
+        1,
+        &["multiple of half the slow rate", "choose another frequency"],
+    );
+    refused(
+        &names,
+        &["--tone", "61.3MHz", "--fit", "cutoff,delay"],
+        1,
+        &["at least 3 tones, and there are 1"],
+    );
+    refused(&names, &["--reference", "5"], 1, &["the channels are 1 to 4"]);
+    refused(&names, &["--tone", "61.3 parsec"], 2, &["--tone"]);
+    refused(&names, &["--tone", "auto", "--blind"], 2, &["cannot be used with"]);
+    refused(&names[..3], &[], 1, &["the spec has 4 channels, but the captures have 3"]);
+    let noise: Vec<f32> = (0..5000).map(|_| dice.sample() as f32).collect();
+    wav::write(&desk, "noise.wav", 1, 1_000_000_000, &noise);
+    refused(&names, &["--training", "noise.wav"], 1, &["waveform"]);
+    desk.refused(1, &with(&["calibrate", "spec.toml", "-o", "t1.wav", "--force"], &names, &[]), &["t1.wav"]);
+}
+
+/// `fuse` and `stream` say when captures are in the wrong order, given twice, or late.
+#[test]
+fn runs_warn_of_captures_that_contradict_the_spec() {
+    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(5));
+    design(&desk, "spec.toml");
+    let names = write(&desk, "t", &captured(&[17.3e6, 43.9e6, 61.3e6, 89.1e6], 0.22, 4096, &mut dice));
+    let warned = |order: [usize; 4]| {
+        let names: Vec<String> = order.map(|i| names[i].clone()).to_vec();
+        let output = desk.run(&with(&["fuse", "bank.json", "-o", "y.wav", "--force"], &names, &[]), &[]);
+        assert!(output.status.success(), "{output:?}");
+        text(&output.stderr)
+    };
+    assert_eq!(warned([0, 1, 2, 3]), "");
+    assert!(warned([0, 2, 1, 3]).contains("those of the channels 1, 3, 2, 4"));
+    assert!(warned([0, 1, 1, 3]).contains("channels 2 and 3 hold the same samples"));
+    let late = NOMINAL.replace("delay = 2.0e-9", "delay = 2.1e-9");
+    desk.write("late.toml", late);
+    design(&desk, "late.toml");
+    let warning = warned([0, 1, 2, 3]);
+    assert!(
+        warning.contains("the delay of channel 2 relative to channel 1")
+            && warning.contains("hybank calibrate"),
+        "{warning}"
+    );
+    let inputs: Vec<&str> = names.iter().flat_map(|name| ["--input", name]).collect();
+    let stream =
+        [&["stream", "bank.json", "--format", "wav", "--output-format", "f32le", "-o", "y.raw"], &inputs[..]]
+            .concat();
+    let output = desk.run(&stream, &[]);
+    assert!(text(&output.stderr).contains("the delay of channel 2"), "{output:?}");
+}
