@@ -72,7 +72,7 @@ fn end_of(number: u64) -> (i32, End) {
 
 #[test]
 fn no_bound_rests_on_differences_below_the_precision_of_delays() {
-    let ends = each(wanted("HYBANK_NEAR_DELAYS", 32), end_of);
+    let ends = each(wanted("HYBANK_NEAR_DELAYS", 20), end_of);
     for decade in (6..14).rev() {
         let of = |end: End| ends.iter().filter(|found| **found == (decade, end)).count();
         let [holds, unstated, beaten, refused] =
