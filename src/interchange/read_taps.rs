@@ -5,6 +5,9 @@ use super::layout::PolyphaseTaps;
 /// Headings of the table that [`export`](super::export) writes.
 const HEADINGS: [&str; 4] = ["channel", "phase", "lag", "value"];
 
+/// Longest header of an array whose shape is looked at; those of taps have a hundred bytes.
+const LONGEST_HEADER: usize = 1 << 16;
+
 /// Why a file holds no taps.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TapsError {
@@ -99,6 +102,9 @@ fn interleaved([channels, ratio, lags]: [usize; 3], values: Vec<f64>) -> Vec<Vec
 pub fn taps_of_npy(bytes: &[u8]) -> Result<Vec<Vec<f64>>, TapsError> {
     let broken =
         |error: &dyn std::fmt::Display| TapsError::Broken(format!("no NumPy array of reals: {error}"));
+    if !fits(bytes) {
+        return Err(broken(&"its shape has more entries than the file has bytes"));
+    }
     let array = npyz::NpyFile::new(bytes).map_err(|error| broken(&error))?;
     let shape = array.shape().to_vec();
     let is_fortran = array.order() == npyz::Order::Fortran;
@@ -125,4 +131,16 @@ pub fn taps_of_npy(bytes: &[u8]) -> Result<Vec<Vec<f64>>, TapsError> {
         }
         _ => Err(TapsError::Shape { shape }),
     }
+}
+
+/// Whether the shape in the header of an array has no more entries than `bytes`. The reader multiplies its
+/// sizes without a check.
+fn fits(bytes: &[u8]) -> bool {
+    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST_HEADER)]);
+    let shape = header.split_once("'shape'").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
+    let sizes =
+        shape.map_or("", |(sizes, _)| sizes).split(',').map(str::trim).filter(|size| !size.is_empty());
+    let entries = sizes.map(|size| size.trim_end_matches('L').parse::<usize>().ok());
+    let product = entries.fold(Some(1), |product: Option<usize>, size| product?.checked_mul(size?.max(1)));
+    product.is_some_and(|entries| entries <= bytes.len())
 }

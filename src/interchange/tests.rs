@@ -125,6 +125,12 @@ fn arrays_are_read_in_both_orders() {
     assert!(matches!(taps_of_npy(&npy(&[3], npyz::Order::C, &[1.0; 3])), Err(TapsError::Shape { .. })));
     assert_eq!(taps_of_npy(&npy(&[2, 0], npyz::Order::C, &[])), Err(TapsError::Empty));
     assert!(matches!(taps_of_npy(b"RIFF"), Err(TapsError::Broken(_))));
+    for sizes in ["4294967296, 4294967296, 4294967296", "99999999999999999999, 1", "9223372036854775807, 1"] {
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({sizes}), }}\n");
+        let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+        let huge = [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), &[0; 64]].concat();
+        assert!(matches!(taps_of_npy(&huge), Err(TapsError::Broken(_))), "{sizes}");
+    }
     let cut = npy(&[2, 3], npyz::Order::C, &[1.0; 6]);
     assert!(matches!(taps_of_npy(&cut[..cut.len() - 3]), Err(TapsError::Broken(_))));
 }

@@ -4,6 +4,7 @@
 use crate::support::campaign::rounds;
 use crate::support::random::Random;
 use hybank::bank::Bank;
+use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::wav::WavReader;
 use hybank::io::{LostSamples, SigmfMeta};
 use hybank::spec::Spec;
@@ -101,4 +102,22 @@ fn specs_and_banks() {
         answers += usize::from(answered(Bank::from_json(&text, "seed")).is_some());
     });
     assert!(answers > 20, "{answers}");
+}
+
+#[test]
+fn taps_of_other_tools() {
+    let (mut answers, mut refusals) = (0, 0);
+    damaged("taps", |bytes| {
+        for taps in [taps_of_csv(bytes), taps_of_npy(bytes)] {
+            match taps {
+                Err(error) => refusals += usize::from(!error.to_string().is_empty()),
+                Ok(taps) => {
+                    answers += 1;
+                    assert!(taps.iter().all(|list| list.len() == taps[0].len()));
+                    assert!(taps.iter().flatten().all(|tap| tap.is_finite()));
+                }
+            }
+        }
+    });
+    assert!(answers > 500 && refusals > 1000, "{answers} {refusals}");
 }
