@@ -1,5 +1,6 @@
 //! Images: intensities 0..255 as f32, one or three interleaved channels, pixel centres at integers.
 
+mod colmap_map;
 pub mod colour;
 pub mod pfm;
 pub mod quality;
@@ -8,7 +9,7 @@ mod write;
 
 pub(crate) use read::unavailable_memory;
 pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
-pub use write::{begin, encode, save};
+pub use write::{Levels, begin, begin_bytes, encode, encode_to, save};
 
 use std::path::PathBuf;
 
@@ -69,6 +70,12 @@ pub enum ImageError {
     /// The extension of the output file is not a known format.
     #[error("{}: the extension is not an image format; use .png, .jpg, .ppm, .pgm or .pfm", path.display())]
     UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// 16 bits per value in a format that this crate writes with 8.
+    #[error("{}: 16 bits per value are written to .png files only; .pfm files have floats", path.display())]
+    Levels {
         /// The file.
         path: PathBuf,
     },

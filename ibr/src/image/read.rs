@@ -1,6 +1,6 @@
 //! Reading images and depth maps from files.
 
-use super::{Image, ImageError, pfm};
+use super::{Image, ImageError, colmap_map, pfm};
 use crate::files;
 use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
@@ -92,6 +92,10 @@ fn load(path: &Path, most: usize) -> Result<Loaded, ImageError> {
     let decode = |reason: String| ImageError::Decode { path: path.into(), reason };
     if bytes.starts_with(b"PF") || bytes.starts_with(b"Pf") {
         let map = pfm::decode(&bytes).map_err(decode)?;
+        return check_size(path, (map.width, map.height), most).map(|()| Loaded::Float(map));
+    }
+    if colmap_map::is_map(&bytes) {
+        let map = colmap_map::decode(&bytes).map_err(decode)?;
         return check_size(path, (map.width, map.height), most).map(|()| Loaded::Float(map));
     }
     let open = || ImageReader::new(Cursor::new(&bytes)).with_guessed_format();

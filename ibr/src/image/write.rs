@@ -13,6 +13,24 @@ use std::path::Path;
 /// # Errors
 /// [`ImageError::UnknownFormat`] for another extension, [`ImageError::Write`] if the encoder fails.
 pub fn encode(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
+    encode_to(image, path, Levels::Eight)
+}
+
+/// Bits per value of a PNG file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Levels {
+    /// 256 levels.
+    #[default]
+    Eight,
+    /// 65536 levels: white is 65535.
+    Sixteen,
+}
+
+/// As [`encode`], with so many levels per value; more than 256 in PNG only.
+///
+/// # Errors
+/// As [`encode`], and [`ImageError::Levels`] for 16 bits in another format.
+pub fn encode_to(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, ImageError> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let format = match ending.as_str() {
         "png" => ImageFormat::Png,
@@ -21,6 +39,10 @@ pub fn encode(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
         "pfm" => return Ok(encode_float(image)),
         _ => return Err(ImageError::UnknownFormat { path: path.into() }),
     };
+    if levels == Levels::Sixteen {
+        let png = format == ImageFormat::Png;
+        return if png { encode_deep(image, path) } else { Err(ImageError::Levels { path: path.into() }) };
+    }
     // A .ppm is always written in colour, a .pgm in grey.
     match ending.as_str() {
         "ppm" => encode_whole(&image.to_rgb(), format, path),
@@ -43,9 +65,16 @@ pub fn save(image: &Image, path: &Path) -> Result<(), ImageError> {
 /// # Errors
 /// As [`save`], and [`ImageError::File`] if the file exists and `replace` is not set.
 pub fn begin(image: &Image, path: &Path, replace: bool) -> Result<AtomicFile, ImageError> {
-    let bytes = encode(image, path)?;
+    begin_bytes(&encode(image, path)?, path, replace)
+}
+
+/// As [`begin`], for encoded bytes.
+///
+/// # Errors
+/// [`ImageError::File`] and [`ImageError::Write`].
+pub fn begin_bytes(bytes: &[u8], path: &Path, replace: bool) -> Result<AtomicFile, ImageError> {
     let mut file = AtomicFile::create(path, replace)?;
-    file.write_all(&bytes).map_err(|e| ImageError::Write { path: path.into(), reason: e.to_string() })?;
+    file.write_all(bytes).map_err(|e| ImageError::Write { path: path.into(), reason: e.to_string() })?;
     Ok(file)
 }
 
@@ -55,11 +84,29 @@ fn encode_float(image: &Image) -> Vec<u8> {
     pfm::encode(&pfm::FloatMap { width, height, channels: image.channels(), data })
 }
 
+fn encode_deep(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
+    let colour = if image.channels() == 3 { ColorType::Rgb16 } else { ColorType::L16 };
+    // 65535 / 255 = 257; the encoder takes the numbers in the order of this machine.
+    let level = |v: &f32| ((v.clamp(0.0, 255.0) * 257.0 + 0.5) as u16).to_ne_bytes();
+    let bytes: Vec<u8> = image.data().iter().flat_map(level).collect();
+    write_buffer(&bytes, image, colour, ImageFormat::Png, path)
+}
+
 fn encode_whole(image: &Image, format: ImageFormat, path: &Path) -> Result<Vec<u8>, ImageError> {
     let colour = if image.channels() == 3 { ColorType::Rgb8 } else { ColorType::L8 };
+    write_buffer(&image.to_bytes(), image, colour, format, path)
+}
+
+fn write_buffer(
+    values: &[u8],
+    image: &Image,
+    colour: ColorType,
+    format: ImageFormat,
+    path: &Path,
+) -> Result<Vec<u8>, ImageError> {
     let mut bytes = Cursor::new(Vec::new());
     let (width, height) = (image.width() as u32, image.height() as u32);
-    image::write_buffer_with_format(&mut bytes, &image.to_bytes(), width, height, colour, format)
+    image::write_buffer_with_format(&mut bytes, values, width, height, colour, format)
         .map_err(|e| ImageError::Write { path: path.into(), reason: e.to_string() })?;
     Ok(bytes.into_inner())
 }
@@ -90,6 +137,24 @@ mod tests {
             assert!(back.data().iter().zip(image.data()).all(|(a, b)| (a - b).abs() < 1e-4), "{name}");
         }
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 6, "no temporary file is left");
+    }
+
+    /// 16 bits keep what 8 round away, and a map reads back as stored.
+    #[test]
+    fn sixteen_bits_are_kept() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("deep.png");
+        for channels in [1, 3] {
+            let values = (0..6 * channels).map(|i| 7.3 + 11.117 * i as f32).collect();
+            let image = Image::new(3, 2, channels, values).unwrap();
+            std::fs::write(&path, encode_to(&image, &path, Levels::Sixteen).unwrap()).unwrap();
+            let back = read_image(&path).unwrap();
+            assert_eq!(back.channels(), channels);
+            assert!(back.data().iter().zip(image.data()).all(|(a, b)| (a - b).abs() < 0.0025), "{back:?}");
+        }
+        let image = Image::filled(2, 2, 1, 7.0);
+        let refused = encode_to(&image, Path::new("x.jpg"), Levels::Sixteen);
+        assert!(matches!(refused, Err(ImageError::Levels { .. })));
     }
 
     #[test]

@@ -1,6 +1,8 @@
-//! COLMAP text models as camera input: `cameras.txt` and `images.txt` of one folder.
+//! COLMAP models as camera input: `cameras` and `images` of one folder, as text or binary.
 //!
 //! COLMAP puts pixel centres at half-integers; the principal point is shifted by half a pixel on reading.
+
+mod binary;
 
 use super::{Camera, CameraError, Lens};
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
@@ -11,7 +13,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ColmapError {
     /// A file cannot be opened.
-    #[error("{}: {source}; a COLMAP text model has cameras.txt and images.txt (export with --output_type TXT)", path.display())]
+    #[error("{}: {source}; a COLMAP model has cameras.txt and images.txt, or cameras.bin and images.bin", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -25,6 +27,16 @@ pub enum ColmapError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A record of a binary file that does not follow the format.
+    #[error("{}: record {record}: {reason}", path.display())]
+    Record {
+        /// The file.
+        path: PathBuf,
+        /// The record, from 1.
+        record: usize,
         /// What is wrong.
         reason: String,
     },
@@ -52,19 +64,30 @@ pub struct ModelCamera {
 /// The cameras of a model by the names of their images.
 pub type Model = BTreeMap<String, ModelCamera>;
 
-/// Reads the model in `folder`.
+/// Reads the model in `folder`: the text files if cameras.txt is there, else the binary ones if cameras.bin
+/// is.
 ///
 /// Accepts pinhole models and models with up to two radial and two tangential coefficients ([`Lens`]).
 /// Images of other models have to be undistorted first, so these are refused.
 ///
 /// # Errors
-/// [`ColmapError`], with file and line.
+/// [`ColmapError`], with file and line or record.
 pub fn read_model(folder: &Path) -> Result<Model, ColmapError> {
-    let load = |name: &str| {
-        let path = folder.join(name);
-        crate::files::read_text(&path).map_err(|source| ColmapError::Read { path, source })
-    };
+    let named = |name: &str, source| ColmapError::Read { path: folder.join(name), source };
+    if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
+        let load = |name: &str| crate::files::read(&folder.join(name)).map_err(|e| named(name, e));
+        return parse_binary(&load("cameras.bin")?, &load("images.bin")?, folder);
+    }
+    let load = |name: &str| crate::files::read_text(&folder.join(name)).map_err(|e| named(name, e));
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
+}
+
+fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<Model, ColmapError> {
+    let fault =
+        |name: &str, (record, reason)| ColmapError::Record { path: folder.join(name), record, reason };
+    let inners = binary::cameras(cameras).map_err(|e| fault("cameras.bin", e))?;
+    let poses = binary::images(images).map_err(|e| fault("images.bin", e))?;
+    join(&inners, poses, &folder.join("images.bin"), |at| fault("images.bin", at))
 }
 
 /// The same from the texts of the two files; `folder` appears in messages.
@@ -75,15 +98,23 @@ pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<Model, 
     let fault = |name: &str, (line, reason)| ColmapError::Line { path: folder.join(name), line, reason };
     let inners = parse_cameras(cameras).map_err(|e| fault("cameras.txt", e))?;
     let poses = parse_images(images).map_err(|e| fault("images.txt", e))?;
+    join(&inners, poses, &folder.join("images.txt"), |at| fault("images.txt", at))
+}
+
+/// The camera of every image; `fault` names an image, by its line or record, whose camera is not listed.
+fn join(
+    inners: &BTreeMap<u64, Inner>,
+    poses: Vec<Pose>,
+    path: &Path,
+    fault: impl Fn((usize, String)) -> ColmapError,
+) -> Result<Model, ColmapError> {
     let mut model = Model::new();
-    for (line, id, pose, name) in poses {
+    for (at, id, pose, name) in poses {
         let inner = inners.get(&id).ok_or_else(|| {
-            let reason = format!("image {name:?} has camera {id}, which cameras.txt does not list");
-            fault("images.txt", (line, reason))
+            fault((at, format!("image {name:?} has camera {id}, which the cameras do not list")))
         })?;
-        let path = folder.join("images.txt");
         let camera = Camera::metric(inner.k * pose, false).map_err(|source| ColmapError::Camera {
-            path,
+            path: path.into(),
             name: name.clone(),
             source,
         })?;
@@ -93,7 +124,7 @@ pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<Model, 
     Ok(model)
 }
 
-/// A line of cameras.txt.
+/// A camera without its pose.
 struct Inner {
     k: Matrix3<f64>,
     size: (usize, usize),
@@ -123,6 +154,11 @@ fn parse_camera(line: &str) -> Result<(u64, Inner), String> {
     let size = (number(words.next(), "width")?, number(words.next(), "height")?);
     let parameters =
         words.map(|w| number(Some(w), "camera parameter")).collect::<Result<Vec<f64>, String>>()?;
+    Ok((id, inner(model, size, &parameters)?))
+}
+
+/// A camera from the name of its model and its parameters.
+fn inner(model: &str, size: (usize, usize), parameters: &[f64]) -> Result<Inner, String> {
     // Focal lengths first (one or two), then the principal point, then distortion.
     let (focal, most) = match model {
         "SIMPLE_PINHOLE" => (1, 0),
@@ -153,9 +189,10 @@ fn parse_camera(line: &str) -> Result<(u64, Inner), String> {
         .iter()
         .any(|b| *b != 0.0)
         .then(|| Lens::new([*fx, fy], [cx, cy], [bend(0), bend(1)], [bend(2), bend(3)]));
-    Ok((id, Inner { k, size, lens }))
+    Ok(Inner { k, size, lens })
 }
 
+/// Line or record of an image, id of its camera, world-to-camera pose, and name.
 type Pose = (usize, u64, Matrix3x4<f64>, String);
 
 /// Two lines per image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then its points, which are ignored.
@@ -185,7 +222,11 @@ fn parse_image(line: &str) -> Result<(u64, Matrix3x4<f64>, String), String> {
     if name.is_empty() {
         return Err("the name of the image is missing".into());
     }
-    let [w, x, y, z, t @ ..] = seven;
+    Ok((id, pose(seven)?, name))
+}
+
+/// \[R | t\] from a quaternion (scalar first) and a translation.
+fn pose([w, x, y, z, t @ ..]: [f64; 7]) -> Result<Matrix3x4<f64>, String> {
     let q = Quaternion::new(w, x, y, z);
     if q.norm() < 1e-9 {
         return Err("the rotation quaternion is 0".into());
@@ -194,7 +235,7 @@ fn parse_image(line: &str) -> Result<(u64, Matrix3x4<f64>, String), String> {
     let rotation = UnitQuaternion::from_quaternion(q).to_rotation_matrix();
     pose.fixed_columns_mut::<3>(0).copy_from(rotation.matrix());
     pose.set_column(3, &Vector3::from(t));
-    Ok((id, pose, name))
+    Ok(pose)
 }
 
 #[cfg(test)]
