@@ -2,7 +2,7 @@
 
 /// One pixel of an actual view, seen from the virtual camera; C = 1 (grey) or 3 (RGB).
 ///
-/// Positions are f64; depth and values are f32, which keeps the list at 40 bytes per sample.
+/// Positions are f64; the rest is f32, which keeps the list at 48 bytes per sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<const C: usize> {
     /// Column in the virtual image, in pixels.
@@ -14,15 +14,33 @@ pub struct Sample<const C: usize> {
     pub depth: f32,
     /// Intensity, 0..255.
     pub value: [f32; C],
+    /// Distance of neighbouring samples of this view on this surface, in virtual pixels: root mean square
+    /// over the two directions of the view. The depth test's radius and the size of holes grow with it.
+    pub spacing: f32,
+    /// Weight in the fit: the area of the virtual image that the sample stands for (at least 1), less where
+    /// depth or colour are doubtful.
+    pub weight: f32,
     /// Index of the pixel in its actual view, row by row.
     pub pixel: u32,
     /// Index of the actual view.
     pub view: u16,
+    /// Whether the depth is a guess, or the colour may be mixed with that of a nearer surface.
+    pub doubtful: bool,
 }
 
 impl<const C: usize> Sample<C> {
-    /// A sample at the origin with all fields 0, for work memory.
-    pub const BLANK: Self = Self { x: 0.0, y: 0.0, depth: 0.0, value: [0.0; C], pixel: 0, view: 0 };
+    /// A sample at the origin with unit spacing and weight and all other fields 0, for work memory.
+    pub const BLANK: Self = Self {
+        x: 0.0,
+        y: 0.0,
+        depth: 0.0,
+        value: [0.0; C],
+        spacing: 1.0,
+        weight: 1.0,
+        pixel: 0,
+        view: 0,
+        doubtful: false,
+    };
 }
 
 /// Pixels that the propagation dropped, by reason.

@@ -4,7 +4,7 @@ use hybank_ibr::camera::Camera;
 use hybank_ibr::interpolate::rows::RowWork;
 use hybank_ibr::interpolate::{Cover, Settings};
 use hybank_ibr::occlusion::{RowScratch, remove_in_row};
-use hybank_ibr::propagate::{Frame, RectifiedView, rectified_row};
+use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};
 use hybank_ibr::sample::Sample;
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 
@@ -23,7 +23,7 @@ fn rows_allocate_nothing() {
         disparity,
         position: *position,
     });
-    let settings = Settings::default();
+    let (settings, camera) = (Settings::default(), RigCamera::new(&views, 0.5));
     let frame = Frame::whole(SIZE.0, SIZE.1, RowWork::<4, 3>::MARGIN, 0.0);
     let mut samples: Vec<Sample<3>> = Vec::with_capacity(2 * SIZE.0);
     let (mut scratch, mut work) = (RowScratch::default(), RowWork::<4, 3>::new(SIZE.0));
@@ -32,7 +32,7 @@ fn rows_allocate_nothing() {
     let mut render = |y: usize| {
         samples.clear();
         for (index, view) in views.iter().enumerate() {
-            rectified_row(view, index as u16, y, 0.5, &frame, &mut samples);
+            rectified_row(view, index as u16, y, &camera, &frame, &mut samples);
         }
         removed += remove_in_row(&mut samples, &settings.depth_test, &mut scratch);
         work.interpolate(&samples, &settings, &mut values, &mut mask).unwrap();

@@ -4,7 +4,7 @@ use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, quality, read_image, read_map};
 use hybank_ibr::partial::{Densify, densify};
 use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedSettings};
-use hybank_ibr::pipeline::{Method, RenderSettings, rectified, uncalibrated};
+use hybank_ibr::pipeline::{Agreement, Method, RenderSettings, rectified, uncalibrated};
 use hybank_ibr::propagate::RectifiedView;
 use hybank_ibr::uncalibrated::Point;
 use std::path::{Path, PathBuf};
@@ -43,11 +43,13 @@ fn pair(folder: &str) -> Option<Pair> {
     })
 }
 
+fn views(pair: &Pair) -> [RectifiedView<'_>; 2] {
+    [0, 1].map(|i| RectifiedView { image: &pair.images[i], disparity: &pair.maps[i], position: i as f64 })
+}
+
 fn psnr(pair: &Pair, settings: &RenderSettings) -> f64 {
-    let view =
-        |i: usize| RectifiedView { image: &pair.images[i], disparity: &pair.maps[i], position: i as f64 };
     let start = std::time::Instant::now();
-    let got = rectified::render(&[view(0), view(1)], 0.5, settings).unwrap();
+    let got = rectified::render(&views(pair), 0.5, settings).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let q = quality::compare(&got.image, pair.truth.as_ref().unwrap(), None).unwrap().unwrap();
     println!("{:.3} dB ssim {:.4} mae {:.3} {:?} {:.1} ms", q.psnr, q.ssim, q.mae, got.report, seconds * 1e3);
@@ -58,9 +60,78 @@ fn psnr(pair: &Pair, settings: &RenderSettings) -> f64 {
 fn cones_full_depth() {
     let Some(pair) = pair("cones") else { return };
     let settings = RenderSettings::default();
-    assert!(psnr(&pair, &settings) >= 28.6);
-    assert!(psnr(&pair, &RenderSettings { offset: 0.25, ..settings }) >= 29.3);
-    assert!(psnr(&pair, &RenderSettings { method: Method::Plane, ..settings }) >= 28.2);
+    assert!(psnr(&pair, &settings) >= 29.1);
+    assert!(psnr(&pair, &RenderSettings { offset: 0.25, ..settings }) >= 30.1);
+    assert!(psnr(&pair, &RenderSettings { method: Method::Plane, ..settings }) >= 28.8);
+}
+
+/// At the place of a photograph that photograph counts most; equal weights gave 33.4 dB.
+#[test]
+fn at_a_photographs_own_place() {
+    for folder in ["cones", "teddy"] {
+        let Some(pair) = pair(folder) else { return };
+        for (place, own) in pair.images.iter().enumerate() {
+            let got = rectified::render(&views(&pair), place as f64, &RenderSettings::default()).unwrap();
+            let psnr = quality::compare(&got.image, own, None).unwrap().unwrap().psnr;
+            println!("{folder} at view {place}: {psnr:.2} dB");
+            assert!(psnr >= 36.5, "{folder} {place}: {psnr}");
+        }
+    }
+}
+
+/// One view brighter by a factor of 1.12: without a match of the exposures this costs 2 dB.
+#[test]
+fn exposures_are_matched() {
+    let Some(mut pair) = pair("cones") else { return };
+    let right = psnr(&pair, &RenderSettings::default());
+    pair.images[1].data_mut().iter_mut().for_each(|v| *v = (*v * 1.12).min(255.0));
+    let matched = psnr(&pair, &RenderSettings::default());
+    let kept = psnr(&pair, &RenderSettings { keep_exposure: true, ..RenderSettings::default() });
+    assert!(matched >= right - 0.5 && matched >= kept + 1.0, "{right} {matched} {kept}");
+}
+
+/// The figures of the check of the inputs on photographs: right, swapped, and with the scale forgotten.
+#[test]
+fn wrong_inputs_show() {
+    for folder in ["cones", "teddy"] {
+        let Some(pair) = pair(folder) else { return };
+        let maps = |factor: f32| {
+            pair.maps.each_ref().map(|m| {
+                let values = m.data().iter().map(|v| factor * v).collect();
+                DepthMap::new(m.size(), values, 1.0, Measure::Disparity).unwrap()
+            })
+        };
+        let share = |positions: [f64; 2], factor: f32| {
+            let maps = maps(factor);
+            let view = |i: usize| RectifiedView {
+                image: &pair.images[i],
+                disparity: &maps[i],
+                position: positions[i],
+            };
+            Agreement::rectified(&[view(0), view(1)]).worst().unwrap().share
+        };
+        let shares = [share([0.0, 1.0], 1.0), share([1.0, 0.0], 1.0), share([0.0, 1.0], 4.0)];
+        println!("{folder}: right, swapped, unscaled {shares:.2?}");
+        assert!(shares[0] > 0.85 && shares[1] < 0.3 && shares[2] < 0.2, "{shares:?}");
+    }
+}
+
+/// Each view from the other one alone. Filling the plane's border holes with the farthest of four neighbours
+/// gave
+/// 22.7 dB where rows gave 25.7.
+#[test]
+fn single_views() {
+    let Some(pair) = pair("teddy") else { return };
+    for (method, least) in [(Method::Rows, [23.1, 26.8]), (Method::Plane, [22.9, 26.3])] {
+        for (place, least) in least.into_iter().enumerate() {
+            let settings = RenderSettings { method, ..RenderSettings::default() };
+            let got =
+                rectified::render(&views(&pair)[1 - place..2 - place], place as f64, &settings).unwrap();
+            let psnr = quality::compare(&got.image, &pair.images[place], None).unwrap().unwrap().psnr;
+            println!("teddy, view {place} from the other, {method:?}: {psnr:.2} dB");
+            assert!(psnr >= least, "{method:?} {place}: {psnr}");
+        }
+    }
 }
 
 #[test]
@@ -79,7 +150,7 @@ fn cones_with_three_percent_of_the_depths() {
     };
     let segmentwise = dense(&Densify::default());
     let bilinear = dense(&Densify::Bilinear);
-    assert!(segmentwise >= 28.1, "{segmentwise}");
+    assert!(segmentwise >= 28.7, "{segmentwise}");
     assert!(segmentwise >= bilinear + 1.8, "{bilinear}");
 }
 

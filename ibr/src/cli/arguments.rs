@@ -1,5 +1,6 @@
 //! Command-line arguments.
 
+use crate::image::Levels;
 use crate::interpolate::{Degree, HoleFill};
 use crate::partial::{Densify, Segmentwise};
 use crate::pipeline::{Method, RenderSettings};
@@ -25,7 +26,7 @@ Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Render the virtual view of a scene.
-    Render(RenderArguments),
+    Render(Box<RenderArguments>),
     /// Render a synthetic scene with exact depth, compare the result with the exact view, and write a
     /// contact sheet.
     Demo(DemoArguments),
@@ -81,6 +82,13 @@ pub(super) struct RenderArguments {
     /// Also write a mask: white for seen pixels, grey for cracks, black for disocclusions.
     #[arg(long, value_name = "FILE")]
     pub(super) mask: Option<PathBuf>,
+    /// Also write the depth of the virtual view (.pfm): disparities for a baseline of one of a rectified
+    /// rig, else depths; NaN in holes.
+    #[arg(long, value_name = "FILE")]
+    pub(super) depth: Option<PathBuf>,
+    /// Bits per value of a PNG, 8 or 16.
+    #[arg(long, value_name = "N", default_value = "8", value_parser = levels)]
+    pub(super) bits: Levels,
     /// Print the results as one JSON object.
     #[arg(long)]
     pub(super) json: bool,
@@ -93,6 +101,9 @@ pub(super) struct RenderArguments {
     /// How samples are interpolated.
     #[arg(long, value_enum, default_value_t = MethodName::Auto)]
     pub(super) method: MethodName,
+    /// Use the brightness of every view as it is, instead of giving all the exposure of the first.
+    #[arg(long)]
+    pub(super) keep_exposure: bool,
     /// How holes are filled.
     #[arg(long, value_enum, default_value_t = FillName::Background)]
     pub(super) fill: FillName,
@@ -163,6 +174,14 @@ fn size(text: &str) -> Result<(usize, usize), String> {
     Ok((side(w)?, side(h)?))
 }
 
+fn levels(text: &str) -> Result<Levels, String> {
+    match text {
+        "8" => Ok(Levels::Eight),
+        "16" => Ok(Levels::Sixteen),
+        _ => Err("give 8 or 16".into()),
+    }
+}
+
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum MethodName {
     /// rows for rectified rigs, plane for other scenes.
@@ -175,9 +194,9 @@ pub(super) enum MethodName {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum FillName {
-    /// Continue the farther side into the hole.
+    /// Continue the farther side into holes between surfaces; bridge cracks within one.
     Background,
-    /// Let the fitted spline bridge the hole.
+    /// Let the fitted spline bridge all holes.
     Bridge,
     /// Leave holes black.
     Leave,
@@ -204,7 +223,9 @@ pub(super) enum DegreeName {
 impl RenderArguments {
     /// The settings that were typed over the defaults; `offset` is that of the scene.
     pub(super) fn settings(&self, offset: f64) -> RenderSettings {
-        let mut settings = RenderSettings { offset: self.offset.unwrap_or(offset), ..Default::default() };
+        let offset = self.offset.unwrap_or(offset);
+        let mut settings =
+            RenderSettings { offset, keep_exposure: self.keep_exposure, ..RenderSettings::default() };
         settings.method = match self.method {
             MethodName::Auto => Method::Auto,
             MethodName::Rows => Method::Rows,

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::summary::Summary;
 use crate::camera::Camera;
 use crate::depth::DepthMap;
-use crate::image::{Image, quality};
+use crate::image::{Image, Levels, quality};
 use crate::partial::{Densify, densify};
 use crate::pipeline::{RenderSettings, Rendering, rectified};
 use crate::propagate::RectifiedView;
@@ -29,7 +29,7 @@ struct DemoSummary {
 
 pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     output::refuse_existing(&arguments.output, arguments.force)?;
-    output::refuse_format(&arguments.output)?;
+    output::refuse_format(&arguments.output, Levels::Eight)?;
     if output::is_standard(&arguments.output) && arguments.json {
         return Err(Failure::Usage(
             "-o - and --json both write to standard output; write the sheet to a file".into(),
@@ -59,7 +59,8 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         contact::difference(&full.image, &exact, gain),
         contact::difference(&partial.image, &exact, gain),
     ];
-    output::write_images(&[(&contact::sheet(&pictures, 3), &arguments.output)], arguments.force)?;
+    let sheet = output::encoded(&contact::sheet(&pictures, 3), &arguments.output, Levels::Eight)?;
+    output::write(&[sheet], arguments.force)?;
     drop(progress);
     report(&DemoSummary { full_depth: full_summary, partial_depth: partial_summary }, arguments)
 }

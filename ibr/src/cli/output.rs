@@ -1,10 +1,10 @@
 //! Writing results: files that are not overwritten by accident, and standard output.
 
 use super::failure::{self, Failure};
-use crate::image::{Image, begin, encode};
-use hybank::files::commit_all;
+use crate::image::{Image, Levels, begin_bytes, encode_to};
+use hybank::files::{AtomicFile, commit_all};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Whether a path stands for standard output.
 pub(super) fn is_standard(path: &Path) -> bool {
@@ -31,28 +31,56 @@ pub(super) fn name_leftovers(outputs: &[&Path]) {
 }
 
 /// Refuses a file name whose extension is not an image format, before any work is done.
-pub(super) fn refuse_format(path: &Path) -> Result<(), Failure> {
-    if is_standard(path) {
-        return Ok(());
-    }
-    encode(&Image::filled(1, 1, 1, 0.0), path).map(|_| ()).map_err(Failure::input)
+pub(super) fn refuse_format(path: &Path, levels: Levels) -> Result<(), Failure> {
+    encoded(&Image::filled(1, 1, 1, 0.0), path, levels).map(|_| ())
 }
 
-/// Writes images to files, which appear together, or as PNG to standard output.
-pub(super) fn write_images(images: &[(&Image, &Path)], force: bool) -> Result<(), Failure> {
-    let (to_output, to_files): (Vec<_>, Vec<_>) = images.iter().partition(|(_, path)| is_standard(path));
+/// A file to be written, or the PNG for standard output.
+pub(super) struct Encoded<'a> {
+    pub(super) bytes: Vec<u8>,
+    pub(super) path: &'a Path,
+}
+
+/// An image in the format of its path, as PNG for standard output.
+pub(super) fn encoded<'a>(image: &Image, path: &'a Path, levels: Levels) -> Result<Encoded<'a>, Failure> {
+    let format = if is_standard(path) { Path::new("standard output.png") } else { path };
+    Ok(Encoded { bytes: encode_to(image, format, levels).map_err(Failure::input)?, path })
+}
+
+/// Writes files, which appear together, and prints what goes to standard output.
+pub(super) fn write(outputs: &[Encoded<'_>], force: bool) -> Result<(), Failure> {
+    commit(begin(outputs, force)?)
+}
+
+/// Writes files without giving them their names yet, and prints what goes to standard output.
+pub(super) fn begin(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFile>, Failure> {
+    let (to_output, to_files): (Vec<_>, Vec<_>) = outputs.iter().partition(|e| is_standard(e.path));
     #[cfg(unix)]
     hybank::files::remove_unfinished_on_signals();
-    let files = to_files.iter().map(|(image, path)| begin(image, path, force));
+    let files = to_files.iter().map(|e| begin_bytes(&e.bytes, e.path, force));
     let files = files.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
-    to_output.iter().try_for_each(|(image, _)| print_image(image))?;
+    to_output.iter().try_for_each(|e| print_bytes(&e.bytes))?;
+    Ok(files)
+}
+
+/// Gives the files their names, all or none.
+pub(super) fn commit(files: Vec<AtomicFile>) -> Result<(), Failure> {
     commit_all(files).map_err(Failure::input)
 }
 
-fn print_image(image: &Image) -> Result<(), Failure> {
-    let bytes = encode(image, Path::new("standard output.png")).map_err(Failure::input)?;
+/// The name of view `frame` of a path, from 0: its number from 1, of four digits, before the extension.
+pub(super) fn numbered(path: &Path, frame: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = match path.extension() {
+        Some(extension) => format!("{stem}-{:04}.{}", frame + 1, extension.to_string_lossy()),
+        None => format!("{stem}-{:04}", frame + 1),
+    };
+    path.with_file_name(name)
+}
+
+fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
+    out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
 }
 
 /// Prints text to standard output.

@@ -1,12 +1,14 @@
 //! `hybank-ibr render`: a scene file in, an image and its figures out.
 
+mod path;
+
 use super::arguments::RenderArguments;
 use super::failure::{self, Failure};
-use super::output;
+use super::output::{self, Encoded};
 use super::progress::Progress;
 use super::summary::{Figures, Summary};
 use crate::files;
-use crate::image::{Image, quality, read_image_within};
+use crate::image::{Image, Levels, pfm, quality, read_image_within};
 use crate::interpolate::Cover;
 use crate::pipeline::uncalibrated::{UncalibratedRendering, UncalibratedSettings};
 use crate::pipeline::{RenderSettings, Rendering, calibrated, rectified, uncalibrated};
@@ -30,25 +32,73 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let start = Instant::now();
     let scene = read(arguments)?;
     let preparation = start.elapsed().as_secs_f64();
+    if scene.kind.frames() > 1 {
+        drop(progress);
+        return path::run(&scene, preparation, arguments);
+    }
     let truth = truth(arguments)?;
     progress.step("rendering");
-    let start = Instant::now();
-    let done = render(&scene, arguments).map_err(|e| e.in_file(&arguments.scene))?;
-    let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
-    summary.preparation_seconds = preparation;
-    summary.geometry = done.geometry.clone();
+    let (done, mut summary) = timed(&scene, 0, preparation, arguments)?;
     progress.step("comparing");
     if let (Some(truth), Some(path)) = (&truth, &arguments.truth) {
         compare(&mut summary, &done, truth, path)?;
     }
     progress.step("writing");
-    let mask = arguments.mask.as_ref().map(|path| (mask_image(&done.rendering), path));
-    let mut images = vec![(&done.rendering.image, arguments.output.as_path())];
-    images.extend(mask.iter().map(|(mask, path)| (mask, path.as_path())));
-    output::write_images(&images, arguments.force)?;
+    let files = Outputs::of(arguments);
+    output::write(&files.encoded(&done.rendering, arguments.bits)?, arguments.force)?;
     drop(progress);
-    warn(&done);
+    warn(&done, &scene.kind);
     report(&summary, arguments)
+}
+
+/// One virtual view of a scene, and its summary.
+fn timed(
+    scene: &Scene,
+    frame: usize,
+    preparation: f64,
+    arguments: &RenderArguments,
+) -> Result<(Rendered, Summary), Failure> {
+    let start = Instant::now();
+    let done = render(scene, frame, arguments).map_err(|e| e.in_file(&arguments.scene))?;
+    let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
+    summary.preparation_seconds = preparation;
+    summary.geometry = done.geometry.clone();
+    Ok((done, summary))
+}
+
+/// The files of one view.
+struct Outputs {
+    view: PathBuf,
+    mask: Option<PathBuf>,
+    depth: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// Those that were asked for.
+    fn of(arguments: &RenderArguments) -> Self {
+        let RenderArguments { output, mask, depth, .. } = arguments;
+        Self { view: output.clone(), mask: mask.clone(), depth: depth.clone() }
+    }
+
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        let all = [Some(&self.view), self.mask.as_ref(), self.depth.as_ref()];
+        all.into_iter().flatten().map(PathBuf::as_path).filter(|path| !output::is_standard(path))
+    }
+
+    /// The contents of the files.
+    fn encoded(&self, rendering: &Rendering, levels: Levels) -> Result<Vec<Encoded<'_>>, Failure> {
+        let mut outputs = vec![output::encoded(&rendering.image, &self.view, levels)?];
+        if let Some(path) = &self.mask {
+            outputs.push(output::encoded(&mask_image(rendering), path, Levels::Eight)?);
+        }
+        if let Some(path) = &self.depth {
+            let (width, height) = rendering.depth.size();
+            let data = rendering.depth.data().to_vec();
+            let bytes = pfm::encode(&pfm::FloatMap { width, height, channels: 1, data });
+            outputs.push(Encoded { bytes, path });
+        }
+        Ok(outputs)
+    }
 }
 
 /// Checks that need no file.
@@ -62,34 +112,36 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     if arguments.depth_step == 0 {
         return Err(Failure::Usage("--depth-step 0: the step must be at least 1".into()));
     }
-    if arguments.mask.as_deref().is_some_and(output::is_standard) {
-        return Err(Failure::Usage("--mask -: the mask cannot go to standard output; give it a file".into()));
+    for (name, path) in [("mask", &arguments.mask), ("depth", &arguments.depth)] {
+        let Some(path) = path else { continue };
+        if output::is_standard(path) {
+            return Err(Failure::Usage(format!(
+                "--{name} -: the {name} cannot go to standard output; give it a file"
+            )));
+        }
+        if *path == arguments.output {
+            let path = path.display();
+            return Err(Failure::Usage(format!(
+                "-o and --{name} both name {path}; give the {name} a file of its own"
+            )));
+        }
     }
-    if arguments.mask.as_ref() == Some(&arguments.output) {
-        let path = arguments.output.display();
-        return Err(Failure::Usage(format!(
-            "-o and --mask both name {path}; give the mask a file of its own"
-        )));
+    if let Some(path) = arguments.depth.as_ref().filter(|path| path.extension().is_none_or(|e| e != "pfm")) {
+        return Err(Failure::Usage(format!("--depth {}: depth is written as .pfm", path.display())));
     }
     let inputs = [Some(arguments.scene.as_path()), arguments.truth.as_deref()];
-    refuse_overlaps(arguments, &inputs.into_iter().flatten().collect::<Vec<_>>())?;
-    output::name_leftovers(&outputs(arguments));
-    for path in [Some(&arguments.output), arguments.mask.as_ref()].into_iter().flatten() {
-        output::refuse_existing(path, arguments.force)?;
-        output::refuse_format(path)?;
-    }
-    Ok(())
+    refuse_overlaps(&[Outputs::of(arguments)], &inputs.into_iter().flatten().collect::<Vec<_>>())?;
+    let outputs = Outputs::of(arguments);
+    output::name_leftovers(&outputs.files().collect::<Vec<_>>());
+    outputs.files().try_for_each(|path| output::refuse_existing(path, arguments.force))?;
+    output::refuse_format(&arguments.output, arguments.bits)?;
+    arguments.mask.iter().try_for_each(|path| output::refuse_format(path, Levels::Eight))
 }
 
 /// Outputs are different files, and none of them is an input.
-fn refuse_overlaps(arguments: &RenderArguments, inputs: &[&Path]) -> Result<(), Failure> {
-    hybank::files::refuse_overlaps(&outputs(arguments), inputs).map_err(Failure::input)
-}
-
-/// The files that are written.
-fn outputs(arguments: &RenderArguments) -> Vec<&Path> {
-    let outputs = [Some(arguments.output.as_path()), arguments.mask.as_deref()];
-    outputs.into_iter().flatten().filter(|path| !output::is_standard(path)).collect()
+fn refuse_overlaps(outputs: &[Outputs], inputs: &[&Path]) -> Result<(), Failure> {
+    let files: Vec<&Path> = outputs.iter().flat_map(Outputs::files).collect();
+    hybank::files::refuse_overlaps(&files, inputs).map_err(Failure::input)
 }
 
 fn truth(arguments: &RenderArguments) -> Result<Option<Image>, Failure> {
@@ -117,27 +169,33 @@ fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
     };
     let spec = scene::parse(&text, &path).map_err(Failure::input)?;
     let files = spec.files(path.parent().unwrap_or(Path::new("")));
-    refuse_overlaps(arguments, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    let target = spec.target.as_ref().filter(|_| arguments.view.is_none());
+    let outputs = match target.and_then(|t| t.frames) {
+        Some(frames) => path::outputs(arguments, frames.min(scene::MOST_FRAMES)),
+        None => vec![Outputs::of(arguments)],
+    };
+    refuse_overlaps(&outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     scene::load(&spec, &path, &options).map_err(Failure::input)
 }
 
-fn render(scene: &Scene, arguments: &RenderArguments) -> Result<Rendered, Failure> {
+/// The virtual view `frame` of a path; 0 without one.
+fn render(scene: &Scene, frame: usize, arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let settings = arguments.settings(scene.offset);
     let whole = |rendering| Rendered { rendering, hull: None, geometry: None };
     match &scene.kind {
-        Kind::Rectified { views, position } => {
+        Kind::Rectified { views, positions } => {
             let views: Vec<RectifiedView<'_>> = views
                 .iter()
                 .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
                 .collect();
-            rectified::render(&views, *position, &settings).map(whole).map_err(Failure::input)
+            rectified::render(&views, positions[frame], &settings).map(whole).map_err(Failure::input)
         }
-        Kind::Calibrated { views, camera, size } => {
+        Kind::Calibrated { views, cameras, size } => {
             let views: Vec<CalibratedView<'_>> = views
                 .iter()
                 .map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera })
                 .collect();
-            calibrated::render(&views, camera, *size, &settings).map(whole).map_err(Failure::input)
+            calibrated::render(&views, &cameras[frame], *size, &settings).map(whole).map_err(Failure::input)
         }
         Kind::Uncalibrated { .. } => render_uncalibrated(&scene.kind, &settings, arguments),
     }
@@ -200,11 +258,24 @@ fn mask_image(rendering: &Rendering) -> Image {
 }
 
 /// Warnings on stderr about what the figures of merit alone do not show.
-fn warn(done: &Rendered) {
+fn warn(done: &Rendered, kind: &Kind) {
     let warn = |text: String| failure::say(&format!("hybank-ibr: warning: {text}\n"));
     let coverage = done.rendering.coverage();
     if coverage < 0.5 && done.hull.is_none() {
         warn(format!("only {:.1} % of the image is covered by samples", 100.0 * coverage));
+    }
+    for pair in done.rendering.agreement.pairs.iter().filter(|p| p.is_poor()) {
+        let suspects = match kind {
+            Kind::Rectified { .. } => "positions (swapped?), disparity_scale and disparity_offset",
+            _ => "cameras and depth_scale",
+        };
+        warn(format!(
+            "views {} and {} agree in depth and colour at only {:.0} % of {} points; check their {suspects}",
+            pair.views[0] + 1,
+            pair.views[1] + 1,
+            100.0 * pair.share,
+            pair.points
+        ));
     }
     if let Some(c) = done.rendering.report.convergence.filter(|c| !c.reached) {
         warn(format!(

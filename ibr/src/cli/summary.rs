@@ -3,8 +3,8 @@
 use crate::image::quality::Quality;
 use crate::interpolate::HoleCount;
 use crate::interpolate::plane::Convergence;
-use crate::pipeline::Rendering;
 use crate::pipeline::uncalibrated::GeometryReport;
+use crate::pipeline::{Agreement, Rendering};
 use crate::sample::Dropped;
 use serde::Serialize;
 
@@ -33,6 +33,8 @@ pub(super) struct Summary {
     /// The same figures over the whole image, if that is another region.
     pub(super) whole_image: Option<Figures>,
     pub(super) convergence: Option<Convergence>,
+    /// How well the views agree in depth and colour, from the inputs alone.
+    pub(super) agreement: Agreement,
     pub(super) geometry: Option<GeometryReport>,
 }
 
@@ -76,6 +78,7 @@ impl Summary {
             compared_share: None,
             whole_image: None,
             convergence: r.convergence,
+            agreement: rendering.agreement.clone(),
             geometry: None,
         }
     }
@@ -110,6 +113,14 @@ impl Summary {
             lines.push(format!(
                 "depth     {} unknown values filled from the farther neighbour",
                 self.filled_depths
+            ));
+        }
+        if let Some(worst) = self.agreement.worst() {
+            let exposures = self.agreement.gains.iter().any(|g| *g != 1.0);
+            lines.push(format!(
+                "inputs    views agree in depth and colour at {:.0} % of the points{}",
+                100.0 * worst.share,
+                if exposures { "; exposures differ and are matched" } else { "" }
             ));
         }
         if let Some(g) = &self.geometry {

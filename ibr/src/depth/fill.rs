@@ -7,12 +7,14 @@ use super::{DepthMap, Measure};
 /// Gives every unknown pixel the farther of the nearest known values to its left and right.
 ///
 /// A row without any known value takes those of the nearest row that has one (the upper of two).
-/// Returns the number of pixels filled.
+/// The map remembers which values are guesses; renderings weigh them less. Returns the number of pixels
+/// filled.
 pub fn fill_unknown(map: &mut DepthMap) -> usize {
     let unknown = map.unknown();
     if unknown == 0 {
         return 0;
     }
+    map.guessed = map.data.iter().map(|v| v.is_nan()).collect();
     let (width, measure) = (map.width, map.measure);
     map.data.chunks_exact_mut(width).for_each(|row| fill_row(row, measure));
     fill_empty_rows(map);

@@ -1,8 +1,10 @@
 //! Depth and disparity maps: one value per pixel, NaN where unknown.
 
 mod fill;
+mod relief;
 
 pub use fill::fill_unknown;
+pub use relief::Relief;
 
 /// The quantity that a map holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,10 +54,14 @@ pub enum DepthError {
         /// Height that would fit.
         expected_height: usize,
     },
+    /// The offset of the disparities is not finite.
+    #[error("the disparity offset is {offset}: it must be a finite number of pixels")]
+    Offset {
+        /// The offset.
+        offset: f64,
+    },
     /// All values of the map are unknown.
-    #[error(
-        "none of the {values} values is a positive finite number: without any depth nothing can be rendered"
-    )]
+    #[error("none of the {values} values is a usable number: without any depth nothing can be rendered")]
     AllUnknown {
         /// Values in the map.
         values: usize,
@@ -65,18 +71,23 @@ pub enum DepthError {
     Step,
 }
 
-/// A map of depths or disparities with NaN for unknown; known values are positive and finite.
-#[derive(Debug, Clone, PartialEq)]
+/// A map of depths or disparities with NaN for unknown. Known depths are positive and finite; known
+/// disparities are finite, and negative behind the point at which converged cameras look.
+#[derive(Debug, Clone)]
 pub struct DepthMap {
     width: usize,
     height: usize,
     measure: Measure,
     data: Vec<f32>,
+    /// Added to a disparity, it gives a positive number in inverse proportion to depth; 0 for depths.
+    offset: f64,
+    /// Which values were filled from their neighbours; empty if none was.
+    guessed: Vec<bool>,
 }
 
 impl DepthMap {
-    /// A map from stored numbers: value / scale, with 0, negative and subnormal numbers, NaN and infinities
-    /// unknown.
+    /// A map from stored numbers: value / scale. 0 and subnormal numbers, NaN and infinities are unknown;
+    /// so are negative depths, and negative disparities if all of them are one number, which then is a mark.
     ///
     /// # Errors
     /// [`DepthError::Scale`], [`DepthError::Size`] when the numbers do not fill the map, and
@@ -104,11 +115,43 @@ impl DepthMap {
                 expected_height,
             });
         }
-        let data: Vec<f32> = stored.into_iter().map(|v| known(v, scale)).collect();
+        let negatives = measure == Measure::Disparity && has_negatives(&stored);
+        let data: Vec<f32> = stored.into_iter().map(|v| known(v, scale, negatives)).collect();
         if data.iter().all(|v| v.is_nan()) {
             return Err(DepthError::AllUnknown { values: data.len() });
         }
-        Ok(Self { width, height, measure, data })
+        Ok(Self::from_known((width, height), data, measure))
+    }
+
+    /// The map with the offset of its disparities: depth = focal length * baseline / (disparity + offset),
+    /// as with principal points that differ by `offset` pixels (Middlebury's `doffs`). Points whose sum is
+    /// not positive become unknown.
+    ///
+    /// # Errors
+    /// [`DepthError::Offset`] and [`DepthError::AllUnknown`].
+    pub fn with_offset(mut self, offset: f64) -> Result<Self, DepthError> {
+        if !offset.is_finite() {
+            return Err(DepthError::Offset { offset });
+        }
+        self.offset = offset;
+        let behind = |v: f32| f64::from(v) + offset < f64::from(f32::MIN_POSITIVE);
+        self.data.iter_mut().filter(|v| behind(**v)).for_each(|v| *v = f32::NAN);
+        if self.unknown() == self.data.len() {
+            return Err(DepthError::AllUnknown { values: self.data.len() });
+        }
+        Ok(self)
+    }
+
+    /// Added to a disparity, a positive number in inverse proportion to depth: the offset given, else 0, or
+    /// a guess if some disparities are negative. 0 for depths.
+    pub fn offset(&self) -> f64 {
+        self.offset
+    }
+
+    /// Whether a value was filled from its neighbours.
+    #[inline]
+    pub fn is_guessed(&self, pixel: usize) -> bool {
+        self.guessed.get(pixel).copied().unwrap_or(false)
     }
 
     /// Width in values.
@@ -156,8 +199,11 @@ impl DepthMap {
         }
         let rows = (0..self.height).step_by(step);
         let data: Vec<f32> = rows.flat_map(|y| self.row(y).iter().copied().step_by(step)).collect();
+        if data.iter().all(|v| v.is_nan()) {
+            return Err(DepthError::AllUnknown { values: data.len() });
+        }
         let size = (self.width.div_ceil(step), self.height.div_ceil(step));
-        Self::new(size, data, 1.0, self.measure)
+        Ok(Self { offset: self.offset, ..Self::from_known(size, data, self.measure) })
     }
 
     /// Refuses a map whose size does not fit an image of `size` with one value every `step` pixels.
@@ -178,14 +224,46 @@ impl DepthMap {
 
     pub(crate) fn from_known((width, height): (usize, usize), data: Vec<f32>, measure: Measure) -> Self {
         debug_assert_eq!(data.len(), width * height);
-        Self { width, height, measure, data }
+        let offset = if measure == Measure::Disparity { guessed_offset(&data) } else { 0.0 };
+        Self { width, height, measure, data, offset, guessed: Vec::new() }
+    }
+
+    /// A map of the same measure and offset with other values, NaN where unknown.
+    pub(crate) fn with_values(&self, (width, height): (usize, usize), data: Vec<f32>) -> Self {
+        debug_assert_eq!(data.len(), width * height);
+        Self { width, height, measure: self.measure, data, offset: self.offset, guessed: Vec::new() }
     }
 }
 
-fn known(stored: f32, scale: f64) -> f32 {
+/// Equal in every bit; unknown values equal each other.
+impl PartialEq for DepthMap {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |map: &Self| (map.width, map.height, map.measure, map.offset.to_bits());
+        let values = |map: &Self| map.data.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        bits(self) == bits(other) && values(self) == values(other) && self.guessed == other.guessed
+    }
+}
+
+fn known(stored: f32, scale: f64, negatives: bool) -> f32 {
     let value = (f64::from(stored) / scale) as f32;
     // A subnormal number is as good as 0: its reciprocal, the depth key of a disparity, overflows.
-    if value.is_normal() && value > 0.0 { value } else { f32::NAN }
+    if value.is_normal() && (value > 0.0 || negatives) { value } else { f32::NAN }
+}
+
+/// Whether negative numbers are values. A single negative number, as often as it may occur, is a mark for
+/// unknown values, as some stereo programs write it.
+fn has_negatives(stored: &[f32]) -> bool {
+    let mut negatives = stored.iter().copied().filter(|v| v.is_finite() && *v < 0.0);
+    let first = negatives.next();
+    negatives.any(|v| Some(v) != first)
+}
+
+/// 0 if all disparities are positive; else what lifts the least to a quarter of their range, and to one
+/// pixel at least: depths in the order of the disparities, in a ratio that real scenes have.
+fn guessed_offset(data: &[f32]) -> f64 {
+    let known = data.iter().copied().filter(|v| !v.is_nan());
+    let (low, high) = known.fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
+    if low > 0.0 { 0.0 } else { f64::from((high - low) / 4.0).max(1.0) - f64::from(low) }
 }
 
 #[cfg(test)]
@@ -197,6 +275,27 @@ mod tests {
         let stored = vec![8.0, 0.0, f32::NAN, f32::INFINITY, -4.0, 1.0, 1e-42, -0.0];
         let map = DepthMap::new((4, 2), stored, 4.0, Measure::Disparity).unwrap();
         assert_eq!((map.data()[0], map.data()[5], map.unknown()), (2.0, 0.25, 6));
+        assert_eq!(map.offset(), 0.0);
+    }
+
+    #[test]
+    fn negative_disparities_are_values_and_negative_depths_are_not() {
+        let stored = vec![8.0, -4.0, -2.0, 0.0];
+        let map = DepthMap::new((4, 1), stored.clone(), 2.0, Measure::Disparity).unwrap();
+        assert_eq!((map.data()[1], map.unknown()), (-2.0, 1));
+        assert!((map.offset() - 3.5).abs() < 1e-9 && map.decimated(1).unwrap().offset() == map.offset());
+        assert_eq!(DepthMap::new((4, 1), stored, 2.0, Measure::Depth).unwrap().unknown(), 3);
+        let marked = vec![8.0, -1.0, -1.0, 3.0];
+        assert_eq!(DepthMap::new((4, 1), marked, 1.0, Measure::Disparity).unwrap().unknown(), 2);
+    }
+
+    #[test]
+    fn offsets_are_checked_and_decide_what_lies_in_front() {
+        let map = || DepthMap::new((3, 1), vec![5.0, -3.0, -8.0], 1.0, Measure::Disparity).unwrap();
+        let placed = map().with_offset(6.0).unwrap();
+        assert_eq!((placed.offset(), placed.unknown()), (6.0, 1));
+        assert!(matches!(map().with_offset(f64::NAN), Err(DepthError::Offset { .. })));
+        assert!(matches!(map().with_offset(-5.0), Err(DepthError::AllUnknown { .. })));
     }
 
     #[test]

@@ -1,12 +1,15 @@
 //! Holes: pixels of the virtual image without a visible sample nearby.
 
+use crate::occlusion::LARGEST_SPACING;
+
 /// Hole filling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HoleFill {
-    /// Continue the farther side into the hole, since a moving camera uncovers background.
+    /// Across a depth jump continue the farther side, since a moving camera uncovers background; at the
+    /// border of the image continue the nearest pixel; bridge cracks within one surface.
     #[default]
     Background,
-    /// Let the fit interpolate between the sides.
+    /// Let the fit interpolate between the sides of every hole.
     Bridge,
     /// Leave holes black.
     Leave,
@@ -15,11 +18,20 @@ pub enum HoleFill {
 /// Definition and filling of holes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoleSettings {
-    /// Neighbouring samples farther apart than this, in pixels, have a hole between them. A pixel belongs to
-    /// a hole if no sample lies within half of this distance.
+    /// Neighbouring samples farther apart than this, in units of their spacing on the surface (at least one
+    /// pixel), have a hole between them. A pixel belongs to a hole if no sample lies within half of this
+    /// distance.
     pub gap: f64,
     /// Hole filling.
     pub fill: HoleFill,
+}
+
+impl HoleSettings {
+    /// Distance up to which a sample of this spacing covers pixels.
+    #[inline]
+    pub(crate) fn reach(&self, spacing: f32) -> f64 {
+        self.gap / 2.0 * f64::from(spacing.clamp(1.0, LARGEST_SPACING))
+    }
 }
 
 impl Default for HoleSettings {
@@ -39,6 +51,28 @@ pub enum Cover {
     /// Disocclusion: no view saw this region. The depth differs across the hole, or the hole touches the
     /// border.
     Disocclusion,
+}
+
+/// Rows on each side over which disocclusions are averaged.
+const ROWS: usize = 4;
+
+/// Replaces every disoccluded pixel by the mean over the disoccluded pixels near it in its column. Each row
+/// fills its holes for itself, and without this the fillings form a comb of teeth one row high.
+pub(crate) fn join_rows<const C: usize>(mask: &[Cover], width: usize, values: &mut [f32]) {
+    let before: Vec<[f32; C]> = values.as_chunks::<C>().0.to_vec();
+    for (p, out) in values.as_chunks_mut::<C>().0.iter_mut().enumerate() {
+        if mask[p] != Cover::Disocclusion {
+            continue;
+        }
+        let rows = (p / width).saturating_sub(ROWS)..p / width + ROWS + 1;
+        let column = rows.map(|y| y * width + p % width);
+        let (mut sum, mut count) = ([0.0; C], 0.0);
+        for q in column.filter(|q| mask.get(*q) == Some(&Cover::Disocclusion)) {
+            sum.iter_mut().zip(before[q]).for_each(|(s, v)| *s += v);
+            count += 1.0;
+        }
+        *out = sum.map(|s| s / count);
+    }
 }
 
 /// Pixels in holes, by kind.

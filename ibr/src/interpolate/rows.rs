@@ -1,10 +1,12 @@
 //! The row fit: one regularised B-spline a row (thesis eq. 2.4 and 2.5).
 //!
 //! ```text
-//! J(x) = sum_m c_m beta(x - m),   f(c) = sum_s (I_s - J(x_s))^2 + lambda V_s J'(x_s)^2 + tau sum_m (c_m - c_{m-1})^2
+//! J(x) = sum_m c_m beta(x - m)
+//! f(c) = sum_s w_s ((I_s - J(x_s))^2 + lambda V_s J'(x_s)^2) + tau sum_m (c_m - c_{m-1})^2
 //! ```
 
 use super::{Cover, HoleFill, InterpolationError, Settings, Variation};
+use crate::propagate::DOUBTFUL_WEIGHT;
 use crate::sample::Sample;
 use hybank::sampling::{Fit, FitSample};
 
@@ -48,18 +50,23 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Ok(false) };
         self.fit.clear();
         self.weigh(samples, settings);
-        self.fit.add_all(samples.iter().zip(&self.smoothing).map(|(s, v)| FitSample {
+        self.fit.add_all(samples.iter().zip(&self.smoothing).enumerate().map(|(i, (s, v))| FitSample {
             x: s.x,
             values: s.value.map(f64::from),
-            weight: 1.0,
+            weight: weight(samples, i, settings),
             slope_weight: settings.fit.lambda * v,
         }));
         mark(samples, settings, mask);
         if settings.holes.fill == HoleFill::Background {
             self.continue_background(samples, settings);
             let edge = self.width as f64 - 1.0;
-            self.replicate(first, -1.0, first.x, settings);
-            self.replicate(last, last.x, edge + 1.0, settings);
+            self.replicate(clean(samples.iter(), settings).unwrap_or(first), -1.0, first.x, settings);
+            self.replicate(
+                clean(samples.iter().rev(), settings).unwrap_or(last),
+                last.x,
+                edge + 1.0,
+                settings,
+            );
         }
         self.fit.regularise(settings.fit.tau, RIDGE);
         self.fit.solve()?;
@@ -107,12 +114,18 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         }));
     }
 
-    /// Fills the gaps between neighbours with copies of the farther one, about a pixel apart.
+    /// Fills the gaps between two surfaces with copies of the farther one, about a pixel apart. Gaps within
+    /// one surface are left to the fit, which bridges them.
     fn continue_background(&mut self, samples: &[Sample<C>], settings: &Settings) {
-        for pair in samples.windows(2) {
-            if pair[1].x - pair[0].x > settings.holes.gap {
-                let farther = if pair[1].depth > pair[0].depth { &pair[1] } else { &pair[0] };
-                self.replicate(farther, pair[0].x, pair[1].x, settings);
+        for i in 1..samples.len() {
+            let (left, right) = (&samples[i - 1], &samples[i]);
+            if right.x - left.x > settings.holes.gap && !one_surface(left, right, settings) {
+                let farther = if right.depth > left.depth {
+                    clean(samples[i..].iter(), settings).unwrap_or(right)
+                } else {
+                    clean(samples[..i].iter().rev(), settings).unwrap_or(left)
+                };
+                self.replicate(farther, left.x, right.x, settings);
             }
         }
     }
@@ -128,15 +141,51 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
     }
 }
 
-/// Marks the pixels near a sample as seen and those in gaps of one depth as cracks.
+/// Whether two samples lie on one surface.
+fn one_surface<const C: usize>(a: &Sample<C>, b: &Sample<C>, settings: &Settings) -> bool {
+    let (near, far) = (a.depth.min(b.depth), a.depth.max(b.depth));
+    !settings.depth_test.hides(f64::from(near), f64::from(far))
+}
+
+/// Distance in pixels within which a sure sample of its surface makes up for a doubtful one. With 3 instead of
+/// 16 the slivers of background beside a foreground count in full, and Cones loses 0.05 dB.
+const DECIDING: f64 = 16.0;
+
+/// Weight of a sample in the fit. A doubtful one counts little only where its surface has sure ones: alone,
+/// it would yield to tau and take the colour of whatever lies beside it.
+fn weight<const C: usize>(samples: &[Sample<C>], i: usize, settings: &Settings) -> f64 {
+    let s = &samples[i];
+    let decides = |other: &Sample<C>| !other.doubtful && one_surface(s, other, settings);
+    let near = |other: &&Sample<C>| (other.x - s.x).abs() <= DECIDING;
+    let before = || samples[..i].iter().rev().take_while(near).any(decides);
+    let after = || samples[i + 1..].iter().take_while(near).any(decides);
+    let alone = s.doubtful && !before() && !after();
+    f64::from(if alone { s.weight / DOUBTFUL_WEIGHT } else { s.weight })
+}
+
+/// Samples at the edge of a hole that may be passed over for one further in.
+const EDGE: usize = 6;
+
+/// The first of the samples, or the next on its surface whose colour is not in doubt: the outermost pixel of
+/// a surface beside a nearer one shows a mixture of both.
+fn clean<'a, const C: usize>(
+    samples: impl Iterator<Item = &'a Sample<C>> + Clone,
+    settings: &Settings,
+) -> Option<&'a Sample<C>> {
+    let edge = samples.clone().next()?;
+    samples.take(EDGE).find(|s| !s.doubtful && one_surface(s, edge, settings))
+}
+
+/// Marks the pixels near a sample and those between neighbours on one surface as seen, and those in wider
+/// gaps of one depth as cracks.
 fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [Cover]) {
-    let half = settings.holes.gap / 2.0;
+    let reach = |s: &Sample<C>| settings.holes.reach(s.spacing);
     for pair in samples.windows(2) {
-        let (near, far) = (pair[0].depth.min(pair[1].depth), pair[0].depth.max(pair[1].depth));
         let gap = pair[1].x - pair[0].x;
-        let one_surface = !settings.depth_test.hides(f64::from(near), f64::from(far));
-        if gap > settings.holes.gap && one_surface {
-            pixels(pair[0].x, pair[1].x, mask.len()).for_each(|j| mask[j] = Cover::Crack);
+        if gap > settings.holes.gap && one_surface(&pair[0], &pair[1], settings) {
+            let near = gap <= 2.0 * reach(&pair[0]).max(reach(&pair[1]));
+            let cover = if near { Cover::Seen } else { Cover::Crack };
+            pixels(pair[0].x, pair[1].x, mask.len()).for_each(|j| mask[j] = cover);
         }
     }
     let mut next = 0;
@@ -145,10 +194,26 @@ fn mark<const C: usize>(samples: &[Sample<C>], settings: &Settings, mask: &mut [
         while next < samples.len() && samples[next].x < x {
             next += 1;
         }
-        let right = samples.get(next).is_some_and(|s| s.x - x <= half);
-        if right || (next > 0 && x - samples[next - 1].x <= half) {
+        let right = samples.get(next).is_some_and(|s| s.x - x <= reach(s));
+        if right || (next > 0 && x - samples[next - 1].x <= reach(&samples[next - 1])) {
             *cover = Cover::Seen;
         }
+    }
+}
+
+/// Depth of the sample nearest to each pixel of a row, NaN where none reaches it. The samples are sorted by
+/// column.
+pub fn nearest_depths<const C: usize>(samples: &[Sample<C>], settings: &Settings, depths: &mut [f32]) {
+    let mut next = 0;
+    for (j, depth) in depths.iter_mut().enumerate() {
+        let x = j as f64;
+        while next < samples.len() && samples[next].x < x {
+            next += 1;
+        }
+        let sides = [next.checked_sub(1), Some(next)].into_iter().flatten().filter_map(|i| samples.get(i));
+        let within = sides.filter(|s| (s.x - x).abs() <= settings.holes.reach(s.spacing));
+        let nearest = within.min_by(|a, b| (a.x - x).abs().total_cmp(&(b.x - x).abs()));
+        *depth = nearest.map_or(f32::NAN, |s| s.depth);
     }
 }
 
@@ -227,6 +292,9 @@ fn interpolate_with<const ORDER: usize, const C: usize>(
     if settings.holes.fill != HoleFill::Leave {
         fill_empty_rows(&filled, &mut values);
     }
+    if settings.holes.fill == HoleFill::Background {
+        super::join_rows::<C>(&mask, width, &mut values);
+    }
     Ok((values, mask))
 }
 
@@ -268,6 +336,23 @@ mod tests {
         assert!(values[10..20].iter().all(|v| *v == 0.0) && values[5] > 190.0);
         let (values, _) = run(&samples, 30, &filling(HoleFill::Bridge));
         assert!(values[10..19].windows(2).all(|w| w[0] > w[1]), "{values:?}");
+    }
+
+    /// A doubtful sample that is the only one of its surface counts in full; beside a sure one it yields.
+    #[test]
+    fn doubtful_samples_yield_to_sure_ones_only() {
+        let with = |doubtful: bool, others: &[f64]| {
+            let mut samples: Vec<_> = (0..10).map(|i| sample(f64::from(i), 1.0, 200.0)).collect();
+            let weight = if doubtful { DOUBTFUL_WEIGHT } else { 1.0 };
+            samples.push(Sample { weight, doubtful, ..sample(10.0, 4.0, 120.0) });
+            samples.extend(others.iter().map(|x| sample(*x, 4.0, 40.0)));
+            run(&samples, 20, &Settings::default()).0
+        };
+        let (alone, sure) = (with(true, &[]), with(false, &[]));
+        assert!(alone.iter().zip(&sure).all(|(a, b)| (a - b).abs() < 1e-3), "{alone:?} {sure:?}");
+        let beside = [10.2, 11.0, 12.0];
+        let (yields, equal) = (with(true, &beside)[10], with(false, &beside)[10]);
+        assert!((yields - 40.0).abs() < 0.7 * (equal - 40.0).abs(), "{yields} {equal}");
     }
 
     #[test]

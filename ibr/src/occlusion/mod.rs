@@ -4,13 +4,17 @@
 //! With P the set of propagated samples, x in P is removed if and only if there is a y in P with
 //!
 //! ```text
-//! ||x - y||_2 <= epsilon   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
+//! ||x - y||_2 <= epsilon(y)   and   d(x) - d(y) >= sigma(y),   sigma(y) = relative d(y) + absolute
 //! ```
 //!
+//! with epsilon(y) = epsilon max(1, spacing(y)). The spacing is the distance between neighbouring samples of
+//! one view on the surface of y. A fixed radius is right only where they lie about a pixel apart: where the
+//! view magnifies, the balls of a foreground would no longer cover it, and background would show through.
+//!
 //! Every test is against all of P, not against the samples that are left, so the result does not depend on
-//! any order. sigma grows with d(y). Hence if any sample in the ball hides x, then the nearest one does,
-//! and comparing with the least depth suffices; this also holds in floating point, since both sides are
-//! monotone.
+//! any order. sigma grows with d(y). Hence if any sample of one radius in the ball hides x, then the nearest
+//! one of that radius does, and comparing with the least depth suffices; this also holds in floating point,
+//! since both sides are monotone.
 
 mod grid;
 mod row;
@@ -20,10 +24,15 @@ pub use row::{RowScratch, remove_in_row};
 
 use crate::sample::Sample;
 
+/// Spacing from which on the radius grows no further, in virtual pixels: beyond it a surface is hardly
+/// sampled, and its samples would hide what shows between them.
+pub const LARGEST_SPACING: f32 = 8.0;
+
 /// The condition under which one sample hides another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthTest {
-    /// Radius of the neighbourhood in virtual pixels.
+    /// Radius of the neighbourhood in virtual pixels, where samples lie a pixel apart or closer; elsewhere
+    /// it grows with their spacing.
     pub epsilon: f64,
     /// Share of the nearer depth that the difference must reach; needs positive depths.
     pub relative: f64,
@@ -84,17 +93,27 @@ impl DepthTest {
         far - near >= self.relative * near + self.absolute
     }
 
-    /// Whether two positions are neighbours.
+    /// The radius within which a sample of this spacing hides others: epsilon max(1, spacing).
+    ///
+    /// On a grid of spacing s every point lies within s / sqrt(2) of a sample, so with epsilon = 0.7 a
+    /// surface is opaque at any magnification.
     #[inline]
-    pub fn close(&self, dx: f64, dy: f64) -> bool {
-        dx * dx + dy * dy <= self.epsilon * self.epsilon
+    pub fn radius(&self, spacing: f32) -> f64 {
+        self.epsilon * f64::from(spacing.clamp(1.0, LARGEST_SPACING))
+    }
+
+    /// Whether two positions lie within `radius` of each other.
+    #[inline]
+    pub fn close(dx: f64, dy: f64, radius: f64) -> bool {
+        dx * dx + dy * dy <= radius * radius
     }
 
     /// The definition, sample against sample, O(n^2): the oracle of the fast routines.
     pub fn hidden_by_definition<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<bool> {
         let hidden = |x: &Sample<C>| {
             samples.iter().any(|y| {
-                self.close(x.x - y.x, x.y - y.y) && self.hides(f64::from(y.depth), f64::from(x.depth))
+                Self::close(x.x - y.x, x.y - y.y, self.radius(y.spacing))
+                    && self.hides(f64::from(y.depth), f64::from(x.depth))
             })
         };
         samples.iter().map(hidden).collect()

@@ -86,9 +86,9 @@ impl Grid {
         pixels.map(|p| value(self.square(p % self.width, p / self.width))).collect()
     }
 
-    pub(super) fn into_map(self, values: Vec<f32>) -> DepthMap {
+    pub(super) fn into_map(self, values: Vec<f32>, coarse: &DepthMap) -> DepthMap {
         let data = values.into_iter().map(|v| turn(v, self.measure)).collect();
-        DepthMap::from_known((self.width, self.height), data, self.measure)
+        coarse.with_values((self.width, self.height), data)
     }
 }
 

@@ -79,7 +79,7 @@ pub fn densify(
             segmentwise::interpolate(&grid, &segments, settings)
         }
     };
-    Ok(grid.into_map(values))
+    Ok(grid.into_map(values, sparse))
 }
 
 #[cfg(test)]

@@ -1,16 +1,19 @@
 //! A view from any number of calibrated cameras with depth.
 
-use super::{Method, RenderError, RenderSettings, Rendering, Report, check_counts};
+use super::{Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, check_counts};
 use crate::camera::Camera;
 use crate::image::Image;
 use crate::interpolate::HoleCount;
-use crate::interpolate::InterpolationError;
 use crate::interpolate::plane::PlaneProblem;
-use crate::occlusion;
-use crate::propagate::{self, CalibratedView, Frame};
+use crate::occlusion::{self, DepthTest, LARGEST_SPACING};
+use crate::propagate::{CalibratedView, Frame, Survey};
+use crate::sample::Sample;
 
-/// Most samples held in memory at a time; larger scenes are rendered in bands of rows.
+/// Samples held in memory at a time; larger scenes are rendered in bands of rows.
 const SAMPLES_AT_A_TIME: usize = 1 << 19;
+/// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
+/// are made twice.
+const FEWEST_ROWS: usize = 96;
 
 /// Renders the view of `camera` with `width` x `height` pixels.
 ///
@@ -57,44 +60,51 @@ fn render_with<const C: usize>(
     let pixels: usize = views.iter().map(|v| v.image.width() * v.image.height()).sum();
     let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
     let whole = Frame::whole(width, height, 0.5, settings.offset);
-    let (propagated, dropped) = propagate::survey(views, camera, &whole);
+    let survey = Survey::new(views, camera, &whole);
+    let (propagated, dropped) = (survey.samples, survey.dropped);
     if propagated == 0 {
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
-    let bands = propagated.div_ceil(SAMPLES_AT_A_TIME).min(height);
+    let agreement = Agreement::calibrated(views);
+    let mut balance = Balance::calibrated(views, camera);
+    if !settings.keep_exposure {
+        balance = balance.with_gains(&agreement.gains);
+    }
+    let bands = propagated.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS));
     for band in 0..bands {
         let rows = band * height / bands..(band + 1) * height / bands;
-        add_band(&mut problem, views, camera, &whole, rows, settings)?;
+        let mut samples = visible_in(rows, height, &survey, views, settings.depth_test());
+        balance.apply(&mut samples);
+        problem.add(&samples)?;
     }
     let used = problem.samples();
     let mut report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
     let fit = problem.solve(None)?;
     report.holes = HoleCount::of(&fit.mask);
     report.convergence = Some(fit.convergence);
-    Ok(Rendering { image: Image::from_values((width, height), C, fit.values), mask: fit.mask, report })
+    let image = Image::from_values((width, height), C, fit.values);
+    Ok(Rendering { image, mask: fit.mask, depth: fit.depth, report, agreement })
 }
 
-/// The first two stages for some rows of the virtual image. The band is widened by epsilon on both sides,
-/// so that it contains every sample that can hide one of the band; only visible samples of the band itself
-/// are added.
-fn add_band<const C: usize>(
-    problem: &mut PlaneProblem<C>,
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    whole: &Frame,
+/// The first two stages for some rows of the virtual image. The band is widened by the largest radius of the
+/// depth test on both sides, so that it contains every sample that can hide one of the band; only visible
+/// samples of the band itself are returned.
+fn visible_in<const C: usize>(
     rows: std::ops::Range<usize>,
-    settings: &RenderSettings,
-) -> Result<(), InterpolationError> {
-    let test = settings.depth_test();
-    let last = rows.end == whole.height;
+    height: usize,
+    survey: &Survey,
+    views: &[CalibratedView<'_>],
+    test: &DepthTest,
+) -> Vec<Sample<C>> {
+    let last = rows.end == height;
     let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
     let bottom = if last { f64::MAX } else { rows.end as f64 };
-    // Twice epsilon: the distance test rounds.
-    let frame = whole.band(top - 2.0 * test.epsilon, bottom + 2.0 * test.epsilon);
-    let (mut samples, _) = propagate::calibrated::<C>(views, camera, &frame);
+    // A little more than the radius: the distance test rounds.
+    let reach = 1.01 * test.radius(LARGEST_SPACING);
+    let mut samples = survey.samples_between::<C>(views, top - reach, bottom + reach);
     occlusion::remove(&mut samples, test);
     samples.retain(|s| s.y >= top && (s.y < bottom || last));
-    problem.add(&samples)
+    samples
 }
 
 #[cfg(test)]
@@ -102,6 +112,7 @@ mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
     use crate::interpolate::plane;
+    use crate::propagate;
     use nalgebra::Matrix3x4;
 
     fn camera(x: f64, turn: f64) -> Camera {
@@ -132,12 +143,16 @@ mod tests {
         assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
+        Balance::calibrated(&views, &target).apply(&mut samples);
         let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
+        let survey = Survey::new(&views, &target, &frame);
         let mut problem = PlaneProblem::<1>::new((40, 30), &settings.interpolation).unwrap();
         for rows in [0..7, 7..8, 8..30] {
-            add_band(&mut problem, &views, &target, &frame, rows, &settings).unwrap();
+            let mut band = visible_in(rows, 30, &survey, &views, settings.depth_test());
+            Balance::calibrated(&views, &target).apply(&mut band);
+            problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());
         let banded = problem.solve(None).unwrap();

@@ -1,9 +1,15 @@
 //! Complete renderings: the three stages for each kind of input.
 
+mod agreement;
+mod balance;
 pub mod calibrated;
 pub mod rectified;
 pub mod uncalibrated;
 
+pub use agreement::{Agreement, PairAgreement};
+pub use balance::Balance;
+
+use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::interpolate::plane::Convergence;
 use crate::interpolate::{Cover, HoleCount, InterpolationError, Settings};
@@ -31,6 +37,9 @@ pub struct RenderSettings {
     pub interpolation: Settings,
     /// Added to every column, in pixels: registration of the virtual image.
     pub offset: f64,
+    /// Use the brightness of every view as it is. Otherwise views that are brighter or darker than the first
+    /// one are given its exposure.
+    pub keep_exposure: bool,
 }
 
 impl RenderSettings {
@@ -145,8 +154,13 @@ pub struct Rendering {
     pub image: Image,
     /// Origin of each pixel's value.
     pub mask: Vec<Cover>,
+    /// Depth of each pixel at the virtual camera, NaN in holes: the disparity for a baseline of one of a
+    /// rectified rig, the depth of calibrated cameras, and the signed order of depth without cameras.
+    pub depth: DepthMap,
     /// Counts.
     pub report: Report,
+    /// How well the views agree with each other; empty without depth maps.
+    pub agreement: Agreement,
 }
 
 impl Rendering {

@@ -1,12 +1,13 @@
 //! A view from a rectified rig: the three stages run row by row, rows in parallel.
 
-use super::{Method, RenderError, RenderSettings, Rendering, Report, check_counts};
+use super::{Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, check_counts};
+use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneProblem;
-use crate::interpolate::rows::{RowWork, fill_empty_rows};
-use crate::interpolate::{Cover, Degree, HoleCount, HoleFill, InterpolationError};
+use crate::interpolate::rows::{RowWork, fill_empty_rows, nearest_depths};
+use crate::interpolate::{Cover, Degree, HoleCount, HoleFill, InterpolationError, join_rows};
 use crate::occlusion::{self, RowScratch};
-use crate::propagate::{self, Frame, RectifiedView};
+use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::{Dropped, Sample};
 use rayon::prelude::*;
 
@@ -55,7 +56,8 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
 /// The inputs that all rows share.
 struct Job<'a> {
     views: &'a [RectifiedView<'a>],
-    position: f64,
+    camera: RigCamera,
+    balance: Balance,
     frame: Frame,
     settings: &'a RenderSettings,
 }
@@ -66,33 +68,43 @@ fn render_with<const ORDER: usize, const C: usize>(
     settings: &RenderSettings,
 ) -> Result<Rendering, RenderError> {
     let (width, height) = views[0].image.size();
+    let agreement = Agreement::rectified(views);
+    let mut balance = Balance::rectified(views, position);
+    if !settings.keep_exposure {
+        balance = balance.with_gains(&agreement.gains);
+    }
     let whole = |margin| {
         let frame = Frame::whole(width, height, margin, settings.offset);
-        Job { views, position, frame, settings }
+        let camera = RigCamera::new(views, position);
+        Job { views, camera, balance, frame, settings }
     };
-    match settings.method {
+    let rendering = match settings.method {
         Method::Plane => render_plane::<C>(&whole(0.5)),
         Method::Auto | Method::Rows => render_rows::<ORDER, C>(&whole(RowWork::<ORDER, C>::MARGIN)),
-    }
+    }?;
+    Ok(Rendering { agreement, ..rendering })
 }
 
 fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
     let Frame { width, height, .. } = job.frame;
     let mut values = vec![0.0; width * height * C];
     let mut mask = vec![Cover::Disocclusion; width * height];
+    let mut keys = vec![f32::NAN; width * height];
     let mut counts = vec![RowCount::default(); height];
     // Blocks of rows share work memory; their borders do not affect the result.
     let block = height.div_ceil(4 * rayon::current_num_threads()).max(1);
     let outputs = values
         .par_chunks_mut(block * width * C)
-        .zip(mask.par_chunks_mut(block * width))
+        .zip(mask.par_chunks_mut(block * width).zip(keys.par_chunks_mut(block * width)))
         .zip(counts.par_chunks_mut(block));
-    outputs.enumerate().try_for_each(|(b, ((values, mask), counts))| {
+    outputs.enumerate().try_for_each(|(b, ((values, (mask, keys)), counts))| {
         let (mut strip, mut fit) = (Strip::<C>::new(job), RowWork::<ORDER, C>::new(width));
-        let rows = values.chunks_exact_mut(width * C).zip(mask.chunks_exact_mut(width)).zip(counts);
-        rows.enumerate().try_for_each(|(k, ((values, mask), count))| {
+        let masks = mask.chunks_exact_mut(width).zip(keys.chunks_exact_mut(width));
+        let rows = values.chunks_exact_mut(width * C).zip(masks).zip(counts);
+        rows.enumerate().try_for_each(|(k, ((values, (mask, keys)), count))| {
             let row = b * block + k;
             *count = strip.survivors_of_row(job, row);
+            nearest_depths(&strip.samples, &job.settings.interpolation, keys);
             fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
                 .map(|_| ())
                 .map_err(|source| InterpolationError::Fit { row, source })
@@ -104,8 +116,11 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
         let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
         fill_empty_rows(&filled, &mut values);
     }
+    if job.settings.interpolation.holes.fill == HoleFill::Background {
+        join_rows::<C>(&mask, width, &mut values);
+    }
     let image = Image::from_values((width, height), C, values);
-    Ok(Rendering { image, mask, report })
+    Ok(Rendering { image, mask, depth: job.disparities(keys), report, agreement: Agreement::default() })
 }
 
 /// The same with the plane fit as third stage; the second stage still runs row by row.
@@ -124,7 +139,17 @@ fn render_plane<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError>
     report.holes = HoleCount::of(&fit.mask);
     report.convergence = Some(fit.convergence);
     let image = Image::from_values((width, height), C, fit.values);
-    Ok(Rendering { image, mask: fit.mask, report })
+    let depth = job.disparities(fit.depth.data().to_vec());
+    Ok(Rendering { image, mask: fit.mask, depth, report, agreement: Agreement::default() })
+}
+
+impl Job<'_> {
+    /// Disparities from the depth keys of the pixels.
+    fn disparities(&self, mut keys: Vec<f32>) -> DepthMap {
+        let offset = self.camera.disparity_offset;
+        keys.iter_mut().for_each(|k| *k = (1.0 / f64::from(*k) - offset) as f32);
+        DepthMap::from_known((self.frame.width, self.frame.height), keys, Measure::Disparity)
+    }
 }
 
 /// Counts of the samples of one row.
@@ -174,11 +199,12 @@ impl<const C: usize> Strip<C> {
         for (index, view) in job.views.iter().enumerate() {
             let index = index as u16;
             count.dropped +=
-                propagate::rectified_row(view, index, y, job.position, &job.frame, &mut self.samples);
+                propagate::rectified_row(view, index, y, &job.camera, &job.frame, &mut self.samples);
         }
         count.propagated = self.samples.len();
         occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
         count.used = self.samples.len();
+        job.balance.apply(&mut self.samples);
         count
     }
 }
@@ -186,7 +212,6 @@ impl<const C: usize> Strip<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::depth::{DepthMap, Measure};
     use crate::interpolate::rows;
 
     fn scene(width: usize, height: usize, channels: usize) -> (Image, DepthMap) {
@@ -221,6 +246,7 @@ mod tests {
         let (mut samples, dropped) = propagate::rectified::<3>(&views(&parts), 0.4, &frame);
         let propagated = samples.len();
         let occluded = occlusion::remove(&mut samples, settings.depth_test());
+        Balance::rectified(&views(&parts), 0.4).apply(&mut samples);
         let (values, mask) = rows::interpolate(&samples, (40, 9), &settings.interpolation).unwrap();
         assert_eq!(got.image.data(), values);
         assert_eq!(got.mask, mask);
@@ -257,6 +283,22 @@ mod tests {
             got.image.data().iter().zip(parts[0].0.data()).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");
         assert_eq!(got.coverage(), 1.0);
+        assert!(got.depth.data().iter().all(|d| (d - 4.0).abs() < 1e-5));
+    }
+
+    /// Both methods give the disparity of the nearest visible sample, and none in holes.
+    #[test]
+    fn the_virtual_view_has_disparities() {
+        let parts = [scene(48, 9, 1)];
+        for method in [Method::Rows, Method::Plane] {
+            let got =
+                render(&views(&parts), 0.0, &RenderSettings { method, ..RenderSettings::default() }).unwrap();
+            for (p, d) in got.depth.data().iter().enumerate() {
+                assert_eq!(d.is_nan(), got.mask[p] != Cover::Seen, "{method:?} {p}");
+                let own = parts[0].1.data()[p];
+                assert!(d.is_nan() || own.is_nan() || (d - own).abs() < 1.0, "{method:?} {p}: {d} {own}");
+            }
+        }
     }
 
     #[test]

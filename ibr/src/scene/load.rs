@@ -60,6 +60,9 @@ pub fn load(spec: &SceneSpec, path: &Path, options: &LoadOptions) -> Result<Scen
     Loader { spec, path, folder: path.parent().unwrap_or(Path::new("")), options }.load()
 }
 
+/// Most views on a path.
+pub const MOST_FRAMES: usize = 9999;
+
 struct Loader<'a> {
     spec: &'a SceneSpec,
     path: &'a Path,
@@ -134,6 +137,25 @@ impl Loader<'_> {
         })
     }
 
+    /// Shares of the way at which the views of a path lie; none if there is no path.
+    fn shares(&self, target: &TargetSpec) -> Loaded<Vec<f64>> {
+        match (target.frames, target.has_end()) {
+            (None, false) => Ok(Vec::new()),
+            (Some(frames), true) if (2..=MOST_FRAMES).contains(&frames) => {
+                Ok((0..frames).map(|k| k as f64 / (frames - 1) as f64).collect())
+            }
+            (Some(frames), true) => Err(self.incomplete(format!(
+                "[virtual] frames = {frames}: a path has 2 to {MOST_FRAMES} views"
+            ))),
+            (Some(_), false) => Err(self.incomplete(
+                "[virtual] has `frames` but no end of the path: `to_position`, `to_camera` or `to_colmap_image`",
+            )),
+            (None, true) => {
+                Err(self.incomplete("[virtual] has the end of a path; say with `frames` how many views it has"))
+            }
+        }
+    }
+
     fn file(&self, path: &Path) -> PathBuf {
         self.folder.join(path)
     }
@@ -187,6 +209,10 @@ impl Loader<'_> {
         let (width, height, stored) = read_map_within(&path, self.options.max_pixels)?;
         let depth_error = |source| SceneError::Depth { view: view.label(), path: path.clone(), source };
         let map = DepthMap::new((width, height), stored, scale, measure).map_err(depth_error)?;
+        let map = match view.disparity_offset {
+            Some(offset) => map.with_offset(offset).map_err(depth_error)?,
+            None => map,
+        };
         let given = view.step.unwrap_or(1);
         map.fits(image.size(), given).map_err(depth_error)?;
         let step = if given == 1 { self.options.depth_step } else { given };
@@ -252,13 +278,44 @@ mod tests {
     #[test]
     fn a_rectified_rig_is_read() {
         let read_rig = read(RIG, &LoadOptions::default()).unwrap();
-        let Kind::Rectified { views, position } = read_rig.kind else { panic!("{read_rig:?}") };
-        assert_eq!((views.len(), position, read_rig.filled), (2, 0.5, 2));
+        let Kind::Rectified { views, positions } = read_rig.kind else { panic!("{read_rig:?}") };
+        assert_eq!((views.len(), &positions[..], read_rig.filled), (2, &[0.5][..], 2));
         assert_eq!((views[0].disparity.data()[3], views[1].disparity.data()[3]), (1.0, 4.0));
         let without = LoadOptions { view: Some("right".into()), fill: false, ..LoadOptions::default() };
-        let Kind::Rectified { views, position } = read(RIG, &without).unwrap().kind else { panic!() };
-        assert_eq!((views.len(), position), (1, 1.0));
+        let Kind::Rectified { views, positions } = read(RIG, &without).unwrap().kind else { panic!() };
+        assert_eq!((views.len(), &positions[..]), (1, &[1.0][..]));
         assert!(views[0].disparity.data()[3].is_nan());
+    }
+
+    #[test]
+    fn paths_have_both_ends() {
+        let defaults = LoadOptions::default();
+        let path = RIG.to_string() + "to_position = 1.0\nframes = 3\n";
+        let Kind::Rectified { positions, .. } = read(&path, &defaults).unwrap().kind else { panic!() };
+        assert_eq!(positions, [0.5, 0.75, 1.0]);
+        for (keys, words) in [
+            ("frames = 3", "no end of the path"),
+            ("to_position = 1.0", "how many views"),
+            ("to_position = 1.0\nframes = 1", "2 to 9999"),
+            ("to_position = nan\nframes = 3", "finite"),
+            ("to_colmap_image = \"a\"\nframes = 3", "`to_position`"),
+        ] {
+            let message = read(&(RIG.to_string() + keys), &defaults).unwrap_err();
+            assert!(message.contains(words), "{message}");
+        }
+        let row = |x: f64| format!("[[5.0, 0.0, 1.5, {x:?}], [0.0, 5.0, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0]]");
+        let text = format!(
+            "[[view]]\nimage = \"a.pgm\"\ncamera = {}\ndepth = \"d.pgm\"\n[virtual]\ncamera = {}\nto_camera = {}\nframes = 5\n",
+            row(0.0),
+            row(-5.0),
+            row(-10.0)
+        );
+        let Kind::Calibrated { cameras, .. } = read(&text, &defaults).unwrap().kind else { panic!() };
+        let columns: Vec<f64> = cameras.iter().map(|c| c.centre().x).collect();
+        assert!(
+            columns.iter().zip([1.0, 1.25, 1.5, 1.75, 2.0]).all(|(a, b)| (a - b).abs() < 1e-9),
+            "{columns:?}"
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 mod load;
 mod spec;
 
-pub use load::{LoadOptions, load, parse};
+pub use load::{LoadOptions, MOST_FRAMES, load, parse};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
 use crate::camera::{Camera, CameraError, colmap::ColmapError};
@@ -33,15 +33,15 @@ pub enum Kind {
     Rectified {
         /// The views.
         views: Vec<RectifiedSource>,
-        /// Position of the virtual view.
-        position: f64,
+        /// Positions of the virtual views: one, or those of a path.
+        positions: Vec<f64>,
     },
     /// Any calibrated cameras.
     Calibrated {
         /// The views.
         views: Vec<CalibratedSource>,
-        /// The virtual camera.
-        camera: Camera,
+        /// The virtual cameras: one, or those of a path.
+        cameras: Vec<Camera>,
         /// Width and height of the virtual view.
         size: (usize, usize),
     },
@@ -56,6 +56,17 @@ pub enum Kind {
         /// Width and height of the virtual view.
         size: (usize, usize),
     },
+}
+
+impl Kind {
+    /// Virtual views to render.
+    pub fn frames(&self) -> usize {
+        match self {
+            Self::Rectified { positions, .. } => positions.len(),
+            Self::Calibrated { cameras, .. } => cameras.len(),
+            Self::Uncalibrated { .. } => 1,
+        }
+    }
 }
 
 /// A view of a rectified rig.

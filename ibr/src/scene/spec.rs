@@ -15,7 +15,7 @@ pub struct SceneSpec {
     pub target: Option<TargetSpec>,
     /// File of tracks over the views (uncalibrated scenes).
     pub matches: Option<PathBuf>,
-    /// Folder of a COLMAP text model that holds the cameras of all views.
+    /// Folder of a COLMAP model that holds the cameras of all views.
     pub colmap: Option<PathBuf>,
     /// Whether the world frame of the cameras is left-handed.
     #[serde(default)]
@@ -36,13 +36,16 @@ pub struct ViewSpec {
     pub disparity: Option<PathBuf>,
     /// Stored value / scale = disparity in pixels for a baseline of one.
     pub disparity_scale: Option<f64>,
+    /// Added to every disparity, it gives a number in inverse proportion to depth: the difference of the
+    /// principal points in pixels (Middlebury's `doffs`).
+    pub disparity_offset: Option<f64>,
     /// 3 x 4 camera matrix, in pixels.
     pub camera: Option<[[f64; 4]; 3]>,
     /// Depth map of a general rig.
     pub depth: Option<PathBuf>,
     /// Stored value / scale = depth.
     pub depth_scale: Option<f64>,
-    /// Folder of a COLMAP text model that holds the camera of this view.
+    /// Folder of a COLMAP model that holds the camera of this view.
     pub colmap: Option<PathBuf>,
     /// Pixels from one value of the map to the next, in both directions.
     pub step: Option<usize>,
@@ -60,6 +63,14 @@ pub struct TargetSpec {
     pub camera: Option<[[f64; 4]; 3]>,
     /// Name of the image of the COLMAP model whose camera is used.
     pub colmap_image: Option<String>,
+    /// Position at the end of a path along the baseline.
+    pub to_position: Option<f64>,
+    /// Camera at the end of a path.
+    pub to_camera: Option<[[f64; 4]; 3]>,
+    /// Image of the COLMAP model with the camera at the end of a path.
+    pub to_colmap_image: Option<String>,
+    /// Views on the path, both ends included.
+    pub frames: Option<usize>,
     /// Width and height in pixels.
     pub size: Option<[usize; 2]>,
     /// Column of the tracks, from 1, that holds the points in the virtual view.
@@ -80,9 +91,18 @@ impl SceneSpec {
         let tracks = [Some(&self.matches), self.target.as_ref().map(|target| &target.matches)];
         let tracks = tracks.into_iter().flatten().flatten();
         let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
-        let models = models.flat_map(|model| ["cameras.txt", "images.txt"].map(|file| model.join(file)));
+        let models = models.flat_map(|model| {
+            ["cameras.txt", "images.txt", "cameras.bin", "images.bin"].map(|file| model.join(file))
+        });
         let files = images.chain(maps).chain(tracks).cloned().chain(models);
         files.map(|file| folder.join(file)).collect()
+    }
+}
+
+impl TargetSpec {
+    /// Whether the end of a path is given.
+    pub(super) fn has_end(&self) -> bool {
+        self.to_position.is_some() || self.to_camera.is_some() || self.to_colmap_image.is_some()
     }
 }
 

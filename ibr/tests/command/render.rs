@@ -17,6 +17,153 @@ fn a_rig_is_rendered_and_compared() {
     assert_eq!(read_image(&dir.path().join("out.png")).unwrap().size(), SIZE);
 }
 
+/// Swapped positions and a missing scale render without an error; the warning names what to check.
+#[test]
+fn inputs_that_do_not_fit_are_warned_about() {
+    let dir = rig();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    let run_with = |text: String| {
+        std::fs::write(dir.path().join("wrong.toml"), text).unwrap();
+        run(dir.path(), &["render", "wrong.toml", "-o", "out.png", "--force", "--json"])
+    };
+    let right = run_with(scene.clone());
+    assert!(json(&right)["agreement"]["pairs"][0]["share"].as_f64().unwrap() > 0.8, "{}", json(&right));
+    assert!(right.stderr.is_empty(), "{}", stderr(&right));
+    let swapped =
+        scene.replace("position = 0.0", "position = 9.0").replace("position = 1.0", "position = 0.0");
+    let swapped = run_with(swapped.replace("position = 9.0", "position = 1.0"));
+    assert!(
+        stderr(&swapped).contains("views 1 and 2 agree in depth and colour at only"),
+        "{}",
+        stderr(&swapped)
+    );
+    assert!(stderr(&swapped).contains("positions (swapped?)"), "{}", stderr(&swapped));
+    let scaled = run_with(scene.replace("disparity =", "disparity_scale = 0.25\ndisparity ="));
+    assert!(stderr(&scaled).contains("disparity_scale"), "{}", stderr(&scaled));
+}
+
+/// Cameras that converge by shifted principal points: the right image lies `SHIFT` columns further right,
+/// all disparities are lower by as much, and some are negative. The virtual image moves by half of that.
+#[test]
+fn converged_rigs_have_negative_disparities() {
+    const SHIFT: usize = 6;
+    let dir = rig();
+    let lower = |name: &str, columns: usize| {
+        let path = dir.path().join(format!("{name}.pfm"));
+        let mut map = pfm::decode(&std::fs::read(&path).unwrap()).unwrap();
+        let before = map.data.clone();
+        for (i, v) in map.data.iter_mut().enumerate() {
+            let from = (i % SIZE.0).saturating_sub(columns);
+            *v = before[i - i % SIZE.0 + from] - SHIFT as f32;
+        }
+        assert!(map.data.iter().any(|v| *v < 0.0) && map.data.iter().any(|v| *v > 0.0));
+        std::fs::write(path, pfm::encode(&map)).unwrap();
+    };
+    let shift_image = |name: &str, columns: usize| {
+        let path = dir.path().join(format!("{name}.png"));
+        let image = read_image(&path).unwrap();
+        let pixel = |i: usize| {
+            let from = i - i % SIZE.0 + (i % SIZE.0).saturating_sub(columns);
+            image.data()[3 * from..3 * from + 3].to_vec()
+        };
+        let data = (0..SIZE.0 * SIZE.1).flat_map(pixel).collect();
+        save(&Image::new(SIZE.0, SIZE.1, 3, data).unwrap(), &path).unwrap();
+    };
+    let render = |scene: &str| {
+        json(&run(
+            dir.path(),
+            &["render", scene, "-o", "o.png", "--force", "--json", "--truth", "middle.png"],
+        ))
+    };
+    let plain = render("scene.toml");
+    lower("left", 0);
+    lower("right", SHIFT);
+    shift_image("right", SHIFT);
+    shift_image("middle", SHIFT / 2);
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    let placed = scene.replace("disparity =", &format!("disparity_offset = {SHIFT}.0\ndisparity ="));
+    std::fs::write(dir.path().join("placed.toml"), placed).unwrap();
+    let psnr = |figures: &serde_json::Value| figures["psnr"].as_f64().unwrap();
+    let (with, without) = (render("placed.toml"), render("scene.toml"));
+    // The columns that the shift pushed out of the right image are missing at the border.
+    assert!(psnr(&with) > psnr(&plain) - 4.0, "{plain} {with}");
+    assert!(psnr(&without) > psnr(&with) - 1.0, "{with} {without}");
+    assert_eq!(without["samples"]["dropped"]["unknown"], 0, "{without}");
+}
+
+/// The depth of the virtual view against that of the ray tracer, and an image of 16 bits.
+#[test]
+fn depth_and_sixteen_bits_are_written() {
+    let dir = rig();
+    let arguments = [
+        "render",
+        "scene.toml",
+        "-o",
+        "deep.png",
+        "--bits",
+        "16",
+        "--depth",
+        "d.pfm",
+        "--json",
+        "--truth",
+        "middle.png",
+    ];
+    let figures = json(&run(dir.path(), &arguments));
+    assert!(figures["psnr"].as_f64().unwrap() > 33.0);
+    let read = |name: &str| pfm::decode(&std::fs::read(dir.path().join(name)).unwrap()).unwrap();
+    let (depth, exact) = (read("d.pfm"), read("middle.pfm"));
+    let near = depth.data.iter().zip(&exact.data).filter(|(a, b)| (*a - *b).abs() < 0.25).count();
+    assert!(near as f64 > 0.95 * exact.data.len() as f64, "{near} of {}", exact.data.len());
+    let unknown = depth.data.iter().filter(|d| d.is_nan()).count();
+    assert_eq!(
+        unknown as u64,
+        figures["holes"]["crack"].as_u64().unwrap() + figures["holes"]["disocclusion"].as_u64().unwrap()
+    );
+    let deep = read_image(&dir.path().join("deep.png")).unwrap();
+    assert!(deep.data().iter().any(|v| (v - v.round()).abs() > 0.1), "more than 256 levels");
+    for (name, value, words) in [
+        ("--depth", "d.png", "depth is written as .pfm"),
+        ("--depth", "-", "cannot go to standard output"),
+        ("--bits", "12", "give 8 or 16"),
+    ] {
+        let refused = run(dir.path(), &["render", "scene.toml", "-o", "x.png", name, value]);
+        assert_eq!(code(&refused), 2);
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+    let refused = run(dir.path(), &["render", "scene.toml", "-o", "x.jpg", "--bits", "16"]);
+    assert!(code(&refused) == 1 && stderr(&refused).contains(".png files only"), "{}", stderr(&refused));
+}
+
+/// The views of a path are those that are rendered one by one, in numbered files.
+#[test]
+fn a_path_gives_numbered_views() {
+    let dir = rig();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    std::fs::write(dir.path().join("path.toml"), scene.clone() + "to_position = 1.0\nframes = 3\n").unwrap();
+    let done = run(dir.path(), &["render", "path.toml", "-o", "film.png", "--depth", "d.pfm", "--json"]);
+    assert_eq!(json(&done)["frames"].as_array().unwrap().len(), 3);
+    let bytes = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
+    for (k, position) in [(1, "0.5"), (2, "0.75"), (3, "1.0")] {
+        let one = scene.replace("position = 0.5", &format!("position = {position}"));
+        std::fs::write(dir.path().join("one.toml"), one).unwrap();
+        let done = run(dir.path(), &["render", "one.toml", "-o", "one.png", "--depth", "one.pfm", "--force"]);
+        assert_eq!(code(&done), 0, "{}", stderr(&done));
+        assert!(bytes("one.png") == bytes(&format!("film-000{k}.png")), "view {k}");
+        assert!(bytes("one.pfm") == bytes(&format!("d-000{k}.pfm")), "depth {k}");
+    }
+    let again = run(dir.path(), &["render", "path.toml", "-o", "film.png"]);
+    assert!(code(&again) == 1 && stderr(&again).contains("film-0001.png exists"), "{}", stderr(&again));
+    for arguments in [&["-o", "-"][..], &["-o", "x.png", "--truth", "middle.png"]] {
+        let refused = run(dir.path(), &[&["render", "path.toml"], arguments].concat());
+        assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+    }
+    // A view that would replace an input is refused before anything is rendered.
+    let taken = scene.replace("left.png", "film-0002.png") + "to_position = 1.0\nframes = 3\n";
+    std::fs::write(dir.path().join("taken.toml"), taken).unwrap();
+    let refused = run(dir.path(), &["render", "taken.toml", "-o", "film.png", "--force"]);
+    assert!(code(&refused) == 1 && stderr(&refused).contains("film-0002.png"), "{}", stderr(&refused));
+}
+
 #[test]
 fn files_are_not_overwritten_and_appear_whole() {
     let dir = rig();
@@ -123,7 +270,8 @@ fn general_cameras_are_rendered() {
     assert_eq!(read_image(&dir.path().join("m.png")).unwrap().channels(), 1);
 }
 
-/// Tracks of points on the scene's surfaces over the three turned cameras, without any camera in the scene file.
+/// Tracks of points on the scene's surfaces over the three turned cameras, without any camera in the scene
+/// file.
 #[test]
 fn images_and_tracks_alone_are_enough() {
     let dir = tempfile::tempdir().unwrap();
@@ -215,7 +363,8 @@ fn odd_images_are_fine() {
     }
 }
 
-/// A COLMAP model whose lenses bend: the photograph of the view that is left out is met through its own lens.
+/// A COLMAP model whose lenses bend: the photograph of the view that is left out is met through its own
+/// lens.
 #[test]
 fn colmap_lenses_are_used() {
     let dir = tempfile::tempdir().unwrap();

@@ -48,16 +48,29 @@ fn distance(p: usize, q: u32, width: usize) -> usize {
     (p % width).abs_diff(q % width) + (p / width).abs_diff(q / width)
 }
 
-/// For every unknown pixel the known pixel to continue from: the farthest in depth of its four neighbours,
-/// and of equal depths the closest.
-pub(super) fn farthest(depth: &[f32], width: usize) -> Vec<Option<u32>> {
+/// For every unknown pixel the known pixel to continue from.
+///
+/// If the closest known pixel has no counterpart on the other side, the hole is open to the border of the
+/// image there, and the closest pixel is continued. Otherwise the hole lies between surfaces, and the
+/// closest pixel of the farthest of them is: background that the camera uncovers.
+pub(super) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<Option<u32>> {
     let mut sources = vec![None; depth.len()];
     for_holes(depth, width, |p, around| {
-        let known = around.into_iter().filter(|q| *q != NONE);
-        sources[p] = known.min_by(|a, b| {
-            let deeper = depth[*b as usize].total_cmp(&depth[*a as usize]);
-            deeper.then(distance(p, *a, width).cmp(&distance(p, *b, width)))
-        });
+        let closest = |among: &[u32]| {
+            among.iter().copied().filter(|q| *q != NONE).min_by_key(|q| distance(p, *q, width))
+        };
+        let enclosed = |pair: &&[u32]| pair[0] != NONE && pair[1] != NONE;
+        let Some(nearest) = closest(&around) else { return };
+        let pairs = around.chunks_exact(2);
+        if pairs.clone().any(|pair| pair.contains(&nearest) && !enclosed(&pair)) {
+            sources[p] = Some(nearest);
+            return;
+        }
+        let sides: Vec<u32> = pairs.filter(enclosed).flatten().copied().collect();
+        let of = |q: &u32| f64::from(depth[*q as usize]);
+        let far = sides.iter().map(of).fold(f64::MIN, f64::max);
+        let farthest: Vec<u32> = sides.into_iter().filter(|q| !test.hides(of(q), far)).collect();
+        sources[p] = closest(&farthest);
     });
     sources
 }
@@ -84,17 +97,42 @@ mod tests {
     const U: f32 = f32::NAN;
 
     #[test]
-    fn the_farthest_of_four_is_continued() {
+    fn the_farthest_surface_around_is_continued() {
         let depth = [
             U, 1.0, U, //
             2.0, U, 2.0, //
             U, 5.0, U,
         ];
-        let sources = farthest(&depth, 3);
+        let test = DepthTest::default();
+        let sources = sources(&depth, 3, &test);
         assert_eq!(sources[4], Some(7));
-        assert_eq!(sources[0], Some(3));
+        assert!(sources[0] == Some(1) || sources[0] == Some(3));
         assert_eq!(sources[1], None);
-        assert_eq!(farthest(&[U; 4], 2), [None; 4]);
+        assert_eq!(super::sources(&[U; 4], 2, &test), [None; 4]);
+    }
+
+    /// Of a slanted surface on both sides the closest pixel is continued, not the one that is a little
+    /// deeper.
+    #[test]
+    fn of_one_surface_the_closest_pixel_is_continued() {
+        let test = DepthTest::default();
+        let row = [2.0, U, U, U, 4.0, 4.01, 4.02];
+        assert_eq!(sources(&row, 7, &test)[1..4], [Some(4); 3]);
+        let slanted = [4.0, U, U, U, U, 4.02];
+        assert_eq!(sources(&slanted, 6, &test)[1..5], [Some(0), Some(0), Some(5), Some(5)]);
+    }
+
+    /// A hole that is open to the border continues the closest pixel of its row, whatever lies above.
+    #[test]
+    fn at_the_border_the_closest_pixel_is_continued() {
+        let depth = [
+            9.0, 9.0, 9.0, 9.0, 9.0, //
+            U, U, 2.0, 2.0, 2.0, //
+            U, U, 2.0, 2.0, 2.0, //
+            U, U, 2.0, 2.0, 2.0, //
+        ];
+        let sources = sources(&depth, 5, &DepthTest::default());
+        assert_eq!([sources[11], sources[16]], [Some(12), Some(17)]);
     }
 
     #[test]

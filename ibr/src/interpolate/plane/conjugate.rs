@@ -1,5 +1,7 @@
-//! Conjugate gradients with diagonal preconditioner, one channel after the other.
+//! Conjugate gradients, one channel after the other: with diagonal preconditioner, and with multigrid from
+//! there on where that does not converge soon.
 
+use super::multigrid::Multigrid;
 use super::stencil::Stencil;
 use super::{Convergence, PlaneSettings};
 use rayon::prelude::*;
@@ -7,6 +9,10 @@ use rayon::prelude::*;
 /// Entries per chunk. Partial sums of a dot product follow the chunks, not the threads, so the bits do not
 /// depend on them.
 const CHUNK: usize = 8192;
+
+/// Steps with the diagonal preconditioner. Fits without large holes end earlier; a multigrid step costs four
+/// times as much.
+const DIAGONAL_STEPS: usize = 50;
 
 /// Solves A u = rhs for every channel; returns the values interleaved, in the memory of the right-hand
 /// sides.
@@ -17,8 +23,14 @@ pub(super) fn solve<const C: usize>(
 ) -> (Vec<f32>, Convergence) {
     let mut ended = Convergence { reached: true, ..Convergence::default() };
     let mut work = Work::new(rhs.len());
+    let mut multigrid = None;
     for channel in 0..C {
-        let one = work.solve(stencil, |p| f64::from(rhs[p][channel]), settings);
+        let first = PlaneSettings { iterations: settings.iterations.min(DIAGONAL_STEPS), ..*settings };
+        let mut one = work.solve(stencil, |p| f64::from(rhs[p][channel]), &first);
+        if !one.reached {
+            let multigrid = multigrid.get_or_insert_with(|| Multigrid::new(stencil));
+            one = work.continue_with(stencil, multigrid, |p| f64::from(rhs[p][channel]), settings, one.steps);
+        }
         ended.steps = ended.steps.max(one.steps);
         ended.residual = ended.residual.max(one.residual);
         ended.reached &= one.reached;
@@ -67,6 +79,47 @@ impl Work {
         }
         let residual = (energy / scale).sqrt();
         Convergence { steps, residual, reached: residual <= settings.tolerance }
+    }
+
+    /// Goes on from u with the multigrid preconditioner.
+    fn continue_with(
+        &mut self,
+        a: &Stencil,
+        multigrid: &mut Multigrid,
+        rhs: impl Fn(usize) -> f64,
+        settings: &PlaneSettings,
+        mut steps: usize,
+    ) -> Convergence {
+        let pixels = self.u.len();
+        let scale: f64 =
+            (0..pixels).map(|p| rhs(p) * rhs(p) / a.diagonal(p)).sum::<f64>().max(f64::MIN_POSITIVE);
+        self.multiply_start(a);
+        (0..pixels).for_each(|p| self.residual[p] = rhs(p) - self.image[p]);
+        multigrid.apply(a, &self.residual, &mut self.direction);
+        let mut preconditioned = vec![0.0; pixels];
+        let mut product = self.dot(&self.direction);
+        let mut energy =
+            (0..pixels).map(|p| self.residual[p] * self.residual[p] / a.diagonal(p)).sum::<f64>();
+        while steps < settings.iterations && energy > scale * settings.tolerance * settings.tolerance {
+            let curvature = a.multiply(&self.direction, &mut self.image, partials(&mut self.partial, a));
+            if !(curvature.is_finite() && curvature > 0.0) {
+                break;
+            }
+            energy = self.step(a, product / curvature);
+            multigrid.apply(a, &self.residual, &mut preconditioned);
+            let next = self.dot(&preconditioned);
+            let factor = next / product;
+            self.direction.iter_mut().zip(&preconditioned).for_each(|(d, z)| *d = z + factor * *d);
+            product = next;
+            steps += 1;
+        }
+        let residual = (energy / scale).sqrt();
+        Convergence { steps, residual, reached: residual <= settings.tolerance }
+    }
+
+    /// residual . v
+    fn dot(&self, v: &[f64]) -> f64 {
+        self.residual.iter().zip(v).map(|(r, v)| r * v).sum()
     }
 
     /// image = A u.

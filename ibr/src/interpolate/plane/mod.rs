@@ -5,20 +5,22 @@
 //! neighbouring pixels p and q, minimise
 //!
 //! ```text
-//! sum_s (I_s - sum_p B_sp u_p)^2 + sum_pq g_pq (u_p - u_q)^2 + sum_pqr h_pqr (u_p - 2 u_q + u_r)^2,
+//! sum_s w_s (I_s - sum_p B_sp u_p)^2 + sum_pq g_pq (u_p - u_q)^2 + sum_pqr h_pqr (u_p - 2 u_q + u_r)^2,
 //! g_pq = stiffness / (1 + ((D_p - D_q) / k)^2) + edge_stiffness,   h_pqr = bending / (1 + (range D / k)^2)
 //! ```
 //!
 //! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in
-//! units of the depth test's sigma. The bending term smooths like a cubic spline: it removes noise and
-//! keeps slopes. Each equation has thirteen unknowns; conjugate gradients with diagonal preconditioner
-//! solve them channel by channel.
+//! units of the depth test's sigma. The bending term smooths like a cubic spline: it removes noise and keeps
+//! slopes. Each equation has thirteen unknowns; conjugate gradients solve them channel by channel, with a
+//! multigrid preconditioner where holes are large.
 
 mod background;
 mod conjugate;
+mod multigrid;
 mod stencil;
 
 use super::{Cover, HoleFill, InterpolationError, Settings};
+use crate::depth::{DepthMap, Measure};
 use crate::sample::Sample;
 use stencil::Stencil;
 
@@ -61,9 +63,15 @@ pub struct PlaneFit {
     pub values: Vec<f32>,
     /// Origin of each pixel's value.
     pub mask: Vec<Cover>,
+    /// Depth of the sample nearest to each pixel, NaN in holes.
+    pub depth: DepthMap,
     /// Convergence of the solver.
     pub convergence: Convergence,
 }
+
+/// Least weight of the samples on a pixel that is continued into holes; below it they are doubtful, or lie
+/// beside the pixel.
+const LEAST_SOURCE_WEIGHT: f32 = 0.3;
 
 /// Collects visible samples, all at once or band by band, and then fits the image.
 #[derive(Debug, Clone)]
@@ -112,7 +120,7 @@ impl<const C: usize> PlaneProblem<C> {
             let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
             if inside {
                 self.register(s);
-                self.splat(s.x.clamp(0.0, right), s.y.clamp(0.0, bottom), &s.value);
+                self.splat(s.x.clamp(0.0, right), s.y.clamp(0.0, bottom), s.weight, &s.value);
                 self.added += 1;
             }
         }
@@ -130,18 +138,19 @@ impl<const C: usize> PlaneProblem<C> {
     }
 
     /// Adds a sample to both sides of the normal equations.
-    fn splat(&mut self, x: f64, y: f64, value: &[f32; C]) {
+    fn splat(&mut self, x: f64, y: f64, weight: f32, value: &[f32; C]) {
         let (pixel, weights) = self.stencil.bilinear(x, y);
-        self.stencil.add_sample(pixel, &weights);
+        self.stencil.add_sample(pixel, &weights, weight);
         for (q, w) in self.stencil.corners(pixel, &weights) {
+            let w = weight * w;
             self.rhs[q].iter_mut().zip(value).for_each(|(r, v)| *r += w * v);
         }
     }
 
-    /// Records the depth of the sample at the pixels within half a gap of it, unless another sample is
+    /// Records the depth of the sample at the pixels within its reach, half a gap, unless another sample is
     /// closer.
     fn register(&mut self, s: &Sample<C>) {
-        let half = self.settings.holes.gap / 2.0;
+        let half = self.settings.holes.reach(s.spacing);
         let range = |centre: f64, length: usize| {
             let end = ((centre + half).floor() + 1.0) as usize;
             ((centre - half).ceil() as usize).min(length)..end.min(length)
@@ -171,10 +180,12 @@ impl<const C: usize> PlaneProblem<C> {
         let inside = |p: usize| region.is_none_or(|r| r.get(p).copied().unwrap_or(false));
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         self.distance = Vec::new();
+        let depth = DepthMap::from_known((width, height), self.depth.clone(), Measure::Depth);
         if self.settings.holes.fill == HoleFill::Background {
             self.fill_background(&mask, &inside);
         }
-        self.connect(&inside);
+        let left_out = self.settings.holes.fill == HoleFill::Leave;
+        self.connect(&|p| inside(p) && !(left_out && mask[p] != Cover::Seen));
         self.depth = Vec::new();
         let (mut values, convergence) = conjugate::solve(&self.stencil, self.rhs, &self.settings.plane);
         (0..width * height).filter(|p| !inside(*p)).for_each(|p| {
@@ -185,20 +196,24 @@ impl<const C: usize> PlaneProblem<C> {
             super::rows::blacken(&mask, &mut values, C);
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
-        Ok(PlaneFit { values, mask, convergence })
+        Ok(PlaneFit { values, mask, depth, convergence })
     }
 
-    /// Gives every hole pixel a sample with value and depth of the farthest surface around it.
+    /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
     fn fill_background(&mut self, mask: &[Cover], inside: &dyn Fn(usize) -> bool) {
-        let sources = background::farthest(&self.depth, self.width);
-        for p in (0..mask.len()).filter(|p| mask[*p] != Cover::Seen && inside(*p)) {
+        let sound = |(p, depth): (usize, &f32)| {
+            if self.stencil.sample_weight(p) < LEAST_SOURCE_WEIGHT { f32::NAN } else { *depth }
+        };
+        let sound: Vec<f32> = self.depth.iter().enumerate().map(sound).collect();
+        let sources = background::sources(&sound, self.width, &self.settings.depth_test);
+        for p in (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && inside(*p)) {
             let Some(source) = sources[p].map(|s| s as usize) else { continue };
             self.depth[p] = self.depth[source];
             // The value of a seen pixel before the fit: its share of the right-hand side. A sample on a
             // pixel centre affects that pixel only, so no source changes in this loop.
-            let weight = self.stencil.sample_weight(source).max(f32::MIN_POSITIVE);
+            let weight = self.stencil.sample_weight(source);
             let value = self.rhs[source].map(|r| r / weight);
-            self.splat((p % self.width) as f64, (p / self.width) as f64, &value);
+            self.splat((p % self.width) as f64, (p / self.width) as f64, 1.0, &value);
         }
     }
 

@@ -2,6 +2,7 @@
 //! stored.
 
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// Entries of one pixel: its diagonal and the couplings to the right, down, down-right and down-left, and to
 /// the pixels two to the right and two down.
@@ -55,25 +56,26 @@ impl Stencil {
         corners.into_iter().zip(*weights).filter(|(_, w)| *w != 0.0)
     }
 
-    /// Adds the products of the four weights of a sample.
-    pub(super) fn add_sample(&mut self, pixel: usize, w: &[f32; 4]) {
-        self.entries[pixel].own += w[0] * w[0];
-        self.entries[pixel].right += w[0] * w[1];
-        self.entries[pixel].down += w[0] * w[2];
-        self.entries[pixel].down_right += w[0] * w[3];
+    /// Adds the products of the four bilinear weights of a sample, times its own weight.
+    pub(super) fn add_sample(&mut self, pixel: usize, w: &[f32; 4], weight: f32) {
+        let v = w.map(|w| weight * w);
+        self.entries[pixel].own += v[0] * w[0];
+        self.entries[pixel].right += v[0] * w[1];
+        self.entries[pixel].down += v[0] * w[2];
+        self.entries[pixel].down_right += v[0] * w[3];
         if w[1] != 0.0 || w[3] != 0.0 {
             let e = &mut self.entries[pixel + 1];
-            e.own += w[1] * w[1];
-            e.down_left += w[1] * w[2];
-            e.down += w[1] * w[3];
+            e.own += v[1] * w[1];
+            e.down_left += v[1] * w[2];
+            e.down += v[1] * w[3];
         }
         if w[2] != 0.0 || w[3] != 0.0 {
             let e = &mut self.entries[pixel + self.width];
-            e.own += w[2] * w[2];
-            e.right += w[2] * w[3];
+            e.own += v[2] * w[2];
+            e.right += v[2] * w[3];
         }
         if w[3] != 0.0 {
-            self.entries[pixel + self.width + 1].own += w[3] * w[3];
+            self.entries[pixel + self.width + 1].own += v[3] * w[3];
         }
     }
 
@@ -137,6 +139,55 @@ impl Stencil {
     /// Makes the row of a pixel without samples and edges nonsingular.
     pub(super) fn isolate(&mut self, p: usize) {
         self.entries[p].own += 1e-6;
+    }
+
+    /// The matrix of blocks of 2 x 2 pixels that move together: the sums of the entries between the blocks.
+    pub(super) fn coarsened(&self) -> Self {
+        let mut coarse = Self::new(self.width.div_ceil(2), self.height.div_ceil(2));
+        for (p, e) in self.entries.iter().enumerate() {
+            coarse.entries[self.block(p)].own += e.own;
+            let neighbours = [
+                (1, e.right),
+                (self.width, e.down),
+                (self.width + 1, e.down_right),
+                (self.width.wrapping_sub(1), e.down_left),
+                (2, e.right_two),
+                (2 * self.width, e.down_two),
+            ];
+            for (offset, coupling) in neighbours.into_iter().filter(|n| n.1 != 0.0) {
+                coarse.couple(self.block(p), self.block(p + offset), coupling);
+            }
+        }
+        coarse
+    }
+
+    /// Adds a coupling between two of the nine neighbours, or to the diagonal if they coincide.
+    fn couple(&mut self, a: usize, b: usize, coupling: f32) {
+        let (first, second) = (a.min(b), a.max(b));
+        let e = &mut self.entries[first];
+        let columns = (first % self.width, second % self.width);
+        match (second / self.width - first / self.width, columns.0.cmp(&columns.1)) {
+            (0, Ordering::Equal) => e.own += 2.0 * coupling,
+            (0, _) => e.right += coupling,
+            (_, Ordering::Equal) => e.down += coupling,
+            (_, Ordering::Less) => e.down_right += coupling,
+            (_, Ordering::Greater) => e.down_left += coupling,
+        }
+    }
+
+    /// The block of a pixel in the coarsened matrix.
+    pub(super) fn block(&self, p: usize) -> usize {
+        (p / self.width / 2) * self.width.div_ceil(2) + p % self.width / 2
+    }
+
+    /// Pixels of the image.
+    pub(super) fn pixels(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Columns of the image.
+    pub(super) fn width(&self) -> usize {
+        self.width
     }
 
     /// Rows of the image.

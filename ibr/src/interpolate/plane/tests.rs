@@ -127,3 +127,50 @@ fn bands_add_up_and_empty_problems_fail() {
     let empty = PlaneProblem::<1>::new((4, 3), &Settings::default()).unwrap();
     assert_eq!(empty.solve(None), Err(InterpolationError::NoSamples { width: 4, height: 3 }));
 }
+
+/// A hole of 200 x 200 pixels that only the smoothing spans: the diagonal preconditioner needs hundreds of
+/// steps.
+#[test]
+fn large_holes_converge_and_are_harmonic_inside() {
+    let side = 240;
+    let tone = |x: f64, y: f64| 60.0 + 0.3 * x + 0.2 * y;
+    let inside = |v: usize| (20..220).contains(&v);
+    let samples: Vec<_> = (0..side * side)
+        .filter(|p| !(inside(p % side) && inside(p / side)))
+        .map(|p| ((p % side) as f64, (p / side) as f64))
+        .map(|(x, y)| sample(x, y, 1.0, tone(x, y) as f32))
+        .collect();
+    let holes = HoleSettings { fill: HoleFill::Bridge, ..HoleSettings::default() };
+    let fit = interpolate(&samples, (side, side), &Settings { holes, ..Settings::default() }).unwrap();
+    assert!(fit.convergence.reached && fit.convergence.steps < 120, "{:?}", fit.convergence);
+    // A plane has no second differences, so the smoothing keeps it.
+    let (x, y) = (120, 100);
+    let got = f64::from(fit.values[y * side + x]);
+    assert!((got - tone(x as f64, y as f64)).abs() < 0.5, "{got}");
+}
+
+#[test]
+fn blocks_move_as_one() {
+    let (width, height) = (7, 5);
+    let mut problem = PlaneProblem::<1>::new((width, height), &Settings::default()).unwrap();
+    let scattered: Vec<_> =
+        (0..40).map(|i| (f64::from(i * 37 % 60) / 10.0, f64::from(i * 23 % 40) / 10.0)).collect();
+    problem.add(&scattered.iter().map(|(x, y)| sample(*x, *y, 1.0, 1.0)).collect::<Vec<_>>()).unwrap();
+    problem.connect(&|_| true);
+    let (fine, coarse) = (&problem.stencil, problem.stencil.coarsened());
+    let product = |a: &Stencil, u: &[f64]| {
+        let (mut image, mut partial) = (vec![0.0; u.len()], vec![0.0; a.rows()]);
+        a.multiply(u, &mut image, &mut partial);
+        image
+    };
+    for unit in 0..coarse.pixels() {
+        let block: Vec<f64> =
+            (0..width * height).map(|p| f64::from(u8::from(fine.block(p) == unit))).collect();
+        let mut want = vec![0.0; coarse.pixels()];
+        product(fine, &block).iter().enumerate().for_each(|(p, v)| want[fine.block(p)] += v);
+        let mut one = vec![0.0; coarse.pixels()];
+        one[unit] = 1.0;
+        let got = product(&coarse, &one);
+        assert!(got.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-4), "{unit}: {got:?} {want:?}");
+    }
+}

@@ -7,7 +7,7 @@ use crate::image::Image;
 use crate::interpolate::HoleCount;
 use crate::interpolate::plane::PlaneProblem;
 use crate::occlusion::{self, DepthTest};
-use crate::pipeline::{RenderError, RenderSettings, Rendering, Report};
+use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering, Report};
 use crate::propagate::Frame;
 use crate::sample::{Dropped, Sample};
 use crate::uncalibrated::chirality;
@@ -62,7 +62,8 @@ pub(super) fn render<const C: usize>(
     report.convergence = Some(fit.convergence);
     report.holes = HoleCount::of(&fit.mask);
     let image = Image::from_values(size, C, fit.values);
-    let rendering = Rendering { image, mask: fit.mask, report };
+    let agreement = Agreement::default();
+    let rendering = Rendering { image, mask: fit.mask, depth: fit.depth, report, agreement };
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
 }
 
@@ -122,7 +123,8 @@ fn propagate_chi<const C: usize>(
         } else if frame.holds(u, v) {
             let depth = (sign * chi / p.z) as f32;
             let value = image.pixel::<C>(pixel);
-            samples.push(Sample { x: u, y: v, depth, value, pixel: pixel as u32, view });
+            let blank = Sample::BLANK;
+            samples.push(Sample { x: u, y: v, depth, value, pixel: pixel as u32, view, ..blank });
         } else {
             dropped.outside += 1;
         }

@@ -19,6 +19,7 @@ impl Loader<'_> {
             let others = [
                 ("disparity", view.disparity.is_some()),
                 ("disparity_scale", view.disparity_scale.is_some()),
+                ("disparity_offset", view.disparity_offset.is_some()),
             ];
             self.no_other_kind(view, "calibrated", &others)?;
             let camera = self.camera_of(view)?;
@@ -36,7 +37,35 @@ impl Loader<'_> {
         let size = self.size(target, own.unwrap_or(first))?;
         let filled = sources.iter().map(|s| s.1).sum();
         let views = sources.into_iter().map(|s| s.0).collect();
-        Ok((Kind::Calibrated { views, camera, size }, filled))
+        let cameras = if left_out.is_some() { vec![camera] } else { self.cameras(camera, target)? };
+        Ok((Kind::Calibrated { views, cameras, size }, filled))
+    }
+
+    /// The camera, or those of the path that begins there.
+    fn cameras(&self, from: Camera, target: &TargetSpec) -> Loaded<Vec<Camera>> {
+        let shares = self.shares(target)?;
+        if shares.is_empty() {
+            return Ok(vec![from]);
+        }
+        let end = TargetSpec {
+            camera: target.to_camera,
+            colmap_image: target.to_colmap_image.clone(),
+            ..TargetSpec::default()
+        };
+        if !(end.camera.is_some() || end.colmap_image.is_some()) {
+            return Err(
+                self.incomplete("[virtual] needs `to_camera` or `to_colmap_image` for a path of cameras")
+            );
+        }
+        let (to, _) = self.target_camera(&end)?;
+        let on_the_way = |t: f64| {
+            from.towards(&to, t).map_err(|source| SceneError::Camera {
+                path: self.path.into(),
+                which: "the path of [virtual]".into(),
+                source,
+            })
+        };
+        shares.into_iter().map(on_the_way).collect()
     }
 
     fn matrix(&self, rows: &[[f64; 4]; 3], which: &str) -> Loaded<Camera> {

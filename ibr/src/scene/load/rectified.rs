@@ -16,6 +16,10 @@ impl Loader<'_> {
             self.incomplete("[virtual] needs a `position` on the line of the rectified rig")
         })?;
         let position = self.finite(position, "the virtual view")?;
+        let positions = match left_out {
+            Some(_) => vec![position],
+            None => self.positions(position, target)?,
+        };
         let one = |view: &&ViewSpec| {
             let others = [
                 ("camera", view.camera.is_some()),
@@ -39,6 +43,19 @@ impl Loader<'_> {
             source.image.same_size(&name, first, &first_name)?;
         }
         let filled = sources.iter().map(|s| s.1).sum();
-        Ok((Kind::Rectified { views: sources.into_iter().map(|s| s.0).collect(), position }, filled))
+        Ok((Kind::Rectified { views: sources.into_iter().map(|s| s.0).collect(), positions }, filled))
+    }
+
+    /// The position, or those of the path that begins there.
+    fn positions(&self, from: f64, target: &TargetSpec) -> Loaded<Vec<f64>> {
+        let shares = self.shares(target)?;
+        if shares.is_empty() {
+            return Ok(vec![from]);
+        }
+        let end = target.to_position.ok_or_else(|| {
+            self.incomplete("[virtual] needs `to_position` for a path on the line of the rectified rig")
+        })?;
+        let to = self.finite(end, "the end of the path")?;
+        Ok(shares.into_iter().map(|t| from + (to - from) * t).collect())
     }
 }

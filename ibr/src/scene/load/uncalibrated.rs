@@ -16,6 +16,11 @@ impl Loader<'_> {
         target: &TargetSpec,
     ) -> Loaded<Kind> {
         let file = self.matches_file(views, target)?;
+        if left_out.is_none() && !self.shares(target)?.is_empty() {
+            return Err(
+                self.incomplete("a path needs cameras or positions; a scene of tracks alone has one view")
+            );
+        }
         let tracks = Tracks::read(&self.file(file))?;
         let virtual_column = match left_out {
             Some(view) => Some(self.column_in_order(view)?),
@@ -52,6 +57,7 @@ impl Loader<'_> {
         for view in views {
             let others = [
                 ("disparity", view.disparity.is_some()),
+                ("disparity_offset", view.disparity_offset.is_some()),
                 ("depth", view.depth.is_some()),
                 ("step", view.step.is_some()),
             ];

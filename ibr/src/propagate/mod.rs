@@ -1,10 +1,14 @@
 //! Stage one, propagation: every pixel with depth becomes a sample in the virtual image (thesis 2.3.1).
 
-use crate::camera::{Camera, Relative};
-use crate::depth::DepthMap;
+mod calibrated;
+
+pub use calibrated::{Survey, calibrated};
+
+use crate::camera::Camera;
+use crate::depth::{DepthMap, Relief};
 use crate::image::Image;
+use crate::occlusion::LARGEST_SPACING;
 use crate::sample::{Dropped, Sample};
-use rayon::prelude::*;
 
 /// One view of a rectified rig: the camera centres lie on a line parallel to the image rows.
 #[derive(Debug, Clone, Copy)]
@@ -72,19 +76,67 @@ impl Frame {
     }
 }
 
-/// Appends the samples of row `y` of a rectified view, seen from `position` on the line.
+/// The virtual camera of a rectified rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigCamera {
+    /// Position on the line of the cameras, in units of the baseline.
+    pub position: f64,
+    /// Added to every disparity, it gives a positive number in inverse proportion to depth.
+    pub disparity_offset: f64,
+}
+
+impl RigCamera {
+    /// The camera at `position`, with the largest offset of the views' maps, under which the disparities of
+    /// all views have one order of depth.
+    pub fn new(views: &[RectifiedView<'_>], position: f64) -> Self {
+        let offsets = views.iter().map(|v| v.disparity.offset());
+        Self { position, disparity_offset: offsets.reduce(f64::max).unwrap_or(0.0) }
+    }
+}
+
+/// Weight of a sample whose depth was filled from its neighbours, or whose pixel lies beside a nearer
+/// surface, with whose colour its own may be mixed. Where another view shows the same point, that view
+/// decides.
+pub const DOUBTFUL_WEIGHT: f32 = 0.1;
+
+/// Largest area that a sample stands for, in virtual pixels.
+const LARGEST_AREA: f64 = (LARGEST_SPACING * LARGEST_SPACING) as f64;
+
+/// Weight of a sample that stands for `area` virtual pixels. Where the view magnifies, samples are few and
+/// each counts for its area, so that the smoothing of the fit does not grow with the magnification.
+#[inline]
+fn weight(area: f64, doubtful: bool) -> f32 {
+    let trust = if doubtful { DOUBTFUL_WEIGHT } else { 1.0 };
+    trust * area.clamp(1.0, LARGEST_AREA) as f32
+}
+
+/// Share of the distance to its neighbours that counts as the spacing of a sample on an outline. A surface
+/// ends about half a distance from its outermost samples; balls that reach farther hide what is visible
+/// beside it, and shorter ones leave gaps along slanted outlines. Forward motion and zoom by two of the
+/// ray-traced test scene:
+/// 36.9 and 36.8 dB with 1, 36.3 and 37.8 with 0.85, 35.2 and 38.8 with 0.7.
+const OUTLINE_SHARE: f64 = 0.85;
+
+/// Spacing of a sample, from the distance to its neighbours.
+#[inline]
+fn spacing(distance: f64, relief: &Relief) -> f32 {
+    (if relief.outline { OUTLINE_SHARE * distance } else { distance }) as f32
+}
+
+/// Appends the samples of row `y` of a rectified view, seen by a camera on the line.
 ///
-/// x_v = x + (c - c_v) D, and the depth key is 1 / D. `view` becomes the samples' view index.
+/// x_v = x + (c - c_v) D, and the depth key is 1 / (D + offset). Neighbouring samples lie
+/// |1 + (c - c_v) D'| apart. `index` becomes the samples' view index.
 pub fn rectified_row<const C: usize>(
     view: &RectifiedView<'_>,
     index: u16,
     y: usize,
-    position: f64,
+    camera: &RigCamera,
     frame: &Frame,
     samples: &mut Vec<Sample<C>>,
 ) -> Dropped {
     let mut dropped = Dropped::default();
-    let shift = view.position - position;
+    let shift = view.position - camera.position;
     let width = view.image.width();
     for (column, &disparity) in view.disparity.row(y).iter().enumerate() {
         if disparity.is_nan() {
@@ -97,14 +149,19 @@ pub fn rectified_row<const C: usize>(
             continue;
         }
         let pixel = y * width + column;
-        let value = view.image.pixel::<C>(pixel);
+        let relief = view.disparity.relief(column, y);
+        let stretch = (1.0 + shift * relief.across).abs();
+        let doubtful = relief.behind_edge || view.disparity.is_guessed(pixel);
         samples.push(Sample {
             x,
             y: y as f64,
-            depth: 1.0 / disparity,
-            value,
+            depth: (1.0 / (f64::from(disparity) + camera.disparity_offset)) as f32,
+            value: view.image.pixel::<C>(pixel),
+            spacing: spacing(((stretch * stretch + 1.0) / 2.0).sqrt(), &relief),
+            weight: weight(stretch, doubtful),
             pixel: pixel as u32,
             view: index,
+            doubtful,
         });
     }
     dropped
@@ -116,116 +173,15 @@ pub fn rectified<const C: usize>(
     position: f64,
     frame: &Frame,
 ) -> (Vec<Sample<C>>, Dropped) {
+    let camera = RigCamera::new(views, position);
     let mut samples = Vec::with_capacity(views.len() * frame.width * frame.height);
     let mut dropped = Dropped::default();
     for y in 0..frame.height {
         for (index, view) in views.iter().enumerate() {
-            dropped += rectified_row(view, index as u16, y, position, frame, &mut samples);
+            dropped += rectified_row(view, index as u16, y, &camera, frame, &mut samples);
         }
     }
     (samples, dropped)
-}
-
-/// The outcome for one pixel.
-enum Fate {
-    Sample(f64, f64, f64),
-    Unknown,
-    Behind,
-    Outside,
-}
-
-/// Propagates one pixel of a calibrated view.
-#[inline]
-fn fate(map: &Relative, x: f64, y: f64, depth: f32, frame: &Frame) -> Fate {
-    if depth.is_nan() {
-        return Fate::Unknown;
-    }
-    let (u, v, d) = map.map(x, y, f64::from(depth));
-    let u = u + frame.offset;
-    // NaN: outside the domain of the lens model, or 0 * d of an infinite depth.
-    if d <= 0.0 || u.is_infinite() || v.is_infinite() {
-        Fate::Behind
-    } else if frame.holds_column(u) && frame.holds_row(v) {
-        Fate::Sample(u, v, d)
-    } else {
-        Fate::Outside
-    }
-}
-
-/// The number of samples of [`calibrated`], and the pixels that it drops.
-pub fn survey(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> (usize, Dropped) {
-    let (mut samples, mut dropped) = (0, Dropped::default());
-    for view in views {
-        let map = view.camera.relative_to(camera);
-        let rows = 0..view.image.height();
-        let counts: Vec<_> = rows.into_par_iter().map(|y| count_row(view, &map, y, frame)).collect();
-        counts.iter().for_each(|c| (samples, _) = (samples + c.0, dropped += c.1));
-    }
-    (samples, dropped)
-}
-
-/// All samples of calibrated views, view by view and row by row (eq. 2.2 and 2.3).
-///
-/// Runs in parallel over the rows. A first pass counts; a second pass writes every row at its offset, so
-/// that the list is allocated once and does not depend on the number of threads.
-pub fn calibrated<const C: usize>(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    frame: &Frame,
-) -> (Vec<Sample<C>>, Dropped) {
-    let rows: Vec<(usize, usize)> =
-        views.iter().enumerate().flat_map(|(i, v)| (0..v.image.height()).map(move |y| (i, y))).collect();
-    let maps: Vec<Relative> = views.iter().map(|v| v.camera.relative_to(camera)).collect();
-    let counts: Vec<(usize, Dropped)> =
-        rows.par_iter().map(|&(i, y)| count_row(&views[i], &maps[i], y, frame)).collect();
-    let mut samples = vec![Sample::BLANK; counts.iter().map(|c| c.0).sum()];
-    let mut slices = Vec::with_capacity(rows.len());
-    let mut rest = samples.as_mut_slice();
-    for (count, _) in &counts {
-        let (head, tail) = rest.split_at_mut(*count);
-        slices.push(head);
-        rest = tail;
-    }
-    rows.par_iter().zip(slices).for_each(|(&(i, y), slice)| {
-        write_row(&views[i], i as u16, &maps[i], y, frame, slice);
-    });
-    let mut dropped = Dropped::default();
-    counts.iter().for_each(|c| dropped += c.1);
-    (samples, dropped)
-}
-
-fn count_row(view: &CalibratedView<'_>, map: &Relative, y: usize, frame: &Frame) -> (usize, Dropped) {
-    let (mut count, mut dropped) = (0, Dropped::default());
-    for (x, &depth) in view.depth.row(y).iter().enumerate() {
-        match fate(map, x as f64, y as f64, depth, frame) {
-            Fate::Sample(..) => count += 1,
-            Fate::Unknown => dropped.unknown += 1,
-            Fate::Behind => dropped.behind += 1,
-            Fate::Outside => dropped.outside += 1,
-        }
-    }
-    (count, dropped)
-}
-
-fn write_row<const C: usize>(
-    view: &CalibratedView<'_>,
-    index: u16,
-    map: &Relative,
-    y: usize,
-    frame: &Frame,
-    samples: &mut [Sample<C>],
-) {
-    let first = y * view.image.width();
-    let known = view.depth.row(y).iter().enumerate().filter_map(|(x, &depth)| {
-        match fate(map, x as f64, y as f64, depth, frame) {
-            Fate::Sample(u, v, d) => Some((first + x, u, v, d as f32)),
-            _ => None,
-        }
-    });
-    for (sample, (pixel, x, y, depth)) in samples.iter_mut().zip(known) {
-        *sample =
-            Sample { x, y, depth, value: view.image.pixel::<C>(pixel), pixel: pixel as u32, view: index };
-    }
 }
 
 #[cfg(test)]
@@ -246,7 +202,8 @@ mod tests {
         let frame = Frame::whole(4, 2, 1.0, 0.25);
         let view = RectifiedView { image: &image, disparity: &disparity, position: 0.0 };
         let mut samples: Vec<Sample<1>> = Vec::new();
-        let dropped = rectified_row(&view, 3, 1, 0.5, &frame, &mut samples);
+        let camera = RigCamera::new(&[view], 0.5);
+        let dropped = rectified_row(&view, 3, 1, &camera, &frame, &mut samples);
         assert_eq!(dropped, Dropped { unknown: 1, behind: 0, outside: 1 });
         let positions: Vec<(f64, f32, u32)> = samples.iter().map(|s| (s.x, s.depth, s.pixel)).collect();
         assert_eq!(positions, [(-0.75, 0.5, 4), (1.25, 0.25, 7)]);

@@ -1,0 +1,88 @@
+//! Cameras on the way from one camera to another.
+
+use super::{Camera, CameraError};
+use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3};
+
+/// M = K R with K upper triangular and K_33 = 1, R a rotation, and the centre.
+struct Parts {
+    k: Matrix3<f64>,
+    rotation: UnitQuaternion<f64>,
+    centre: Vector3<f64>,
+}
+
+impl Parts {
+    /// Orthogonalises the rows of M from the last to the first. In a left-handed world K_11 is negative.
+    fn of(camera: &Camera) -> Self {
+        let m = camera.m() / camera.m().row(2).norm();
+        let row = |i: usize| m.row(i).transpose();
+        let r3 = row(2);
+        let k23 = row(1).dot(&r3);
+        let second = row(1) - r3 * k23;
+        let r2 = second.normalize();
+        let r1 = r2.cross(&r3);
+        let k = Matrix3::new(
+            row(0).dot(&r1),
+            row(0).dot(&r2),
+            row(0).dot(&r3),
+            0.0,
+            second.norm(),
+            k23,
+            0.0,
+            0.0,
+            1.0,
+        );
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_rows(&[
+            r1.transpose(),
+            r2.transpose(),
+            r3.transpose(),
+        ]));
+        Self { k, rotation: UnitQuaternion::from_rotation_matrix(&rotation), centre: camera.centre() }
+    }
+}
+
+impl Camera {
+    /// The metric camera at the share t of the way to another one, 0 to 1: centre and calibration change
+    /// linearly, and the rotation about one axis at constant speed. The lens is that of this camera.
+    ///
+    /// # Errors
+    /// [`CameraError::Singular`] half-way between calibrations of opposite sign.
+    pub fn towards(&self, other: &Self, t: f64) -> Result<Self, CameraError> {
+        let (a, b) = (Parts::of(self), Parts::of(other));
+        let k = a.k * (1.0 - t) + b.k * t;
+        // Half a turn has no shortest way; any will do.
+        let rotation = a.rotation.try_slerp(&b.rotation, t, 1e-9).unwrap_or(a.rotation);
+        let m = k * rotation.to_rotation_matrix().matrix();
+        let mut matrix = Matrix3x4::zeros();
+        matrix.fixed_columns_mut::<3>(0).copy_from(&m);
+        matrix.set_column(3, &(-m * (a.centre * (1.0 - t) + b.centre * t)));
+        let mirrored = self.determinant() < 0.0;
+        let camera = Self::metric(matrix, mirrored)?;
+        Ok(self.lens.map_or(camera, |lens| camera.with_lens(lens)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(focal: f64, turn: f64, centre: [f64; 3], mirror: f64) -> Camera {
+        let k = Matrix3::new(focal, 0.3, 50.0, 0.0, 1.1 * focal, 40.0, 0.0, 0.0, 1.0);
+        let r = Rotation3::from_axis_angle(&Vector3::y_axis(), turn).matrix()
+            * Matrix3::from_diagonal(&Vector3::new(mirror, 1.0, 1.0));
+        let mut matrix = Matrix3x4::zeros();
+        matrix.fixed_columns_mut::<3>(0).copy_from(&(k * r));
+        matrix.set_column(3, &(-(k * r) * Vector3::from(centre)));
+        Camera::metric(matrix, mirror < 0.0).unwrap()
+    }
+
+    #[test]
+    fn ends_are_the_cameras_and_the_middle_is_half_way() {
+        for mirror in [1.0, -1.0] {
+            let at = |focal, turn, centre| camera(focal, turn, centre, mirror);
+            let (a, b) = (at(100.0, 0.1, [0.0, 1.0, 2.0]), at(140.0, 0.5, [4.0, 1.0, 0.0]));
+            let close = |x: &Camera, y: &Camera| (x.matrix() - y.matrix()).norm() < 1e-9 * y.matrix().norm();
+            assert!(close(&a.towards(&b, 0.0).unwrap(), &a) && close(&a.towards(&b, 1.0).unwrap(), &b));
+            assert!(close(&a.towards(&b, 0.5).unwrap(), &at(120.0, 0.3, [2.0, 1.0, 1.0])), "{mirror}");
+        }
+    }
+}

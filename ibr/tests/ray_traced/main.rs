@@ -1,0 +1,107 @@
+//! Renderings of a ray-traced scene with exact depth: cameras that move sideways and forward and that zoom.
+
+mod scene;
+
+use hybank_ibr::depth::{DepthMap, Measure};
+use hybank_ibr::image::{Image, quality};
+use hybank_ibr::pipeline::{Method, RenderSettings, Rendering, calibrated, rectified};
+use hybank_ibr::propagate::{CalibratedView, RectifiedView};
+use scene::{Eye, SIZE, eye, shoot};
+
+struct Shot {
+    eye: Eye,
+    image: Image,
+    depth: DepthMap,
+}
+
+fn shots(eyes: &[Eye]) -> Vec<Shot> {
+    let shot = |eye: &Eye| {
+        let (image, depth) = shoot(eye);
+        Shot { eye: *eye, image, depth }
+    };
+    eyes.iter().map(shot).collect()
+}
+
+fn render(shots: &[Shot], target: &Eye) -> Rendering {
+    let views: Vec<CalibratedView<'_>> = shots
+        .iter()
+        .map(|s| CalibratedView { image: &s.image, depth: &s.depth, camera: s.eye.camera() })
+        .collect();
+    calibrated::render(&views, &target.camera(), SIZE, &RenderSettings::default()).unwrap()
+}
+
+fn psnr(shots: &[Shot], target: &Eye, what: &str) -> f64 {
+    let rendering = render(shots, target);
+    let quality = quality::compare(&rendering.image, &shoot(target).0, None).unwrap().unwrap();
+    println!("{what}: {:.2} dB, coverage {:.4} {:?}", quality.psnr, rendering.coverage(), rendering.report);
+    quality.psnr
+}
+
+#[test]
+fn a_stereo_pair_gives_the_view_between() {
+    let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
+    let got = psnr(&pair, &eye(0.0, 0.0, 0.0), "stereo");
+    assert!(got >= 40.8, "{got}");
+}
+
+/// The virtual camera is 1.5 nearer to a scene 9 deep: surfaces are magnified by 1.2 to 1.5.
+#[test]
+fn a_foreground_stays_opaque_when_the_camera_moves_forward() {
+    let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
+    let got = psnr(&pair, &eye(0.0, 0.0, 1.5), "forward");
+    assert!(got >= 31.5, "{got}");
+}
+
+#[test]
+fn a_zoom_by_two_loses_little() {
+    let pair = shots(&[eye(-0.1, 0.0, 0.0), eye(0.1, 0.0, 0.0)]);
+    let target = Eye { zoom: 2.0, ..eye(0.0, 0.0, 0.0) };
+    let got = psnr(&pair, &target, "zoom, two views");
+    assert!(got >= 37.0, "{got}");
+}
+#[test]
+fn a_zoom_by_two_from_one_view() {
+    let pair = shots(&[eye(0.0, 0.0, 0.0)]);
+    let target = Eye { zoom: 2.0, ..eye(0.0, 0.0, 0.0) };
+    let got = psnr(&pair, &target, "zoom, one view");
+    assert!(got >= 37.0, "{got}");
+}
+
+/// Camera positions along a path through two photographs: the error changes smoothly, so a film does not
+/// pulse. A photograph's own place is one of the positions.
+#[test]
+fn a_camera_path_does_not_pulse() {
+    let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
+    let error = |k: i32| {
+        let psnr = psnr(&pair, &eye(-0.25 + 0.05 * f64::from(k), 0.0, 0.0), &format!("path {k}"));
+        255.0 * 10.0_f64.powf(-psnr / 20.0)
+    };
+    let path: Vec<f64> = (0..=10).map(error).collect();
+    let steps: Vec<f64> = path.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    println!("root mean square errors {path:.2?}, steps {steps:.2?}");
+    assert!(path.iter().all(|e| *e < 2.5), "{path:?}");
+    assert!(steps.iter().all(|s| *s < 1.0), "grey levels from frame to frame: {steps:?}");
+}
+
+/// A slanted surface seen at twice its width: every pixel is covered, and between the samples the fit
+/// bridges. Disparity x + 40 from one unit away moves column x to 2 x + 40, and the offset brings it to 2 x.
+#[test]
+fn a_stretched_surface_is_bridged() {
+    let (width, height) = (120, 40);
+    let tone = |x: f64, y: f64| 120.0 + 60.0 * (x / 11.0).sin() + 30.0 * (y / 7.0 + x / 17.0).cos();
+    let picture = |stretch: f64| {
+        let value = |i: usize| tone((i % width) as f64 / stretch, (i / width) as f64) as f32;
+        Image::new(width, height, 1, (0..width * height).map(value).collect()).unwrap()
+    };
+    let disparities = (0..width * height).map(|i| 40.0 + (i % width) as f32).collect();
+    let disparity = DepthMap::new((width, height), disparities, 1.0, Measure::Disparity).unwrap();
+    let image = picture(1.0);
+    let view = RectifiedView { image: &image, disparity: &disparity, position: 1.0 };
+    for (method, least) in [(Method::Rows, 60.0), (Method::Plane, 55.0)] {
+        let settings = RenderSettings { method, offset: -40.0, ..RenderSettings::default() };
+        let got = rectified::render(&[view], 0.0, &settings).unwrap();
+        let psnr = quality::compare(&got.image, &picture(2.0), None).unwrap().unwrap().psnr;
+        println!("stretched by two, {method:?}: {psnr:.2} dB");
+        assert!(psnr >= least && got.coverage() == 1.0, "{method:?} {psnr} {}", got.coverage());
+    }
+}
