@@ -32,10 +32,11 @@ use super::model::Model;
 use super::parameters::{Fit, Kind, Point};
 use super::record::{Record, longest_run};
 use super::remark::Remark;
-use crate::linalg::{Mat, solve};
+use crate::linalg::{CMat, Complex, Mat, solve};
 use likelihood::{Score, band_score, complement, lowest_aliases, noise_power, steering};
 use occupancy::occupied;
 use spectra::{Band, Spectra};
+use std::f64::consts::TAU;
 
 /// Least number of frames in a row.
 const LEAST_FRAMES: usize = 256;
@@ -175,6 +176,34 @@ impl<'a> Blind<'a> {
         let covariance = covariance(&score.information).ok_or(CalibrateError::NotIdentifiable)?;
         let sigma = (0..covariance.nrows()).map(|k| covariance[(k, k)].sqrt()).collect();
         Ok((covariance * &score.gradient, sigma))
+    }
+
+    /// The bands that hold one alias, with the phases of the nominal delays removed.
+    pub(super) fn single_bands(&self) -> Vec<Band> {
+        let nominal = Point::nominal(self.model, Fit::default(), 0);
+        self.bands(&nominal, FIRST_LEAST).into_iter().map(|held| held.band).collect()
+    }
+
+    /// The share of the power that one alias per band leaves unexplained if capture i is channel `order[i]`,
+    /// with the nominal values and whichever alias fits a band best. NaN without bands.
+    pub(super) fn unexplained_in_order(&self, bands: &[Band], order: &[usize]) -> f64 {
+        let m = self.model.ratio as f64;
+        let reach = self.model.ratio as i32;
+        let delay = |i: usize| self.model.delays[i].0;
+        let left = |band: &Band, alias: i32| {
+            let turn = TAU * f64::from(alias);
+            let column = CMat::from_fn(order.len(), 1, |i, _| {
+                let c = order[i];
+                let phase = turn * delay(c) + band.w * (delay(c) - delay(i));
+                let gain = Complex::from_polar(self.model.gains[c], -phase / m);
+                self.model.response(c, (band.w + turn) / m, 0.0) * gain
+            });
+            let explained = (column.adjoint() * &band.matrix * &column)[(0, 0)].re / column.norm_squared();
+            band.count as f64 * (band.matrix.trace().re - explained)
+        };
+        let best = |band: &Band| (-reach..=reach).map(|k| left(band, k)).fold(f64::INFINITY, f64::min);
+        let power = |band: &Band| band.count as f64 * band.matrix.trace().re;
+        bands.iter().map(best).sum::<f64>() / bands.iter().map(power).sum::<f64>()
     }
 
     /// The power that one alias per band leaves unexplained: with the nominal values and whichever alias

@@ -32,7 +32,7 @@ pub(super) struct Spectra {
 }
 
 /// The mean spectral matrix of neighbouring frequencies.
-pub(super) struct Band {
+pub(in crate::calibrate) struct Band {
     /// W at the centre, rad per slow period.
     pub(super) w: f64,
     /// Bins.
