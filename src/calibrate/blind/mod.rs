@@ -236,11 +236,9 @@ impl<'a> Blind<'a> {
         let covariance =
             covariance(&maximum.score.information).ok_or(CalibrateError::NotIdentifiable)? * factor;
         let mut fitted = Fitted::new(maximum.point.clone(), covariance);
-        if let Some((squares, freedom)) = maximum.disagreement(factor) {
-            fitted
-                .widen(squares, freedom)
-                .map(|misfit| fitted.remarks.push(Remark::BandsDisagree { misfit }));
-        }
+        let misfit =
+            maximum.disagreement(factor).and_then(|(squares, freedom)| fitted.widen(squares, freedom));
+        fitted.remarks.extend(misfit.map(|misfit| Remark::BandsDisagree { misfit }));
         if fit.offset {
             fitted.offsets = Some(self.offsets(maximum, reference));
         }

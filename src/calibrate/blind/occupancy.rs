@@ -11,7 +11,7 @@ const ABOVE_NOISE: f64 = 10.0;
 /// largest. A band in which all N eigenvalues count is of no use, and so is one in which none does: 0 for
 /// both.
 pub(super) fn occupied(bands: &[Band], least: f64) -> Vec<usize> {
-    let values: Vec<Vec<f64>> = bands.iter().map(|band| descending(band)).collect();
+    let values: Vec<Vec<f64>> = bands.iter().map(descending).collect();
     let mut noise: Vec<f64> = values.iter().filter_map(|values| values.last().copied()).collect();
     noise.sort_by(f64::total_cmp);
     let floor = noise.get(noise.len() / 4).copied().unwrap_or(0.0).max(0.0);
