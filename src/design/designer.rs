@@ -214,7 +214,8 @@ impl Design {
         if search == ProofSearch::Run {
             let begin = Instant::now();
             self.proof = prove::attach_proof(&mut self.bank, dual);
-            if let Some(study) = &self.robust {
+            // `verify` proves it only with the rest.
+            if let (Some(study), Ok(_)) = (&self.robust, &self.proof) {
                 self.bank.gamma.worst_case = proven_worst_case(&self.bank, &study.errors);
             }
             self.proof_time = begin.elapsed();

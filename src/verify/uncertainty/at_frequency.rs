@@ -65,6 +65,20 @@ pub(super) struct Attained {
     pub(super) vertices: Vec<Vertex>,
 }
 
+impl Attained {
+    /// Nothing is known.
+    fn unknown() -> Self {
+        Self { lower: 0.0, upper: f64::INFINITY, vertices: Vec::new() }
+    }
+}
+
+/// Gains computed, and how many may be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Work {
+    pub(super) done: usize,
+    pub(super) limit: usize,
+}
+
 /// What is known of the gains over the box.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Verdict {
@@ -85,14 +99,17 @@ struct Part {
 }
 
 impl AtFrequency<'_> {
-    /// Compares the largest gain over the whole box with `threshold`. Counts the gains computed in `work`.
-    pub(super) fn compare(&self, threshold: f64, work: &mut usize) -> Verdict {
+    /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
+    pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
         let whole = |channel: &ChannelGrid| Part { first: 0, last: channel.errors.len() - 1, level: 0 };
         let mut boxes: Vec<Vec<Part>> = vec![self.channels.iter().map(whole).collect()];
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
             let remainder = self.remainder(&parts);
             let Some(found) = self.above(&parts, threshold - remainder, work) else { continue };
+            if found.vertices.is_empty() {
+                break;
+            }
             if found.lower > threshold {
                 return Verdict::Above(found);
             }
@@ -101,7 +118,7 @@ impl AtFrequency<'_> {
                 None => return Verdict::Open(found),
             }
         }
-        Verdict::Open(Attained { lower: 0.0, upper: f64::INFINITY, vertices: Vec::new() })
+        Verdict::Open(Attained::unknown())
     }
 
     fn term(&self, i: usize, part: &Part) -> f64 {
@@ -142,7 +159,7 @@ impl AtFrequency<'_> {
     }
 
     /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none.
-    fn above(&self, parts: &[Part], limit: f64, work: &mut usize) -> Option<Attained> {
+    fn above(&self, parts: &[Part], limit: f64, work: &mut Work) -> Option<Attained> {
         let sets: Vec<Vec<Vertex>> =
             parts.iter().enumerate().map(|(i, part)| self.vertices(i, part)).collect();
         let means: Vec<Mix> = sets.iter().enumerate().map(|(i, set)| self.mean(i, set)).collect();
@@ -218,14 +235,17 @@ struct Tree<'a, 'b> {
     sets: &'a [Vec<Vertex>],
     spread: &'a [f64],
     limit: f64,
-    work: &'a mut usize,
+    work: &'a mut Work,
 }
 
 impl Tree<'_, '_> {
     /// `mixes` are the chosen vertices of the first channels and the means of the others.
     fn search(&mut self, mixes: &mut [Mix], chosen: &mut Vec<Vertex>) -> Option<Attained> {
         let channel = chosen.len();
-        *self.work += 1;
+        if self.work.done >= self.work.limit {
+            return Some(Attained::unknown());
+        }
+        self.work.done += 1;
         let square = self.at.square(mixes);
         let upper = upper_gain(&square, self.limit - self.spread[channel]);
         if upper + self.spread[channel] <= self.limit {

@@ -7,7 +7,7 @@ use super::super::lower::Covariance;
 use super::super::spectrum;
 use super::aliases::{Aliases, Weight};
 use super::angle::{Frequency, cosine_below, outward};
-use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, lower_gain};
+use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, Work, lower_gain};
 use super::grid::Grid;
 use super::memory::{Lags, Memory, growth};
 use super::transfer::Transfer;
@@ -21,11 +21,11 @@ const MAX_LEVEL: u32 = 5;
 /// Most rows of a Gram matrix.
 const MAX_ROWS: usize = 160;
 /// Factors by which the accuracy is relaxed until the work allows it.
-const RELAXED: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 30.0, 100.0, 1e4];
+const RELAXED: [f64; 6] = [1.0, 2.0, 5.0, 20.0, 100.0, 1e4];
 /// Limit on the cells of one attempt.
 const MAX_CELLS: usize = 20_000;
-/// Limit on the gains computed in one attempt.
-const MAX_GAINS: usize = 400_000;
+/// Limit on the operations on balls in one attempt: half a minute or so.
+const MAX_OPERATIONS: f64 = 1e9;
 /// Cells whose bound exceeds the value at their centre by less than the square of this are not halved
 /// further for the sake of remainders.
 const NARROW: f64 = 0.02;
@@ -50,7 +50,10 @@ pub(super) struct Cover<'a> {
     best: Option<Best>,
     /// The upper end that is to be proven; without it one relative to the best lower end.
     goal: Option<f64>,
-    work: usize,
+    /// Gains computed so far.
+    gains_computed: usize,
+    /// Operations on balls in this attempt.
+    operations: f64,
 }
 
 /// The bounds of one channel.
@@ -114,7 +117,8 @@ impl<'a> Cover<'a> {
             scale,
             best: None,
             goal: None,
-            work: 0,
+            gains_computed: 0,
+            operations: 0.0,
         })
     }
 
@@ -143,18 +147,16 @@ impl<'a> Cover<'a> {
     /// # Errors
     /// [`VerifyError::WideBox`] if no upper end is proven.
     pub(super) fn prove(mut self, accuracy: f64) -> Result<WorstCase, VerifyError> {
-        let mut spent = 0;
         for factor in RELAXED {
-            self.work = 0;
+            self.operations = 0.0;
             let upper = self.attempt(accuracy * factor)?;
-            spent += self.work;
             if let (Some(upper), Some(best)) = (upper, &self.best) {
                 return Ok(WorstCase {
                     lower: best.lower,
                     upper,
                     point: best.point.clone(),
                     frequency: RadiansPerSlowPeriod(best.frequency),
-                    gains_computed: spent,
+                    gains_computed: self.gains_computed,
                 });
             }
         }
@@ -200,7 +202,7 @@ impl<'a> Cover<'a> {
             let Some((begin, end)) = cells.pop() else { return Ok(Some(self.target(accuracy))) };
             let refuted =
                 self.goal.is_some_and(|goal| self.best.as_ref().is_some_and(|best| best.lower > goal));
-            if refuted || self.work > MAX_GAINS {
+            if refuted || self.operations > MAX_OPERATIONS {
                 break;
             }
             // The centre is not exactly the frequency that is judged.
@@ -262,8 +264,10 @@ impl<'a> Cover<'a> {
             if !self.make_grid(level)? {
                 break;
             }
-            let (judged, work, best) = self.judge_on(&self.grids[level as usize], &near, &rows, threshold);
-            self.work += work;
+            let grid = &self.grids[level as usize];
+            let (judged, gains, best) = self.judge_on(grid, &near, &rows, threshold);
+            self.operations += self.cost_of_gram(grid) + gains as f64 * self.cost_of_gain();
+            self.gains_computed += gains;
             if let Some(best) = best {
                 self.offer(Best { frequency: centre.min(PI), ..best });
             }
@@ -284,13 +288,25 @@ impl<'a> Cover<'a> {
         threshold: f64,
     ) -> (Verdict, usize, Option<Best>) {
         let at = AtFrequency { remainders: remainders.to_vec(), ..self.plain(grid, near) };
-        let mut work = 0;
+        let left = (MAX_OPERATIONS - self.operations).max(0.0) / self.cost_of_gain();
+        let mut work = Work { done: 0, limit: left as usize + 1 };
         let verdict = at.compare(threshold, &mut work);
         let best = match &verdict {
             Verdict::Below => None,
-            Verdict::Above(attained) | Verdict::Open(attained) => Some(best_of(grid, attained)),
+            Verdict::Above(attained) | Verdict::Open(attained) => best_of(grid, attained),
         };
-        (verdict, work, best)
+        (verdict, work.done, best)
+    }
+
+    /// Operations for one gain, and for the Gram matrix of a grid.
+    fn cost_of_gain(&self) -> f64 {
+        let (m, n) = (self.bank.ratio as f64, self.channels.len() as f64);
+        4.0 * m * (m + 1.5 * n) * (2.0 * m + 1.5 * n)
+    }
+
+    fn cost_of_gram(&self, grid: &Grid) -> f64 {
+        let (states, rows) = (grid.period.order() as f64, grid.period.samples() as f64);
+        4.0 * rows * rows * (states + rows) + 2.0 * rows * states * (states + rows)
     }
 
     /// Makes the grid of `level` if it is missing; false if it would be too large.
@@ -363,13 +379,16 @@ impl<'a> Cover<'a> {
     }
 }
 
-/// The errors at a vertex of `grid`.
-fn best_of(grid: &Grid, attained: &Attained) -> Best {
+/// The errors at a vertex of `grid`; `None` without a vertex.
+fn best_of(grid: &Grid, attained: &Attained) -> Option<Best> {
+    if attained.vertices.is_empty() {
+        return None;
+    }
     let vertices = attained.vertices.iter().zip(&grid.channels);
     let point = ErrorPoint {
         delays: vertices.clone().map(|(vertex, channel)| channel.errors[vertex.error]).collect(),
         gains: vertices.clone().map(|(vertex, _)| vertex.gain - 1.0).collect(),
         cutoffs: vertices.map(|(vertex, channel)| channel.speeds[vertex.speed] - 1.0).collect(),
     };
-    Best { lower: attained.lower, point, frequency: 0.0 }
+    Some(Best { lower: attained.lower, point, frequency: 0.0 })
 }
