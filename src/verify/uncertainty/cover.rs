@@ -1,16 +1,12 @@
 //! Covers all frequencies with cells and proves a bound in each of them.
 
 use super::super::VerifyError;
-use super::super::ball::Ball;
-use super::super::front_ends::FrontEnds;
-use super::super::lower::Covariance;
 use super::super::spectrum;
-use super::aliases::{Aliases, Weight};
 use super::angle::{Frequency, cosine_below, outward};
 use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, Work, lower_gain};
+use super::channel::{Channel, Memories, column_norm};
 use super::grid::Grid;
-use super::memory::{Lags, Memory, growth};
-use super::transfer::Transfer;
+use super::memory::{Lags, Memory};
 use super::{ErrorBox, ErrorPoint, WorstCase};
 use crate::bank::Bank;
 use crate::units::RadiansPerSlowPeriod;
@@ -56,18 +52,6 @@ pub(super) struct Cover<'a> {
     operations: f64,
 }
 
-/// The bounds of one channel.
-struct Channel {
-    transfer: Transfer,
-    /// Second derivative in the cut-off, if that is uncertain.
-    curvature: Option<Transfer>,
-    memory: Memory,
-    /// Largest factor of the cut-off over the least.
-    speed_ratio: f64,
-    /// D_i in fast periods, for the rounding of delays.
-    delay: f64,
-}
-
 /// The largest gain found.
 struct Best {
     lower: f64,
@@ -80,31 +64,15 @@ impl<'a> Cover<'a> {
     /// See [`super::worst_case`].
     pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox) -> Result<Self, VerifyError> {
         let grid = Grid::new(bank, errors, 0)?;
-        let slow = || VerifyError::LongMemory;
-        let covariance = Covariance::new(&grid.period).ok_or_else(slow)?;
-        let growth = growth(&grid.period.transition).ok_or_else(slow)?;
-        let memory = |sample: usize| {
-            let row = grid.front_ends.output(&grid.samples[sample]);
-            Memory::new(&row, &grid.period.transition, &covariance.state, growth)
-        };
+        let memories = Memories::new(&grid)?;
         let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
         let channel = |i: usize| {
-            let sample = &grid.samples[grid.channels[i].rows[0][0]];
-            let filter = grid.front_ends.filter(sample.filter);
-            let transfer = Transfer::new(filter, FrontEnds::gain(sample));
-            let cutoff = errors.cutoffs[i];
-            Channel {
-                curvature: (cutoff > 0.0).then(|| transfer.curvature()),
-                transfer,
-                // The row of the slowest variant is the first one.
-                memory: memory(grid.channels[i].rows[0][0]),
-                speed_ratio: outward((1.0 + cutoff) / (1.0 - cutoff)),
-                delay: sample.time.delay.in_fast_periods(fast_period).0.abs(),
-            }
+            let largest = (errors.delays[i], errors.gains[i], errors.cutoffs[i]);
+            Channel::new(&memories, i, largest, fast_period)
         };
         let channels = (0..bank.channel_count()).map(channel).collect();
-        let reference = memory(0);
-        let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or_else(slow)?;
+        let reference = memories.of_sample(0);
+        let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
         let n = grid.period.order();
         let scale = (n..n + bank.ratio).map(|i| grid.period.gram[(i, i)].nearest()).sum::<f64>().sqrt();
         Ok(Self {
@@ -246,19 +214,18 @@ impl<'a> Cover<'a> {
     /// Bounds ||K - K_J|| for all errors in the box, J = `periods`.
     fn tail(&self, periods: usize) -> f64 {
         let reference = (self.bank.ratio as f64).sqrt() * self.reference.tail(periods);
-        let channels = self.channels.iter().enumerate().map(|(i, channel)| {
-            let factor = (1.0 + self.errors.gains[i]) * channel.speed_ratio.sqrt();
-            factor
-                * (self.lags.sizes[i] * channel.memory.tail(periods)
-                    + self.lags.tails[i] * channel.memory.whole())
-        });
+        let tail =
+            |(i, channel): (usize, &Channel)| channel.tail(periods, self.lags.sizes[i], self.lags.tails[i]);
+        let channels = self.channels.iter().enumerate().map(tail);
         outward(reference + channels.sum::<f64>())
     }
 
     /// Judges one frequency on coarse grids first.
     fn judge(&mut self, centre: f64, threshold: f64) -> Result<Verdict, VerifyError> {
         let near = Frequency::near(centre);
-        let rows = self.remainders(&near)?;
+        let remainders =
+            self.channels.iter().map(|channel| channel.remainders(&near, self.bank.ratio, MAX_LEVEL));
+        let rows = remainders.collect::<Result<Vec<_>, _>>()?;
         let mut verdict = Verdict::Below;
         for level in 0..=MAX_LEVEL {
             if !self.make_grid(level)? {
@@ -325,57 +292,14 @@ impl<'a> Cover<'a> {
     /// The Gram matrix and the filters at a frequency, without remainders.
     fn plain<'b>(&'b self, grid: &'b Grid, near: &Frequency) -> AtFrequency<'b> {
         let filters = spectrum::filter_response(&self.bank.filters, self.bank.ratio, &near.z);
-        let column = |i: usize| {
-            let square = filters
-                .re
-                .column(i)
-                .iter()
-                .chain(filters.im.column(i).iter())
-                .fold(Ball::ZERO, |sum, &x| sum + x * x);
-            square.upper().max(0.0).sqrt() * (1.0 + 1e-15)
-        };
         AtFrequency {
             gram: spectrum::gram(&grid.period, &near.z),
-            columns: (0..self.channels.len()).map(column).collect(),
+            columns: (0..self.channels.len()).map(|i| column_norm(&filters, i)).collect(),
             filters,
             channels: &grid.channels,
             gains: &self.errors.gains,
             remainders: vec![vec![0.0; MAX_LEVEL as usize + 1]; self.channels.len()],
         }
-    }
-
-    /// The remainder of each channel, by the number of halvings.
-    fn remainders(&self, near: &Frequency) -> Result<Vec<Vec<f64>>, VerifyError> {
-        let fast_period = self.bank.spec.as_ref().map_or(self.bank.fast_period, |spec| spec.fast_period);
-        (0..self.channels.len())
-            .map(|i| {
-                let (channel, cutoff) = (&self.channels[i], self.errors.cutoffs[i]);
-                let half = self.errors.delays[i].in_fast_periods(fast_period).0;
-                if half == 0.0 && cutoff == 0.0 {
-                    return Ok(vec![0.0; MAX_LEVEL as usize + 1]);
-                }
-                let range = [1.0 - cutoff, 1.0 + cutoff];
-                let sum = |transfer: &Transfer| {
-                    Aliases::new(transfer, near.angle, self.bank.ratio, range).ok_or(VerifyError::LongMemory)
-                };
-                let aliases = sum(&channel.transfer)?;
-                // The chord over 2 x of a function with second derivative at most curvature / (1 - x)^2.
-                let bend = match &channel.curvature {
-                    Some(curvature) => {
-                        0.5 * (cutoff / (1.0 - cutoff)).powi(2) * sum(curvature)?.norm(Weight::One)
-                    }
-                    None => 0.0,
-                };
-                // The grid points are rounded.
-                let rounding =
-                    if half > 0.0 { 8.0 * f64::EPSILON * (1.0 + channel.delay + half) } else { 0.0 };
-                let level = |level: u32| {
-                    let half = half / f64::from(1u32 << level) + rounding;
-                    outward((aliases.norm(Weight::Chord(half)) + bend) * (1.0 + self.errors.gains[i]))
-                };
-                Ok((0..=MAX_LEVEL).map(level).collect())
-            })
-            .collect()
     }
 }
 

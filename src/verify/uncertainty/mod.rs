@@ -29,6 +29,7 @@
 mod aliases;
 mod angle;
 mod at_frequency;
+mod channel;
 mod cover;
 mod grid;
 mod memory;

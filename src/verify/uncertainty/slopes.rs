@@ -1,16 +1,14 @@
 //! Proven bounds of how fast the error can change with the delays.
 
 use super::super::VerifyError;
-use super::super::ball::{self, Ball};
-use super::super::front_ends::FrontEnds;
-use super::super::lower::Covariance;
+use super::super::ball;
 use super::super::spectrum;
 use super::ErrorBox;
 use super::aliases::{Aliases, Weight};
 use super::angle::{Frequency, cosine_below, outward};
+use super::channel::{Memories, column_norm, transfer};
 use super::grid::Grid;
-use super::memory::{Lags, Memory, growth};
-use super::transfer::Transfer;
+use super::memory::Lags;
 use crate::bank::Bank;
 use crate::units::Seconds;
 use std::f64::consts::PI;
@@ -19,6 +17,8 @@ use std::f64::consts::PI;
 const CELLS_PER_DEGREE: f64 = 10.0;
 /// Relative size of the tails.
 const TAIL: f64 = 1e-6;
+/// Relative size of the tails of recursive filters.
+const FILTER_TAIL: f64 = 1e-12;
 const MAX_DEGREE: usize = 4096;
 
 /// How fast the error of a bank can change with the delays. The bounds hold for all delays.
@@ -57,48 +57,46 @@ impl Slopes {
 /// As [`super::worst_case`].
 pub fn slopes(bank: &Bank, errors: &ErrorBox) -> Result<Slopes, VerifyError> {
     errors.check(bank.channel_count())?;
-    let grid =
-        Grid::new(bank, &ErrorBox { delays: vec![Seconds(0.0); bank.channel_count()], ..errors.clone() }, 0)?;
-    let covariance = Covariance::new(&grid.period).ok_or(VerifyError::LongMemory)?;
-    let growth = growth(&grid.period.transition).ok_or(VerifyError::LongMemory)?;
-    let lags = Lags::new(&bank.filters, bank.ratio, 1e-12).ok_or(VerifyError::LongMemory)?;
+    let certain = ErrorBox { delays: vec![Seconds(0.0); bank.channel_count()], ..errors.clone() };
+    let grid = Grid::new(bank, &certain, 0)?;
+    let memories = Memories::new(&grid)?;
+    let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
     let mut found = Slopes { lipschitz: Vec::new(), columns: Vec::new(), steepness: Vec::new() };
     for i in 0..bank.channel_count() {
-        let sample = &grid.samples[grid.channels[i].rows[0][0]];
-        let filter = grid.front_ends.filter(sample.filter);
-        let transfer = Transfer::new(filter, FrontEnds::gain(sample));
-        let (a, _) = grid.front_ends.dynamics();
-        let row = ball::product(&grid.front_ends.output(sample), &a);
-        let memory = Memory::new(&row, &grid.period.transition, &covariance.state, growth);
-        let cutoff = errors.cutoffs[i];
-        let range = [1.0 - cutoff, 1.0 + cutoff];
-        let factor = (range[1] / range[0]).powf(1.5) * (1.0 + 1e-12);
-        let whole = memory.whole();
-        let periods =
-            (0..MAX_DEGREE).find(|&periods| memory.tail(periods) <= TAIL * whole).unwrap_or(MAX_DEGREE);
-        let tail = outward(factor * memory.tail(periods));
-        let cut = [outward(lags.sizes[i] * tail + lags.tails[i] * factor * whole), lags.tails[i], tail];
-        let degrees = [periods + lags.last, lags.last, periods];
+        let [lipschitz, column, steep] = of_channel(bank, &memories, &lags, i, errors.cutoffs[i])?;
         let gain = 1.0 + errors.gains[i];
-        let values = |near: &Frequency| {
-            let filters = spectrum::filter_response(&bank.filters, bank.ratio, &near.z);
-            let square = filters
-                .re
-                .column(i)
-                .iter()
-                .chain(filters.im.column(i).iter())
-                .fold(Ball::ZERO, |sum, &x| sum + x * x);
-            let column = square.upper().max(0.0).sqrt() * (1.0 + 1e-15);
-            let aliases = Aliases::new(&transfer, near.angle, bank.ratio, range)?;
-            let steep = aliases.norm(Weight::Slope);
-            Some([column * steep, column, steep])
-        };
-        let [lipschitz, column, steep] = largest(degrees, cut, values).ok_or(VerifyError::LongMemory)?;
         found.lipschitz.push(outward(gain * lipschitz));
         found.columns.push(column);
         found.steepness.push(outward(gain * steep));
     }
     Ok(found)
+}
+
+/// L_i, max |F_i| and max g_i of channel `i`.
+fn of_channel(
+    bank: &Bank,
+    memories: &Memories<'_>,
+    lags: &Lags,
+    i: usize,
+    cutoff: f64,
+) -> Result<[f64; 3], VerifyError> {
+    let transfer = transfer(memories.grid(), i);
+    let memory = memories.of_slope(memories.grid().channels[i].rows[0][0]);
+    let range = [1.0 - cutoff, 1.0 + cutoff];
+    // The slope of a kernel that is x times faster is x^2 phi'(x t).
+    let factor = (range[1] / range[0]).powf(1.5) * (1.0 + 1e-12);
+    let whole = memory.whole();
+    let periods = (0..MAX_DEGREE).find(|&periods| memory.tail(periods) <= TAIL * whole).unwrap_or(MAX_DEGREE);
+    let tail = outward(factor * memory.tail(periods));
+    let cut = [outward(lags.sizes[i] * tail + lags.tails[i] * factor * whole), lags.tails[i], tail];
+    let degrees = [periods + lags.last, lags.last, periods];
+    let values = |near: &Frequency| {
+        let filters = spectrum::filter_response(&bank.filters, bank.ratio, &near.z);
+        let column = column_norm(&filters, i);
+        let steep = Aliases::new(&transfer, near.angle, bank.ratio, range)?.norm(Weight::Slope);
+        Some([column * steep, column, steep])
+    };
+    largest(degrees, cut, values).ok_or(VerifyError::LongMemory)
 }
 
 /// Bounds the maxima over all frequencies of three norms, whose polynomials have these degrees and tails.

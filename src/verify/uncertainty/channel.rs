@@ -1,0 +1,147 @@
+//! The bounds of one channel: what its memory and the chords of its errors leave out.
+
+use super::super::VerifyError;
+use super::super::ball::{self, Ball, Matrix};
+use super::super::front_ends::FrontEnds;
+use super::super::lower::Covariance;
+use super::aliases::{Aliases, Weight};
+use super::angle::{Frequency, outward};
+use super::grid::Grid;
+use super::memory::{Memory, growth};
+use super::transfer::Transfer;
+use crate::units::Seconds;
+
+/// A channel with the range of its errors.
+pub(super) struct Channel {
+    transfer: Transfer,
+    /// Second derivative in the cut-off, if that is uncertain.
+    curvature: Option<Transfer>,
+    memory: Memory,
+    /// Largest relative errors.
+    cutoff: f64,
+    gain: f64,
+    /// Largest error of the delay, in fast periods.
+    half: f64,
+    /// D_i in fast periods, for the rounding of delays.
+    delay: f64,
+}
+
+/// The memories of all rows of a grid.
+pub(super) struct Memories<'a> {
+    grid: &'a Grid,
+    covariance: Covariance,
+    growth: f64,
+}
+
+impl<'a> Memories<'a> {
+    /// # Errors
+    /// [`VerifyError::LongMemory`].
+    pub(super) fn new(grid: &'a Grid) -> Result<Self, VerifyError> {
+        let covariance = Covariance::new(&grid.period).ok_or(VerifyError::LongMemory)?;
+        let growth = growth(&grid.period.transition).ok_or(VerifyError::LongMemory)?;
+        Ok(Self { grid, covariance, growth })
+    }
+
+    /// The grid.
+    pub(super) fn grid(&self) -> &Grid {
+        self.grid
+    }
+
+    /// Of the sample with this row of the Gram matrix.
+    pub(super) fn of_sample(&self, sample: usize) -> Memory {
+        self.of_row(&self.grid.front_ends.output(&self.grid.samples[sample]))
+    }
+
+    /// Of the derivative of that sample with respect to time.
+    pub(super) fn of_slope(&self, sample: usize) -> Memory {
+        let (a, _) = self.grid.front_ends.dynamics();
+        let row: Matrix = self.grid.front_ends.output(&self.grid.samples[sample]);
+        self.of_row(&ball::product(&row, &a))
+    }
+
+    fn of_row(&self, row: &Matrix) -> Memory {
+        Memory::new(row, &self.grid.period.transition, &self.covariance.state, self.growth)
+    }
+}
+
+/// The transfer function of channel `i`, from the filter to the sample.
+pub(super) fn transfer(grid: &Grid, i: usize) -> Transfer {
+    let sample = &grid.samples[grid.channels[i].rows[0][0]];
+    Transfer::new(grid.front_ends.filter(sample.filter), FrontEnds::gain(sample))
+}
+
+impl Channel {
+    /// Channel `i` of `grid`, with the largest errors of its delay, gain and cut-off.
+    pub(super) fn new(
+        memories: &Memories<'_>,
+        i: usize,
+        (half, gain, cutoff): (Seconds, f64, f64),
+        fast_period: Seconds,
+    ) -> Self {
+        let grid = memories.grid;
+        // The row of the slowest variant is the first one.
+        let first = grid.channels[i].rows[0][0];
+        let transfer = transfer(grid, i);
+        Self {
+            curvature: (cutoff > 0.0).then(|| transfer.curvature()),
+            transfer,
+            memory: memories.of_sample(first),
+            cutoff,
+            gain,
+            half: half.in_fast_periods(fast_period).0,
+            delay: grid.samples[first].time.delay.in_fast_periods(fast_period).0.abs(),
+        }
+    }
+
+    /// Bounds what the cut of the memory after `periods` and that of the filters by `filter_tail` leave out
+    /// of F_i H_i, for all errors; `filter` bounds |F_i|.
+    pub(super) fn tail(&self, periods: usize, filter: f64, filter_tail: f64) -> f64 {
+        // A kernel that is x times faster is x phi(x t): its energy beyond T is at most that of the slowest
+        // one, times the ratio of the factors.
+        let speeds = outward((1.0 + self.cutoff) / (1.0 - self.cutoff));
+        let rows = filter * self.memory.tail(periods) + filter_tail * self.memory.whole();
+        outward((1.0 + self.gain) * speeds.sqrt() * rows)
+    }
+
+    /// Bounds the remainder of the chords, after 0, 1, .. `levels` halvings of the delay.
+    ///
+    /// # Errors
+    /// [`VerifyError::LongMemory`].
+    pub(super) fn remainders(
+        &self,
+        near: &Frequency,
+        ratio: usize,
+        levels: u32,
+    ) -> Result<Vec<f64>, VerifyError> {
+        if self.half == 0.0 && self.cutoff == 0.0 {
+            return Ok(vec![0.0; levels as usize + 1]);
+        }
+        let range = [1.0 - self.cutoff, 1.0 + self.cutoff];
+        let sum = |transfer: &Transfer| {
+            Aliases::new(transfer, near.angle, ratio, range).ok_or(VerifyError::LongMemory)
+        };
+        let aliases = sum(&self.transfer)?;
+        // The chord over 2 x of a function with second derivative at most curvature / (1 - x)^2.
+        let bend = match &self.curvature {
+            Some(curvature) => {
+                0.5 * (self.cutoff / (1.0 - self.cutoff)).powi(2) * sum(curvature)?.norm(Weight::One)
+            }
+            None => 0.0,
+        };
+        // The grid points are rounded.
+        let slack = 8.0 * f64::EPSILON * (1.0 + self.delay + self.half);
+        let rounding = if self.half > 0.0 { slack } else { 0.0 };
+        let level = |level: u32| {
+            let half = self.half / f64::from(1u32 << level) + rounding;
+            outward((aliases.norm(Weight::Chord(half)) + bend) * (1.0 + self.gain))
+        };
+        Ok((0..=levels).map(level).collect())
+    }
+}
+
+/// A bound of |F_i| from the column of the response.
+pub(super) fn column_norm(filters: &super::super::spectrum::ComplexMatrix, i: usize) -> f64 {
+    let entries = filters.re.column(i).into_iter().chain(filters.im.column(i).into_iter());
+    let square = entries.fold(Ball::ZERO, |sum, &x| sum + x * x);
+    square.upper().max(0.0).sqrt() * (1.0 + 1e-15)
+}
