@@ -227,7 +227,7 @@ fn lattice_point(errors: &ErrorBox, sides: &[Side], per_side: &[usize], index: u
 
 /// Rows of a Hadamard matrix and their opposites: corners that differ from each other in half of the sides.
 fn corners(errors: &ErrorBox, sides: &[Side]) -> Vec<ErrorPoint> {
-    let sign = |row: usize, side: usize| if (row & side).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = |row: usize, side: usize| if (row & side).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
     (0..MAX_SCENARIOS)
         .map(|corner| {
             let (row, opposite) = (corner / 2, if corner % 2 == 0 { 1.0 } else { -1.0 });
