@@ -27,7 +27,7 @@ fn derivatives_are_those_of_differences() {
                 point.delays[i] = Seconds(shift);
                 norm_at(&bank, &point).unwrap().0
             };
-            let h = 4e-3;
+            let h = 2e-3;
             let difference = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
             let size = found.per_fast_period.iter().fold(0.0, |most: f64, slope| most.max(slope.abs()));
             let slope = found.per_fast_period[i];

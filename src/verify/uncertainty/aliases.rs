@@ -11,13 +11,17 @@
 //! function of |nu| that rises at most once and then falls, so its sum over the aliases of one sign is at
 //! most its largest value plus M / (2 pi) times its integral.
 
-use super::super::ball::Ball;
+use super::super::ball::{self, Ball};
 use super::angle::{outward, pi};
 use super::transfer::Transfer;
 use std::f64::consts::TAU;
 
 /// K to begin with, and the most.
 const ALIASES: [usize; 2] = [24, 1 << 14];
+
+/// Length of the pieces of a range of cut-offs, and the most pieces.
+const PIECE: f64 = 5e-4;
+const MAX_PIECES: f64 = 256.0;
 
 /// The weight m(nu) of an alias.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,10 +50,7 @@ impl Aliases {
     /// Of Phi(s / x) for all x in `speeds`, at the frequency `angle` in [0, pi]. `None` if the poles lie
     /// beyond all aliases that are summed.
     pub(super) fn new(transfer: &Transfer, angle: Ball, ratio: usize, speeds: [f64; 2]) -> Option<Self> {
-        let [slow, fast] = speeds.map(f64::recip);
-        let inverse =
-            Ball::from(0.5 * (slow + fast)).widened(0.5 * (slow - fast).abs() * (1.0 + 1e-9) + 1e-15);
-        let inverse = if speeds == [1.0, 1.0] { Ball::from(1.0) } else { inverse };
+        let inverses = reciprocals(speeds);
         let period = Ball::from(ratio as f64);
         let begin =
             |count: usize| std::f64::consts::PI * (2 * count + 1) as f64 / ratio as f64 * (1.0 - 1e-12);
@@ -66,7 +67,8 @@ impl Aliases {
         let turn = pi() + pi();
         let near = (-(count as i64)..=count as i64).map(|k| {
             let nu = (angle + turn * Ball::from(k as f64)) / period;
-            (nu.magnitude(), transfer.square(nu * inverse))
+            let squares = inverses.iter().map(|&inverse| transfer.square(nu * inverse));
+            (nu.magnitude(), squares.fold(0.0, ball::nan_max))
         });
         Some(Self { ratio: ratio as f64, near: near.collect(), far: begin(count), decay })
     }
@@ -92,6 +94,20 @@ impl Aliases {
         let (largest, integral) = weight.far(p, self.far);
         a * (2.0 * (largest / self.ratio + integral / TAU)).sqrt()
     }
+}
+
+/// The reciprocals of all factors between `speeds`, in short pieces: an enclosure over a long piece would
+/// contain the poles.
+fn reciprocals(speeds: [f64; 2]) -> Vec<Ball> {
+    if speeds == [1.0, 1.0] {
+        return vec![Ball::from(1.0)];
+    }
+    let [largest, least] = speeds.map(f64::recip);
+    let count = ((largest - least) / PIECE).ceil().clamp(1.0, MAX_PIECES);
+    let step = (largest - least) / count;
+    let centre = |k: usize| least + (k as f64 + 0.5) * step;
+    let piece = |k: usize| Ball::from(centre(k)).widened(0.5 * step * (1.0 + 1e-9) + 1e-14);
+    (0..count as usize).map(piece).collect()
 }
 
 impl Weight {

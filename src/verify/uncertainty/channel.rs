@@ -141,7 +141,7 @@ impl Channel {
 
 /// A bound of |F_i| from the column of the response.
 pub(super) fn column_norm(filters: &super::super::spectrum::ComplexMatrix, i: usize) -> f64 {
-    let entries = filters.re.column(i).into_iter().chain(filters.im.column(i).into_iter());
-    let square = entries.fold(Ball::ZERO, |sum, &x| sum + x * x);
+    let add = |sum: Ball, &x: &Ball| sum + x * x;
+    let square = filters.re.column(i).iter().chain(filters.im.column(i).iter()).fold(Ball::ZERO, add);
     square.upper().max(0.0).sqrt() * (1.0 + 1e-15)
 }

@@ -173,7 +173,9 @@ pub fn worst_case(
     errors.check(bank.channel_count())?;
     let mut cover = cover::Cover::new(bank, errors)?;
     // A first lower end, so that the accuracy has a meaning.
-    cover.try_point(&ErrorPoint::none(bank.channel_count()), RadiansPerSlowPeriod(0.0))?;
+    if candidates.is_empty() {
+        cover.try_point(&ErrorPoint::none(bank.channel_count()), RadiansPerSlowPeriod(0.0))?;
+    }
     for (point, frequency) in candidates {
         cover.try_point(point, *frequency)?;
     }
