@@ -345,12 +345,13 @@ fn odd_images_are_fine() {
     write("little.pfm", b"Pf 2 1 -1\n\0\0\x80\x3f\0\0\x80\x3f");
     write("big.pfm", b"Pf 2 1 1\n\x3f\x80\0\0\x3f\x80\0\0");
     write("one.pgm", b"P5 1 1 255\n\x40");
+    write("flat.pgm", b"P5 2 1 255\n\x10\x10");
     let view = |name: usize, image: &str, map: &str| {
         format!("[[view]]\nname = \"{name}\"\nimage = \"{image}\"\nposition = 0.0\ndisparity = \"{map}\"\n")
     };
     for (a, b, maps) in [
         ("grey.pgm", "colour.ppm", ["little.pfm", "big.pfm"]),
-        ("deep.pgm", "c.jpg", ["big.pfm", "grey.pgm"]),
+        ("deep.pgm", "c.jpg", ["big.pfm", "flat.pgm"]),
         ("one.pgm", "one.pgm", ["one.pgm", "one.pgm"]),
     ] {
         let text = view(1, a, maps[0]) + &view(2, b, maps[1]) + "[virtual]\nposition = 0.0\n";
