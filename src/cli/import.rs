@@ -63,10 +63,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if args.json { super::print_json(&report) } else { super::print(&report.text()) }
 }
 
+/// Reads taps from the bytes of a file.
+type Parse = fn(&[u8]) -> Result<Vec<Vec<f64>>, TapsError>;
+
 /// The taps of a file, by its extension.
 fn read(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    let parse: fn(&[u8]) -> Result<Vec<Vec<f64>>, TapsError> = match extension.to_ascii_lowercase().as_str() {
+    let parse: Parse = match extension.to_ascii_lowercase().as_str() {
         "csv" => taps_of_csv,
         "npy" => taps_of_npy,
         _ => {

@@ -140,7 +140,7 @@ fn fits(bytes: &[u8]) -> bool {
     let shape = header.split_once("'shape'").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
     let sizes =
         shape.map_or("", |(sizes, _)| sizes).split(',').map(str::trim).filter(|size| !size.is_empty());
-    let entries = sizes.map(|size| size.trim_end_matches('L').parse::<usize>().ok());
-    let product = entries.fold(Some(1), |product: Option<usize>, size| product?.checked_mul(size?.max(1)));
+    let mut entries = sizes.map(|size| size.trim_end_matches('L').parse::<usize>().ok());
+    let product = entries.try_fold(1, |product: usize, size| product.checked_mul(size?.max(1)));
     product.is_some_and(|entries| entries <= bytes.len())
 }

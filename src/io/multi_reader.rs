@@ -96,7 +96,7 @@ enum Source {
     Thread { messages: Receiver<Result<Message, IoError>>, pool: Sender<Vec<u8>> },
     /// Standard input itself.
     #[cfg(target_os = "linux")]
-    Stdin(StdinReader),
+    Stdin(Box<StdinReader>),
 }
 
 /// Several inputs, read side by side into frames.
@@ -278,7 +278,7 @@ impl Input {
             return Self::on_thread(source);
         }
         let stdin = StdinReader::new(&source)?;
-        Ok(Self::new(source.name(), stdin.header, Source::Stdin(stdin)))
+        Ok(Self::new(source.name(), stdin.header, Source::Stdin(Box::new(stdin))))
     }
 
     /// The only input.
