@@ -63,14 +63,11 @@ fn doubles(bytes: &[u8]) -> Vec<f64> {
 }
 
 /// y[kM+p] = sum over j and i, in this order.
-fn fir_by_definition<T: Copy + Default, S: Copy + Default + std::ops::AddAssign>(
+fn fir_by_definition<T: Copy + Default + PartialEq, S: Copy + Default + std::ops::AddAssign>(
     taps: &PolyphaseTaps<T>,
     input: &[S],
     product: impl Fn(T, S) -> S,
-) -> Vec<S>
-where
-    T: PartialEq,
-{
+) -> Vec<S> {
     let n = taps.channels;
     let of = |k: usize, p: usize| {
         let mut sum = S::default();
