@@ -41,6 +41,8 @@ pub mod lmi;
 #[cfg(feature = "design")]
 pub mod lti;
 #[cfg(feature = "design")]
+pub mod measure;
+#[cfg(feature = "design")]
 pub mod simulate;
 #[cfg(feature = "design")]
 pub mod sine_fit;

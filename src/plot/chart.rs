@@ -24,6 +24,15 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
+/// Points of one kind, each with a text beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marks {
+    /// Legend text.
+    pub label: String,
+    /// Points (x, y) and their texts; points that are not finite are left out.
+    pub points: Vec<(f64, f64, String)>,
+}
+
 /// Curves over a common axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
@@ -59,16 +68,22 @@ pub enum PlotError {
 impl Chart {
     /// The chart as SVG text.
     pub fn to_svg(&self) -> Result<String, PlotError> {
-        let (x, y) = self.ranges()?;
+        self.to_svg_with(&[])
+    }
+
+    /// The chart as SVG text with points over the curves, in the colours that follow those of the curves.
+    pub fn to_svg_with(&self, marks: &[Marks]) -> Result<String, PlotError> {
+        let (x, y) = self.ranges(marks)?;
         let mut svg = String::new();
-        self.draw(&mut svg, x, y)
+        self.draw(&mut svg, marks, x, y)
             .map_err(|e| PlotError::Drawing { title: self.title.clone(), reason: e.to_string() })?;
         Ok(scale_by_view_box(&svg))
     }
 
-    fn ranges(&self) -> Result<(std::ops::Range<f64>, std::ops::Range<f64>), PlotError> {
-        let points =
-            || self.series.iter().flat_map(|s| &s.points).filter(|p| p.0.is_finite() && p.1.is_finite());
+    fn ranges(&self, marks: &[Marks]) -> Result<(std::ops::Range<f64>, std::ops::Range<f64>), PlotError> {
+        let marked = || marks.iter().flat_map(|m| &m.points).map(|(x, y, _)| (*x, *y));
+        let drawn = || self.series.iter().flat_map(|s| &s.points).copied().chain(marked());
+        let points = || drawn().filter(|p| p.0.is_finite() && p.1.is_finite());
         if points().next().is_none() {
             return Err(PlotError::Empty { title: self.title.clone() });
         }
@@ -78,12 +93,14 @@ impl Chart {
     fn draw(
         &self,
         svg: &mut String,
+        marks: &[Marks],
         x: std::ops::Range<f64>,
         y: std::ops::Range<f64>,
     ) -> Result<(), Box<dyn std::error::Error>> {
         let root = SVGBackend::with_string(svg, (WIDTH * OVERSIZE, HEIGHT * OVERSIZE)).into_drawing_area();
         root.fill(&WHITE)?;
         let text = |size: u32| ("sans-serif", size * OVERSIZE).into_font();
+        let text_style = TextStyle::from(text(10)).color(&RGBColor(60, 60, 60));
         let mut chart = ChartBuilder::on(&root)
             .caption(&self.title, text(16))
             .margin(10 * OVERSIZE)
@@ -107,6 +124,21 @@ impl Chart {
                 .draw_series(LineSeries::new(points, style))?
                 .label(&series.label)
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + length, y)], style));
+        }
+        for (marks, colour) in marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())) {
+            let points = || marks.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
+            let radius = 3 * OVERSIZE as i32;
+            let dot = |(x, y, _): &(f64, f64, String)| Circle::new((*x, *y), radius, colour.filled());
+            let length = 20 * OVERSIZE as i32;
+            chart
+                .draw_series(points().map(dot))?
+                .label(&marks.label)
+                .legend(move |(x, y)| Circle::new((x + length / 2, y), radius, colour.filled()));
+            let above = |(x, y, text): &(f64, f64, String)| {
+                let place = (-(text.chars().count() as i32) * radius, -16 * OVERSIZE as i32);
+                EmptyElement::at((*x, *y)) + Text::new(text.clone(), place, text_style.clone())
+            };
+            chart.draw_series(points().map(above))?;
         }
         chart
             .configure_series_labels()
@@ -140,6 +172,16 @@ mod tests {
     fn chart(points: Vec<(f64, f64)>) -> Chart {
         let series = vec![Series { label: "error <1>".into(), points }];
         Chart { title: "t".into(), x_label: "x".into(), y_label: "y".into(), series }
+    }
+
+    #[test]
+    fn marks_are_drawn_with_their_texts() {
+        let points = vec![(1.0, 2.0, "spur".to_owned()), (f64::NAN, 0.0, "absent".to_owned())];
+        let marks = [Marks { label: "offset".into(), points }];
+        let svg = chart(vec![(0.0, 1.0), (2.0, 3.0)]).to_svg_with(&marks).unwrap();
+        // One circle for the point and one in the legend.
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert!(svg.contains("spur") && svg.contains("offset") && !svg.contains("absent"));
     }
 
     #[test]

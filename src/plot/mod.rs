@@ -2,4 +2,4 @@
 
 mod chart;
 
-pub use chart::{Chart, PlotError, Series};
+pub use chart::{Chart, Marks, PlotError, Series};

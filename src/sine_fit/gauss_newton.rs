@@ -15,13 +15,15 @@ const MOST_STEPS: usize = 40;
 const PHASE_TOLERANCE: f64 = 1e-11;
 /// Least distance of two aliases, and of an alias and a multiple of half the rate, in cycles per record.
 const LEAST_DISTANCE: f64 = 0.5;
-/// A step of the frequency is at most this (radians at the ends of the longest record): a quarter of a cycle.
+/// A step of the frequency is at most this (radians at the ends of the longest record): a quarter of a
+/// cycle.
 const LARGEST_STEP: f64 = 0.5 * PI;
-/// A frequency that moves farther than this from its start is lost (radians at the ends of the longest record).
+/// A frequency that moves farther than this from its start is lost (radians at the ends of the longest
+/// record).
 const FARTHEST: f64 = 2.0 * PI;
 
-/// Fits constants, amplitudes and phases of tones of known frequencies: the three-parameter fit of IEEE 1057,
-/// for several tones and channels.
+/// Fits constants, amplitudes and phases of tones of known frequencies: the three-parameter fit of IEEE
+/// 1057, for several tones and channels.
 ///
 /// # Errors
 /// [`SineFitError`], but neither `NoTone` nor `NoConvergence`.
@@ -33,9 +35,9 @@ pub fn fit_known(channels: &[Channel<'_>], rate: Hertz, tones: &[Hertz]) -> Resu
     state.finish(0)
 }
 
-/// Fits frequencies, constants, amplitudes and phases: the four-parameter fit of IEEE 1057, for several tones
-/// and channels. `tones` are within about half a cycle per record of the frequencies; [`super::find_tones`] and
-/// [`super::locate`] give such a start.
+/// Fits frequencies, constants, amplitudes and phases: the four-parameter fit of IEEE 1057, for several
+/// tones and channels. `tones` are within about half a cycle per record of the frequencies;
+/// [`super::find_tones`] and [`super::locate`] give such a start.
 ///
 /// # Errors
 /// [`SineFitError`].
@@ -125,7 +127,7 @@ impl<'a> State<'a> {
         let shortest = self.channels.iter().map(|channel| channel.samples.len()).min().unwrap_or(0) as f64;
         for (k, &f) in self.frequencies.iter().enumerate() {
             let distance = distance_to_edge(f) * shortest;
-            if !(distance >= LEAST_DISTANCE) {
+            if distance.is_nan() || distance < LEAST_DISTANCE {
                 return Err(SineFitError::AtEdge { frequency: self.tone(k), distance, rate: self.rate });
             }
             let close = |other: f64| (alias(f) - alias(other)).abs() * shortest < LEAST_DISTANCE;
@@ -176,8 +178,8 @@ impl<'a> State<'a> {
         Ok(())
     }
 
-    /// One Gauss-Newton step of all parameters; returns the largest movement of a frequency, in radians at the
-    /// ends of the longest record.
+    /// One Gauss-Newton step of all parameters; returns the largest movement of a frequency, in radians at
+    /// the ends of the longest record.
     fn solve(&mut self) -> Result<f64, SineFitError> {
         self.is_known = false;
         let parts = self.eliminate()?;
@@ -224,7 +226,7 @@ impl<'a> State<'a> {
     fn check_movement(&self, tones: &[Hertz], iterations: usize) -> Result<(), SineFitError> {
         for (f, tone) in self.frequencies.iter().zip(tones) {
             let moved = 2.0 * PI * self.unit * (f - *tone / self.rate);
-            if !(moved.abs() <= FARTHEST) {
+            if moved.is_nan() || moved.abs() > FARTHEST {
                 return Err(SineFitError::NoConvergence { frequency: *tone, iterations });
             }
         }

@@ -1,5 +1,5 @@
-//! Least-squares fits of sines to records: IEEE Std 1057-2017 and 1241-2023 (three and four parameters), sums
-//! of several tones, and one frequency fitted jointly over the channels of a converter.
+//! Least-squares fits of sines to records: IEEE Std 1057-2017 and 1241-2023 (three and four parameters),
+//! sums of several tones, and one frequency fitted jointly over the channels of a converter.
 //!
 //! Sample n of channel i is taken at the instant t = t_i + n T, with T the period of the samples and t_i the
 //! known [`Channel::offset`]. K tones are fitted to it:
@@ -10,8 +10,8 @@
 //!
 //! The constant c_i, the amplitudes A_ik and the phases phi_ik belong to a channel; the frequencies f_k are
 //! common to all. [`fit_known`] keeps the frequencies (three parameters per tone and channel), [`fit`] finds
-//! them too (Gauss-Newton, each step a least-squares problem). A frequency may lie in any Nyquist zone of the
-//! sample rate: the fit starts there and stays there.
+//! them too (Gauss-Newton, each step a least-squares problem). A frequency may lie in any Nyquist zone of
+//! the sample rate: the fit starts there and stays there.
 //!
 //! # Errors of the estimates
 //!
@@ -30,8 +30,8 @@
 //! # Cost
 //!
 //! A pass over the samples accumulates the normal equations of all columns in blocks; nothing of the size of
-//! samples times parameters is stored. Time counts from the centre of each record in units of half the longest
-//! one, which makes the columns nearly orthogonal.
+//! samples times parameters is stored. Time counts from the centre of each record in units of half the
+//! longest one, which makes the columns nearly orthogonal.
 
 mod columns;
 mod error;

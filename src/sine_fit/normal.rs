@@ -16,8 +16,8 @@ pub(super) struct Normal {
     pub(super) used: usize,
 }
 
-/// The parameters at which a channel is linearised: the coefficients of 1, cosine and sine of each tone, with
-/// the time of the phases at the centre of the record.
+/// The parameters at which a channel is linearised: the coefficients of 1, cosine and sine of each tone,
+/// with the time of the phases at the centre of the record.
 pub(super) struct Point<'a> {
     pub(super) oscillators: &'a [Oscillator],
     pub(super) linear: &'a [f64],
@@ -73,11 +73,12 @@ impl Normal {
     }
 }
 
-/// The Gram matrix of 1, cosines and sines of a record without gaps. Since time counts from the centre, sums of
-/// sines vanish, and with the sum D of cosines
+/// The Gram matrix of 1, cosines and sines of a record without gaps. Since time counts from the centre, sums
+/// of sines vanish, and with the sum D of cosines
 ///
 /// ```text
-/// <1, cos a> = D(a)   <cos a, cos b> = (D(a - b) + D(a + b)) / 2   <sin a, sin b> = (D(a - b) - D(a + b)) / 2
+/// <1, cos a> = D(a)
+/// <cos a, cos b> = (D(a - b) + D(a + b)) / 2   <sin a, sin b> = (D(a - b) - D(a + b)) / 2
 /// ```
 fn gram_of_whole(oscillators: &[Oscillator], samples: usize) -> Mat {
     let columns = linear_count(oscillators.len());

@@ -6,6 +6,7 @@ use super::normal::linear_count;
 use crate::linalg::{Mat, PositiveFactor};
 use crate::units::{Hertz, Radians, Seconds};
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// Sines fitted to the records of one or several channels.
 #[derive(Debug, Clone)]
@@ -139,13 +140,25 @@ impl SineFit {
     /// # Panics
     /// If there is no such channel.
     pub fn residual(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
+        self.subtracted(channel, samples, 0..self.cycles.len(), self.linear[channel][0])
+    }
+
+    /// Samples minus some of the fitted tones (from 0) of channel `channel`; the constant stays.
+    ///
+    /// # Panics
+    /// If there is no such channel or tone.
+    pub fn without(&self, channel: usize, samples: &[f64], tones: Range<usize>) -> Vec<f64> {
+        self.subtracted(channel, samples, tones, 0.0)
+    }
+
+    fn subtracted(&self, channel: usize, samples: &[f64], tones: Range<usize>, constant: f64) -> Vec<f64> {
         let linear = &self.linear[channel];
-        let oscillators: Vec<_> = self.cycles.iter().map(|&f| Oscillator::new(f)).collect();
+        let oscillators: Vec<_> = tones.clone().map(|k| Oscillator::new(self.cycles[k])).collect();
         let mut residual = samples.to_vec();
         let (mut cosines, mut sines) = (vec![0.0; BLOCK], vec![0.0; BLOCK]);
         for (number, block) in residual.chunks_mut(BLOCK).enumerate() {
-            block.iter_mut().for_each(|r| *r -= linear[0]);
-            for (k, oscillator) in oscillators.iter().enumerate() {
+            block.iter_mut().for_each(|r| *r -= constant);
+            for (k, oscillator) in tones.clone().zip(&oscillators) {
                 let (a, b) = (linear[linear_count(k)], linear[linear_count(k) + 1]);
                 oscillator.fill((number * BLOCK) as f64 - self.centres[channel], &mut cosines, &mut sines);
                 let waves = cosines.iter().zip(&sines);
@@ -155,15 +168,16 @@ impl SineFit {
         residual
     }
 
-    /// The delay by which tone `tone` comes later in `channel` than in `reference` (both from 0), beyond what
-    /// their offsets explain. It is known modulo the period of the tone; the value nearest to 0 is given:
+    /// The delay by which tone `tone` comes later in `channel` than in `reference` (both from 0), beyond
+    /// what their offsets explain. It is known modulo the period of the tone; the value nearest to 0 is
+    /// given:
     ///
     /// ```text
     /// delay = -(phi_channel - phi_reference) / (2 pi f),   sigma = sqrt(2 / (N SNR)) / (2 pi f)
     /// ```
     ///
-    /// A converter that samples at k T - D_i, of which the offset says -D, is late by D_i - D. The equation for
-    /// sigma is that of two equal channels.
+    /// A converter that samples at k T - D_i, of which the offset says -D, is late by D_i - D. The equation
+    /// for sigma is that of two equal channels.
     ///
     /// # Panics
     /// If there is no such channel or tone.

@@ -6,8 +6,8 @@ use crate::linalg::fourier;
 use crate::units::{Decibels, Hertz};
 use std::f64::consts::{LN_2, TAU};
 
-/// A peak is a tone if its power is this many times ln(bins) times the mean noise power per bin. The largest of
-/// B bins of Gaussian noise exceeds c ln B times the mean with probability B^(1-c).
+/// A peak is a tone if its power is this many times ln(bins) times the mean noise power per bin. The largest
+/// of B bins of Gaussian noise exceeds c ln B times the mean with probability B^(1-c).
 const SIGNIFICANCE: f64 = 4.0;
 /// A peak below this share of the largest sample is the rounding of the transform.
 const ROUNDING: f64 = 1e-13;
@@ -97,8 +97,8 @@ impl Power {
         Self { bins, length, largest }
     }
 
-    /// The largest significant peak with an alias in `range`, in cycles per sample, interpolated. `largest` is
-    /// the size of the samples, which bounds the rounding errors.
+    /// The largest significant peak with an alias in `range`, in cycles per sample, interpolated. `largest`
+    /// is the size of the samples, which bounds the rounding errors.
     fn peak(&self, range: std::ops::Range<f64>, largest: f64) -> Option<f64> {
         let bin = |cycles: f64| (cycles * self.length as f64).max(0.0);
         // The first bins hold the rest of the constant, the last one is half the rate.
@@ -128,8 +128,8 @@ impl Power {
         self.bins[at] > SIGNIFICANCE * (self.bins.len() as f64).ln() * (*median / LN_2)
     }
 
-    /// With the ratio r of the larger neighbour's amplitude to the peak's, a tone is (2 r - 1) / (r + 1) bins
-    /// from the peak towards that neighbour (exact for one complex exponential behind a Hann window).
+    /// With the ratio r of the larger neighbour's amplitude to the peak's, a tone is (2 r - 1) / (r + 1)
+    /// bins from the peak towards that neighbour (exact for one complex exponential behind a Hann window).
     fn interpolated(&self, at: usize) -> f64 {
         let left = self.bins[at - 1];
         let right = self.bins.get(at + 1).copied().unwrap_or(0.0);

@@ -202,7 +202,8 @@ fn standard_deviations_are_the_cramer_rao_bounds_of_the_closed_forms() {
     }
 }
 
-/// The scatter over many records is what each record says of itself; short records, two tones, unequal channels.
+/// The scatter over many records is what each record says of itself; short records, two tones, unequal
+/// channels.
 #[test]
 fn standard_deviations_are_the_scatter_of_repeated_records() {
     const TRIALS: usize = 1000;
@@ -259,6 +260,11 @@ fn a_residual_is_what_the_tones_do_not_explain() {
     let residual = fit.residual(0, &samples);
     let power = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     assert!((power(&residual) / 1300.0 - fit.channels[0].residual_rms.powi(2)).abs() < 1e-16);
+    let second = fit.without(0, &samples, 1..2);
+    for (n, (x, e)) in second.iter().zip(&residual).enumerate() {
+        let first = 0.4 + (TAU * 0.1 * n as f64).cos();
+        assert!((x - e - first).abs() < 2e-3, "{n}: {x}");
+    }
     // The fit takes 5 of 1300 degrees of freedom.
     let ratio = power(&residual) / power(&noise);
     assert!((0.985..1.0).contains(&ratio), "{ratio}");

@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod adc_tools;
 mod causal_optima;
 mod equivalence;
 mod filters;

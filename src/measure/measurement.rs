@@ -1,0 +1,260 @@
+//! The figures of a record with tones.
+
+use super::expected::{Expected, Pattern};
+use super::lines::{Found, Lines, fit_lines};
+use super::{Cause, MeasureError, Settings, Spectrum, Window};
+use crate::sine_fit::{Channel, Estimate, SineFit, find_tones, fit, locate};
+use crate::units::{Decibels, Hertz, Radians};
+
+/// A tone that is given may be this far from the true one, in cycles per sample ..
+const NEAR: f64 = 1e-3;
+/// .. and at least so many cycles per record.
+const NEAR_BINS: f64 = 5.0;
+
+/// The figures of a record. Decibels of a power or an amplitude that is 0 are infinite.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Measurement {
+    /// Samples of the record.
+    pub samples: usize,
+    /// Samples that are not finite, which are left out.
+    pub left_out: usize,
+    /// Samples at the rails. They take part.
+    pub clipped: usize,
+    /// fs.
+    #[serde(rename = "rate_hertz")]
+    pub rate: Hertz,
+    /// M; 1 for a single converter.
+    pub converters: usize,
+    /// X.
+    pub full_scale: f64,
+    /// The constant part of the record.
+    pub offset: Estimate<f64>,
+    /// The tones.
+    pub tones: Vec<Tone>,
+    /// Signal over everything else but the constant.
+    #[serde(rename = "sinad_db")]
+    pub sinad: Decibels,
+    /// Effective number of bits from SINAD.
+    #[serde(rename = "enob_from_sinad")]
+    pub enob: f64,
+    /// Effective number of bits of a tone of full scale with the same noise and distortion.
+    pub enob_full_scale: f64,
+    /// Signal over what no line explains.
+    #[serde(rename = "snr_db")]
+    pub snr: Decibels,
+    /// Harmonics 2 .. H over signal.
+    #[serde(rename = "thd_db")]
+    pub thd: Decibels,
+    /// H.
+    pub harmonics: usize,
+    /// Interleaving spurs over signal; `None` for a single converter.
+    #[serde(rename = "interleaving_db")]
+    pub interleaving: Option<Decibels>,
+    /// Largest tone over largest line or bin.
+    #[serde(rename = "sfdr_db")]
+    pub sfdr: Decibels,
+    /// The same without lines that only interleaving explains; `None` for a single converter.
+    #[serde(rename = "sfdr_without_interleaving_db")]
+    pub sfdr_without_interleaving: Option<Decibels>,
+    /// Noise per hertz relative to a sine of full scale (dBFS/Hz).
+    #[serde(rename = "noise_density_dbfs_per_hertz")]
+    pub noise_density: Decibels,
+    /// The window of the spectrum and its equivalent noise bandwidth.
+    pub window: Window,
+    /// Bins.
+    pub noise_bandwidth_bins: f64,
+    /// All expected lines and the unexpected ones, largest first.
+    pub spurs: Vec<Spur>,
+    /// Spurs that cannot be seen, because they coincide with a tone, with the constant or with half the
+    /// rate.
+    pub hidden: Vec<Cause>,
+    /// The spectrum of the record without its constant.
+    #[serde(skip)]
+    pub spectrum: Spectrum,
+}
+
+/// A fitted tone.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Tone {
+    /// In its own Nyquist zone.
+    #[serde(rename = "frequency_hertz")]
+    pub frequency: Estimate<Hertz>,
+    /// Where the spectrum shows it.
+    #[serde(rename = "alias_hertz")]
+    pub alias: Hertz,
+    /// In units of the samples.
+    pub amplitude: Estimate<f64>,
+    /// Relative to full scale.
+    #[serde(rename = "level_dbfs")]
+    pub level: Decibels,
+    /// At the first sample.
+    #[serde(rename = "phase_radians")]
+    pub phase: Estimate<Radians>,
+}
+
+/// A line beside the tones.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Spur {
+    /// Where the spectrum shows it.
+    #[serde(rename = "frequency_hertz")]
+    pub frequency: Hertz,
+    /// In units of the samples, of the sine with the power of the line: at half the rate, where a line has
+    /// no phase, sqrt 2 times its size.
+    pub amplitude: f64,
+    /// Power relative to the largest tone.
+    #[serde(rename = "level_dbc")]
+    pub level: Decibels,
+    /// True if noise alone would hardly give this amplitude.
+    pub above_noise: bool,
+    /// Everything that is expected at this frequency.
+    pub causes: Vec<Cause>,
+}
+
+/// Measures a record of one or several tones.
+///
+/// # Errors
+/// [`MeasureError`], but not those of a comparison.
+pub fn measure(samples: &[f64], rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
+    settings.check()?;
+    let channels = [Channel::new(samples)];
+    let tones = fit(&channels, rate, &starts(&channels, rate, settings)?)?;
+    let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
+    let pattern = Pattern {
+        tones: &cycles,
+        converters: settings.converters,
+        harmonics: settings.harmonics,
+        resolution: 1.0 / samples.len() as f64,
+    };
+    let expected = Expected::of(&pattern);
+    let lines = fit_lines(samples, &tones, &expected, &pattern)?;
+    let rest = Spectrum::new(&lines.rest, rate, settings.window);
+    Ok(Figures { samples, tones: &tones, lines: &lines, rest, settings }.assemble(expected.hidden))
+}
+
+/// Frequencies at which the fit begins.
+fn starts(channels: &[Channel<'_>], rate: Hertz, settings: &Settings) -> Result<Vec<Hertz>, MeasureError> {
+    if settings.tones.is_empty() {
+        return Ok(find_tones(channels, rate, 1, Decibels(0.0))?);
+    }
+    let within = rate * NEAR.max(NEAR_BINS / channels[0].samples.len().max(1) as f64);
+    let start = |tone: &Hertz| Ok(locate(channels, rate, *tone, within)?);
+    settings.tones.iter().map(start).collect()
+}
+
+/// What the figures are computed from.
+struct Figures<'a> {
+    samples: &'a [f64],
+    tones: &'a SineFit,
+    lines: &'a Lines,
+    /// The spectrum of what is left without lines.
+    rest: Spectrum,
+    settings: &'a Settings,
+}
+
+impl Figures<'_> {
+    fn assemble(&self, hidden: Vec<Cause>) -> Measurement {
+        let Settings { converters, harmonics, full_scale, rails, window, .. } = *self.settings;
+        let own = &self.tones.channels[0];
+        let signal = self.signal_power();
+        let sinad = Decibels::of_power(signal / own.residual_rms.powi(2));
+        let enob = (sinad.0 - 10.0 * 1.5f64.log10()) / (20.0 * 2f64.log10());
+        let is_turned = converters > 1;
+        let total = |counts: &dyn Fn(&Cause) -> bool| {
+            let counted = self.lines.found.iter().filter(|line| line.causes.first().is_some_and(counts));
+            Decibels::of_power(counted.map(|line| 0.5 * line.amplitude.powi(2)).sum::<f64>() / signal)
+        };
+        Measurement {
+            samples: self.samples.len(),
+            left_out: own.left_out,
+            clipped: self.samples.iter().filter(|&&x| x <= rails.0 || x >= rails.1).count(),
+            rate: self.tones.rate,
+            converters,
+            full_scale,
+            offset: own.constant,
+            tones: self.tones(),
+            sinad,
+            enob,
+            enob_full_scale: enob + 0.5 * (0.5 * full_scale * full_scale / signal).log2(),
+            snr: Decibels::of_power(signal / self.lines.noise_power),
+            thd: total(&|cause| cause.is_harmonic()),
+            harmonics,
+            interleaving: is_turned.then(|| total(&|cause| cause.is_interleaving())),
+            sfdr: self.sfdr(|_| true),
+            sfdr_without_interleaving: is_turned
+                .then(|| self.sfdr(|line| !line.causes.iter().all(|cause| cause.is_interleaving()))),
+            noise_density: self.noise_density(),
+            window,
+            noise_bandwidth_bins: window.noise_bandwidth(),
+            spurs: self.spurs(),
+            hidden,
+            spectrum: Spectrum::new(&self.completed(), self.tones.rate, window),
+        }
+    }
+
+    fn amplitudes(&self) -> impl Iterator<Item = f64> {
+        self.tones.channels[0].tones.iter().map(|tone| tone.amplitude.value)
+    }
+
+    /// Sum of A^2 / 2.
+    fn signal_power(&self) -> f64 {
+        self.amplitudes().map(|a| 0.5 * a * a).sum()
+    }
+
+    fn largest_tone(&self) -> f64 {
+        self.amplitudes().fold(0.0, f64::max)
+    }
+
+    fn tones(&self) -> Vec<Tone> {
+        let rate = self.tones.rate;
+        let tone = |(fitted, frequency): (&crate::sine_fit::ToneFit, &Estimate<Hertz>)| Tone {
+            frequency: *frequency,
+            alias: rate * super::expected::folded(frequency.value / rate),
+            amplitude: fitted.amplitude,
+            level: Decibels::of_amplitude(fitted.amplitude.value / self.settings.full_scale),
+            phase: fitted.phase,
+        };
+        self.tones.channels[0].tones.iter().zip(&self.tones.frequencies).map(tone).collect()
+    }
+
+    /// The largest tone over the largest line that counts, or the largest bin of the rest.
+    fn sfdr(&self, counts: impl Fn(&Found) -> bool) -> Decibels {
+        let floor = self.rest.largest();
+        let counted = self.lines.found.iter().filter(|line| counts(line));
+        let largest = counted.fold(floor, |most, line| most.max(line.amplitude));
+        Decibels::of_amplitude(self.largest_tone() / largest)
+    }
+
+    fn noise_density(&self) -> Decibels {
+        let used = self.tones.channels[0].used as f64;
+        let power = self.lines.rest.iter().map(|x| x * x).sum::<f64>() / self.lines.rest.len() as f64;
+        // Lines and missing samples took a share of the noise with them.
+        let share =
+            if power > 0.0 { self.lines.noise_power / power } else { self.lines.rest.len() as f64 / used };
+        Decibels::of_power(self.rest.density() * share / (0.5 * self.settings.full_scale.powi(2)))
+    }
+
+    fn spurs(&self) -> Vec<Spur> {
+        let largest = self.largest_tone();
+        let spur = |line: &Found| Spur {
+            frequency: line.frequency,
+            amplitude: line.amplitude,
+            level: Decibels::of_amplitude(line.amplitude / largest),
+            above_noise: line.amplitude > self.lines.threshold,
+            causes: line.causes.clone(),
+        };
+        let mut spurs: Vec<Spur> = self.lines.found.iter().map(spur).collect();
+        spurs.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+        spurs
+    }
+
+    /// The samples without their constant; the fitted tones where one is missing.
+    fn completed(&self) -> Vec<f64> {
+        let offset = self.tones.channels[0].constant.value;
+        if self.samples.iter().all(|x| x.is_finite()) {
+            return self.samples.iter().map(|x| x - offset).collect();
+        }
+        let fitted = self.tones.residual(0, &vec![offset; self.samples.len()]);
+        let value = |(x, tones): (&f64, &f64)| if x.is_finite() { x - offset } else { -tones };
+        self.samples.iter().zip(&fitted).map(value).collect()
+    }
+}
