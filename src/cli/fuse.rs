@@ -1,10 +1,11 @@
 //! `hybank fuse`: fuses slow recordings into one fast recording.
 
 use super::Failure;
+use super::before_after::{BeforeAfter, BeforeAfterArgs};
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::output::{Bits, check_files, precision};
-use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
+use super::run::{AlgorithmArg, RunReport, ThreadArgs, complete};
 use super::turns::TurnArgs;
 use super::understood::say_understood;
 use super::watch::Watch;
@@ -28,6 +29,7 @@ Examples:
   hybank fuse bank.json left.wav right.wav -o fused.wav
   hybank fuse bank.json both.wav -o fused.wav --bits 24 --force
   hybank fuse bank.json capture.wav -o fused.wav --interleaved 4
+  hybank fuse bank.json tone1.wav tone2.wav -o fused.wav --measure
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
@@ -53,6 +55,8 @@ pub(super) struct Args {
     gaps: GapArgs,
     #[command(flatten)]
     threads: ThreadArgs,
+    #[command(flatten)]
+    before_after: BeforeAfterArgs,
     /// Make every tolerated fault (unequal lengths, truncation, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
@@ -77,6 +81,9 @@ struct Report<'a> {
     /// only those that the algorithm adds.
     latency_dropped: u64,
     seconds: f64,
+    /// The figures of plain interleaving and of the output, with --measure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measure: Option<BeforeAfter>,
 }
 
 /// Runs the command.
@@ -102,8 +109,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
     let run = run.with_warnings(watch.finish());
     let seconds = begin.elapsed().as_secs_f64();
-    let report = Report { run: &run, rate: rate.round() as u64, frames, latency_dropped: skip, seconds };
-    finish(outputs, &run, args.strict, args.json.then_some(&report))
+    complete(outputs, &run, args.strict)?;
+    let measure = args.measured(&bank)?;
+    if !args.json {
+        return measure.map_or(Ok(()), |measured| super::print(&measured.text()));
+    }
+    let rate = rate.round() as u64;
+    super::print_json(&Report { run: &run, rate, frames, latency_dropped: skip, seconds, measure })
 }
 
 impl Args {
@@ -112,6 +124,7 @@ impl Args {
         match_bank::check_stdin(&self.bank, &self.inputs)?;
         self.gaps.check()?;
         self.turns.check(self.inputs.len())?;
+        self.before_after.check(&self.inputs, &self.output)?;
         if self.json && self.output.as_os_str() == "-" {
             let message = "--json and `-o -` both want standard output; write the samples to a file";
             return Err(Failure::Usage(message.into()));
@@ -129,6 +142,15 @@ impl Args {
         let files = ReadOptions { block_bytes, turns: turns.as_ref(), ..ReadOptions::files() };
         let options = self.gaps.read_options(lost.as_ref(), files);
         MultiReader::start(&self.inputs, options, interrupts()).map_err(Failure::input)
+    }
+
+    /// Reads the inputs once more, and the output.
+    fn measured(&self, bank: &Bank) -> Result<Option<BeforeAfter>, Failure> {
+        if !self.before_after.is_wanted() {
+            return Ok(None);
+        }
+        let Some(reader) = self.start_reader(bank)? else { return Err(interrupted(0)) };
+        self.before_after.measured(bank, reader, &self.output).map(Some)
     }
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {

@@ -5,7 +5,9 @@
 
 mod analyze;
 mod bank_file;
+mod before_after;
 mod calibrate;
+mod capture_file;
 mod completions;
 mod demo;
 mod design;
@@ -19,6 +21,7 @@ mod import;
 mod init;
 mod interrupt;
 mod match_bank;
+mod measure;
 mod output;
 mod plot;
 mod print;
@@ -56,6 +59,7 @@ Examples:
   hybank verify bank.json
   hybank simulate bank.json --source chirp:50Hz..8kHz@1s -o captures
   hybank fuse bank.json captures/ch1.wav captures/ch2.wav -o fused.wav
+  hybank measure fused.wav --ref captures/target.wav
 
 Exit codes: 0 done; 1 the input or the design failed; 2 wrong usage."
 )]
@@ -76,6 +80,7 @@ enum Command {
     Simulate(simulate::Args),
     Calibrate(calibrate::Args),
     Fuse(fuse::Args),
+    Measure(measure::Args),
     Stream(stream::Args),
     Demo(demo::Args),
     Completions(completions::Args),
@@ -114,6 +119,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Fuse(args) => fuse::run(&args),
+        Command::Measure(args) => measure::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Completions(args) => completions::run(&args),

@@ -139,6 +139,12 @@ pub(super) fn finish(
     strict: bool,
     report: Option<&impl serde::Serialize>,
 ) -> Result<(), Failure> {
+    complete(outputs, run, strict)?;
+    report.map_or(Ok(()), print_json)
+}
+
+/// As [`finish`], without a report.
+pub(super) fn complete(outputs: FileOutputs, run: &RunReport, strict: bool) -> Result<(), Failure> {
     let judged = run.judge(strict);
     if judged.is_ok() {
         outputs.finish().map_err(Failure::running)?;
@@ -146,5 +152,5 @@ pub(super) fn finish(
     run.gaps.iter().for_each(say_gaps);
     judged?;
     run.warnings.iter().for_each(|warning| warn(warning));
-    report.map_or(Ok(()), print_json)
+    Ok(())
 }

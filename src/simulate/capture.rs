@@ -97,16 +97,26 @@ impl Analog {
 /// Plain interleaving, for comparison: output n is the slow sample whose instant lies nearest to n - m0, as
 /// if all front ends were alike; 0 where that sample has not been captured.
 pub fn interleaved(problem: &Problem, channels: &[Vec<f64>]) -> Vec<f64> {
+    let delays: Vec<FastPeriods> = problem.channels.iter().map(|channel| channel.delay).collect();
+    nearest_samples(&delays, problem.ratio, problem.latency, channels)
+}
+
+/// As [`interleaved`], for channels of which only the delays are known.
+pub fn nearest_samples(
+    delays: &[FastPeriods],
+    ratio: usize,
+    latency: usize,
+    channels: &[Vec<f64>],
+) -> Vec<f64> {
     let periods = channels.iter().map(Vec::len).min().unwrap_or(0);
-    let slow_period = problem.ratio as f64;
+    let slow_period = ratio as f64;
     let nearest = |n: usize| {
-        let instant = n as f64 - problem.latency as f64;
-        problem
-            .channels
+        let instant = n as f64 - latency as f64;
+        delays
             .iter()
             .zip(channels)
-            .map(|(channel, samples)| {
-                let delay = channel.delay.0;
+            .map(|(delay, samples)| {
+                let delay = delay.0;
                 let k = ((instant + delay) / slow_period).round();
                 let distance = (k * slow_period - delay - instant).abs();
                 let value = if k < 0.0 { 0.0 } else { samples.get(k as usize).copied().unwrap_or(0.0) };
@@ -115,7 +125,7 @@ pub fn interleaved(problem: &Problem, channels: &[Vec<f64>]) -> Vec<f64> {
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map_or(0.0, |(_, value)| value)
     };
-    (0..periods * problem.ratio).map(nearest).collect()
+    (0..periods * ratio).map(nearest).collect()
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ mod response;
 mod source;
 mod walk;
 
-pub use capture::{Analog, Captured, capture, interleaved, recordings, target};
+pub use capture::{Analog, Captured, capture, interleaved, nearest_samples, recordings, target};
 pub use converter::{Converter, Delivered};
 pub use parse::ParseSourceError;
 pub use quantiser::Quantiser;

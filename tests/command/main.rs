@@ -19,6 +19,7 @@ mod fuse;
 #[cfg(target_os = "linux")]
 mod long_files;
 mod lost;
+mod measure;
 #[cfg(unix)]
 mod outputs;
 mod simulate;

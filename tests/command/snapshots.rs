@@ -7,7 +7,7 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "init",
     "design",
     "analyze",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 14] = [
     "simulate",
     "calibrate",
     "fuse",
+    "measure",
     "stream",
     "demo",
     "completions",

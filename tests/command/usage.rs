@@ -51,7 +51,7 @@ fn completions_know_the_verbs() {
 fn help_and_version() {
     let desk = Desk::with_spec(THESIS);
     assert_eq!(desk.good(&["--version"]), format!("hybank {}\n", env!("CARGO_PKG_VERSION")));
-    for command in ["design", "analyze", "simulate", "fuse", "stream", "demo", "completions"] {
+    for command in ["design", "analyze", "simulate", "fuse", "measure", "stream", "demo", "completions"] {
         let help = desk.good(&[command, "--help"]);
         assert!(help.contains("Examples:") && help.contains("Usage:"), "{command}");
     }

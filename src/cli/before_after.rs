@@ -1,0 +1,113 @@
+//! `fuse --measure`: the figures of the recording before and after.
+
+use super::Failure;
+use super::bank_file::is_dash;
+use super::capture_file::{CaptureFile, check_files_on_disk, read_channels};
+use super::measure::{ToneArg, column, tone, tones};
+use crate::bank::{Bank, SynthesisFilters};
+use crate::io::MultiReader;
+use crate::measure::{Measurement, Settings, measure};
+use crate::simulate::nearest_samples;
+use crate::units::Hertz;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Fast samples at either end that are not measured, beside the latency and the length of the filters: a
+/// recursive bank settles in that time.
+const MARGIN: usize = 512;
+/// Least part of the recording that stays.
+const LEAST_PART: usize = 2;
+
+/// The options.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct BeforeAfterArgs {
+    /// Measure the recording of a tone before, as plain interleaving of the inputs, and after, as
+    /// `hybank measure` does
+    #[arg(long)]
+    measure: bool,
+    /// Tones to measure (9kHz, 1.2GHz, or hertz); auto: the largest one
+    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, requires = "measure")]
+    tone: Vec<ToneArg>,
+}
+
+/// The figures of both.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct BeforeAfter {
+    /// Of plain interleaving: each output sample is the input sample that was taken nearest to it.
+    before: Measurement,
+    after: Measurement,
+}
+
+impl BeforeAfterArgs {
+    /// Refuses what cannot be read twice, before any file is read.
+    pub(super) fn check(&self, inputs: &[PathBuf], output: &Path) -> Result<(), Failure> {
+        if !self.measure {
+            return Ok(());
+        }
+        tones(&self.tone)?;
+        if is_dash(output) {
+            let message = "--measure reads the output once more; write it to a file";
+            return Err(Failure::Usage(message.into()));
+        }
+        check_files_on_disk(inputs, "--measure")
+    }
+
+    /// True if something is to be measured.
+    pub(super) fn is_wanted(&self) -> bool {
+        self.measure
+    }
+
+    /// Measures the inputs, which `reader` reads once more, and the finished output.
+    pub(super) fn measured(
+        &self,
+        bank: &Bank,
+        mut reader: MultiReader,
+        output: &Path,
+    ) -> Result<BeforeAfter, Failure> {
+        let fused = CaptureFile::read(output, None)?;
+        let channels = read_channels(&mut reader, None)?;
+        let delays: Vec<_> =
+            bank.delays.iter().map(|delay| delay.in_fast_periods(bank.fast_period)).collect();
+        let plain = nearest_samples(&delays, bank.ratio, 0, &channels);
+        let settings = Settings {
+            tones: tones(&self.tone)?,
+            converters: bank.ratio,
+            rails: (f64::NEG_INFINITY, f64::INFINITY),
+            ..Settings::default()
+        };
+        let of = |which: &str, samples: &[f64]| {
+            let part = inner(bank, samples);
+            measure(part, Hertz(fused.rate.0), &settings).map_err(|error| {
+                let output = output.display();
+                Failure::Input(format!("{output} is written, but --measure cannot measure {which}: {error}"))
+            })
+        };
+        Ok(BeforeAfter { before: of("plain interleaving", &plain)?, after: of("it", &fused.samples)? })
+    }
+}
+
+/// The samples without those at the ends, where the filters lack input.
+fn inner<'a>(bank: &Bank, samples: &'a [f64]) -> &'a [f64] {
+    let taps = match &bank.filters {
+        SynthesisFilters::Fir(taps) => taps.iter().map(Vec::len).max().unwrap_or(0),
+        SynthesisFilters::StateSpace(_) => MARGIN,
+    };
+    let margin = (bank.latency + taps + MARGIN).min(samples.len() / (2 * LEAST_PART));
+    &samples[margin..samples.len() - margin]
+}
+
+impl BeforeAfter {
+    /// Both columns side by side.
+    pub(super) fn text(&self) -> String {
+        let tone = self.after.tones.first();
+        let mut text = tone.map_or_else(String::new, |tone| {
+            format!("tone at {:.6}, {:.2} dBFS\n", tone.frequency.value, tone.level.0)
+        });
+        let _ = writeln!(text, "{:<16} {:>12} {:>12}", "", "interleaved", "fused");
+        for (before, after) in column(&self.before).iter().zip(column(&self.after)) {
+            let _ =
+                writeln!(text, "{:<16} {:>12} {:>12} {}", after.name, before.value, after.value, after.unit);
+        }
+        text
+    }
+}

@@ -1,0 +1,225 @@
+//! `hybank measure`: the quality of a recording.
+
+mod chart;
+mod report;
+
+use super::Failure;
+use super::bank_file::{is_dash, name, refuse_overlap, write_text};
+use super::capture_file::CaptureFile;
+use crate::measure::{Comparison, Measurement, Settings, Window, compare, measure};
+use crate::quantity;
+use crate::units::Hertz;
+pub(super) use report::{column, warnings};
+use std::path::{Path, PathBuf};
+
+/// Measures a recording of a tone: SINAD, ENOB, SNR, THD, SFDR, noise density and spurs with their causes
+///
+/// The figures come from a least-squares fit of the tone (IEEE 1057 and 1241), so the tone need not lie on a
+/// bin of the spectrum. With --ref the recording is compared with another one of the same signal: lag, gain,
+/// SNR and error.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  hybank measure capture.wav
+  hybank measure capture.wav --interleaved 4 --tone 9.7MHz --plot spectrum.svg
+  hybank measure fused.wav --skip 200 --json | jq .sinad_db
+  hybank measure fused.wav --ref captures/target.wav")]
+pub(super) struct Args {
+    /// The recording (WAV or SigMF); `-` is standard input
+    file: PathBuf,
+    /// Tones of the recording (9kHz, 1.2GHz, or hertz), in any Nyquist zone, to within 0.1 % of the sample
+    /// rate; auto: the largest tone [default: auto, or none with --ref]
+    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone)]
+    tone: Vec<ToneArg>,
+    /// Number of converters that take turns in the recording: tells which spurs are interleaving spurs
+    #[arg(long, value_name = "M", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    interleaved: u16,
+    /// Window of the spectrum (SFDR, noise density, plot); SINAD, THD and the spurs need none
+    #[arg(long, value_enum, default_value_t = WindowArg::Bh7)]
+    window: WindowArg,
+    /// Highest order of the harmonics in THD
+    #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    harmonics: u16,
+    /// Amplitude of full scale; 1 is that of integer formats
+    #[arg(long, value_name = "X", default_value_t = 1.0)]
+    full_scale: f64,
+    /// A recording of the same signal to compare with, of the same rate
+    #[arg(long = "ref", value_name = "TARGET")]
+    reference: Option<PathBuf>,
+    /// The channel to measure, from 1; a mono recording needs none
+    #[arg(long, value_name = "I")]
+    channel: Option<usize>,
+    /// Samples at either end that are not measured, such as those before a filter has settled
+    #[arg(long, value_name = "SAMPLES", default_value_t = 0)]
+    skip: usize,
+    /// Write the spectrum with its spurs as SVG
+    #[arg(long, value_name = "OUT.svg")]
+    plot: Option<PathBuf>,
+    /// Replace an existing plot
+    #[arg(long)]
+    force: bool,
+    /// Print the figures as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Windows on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum WindowArg {
+    /// No window
+    None,
+    /// Two terms
+    Hann,
+    /// Four-term Blackman-Harris, side lobes at -92 dB
+    Bh4,
+    /// Seven-term Blackman-Harris, side lobes at -180 dB
+    Bh7,
+}
+
+impl WindowArg {
+    fn window(self) -> Window {
+        match self {
+            Self::None => Window::None,
+            Self::Hann => Window::Hann,
+            Self::Bh4 => Window::Bh4,
+            Self::Bh7 => Window::Bh7,
+        }
+    }
+}
+
+/// A tone on the command line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum ToneArg {
+    /// The largest one.
+    Auto,
+    /// The one near a frequency.
+    Near(Hertz),
+}
+
+/// Reads `auto` or a frequency above 0.
+pub(super) fn tone(text: &str) -> Result<ToneArg, String> {
+    if text.trim() == "auto" {
+        return Ok(ToneArg::Auto);
+    }
+    match quantity::frequency(text) {
+        Ok(frequency) if frequency.0 > 0.0 => Ok(ToneArg::Near(frequency)),
+        Ok(frequency) => Err(format!("the tone is at {frequency}; give a frequency above 0, or auto")),
+        Err(error) => Err(format!("{error}; or auto")),
+    }
+}
+
+/// The tones for [`Settings::tones`]: none for the largest one.
+pub(super) fn tones(given: &[ToneArg]) -> Result<Vec<Hertz>, Failure> {
+    let near = given.iter().filter_map(|tone| match tone {
+        ToneArg::Auto => None,
+        ToneArg::Near(frequency) => Some(*frequency),
+    });
+    let tones: Vec<Hertz> = near.collect();
+    if !tones.is_empty() && tones.len() < given.len() || given.len() > tones.len() + 1 {
+        return Err(Failure::Usage("--tone is `auto` or a list of frequencies, not both".into()));
+    }
+    Ok(tones)
+}
+
+/// What the command found.
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    file: String,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    measurement: Option<Measurement>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<ReferenceReport>,
+    warnings: Vec<String>,
+}
+
+/// The comparison with a reference.
+#[derive(Debug, serde::Serialize)]
+struct ReferenceReport {
+    file: String,
+    #[serde(flatten)]
+    comparison: Comparison,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] with the one message for the user.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    args.check()?;
+    let capture = CaptureFile::read(&args.file, args.channel)?.trimmed(&args.file, args.skip)?;
+    let settings = args.settings(&capture)?;
+    let measurement = match args.reference.is_some() && args.tone.is_empty() {
+        true => None,
+        false => Some(measure(&capture.samples, capture.rate, &settings).map_err(|e| args.named(&e))?),
+    };
+    let reference = match &args.reference {
+        None => None,
+        Some(path) => Some(args.compared(&capture, path)?),
+    };
+    let warnings = measurement.as_ref().map(warnings).unwrap_or_default();
+    let report = Report { file: name(&args.file), measurement, reference, warnings };
+    if let Some(path) = &args.plot {
+        let (chart, marks) = chart::chart(&report, &settings, &capture);
+        let svg = chart.to_svg_with(&marks).map_err(|e| args.named(&e))?;
+        write_text(path, &svg, args.force)?;
+    }
+    report.warnings.iter().for_each(|warning| super::warn(&format!("{}: {warning}", report.file)));
+    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
+}
+
+impl Args {
+    /// Refuses impossible combinations of options, before any file is read.
+    fn check(&self) -> Result<(), Failure> {
+        if let Some(plot) = &self.plot {
+            if is_dash(plot) {
+                let message = "the figures go to standard output; write the plot to a file";
+                return Err(Failure::Usage(format!("--plot -: {message}")));
+            }
+            let inputs = [Some(&self.file), self.reference.as_ref()];
+            inputs.into_iter().flatten().try_for_each(|input| refuse_overlap(plot, input))?;
+        }
+        match &self.reference {
+            Some(reference) if is_dash(reference) && is_dash(&self.file) => {
+                Err(Failure::Usage("`-` is given twice; standard input can be only one of them".into()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn settings(&self, capture: &CaptureFile) -> Result<Settings, Failure> {
+        if !(self.full_scale > 0.0 && self.full_scale.is_finite()) {
+            let message = format!("--full-scale {} is not a positive number", self.full_scale);
+            return Err(Failure::Usage(message));
+        }
+        Ok(Settings {
+            tones: tones(&self.tone)?,
+            converters: self.interleaved.into(),
+            harmonics: self.harmonics.into(),
+            full_scale: self.full_scale,
+            rails: capture.rails.unwrap_or((-self.full_scale, self.full_scale)),
+            window: self.window.window(),
+        })
+    }
+
+    fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
+        let reference = CaptureFile::read(path, None)?.trimmed(path, self.skip)?;
+        if (reference.rate.0 - capture.rate.0).abs() > 1e-9 * capture.rate.0 {
+            return Err(Failure::Input(format!(
+                "{}: the sample rate is {}, but {} has {}; a comparison needs one rate, resample one of them",
+                name(path),
+                reference.rate,
+                name(&self.file),
+                capture.rate
+            )));
+        }
+        let comparison = compare(&capture.samples, &reference.samples, capture.rate, self.window.window());
+        let comparison = comparison.map_err(|error| {
+            Failure::Input(format!("{} against {}: {error}", name(&self.file), name(path)))
+        })?;
+        Ok(ReferenceReport { file: name(path), comparison })
+    }
+
+    fn named(&self, error: &dyn std::fmt::Display) -> Failure {
+        Failure::Input(format!("{}: {error}", name(&self.file)))
+    }
+}

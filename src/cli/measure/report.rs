@@ -1,0 +1,157 @@
+//! The figures as text.
+
+use super::Report;
+use crate::measure::{Comparison, Measurement, Spur};
+use std::fmt::Write as _;
+
+/// Spurs that the text lists.
+const MOST_SPURS: usize = 20;
+
+/// A figure: its name, its value, its unit and what it means.
+pub(in crate::cli) struct Figure {
+    pub(in crate::cli) name: &'static str,
+    pub(in crate::cli) value: String,
+    pub(in crate::cli) unit: &'static str,
+    meaning: &'static str,
+}
+
+/// What the user should know beside the figures.
+pub(in crate::cli) fn warnings(measured: &Measurement) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if measured.clipped > 0 {
+        warnings.push(format!(
+            "{} of {} samples are at the limits of the range; SINAD and THD contain their distortion, so lower the level if it is not meant",
+            measured.clipped, measured.samples
+        ));
+    }
+    if measured.left_out > 0 {
+        warnings.push(format!(
+            "{} of {} samples are NaN or infinite and were left out",
+            measured.left_out, measured.samples
+        ));
+    }
+    if !measured.hidden.is_empty() {
+        let names: Vec<String> = measured.hidden.iter().map(ToString::to_string).collect();
+        warnings.push(format!(
+            "these spurs fall on the tone, on the constant or on half the rate and cannot be seen: {}; choose another frequency to see them",
+            names.join("; ")
+        ));
+    }
+    warnings
+}
+
+/// The figures of a measurement in the order of the report.
+pub(in crate::cli) fn column(measured: &Measurement) -> Vec<Figure> {
+    let figure = |name, value: f64, digits: usize, unit, meaning| Figure {
+        name,
+        value: format!("{value:.digits$}"),
+        unit,
+        meaning,
+    };
+    let db = |name, value: f64, meaning| figure(name, value, 2, "dB", meaning);
+    let mut figures = vec![
+        db("SINAD", measured.sinad.0, "tone over all else, from the residual of the sine fit"),
+        figure("ENOB", measured.enob, 3, "bits", "from SINAD: (SINAD - 1.76) / 6.02"),
+        figure(
+            "ENOB, full scale",
+            measured.enob_full_scale,
+            3,
+            "bits",
+            "of a tone of full scale in the same noise",
+        ),
+        db("SNR", measured.snr.0, "tone over noise: no harmonics, no spurs"),
+        db("THD", measured.thd.0, "harmonics over tone"),
+    ];
+    if let Some(interleaving) = measured.interleaving {
+        figures.push(db("interleaving", interleaving.0, "interleaving spurs over tone"));
+    }
+    figures.push(figure("SFDR", measured.sfdr.0, 2, "dBc", "tone over the largest spur"));
+    if let Some(sfdr) = measured.sfdr_without_interleaving {
+        figures.push(figure("SFDR, converters", sfdr.0, 2, "dBc", "without interleaving spurs"));
+    }
+    figures.push(figure(
+        "noise density",
+        measured.noise_density.0,
+        2,
+        "dBFS/Hz",
+        "relative to a sine of full scale",
+    ));
+    figures
+}
+
+impl Report {
+    pub(super) fn text(&self) -> String {
+        let mut text = String::new();
+        if let Some(measured) = &self.measurement {
+            write_measurement(&mut text, measured);
+        }
+        if let Some(reference) = &self.reference {
+            write_comparison(&mut text, &reference.file, &reference.comparison);
+        }
+        text
+    }
+}
+
+fn write_measurement(text: &mut String, measured: &Measurement) {
+    for tone in &measured.tones {
+        let _ = writeln!(
+            text,
+            "tone             {:.6} +- {:.2e} Hz, amplitude {:.6} ({:.2} dBFS)",
+            tone.frequency.value.0, tone.frequency.sigma.0, tone.amplitude.value, tone.level.0
+        );
+        if (tone.alias - tone.frequency.value).0.abs() > 0.5 * measured.rate.0 / measured.samples as f64 {
+            let _ = writeln!(text, "                 seen at {:.6}", tone.alias);
+        }
+    }
+    let _ = writeln!(text, "offset           {:.6} +- {:.2e}", measured.offset.value, measured.offset.sigma);
+    for Figure { name, value, unit, meaning } in column(measured) {
+        let _ = writeln!(text, "{name:<16} {value:>9} {unit:<7}   {meaning}");
+    }
+    write_spurs(text, measured);
+}
+
+fn write_spurs(text: &mut String, measured: &Measurement) {
+    let above: Vec<&Spur> = measured.spurs.iter().filter(|spur| spur.above_noise).collect();
+    let _ = match above.len() {
+        0 => writeln!(text, "no spur above the noise"),
+        _ => writeln!(text, "\nspurs above the noise (Hz, dBc, cause):"),
+    };
+    for spur in above.iter().take(MOST_SPURS) {
+        let causes: Vec<String> = spur.causes.iter().map(ToString::to_string).collect();
+        let _ = writeln!(text, "{:>18.3} {:>8.2}   {}", spur.frequency.0, spur.level.0, causes.join("; "));
+    }
+    if above.len() > MOST_SPURS {
+        let _ = writeln!(text, "  and {} smaller ones (--json lists all)", above.len() - MOST_SPURS);
+    }
+}
+
+fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
+    let _ = writeln!(
+        text,
+        "{}against {file}, {} samples:",
+        if text.is_empty() { "" } else { "\n" },
+        found.compared
+    );
+    let _ = writeln!(
+        text,
+        "lag              {:.6} +- {:.1e} samples ({:.6e})",
+        found.lag_samples.value, found.lag_samples.sigma, found.lag
+    );
+    let _ = writeln!(text, "gain             {:.8} +- {:.1e}", found.gain.value, found.gain.sigma);
+    let _ = writeln!(text, "offset           {:.3e} +- {:.1e}", found.offset.value, found.offset.sigma);
+    let _ = writeln!(
+        text,
+        "SNR              {:.2} dB   reference over error, lag, gain and offset taken out",
+        found.snr.0
+    );
+    let _ = writeln!(
+        text,
+        "SNR, unaligned   {:.2} dB   sample by sample, nothing taken out",
+        found.snr_unaligned.0
+    );
+    let _ = writeln!(
+        text,
+        "error            {:.3e} rms, at most {:.3e} (sample {})",
+        found.error_rms, found.largest_error, found.largest_error_at
+    );
+}

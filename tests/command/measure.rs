@@ -1,0 +1,182 @@
+//! The command `measure`, and `fuse --measure`.
+
+use crate::support::random::Random;
+use crate::support::{Desk, THESIS, number, text, wav};
+use std::f64::consts::TAU;
+use std::fs;
+
+const RATE: f64 = 48_000.0;
+
+/// Two converters in turn: offsets of +-0.01, gains of 1 +- 0.02; some noise.
+fn capture(count: usize, hertz: f64) -> Vec<f32> {
+    let mut random = Random(4);
+    let at = |n: usize| {
+        let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let noise = 1e-4 * (0..6).map(|_| random.sample()).sum::<f64>();
+        (sign * 0.01 + 0.5 * (1.0 + 0.02 * sign) * (TAU * hertz / RATE * n as f64).cos() + noise) as f32
+    };
+    (0..count).map(at).collect()
+}
+
+fn db(ratio: f64) -> f64 {
+    20.0 * ratio.log10()
+}
+
+#[test]
+fn a_recording_is_measured() {
+    let desk = Desk::with_spec(THESIS);
+    wav::write(&desk, "x.wav", 1, 48_000, &capture(20_000, 4321.0));
+    let found = desk.json(&["measure", "x.wav", "--interleaved", "2", "--json"]);
+    assert!((number(&found, "/tones/0/frequency_hertz/value") - 4321.0).abs() < 0.01);
+    assert!((number(&found, "/tones/0/level_dbfs") - db(0.5)).abs() < 0.01);
+    // The offset at half the rate and the gain at 24000 - 4321, relative to an amplitude of 0.5.
+    assert_eq!(number(&found, "/spurs/0/frequency_hertz"), 24_000.0);
+    // (-1)^n a has the power a^2, a sine a^2 / 2.
+    assert!((number(&found, "/spurs/0/level_dbc") - db(2f64.sqrt() * 0.01 / 0.5)).abs() < 0.05);
+    assert_eq!(found["spurs"][0]["causes"][0]["kind"], "offset");
+    assert!((number(&found, "/spurs/1/level_dbc") - db(0.02)).abs() < 0.05);
+    assert!((number(&found, "/spurs/1/frequency_hertz") - 19_679.0).abs() < 0.01);
+    assert_eq!(found["spurs"][1]["causes"][0]["kind"], "gain_or_skew");
+    let spurs = 0.01f64.powi(2) + 0.5 * 0.01f64.powi(2);
+    assert!((number(&found, "/sinad_db") - 10.0 * (0.125 / spurs).log10()).abs() < 0.05);
+    assert!(number(&found, "/sfdr_without_interleaving_db") > 70.0);
+    let report = desk.good(&["measure", "x.wav", "--interleaved", "2", "--tone", "4.32kHz"]);
+    for part in ["SINAD", "ENOB, full scale", "noise density", "offset, 1/2 fs", "gain or skew, 1/2 fs - f"] {
+        assert!(report.contains(part), "{part}: {report}");
+    }
+    // A single converter has no interleaving spurs: the same lines are unknown.
+    let single = desk.json(&["measure", "x.wav", "--json"]);
+    assert!(single["interleaving_db"].is_null());
+    assert_eq!(single["spurs"][0]["causes"][0]["kind"], "unknown");
+}
+
+#[test]
+fn the_spectrum_is_drawn_with_its_spurs() {
+    let desk = Desk::with_spec(THESIS);
+    wav::write(&desk, "x.wav", 1, 48_000, &capture(20_000, 4321.0));
+    let args = ["measure", "x.wav", "--interleaved", "2", "--plot", "x.svg"];
+    desk.good(&args);
+    let svg = fs::read_to_string(desk.path("x.svg")).unwrap();
+    for part in ["frequency (kHz)", "dBFS", "gain or skew", "offset", "1/2-f", "SINAD"] {
+        assert!(svg.contains(part), "{part}");
+    }
+    desk.refused(1, &args, &["x.svg", "exists", "--force"]);
+    desk.refused(2, &["measure", "x.wav", "--plot", "-"], &["--plot -", "file"]);
+    desk.refused(1, &["measure", "x.wav", "--plot", "x.wav", "--force"], &["x.wav"]);
+}
+
+#[test]
+fn a_recording_is_compared_with_a_reference() {
+    let desk = Desk::with_spec(THESIS);
+    let clean: Vec<f32> = (0..3000).map(|n| ((n * n) as f64 * 1e-4).sin() as f32).collect();
+    // Seven samples late, half as large.
+    let late: Vec<f32> = (0..3000).map(|n: usize| if n < 7 { 0.0 } else { 0.5 * clean[n - 7] }).collect();
+    wav::write(&desk, "clean.wav", 1, 48_000, &clean);
+    wav::write(&desk, "late.wav", 1, 48_000, &late);
+    let found = desk.json(&["measure", "late.wav", "--ref", "clean.wav", "--json"]);
+    assert!((number(&found, "/reference/lag_samples/value") - 7.0).abs() < 1e-6);
+    assert!((number(&found, "/reference/gain/value") - 0.5).abs() < 1e-6);
+    assert!(number(&found, "/reference/snr_db") > 130.0);
+    assert!(number(&found, "/reference/snr_unaligned_db") < 10.0);
+    assert!(found["sinad_db"].is_null());
+    let report = desk.good(&["measure", "late.wav", "--ref", "clean.wav", "--plot", "e.svg"]);
+    assert!(report.contains("lag") && report.contains("SNR, unaligned"), "{report}");
+    assert!(fs::read_to_string(desk.path("e.svg")).unwrap().contains("error against clean.wav"));
+    wav::write(&desk, "fast.wav", 1, 96_000, &clean);
+    desk.refused(
+        1,
+        &["measure", "late.wav", "--ref", "fast.wav"],
+        &["fast.wav", "96000", "48000", "resample"],
+    );
+    wav::write(&desk, "flat.wav", 1, 48_000, &[0.25; 3000]);
+    desk.refused(
+        1,
+        &["measure", "late.wav", "--ref", "flat.wav"],
+        &["late.wav against flat.wav", "constant"],
+    );
+    desk.refused(2, &["measure", "-", "--ref", "-"], &["`-` is given twice"]);
+}
+
+#[test]
+fn channels_ends_and_standard_input() {
+    let desk = Desk::with_spec(THESIS);
+    let tone = capture(6000, 4321.0);
+    let both: Vec<f32> = tone.iter().flat_map(|x| [*x, 0.0]).collect();
+    wav::write(&desk, "both.wav", 2, 48_000, &both);
+    wav::write(&desk, "x.wav", 1, 48_000, &tone);
+    desk.refused(2, &["measure", "both.wav"], &["2 channels", "--channel 1 to 2"]);
+    desk.refused(2, &["measure", "both.wav", "--channel", "3"], &["--channel 3", "counted from 1"]);
+    desk.refused(1, &["measure", "both.wav", "--channel", "2"], &["both.wav", "no tone found"]);
+    let mono = desk.json(&["measure", "x.wav", "--json"]);
+    let first = desk.json(&["measure", "both.wav", "--channel", "1", "--json"]);
+    assert_eq!(mono["sinad_db"], first["sinad_db"]);
+    let inner = desk.json(&["measure", "x.wav", "--skip", "500", "--json"]);
+    assert_eq!(inner["samples"], 5000);
+    desk.refused(2, &["measure", "x.wav", "--skip", "3000"], &["--skip 3000", "6000 samples"]);
+}
+
+#[test]
+fn clipping_and_hidden_spurs_are_said() {
+    let desk = Desk::with_spec(THESIS);
+    let loud: Vec<f32> = capture(6000, 4321.0).iter().map(|x| (3.0 * x).clamp(-1.0, 1.0)).collect();
+    wav::write(&desk, "loud.wav", 1, 48_000, &loud);
+    let output = desk.run(&["measure", "loud.wav"], b"");
+    assert!(text(&output.stderr).contains("limits of the range"), "{}", text(&output.stderr));
+    // A quarter of the rate: the image of two converters is the tone itself.
+    wav::write(&desk, "quarter.wav", 1, 48_000, &capture(6000, 12_000.0));
+    let output = desk.run(&["measure", "quarter.wav", "--interleaved", "2"], b"");
+    assert!(text(&output.stderr).contains("gain or skew, 1/2 fs - f"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn what_cannot_be_measured_is_refused() {
+    let desk = Desk::with_spec(THESIS);
+    wav::write(&desk, "x.wav", 1, 48_000, &capture(6000, 4321.0));
+    wav::write(&desk, "flat.wav", 1, 48_000, &[0.5; 1000]);
+    wav::write(&desk, "empty.wav", 1, 48_000, &[]);
+    wav::write(&desk, "short.wav", 1, 48_000, &capture(100, 4321.0));
+    desk.refused(1, &["measure", "flat.wav"], &["flat.wav", "no tone found"]);
+    desk.refused(1, &["measure", "empty.wav"], &["empty.wav", "no samples"]);
+    desk.refused(1, &["measure", "short.wav", "--interleaved", "16"], &["short.wav", "too few", "harmonics"]);
+    desk.refused(1, &["measure", "x.wav", "--tone", "9kHz"], &["x.wav", "no tone found near 9000 Hz"]);
+    desk.refused(2, &["measure", "x.wav", "--tone", "fast"], &["fast", "auto"]);
+    desk.refused(2, &["measure", "x.wav", "--tone", "-3"], &["unexpected argument"]);
+    desk.refused(2, &["measure", "x.wav", "--tone", "0"], &["above 0"]);
+    desk.refused(2, &["measure", "x.wav", "--tone", "auto,4321"], &["not both"]);
+    desk.refused(2, &["measure", "x.wav", "--full-scale", "0"], &["--full-scale 0", "positive"]);
+    desk.refused(2, &["measure", "x.wav", "--interleaved", "0"], &["0"]);
+    desk.refused(1, &["measure", "none.wav"], &["none.wav"]);
+}
+
+/// Two channels 0.4 fast samples off their places: plain interleaving has the spurs of that skew, the bank not.
+#[test]
+fn fuse_measures_before_and_after() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "40", "--latency", "20"]);
+    let simulate = ["simulate", "b.json", "--source", "tones:0.35", "-o", "cap", "--samples", "8000"];
+    desk.good(&simulate);
+    let fuse = ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav", "--measure"];
+    let report = desk.good(&fuse);
+    assert!(
+        report.contains("interleaved") && report.contains("SINAD") && report.contains("fused"),
+        "{report}"
+    );
+    let found = desk.json(&[&fuse[..], &["--json", "--force"]].concat());
+    let (before, after) =
+        (number(&found, "/measure/before/sinad_db"), number(&found, "/measure/after/sinad_db"));
+    assert!(after > before + 20.0, "{before} {after}");
+    let tone = number(&found, "/measure/after/tones/0/frequency_hertz/value");
+    assert!((tone - 0.35 / TAU * RATE).abs() < 0.1, "{tone}");
+    desk.refused(
+        2,
+        &["fuse", "b.json", "cap/ch1.wav", "-", "-o", "z.wav", "--measure"],
+        &["--measure", "standard input"],
+    );
+    desk.refused(
+        2,
+        &["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "-", "--measure"],
+        &["--measure"],
+    );
+    desk.refused(2, &[&fuse[..6], &["--tone", "9kHz"]].concat(), &["--measure"]);
+    assert!(!desk.path("z.wav").exists());
+}
