@@ -65,7 +65,7 @@ mod tests;
 #[cfg(feature = "rayon")]
 mod thread_pool;
 
-pub use adapters::{Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
+pub use adapters::{Frames, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
 pub use algorithms::choice::Algorithm;
 pub use complex::ComplexStream;
 pub use error::{BuildError, ProcessError, SwapError};

@@ -5,9 +5,9 @@
 //! than threads: a thread that is done takes the next one, so that a thread that was held up does not hold
 //! up all.
 
-use crate::adapters::{Input, SplitOutput};
+use crate::ThreadPool;
+use crate::adapters::{Frames, Input, SplitOutput};
 use crate::algorithms::Filter;
-use crate::{Isa, Sample, ThreadPool};
 use std::ops::Range;
 
 /// Multiply-adds that are worth a chunk: some tens of microseconds, many times what it costs to hand it
@@ -97,7 +97,7 @@ impl<F: Chunked, I: Input + Sync + ?Sized> Call<'_, F, I> {
         state: Option<&mut F::State>,
         output: &mut (impl SplitOutput + ?Sized),
     ) -> (u64, Option<F::State>) {
-        let chunk = Chunk { input: self.input, frames: frames.clone() };
+        let chunk = Frames::new(self.input, frames.clone());
         match state {
             Some(state) => (self.filter.process(state, &chunk, output), None),
             None => {
@@ -105,30 +105,5 @@ impl<F: Chunked, I: Input + Sync + ?Sized> Call<'_, F, I> {
                 (self.filter.process(&mut own, &chunk, output), Some(own))
             }
         }
-    }
-}
-
-/// Some of the frames of an input.
-struct Chunk<'a, I: ?Sized> {
-    input: &'a I,
-    frames: Range<usize>,
-}
-
-impl<I: Input + ?Sized> Input for Chunk<'_, I> {
-    fn channels(&self) -> usize {
-        self.input.channels()
-    }
-
-    fn frames(&self) -> usize {
-        self.frames.len()
-    }
-
-    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
-        let n = self.channels();
-        self.input.in_memory().map(|samples| &samples[self.frames.start * n..self.frames.end * n])
-    }
-
-    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
-        self.input.load(isa, self.frames.start + first, samples);
     }
 }

@@ -85,6 +85,11 @@ impl Stream {
         self.plan.history()
     }
 
+    /// See [`Plan::alignment`].
+    pub fn alignment(&self) -> usize {
+        self.plan.alignment()
+    }
+
     /// Frames since the beginning.
     pub fn position(&self) -> u64 {
         self.position

@@ -5,7 +5,7 @@ use super::file_kind::FileKind;
 use super::interrupt::remove_unfinished;
 use super::print::print_bytes;
 use super::say::name_leftovers;
-use crate::bank::{Bank, SynthesisFilters};
+use crate::bank::Bank;
 use crate::design::filters;
 use crate::files::{self, AtomicFile, Bound};
 use crate::spec::{DesignOverrides, Spec, SpecProblem};
@@ -28,7 +28,7 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
         return Err(is_a_spec(path));
     }
     let bank = Bank::from_json(&text, &name(path)).map_err(Failure::input)?;
-    check_stable(&bank, path)?;
+    filters::check_stable(&bank).map_err(|error| Failure::Input(format!("{}: {error}", name(path))))?;
     Ok(bank)
 }
 
@@ -38,22 +38,6 @@ pub(super) fn is_a_spec(path: &Path) -> Failure {
     Failure::Input(format!(
         "{name}: this is a spec, and a bank is needed; design it first: hybank design {name} -o bank.json"
     ))
-}
-
-/// Refuses unstable filters: their output would grow to infinity without a message.
-fn check_stable(bank: &Bank, path: &Path) -> Result<(), Failure> {
-    if let SynthesisFilters::StateSpace(_) = &bank.filters {
-        let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(path)));
-        let block = filters::lifted(&bank.filters, bank.ratio).map_err(|error| named(&error))?;
-        let radius = block.spectral_radius().map_err(|error| named(&error))?;
-        if radius >= 1.0 {
-            return Err(named(&format!(
-                "state_space.a has spectral radius {radius}, so the bank is unstable and its output would grow \
-                 without bound; it must be below 1"
-            )));
-        }
-    }
-    Ok(())
 }
 
 /// Reads a spec file; `-` is standard input.

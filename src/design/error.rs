@@ -183,6 +183,15 @@ pub enum DesignError {
         /// Expected columns.
         cols: usize,
     },
+    /// A bank's recursive filters are unstable.
+    #[error(
+        "state_space.a has spectral radius {radius}, so the bank is unstable and its output would grow without bound; \
+         it must be below 1"
+    )]
+    UnstableBank {
+        /// The largest modulus of an eigenvalue.
+        radius: f64,
+    },
     /// No Riccati equation could be solved, not even at the largest gamma.
     #[error(
         "the Riccati equation could not be solved at gamma = {gamma}: the front ends are too stiff or the \

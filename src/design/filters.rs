@@ -1,7 +1,7 @@
 //! The synthesis filters as the matrix F(z) of their polyphase components, `f_i[p + j M] = F_j[p, i]`.
 
 use super::DesignError;
-use crate::bank::{BlockFilter, SynthesisFilters};
+use crate::bank::{Bank, BlockFilter, SynthesisFilters};
 use crate::linalg::{CMat, Complex, Mat};
 use crate::lti::StateSpace;
 
@@ -37,6 +37,18 @@ pub fn lifted(filters: &SynthesisFilters, ratio: usize) -> Result<StateSpace, De
     match filters {
         SynthesisFilters::Fir(taps) => Ok(StateSpace::fir(&polyphase(taps, ratio))?),
         SynthesisFilters::StateSpace(block) => from_block(block, ratio),
+    }
+}
+
+/// Refuses unstable filters: their output would grow to infinity without a message.
+///
+/// # Errors
+/// [`DesignError::UnstableBank`]; [`DesignError::RaggedStateSpace`] as [`lifted`].
+pub fn check_stable(bank: &Bank) -> Result<(), DesignError> {
+    let SynthesisFilters::StateSpace(_) = &bank.filters else { return Ok(()) };
+    match lifted(&bank.filters, bank.ratio)?.spectral_radius()? {
+        radius if radius < 1.0 => Ok(()),
+        radius => Err(DesignError::UnstableBank { radius }),
     }
 }
 
@@ -99,6 +111,20 @@ mod tests {
             let stored = SynthesisFilters::StateSpace(to_block(&system));
             assert_eq!(lifted(&stored, ratio).unwrap(), system);
         }
+    }
+
+    #[test]
+    fn unstable_recursions_are_refused_and_fir_banks_never_are() {
+        let block = |pole: f64| BlockFilter {
+            a: vec![vec![pole]],
+            b: vec![vec![1.0]],
+            c: vec![vec![1.0]],
+            d: vec![vec![0.0]],
+        };
+        let bank = |pole| Bank::bare(SynthesisFilters::StateSpace(block(pole)), 1);
+        assert_eq!(check_stable(&bank(-0.99)), Ok(()));
+        assert_eq!(check_stable(&bank(-1.25)), Err(DesignError::UnstableBank { radius: 1.25 }));
+        assert_eq!(check_stable(&Bank::bare(SynthesisFilters::Fir(vec![vec![9.0]]), 1)), Ok(()));
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! A [`Pipeline`] takes frames as they arrive. It fills missing samples, runs the bank, drops the latency,
 //! and passes encoded samples to an [`Output`], with a mask of the samples that missing inputs affect.
 //! [`run`] processes all frames of a [`MultiReader`](crate::io::MultiReader). The result is an [`Outcome`]
-//! with counts and [`Warning`]s; nothing is printed.
+//! with counts and [`Warning`]s; nothing is printed. [`fuse`] does the same with a signal that is in memory.
 
 mod error;
 mod gap;
@@ -19,6 +19,7 @@ mod outputs;
 mod run;
 mod stage;
 mod touch;
+mod whole;
 
 pub use error::PipelineError;
 pub use gap::Gap;
@@ -27,3 +28,4 @@ pub use outcome::{GapSummary, Outcome, Warning};
 pub use outputs::{Block, FileOutputs, Output};
 pub use run::{Ending, run};
 pub use stage::{Pipeline, Settings};
+pub use whole::{Whole, WholeSettings, fuse};

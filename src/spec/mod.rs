@@ -30,7 +30,7 @@ pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use crate::units::{FastPeriods, Hertz, Seconds};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
 ///
@@ -249,6 +249,20 @@ impl Spec {
         })?;
         decode::spec(&reader::Value::root(&document), overrides)
             .map_err(|fault| SpecError::of(file_name, text, fault))
+    }
+
+    /// Reads a spec from data that have no text: the tables and lists of another language, with the keys of a
+    /// spec file. `name` is used only in messages.
+    ///
+    /// # Errors
+    /// As [`Spec::from_toml`], without a location; the path of keys says where.
+    pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
+        let document = document::Node::deserialize(data).map_err(|error| {
+            let problem = SpecProblem::Syntax { message: error.to_string() };
+            SpecError::new(name, "", None, String::new(), problem)
+        })?;
+        decode::spec(&reader::Value::root(&document), DesignOverrides::default())
+            .map_err(|fault| SpecError::of(name, "", Fault { span: None, ..fault }))
     }
 
     /// The spec as a TOML file that reads back equal.

@@ -7,12 +7,14 @@
 //! adapter needs memory of its own.
 
 mod complex;
+mod frames;
 mod interleaved;
 mod offsets;
 mod pcm;
 mod planar;
 
 pub(crate) use complex::{ComplexInput, ComplexOutput, Part};
+pub use frames::Frames;
 pub use interleaved::Interleaved;
 pub(crate) use offsets::{Offsets, WithoutOffsets};
 pub use pcm::PcmOutput;
