@@ -1,0 +1,103 @@
+"""Specs as Python writes them: mappings with the keys of a spec file. Everything is checked by the Rust library."""
+
+from hybank import _hybank
+
+_DESIGN_KEYS = (
+    "method", "taps", "gamma_margin", "solver", "bits", "fraction_bits", "order", "reduction_loss_db", "noise",
+)
+
+
+def _given(**entries):
+    return {key: value for key, value in entries.items() if value is not None}
+
+
+def design(source=None, /, *, proof=True, limits=True, progress=None, **keywords):
+    """Design the bank of a spec: a path, a TOML text of several lines, a mapping, or keywords.
+
+    Keywords are those of a spec file, with ``channels`` for the list of channels, a filter for ``target``, and the
+    keys of the table ``[design]`` beside the others. ``progress(step, seconds)`` is called for every step, with the
+    estimated seconds of the whole design. Ctrl-C interrupts it.
+    """
+    if source is None:
+        source = _of_keywords(keywords)
+    elif keywords:
+        raise TypeError(f"give a spec or keywords, not both: {', '.join(keywords)}")
+    return _hybank.design(source, proof=proof, limits=limits, progress=progress)
+
+
+def _of_keywords(keywords):
+    spec = {key: value for key, value in keywords.items() if key not in _DESIGN_KEYS}
+    if "channels" in spec:
+        spec["channel"] = spec.pop("channels")
+    target = spec.get("target")
+    if target is not None and "filter" not in target:
+        spec["target"] = {"filter": target}
+    table = {key: keywords[key] for key in _DESIGN_KEYS if key in keywords}
+    return {**spec, "design": {**spec.get("design", {}), **table}}
+
+
+class Channel(dict):
+    """One slow converter: its delay in seconds (or as a text with a unit), and what differs from the default."""
+
+    def __init__(self, delay=None, filter=None, *, delay_samples=None, noise=None, gain=None, offset=None):
+        super().__init__(
+            _given(
+                delay=delay, filter=filter, delay_samples=delay_samples, noise=noise, gain=gain, offset=offset
+            )
+        )
+
+
+def butterworth(order, cutoff):
+    """Low-pass with the flattest magnitude; -3 dB at ``cutoff`` hertz."""
+    return _given(family="butterworth", order=order, cutoff=cutoff)
+
+
+def chebyshev1(order, cutoff, ripple_db):
+    """Low-pass with equal ripples up to ``cutoff`` hertz."""
+    return _given(family="chebyshev1", order=order, cutoff=cutoff, ripple_db=ripple_db)
+
+
+def chebyshev2(order, cutoff, attenuation_db):
+    """Low-pass with equal ripples from ``cutoff`` hertz on."""
+    return _given(family="chebyshev2", order=order, cutoff=cutoff, attenuation_db=attenuation_db)
+
+
+def elliptic(order, cutoff, ripple_db, attenuation_db):
+    """Low-pass with equal ripples in both bands."""
+    return _given(
+        family="elliptic", order=order, cutoff=cutoff, ripple_db=ripple_db, attenuation_db=attenuation_db
+    )
+
+
+def bessel(order, cutoff):
+    """Low-pass with the flattest group delay."""
+    return _given(family="bessel", order=order, cutoff=cutoff)
+
+
+def rc(cutoff):
+    """One pole at ``cutoff`` hertz."""
+    return _given(family="rc", cutoff=cutoff)
+
+
+def tf(num, den):
+    """A transfer function: coefficients in descending powers of s (rad/s)."""
+    return _given(num=num, den=den)
+
+
+def zpk(zeros, poles, gain):
+    """A transfer function: zeros and poles in rad/s, complex or as pairs, and the factor before them."""
+    return _given(zeros=_roots(zeros), poles=_roots(poles), gain=gain)
+
+
+def _roots(roots):
+    return [(complex(root).real, complex(root).imag) if not hasattr(root, "__len__") else root for root in roots]
+
+
+def ss(a, b, c):
+    """A state space dx/dt = a x + b f, out = c x."""
+    return _given(a=a, b=b, c=c)
+
+
+def cascade(*stages):
+    """Filters one after the other."""
+    return {"cascade": list(stages)}

@@ -1,0 +1,232 @@
+//! Arrays as inputs of a bank, without a copy.
+
+use crate::errors::{HybankError, refused};
+use crate::formats::{Format, Number};
+use crate::samples::{Part, Samples};
+use hybank::runtime::{Interleaved, PcmFrames, SampleLayout};
+use numpy::{
+    Complex32, Complex64, Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+
+/// What an array of samples must look like.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shape {
+    /// The axis of time, as NumPy counts: 0 or -2, 1 or -1.
+    pub(crate) axis: isize,
+    /// N.
+    pub(crate) channels: usize,
+}
+
+/// How samples lie in memory.
+#[derive(Debug, Clone, Copy)]
+struct Layout {
+    channels: usize,
+    frames: usize,
+    /// Frame after frame; otherwise channel after channel.
+    by_frames: bool,
+}
+
+/// An array that is read while the interpreter lock is released.
+pub(crate) struct Held<'py> {
+    numbers: Numbers<'py>,
+    layout: Layout,
+    pub(crate) format: Format,
+}
+
+enum Numbers<'py> {
+    F32(PyReadonlyArrayDyn<'py, f32>),
+    F64(PyReadonlyArrayDyn<'py, f64>),
+    I8(PyReadonlyArrayDyn<'py, i8>),
+    U8(PyReadonlyArrayDyn<'py, u8>),
+    I16(PyReadonlyArrayDyn<'py, i16>),
+    I32(PyReadonlyArrayDyn<'py, i32>),
+}
+
+impl<'py> Held<'py> {
+    /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it is. Others
+    /// (slices with steps, foreign byte orders, lists) are copied first.
+    pub(crate) fn new(x: &Bound<'py, PyAny>, shape: Shape) -> PyResult<Self> {
+        let Ok(array) = x.cast::<PyUntypedArray>() else {
+            return Self::new(&x.py().import("numpy")?.call_method1("asarray", (x,))?, shape);
+        };
+        let [channels, frames] = shape.of(array)?;
+        let (by_rows, by_columns) = (array.is_c_contiguous(), array.is_fortran_contiguous());
+        if !(by_rows || by_columns) || !array.is_aligned() {
+            return Self::new(&x.call_method0("copy")?, shape);
+        }
+        let time_first = shape.time_first();
+        let layout = Layout { channels, frames, by_frames: if by_rows { time_first } else { !time_first } };
+        // Complex numbers as pairs of floats: a view along the axis that varies fastest.
+        let pairs = |name: &str| {
+            let rows = if by_rows { x.clone() } else { x.getattr("T")? };
+            rows.call_method1("view", (name,))
+        };
+        let complex = |numbers: Numbers<'py>| {
+            let format = Format { number: numbers.number(), complex: true };
+            Self { numbers, layout, format }
+        };
+        if let Some(numbers) = Numbers::of(x)? {
+            let format = Format { number: numbers.number(), complex: false };
+            return Ok(Self { numbers, layout, format });
+        }
+        if x.cast::<PyArrayDyn<Complex32>>().is_ok() {
+            return Ok(complex(Numbers::F32(readonly(pairs("f4")?.cast()?)?)));
+        }
+        if x.cast::<PyArrayDyn<Complex64>>().is_ok() {
+            return Ok(complex(Numbers::F64(readonly(pairs("f8")?.cast()?)?)));
+        }
+        Self::converted(array, shape)
+    }
+
+    /// From another byte order.
+    fn converted(array: &Bound<'py, PyUntypedArray>, shape: Shape) -> PyResult<Self> {
+        let dtype = array.getattr("dtype")?;
+        if !dtype.getattr("isnative")?.extract::<bool>()? {
+            let native = dtype.call_method1("newbyteorder", ("=",))?;
+            return Self::new(&array.call_method1("astype", (native,))?, shape);
+        }
+        Err(HybankError::new_err(format!(
+            "samples of {dtype} have no full scale; convert them to float32, float64, int16, int32, int8, uint8, complex64 \
+             or complex128"
+        )))
+    }
+
+    /// T.
+    pub(crate) fn frames(&self) -> usize {
+        self.layout.frames
+    }
+
+    /// The samples; of complex ones the real parts.
+    pub(crate) fn samples(&self) -> PyResult<Samples<'_>> {
+        let layout = self.layout;
+        let integers = |bytes| Samples::Pcm(layout.pcm(bytes, self.format.number));
+        Ok(match &self.numbers {
+            Numbers::F32(array) => match array.as_slice().map_err(refused)? {
+                numbers if self.format.complex => Samples::Part32(layout.parts(numbers)),
+                numbers if layout.by_frames => {
+                    Samples::Interleaved32(Interleaved::new(numbers, layout.channels).map_err(refused)?)
+                }
+                numbers => Samples::Planar32(layout.rows(numbers)),
+            },
+            Numbers::F64(array) => match array.as_slice().map_err(refused)? {
+                numbers if self.format.complex => Samples::Part64(layout.parts(numbers)),
+                numbers if layout.by_frames => {
+                    Samples::Interleaved64(Interleaved::new(numbers, layout.channels).map_err(refused)?)
+                }
+                numbers => Samples::Planar64(layout.rows(numbers)),
+            },
+            Numbers::I8(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
+            Numbers::U8(array) => integers(array.as_slice().map_err(refused)?),
+            Numbers::I16(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
+            Numbers::I32(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
+        })
+    }
+}
+
+impl Shape {
+    fn time_first(self) -> bool {
+        matches!(self.axis, 0 | -2)
+    }
+
+    /// Refuses an axis that is none.
+    pub(crate) fn check(self) -> PyResult<()> {
+        if (-2..2).contains(&self.axis) {
+            return Ok(());
+        }
+        Err(HybankError::new_err(format!("axis {} is not the axis of time; give 0 or 1", self.axis)))
+    }
+
+    /// N and T of an array.
+    fn of(self, array: &Bound<'_, PyUntypedArray>) -> PyResult<[usize; 2]> {
+        let (sizes, wanted) = (array.shape(), self.channels);
+        self.check()?;
+        let [channels, frames] = match *sizes {
+            [frames] => [1, frames],
+            [frames, channels] if self.time_first() => [channels, frames],
+            [channels, frames] => [channels, frames],
+            _ => {
+                return Err(HybankError::new_err(format!(
+                    "an array of {} dimensions is no signal; give one of shape (N, T), or (T, N) with axis=0",
+                    sizes.len()
+                )));
+            }
+        };
+        if channels == wanted {
+            return Ok([channels, frames]);
+        }
+        let remedy = match (frames == wanted, self.time_first()) {
+            (true, true) => "; leave axis=0 out if the rows are channels",
+            (true, false) => "; give axis=0 if the columns are channels",
+            (false, _) => "",
+        };
+        Err(HybankError::new_err(format!(
+            "the samples {sizes:?} have {channels} channels (time along axis {}), the bank has {wanted}{remedy}",
+            self.axis
+        )))
+    }
+}
+
+impl Layout {
+    fn rows<'a, S>(&self, numbers: &'a [S]) -> Vec<&'a [S]> {
+        (0..self.channels).map(|i| &numbers[i * self.frames..(i + 1) * self.frames]).collect()
+    }
+
+    fn parts<'a, S>(&self, numbers: &'a [S]) -> Part<'a, S> {
+        let &Self { channels, frames, by_frames } = self;
+        let (frame_step, channel_step) = if by_frames { (channels, 1) } else { (1, frames) };
+        Part { numbers, part: 0, frame_step, channel_step, channels, frames }
+    }
+
+    fn pcm<'a>(&self, bytes: &'a [u8], number: Number) -> Vec<PcmFrames<'a>> {
+        let Some(format) = number.pcm() else { return Vec::new() };
+        let layout = SampleLayout::packed(format);
+        if self.by_frames {
+            return vec![PcmFrames { layout, channels: self.channels, bytes }];
+        }
+        let row = |bytes| PcmFrames { layout, channels: 1, bytes };
+        let size = self.frames * format.bytes();
+        (0..self.channels).map(|i| row(&bytes[i * size..(i + 1) * size])).collect()
+    }
+}
+
+impl<'py> Numbers<'py> {
+    /// Of a real array; `None` for another number type.
+    fn of(x: &Bound<'py, PyAny>) -> PyResult<Option<Self>> {
+        if let Ok(array) = x.cast::<PyArrayDyn<f32>>() {
+            return Ok(Some(Self::F32(readonly(array)?)));
+        }
+        if let Ok(array) = x.cast::<PyArrayDyn<f64>>() {
+            return Ok(Some(Self::F64(readonly(array)?)));
+        }
+        if let Ok(array) = x.cast::<PyArrayDyn<i16>>() {
+            return Ok(Some(Self::I16(readonly(array)?)));
+        }
+        if let Ok(array) = x.cast::<PyArrayDyn<i32>>() {
+            return Ok(Some(Self::I32(readonly(array)?)));
+        }
+        if let Ok(array) = x.cast::<PyArrayDyn<i8>>() {
+            return Ok(Some(Self::I8(readonly(array)?)));
+        }
+        if let Ok(array) = x.cast::<PyArrayDyn<u8>>() {
+            return Ok(Some(Self::U8(readonly(array)?)));
+        }
+        Ok(None)
+    }
+
+    fn number(&self) -> Number {
+        match self {
+            Self::F32(_) => Number::F32,
+            Self::F64(_) => Number::F64,
+            Self::I8(_) => Number::I8,
+            Self::U8(_) => Number::U8,
+            Self::I16(_) => Number::I16,
+            Self::I32(_) => Number::I32,
+        }
+    }
+}
+
+fn readonly<'py, T: Element>(array: &Bound<'py, PyArrayDyn<T>>) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    array.try_readonly().map_err(refused)
+}

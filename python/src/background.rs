@@ -1,0 +1,78 @@
+//! Long computations that Ctrl-C interrupts.
+
+use crate::errors::HybankError;
+use hybank::design::Stage;
+use pyo3::prelude::*;
+use std::panic;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread;
+use std::time::Duration;
+
+/// Time between two looks for signals.
+const LOOK: Duration = Duration::from_millis(20);
+/// Recursions of the solvers fit the stack of a main thread.
+const STACK_BYTES: usize = 16 << 20;
+
+enum Message<T> {
+    /// A step begins, of a computation of so many seconds.
+    Stage(Stage, f64),
+    Done(T),
+}
+
+/// What a computation says while it runs.
+pub(crate) struct Reporter<T> {
+    sender: Sender<Message<T>>,
+    abandoned: Arc<AtomicBool>,
+}
+
+impl<T> Reporter<T> {
+    /// Tells that a step begins. Ends the thread if nobody waits for its result any more.
+    pub(crate) fn begins(&self, stage: Stage, seconds: f64) {
+        if self.abandoned.load(Ordering::Relaxed) {
+            panic::resume_unwind(Box::new("interrupted"));
+        }
+        // The receiver lives as long as somebody waits.
+        let _ = self.sender.send(Message::Stage(stage, seconds));
+    }
+}
+
+/// Runs `work` on a thread of its own, without the interpreter lock. A signal whose handler raises ends the wait at
+/// once; the thread ends with the step that it is in. `progress(step, seconds)` is called for every step.
+pub(crate) fn run<T: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Reporter<T>) -> T + Send + 'static,
+) -> PyResult<T> {
+    let (sender, mut messages) = mpsc::channel();
+    let abandoned = Arc::new(AtomicBool::new(false));
+    let reporter = Reporter { sender, abandoned: Arc::clone(&abandoned) };
+    let thread = thread::Builder::new().name("hybank".into()).stack_size(STACK_BYTES);
+    thread.spawn(move || {
+        let result = work(&reporter);
+        let _ = reporter.sender.send(Message::Done(result));
+    })?;
+    let mut wait = || loop {
+        let inbox = &mut messages;
+        match py.detach(move || inbox.recv_timeout(LOOK)) {
+            Ok(Message::Done(result)) => return Ok(result),
+            Ok(Message::Stage(stage, seconds)) => tell(progress, stage, seconds)?,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(HybankError::new_err(
+                    "the computation ended without a result; this is a fault of hybank",
+                ));
+            }
+        }
+        py.check_signals()?;
+    };
+    let result = wait();
+    abandoned.store(result.is_err(), Ordering::Relaxed);
+    result
+}
+
+fn tell(progress: Option<&Bound<'_, PyAny>>, stage: Stage, seconds: f64) -> PyResult<()> {
+    let Some(progress) = progress else { return Ok(()) };
+    progress.call1((stage.to_string(), seconds)).map(drop)
+}

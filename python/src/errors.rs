@@ -1,0 +1,72 @@
+//! Errors of the library as Python exceptions.
+
+use hybank::files::FileError;
+use hybank::spec;
+use pyo3::create_exception;
+use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
+use pyo3::prelude::*;
+use std::fmt::Display;
+
+create_exception!(
+    hybank,
+    HybankError,
+    PyValueError,
+    "Something that hybank refuses, with the rule and the remedy."
+);
+create_exception!(
+    hybank,
+    SpecError,
+    HybankError,
+    "A spec that cannot be used. `path` is the path of keys to the value; `line` and `column`, from 1, are its place \
+     in the text, or None for a spec that has no text."
+);
+
+/// A refusal of the library.
+pub(crate) fn refused(error: impl Display) -> PyErr {
+    HybankError::new_err(error.to_string())
+}
+
+/// A refusal that names the file first.
+pub(crate) fn refused_in(name: &str, error: impl Display) -> PyErr {
+    HybankError::new_err(format!("{name}: {error}"))
+}
+
+/// A spec that was refused, with its place.
+pub(crate) fn spec_error(py: Python<'_>, error: &spec::SpecError) -> PyErr {
+    let place = error.location().map(|location| (location.line, location.column));
+    with_place(py, SpecError::new_err(error.to_string()), error.path(), place)
+}
+
+/// A rule for specs that a design found broken.
+pub(crate) fn spec_problem(py: Python<'_>, problem: &spec::SpecProblem) -> PyErr {
+    with_place(py, SpecError::new_err(problem.to_string()), "", None)
+}
+
+fn with_place(py: Python<'_>, error: PyErr, path: &str, place: Option<(usize, usize)>) -> PyErr {
+    let value = error.value(py);
+    let (line, column) = place.unzip();
+    let set = value
+        .setattr("path", path)
+        .and_then(|()| value.setattr("line", line))
+        .and_then(|()| value.setattr("column", column));
+    set.err().unwrap_or(error)
+}
+
+/// A fault of a file: what the system refuses is an `OSError` of its kind.
+pub(crate) fn file_error(error: FileError) -> PyErr {
+    match &error {
+        FileError::System { file, source, .. } => match source.raw_os_error() {
+            // Python chooses the subclass by the number: FileNotFoundError, PermissionError and so on.
+            Some(number) => {
+                let text = source.to_string();
+                let reason = text.split(" (os error").next().unwrap_or_default().to_owned();
+                PyOSError::new_err((number, reason, file.clone()))
+            }
+            None => PyOSError::new_err(error.to_string()),
+        },
+        FileError::Exists { file } => PyFileExistsError::new_err(format!(
+            "{file}: the file exists; give another name or overwrite=True"
+        )),
+        _ => refused(error),
+    }
+}

@@ -1,0 +1,47 @@
+//! The extension module of the Python package `hybank`: design, banks, streams and proofs of the crate `hybank`
+//! for NumPy arrays.
+//!
+//! Nothing is computed here. These files convert arguments, hold arrays while the interpreter lock is released,
+//! and turn errors into exceptions.
+
+#![deny(unsafe_code)]
+
+mod arrays;
+mod background;
+mod bank;
+mod design;
+mod errors;
+mod formats;
+mod fuse;
+mod judge;
+mod outputs;
+mod results;
+mod samples;
+mod simulate;
+mod sources;
+mod stream;
+mod values;
+
+use pyo3::prelude::*;
+
+/// Hybrid multirate filter banks: see `hybank`.
+#[pymodule]
+fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("HybankError", py.get_type::<errors::HybankError>())?;
+    module.add("SpecError", py.get_type::<errors::SpecError>())?;
+    module.add_class::<bank::Bank>()?;
+    module.add_class::<stream::Stream>()?;
+    module.add_class::<results::Gamma>()?;
+    module.add_class::<results::FuseReport>()?;
+    module.add_class::<results::Verified>()?;
+    module.add_class::<results::Analysis>()?;
+    module.add_class::<results::Capture>()?;
+    module.add_function(wrap_pyfunction!(design::design, module)?)?;
+    module.add_function(wrap_pyfunction!(bank::load, module)?)?;
+    module.add_function(wrap_pyfunction!(judge::verify, module)?)?;
+    module.add_function(wrap_pyfunction!(judge::analyze, module)?)?;
+    module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;
+    Ok(())
+}

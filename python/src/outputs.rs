@@ -1,0 +1,85 @@
+//! New arrays for outputs.
+
+use crate::errors::refused;
+use crate::formats::{Format, Number};
+use crate::samples::Room;
+use hybank::runtime::PcmOutput;
+use numpy::{Element, PyArray1, PyArrayMethods, PyReadwriteArray1};
+use pyo3::prelude::*;
+
+/// A new array of output samples that is being written.
+pub(crate) struct NewArray<'py> {
+    numbers: Numbers<'py>,
+    format: Format,
+}
+
+enum Numbers<'py> {
+    F32(PyReadwriteArray1<'py, f32>),
+    F64(PyReadwriteArray1<'py, f64>),
+    I8(PyReadwriteArray1<'py, i8>),
+    U8(PyReadwriteArray1<'py, u8>),
+    I16(PyReadwriteArray1<'py, i16>),
+    I32(PyReadwriteArray1<'py, i32>),
+}
+
+impl<'py> NewArray<'py> {
+    /// Zeros.
+    pub(crate) fn new(py: Python<'py>, samples: usize, format: Format) -> PyResult<Self> {
+        let len = if format.complex { 2 * samples } else { samples };
+        let numbers = match format.number {
+            Number::F32 => Numbers::F32(zeros(py, len)?),
+            Number::F64 => Numbers::F64(zeros(py, len)?),
+            Number::I8 => Numbers::I8(zeros(py, len)?),
+            Number::U8 => Numbers::U8(zeros(py, len)?),
+            Number::I16 => Numbers::I16(zeros(py, len)?),
+            Number::I32 => Numbers::I32(zeros(py, len)?),
+        };
+        Ok(Self { numbers, format })
+    }
+
+    /// Room for the samples; for the real parts of complex ones.
+    pub(crate) fn room(&mut self) -> PyResult<Room<'_>> {
+        let (complex, pcm) = (self.format.complex, self.format.number.pcm());
+        let bytes: &mut [u8] = match &mut self.numbers {
+            Numbers::F32(array) => {
+                let room = array.as_slice_mut().map_err(refused)?;
+                return Ok(if complex { Room::Part32(room, 0) } else { Room::F32(room) });
+            }
+            Numbers::F64(array) => {
+                let room = array.as_slice_mut().map_err(refused)?;
+                return Ok(if complex { Room::Part64(room, 0) } else { Room::F64(room) });
+            }
+            Numbers::I8(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
+            Numbers::U8(array) => array.as_slice_mut().map_err(refused)?,
+            Numbers::I16(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
+            Numbers::I32(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
+        };
+        let format = pcm.ok_or_else(|| refused("floats are not integers"))?;
+        Ok(Room::Pcm(PcmOutput { format, bytes, clipped: 0 }))
+    }
+
+    /// The array.
+    pub(crate) fn finish(self) -> PyResult<Bound<'py, PyAny>> {
+        let name = match self.format {
+            Format { number: Number::F32, complex: true } => Some("c8"),
+            Format { number: Number::F64, complex: true } => Some("c16"),
+            _ => None,
+        };
+        let array = match self.numbers {
+            Numbers::F32(array) => array.as_any().clone(),
+            Numbers::F64(array) => array.as_any().clone(),
+            Numbers::I8(array) => array.as_any().clone(),
+            Numbers::U8(array) => array.as_any().clone(),
+            Numbers::I16(array) => array.as_any().clone(),
+            Numbers::I32(array) => array.as_any().clone(),
+        };
+        match name {
+            Some(name) => array.call_method1("view", (name,)),
+            None => Ok(array),
+        }
+    }
+}
+
+fn zeros<T: Element>(py: Python<'_>, len: usize) -> PyResult<PyReadwriteArray1<'_, T>> {
+    PyArray1::zeros(py, len, false).try_readwrite().map_err(refused)
+}

@@ -1,0 +1,151 @@
+//! What calls give back: named numbers.
+
+use hybank::design;
+use hybank::verify::{self, BoundedBanks};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+/// The worst-case error gamma with its bounds, in normalised time; None where a bound is not known.
+#[pyclass(frozen, get_all, module = "hybank")]
+pub(crate) struct Gamma {
+    /// Norm computed from the coefficients.
+    pub(crate) norm: Option<f64>,
+    /// An upper bound of the true norm.
+    pub(crate) upper: Option<f64>,
+    /// A lower bound for all banks of this method and size.
+    pub(crate) lower: Option<f64>,
+    /// A lower bound for all banks.
+    pub(crate) noncausal: Option<f64>,
+}
+
+#[pymethods]
+impl Gamma {
+    fn __repr__(&self) -> String {
+        let text = |bound: Option<f64>| bound.map_or_else(|| "None".to_owned(), |value| format!("{value:?}"));
+        let [norm, upper, lower, noncausal] = [self.norm, self.upper, self.lower, self.noncausal].map(text);
+        format!("Gamma(norm={norm}, upper={upper}, lower={lower}, noncausal={noncausal})")
+    }
+}
+
+/// What happened while a bank was run on an array.
+#[pyclass(frozen, get_all, module = "hybank")]
+pub(crate) struct FuseReport {
+    /// `direct`, `fast-fir`, `overlap-save`, `parallel-form` or `dense`.
+    pub(crate) algorithm: &'static str,
+    /// Number type of the sums: `f32` or `f64`.
+    pub(crate) numbers: &'static str,
+    /// Instruction set of the kernels.
+    pub(crate) isa: String,
+    /// Output samples dropped at the beginning.
+    pub(crate) latency_dropped: usize,
+    /// Output samples that saturated.
+    pub(crate) clipped: u64,
+    /// Input samples that were NaN or infinite and became 0.
+    pub(crate) replaced: u64,
+    /// Times that the state of a recursion was not finite and became 0.
+    pub(crate) state_resets: u64,
+    /// Missing samples, and the gaps (channel from 1, first frame, length); None unless gaps were filled.
+    pub(crate) missing: Option<u64>,
+    pub(crate) gaps: Option<Vec<(usize, u64, u64)>>,
+    /// True where a missing sample affects the output; None unless gaps were filled.
+    pub(crate) mask: Option<Py<PyArray1<bool>>>,
+}
+
+#[pymethods]
+impl FuseReport {
+    fn __repr__(&self) -> String {
+        format!(
+            "FuseReport(algorithm='{}', numbers='{}', isa='{}', latency_dropped={}, clipped={}, replaced={})",
+            self.algorithm, self.numbers, self.isa, self.latency_dropped, self.clipped, self.replaced
+        )
+    }
+}
+
+/// Proven bounds of gamma.
+#[pyclass(frozen, get_all, module = "hybank")]
+pub(crate) struct Verified {
+    /// No bank of the class `lower_banks` has a smaller gamma.
+    lower: f64,
+    /// `any`, `causal` or `fir_of_this_length`.
+    lower_banks: &'static str,
+    /// Gamma of this bank is at most this.
+    upper: f64,
+    /// Gamma of this bank is at least this.
+    attained: f64,
+    /// No bank has a smaller gamma.
+    noncausal: f64,
+    /// Order of the certificate.
+    states: usize,
+    /// The file has a digest, and it matches; None for a bank in memory.
+    digest: Option<bool>,
+    /// The certificate came with the bank; otherwise it was found now.
+    certificate_in_bank: bool,
+}
+
+impl Verified {
+    pub(crate) fn new(verified: verify::Verified, digest: Option<bool>, certificate_in_bank: bool) -> Self {
+        let verify::Verified { lower, lower_banks, upper, attained, noncausal, states } = verified;
+        let lower_banks = match lower_banks {
+            BoundedBanks::Any => "any",
+            BoundedBanks::Causal => "causal",
+            BoundedBanks::FirOfThisLength => "fir_of_this_length",
+        };
+        Self { lower, lower_banks, upper, attained, noncausal, states, digest, certificate_in_bank }
+    }
+}
+
+#[pymethods]
+impl Verified {
+    fn __repr__(&self) -> String {
+        format!(
+            "Verified(lower={:?}, upper={:?}, lower_banks='{}')",
+            self.lower, self.upper, self.lower_banks
+        )
+    }
+}
+
+/// The error of a bank with given delays.
+#[pyclass(frozen, get_all, module = "hybank")]
+pub(crate) struct Analysis {
+    /// The worst-case gain, in normalised time.
+    gamma: f64,
+    /// Frequency of the worst case, modulo the slow rate.
+    peak_hertz: f64,
+    /// No bank has a smaller gamma with these front ends and delays.
+    noncausal: f64,
+    /// Rms of the error for white noise of unit density at the analog input.
+    rms_error: f64,
+    /// Rms of the output noise for independent noise of unit rms on all slow samples.
+    noise_gain: f64,
+    /// Rms of the output noise for the noise of the converters in the spec.
+    output_noise: f64,
+}
+
+impl From<design::Analysis> for Analysis {
+    fn from(analysis: design::Analysis) -> Self {
+        let design::Analysis { gamma, peak_hertz, noncausal, mean } = analysis;
+        let design::MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
+        Self { gamma, peak_hertz: peak_hertz.0, noncausal, rms_error, noise_gain, output_noise }
+    }
+}
+
+#[pymethods]
+impl Analysis {
+    fn __repr__(&self) -> String {
+        format!(
+            "Analysis(gamma={:?}, peak_hertz={:?}, noncausal={:?}, rms_error={:?}, noise_gain={:?}, output_noise={:?})",
+            self.gamma, self.peak_hertz, self.noncausal, self.rms_error, self.noise_gain, self.output_noise
+        )
+    }
+}
+
+/// What virtual converters capture.
+#[pyclass(frozen, get_all, module = "hybank")]
+pub(crate) struct Capture {
+    /// Slow samples, (N, T).
+    pub(crate) channels: Py<PyArray2<f64>>,
+    /// Samples of the ideal fast converter, delayed by the latency: M T of them.
+    pub(crate) target: Py<PyArray1<f64>>,
+    /// The latency in fast samples.
+    pub(crate) latency: usize,
+}

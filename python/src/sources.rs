@@ -1,0 +1,60 @@
+//! Where specs and banks come from: paths, texts, mappings, banks.
+
+use crate::bank::Bank;
+use crate::errors::{file_error, refused, refused_in, spec_error};
+use crate::values;
+use hybank::bank;
+use hybank::files::{self, Bound as SizeBound};
+use hybank::spec::Spec;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// The largest bank with its proof is smaller.
+const TEXT_FILE: SizeBound =
+    SizeBound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
+
+/// The spec that `source` is, names or carries: a path, a TOML text of several lines, a mapping, or a bank. A bank
+/// stands for its spec with the latency of the bank.
+pub(crate) fn spec(source: &Bound<'_, PyAny>) -> PyResult<Spec> {
+    let py = source.py();
+    if let Ok(bank) = source.cast::<Bank>() {
+        return spec_of_bank(&bank.get().bank, "the bank");
+    }
+    if let Ok(text) = source.extract::<String>()
+        && text.contains('\n')
+    {
+        return Spec::from_toml(&text, "spec").map_err(|error| spec_error(py, &error));
+    }
+    let Some(path) = path(source) else {
+        return Spec::from_data(values::table(source)?, "spec").map_err(|error| spec_error(py, &error));
+    };
+    let (text, name) = (read(&path)?, path.display().to_string());
+    if path.extension().is_some_and(|extension| extension == "json") {
+        return spec_of_bank(&parse_bank(&text, &name)?, &name);
+    }
+    Spec::from_toml(&text, &name).map_err(|error| spec_error(py, &error))
+}
+
+fn spec_of_bank(bank: &bank::Bank, name: &str) -> PyResult<Spec> {
+    let spec = bank.spec.clone().ok_or_else(|| {
+        refused_in(name, "this bank carries no spec, so its front ends are unknown; give the spec")
+    })?;
+    Ok(Spec { latency: Some(bank.latency), ..spec })
+}
+
+/// A path, as text or as an object of `pathlib`.
+pub(crate) fn path(source: &Bound<'_, PyAny>) -> Option<PathBuf> {
+    source.extract().ok()
+}
+
+/// The text of a spec or bank file.
+pub(crate) fn read(path: &Path) -> PyResult<String> {
+    files::read_text(path, TEXT_FILE).map_err(file_error)
+}
+
+/// A bank that can run.
+pub(crate) fn parse_bank(text: &str, name: &str) -> PyResult<bank::Bank> {
+    let bank = bank::Bank::from_json(text, name).map_err(refused)?;
+    hybank::design::filters::check_stable(&bank).map_err(|error| refused_in(name, error))?;
+    Ok(bank)
+}

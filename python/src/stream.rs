@@ -1,0 +1,243 @@
+//! `hybank.Stream`: a causal stream, block by block.
+
+use crate::arrays::{Held, Shape};
+use crate::errors::{HybankError, refused};
+use crate::formats::{Format, Number};
+use crate::fuse::{parse_algorithm, plan};
+use crate::outputs::NewArray;
+use crate::samples::{Room, Samples};
+use hybank::bank::Bank;
+use hybank::runtime::{self, Algorithm, Plan, ProcessError};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use std::fmt;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// A stream through a bank: blocks of frames in, M samples per frame out, late by the latency.
+///
+/// Threads may share a stream; their blocks come one after another.
+#[pyclass(frozen, module = "hybank")]
+pub(crate) struct Stream {
+    plan: Plan,
+    shape: Shape,
+    format: Format,
+    state: Mutex<State>,
+}
+
+#[derive(Clone)]
+struct State {
+    /// One for real samples, two for the parts of complex ones.
+    streams: Vec<runtime::Stream>,
+    clipped: u64,
+    closed: bool,
+}
+
+impl Stream {
+    pub(crate) fn new(
+        bank: &Bank,
+        axis: isize,
+        dtype: Option<&Bound<'_, PyAny>>,
+        algorithm: &str,
+    ) -> PyResult<Self> {
+        let default = Format { number: Number::F32, complex: false };
+        let format = dtype.map_or(Ok(default), Format::of_dtype)?;
+        let shape = Shape { axis, channels: bank.channel_count() };
+        shape.check()?;
+        let auto = Algorithm::Auto { added_latency: false };
+        let plan = plan(bank, format, parse_algorithm(algorithm)?.unwrap_or(auto))?;
+        let streams = vec![runtime::Stream::new(&plan); 1 + usize::from(format.complex)];
+        let state = Mutex::new(State { streams, clipped: 0, closed: false });
+        Ok(Self { plan, shape, format, state })
+    }
+
+    /// To be called without the interpreter lock: the thread that holds the state may wait for that lock.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn read<T: Send>(&self, py: Python<'_>, of: impl FnOnce(&State) -> T + Send) -> T {
+        py.detach(|| of(&self.lock()))
+    }
+}
+
+#[pymethods]
+impl Stream {
+    /// Filters a block of frames; M output samples for each of them.
+    fn process<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let held = Held::new(x, self.shape)?;
+        self.check_parts(held.format)?;
+        let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
+        let (mut input, mut room) = (held.samples()?, array.room()?);
+        x.py().detach(|| self.lock().process(&mut input, &mut room)).map_err(refused)?;
+        array.finish()
+    }
+
+    /// The last samples, by zeros for input: as many frames of them as the latency has.
+    fn flush<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let mut array = NewArray::new(py, self.plan.flush_frames() * self.plan.ratio(), self.format)?;
+        let mut room = array.room()?;
+        py.detach(|| self.lock().flush(&mut room)).map_err(refused)?;
+        array.finish()
+    }
+
+    /// Back to the beginning.
+    fn reset(&self, py: Python<'_>) {
+        py.detach(|| self.lock().reset());
+    }
+
+    /// N.
+    #[getter]
+    fn channels(&self) -> usize {
+        self.plan.channels()
+    }
+
+    /// M.
+    #[getter]
+    fn ratio(&self) -> usize {
+        self.plan.ratio()
+    }
+
+    /// Output samples by which the stream is late.
+    #[getter]
+    fn latency(&self) -> usize {
+        self.plan.latency()
+    }
+
+    /// Frames after which an input is forgotten; None for a recursion, which never forgets.
+    #[getter]
+    fn memory(&self) -> Option<usize> {
+        self.plan.history()
+    }
+
+    /// Frames by which the stream is processed: a second stream that begins a multiple of so many frames later, with
+    /// `memory` frames before that, has the same bits.
+    #[getter]
+    fn alignment(&self) -> usize {
+        self.plan.alignment()
+    }
+
+    /// The name of the algorithm.
+    #[getter]
+    fn algorithm(&self) -> &'static str {
+        self.plan.algorithm()
+    }
+
+    /// Frames since the beginning.
+    #[getter]
+    fn position(&self, py: Python<'_>) -> u64 {
+        self.read(py, |state| state.streams[0].position())
+    }
+
+    /// Numbers of the input that were NaN or infinite and became 0.
+    #[getter]
+    fn replaced(&self, py: Python<'_>) -> u64 {
+        self.read(py, |state| state.streams.iter().map(runtime::Stream::replaced).sum())
+    }
+
+    /// Output samples that saturated.
+    #[getter]
+    fn clipped(&self, py: Python<'_>) -> u64 {
+        self.read(py, |state| state.clipped)
+    }
+
+    /// Times that the state of a recursion was not finite and became 0.
+    #[getter]
+    fn state_resets(&self, py: Python<'_>) -> u64 {
+        self.read(py, |state| state.streams.iter().map(runtime::Stream::state_resets).sum())
+    }
+
+    /// A second stream at the same place.
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        let state = self.read(py, State::clone);
+        Self { plan: self.plan.clone(), shape: self.shape, format: self.format, state: Mutex::new(state) }
+    }
+
+    fn __enter__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, PyTuple>) {
+        py.detach(|| self.lock().closed = true);
+    }
+
+    fn __repr__(&self) -> String {
+        let memory = self.memory().map_or_else(|| "None".to_owned(), |frames| frames.to_string());
+        format!(
+            "<hybank.Stream {}: {} channels, ratio {}, latency {}, memory {memory}>",
+            self.algorithm(),
+            self.channels(),
+            self.ratio(),
+            self.latency()
+        )
+    }
+}
+
+impl Stream {
+    fn check_parts(&self, given: Format) -> PyResult<()> {
+        match (given.complex, self.format.complex) {
+            (true, false) => Err(HybankError::new_err(
+                "the samples are complex, the stream is real; make it with bank.stream(dtype=\"c8\") or \"c16\"",
+            )),
+            (false, true) => Err(HybankError::new_err(
+                "the samples are real, the stream is complex; make it with bank.stream(dtype=\"f4\") or \"f8\"",
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl State {
+    fn process(&mut self, input: &mut Samples<'_>, room: &mut Room<'_>) -> Result<(), StreamError> {
+        self.check_open()?;
+        for (part, stream) in self.streams.iter_mut().enumerate() {
+            input.turn_to(part);
+            room.turn_to(part);
+            stream.run(input, room)?;
+        }
+        self.clipped += room.clipped();
+        Ok(())
+    }
+
+    fn flush(&mut self, room: &mut Room<'_>) -> Result<(), StreamError> {
+        self.check_open()?;
+        for (part, stream) in self.streams.iter_mut().enumerate() {
+            room.turn_to(part);
+            stream.flush(room)?;
+        }
+        self.clipped += room.clipped();
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.streams.iter_mut().for_each(runtime::Stream::reset);
+        self.clipped = 0;
+    }
+
+    fn check_open(&self) -> Result<(), StreamError> {
+        if self.closed { Err(StreamError::Closed) } else { Ok(()) }
+    }
+}
+
+/// Why a stream takes no samples.
+enum StreamError {
+    Closed,
+    Process(ProcessError),
+}
+
+impl From<ProcessError> for StreamError {
+    fn from(error: ProcessError) -> Self {
+        Self::Process(error)
+    }
+}
+
+impl fmt::Display for StreamError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Closed => {
+                f.write_str("the stream was closed at the end of its with block; make another one")
+            }
+            Self::Process(error) => error.fmt(f),
+        }
+    }
+}

@@ -1,0 +1,175 @@
+"""Designs from all kinds of specs, their errors, and interrupts."""
+
+import signal
+import threading
+import time
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import hybank as hb
+
+TEXT = """\
+fast_rate = "48 kS/s"
+ratio = 2
+latency = 4
+target = { filter = { family = "butterworth", order = 4, cutoff = "9 kHz" } }
+channel = [{ delay = "25 us" }, { delay = "12.5 us" }]
+design = { method = "fir", taps = 16 }
+"""
+
+
+@pytest.fixture(scope="module")
+def bank():
+    return hb.design(TEXT)
+
+
+def test_text_path_mapping_and_keywords_give_the_same_bank(bank, tmp_path):
+    path = tmp_path / "spec.toml"
+    path.write_text(TEXT)
+    mapping = {
+        "fast_rate": np.float32(48e3),
+        "ratio": np.int64(2),
+        "latency": 4,
+        "target": {"filter": {"family": "butterworth", "order": np.uint8(4), "cutoff": Fraction(9000)}},
+        "channel": ({"delay": np.array(25e-6), "noise": None}, {"delay": 12.5e-6}),
+        "design": {"method": "fir", "taps": 16, "solver": None},
+    }
+    keywords = hb.design(
+        fast_rate=48e3,
+        ratio=2,
+        latency=4,
+        target=hb.butterworth(4, 9e3),
+        channels=[hb.Channel(delay=25e-6), hb.Channel("12.5 us", gain=None)],
+        method="fir",
+        taps=np.int32(16),
+        order=None,
+    )
+    for other in (hb.design(path), hb.design(str(path)), hb.design(mapping), keywords):
+        assert other.to_json() == bank.to_json()
+    assert (bank.channels, bank.ratio, bank.latency, bank.method) == (2, 2, 4, "fir")
+    assert bank.proven and hb.verify(bank).upper == bank.gamma.upper
+    assert hb.design(bank.spec).to_json() == bank.to_json()
+
+
+def test_every_form_of_a_filter_is_taken(bank):
+    poles = np.roots([1, np.sqrt(2), 1]) * 2 * np.pi * 9e3
+    gain = float(np.prod(poles).real)
+    common = {"fast_rate": 48e3, "ratio": 2, "latency": 4, "channels": [{"delay": 25e-6}, {"delay": 12.5e-6}]}
+    forms = [
+        hb.butterworth(2, 9e3),
+        hb.zpk([], poles, gain),
+        hb.tf([gain], np.poly(poles).real),
+        hb.cascade(hb.zpk([], poles, gain)),
+    ]
+    banks = [hb.design(**common, target=form, method="fir", taps=8, proof=False) for form in forms]
+    for other in banks[1:]:
+        assert other.gamma.norm == pytest.approx(banks[0].gamma.norm, rel=1e-6)
+    assert not banks[0].proven
+    for form in (
+        hb.chebyshev1(3, 9e3, 0.5),
+        hb.chebyshev2(3, 9e3, 40),
+        hb.elliptic(3, 9e3, 0.5, 40),
+        hb.bessel(3, 9e3),
+        hb.rc(9e3),
+        hb.ss([[-5e4]], [[1.0]], [[5e4]]),
+    ):
+        assert hb.design(**common, target=form, method="fir", taps=8, proof=False).gamma.norm < 1
+
+
+def test_errors_of_a_text_have_line_caret_and_remedy():
+    with pytest.raises(hb.SpecError) as caught:
+        hb.design(TEXT.replace("taps", "tabs"))
+    error = caught.value
+    assert isinstance(error, hb.HybankError) and isinstance(error, ValueError)
+    assert (error.line, error.column) == (6, 28) and 'did you mean "taps"' in str(error)
+    assert "^^^^" in str(error).splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    "change, path, words",
+    [
+        ({"ratio": 2.5}, "ratio", "whole"),
+        ({"ratio": None}, "", "missing"),
+        ({"fast_rate": float("inf")}, "fast_rate", "out of range"),
+        ({"fast_rate": np.nan}, "fast_rate", "NaN"),
+        ({"channel": [{"delay": -1e-6}]}, "channel[0].delay", "out of range"),
+        ({"channel": [{"delay": True}]}, "channel[0].delay", "true or false"),
+        ({"design": {"method": "fur"}}, "design.method", 'did you mean "fir"'),
+        ({"target": {"filter": {"num": np.array([1.0]), "den": np.array([1.0])}}}, "target.filter", ""),
+    ],
+)
+def test_errors_of_a_mapping_carry_their_path(change, path, words):
+    spec = {
+        "fast_rate": 48e3,
+        "ratio": 2,
+        "target": {"filter": hb.butterworth(4, 9e3)},
+        "channel": [{"delay": 25e-6}, {"delay": 12.5e-6}],
+        **change,
+    }
+    with pytest.raises(hb.SpecError, match=words) as caught:
+        hb.design(spec)
+    assert caught.value.path.startswith(path) and caught.value.line is None
+
+
+def test_what_is_no_spec_is_a_type_error():
+    for source in (3.5, [1], {1: 2}, {"channel": [None]}, {"ratio": object()}):
+        with pytest.raises(TypeError):
+            hb.design(source)
+    with pytest.raises(TypeError, match="not both"):
+        hb.design(TEXT, taps=3)
+
+
+def test_implausible_specs_warn_at_the_line_of_the_caller():
+    with pytest.warns(UserWarning, match="Nyquist") as caught:
+        hb.design(TEXT.replace("9 kHz", "90 Hz"), proof=False)
+    assert caught[0].filename == __file__
+
+
+def test_progress_is_told():
+    steps = []
+    hb.design(TEXT, progress=lambda step, seconds: steps.append((step, seconds)))
+    assert any("filters" in step for step, _ in steps) and all(seconds > 0 for _, seconds in steps)
+
+    class Enough(Exception):
+        pass
+
+    def refuse(step, seconds):
+        raise Enough
+
+    with pytest.raises(Enough):
+        hb.design(TEXT, progress=refuse)
+
+
+LONG = TEXT.replace("taps = 16", "taps = 1200").replace("latency = 4", "latency = 600")
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="needs signals")
+def test_ctrl_c_interrupts_a_long_design_at_once():
+    main = threading.main_thread().ident
+    timer = threading.Timer(0.5, lambda: signal.pthread_kill(main, signal.SIGINT))
+    timer.start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        hb.design(LONG, limits=False)
+    assert time.monotonic() - begin < 2
+
+
+def test_a_design_lets_other_threads_run():
+    """While it runs, another thread of Python counts."""
+    counted = 0
+    done = threading.Event()
+
+    def count():
+        nonlocal counted
+        while not done.is_set():
+            counted += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    hb.design(TEXT.replace("taps = 16", "taps = 64"), proof=False)
+    done.set()
+    thread.join()
+    assert counted > 3

@@ -1,0 +1,34 @@
+"""The snippets of docs/python.md run, one after another, in one folder."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+SPEC = """\
+fast_rate = "48 kS/s"
+ratio = 2
+target = { filter = { family = "butterworth", order = 4, cutoff = "9 kHz" } }
+channel = [{ delay = "25 us" }, { delay = "12.5 us" }]
+design = { method = "iir" }
+"""
+
+
+def test_the_snippets_run_and_say_what_is_true(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("spec.toml").write_text(SPEC)
+    text = (ROOT / "docs" / "python.md").read_text()
+    names = {}
+    for snippet in re.findall(r"```python\n(.*?)```", text, re.S):
+        for package in ("scipy", "soundfile"):
+            if package in snippet:
+                pytest.importorskip(package)
+        exec(compile(snippet, "docs/python.md", "exec"), names)
+        if "same =" in snippet:
+            np.testing.assert_allclose(names["same"], names["bank"].fuse(names["x"]), atol=1e-12)
+        if "dlsim" in snippet:
+            want = names["bank"].fuse(names["x"], keep_latency=True)
+            np.testing.assert_allclose(names["causal"], want, atol=1e-10)
+    assert names["report"].gaps == [(2, 100, 4)] and names["report"].mask.any()
