@@ -1,6 +1,6 @@
 """Specs as Python writes them: mappings with the keys of a spec file. Everything is checked by the Rust library."""
 
-from hybank import _hybank
+from hybank._hybank import design as _design
 
 _DESIGN_KEYS = (
     "method", "taps", "gamma_margin", "solver", "bits", "fraction_bits", "order", "reduction_loss_db", "noise",
@@ -22,7 +22,7 @@ def design(source=None, /, *, proof=True, limits=True, progress=None, **keywords
         source = _of_keywords(keywords)
     elif keywords:
         raise TypeError(f"give a spec or keywords, not both: {', '.join(keywords)}")
-    return _hybank.design(source, proof=proof, limits=limits, progress=progress)
+    return _design(source, proof=proof, limits=limits, progress=progress)
 
 
 def _of_keywords(keywords):

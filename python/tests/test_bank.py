@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from oracles import polyphase_sum
 
 import hybank as hb
@@ -62,8 +63,8 @@ def test_the_error_response_stays_below_gamma_and_reaches_it(fir, iir):
 
 def test_verify_and_analyze_agree_with_the_bank(fir, filters, tmp_path):
     proof = hb.verify(filters / "thesis-fir.json")
-    assert proof.digest and proof.certificate_in_bank and proof.lower_banks == "fir_of_this_length"
-    assert fir.proven and proof.upper == fir.gamma.upper
+    assert proof.digest and proof.certificate_in_bank and proof.lower_banks == "any"
+    assert fir.proven and proof.lower <= fir.gamma.norm <= proof.upper == fir.gamma.upper
     assert hb.verify(fir).digest is None
     found = hb.analyze(fir)
     assert found.gamma == pytest.approx(fir.gamma.norm, rel=1e-8)
@@ -130,6 +131,6 @@ def test_plot_draws_or_names_what_is_missing(fir):
 
 def test_the_stubs_tell_the_truth():
     pytest.importorskip("mypy")
-    command = [sys.executable, "-m", "mypy.stubtest", "hybank"]
+    command = [sys.executable, "-m", "mypy.stubtest", "hybank", "--mypy-config-file", ROOT / "pyproject.toml"]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
