@@ -113,8 +113,8 @@ impl Bank {
     /// The worst-case error with its bounds.
     #[getter]
     fn gamma(&self) -> Gamma {
-        let bank::Gamma { norm, upper, lower, noncausal } = self.bank.gamma;
-        Gamma { norm, upper, lower, noncausal }
+        let bank::Gamma { norm, upper, lower, noncausal, worst_case } = self.bank.gamma;
+        Gamma { norm, upper, lower, noncausal, worst_case }
     }
 
     /// The delay of each channel in seconds.

@@ -16,15 +16,21 @@ pub(crate) struct Gamma {
     pub(crate) lower: Option<f64>,
     /// A lower bound for all banks.
     pub(crate) noncausal: Option<f64>,
+    /// An upper bound over all errors that the spec allows for.
+    pub(crate) worst_case: Option<f64>,
 }
 
 #[pymethods]
 impl Gamma {
     fn __repr__(&self) -> String {
-        let text = |bound: Option<f64>| bound.map_or_else(|| "None".to_owned(), |value| format!("{value:?}"));
-        let [norm, upper, lower, noncausal] = [self.norm, self.upper, self.lower, self.noncausal].map(text);
+        let [norm, upper, lower, noncausal] = [self.norm, self.upper, self.lower, self.noncausal].map(known);
         format!("Gamma(norm={norm}, upper={upper}, lower={lower}, noncausal={noncausal})")
     }
+}
+
+/// As Python writes it.
+fn known(bound: Option<f64>) -> String {
+    bound.map_or_else(|| "None".to_owned(), |value| format!("{value:?}"))
 }
 
 /// What happened while a bank was run on an array.
@@ -111,8 +117,8 @@ pub(crate) struct Analysis {
     gamma: f64,
     /// Frequency of the worst case, modulo the slow rate.
     peak_hertz: f64,
-    /// No bank has a smaller gamma with these front ends and delays.
-    noncausal: f64,
+    /// No bank has a smaller gamma with these front ends and delays; None where that is not known.
+    noncausal: Option<f64>,
     /// Rms of the error for white noise of unit density at the analog input.
     rms_error: f64,
     /// Rms of the output noise for independent noise of unit rms on all slow samples.
@@ -133,8 +139,13 @@ impl From<design::Analysis> for Analysis {
 impl Analysis {
     fn __repr__(&self) -> String {
         format!(
-            "Analysis(gamma={:?}, peak_hertz={:?}, noncausal={:?}, rms_error={:?}, noise_gain={:?}, output_noise={:?})",
-            self.gamma, self.peak_hertz, self.noncausal, self.rms_error, self.noise_gain, self.output_noise
+            "Analysis(gamma={:?}, peak_hertz={:?}, noncausal={}, rms_error={:?}, noise_gain={:?}, output_noise={:?})",
+            self.gamma,
+            self.peak_hertz,
+            known(self.noncausal),
+            self.rms_error,
+            self.noise_gain,
+            self.output_noise
         )
     }
 }
