@@ -178,10 +178,13 @@ impl Bank {
     }
 
     /// Fuses a whole signal; the output lines up with the time axis of the input.
-    #[pyo3(signature = (
-        x, *, axis = -1, dtype = None, threads = 1, gaps = None, algorithm = "auto", keep_latency = false,
-        full_output = false
-    ))]
+    #[pyo3(
+        signature = (
+            x, *, axis = -1, dtype = None, threads = 1, gaps = None, algorithm = "auto", keep_latency = false,
+            full_output = false
+        ),
+        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=None, algorithm='auto', keep_latency=False, full_output=False)"
+    )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn fuse<'py>(
         &self,
@@ -201,7 +204,10 @@ impl Bank {
     }
 
     /// A causal stream through the bank.
-    #[pyo3(signature = (*, axis = -1, dtype = None, algorithm = "auto"))]
+    #[pyo3(
+        signature = (*, axis = -1, dtype = None, algorithm = "auto"),
+        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto')"
+    )]
     fn stream(&self, axis: isize, dtype: Option<Bound<'_, PyAny>>, algorithm: &str) -> PyResult<Stream> {
         Stream::new(&self.bank, axis, dtype.as_ref(), algorithm)
     }

@@ -97,7 +97,7 @@ def test_errors_of_a_text_have_line_caret_and_remedy():
         ({"channel": [{"delay": -1e-6}]}, "channel[0].delay", "out of range"),
         ({"channel": [{"delay": True}]}, "channel[0].delay", "true or false"),
         ({"design": {"method": "fur"}}, "design.method", 'did you mean "fir"'),
-        ({"target": {"filter": {"num": np.array([1.0]), "den": np.array([1.0])}}}, "target.filter", "proper"),
+        ({"target": {"filter": {"num": np.array([1.0]), "den": np.array([1.0])}}}, "target.filter.den", "no pole"),
     ],
 )
 def test_errors_of_a_mapping_carry_their_path(change, path, words):
