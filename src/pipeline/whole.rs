@@ -83,7 +83,12 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(bank: &Bank, plan: &Plan, skip: usize, settings: WholeSettings<'a>) -> Result<Self, PipelineError> {
+    fn new(
+        bank: &Bank,
+        plan: &Plan,
+        skip: usize,
+        settings: WholeSettings<'a>,
+    ) -> Result<Self, PipelineError> {
         Ok(Self {
             stream: Stream::new(plan),
             filler: settings.gaps.map(|policy| GapFiller::new(bank, policy)).transpose()?,

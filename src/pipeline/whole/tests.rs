@@ -40,7 +40,12 @@ fn channels(frames: usize, gap: bool) -> [Vec<f32>; 2] {
 }
 
 /// As `hybank fuse` does it, from mono recordings.
-fn command(bank: &Bank, plan: &Plan, both: &[Vec<f32>; 2], settings: Settings) -> (Written, super::super::Outcome) {
+fn command(
+    bank: &Bank,
+    plan: &Plan,
+    both: &[Vec<f32>; 2],
+    settings: Settings,
+) -> (Written, super::super::Outcome) {
     let mut pipeline = Pipeline::new(bank, plan, settings).unwrap();
     let bytes = both.each_ref().map(|x| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
     let layout = SampleLayout::packed(PcmFormat::F32Le);
@@ -65,13 +70,16 @@ fn a_whole_signal_has_the_bits_of_the_command() {
     ] {
         let bank = bank(24, ratio, latency);
         let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
-        for (gap, keep_latency, format) in
-            [(false, false, PcmFormat::F32Le), (false, true, PcmFormat::S16Le), (true, false, PcmFormat::S16Le)]
-        {
+        for (gap, keep_latency, format) in [
+            (false, false, PcmFormat::F32Le),
+            (false, true, PcmFormat::S16Le),
+            (true, false, PcmFormat::S16Le),
+        ] {
             let both = channels(frames, gap);
             let gaps = gap.then_some(GapPolicy::Hold);
             let skip = if keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
-            let (want, outcome) = command(&bank, &plan, &both, Settings { format, skip, gaps, workers: None });
+            let (want, outcome) =
+                command(&bank, &plan, &both, Settings { format, skip, gaps, workers: None });
             let planes = both.each_ref().map(Vec::as_slice);
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput { format, bytes: &mut bytes, clipped: 0 };
@@ -92,11 +100,17 @@ fn an_output_that_is_too_short_and_channels_that_do_not_match_are_refused() {
     let plan = bank.plan(Options::default()).unwrap();
     let input = Interleaved::new(&[0.0f32; 8], 2).unwrap();
     let short = fuse(&bank, &plan, &input, &mut [0.0f32; 7][..], WholeSettings::default());
-    assert!(matches!(short, Err(PipelineError::Process(ProcessError::OutputTooShort { given: 7, wanted: 8 }))));
+    assert!(matches!(
+        short,
+        Err(PipelineError::Process(ProcessError::OutputTooShort { given: 7, wanted: 8 }))
+    ));
     let mono = Interleaved::new(&[0.0f32; 8], 1).unwrap();
     for gaps in [None, Some(GapPolicy::Zero)] {
         let settings = WholeSettings { gaps, ..WholeSettings::default() };
         let refused = fuse(&bank, &plan, &mono, &mut [0.0f32; 16][..], settings);
-        assert!(matches!(refused, Err(PipelineError::Process(ProcessError::Channels { given: 1, wanted: 2 }))));
+        assert!(matches!(
+            refused,
+            Err(PipelineError::Process(ProcessError::Channels { given: 1, wanted: 2 }))
+        ));
     }
 }
