@@ -14,7 +14,8 @@ pub(super) struct Line {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Expected {
     pub(super) lines: Vec<Line>,
-    /// Offsets at exactly half the rate, where there is no phase.
+    /// The line at exactly half the rate, where there is no phase: offsets, if there is an even number of
+    /// converters.
     pub(super) half_rate: Option<Cause>,
     /// Spurs that coincide with a tone, with the constant or with half the rate.
     pub(super) hidden: Vec<Cause>,
@@ -46,6 +47,8 @@ impl Expected {
         }
         expected.add_intermodulation(pattern);
         let of = pattern.converters;
+        // No sine can be fitted there, so that it is never found among the unexpected lines.
+        expected.half_rate = Some(Cause::Unknown);
         for k in 1..=of / 2 {
             let cause = Cause::Offset { k, of };
             if 2 * k == of {

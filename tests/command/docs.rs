@@ -70,8 +70,8 @@ impl Folder {
             "toml" => self.check_spec(snippet),
             "json" => self.check_bank(snippet),
             "sh" => self.run(snippet),
-            // Rust is a documentation test; lines of lost samples run with the stream that reads them.
-            "rust" | "text" | "jsonl" => {}
+            // Python has tests of its own; Rust is a documentation test; lines of lost samples run with the stream that reads them.
+            "rust" | "text" | "jsonl" | "python" => {}
             other => panic!("{}: no check for a snippet of {other:?}", self.place(snippet)),
         }
     }
