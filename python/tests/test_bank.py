@@ -71,7 +71,7 @@ def test_verify_and_analyze_agree_with_the_bank(fir, filters, tmp_path):
     # The noise gain by its definition.
     assert found.noise_gain == pytest.approx(np.sqrt((fir.taps**2).sum() / fir.ratio), rel=1e-12)
     assert hb.analyze(fir, delay_error=np.zeros(2)).gamma == found.gamma
-    assert hb.analyze(fir, delay_error=np.array([0.3, -0.3])).gamma > 2 * found.gamma
+    assert hb.analyze(fir, delay_error=np.array([0.3, -0.3])).gamma > 1.5 * found.gamma
     altered = tmp_path / "bank.json"
     text = fir.to_json()
     number = text[text.index('"taps": [') + 9 :].split(",")[0]
