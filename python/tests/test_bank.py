@@ -78,7 +78,7 @@ def test_verify_and_analyze_agree_with_the_bank(fir, filters, tmp_path):
     altered.write_text(text.replace(number, f"{float(number) + 1e-9!r}", 1))
     with pytest.raises(hb.HybankError, match="altered"):
         hb.verify(altered)
-    with pytest.raises(hb.HybankError, match="one error"):
+    with pytest.raises(hb.HybankError, match="one for each channel"):
         hb.analyze(fir, delay_error=[1e-9])
 
 

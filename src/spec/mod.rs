@@ -24,7 +24,9 @@ pub use filter::{MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
-pub(crate) use limits::{check_gain, check_noise, check_offset};
+#[cfg(feature = "cli")]
+pub(crate) use limits::check_noise;
+pub(crate) use limits::{check_gain, check_offset};
 pub use uncertainty::{PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
