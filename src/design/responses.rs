@@ -12,7 +12,7 @@ const TAIL: f64 = 1e-12;
 /// Slow periods of a recursive filter's response that are computed at most.
 const MOST_PERIODS: usize = 4096;
 
-/// The impulse responses f_i[n] of the synthesis filters at the fast rate, all of one length. That of a
+/// The impulse responses `f_i[n]` of the synthesis filters at the fast rate, all of one length. That of a
 /// recursive filter ends where 1e-12 of its energy is left, or after 4,096 slow periods.
 ///
 /// # Errors
@@ -48,7 +48,7 @@ fn lags_of_recursion(bank: &Bank) -> Result<Vec<Mat>, DesignError> {
     Ok(lags)
 }
 
-/// F(e^{j w}) = sum_n f[n] e^{-j w n} and its group delay, -d arg F / d w, in fast samples.
+/// `F(e^{j w}) = sum_n f[n] e^{-j w n}` and its group delay, `-d arg F / d w`, in fast samples.
 pub fn fir_response(taps: &[f64], w: RadiansPerFastPeriod) -> (Complex<f64>, f64) {
     let term = |(n, tap): (usize, &f64)| {
         let value = Complex::from_polar(*tap, -w.0 * n as f64);

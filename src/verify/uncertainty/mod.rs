@@ -10,11 +10,11 @@
 //!
 //! The lower end is the gain of one K_delta at one frequency. The upper end rests on two facts.
 //!
-//! *Over the errors, at a fixed frequency* ([`at_frequency`]): each channel's row is a convex mix of its
+//! *Over the errors, at a fixed frequency* (`at_frequency`): each channel's row is a convex mix of its
 //! rows at the ends of the box plus a remainder that falls with the square of the width, so the gain is at
 //! most the largest gain at a vertex plus the remainders. Where that is too much, the box is halved.
 //!
-//! *Between frequencies, for fixed errors*: with its memory cut off after J slow periods ([`memory`]) K is a
+//! *Between frequencies, for fixed errors*: with its memory cut off after J slow periods (`memory`) K is a
 //! polynomial in z^-1, and |a* K|^2 is a nonnegative trigonometric polynomial p of some degree d for every
 //! direction a. By M. Riesz's lemma, p(omega + t) >= max p cos^2(d t / 2) around its maximum, |t| <= pi / d.
 //! (P. Borwein, T. Erdelyi, *Polynomials and Polynomial Inequalities*, 1995, lemma E.3 of section 5.1, for p
