@@ -22,10 +22,10 @@ pub(crate) use error::Fault;
 pub use error::{Location, SpecError, SpecProblem};
 pub use filter::{MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
-pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
-pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 #[cfg(feature = "cli")]
 pub(crate) use limits::check_noise;
+pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
+pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub(crate) use limits::{check_gain, check_offset};
 pub use uncertainty::{PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
