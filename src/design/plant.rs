@@ -106,11 +106,6 @@ impl LiftedPlant {
         Ok(self.system.select_outputs(self.channels()..self.channels() + self.ratio())?)
     }
 
-    /// The number of states that follow the analog filters. They come first; those of delay chains follow.
-    pub(super) fn analog_order(&self) -> usize {
-        self.prompt.order()
-    }
-
     /// The states of the delay chain of `channel`, newest sample first. The range is empty unless the
     /// channel is delayed by whole slow periods. The measurement of a delayed channel is the last state of
     /// its chain, without feedthrough.

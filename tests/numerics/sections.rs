@@ -69,22 +69,6 @@ fn designs_are_sections_behind_delay_lines() {
     }
 }
 
-/// Behind these front ends double precision does not reach the optimum; more bits keep the delay lines too.
-#[test]
-fn designs_in_extended_precision_are_sections_behind_delay_lines() {
-    let steep = "{ family = \"butterworth\", order = 8, cutoff = 0.1 }";
-    for method in ["iir", "h2"] {
-        for latency in [0, 10, 30] {
-            let bank = design(&spec(method, &[0.2, 0.9, 1.6], latency, steep)).unwrap().bank;
-            let stream = Stream::new(&bank.plan(Options::default()).unwrap());
-            assert_eq!(stream.plan().summary().algorithm, "parallel-form", "{method} {latency}");
-            // Three inputs a frame of the line, and the states of the front end.
-            let states = block(&bank).a.len();
-            assert!(states <= 8 + 3 * (latency / 2 + 1), "{method} {latency}: {states}");
-        }
-    }
-}
-
 #[test]
 fn the_gamma_written_is_that_of_the_sections() {
     for latency in [0, 3, 10, 41] {

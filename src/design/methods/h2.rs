@@ -33,7 +33,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, _: &Settings) -> Result<Synthesis,
     candidates.extend(precise_filter);
     let rms: Vec<f64> = candidates.iter().map(|filter| rms_error(plant, filter)).collect();
     let enough = SAME_ERROR * rms.iter().copied().fold(f64::INFINITY, f64::min);
-    // Of equally good ones the first is taken, which is that of double precision if it is among them.
+    // Those of double precision come first: they keep the delay lines of the plant.
     let good = candidates.into_iter().zip(rms).filter(|(_, rms)| *rms <= enough);
     iteration.start_from(good.map(|(filter, _)| filter))?;
     let optimum = iteration.best().map_err(|_| DesignError::RiccatiFailed { gamma: f64::INFINITY })?;

@@ -55,8 +55,6 @@ pub(super) struct PreciseFiltering<F> {
     fresh: Matrix<F>,
     /// Number of states.
     order: usize,
-    /// How many of them, the first ones, follow the analog filters; the others are delay chains.
-    analog: usize,
     /// Number of measurements.
     measured: usize,
     /// Size of each measurement for white inputs.
@@ -84,7 +82,6 @@ impl<F: Number> PreciseFiltering<F> {
             system: stacked(system.a(), system.c()),
             fresh: (&inputs * &inputs.transpose()).symmetric(),
             order: system.order(),
-            analog: plant.analog_order(),
             measured,
             sizes: output_sizes(system)?.into_iter().take(measured).collect(),
             start: 1 + (0..measured).map(|channel| plant.chain(channel).len()).max().unwrap_or(0),
@@ -190,28 +187,17 @@ impl<F: Number> PreciseFiltering<F> {
         )
     }
 
-    /// The filter in double precision, in coordinates in which white measurements of their own size make the
-    /// states of its analog part white: rounding there is relative to the size of the signals. The states of
-    /// delay chains are samples as they are. A change of their coordinates would fill the zeros by which the
-    /// chains are recognised.
+    /// The filter in double precision, in coordinates in which white measurements of their own size make its
+    /// states white: rounding there is relative to the size of the signals.
     fn realised(&self, a: &Matrix<F>, b: &Matrix<F>, c: &Matrix<F>, d: &Matrix<F>) -> Option<StateSpace> {
         let driven = Matrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * F::from(self.sizes[j]));
-        let states: Vec<usize> = (0..self.analog).collect();
-        let mut gramian = gramian(a, &driven)?.select(&states, &states);
+        let mut gramian = gramian(a, &driven)?;
         let noise = F::from(STATE_NOISE.max(100.0 * F::ROUNDING));
-        states.iter().for_each(|&i| gramian[(i, i)] = gramian[(i, i)] + gramian[(i, i)] * noise);
-        let root = self.beside_chains(&gramian.cholesky()?);
+        (0..gramian.nrows()).for_each(|i| gramian[(i, i)] = gramian[(i, i)] + gramian[(i, i)] * noise);
+        let root = gramian.cholesky()?;
         let (a, b) = (root.solve_lower(&(a * &root)), root.solve_lower(b));
         let filter = StateSpace::new(nearest(&a), nearest(&b), nearest(&(c * &root)), nearest(d)).ok()?;
         (filter.spectral_radius().ok()? < 1.0).then_some(filter)
-    }
-
-    /// diag(`root`, I).
-    fn beside_chains(&self, root: &Matrix<F>) -> Matrix<F> {
-        Matrix::from_fn(self.order, self.order, |i, j| match i.max(j) < self.analog {
-            true => root[(i, j)],
-            false => F::from(if i == j { 1.0 } else { 0.0 }),
-        })
     }
 }
 

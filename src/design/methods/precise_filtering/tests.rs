@@ -32,8 +32,8 @@ fn norm(plant: &LiftedPlant, filter: &StateSpace) -> f64 {
 fn covariances_do_not_change_in_a_step() {
     for plant in plants() {
         let filtering = PreciseFiltering::<BigFloat>::new(&plant).unwrap();
-        let zero_output = norm(&plant, &StateSpace::gain(Mat::zeros(plant.ratio(), plant.channels())));
-        for gamma in [None, Some(1.2 * zero_output)] {
+        let silence = norm(&plant, &StateSpace::gain(Mat::zeros(plant.ratio(), plant.channels())));
+        for gamma in [None, Some(1.2 * silence)] {
             let p = filtering.covariance(gamma).unwrap();
             let next = filtering.step(&p, gamma).unwrap().next;
             for i in 0..p.nrows() {
