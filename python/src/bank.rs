@@ -26,6 +26,9 @@ pub(crate) fn load(path: PathBuf) -> PyResult<Bank> {
     sources::parse_bank(&text, &path.display().to_string()).map(Bank::from)
 }
 
+/// A one-dimensional array of doubles.
+type Array<'py> = Bound<'py, PyArray1<f64>>;
+
 /// Synthesis filters with the data to run and verify them.
 #[pyclass(frozen, module = "hybank")]
 pub(crate) struct Bank {
@@ -159,11 +162,7 @@ impl Bank {
 
     /// The largest gain of the error system at `n` frequencies from 0 to half the slow rate: (hertz, gain).
     #[pyo3(signature = (n = 512))]
-    fn error_response<'py>(
-        &self,
-        py: Python<'py>,
-        n: usize,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    fn error_response<'py>(&self, py: Python<'py>, n: usize) -> PyResult<(Array<'py>, Array<'py>)> {
         let bank = Arc::clone(&self.bank);
         let points = py.detach(|| design::error_response(&bank, n)).map_err(refused)?;
         let (hertz, gain): (Vec<f64>, Vec<f64>) =
