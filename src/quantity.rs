@@ -7,7 +7,7 @@
 //! use hybank::quantity::{self, Time};
 //! use hybank::units::Seconds;
 //! assert_eq!(quantity::time("10ps"), Ok(Time::Seconds(Seconds(1e-11))));
-//! assert_eq!(quantity::time("0.01 samples").map(|time| time.in_seconds(Seconds(1e-9))), Ok(Seconds(1e-11)));
+//! assert_eq!(quantity::time("0.25 samples").map(|time| time.in_seconds(Seconds(4e-9))), Ok(Seconds(1e-9)));
 //! assert_eq!(quantity::relative("0.5%"), Ok(0.005));
 //! ```
 
