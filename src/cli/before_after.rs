@@ -7,7 +7,7 @@ use super::measure::{ToneArg, column, tone, tones};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::io::MultiReader;
 use crate::measure::{Measurement, Settings, measure};
-use crate::simulate::nearest_samples;
+use crate::simulate::interleaved;
 use crate::units::Hertz;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -66,9 +66,7 @@ impl BeforeAfterArgs {
     ) -> Result<BeforeAfter, Failure> {
         let fused = CaptureFile::read(output, None)?;
         let channels = read_channels(&mut reader, None)?;
-        let delays: Vec<_> =
-            bank.delays.iter().map(|delay| delay.in_fast_periods(bank.fast_period)).collect();
-        let plain = nearest_samples(&delays, bank.ratio, 0, &channels);
+        let plain = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
         let settings = Settings {
             tones: tones(&self.tone)?,
             converters: bank.ratio,

@@ -104,7 +104,7 @@ fn contend(spec: &Spec, problem: &Problem, captured: &Captured) -> Result<Vec<Co
         let samples = fuse(&bank, &captured.channels)?;
         contenders.push(Contender::judge(name, method.name(), Some(&bank), samples, &captured.target));
     }
-    let plain = interleaved(problem, &captured.channels);
+    let plain = interleaved(&problem.delays(), problem.ratio, problem.latency, &captured.channels);
     contenders.push(Contender::judge("plain interleaving", "interleaved", None, plain, &captured.target));
     Ok(contenders)
 }

@@ -10,6 +10,7 @@ mod error_grid;
 mod error_response;
 mod exchange;
 pub mod filters;
+pub mod interleaving;
 mod lifting;
 mod merging;
 mod methods;

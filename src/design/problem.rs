@@ -62,6 +62,11 @@ impl Problem {
         Ok(problem)
     }
 
+    /// The delays of the channels.
+    pub fn delays(&self) -> Vec<FastPeriods> {
+        self.channels.iter().map(|channel| channel.delay).collect()
+    }
+
     /// Checks that the delay chains are not too long.
     ///
     /// # Errors

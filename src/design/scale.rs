@@ -2,6 +2,7 @@
 
 use super::DesignError;
 use super::analysis::bank_problem;
+use super::interleaving::nearest_samples;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use crate::bank::Bank;
@@ -41,24 +42,13 @@ impl GammaScale {
 }
 
 /// The taps of plain interleaving: one tap of 1 for each of the M phases.
-///
-/// Phase p belongs to the instant p - m0, and the newest sample of channel i but l to -l M - D_i.
 fn interleaving(problem: &Problem) -> Vec<Vec<f64>> {
-    let period = problem.ratio as f64;
-    let nearest = |phase: usize| {
-        let instant = phase as f64 - problem.latency as f64;
-        let of_channel = |(i, delay): (usize, f64)| {
-            let lag = ((-instant - delay) / period).round().max(0.0);
-            ((instant + lag * period + delay).abs(), i, lag as usize)
-        };
-        let delays = problem.channels.iter().map(|channel| channel.delay.0);
-        delays.enumerate().map(of_channel).min_by(|a, b| a.0.total_cmp(&b.0))
-    };
-    let samples: Vec<(usize, usize, usize)> =
-        (0..problem.ratio).filter_map(|p| nearest(p).map(|(_, i, lag)| (p, i, lag))).collect();
-    let lags = 1 + samples.iter().map(|&(_, _, lag)| lag).max().unwrap_or(0);
+    let nearest = nearest_samples(&problem.delays(), problem.ratio, problem.latency, 0);
+    let lags = 1 + nearest.iter().map(|sample| sample.lag as usize).max().unwrap_or(0);
     let mut taps = vec![vec![0.0; lags * problem.ratio]; problem.channels.len()];
-    samples.into_iter().for_each(|(p, i, lag)| taps[i][lag * problem.ratio + p] = 1.0);
+    for (phase, sample) in nearest.into_iter().enumerate() {
+        taps[sample.channel][sample.lag as usize * problem.ratio + phase] = 1.0;
+    }
     taps
 }
 
@@ -101,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn every_phase_has_the_nearest_sample() {
+    fn the_taps_pick_the_nearest_samples() {
         let bank = bank("{ delay = 1.4 }, { delay = 0.2 }", 3);
         let taps = interleaving(&bank_problem(&bank).unwrap());
         // Instants -3 and -2: the samples at -3.4 and -2.2.

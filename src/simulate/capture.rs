@@ -6,6 +6,7 @@ use super::source::NormalisedSource;
 use super::walk::sample_at;
 use crate::analog::StrictlyProper;
 use crate::design::Problem;
+use crate::design::interleaving::{NearestSample, nearest_samples};
 use crate::design::problem::Channel;
 use crate::units::FastPeriods;
 
@@ -94,38 +95,16 @@ impl Analog {
     }
 }
 
-/// Plain interleaving, for comparison: output n is the slow sample whose instant lies nearest to n - m0, as
-/// if all front ends were alike; 0 where that sample has not been captured.
-pub fn interleaved(problem: &Problem, channels: &[Vec<f64>]) -> Vec<f64> {
-    let delays: Vec<FastPeriods> = problem.channels.iter().map(|channel| channel.delay).collect();
-    nearest_samples(&delays, problem.ratio, problem.latency, channels)
-}
-
-/// As [`interleaved`], for channels of which only the delays are known.
-pub fn nearest_samples(
-    delays: &[FastPeriods],
-    ratio: usize,
-    latency: usize,
-    channels: &[Vec<f64>],
-) -> Vec<f64> {
-    let periods = channels.iter().map(Vec::len).min().unwrap_or(0);
-    let slow_period = ratio as f64;
-    let nearest = |n: usize| {
-        let instant = n as f64 - latency as f64;
-        delays
-            .iter()
-            .zip(channels)
-            .map(|(delay, samples)| {
-                let delay = delay.0;
-                let k = ((instant + delay) / slow_period).round();
-                let distance = (k * slow_period - delay - instant).abs();
-                let value = if k < 0.0 { 0.0 } else { samples.get(k as usize).copied().unwrap_or(0.0) };
-                (distance, value)
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map_or(0.0, |(_, value)| value)
+/// Plain interleaving, for comparison, as if all front ends were alike: output n is the slow sample whose
+/// instant lies nearest to n - m0, also a later one; 0 where that sample has not been captured.
+pub fn interleaved(delays: &[FastPeriods], ratio: usize, latency: usize, channels: &[Vec<f64>]) -> Vec<f64> {
+    let nearest = nearest_samples(delays, ratio, latency, i64::MIN);
+    let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
+    let sample = |frame: usize, sample: &NearestSample| {
+        let index = usize::try_from(frame as i64 - sample.lag).ok();
+        index.and_then(|index| channels[sample.channel].get(index)).copied().unwrap_or(0.0)
     };
-    (0..periods * ratio).map(nearest).collect()
+    (0..frames).flat_map(|frame| nearest.iter().map(move |near| sample(frame, near))).collect()
 }
 
 #[cfg(test)]
@@ -159,7 +138,7 @@ mod tests {
         let problem = problem([1.0, 0.0], 1);
         let source: crate::simulate::Source = "tones:0.3,0.8".parse().unwrap();
         let captured = capture(&problem, &Analog::Known(source.normalised(Seconds(1.0))), 40);
-        let fast = interleaved(&problem, &captured.channels);
+        let fast = interleaved(&problem.delays(), problem.ratio, problem.latency, &captured.channels);
         assert_eq!(fast.len(), captured.target.len());
         for (n, (a, b)) in fast.iter().zip(&captured.target).enumerate() {
             assert!((a - b).abs() < 1e-13, "{n}: {a} {b}");
