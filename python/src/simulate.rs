@@ -5,19 +5,12 @@ use crate::errors::{HybankError, refused};
 use crate::results::Capture;
 use crate::sources;
 use hybank::design::{self, Problem};
-use hybank::simulate::{Analog, Captured, Recording, Source, capture, panels};
+use hybank::simulate::{Analog, Captured, Recording, Source, capture, frames};
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
-
-/// Fast samples of a signal that does not say how long it is.
-const DEFAULT_SAMPLES: f64 = 200.0;
-/// Most fast samples: 2 GiB.
-const MOST_SAMPLES: usize = 1 << 28;
-/// Most steps of integration per converter: about ten seconds.
-const MOST_PANELS: f64 = 2e7;
 
 /// What virtual converters capture of a signal: a text like `chirp:50Hz..8kHz@1s`, or samples.
 #[pyfunction]
@@ -36,24 +29,18 @@ pub(crate) fn simulate(
     let spec = sources::spec(source)?;
     let latency = design::latency(&spec).map_err(refused)?;
     let problem = Problem::new(&spec, latency).map_err(refused)?;
-    let (signal, length) = analog(&spec, signal, rate)?;
-    let samples = samples.unwrap_or(length);
-    check_work(&problem, &signal, samples)?;
-    let frames = samples.div_ceil(spec.ratio);
+    let signal = analog(&spec, signal, rate)?;
+    let samples = samples.unwrap_or_else(|| signal.usual_samples(spec.ratio));
+    let frames = frames(&problem, &signal, samples, false).map_err(refused)?;
     let captured = background::run(py, None, move |_| capture(&problem, &signal, frames))?;
     delivered(py, &spec, captured, gain, latency)
 }
 
-/// The signal in normalised time, and its length in fast samples.
-fn analog(spec: &Spec, signal: &Bound<'_, PyAny>, rate: Option<f64>) -> PyResult<(Analog, usize)> {
+/// The signal in normalised time.
+fn analog(spec: &Spec, signal: &Bound<'_, PyAny>, rate: Option<f64>) -> PyResult<Analog> {
     if let Ok(text) = signal.cast::<PyString>() {
         let source: Source = text.to_cow()?.parse().map_err(refused)?;
-        let source = source.normalised(spec.fast_period);
-        let length = source.duration().unwrap_or_default().0.ceil();
-        return Ok((
-            Analog::Known(source),
-            length.clamp(DEFAULT_SAMPLES, MOST_SAMPLES as f64 + 1.0) as usize,
-        ));
+        return Ok(Analog::Known(source.normalised(spec.fast_period)));
     }
     let fast = spec.fast_period.rate();
     let rate = rate.map_or(fast, Hertz);
@@ -64,27 +51,7 @@ fn analog(spec: &Spec, signal: &Bound<'_, PyAny>, rate: Option<f64>) -> PyResult
         )));
     }
     let recording = Recording::new(&signal.extract::<Vec<f64>>()?, FastPeriods(fast / rate));
-    let length = (recording.duration() * (1.0 + 1e-12)).0.floor() as usize;
-    Ok((Analog::Recorded(recording), length / spec.ratio * spec.ratio))
-}
-
-fn check_work(problem: &Problem, signal: &Analog, samples: usize) -> PyResult<()> {
-    if samples == 0 || samples > MOST_SAMPLES {
-        return Err(HybankError::new_err(format!(
-            "samples: {samples} fast samples cannot be captured; ask for 1 to {MOST_SAMPLES}"
-        )));
-    }
-    let Analog::Known(source) = signal else { return Ok(()) };
-    let span = FastPeriods(samples as f64);
-    let work =
-        problem.front_ends.iter().map(|filter| panels(filter, source, span, false)).fold(0.0, f64::max);
-    if work <= MOST_PANELS {
-        return Ok(());
-    }
-    Err(HybankError::new_err(format!(
-        "the chirp or a front end is too fast for the fast rate: it takes {work:.1e} integration steps, more than the \
-         limit of {MOST_PANELS:.0e}; check the units of frequencies and fast_period, or ask for fewer samples"
-    )))
+    Ok(Analog::Recorded(recording))
 }
 
 /// The samples as the converters deliver them: with the gain of the signal and the offsets of the spec.

@@ -94,11 +94,16 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8], force: bool) -> Result<(), 
     if is_dash(path) {
         return print_bytes(bytes);
     }
+    begin_file(path, bytes, force)?.commit().map_err(Failure::input)
+}
+
+/// A file that is whole but has no name yet.
+pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<AtomicFile, Failure> {
     remove_unfinished();
     let mut file = AtomicFile::create(path, force).map_err(Failure::input)?;
     file.write_all(bytes)
         .map_err(|error| Failure::Input(format!("{}: cannot write it: {error}", name(path))))?;
-    file.commit().map_err(Failure::input)
+    Ok(file)
 }
 
 /// The name of a file in messages.

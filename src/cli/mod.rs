@@ -14,6 +14,7 @@ mod design;
 mod export;
 mod failure;
 mod file_kind;
+mod folder;
 mod fuse;
 mod gaps;
 mod help;

@@ -1,18 +1,17 @@
 //! `hybank plot`: a bank as pictures.
 
 use super::Failure;
-use super::bank_file::{load, name};
-use super::interrupt::remove_unfinished;
+use super::bank_file::{begin_file, load, name};
+use super::folder::write_together;
 use super::say::name_leftovers;
 use crate::bank::Bank;
 use crate::design::responses::{fir_response, front_end_gains, impulse_responses};
 use crate::design::{self, DesignError};
-use crate::files::{AtomicFile, commit_all, refuse_overlaps};
+use crate::files::refuse_overlaps;
 use crate::plot::{Chart, Series};
 use crate::quantity::scale_of;
 use crate::units::{Hertz, RadiansPerFastPeriod};
 use std::f64::consts::PI;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Frequencies of a curve.
@@ -64,19 +63,10 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 fn write_all(args: &Args, pictures: &[(PathBuf, String)]) -> Result<(), Failure> {
     let paths: Vec<&Path> = pictures.iter().map(|(path, _)| path.as_path()).collect();
     refuse_overlaps(&paths, &[&args.bank]).map_err(Failure::input)?;
-    std::fs::create_dir_all(&args.output).map_err(|error| {
-        Failure::Input(format!("{}: cannot create the folder: {error}", args.output.display()))
-    })?;
     name_leftovers(&paths);
-    remove_unfinished();
-    let begin = |(path, text): &(PathBuf, String)| {
-        let mut file = AtomicFile::create(path, args.force).map_err(Failure::input)?;
-        file.write_all(text.as_bytes())
-            .map_err(|error| Failure::Input(format!("{}: cannot write it: {error}", path.display())))?;
-        Ok(file)
-    };
-    let files = pictures.iter().map(begin).collect::<Result<Vec<_>, Failure>>()?;
-    commit_all(files).map_err(Failure::input)
+    write_together(&args.output, pictures.iter().map(Ok), |(path, text)| {
+        begin_file(path, text.as_bytes(), args.force)
+    })
 }
 
 fn charts(bank: &Bank) -> Result<Vec<(&'static str, Chart)>, DesignError> {

@@ -17,12 +17,14 @@ mod recording;
 mod response;
 mod source;
 mod walk;
+mod workload;
 
-pub use capture::{Analog, Captured, capture, interleaved, nearest_samples, recordings, target};
+pub use capture::{Analog, Captured, capture, interleaved, recordings, target};
 pub use converter::{Converter, Delivered};
 pub use parse::ParseSourceError;
 pub use quantiser::Quantiser;
 pub use recording::Recording;
-pub use response::{Instants, panels, sample};
+pub use response::{Instants, sample};
 pub use source::{NormalisedSource, Source, Tone};
 pub use walk::sample_at;
+pub use workload::{MOST_SAMPLES, WorkloadError, frames};

@@ -156,7 +156,12 @@ pub(super) fn panel_rate(filter: &StrictlyProper, band: f64) -> f64 {
 
 /// Number of quadrature panels that [`sample`] needs over `span`; 0 for sources with a closed form. At
 /// instants without a common distance (`jittered`, [`sample_at`](super::sample_at)) a step needs them too.
-pub fn panels(filter: &StrictlyProper, source: &NormalisedSource, span: FastPeriods, jittered: bool) -> f64 {
+pub(super) fn panels(
+    filter: &StrictlyProper,
+    source: &NormalisedSource,
+    span: FastPeriods,
+    jittered: bool,
+) -> f64 {
     match source {
         Source::Chirp { start, end, .. } => span.0 * panel_rate(filter, start.0.abs().max(end.0.abs())),
         Source::Step { .. } if jittered => span.0 * panel_rate(filter, 0.0),

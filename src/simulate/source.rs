@@ -131,7 +131,7 @@ impl<T: Time> Source<T> {
 }
 
 impl Tone<FastPeriods> {
-    /// The phasor of the steady state behind a filter: amplitude Phi(j omega) e^{j phase}.
+    /// The phasor of the steady state after a filter: amplitude Phi(j omega) e^{j phase}.
     pub(super) fn response(&self, filter: &StrictlyProper) -> Complex<f64> {
         filter.response(self.omega) * Complex::from_polar(self.amplitude, self.phase)
     }

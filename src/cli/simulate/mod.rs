@@ -5,26 +5,19 @@ mod converters;
 use self::converters::{CommonReport, ConverterArgs, ConverterReport, Converters};
 use super::Failure;
 use super::bank_file::load_spec_or_bank;
+use super::folder::write_together;
 use super::recordings::{Mono, begin_recording, read_channel};
 use super::say::name_leftovers;
 use super::understood::understood;
 use crate::design::{self, Problem};
-use crate::files::{commit_all, refuse_overlaps};
-use crate::simulate::{Analog, Delivered, Recording, Source, panels, target};
+use crate::files::refuse_overlaps;
+use crate::simulate::{Analog, Delivered, Recording, Source, frames, target};
 use crate::spec::Spec;
-use crate::units::{FastPeriods, Hertz, Seconds};
+use crate::units::{FastPeriods, Hertz};
 use std::path::{Path, PathBuf};
 
-/// The fast period of a spec in normalised time, which has no rate.
-const NORMALISED: Seconds = Seconds(1.0);
 /// Fast rate in the WAV headers of captures in normalised time.
 const NORMALISED_RATE: Hertz = Hertz(48_000.0);
-/// Minimum number of fast samples of an analytic source unless `--samples` is given (thesis 5.6).
-const DEFAULT_SAMPLES: f64 = 200.0;
-/// Maximum number of fast samples of a simulation: the target, in memory, then takes 2 GiB.
-const MOST_SAMPLES: usize = 1 << 28;
-/// Maximum number of quadrature panels of a chirp per converter, about ten seconds of computing.
-const MOST_PANELS: f64 = 2e7;
 
 /// Simulates what the slow converters capture
 ///
@@ -110,10 +103,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if spec.latency.is_none() {
         warnings.push(format!("the spec gives no latency; {latency} fast samples are used"));
     }
-    let (signal, samples) = args.signal(&spec)?;
+    let signal = args.signal(&spec)?;
     let Converters { common, each } = args.converters.converters(&spec, &signal)?;
-    let frames = args.frames(samples, spec.ratio)?;
-    args.check_work(&problem, &signal, frames)?;
+    let samples = args.samples.unwrap_or_else(|| signal.usual_samples(spec.ratio));
+    let frames = frames(&problem, &signal, samples, args.converters.is_jittered())
+        .map_err(|error| Failure::Input(format!("{}: {error}", args.source)))?;
     let files = args.files(&rates, spec.channels.len())?;
     let (converters, mut reports): (Vec<_>, Vec<_>) = each.into_iter().unzip();
     let captures = converters.iter().zip(&mut reports).enumerate().map(|(i, (converter, report))| {
@@ -122,8 +116,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         samples
     });
     let reference = std::iter::once_with(|| args.amplified(target(&problem, &signal, frames)));
-    let recordings = captures.chain(reference).map(|samples| args.checked(samples));
-    write_all(&args.output, &files, recordings, args.force)?;
+    let recordings = files.iter().zip(captures.chain(reference));
+    let recordings = recordings.map(|(file, samples)| Ok((file, args.checked(samples)?)));
+    write_together(&args.output, recordings, |(file, samples)| {
+        begin_recording(&file.path, Mono { samples: &samples, rate: file.rate }, args.force)
+    })?;
     let files: Vec<String> = files.iter().map(|file| file.path.display().to_string()).collect();
     warnings.extend(clipping(&files, &reports));
     let (slow_rate, fast_rate) = (rates.slow, rates.fast);
@@ -161,20 +158,16 @@ impl Args {
         self.source.parse().map_or_else(|_| self.source.clone(), |source: Source| source.to_string())
     }
 
-    /// The signal in normalised time and its length in fast samples.
-    fn signal(&self, spec: &Spec) -> Result<(Analog, usize), Failure> {
+    /// The signal in normalised time.
+    fn signal(&self, spec: &Spec) -> Result<Analog, Failure> {
         let path = Path::new(&self.source);
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("wav")) {
             let (samples, rate) = read_channel(path, self.channel.map(usize::from))?;
             let rate = Hertz(f64::from(rate));
             // In normalised time the recording's own rate is the fast rate.
-            let fast = if spec.fast_period == NORMALISED { rate } else { spec.fast_period.rate() };
+            let fast = if spec.is_normalised() { rate } else { spec.fast_period.rate() };
             let recording = Recording::new(&samples, FastPeriods(fast / rate));
-            let length = (recording.duration() * (1.0 + 1e-12)).0.floor() as usize;
-            return Ok((
-                Analog::Recorded(recording),
-                self.samples.unwrap_or(length / spec.ratio * spec.ratio),
-            ));
+            return Ok(Analog::Recorded(recording));
         }
         if let Some(channel) = self.channel {
             return Err(Failure::Usage(format!(
@@ -184,42 +177,7 @@ impl Args {
         }
         let source: Source =
             self.source.parse().map_err(|error| Failure::Usage(format!("--source: {error}")))?;
-        let source = source.normalised(spec.fast_period);
-        let duration = source.duration().unwrap_or_default();
-        let length = duration.0.ceil().clamp(DEFAULT_SAMPLES, MOST_SAMPLES as f64 + 1.0);
-        Ok((Analog::Known(source), self.samples.unwrap_or(length as usize)))
-    }
-
-    /// Refuses a chirp or a front end so fast that the quadrature would take too long, and captures that the
-    /// memory cannot hold.
-    fn check_work(&self, problem: &Problem, signal: &Analog, frames: usize) -> Result<(), Failure> {
-        let samples = frames * problem.ratio;
-        let jittered = self.converters.is_jittered();
-        // Jitter, instants, their order, and a power of each jitter.
-        let bytes = signal.work_bytes(samples).saturating_add(if jittered { 32 * samples } else { 0 });
-        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
-            return Err(Failure::Input(format!(
-                "{}: {samples} fast samples take {:.1} GB of memory, more than the system gives; ask for fewer with \
-                 --samples",
-                self.source,
-                bytes as f64 / 1e9
-            )));
-        }
-        let Analog::Known(source) = signal else { return Ok(()) };
-        let span = FastPeriods(samples as f64);
-        let work = problem
-            .front_ends
-            .iter()
-            .map(|filter| panels(filter, source, span, jittered))
-            .fold(0.0, f64::max);
-        if work <= MOST_PANELS {
-            return Ok(());
-        }
-        Err(Failure::Input(format!(
-            "{}: the chirp or a front end is too fast for the fast rate: it takes {work:.1e} integration steps, \
-             more than the limit of {MOST_PANELS:.0e}; check the units of frequencies and fast_period, or ask for fewer --samples",
-            self.source
-        )))
+        Ok(Analog::Known(source.normalised(spec.fast_period)))
     }
 
     /// The channels' files and the target's; none of them may be an input.
@@ -248,23 +206,6 @@ impl Args {
             ))),
         }
     }
-
-    /// `samples` fast samples as whole frames.
-    fn frames(&self, samples: usize, ratio: usize) -> Result<usize, Failure> {
-        if samples == 0 {
-            return Err(Failure::Input(format!(
-                "{}: shorter than one slow sample, so there is nothing to capture",
-                self.source
-            )));
-        }
-        if samples > MOST_SAMPLES {
-            return Err(Failure::Input(format!(
-                "{}: {samples} fast samples are more than the limit of {MOST_SAMPLES}; ask for fewer with --samples",
-                self.source
-            )));
-        }
-        Ok(samples.div_ceil(ratio))
-    }
 }
 
 /// Rates for WAV headers, whole hertz.
@@ -276,7 +217,7 @@ struct Rates {
 impl Rates {
     fn of(spec: &Spec) -> Result<(Self, Vec<String>), String> {
         let ratio = spec.ratio as f64;
-        let slow = if spec.fast_period == NORMALISED {
+        let slow = if spec.is_normalised() {
             (NORMALISED_RATE / ratio).0.round().max(1.0)
         } else {
             (spec.fast_period * ratio).rate().0
@@ -300,31 +241,6 @@ impl Rates {
         }
         Ok((Self { slow: slow.round() as u32, fast: fast.round() as u32 }, warnings))
     }
-}
-
-/// Writes the recordings, each as soon as it is known; they appear together. A folder that was made for them
-/// goes if they do not.
-fn write_all(
-    folder: &Path,
-    files: &[Output],
-    recordings: impl Iterator<Item = Result<Vec<f64>, Failure>>,
-    force: bool,
-) -> Result<(), Failure> {
-    let is_new = !folder.exists();
-    let begin = |(file, samples): (&Output, Result<Vec<f64>, Failure>)| {
-        let samples = samples?;
-        std::fs::create_dir_all(folder).map_err(|error| {
-            Failure::Input(format!("{}: cannot create the folder: {error}", folder.display()))
-        })?;
-        begin_recording(&file.path, Mono { samples: &samples, rate: file.rate }, force)
-    };
-    let begun = files.iter().zip(recordings).map(begin).collect::<Result<Vec<_>, _>>();
-    let written = begun.and_then(|files| commit_all(files).map_err(Failure::input));
-    if written.is_err() && is_new {
-        // It is empty, or somebody else uses it.
-        let _ = std::fs::remove_dir(folder);
-    }
-    written
 }
 
 impl Report {
