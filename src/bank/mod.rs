@@ -166,6 +166,11 @@ impl Bank {
         self.fast_period * self.ratio as f64
     }
 
+    /// True in normalised time: times are in fast periods, and the rates of recordings are free.
+    pub fn is_normalised(&self) -> bool {
+        self.fast_period == Seconds(1.0)
+    }
+
     /// D_i / h of every channel. A value that is whole up to rounding becomes exactly whole.
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
         let h = self.fast_period;

@@ -3,7 +3,6 @@
 use super::Failure;
 use crate::bank::Bank;
 use crate::io::MultiReader;
-use crate::units::Seconds;
 use std::path::{Path, PathBuf};
 
 /// `-` may be given once.
@@ -37,7 +36,7 @@ pub(super) fn check_channels(bank: &Bank, path: &Path, reader: &MultiReader) -> 
 pub(super) fn output_rate(bank: &Bank, reader: &MultiReader) -> Result<f64, Failure> {
     let rates = reader.headers().map(|(name, header)| (name, header.rate));
     match input_rate(bank, rates)? {
-        Some(rate) if bank.fast_period == Seconds(1.0) => Ok(rate * bank.ratio as f64),
+        Some(rate) if bank.is_normalised() => Ok(rate * bank.ratio as f64),
         _ => Ok(1.0 / bank.fast_period.0),
     }
 }
@@ -58,7 +57,7 @@ fn input_rate<'a>(
         )));
     }
     let wanted = 1.0 / bank.slow_period().0;
-    if bank.fast_period != Seconds(1.0) && !same_rate(rate, wanted) {
+    if !bank.is_normalised() && !same_rate(rate, wanted) {
         return Err(Failure::Input(format!(
             "{first}: the sample rate is {rate} Hz, but the bank is designed for slow channels of {wanted} Hz; \
              record at that rate or design a bank for this one"

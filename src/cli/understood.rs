@@ -24,15 +24,23 @@ pub(super) fn say_understood(spec: Option<&Spec>) {
 }
 
 fn rates(spec: &Spec) -> String {
+    let converters = spec.channels.len();
+    if spec.is_normalised() {
+        return format!("normalised time (fast period 1) from {converters} x 1/{} of the rate", spec.ratio);
+    }
     let fast = spec.fast_period.rate().0;
     let slow = readable(fast / spec.ratio as f64, "S/s");
-    format!("{} from {} x {slow}", readable(fast, "S/s"), spec.channels.len())
+    format!("{} from {converters} x {slow}", readable(fast, "S/s"))
 }
 
 fn target(spec: &Spec) -> Option<String> {
     let edge = StrictlyProper::new(&spec.target, spec.fast_period).ok()?.half_power_frequency().0;
+    let share = format!("{:.2} of Nyquist", edge / PI);
+    if spec.is_normalised() {
+        return Some(format!("target -3 dB at {share}"));
+    }
     let hertz = Hertz(edge / TAU / spec.fast_period.0);
-    Some(format!("target -3 dB at {} ({:.2} of Nyquist)", readable(hertz.0, "Hz"), edge / PI))
+    Some(format!("target -3 dB at {} ({share})", readable(hertz.0, "Hz")))
 }
 
 fn delays(spec: &Spec) -> String {
@@ -44,6 +52,9 @@ fn delays(spec: &Spec) -> String {
 
 fn latency(spec: &Spec) -> Option<String> {
     let samples = spec.latency?;
+    if spec.is_normalised() {
+        return Some(format!("latency {samples} samples"));
+    }
     let time = readable(spec.fast_period.0 * samples as f64, "s");
     Some(format!("latency {samples} samples = {time}"))
 }
@@ -70,6 +81,21 @@ mod tests {
             understood(&spec.unwrap()),
             "1 GS/s from 2 x 500 MS/s; target -3 dB at 450 MHz (0.90 of Nyquist); delays 1.0062, 0.25 samples; \
              latency 16 samples = 16 ns"
+        );
+    }
+
+    #[test]
+    fn normalised_time_has_no_unit() {
+        let spec = Spec::from_toml(
+            "fast_period = 1.0\nratio = 2\nlatency = 10\n\
+             target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
+             channel = [{ delay = 1.2 }, { delay = 0.6 }]\ndesign = { method = \"iir\" }",
+            "spec.toml",
+        );
+        assert_eq!(
+            understood(&spec.unwrap()),
+            "normalised time (fast period 1) from 2 x 1/2 of the rate; target -3 dB at 0.10 of Nyquist; \
+             delays 1.2, 0.6 samples; latency 10 samples"
         );
     }
 }

@@ -299,6 +299,11 @@ impl Spec {
         self.design.check(self.channels.len())
     }
 
+    /// True in normalised time: times are in fast periods, and the rates of recordings are free.
+    pub fn is_normalised(&self) -> bool {
+        self.fast_period == Seconds(1.0)
+    }
+
     /// D_i / h of every channel; see [`delay_in_fast_periods`].
     pub fn delays_in_fast_periods(&self) -> Vec<FastPeriods> {
         self.channels.iter().map(|channel| delay_in_fast_periods(channel.delay, self.fast_period)).collect()

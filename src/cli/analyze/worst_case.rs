@@ -3,6 +3,7 @@
 use crate::bank::Bank;
 use crate::design::DesignError;
 use crate::design::uncertainty::{self, DelayDerivatives, Floor};
+use crate::quantity::readable;
 use crate::units::{Hertz, Seconds};
 use crate::verify::VerifyError;
 use crate::verify::uncertainty::{ErrorBox, Slopes, WorstCase, slopes};
@@ -227,14 +228,9 @@ fn percent(share: f64) -> String {
     format!("{} %", rounded(100.0 * share))
 }
 
-/// A time with the prefix that leaves one to three digits before the point.
+/// A time in four significant digits.
 fn time(seconds: f64) -> String {
-    let units = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("ps", 1e-12), ("fs", 1e-15)];
-    if seconds == 0.0 {
-        return "0".to_owned();
-    }
-    let (unit, size) = units.into_iter().find(|(_, size)| seconds.abs() >= 0.9999 * size).unwrap_or(units[5]);
-    format!("{} {unit}", rounded(seconds / size))
+    readable(rounded(seconds), "s")
 }
 
 /// Four significant digits.

@@ -5,7 +5,6 @@ use super::super::interrupt::interrupts;
 use crate::calibrate::Record;
 use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions, Turns};
 use crate::spec::Spec;
-use crate::units::Seconds;
 use std::path::PathBuf;
 
 /// Most samples of all channels together: 512 MiB as doubles.
@@ -85,7 +84,7 @@ fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     let wrong =
         reader.headers().find_map(|(name, header)| Some((name, header.rate.filter(|&rate| differs(rate))?)));
     match wrong {
-        Some((name, rate)) if spec.fast_period != Seconds(1.0) => Err(Failure::Input(format!(
+        Some((name, rate)) if !spec.is_normalised() => Err(Failure::Input(format!(
             "{name}: the sample rate is {rate} Hz, but the spec says {wanted} Hz; record at that rate or correct the spec"
         ))),
         _ => Ok(()),

@@ -13,7 +13,7 @@ use crate::calibrate::{Calibration, Evidence, Fit, Record, Settings, applied, ca
 use crate::files;
 use crate::quantity;
 use crate::spec::Spec;
-use crate::units::{FastPeriods, Hertz, Seconds};
+use crate::units::{FastPeriods, Hertz};
 use captures::Reading;
 use report::Report;
 use std::path::{Path, PathBuf};
@@ -217,9 +217,8 @@ impl Args {
         if let Some(path) = &self.training {
             let (samples, rate) = read_channel(path, None)?;
             // In normalised time the recording's own rate is the fast rate.
-            let is_normalised = spec.fast_period == Seconds(1.0);
             let rate = Hertz(f64::from(rate));
-            let spacing = if is_normalised {
+            let spacing = if spec.is_normalised() {
                 FastPeriods(1.0)
             } else {
                 rate.period().in_fast_periods(spec.fast_period)
