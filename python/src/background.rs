@@ -28,7 +28,7 @@ pub(crate) struct Reporter<T> {
 }
 
 impl<T> Reporter<T> {
-    /// Tells that a step begins. Ends the thread if nobody waits for its result any more.
+    /// Reports that a step begins. Ends the thread if its result is no longer waited for.
     pub(crate) fn begins(&self, stage: Stage, seconds: f64) {
         if self.abandoned.load(Ordering::Relaxed) {
             panic::resume_unwind(Box::new("interrupted"));

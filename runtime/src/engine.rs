@@ -123,7 +123,7 @@ impl Engine {
     }
 
     /// The state becomes that of a stream which has had the input of `running`, `position` frames of it;
-    /// false, with the state as before, if that cannot be told.
+    /// false, with the state as before, if that cannot be known.
     pub(crate) fn continue_from(&mut self, running: &Self, position: u64) -> bool {
         self.take_over(running)
             || running.past().is_some_and(

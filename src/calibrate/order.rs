@@ -20,7 +20,7 @@ pub(super) fn other_order(
         order.iter().enumerate().map(|(i, &j)| distance(i, j, order[reference])).fold(0.0, f64::max)
     };
     let given: Vec<usize> = (0..channels).collect();
-    // Of channels with one delay nothing is told; NaN tells nothing either.
+    // Channels with one delay have no order, and NaN says nothing of it.
     let contradicts = spacing > 0.0 && worst(&given) > 0.5 * spacing;
     if !contradicts {
         return None;

@@ -7,7 +7,7 @@ use crate::spec::Spec;
 use crate::units::{Hertz, RadiansPerFastPeriod};
 use std::f64::consts::TAU;
 
-/// Four interleaved converters with M = 4 at 1 MHz, behind a first-order low-pass of 2 MHz.
+/// Four interleaved converters with M = 4 at 1 MHz, after a first-order low-pass of 2 MHz.
 pub(super) fn interleaved() -> Spec {
     let text = "fast_rate = 1e6\nratio = 4\nlatency = 8\n[target]\nfilter = { family = \"rc\", cutoff = 2e6 }\n\
                 channel = []\n";

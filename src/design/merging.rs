@@ -157,7 +157,7 @@ mod tests {
     use super::*;
     use crate::spec::Spec;
 
-    /// M = 2; each channel by its numerator, delay and noise, behind num / (s + 1).
+    /// M = 2; each channel by its numerator, delay and noise, after num / (s + 1).
     fn problem(channels: &[(f64, f64, f64)]) -> Problem {
         let channel = |&(num, delay, noise): &(f64, f64, f64)| {
             format!(

@@ -46,8 +46,8 @@ pub enum MeasureError {
         /// Samples that are needed.
         needed: usize,
     },
-    /// A signal without variation, of which no lag can be told.
-    #[error("the {which} is constant, so no lag and gain can be told; give a recording with a signal")]
+    /// A signal without variation, which determines no lag.
+    #[error("the {which} is constant, so it determines no lag and no gain; give a recording with a signal")]
     Constant {
         /// Record or reference.
         which: &'static str,

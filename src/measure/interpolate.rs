@@ -1,4 +1,4 @@
-//! Samples between samples: a sinc behind a Kaiser window.
+//! Samples between samples: a sinc under a Kaiser window.
 
 use std::f64::consts::PI;
 

@@ -35,7 +35,7 @@ pub(super) fn likely_lags(samples: &[f64], reference: &[f64]) -> Vec<i64> {
         let own = energies[last] - energies[first];
         let other = others[(last as i64 - lag) as usize] - others[(first as i64 - lag) as usize];
         let covariance = correlation[lag.rem_euclid(size as i64) as usize].re / size as f64;
-        // A silent overlap correlates with nothing.
+        // An overlap of zeros correlates with nothing.
         if own > 0.0 && other > 0.0 { covariance.abs() / (own * other).sqrt() } else { 0.0 }
     };
     let lags = 1 - r.len() as i64..x.len() as i64;

@@ -157,8 +157,8 @@ impl<'a> Run<'a> {
 
     /// The last samples.
     fn flush(&mut self, output: &mut [f64]) -> Result<(), ProcessError> {
-        let silent = self.dropped.div_ceil(self.stream.ratio()) * self.stream.channels();
-        self.fill(&mut vec![0.0; silent]);
+        let zeros = self.dropped.div_ceil(self.stream.ratio()) * self.stream.channels();
+        self.fill(&mut vec![0.0; zeros]);
         self.stream.flush(output)?;
         Ok(())
     }

@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn taps_reproduce_a_pulse_behind_the_latency() {
+    fn taps_reproduce_a_pulse_after_the_latency() {
         let sets = Recurrent::new(&[-1.2, -0.6], 2).unwrap();
         let (latency, length) = (400.0, 801);
         let f = |t: f64| sinc(0.35 * (t - 201.3)).powi(2);

@@ -129,7 +129,7 @@ impl Power {
     }
 
     /// With the ratio r of the larger neighbour's amplitude to the peak's, a tone is (2 r - 1) / (r + 1)
-    /// bins from the peak towards that neighbour (exact for one complex exponential behind a Hann window).
+    /// bins from the peak towards that neighbour (exact for one complex exponential under a Hann window).
     fn interpolated(&self, at: usize) -> f64 {
         let left = self.bins[at - 1];
         let right = self.bins.get(at + 1).copied().unwrap_or(0.0);
@@ -140,7 +140,7 @@ impl Power {
     }
 }
 
-/// Deviations from the mean behind a Hann window; 0 where a sample is not finite.
+/// Deviations from the mean under a Hann window; 0 where a sample is not finite.
 fn windowed(samples: &[f64], mean: f64) -> Vec<f64> {
     let step = TAU / samples.len() as f64;
     let value = |(n, x): (usize, &f64)| match x.is_finite() {

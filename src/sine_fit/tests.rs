@@ -314,8 +314,8 @@ fn what_cannot_be_fitted_is_refused() {
     // Far from any tone the iteration has nowhere to go.
     let refused = fit(&one, RATE, &[RATE * 0.4]);
     assert!(refused.is_err(), "{refused:?}");
-    let silent = [Channel::new(&[0.0; 100])];
-    assert!(matches!(fit(&silent, RATE, &tone), Err(SineFitError::NoTone { near: Some(_) })));
+    let zero = [Channel::new(&[0.0; 100])];
+    assert!(matches!(fit(&zero, RATE, &tone), Err(SineFitError::NoTone { near: Some(_) })));
     let refused = locate(&one, RATE, RATE * 0.4, RATE * 0.01);
     assert!(matches!(refused, Err(SineFitError::NoTone { near: Some(_) })), "{refused:?}");
 }

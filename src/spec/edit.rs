@@ -6,7 +6,7 @@ use super::document::{Entry, Kind, Node};
 use super::{ChannelSpec, PerChannel, Spec, SpecProblem, UncertaintySpec};
 use crate::units::Seconds;
 
-/// Relative difference of two delays that are equal but for the rounding of their unit.
+/// Largest relative difference of two delays that differ only by the rounding of their unit.
 const ROUNDING: f64 = 1e-12;
 
 /// Replacements of ranges of a text.
@@ -21,7 +21,7 @@ impl Spec {
     /// the file gives them.
     ///
     /// Where the text cannot be edited (it describes another spec, or writes channels in an unusual way),
-    /// the whole spec is written anew.
+    /// the whole spec is rewritten.
     ///
     /// # Errors
     /// As [`Spec::to_toml`].

@@ -217,7 +217,7 @@ fn refusals_name_the_remedy() {
     );
 }
 
-/// What was exported comes back with the gamma that it had, proven anew.
+/// What was exported comes back with the gamma that it had, proven again.
 #[test]
 fn taps_of_other_tools_are_judged() {
     let desk = Desk::with_spec(THESIS);

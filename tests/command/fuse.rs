@@ -137,9 +137,9 @@ fn an_interrupt_leaves_nothing_behind() {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     drop(stdin);
-    let told = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("interrupted after") && told.contains("nothing was kept"), "{told}");
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("interrupted after") && message.contains("nothing was kept"), "{message}");
     assert_eq!(names(&desk.path("")), before);
 }
 

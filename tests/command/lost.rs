@@ -65,13 +65,13 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
     wav::write(&desk, "a.wav", 1, 24_000, &kept(&whole));
     wav::write(&desk, "b.wav", 1, 24_000, &channel(&whole, 1));
     desk.write("lost.jsonl", SEQUENCE);
-    let told = ["--lost", "lost.jsonl", "--mask", "mask"];
+    let lost = ["--lost", "lost.jsonl", "--mask", "mask"];
     let stream = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out"];
     let fuse = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"];
     for (policy, hold) in [("zero", 0.0), ("mask", 0.0), ("hold", 1.0)] {
         let want = fused(&filled(&whole, |last| hold * last));
         for command in [&stream[..], &fuse] {
-            let report = desk.report(&[command, &told, &["--gaps", policy]].concat());
+            let report = desk.report(&[command, &lost, &["--gaps", policy]].concat());
             assert_eq!(report["gaps"]["list"], gaps(&[(1, 0, 2), (1, 7, 1), (1, 100, 1400)]));
             assert_eq!(
                 (report["gaps"]["missing"].as_u64(), report["frames"].as_u64()),
@@ -89,7 +89,7 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
 }
 
 #[test]
-fn void_samples_of_an_interleaved_stream_are_told_by_the_report_of_another_run() {
+fn void_samples_of_an_interleaved_stream_are_in_the_report_of_another_run() {
     let desk = Desk::new();
     let clean = frames(500);
     let mut marked = clean.clone();
@@ -227,7 +227,7 @@ fn captures_tell_stream_what_was_lost() {
     let got = floats(&desk.read("out"));
     assert!(got == fused(&filled(&whole, |last| last)));
     check_mask(&desk.read("mask"), &got, &fused(&whole));
-    // What is void is told beside the captures; what is left out only once.
+    // What is void is reported beside the captures; what is left out only once.
     desk.write("lost", r#"{"channel": 2, "first": 2990, "length": 3}"#);
     let both = [&args[..], &["--gaps", "hold", "--lost", "lost"]].concat();
     assert_eq!(desk.report(&both)["gaps"]["list"][3], gaps(&[(2, 2990, 3)])[0]);
@@ -236,13 +236,13 @@ fn captures_tell_stream_what_was_lost() {
 }
 
 #[test]
-fn faults_are_told_with_their_place() {
+fn faults_are_reported_with_their_place() {
     let desk = Desk::new();
     desk.write("a", bytes(&[1.0; 20]));
     let args = ["stream", "bank.json", "--input", "a", "--input", "a", "-o", "out"];
     desk.refused(2, &[&args[..], &["--lost", "lost"]].concat(), &["--gaps"]);
-    let told = [&args[..], &["--gaps", "zero", "--lost", "lost"]].concat();
-    desk.refused(1, &told, &["lost: cannot read it"]);
+    let lost = [&args[..], &["--gaps", "zero", "--lost", "lost"]].concat();
+    desk.refused(1, &lost, &["lost: cannot read it"]);
     for (line, parts) in [
         ("{\"channel\": 1,\n", &["lost: line 1", "EOF"][..]),
         ("\n{\"channel\": 3, \"first\": 0, \"length\": 1}", &["lost: channel 3", "there are 2"]),
@@ -254,10 +254,10 @@ fn faults_are_told_with_their_place() {
         ),
     ] {
         desk.write("lost", line);
-        desk.refused(1, &told, parts);
+        desk.refused(1, &lost, parts);
     }
-    // Numbers beyond the end are told, and an error only if they are to be.
+    // Numbers beyond the end are reported, and are an error only where asked for.
     desk.write("lost", r#"{"channel": 1, "sample_start": 30, "global_index": 31}"#);
-    let report = desk.report(&told);
+    let report = desk.report(&lost);
     assert!(report["warnings"][0].as_str().unwrap().contains("ends before the last"), "{report}");
 }

@@ -148,7 +148,7 @@ fn converters_without_a_signal_give_silence() {
     {
         let args =
             [&["fuse", "bank.json", "lossy.wav", "cap/ch2.wav", "-o", "y.wav", "--force"], more].concat();
-        // The missing samples are told.
+        // The missing samples are reported.
         assert!(desk.run(&args, &[]).status.success());
         let fused = recording(&desk.path("y.wav")).1;
         assert!(fused.len() == 200 && fused.iter().all(|&y| y == 0.0), "{more:?}: {fused:?}");
@@ -262,7 +262,7 @@ fn noise_jitter_and_bits_have_their_powers_and_their_seed() {
 }
 
 #[test]
-fn clipped_samples_are_counted_and_told() {
+fn clipped_samples_are_counted_and_reported() {
     let desk = Desk::with_spec(THESIS);
     let args = ["simulate", "spec.toml", "--source", "step@0", "-o", "cap", "--gain", "2", "--bits", "8"];
     let output = desk.run(&[&args[..], &["--json", "--force"]].concat(), &[]);
@@ -271,8 +271,8 @@ fn clipped_samples_are_counted_and_told() {
     // The step response reaches one half after 3.4 and never leaves it.
     let most = number(&report, "/converters/0/clipped");
     assert!(most > 95.0 && most < 100.0, "{report}");
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(told.contains("cap/ch1.wav") && told.contains("clipped at full scale"), "{told}");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("cap/ch1.wav") && message.contains("clipped at full scale"), "{message}");
     assert!(recording(&desk.path("cap/ch1.wav")).1.iter().all(|&x| x <= 127.0 / 128.0));
 }
 

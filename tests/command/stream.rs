@@ -166,7 +166,7 @@ fn flushing_brings_out_the_last_samples() {
 }
 
 #[test]
-fn cut_frames_and_unequal_channels_are_told() {
+fn cut_frames_and_unequal_channels_are_reported() {
     let bench = Bench::new();
     let input = frames(10);
     let mut cut = bytes(&input);
@@ -223,7 +223,7 @@ fn a_closed_pipe_ends_quietly() {
 }
 
 #[test]
-fn wrong_usage_and_missing_inputs_are_told() {
+fn wrong_usage_and_missing_inputs_are_reported() {
     let bench = Bench::new();
     fs::write(bench.path("there"), "old").unwrap();
     for (code, args, part) in [

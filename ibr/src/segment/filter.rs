@@ -51,13 +51,13 @@ pub(super) fn modes(image: &Image, settings: &MeanShift) -> Vec<Mode> {
     let mut modes = vec![Mode::default(); planes.width * planes.height];
     modes.par_chunks_exact_mut(planes.width).enumerate().for_each(|(y, row)| {
         for (x, mode) in row.iter_mut().enumerate() {
-            *mode = climb(&planes, x, y, settings);
+            *mode = ascend(&planes, x, y, settings);
         }
     });
     modes
 }
 
-fn climb(planes: &Planes, x: usize, y: usize, settings: &MeanShift) -> Mode {
+fn ascend(planes: &Planes, x: usize, y: usize, settings: &MeanShift) -> Mode {
     let mut at = Mode { x: x as f32, y: y as f32, luv: planes.colour(x, y) };
     let (hs, hr) = (settings.spatial as f32, settings.range);
     for _ in 0..settings.steps {

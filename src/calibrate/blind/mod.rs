@@ -9,8 +9,8 @@
 //!
 //! over the occupied aliases. Where they are fewer than the channels, A leaves directions that hold noise
 //! only, whatever the signal is, and these determine the ratios of A's rows. Signal S and noise s of each
-//! band of frequencies are free, so a band weighs what it is worth. Which aliases a band holds follows from
-//! the eigenvalues of its matrix: p large ones are the p aliases of lowest frequency, as a signal behind
+//! band of frequencies are free, so the weight of a band follows from its noise. The eigenvalues of its
+//! matrix show which aliases it holds: p large ones are the p aliases of lowest frequency, as a signal after
 //! low-passes has them.
 //!
 //! Fisher scoring finds the maximum; the inverse of the Fisher information is the covariance of the
@@ -97,8 +97,8 @@ impl<'a> Blind<'a> {
     /// The maximum of the likelihood near the nominal values.
     pub(super) fn maximise(&self, fit: Fit, reference: usize) -> Result<Maximum, CalibrateError> {
         let mut point = Point::nominal(self.model, fit, reference);
-        self.climb(&mut point, FIRST_LEAST)?;
-        self.climb(&mut point, FINAL_LEAST)
+        self.ascend(&mut point, FIRST_LEAST)?;
+        self.ascend(&mut point, FINAL_LEAST)
     }
 
     fn bands(&self, point: &Point, least: f64) -> Vec<Occupied> {
@@ -113,7 +113,7 @@ impl<'a> Blind<'a> {
         with_signal.map(held).collect()
     }
 
-    fn climb(&self, point: &mut Point, least: f64) -> Result<Maximum, CalibrateError> {
+    fn ascend(&self, point: &mut Point, least: f64) -> Result<Maximum, CalibrateError> {
         let counted = self.bands(point, least);
         let chosen: Vec<usize> = counted.iter().map(|held| held.aliases.len()).collect();
         if chosen.is_empty() {

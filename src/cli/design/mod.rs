@@ -118,7 +118,7 @@ const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no bet
 const USELESS_BANK: &str = "gamma is no better than that of zero output: the front ends or the delays leave nothing to \
                             reconstruct, or the latency does not suit the taps";
 
-/// Noise gains above this are worth a warning: 20 dB.
+/// Noise gains above this cause a warning: 20 dB.
 const LARGE_NOISE_GAIN: f64 = 10.0;
 /// A gamma above this share of that of zero output is no better than zero output.
 const USELESS: f64 = 0.99;

@@ -4,7 +4,7 @@
 //! A and B are fixed, C and D are affine in the taps:
 //!
 //! ```text
-//! [u; z] = [y[k-J]; ..; y[k]; z[k]]    delay line behind the plant
+//! [u; z] = [y[k-J]; ..; y[k]; z[k]]    delay line after the plant
 //! e      = z - sum_j F_j y[k-j]        F_j[p, i] = f_i[p + j M]
 //! ```
 //!

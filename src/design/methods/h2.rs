@@ -24,7 +24,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, _: &Settings) -> Result<Synthesis,
     let innovations = Innovations::in_all_coordinates(plant)?;
     let mut iteration = GammaIteration::new(plant, &innovations)?;
     let mut candidates: Vec<Filter> = innovations.iter().filter_map(|form| form.h2()).collect();
-    // Double precision loses up to a fifth of the mean square behind smooth front ends, and nothing shows it.
+    // Double precision loses up to a fifth of the mean square after smooth front ends, and nothing shows it.
     let precise_filter = precise::<DoubleDouble>(plant, MOST_STATES_AT_106_BITS)?;
     let faint = innovations.iter().any(|form| form.least_feedthrough() < FAINT_FEEDTHROUGH);
     if faint || precise_filter.is_none() {

@@ -4,7 +4,7 @@ use super::{quietly, ramps, refused, scale_bank};
 use crate::support::{Desk, fused, interleaved, text, wav};
 
 #[test]
-fn integers_saturate_and_the_count_is_told() {
+fn integers_saturate_and_the_count_is_reported() {
     let desk = Desk::new();
     scale_bank(&desk, 1.0, 1.0 / 16.0);
     wav::write_pair(&desk, &[0.1, 0.1, 0.1], &[0.0, 0.0, 0.0]);
@@ -48,7 +48,7 @@ fn every_width_is_what_it_says() {
 }
 
 #[test]
-fn unequal_lengths_are_told_and_strict_refuses_them() {
+fn unequal_lengths_are_reported_and_strict_refuses_them() {
     let desk = Desk::new();
     let (a, b) = ramps(50_000);
     wav::write_pair(&desk, &a, &b[..20_000]);

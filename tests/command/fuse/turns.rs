@@ -70,7 +70,7 @@ fn pipes_are_read_in_turns_too() {
     assert!(piped.stdout == bytes(&by_channel(20_000)));
     let file = desk.run(&[&args[..], &["--input", "capture.raw"]].concat(), &[]);
     assert!(file.stdout == piped.stdout);
-    // A turn that is not whole is left out and told.
+    // A turn that is not whole is left out and reported.
     let cut = desk.run(&args, &input[..12 * 7 + 5]);
     assert!(cut.stdout == bytes(&by_channel(7)), "{cut:?}");
     assert!(
@@ -105,7 +105,7 @@ fn timestamps_count_whole_turns() {
         "--force",
     ];
     meta(9);
-    // The gap is told.
+    // The gap is reported.
     assert!(desk.run(&args, &[]).status.success());
     let mut want = by_channel(4);
     want.splice(6..6, [0.0; 3]);

@@ -1,5 +1,5 @@
 //! A-posteriori filtering in extended precision, for plants on which double precision leaves the optimum
-//! open: a sample shortly after the beginning of the slow period, behind a steep front end, has almost no
+//! open: a sample shortly after the beginning of the slow period, after a steep front end, has almost no
 //! feedthrough.
 //!
 //! The covariance P of the prediction error follows the filtering Riccati difference equation from P = 0

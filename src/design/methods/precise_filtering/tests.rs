@@ -15,7 +15,7 @@ fn plant(latency: usize, delays: &str) -> LiftedPlant {
     LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap()).unwrap()
 }
 
-/// All channels with feedthrough, and one behind a delay chain.
+/// All channels with feedthrough, and one delayed by whole periods.
 fn plants() -> [LiftedPlant; 3] {
     [
         plant(4, "{ delay = 0.3 }, { delay = 1.7 }"),
