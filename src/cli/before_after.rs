@@ -5,7 +5,7 @@ use super::bank_file::is_dash;
 use super::capture_file::{CaptureFile, check_files_on_disk, read_channels};
 use super::measure::{ToneArg, column, tone, tones};
 use crate::bank::{Bank, SynthesisFilters};
-use crate::io::MultiReader;
+use crate::io::{MultiReader, is_pipe};
 use crate::measure::{Measurement, Settings, measure};
 use crate::simulate::interleaved;
 use crate::units::Hertz;
@@ -49,7 +49,12 @@ impl BeforeAfterArgs {
             let message = "--measure reads the output once more; write it to a file";
             return Err(Failure::Usage(message.into()));
         }
-        check_files_on_disk(inputs, "--measure")
+        check_files_on_disk(inputs, "--measure")?;
+        if is_pipe(output) {
+            let message = format!("--measure reads the output once more, which {} cannot give", output.display());
+            return Err(Failure::Usage(message));
+        }
+        Ok(())
     }
 
     /// True if something is to be measured.

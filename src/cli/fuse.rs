@@ -2,10 +2,12 @@
 
 use super::Failure;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
+use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
+use super::journal::{Journal, JournalArgs};
 use super::output::{Bits, check_files, precision};
-use super::run::{AlgorithmArg, RunReport, ThreadArgs, complete};
+use super::run::{AlgorithmArg, RunReport, ThreadArgs, complete, print_report};
 use super::turns::TurnArgs;
 use super::understood::say_understood;
 use super::watch::Watch;
@@ -37,7 +39,7 @@ pub(super) struct Args {
     /// One mono WAV file or SigMF recording per channel, or one of N channels; `-` is standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta); `-` is standard output
+    /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta) or a FIFO; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
     /// Sample format of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
@@ -57,13 +59,15 @@ pub(super) struct Args {
     threads: ThreadArgs,
     #[command(flatten)]
     before_after: BeforeAfterArgs,
+    #[command(flatten)]
+    journal: JournalArgs,
     /// Make every tolerated fault (unequal lengths, truncation, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
     /// Replace an existing output
     #[arg(long)]
     force: bool,
-    /// Print a report as one JSON object on standard output
+    /// Print a report as one JSON object on standard output, or on standard error with `-o -`
     #[arg(long)]
     json: bool,
 }
@@ -92,30 +96,41 @@ struct Report<'a> {
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
-    let begin = Instant::now();
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
-    let Some(mut reader) = args.start_reader(&bank)? else { return Err(interrupted(0)) };
-    match_bank::check_channels(&bank, &args.bank, &reader)?;
-    let rate = match_bank::output_rate(&bank, &reader)?;
-    let plan = args.plan(&bank)?;
+    let journal = args.journal.begin(args.force)?;
+    fuse(args, &bank, &journal).inspect_err(|failure| journal.fail(failure))
+}
+
+fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
+    let begin = Instant::now();
+    let Some(mut reader) = args.start_reader(bank, Some(journal))? else { return Err(interrupted(0)) };
+    match_bank::check_channels(bank, &args.bank, &reader)?;
+    let rate = match_bank::output_rate(bank, &reader)?;
+    let plan = args.plan(bank)?;
     let skip = if args.keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
-    let mut pipeline = args.pipeline(&bank, &plan, skip)?;
+    let mut pipeline = args.pipeline(bank, &plan, skip)?;
     let mut outputs = args.outputs(rate)?;
-    let mut watch = Watch::new(&bank);
-    run_all(&mut pipeline, &mut reader, &mut outputs, &mut watch)?;
+    let mut watch = Watch::new(bank);
+    let mut follow = Follow::new(journal.clone());
+    run_all(&mut pipeline, &mut reader, &mut outputs, |parts, pipeline| {
+        watch.observe(parts);
+        follow.step(parts, pipeline);
+    })?;
     let frames = reader.consumed();
     pipeline.flush(frames * bank.ratio as u64, &mut outputs).map_err(Failure::running)?;
     let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
     let run = run.with_warnings(watch.finish());
     let seconds = begin.elapsed().as_secs_f64();
-    complete(outputs, &run, args.strict)?;
-    let measure = args.measured(&bank)?;
-    if !args.json {
-        return measure.map_or(Ok(()), |measured| super::print(&measured.text()));
+    complete(outputs, &run, args.strict, journal)?;
+    let (measure, rate) = (args.measured(bank)?, rate.round() as u64);
+    let report = Report { run: &run, rate, frames, latency_dropped: skip, seconds, measure };
+    journal.end(&report)?;
+    match &report.measure {
+        _ if args.json => print_report(&report, &args.output),
+        Some(measured) => super::print(&measured.text()),
+        None => Ok(()),
     }
-    let rate = rate.round() as u64;
-    super::print_json(&Report { run: &run, rate, frames, latency_dropped: skip, seconds, measure })
 }
 
 impl Args {
@@ -125,22 +140,22 @@ impl Args {
         self.gaps.check()?;
         self.turns.check(self.inputs.len())?;
         self.before_after.check(&self.inputs, &self.output)?;
-        if self.json && self.output.as_os_str() == "-" {
-            let message = "--json and `-o -` both want standard output; write the samples to a file";
-            return Err(Failure::Usage(message.into()));
-        }
+        self.journal.check(&self.output, self.json || self.before_after.is_wanted())?;
         let inputs = self.inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
         let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
-        check_files(&self.output, self.gaps.mask(), &inputs)
+        let others: Vec<&Path> = self.gaps.mask().into_iter().chain(self.journal.report()).collect();
+        check_files(&self.output, &others, &inputs)
     }
 
     /// `None` if an interrupt came first.
-    fn start_reader(&self, bank: &Bank) -> Result<Option<MultiReader>, Failure> {
+    fn start_reader(&self, bank: &Bank, journal: Option<&Journal>) -> Result<Option<MultiReader>, Failure> {
         let lost = self.gaps.lost_samples()?;
         let turns = self.turns.turns(bank, &self.bank)?;
         let block_bytes = self.threads.bytes(BLOCK_BYTES);
-        let files = ReadOptions { block_bytes, turns: turns.as_ref(), ..ReadOptions::files() };
-        let options = self.gaps.read_options(lost.as_ref(), files);
+        let stalls = journal.map(Journal::stall_watch);
+        let (turns, stalls) = (turns.as_ref(), stalls.as_ref());
+        let files = ReadOptions { block_bytes, turns, stalls, ..ReadOptions::files() };
+        let options = self.gaps.read_options(&lost, files);
         MultiReader::start(&self.inputs, options, interrupts()).map_err(Failure::input)
     }
 
@@ -149,7 +164,7 @@ impl Args {
         if !self.before_after.is_wanted() {
             return Ok(None);
         }
-        let Some(reader) = self.start_reader(bank)? else { return Err(interrupted(0)) };
+        let Some(reader) = self.start_reader(bank, None)? else { return Err(interrupted(0)) };
         self.before_after.measured(bank, reader, &self.output).map(Some)
     }
 
@@ -190,11 +205,11 @@ fn run_all(
     pipeline: &mut Pipeline,
     reader: &mut MultiReader,
     outputs: &mut FileOutputs,
-    watch: &mut Watch,
+    mut observe: impl FnMut(&[PcmFrames<'_>], &Pipeline),
 ) -> Result<(), Failure> {
     let progress = progress_bar(reader.promised_frames());
-    let ending = run_pipeline(reader, pipeline, outputs, |parts| {
-        watch.observe(parts);
+    let ending = run_pipeline(reader, pipeline, outputs, |parts, pipeline| {
+        observe(parts, pipeline);
         progress.inc(parts.iter().map(PcmFrames::frames).min().unwrap_or(0) as u64);
     });
     match ending.map_err(Failure::running)? {

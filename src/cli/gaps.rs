@@ -3,7 +3,7 @@
 use super::Failure;
 use super::say::say_line;
 use crate::files::AtomicFile;
-use crate::io::{LostSamples, MAX_LOST, ReadOptions, Until};
+use crate::io::{LiveLost, LostSamples, MAX_LOST, ReadOptions, Until, is_pipe};
 use crate::pipeline::{GapPolicy, GapSummary};
 use std::path::{Path, PathBuf};
 
@@ -23,12 +23,13 @@ pub(super) struct GapArgs {
     mask: Option<PathBuf>,
     /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
     /// sample 5 of the input was number 8 at the converter. {"channel": 2, "first": 40, "length": 3}:
-    /// samples 40 to 42 are invalid
+    /// samples 40 to 42 are invalid. From a FIFO `stream` takes lines as they come, each before its samples,
+    /// and waits for none
     #[arg(long, value_name = "FILE", requires = "gaps")]
     lost: Option<PathBuf>,
-    /// The most samples that a channel may lose in all; more are an error, because a number is probably
-    /// wrong
-    #[arg(long, value_name = "SAMPLES", requires = "gaps", default_value_t = MAX_LOST)]
+    /// The most frames (one sample of each channel of an input) that an input may leave out in all; more are
+    /// an error, because a number is probably wrong
+    #[arg(long, value_name = "FRAMES", requires = "gaps", default_value_t = MAX_LOST)]
     max_lost: u64,
     /// Continue until the last channel ends; the missing ends of the other channels are filled as gaps
     #[arg(long, requires = "gaps")]
@@ -60,8 +61,19 @@ impl GapArgs {
     }
 
     /// Reads the file of lost samples, if one is given.
-    pub(super) fn lost_samples(&self) -> Result<Option<LostSamples>, Failure> {
-        self.lost().map(LostSamples::read).transpose().map_err(Failure::input)
+    pub(super) fn lost_samples(&self) -> Result<Lost, Failure> {
+        let read = self.lost().map(LostSamples::read).transpose().map_err(Failure::input)?;
+        Ok(Lost { read, live: None })
+    }
+
+    /// As [`GapArgs::lost_samples`], but begins to read a FIFO and waits for nothing.
+    pub(super) fn live_lost_samples(&self) -> Result<Lost, Failure> {
+        match self.lost().filter(|path| is_pipe(path)) {
+            None => self.lost_samples(),
+            Some(path) => {
+                Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(Failure::input)?) })
+            }
+        }
     }
 
     /// The file of lost samples.
@@ -77,11 +89,12 @@ impl GapArgs {
     /// The options of reading that concern gaps; the others are those of `options`.
     pub(super) fn read_options<'a>(
         &self,
-        lost: Option<&'a LostSamples>,
+        lost: &'a Lost,
         options: ReadOptions<'a>,
     ) -> ReadOptions<'a> {
         let until = if self.longest { Until::Longest } else { Until::Shortest };
-        ReadOptions { lost, until, max_lost: self.max_lost, ..options }
+        let (lost, live_lost) = (lost.read.as_ref(), lost.live.as_ref());
+        ReadOptions { lost, live_lost, until, max_lost: self.max_lost, ..options }
     }
 
     /// The replacement of a missing sample, if gaps are to be filled.
@@ -98,8 +111,18 @@ impl GapArgs {
     }
 }
 
-/// Reports the gaps on standard error.
-pub(super) fn say_gaps(gaps: &GapSummary) {
+/// What `--lost` says: now, or during the run.
+#[derive(Debug)]
+pub(super) struct Lost {
+    read: Option<LostSamples>,
+    live: Option<LiveLost>,
+}
+
+/// Reports the gaps on standard error; only how many, if they were said during the run.
+pub(super) fn say_gaps(gaps: &GapSummary, are_said: bool) {
+    if are_said {
+        return say_line(&format!("gap: {} in all, {} samples missing", gaps.count, gaps.missing));
+    }
     for gap in gaps.list.iter().take(REPORTED) {
         say_line(&format!("gap: channel {}, sample {}, {} missing", gap.channel, gap.first, gap.length));
     }

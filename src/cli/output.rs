@@ -1,6 +1,7 @@
 //! The format of output samples, and the files that a run writes.
 
 use super::Failure;
+use super::bank_file::is_dash;
 use super::say::name_leftovers;
 use crate::files::refuse_overlaps;
 use crate::io::{PcmFormat, SampleWriter, is_sigmf, sigmf_files};
@@ -63,10 +64,10 @@ fn check_extension(output: &Path) -> Result<(), Failure> {
 }
 
 /// Checks that no output of a run is also an input or another output.
-pub(super) fn check_files(output: &Path, mask: Option<&Path>, inputs: &[&Path]) -> Result<(), Failure> {
+pub(super) fn check_files(output: &Path, others: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
     check_extension(output)?;
     let mut outputs = SampleWriter::files(output);
-    outputs.extend(mask.map(Path::to_owned));
+    outputs.extend(others.iter().copied().filter(|path| !is_dash(path)).map(Path::to_owned));
     let outputs: Vec<_> = outputs.iter().map(|path| path.as_path()).collect();
     // A SigMF recording has two files, and only one of them is named.
     let pairs: Vec<_> =

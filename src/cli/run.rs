@@ -1,11 +1,14 @@
 //! Code that `fuse` and `stream` share: options of the filters, the report, the end of a run.
 
 use super::Failure;
+use super::bank_file::is_dash;
 use super::gaps::say_gaps;
+use super::journal::Journal;
 use super::print::print_json;
-use super::say::warn;
+use super::say::{say, warn};
 use crate::pipeline::{FileOutputs, GapSummary, Outcome, Warning};
 use crate::runtime::{Algorithm, PlanSummary, ThreadPool};
+use std::path::Path;
 
 /// How FIR filters are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -100,6 +103,9 @@ pub(super) struct RunReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     gaps: Option<GapSummary>,
     warnings: Vec<String>,
+    /// How many of the last warnings were told during the run.
+    #[serde(skip)]
+    told: usize,
 }
 
 impl RunReport {
@@ -113,13 +119,19 @@ impl RunReport {
         let warnings = tolerated.into_iter().chain(outcome.warnings()).map(text).collect();
         let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps } = outcome;
         let plan = plan.into();
-        Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings }
+        Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, told: 0 }
     }
 
     /// With further warnings.
     pub(super) fn with_warnings(mut self, more: Vec<String>) -> Self {
         self.warnings.extend(more);
         self
+    }
+
+    /// With warnings that were told during the run.
+    pub(super) fn with_told(mut self, told: Vec<String>) -> Self {
+        self.told = told.len();
+        self.with_warnings(told)
     }
 
     /// With `strict` the first warning is an error.
@@ -132,25 +144,30 @@ impl RunReport {
 }
 
 /// Checks the run, renames the outputs to their final names, and then prints the warnings, so that a
-/// warning that cannot be written loses no output. `report` is printed if requested.
-pub(super) fn finish(
+/// warning that cannot be written loses no output.
+pub(super) fn complete(
     outputs: FileOutputs,
     run: &RunReport,
     strict: bool,
-    report: Option<&impl serde::Serialize>,
+    journal: &Journal,
 ) -> Result<(), Failure> {
-    complete(outputs, run, strict)?;
-    report.map_or(Ok(()), print_json)
-}
-
-/// As [`finish`], without a report.
-pub(super) fn complete(outputs: FileOutputs, run: &RunReport, strict: bool) -> Result<(), Failure> {
     let judged = run.judge(strict);
     if judged.is_ok() {
         outputs.finish().map_err(Failure::running)?;
     }
-    run.gaps.iter().for_each(say_gaps);
+    let are_said = journal.quiet();
+    run.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
     judged?;
-    run.warnings.iter().for_each(|warning| warn(warning));
+    run.warnings[..run.warnings.len() - run.told].iter().for_each(|warning| warn(warning));
+    Ok(())
+}
+
+/// The report as one JSON object: on standard output, or on standard error where samples go to standard
+/// output.
+pub(super) fn print_report(report: &impl serde::Serialize, samples: &Path) -> Result<(), Failure> {
+    if !is_dash(samples) {
+        return print_json(report);
+    }
+    say(&(serde_json::to_string(report).map_err(Failure::input)? + "\n"));
     Ok(())
 }

@@ -1,9 +1,11 @@
 //! `hybank stream`: fuses slow samples as they arrive.
 
+use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
+use super::journal::{Journal, JournalArgs};
 use super::output::{check_files, precision};
-use super::run::{AlgorithmArg, RunReport, ThreadArgs, finish};
+use super::run::{AlgorithmArg, RunReport, ThreadArgs, complete, print_report};
 use super::say::say_line;
 use super::turns::TurnArgs;
 use super::understood::say_understood;
@@ -50,7 +52,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     input: Vec<PathBuf>,
     /// The output file, which appears when it is complete (a SigMF recording if its name ends in
-    /// sigmf-meta); `-` is standard output
+    /// sigmf-meta), or a FIFO; `-` is standard output
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
     /// Algorithm of FIR filters; auto is the faster one of direct and fast-fir, because overlap-save adds
@@ -66,13 +68,15 @@ pub(super) struct Args {
     gaps: GapArgs,
     #[command(flatten)]
     threads: ThreadArgs,
+    #[command(flatten)]
+    journal: JournalArgs,
     /// Make every tolerated fault (an incomplete last frame, unequal lengths, NaN, clipping) an error
     #[arg(long)]
     strict: bool,
     /// Replace an existing output
     #[arg(long)]
     force: bool,
-    /// Print a report as one JSON object on standard output; needs --output
+    /// Print a report as one JSON object on standard output, or on standard error if the samples are there
     #[arg(long)]
     json: bool,
 }
@@ -105,14 +109,23 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
     args.check_inputs(&inputs, bank.channel_count())?;
-    let plan = args.plan(&bank)?;
-    let Some(mut reader) = args.start_reader(&inputs, &bank)? else { return Ok(()) };
-    match_bank::check_channels(&bank, &args.bank, &reader)?;
-    let rate = match_bank::output_rate(&bank, &reader)?;
-    let mut pipeline = args.pipeline(&bank, &plan)?;
+    let journal = args.journal.begin(args.force)?;
+    stream(args, &inputs, &bank, &journal).inspect_err(|failure| journal.fail(failure))
+}
+
+fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Result<(), Failure> {
+    let plan = args.plan(bank)?;
+    let Some(mut reader) = args.start_reader(inputs, bank, journal)? else { return Ok(()) };
+    match_bank::check_channels(bank, &args.bank, &reader)?;
+    let rate = match_bank::output_rate(bank, &reader)?;
+    let mut pipeline = args.pipeline(bank, &plan)?;
     let mut outputs = args.outputs(rate)?;
-    let mut watch = Watch::new(&bank).live();
-    let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |parts| watch.observe(parts));
+    let mut watch = Watch::new(bank).live(journal.clone());
+    let mut follow = Follow::new(journal.clone());
+    let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |parts, pipeline| {
+        watch.observe(parts);
+        follow.step(parts, pipeline);
+    });
     let ending = ending.map_err(Failure::running)?;
     if args.flush {
         let samples = pipeline.stream().plan().flush_frames() * bank.ratio;
@@ -120,14 +133,16 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
     let run = RunReport::new(pipeline.finish(), tolerated, "--output-format f32le");
-    let run = run.with_warnings(watch.finish());
+    let run = run.with_told(watch.finish());
     let (frames, interrupted) = (reader.consumed(), ending == Ending::Stopped);
     let report = Report { run: &run, frames, interrupted };
-    let finished = finish(outputs, &run, args.strict, args.json.then_some(&report));
-    if interrupted && finished.is_ok() {
+    complete(outputs, &run, args.strict, journal)?;
+    journal.end(&report)?;
+    let printed = if args.json { print_report(&report, &args.output) } else { Ok(()) };
+    if interrupted && printed.is_ok() {
         say_line(&format!("interrupted after {frames} frames, {} samples written", run.samples));
     }
-    finished
+    printed
 }
 
 impl Args {
@@ -140,13 +155,11 @@ impl Args {
         match_bank::check_stdin(&self.bank, inputs)?;
         self.gaps.check()?;
         self.turns.check(inputs.len())?;
-        if self.json && self.output.as_os_str() == "-" {
-            let message = "--json needs --output: standard output carries the samples";
-            return Err(Failure::Usage(message.into()));
-        }
+        self.journal.check(&self.output, self.json)?;
         let inputs = inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
         let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
-        check_files(&self.output, self.gaps.mask(), &inputs)
+        let others: Vec<&Path> = self.gaps.mask().into_iter().chain(self.journal.report()).collect();
+        check_files(&self.output, &others, &inputs)
     }
 
     /// Raw inputs are one interleaved or one per channel; other formats state their channels.
@@ -162,13 +175,19 @@ impl Args {
     }
 
     /// `None` if an interrupt came first.
-    fn start_reader(&self, inputs: &[PathBuf], bank: &Bank) -> Result<Option<MultiReader>, Failure> {
-        let lost = self.gaps.lost_samples()?;
+    fn start_reader(
+        &self,
+        inputs: &[PathBuf],
+        bank: &Bank,
+        journal: &Journal,
+    ) -> Result<Option<MultiReader>, Failure> {
+        let lost = self.gaps.live_lost_samples()?;
         let turns = self.turns.turns(bank, &self.bank)?;
         let (channels, block_bytes) = (bank.channel_count(), self.threads.bytes(BLOCK_BYTES));
-        let turns = turns.as_ref();
-        let raw = ReadOptions { coding: self.format, channels, turns, block_bytes, ..ReadOptions::files() };
-        let options = self.gaps.read_options(lost.as_ref(), raw);
+        let (turns, stalls) = (turns.as_ref(), journal.stall_watch());
+        let (coding, stalls) = (self.format, Some(&stalls));
+        let raw = ReadOptions { coding, channels, turns, block_bytes, stalls, ..ReadOptions::files() };
+        let options = self.gaps.read_options(&lost, raw);
         MultiReader::start(inputs, options, interrupts()).map_err(Failure::input)
     }
 

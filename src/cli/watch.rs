@@ -1,6 +1,6 @@
 //! Watches the first frames of a run for captures that contradict the spec of the bank, beside the filters.
 
-use super::warn;
+use super::journal::{Event, Journal};
 use crate::bank::Bank;
 use crate::calibrate::{ENOUGH_FRAMES, Record, contradictions};
 use crate::io::PcmFrames;
@@ -13,8 +13,8 @@ const MOST_CHANNELS: usize = 32;
 /// Keeps the first frames and judges them on a thread of its own.
 pub(super) struct Watch {
     state: State,
-    /// Whether a warning is printed as soon as it is known.
-    is_live: bool,
+    /// Where a warning goes as soon as it is known.
+    journal: Option<Journal>,
 }
 
 enum State {
@@ -34,12 +34,12 @@ impl Watch {
         let spec = bank.spec.clone().filter(|_| (2..=MOST_CHANNELS).contains(&channels));
         let collecting =
             |spec| State::Collecting { spec: Box::new(spec), samples: vec![Vec::new(); channels] };
-        Self { state: spec.map_or(State::Idle, collecting), is_live: false }
+        Self { state: spec.map_or(State::Idle, collecting), journal: None }
     }
 
-    /// Warnings are printed as soon as they are known.
-    pub(super) fn live(self) -> Self {
-        Self { is_live: true, ..self }
+    /// Warnings are told as soon as they are known.
+    pub(super) fn live(self, journal: Journal) -> Self {
+        Self { journal: Some(journal), ..self }
     }
 
     /// Takes the frames of a block until there are enough; nothing after that.
@@ -63,25 +63,24 @@ impl Watch {
         let State::Collecting { spec, samples } = std::mem::replace(&mut self.state, State::Idle) else {
             return;
         };
-        let is_live = self.is_live;
+        let journal = self.journal.clone();
         let judge = move || {
             let found = judged(&spec, samples);
-            if is_live {
-                found.iter().for_each(|text| warn(text));
-            }
+            let told = journal.iter().flat_map(|journal| found.iter().map(move |text| (journal, text)));
+            told.for_each(|(journal, text)| journal.tell(Event::Warning { text: text.clone() }));
             found
         };
         // Without a thread nothing is judged: the run matters more.
         self.state = Builder::new().spawn(judge).map_or(State::Idle, State::Judging);
     }
 
-    /// The warnings that were not printed yet, of short runs too.
+    /// The warnings, of short runs too.
     pub(super) fn finish(mut self) -> Vec<String> {
         if matches!(self.state, State::Collecting { .. }) {
             self.judge();
         }
         match self.state {
-            State::Judging(thread) => thread.join().ok().filter(|_| !self.is_live).unwrap_or_default(),
+            State::Judging(thread) => thread.join().unwrap_or_default(),
             _ => Vec::new(),
         }
     }

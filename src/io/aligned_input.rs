@@ -3,7 +3,7 @@
 //! Frames are copied only where samples are lost; otherwise they refer to the block that was read.
 
 use super::dropouts::Dropouts;
-use super::lost::LostInInput;
+use super::lost::{Dropout, LostInInput};
 use super::timestamps::Segment;
 use super::{PcmFormat, PcmFrames, SampleLayout, StreamHeader};
 use std::collections::VecDeque;
@@ -68,6 +68,26 @@ impl AlignedInput {
     pub(super) fn lose(&mut self, segments: VecDeque<Segment>, lost: LostInInput) {
         self.segments = segments;
         self.dropouts = Dropouts::new(lost.dropouts, self.header.channels);
+    }
+
+    /// Takes invalid frames that have become known; true if some of them have been used.
+    pub(super) fn invalidate(&mut self, dropout: Dropout) -> bool {
+        self.dropouts.add(dropout)
+    }
+
+    /// `lost` frames were left out before frame `frame` of the input, which no segment lies behind. True if
+    /// that frame has been used; then they are lost from now on, so that later frames are in time.
+    pub(super) fn leave_out(&mut self, frame: u64, lost: u64) -> bool {
+        if lost == 0 {
+            return false;
+        }
+        let Some(Segment::Frames(rest)) = self.segments.pop_back() else { return false };
+        let known: u64 = self.segments.iter().map(Segment::frames).sum();
+        let ahead = frame.saturating_sub(self.frames + known).min(rest);
+        self.segments.extend((ahead > 0).then_some(Segment::Frames(ahead)));
+        self.segments.push_back(Segment::Lost(lost));
+        self.segments.push_back(Segment::Frames(rest - ahead));
+        frame < self.frames
     }
 
     /// Takes the next block when the last one is used up, and returns the used one.
@@ -255,6 +275,35 @@ mod tests {
         for (block, step) in [(1, 1), (2, 3), (5, 1000), (7, usize::MAX)] {
             assert_eq!(run(input(2, &segments, &dropouts), 7, block, step), want, "{block} {step}");
         }
+    }
+
+    #[test]
+    fn frames_left_out_may_become_known_during_the_run() {
+        // Three frames are used, a break before frame 5 is told in time and one before frame 6 late.
+        let mut live = input(1, &[Segment::Frames(u64::MAX)], &[]);
+        let bytes: Vec<u8> = (0..9i16).flat_map(i16::to_be_bytes).collect();
+        let _ = live.refill(Block { filled: bytes.len(), bytes });
+        live.end();
+        let mut out = Vec::new();
+        let mut step = |live: &mut AlignedInput, frames: usize| {
+            live.prepare(frames);
+            let read = live.view(frames);
+            let sample = |b: &[u8]| Some(read.layout.format.decode(b) * 32768.0).filter(|x| x.is_finite());
+            out.extend(read.bytes.chunks_exact(read.layout.container).map(sample));
+            live.advance(frames);
+        };
+        step(&mut live, 3);
+        assert!(!live.leave_out(5, 2) && live.ready() == 2);
+        step(&mut live, 2);
+        assert_eq!(live.ready(), 2);
+        step(&mut live, 2);
+        step(&mut live, 2);
+        assert!(live.leave_out(6, 1) && live.ready() == 1);
+        step(&mut live, 1);
+        assert_eq!(live.ready(), 2);
+        step(&mut live, 2);
+        let want = [0, 1, 2, 3, 4, -1, -1, 5, 6, -1, 7, 8].map(|x| (x >= 0).then_some(f64::from(x)));
+        assert_eq!(out, want);
     }
 
     #[test]

@@ -29,6 +29,15 @@ impl Dropouts {
         dropouts
     }
 
+    /// Takes a dropout that has become known; true if some of its frames lie before the current one.
+    pub(super) fn add(&mut self, dropout: Dropout) -> bool {
+        let is_late = dropout.frames.start < self.time;
+        let place = self.ahead.partition_point(|other| other.frames.start <= dropout.frames.start);
+        self.ahead.insert(place, dropout);
+        self.enter();
+        is_late
+    }
+
     /// True if a channel is invalid at the current frame.
     pub(super) fn any(&self) -> bool {
         self.next_end.is_some()
@@ -110,6 +119,22 @@ mod tests {
                 time += step;
             }
         }
+    }
+
+    #[test]
+    fn a_dropout_may_become_known_at_any_time_before_its_frames() {
+        let invalid = |channel, frames| Dropout { channel, frames };
+        let mut dropouts = Dropouts::new(vec![invalid(None, 50..51)], 2);
+        dropouts.advance(10);
+        assert!(!dropouts.add(invalid(Some(1), 12..14)) && !dropouts.any());
+        assert_eq!(dropouts.until_change(), 2);
+        // Of the frames 8 to 10 only the last is still ahead.
+        assert!(dropouts.add(invalid(Some(0), 8..11)));
+        assert!(dropouts.covers(0) && !dropouts.covers(1) && dropouts.until_change() == 1);
+        assert!(dropouts.add(invalid(Some(1), 3..5)) && !dropouts.covers(1));
+        dropouts.advance(1);
+        dropouts.advance(1);
+        assert!(dropouts.covers(1) && !dropouts.covers(0));
     }
 
     #[test]

@@ -17,6 +17,11 @@ pub enum InputFault {
     },
     /// The input ended before the last sample whose number at the converter is given.
     TimestampsBeyondEnd,
+    /// Lines about lost samples came after their samples had been used.
+    ToldLate {
+        /// Number of lines.
+        lines: u64,
+    },
     /// The input is longer than the shortest one, which decided where to end.
     Unused {
         /// Frames that were not used.
@@ -37,6 +42,9 @@ impl fmt::Display for InputFault {
             }
             Self::TimestampsBeyondEnd => {
                 write!(f, "it ends before the last of the samples whose number is given")
+            }
+            Self::ToldLate { lines } => {
+                write!(f, "{lines} lines about lost samples came after these samples had been used")
             }
             Self::Unused { frames, at_least } => {
                 let at_least = if *at_least { "at least " } else { "" };

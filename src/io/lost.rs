@@ -68,6 +68,51 @@ struct Line {
     length: Option<u64>,
 }
 
+/// What a line says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Entry {
+    /// Samples before this one were left out, if its number has increased by more than the samples.
+    Timestamp(Timestamp),
+    /// These frames are in the input but invalid.
+    Invalid(Range<u64>),
+}
+
+/// A line, checked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct LostLine {
+    /// From 1.
+    pub(super) number: usize,
+    /// The channel, from 0; `None` for all.
+    pub(super) channel: Option<usize>,
+    pub(super) entry: Entry,
+}
+
+impl LostLine {
+    /// Line `number` of a file, or what is wrong with it.
+    pub(super) fn parse(line: &str, number: usize) -> Result<Self, String> {
+        let line: Line = serde_json::from_str(line).map_err(|error| without_place(&error))?;
+        if line.channel == Some(0) {
+            return Err("channel is 0; channels count from 1".into());
+        }
+        let channel = line.channel.map(|channel| channel - 1);
+        let entry = match line {
+            Line {
+                sample_start: Some(frame), global_index: Some(index), first: None, length: None, ..
+            } => Entry::Timestamp(Timestamp { frame, index }),
+            Line {
+                first: Some(first), length: Some(length), sample_start: None, global_index: None, ..
+            } => {
+                let end = first.checked_add(length).filter(|_| length <= MAX_LOST_AT_ONCE);
+                let end =
+                    end.ok_or_else(|| format!("length is {length}; it may be at most {MAX_LOST_AT_ONCE}"))?;
+                Entry::Invalid(first..end)
+            }
+            _ => return Err("give either sample_start and global_index, or first and length".into()),
+        };
+        Ok(Self { number, channel, entry })
+    }
+}
+
 /// The lost samples of one input.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct LostInInput {
@@ -93,32 +138,15 @@ impl LostSamples {
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
         let mut lost = Self { file: file.to_owned(), timestamps: Vec::new(), dropouts: Vec::new() };
         for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-            lost.add(line).map_err(|problem| lost.fault(format!("line {}: {problem}", number + 1)))?;
+            let line = LostLine::parse(line, number + 1);
+            match line.map_err(|problem| lost.fault(format!("line {}: {problem}", number + 1)))? {
+                LostLine { channel, entry: Entry::Timestamp(timestamp), .. } => {
+                    lost.timestamps.push((channel, timestamp));
+                }
+                LostLine { channel, entry: Entry::Invalid(frames), .. } => lost.dropouts.push((channel, frames)),
+            }
         }
         Ok(lost)
-    }
-
-    fn add(&mut self, line: &str) -> Result<(), String> {
-        let line: Line = serde_json::from_str(line).map_err(|error| without_place(&error))?;
-        if line.channel == Some(0) {
-            return Err("channel is 0; channels count from 1".into());
-        }
-        let channel = line.channel.map(|channel| channel - 1);
-        match line {
-            Line {
-                sample_start: Some(frame), global_index: Some(index), first: None, length: None, ..
-            } => self.timestamps.push((channel, Timestamp { frame, index })),
-            Line {
-                first: Some(first), length: Some(length), sample_start: None, global_index: None, ..
-            } => {
-                let end = first.checked_add(length).filter(|_| length <= MAX_LOST_AT_ONCE);
-                let end =
-                    end.ok_or_else(|| format!("length is {length}; it may be at most {MAX_LOST_AT_ONCE}"))?;
-                self.dropouts.push((channel, first..end));
-            }
-            _ => return Err("give either sample_start and global_index, or first and length".into()),
-        }
-        Ok(())
     }
 
     /// The lines of each input, given the channels of all inputs in their order.

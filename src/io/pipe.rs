@@ -1,7 +1,10 @@
 //! Standard input and output as files, and pipes with buffers large enough for two processes.
 
+use super::IoError;
+use crate::files::is_same_file;
 use std::fs::File;
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -70,6 +73,32 @@ impl Stdout {
     }
 }
 
+#[cfg(unix)]
+impl Stdout {
+    /// A FIFO in place of standard output; waits for its reader.
+    ///
+    /// # Errors
+    /// The system's refusal to open it.
+    pub fn fifo(path: &Path) -> io::Result<Self> {
+        // An interrupt must end the wait too.
+        let mut waiting = Watched::new((), &STDOUT_WRITE_BEGAN);
+        let file = waiting.timed(|()| std::fs::OpenOptions::new().write(true).open(path))?;
+        widen_pipe(&file);
+        Ok(Watched::new(file, &STDOUT_WRITE_BEGAN))
+    }
+}
+
+#[cfg(not(unix))]
+impl Stdout {
+    /// Systems without FIFOs.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn fifo(_: &Path) -> io::Result<Self> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+}
+
 /// Standard output for text.
 pub fn stdout() -> Watched<impl Write> {
     Watched::new(io::stdout().lock(), &STDOUT_WRITE_BEGAN)
@@ -122,3 +151,29 @@ pub(super) fn widen_pipe(file: &File) {
 
 #[cfg(not(target_os = "linux"))]
 pub(super) fn widen_pipe(_: &File) {}
+
+/// Two readers of one pipe would each get only some of its bytes.
+pub(super) fn refuse_shared_pipes(paths: &[PathBuf]) -> Result<(), IoError> {
+    let pipes: Vec<_> = paths.iter().filter(|path| is_pipe(path)).collect();
+    for (i, second) in pipes.iter().enumerate() {
+        if let Some(first) = pipes[..i].iter().find(|first| is_same_file(first, second)) {
+            let (first, second) = (first.display().to_string(), second.display().to_string());
+            return Err(IoError::SharedPipe { first, second });
+        }
+    }
+    Ok(())
+}
+
+/// True for a FIFO, pipe or socket, and for `-` if standard input is one.
+#[cfg(unix)]
+pub fn is_pipe(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    let path = if path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path };
+    path.metadata().is_ok_and(|known| known.file_type().is_fifo() || known.file_type().is_socket())
+}
+
+/// True for standard input.
+#[cfg(not(unix))]
+pub fn is_pipe(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}

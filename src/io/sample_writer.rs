@@ -1,9 +1,9 @@
-//! Writes one channel of samples to standard output, or to a file or SigMF recording that appears only when
-//! it is complete.
+//! Writes one channel of samples to standard output or a FIFO, or to a file or SigMF recording that appears
+//! only when it is complete.
 
 use super::wav::{WavFile, stream_header};
-use super::{IoError, PcmFormat, SigmfMeta, Stdout};
-use crate::files::AtomicFile;
+use super::{IoError, PcmFormat, SigmfMeta, Stdout, is_pipe};
+use crate::files::{AtomicFile, is_same_file};
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,8 @@ pub enum Container {
 enum Target {
     Wav(WavFile<AtomicFile>),
     Raw(AtomicFile),
-    Stdout(Stdout),
+    /// Standard output or a FIFO.
+    Stream(Stdout),
     /// Raw samples, and the metadata beside them.
     Sigmf {
         data: AtomicFile,
@@ -36,8 +37,9 @@ pub struct SampleWriter {
 }
 
 impl SampleWriter {
-    /// Begins an output at `rate` hertz. `-` is standard output, where a WAV header states no length; a
-    /// name that ends in sigmf-meta is a SigMF recording. `replace` allows files to be replaced.
+    /// Begins an output at `rate` hertz. `-` is standard output. There and in a FIFO, which waits for its
+    /// reader, a WAV header states no length. A name that ends in sigmf-meta is a SigMF recording. `replace`
+    /// allows files to be replaced.
     ///
     /// # Errors
     /// [`IoError`] for files that exist or cannot be created, for samples or rates that WAV cannot hold,
@@ -50,20 +52,21 @@ impl SampleWriter {
         replace: bool,
     ) -> Result<Self, IoError> {
         let to_stdout = path.as_os_str() == "-";
+        let is_stream = to_stdout || is_fifo(path);
         let name = if to_stdout { "standard output".into() } else { path.display().to_string() };
         let refused = || IoError::system(&name, "write it");
         let target = match container {
             _ if is_sigmf_meta(path) => sigmf_target(path, format, rate, replace)?,
-            Container::Wav if to_stdout => {
+            Container::Wav if is_stream => {
                 let header = stream_header(format, 1, wav_rate(&name, rate)?).map_err(refused())?;
-                stdout_target(&header).map_err(refused())?
+                stream_target(path, &header).map_err(refused())?
             }
             Container::Wav => {
                 let rate = wav_rate(&name, rate)?;
                 let file = AtomicFile::create(path, replace)?;
                 Target::Wav(WavFile::new(file, format, 1, rate).map_err(refused())?)
             }
-            Container::Raw if to_stdout => stdout_target(&[]).map_err(refused())?,
+            Container::Raw if is_stream => stream_target(path, &[]).map_err(refused())?,
             Container::Raw => Target::Raw(AtomicFile::create(path, replace)?),
         };
         Ok(Self { target, name })
@@ -86,7 +89,7 @@ impl SampleWriter {
         let written = match &mut self.target {
             Target::Wav(file) => file.write_bytes(bytes),
             Target::Raw(file) => file.write_all(bytes),
-            Target::Stdout(stdout) => stdout.write_all(bytes),
+            Target::Stream(stream) => stream.write_all(bytes),
             Target::Sigmf { data, .. } => data.write_all(bytes),
         };
         written.map_err(IoError::system(&self.name, "write it"))
@@ -102,13 +105,18 @@ impl SampleWriter {
         match self.target {
             Target::Wav(file) => Ok(vec![file.finish().map_err(refused)?]),
             Target::Raw(file) => Ok(vec![file]),
-            Target::Stdout(mut stdout) => stdout.flush().map(|()| Vec::new()).map_err(refused),
+            Target::Stream(mut stream) => stream.flush().map(|()| Vec::new()).map_err(refused),
             Target::Sigmf { data, mut meta, text } => {
                 meta.write_all(text.as_bytes()).map_err(refused)?;
                 Ok(vec![data, meta])
             }
         }
     }
+}
+
+/// A pipe other than standard output, whose name is `-`.
+fn is_fifo(path: &Path) -> bool {
+    is_pipe(path) && !is_same_file(path, Path::new("/dev/stdout"))
 }
 
 fn is_sigmf_meta(path: &Path) -> bool {
@@ -134,12 +142,13 @@ fn wav_rate(file: &str, rate: f64) -> Result<u32, IoError> {
     Ok(rate.round().max(1.0) as u32)
 }
 
-/// Standard output for samples; refuses a terminal.
-fn stdout_target(header: &[u8]) -> io::Result<Target> {
-    if io::stdout().is_terminal() {
+/// Standard output (`-`) or a FIFO for samples; refuses a terminal.
+fn stream_target(path: &Path, header: &[u8]) -> io::Result<Target> {
+    let to_stdout = path.as_os_str() == "-";
+    if to_stdout && io::stdout().is_terminal() {
         return Err(io::Error::other("it is a terminal; redirect it to a file or a pipe"));
     }
-    let mut stdout = Stdout::for_samples()?;
-    stdout.write_all(header)?;
-    Ok(Target::Stdout(stdout))
+    let mut stream = if to_stdout { Stdout::for_samples()? } else { Stdout::fifo(path)? };
+    stream.write_all(header)?;
+    Ok(Target::Stream(stream))
 }

@@ -6,13 +6,15 @@
 
 use super::input_thread::{InputSource, Message, cut_frame};
 use super::pipe::stdin_file;
+use super::stall::Wait;
 use super::{FrameReader, IoError, StreamHeader};
 use crossbeam_channel::{Receiver, TryRecvError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::fs::File;
+use std::time::Duration;
 
 /// Maximum delay of a stop.
-const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
+const PATIENCE: Duration = Duration::from_millis(50);
 
 /// The reading end with its block.
 pub(super) struct StdinReader {
@@ -42,7 +44,11 @@ impl StdinReader {
     ///
     /// # Errors
     /// The system's refusal to read.
-    pub(super) fn receive(&mut self, stop: &Receiver<()>) -> Result<Option<Message>, IoError> {
+    pub(super) fn receive(
+        &mut self,
+        stop: &Receiver<()>,
+        wait: &mut Wait<'_>,
+    ) -> Result<Option<Message>, IoError> {
         let mut bytes = std::mem::take(&mut self.spare);
         let frame = self.frames.frame_bytes();
         bytes.resize((self.source.block / frame).max(1) * frame, 0);
@@ -51,6 +57,7 @@ impl StdinReader {
                 return Ok(None);
             }
             if !self.is_readable()? {
+                wait.passed(PATIENCE);
                 continue;
             }
             let got = self.frames.read_whole(&mut bytes);
@@ -71,7 +78,8 @@ impl StdinReader {
     /// Whether a read would not wait; false after a while without bytes.
     fn is_readable(&self) -> Result<bool, IoError> {
         let mut ends = [PollFd::new(&self.pipe, PollFlags::IN)];
-        match poll(&mut ends, Some(&PATIENCE)) {
+        let patience = Timespec { tv_sec: 0, tv_nsec: PATIENCE.subsec_nanos().into() };
+        match poll(&mut ends, Some(&patience)) {
             Ok(count) => Ok(count > 0),
             Err(rustix::io::Errno::INTR) => Ok(false),
             Err(error) => Err(self.refused()(error.into())),

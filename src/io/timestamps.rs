@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 /// Maximum number of frames lost at one break, 2^36 (a minute at a gigahertz).
 pub const MAX_LOST_AT_ONCE: u64 = 1 << 36;
 
-/// Default maximum number of lost frames of an input, 2^26 (23 minutes at 48 kHz, 256 MiB of 32-bit floats
-/// for each sample of an output frame): without a limit a wrong number would lead to endless output.
+/// Default maximum number of frames that an input leaves out, 2^26 (23 minutes at 48 kHz): without a limit a
+/// wrong number would lead to endless output.
 pub const MAX_LOST: u64 = 1 << 26;
 
 /// Frame `frame` of the input was number `index` at the converter, which counts lost frames too.
@@ -33,6 +33,11 @@ pub(super) enum Segment {
 }
 
 impl Segment {
+    /// Frames that are in the input.
+    pub(super) fn frames(&self) -> u64 {
+        if let Self::Frames(frames) = *self { frames } else { 0 }
+    }
+
     /// Frames that were lost.
     pub(super) fn lost(&self) -> u64 {
         if let Self::Lost(frames) = *self { frames } else { 0 }
@@ -104,7 +109,7 @@ impl Timestamps {
 }
 
 /// Frames lost between two timestamps.
-fn lost_between(a: Timestamp, b: Timestamp) -> Result<u64, String> {
+pub(super) fn lost_between(a: Timestamp, b: Timestamp) -> Result<u64, String> {
     let lost = b.frame.checked_sub(a.frame).zip(b.index.checked_sub(a.index));
     let lost = lost.and_then(|(frames, time)| time.checked_sub(frames)).ok_or_else(|| {
         format!(

@@ -134,6 +134,11 @@ impl GapFiller {
         &self.gaps
     }
 
+    /// The gaps that have not ended, with their length so far.
+    pub fn open(&self) -> impl Iterator<Item = Gap> {
+        self.channels.iter().filter_map(|channel| channel.open)
+    }
+
     /// How many gaps there were.
     pub fn total(&self) -> u64 {
         self.total

@@ -12,8 +12,8 @@ pub enum Ending {
     Stopped,
 }
 
-/// Runs until the inputs end or a stop is requested. Each step calls `observe` with its frames, once they are
-/// processed. This function does not flush.
+/// Runs until the inputs end or a stop is requested. Each step calls `observe` with its frames and the
+/// pipeline, once they are processed. This function does not flush.
 ///
 /// # Errors
 /// [`PipelineError`] for an input that cannot be read, frames that do not fit the bank, or an output that
@@ -22,14 +22,14 @@ pub fn run(
     reader: &mut MultiReader,
     pipeline: &mut Pipeline,
     output: &mut impl Output,
-    mut observe: impl FnMut(&[PcmFrames<'_>]),
+    mut observe: impl FnMut(&[PcmFrames<'_>], &Pipeline),
 ) -> Result<Ending, PipelineError> {
     loop {
         match reader.wait()? {
             Arrival::Frames(frames) => {
                 let parts = reader.frames();
                 pipeline.push(&parts, output)?;
-                observe(&parts);
+                observe(&parts, pipeline);
                 drop(parts);
                 reader.consume(frames);
             }

@@ -1,7 +1,7 @@
 //! The stages of a pipeline: gap filling, filtering and encoding.
 
 use super::mask::MaskDelay;
-use super::{Block, GapFiller, GapPolicy, GapSummary, Outcome, Output, PipelineError};
+use super::{Block, Gap, GapFiller, GapPolicy, GapSummary, Outcome, Output, PipelineError};
 use crate::bank::Bank;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::runtime::{PcmOutput, Plan, ProcessError, Stream, ThreadPool};
@@ -81,6 +81,26 @@ impl Pipeline {
     /// Output samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
+    }
+
+    /// Output samples that saturated so far.
+    pub fn clipped(&self) -> u64 {
+        self.clipped
+    }
+
+    /// Input samples so far that were NaN or infinite and became 0.
+    pub fn replaced(&self) -> u64 {
+        self.stream.replaced()
+    }
+
+    /// The gaps that have ended, as in [`GapFiller::gaps`].
+    pub fn gaps(&self) -> &[Gap] {
+        self.gaps.as_ref().map_or(&[], |(filler, _)| filler.gaps())
+    }
+
+    /// The gaps that go on.
+    pub fn open_gaps(&self) -> impl Iterator<Item = Gap> {
+        self.gaps.iter().flat_map(|(filler, _)| filler.open())
     }
 
     /// Processes frames. The channels are those of all `parts`, one part after another.

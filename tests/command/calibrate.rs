@@ -251,6 +251,12 @@ fn runs_warn_of_captures_that_contradict_the_spec() {
     let stream =
         [&["stream", "bank.json", "--format", "wav", "--output-format", "f32le", "-o", "y.raw"], &inputs[..]]
             .concat();
-    let output = desk.run(&stream, &[]);
-    assert!(text(&output.stderr).contains("the delay of channel 2"), "{output:?}");
+    let output = desk.run(&[&stream[..], &["--json"]].concat(), &[]);
+    let said = "the delay of channel 2";
+    assert_eq!(text(&output.stderr).matches(said).count(), 1, "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["warnings"][0].as_str().unwrap().contains(said), "{report}");
+    let output = desk.run(&[&stream[..], &["--force", "--strict"]].concat(), &[]);
+    let message = text(&output.stderr);
+    assert!(output.status.code() == Some(1) && message.contains("because of --strict"), "{message}");
 }

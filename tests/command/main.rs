@@ -18,6 +18,8 @@ mod faults;
 mod fuse;
 #[cfg(target_os = "linux")]
 mod long_files;
+#[cfg(unix)]
+mod live;
 mod lost;
 mod measure;
 #[cfg(unix)]

@@ -228,7 +228,7 @@ fn wrong_usage_and_missing_inputs_are_reported() {
     fs::write(bench.path("there"), "old").unwrap();
     for (code, args, part) in [
         (2, &["--format", "f16"][..], "f16"),
-        (2, &["--json"], "--output"),
+        (2, &["--report", "-"], "--output"),
         (2, &["--input", "a", "--input", "b", "--input", "c"], "2 times"),
         (2, &["--input", "-", "--input", "-"], "twice"),
         (1, &["--input", "none", "--input", "none"], "none: cannot open"),

@@ -108,7 +108,6 @@ fn faults_have_one_clear_message_and_leave_nothing() {
     refused(fuse("bank.json", "a.wav", "a.wav", "."), &[".: "]);
     assert_eq!(desk.read("there.wav"), b"old");
     desk.refused(2, &["fuse", "bank.json", "-", "-", "-o", "no.wav"], &["twice"]);
-    desk.refused(2, &["fuse", "bank.json", "a.wav", "a.wav", "-o", "-", "--json"], &["--json"]);
     desk.refused(2, &["fuse", "bank.json", "a.wav", "a.wav"], &["--output"]);
 }
 

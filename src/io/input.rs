@@ -1,0 +1,223 @@
+//! One input of several: its source, its frames in the order of time, and what was tolerated.
+
+use super::aligned_input::{AlignedInput, Block};
+use super::input_thread::{InputSource, Message, read};
+use super::lost::{Dropout, Entry, LostInInput};
+use super::stall::Wait;
+#[cfg(target_os = "linux")]
+use super::stdin_reader::StdinReader;
+use super::timestamps::{Timestamp, Timestamps, lost_between};
+use super::{Coding, InputFault, IoError, StreamHeader};
+use crossbeam_channel::{Receiver, Sender, bounded, select};
+use std::thread;
+
+/// Number of blocks in the pool of each input.
+pub(super) const BLOCKS: usize = 4;
+
+/// One input on the side of the consumer.
+pub(super) struct Input {
+    pub(super) name: String,
+    pub(super) aligned: AlignedInput,
+    source: Source,
+    /// When its frames were taken, as far as the input itself knows.
+    timestamps: Timestamps,
+    live: Live,
+    faults: Vec<InputFault>,
+}
+
+/// What became known of lost samples during the run.
+#[derive(Debug, Default)]
+struct Live {
+    /// The last frame whose number is known.
+    last: Option<Timestamp>,
+    /// Frames that were left out.
+    lost: u64,
+    /// Lines that came after their samples were used.
+    late: u64,
+}
+
+/// The source of an input's frames.
+enum Source {
+    /// Its thread, to which blocks go back.
+    Thread { messages: Receiver<Result<Message, IoError>>, pool: Sender<Vec<u8>> },
+    /// Standard input itself.
+    #[cfg(target_os = "linux")]
+    Stdin(Box<StdinReader>),
+}
+
+impl Input {
+    /// The only input.
+    #[cfg(target_os = "linux")]
+    pub(super) fn alone(source: InputSource) -> Result<Self, IoError> {
+        if !source.is_stdin() || source.coding == Coding::Wav {
+            return Self::on_thread(source);
+        }
+        let stdin = StdinReader::new(&source)?;
+        Ok(Self::new(source.name(), stdin.header, Source::Stdin(Box::new(stdin))))
+    }
+
+    /// The only input.
+    #[cfg(not(target_os = "linux"))]
+    pub(super) fn alone(source: InputSource) -> Result<Self, IoError> {
+        Self::on_thread(source)
+    }
+
+    pub(super) fn on_thread(source: InputSource) -> Result<Self, IoError> {
+        let (name, header) = (source.name(), source.raw_header());
+        Self::on_thread_of(name, header, move |messages, pool| read(source, messages, pool))
+    }
+
+    /// An input whose messages a new thread sends, with a pool of blocks to fill.
+    pub(super) fn on_thread_of(
+        name: String,
+        header: StreamHeader,
+        send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Vec<u8>>) + Send + 'static,
+    ) -> Result<Self, IoError> {
+        let (message_sender, messages) = bounded(BLOCKS + 2);
+        let (pool, pool_out) = bounded(BLOCKS);
+        (0..BLOCKS).for_each(|_| {
+            // The channel has room for all blocks.
+            let _ = pool.send(Vec::new());
+        });
+        let thread = thread::Builder::new().name("input".into());
+        thread
+            .spawn(move || send_all(message_sender, pool_out))
+            .map_err(IoError::system(&name, "start a thread that reads it"))?;
+        Ok(Self::new(name, header, Source::Thread { messages, pool }))
+    }
+
+    fn new(name: String, header: StreamHeader, source: Source) -> Self {
+        let aligned = AlignedInput::new(header);
+        Self { name, aligned, source, timestamps: Timestamps::default(), live: Live::default(), faults: Vec::new() }
+    }
+
+    /// Waits for the next message; false if a stop was asked for first.
+    pub(super) fn receive(&mut self, stop: &Receiver<()>, mut wait: Wait<'_>) -> Result<bool, IoError> {
+        let message = match &mut self.source {
+            Source::Thread { messages, .. } => loop {
+                select! {
+                    // A reader that has come to the end of its input says so.
+                    recv(messages) -> message => match message {
+                        Ok(message) => break Some(message?),
+                        Err(_) => return Err(IoError::ReaderDied { file: self.name.clone() }),
+                    },
+                    recv(stop) -> _ => break None,
+                    default(wait.patience()) => wait.passed(wait.patience()),
+                }
+            },
+            #[cfg(target_os = "linux")]
+            Source::Stdin(stdin) => stdin.receive(stop, &mut wait)?,
+        };
+        let received = message.is_some();
+        if let Some(message) = message {
+            wait.end();
+            self.take(message);
+        }
+        Ok(received)
+    }
+
+    /// Whether the first message is the header.
+    pub(super) fn sends_header(&self) -> bool {
+        matches!(self.source, Source::Thread { .. })
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Header { header, timestamps } => {
+                self.aligned = AlignedInput::new(header);
+                self.timestamps = timestamps;
+            }
+            Message::Frames { bytes, filled } => {
+                let used = self.aligned.refill(Block { bytes, filled });
+                self.give_back(used);
+            }
+            Message::End { faults } => {
+                self.aligned.end();
+                self.faults = faults;
+            }
+        }
+    }
+
+    pub(super) fn advance(&mut self, frames: usize) {
+        self.aligned.advance(frames);
+        if let Some(used) = self.aligned.take_used() {
+            self.give_back(used);
+        }
+    }
+
+    fn give_back(&mut self, block: Block) {
+        if block.bytes.is_empty() {
+            return;
+        }
+        match &mut self.source {
+            // A thread that has ended needs no blocks.
+            Source::Thread { pool, .. } => drop(pool.send(block.bytes)),
+            #[cfg(target_os = "linux")]
+            Source::Stdin(stdin) => stdin.give_back(block.bytes),
+        }
+    }
+
+    /// The input's own timestamps go together with dropouts given beside it, but not with other timestamps.
+    pub(super) fn take_timestamps(&mut self, lost: &mut LostInInput) -> Result<(), IoError> {
+        if self.timestamps.is_empty() {
+            return Ok(());
+        }
+        if !lost.timestamps.is_empty() {
+            return Err(
+                self.timing_fault("it has captures of its own; leave out the lines with sample_start".into())
+            );
+        }
+        lost.timestamps = std::mem::take(&mut self.timestamps);
+        Ok(())
+    }
+
+    /// Takes what became known of lost samples during the run: of a channel of this input, from 0, or of all.
+    /// At most `max_lost` frames may be left out.
+    pub(super) fn lose_live(
+        &mut self,
+        channel: Option<usize>,
+        entry: &Entry,
+        max_lost: u64,
+    ) -> Result<(), String> {
+        let is_late = match entry {
+            Entry::Invalid(frames) => self.aligned.invalidate(Dropout { channel, frames: frames.clone() }),
+            Entry::Timestamp(next) => {
+                let Some(last) = self.live.last.replace(*next) else { return Ok(()) };
+                let lost = lost_between(last, *next)?;
+                self.live.lost = self.live.lost.saturating_add(lost);
+                if self.live.lost > max_lost {
+                    return Err(too_many_lost(self.live.lost, max_lost));
+                }
+                self.aligned.leave_out(next.frame, lost)
+            }
+        };
+        self.live.late += u64::from(is_late);
+        Ok(())
+    }
+
+    pub(super) fn timing_fault(&self, problem: String) -> IoError {
+        IoError::Lost { file: self.name.clone(), problem }
+    }
+
+    pub(super) fn faults(&self) -> impl Iterator<Item = InputFault> {
+        let beyond = self.aligned.is_over() && self.aligned.has_unreached_segments();
+        let late = (self.live.late > 0).then_some(InputFault::ToldLate { lines: self.live.late });
+        self.faults.iter().copied().chain(beyond.then_some(InputFault::TimestampsBeyondEnd)).chain(late)
+    }
+
+    /// Frames that were not used.
+    pub(super) fn unused(&self) -> Option<InputFault> {
+        let seen = self.aligned.seen();
+        let promised = if self.aligned.is_over() { None } else { self.aligned.header.promised };
+        let frames = promised.unwrap_or(0).max(seen) - (seen - self.aligned.left() as u64);
+        let at_least = promised.is_none() && !self.aligned.ended();
+        (frames > 0).then_some(InputFault::Unused { frames, at_least })
+    }
+}
+
+/// The message for more lost frames than are allowed.
+pub(super) fn too_many_lost(frames: u64, most: u64) -> String {
+    format!(
+        "{frames} frames were lost in all, more than {most}; check the numbers, or allow so many with --max-lost {frames}"
+    )
+}

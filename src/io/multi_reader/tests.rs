@@ -1,0 +1,87 @@
+//! Readers that die, converters in turn, and bounds of what may be lost.
+
+use super::super::input_thread::Message;
+use super::*;
+use crate::io::{Coding, InputFault, PcmFormat, Turns};
+use crossbeam_channel::Sender;
+
+fn raw(channels: usize) -> ReadOptions<'static> {
+    ReadOptions { coding: Coding::Raw(PcmFormat::S8), channels, ..ReadOptions::files() }
+}
+
+/// A reader of one input whose thread does `send_all`.
+fn reader(
+    send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Vec<u8>>) + Send + 'static,
+) -> MultiReader {
+    let header =
+        InputSource { path: "x".into(), coding: raw(1).coding, channels: 1, turns: None, block: 4 }
+            .raw_header();
+    let input = Input::on_thread_of("dying".into(), header, send_all).unwrap();
+    let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
+    let inputs = vec![input];
+    MultiReader { inputs, stop, until, stalls: None, live: None, max_lost: 0, ready: 0, consumed: 0 }
+}
+
+#[test]
+fn a_reader_that_dies_is_an_error_and_not_the_end_of_its_input() {
+    let mut reader = reader(|messages, _| {
+        messages.send(Ok(Message::Frames { bytes: vec![1, 2, 3], filled: 3 })).unwrap();
+        // As when it panics: the channel closes without an end.
+    });
+    assert_eq!(reader.wait().unwrap(), Arrival::Frames(3));
+    reader.consume(3);
+    let error = reader.wait().unwrap_err();
+    assert!(matches!(&error, IoError::ReaderDied { file } if file == "dying"), "{error}");
+}
+
+#[test]
+fn a_panic_in_a_reader_is_an_error_too() {
+    let mut reader = reader(|_messages, _| panic!("a reader that panics, for this test"));
+    assert!(matches!(reader.wait(), Err(IoError::ReaderDied { .. })));
+}
+
+#[test]
+fn an_input_that_ends_is_no_error() {
+    let mut reader = reader(|messages, _| messages.send(Ok(Message::End { faults: vec![] })).unwrap());
+    assert_eq!(reader.wait().unwrap(), Arrival::End);
+}
+
+#[test]
+fn converters_in_turn_are_the_channels_of_one_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.raw");
+    // Four turns of three converters, and two samples of a fifth.
+    std::fs::write(&path, (0u8..14).collect::<Vec<_>>()).unwrap();
+    let turns = Turns::by_delay(&[0.0, 2.0, 1.0]);
+    let options = ReadOptions { turns: Some(&turns), ..raw(1) };
+    let started = MultiReader::start(&[path], options, crossbeam_channel::never()).unwrap();
+    let mut reader = started.unwrap();
+    assert_eq!(reader.channels(), 3);
+    let mut bytes: Vec<u8> = Vec::new();
+    while let Arrival::Frames(frames) = reader.wait().unwrap() {
+        bytes.extend(reader.frames()[0].bytes);
+        reader.consume(frames);
+    }
+    assert_eq!(bytes, [2, 0, 1, 5, 3, 4, 8, 6, 7, 11, 9, 10]);
+    let faults: Vec<_> = reader.warnings().into_iter().map(|warning| warning.fault).collect();
+    assert_eq!(faults, [InputFault::CutFrame { bytes: 2 }]);
+}
+
+#[test]
+fn more_lost_samples_than_allowed_are_refused_with_the_bound() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.raw");
+    std::fs::write(&path, [0; 8]).unwrap();
+    let lines = r#"{"sample_start": 0, "global_index": 0}
+        {"sample_start": 1, "global_index": 41}
+        {"sample_start": 2, "global_index": 82}"#;
+    let lost = LostSamples::parse(lines, "lost").unwrap();
+    let start = |max_lost| {
+        let options = ReadOptions { lost: Some(&lost), max_lost, ..raw(1) };
+        MultiReader::start(std::slice::from_ref(&path), options, crossbeam_channel::never())
+    };
+    assert!(start(80).is_ok());
+    let error = start(79).err().unwrap().to_string();
+    assert!(error.contains("80 frames were lost in all, more than 79"), "{error}");
+    assert!(error.contains("--max-lost 80"), "{error}");
+}
