@@ -51,7 +51,8 @@ impl BeforeAfterArgs {
         }
         check_files_on_disk(inputs, "--measure")?;
         if is_pipe(output) {
-            let message = format!("--measure reads the output once more, which {} cannot give", output.display());
+            let message =
+                format!("--measure reads the output once more, which {} cannot give", output.display());
             return Err(Failure::Usage(message));
         }
         Ok(())

@@ -70,9 +70,7 @@ impl GapArgs {
     pub(super) fn live_lost_samples(&self) -> Result<Lost, Failure> {
         match self.lost().filter(|path| is_pipe(path)) {
             None => self.lost_samples(),
-            Some(path) => {
-                Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(Failure::input)?) })
-            }
+            Some(path) => Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(Failure::input)?) }),
         }
     }
 
@@ -87,11 +85,7 @@ impl GapArgs {
     }
 
     /// The options of reading that concern gaps; the others are those of `options`.
-    pub(super) fn read_options<'a>(
-        &self,
-        lost: &'a Lost,
-        options: ReadOptions<'a>,
-    ) -> ReadOptions<'a> {
+    pub(super) fn read_options<'a>(&self, lost: &'a Lost, options: ReadOptions<'a>) -> ReadOptions<'a> {
         let until = if self.longest { Until::Longest } else { Until::Shortest };
         let (lost, live_lost) = (lost.read.as_ref(), lost.live.as_ref());
         ReadOptions { lost, live_lost, until, max_lost: self.max_lost, ..options }

@@ -88,7 +88,14 @@ impl Input {
 
     fn new(name: String, header: StreamHeader, source: Source) -> Self {
         let aligned = AlignedInput::new(header);
-        Self { name, aligned, source, timestamps: Timestamps::default(), live: Live::default(), faults: Vec::new() }
+        Self {
+            name,
+            aligned,
+            source,
+            timestamps: Timestamps::default(),
+            live: Live::default(),
+            faults: Vec::new(),
+        }
     }
 
     /// Waits for the next message; false if a stop was asked for first.

@@ -75,7 +75,8 @@ fn read(path: &PathBuf, name: &str, lines: &Sender<Result<LostLine, IoError>>) {
         let line = next_line(&mut reader, name, number);
         let is_last = !matches!(line, Some(Ok(_)));
         let is_blank = matches!(&line, Some(Ok(text)) if text.trim().is_empty());
-        let fault = |problem| IoError::Lost { file: name.to_owned(), problem: format!("line {number}: {problem}") };
+        let fault =
+            |problem| IoError::Lost { file: name.to_owned(), problem: format!("line {number}: {problem}") };
         let parsed = line.filter(|_| !is_blank).map(|line| LostLine::parse(&line?, number).map_err(fault));
         if parsed.is_some_and(|line| lines.send(line).is_err()) || is_last {
             return;
@@ -89,9 +90,9 @@ fn next_line(reader: &mut impl BufRead, name: &str, number: usize) -> Option<Res
     match reader.take(LONGEST_LINE + 1).read_until(b'\n', &mut line) {
         Err(error) => Some(Err(IoError::system(name, "read it")(error))),
         Ok(0) => None,
-        Ok(length) if length as u64 > LONGEST_LINE => {
-            Some(Err(fault(format!("line {number} is longer than {LONGEST_LINE} bytes; give one object a line"))))
-        }
+        Ok(length) if length as u64 > LONGEST_LINE => Some(Err(fault(format!(
+            "line {number} is longer than {LONGEST_LINE} bytes; give one object a line"
+        )))),
         Ok(_) => Some(String::from_utf8(line).map_err(|_| fault(format!("line {number} is not UTF-8")))),
     }
 }

@@ -143,7 +143,9 @@ impl LostSamples {
                 LostLine { channel, entry: Entry::Timestamp(timestamp), .. } => {
                     lost.timestamps.push((channel, timestamp));
                 }
-                LostLine { channel, entry: Entry::Invalid(frames), .. } => lost.dropouts.push((channel, frames)),
+                LostLine { channel, entry: Entry::Invalid(frames), .. } => {
+                    lost.dropouts.push((channel, frames))
+                }
             }
         }
         Ok(lost)

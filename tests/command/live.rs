@@ -80,7 +80,8 @@ fn gaps_clipping_and_stalls_are_told_while_they_happen() {
     assert!(child.wait().unwrap().success());
     let zero = |x: &f32| if x.is_nan() { 0.0 } else { *x };
     let whole: Vec<f32> = interleaved(&a, &b).iter().map(zero).collect();
-    let want: Vec<i16> = fused(&whole).iter().map(|y| (y * 32768.0).clamp(-32768.0, 32767.0) as i16).collect();
+    let want: Vec<i16> =
+        fused(&whole).iter().map(|y| (y * 32768.0).clamp(-32768.0, 32767.0) as i16).collect();
     let got: Vec<i16> = samples.chunks_exact(2).map(|b| i16::from_le_bytes([b[0], b[1]])).collect();
     assert_eq!(got, want);
     // Samples have standard output, so the JSON object is on standard error; the report ends with the same.
@@ -114,7 +115,8 @@ fn lost_samples_from_a_fifo_hold_nothing_up() {
     let mut got = answer(0, 20);
     let mut lost = writer(&desk, "lost");
     // The last line comes too late.
-    lost.write_all(b"{\"channel\": 2, \"first\": 30, \"length\": 3}\n\n{\"first\": 2, \"length\": 1}\n").unwrap();
+    lost.write_all(b"{\"channel\": 2, \"first\": 30, \"length\": 3}\n\n{\"first\": 2, \"length\": 1}\n")
+        .unwrap();
     // The line is read on a thread of its own.
     std::thread::sleep(Duration::from_millis(300));
     got.extend(answer(20, 60));
@@ -142,13 +144,20 @@ fn frames_left_out_may_be_told_by_a_fifo_and_wrong_lines_are_refused() {
         let _ = child.stdin.take().unwrap().write_all(&bytes(&frames(20)));
         child.wait_with_output().unwrap()
     };
-    let output = run("{\"sample_start\": 0, \"global_index\": 7}\n{\"sample_start\": 5, \"global_index\": 14}\n");
+    let output =
+        run("{\"sample_start\": 0, \"global_index\": 7}\n{\"sample_start\": 5, \"global_index\": 14}\n");
     let (before, after) = (frames(5), frames(20)[10..].to_vec());
     assert!(floats(&output.stdout) == fused(&[before, vec![0.0; 4], after].concat()), "{output:?}");
     for (line, part) in [
         ("{}\n", "lost: line 1: give either"),
-        ("\n{\"channel\": 3, \"first\": 1, \"length\": 1}\n", "lost: line 2: channel 3 is named, but there are 2"),
-        ("{\"channel\": 1, \"sample_start\": 1, \"global_index\": 1}\n", "lost: line 1: interleaved channels"),
+        (
+            "\n{\"channel\": 3, \"first\": 1, \"length\": 1}\n",
+            "lost: line 2: channel 3 is named, but there are 2",
+        ),
+        (
+            "{\"channel\": 1, \"sample_start\": 1, \"global_index\": 1}\n",
+            "lost: line 1: interleaved channels",
+        ),
     ] {
         let output = run(line);
         let message = text(&output.stderr);

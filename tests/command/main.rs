@@ -16,10 +16,10 @@ mod examples;
 mod export;
 mod faults;
 mod fuse;
-#[cfg(target_os = "linux")]
-mod long_files;
 #[cfg(unix)]
 mod live;
+#[cfg(target_os = "linux")]
+mod long_files;
 mod lost;
 mod measure;
 #[cfg(unix)]

@@ -160,9 +160,7 @@ impl Journal {
             last.insert("events_dropped".into(), dropped.into());
         }
         let ended = match &*self.sink {
-            Sink::Thread(messages) => {
-                ask(messages, |answer| Message::End(last, answer)).unwrap_or(Ok(()))
-            }
+            Sink::Thread(messages) => ask(messages, |answer| Message::End(last, answer)).unwrap_or(Ok(())),
             Sink::Here(scribe) => locked(scribe).end(&last, Instant::now()),
         };
         ended.map_err(Failure::Input)

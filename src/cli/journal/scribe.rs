@@ -101,10 +101,7 @@ impl Scribe {
             (self.say)(&format!("{}{more}", Event::Gap(last)));
             self.has_said_gaps = true;
         }
-        let spans = [
-            self.replaced.due(now).map(Event::Replaced),
-            self.clipped.due(now).map(Event::Clipped),
-        ];
+        let spans = [self.replaced.due(now).map(Event::Replaced), self.clipped.due(now).map(Event::Clipped)];
         for event in spans.into_iter().flatten() {
             self.write(&event, now);
             (self.say)(&event.to_string());
@@ -121,10 +118,8 @@ impl Scribe {
     /// Says nothing more of what waits: the summary does. The report gets it.
     pub(super) fn quiet(&mut self, now: Instant) {
         self.gaps.held = None;
-        let spans = [
-            self.replaced.held.take().map(Event::Replaced),
-            self.clipped.held.take().map(Event::Clipped),
-        ];
+        let spans =
+            [self.replaced.held.take().map(Event::Replaced), self.clipped.held.take().map(Event::Clipped)];
         spans.into_iter().flatten().for_each(|event| self.write(&event, now));
     }
 
