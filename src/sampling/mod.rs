@@ -3,17 +3,26 @@
 //! * [`kernel`]: centred B-splines of any degree and the sinc, with slopes;
 //! * [`fit`]: regularised, weighted least squares in a shift-invariant spline space, solved in O(M n^2);
 //! * [`recurrent`]: perfect reconstruction from M interleaved sample sets (Yen's formula);
-//! * [`nonuniform`]: samples with value errors and jitter, error bounds, interval moments.
+//! * [`nonuniform`]: samples with value errors and jitter, and sure bounds of the error between them;
+//! * [`periodic`]: superposed periodic sets, as several cameras or converters take them, and the moments of
+//!   the intervals between their samples;
+//! * [`jump`]: the error of linear interpolation across a jump;
+//! * [`delaunay`]: the moments of the triangles between samples of a plane.
 //!
 //! Unit spacing and f64 throughout; no dependency beyond the standard library.
 
+pub mod delaunay;
 mod error;
 pub mod fit;
+pub mod jump;
 pub mod kernel;
 pub mod nonuniform;
+pub mod periodic;
+mod quadrature;
 pub mod recurrent;
 
 pub use error::SamplingError;
 pub use fit::{Fit, FitSample};
 pub use kernel::{BSpline, sinc, sinc_slope};
+pub use periodic::PeriodicSets;
 pub use recurrent::Recurrent;
