@@ -1,0 +1,184 @@
+//! Theorems 3.1 and 3.2: the mean absolute error of a virtual view of an unoccluded scene of the plane.
+
+use super::{FlatCamera, PaintedCurve, cross};
+use hybank::sampling::PeriodicSets;
+use hybank::sampling::nonuniform::Smoothness;
+
+/// Nodes at which suprema and means over the curve are taken.
+const NODES: usize = 4000;
+
+/// Bounds of the errors of the inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Errors {
+    /// E_T, of intensities.
+    pub texture: f64,
+    /// E_D, of depths along the rays of the actual cameras.
+    pub depth: f64,
+}
+
+/// A bound of the mean absolute error, by cause.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorBound {
+    /// Too few samples.
+    pub sampling: f64,
+    /// Errors of intensity.
+    pub texture: f64,
+    /// Errors of depth.
+    pub depth: f64,
+}
+
+impl ErrorBound {
+    /// The sum.
+    pub fn total(&self) -> f64 {
+        self.sampling + self.texture + self.depth
+    }
+}
+
+/// A scene, the cameras that see it, and the virtual camera.
+#[derive(Clone, Copy)]
+pub struct FlatRig<'a> {
+    /// The curve.
+    pub scene: &'a dyn PaintedCurve,
+    /// The actual cameras.
+    pub cameras: &'a [FlatCamera],
+    /// The virtual camera.
+    pub view: FlatCamera,
+    /// The part of the curve that is judged, from one parameter to another.
+    pub window: (f64, f64),
+}
+
+/// Intensity of the virtual image f_v around one pixel, by the pixel.
+struct Virtual {
+    slope: f64,
+    curvature: f64,
+    /// |H_v'|, virtual pixels per unit of u.
+    stretch: f64,
+}
+
+impl FlatRig<'_> {
+    fn parameters(&self) -> impl Iterator<Item = f64> + use<> {
+        let (a, b) = self.window;
+        (0..NODES).map(move |k| a + (b - a) * (k as f64 + 0.5) / NODES as f64)
+    }
+
+    fn virtual_at(&self, u: f64) -> Virtual {
+        let c = self.scene.at(u);
+        let h = self.view.see(&c);
+        let slope = c.texture[1] / h.first;
+        let curvature = (c.texture[2] - slope * h.second) / (h.first * h.first);
+        Virtual { slope, curvature, stretch: h.first.abs() }
+    }
+
+    /// Samples of each camera per virtual pixel around the point of parameter u: |H_i'| / |H_v'|.
+    pub fn densities(&self, u: f64) -> Vec<f64> {
+        let c = self.scene.at(u);
+        let stretch = self.view.see(&c).first.abs();
+        self.cameras.iter().map(|camera| camera.see(&c).first.abs() / stretch).collect()
+    }
+
+    /// lambda_x, samples per virtual pixel.
+    pub fn density(&self, u: f64) -> f64 {
+        self.densities(u).iter().sum()
+    }
+
+    /// lambda_u, samples per unit of u.
+    pub fn object_density(&self, u: f64) -> f64 {
+        let c = self.scene.at(u);
+        self.cameras.iter().map(|camera| camera.see(&c).first.abs()).sum()
+    }
+
+    /// Mean over the pixels of the virtual view of a function of u.
+    fn mean(&self, g: impl Fn(f64) -> f64) -> f64 {
+        let (sum, pixels) = self.parameters().fold((0.0, 0.0), |(sum, pixels), u| {
+            let stretch = self.virtual_at(u).stretch;
+            (sum + stretch * g(u), pixels + stretch)
+        });
+        sum / pixels
+    }
+
+    fn largest(&self, g: impl Fn(f64) -> f64) -> f64 {
+        self.parameters().map(g).fold(0.0, f64::max)
+    }
+
+    /// Displacement in the virtual view, in pixels, of the sample that camera i takes at u with the depth
+    /// error delta (thesis Prop. 3.3, exact):
+    ///
+    /// ```text
+    /// mu = delta det(M_v) ((S - C_i) x (S - C_v)) / (d_i d_v d^_v)
+    /// ```
+    pub fn jitter(&self, camera: usize, u: f64, delta: f64) -> f64 {
+        let (s, c) = (self.scene.at(u).point, self.cameras[camera].centre());
+        let (d, d_v) = (self.cameras[camera].project(&s).1, self.view.project(&s).1);
+        let moved = self.view.project(&(s + (s - c) * (delta / d))).1;
+        let area = cross(&(s - c), &(s - self.view.centre()));
+        delta * self.view.determinant() * area / (d * d_v * moved)
+    }
+
+    /// B_v: the largest jitter per unit of depth error, for errors up to `depth_error`.
+    pub fn jitter_factor(&self, depth_error: f64) -> f64 {
+        let delta = depth_error.max(1e-9);
+        let worst = |i: usize, u: f64| self.jitter(i, u, delta).abs().max(self.jitter(i, u, -delta).abs());
+        let of_point = |u| (0..self.cameras.len()).map(|i| worst(i, u)).fold(0.0, f64::max);
+        self.largest(of_point) / delta
+    }
+
+    /// Suprema of the derivatives of the virtual image over the window.
+    pub fn smoothness(&self) -> Smoothness {
+        let slope = self.largest(|u| self.virtual_at(u).slope.abs());
+        Smoothness { slope, curvature: self.largest(|u| self.virtual_at(u).curvature.abs()) }
+    }
+
+    /// Theorem 3.1, for linear interpolation between the propagated samples:
+    ///
+    /// ```text
+    /// MAE <= (3/4) sup|f_v''| <lambda_x^-2> + E_T + E_D B_v sup|f_v'|
+    /// ```
+    ///
+    /// An expectation over independent, uniform phases of the cameras. For cameras that share a phase it is
+    /// false; [`hybank::sampling::nonuniform::PiecewiseLinear::mean_error_bound`] holds always.
+    pub fn image_space(&self, errors: Errors) -> ErrorBound {
+        let Smoothness { slope, curvature } = self.smoothness();
+        ErrorBound {
+            sampling: 0.75 * curvature * self.mean(|u| self.density(u).powi(-2)),
+            texture: errors.texture,
+            depth: errors.depth * self.jitter_factor(errors.depth) * slope,
+        }
+    }
+
+    /// Theorem 3.2, for linear interpolation on the chords between the reconstructed points:
+    ///
+    /// ```text
+    /// MAE <= (3/4) (sup|T''| + sup|T'| G sup|S''| / min|H_v'|) <lambda_u^-2>
+    ///        + E_T + E_D B_v sup|T'| / min|H_v'|
+    /// ```
+    ///
+    /// G is the largest change of a virtual pixel per displacement of a point.
+    pub fn object_space(&self, errors: Errors) -> ErrorBound {
+        let paint = |k: usize| self.largest(|u| self.scene.at(u).texture[k].abs());
+        let bend = self.largest(|u| self.scene.at(u).bend.norm());
+        let sensitivity = self.largest(|u| self.view.sensitivity(&self.scene.at(u).point));
+        let least = 1.0 / self.largest(|u| 1.0 / self.virtual_at(u).stretch);
+        let curvature = paint(2) + paint(1) * sensitivity * bend / least;
+        ErrorBound {
+            sampling: 0.75 * curvature * self.mean(|u| self.object_density(u).powi(-2)),
+            texture: errors.texture,
+            depth: errors.depth * self.jitter_factor(errors.depth) * paint(1) / least,
+        }
+    }
+
+    /// What Theorem 3.1 bounds, estimated for exact inputs: the mean of |f_v''| lambda E\[D^3\] / 12 with the
+    /// exact moments of as many cameras as there are.
+    pub fn estimate(&self) -> f64 {
+        self.mean(|u| {
+            let periods = self.densities(u).iter().map(|d| 1.0 / d).collect();
+            let moment = |sets: PeriodicSets| sets.density() * sets.moment(3) / 12.0;
+            self.virtual_at(u).curvature.abs() * PeriodicSets::new(periods).map_or(f64::NAN, moment)
+        })
+    }
+}
+
+/// Mean of |w e_1 + (1 - w) e_2| for w uniform in \[0, 1\] and e_k uniform in \[-1, 1\]: (1/2 + ln 2) / 3.
+///
+/// For w >= 1/2 the mean over e_1 and e_2 is (3 w^2 + (1 - w)^2) / (6 w). The share of E_T that the error
+/// of linear interpolation has on average.
+pub const UNIFORM_ERROR_SHARE: f64 = (0.5 + std::f64::consts::LN_2) / 3.0;
