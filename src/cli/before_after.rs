@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::bank_file::is_dash;
-use super::capture_file::{CaptureFile, check_files_on_disk, read_channels};
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, Whole, check_files_on_disk};
 use super::measure::{ToneArg, column, tone, tones};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::io::{MultiReader, is_pipe};
@@ -70,8 +70,8 @@ impl BeforeAfterArgs {
         mut reader: MultiReader,
         output: &Path,
     ) -> Result<BeforeAfter, Failure> {
-        let fused = CaptureFile::read(output, None)?;
-        let channels = read_channels(&mut reader, None)?;
+        let fused = CaptureFile::read(output, Reading::channel(None, MOST_MEASURED))?;
+        let channels = Whole::read(&mut reader, MOST_MEASURED)?.channels;
         let plain = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
         let settings = Settings {
             tones: tones(&self.tone)?,

@@ -1,13 +1,13 @@
-//! One channel of a recording in memory, with what a measurement must know about its format.
+//! Recordings in memory, with what must be known about their format.
 
 use super::Failure;
 use super::bank_file::{is_dash, name};
-use crate::io::{Arrival, MultiReader, PcmFormat, ReadOptions, SampleLayout};
+use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions};
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
 
-/// Samples that are read at most: the spectra of more take several gigabytes.
-const MOST_SAMPLES: usize = 1 << 26;
+/// Samples that a measurement reads at most: the spectra of more take several gigabytes.
+pub(super) const MOST_MEASURED: usize = 1 << 26;
 
 /// One channel of a recording.
 #[derive(Debug, Clone)]
@@ -18,31 +18,67 @@ pub(super) struct CaptureFile {
     pub(super) rails: Option<(f64, f64)>,
 }
 
+/// How a recording is read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reading {
+    /// Format and channel; a mono recording needs no channel.
+    pub(super) options: ReadOptions<'static>,
+    /// The rate, if the file states none.
+    pub(super) rate: Option<Hertz>,
+    /// Samples that are read at most.
+    pub(super) most: usize,
+}
+
+impl Reading {
+    /// Channel `channel` (from 1) of a file with a header.
+    pub(super) fn channel(channel: Option<usize>, most: usize) -> Self {
+        let only = channel.map(|channel| channel.saturating_sub(1));
+        Self { options: ReadOptions { only, ..ReadOptions::files() }, rate: None, most }
+    }
+}
+
 impl CaptureFile {
-    /// Reads channel `channel` (from 1) of a WAV file or SigMF recording; a mono recording needs no number.
-    /// `-` is standard input.
-    pub(super) fn read(path: &Path, channel: Option<usize>) -> Result<Self, Failure> {
+    /// Reads a recording; `-` is standard input.
+    pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
         let stop = crossbeam_channel::never();
-        let reader =
-            MultiReader::start(&[path.to_owned()], ReadOptions::files(), stop).map_err(Failure::input)?;
-        let mut reader = reader.ok_or_else(|| Failure::input("interrupted"))?;
-        let index = chosen(path, channel, reader.channels())?;
+        let reader = MultiReader::start(&[path.to_owned()], reading.options, stop).map_err(Failure::input)?;
+        let mut reader = reader.ok_or_else(interrupted)?;
+        let channels = reader.channels();
+        if channels != 1 {
+            return Err(Failure::Input(format!(
+                "{} has {channels} channels, and one is needed; give its number, --channel 1 to {channels}",
+                name(path)
+            )));
+        }
         let header = reader.headers().next().map(|(_, header)| *header);
-        let rate = header.and_then(|header| header.rate).filter(|rate| *rate > 0.0).ok_or_else(|| {
-            let message = "the header states no sample rate; record or convert it with its rate";
+        let stated = header.and_then(|header| header.rate).filter(|rate| *rate > 0.0).map(Hertz);
+        let rate = stated.or(reading.rate).ok_or_else(|| {
+            let message = "it states no sample rate; record or convert it with its rate, or give --rate where there is one";
             Failure::Input(format!("{}: {message}", name(path)))
         })?;
         let rails = header.and_then(|header| rails(header.layout.format));
-        let mut columns = read_channels(&mut reader, Some(index))?;
+        let Whole { mut channels, is_cut } = Whole::read(&mut reader, reading.most)?;
         reader.warnings().iter().for_each(|warning| super::warn(&warning.to_string()));
-        let samples = columns.pop().unwrap_or_default();
+        let samples = channels.pop().unwrap_or_default();
         if samples.is_empty() {
             return Err(Failure::Input(format!("{}: no samples (the length is zero)", name(path))));
         }
-        if samples.len() == MOST_SAMPLES {
-            super::warn(&format!("{}: only the first {MOST_SAMPLES} samples are measured", name(path)));
+        if is_cut {
+            super::warn(&format!("{}: only the first {} samples are used", name(path), samples.len()));
         }
-        Ok(Self { samples, rate: Hertz(rate), rails })
+        Ok(Self { samples, rate, rails })
+    }
+
+    /// Refuses samples that are not finite.
+    pub(super) fn finite(self, path: &Path) -> Result<Self, Failure> {
+        match self.samples.iter().position(|x| !x.is_finite()) {
+            Some(n) => Err(Failure::Input(format!(
+                "{}: sample {n} is {}; a source must be finite, repair the recording first",
+                name(path),
+                self.samples[n]
+            ))),
+            None => Ok(self),
+        }
     }
 
     /// Leaves out `skip` samples at either end.
@@ -61,50 +97,60 @@ impl CaptureFile {
     }
 }
 
-/// The index of the channel to read.
-fn chosen(path: &Path, channel: Option<usize>, channels: usize) -> Result<usize, Failure> {
-    match channel {
-        None if channels == 1 => Ok(0),
-        Some(channel) if (1..=channels).contains(&channel) => Ok(channel - 1),
-        None => Err(Failure::Usage(format!(
-            "{} has {channels} channels, and one is measured at a time; give its number, --channel 1 to {channels}",
-            name(path)
-        ))),
-        Some(channel) => Err(Failure::Usage(format!(
-            "--channel {channel}: {} has {channels} channels, counted from 1",
-            name(path)
-        ))),
+/// All channels of a reader.
+#[derive(Debug)]
+pub(super) struct Whole {
+    /// Lost samples are NaN.
+    pub(super) channels: Vec<Vec<f64>>,
+    /// There are more samples, which were not read.
+    pub(super) is_cut: bool,
+}
+
+impl Whole {
+    /// At most `most` samples of each channel; real ones only.
+    pub(super) fn read(reader: &mut MultiReader, most: usize) -> Result<Self, Failure> {
+        if let Some((input, _)) = reader.headers().find(|(_, header)| header.is_complex) {
+            return Err(Failure::Input(format!(
+                "{input}: complex samples, which only `fuse` and `stream` take; extract the real or the imaginary part"
+            )));
+        }
+        let mut channels = vec![Vec::new(); reader.channels()];
+        loop {
+            match reader.wait().map_err(Failure::input)? {
+                Arrival::Frames(count) => {
+                    let room = most - channels.first().map_or(0, Vec::len);
+                    append(&reader.frames(), count.min(room), &mut channels);
+                    reader.consume(count);
+                    if room < count {
+                        return Ok(Self { channels, is_cut: true });
+                    }
+                }
+                Arrival::End => return Ok(Self { channels, is_cut: false }),
+                Arrival::Stopped => return Err(interrupted()),
+            }
+        }
     }
 }
 
-/// All samples of one channel of the inputs (from 0), or of all. Lost samples are NaN.
-pub(super) fn read_channels(reader: &mut MultiReader, only: Option<usize>) -> Result<Vec<Vec<f64>>, Failure> {
-    let wanted = only.map_or(0..reader.channels(), |index| index..index + 1);
-    let mut channels = vec![Vec::new(); wanted.len()];
-    while channels[0].len() < MOST_SAMPLES {
-        let Arrival::Frames(count) = reader.wait().map_err(Failure::input)? else { break };
-        let mut number = 0;
-        for frames in reader.frames() {
-            let SampleLayout { format, container } = frames.layout;
-            for within in 0..frames.frame_bytes() / container {
-                if wanted.contains(&number) {
-                    let sample = |frame: &[u8]| format.decode(&frame[within * container..][..format.bytes()]);
-                    channels[number - wanted.start]
-                        .extend(frames.bytes.chunks_exact(frames.frame_bytes()).map(sample));
-                }
-                number += 1;
-            }
+fn interrupted() -> Failure {
+    Failure::input("interrupted; nothing was written")
+}
+
+/// The first `count` frames of all parts.
+fn append(parts: &[PcmFrames<'_>], count: usize, channels: &mut [Vec<f64>]) {
+    let mut next = channels.iter_mut();
+    for part in parts {
+        let (format, container) = (part.layout.format, part.layout.container);
+        for (c, samples) in next.by_ref().take(part.channels).enumerate() {
+            let frames = part.bytes.chunks_exact(part.frame_bytes()).take(count);
+            samples.extend(frames.map(|frame| format.decode(&frame[c * container..])));
         }
-        reader.consume(count);
     }
-    channels.iter_mut().for_each(|samples| samples.truncate(MOST_SAMPLES));
-    Ok(channels)
 }
 
 /// The lowest and highest value of an integer format.
 fn rails(format: PcmFormat) -> Option<(f64, f64)> {
-    use PcmFormat::{F32Be, F32Le, F64Be, F64Le};
-    if matches!(format, F32Le | F32Be | F64Le | F64Be) {
+    if format.is_float() {
         return None;
     }
     // Encoding saturates.

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
+use super::capture_args::CaptureArgs;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
@@ -13,7 +14,7 @@ use super::understood::say_understood;
 use super::watch::Watch;
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{BLOCK_BYTES, Container, MultiReader, PcmFrames, ReadOptions, SampleWriter};
+use crate::io::{BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, ReadOptions, SampleWriter};
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
 use crate::runtime::{Algorithm, Options, Plan};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -36,7 +37,8 @@ Examples:
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
     bank: PathBuf,
-    /// One mono WAV file or SigMF recording per channel, or one of N channels; `-` is standard input
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, or raw with --format), or one of N channels; `-`
+    /// is standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta) or a FIFO; `-` is standard output
@@ -51,6 +53,8 @@ pub(super) struct Args {
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
+    #[command(flatten)]
+    reading: CaptureArgs,
     #[command(flatten)]
     turns: TurnArgs,
     #[command(flatten)]
@@ -109,9 +113,10 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     let rate = match_bank::output_rate(bank, &reader)?;
     let plan = args.plan(bank)?;
     let skip = if args.keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
-    let mut pipeline = args.pipeline(bank, &plan, skip)?;
-    let mut outputs = args.outputs(rate)?;
-    let mut watch = Watch::new(bank);
+    let is_complex = reader.is_complex();
+    let mut pipeline = args.pipeline(bank, &plan, skip, is_complex)?;
+    let mut outputs = args.outputs(rate, is_complex)?;
+    let mut watch = if is_complex { Watch::idle() } else { Watch::new(bank) };
     let mut follow = Follow::new(journal.clone());
     run_all(&mut pipeline, &mut reader, &mut outputs, |parts, pipeline| {
         watch.observe(parts);
@@ -139,6 +144,7 @@ impl Args {
         match_bank::check_stdin(&self.bank, &self.inputs)?;
         self.gaps.check()?;
         self.turns.check(self.inputs.len())?;
+        self.reading.check(self.turns.is_given())?;
         self.before_after.check(&self.inputs, &self.output)?;
         self.journal.check(&self.output, self.json || self.before_after.is_wanted())?;
         let inputs = self.inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
@@ -154,7 +160,8 @@ impl Args {
         let block_bytes = self.threads.bytes(BLOCK_BYTES);
         let stalls = journal.map(Journal::stall_watch);
         let (turns, stalls) = (turns.as_ref(), stalls.as_ref());
-        let files = ReadOptions { block_bytes, turns, stalls, ..ReadOptions::files() };
+        let captures = self.reading.options(self.inputs.len(), bank.channel_count());
+        let files = ReadOptions { block_bytes, turns, stalls, ..captures };
         let options = self.gaps.read_options(&lost, files);
         MultiReader::start(&self.inputs, options, interrupts()).map_err(Failure::input)
     }
@@ -180,16 +187,18 @@ impl Args {
         bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
 
-    fn pipeline(&self, bank: &Bank, plan: &Plan, skip: u64) -> Result<Pipeline, Failure> {
+    fn pipeline(&self, bank: &Bank, plan: &Plan, skip: u64, is_complex: bool) -> Result<Pipeline, Failure> {
         let (format, gaps, workers) = (self.bits.format(), self.gaps.policy(), self.threads.workers()?);
-        Pipeline::new(bank, plan, Settings { format, skip, gaps, workers }).map_err(Failure::running)
+        let settings = Settings { format, is_complex, skip, gaps, workers };
+        Pipeline::new(bank, plan, settings).map_err(Failure::running)
     }
 
     /// The outputs at their beginning, of `rate` hertz.
-    fn outputs(&self, rate: f64) -> Result<FileOutputs, Failure> {
+    fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
         let mask = self.gaps.begin_mask(self.force)?;
-        let format = self.bits.format();
-        let samples = SampleWriter::create(&self.output, Container::Wav, format, rate, self.force);
+        let (container, format) = (Container::Wav, self.bits.format());
+        let header = OutputHeader { container, format, is_complex, rate };
+        let samples = SampleWriter::create(&self.output, header, self.force);
         Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask))
     }
 

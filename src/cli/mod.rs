@@ -7,6 +7,7 @@ mod analyze;
 mod bank_file;
 mod before_after;
 mod calibrate;
+mod capture_args;
 mod capture_file;
 mod completions;
 mod demo;

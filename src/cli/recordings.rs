@@ -1,63 +1,12 @@
-//! Whole recordings of one channel in memory, for the commands that work on short ones.
+//! Writes whole recordings of one channel.
 
 use super::Failure;
 use super::interrupt::remove_unfinished;
 use crate::files::{AtomicFile, commit_all};
+use crate::io::PcmFormat;
 use crate::io::wav::WavFile;
-use crate::io::{Arrival, MultiReader, PcmFormat, ReadOptions, SampleLayout};
 use std::io;
 use std::path::Path;
-
-/// The samples and the rate (hertz) of one channel, counted from 1, of a WAV file or SigMF recording; a mono
-/// recording needs no number.
-pub(super) fn read_channel(path: &Path, channel: Option<usize>) -> Result<(Vec<f64>, u32), Failure> {
-    let reader = MultiReader::start(&[path.to_owned()], ReadOptions::files(), crossbeam_channel::never());
-    let mut reader = reader.map_err(Failure::input)?.ok_or_else(|| Failure::input("interrupted"))?;
-    let channels = reader.channels();
-    let index = match channel {
-        None if channels == 1 => 0,
-        Some(channel) if (1..=channels).contains(&channel) => channel - 1,
-        None => {
-            return Err(Failure::Input(format!(
-                "{}: {channels} channels, but a source is one of them; give its number, --channel 1 to {channels}",
-                path.display()
-            )));
-        }
-        Some(channel) => {
-            return Err(Failure::Input(format!(
-                "--channel {channel}: {} has {channels} channels, counted from 1",
-                path.display()
-            )));
-        }
-    };
-    let rate = reader.headers().find_map(|(_, header)| header.rate).unwrap_or(0.0).round() as u32;
-    let mut samples = Vec::new();
-    while let Arrival::Frames(count) = reader.wait().map_err(Failure::input)? {
-        for frames in reader.frames() {
-            let SampleLayout { format, container } = frames.layout;
-            let sample = |frame: &[u8]| format.decode(&frame[index * container..][..container]);
-            samples.extend(frames.bytes.chunks_exact(frames.frame_bytes()).map(sample));
-        }
-        reader.consume(count);
-    }
-    reader.warnings().iter().for_each(|warning| super::warn(&warning.to_string()));
-    refuse_useless(path, &samples)?;
-    Ok((samples, rate))
-}
-
-fn refuse_useless(path: &Path, samples: &[f64]) -> Result<(), Failure> {
-    if samples.is_empty() {
-        return Err(Failure::Input(format!("{}: no samples (the length is zero)", path.display())));
-    }
-    match samples.iter().position(|x| !x.is_finite()) {
-        Some(n) => Err(Failure::Input(format!(
-            "{}: sample {n} is {}; a source must be finite, repair the recording first",
-            path.display(),
-            samples[n]
-        ))),
-        None => Ok(()),
-    }
-}
 
 /// A mono recording to be written.
 #[derive(Debug, Clone, Copy)]

@@ -1,5 +1,6 @@
 //! `hybank stream`: fuses slow samples as they arrive.
 
+use super::capture_args::coding;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
@@ -13,12 +14,12 @@ use super::watch::Watch;
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
-    BLOCK_BYTES, Coding, Container, MultiReader, PcmFormat, ReadOptions, SampleWriter, is_sigmf,
+    BLOCK_BYTES, Coding, Container, MultiReader, OutputHeader, PcmFormat, ReadOptions, SampleWriter,
+    is_self_describing,
 };
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
 use crate::runtime::{Algorithm, Options, Plan};
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 /// Fuses slow samples as they arrive
 ///
@@ -28,24 +29,25 @@ use std::str::FromStr;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sample formats, as in ffmpeg:
-  s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be, and wav
+  s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be, and wav; cf32, cs16, cu8, .. are complex
 
 Examples:
   capture | hybank stream bank.json --format s16le > fast.raw
   hybank stream bank.json --input ch1.fifo --input ch2.fifo --format f32le | analyse
   hybank stream bank.json --input ch1.sigmf-meta --input ch2.sigmf-meta -o fast.sigmf-meta
   capture | hybank stream bank.json --format s16le --interleaved 4 > fast.raw
+  receive | hybank stream bank.json --format cs16 --output-format cf32 > fast.iq
   sox both.flac -t wav - | hybank stream bank.json --format wav | play -t wav -
 
 An interrupt (Ctrl-C) ends the stream after whole frames; a second one ends it at once.")]
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
     bank: PathBuf,
-    /// Sample format of the input
-    #[arg(long, value_name = "FORMAT", default_value = "f32le", value_parser = parse_coding)]
+    /// Sample format of the input; with c before it for complex samples
+    #[arg(long, value_name = "FORMAT", default_value = "f32le", value_parser = coding)]
     format: Coding,
     /// Sample format of the output [default: that of the input]
-    #[arg(long, value_name = "FORMAT", value_parser = parse_coding)]
+    #[arg(long, value_name = "FORMAT", value_parser = coding)]
     output_format: Option<Coding>,
     /// A FIFO or file. Give the option once per channel, or once for an input that holds all channels. A
     /// SigMF recording (a name that ends in sigmf-meta) states its own format and channels
@@ -81,13 +83,6 @@ pub(super) struct Args {
     json: bool,
 }
 
-fn parse_coding(name: &str) -> Result<Coding, String> {
-    if name == "wav" {
-        return Ok(Coding::Wav);
-    }
-    PcmFormat::from_str(name).map(Coding::Raw).map_err(|error| format!("{error}, or wav"))
-}
-
 /// The report of a run.
 #[derive(Debug, serde::Serialize)]
 struct Report<'a> {
@@ -118,9 +113,12 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     let Some(mut reader) = args.start_reader(inputs, bank, journal)? else { return Ok(()) };
     match_bank::check_channels(bank, &args.bank, &reader)?;
     let rate = match_bank::output_rate(bank, &reader)?;
-    let mut pipeline = args.pipeline(bank, &plan)?;
-    let mut outputs = args.outputs(rate)?;
-    let mut watch = Watch::new(bank).live(journal.clone());
+    let is_complex = reader.is_complex();
+    args.check_output(is_complex)?;
+    let mut pipeline = args.pipeline(bank, &plan, is_complex)?;
+    let mut outputs = args.outputs(rate, is_complex)?;
+    let watch = if is_complex { Watch::idle() } else { Watch::new(bank) };
+    let mut watch = watch.live(journal.clone());
     let mut follow = Follow::new(journal.clone());
     let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |parts, pipeline| {
         watch.observe(parts);
@@ -128,7 +126,7 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     });
     let ending = ending.map_err(Failure::running)?;
     if args.flush {
-        let samples = pipeline.stream().plan().flush_frames() * bank.ratio;
+        let samples = pipeline.plan().flush_frames() * bank.ratio;
         pipeline.flush(pipeline.samples() + samples as u64, &mut outputs).map_err(Failure::running)?;
     }
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
@@ -164,7 +162,7 @@ impl Args {
 
     /// Raw inputs are one interleaved or one per channel; other formats state their channels.
     fn check_inputs(&self, inputs: &[PathBuf], channels: usize) -> Result<(), Failure> {
-        let raw = matches!(self.format, Coding::Raw(_)) && !inputs.iter().any(|path| is_sigmf(path));
+        let raw = self.format != Coding::Wav && !inputs.iter().any(|path| is_self_describing(path));
         if raw && inputs.len() != 1 && inputs.len() != channels {
             return Err(Failure::Usage(format!(
                 "--input is given {} times; the bank has {channels} channels, so give it {channels} times, once, or not at all",
@@ -183,7 +181,8 @@ impl Args {
     ) -> Result<Option<MultiReader>, Failure> {
         let lost = self.gaps.live_lost_samples()?;
         let turns = self.turns.turns(bank, &self.bank)?;
-        let (channels, block_bytes) = (bank.channel_count(), self.threads.bytes(BLOCK_BYTES));
+        let block_bytes = self.threads.bytes(BLOCK_BYTES);
+        let channels = if inputs.len() == 1 { bank.channel_count() } else { 1 };
         let (turns, stalls) = (turns.as_ref(), journal.stall_watch());
         let (coding, stalls) = (self.format, Some(&stalls));
         let raw = ReadOptions { coding, channels, turns, block_bytes, stalls, ..ReadOptions::files() };
@@ -197,9 +196,18 @@ impl Args {
 
     /// How output samples are stored; a WAV stream has 32-bit floats.
     fn output_format(&self) -> PcmFormat {
-        match self.output_coding() {
-            Coding::Raw(format) => format,
-            Coding::Wav => PcmFormat::F32Le,
+        self.output_coding().format().unwrap_or(PcmFormat::F32Le)
+    }
+
+    /// Real samples cannot be written as complex ones.
+    fn check_output(&self, is_complex: bool) -> Result<(), Failure> {
+        match self.output_format {
+            Some(format) if format.is_complex() && !is_complex => {
+                let message =
+                    "--output-format is complex, but the input is real; leave out the c before its name";
+                Err(Failure::Usage(message.into()))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -215,16 +223,18 @@ impl Args {
         bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
     }
 
-    fn pipeline(&self, bank: &Bank, plan: &Plan) -> Result<Pipeline, Failure> {
+    fn pipeline(&self, bank: &Bank, plan: &Plan, is_complex: bool) -> Result<Pipeline, Failure> {
         let (format, gaps, workers) = (self.output_format(), self.gaps.policy(), self.threads.workers()?);
-        Pipeline::new(bank, plan, Settings { format, skip: 0, gaps, workers }).map_err(Failure::running)
+        let settings = Settings { format, is_complex, skip: 0, gaps, workers };
+        Pipeline::new(bank, plan, settings).map_err(Failure::running)
     }
 
     /// The outputs at their beginning, of `rate` hertz.
-    fn outputs(&self, rate: f64) -> Result<FileOutputs, Failure> {
+    fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
         let mask = self.gaps.begin_mask(self.force)?;
         let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };
-        let samples = SampleWriter::create(&self.output, container, self.output_format(), rate, self.force);
+        let header = OutputHeader { container, format: self.output_format(), is_complex, rate };
+        let samples = SampleWriter::create(&self.output, header, self.force);
         Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask))
     }
 }

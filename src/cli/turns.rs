@@ -17,6 +17,11 @@ pub(super) struct TurnArgs {
 }
 
 impl TurnArgs {
+    /// True if converters take turns.
+    pub(super) fn is_given(self) -> bool {
+        self.interleaved.is_some()
+    }
+
     /// Refuses more than one input, before any file is read.
     pub(super) fn check(self, inputs: usize) -> Result<(), Failure> {
         match self.interleaved {

@@ -37,6 +37,11 @@ impl Watch {
         Self { state: spec.map_or(State::Idle, collecting), journal: None }
     }
 
+    /// Nothing to watch.
+    pub(super) fn idle() -> Self {
+        Self { state: State::Idle, journal: None }
+    }
+
     /// Warnings are told as soon as they are known.
     pub(super) fn live(self, journal: Journal) -> Self {
         Self { journal: Some(journal), ..self }

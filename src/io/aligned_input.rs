@@ -163,15 +163,15 @@ impl AlignedInput {
             View::Dropouts => self.decode_with_dropouts(frames),
             View::Lost | View::Over => {
                 self.numbers.clear();
-                let samples = frames * self.header.channels;
-                self.numbers.extend(std::iter::repeat_n(f64::NAN.to_le_bytes(), samples).flatten());
+                let numbers = frames * self.header.columns();
+                self.numbers.extend(std::iter::repeat_n(f64::NAN.to_le_bytes(), numbers).flatten());
             }
         }
     }
 
-    /// The prepared frames.
+    /// The prepared frames. Of complex samples each part is a channel.
     pub(super) fn view(&self, frames: usize) -> PcmFrames<'_> {
-        let channels = self.header.channels;
+        let channels = self.header.columns();
         if self.view == View::Read {
             let bytes = &self.block.bytes[self.used..self.used + frames * self.header.frame_bytes()];
             return PcmFrames { layout: self.header.layout, channels, bytes };
@@ -199,11 +199,12 @@ impl AlignedInput {
     }
 
     fn decode_with_dropouts(&mut self, frames: usize) {
-        let StreamHeader { layout, channels, .. } = self.header;
+        let StreamHeader { layout, .. } = self.header;
+        let (columns, parts) = (self.header.columns(), self.header.parts());
         let bytes = &self.block.bytes[self.used..self.used + frames * self.header.frame_bytes()];
         self.numbers.clear();
         for (index, sample) in bytes.chunks_exact(layout.container).enumerate() {
-            let invalid = self.dropouts.covers(index % channels);
+            let invalid = self.dropouts.covers(index % columns / parts);
             let value = if invalid { f64::NAN } else { layout.format.decode(sample) };
             self.numbers.extend(value.to_le_bytes());
         }
@@ -226,7 +227,7 @@ mod tests {
         dropouts: &[(usize, std::ops::Range<u64>)],
     ) -> AlignedInput {
         let layout = SampleLayout::packed(PcmFormat::S16Be);
-        let mut input = AlignedInput::new(StreamHeader { layout, channels, rate: None, promised: None });
+        let mut input = AlignedInput::new(StreamHeader::real(layout, channels));
         let dropout = |(channel, frames): &(usize, std::ops::Range<u64>)| Dropout {
             channel: Some(*channel),
             frames: frames.clone(),

@@ -93,6 +93,34 @@ pub enum IoError {
         /// What is wrong, and the remedy.
         problem: String,
     },
+    /// A file that is not of its kind, or holds no samples.
+    #[error("{file}: not {kind} that can be read: {problem}")]
+    Malformed {
+        /// Name of the file.
+        file: String,
+        /// What its name says that it is, with its article.
+        kind: &'static str,
+        /// Place, reason and remedy.
+        problem: String,
+    },
+    /// An input lacks the channel that was chosen.
+    #[error("--channel {channel}: {file} has {channels} channels, counted from 1")]
+    NoChannel {
+        /// Name of the input.
+        file: String,
+        /// The channel, from 1.
+        channel: usize,
+        /// Channels of the input.
+        channels: usize,
+    },
+    /// Some inputs are complex and some are real.
+    #[error("{complex} holds complex samples and {real} real ones; give all channels in one of the two ways")]
+    SomeComplex {
+        /// Name of a complex input.
+        complex: String,
+        /// Name of a real input.
+        real: String,
+    },
     /// An input in which converters take turns has more than one channel.
     #[error(
         "{file}: {channels} channels, but converters that take turns share one; read it without --interleaved, or \
@@ -137,6 +165,15 @@ impl IoError {
     pub fn system(file: &str, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         let file = file.to_owned();
         move |source| Self::System { file, action, source }
+    }
+
+    /// An error of reading samples, which may hold one of these errors; for use with `map_err`.
+    pub(super) fn reading(file: &str) -> impl FnOnce(io::Error) -> Self {
+        let file = file.to_owned();
+        move |error| match error.downcast::<Self>() {
+            Ok(error) => error,
+            Err(source) => Self::System { file, action: "read the samples", source },
+        }
     }
 
     /// True if the reader of a pipe went away, which ends a stream quietly.

@@ -1,7 +1,10 @@
 //! The thread of an input: opens it, sends its header, and passes its frames on.
 
+use super::csv::CsvReader;
+use super::kind::Kind;
+use super::npy::{NpyHeader, PlanarReader};
 use super::pipe::{stdin_file, widen_pipe};
-use super::sigmf::{SigmfMeta, file_pair, is_sigmf};
+use super::sigmf::{SigmfMeta, file_pair};
 use super::timestamps::Timestamps;
 use super::wav::WavReader;
 use super::{Coding, FrameReader, InputFault, IoError, PcmFormat, SampleLayout, StreamHeader, Turns};
@@ -19,6 +22,8 @@ pub(super) struct InputSource {
     pub(super) channels: usize,
     /// The converters that take turns in the input, if they do.
     pub(super) turns: Option<Turns>,
+    /// The only channel to read, from 0.
+    pub(super) only: Option<usize>,
     /// Bytes of a block.
     pub(super) block: usize,
 }
@@ -41,10 +46,21 @@ impl InputSource {
 
     /// Raw samples in the coding's format.
     pub(super) fn raw_header(&self) -> StreamHeader {
-        let format = if let Coding::Raw(format) = self.coding { format } else { PcmFormat::F32Le };
-        let layout = SampleLayout::packed(format);
+        let layout = SampleLayout::packed(self.coding.format().unwrap_or(PcmFormat::F32Le));
         let channels = self.turns.as_ref().map_or(self.channels, Turns::converters);
-        StreamHeader { layout, channels, rate: None, promised: None }
+        StreamHeader { is_complex: self.coding.is_complex(), ..StreamHeader::real(layout, channels) }
+    }
+
+    /// As the consumer sees an input that states `header`: converters that take turns as channels, or the only
+    /// channel that is read.
+    pub(super) fn chosen(&self, header: StreamHeader) -> Result<StreamHeader, IoError> {
+        match self.only {
+            None => self.in_turns(header),
+            Some(only) if only < header.channels => Ok(StreamHeader { channels: 1, ..header }),
+            Some(only) => {
+                Err(IoError::NoChannel { file: self.name(), channel: only + 1, channels: header.channels })
+            }
+        }
     }
 
     /// Samples in a row that belong to one frame.
@@ -60,16 +76,25 @@ impl InputSource {
         }
         let converters = turns.converters();
         Ok(StreamHeader {
-            layout: header.layout,
             channels: converters,
             rate: header.rate.map(|rate| rate / converters as f64),
             promised: header.promised.map(|samples| samples / converters as u64),
+            ..header
         })
     }
 
-    /// Puts the samples of whole frames into the order of the channels.
-    pub(super) fn reorder(&self, frames: &mut [u8], layout: SampleLayout) {
-        self.turns.iter().for_each(|turns| turns.reorder(frames, layout.container));
+    /// Puts the samples of whole frames, which are those of `header`, into the order of the channels, or keeps
+    /// those of the only one. Gives the bytes that remain.
+    pub(super) fn arrange(&self, frames: &mut [u8], header: &StreamHeader) -> usize {
+        let sample = header.layout.container * header.parts();
+        self.turns.iter().for_each(|turns| turns.reorder(frames, sample));
+        let Some(only) = self.only.filter(|_| header.channels > 1) else { return frames.len() };
+        let count = frames.len() / header.frame_bytes();
+        for k in 0..count {
+            let from = k * header.frame_bytes() + only * sample;
+            frames.copy_within(from..from + sample, k * sample);
+        }
+        count * sample
     }
 
     pub(super) fn is_stdin(&self) -> bool {
@@ -80,10 +105,12 @@ impl InputSource {
 /// Reads until the end, or until the receiver is dropped. Blocks to fill come from `pool`.
 pub(super) fn read(source: InputSource, messages: Sender<Result<Message, IoError>>, pool: Receiver<Vec<u8>>) {
     let reader = Reader { name: source.name(), source, messages, pool };
-    let end = match reader.source.coding {
-        _ if is_sigmf(&reader.source.path) => reader.read_sigmf(),
-        Coding::Raw(_) => reader.read_raw(),
-        Coding::Wav => reader.read_wav(),
+    let end = match Kind::of(&reader.source.path, reader.source.coding) {
+        Kind::Sigmf => reader.read_sigmf(),
+        Kind::Csv => reader.read_csv(),
+        Kind::Npy => reader.read_npy(),
+        Kind::Raw => reader.read_raw(),
+        Kind::Wav => reader.read_wav(),
     };
     // If the receiver is gone, the message is not needed.
     let _ = reader.messages.send(end);
@@ -109,7 +136,8 @@ impl Reader {
     fn read_raw(&self) -> Result<Message, IoError> {
         let header = self.source.raw_header();
         // Sent before opening, which may have to wait for a writer.
-        self.send_header(header, Timestamps::default());
+        let chosen = if self.source.only.is_some() { self.source.chosen(header)? } else { header };
+        self.send_header(chosen, Timestamps::default());
         self.send_raw_frames(self.open()?, header)
     }
 
@@ -118,11 +146,45 @@ impl Reader {
         let wav = reader.header();
         let promised = wav.data_bytes.map(|bytes| bytes / wav.frame_bytes() as u64);
         let rate = Some(f64::from(wav.rate));
-        let header = StreamHeader { layout: wav.layout, channels: wav.channels, rate, promised };
-        self.send_header(self.source.in_turns(header)?, Timestamps::default());
+        let header = StreamHeader { rate, promised, ..StreamHeader::real(wav.layout, wav.channels) };
+        self.send_header(self.source.chosen(header)?, Timestamps::default());
         reader.frames().group(self.source.turn());
-        self.send_frames(reader.frames(), header.layout)?;
+        self.send_frames(reader.frames(), header)?;
         Ok(Message::End { faults: reader.faults() })
+    }
+
+    fn read_csv(&self) -> Result<Message, IoError> {
+        let reader = CsvReader::new(self.open()?, &self.name)?;
+        let header = reader.stream_header();
+        self.send_header(self.source.chosen(header)?, Timestamps::default());
+        self.send_turns(FrameReader::new(reader, header.frame_bytes(), None), header)
+    }
+
+    fn read_npy(&self) -> Result<Message, IoError> {
+        let mut file = open_file(&self.source.path)?;
+        let array = NpyHeader::read(&mut file, &self.name)?;
+        let header = array.stream_header();
+        let chosen = self.source.chosen(header)?;
+        let (frame, bytes) = (header.frame_bytes(), array.data_bytes());
+        let reader: Box<dyn Read> = match array.is_planar {
+            true => Box::new(PlanarReader::new(file, array, &self.name)?),
+            false => Box::new(file),
+        };
+        self.send_header(chosen, Timestamps::default());
+        self.send_turns(FrameReader::new(reader, frame, Some(bytes)), header)
+    }
+
+    /// Sends frames of one channel or more, or turns.
+    fn send_turns(
+        &self,
+        mut frames: FrameReader<impl Read>,
+        header: StreamHeader,
+    ) -> Result<Message, IoError> {
+        frames.group(self.source.turn());
+        self.send_frames(&mut frames, header)?;
+        let missing_bytes = frames.missing_bytes();
+        let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
+        Ok(Message::End { faults: truncated.into_iter().chain(cut_frame(frames.cut_bytes())).collect() })
     }
 
     fn read_sigmf(&self) -> Result<Message, IoError> {
@@ -131,19 +193,20 @@ impl Reader {
         let meta_name = meta_path.display().to_string();
         let (_, data_path) = file_pair(&self.source.path, Some(&meta));
         let file = open_file(&data_path)?;
+        let layout = SampleLayout::packed(meta.format(&meta_name)?);
         let header = StreamHeader {
-            layout: SampleLayout::packed(meta.format(&meta_name)?),
-            channels: meta.global.num_channels.unwrap_or(1),
+            is_complex: meta.is_complex(),
             rate: meta.global.sample_rate,
-            promised: None,
+            ..StreamHeader::real(layout, meta.global.num_channels.unwrap_or(1))
         };
         let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
         let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
-        let header = self.source.in_turns(StreamHeader { promised, ..header })?;
+        let header = StreamHeader { promised, ..header };
+        let chosen = self.source.chosen(header)?;
         let broken = |problem| IoError::Sigmf { file: meta_name.clone(), problem };
         let timestamps = meta.timestamps(&meta_name)?.in_turns(self.source.turn()).map_err(broken)?;
-        self.send_header(header, timestamps);
-        self.send_raw_frames(file, header)
+        self.send_header(chosen, timestamps);
+        self.send_turns(FrameReader::new(file, header.frame_bytes(), None), header)
     }
 
     fn send_header(&self, header: StreamHeader, timestamps: Timestamps) {
@@ -152,17 +215,16 @@ impl Reader {
 
     fn send_raw_frames(&self, bytes: impl Read, header: StreamHeader) -> Result<Message, IoError> {
         let mut frames = FrameReader::new(bytes, header.frame_bytes(), None);
-        self.send_frames(&mut frames, header.layout)?;
+        self.send_frames(&mut frames, header)?;
         Ok(Message::End { faults: cut_frame(frames.cut_bytes()) })
     }
 
     /// Sends frames to the consumer until the end, or until the consumer is gone.
-    fn send_frames(&self, frames: &mut FrameReader<impl Read>, layout: SampleLayout) -> Result<(), IoError> {
+    fn send_frames(&self, frames: &mut FrameReader<impl Read>, header: StreamHeader) -> Result<(), IoError> {
         while let Ok(mut bytes) = self.pool.recv() {
             bytes.resize(self.source.block.max(frames.frame_bytes()), 0);
-            let filled =
-                frames.take_ready(&mut bytes).map_err(IoError::system(&self.name, "read the samples"))?;
-            self.source.reorder(&mut bytes[..filled], layout);
+            let filled = frames.take_ready(&mut bytes).map_err(IoError::reading(&self.name))?;
+            let filled = self.source.arrange(&mut bytes[..filled], &header);
             if filled == 0 || self.messages.send(Ok(Message::Frames { bytes, filled })).is_err() {
                 break;
             }

@@ -1,18 +1,21 @@
-//! Input and output of samples: WAV, SigMF, raw PCM, and lists of lost samples.
+//! Input and output of samples: WAV, SigMF, tables, NumPy arrays, raw PCM, and lists of lost samples.
 //!
 //! A *frame* holds one sample of each channel of a file or stream. A sample is stored in one of the
 //! [`PcmFormat`]s; the full scale of integer formats is 1.0.
 
 mod aligned_input;
+mod csv;
 mod dropouts;
 mod error;
 mod fault;
 mod frames;
 mod input;
 mod input_thread;
+mod kind;
 mod live_lost;
 mod lost;
 mod multi_reader;
+mod npy;
 mod pipe;
 mod read_options;
 mod sample_writer;
@@ -26,15 +29,18 @@ mod turns;
 pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
+pub use csv::CsvReader;
 pub use error::IoError;
 pub use fault::{InputFault, InputWarning};
 pub use frames::FrameReader;
+pub use kind::is_self_describing;
 pub use live_lost::LiveLost;
 pub use lost::LostSamples;
 pub use multi_reader::{Arrival, MultiReader};
+pub use npy::NpyHeader;
 pub use pipe::{Stdout, Watched, is_output_stalled, is_pipe, stderr, stdout};
 pub use read_options::{BLOCK_BYTES, ReadOptions, Until};
-pub use sample_writer::{Container, SampleWriter};
+pub use sample_writer::{Container, OutputHeader, SampleWriter};
 pub use sigmf::{SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
 pub use stall::{Stall, StallWatch};
 pub use stream_header::{Coding, StreamHeader};

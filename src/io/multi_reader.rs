@@ -62,13 +62,13 @@ impl MultiReader {
         stop: Receiver<()>,
     ) -> Result<Option<Self>, IoError> {
         refuse_shared_pipes(paths)?;
-        let channels = if paths.len() == 1 { options.channels } else { 1 };
         let block = (ALL_BYTES / BLOCKS / paths.len().max(1)).min(options.block_bytes).max(4096);
         let turns = options.turns.filter(|_| paths.len() == 1);
         let source = |path: &PathBuf| InputSource {
             path: path.clone(),
             coding: options.coding,
-            channels,
+            channels: options.channels,
+            only: options.only,
             turns: turns.cloned(),
             block,
         };
@@ -85,6 +85,7 @@ impl MultiReader {
                 return Ok(None);
             }
         }
+        reader.refuse_some_complex()?;
         reader.align(lost)?;
         Ok(Some(reader))
     }
@@ -92,6 +93,11 @@ impl MultiReader {
     /// N, the channels of all inputs together.
     pub fn channels(&self) -> usize {
         self.headers().map(|(_, header)| header.channels).sum()
+    }
+
+    /// True if the samples are complex; then each part is a channel of [`MultiReader::frames`].
+    pub fn is_complex(&self) -> bool {
+        self.headers().any(|(_, header)| header.is_complex)
     }
 
     /// Name and header of each input.
@@ -197,6 +203,16 @@ impl MultiReader {
             }
         }
         Ok(())
+    }
+
+    fn refuse_some_complex(&self) -> Result<(), IoError> {
+        let find = |is_complex| self.headers().find(move |(_, header)| header.is_complex == is_complex);
+        match (find(true), find(false)) {
+            (Some((complex, _)), Some((real, _))) => {
+                Err(IoError::SomeComplex { complex: complex.to_owned(), real: real.to_owned() })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// One time axis for all inputs.

@@ -20,10 +20,12 @@ pub enum Until {
 /// Settings of the reading.
 #[derive(Debug, Clone, Copy)]
 pub struct ReadOptions<'a> {
-    /// Coding of all inputs except SigMF recordings.
+    /// Coding of all inputs except [those that state it](super::is_self_describing).
     pub coding: Coding,
-    /// Channels of a raw input, if it is the only one; several have one each.
+    /// Channels of each raw input.
     pub channels: usize,
+    /// The only channel to read of each input, from 0.
+    pub only: Option<usize>,
     /// The converters that take turns in the only input, which has one channel then. Its frames are those of
     /// an input of M channels, at an M-th of its rate.
     pub turns: Option<&'a Turns>,
@@ -48,6 +50,7 @@ impl ReadOptions<'_> {
         Self {
             coding: Coding::Wav,
             channels: 1,
+            only: None,
             turns: None,
             lost: None,
             live_lost: None,

@@ -16,6 +16,19 @@ pub enum Container {
     Raw,
 }
 
+/// What an output holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutputHeader {
+    /// The container; a SigMF recording is one by its name.
+    pub container: Container,
+    /// Format of the numbers.
+    pub format: PcmFormat,
+    /// Each sample is two numbers. In WAV these are two channels.
+    pub is_complex: bool,
+    /// Hertz.
+    pub rate: f64,
+}
+
 /// The open destination.
 enum Target {
     Wav(WavFile<AtomicFile>),
@@ -37,34 +50,30 @@ pub struct SampleWriter {
 }
 
 impl SampleWriter {
-    /// Begins an output at `rate` hertz. `-` is standard output. There and in a FIFO, which waits for its
+    /// Begins an output. `-` is standard output. There and in a FIFO, which waits for its
     /// reader, a WAV header states no length. A name that ends in sigmf-meta is a SigMF recording. `replace`
     /// allows files to be replaced.
     ///
     /// # Errors
     /// [`IoError`] for files that exist or cannot be created, for samples or rates that WAV cannot hold,
     /// and for a standard output that is a terminal.
-    pub fn create(
-        path: &Path,
-        container: Container,
-        format: PcmFormat,
-        rate: f64,
-        replace: bool,
-    ) -> Result<Self, IoError> {
+    pub fn create(path: &Path, header: OutputHeader, replace: bool) -> Result<Self, IoError> {
+        let OutputHeader { container, format, is_complex, rate } = header;
+        let channels = if is_complex { 2 } else { 1 };
         let to_stdout = path.as_os_str() == "-";
         let is_stream = to_stdout || is_fifo(path);
         let name = if to_stdout { "standard output".into() } else { path.display().to_string() };
         let refused = || IoError::system(&name, "write it");
         let target = match container {
-            _ if is_sigmf_meta(path) => sigmf_target(path, format, rate, replace)?,
+            _ if is_sigmf_meta(path) => sigmf_target(path, header, replace)?,
             Container::Wav if is_stream => {
-                let header = stream_header(format, 1, wav_rate(&name, rate)?).map_err(refused())?;
+                let header = stream_header(format, channels, wav_rate(&name, rate)?).map_err(refused())?;
                 stream_target(path, &header).map_err(refused())?
             }
             Container::Wav => {
                 let rate = wav_rate(&name, rate)?;
                 let file = AtomicFile::create(path, replace)?;
-                Target::Wav(WavFile::new(file, format, 1, rate).map_err(refused())?)
+                Target::Wav(WavFile::new(file, format, channels, rate).map_err(refused())?)
             }
             Container::Raw if is_stream => stream_target(path, &[]).map_err(refused())?,
             Container::Raw => Target::Raw(AtomicFile::create(path, replace)?),
@@ -123,10 +132,11 @@ fn is_sigmf_meta(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "sigmf-meta")
 }
 
-fn sigmf_target(path: &Path, format: PcmFormat, rate: f64, replace: bool) -> Result<Target, IoError> {
+fn sigmf_target(path: &Path, header: OutputHeader, replace: bool) -> Result<Target, IoError> {
     let meta = AtomicFile::create(path, replace)?;
     let data = AtomicFile::create(&path.with_extension("sigmf-data"), replace)?;
-    let text = serde_json::to_string_pretty(&SigmfMeta::for_output(format, rate));
+    let OutputHeader { format, is_complex, rate, .. } = header;
+    let text = serde_json::to_string_pretty(&SigmfMeta::for_output(format, is_complex, rate));
     let fault = |error: serde_json::Error| IoError::Sigmf {
         file: path.display().to_string(),
         problem: error.to_string(),

@@ -1,6 +1,6 @@
 //! The metadata file of SigMF recordings, which accompanies a file of raw samples.
 //!
-//! Real samples only, one or several interleaved channels. If `core:global_index` increases by more than
+//! Real or complex samples, one or several interleaved channels. If `core:global_index` increases by more than
 //! `core:sample_start` between captures, samples were lost.
 
 use super::timestamps::{Timestamp, Timestamps};
@@ -76,8 +76,8 @@ fn is_zero(count: &u64) -> bool {
 
 impl SigmfMeta {
     /// One channel of fast samples.
-    pub fn for_output(format: PcmFormat, rate: f64) -> Self {
-        let datatype = format!("r{}", datatype(format));
+    pub fn for_output(format: PcmFormat, is_complex: bool, rate: f64) -> Self {
+        let datatype = format!("{}{}", if is_complex { 'c' } else { 'r' }, datatype(format));
         Self {
             global: SigmfGlobal {
                 datatype,
@@ -125,21 +125,26 @@ impl SigmfMeta {
         }
     }
 
-    /// The sample format of the data type.
+    /// The format of the numbers of the data type.
     ///
     /// # Errors
-    /// [`IoError::Sigmf`] for complex samples and types that no [`PcmFormat`] covers.
+    /// [`IoError::Sigmf`] for types that no [`PcmFormat`] covers.
     pub fn format(&self, file: &str) -> Result<PcmFormat, IoError> {
         PcmFormat::ALL
             .into_iter()
-            .find(|&format| self.global.datatype.strip_prefix('r') == Some(datatype(format).as_str()))
+            .find(|&format| self.global.datatype.strip_prefix(['r', 'c']) == Some(datatype(format).as_str()))
             .ok_or_else(|| IoError::Sigmf {
                 file: file.to_owned(),
                 problem: format!(
-                    "core:datatype is {}; use real samples: ri8, ru8, ri16_le, ri32_le, rf32_le, rf64_le or their _be forms",
+                    "core:datatype is {}; use ri8, ru8, ri16_le, ri32_le, rf32_le, rf64_le, their _be forms, or complex ones (cf32_le)",
                     self.global.datatype
                 ),
             })
+    }
+
+    /// True if each sample is two numbers of the [format](Self::format).
+    pub fn is_complex(&self) -> bool {
+        self.global.datatype.starts_with('c')
     }
 
     /// When the frames of the sample file were taken.
@@ -210,7 +215,7 @@ mod tests {
     fn meta(datatype: &str, captures: &[(u64, Option<u64>)]) -> SigmfMeta {
         let capture =
             |&(sample_start, global_index): &_| SigmfCapture { sample_start, global_index, header_bytes: 0 };
-        let mut meta = SigmfMeta::for_output(PcmFormat::F32Le, 1.0);
+        let mut meta = SigmfMeta::for_output(PcmFormat::F32Le, false, 1.0);
         meta.global.datatype = datatype.into();
         SigmfMeta { captures: captures.iter().map(capture).collect(), ..meta }
     }
@@ -226,8 +231,10 @@ mod tests {
         for (name, format) in want.into_iter().zip(PcmFormat::ALL) {
             assert_eq!(meta(name, &[]).format("test").unwrap(), format);
         }
-        let error = meta("cf32_le", &[]).format("test").unwrap_err().to_string();
-        assert!(error.contains("cf32_le") && error.contains("real samples"), "{error}");
+        let complex = meta("cf32_le", &[]);
+        assert!(complex.is_complex() && complex.format("test").unwrap() == PcmFormat::F32Le);
+        let error = meta("xf32_le", &[]).format("test").unwrap_err().to_string();
+        assert!(error.contains("xf32_le") && error.contains("ri16_le"), "{error}");
     }
 
     #[test]

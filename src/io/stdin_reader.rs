@@ -22,6 +22,9 @@ pub(super) struct StdinReader {
     source: InputSource,
     pipe: File,
     frames: FrameReader<File>,
+    /// As the samples come.
+    raw: StreamHeader,
+    /// As the consumer sees them.
     pub(super) header: StreamHeader,
     spare: Vec<u8>,
 }
@@ -35,9 +38,10 @@ impl StdinReader {
         let name = source.name();
         let refused = || IoError::system(&name, "open it");
         let pipe = stdin_file().map_err(refused())?;
-        let header = source.raw_header();
-        let frames = FrameReader::new(pipe.try_clone().map_err(refused())?, header.frame_bytes(), None);
-        Ok(Self { pipe, frames, header, source: source.clone(), spare: Vec::new(), name })
+        let raw = source.raw_header();
+        let header = if source.only.is_some() { source.chosen(raw)? } else { raw };
+        let frames = FrameReader::new(pipe.try_clone().map_err(refused())?, raw.frame_bytes(), None);
+        Ok(Self { pipe, frames, raw, header, source: source.clone(), spare: Vec::new(), name })
     }
 
     /// Waits for whole frames or the end; `None` if a stop was requested first.
@@ -63,7 +67,7 @@ impl StdinReader {
             let got = self.frames.read_whole(&mut bytes);
             let filled = got.map_err(self.refused())?;
             if filled > 0 {
-                self.source.reorder(&mut bytes[..filled], self.header.layout);
+                let filled = self.source.arrange(&mut bytes[..filled], &self.raw);
                 return Ok(Some(Message::Frames { bytes, filled }));
             }
         }

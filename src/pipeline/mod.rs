@@ -10,6 +10,7 @@
 //! [`run`] processes all frames of a [`MultiReader`](crate::io::MultiReader). The result is an [`Outcome`]
 //! with counts and [`Warning`]s; nothing is printed. [`fuse`] does the same with a signal that is in memory.
 
+mod complex;
 mod error;
 mod gap;
 mod gaps;
@@ -18,6 +19,7 @@ mod outcome;
 mod outputs;
 mod run;
 mod stage;
+mod streams;
 mod touch;
 mod whole;
 
@@ -27,5 +29,5 @@ pub use gaps::{GapFiller, GapPolicy};
 pub use outcome::{GapSummary, Outcome, Warning};
 pub use outputs::{Block, FileOutputs, Output};
 pub use run::{Ending, run};
-pub use stage::{Pipeline, Settings};
+pub use streams::{Pipeline, Settings};
 pub use whole::{Whole, WholeSettings, fuse};

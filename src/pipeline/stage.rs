@@ -6,38 +6,19 @@ use crate::bank::Bank;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::runtime::{PcmOutput, Plan, ProcessError, Stream, ThreadPool};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Maximum size of the encoded output of one step, for one thread.
 const STEP_BYTES: usize = 256 << 10;
 /// Number of zero frames per step of a flush.
 const FLUSH_FRAMES: usize = 256;
 
-/// Settings of a pipeline.
-#[derive(Debug)]
-pub struct Settings {
-    /// Format of the output samples.
-    pub format: PcmFormat,
-    /// Number of output samples that are dropped at the beginning.
-    pub skip: u64,
-    /// Replacement of missing samples. With `None` the runtime replaces NaN and infinity by 0.
-    pub gaps: Option<GapPolicy>,
-    /// Threads for filtering; `None` uses the calling thread.
-    pub workers: Option<ThreadPool>,
-}
-
-impl Settings {
-    /// Settings that only encode the output: no gaps, no latency skip, no threads.
-    pub fn plain(format: PcmFormat) -> Self {
-        Self { format, skip: 0, gaps: None, workers: None }
-    }
-}
-
 /// Runs one stream: fills gaps, filters, drops the latency and counts.
 #[derive(Debug)]
-pub struct Pipeline {
+pub(super) struct RealPipeline {
     stream: Stream,
     gaps: Option<(GapFiller, MaskDelay)>,
-    workers: Option<ThreadPool>,
+    workers: Option<Arc<ThreadPool>>,
     format: PcmFormat,
     step_bytes: usize,
     /// Output samples still to be dropped.
@@ -49,13 +30,19 @@ pub struct Pipeline {
     offsets: Vec<f64>,
 }
 
-impl Pipeline {
+impl RealPipeline {
     /// A new stream of `plan`, which must be the plan of `bank`.
     ///
     /// # Errors
     /// [`PipelineError::Build`] for a bank without outputs or inputs whose gaps are to be filled.
-    pub fn new(bank: &Bank, plan: &Plan, settings: Settings) -> Result<Self, PipelineError> {
-        let Settings { format, skip, gaps, workers } = settings;
+    pub(super) fn new(
+        bank: &Bank,
+        plan: &Plan,
+        format: PcmFormat,
+        skip: u64,
+        gaps: Option<GapPolicy>,
+        workers: Option<Arc<ThreadPool>>,
+    ) -> Result<Self, PipelineError> {
         let filler = gaps.map(|policy| GapFiller::new(bank, policy)).transpose()?;
         let delay = MaskDelay::new(plan.extra_latency());
         Ok(Self {
@@ -73,33 +60,38 @@ impl Pipeline {
         })
     }
 
-    /// The stream, with the latency and the counts of the runtime.
-    pub fn stream(&self) -> &Stream {
-        &self.stream
+    /// The plan.
+    pub(super) fn plan(&self) -> &Plan {
+        self.stream.plan()
+    }
+
+    /// The format of the output.
+    pub(super) fn format(&self) -> PcmFormat {
+        self.format
     }
 
     /// Output samples so far.
-    pub fn samples(&self) -> u64 {
+    pub(super) fn samples(&self) -> u64 {
         self.samples
     }
 
     /// Output samples that saturated so far.
-    pub fn clipped(&self) -> u64 {
+    pub(super) fn clipped(&self) -> u64 {
         self.clipped
     }
 
     /// Input samples so far that were NaN or infinite and became 0.
-    pub fn replaced(&self) -> u64 {
+    pub(super) fn replaced(&self) -> u64 {
         self.stream.replaced()
     }
 
     /// The gaps that have ended, as in [`GapFiller::gaps`].
-    pub fn gaps(&self) -> &[Gap] {
+    pub(super) fn gaps(&self) -> &[Gap] {
         self.gaps.as_ref().map_or(&[], |(filler, _)| filler.gaps())
     }
 
     /// The gaps that go on.
-    pub fn open_gaps(&self) -> impl Iterator<Item = Gap> {
+    pub(super) fn open_gaps(&self) -> impl Iterator<Item = Gap> {
         self.gaps.iter().flat_map(|(filler, _)| filler.open())
     }
 
@@ -107,7 +99,11 @@ impl Pipeline {
     ///
     /// # Errors
     /// [`PipelineError::Process`] if the channels do not match the bank, or the errors of the output.
-    pub fn push(&mut self, parts: &[PcmFrames<'_>], output: &mut impl Output) -> Result<(), PipelineError> {
+    pub(super) fn push(
+        &mut self,
+        parts: &[PcmFrames<'_>],
+        output: &mut impl Output,
+    ) -> Result<(), PipelineError> {
         self.push_at_most(parts, u64::MAX, output)
     }
 
@@ -116,7 +112,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// The errors of the output.
-    pub fn flush(&mut self, samples: u64, output: &mut impl Output) -> Result<(), PipelineError> {
+    pub(super) fn flush(&mut self, samples: u64, output: &mut impl Output) -> Result<(), PipelineError> {
         let layout = SampleLayout::packed(PcmFormat::F64Le);
         let (channels, ratio) = (self.stream.channels(), self.stream.ratio() as u64);
         let silence: Vec<u8> = self.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
@@ -132,7 +128,7 @@ impl Pipeline {
     }
 
     /// Ends the open gaps and returns the outcome.
-    pub fn finish(mut self) -> Outcome {
+    pub(super) fn finish(mut self) -> Outcome {
         let gaps = self.gaps.as_mut().map(|(filler, _)| {
             filler.finish();
             let (count, missing, list) = (filler.total(), filler.missing(), filler.gaps().to_vec());
@@ -150,7 +146,7 @@ impl Pipeline {
         }
     }
 
-    /// As [`Pipeline::push`], with at most `limit` samples coming out.
+    /// As [`RealPipeline::push`], with at most `limit` samples coming out.
     fn push_at_most(
         &mut self,
         parts: &[PcmFrames<'_>],
@@ -183,7 +179,7 @@ impl Pipeline {
         self.buffer.resize(samples * size, 0);
         let mut engine = Engine {
             stream: &mut self.stream,
-            workers: self.workers.as_ref(),
+            workers: self.workers.as_deref(),
             format: self.format,
             clipped: &mut self.clipped,
         };
@@ -294,6 +290,7 @@ fn ranges<'a>(parts: &[PcmFrames<'a>], frames: Range<usize>) -> Vec<PcmFrames<'a
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Pipeline, Settings};
     use super::*;
     use crate::bank::SynthesisFilters;
     use crate::random::Random;

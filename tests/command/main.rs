@@ -15,6 +15,7 @@ mod examples;
 #[cfg(target_os = "linux")]
 mod export;
 mod faults;
+mod formats;
 mod fuse;
 #[cfg(unix)]
 mod live;

@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::wav::WavReader;
-use hybank::io::{LostSamples, SigmfMeta};
+use hybank::io::{CsvReader, LostSamples, NpyHeader, SigmfMeta};
 use hybank::spec::Spec;
 use std::fs;
 use std::path::Path;
@@ -78,6 +78,29 @@ fn sigmf_metadata() {
         answers += usize::from(answered(SigmfMeta::parse(&text, "seed")).is_some());
     });
     assert!((20..rounds(COPIES)).contains(&answers), "{answers}");
+}
+
+#[test]
+fn tables_and_arrays_of_samples() {
+    let (mut answers, mut refusals) = (0, 0);
+    damaged("csv", |bytes| {
+        let Some(mut reader) = answered(CsvReader::new(bytes, "seed")) else { return refusals += 1 };
+        let mut frames = Vec::new();
+        while answered(reader.fill(&mut frames, 3)).is_some() && !frames.is_empty() {
+            assert!(frames.len() <= 3 * reader.channels());
+            answers += 1;
+        }
+    });
+    assert!(answers > 1000 && refusals > 100, "{answers} {refusals}");
+    (answers, refusals) = (0, 0);
+    damaged("npy", |bytes| match answered(NpyHeader::read(&mut &bytes[..], "seed")) {
+        None => refusals += 1,
+        Some(header) => {
+            answers += 1;
+            assert!(header.channels > 0 && header.offset <= bytes.len() as u64);
+        }
+    });
+    assert!(answers > 1000 && refusals > 1000, "{answers} {refusals}");
 }
 
 #[test]

@@ -1,9 +1,11 @@
 //! The captures of all channels in memory.
 
 use super::super::Failure;
+use super::super::capture_args::CaptureArgs;
+use super::super::capture_file::Whole;
 use super::super::interrupt::interrupts;
 use crate::calibrate::Record;
-use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions, Turns};
+use crate::io::{MultiReader, PcmFormat, ReadOptions, Turns};
 use crate::spec::Spec;
 use std::path::PathBuf;
 
@@ -13,6 +15,8 @@ const MOST_SAMPLES: usize = 1 << 26;
 /// How captures are read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reading<'a> {
+    /// Their format.
+    pub(super) captures: CaptureArgs,
     /// The converters that take turns in one file, if they do.
     pub(super) turns: Option<&'a Turns>,
     /// Samples of this size and more are clipped.
@@ -25,43 +29,24 @@ pub(super) fn read(
     spec: &Spec,
     reading: Reading<'_>,
 ) -> Result<(Vec<Record>, Vec<String>), Failure> {
-    let options = ReadOptions { turns: reading.turns, ..ReadOptions::files() };
+    let captures = reading.captures.options(paths.len(), spec.channels.len());
+    let options = ReadOptions { turns: reading.turns, ..captures };
     let reader = MultiReader::start(paths, options, interrupts()).map_err(Failure::input)?;
-    let mut reader = reader.ok_or_else(interrupted)?;
-    let channels = reader.channels();
+    let mut reader = reader.ok_or_else(|| Failure::input("interrupted; nothing was written"))?;
     check_channels(spec, &reader)?;
     check_rate(spec, &reader)?;
-    let most = MOST_SAMPLES / channels.max(1);
-    let mut samples = vec![Vec::new(); channels];
-    let mut formats = vec![None; channels];
-    let mut is_cut = false;
-    loop {
-        match reader.wait().map_err(Failure::input)? {
-            Arrival::Frames(count) => {
-                let room = most - samples.first().map_or(0, Vec::len);
-                let parts = reader.frames();
-                append(&parts, count.min(room), &mut samples, &mut formats);
-                is_cut = room < count;
-                reader.consume(count);
-            }
-            Arrival::End => break,
-            Arrival::Stopped => return Err(interrupted()),
-        }
-        if is_cut {
-            break;
-        }
-    }
+    let most = MOST_SAMPLES / reader.channels().max(1);
+    let headers = reader.headers();
+    let formats = headers.flat_map(|(_, header)| std::iter::repeat_n(header.layout.format, header.channels));
+    let formats: Vec<PcmFormat> = formats.collect();
+    let Whole { channels, is_cut } = Whole::read(&mut reader, most)?;
     let mut warnings: Vec<String> = reader.warnings().iter().map(ToString::to_string).collect();
     if is_cut {
         warnings.push(format!("only the first {most} frames are used"));
     }
-    let records =
-        samples.into_iter().zip(formats).map(|(samples, format)| record(samples, format, reading.clip));
+    let records = channels.into_iter().zip(formats);
+    let records = records.map(|(samples, format)| record(samples, format, reading.clip));
     Ok((records.collect(), warnings))
-}
-
-fn interrupted() -> Failure {
-    Failure::input("interrupted; nothing was written")
 }
 
 fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
@@ -91,32 +76,14 @@ fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     }
 }
 
-fn append(
-    parts: &[PcmFrames<'_>],
-    count: usize,
-    samples: &mut [Vec<f64>],
-    formats: &mut [Option<PcmFormat>],
-) {
-    let mut channel = 0;
-    for part in parts {
-        let (format, container) = (part.layout.format, part.layout.container);
-        for c in 0..part.channels {
-            formats[channel] = Some(format);
-            let frames = part.bytes.chunks_exact(part.frame_bytes()).take(count);
-            samples[channel].extend(frames.map(|frame| format.decode(&frame[c * container..])));
-            channel += 1;
-        }
-    }
-}
-
 /// Integers clip at the ends of their range. Floats within +-1 clip there, or at 1 - q if that is their largest
 /// value and all are multiples of q, a power of two: the steps of a converter.
-fn record(samples: Vec<f64>, format: Option<PcmFormat>, clip: Option<f64>) -> Record {
+fn record(samples: Vec<f64>, format: PcmFormat, clip: Option<f64>) -> Record {
     if let Some(level) = clip {
         return Record::within(samples, -level, level);
     }
     match format {
-        Some(format) if !format.is_float() => {
+        _ if !format.is_float() => {
             let step = 2f64.powi(1 - 8 * format.bytes() as i32);
             Record::within(samples, -1.0, 1.0 - step)
         }
@@ -137,7 +104,7 @@ mod tests {
 
     #[test]
     fn integers_clip_at_the_ends_of_their_range_and_floats_at_one() {
-        let clipped = |samples: &[f64], format, clip| record(samples.to_vec(), Some(format), clip).clipped;
+        let clipped = |samples: &[f64], format, clip| record(samples.to_vec(), format, clip).clipped;
         assert_eq!(clipped(&[-1.0, 0.0, 32767.0 / 32768.0, 0.99], PcmFormat::S16Le, None), 2);
         assert_eq!(clipped(&[-1.0, 0.0, 1.0, 0.99], PcmFormat::F32Le, None), 2);
         assert_eq!(clipped(&[-1.0, 0.0, 2047.0 / 2048.0, 0.5], PcmFormat::F32Le, None), 2);

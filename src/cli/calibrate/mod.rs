@@ -5,7 +5,8 @@ mod report;
 
 use super::Failure;
 use super::bank_file::{is_dash, name, read_text, write_text};
-use super::recordings::read_channel;
+use super::capture_args::CaptureArgs;
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading as FileReading};
 use super::say::name_leftovers;
 use super::turns::TurnArgs;
 use super::understood::say_understood;
@@ -41,7 +42,8 @@ takes their zones from the delays of the spec.")]
 pub(super) struct Args {
     /// The spec (TOML) with the nominal values; `-` is standard input
     spec: PathBuf,
-    /// One mono WAV file or SigMF recording per channel, in the order of the spec, or one of N channels
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, or raw with --format), in the order of the spec,
+    /// or one of N channels
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     /// The calibrated spec; `-` is standard output
@@ -66,6 +68,8 @@ pub(super) struct Args {
     /// Captures of the same converters to check the calibrated spec with, of the same kind of signal
     #[arg(long, value_name = "HOLDOUT", num_args = 1..)]
     check: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: CaptureArgs,
     #[command(flatten)]
     turns: TurnArgs,
     /// Samples of this size and more are clipped and left out [default: the ends of integer formats, 1 for
@@ -112,7 +116,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let settings = args.settings(&spec)?;
     let signal = args.signal(&spec)?;
     let turns = args.turns.by_delay(&spec.delays_in_fast_periods(), spec.ratio, &args.spec)?;
-    let reading = Reading { turns: turns.as_ref(), clip: args.clip };
+    let reading = Reading { captures: args.reading, turns: turns.as_ref(), clip: args.clip };
     let (records, mut warnings) = captures::read(&args.captures, &spec, reading)?;
     let found = run_on(&spec, &records, &signal, settings)?;
     let (calibrated, remarks) = applied(&spec, &found);
@@ -170,6 +174,7 @@ impl Args {
     /// Refuses impossible combinations of options, before any file is read.
     fn check_usage(&self) -> Result<(), Failure> {
         self.turns.check(self.captures.len())?;
+        self.reading.check(self.turns.is_given())?;
         if !self.check.is_empty() {
             self.turns.check(self.check.len())?;
         }
@@ -215,9 +220,9 @@ impl Args {
             return Ok(Signal::Any);
         }
         if let Some(path) = &self.training {
-            let (samples, rate) = read_channel(path, None)?;
+            let reading = FileReading::channel(None, MOST_MEASURED);
+            let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
             // In normalised time the recording's own rate is the fast rate.
-            let rate = Hertz(f64::from(rate));
             let spacing = if spec.is_normalised() {
                 FastPeriods(1.0)
             } else {

@@ -5,7 +5,8 @@ mod report;
 
 use super::Failure;
 use super::bank_file::{is_dash, name, refuse_overlap, write_text};
-use super::capture_file::CaptureFile;
+use super::capture_args::CaptureArgs;
+use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
 use crate::measure::{Comparison, Measurement, Settings, Window, compare, measure};
 use crate::quantity;
 use crate::units::Hertz;
@@ -25,7 +26,7 @@ Examples:
   hybank measure fused.wav --skip 200 --json | jq .sinad_db
   hybank measure fused.wav --ref captures/target.wav")]
 pub(super) struct Args {
-    /// The recording (WAV or SigMF); `-` is standard input
+    /// The recording (WAV, SigMF, .csv, .npy, or raw with --format); `-` is standard input
     file: PathBuf,
     /// Tones of the recording (9kHz, 1.2GHz, or hertz), in any Nyquist zone, to within 0.1 % of the sample
     /// rate; auto: the largest tone [default: auto, or none with --ref]
@@ -46,9 +47,11 @@ pub(super) struct Args {
     /// A recording of the same signal to compare with, of the same rate
     #[arg(long = "ref", value_name = "TARGET")]
     reference: Option<PathBuf>,
-    /// The channel to measure, from 1; a mono recording needs none
-    #[arg(long, value_name = "I")]
-    channel: Option<usize>,
+    #[command(flatten)]
+    reading: CaptureArgs,
+    /// Sample rate of a recording that states none (48kHz, 1GS/s, or hertz)
+    #[arg(long, value_name = "F", value_parser = rate)]
+    rate: Option<Hertz>,
     /// Samples at either end that are not measured, such as those before a filter has settled
     #[arg(long, value_name = "SAMPLES", default_value_t = 0)]
     skip: usize,
@@ -94,6 +97,14 @@ pub(super) enum ToneArg {
     Auto,
     /// The one near a frequency.
     Near(Hertz),
+}
+
+fn rate(text: &str) -> Result<Hertz, String> {
+    match quantity::rate(text) {
+        Ok(rate) if rate.0 > 0.0 => Ok(rate),
+        Ok(rate) => Err(format!("the rate is {rate}; give one above 0")),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 /// Reads `auto` or a frequency above 0.
@@ -146,7 +157,7 @@ struct ReferenceReport {
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
-    let capture = CaptureFile::read(&args.file, args.channel)?.trimmed(&args.file, args.skip)?;
+    let capture = CaptureFile::read(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
     let settings = args.settings(&capture)?;
     let measurement = match args.reference.is_some() && args.tone.is_empty() {
         true => None,
@@ -170,6 +181,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 impl Args {
     /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
+        self.reading.check(false)?;
         if let Some(plot) = &self.plot {
             if is_dash(plot) {
                 let message = "the figures go to standard output; write the plot to a file";
@@ -184,6 +196,10 @@ impl Args {
             }
             _ => Ok(()),
         }
+    }
+
+    fn reading(&self) -> Reading {
+        Reading { options: self.reading.options(1, 1), rate: self.rate, most: MOST_MEASURED }
     }
 
     fn settings(&self, capture: &CaptureFile) -> Result<Settings, Failure> {
@@ -202,7 +218,8 @@ impl Args {
     }
 
     fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
-        let reference = CaptureFile::read(path, None)?.trimmed(path, self.skip)?;
+        let reference =
+            CaptureFile::read(path, Reading::channel(None, MOST_MEASURED))?.trimmed(path, self.skip)?;
         if (reference.rate.0 - capture.rate.0).abs() > 1e-9 * capture.rate.0 {
             return Err(Failure::Input(format!(
                 "{}: the sample rate is {}, but {} has {}; a comparison needs one rate, resample one of them",

@@ -5,8 +5,9 @@ mod converters;
 use self::converters::{CommonReport, ConverterArgs, ConverterReport, Converters};
 use super::Failure;
 use super::bank_file::load_spec_or_bank;
+use super::capture_file::{CaptureFile, Reading};
 use super::folder::write_together;
-use super::recordings::{Mono, begin_recording, read_channel};
+use super::recordings::{Mono, begin_recording};
 use super::say::name_leftovers;
 use super::understood::understood;
 use crate::design::{self, Problem};
@@ -162,8 +163,8 @@ impl Args {
     fn signal(&self, spec: &Spec) -> Result<Analog, Failure> {
         let path = Path::new(&self.source);
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("wav")) {
-            let (samples, rate) = read_channel(path, self.channel.map(usize::from))?;
-            let rate = Hertz(f64::from(rate));
+            let reading = Reading::channel(self.channel.map(usize::from), crate::simulate::MOST_SAMPLES);
+            let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
             // In normalised time the recording's own rate is the fast rate.
             let fast = if spec.is_normalised() { rate } else { spec.fast_period.rate() };
             let recording = Recording::new(&samples, FastPeriods(fast / rate));

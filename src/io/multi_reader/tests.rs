@@ -13,8 +13,15 @@ fn raw(channels: usize) -> ReadOptions<'static> {
 fn reader(
     send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Vec<u8>>) + Send + 'static,
 ) -> MultiReader {
-    let header = InputSource { path: "x".into(), coding: raw(1).coding, channels: 1, turns: None, block: 4 }
-        .raw_header();
+    let header = InputSource {
+        path: "x".into(),
+        coding: raw(1).coding,
+        channels: 1,
+        turns: None,
+        only: None,
+        block: 4,
+    }
+    .raw_header();
     let input = Input::on_thread_of("dying".into(), header, send_all).unwrap();
     let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
     let inputs = vec![input];

@@ -79,7 +79,7 @@ fn a_whole_signal_has_the_bits_of_the_command() {
             let gaps = gap.then_some(GapPolicy::Hold);
             let skip = if keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
             let (want, outcome) =
-                command(&bank, &plan, &both, Settings { format, skip, gaps, workers: None });
+                command(&bank, &plan, &both, Settings { skip, gaps, ..Settings::plain(format) });
             let planes = both.each_ref().map(Vec::as_slice);
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput { format, bytes: &mut bytes, clipped: 0 };

@@ -1,0 +1,34 @@
+//! Which kind of file an input is, by its name.
+
+use super::{Coding, is_sigmf};
+use std::path::Path;
+
+/// A kind of input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Sigmf,
+    Csv,
+    Npy,
+    Raw,
+    Wav,
+}
+
+impl Kind {
+    /// Of an input of this name, which is of this coding if its name says nothing.
+    pub(super) fn of(path: &Path, coding: Coding) -> Self {
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        match extension.map(str::to_ascii_lowercase).as_deref() {
+            _ if is_sigmf(path) => Self::Sigmf,
+            Some("csv") => Self::Csv,
+            Some("npy") => Self::Npy,
+            _ if coding == Coding::Wav => Self::Wav,
+            _ => Self::Raw,
+        }
+    }
+}
+
+/// True for inputs that state their own format and channels whatever the [`Coding`] is: SigMF recordings,
+/// tables and arrays.
+pub fn is_self_describing(path: &Path) -> bool {
+    !matches!(Kind::of(path, Coding::Wav), Kind::Wav | Kind::Raw)
+}
