@@ -122,7 +122,7 @@ fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<State
         rows[index] = (&output * &state, &output * &input);
     }
     // The latest sample ends the period by construction; a remainder below SAME_INSTANT is ignored.
-    debug_assert!(problem.ratio as f64 - now < SAME_INSTANT);
+    assert!(problem.ratio as f64 - now < SAME_INSTANT);
     let width = input.ncols();
     let (c, d): (Vec<Mat>, Vec<Mat>) =
         rows.into_iter().map(|(c, d)| (c, d.resize_horizontally(width, 0.0))).unzip();

@@ -223,14 +223,14 @@ impl DepthMap {
     }
 
     pub(crate) fn from_known((width, height): (usize, usize), data: Vec<f32>, measure: Measure) -> Self {
-        debug_assert_eq!(data.len(), width * height);
+        assert_eq!(data.len(), width * height);
         let offset = if measure == Measure::Disparity { guessed_offset(&data) } else { 0.0 };
         Self { width, height, measure, data, offset, guessed: Vec::new() }
     }
 
     /// A map of the same measure and offset with other values, NaN where unknown.
     pub(crate) fn with_values(&self, (width, height): (usize, usize), data: Vec<f32>) -> Self {
-        debug_assert_eq!(data.len(), width * height);
+        assert_eq!(data.len(), width * height);
         Self { width, height, measure: self.measure, data, offset: self.offset, guessed: Vec::new() }
     }
 }

@@ -150,7 +150,7 @@ impl Image {
 
     /// An image of values whose number is right by construction.
     pub(crate) fn from_values((width, height): (usize, usize), channels: usize, data: Vec<f32>) -> Self {
-        debug_assert_eq!(data.len(), width * height * channels);
+        assert_eq!(data.len(), width * height * channels);
         Self { width, height, channels, data }
     }
 

@@ -88,7 +88,7 @@ impl Covariance {
             (true, false) => uu[(r - n, c - n)],
             _ => 0.0,
         };
-        debug_assert_eq!(uu.shape(), (m, m));
+        assert_eq!(uu.shape(), (m, m));
         let value =
             |(k, &(r, c)): (usize, &(usize, usize))| multiplicity(r, c) * (y[(r, c)] + through(k, (r, c)));
         self.units.iter().enumerate().map(value).collect()

@@ -152,7 +152,7 @@ fn add_toeplitz(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (us
             if j >= j2 { even[(r, j - j2)] + odd[(r, j - j2)] } else { even[(r, j2 - j)] - odd[(r, j2 - j)] };
         matrix[(row, col)] += sum;
     });
-    debug_assert_eq!(data.nrows(), n * n);
+    assert_eq!(data.nrows(), n * n);
 }
 
 fn add_hankel(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (usize, usize), data: &Mat) {

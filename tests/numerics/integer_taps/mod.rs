@@ -77,7 +77,7 @@ fn outcome(spec: &Spec, bits: u32) -> Outcome {
 
 #[test]
 fn small_banks_are_within_a_tenth_of_a_decibel_of_all_integers() {
-    let cases = wanted("HYBANK_INTEGER_CASES", 16);
+    let cases = wanted("HYBANK_INTEGER_CASES", 8);
     let all = each(cases, |number| {
         let (spec, bits) = case(number);
         outcome(&spec, bits)
