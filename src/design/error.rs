@@ -161,9 +161,9 @@ pub enum DesignError {
     },
     /// No tap sees a sample that has to do with the reference.
     #[error(
-        "at latency {latency} the {taps} taps per channel see no samples that tell anything of the output: latencies \
-         {shortest} to {longest} suit them; choose one of these, leave the latency out to have the best one chosen, \
-         or give more taps"
+        "at latency {latency} filters of length {taps} (taps per channel) see no sample that has to do with the output: they \
+         suit latencies from {shortest} to {longest}; choose one of these, leave the latency out to have the best one \
+         chosen, or give more taps"
     )]
     OutOfReach {
         /// m0, fast samples.
