@@ -19,6 +19,7 @@ const EXAMPLES: &str = "Examples:
   hybank-ibr render scene.toml -o middle.png
   hybank-ibr render scene.toml --view centre -o centre.png --truth centre-photo.png
   hybank-ibr render scene.toml --depth-step 6 -o sparse.png --json
+  hybank-ibr bound scene.toml --map error.png
   hybank-ibr demo -o demo.png
 
 Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
@@ -27,6 +28,8 @@ Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 pub(super) enum Command {
     /// Render the virtual view of a scene.
     Render(Box<RenderArguments>),
+    /// Predict the error of the virtual view without a photograph of it, and what to spend on next.
+    Bound(BoundArguments),
     /// Render a synthetic scene with exact depth, compare the result with the exact view, and write a
     /// contact sheet.
     Demo(DemoArguments),
@@ -136,6 +139,55 @@ pub(super) struct RenderArguments {
     pub(super) reverse_order: bool,
     /// Most pixels of the virtual view, and of each image and map. A rendering takes up to 64 bytes of
     /// memory per pixel.
+    #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
+    pub(super) max_pixels: usize,
+    /// Number of threads [default: all cores]. The result has the same bits for every number.
+    #[arg(long, value_name = "N")]
+    pub(super) threads: Option<usize>,
+}
+
+const BOUND_EXAMPLES: &str = "Examples:
+  hybank-ibr bound scene.toml
+      prints how large the error of the virtual view will be, and its causes
+  hybank-ibr bound scene.toml --map error.png --truth photo.png
+      also writes where the error is, and compares the prediction with a photograph
+
+Three figures, in grey levels:
+  sure       the mean error is not larger, while slopes and residuals are those of the samples
+  expected   root mean square error, a bound of the expected mean error
+  estimate   mean absolute error, calibrated by leaving out each view in turn
+Scenes of rectified rigs only; the view is the one that `render --method rows` gives.";
+
+#[derive(Debug, Args)]
+#[command(after_help = BOUND_EXAMPLES)]
+pub(super) struct BoundArguments {
+    /// Scene file (TOML); `-` is standard input.
+    pub(super) scene: PathBuf,
+    /// Leave this view out and predict the error of its place.
+    #[arg(long, value_name = "NAME")]
+    pub(super) view: Option<String>,
+    /// Use only every K-th value of full depth maps, in rows and columns.
+    #[arg(long, value_name = "K", default_value_t = 1)]
+    pub(super) depth_step: usize,
+    /// Photograph of the virtual view, to compare the prediction with.
+    #[arg(long, value_name = "FILE")]
+    pub(super) truth: Option<PathBuf>,
+    /// Write the estimate of every pixel as an image: black is no error, white the largest.
+    #[arg(long, value_name = "FILE")]
+    pub(super) map: Option<PathBuf>,
+    /// Offset added to every column of the virtual view, in pixels; overrides that of the scene.
+    #[arg(long, value_name = "PX", allow_hyphen_values = true)]
+    pub(super) offset: Option<f64>,
+    /// Use the brightness of every view as it is, instead of giving all the exposure of the first.
+    #[arg(long)]
+    pub(super) keep_exposure: bool,
+    /// Print the results as one JSON object, with the figures of each row.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Most pixels of the virtual view, and of each image and map.
     #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
     pub(super) max_pixels: usize,
     /// Number of threads [default: all cores]. The result has the same bits for every number.

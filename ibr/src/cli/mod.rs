@@ -1,9 +1,11 @@
 //! The command line of `hybank-ibr`, and the only module that prints.
 
 mod arguments;
+mod bound;
 mod contact;
 mod demo;
 mod failure;
+mod heat;
 mod output;
 mod progress;
 mod render;
@@ -26,6 +28,7 @@ pub fn run() -> ExitCode {
     };
     let outcome = match arguments.command {
         Command::Render(arguments) => in_pool(arguments.threads, || render::run(&arguments)),
+        Command::Bound(arguments) => in_pool(arguments.threads, || bound::run(&arguments)),
         Command::Demo(arguments) => in_pool(arguments.threads, || demo::run(&arguments)),
     };
     match outcome {

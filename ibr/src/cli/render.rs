@@ -149,17 +149,21 @@ fn truth(arguments: &RenderArguments) -> Result<Option<Image>, Failure> {
     arguments.truth.as_deref().map(read).transpose().map_err(Failure::input)
 }
 
-fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
-    let (path, text) = if output::is_standard(&arguments.scene) {
+/// The name and the text of a scene file, `-` for standard input.
+pub(super) fn scene_text(path: &Path) -> Result<(PathBuf, String), Failure> {
+    if output::is_standard(path) {
         let text = files::text(std::io::stdin().lock())
             .map_err(|e| Failure::Input(format!("standard input: {e}")))?;
-        (PathBuf::from("<stdin>"), text)
-    } else {
-        let path = arguments.scene.clone();
-        let text = files::read_text(&path)
-            .map_err(|source| Failure::input(scene::SceneError::Read { path: path.clone(), source }))?;
-        (path, text)
-    };
+        return Ok((PathBuf::from("<stdin>"), text));
+    }
+    let path = path.to_owned();
+    let text = files::read_text(&path)
+        .map_err(|source| Failure::input(scene::SceneError::Read { path: path.clone(), source }))?;
+    Ok((path, text))
+}
+
+fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
+    let (path, text) = scene_text(&arguments.scene)?;
     let options = LoadOptions {
         view: arguments.view.clone(),
         depth_step: arguments.depth_step,

@@ -228,6 +228,14 @@ impl DepthMap {
         Self { width, height, measure, data, offset, guessed: Vec::new() }
     }
 
+    /// The same map with an error added to every value, which leaves it before the camera: a tenth of its
+    /// disparity or depth remains.
+    pub(crate) fn with_errors(&self, mut error: impl FnMut() -> f32) -> Self {
+        let (mut map, offset) = (self.clone(), self.offset as f32);
+        map.data.iter_mut().for_each(|v| *v = (*v + error()).max(0.1 * *v - 0.9 * offset));
+        map
+    }
+
     /// A map of the same measure and offset with other values, NaN where unknown.
     pub(crate) fn with_values(&self, (width, height): (usize, usize), data: Vec<f32>) -> Self {
         assert_eq!(data.len(), width * height);

@@ -7,6 +7,7 @@
 
 use super::{Cover, HoleFill, InterpolationError, Settings, Variation};
 use crate::sample::Sample;
+use hybank::sampling::fit::Response;
 use hybank::sampling::{Fit, FitSample};
 
 /// Keeps the normal equations definite if lambda and tau are 0; negligible beside any other weight.
@@ -76,6 +77,17 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
             blacken(mask, values, C);
         }
         Ok(true)
+    }
+
+    /// The fitted row at any column; meaningful after [`RowWork::interpolate`].
+    pub fn value(&self, x: f64) -> [f64; C] {
+        self.fit.value(x)
+    }
+
+    /// How much samples count at a column, with the equations that the last call of
+    /// [`RowWork::interpolate`] solved.
+    pub fn respond(&self, x: f64, response: &mut Response) {
+        self.fit.respond(x, response);
     }
 
     /// V_s of every sample, from the variance of the depth within max(epsilon, 1 px).

@@ -58,11 +58,21 @@ impl Balance {
         Self { gains: if needed { gains.iter().map(|g| *g as f32).collect() } else { Vec::new() }, ..self }
     }
 
+    /// The weight of a view.
+    pub fn weight(&self, view: u16) -> f32 {
+        self.weights.get(usize::from(view)).copied().unwrap_or(1.0)
+    }
+
+    /// The factor for the brightness of a view.
+    pub fn gain(&self, view: u16) -> f32 {
+        self.gains.get(usize::from(view)).copied().unwrap_or(1.0)
+    }
+
     /// Multiplies the weight and the brightness of every sample by those of its view.
     pub fn apply<const C: usize>(&self, samples: &mut [Sample<C>]) {
         for s in samples {
             let view = usize::from(s.view);
-            s.weight *= self.weights.get(view).copied().unwrap_or(1.0);
+            s.weight *= self.weight(s.view);
             if let Some(gain) = self.gains.get(view) {
                 s.value.iter_mut().for_each(|v| *v *= gain);
             }

@@ -83,6 +83,28 @@ impl Default for SyntheticScene {
 }
 
 impl SyntheticScene {
+    /// The wall with a ball and three discs at places that depend on the seed: other scenes of one kind.
+    pub fn varied(seed: u64) -> Self {
+        // Fractional parts of multiples of the golden ratio and its kin: spread evenly, without a generator.
+        let part = |k: u64| (0.618_033_988_75 * (seed * 31 + k * 7 + 1) as f64).fract();
+        let between = |k: u64, low: f64, high: f64| low + (high - low) * part(k);
+        let centre = |k: u64| [between(k, -1.3, 1.3), between(k + 1, -0.8, 0.8), between(k + 2, 3.3, 6.5)];
+        let disc = |k: u64| Surface::Disc {
+            normal: Vector3::new(between(k + 3, -0.4, 0.4), between(k + 4, -0.3, 0.3), -1.0).normalize(),
+            centre: Vector3::from(centre(k)),
+            radius: between(k + 5, 0.3, 0.8),
+        };
+        let ball = Surface::Ball { centre: Vector3::from(centre(40)), radius: between(43, 0.3, 0.8) };
+        let mut scene = Self::default();
+        scene.surfaces.truncate(1);
+        for (k, surface) in [disc(0), disc(10), disc(20), ball].into_iter().enumerate() {
+            let k = k as u64;
+            let base = std::array::from_fn(|c| between(50 + 3 * k + c as u64, 70.0, 190.0));
+            scene.surfaces.push(Painted { surface, base, pitch: between(70 + k, 0.3, 0.8) });
+        }
+        scene
+    }
+
     /// Image (RGB) and depth of the scene for a metric camera. The wall fills every view that looks along
     /// +z.
     pub fn view(&self, camera: &Camera, (width, height): (usize, usize)) -> (Image, DepthMap) {

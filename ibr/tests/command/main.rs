@@ -7,6 +7,7 @@ use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use std::path::Path;
 use std::process::{Command, Output};
 
+mod bound;
 #[cfg(unix)]
 mod disturbed;
 mod refuse;

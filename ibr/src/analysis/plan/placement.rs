@@ -1,0 +1,159 @@
+//! Where to put cameras: the error of wanted views, predicted from a model of the surfaces alone.
+//!
+//! A pixel that no camera sees costs the error of a guess. One that cameras see at the distances s_i costs the
+//! noise of their photographs and the displacement by errors of depth, weighted as the renderer weights them:
+//!
+//! ```text
+//! e^2 = hole^2   or   sum_i g_i^2 (noise^2 + (displacement s_i)^2),   sum_i g_i = 1
+//! ```
+
+use crate::depth::DepthMap;
+use crate::pipeline::Balance;
+
+/// Disparities within this share of each other, or within a pixel, belong to one point.
+const SAME_POINT: f64 = 0.05;
+
+/// What the causes cost, in grey levels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// Error of a pixel that no camera sees.
+    pub hole: f64,
+    /// Noise of a photograph.
+    pub noise: f64,
+    /// Error per unit of distance between a camera and the wanted view.
+    pub displacement: f64,
+}
+
+impl Default for Costs {
+    /// Of photographs such as "Cones", for distances in units of the baseline.
+    fn default() -> Self {
+        Self { hole: 40.0, noise: 3.0, displacement: 6.0 }
+    }
+}
+
+/// A place for a camera of a rectified rig.
+#[derive(Debug, Clone, Copy)]
+pub struct Candidate<'a> {
+    /// Position on the line of the cameras.
+    pub position: f64,
+    /// What it would see: disparities of the model.
+    pub disparity: &'a DepthMap,
+}
+
+/// A view that is wanted.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Position on the line of the cameras.
+    pub position: f64,
+    /// Its disparities.
+    pub disparity: &'a DepthMap,
+}
+
+/// Candidates, wanted views, and which of their points each candidate sees.
+pub struct Placement {
+    costs: Costs,
+    /// Distance of candidate i from wanted view j, and the pixels it sees there.
+    sights: Vec<Vec<Sight>>,
+}
+
+struct Sight {
+    distance: f64,
+    seen: Vec<bool>,
+}
+
+impl Placement {
+    /// Looks every point of the wanted views up in every candidate's map; all maps have one size.
+    pub fn new(candidates: &[Candidate<'_>], wanted: &[Wanted<'_>], costs: Costs) -> Self {
+        let sight = |w: &Wanted<'_>, c: &Candidate<'_>| Sight {
+            distance: (c.position - w.position).abs(),
+            seen: seen(w, c),
+        };
+        let sights = wanted.iter().map(|w| candidates.iter().map(|c| sight(w, c)).collect()).collect();
+        Self { costs, sights }
+    }
+
+    /// Root mean square error of the wanted views from the cameras `chosen`, in grey levels.
+    pub fn predicted(&self, chosen: &[usize]) -> f64 {
+        let views = self.sights.len().max(1) as f64;
+        (self.sights.iter().map(|sights| self.mean_square(sights, chosen)).sum::<f64>() / views).sqrt()
+    }
+
+    fn mean_square(&self, sights: &[Sight], chosen: &[usize]) -> f64 {
+        let sights: Vec<&Sight> = chosen.iter().filter_map(|i| sights.get(*i)).collect();
+        let Some(pixels) = sights.first().map(|s| s.seen.len()) else { return self.costs.hole.powi(2) };
+        let weights = Balance::by_distance(&sights.iter().map(|s| s.distance).collect::<Vec<_>>());
+        let of_pixel = |p: usize| {
+            let (mut sum, mut square) = (0.0, 0.0);
+            for (i, s) in sights.iter().enumerate().filter(|(_, s)| s.seen[p]) {
+                let weight = f64::from(weights.weight(i as u16));
+                let error = self.costs.noise.powi(2) + (self.costs.displacement * s.distance).powi(2);
+                sum += weight;
+                square += weight * weight * error;
+            }
+            if sum > 0.0 { square / (sum * sum) } else { self.costs.hole.powi(2) }
+        };
+        (0..pixels).map(of_pixel).sum::<f64>() / pixels as f64
+    }
+
+    /// `count` candidates, each of which reduces the predicted error the most, given those before it.
+    pub fn greedy(&self, count: usize) -> Vec<usize> {
+        let candidates = self.sights.first().map_or(0, Vec::len);
+        let mut chosen = Vec::new();
+        for _ in 0..count.min(candidates) {
+            let with = |i: &usize| self.predicted(&[&chosen[..], &[*i]].concat());
+            let free = (0..candidates).filter(|i| !chosen.contains(i));
+            let scored = free.map(|i| (i, with(&i)));
+            let best = scored.min_by(|a, b| a.1.total_cmp(&b.1));
+            chosen.extend(best.map(|(i, _)| i));
+        }
+        chosen
+    }
+}
+
+/// Which pixels of a wanted view a candidate sees: its map has the same disparity at their place.
+fn seen(wanted: &Wanted<'_>, candidate: &Candidate<'_>) -> Vec<bool> {
+    let (width, height) = wanted.disparity.size();
+    let shift = wanted.position - candidate.position;
+    let at = |p: usize| {
+        let d = f64::from(wanted.disparity.data()[p]);
+        let x = ((p % width) as f64 + shift * d).round();
+        // Also false for unknown disparities.
+        if !(x >= 0.0 && x < width as f64) {
+            return false;
+        }
+        let other = candidate.disparity.data().get(p / width * width + x as usize).copied();
+        other.is_some_and(|o| (f64::from(o) - d).abs() <= (SAME_POINT * d).max(1.0))
+    };
+    (0..width * height).map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::Measure;
+
+    /// A wall of disparity 4 and a post of 12 before it.
+    fn map(position: f64) -> DepthMap {
+        let disparity = |x: f64| if (x + 12.0 * position - 40.0).abs() < 5.0 { 12.0 } else { 4.0 };
+        let data = (0..800).map(|i| disparity(f64::from(i % 80))).collect();
+        DepthMap::new((80, 10), data, 1.0, Measure::Disparity).unwrap()
+    }
+
+    #[test]
+    fn cameras_surround_what_is_wanted() {
+        let positions = [-2.0, -1.0, -0.4, 0.3, 1.0, 2.5];
+        let maps: Vec<DepthMap> = positions.iter().map(|p| map(*p)).collect();
+        let candidates: Vec<Candidate<'_>> =
+            positions.iter().zip(&maps).map(|(p, disparity)| Candidate { position: *p, disparity }).collect();
+        let own = map(0.0);
+        let wanted = [Wanted { position: 0.0, disparity: &own }];
+        let placement = Placement::new(&candidates, &wanted, Costs::default());
+        let mut chosen = placement.greedy(2);
+        chosen.sort_unstable();
+        // One camera on each side of the post sees all of the wall; two on one side do not.
+        assert_eq!(chosen, [2, 3]);
+        assert!(placement.predicted(&[2, 3]) < placement.predicted(&[3, 4]));
+        assert_eq!(placement.predicted(&[]), Costs::default().hole);
+        assert_eq!(placement.greedy(9).len(), 6);
+    }
+}

@@ -1,0 +1,96 @@
+//! What errors of depth change in a view: it is rendered once more from depths with such errors.
+
+use crate::analysis::random::{part, seeded};
+use crate::depth::DepthMap;
+use crate::image::Image;
+use crate::pipeline::{RenderError, RenderSettings, rectified};
+use crate::propagate::RectifiedView;
+
+/// Errors of disparity below this many pixels change nothing that can be seen.
+const LEAST: f64 = 0.02;
+
+/// Half the side of the window over which the change is averaged, in pixels.
+const WINDOW: usize = 2;
+
+/// Standard deviation of independent errors of the disparities, in pixels for a baseline of one, from the
+/// maps alone: points that one map gives are looked up in the other. 0 for a single view.
+///
+/// With two maps of the standard deviation s the difference has s^2 (1 + 2/3): the second value is
+/// interpolated between two neighbours. The median makes hidden points harmless. Errors that both maps share,
+/// and offsets between the cameras, do not show.
+pub fn disparity_noise(views: &[RectifiedView<'_>]) -> f64 {
+    let mut differences: Vec<f64> = views.windows(2).flat_map(|pair| lookups(&pair[0], &pair[1])).collect();
+    if differences.is_empty() {
+        return 0.0;
+    }
+    let middle = differences.len() / 2;
+    let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
+    1.4826 * median / (5.0_f64 / 3.0).sqrt()
+}
+
+/// |difference| of the disparities of a point in two maps, for every fourth pixel of the first.
+fn lookups(a: &RectifiedView<'_>, b: &RectifiedView<'_>) -> Vec<f64> {
+    let (width, height) = a.disparity.size();
+    let lookup = |p: usize| {
+        let (x, y) = (p % width, p / width);
+        let d = f64::from(a.disparity.data()[p]);
+        let there = x as f64 + (a.position - b.position) * d;
+        // Also false for unknown disparities.
+        if a.disparity.is_guessed(p) || !(there >= 0.0 && there < width as f64 - 1.0) {
+            return None;
+        }
+        let (column, part) = (there as usize, there.fract());
+        let q = y * width + column;
+        let known = |q: usize| (!b.disparity.is_guessed(q)).then(|| f64::from(b.disparity.data()[q]));
+        let other = known(q)? * (1.0 - part) + known(q + 1)? * part;
+        (!other.is_nan()).then_some((other - d).abs())
+    };
+    (0..width * height).step_by(4).filter_map(lookup).collect()
+}
+
+/// The views' disparity maps with independent errors of this standard deviation, from a fixed seed.
+pub fn with_noise(views: &[RectifiedView<'_>], deviation: f64, seed: u64) -> Vec<DepthMap> {
+    let random = &mut seeded(seed);
+    // The sum of three uniform numbers in [-1, 1) has the variance one, and bounded tails.
+    let mut error = || (deviation * (2.0 * (part(random) + part(random) + part(random)) - 3.0)) as f32;
+    views.iter().map(|v| v.disparity.with_errors(&mut error)).collect()
+}
+
+/// Local mean of the change of a view under errors of the disparities, in grey levels per pixel.
+pub(super) fn jitter(
+    views: &[RectifiedView<'_>],
+    position: f64,
+    settings: &RenderSettings,
+    view: &Image,
+    deviation: f64,
+) -> Result<Vec<f32>, RenderError> {
+    let (width, height) = view.size();
+    if deviation < LEAST {
+        return Ok(vec![0.0; width * height]);
+    }
+    let maps = with_noise(views, deviation, 1);
+    let noisy: Vec<RectifiedView<'_>> =
+        views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect();
+    let changed = rectified::render(&noisy, position, settings)?.image;
+    Ok(local_mean(&difference(&changed, view), (width, height)))
+}
+
+/// |a - b| of each pixel, mean over the channels.
+pub(super) fn difference(a: &Image, b: &Image) -> Vec<f32> {
+    let channels = a.channels();
+    let pairs = a.data().chunks_exact(channels).zip(b.data().chunks_exact(channels));
+    pairs.map(|(p, q)| p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum::<f32>() / channels as f32).collect()
+}
+
+/// Means over windows of 5 x 5 pixels, smaller at the border.
+fn local_mean(values: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
+    let range = |at: usize, side: usize| at.saturating_sub(WINDOW)..(at + WINDOW + 1).min(side);
+    let mean = |p: usize| {
+        let (columns, rows) = (range(p % width, width), range(p / width, height));
+        let count = (columns.len() * rows.len()) as f32;
+        rows.map(|y| values[y * width + columns.start..y * width + columns.end].iter().sum::<f32>())
+            .sum::<f32>()
+            / count
+    };
+    (0..width * height).map(mean).collect()
+}

@@ -1,0 +1,92 @@
+//! What the error of a pixel is proportional to, cause by cause, in grey levels.
+
+use super::Cause;
+use super::survey::Survey;
+use super::variogram::Variogram;
+use crate::image::Image;
+use crate::interpolate::Cover;
+
+/// Number of regressors.
+pub(super) const REGRESSORS: usize = 7;
+
+/// The regressors of one pixel: bias of the fit, noise, slope, jitter, edge, doubt, hole.
+pub(super) type Regressors = [f64; REGRESSORS];
+
+/// The cause that each regressor belongs to.
+pub(super) const CAUSE_OF: [Cause; REGRESSORS] =
+    [Cause::Density, Cause::Texture, Cause::Depth, Cause::Depth, Cause::Edges, Cause::Edges, Cause::Holes];
+
+/// Distance in pixels over which a colour of doubtful depth is wrong, for the variogram.
+const DOUBT: usize = 4;
+
+/// The regressors of every pixel of a survey; `jitter` is the local change of the view under errors of depth.
+///
+/// `spacing` is the distance between neighbouring views.
+pub(super) fn regressors(
+    survey: &Survey,
+    jitter: &[f32],
+    variogram: &Variogram,
+    spacing: f64,
+) -> Vec<Regressors> {
+    let image = &survey.rendering.image;
+    let distances = hole_distances(&survey.rendering.mask, image.width());
+    let slopes = slopes(image);
+    let of_pixel = |p: usize| {
+        if distances[p] > 0 {
+            return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variogram.at(distances[p])];
+        }
+        let e = &survey.evidence[p];
+        // The noise of the photograph that a view is compared with adds to that of the views.
+        let noise = (1.0 + f64::from(e.views)).sqrt();
+        // Displacements of the samples: one part grows with the distance to the views, and one does not.
+        let lever = f64::from(e.lever) / (spacing * spacing);
+        let displacement = ((f64::from(e.views) + lever) / 2.0).sqrt();
+        [
+            f64::from(e.bias),
+            noise,
+            f64::from(slopes[p]) * displacement,
+            f64::from(jitter[p]),
+            f64::from(survey.edges[p]),
+            f64::from(e.doubtful) * variogram.at(DOUBT),
+            0.0,
+        ]
+    };
+    (0..survey.evidence.len()).map(of_pixel).collect()
+}
+
+/// Slope of the image along the rows and columns in grey levels per pixel, mean over the channels.
+pub(super) fn slopes(image: &Image) -> Vec<f32> {
+    let (width, height) = image.size();
+    let channels = image.channels();
+    let at = |x: usize, y: usize, c: usize| image.data()[(y * width + x) * channels + c];
+    let slope = |p: usize| {
+        let (x, y) = (p % width, p / width);
+        let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
+        let (up, down) = (y.saturating_sub(1), (y + 1).min(height - 1));
+        let of_channel = |c: usize| {
+            let across = (at(right, y, c) - at(left, y, c)) / (right - left).max(1) as f32;
+            let along = (at(x, down, c) - at(x, up, c)) / (down - up).max(1) as f32;
+            across.hypot(0.5 * along)
+        };
+        (0..channels).map(of_channel).sum::<f32>() / channels as f32
+    };
+    (0..width * height).map(slope).collect()
+}
+
+/// Distance of every pixel of a hole to the nearest seen pixel of its row, 0 for seen pixels.
+fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
+    let mut distances = vec![usize::MAX; mask.len()];
+    for (row, mask) in distances.chunks_mut(width).zip(mask.chunks(width)) {
+        let mut away = width;
+        for x in 0..width {
+            away = if mask[x] == Cover::Seen { 0 } else { away + 1 };
+            row[x] = away;
+        }
+        away = width;
+        for x in (0..width).rev() {
+            away = if mask[x] == Cover::Seen { 0 } else { away + 1 };
+            row[x] = row[x].min(away);
+        }
+    }
+    distances
+}

@@ -1,0 +1,341 @@
+//! What the samples of a rendering say about its error, pixel by pixel: how much each sample counts in the
+//! fit that is really used, and how well the samples agree.
+
+use crate::image::Image;
+use crate::interpolate::rows::RowWork;
+use crate::interpolate::{Cover, Degree, InterpolationError};
+use crate::occlusion::{self, RowScratch};
+use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, rectified};
+use crate::propagate::{self, Frame, RectifiedView, RigCamera};
+use crate::sample::Sample;
+use hybank::sampling::fit::Response;
+use rayon::prelude::*;
+
+/// Pixels to each side beyond which no sample has an influence worth counting: it falls by four per pixel.
+const INFLUENCE: f64 = 8.0;
+
+/// Pixels to each side over which local suprema are taken.
+const NEAR: usize = 3;
+
+/// One pixel of a virtual view. h_s is the influence of sample s on the pixel at x.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Evidence {
+    /// sum h_s over the samples; the rest comes from what fills holes.
+    pub held: f32,
+    /// sum |h_s|.
+    pub reach: f32,
+    /// sum h_s (x_s - x).
+    pub shift: f32,
+    /// sum |h_s| (x_s - x)^2.
+    pub spread: f32,
+    /// sum over the views of (sum of the h_s of the view)^2: 1 for one view, 1/2 for two equal ones.
+    pub views: f32,
+    /// sum over the views of (sum of the h_s of the view)^2 (distance to the view)^2.
+    pub lever: f32,
+    /// Change of the pixel when the fit is fitted once more: its bias.
+    pub bias: f32,
+    /// Difference between what the two most influential views say, NaN where only one says anything.
+    pub disagreement: f32,
+    /// Influence of samples whose depth or colour is doubtful.
+    pub doubtful: f32,
+    /// Largest slope of the samples nearby.
+    pub steepest: f32,
+    /// Largest second difference of the samples nearby.
+    pub sharpest: f32,
+    /// Largest residual of the samples nearby.
+    pub residual: f32,
+    /// Largest distance of a view that counts at the pixel.
+    pub distance: f32,
+}
+
+/// A rendering with the evidence for each of its pixels.
+pub struct Survey {
+    /// The rendering.
+    pub rendering: Rendering,
+    /// Row by row.
+    pub evidence: Vec<Evidence>,
+    /// Depth edges: row by row, the height of the jump beside the pixel, weighted by its distance; 0
+    /// elsewhere.
+    pub edges: Vec<f32>,
+}
+
+/// Renders a view of a rectified rig and collects the evidence.
+///
+/// # Errors
+/// Those of [`rectified::render`].
+pub fn survey(
+    views: &[RectifiedView<'_>],
+    position: f64,
+    settings: &RenderSettings,
+) -> Result<Survey, RenderError> {
+    let rendering = rectified::render(views, position, settings)?;
+    let colour = rendering.image.channels() == 3;
+    let (evidence, edges) = match (settings.interpolation.fit.degree, colour) {
+        (Degree::Linear, false) => collect::<2, 1>(views, position, settings, &rendering)?,
+        (Degree::Linear, true) => collect::<2, 3>(views, position, settings, &rendering)?,
+        (Degree::Cubic, false) => collect::<4, 1>(views, position, settings, &rendering)?,
+        (Degree::Cubic, true) => collect::<4, 3>(views, position, settings, &rendering)?,
+    };
+    Ok(Survey { rendering, evidence, edges })
+}
+
+/// What all rows share.
+struct Job<'a> {
+    views: &'a [RectifiedView<'a>],
+    camera: RigCamera,
+    frame: Frame,
+    balance: Balance,
+    settings: &'a RenderSettings,
+    image: &'a Image,
+}
+
+fn collect<const ORDER: usize, const C: usize>(
+    views: &[RectifiedView<'_>],
+    position: f64,
+    settings: &RenderSettings,
+    rendering: &Rendering,
+) -> Result<(Vec<Evidence>, Vec<f32>), RenderError> {
+    let (width, height) = rendering.image.size();
+    let job = Job {
+        views,
+        camera: RigCamera::new(views, position),
+        frame: Frame::whole(width, height, RowWork::<ORDER, C>::MARGIN, settings.offset),
+        balance: Balance::rectified(views, position).with_gains(&rendering.agreement.gains),
+        settings,
+        image: &rendering.image,
+    };
+    let mut evidence = vec![Evidence::default(); width * height];
+    let mut edges = vec![0.0; width * height];
+    let rows = evidence.par_chunks_mut(width).zip(edges.par_chunks_mut(width)).enumerate();
+    rows.try_for_each_init(
+        || RowSurvey::<ORDER, C>::new(width),
+        |work, (y, (evidence, edges))| work.row(&job, y, evidence, edges),
+    )?;
+    Ok((evidence, edges))
+}
+
+/// Work memory of one row.
+struct RowSurvey<const ORDER: usize, const C: usize> {
+    samples: Vec<Sample<C>>,
+    scratch: RowScratch<C>,
+    fit: RowWork<ORDER, C>,
+    again: RowWork<ORDER, C>,
+    response: Response,
+    of_views: Vec<ViewShare<C>>,
+    values: Vec<f32>,
+    mask: Vec<Cover>,
+}
+
+/// What one view contributes to a pixel.
+#[derive(Clone, Copy)]
+struct ViewShare<const C: usize> {
+    influence: f64,
+    value: [f64; C],
+}
+
+impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
+    fn new(width: usize) -> Self {
+        Self {
+            samples: Vec::new(),
+            scratch: RowScratch::default(),
+            fit: RowWork::new(width),
+            again: RowWork::new(width),
+            response: Response::default(),
+            of_views: Vec::new(),
+            values: vec![0.0; width * C],
+            mask: vec![Cover::default(); width],
+        }
+    }
+
+    fn row(
+        &mut self,
+        job: &Job<'_>,
+        y: usize,
+        evidence: &mut [Evidence],
+        edges: &mut [f32],
+    ) -> Result<(), RenderError> {
+        let failed = |source| RenderError::from(InterpolationError::Fit { row: y, source });
+        let settings = &job.settings.interpolation;
+        self.samples.clear();
+        for (index, view) in job.views.iter().enumerate() {
+            let index = index as u16;
+            propagate::rectified_row(view, index, y, &job.camera, &job.frame, &mut self.samples);
+        }
+        occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
+        job.balance.apply(&mut self.samples);
+        let fitted = self.fit.interpolate(&self.samples, settings, &mut self.values, &mut self.mask);
+        if !fitted.map_err(failed)? {
+            return Ok(());
+        }
+        let limits: Vec<Limits> = self.samples.iter().map(|s| self.limits(job, s)).collect();
+        for (x, pixel) in evidence.iter_mut().enumerate() {
+            *pixel = self.pixel(job, x, &limits);
+        }
+        self.bias(settings, evidence).map_err(failed)?;
+        self.edges(job, y, edges);
+        Ok(())
+    }
+
+    /// Fits the fit again, at the samples.
+    fn bias(
+        &mut self,
+        settings: &crate::interpolate::Settings,
+        evidence: &mut [Evidence],
+    ) -> Result<(), hybank::sampling::SamplingError> {
+        let once = std::mem::take(&mut self.values);
+        let mut smooth = self.samples.clone();
+        smooth.iter_mut().for_each(|s| s.value = self.fit.value(s.x).map(|v| v as f32));
+        self.values = vec![0.0; once.len()];
+        self.again.interpolate(&smooth, settings, &mut self.values, &mut self.mask)?;
+        let pairs = once.chunks_exact(C).zip(self.values.chunks_exact(C));
+        for (pixel, (a, b)) in evidence.iter_mut().zip(pairs) {
+            pixel.bias = a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / C as f32;
+        }
+        Ok(())
+    }
+
+    fn pixel(&mut self, job: &Job<'_>, column: usize, limits: &[Limits]) -> Evidence {
+        let x = column as f64;
+        self.fit.respond(x, &mut self.response);
+        self.of_views.clear();
+        self.of_views.resize(job.views.len(), ViewShare { influence: 0.0, value: [0.0; C] });
+        let mut e = Evidence::default();
+        let from = self.samples.partition_point(|s| s.x < x - INFLUENCE);
+        for (s, limit) in
+            self.samples[from..].iter().zip(&limits[from..]).take_while(|(s, _)| s.x <= x + INFLUENCE)
+        {
+            let h = f64::from(s.weight) * self.response.at::<ORDER>(s.x);
+            let away = s.x - x;
+            e.held += h as f32;
+            e.reach += h.abs() as f32;
+            e.shift += (h * away) as f32;
+            e.spread += (h.abs() * away * away) as f32;
+            e.doubtful += if s.doubtful { h.abs() as f32 } else { 0.0 };
+            let share = &mut self.of_views[usize::from(s.view)];
+            share.influence += h;
+            share.value.iter_mut().zip(s.value).for_each(|(sum, v)| *sum += h * f64::from(v));
+            if away.abs() <= NEAR as f64 {
+                e.steepest = e.steepest.max(limit.slope);
+                e.sharpest = e.sharpest.max(limit.curvature);
+                e.residual = e.residual.max(limit.residual);
+            }
+        }
+        for (share, view) in self.of_views.iter().zip(job.views) {
+            let (g2, distance) = (share.influence.powi(2), (view.position - job.camera.position).abs());
+            e.views += g2 as f32;
+            e.lever += (g2 * distance * distance) as f32;
+            if share.influence > 0.02 {
+                e.distance = e.distance.max(distance as f32);
+            }
+        }
+        e.disagreement = disagreement(&mut self.of_views);
+        e
+    }
+
+    /// Slope and second difference of the photograph around a sample's pixel, in virtual pixels, and the
+    /// residual of the fit there; the largest over the channels.
+    fn limits(&self, job: &Job<'_>, s: &Sample<C>) -> Limits {
+        let image = job.views[usize::from(s.view)].image;
+        let (pixel, width) = (s.pixel as usize, image.width());
+        let (column, gain) = (pixel % width, job.balance.gain(s.view));
+        let at = |p: usize| image.pixel::<C>(p).map(|v| v * gain);
+        let here = at(pixel);
+        let left = if column > 0 { at(pixel - 1) } else { here };
+        let right = if column + 1 < width { at(pixel + 1) } else { here };
+        let fitted = self.fit.value(s.x);
+        let mut limits = Limits::default();
+        for c in 0..C {
+            let (a, b) = ((here[c] - left[c]).abs(), (right[c] - here[c]).abs());
+            limits.slope = limits.slope.max(a).max(b);
+            limits.curvature = limits.curvature.max((left[c] - 2.0 * here[c] + right[c]).abs());
+            limits.residual = limits.residual.max((s.value[c] - fitted[c] as f32).abs());
+        }
+        limits
+    }
+
+    /// The height of every jump of depth between neighbouring samples, on the pixels within 1.5 of it.
+    fn edges(&self, job: &Job<'_>, y: usize, edges: &mut [f32]) {
+        let row = job.image.row(y).chunks_exact(job.image.channels()).collect::<Vec<_>>();
+        let value = |x: f64| row[(x.round().max(0.0) as usize).min(row.len() - 1)];
+        let test = job.settings.depth_test();
+        for pair in self.samples.windows(2) {
+            let (near, far) = (pair[0].depth.min(pair[1].depth), pair[0].depth.max(pair[1].depth));
+            if !test.hides(f64::from(near), f64::from(far)) {
+                continue;
+            }
+            let (left, right) = (value(pair[0].x - 1.5), value(pair[1].x + 1.5));
+            let height = left.iter().zip(right).map(|(a, b)| (a - b).abs()).sum::<f32>() / left.len() as f32;
+            let (low, high) = (pair[0].x, pair[1].x);
+            let first = (low - 1.5).ceil().max(0.0) as usize;
+            for x in (first..edges.len()).take_while(|x| *x as f64 <= high + 1.5) {
+                let away = (low - x as f64).max(x as f64 - high).max(0.0) as f32;
+                edges[x] = edges[x].max(height * (1.0 - away / 1.5));
+            }
+        }
+    }
+}
+
+/// Mean over the channels of the difference between the two views of the largest influence.
+fn disagreement<const C: usize>(views: &mut [ViewShare<C>]) -> f32 {
+    views.sort_by(|a, b| b.influence.total_cmp(&a.influence));
+    match views {
+        [a, b, ..] if b.influence > 0.1 => {
+            let difference = |c: usize| (a.value[c] / a.influence - b.value[c] / b.influence).abs();
+            ((0..C).map(difference).sum::<f64>() / C as f64) as f32
+        }
+        _ => f32::NAN,
+    }
+}
+
+/// What bounds a sample.
+#[derive(Debug, Clone, Copy, Default)]
+struct Limits {
+    slope: f32,
+    curvature: f32,
+    residual: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::{DepthMap, Measure};
+
+    fn surveyed(positions: &[f64], at: f64, paint: impl Fn(usize) -> f32) -> Survey {
+        let image = Image::new(60, 8, 1, (0..480).map(|i| paint(i % 60)).collect()).unwrap();
+        let disparity = DepthMap::new((60, 8), vec![4.0; 480], 1.0, Measure::Disparity).unwrap();
+        let view =
+            |position: &f64| RectifiedView { image: &image, disparity: &disparity, position: *position };
+        let views: Vec<RectifiedView<'_>> = positions.iter().map(view).collect();
+        survey(&views, at, &RenderSettings::default()).unwrap()
+    }
+
+    fn near(value: f32, want: f32) -> bool {
+        (value - want).abs() < 0.02
+    }
+
+    /// Inside a flat scene the influences add up to one, evenly over the views half-way between them.
+    #[test]
+    fn influences_are_shares() {
+        let two = surveyed(&[0.0, 1.0], 0.5, |_| 90.0);
+        let one = surveyed(&[0.0], 0.5, |_| 90.0);
+        for (s, views, lever) in [(&two, 0.5, 0.125), (&one, 1.0, 0.25)] {
+            let e = s.evidence[4 * 60 + 30];
+            assert!(near(e.held, 1.0) && near(e.views, views) && near(e.lever, lever), "{e:?}");
+            assert!(near(e.bias, 0.0) && near(e.residual, 0.0) && near(e.shift, 0.0), "{e:?}");
+            assert!(e.reach >= e.held && e.spread > 0.1 && near(e.distance, 0.5), "{e:?}");
+        }
+        assert!(near(two.evidence[270].disagreement, 0.0) && one.evidence[270].disagreement.is_nan());
+        assert!(two.edges.iter().all(|e| *e == 0.0));
+    }
+
+    /// The bias of a smoothing fit is large where the texture is fine, and slopes are those of the paint.
+    #[test]
+    fn fine_texture_has_a_bias() {
+        let wave = |rate: f32| move |x: usize| 120.0 + 50.0 * (rate * x as f32).sin();
+        let mean = |s: &Survey| s.evidence[250..290].iter().map(|e| e.bias).sum::<f32>() / 40.0;
+        let (fine, coarse) = (surveyed(&[0.0, 1.0], 0.5, wave(1.8)), surveyed(&[0.0, 1.0], 0.5, wave(0.3)));
+        assert!(mean(&fine) > 10.0 * mean(&coarse), "{} {}", mean(&fine), mean(&coarse));
+        let steepest = coarse.evidence[270].steepest;
+        assert!((10.0..15.1).contains(&steepest), "{steepest}");
+    }
+}

@@ -1,0 +1,195 @@
+//! `hybank-ibr bound`: the error of the virtual view, predicted from the inputs alone.
+
+use super::arguments::BoundArguments;
+use super::failure::Failure;
+use super::progress::Progress;
+use super::{heat, output, render};
+use crate::analysis::view::{self, Cause, Totals, ViewError};
+use crate::image::{Image, Levels, quality, read_image_within};
+use crate::partial::{Densify, Segmentwise};
+use crate::pipeline::{RenderError, RenderSettings};
+use crate::propagate::RectifiedView;
+use crate::scene::{self, Kind, LoadOptions, RectifiedSource, Scene};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Everything `--json` prints, in grey levels unless named.
+#[derive(Debug, Serialize)]
+struct Summary {
+    totals: Totals,
+    causes: Vec<CauseShare>,
+    dominant: Cause,
+    /// What makes the largest part smaller.
+    remedy: &'static str,
+    /// Views that were left out in turn to calibrate the estimate; 0 if typical weights were used.
+    calibrated_on: usize,
+    /// Standard deviation of the disparities' errors for a baseline of one, in pixels.
+    disparity_noise: f64,
+    /// Estimate that is white in the map.
+    white: f32,
+    measured: Option<Measured>,
+    rows: Vec<Totals>,
+}
+
+#[derive(Debug, Serialize)]
+struct CauseShare {
+    cause: Cause,
+    /// Mean over the view.
+    error: f64,
+}
+
+/// The comparison with a photograph.
+#[derive(Debug, Serialize)]
+struct Measured {
+    mae: f64,
+    psnr: f64,
+    /// Estimate divided by the measured mean absolute error.
+    ratio: f64,
+    /// Share of the pixels whose error is within the sure bound.
+    within_sure: f64,
+}
+
+pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
+    check(arguments)?;
+    let progress = Progress::new(3);
+    progress.step("reading");
+    let scene = read(arguments)?;
+    let (sources, position) = rectified(&scene, &arguments.scene)?;
+    let read = |path: &PathBuf| read_image_within(path, arguments.max_pixels).map_err(Failure::input);
+    let truth = arguments.truth.as_ref().map(read).transpose()?;
+    progress.step("predicting");
+    let predicted = predict(sources, position, &settings(arguments, &scene)).map_err(Failure::input)?;
+    let measured = match (&truth, &arguments.truth) {
+        (Some(truth), Some(path)) => measure(&predicted, truth, path)?,
+        _ => None,
+    };
+    progress.step("writing");
+    let (map, white) = heat::map(&predicted.estimate, predicted.rendering.image.size());
+    if let Some(path) = &arguments.map {
+        output::write(&[output::encoded(&map, path, Levels::Eight)?], arguments.force)?;
+    }
+    drop(progress);
+    report(&Summary::new(&predicted, white, measured), arguments.json)
+}
+
+fn check(arguments: &BoundArguments) -> Result<(), Failure> {
+    if arguments.depth_step == 0 {
+        return Err(Failure::Usage("--depth-step 0: the step must be at least 1".into()));
+    }
+    let Some(map) = &arguments.map else { return Ok(()) };
+    if output::is_standard(map) {
+        return Err(Failure::Usage("--map -: the map cannot go to standard output; give it a file".into()));
+    }
+    let inputs = [Some(arguments.scene.as_path()), arguments.truth.as_deref()];
+    refuse_overlaps(map, &inputs.into_iter().flatten().collect::<Vec<_>>())?;
+    output::name_leftovers(&[map]);
+    output::refuse_existing(map, arguments.force)?;
+    output::refuse_format(map, Levels::Eight)
+}
+
+fn refuse_overlaps(map: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+    hybank::files::refuse_overlaps(&[map], inputs).map_err(Failure::input)
+}
+
+fn read(arguments: &BoundArguments) -> Result<Scene, Failure> {
+    let (path, text) = render::scene_text(&arguments.scene)?;
+    let options = LoadOptions {
+        view: arguments.view.clone(),
+        depth_step: arguments.depth_step,
+        densify: Densify::Segmentwise(Segmentwise::default()),
+        fill: true,
+        max_pixels: arguments.max_pixels,
+    };
+    let spec = scene::parse(&text, &path).map_err(Failure::input)?;
+    if let Some(map) = &arguments.map {
+        let files = spec.files(path.parent().unwrap_or(Path::new("")));
+        refuse_overlaps(map, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    }
+    scene::load(&spec, &path, &options).map_err(Failure::input)
+}
+
+/// The views and the first virtual position of a rectified rig.
+fn rectified<'a>(scene: &'a Scene, path: &Path) -> Result<(&'a [RectifiedSource], f64), Failure> {
+    match &scene.kind {
+        Kind::Rectified { views, positions } => Ok((views, positions.first().copied().unwrap_or(0.0))),
+        _ => Err(Failure::Input(format!(
+            "{}: bound predicts the errors of rectified rigs only; the views of this scene have no `position`",
+            path.display()
+        ))),
+    }
+}
+
+fn settings(arguments: &BoundArguments, scene: &Scene) -> RenderSettings {
+    let offset = arguments.offset.unwrap_or(scene.offset);
+    RenderSettings { offset, keep_exposure: arguments.keep_exposure, ..RenderSettings::default() }
+}
+
+fn predict(
+    sources: &[RectifiedSource],
+    position: f64,
+    settings: &RenderSettings,
+) -> Result<ViewError, RenderError> {
+    let views: Vec<RectifiedView<'_>> = sources
+        .iter()
+        .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
+        .collect();
+    view::rectified(&views, position, settings)
+}
+
+fn measure(predicted: &ViewError, truth: &Image, path: &Path) -> Result<Option<Measured>, Failure> {
+    let named = |e| Failure::Input(format!("{}: {e}", path.display()));
+    let image = &predicted.rendering.image;
+    let Some(found) = quality::compare(image, truth, None).map_err(named)? else { return Ok(None) };
+    let within = predicted.within_sure(truth);
+    let ratio = predicted.totals().estimate / found.mae;
+    Ok(Some(Measured { mae: found.mae, psnr: found.psnr, ratio, within_sure: within }))
+}
+
+impl Summary {
+    fn new(predicted: &ViewError, white: f32, measured: Option<Measured>) -> Self {
+        let share = |(cause, error)| CauseShare { cause, error };
+        let dominant = predicted.dominant();
+        Self {
+            totals: predicted.totals(),
+            causes: Cause::ALL.into_iter().zip(predicted.causes).map(share).collect(),
+            dominant,
+            remedy: dominant.remedy(),
+            calibrated_on: predicted.calibration.views,
+            disparity_noise: predicted.calibration.disparity_noise,
+            white,
+            measured,
+            rows: predicted.rows(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let t = &self.totals;
+        let mut lines = vec![
+            format!("estimate  {:.2} grey levels of mean absolute error", t.estimate),
+            format!("expected  {:.2} root mean square, a PSNR of {:.1} dB", t.expected, t.psnr),
+            format!("sure      {:.2} at most in the mean", t.sure),
+        ];
+        let part = |c: &CauseShare| format!("{:?} {:.2}", c.cause, c.error).to_lowercase();
+        lines.push(format!("causes    {}", self.causes.iter().map(part).collect::<Vec<_>>().join(", ")));
+        lines.push(format!("next      {}", self.remedy));
+        lines.push(match self.calibrated_on {
+            0 => "weights   those of typical photographs: a single view cannot be left out".into(),
+            views => format!("weights   calibrated on {views} views, each left out in turn"),
+        });
+        if let Some(m) = &self.measured {
+            lines.push(format!(
+                "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the sure bound",
+                m.mae, m.ratio, m.psnr, 100.0 * m.within_sure
+            ));
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+fn report(summary: &Summary, json: bool) -> Result<(), Failure> {
+    if json {
+        let json = serde_json::to_string(summary).map_err(Failure::input)?;
+        return output::print(&(json + "\n"));
+    }
+    output::print(&summary.text())
+}
