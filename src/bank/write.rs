@@ -58,6 +58,14 @@ impl Bank {
         text(&self.document(Some(digest(&parse(&bare)?))))
     }
 
+    /// The digest that the bank file has.
+    ///
+    /// # Errors
+    /// As [`Bank::to_json`].
+    pub fn digest(&self) -> Result<String, BankError> {
+        Ok(digest(&parse(&text(&self.document(None))?)?))
+    }
+
     fn document(&self, digest: Option<String>) -> Document<'_> {
         let (taps, state_space) = match &self.filters {
             SynthesisFilters::Fir(taps) => (Some(taps), None),

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
 use super::capture_args::CaptureArgs;
+use super::carried::carried;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
@@ -14,7 +15,9 @@ use super::understood::say_understood;
 use super::watch::Watch;
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
-use crate::io::{BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, ReadOptions, SampleWriter};
+use crate::io::{
+    BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, Placement, ReadOptions, SampleWriter,
+};
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
 use crate::runtime::{Algorithm, Options, Plan};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -127,6 +130,9 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
     let run = run.with_warnings(watch.finish());
     let seconds = begin.elapsed().as_secs_f64();
+    let shift = plan.latency() as u64 - skip;
+    let placement = Placement { ratio: bank.ratio as u64, shift, samples: run.samples };
+    outputs.annotate(carried(&reader, &run, bank, &args.output, placement)?);
     complete(outputs, &run, args.strict, journal)?;
     let (measure, rate) = (args.measured(bank)?, rate.round() as u64);
     let report = Report { run: &run, rate, frames, latency_dropped: skip, seconds, measure };

@@ -6,7 +6,7 @@ use super::gaps::say_gaps;
 use super::journal::Journal;
 use super::print::print_json;
 use super::say::{say, warn};
-use crate::pipeline::{FileOutputs, GapSummary, Outcome, Warning};
+use crate::pipeline::{FileOutputs, Gap, GapSummary, Outcome, Warning};
 use crate::runtime::{Algorithm, PlanSummary, ThreadPool};
 use std::path::Path;
 
@@ -120,6 +120,11 @@ impl RunReport {
         let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps } = outcome;
         let plan = plan.into();
         Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, told: 0 }
+    }
+
+    /// The gaps that were filled.
+    pub(super) fn gaps(&self) -> &[Gap] {
+        self.gaps.as_ref().map_or(&[], |gaps| &gaps.list)
     }
 
     /// With further warnings.

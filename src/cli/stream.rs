@@ -1,6 +1,7 @@
 //! `hybank stream`: fuses slow samples as they arrive.
 
 use super::capture_args::coding;
+use super::carried::carried;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
@@ -14,8 +15,8 @@ use super::watch::Watch;
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
-    BLOCK_BYTES, Coding, Container, MultiReader, OutputHeader, PcmFormat, ReadOptions, SampleWriter,
-    is_self_describing,
+    BLOCK_BYTES, Coding, Container, MultiReader, OutputHeader, PcmFormat, Placement, ReadOptions,
+    SampleWriter, is_self_describing,
 };
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
 use crate::runtime::{Algorithm, Options, Plan};
@@ -132,6 +133,9 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
     let run = RunReport::new(pipeline.finish(), tolerated, "--output-format f32le");
     let run = run.with_told(watch.finish());
+    let (ratio, shift) = (bank.ratio as u64, plan.latency() as u64);
+    let placement = Placement { ratio, shift, samples: run.samples };
+    outputs.annotate(carried(&reader, &run, bank, &args.output, placement)?);
     let (frames, interrupted) = (reader.consumed(), ending == Ending::Stopped);
     let report = Report { run: &run, frames, interrupted };
     complete(outputs, &run, args.strict, journal)?;

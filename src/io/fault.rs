@@ -17,6 +17,8 @@ pub enum InputFault {
     },
     /// The input ended before the last sample whose number at the converter is given.
     TimestampsBeyondEnd,
+    /// A SigMF recording does not state its rate.
+    NoRate,
     /// Lines about lost samples came after their samples had been used.
     ToldLate {
         /// Number of lines.
@@ -43,6 +45,7 @@ impl fmt::Display for InputFault {
             Self::TimestampsBeyondEnd => {
                 write!(f, "it ends before the last of the samples whose number is given")
             }
+            Self::NoRate => write!(f, "it states no core:sample_rate; the rate of the bank is assumed"),
             Self::ToldLate { lines } => {
                 write!(f, "{lines} lines about lost samples came after these samples had been used")
             }

@@ -53,6 +53,11 @@ impl<R: Read> FrameReader<R> {
         self.frame *= count;
     }
 
+    /// What the bytes come from.
+    pub(super) fn inner_mut(&mut self) -> &mut R {
+        &mut self.inner
+    }
+
     /// Bytes a frame.
     pub fn frame_bytes(&self) -> usize {
         self.frame

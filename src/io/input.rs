@@ -3,6 +3,7 @@
 use super::aligned_input::{AlignedInput, Block};
 use super::input_thread::{InputSource, Message, read};
 use super::lost::{Dropout, Entry, LostInInput};
+use super::notes::InputNotes;
 use super::stall::Wait;
 #[cfg(target_os = "linux")]
 use super::stdin_reader::StdinReader;
@@ -22,6 +23,8 @@ pub(super) struct Input {
     /// When its frames were taken, as far as the input itself knows.
     timestamps: Timestamps,
     live: Live,
+    /// What it says besides its samples.
+    pub(super) notes: InputNotes,
     faults: Vec<InputFault>,
 }
 
@@ -94,6 +97,7 @@ impl Input {
             source,
             timestamps: Timestamps::default(),
             live: Live::default(),
+            notes: InputNotes::default(),
             faults: Vec::new(),
         }
     }
@@ -130,17 +134,19 @@ impl Input {
 
     fn take(&mut self, message: Message) {
         match message {
-            Message::Header { header, timestamps } => {
+            Message::Header { header, timestamps, notes } => {
                 self.aligned = AlignedInput::new(header);
                 self.timestamps = timestamps;
+                self.notes = *notes;
             }
             Message::Frames { bytes, filled } => {
                 let used = self.aligned.refill(Block { bytes, filled });
                 self.give_back(used);
             }
-            Message::End { faults } => {
+            Message::End { faults, chunks } => {
                 self.aligned.end();
                 self.faults = faults;
+                self.notes.chunks.extend(chunks);
             }
         }
     }
@@ -209,7 +215,13 @@ impl Input {
     pub(super) fn faults(&self) -> impl Iterator<Item = InputFault> {
         let beyond = self.aligned.is_over() && self.aligned.has_unreached_segments();
         let late = (self.live.late > 0).then_some(InputFault::ToldLate { lines: self.live.late });
-        self.faults.iter().copied().chain(beyond.then_some(InputFault::TimestampsBeyondEnd)).chain(late)
+        let unrated = self.notes.sigmf.is_some() && self.aligned.header.rate.is_none();
+        let unrated = unrated.then_some(InputFault::NoRate);
+        unrated
+            .into_iter()
+            .chain(self.faults.iter().copied())
+            .chain(beyond.then_some(InputFault::TimestampsBeyondEnd))
+            .chain(late)
     }
 
     /// Frames that were not used.

@@ -2,15 +2,16 @@
 
 use super::csv::CsvReader;
 use super::kind::Kind;
+use super::notes::InputNotes;
 use super::npy::{NpyHeader, PlanarReader};
 use super::pipe::{stdin_file, widen_pipe};
-use super::sigmf::{SigmfMeta, file_pair};
+use super::sigmf::{SigmfMeta, archived, file_pair};
 use super::timestamps::Timestamps;
-use super::wav::WavReader;
+use super::wav::{WavChunk, WavReader};
 use super::{Coding, FrameReader, InputFault, IoError, PcmFormat, SampleLayout, StreamHeader, Turns};
 use crossbeam_channel::{Receiver, Sender};
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// An input to open, with its settings.
@@ -31,11 +32,11 @@ pub(super) struct InputSource {
 /// What the thread of an input sends.
 pub(super) enum Message {
     /// The header and the timestamps; always the first message.
-    Header { header: StreamHeader, timestamps: Timestamps },
+    Header { header: StreamHeader, timestamps: Timestamps, notes: Box<InputNotes> },
     /// Whole frames.
     Frames { bytes: Vec<u8>, filled: usize },
     /// The end, with the faults that were tolerated; always last.
-    End { faults: Vec<InputFault> },
+    End { faults: Vec<InputFault>, chunks: Vec<WavChunk> },
 }
 
 impl InputSource {
@@ -107,6 +108,7 @@ pub(super) fn read(source: InputSource, messages: Sender<Result<Message, IoError
     let reader = Reader { name: source.name(), source, messages, pool };
     let end = match Kind::of(&reader.source.path, reader.source.coding) {
         Kind::Sigmf => reader.read_sigmf(),
+        Kind::Archive => reader.read_archive(),
         Kind::Csv => reader.read_csv(),
         Kind::Npy => reader.read_npy(),
         Kind::Raw => reader.read_raw(),
@@ -147,10 +149,13 @@ impl Reader {
         let promised = wav.data_bytes.map(|bytes| bytes / wav.frame_bytes() as u64);
         let rate = Some(f64::from(wav.rate));
         let header = StreamHeader { rate, promised, ..StreamHeader::real(wav.layout, wav.channels) };
-        self.send_header(self.source.chosen(header)?, Timestamps::default());
+        let notes = InputNotes { chunks: reader.header().chunks.clone(), ..InputNotes::default() };
+        self.send_header_with(self.source.chosen(header)?, Timestamps::default(), notes);
         reader.frames().group(self.source.turn());
         self.send_frames(reader.frames(), header)?;
-        Ok(Message::End { faults: reader.faults() })
+        // A pipe may stay open after the samples.
+        let chunks = if self.source.path.is_file() { reader.chunks_after() } else { Vec::new() };
+        Ok(Message::End { faults: reader.faults(), chunks })
     }
 
     fn read_csv(&self) -> Result<Message, IoError> {
@@ -184,7 +189,8 @@ impl Reader {
         self.send_frames(&mut frames, header)?;
         let missing_bytes = frames.missing_bytes();
         let truncated = (missing_bytes > 0).then_some(InputFault::Truncated { missing_bytes });
-        Ok(Message::End { faults: truncated.into_iter().chain(cut_frame(frames.cut_bytes())).collect() })
+        let faults = truncated.into_iter().chain(cut_frame(frames.cut_bytes())).collect();
+        Ok(Message::End { faults, chunks: Vec::new() })
     }
 
     fn read_sigmf(&self) -> Result<Message, IoError> {
@@ -193,30 +199,56 @@ impl Reader {
         let meta_name = meta_path.display().to_string();
         let (_, data_path) = file_pair(&self.source.path, Some(&meta));
         let file = open_file(&data_path)?;
-        let layout = SampleLayout::packed(meta.format(&meta_name)?);
+        let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
+        self.read_recording(meta, &meta_name, file, bytes)
+    }
+
+    fn read_archive(&self) -> Result<Message, IoError> {
+        let mut archive = open_file(&self.source.path)?;
+        let (meta, name, data) = archived(&mut archive, &self.name)?;
+        let sought = archive.seek(SeekFrom::Start(data.offset));
+        sought.map_err(IoError::system(&self.name, "read the samples"))?;
+        self.read_recording(meta, &name, archive.take(data.size), Some(data.size))
+    }
+
+    /// The samples `data`, of `bytes` bytes if that is known, with their metadata.
+    fn read_recording(
+        &self,
+        meta: SigmfMeta,
+        meta_name: &str,
+        data: impl Read,
+        bytes: Option<u64>,
+    ) -> Result<Message, IoError> {
+        let layout = SampleLayout::packed(meta.format(meta_name)?);
         let header = StreamHeader {
             is_complex: meta.is_complex(),
             rate: meta.global.sample_rate,
             ..StreamHeader::real(layout, meta.global.num_channels.unwrap_or(1))
         };
-        let bytes = file.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
         let promised = bytes.map(|bytes| bytes / header.frame_bytes() as u64);
         let header = StreamHeader { promised, ..header };
         let chosen = self.source.chosen(header)?;
-        let broken = |problem| IoError::Sigmf { file: meta_name.clone(), problem };
-        let timestamps = meta.timestamps(&meta_name)?.in_turns(self.source.turn()).map_err(broken)?;
-        self.send_header(chosen, timestamps);
-        self.send_turns(FrameReader::new(file, header.frame_bytes(), None), header)
+        let broken = |problem| IoError::Sigmf { file: meta_name.to_owned(), problem };
+        let turn = self.source.turn();
+        let timestamps = meta.timestamps(meta_name)?.in_turns(turn).map_err(broken)?;
+        let (sigmf, chunks) = (Some(Box::new(meta)), Vec::new());
+        let notes = InputNotes { sigmf, timestamps: timestamps.clone(), turn, chunks };
+        self.send_header_with(chosen, timestamps, notes);
+        self.send_turns(FrameReader::new(data, header.frame_bytes(), None), header)
     }
 
     fn send_header(&self, header: StreamHeader, timestamps: Timestamps) {
-        let _ = self.messages.send(Ok(Message::Header { header, timestamps }));
+        self.send_header_with(header, timestamps, InputNotes::default());
+    }
+
+    fn send_header_with(&self, header: StreamHeader, timestamps: Timestamps, notes: InputNotes) {
+        let _ = self.messages.send(Ok(Message::Header { header, timestamps, notes: Box::new(notes) }));
     }
 
     fn send_raw_frames(&self, bytes: impl Read, header: StreamHeader) -> Result<Message, IoError> {
         let mut frames = FrameReader::new(bytes, header.frame_bytes(), None);
         self.send_frames(&mut frames, header)?;
-        Ok(Message::End { faults: cut_frame(frames.cut_bytes()) })
+        Ok(Message::End { faults: cut_frame(frames.cut_bytes()), chunks: Vec::new() })
     }
 
     /// Sends frames to the consumer until the end, or until the consumer is gone.

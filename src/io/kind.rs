@@ -7,6 +7,8 @@ use std::path::Path;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Sigmf,
+    /// A SigMF recording in an archive.
+    Archive,
     Csv,
     Npy,
     Raw,
@@ -19,6 +21,7 @@ impl Kind {
         let extension = path.extension().and_then(|extension| extension.to_str());
         match extension.map(str::to_ascii_lowercase).as_deref() {
             _ if is_sigmf(path) => Self::Sigmf,
+            Some("sigmf") => Self::Archive,
             Some("csv") => Self::Csv,
             Some("npy") => Self::Npy,
             _ if coding == Coding::Wav => Self::Wav,
@@ -27,8 +30,8 @@ impl Kind {
     }
 }
 
-/// True for inputs that state their own format and channels whatever the [`Coding`] is: SigMF recordings,
-/// tables and arrays.
+/// True for inputs that state their own format and channels whatever the [`Coding`] is: SigMF recordings and
+/// archives, tables and arrays.
 pub fn is_self_describing(path: &Path) -> bool {
     !matches!(Kind::of(path, Coding::Wav), Kind::Wav | Kind::Raw)
 }

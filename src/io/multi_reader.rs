@@ -9,6 +9,7 @@ use super::input::{BLOCKS, Input, too_many_lost};
 use super::input_thread::InputSource;
 use super::live_lost::{LiveLines, LiveLost};
 use super::lost::{Entry, LostInInput, LostLine, LostSamples};
+use super::notes::{OutputNotes, Placement};
 use super::pipe::refuse_shared_pipes;
 use super::stall::Wait;
 use super::timestamps::Segment;
@@ -41,6 +42,8 @@ pub struct MultiReader {
     stalls: Option<StallWatch>,
     live: Option<LiveLines>,
     max_lost: u64,
+    /// Number of the earliest frame at the converter.
+    origin: u64,
     /// Frames at hand.
     ready: usize,
     consumed: u64,
@@ -79,7 +82,8 @@ impl MultiReader {
         };
         let ReadOptions { until, max_lost, lost, .. } = options;
         let (stalls, live) = (options.stalls.cloned(), options.live_lost.map(LiveLost::lines));
-        let mut reader = Self { inputs, stop, until, stalls, live, max_lost, ready: 0, consumed: 0 };
+        let mut reader =
+            Self { inputs, stop, until, stalls, live, max_lost, origin: 0, ready: 0, consumed: 0 };
         for i in 0..paths.len() {
             if reader.inputs[i].sends_header() && !reader.receive(i)? {
                 return Ok(None);
@@ -153,6 +157,12 @@ impl MultiReader {
     /// Frames consumed since the beginning.
     pub fn consumed(&self) -> u64 {
         self.consumed
+    }
+
+    /// What the inputs say besides their samples, for an output with its frames at `placement`.
+    pub fn notes(&self, placement: Placement) -> OutputNotes {
+        let notes: Vec<_> = self.inputs.iter().map(|input| &input.notes).collect();
+        OutputNotes::of(&notes, self.origin, placement)
     }
 
     /// The faults tolerated so far.
@@ -237,6 +247,7 @@ impl MultiReader {
             }
             input.aligned.lose(segments, lost);
         }
+        self.origin = origin;
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 //! only when it is complete.
 
 use super::wav::{WavFile, stream_header};
-use super::{IoError, PcmFormat, SigmfMeta, Stdout, is_pipe};
+use super::{IoError, OutputNotes, PcmFormat, SigmfMeta, Stdout, is_pipe};
 use crate::files::{AtomicFile, is_same_file};
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ enum Target {
     Sigmf {
         data: AtomicFile,
         meta: AtomicFile,
-        text: String,
+        header: OutputHeader,
     },
 }
 
@@ -47,6 +47,7 @@ enum Target {
 pub struct SampleWriter {
     target: Target,
     name: String,
+    notes: OutputNotes,
 }
 
 impl SampleWriter {
@@ -78,7 +79,7 @@ impl SampleWriter {
             Container::Raw if is_stream => stream_target(path, &[]).map_err(refused())?,
             Container::Raw => Target::Raw(AtomicFile::create(path, replace)?),
         };
-        Ok(Self { target, name })
+        Ok(Self { target, name, notes: OutputNotes::default() })
     }
 
     /// The files that an output of this name has: none for `-`, two for a SigMF recording.
@@ -104,6 +105,11 @@ impl SampleWriter {
         written.map_err(IoError::system(&self.name, "write it"))
     }
 
+    /// What is to accompany the samples, where the output has room for it: SigMF and WAV files.
+    pub fn annotate(&mut self, notes: OutputNotes) {
+        self.notes = notes;
+    }
+
     /// Completes headers and metadata. The caller must commit the returned files, which do not have their
     /// final names yet.
     ///
@@ -112,10 +118,11 @@ impl SampleWriter {
     pub fn finish(self) -> Result<Vec<AtomicFile>, IoError> {
         let refused = IoError::system(&self.name, "write it");
         match self.target {
-            Target::Wav(file) => Ok(vec![file.finish().map_err(refused)?]),
+            Target::Wav(file) => Ok(vec![file.finish_with(&self.notes.chunks).map_err(refused)?]),
             Target::Raw(file) => Ok(vec![file]),
             Target::Stream(mut stream) => stream.flush().map(|()| Vec::new()).map_err(refused),
-            Target::Sigmf { data, mut meta, text } => {
+            Target::Sigmf { data, mut meta, header } => {
+                let text = sigmf_text(&self.name, header, self.notes)?;
                 meta.write_all(text.as_bytes()).map_err(refused)?;
                 Ok(vec![data, meta])
             }
@@ -135,13 +142,23 @@ fn is_sigmf_meta(path: &Path) -> bool {
 fn sigmf_target(path: &Path, header: OutputHeader, replace: bool) -> Result<Target, IoError> {
     let meta = AtomicFile::create(path, replace)?;
     let data = AtomicFile::create(&path.with_extension("sigmf-data"), replace)?;
+    Ok(Target::Sigmf { data, meta, header })
+}
+
+/// The metadata of an output called `file`.
+fn sigmf_text(file: &str, header: OutputHeader, mut notes: OutputNotes) -> Result<String, IoError> {
     let OutputHeader { format, is_complex, rate, .. } = header;
-    let text = serde_json::to_string_pretty(&SigmfMeta::for_output(format, is_complex, rate));
-    let fault = |error: serde_json::Error| IoError::Sigmf {
-        file: path.display().to_string(),
-        problem: error.to_string(),
-    };
-    Ok(Target::Sigmf { data, meta, text: text.map_err(fault)? + "\n" })
+    let mut meta = SigmfMeta::for_output(format, is_complex, rate);
+    notes.sort();
+    meta.global.other = notes.global;
+    if !notes.captures.is_empty() {
+        meta.captures = notes.captures;
+    }
+    let fault =
+        |error: serde_json::Error| IoError::Sigmf { file: file.to_owned(), problem: error.to_string() };
+    let annotations = notes.annotations.iter().map(serde_json::to_value).collect::<Result<_, _>>();
+    meta.annotations = annotations.map_err(fault)?;
+    Ok(serde_json::to_string_pretty(&meta).map_err(fault)? + "\n")
 }
 
 /// The nearest rate that a WAV header can state.

@@ -3,10 +3,13 @@
 //! Real or complex samples, one or several interleaved channels. If `core:global_index` increases by more than
 //! `core:sample_start` between captures, samples were lost.
 
+use super::tar::{TarFile, tar_files};
 use super::timestamps::{Timestamp, Timestamps};
 use super::{IoError, PcmFormat};
 use crate::files::{Bound, read_text};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 
 /// Maximum number of interleaved channels, the same as in a WAV header.
@@ -19,7 +22,7 @@ const META_FILE: Bound = Bound {
     remedy: "give the file that was meant, or remove annotations from it",
 };
 
-/// The supported part of a SigMF metadata file; other keys are ignored.
+/// A SigMF metadata file. Keys that are not supported are kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SigmfMeta {
     /// Properties of the whole recording.
@@ -27,9 +30,9 @@ pub struct SigmfMeta {
     /// The starts of runs of consecutive samples.
     #[serde(default)]
     pub captures: Vec<SigmfCapture>,
-    /// Always empty; other tools require the key.
-    #[serde(default, skip_deserializing)]
-    pub annotations: [(); 0],
+    /// What is said of some of the samples, as it was written: [`SigmfAnnotation`]s if it is well-formed.
+    #[serde(default)]
+    pub annotations: Vec<Value>,
 }
 
 /// The `global` object.
@@ -54,10 +57,27 @@ pub struct SigmfGlobal {
     /// Version of SigMF.
     #[serde(rename = "core:version", default)]
     pub version: String,
+    /// Author, hardware, licence, and all other members.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+/// One of the `annotations`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SigmfAnnotation {
+    /// Its first frame in the file.
+    #[serde(rename = "core:sample_start")]
+    pub sample_start: u64,
+    /// Its frames.
+    #[serde(rename = "core:sample_count", default, skip_serializing_if = "Option::is_none")]
+    pub sample_count: Option<u64>,
+    /// Label, comment, frequencies, and all other members.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
 }
 
 /// One of the `captures`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SigmfCapture {
     /// Its first frame in the file.
     #[serde(rename = "core:sample_start")]
@@ -68,6 +88,9 @@ pub struct SigmfCapture {
     /// Bytes before the capture's first frame that are not samples; only 0 is read.
     #[serde(rename = "core:header_bytes", default, skip_serializing_if = "is_zero")]
     pub header_bytes: u64,
+    /// Date and time, frequency, and all other members.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
 }
 
 fn is_zero(count: &u64) -> bool {
@@ -86,9 +109,10 @@ impl SigmfMeta {
                 dataset: None,
                 offset: 0,
                 version: "1.0.0".into(),
+                other: Map::new(),
             },
-            captures: vec![SigmfCapture { sample_start: 0, global_index: None, header_bytes: 0 }],
-            annotations: [],
+            captures: vec![SigmfCapture::default()],
+            annotations: Vec::new(),
         }
     }
 
@@ -203,6 +227,35 @@ pub fn sigmf_files(path: &Path) -> [PathBuf; 2] {
     file_pair(path, meta.as_ref()).into()
 }
 
+/// The metadata of the only recording in an archive called `file`, the name of it for messages, and where the
+/// samples are.
+pub(super) fn archived(
+    archive: &mut (impl Read + Seek),
+    file: &str,
+) -> Result<(SigmfMeta, String, TarFile), IoError> {
+    let files = tar_files(archive, file)?;
+    let fault = |problem: String| IoError::Sigmf { file: file.to_owned(), problem };
+    let metas: Vec<_> = files.iter().filter(|file| file.name.ends_with(".sigmf-meta")).collect();
+    let [meta] = metas[..] else {
+        let count = metas.len();
+        return Err(fault(format!("it holds {count} recordings; extract the one that is meant (tar -xf)")));
+    };
+    let name = format!("{file} ({})", meta.name);
+    if meta.size > META_FILE.bytes {
+        let TarFile { size, .. } = meta;
+        return Err(fault(format!("{} has {size} bytes, more than {}", meta.name, META_FILE.bytes)));
+    }
+    let mut text = vec![0; meta.size as usize];
+    let sought = archive.seek(SeekFrom::Start(meta.offset));
+    sought.and_then(|_| archive.read_exact(&mut text)).map_err(IoError::system(file, "read it"))?;
+    let text = String::from_utf8(text).map_err(|_| fault(format!("{} is not UTF-8", meta.name)))?;
+    let parsed = SigmfMeta::parse(&text, &name)?;
+    let (_, data) = file_pair(Path::new(&meta.name), Some(&parsed));
+    let found = files.iter().find(|file| Path::new(&file.name) == data);
+    let found = found.ok_or_else(|| fault(format!("{} is not in it; pack both files", data.display())))?;
+    Ok((parsed, name, found.clone()))
+}
+
 /// True for the names of SigMF's two files.
 pub fn is_sigmf(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "sigmf-meta" || extension == "sigmf-data")
@@ -213,8 +266,11 @@ mod tests {
     use super::*;
 
     fn meta(datatype: &str, captures: &[(u64, Option<u64>)]) -> SigmfMeta {
-        let capture =
-            |&(sample_start, global_index): &_| SigmfCapture { sample_start, global_index, header_bytes: 0 };
+        let capture = |&(sample_start, global_index): &_| SigmfCapture {
+            sample_start,
+            global_index,
+            ..SigmfCapture::default()
+        };
         let mut meta = SigmfMeta::for_output(PcmFormat::F32Le, false, 1.0);
         meta.global.datatype = datatype.into();
         SigmfMeta { captures: captures.iter().map(capture).collect(), ..meta }

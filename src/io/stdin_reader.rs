@@ -71,7 +71,7 @@ impl StdinReader {
                 return Ok(Some(Message::Frames { bytes, filled }));
             }
         }
-        Ok(Some(Message::End { faults: cut_frame(self.frames.cut_bytes()) }))
+        Ok(Some(Message::End { faults: cut_frame(self.frames.cut_bytes()), chunks: Vec::new() }))
     }
 
     /// Takes a used block back.

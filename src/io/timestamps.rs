@@ -88,6 +88,17 @@ impl Timestamps {
         self.0.first().and_then(|first| first.beginning())
     }
 
+    /// When a frame of the input was taken, counted from `origin`.
+    pub(super) fn time_of(&self, frame: u64, origin: u64) -> u64 {
+        let last = self.0.iter().take_while(|timestamp| timestamp.frame <= frame).last();
+        let index = match (last, self.beginning()) {
+            (Some(last), _) => last.index.saturating_add(frame - last.frame),
+            (None, Some(beginning)) => beginning.saturating_add(frame),
+            (None, None) => origin.saturating_add(frame),
+        };
+        index.saturating_sub(origin)
+    }
+
     /// Frames and breaks in their order, with time counted from `origin`, which is not later than
     /// the beginning.
     pub(super) fn segments(&self, origin: u64) -> Result<VecDeque<Segment>, String> {
@@ -153,6 +164,14 @@ mod tests {
         // Lost at the very beginning, said twice.
         assert_eq!(segments(&[(0, 5), (0, 6)], 5), [Lost(1), rest]);
         assert_eq!(timestamps(&[(4, 14)]).unwrap().beginning(), Some(10));
+    }
+
+    #[test]
+    fn the_time_of_a_frame_counts_what_was_lost() {
+        let given = timestamps(&[(2, 102), (5, 110)]).unwrap();
+        let times: Vec<u64> = (0..7).map(|frame| given.time_of(frame, 98)).collect();
+        assert_eq!(times, [2, 3, 4, 5, 6, 12, 13]);
+        assert_eq!(Timestamps::default().time_of(7, 98), 7);
     }
 
     #[test]

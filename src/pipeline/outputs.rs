@@ -2,7 +2,7 @@
 
 use super::PipelineError;
 use crate::files::{AtomicFile, commit_all};
-use crate::io::{IoError, SampleWriter};
+use crate::io::{IoError, OutputNotes, SampleWriter};
 use std::io::Write;
 
 /// Output samples with their mask.
@@ -34,6 +34,11 @@ impl FileOutputs {
     /// Writes samples to `samples`, and the mask to `mask` if given.
     pub fn new(samples: SampleWriter, mask: Option<AtomicFile>) -> Self {
         Self { samples, mask }
+    }
+
+    /// What is to accompany the samples.
+    pub fn annotate(&mut self, notes: OutputNotes) {
+        self.samples.annotate(notes);
     }
 
     /// Completes the files and renames them to their final names.

@@ -23,6 +23,7 @@ mod live;
 mod long_files;
 mod lost;
 mod measure;
+mod notes;
 #[cfg(unix)]
 mod outputs;
 mod simulate;

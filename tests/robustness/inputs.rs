@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The file that is damaged, and the run that reads it.
-const RUNS: [(&str, &str); 8] = [
+const RUNS: [(&str, &str); 11] = [
     ("bank.json", "fuse bank.json a.wav b.wav -o out.wav --force"),
     ("designed.json", "verify designed.json"),
     ("designed.json", "analyze designed.json"),
@@ -20,6 +20,9 @@ const RUNS: [(&str, &str); 8] = [
     ("a.wav", "fuse bank.json a.wav b.wav -o out.wav --force --gaps zero"),
     ("both.sigmf-meta", "stream bank.json --input both.sigmf-meta --gaps hold -o out --force"),
     ("both.sigmf-data", "stream bank.json --input both.sigmf-meta --gaps hold -o out --force"),
+    ("both.csv", "fuse bank.json both.csv -o out.wav --force"),
+    ("rows.npy", "fuse bank.json rows.npy -o out.wav --force"),
+    ("both.sigmf", "fuse bank.json both.sigmf -o out.sigmf-meta --force"),
     ("lost", "stream bank.json --input raw --gaps zero --lost lost -o out --force"),
 ];
 
@@ -39,6 +42,14 @@ fn desk() -> Desk {
     desk.write("both.sigmf-data", &raw);
     desk.write("both.sigmf-meta", META);
     desk.write("lost", LOST);
+    desk.write("both.csv", "time,a,b\n0.0,1,2\n0.5,,4\n1.0,5,6\n");
+    let header =
+        "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 40), }".to_owned() + &" ".repeat(55) + "\n";
+    let header =
+        [&b"\x93NUMPY\x01\x00"[..], &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
+    desk.write("rows.npy", [header, raw].concat());
+    let tar = ["-cf", "both.sigmf", "both.sigmf-meta", "both.sigmf-data"];
+    assert!(Command::new("tar").current_dir(desk.path("")).args(tar).status().unwrap().success());
     desk
 }
 

@@ -6,9 +6,10 @@ use crate::support::random::Random;
 use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::wav::WavReader;
-use hybank::io::{CsvReader, LostSamples, NpyHeader, SigmfMeta};
+use hybank::io::{CsvReader, LostSamples, NpyHeader, SigmfMeta, tar_files};
 use hybank::spec::Spec;
 use std::fs;
+use std::io::Cursor;
 use std::path::Path;
 
 /// Damaged copies of each seed.
@@ -101,6 +102,19 @@ fn tables_and_arrays_of_samples() {
         }
     });
     assert!(answers > 1000 && refusals > 1000, "{answers} {refusals}");
+}
+
+#[test]
+fn archives() {
+    let (mut answers, mut refusals) = (0, 0);
+    damaged("tar", |bytes| match answered(tar_files(&mut Cursor::new(bytes), "seed")) {
+        None => refusals += 1,
+        Some(files) => {
+            answers += 1;
+            assert!(files.iter().all(|file| file.offset + file.size <= bytes.len() as u64));
+        }
+    });
+    assert!(answers > 100 && refusals > 1000, "{answers} {refusals}");
 }
 
 #[test]

@@ -25,7 +25,8 @@ fn reader(
     let input = Input::on_thread_of("dying".into(), header, send_all).unwrap();
     let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
     let inputs = vec![input];
-    MultiReader { inputs, stop, until, stalls: None, live: None, max_lost: 0, ready: 0, consumed: 0 }
+    let (stalls, live) = (None, None);
+    MultiReader { inputs, stop, until, stalls, live, max_lost: 0, origin: 0, ready: 0, consumed: 0 }
 }
 
 #[test]
@@ -48,7 +49,8 @@ fn a_panic_in_a_reader_is_an_error_too() {
 
 #[test]
 fn an_input_that_ends_is_no_error() {
-    let mut reader = reader(|messages, _| messages.send(Ok(Message::End { faults: vec![] })).unwrap());
+    let mut reader =
+        reader(|messages, _| messages.send(Ok(Message::End { faults: vec![], chunks: vec![] })).unwrap());
     assert_eq!(reader.wait().unwrap(), Arrival::End);
 }
 

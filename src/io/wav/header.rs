@@ -8,6 +8,34 @@ const TAG_PCM: u16 = 1;
 const TAG_FLOAT: u16 = 3;
 const TAG_EXTENSIBLE: u16 = 0xFFFE;
 
+/// Chunks that say something about the recording; others hold positions in its samples, or are unknown.
+const NOTES: [&[u8; 4]; 3] = [b"bext", b"iXML", b"LIST"];
+/// Longest chunk that is kept, and longest in all.
+const LONGEST_NOTE: u64 = 1 << 20;
+const ALL_NOTES: usize = 4 << 20;
+
+/// A chunk that says something about the recording: `bext`, `iXML`, or `LIST` of the type `INFO`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WavChunk {
+    /// Its name.
+    pub id: [u8; 4],
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+impl WavChunk {
+    /// Whether a chunk of this name and size, beside those that are kept, may be one.
+    pub(super) fn may_be(id: &[u8; 4], size: u64, kept: &[Self]) -> bool {
+        let bytes: usize = kept.iter().map(|chunk| chunk.bytes.len()).sum();
+        NOTES.contains(&id) && size <= LONGEST_NOTE && bytes <= ALL_NOTES - LONGEST_NOTE as usize
+    }
+
+    /// The chunk, unless it is a list of something else.
+    pub(super) fn new(id: [u8; 4], bytes: Vec<u8>) -> Option<Self> {
+        (&id != b"LIST" || bytes.starts_with(b"INFO")).then_some(Self { id, bytes })
+    }
+}
+
 /// A checked header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WavHeader {
@@ -21,6 +49,10 @@ pub struct WavHeader {
     pub data_bytes: Option<u64>,
     /// Where the samples begin.
     pub data_offset: u64,
+    /// What is said of the recording before the samples.
+    pub chunks: Vec<WavChunk>,
+    /// Chunks may follow the samples.
+    pub(super) is_riff: bool,
     /// 24 significant bits in 32: writers disagree whether they lie high or low.
     pub(super) justification_open: bool,
 }
@@ -47,13 +79,21 @@ impl WavHeader {
     pub(super) fn read<R: Read>(chunks: &mut Chunks<'_, R>) -> Result<Self, IoError> {
         let mut fmt = None;
         let mut true_size = None;
+        let mut notes = Vec::new();
         while let Some(chunk) = chunks.next()? {
             match &chunk.id {
                 b"fmt " => fmt = Some(Fmt::read(chunks, chunk)?),
                 b"ds64" => true_size = Some(read_ds64(chunks, chunk)?),
                 b"data" => {
                     let fmt = fmt.ok_or_else(|| no_fmt(chunks, chunk))?;
-                    return Self::assemble(chunks, &fmt, chunk, true_size);
+                    let header = Self::assemble(chunks, &fmt, chunk, true_size)?;
+                    return Ok(Self { chunks: notes, ..header });
+                }
+                id if WavChunk::may_be(id, chunk.size, &notes) => {
+                    let mut bytes = vec![0; chunk.size as usize];
+                    chunks.exact(&mut bytes, "a chunk of metadata")?;
+                    chunks.skip(chunk, chunk.size)?;
+                    notes.extend(WavChunk::new(chunk.id, bytes));
                 }
                 _ => chunks.skip(chunk, 0)?,
             }
@@ -81,6 +121,8 @@ impl WavHeader {
             rate: fmt.rate,
             data_bytes,
             data_offset: data.offset,
+            chunks: Vec::new(),
+            is_riff: chunks.family != Family::W64,
             justification_open: layout.container == 4 && fmt.significant_bits() == 24,
         })
     }

@@ -11,6 +11,6 @@ mod reader;
 mod tests;
 mod writer;
 
-pub use header::WavHeader;
+pub use header::{WavChunk, WavHeader};
 pub use reader::WavReader;
 pub use writer::{WavFile, stream_header};

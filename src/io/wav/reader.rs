@@ -1,9 +1,9 @@
 //! Reads frames from a WAV file or stream.
 
 use super::chunks::Chunks;
-use super::header::WavHeader;
+use super::header::{WavChunk, WavHeader};
 use crate::io::{FrameReader, InputFault, IoError, PcmFormat, SampleLayout};
-use std::io::{Chain, Cursor, Read};
+use std::io::{self, Chain, Cursor, Read};
 
 /// Number of samples used to distinguish 24 high bits of 32 from 24 low ones.
 const JUSTIFICATION_SAMPLES: usize = 16384;
@@ -41,6 +41,34 @@ impl<R: Read> WavReader<R> {
     /// The frames.
     pub fn frames(&mut self) -> &mut FrameReader<impl Read + use<R>> {
         &mut self.frames
+    }
+
+    /// What is said of the recording after the samples, once they have all been read. What is damaged there
+    /// is left out: the samples matter.
+    pub fn chunks_after(&mut self) -> Vec<WavChunk> {
+        let mut chunks = Vec::new();
+        let is_whole = self.frames.ended() && self.frames.missing_bytes() == 0;
+        let Some(data_bytes) = self.header.data_bytes.filter(|_| is_whole && self.header.is_riff) else {
+            return chunks;
+        };
+        let inner = self.frames.inner_mut();
+        let mut pad = data_bytes % 2;
+        let mut head = [0; 8];
+        while io::copy(&mut inner.take(pad), &mut io::sink()).is_ok() && inner.read_exact(&mut head).is_ok() {
+            let [a, b, c, d, size @ ..] = head;
+            let (id, size) = ([a, b, c, d], u64::from(u32::from_le_bytes(size)));
+            pad = size % 2;
+            if WavChunk::may_be(&id, size, &chunks) {
+                let mut bytes = vec![0; size as usize];
+                if inner.read_exact(&mut bytes).is_err() {
+                    break;
+                }
+                chunks.extend(WavChunk::new(id, bytes));
+            } else {
+                pad += size;
+            }
+        }
+        chunks
     }
 
     /// The tolerated faults; complete when the frames have ended.

@@ -3,6 +3,7 @@
 //! A file is begun as RIFF with a JUNK chunk where RF64's ds64 chunk would be; closing it writes
 //! either the two 32-bit sizes or, past 4 GiB, turns it into RF64 in place (EBU Tech 3306).
 
+use super::header::WavChunk;
 use crate::io::PcmFormat;
 use std::io::{self, Seek, SeekFrom, Write};
 
@@ -119,10 +120,26 @@ impl<W: Write + Seek> WavFile<W> {
     ///
     /// # Errors
     /// The writer's.
-    pub fn finish(mut self) -> io::Result<W> {
+    pub fn finish(self) -> io::Result<W> {
+        self.finish_with(&[])
+    }
+
+    /// As [`WavFile::finish`], with chunks after the samples.
+    ///
+    /// # Errors
+    /// The writer's.
+    pub fn finish_with(mut self, chunks: &[WavChunk]) -> io::Result<W> {
         let pad = self.data_bytes % 2;
         self.inner.write_all(&[0][..pad as usize])?;
-        let riff_bytes = self.header_bytes + self.data_bytes + pad - 8;
+        let mut after = Vec::new();
+        for WavChunk { id, bytes } in chunks {
+            after.extend(id);
+            after.extend((bytes.len() as u32).to_le_bytes());
+            after.extend(bytes);
+            after.resize(after.len().next_multiple_of(2), 0);
+        }
+        self.inner.write_all(&after)?;
+        let riff_bytes = self.header_bytes + self.data_bytes + pad + after.len() as u64 - 8;
         match u32::try_from(riff_bytes) {
             // The highest numbers mean "unknown" to readers.
             Ok(size) if size < 0xFFFF_0000 => self.write_riff_sizes(size, self.data_bytes as u32)?,

@@ -1,0 +1,175 @@
+//! What recordings say besides their samples, and what of it holds for the output.
+//!
+//! Frame k of the time axis gives the output samples kM + shift to kM + shift + M - 1, where the shift is the
+//! latency that is not dropped. Positions in the inputs are carried over by this rule, with lost frames counted.
+
+use super::sigmf::{SigmfAnnotation, SigmfCapture, SigmfMeta};
+use super::timestamps::Timestamps;
+use super::wav::WavChunk;
+use serde_json::{Map, Value, json};
+
+/// Members of `global` that hold for the input's own files only.
+const OF_THE_FILE: [&str; 5] =
+    ["core:sha512", "core:trailing_bytes", "core:metadata_only", "core:collection", "core:extensions"];
+
+/// Where the Broadcast Wave chunk counts the samples since midnight (EBU Tech 3285).
+const TIME_REFERENCE: std::ops::Range<usize> = 338..346;
+
+/// A chunk with its count of samples since midnight at the output's rate; the output begins earlier by its
+/// shift.
+fn moved(chunk: &WavChunk, placement: Placement) -> WavChunk {
+    let mut chunk = chunk.clone();
+    if let (b"bext", Some(Ok(field))) = (&chunk.id, chunk.bytes.get(TIME_REFERENCE).map(<[u8; 8]>::try_from))
+    {
+        let samples =
+            u64::from_le_bytes(field).saturating_mul(placement.ratio).saturating_sub(placement.shift);
+        chunk.bytes[TIME_REFERENCE].copy_from_slice(&samples.to_le_bytes());
+    }
+    chunk
+}
+
+/// What an input says.
+#[derive(Debug, Clone, Default)]
+pub(super) struct InputNotes {
+    /// The metadata of a SigMF recording.
+    pub(super) sigmf: Option<Box<SigmfMeta>>,
+    /// When its frames were taken.
+    pub(super) timestamps: Timestamps,
+    /// Samples per frame of converters that take turns, or 1.
+    pub(super) turn: usize,
+    /// Chunks of a WAV file.
+    pub(super) chunks: Vec<WavChunk>,
+}
+
+/// Where the frames of the inputs are in the output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Placement {
+    /// M, output samples per frame.
+    pub ratio: u64,
+    /// Output samples before those of frame 0.
+    pub shift: u64,
+    /// Output samples in all.
+    pub samples: u64,
+}
+
+/// What accompanies the samples of an output.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OutputNotes {
+    /// Further members of the `global` object of a SigMF recording.
+    pub global: Map<String, Value>,
+    /// Its captures; without any, one that begins at 0.
+    pub captures: Vec<SigmfCapture>,
+    /// Its annotations.
+    pub annotations: Vec<SigmfAnnotation>,
+    /// Chunks of a WAV file.
+    pub chunks: Vec<WavChunk>,
+}
+
+impl OutputNotes {
+    /// Of the notes of all inputs, whose time begins at number `origin` of the converters. The members of
+    /// `global`, the captures and the chunks are those of the first input that has any; annotations are those of
+    /// all, each once.
+    pub(super) fn of(inputs: &[&InputNotes], origin: u64, placement: Placement) -> Self {
+        let mut notes = Self::default();
+        for input in inputs {
+            if notes.chunks.is_empty() {
+                notes.chunks = input.chunks.iter().map(|chunk| moved(chunk, placement)).collect();
+            }
+            let Some(meta) = &input.sigmf else { continue };
+            let axis = Axis { input, offset: meta.global.offset, origin, placement };
+            if notes.captures.is_empty() {
+                let kept = meta.global.other.iter().filter(|(key, _)| !OF_THE_FILE.contains(&key.as_str()));
+                notes.global = kept.map(|(key, value)| (key.clone(), value.clone())).collect();
+                notes.extensions(meta.global.other.get("core:extensions"));
+                notes.captures = axis.captures(&meta.captures);
+            }
+            for annotation in meta.annotations.iter().filter_map(|annotation| axis.annotation(annotation)) {
+                if !notes.annotations.contains(&annotation) {
+                    notes.annotations.push(annotation);
+                }
+            }
+        }
+        notes
+    }
+
+    /// Records the digest of the bank, in a namespace of its own.
+    pub fn record_bank(&mut self, digest: &str) {
+        self.global.insert("hybank:bank_digest".into(), digest.into());
+        let own = json!({ "name": "hybank", "version": env!("CARGO_PKG_VERSION"), "optional": true });
+        let extensions = self.global.entry("core:extensions").or_insert_with(|| json!([]));
+        if let Value::Array(list) = extensions {
+            list.retain(|extension| extension["name"] != "hybank");
+            list.push(own);
+        }
+    }
+
+    /// Adds an annotation about `frames` frames from `first` on.
+    pub fn annotate(&mut self, placement: Placement, first: u64, frames: u64, label: &str, comment: &str) {
+        let begin = first.saturating_mul(placement.ratio).saturating_add(placement.shift);
+        let end = begin.saturating_add(frames.saturating_mul(placement.ratio)).min(placement.samples);
+        if begin < end {
+            let other = [("core:label", label), ("core:comment", comment), ("core:generator", "hybank")];
+            let other = other.into_iter().map(|(key, text)| (key.to_owned(), text.into())).collect();
+            self.annotations.push(SigmfAnnotation {
+                sample_start: begin,
+                sample_count: Some(end - begin),
+                other,
+            });
+        }
+    }
+
+    /// In the order that SigMF asks for.
+    pub(super) fn sort(&mut self) {
+        self.annotations.sort_by_key(|annotation| annotation.sample_start);
+    }
+
+    fn extensions(&mut self, extensions: Option<&Value>) {
+        if let Some(list @ Value::Array(_)) = extensions {
+            self.global.insert("core:extensions".into(), list.clone());
+        }
+    }
+}
+
+/// The samples of an input in the output.
+struct Axis<'a> {
+    input: &'a InputNotes,
+    /// Number of the file's first sample.
+    offset: u64,
+    origin: u64,
+    placement: Placement,
+}
+
+impl Axis<'_> {
+    /// The output sample of an input sample, unless it is before the file.
+    fn place(&self, sample: u64) -> Option<u64> {
+        let frame = sample.checked_sub(self.offset)? / self.input.turn.max(1) as u64;
+        let time = self.input.timestamps.time_of(frame, self.origin);
+        time.checked_mul(self.placement.ratio)?.checked_add(self.placement.shift)
+    }
+
+    /// Captures that say more than where they begin; the first begins at 0.
+    fn captures(&self, captures: &[SigmfCapture]) -> Vec<SigmfCapture> {
+        let placed = captures.iter().filter_map(|capture| {
+            let sample_start = self.place(capture.sample_start).filter(|&n| n < self.placement.samples)?;
+            Some(SigmfCapture { sample_start, other: capture.other.clone(), ..SigmfCapture::default() })
+        });
+        let mut placed: Vec<_> = placed.filter(|capture| !capture.other.is_empty()).collect();
+        if placed.first().is_none_or(|first| first.sample_start > 0) {
+            // What holds from the beginning, but not the time of another sample.
+            let mut other = placed.first().map(|first| first.other.clone()).unwrap_or_default();
+            other.remove("core:datetime");
+            placed.insert(0, SigmfCapture { other, ..SigmfCapture::default() });
+        }
+        placed
+    }
+
+    /// An annotation of samples that are in the output.
+    fn annotation(&self, annotation: &Value) -> Option<SigmfAnnotation> {
+        let SigmfAnnotation { sample_start, sample_count, other } =
+            serde_json::from_value(annotation.clone()).ok()?;
+        let begin = self.place(sample_start).filter(|&n| n < self.placement.samples)?;
+        let end = sample_count.and_then(|count| self.place(sample_start.checked_add(count)?));
+        let count = end.map(|end| end.min(self.placement.samples).saturating_sub(begin));
+        Some(SigmfAnnotation { sample_start: begin, sample_count: count, other })
+    }
+}

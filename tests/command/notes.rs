@@ -1,0 +1,179 @@
+//! What recordings say besides their samples, and what of it comes out. As a user runs it.
+
+use crate::support::{Desk, THESIS, bytes, channel, floats, frames, fused, text, wav};
+use serde_json::{Value, json};
+use std::process::Command;
+
+/// A recording of one channel: three samples are lost before its sample 40.
+fn meta(more: &str, annotations: &str) -> String {
+    format!(
+        r#"{{ "global": {{ "core:datatype": "rf32_le", "core:sample_rate": 24000, "core:version": "1.0.0",
+        "core:author": "A. Listener", "core:hw": "two receivers", "antenna:gain": 3.5, "core:sha512": "ab",
+        "core:extensions": [{{ "name": "antenna", "version": "1.0.0", "optional": true }}] }},
+        "captures": [
+        {{ "core:sample_start": 0, "core:global_index": 1000, "core:frequency": 1e8{more} }},
+        {{ "core:sample_start": 40, "core:global_index": 1043, "core:frequency": 2e8 }}],
+        "annotations": [{annotations}] }}"#
+    )
+}
+
+/// The first channel says more than the second, and an annotation of its own.
+fn desk() -> Desk {
+    let desk = Desk::with_spec(THESIS);
+    desk.report(&["design", "spec.toml", "-o", "bank.json"]);
+    let input = frames(100);
+    let shared = r#"{ "core:sample_start": 10, "core:sample_count": 5, "core:label": "burst" }"#;
+    let own = r#", { "core:sample_start": 38, "core:sample_count": 4 }, { "core:sample_start": -1 },
+        { "core:sample_start": 97, "core:sample_count": 50, "core:comment": "to the end" }"#;
+    let time = r#", "core:datetime": "2026-01-02T03:04:05Z""#;
+    for (name, meta) in [("a", meta(time, &[shared, own].concat())), ("b", meta("", shared))] {
+        desk.write(&format!("{name}.sigmf-meta"), meta);
+    }
+    desk.write("a.sigmf-data", bytes(&channel(&input, 0)));
+    desk.write("b.sigmf-data", bytes(&channel(&input, 1)));
+    desk
+}
+
+/// (start, count, label or comment) of each annotation.
+fn annotations(meta: &Value) -> Vec<(u64, u64, String)> {
+    let list = meta["annotations"].as_array().unwrap();
+    let word = |annotation: &Value, key: &str| annotation[key].as_str().map(str::to_owned);
+    let of = |annotation: &Value| {
+        let count = |key: &str| annotation[key].as_u64().unwrap();
+        let said = word(annotation, "core:comment").or_else(|| word(annotation, "core:label"));
+        (count("core:sample_start"), count("core:sample_count"), said.unwrap_or_default())
+    };
+    list.iter().map(of).collect()
+}
+
+#[test]
+fn sigmf_keeps_what_it_is_for() {
+    let desk = desk();
+    let inputs = ["--gaps", "zero", "--force"];
+    let fuse = ["fuse", "bank.json", "a.sigmf-meta", "b.sigmf-meta", "-o", "fused.sigmf-meta"];
+    let stream = ["stream", "bank.json", "--input", "a.sigmf-meta", "--input", "b.sigmf-meta"];
+    let live = [&stream[..], &["-o", "live.sigmf-meta"]].concat();
+    for (args, name, shift, samples) in
+        [(&fuse[..], "fused.sigmf-meta", 0, 206), (&live, "live.sigmf-meta", 10, 206)]
+    {
+        let output = desk.run(&[args, &inputs].concat(), &[]);
+        assert!(output.status.success(), "{output:?}");
+        let meta = desk.read_json(name);
+        let global = &meta["global"];
+        assert_eq!(global["core:author"], "A. Listener");
+        assert_eq!((&global["core:hw"], &global["antenna:gain"]), (&json!("two receivers"), &json!(3.5)));
+        assert!(global.get("core:sha512").is_none(), "that of another file");
+        assert_eq!(global["hybank:bank_digest"], desk.read_json("bank.json")["digest"]);
+        let names: Vec<_> = global["core:extensions"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|extension| &extension["name"])
+            .collect();
+        assert_eq!(names, ["antenna", "hybank"]);
+        // Sample 40 of the input is frame 43, two output samples each.
+        let mut captures = vec![
+            json!({ "core:sample_start": shift, "core:frequency": 1e8, "core:datetime": "2026-01-02T03:04:05Z" }),
+            json!({ "core:sample_start": 86 + shift, "core:frequency": 2e8 }),
+        ];
+        if shift > 0 {
+            captures.insert(0, json!({ "core:sample_start": 0, "core:frequency": 1e8 }));
+        }
+        assert_eq!(meta["captures"], Value::Array(captures));
+        let gap = |channel: u64| (80 + shift, 6, format!("channel {channel}: 3 samples missing"));
+        let want = [
+            (20 + shift, 10, "burst".to_owned()),
+            // Two samples before the break and two after it.
+            (76 + shift, 14, String::new()),
+            gap(1),
+            gap(2),
+            (200 + shift, (samples - 200_u64).saturating_sub(shift), "to the end".to_owned()),
+        ];
+        let mut found = annotations(&meta);
+        found.sort();
+        assert_eq!(found, want.into_iter().filter(|note| note.0 < samples).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn recordings_in_archives_are_read() {
+    let desk = Desk::new();
+    let input = frames(200);
+    let name = "a-recording-with-a-name-that-does-not-fit-the-hundred-bytes-that-the-head-of-a-file-in-an-archive-has-for-it";
+    let meta =
+        r#"{ "global": { "core:datatype": "rf32_le", "core:num_channels": 2, "core:version": "1.0.0" } }"#;
+    let tar = |archive: &str, more: &[&str]| {
+        let tar = Command::new("tar").current_dir(desk.path("")).args(["-cf", archive]).args(more).status();
+        assert!(tar.unwrap().success());
+    };
+    for (short, format) in [("both", "ustar"), (name, "gnu"), (name, "pax")] {
+        let [meta_name, data_name] = ["meta", "data"].map(|end| format!("{short}.sigmf-{end}"));
+        desk.write(&meta_name, meta);
+        desk.write(&data_name, bytes(&input));
+        let archive = format!("{format}.sigmf");
+        tar(&archive, &["--format", format, &meta_name, &data_name]);
+        let output = desk.run(&["stream", "bank.json", "--input", &archive], &[]);
+        assert!(output.status.success() && floats(&output.stdout) == fused(&input), "{format}: {output:?}");
+        // No rate is stated, so the run says which one it takes.
+        let told = text(&output.stderr);
+        assert!(told.contains("states no core:sample_rate") && told.lines().count() == 1, "{told}");
+        let strict = ["fuse", "bank.json", &archive, "-o", "no.wav", "--strict"];
+        desk.refused(1, &strict, &[&archive, "core:sample_rate", "--strict"]);
+    }
+    desk.write("two.sigmf-meta", meta);
+    tar("two.sigmf", &["two.sigmf-meta", "both.sigmf-meta"]);
+    tar("half.sigmf", &["both.sigmf-meta"]);
+    desk.write("cut.sigmf", &desk.read("ustar.sigmf")[..2000]);
+    desk.write("text.sigmf", "hello, world".repeat(100));
+    for (archive, parts) in [
+        ("two.sigmf", ["holds 2 recordings", "extract"]),
+        ("half.sigmf", ["both.sigmf-data is not in it", "pack both files"]),
+        ("cut.sigmf", ["byte 1024", "copy it again"]),
+        ("text.sigmf", ["byte 0", "tar"]),
+    ] {
+        desk.refused(1, &["fuse", "bank.json", archive, "-o", "no.wav"], &[&[archive][..], &parts].concat());
+    }
+    let both = ["fuse", "bank.json", "ustar.sigmf", "-o", "ustar.sigmf", "--force"];
+    desk.refused(1, &both, &["ustar.sigmf", "also the input"]);
+}
+
+/// A chunk with its pad byte.
+fn chunk(id: &[u8; 4], content: &[u8]) -> Vec<u8> {
+    let mut bytes = [&id[..], &(content.len() as u32).to_le_bytes(), content].concat();
+    bytes.resize(bytes.len().next_multiple_of(2), 0);
+    bytes
+}
+
+#[test]
+fn what_a_wav_file_says_of_the_recording_survives() {
+    let desk = Desk::new();
+    let input = frames(51);
+    wav::write_pair(&desk, &channel(&input, 0), &channel(&input, 1));
+    let plain = desk.read("a.wav");
+    let mut bext = vec![b'x'; 603];
+    bext[338..346].copy_from_slice(&48_000_u64.to_le_bytes());
+    let info = [&b"INFO"[..], &chunk(b"INAM", b"a tone\0")].concat();
+    // Before the format, after the samples, and what holds positions or is unknown.
+    let (before, after) = (
+        [chunk(b"bext", &bext), chunk(b"cue ", &[0; 4])],
+        [chunk(b"LIST", &info), chunk(b"LIST", b"adtl1234")],
+    );
+    let content = [&plain[..12], &before.concat(), &plain[12..], &after.concat()].concat();
+    let size = (content.len() as u32 - 8).to_le_bytes();
+    desk.write("noted.wav", [&content[..4], &size, &content[8..]].concat());
+    assert_eq!(desk.good(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "plain-out.wav"]), "");
+    assert_eq!(desk.good(&["fuse", "bank.json", "noted.wav", "b.wav", "-o", "out.wav"]), "");
+    assert_eq!(wav::samples(&desk, "out.wav"), wav::samples(&desk, "plain-out.wav"));
+    let found = desk.read("out.wav");
+    let count = |needle: &[u8]| found.windows(needle.len()).filter(|window| *window == needle).count();
+    // One sample of the input is two of the output.
+    bext[338..346].copy_from_slice(&96_000_u64.to_le_bytes());
+    assert_eq!((count(&chunk(b"bext", &bext)), count(&chunk(b"LIST", &info))), (1, 1));
+    assert_eq!((count(b"cue "), count(b"adtl")), (0, 0));
+    assert_eq!(found[4..8], (found.len() as u32 - 8).to_le_bytes());
+    // The causal output begins earlier by the latency of 3 samples.
+    desk.good(&["fuse", "bank.json", "noted.wav", "b.wav", "-o", "causal.wav", "--keep-latency"]);
+    let causal = desk.read("causal.wav");
+    let at = causal.windows(4).position(|window| window == b"bext").unwrap() + 8 + 338;
+    assert_eq!(causal[at..at + 8], 95_997_u64.to_le_bytes());
+}
