@@ -3,13 +3,12 @@
 use super::Failure;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
 use super::capture_args::CaptureArgs;
-use super::carried::carried;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
 use super::output::{Bits, check_files, precision};
-use super::run::{AlgorithmArg, RunReport, ThreadArgs, complete, print_report};
+use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_report};
 use super::turns::TurnArgs;
 use super::understood::say_understood;
 use super::watch::Watch;
@@ -132,7 +131,7 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     let seconds = begin.elapsed().as_secs_f64();
     let shift = plan.latency() as u64 - skip;
     let placement = Placement { ratio: bank.ratio as u64, shift, samples: run.samples };
-    outputs.annotate(carried(&reader, &run, bank, &args.output, placement)?);
+    outputs.annotate(carried(&reader, run.gaps(), bank, &args.output, placement)?);
     complete(outputs, &run, args.strict, journal)?;
     let (measure, rate) = (args.measured(bank)?, rate.round() as u64);
     let report = Report { run: &run, rate, frames, latency_dropped: skip, seconds, measure };

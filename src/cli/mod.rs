@@ -9,7 +9,6 @@ mod before_after;
 mod calibrate;
 mod capture_args;
 mod capture_file;
-mod carried;
 mod completions;
 mod demo;
 mod design;

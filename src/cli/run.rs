@@ -1,5 +1,7 @@
 //! Code that `fuse` and `stream` share: options of the filters, the report, the end of a run.
 
+mod carried;
+
 use super::Failure;
 use super::bank_file::is_dash;
 use super::gaps::say_gaps;
@@ -8,6 +10,7 @@ use super::print::print_json;
 use super::say::{say, warn};
 use crate::pipeline::{FileOutputs, Gap, GapSummary, Outcome, Warning};
 use crate::runtime::{Algorithm, PlanSummary, ThreadPool};
+pub(super) use carried::carried;
 use std::path::Path;
 
 /// How FIR filters are computed.

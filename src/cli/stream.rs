@@ -1,13 +1,12 @@
 //! `hybank stream`: fuses slow samples as they arrive.
 
 use super::capture_args::coding;
-use super::carried::carried;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
 use super::output::{check_files, precision};
-use super::run::{AlgorithmArg, RunReport, ThreadArgs, complete, print_report};
+use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_report};
 use super::say::say_line;
 use super::turns::TurnArgs;
 use super::understood::say_understood;
@@ -135,7 +134,7 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     let run = run.with_told(watch.finish());
     let (ratio, shift) = (bank.ratio as u64, plan.latency() as u64);
     let placement = Placement { ratio, shift, samples: run.samples };
-    outputs.annotate(carried(&reader, &run, bank, &args.output, placement)?);
+    outputs.annotate(carried(&reader, run.gaps(), bank, &args.output, placement)?);
     let (frames, interrupted) = (reader.consumed(), ending == Ending::Stopped);
     let report = Report { run: &run, frames, interrupted };
     complete(outputs, &run, args.strict, journal)?;

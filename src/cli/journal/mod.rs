@@ -73,7 +73,7 @@ pub(super) struct Journal {
 enum Sink {
     Thread(Sender<Message>),
     /// No thread could be started.
-    Here(Mutex<Scribe>),
+    Here(Box<Mutex<Scribe>>),
 }
 
 enum Message {
@@ -102,7 +102,7 @@ impl Journal {
                 let _ = hand_over.send(scribe);
                 Sink::Thread(sender)
             }
-            Err(_) => Sink::Here(Mutex::new(scribe)),
+            Err(_) => Sink::Here(Box::new(Mutex::new(scribe))),
         };
         Self { sink: Arc::new(sink), dropped: Arc::default() }
     }
