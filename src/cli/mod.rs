@@ -24,12 +24,15 @@ mod import;
 mod init;
 mod interrupt;
 mod journal;
+mod man;
 mod match_bank;
 mod measure;
 mod output;
+mod pictures;
 mod plot;
 mod print;
 mod recordings;
+mod report;
 mod run;
 mod say;
 mod simulate;
@@ -79,6 +82,7 @@ enum Command {
     Analyze(analyze::Args),
     Verify(verify::Args),
     Plot(plot::Args),
+    Report(report::Args),
     Import(import::Args),
     Export(export::Args),
     Simulate(simulate::Args),
@@ -88,6 +92,7 @@ enum Command {
     Stream(stream::Args),
     Demo(demo::Args),
     Completions(completions::Args),
+    Man(man::Args),
     Help(help::Args),
 }
 
@@ -118,6 +123,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Analyze(args) => analyze::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Plot(args) => plot::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Simulate(args) => simulate::run(&args),
@@ -127,6 +133,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Stream(args) => stream::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
         Command::Help(args) => help::run(&args),
     }
 }

@@ -26,6 +26,7 @@ mod measure;
 mod notes;
 #[cfg(unix)]
 mod outputs;
+mod report;
 mod simulate;
 mod snapshots;
 #[cfg(unix)]

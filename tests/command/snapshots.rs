@@ -7,12 +7,13 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 17] = [
     "init",
     "design",
     "analyze",
     "verify",
     "plot",
+    "report",
     "import",
     "export",
     "simulate",
@@ -22,6 +23,7 @@ const COMMANDS: [&str; 15] = [
     "stream",
     "demo",
     "completions",
+    "man",
     "help",
 ];
 

@@ -136,19 +136,20 @@ fn help_has_the_reference_of_specs() {
 
 /// The curve that must be in a picture is there, and no number is missing.
 #[test]
-fn a_bank_is_drawn_in_five_pictures() {
+fn a_bank_is_drawn_in_six_pictures() {
     let desk = Desk::with_spec(AUDIO);
     for flags in [&[][..], &["--method", "iir"]] {
         let spec = if flags.is_empty() { AUDIO.to_owned() } else { AUDIO.replace("taps = 24\n", "") };
         assert_eq!(designed(&desk, &spec, flags), (Some(0), String::new()));
         let files = desk.good(&["plot", "b.json", "-o", "pictures", "--force"]);
-        assert_eq!(files.lines().count(), 5);
+        assert_eq!(files.lines().count(), 6);
         for (name, words) in [
             ("front-ends", &["target", "channel 2", "kHz"][..]),
             ("filters", &["channel 1", "channel 2", "dB"]),
             ("group-delay", &["fast samples"]),
             ("impulse-responses", &["channel 2"]),
             ("error", &["upper bound", "lower bound", "modulo the slow rate"]),
+            ("delay-error", &["gamma", "error of each delay"]),
         ] {
             let picture = String::from_utf8(desk.read(&format!("pictures/{name}.svg"))).unwrap();
             assert!(picture.starts_with("<svg") && !picture.contains("NaN"), "{name}");
