@@ -96,6 +96,12 @@ pub(super) fn judged(sizes: &Sizes) -> Effort {
     norm(sizes).then(noncausal(sizes))
 }
 
+/// The scale that is stated beside gamma: the errors of a bank of zeros and of plain interleaving, whose taps
+/// reach back over the latency.
+pub(super) fn scale(sizes: &Sizes) -> Effort {
+    judged(&Sizes { taps: sizes.latency + sizes.ratio, ..*sizes })
+}
+
 /// A bank for whole delays and a fractional delay for each channel.
 pub(super) fn separation(sizes: &Sizes) -> Effort {
     let alone = Sizes { channels: 1.0, ratio: 1.0, taps: (0.5 * sizes.lags()).ceil(), ..*sizes };

@@ -43,7 +43,7 @@ pub enum Limits {
 }
 
 /// The effort of the design of a spec with taps and, unless it is still to be chosen, a latency; with the
-/// search for a proof if `proving`.
+/// search for a proof if `proving`, and with the scale of gamma that is reported.
 ///
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`].
@@ -55,7 +55,7 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     let latency = spec.latency.unwrap_or_else(|| guess(&problem));
     let sizes = Sizes::new(&Problem { latency, ..problem }, taps);
     let design = synthesis(spec, &sizes);
-    let finished = design.then(finishing(spec, &sizes)).then(if proving {
+    let finished = design.then(finishing(spec, &sizes)).then(fir::scale(&sizes)).then(if proving {
         proven(spec, &sizes)
     } else {
         Effort::default()
