@@ -116,7 +116,7 @@ impl Bank {
     /// The worst-case error with its bounds.
     #[getter]
     fn gamma(&self) -> Gamma {
-        let bank::Gamma { norm, upper, lower, noncausal, worst_case } = self.bank.gamma;
+        let bank::Gamma { norm, upper, lower, noncausal, worst_case, .. } = self.bank.gamma;
         Gamma { norm, upper, lower, noncausal, worst_case }
     }
 

@@ -7,7 +7,7 @@ use crate::units::Seconds;
 
 use super::{
     Bank, BankError, BankProblem, BlockFilter, CausalWitness, Certificate, DualWitness, FixedPoint, Gamma,
-    LowerProof, SynthesisFilters,
+    LowerProof, SynthesisFilters, TapSlopes,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
@@ -47,9 +47,39 @@ impl Bank {
             SynthesisFilters::Fir(taps) => check_taps(taps, self.channel_count())?,
             SynthesisFilters::StateSpace(block) => check_block(block, self.ratio, self.channel_count())?,
         }
+        self.tap_slopes.as_ref().map_or(Ok(()), |slopes| self.check_tap_slopes(slopes))?;
         self.fixed_point.as_ref().map_or(Ok(()), |words| self.check_fixed_point(words))?;
         self.check_proof()?;
         self.spec.as_ref().map_or(Ok(()), |spec| self.check_spec(spec))
+    }
+
+    /// There is a slope for each tap, or none for a delay.
+    fn check_tap_slopes(&self, slopes: &TapSlopes) -> Checked {
+        let SynthesisFilters::Fir(taps) = &self.filters else {
+            let (method, expected, found) = (self.method.name(), "state_space", "tap_slopes");
+            return refuse("channels", BankProblem::Filters { method, expected, found });
+        };
+        let sizes = |path: String, found, expected, unit| {
+            let rule = "there is a slope for each tap of each channel, or none for the delay of a channel";
+            refuse(path, BankProblem::Length { found, expected, unit, rule })
+        };
+        if slopes.by_delay.len() != taps.len() {
+            return sizes("channels".into(), slopes.by_delay.len(), taps.len(), "lists of tap slopes");
+        }
+        for (j, by_delay) in slopes.by_delay.iter().enumerate().filter(|(_, list)| !list.is_empty()) {
+            let path = format!("channels[{j}].tap_slopes");
+            if by_delay.len() != taps.len() {
+                return sizes(path, by_delay.len(), taps.len(), "lists of tap slopes");
+            }
+            for (i, list) in by_delay.iter().enumerate() {
+                let path = format!("{path}[{i}]");
+                if list.len() != taps[i].len() {
+                    return sizes(path, list.len(), taps[i].len(), "tap slopes");
+                }
+                check_finite(&path, list)?;
+            }
+        }
+        Ok(())
     }
 
     /// The taps are the integers, and each integer fits its bits.
@@ -203,10 +233,9 @@ fn check_converters(
 
 fn check_gamma(gamma: &Gamma) -> Checked {
     let bounds = [("lower", gamma.lower), ("noncausal", gamma.noncausal)];
-    for (key, value) in [("norm", gamma.norm), ("upper", gamma.upper), ("worst_case", gamma.worst_case)]
-        .into_iter()
-        .chain(bounds)
-    {
+    let norms = [("norm", gamma.norm), ("upper", gamma.upper)];
+    let worst = [("worst_case", gamma.worst_case), ("tracked", gamma.tracked)];
+    for (key, value) in norms.into_iter().chain(worst).chain(bounds) {
         if let Some(value) = value.filter(|x| !(x.is_finite() && *x >= 0.0)) {
             let rule = "a norm is zero or more, and finite; null says that it is not known";
             return out_of_range(format!("gamma.{key}"), value, "(h = 1)", rule);

@@ -14,6 +14,7 @@ mod fixed_point;
 mod plan;
 mod proof;
 mod read;
+mod tap_slopes;
 mod write;
 
 pub use check::MAX_BANK_LATENCY;
@@ -21,6 +22,7 @@ pub use error::{BankError, BankProblem};
 pub use fixed_point::FixedPoint;
 pub use proof::{CausalWitness, Certificate, DualWitness, LowerProof, Proof};
 pub use read::check_digest;
+pub use tap_slopes::TapSlopes;
 
 use crate::spec::{Method, Spec};
 use crate::units::{FastPeriods, Seconds};
@@ -53,6 +55,8 @@ pub struct Bank {
     pub offsets: Vec<f64>,
     /// The synthesis filters F_1 .. F_N.
     pub filters: SynthesisFilters,
+    /// How the taps follow the delays, for an FIR bank that was designed for it.
+    pub tap_slopes: Option<TapSlopes>,
     /// The integers of the taps, if the taps are fixed-point numbers.
     pub fixed_point: Option<FixedPoint>,
     /// The worst-case error gamma and its bounds.
@@ -107,6 +111,10 @@ pub struct Gamma {
     /// table `None`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<f64>,
+    /// No delays within the spec's `[uncertainty]` make the norm larger while the taps follow them by
+    /// [`Bank::tap_slopes`]. Proven by `verify`; `None` for a bank without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracked: Option<f64>,
 }
 
 impl Gamma {
@@ -128,6 +136,7 @@ impl Gamma {
             lower: Some(lower.min(norm)),
             noncausal: Some(noncausal.min(norm)),
             worst_case: None,
+            tracked: None,
         }
     }
 }
@@ -150,6 +159,7 @@ impl Bank {
             gains: vec![1.0; channels],
             offsets: vec![0.0; channels],
             filters,
+            tap_slopes: None,
             fixed_point: None,
             gamma: Gamma::default(),
             proof: None,

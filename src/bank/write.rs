@@ -44,6 +44,8 @@ struct Channel<'a> {
     offset: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     taps: Option<&'a [f64]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tap_slopes: Option<&'a [Vec<f64>]>,
 }
 
 impl Bank {
@@ -74,11 +76,16 @@ impl Bank {
         let taps_of = |i: usize| taps.and_then(|lists| lists.get(i)).map(Vec::as_slice);
         // What a reader takes for granted is left out.
         let unless = |value: f64, default: f64| (value != default).then_some(value);
+        let slopes_of = |j: usize| {
+            let slopes = self.tap_slopes.as_ref()?.by_delay.get(j)?;
+            (!slopes.is_empty()).then_some(slopes.as_slice())
+        };
         let channel = |i: usize| Channel {
             delay: self.delays[i],
             gain: unless(self.gains[i], 1.0),
             offset: unless(self.offsets[i], 0.0),
             taps: taps_of(i),
+            tap_slopes: slopes_of(i),
         };
         Document {
             format: FORMAT,

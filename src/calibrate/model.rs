@@ -76,7 +76,7 @@ impl Model {
     }
 
     /// g_i Phi_i(jw) e^{-jw D_i}, nominal.
-    pub(super) fn nominal(&self, i: usize, w: f64) -> Complex<f64> {
+    pub(crate) fn nominal(&self, i: usize, w: f64) -> Complex<f64> {
         self.response(i, w, 0.0) * Complex::from_polar(1.0, -w * self.delays[i].0) * self.gains[i]
     }
 }

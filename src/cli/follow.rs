@@ -16,6 +16,7 @@ pub(super) struct Follow {
     gaps: usize,
     replaced: u64,
     clipped: u64,
+    warnings: usize,
     /// The gap of each channel that goes on.
     open: Vec<Open>,
 }
@@ -31,7 +32,8 @@ struct Open {
 
 impl Follow {
     pub(super) fn new(journal: Journal) -> Self {
-        Self { journal, frames: 0, samples: 0, gaps: 0, replaced: 0, clipped: 0, open: Vec::new() }
+        let open = Vec::new();
+        Self { journal, frames: 0, samples: 0, gaps: 0, replaced: 0, clipped: 0, warnings: 0, open }
     }
 
     /// Tells what happened since the last call, with the frames of this step.
@@ -48,6 +50,11 @@ impl Follow {
         let gaps = pipeline.gaps();
         gaps[self.gaps..].iter().for_each(|&gap| self.journal.tell(Event::Gap(gap)));
         self.gaps = gaps.len();
+        let warnings = pipeline.warnings();
+        for text in &warnings[self.warnings..] {
+            self.journal.tell(Event::Warning { text: text.clone() });
+        }
+        self.warnings = warnings.len();
         self.follow_open(pipeline);
     }
 

@@ -9,6 +9,7 @@ use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
 use super::output::{Bits, check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_report};
+use super::track::TrackArgs;
 use super::turns::TurnArgs;
 use super::understood::say_understood;
 use super::watch::Watch;
@@ -35,6 +36,7 @@ Examples:
   hybank fuse bank.json both.wav -o fused.wav --bits 24 --force
   hybank fuse bank.json capture.wav -o fused.wav --interleaved 4
   hybank fuse bank.json tone1.wav tone2.wav -o fused.wav --measure
+  hybank fuse bank.json ch1.wav ch2.wav -o fused.wav --track blind --track-log delays.jsonl
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
@@ -61,6 +63,8 @@ pub(super) struct Args {
     turns: TurnArgs,
     #[command(flatten)]
     gaps: GapArgs,
+    #[command(flatten)]
+    track: TrackArgs,
     #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
@@ -116,18 +120,22 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     let plan = args.plan(bank)?;
     let skip = if args.keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
     let is_complex = reader.is_complex();
-    let mut pipeline = args.pipeline(bank, &plan, skip, is_complex)?;
+    let mut pipeline = args.pipeline(bank, &plan, (skip, rate), is_complex)?;
     let mut outputs = args.outputs(rate, is_complex)?;
-    let mut watch = if is_complex { Watch::idle() } else { Watch::new(bank) };
+    let is_watched = !is_complex && !args.track.is_wanted();
+    let mut watch = if is_watched { Watch::new(bank) } else { Watch::idle() };
     let mut follow = Follow::new(journal.clone());
     run_all(&mut pipeline, &mut reader, &mut outputs, |parts, pipeline| {
         watch.observe(parts);
         follow.step(parts, pipeline);
     })?;
+    pipeline.settle(&mut outputs).map_err(Failure::running)?;
+    follow.step(&[], &pipeline);
+    let told = pipeline.warnings().to_vec();
     let frames = reader.consumed();
     pipeline.flush(frames * bank.ratio as u64, &mut outputs).map_err(Failure::running)?;
     let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
-    let run = run.with_warnings(watch.finish());
+    let run = run.with_warnings(watch.finish()).with_told(told);
     let seconds = begin.elapsed().as_secs_f64();
     let shift = plan.latency() as u64 - skip;
     let placement = Placement { ratio: bank.ratio as u64, shift, samples: run.samples };
@@ -153,9 +161,10 @@ impl Args {
         self.before_after.check(&self.inputs, &self.output)?;
         self.journal.check(&self.output, self.json || self.before_after.is_wanted())?;
         let inputs = self.inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
-        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
-        let others: Vec<&Path> = self.gaps.mask().into_iter().chain(self.journal.report()).collect();
-        check_files(&self.output, &others, &inputs)
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
+        self.track.check(self.algorithm)?;
+        let others = self.gaps.mask().into_iter().chain(self.journal.report()).chain(self.track.log());
+        check_files(&self.output, &others.collect::<Vec<&Path>>(), &inputs)
     }
 
     /// `None` if an interrupt came first.
@@ -181,6 +190,11 @@ impl Args {
     }
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
+        let plan = bank.plan(self.options());
+        plan.map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+    }
+
+    fn options(&self) -> Options {
         // Outputs that no gap affects must have the same bits as without gaps.
         let auto = if self.gaps.policy().is_some() {
             Algorithm::Direct
@@ -188,14 +202,23 @@ impl Args {
             Algorithm::Auto { added_latency: true }
         };
         let precision = precision(self.bits.format());
-        let options = Options { precision, algorithm: self.algorithm.resolve(auto), ..Options::default() };
-        bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+        let algorithm = self.algorithm.resolve(self.track.algorithm(auto));
+        Options { precision, algorithm, ..Options::default() }
     }
 
-    fn pipeline(&self, bank: &Bank, plan: &Plan, skip: u64, is_complex: bool) -> Result<Pipeline, Failure> {
+    /// That drops `skip` samples of an output of `rate` hertz.
+    fn pipeline(
+        &self,
+        bank: &Bank,
+        plan: &Plan,
+        (skip, rate): (u64, f64),
+        is_complex: bool,
+    ) -> Result<Pipeline, Failure> {
+        self.track.check_samples(is_complex)?;
         let (format, gaps, workers) = (self.bits.format(), self.gaps.policy(), self.threads.workers()?);
         let settings = Settings { format, is_complex, skip, gaps, workers };
-        Pipeline::new(bank, plan, settings).map_err(Failure::running)
+        let pipeline = Pipeline::new(bank, plan, settings).map_err(Failure::running)?;
+        self.track.followed(pipeline, (bank, &self.bank), self.options(), rate)
     }
 
     /// The outputs at their beginning, of `rate` hertz.
@@ -204,7 +227,8 @@ impl Args {
         let (container, format) = (Container::Wav, self.bits.format());
         let header = OutputHeader { container, format, is_complex, rate };
         let samples = SampleWriter::create(&self.output, header, self.force);
-        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask))
+        let log = self.track.begin_log(self.force)?;
+        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log))
     }
 
     fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {

@@ -37,6 +37,7 @@ mod run;
 mod say;
 mod simulate;
 mod stream;
+mod track;
 mod turns;
 mod understood;
 mod verify;

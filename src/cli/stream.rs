@@ -8,6 +8,7 @@ use super::journal::{Journal, JournalArgs};
 use super::output::{check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_report};
 use super::say::say_line;
+use super::track::TrackArgs;
 use super::turns::TurnArgs;
 use super::understood::say_understood;
 use super::watch::Watch;
@@ -69,6 +70,8 @@ pub(super) struct Args {
     #[command(flatten)]
     gaps: GapArgs,
     #[command(flatten)]
+    track: TrackArgs,
+    #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
     journal: JournalArgs,
@@ -115,9 +118,10 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     let rate = match_bank::output_rate(bank, &reader)?;
     let is_complex = reader.is_complex();
     args.check_output(is_complex)?;
-    let mut pipeline = args.pipeline(bank, &plan, is_complex)?;
+    let mut pipeline = args.pipeline(bank, &plan, rate, is_complex)?;
     let mut outputs = args.outputs(rate, is_complex)?;
-    let watch = if is_complex { Watch::idle() } else { Watch::new(bank) };
+    let is_watched = !is_complex && !args.track.is_wanted();
+    let watch = if is_watched { Watch::new(bank) } else { Watch::idle() };
     let mut watch = watch.live(journal.clone());
     let mut follow = Follow::new(journal.clone());
     let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |parts, pipeline| {
@@ -125,13 +129,16 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
         follow.step(parts, pipeline);
     });
     let ending = ending.map_err(Failure::running)?;
+    pipeline.settle(&mut outputs).map_err(Failure::running)?;
+    follow.step(&[], &pipeline);
+    let told = pipeline.warnings().to_vec();
     if args.flush {
         let samples = pipeline.plan().flush_frames() * bank.ratio;
         pipeline.flush(pipeline.samples() + samples as u64, &mut outputs).map_err(Failure::running)?;
     }
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
     let run = RunReport::new(pipeline.finish(), tolerated, "--output-format f32le");
-    let run = run.with_told(watch.finish());
+    let run = run.with_told([told, watch.finish()].concat());
     let (ratio, shift) = (bank.ratio as u64, plan.latency() as u64);
     let placement = Placement { ratio, shift, samples: run.samples };
     outputs.annotate(carried(&reader, run.gaps(), bank, &args.output, placement)?);
@@ -158,9 +165,10 @@ impl Args {
         self.turns.check(inputs.len())?;
         self.journal.check(&self.output, self.json)?;
         let inputs = inputs.iter().map(PathBuf::as_path).chain([self.bank.as_path()]);
-        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
-        let others: Vec<&Path> = self.gaps.mask().into_iter().chain(self.journal.report()).collect();
-        check_files(&self.output, &others, &inputs)
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
+        self.track.check(self.algorithm)?;
+        let others = self.gaps.mask().into_iter().chain(self.journal.report()).chain(self.track.log());
+        check_files(&self.output, &others.collect::<Vec<&Path>>(), &inputs)
     }
 
     /// Raw inputs are one interleaved or one per channel; other formats state their channels.
@@ -215,6 +223,11 @@ impl Args {
     }
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
+        let plan = bank.plan(self.options());
+        plan.map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+    }
+
+    fn options(&self) -> Options {
         // Outputs that no gap affects must have the same bits as without gaps.
         let auto = if self.gaps.policy().is_some() {
             Algorithm::Direct
@@ -222,14 +235,23 @@ impl Args {
             Algorithm::Auto { added_latency: false }
         };
         let precision = precision(self.output_format());
-        let options = Options { precision, algorithm: self.algorithm.resolve(auto), ..Options::default() };
-        bank.plan(options).map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+        let algorithm = self.algorithm.resolve(self.track.algorithm(auto));
+        Options { precision, algorithm, ..Options::default() }
     }
 
-    fn pipeline(&self, bank: &Bank, plan: &Plan, is_complex: bool) -> Result<Pipeline, Failure> {
+    /// For an output of `rate` hertz.
+    fn pipeline(
+        &self,
+        bank: &Bank,
+        plan: &Plan,
+        rate: f64,
+        is_complex: bool,
+    ) -> Result<Pipeline, Failure> {
+        self.track.check_samples(is_complex)?;
         let (format, gaps, workers) = (self.output_format(), self.gaps.policy(), self.threads.workers()?);
         let settings = Settings { format, is_complex, skip: 0, gaps, workers };
-        Pipeline::new(bank, plan, settings).map_err(Failure::running)
+        let pipeline = Pipeline::new(bank, plan, settings).map_err(Failure::running)?;
+        self.track.followed(pipeline, (bank, &self.bank), self.options(), rate)
     }
 
     /// The outputs at their beginning, of `rate` hertz.
@@ -238,6 +260,7 @@ impl Args {
         let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };
         let header = OutputHeader { container, format: self.output_format(), is_complex, rate };
         let samples = SampleWriter::create(&self.output, header, self.force);
-        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask))
+        let log = self.track.begin_log(self.force)?;
+        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log))
     }
 }

@@ -57,6 +57,9 @@ struct Report {
     /// No errors within the spec's uncertainty make gamma larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     worst_case: Option<f64>,
+    /// No delays within the spec's uncertainty make gamma larger while the taps follow them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tracked: Option<f64>,
 }
 
 /// Runs the command.
@@ -85,11 +88,12 @@ fn report(args: &Args) -> Result<Report, Failure> {
     } else {
         verify(&bank).map_err(|error| named(&error))?
     };
-    let worst_case = bank.gamma.worst_case;
+    let (worst_case, tracked) = (bank.gamma.worst_case, bank.gamma.tracked);
     Ok(Report {
         taps: taps(&bank),
         words: words(&bank),
         worst_case,
+        tracked,
         bank: file,
         verified,
         digest,
@@ -137,7 +141,7 @@ impl Report {
              attained   {}   this bank's own gain at one frequency\n\
              lower      {}   {}\n\
              noncausal  {}   no bank at all is better\n\
-             {}{}digest     {digest}\n",
+             {}{}{}digest     {digest}\n",
             self.bank,
             number(lower),
             number(upper),
@@ -151,6 +155,9 @@ impl Report {
                     "worst case {}   no errors within the spec's uncertainty make gamma larger\n",
                     number(bound)
                 )
+            }),
+            self.tracked.map_or_else(String::new, |bound| {
+                format!("tracked    {}   no delays within it do while the taps follow them\n", number(bound))
             }),
             self.words,
         )

@@ -3,7 +3,7 @@
 use super::choices::{completed, settings, with_taps};
 use super::effort::{self, Effort, Limits, Observer, Stage, unobserved};
 use super::merging::Repeats;
-use super::methods::robust_fir::RobustStudy;
+use super::methods::robust_fir::{RobustStudy, TrackingStudy};
 use super::methods::{self, DualPoint, Synthesis};
 use super::plant::LiftedPlant;
 use super::problem::Problem;
@@ -16,7 +16,7 @@ use crate::bank::{Bank, Gamma, SynthesisFilters};
 use crate::spec::{DesignSpec, Method, Spec, SpecProblem};
 use crate::units::RadiansPerSlowPeriod;
 use crate::verify::Verified;
-use crate::verify::uncertainty::{ErrorBox, keeps_within};
+use crate::verify::uncertainty::{ErrorBox, Taps, keeps_within};
 use std::time::{Duration, Instant};
 
 /// A bank with the record of its design.
@@ -38,6 +38,8 @@ pub struct Design {
     pub reduction: Option<OrderReduction>,
     /// The comparison with a nominal bank, if the spec has an `[uncertainty]`.
     pub robust: Option<RobustStudy>,
+    /// The comparison of taps that follow the delays with taps that stay, if the spec asks for `tracking`.
+    pub tracking: Option<TrackingStudy>,
     /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
     /// Time that the search for the proof took.
@@ -180,6 +182,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         gains: complete.channels.iter().map(|channel| channel.gain).collect(),
         offsets: complete.channels.iter().map(|channel| channel.offset).collect(),
         filters,
+        tap_slopes: synthesis.affine.as_ref().map(|affine| affine.slopes.clone()),
         gamma: Gamma::computed(peak.gain, rounding, synthesis.lower, synthesis.noncausal),
         proof: None,
         fixed_point,
@@ -193,6 +196,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
         words,
         reduction,
         robust: synthesis.robust.clone(),
+        tracking: synthesis.affine.as_ref().map(|affine| affine.study.clone()),
         proof: Err(DesignError::ProofSkipped),
         proof_time: Duration::ZERO,
         bank,
@@ -216,7 +220,10 @@ impl Design {
             self.proof = prove::attach_proof(&mut self.bank, dual);
             // `verify` proves it only with the rest.
             if let (Some(study), Ok(_)) = (&self.robust, &self.proof) {
-                self.bank.gamma.worst_case = proven_worst_case(&self.bank, &study.errors);
+                self.bank.gamma.worst_case = proven_worst_case(&self.bank, &study.errors, Taps::Fixed);
+            }
+            if let (Some(study), Ok(_)) = (&self.tracking, &self.proof) {
+                self.bank.gamma.tracked = proven_worst_case(&self.bank, &study.errors, Taps::Following);
             }
             self.proof_time = begin.elapsed();
         }
@@ -229,10 +236,10 @@ const WORST_CASE_ACCURACY: f64 = 0.005;
 const STATED_ABOVE: f64 = 1e-9;
 
 /// A worst case over `errors` that `verify` proves; `None` if it does not.
-fn proven_worst_case(bank: &Bank, errors: &ErrorBox) -> Option<f64> {
-    let found = uncertainty::worst_case(bank, errors, WORST_CASE_ACCURACY).ok()?;
+fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Option<f64> {
+    let found = uncertainty::worst_case_of(bank, errors, taps, WORST_CASE_ACCURACY).ok()?;
     let stated = found.upper * (1.0 + STATED_ABOVE);
-    keeps_within(bank, errors, stated).ok()?.then_some(stated)
+    keeps_within(bank, errors, taps, stated).ok()?.then_some(stated)
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ pub use designer::{Design, Options, ProofSearch, design, design_observed, design
 pub use effort::{Limits, Stage};
 pub use error::DesignError;
 pub use error_response::error_response;
-pub use methods::robust_fir::{RobustNorms, RobustStudy};
+pub use methods::robust_fir::{RobustNorms, RobustStudy, TrackingStudy};
 pub use plant::LiftedPlant;
 pub use plausibility::{Implausible, implausible};
 pub use problem::Problem;

@@ -2,7 +2,7 @@
 
 use crate::files::FileError;
 use crate::io::IoError;
-use crate::runtime::{BuildError, ProcessError};
+use crate::runtime::{BuildError, ProcessError, SwapError};
 
 /// An error of one of the stages.
 #[derive(Debug, thiserror::Error)]
@@ -13,12 +13,18 @@ pub enum PipelineError {
     /// The frames do not fit the bank.
     #[error(transparent)]
     Process(#[from] ProcessError),
+    /// A stream cannot go on with other filters.
+    #[error(transparent)]
+    Swap(#[from] SwapError),
     /// An input cannot be read, or an output written.
     #[error(transparent)]
     Io(#[from] IoError),
     /// An output file cannot be created or renamed to its final name.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The thread that prepares changes of the filters cannot be started.
+    #[error("no thread for the changes of the filters: {0}")]
+    Thread(std::io::Error),
 }
 
 impl PipelineError {

@@ -8,7 +8,7 @@
 //! A [`Pipeline`] takes frames as they arrive. It fills missing samples, runs the bank, drops the latency,
 //! and passes encoded samples to an [`Output`], with a mask of the samples that missing inputs affect.
 //! [`run`] processes all frames of a [`MultiReader`](crate::io::MultiReader). The result is an [`Outcome`]
-//! with counts and [`Warning`]s; nothing is printed. [`fuse`] does the same with a signal that is in memory.
+//! with counts and [`Warning`]s; nothing is printed. A [`Retuner`] changes the filters on the way. [`fuse`] does the same with a signal that is in memory.
 
 mod complex;
 mod error;
@@ -17,6 +17,7 @@ mod gaps;
 mod mask;
 mod outcome;
 mod outputs;
+mod retune;
 mod run;
 mod stage;
 mod streams;
@@ -28,6 +29,7 @@ pub use gap::Gap;
 pub use gaps::{GapFiller, GapPolicy};
 pub use outcome::{GapSummary, Outcome, Warning};
 pub use outputs::{Block, FileOutputs, Output};
+pub use retune::{Retuned, Retuner};
 pub use run::{Ending, run};
 pub use streams::{Pipeline, Settings};
 pub use whole::{Whole, WholeSettings, fuse};

@@ -21,6 +21,14 @@ pub trait Output {
     /// # Errors
     /// The errors of the destination.
     fn write(&mut self, block: Block<'_>) -> Result<(), IoError>;
+
+    /// Takes a line for the log of a [`Retuner`](super::Retuner); by default nobody reads it.
+    ///
+    /// # Errors
+    /// The errors of the destination.
+    fn log(&mut self, _line: &str) -> Result<(), IoError> {
+        Ok(())
+    }
 }
 
 /// Samples to a file or standard output, the mask to a file of its own. [`FileOutputs::finish`] makes all
@@ -28,17 +36,23 @@ pub trait Output {
 pub struct FileOutputs {
     samples: SampleWriter,
     mask: Option<AtomicFile>,
+    log: Option<AtomicFile>,
 }
 
 impl FileOutputs {
     /// Writes samples to `samples`, and the mask to `mask` if given.
     pub fn new(samples: SampleWriter, mask: Option<AtomicFile>) -> Self {
-        Self { samples, mask }
+        Self { samples, mask, log: None }
     }
 
     /// What is to accompany the samples.
     pub fn annotate(&mut self, notes: OutputNotes) {
         self.samples.annotate(notes);
+    }
+
+    /// The same outputs with a log beside them.
+    pub fn with_log(self, log: Option<AtomicFile>) -> Self {
+        Self { log, ..self }
     }
 
     /// Completes the files and renames them to their final names.
@@ -49,6 +63,7 @@ impl FileOutputs {
     pub fn finish(self) -> Result<(), PipelineError> {
         let mut files = self.samples.finish()?;
         files.extend(self.mask);
+        files.extend(self.log);
         Ok(commit_all(files)?)
     }
 }
@@ -59,6 +74,11 @@ impl Output for FileOutputs {
             file.write_all(mask).map_err(IoError::system(file.name(), "write it"))?;
         }
         self.samples.write(block.samples)
+    }
+
+    fn log(&mut self, line: &str) -> Result<(), IoError> {
+        let Some(file) = &mut self.log else { return Ok(()) };
+        writeln!(file, "{line}").map_err(IoError::system(file.name(), "write it"))
     }
 }
 

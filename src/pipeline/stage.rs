@@ -1,10 +1,11 @@
 //! The stages of a pipeline: gap filling, filtering and encoding.
 
 use super::mask::MaskDelay;
+use super::retune::{Retuner, Tuning};
 use super::{Block, Gap, GapFiller, GapPolicy, GapSummary, Outcome, Output, PipelineError};
 use crate::bank::Bank;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::runtime::{PcmOutput, Plan, ProcessError, Stream, ThreadPool};
+use crate::runtime::{Options, PcmOutput, Plan, ProcessError, Stream, ThreadPool};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -28,6 +29,8 @@ pub(super) struct RealPipeline {
     buffer: Vec<u8>,
     /// What the converters deliver without a signal.
     offsets: Vec<f64>,
+    /// The changes of the filters.
+    tuning: Option<Tuning>,
 }
 
 impl RealPipeline {
@@ -57,6 +60,7 @@ impl RealPipeline {
             clipped: 0,
             buffer: Vec::new(),
             offsets: bank.offsets.clone(),
+            tuning: None,
         })
     }
 
@@ -68,6 +72,28 @@ impl RealPipeline {
     /// The format of the output.
     pub(super) fn format(&self) -> PcmFormat {
         self.format
+    }
+
+    /// As [`super::Pipeline::retuned_by`].
+    pub(super) fn retuned_by(
+        self,
+        bank: &Bank,
+        options: Options,
+        retuner: Box<dyn Retuner>,
+    ) -> Result<Self, PipelineError> {
+        Ok(Self { tuning: Some(Tuning::start(bank, options, retuner)?), ..self })
+    }
+
+    /// As [`super::Pipeline::settle`].
+    pub(super) fn settle(&mut self, output: &mut impl Output) -> Result<(), PipelineError> {
+        let Some(tuning) = &mut self.tuning else { return Ok(()) };
+        tuning.receive()?;
+        tuning.log(output)
+    }
+
+    /// As [`super::Pipeline::warnings`].
+    pub(super) fn warnings(&self) -> &[String] {
+        self.tuning.as_ref().map_or(&[], |tuning| &tuning.warnings)
     }
 
     /// Output samples so far.
@@ -104,7 +130,7 @@ impl RealPipeline {
         parts: &[PcmFrames<'_>],
         output: &mut impl Output,
     ) -> Result<(), PipelineError> {
-        self.push_at_most(parts, u64::MAX, output)
+        self.push_at_most(parts, u64::MAX, output, true)
     }
 
     /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples have
@@ -122,7 +148,8 @@ impl RealPipeline {
             let frames = (wanted + self.skip).div_ceil(ratio).min(FLUSH_FRAMES as u64) as usize;
             let part =
                 PcmFrames { layout, channels, bytes: &silence[..frames * channels * layout.container] };
-            self.push_at_most(&[part], wanted, output)?;
+            // What is no signal says nothing of the filters.
+            self.push_at_most(&[part], wanted, output, false)?;
         }
         Ok(())
     }
@@ -152,13 +179,36 @@ impl RealPipeline {
         parts: &[PcmFrames<'_>],
         limit: u64,
         output: &mut impl Output,
+        is_signal: bool,
     ) -> Result<(), PipelineError> {
         let frames = parts.iter().map(PcmFrames::frames).min().unwrap_or(0);
         let step = (self.step_bytes / self.stream.ratio() / self.format.bytes()).max(1);
-        let mut limit = limit;
-        for first in (0..frames).step_by(step) {
-            let count = step.min(frames - first);
-            limit -= self.step(&ranges(parts, first..first + count), limit, output)?;
+        let (mut limit, mut first) = (limit, 0);
+        while first < frames {
+            let ahead = self.tuning.as_ref().filter(|_| is_signal).map_or(usize::MAX, Tuning::frames_ahead);
+            let count = step.min(frames - first).min(ahead);
+            let parts = ranges(parts, first..first + count);
+            limit -= self.step(&parts, limit, output)?;
+            if is_signal {
+                self.change_filters(&parts, output)?;
+            }
+            first += count;
+        }
+        Ok(())
+    }
+
+    /// Lets the stream go on with other filters after `parts`, if they change there.
+    fn change_filters(
+        &mut self,
+        parts: &[PcmFrames<'_>],
+        output: &mut impl Output,
+    ) -> Result<(), PipelineError> {
+        let Some(tuning) = &mut self.tuning else { return Ok(()) };
+        let next = tuning.passed(parts)?;
+        tuning.log(output)?;
+        if let Some(mut stream) = next {
+            stream.continue_from(&self.stream)?;
+            self.stream = stream;
         }
         Ok(())
     }

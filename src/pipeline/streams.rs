@@ -2,10 +2,10 @@
 
 use super::complex::Imaginary;
 use super::stage::RealPipeline;
-use super::{Gap, GapPolicy, Outcome, Output, PipelineError};
+use super::{Gap, GapPolicy, Outcome, Output, PipelineError, Retuner};
 use crate::bank::Bank;
 use crate::io::{PcmFormat, PcmFrames};
-use crate::runtime::{Plan, ThreadPool};
+use crate::runtime::{Options, Plan, ThreadPool};
 use std::sync::Arc;
 
 /// Settings of a pipeline.
@@ -50,6 +50,36 @@ impl Pipeline {
         let imaginary = is_complex.then(part).transpose()?;
         let imaginary = imaginary.map(|pipeline| Imaginary::new(pipeline, gaps.is_some()));
         Ok(Self { real: part()?, imaginary })
+    }
+
+    /// The same pipeline, whose filters change as `retuner` says; `bank` and `options` are those of its plan,
+    /// which adds no latency. Of complex samples the filters do not change.
+    ///
+    /// # Errors
+    /// [`PipelineError::Thread`] if there is no thread for it.
+    pub fn retuned_by(
+        self,
+        bank: &Bank,
+        options: Options,
+        retuner: Box<dyn Retuner>,
+    ) -> Result<Self, PipelineError> {
+        if self.imaginary.is_some() {
+            return Ok(self);
+        }
+        Ok(Self { real: self.real.retuned_by(bank, options, retuner)?, ..self })
+    }
+
+    /// Waits for the last block that a [`Retuner`] has.
+    ///
+    /// # Errors
+    /// [`PipelineError::Build`] for filters that do not run, or the errors of the output.
+    pub fn settle(&mut self, output: &mut impl Output) -> Result<(), PipelineError> {
+        self.real.settle(output)
+    }
+
+    /// What a [`Retuner`] has warned of so far.
+    pub fn warnings(&self) -> &[String] {
+        self.real.warnings()
     }
 
     /// The plan.

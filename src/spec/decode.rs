@@ -12,7 +12,7 @@ use super::limits::{
 use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{
-    ChannelSpec, Family, FilterSpec, Method, PerChannel, Reduction, Solver, Spec, SpecProblem,
+    ChannelSpec, Family, FilterSpec, Method, PerChannel, Reduction, Solver, Spec, SpecProblem, Tracking,
     UncertaintySpec,
 };
 use crate::quantity::Time;
@@ -20,13 +20,14 @@ use crate::quantity::Time;
 const TOP_KEYS: [&str; 9] =
     ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "uncertainty", "design"];
 const CHANNEL_KEYS: [&str; 6] = ["delay", "delay_samples", "filter", "noise", "gain", "offset"];
-const DESIGN_KEYS: [&str; 9] = [
+const DESIGN_KEYS: [&str; 10] = [
     "method",
     "taps",
     "gamma_margin",
     "solver",
     "bits",
     "fraction_bits",
+    "tracking",
     "order",
     "reduction_loss_db",
     "noise",
@@ -61,7 +62,15 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
     let channels = channels(&top, &common)?;
     let uncertainty =
         top.optional("uncertainty").map(|v| uncertainty(&v, channels.len(), fast_period)).transpose()?;
+    let is_overriding = overrides.tracking.is_some();
     let design = design(table.as_ref(), &top, overrides, channels.len())?;
+    design.check_tracking(uncertainty.as_ref(), channels.len()).map_err(|problem| {
+        if is_overriding {
+            Fault::overriding("tracking", problem)
+        } else {
+            table.as_ref().unwrap_or(&top).fault_at(Some("tracking"), problem)
+        }
+    })?;
     Ok(Spec { name, fast_period, ratio, latency, target, channels, uncertainty, design })
 }
 
@@ -232,6 +241,9 @@ fn design(
         solver: get("solver").map(|v| v.name("solver", &Solver::ALL.map(|s| (s.name(), s)))).transpose()?,
         bits: get("bits").map(|v| word_lengths(&v)).transpose()?,
         fraction_bits: get("fraction_bits").map(|v| fraction_bits(&v)).transpose()?,
+        tracking: get("tracking")
+            .map(|v| v.name("tracking", &Tracking::ALL.map(|t| (t.name(), t))))
+            .transpose()?,
         reduction: reduction(get("order"), get("reduction_loss_db"))?,
     };
     let design = overrides.clone().over(written).resolved();

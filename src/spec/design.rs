@@ -4,7 +4,8 @@ use super::limits::{
     check_gamma_margin, check_optimised_taps, check_order, check_reduction_loss, check_taps,
 };
 use super::word_lengths::{WordLengths, check_fraction_bits};
-use super::{DesignSpec, Method, Reduction, Solver, SpecProblem};
+use super::{DesignSpec, Method, Reduction, Solver, SpecProblem, Tracking, UncertaintySpec};
+use crate::units::Seconds;
 
 /// The keys of a `[design]` table that are present, in a file or on the command line.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,6 +22,8 @@ pub struct DesignOverrides {
     pub bits: Option<WordLengths>,
     /// Taps are integers times 2^-fraction_bits.
     pub fraction_bits: Option<i32>,
+    /// Taps that follow the delays.
+    pub tracking: Option<Tracking>,
     /// The order, or the loss by order reduction.
     pub reduction: Option<Reduction>,
 }
@@ -60,6 +63,11 @@ impl Method {
         matches!(self, Self::Fir)
     }
 
+    /// Whether the method makes taps that follow the delays and therefore reads `tracking`.
+    pub const fn has_tracking(self) -> bool {
+        matches!(self, Self::Fir)
+    }
+
     /// Whether the method makes recursive filters and therefore reads `order` and `reduction_loss_db`.
     pub const fn has_states(self) -> bool {
         matches!(self, Self::Iir | Self::H2)
@@ -75,6 +83,18 @@ impl Solver {
         match self {
             Self::Sampled => "sampled",
             Self::Kyp => "kyp",
+        }
+    }
+}
+
+impl Tracking {
+    /// Every way.
+    pub const ALL: [Self; 1] = [Self::Affine];
+
+    /// The name in spec files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Affine => "affine",
         }
     }
 }
@@ -106,6 +126,7 @@ impl DesignSpec {
             solver: None,
             bits: None,
             fraction_bits: None,
+            tracking: None,
             reduction: None,
         }
     }
@@ -127,7 +148,8 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, reduction } = self.clone();
+        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, tracking, reduction } =
+            self.clone();
         let written = DesignOverrides {
             method: Some(method),
             taps,
@@ -135,6 +157,7 @@ impl DesignSpec {
             solver,
             bits,
             fraction_bits,
+            tracking,
             reduction,
         };
         let design = overrides.over(written).resolved();
@@ -166,9 +189,29 @@ impl DesignSpec {
                 let remedy = "the method fir needs the number of taps per channel at the fast rate, for example taps = 22";
                 blame("method", Err(SpecProblem::MissingKey { key: "taps", remedy }))
             }
-            (Method::Fir, Some(taps)) => blame("taps", check_optimised_taps(taps, channels)),
+            (Method::Fir, Some(taps)) => blame("taps", self.check_unknowns(taps, channels)),
             _ => Ok(()),
         }
+    }
+
+    /// Each tap is a function of all delays but one if the taps follow them.
+    fn check_unknowns(&self, taps: usize, channels: usize) -> Result<(), SpecProblem> {
+        let functions = if self.tracking.is_some() { channels } else { 1 };
+        check_optimised_taps(taps, channels.saturating_mul(functions))
+    }
+
+    /// Taps can only follow delays that are uncertain.
+    pub(super) fn check_tracking(
+        &self,
+        uncertainty: Option<&UncertaintySpec>,
+        channels: usize,
+    ) -> Result<(), SpecProblem> {
+        let is_uncertain = |table: &UncertaintySpec| table.delays(channels).iter().any(|d| *d > Seconds(0.0));
+        if self.tracking.is_none() || uncertainty.is_some_and(is_uncertain) {
+            return Ok(());
+        }
+        let remedy = "tracking needs to know how far the delays may move: give [uncertainty] delay";
+        Err(SpecProblem::MissingKey { key: "delay", remedy })
     }
 
     fn check_keys(&self) -> Result<(), KeyProblem> {
@@ -178,6 +221,7 @@ impl DesignSpec {
             ("solver", self.solver.is_some(), self.method.has_solver(), "fir"),
             ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
             ("fraction_bits", self.fraction_bits.is_some(), self.method.has_bits(), "fir"),
+            ("tracking", self.tracking.is_some(), self.method.has_tracking(), "fir"),
             (
                 self.reduction.map_or("order", Reduction::key),
                 self.reduction.is_some(),
@@ -190,6 +234,17 @@ impl DesignSpec {
             return blame(
                 "gamma_margin",
                 Err(SpecProblem::NeedlessKey { key: "gamma_margin", method, remedy }),
+            );
+        }
+        if let (Some(Solver::Kyp), Some(_)) = (self.solver, self.tracking) {
+            let (method, remedy) = ("fir with solver = \"kyp\"", "fir with solver = \"sampled\"");
+            return blame("tracking", Err(SpecProblem::NeedlessKey { key: "tracking", method, remedy }));
+        }
+        if let (Some(_), Some(_)) = (&self.bits, self.tracking) {
+            let remedy = "taps that follow the delays are no integers; leave out one of the two";
+            return blame(
+                "tracking",
+                Err(SpecProblem::Conflict { first: "bits", second: "tracking", remedy }),
             );
         }
         match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
@@ -222,6 +277,7 @@ impl DesignOverrides {
             "solver" => self.solver.is_some(),
             "bits" => self.bits.is_some(),
             "fraction_bits" => self.fraction_bits.is_some(),
+            "tracking" => self.tracking.is_some(),
             _ => self.reduction.is_some_and(|reduction| reduction.key() == key),
         }
     }
@@ -238,13 +294,14 @@ impl DesignOverrides {
             solver: self.solver.or(file.solver.filter(|_| kept(Method::has_solver))),
             bits: self.bits.or(file.bits.filter(|_| kept(Method::has_bits))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| kept(Method::has_bits))),
+            tracking: self.tracking.or(file.tracking.filter(|_| kept(Method::has_tracking))),
             reduction: self.reduction.or(file.reduction.filter(|_| kept(Method::has_states))),
         }
     }
 
     /// The default method is FIR if taps are given, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, reduction } = self;
+        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, tracking, reduction } = self;
         let default = if taps.is_some() { Method::Fir } else { Method::Iir };
         DesignSpec {
             method: method.unwrap_or(default),
@@ -253,6 +310,7 @@ impl DesignOverrides {
             solver,
             bits,
             fraction_bits,
+            tracking,
             reduction,
         }
     }

@@ -189,6 +189,15 @@ pub enum Solver {
     Kyp,
 }
 
+/// How the taps of an FIR bank follow delays that change while it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tracking {
+    /// The taps are affine functions of the delays, optimal over the box of delays of the `[uncertainty]`
+    /// table.
+    Affine,
+}
+
 /// The `[design]` table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignSpec {
@@ -209,6 +218,9 @@ pub struct DesignSpec {
     /// Taps are integers times 2^-fraction_bits; `None` lets the designer choose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fraction_bits: Option<i32>,
+    /// Taps that follow the delays, for the method `fir`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking: Option<Tracking>,
     /// Order reduction, for recursive methods.
     #[serde(flatten)]
     pub reduction: Option<Reduction>,
@@ -296,7 +308,8 @@ impl Spec {
         if let Some(uncertainty) = &self.uncertainty {
             uncertainty.check(self.channels.len(), self.fast_period)?;
         }
-        self.design.check(self.channels.len())
+        self.design.check(self.channels.len())?;
+        self.design.check_tracking(self.uncertainty.as_ref(), self.channels.len())
     }
 
     /// True in normalised time: times are in fast periods, and the rates of recordings are free.

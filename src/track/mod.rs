@@ -5,7 +5,8 @@
 //! its rate: measurements of block fits enter with their variance, silence lets the variance grow. A
 //! [`DelayTracker`] holds the filters of all channels, refuses measurements that contradict them, and says
 //! whether it is locked. [`Coincidence`] warns ahead of delays that come together, where no bank recovers the
-//! signal.
+//! signal. A [`Follower`] measures the delays of a bank's channels block by block, by a pilot tone or by any
+//! signal, and says how taps that are affine in the delays are to change.
 //!
 //! ```
 //! use hybank::track::{DelayFilter, DelayMeasurement, DriftModel, DelayState};
@@ -23,9 +24,21 @@
 //! ```
 
 mod coincidence;
+mod error;
 mod filter;
+mod follower;
+mod guide;
+mod log;
+mod readings;
+#[cfg(test)]
+mod tests;
 mod tracker;
 
 pub use coincidence::Coincidence;
+pub use error::TrackError;
 pub use filter::{DelayFilter, DelayMeasurement, DelayState, DriftModel, Innovation};
+pub use follower::{Change, FollowSettings, Followed, Follower};
+pub use guide::Guide;
+pub use log::{Logged, TrackWarning};
+pub use readings::Reading;
 pub use tracker::{DelayTracker, Lock};

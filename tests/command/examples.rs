@@ -25,19 +25,36 @@ fn every_example_runs() {
     }
 }
 
+/// Runs the script of a folder of examples in a folder of its own; gives what it printed.
+#[cfg(unix)]
+fn run_script(example: &str, folder: &Path) -> String {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(example).join("run.sh");
+    let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().unwrap();
+    let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
+    let output = Command::new("sh").arg(script).arg(folder).env("PATH", path).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    text(&output.stdout)
+}
+
 /// The loop of capture, calibration, bank and fused recording, as a user starts it.
 #[test]
 #[cfg(unix)]
 fn the_calibration_loop_runs() {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/calibrate/run.sh");
-    let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().unwrap();
-    let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let output = Command::new("sh").arg(script).arg(folder.path()).env("PATH", path).output().unwrap();
-    assert!(output.status.success(), "{output:?}");
-    let shown = text(&output.stdout);
+    let shown = run_script("calibrate", folder.path());
     assert!(shown.contains("held out   the captures agree"), "{shown}");
     for name in ["measured.toml", "measured.json", "measured.wav"] {
         assert!(folder.path().join(name).is_file(), "{name}");
     }
+}
+
+/// Two recordings with clocks of their own become one; the last line is that of the log.
+#[test]
+#[cfg(unix)]
+fn two_recorders_become_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = run_script("recorders", folder.path());
+    let last: serde_json::Value = serde_json::from_str(shown.lines().last().unwrap()).unwrap();
+    assert_eq!(last["lock"][1], "locked", "{shown}");
+    assert!((last["rate_ppm"][1].as_f64().unwrap() - 3.0).abs() < 1.0, "{last}");
 }

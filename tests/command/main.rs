@@ -31,6 +31,7 @@ mod simulate;
 mod snapshots;
 #[cfg(unix)]
 mod stream;
+mod track;
 mod understanding;
 mod usage;
 mod verify;

@@ -107,6 +107,7 @@ fn reports_are_what_they_were() {
         THESIS.replace("latency = 10", "latency = 4").replace("\"fir\"\ntaps = 22", "\"iir\""),
     );
     desk.write("robust.toml", format!("{THESIS}\n[uncertainty]\ndelay_samples = 0.1\nreference = 0\n"));
+    desk.write("drift.toml", format!("{THESIS}\n[uncertainty]\ndelay_samples = 0.1\n"));
     for (name, args) in [
         ("design-fir", &["design", "spec.toml", "-o", "fir.json"][..]),
         ("design-bits", &["design", "spec.toml", "-o", "bits.json", "--bits", "8"]),
@@ -130,6 +131,8 @@ fn reports_are_what_they_were() {
         ),
         ("design-robust", &["design", "robust.toml", "-o", "robust.json"]),
         ("verify-robust", &["verify", "robust.json"]),
+        ("design-tracking", &["design", "drift.toml", "-o", "drift.json", "--tracking", "affine"]),
+        ("verify-tracking", &["verify", "drift.json"]),
         ("verify-fir", &["verify", "fir.json"]),
         ("verify-iir", &["verify", "iir.json"]),
         ("simulate", &["simulate", "spec.toml", "--source", "step@0.3", "-o", "cap"]),

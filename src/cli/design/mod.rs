@@ -9,7 +9,7 @@ use super::interrupt::end_at_interrupt;
 use super::understood::say_understood;
 use crate::bank::FixedPoint;
 use crate::design::{self, Design, DesignError, GammaScale, Limits, MeanAnalysis, Options};
-use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, WordLengths};
+use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use progress::Progress;
 use report::Report;
@@ -60,6 +60,10 @@ pub(super) struct Args {
     /// A tap is its integer times 2^-FRACTION_BITS; chosen for the least gamma if left out
     #[arg(long, allow_negative_numbers = true)]
     fraction_bits: Option<i32>,
+    /// Taps that follow the delays while the bank runs, optimal over the delays of the spec's [uncertainty]
+    /// (method fir)
+    #[arg(long, value_parser = trackings())]
+    tracking: Option<Tracking>,
     /// Use at most this many states (methods iir and h2)
     #[arg(long)]
     order: Option<usize>,
@@ -90,6 +94,10 @@ fn solvers() -> impl TypedValueParser<Value = Solver> {
     named(Solver::ALL.map(|solver| (solver.name(), solver)))
 }
 
+fn trackings() -> impl TypedValueParser<Value = Tracking> {
+    named(Tracking::ALL.map(|tracking| (tracking.name(), tracking)))
+}
+
 fn named<T: Copy + Send + Sync + 'static, const K: usize>(
     known: [(&'static str, T); K],
 ) -> impl TypedValueParser<Value = T> {
@@ -106,6 +114,7 @@ fn overrides(args: &Args) -> DesignOverrides {
         solver: args.solver,
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
+        tracking: args.tracking,
         reduction: args.order.map(Reduction::Order).or(args.reduction_loss_db.map(Reduction::Loss)),
     }
 }

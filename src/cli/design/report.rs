@@ -3,7 +3,9 @@
 use crate::bank::{Gamma, SynthesisFilters};
 use crate::cli::understood::understood;
 use crate::design::quantise::WordStudy;
-use crate::design::{Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction, RobustStudy};
+use crate::design::{
+    Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy,
+};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -31,6 +33,9 @@ pub(in crate::cli) struct Report<'a> {
     /// For a spec with `[uncertainty]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     robust: Option<&'a RobustStudy>,
+    /// For taps that follow the delays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tracking: Option<&'a TrackingStudy>,
     #[serde(flatten)]
     mean: MeanAnalysis,
     scale: GammaScale,
@@ -148,6 +153,7 @@ impl<'a> Report<'a> {
             gamma: &bank.gamma,
             words: Words::of(design),
             robust: design.robust.as_ref(),
+            tracking: design.tracking.as_ref(),
             mean,
             scale,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
@@ -175,7 +181,7 @@ impl<'a> Report<'a> {
              H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              SNR        {} for a signal with the target's spectrum\n\
              noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
-             {}{}{}designed in {:.1} ms, {} iterations\n{}",
+             {}{}{}{}designed in {:.1} ms, {} iterations\n{}",
             self.understood,
             self.bank,
             self.method.name(),
@@ -203,6 +209,7 @@ impl<'a> Report<'a> {
             self.words.as_ref().map(Words::text).unwrap_or_default(),
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.robust.map(|study| robust_text(study, self.gamma.worst_case)).unwrap_or_default(),
+            self.tracking.map(|study| tracking_text(study, self.gamma.tracked)).unwrap_or_default(),
             self.seconds * 1e3,
             self.iterations,
             self.proof.text(),
@@ -240,8 +247,7 @@ const WORTHWHILE: f64 = 0.01;
 /// The bank and the nominal one, without errors and at worst over the spec's uncertainty.
 fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
     let RobustStudy { robust, nominal, lower, .. } = study;
-    let proven =
-        proven.map_or("not proven".to_owned(), |proven| format!("proven: at most {}", number(Some(proven))));
+    let proven = at_most(proven);
     let gain = 100.0 * study.gain();
     let advice = if study.gain() < WORTHWHILE {
         format!(
@@ -261,6 +267,29 @@ fn robust_text(study: &RobustStudy, proven: Option<f64>) -> String {
         number(Some(nominal.nominal)),
         number(Some(*lower)),
     )
+}
+
+/// Taps that follow the delays, and taps that stay, over the spec's uncertainty.
+fn tracking_text(study: &TrackingStudy, proven: Option<f64>) -> String {
+    let TrackingStudy { tracked, fixed, redesigned, ratio, least_ratio, .. } = study;
+    let [worst, of_fixed, redesigned_worst] =
+        [tracked.worst, fixed.worst, *redesigned].map(|value| number(Some(value)));
+    let percent = |ratio: f64| 100.0 * (ratio - 1.0);
+    format!(
+        "tracked    {worst} at worst over the spec's uncertainty ({}), {} without errors\n\
+         redesigned {redesigned_worst} for the delays where that is worst: {:.3} % less\n\
+         \x20          at all delays at most {:.3} % above what is within reach there; no affine taps: below {:.3} %\n\
+         fixed      {of_fixed} at worst, for the best taps that stay as they are\n",
+        at_most(proven),
+        number(Some(tracked.nominal)),
+        100.0 * study.excess(),
+        percent(*ratio),
+        percent(*least_ratio),
+    )
+}
+
+fn at_most(proven: Option<f64>) -> String {
+    proven.map_or("not proven".to_owned(), |proven| format!("proven: at most {}", number(Some(proven))))
 }
 
 /// Why no bound is stated.

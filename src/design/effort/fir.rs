@@ -21,6 +21,21 @@ pub(super) fn design(sizes: &Sizes) -> Effort {
     exchange.then(norm(sizes).times(NORMS)).then(noncausal(sizes))
 }
 
+/// Scenarios of a box of delays, about.
+const SCENARIOS: f64 = 32.0;
+
+/// A design of taps that follow the delays of all channels but one: every tap is a function of N numbers.
+pub(super) fn affine(sizes: &Sizes) -> Effort {
+    let functions = Sizes { channels: sizes.channels * sizes.channels, ..*sizes };
+    let points = 2.0 * sizes.channels * sizes.points();
+    let rounds = 2.0 * ROUNDS;
+    let exchange = grid(sizes)
+        .times(SCENARIOS)
+        .with(iteration_on(&functions, points).times(rounds * ITERATIONS))
+        .with(errors(sizes).times(SCENARIOS * rounds));
+    exchange.then(norm(sizes).times(2.0 * SCENARIOS))
+}
+
 /// A design that is only exact enough to be compared, without norms.
 pub(super) fn comparison(sizes: &Sizes) -> Effort {
     grid(sizes).with(iteration(sizes).times(COARSE * ITERATIONS)).with(errors(sizes).times(COARSE * ROUNDS))
@@ -36,8 +51,12 @@ fn grid(sizes: &Sizes) -> Effort {
 
 /// An interior-point iteration: blocks of order M + N at each frequency, and the Newton matrix of the taps.
 fn iteration(sizes: &Sizes) -> Effort {
-    let (n, m, u, points, lags) =
-        (sizes.channels, sizes.ratio, sizes.unknowns(), sizes.points(), sizes.lags());
+    iteration_on(sizes, sizes.points())
+}
+
+/// The same with another number of frequencies.
+fn iteration_on(sizes: &Sizes, points: f64) -> Effort {
+    let (n, m, u, lags) = (sizes.channels, sizes.ratio, sizes.unknowns(), sizes.lags());
     let order = m + n.min(sizes.inputs());
     let blocks = points * complex_cube(order);
     let rows = m.min(sizes.taps);

@@ -68,6 +68,7 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
 fn synthesis(spec: &Spec, sizes: &Sizes) -> Effort {
     match spec.design.method {
         Method::Fir if spec.design.solver == Some(Solver::Kyp) => fir::by_lmi(sizes),
+        Method::Fir if spec.design.tracking.is_some() => fir::design(sizes).then(fir::affine(sizes)),
         Method::Fir => fir::design(sizes),
         Method::Iir => recursive::design(sizes),
         Method::H2 => recursive::mean_square(sizes),
@@ -124,6 +125,9 @@ fn remedy(spec: &Spec) -> &'static str {
     match spec.design.method {
         Method::Fir if spec.design.bits.is_some() => {
             "use fewer taps, leave out bits, take a smaller ratio or fewer channels"
+        }
+        Method::Fir if spec.design.tracking.is_some() => {
+            "use fewer taps or channels, a smaller ratio, or leave out tracking"
         }
         Method::Fir => "use fewer taps, a smaller ratio or fewer channels",
         Method::Iir | Method::H2 if spec.design.reduction.is_some() => {

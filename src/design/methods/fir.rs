@@ -41,6 +41,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
         dual: exchange.dual,
         iterations: exchange.iterations,
         robust: None,
+        affine: None,
     })
 }
 

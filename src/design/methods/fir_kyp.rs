@@ -46,6 +46,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
         dual: Vec::new(),
         iterations: solution.steps.len(),
         robust: None,
+        affine: None,
     })
 }
 

@@ -270,6 +270,7 @@ impl<'a> GammaIteration<'a> {
             dual: Vec::new(),
             iterations: self.trials,
             robust: None,
+            affine: None,
         }
     }
 }

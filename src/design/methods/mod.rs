@@ -25,7 +25,7 @@ use super::plant::LiftedPlant;
 use super::problem::Problem;
 use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
-use crate::spec::{Method, Solver};
+use crate::spec::{Method, Solver, Tracking};
 
 /// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]
@@ -69,6 +69,8 @@ pub(crate) struct Synthesis {
     pub(crate) iterations: usize,
     /// For a robust design.
     pub(crate) robust: Option<robust_fir::RobustStudy>,
+    /// For taps that follow the delays; `filters` are those without errors.
+    pub(crate) affine: Option<robust_fir::AffineDesign>,
 }
 
 impl Synthesis {
@@ -77,7 +79,8 @@ impl Synthesis {
         let peak = plant.fir_norm(&taps)?;
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
         let filters = Filters::Fir(taps);
-        Ok(Self { filters, peak, lower: noncausal, noncausal, dual: Vec::new(), iterations: 0, robust: None })
+        let (dual, iterations) = (Vec::new(), 0);
+        Ok(Self { filters, peak, lower: noncausal, noncausal, dual, iterations, robust: None, affine: None })
     }
 }
 
@@ -91,7 +94,10 @@ pub(crate) fn synthesise(
     settings: &Settings,
 ) -> Result<Synthesis, DesignError> {
     if let (Method::Fir, Some(problem)) = (method, &settings.robust) {
-        return robust_fir::synthesise(plant, settings, problem);
+        return match problem.spec.design.tracking {
+            Some(Tracking::Affine) => robust_fir::synthesise_affine(plant, settings, problem),
+            None => robust_fir::synthesise(plant, settings, problem),
+        };
     }
     match method {
         Method::Fir if settings.solver == Some(Solver::Kyp) => fir_kyp::synthesise(plant, settings),

@@ -13,13 +13,13 @@ mod tests;
 
 pub use derivatives::{DelayDerivatives, delay_derivatives};
 pub use floor::{Floor, floor};
-pub use search::norm_at;
+pub use search::{norm_at, norm_of};
 
 use super::DesignError;
 use super::analysis::bank_problem;
 use super::plant::LiftedPlant;
 use crate::bank::Bank;
-use crate::verify::uncertainty::{ErrorBox, WorstCase, keeps_within, worst_case as proven_worst_case};
+use crate::verify::uncertainty::{ErrorBox, Taps, WorstCase, keeps_within, worst_case as proven_worst_case};
 
 /// Doublings of the box in the search for the largest one that is affordable.
 const MAX_DOUBLINGS: usize = 24;
@@ -32,9 +32,22 @@ const FACTOR_ACCURACY: f64 = 0.01;
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::Verify`] as [`crate::verify::uncertainty::worst_case`].
 pub fn worst_case(bank: &Bank, errors: &ErrorBox, accuracy: f64) -> Result<WorstCase, DesignError> {
+    worst_case_of(bank, errors, Taps::Fixed, accuracy)
+}
+
+/// As [`worst_case`], with taps that stay or follow the delays.
+///
+/// # Errors
+/// As [`worst_case`].
+pub fn worst_case_of(
+    bank: &Bank,
+    errors: &ErrorBox,
+    taps: Taps,
+    accuracy: f64,
+) -> Result<WorstCase, DesignError> {
     errors.check(bank.channel_count())?;
-    let candidates = search::candidates(bank, errors)?;
-    Ok(proven_worst_case(bank, errors, accuracy, &candidates)?)
+    let candidates = search::candidates(bank, errors, taps)?;
+    Ok(proven_worst_case(bank, errors, taps, accuracy, &candidates)?)
 }
 
 /// The largest factor t for which errors in t times the box are proven to cost at most `loss` (relative to
@@ -49,7 +62,7 @@ pub fn affordable(bank: &Bank, errors: &ErrorBox, loss: f64) -> Result<f64, Desi
     let keeps = |factor: f64| -> Result<bool, DesignError> {
         let scaled = errors.scaled(factor);
         // Gains and cut-offs of 50 % are out of the range of the proof.
-        Ok(scaled.check(bank.channel_count()).is_ok() && keeps_within(bank, &scaled, allowed)?)
+        Ok(scaled.check(bank.channel_count()).is_ok() && keeps_within(bank, &scaled, Taps::Fixed, allowed)?)
     };
     let (mut kept, mut lost) = (0.0, 1.0);
     let grows = keeps(1.0)?;

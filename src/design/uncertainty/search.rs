@@ -8,7 +8,7 @@ use super::sides::{Side, point_at, sides};
 use crate::bank::Bank;
 use crate::lti::peak::Peak;
 use crate::units::RadiansPerSlowPeriod;
-use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Taps};
 
 /// Vertices are all tried up to this number; beyond it one is improved by single changes.
 const MAX_VERTICES: usize = 32;
@@ -25,7 +25,19 @@ pub(super) fn moved(bank: &Bank, point: &ErrorPoint) -> Result<Problem, DesignEr
 /// # Errors
 /// As [`super::super::analyze`].
 pub fn norm_at(bank: &Bank, point: &ErrorPoint) -> Result<(f64, RadiansPerSlowPeriod), DesignError> {
-    let peak = LiftedPlant::new(&moved(bank, point)?)?.bank_norm(&bank.filters)?;
+    norm_of(bank, point, Taps::Fixed)
+}
+
+/// As [`norm_at`], with taps that stay or follow the delays.
+///
+/// # Errors
+/// As [`norm_at`].
+pub fn norm_of(
+    bank: &Bank,
+    point: &ErrorPoint,
+    taps: Taps,
+) -> Result<(f64, RadiansPerSlowPeriod), DesignError> {
+    let peak = LiftedPlant::new(&moved(bank, point)?)?.bank_norm(&taps.filters(bank, point))?;
     Ok((peak.gain, RadiansPerSlowPeriod(peak.frequency)))
 }
 
@@ -33,8 +45,9 @@ pub fn norm_at(bank: &Bank, point: &ErrorPoint) -> Result<(f64, RadiansPerSlowPe
 pub(super) fn candidates(
     bank: &Bank,
     errors: &ErrorBox,
+    taps: Taps,
 ) -> Result<Vec<(ErrorPoint, RadiansPerSlowPeriod)>, DesignError> {
-    let search = Search { bank, errors, sides: sides(errors) };
+    let search = Search { bank, errors, taps, sides: sides(errors) };
     let centre = ErrorPoint::none(bank.channel_count());
     let nominal = search.norm(&centre)?;
     let count = search.sides.len();
@@ -50,12 +63,13 @@ pub(super) fn candidates(
 struct Search<'a> {
     bank: &'a Bank,
     errors: &'a ErrorBox,
+    taps: Taps,
     sides: Vec<Side>,
 }
 
 impl Search<'_> {
     fn norm(&self, point: &ErrorPoint) -> Result<Peak, DesignError> {
-        LiftedPlant::new(&moved(self.bank, point)?)?.bank_norm(&self.bank.filters)
+        LiftedPlant::new(&moved(self.bank, point)?)?.bank_norm(&self.taps.filters(self.bank, point))
     }
 
     /// The vertex with these signs.

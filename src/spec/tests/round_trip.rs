@@ -70,6 +70,8 @@ prop_compose! {
             jitter: each.then_some(PerChannel::Same(fast_period * x)),
             ..UncertaintySpec::default()
         });
+        let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
+        let follows = method.has_tracking() && solver != Some(Solver::Kyp) && bits.is_none() && moves;
         Spec {
             name, fast_period, ratio, latency, target,
             channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
@@ -81,6 +83,7 @@ prop_compose! {
                 solver: solver.filter(|_| method.has_solver()),
                 bits: bits.clone().filter(|_| method.has_bits()),
                 fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
+                tracking: follows.then_some(Tracking::Affine),
                 reduction: reduction.filter(|_| method.has_states()),
             },
         }

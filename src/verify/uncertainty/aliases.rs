@@ -23,6 +23,9 @@ const ALIASES: [usize; 2] = [24, 1 << 14];
 const PIECE: f64 = 5e-4;
 const MAX_PIECES: f64 = 256.0;
 
+/// 9 sqrt 3, from below.
+const PARABOLA: f64 = 15.588457268119893;
+
 /// The weight m(nu) of an alias.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Weight {
@@ -33,6 +36,12 @@ pub(super) enum Weight {
     /// min(nu^2 d^2 / 2, 2): the distance of e^{-j nu t}, |t| <= d, from the chord between its ends. (A
     /// function with second derivative at most nu^2 lies within (2 d)^2 nu^2 / 8 of its chord.)
     Chord(f64),
+    /// min(|nu|^3 d^3 / (9 sqrt 3), 9/4): the distance of e^{-j nu t}, |t| <= d, from the parabola through its
+    /// values at -d, 0 and d. (The error is the third derivative over 6 times |t (t^2 - d^2)|, which is at
+    /// most 2 d^3 / (3 sqrt 3); and the parabola is at most 5/4.)
+    Parabola(f64),
+    /// min(|nu| s, 2): the distance of e^{-j nu t} from e^{-j nu (t + s)}.
+    Shift(f64),
 }
 
 /// The moduli of a channel's response at the aliases of a frequency.
@@ -116,31 +125,57 @@ impl Weight {
             Self::One => 1.0,
             Self::Slope => nu,
             Self::Chord(d) => (0.5 * nu * nu * d * d).min(2.0),
+            Self::Parabola(d) => ((nu * d).powi(3) / PARABOLA).min(2.25),
+            Self::Shift(s) => (nu * s).min(2.0),
         }
     }
 
     /// The largest value of nu^-2p m(nu)^2 from `far` on, and its integral.
     fn far(self, p: i32, far: f64) -> (f64, f64) {
         let odd = f64::from(2 * p - 1);
-        let plain = |from: f64| (from.powi(-2 * p), from.powi(1 - 2 * p) / odd);
         match self {
-            Self::One => plain(far),
+            Self::One => plain(p, far),
             Self::Slope if p == 1 => (f64::INFINITY, f64::INFINITY),
             Self::Slope => (far.powi(2 - 2 * p), far.powi(3 - 2 * p) / (odd - 2.0)),
-            Self::Chord(d) if d * far >= 2.0 => {
-                let (largest, integral) = plain(far);
-                (4.0 * largest, 4.0 * integral)
+            Self::Chord(d) => Bent { power: 2, bend: 2.0 / d, limit: 2.0 }.far(p, far),
+            Self::Parabola(d) => {
+                Bent { power: 3, bend: (2.25 * PARABOLA).cbrt() / d, limit: 2.25 }.far(p, far)
             }
-            Self::Chord(0.0) => (0.0, 0.0),
-            // nu^(4 - 2 p) d^4 / 4 up to nu = 2 / d, then 4 nu^-2p.
-            Self::Chord(d) => {
-                let (bend, factor) = (2.0 / d, 0.25 * d.powi(4));
-                let power = 5 - 2 * p;
-                let below = factor * (bend.powi(power) - far.powi(power)) / f64::from(power);
-                let largest = factor * if p == 1 { bend * bend } else { far.powi(4 - 2 * p) };
-                (largest, below + 4.0 * plain(bend).1)
-            }
+            Self::Shift(s) => Bent { power: 1, bend: 2.0 / s, limit: 2.0 }.far(p, far),
         }
+    }
+}
+
+/// nu^-2p from `from` on: the largest value and the integral.
+fn plain(p: i32, from: f64) -> (f64, f64) {
+    (from.powi(-2 * p), from.powi(1 - 2 * p) / f64::from(2 * p - 1))
+}
+
+/// The weight `limit` min(nu / `bend`, 1)^`power`.
+struct Bent {
+    power: i32,
+    bend: f64,
+    limit: f64,
+}
+
+impl Bent {
+    /// As [`Weight::far`].
+    fn far(&self, p: i32, far: f64) -> (f64, f64) {
+        let square = self.limit * self.limit;
+        if self.bend.is_infinite() {
+            return (0.0, 0.0);
+        }
+        if far >= self.bend {
+            let (largest, integral) = plain(p, far);
+            return (square * largest, square * integral);
+        }
+        // limit^2 (nu / bend)^(2 power) nu^-2p up to the bend, then limit^2 nu^-2p. The power of the integral
+        // is odd, so never zero.
+        let factor = square * self.bend.powi(-2 * self.power);
+        let (rise, power) = (2 * (self.power - p), 2 * (self.power - p) + 1);
+        let below = factor * (self.bend.powi(power) - far.powi(power)) / f64::from(power);
+        let largest = factor * if rise > 0 { self.bend } else { far }.powi(rise);
+        (largest, below + square * plain(p, self.bend).1)
     }
 }
 
@@ -163,9 +198,17 @@ mod tests {
             [(&[1.0][..], &[1.0, 0.7][..]), (&[0.25], &[1.0, 1.0, 0.25]), (&[1.0], &[1.0, 2.0, 2.0, 1.0])]
         {
             let transfer = transfer(num, den);
-            for weight in
-                [Weight::One, Weight::Slope, Weight::Chord(0.1), Weight::Chord(1e-3), Weight::Chord(0.0)]
-            {
+            let weights = [
+                Weight::One,
+                Weight::Slope,
+                Weight::Chord(0.1),
+                Weight::Chord(1e-3),
+                Weight::Chord(0.0),
+                Weight::Parabola(0.1),
+                Weight::Parabola(0.01),
+                Weight::Shift(1e-3),
+            ];
+            for weight in weights {
                 if weight == Weight::Slope && den.len() == 2 {
                     continue;
                 }

@@ -21,10 +21,12 @@ use super::super::spectrum::ComplexMatrix;
 use super::grid::ChannelGrid;
 use crate::linalg;
 
+/// Steps of the grid that a part needs to be halved.
+const HALVED: usize = 2;
 /// Relative margins over a computed eigenvalue at which a proof that it is an upper bound is tried.
 const MARGINS: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
 /// Maximum number of boxes at one frequency.
-const MAX_BOXES: usize = 4096;
+pub(super) const MAX_BOXES: usize = 4096;
 
 /// The Gram matrix of all samples of a grid at one frequency, with the filters.
 #[derive(Debug)]
@@ -67,7 +69,7 @@ pub(super) struct Attained {
 
 impl Attained {
     /// Nothing is known.
-    fn unknown() -> Self {
+    pub(super) fn unknown() -> Self {
         Self { lower: 0.0, upper: f64::INFINITY, vertices: Vec::new() }
     }
 }
@@ -92,17 +94,16 @@ pub(super) enum Verdict {
 
 /// A part of the delays of a channel: the points `first..=last` of its grid, after `level` halvings.
 #[derive(Debug, Clone, Copy)]
-struct Part {
-    first: usize,
-    last: usize,
-    level: usize,
+pub(super) struct Part {
+    pub(super) first: usize,
+    pub(super) last: usize,
+    pub(super) level: usize,
 }
 
 impl AtFrequency<'_> {
     /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
     pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
-        let whole = |channel: &ChannelGrid| Part { first: 0, last: channel.errors.len() - 1, level: 0 };
-        let mut boxes: Vec<Vec<Part>> = vec![self.channels.iter().map(whole).collect()];
+        let mut boxes = vec![self.whole()];
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
             let remainder = self.remainder(&parts);
@@ -113,7 +114,7 @@ impl AtFrequency<'_> {
             if found.lower > threshold {
                 return Verdict::Above(found);
             }
-            match self.halved(&parts) {
+            match self.halved(&parts, HALVED) {
                 Some(halves) => boxes.extend(halves),
                 None => return Verdict::Open(found),
             }
@@ -121,17 +122,25 @@ impl AtFrequency<'_> {
         Verdict::Open(Attained::unknown())
     }
 
+    /// The whole box.
+    pub(super) fn whole(&self) -> Vec<Part> {
+        let part = |channel: &ChannelGrid| Part { first: 0, last: channel.errors.len() - 1, level: 0 };
+        self.channels.iter().map(part).collect()
+    }
+
+    /// A bound of what channel `i` adds to the gains at the vertices.
     fn term(&self, i: usize, part: &Part) -> f64 {
         self.columns[i] * self.remainders[i][part.level]
     }
 
-    fn remainder(&self, parts: &[Part]) -> f64 {
+    /// A bound of what all channels add to them.
+    pub(super) fn remainder(&self, parts: &[Part]) -> f64 {
         super::angle::outward(parts.iter().enumerate().map(|(i, part)| self.term(i, part)).sum())
     }
 
-    /// The halves along the channel with the largest remainder that can be halved.
-    fn halved(&self, parts: &[Part]) -> Option<[Vec<Part>; 2]> {
-        let can = |i: &usize| parts[*i].last > parts[*i].first + 1;
+    /// The halves along the channel with the largest remainder that has at least `steps` steps of the grid.
+    pub(super) fn halved(&self, parts: &[Part], steps: usize) -> Option<[Vec<Part>; 2]> {
+        let can = |i: &usize| parts[*i].last - parts[*i].first >= steps;
         let size = |i: usize| self.term(i, &parts[i]);
         let i = (0..parts.len()).filter(can).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
         let Part { first, last, level } = parts[i];
@@ -145,7 +154,7 @@ impl AtFrequency<'_> {
     }
 
     /// The vertices of a channel.
-    fn vertices(&self, i: usize, part: &Part) -> Vec<Vertex> {
+    pub(super) fn vertices(&self, i: usize, part: &Part) -> Vec<Vertex> {
         let ends = if part.first == part.last { vec![part.first] } else { vec![part.first, part.last] };
         let gain = self.gains[i];
         let gains = if gain == 0.0 { vec![1.0] } else { vec![1.0 - gain, 1.0 + gain] };
@@ -206,6 +215,21 @@ impl AtFrequency<'_> {
             square.upper().max(0.0).sqrt() * (1.0 + 1e-15)
         };
         set.iter().map(distance).fold(0.0, ball::nan_max)
+    }
+
+    /// K K*, M x M, of K = W + the sum of the columns times their rows of the Gram matrix.
+    pub(super) fn square_of(&self, terms: &[(ComplexMatrix, usize)]) -> ComplexMatrix {
+        let outputs = self.filters.re.nrows();
+        let rows: Vec<usize> = (0..outputs).chain(terms.iter().map(|&(_, row)| row)).collect();
+        let part = |of: fn(&ComplexMatrix) -> &Matrix, unit: f64| {
+            Matrix::from_fn(outputs, rows.len(), |p, c| match c.checked_sub(outputs) {
+                None if p == c && unit != 0.0 => Ball::from(unit),
+                None => Ball::ZERO,
+                Some(t) => of(&terms[t].0)[(p, 0)],
+            })
+        };
+        let map = ComplexMatrix { re: part(|m| &m.re, 1.0), im: part(|m| &m.im, 0.0) };
+        map.product(&self.gram.select(&rows, &rows)).product(&map.adjoint())
     }
 
     /// K K*, M x M, of the rows `mixes`.

@@ -4,6 +4,7 @@ use super::super::VerifyError;
 use super::super::ball::{self, Ball, Matrix};
 use super::super::front_ends::FrontEnds;
 use super::super::lower::Covariance;
+use super::Taps;
 use super::aliases::{Aliases, Weight};
 use super::angle::{Frequency, outward};
 use super::grid::Grid;
@@ -103,7 +104,7 @@ impl Channel {
         outward((1.0 + self.gain) * speeds.sqrt() * rows)
     }
 
-    /// Bounds the remainder of the chords, after 0, 1, .. `levels` halvings of the delay.
+    /// Bounds the remainder of the chords or parabolas, after 0, 1, .. `levels` halvings of the delay.
     ///
     /// # Errors
     /// [`VerifyError::LongMemory`].
@@ -112,6 +113,7 @@ impl Channel {
         near: &Frequency,
         ratio: usize,
         levels: u32,
+        taps: Taps,
     ) -> Result<Vec<f64>, VerifyError> {
         if self.half == 0.0 && self.cutoff == 0.0 {
             return Ok(vec![0.0; levels as usize + 1]);
@@ -133,7 +135,15 @@ impl Channel {
         let rounding = if self.half > 0.0 { slack } else { 0.0 };
         let level = |level: u32| {
             let half = self.half / f64::from(1u32 << level) + rounding;
-            outward((aliases.norm(Weight::Chord(half)) + bend) * (1.0 + self.gain))
+            let between = match taps {
+                Taps::Fixed => aliases.norm(Weight::Chord(half)),
+                // The parabola goes through the rows of the rounded points, so its own weights (5/4 in all)
+                // times the distance of these rows from those of the points come in addition.
+                Taps::Following => {
+                    aliases.norm(Weight::Parabola(half)) + 1.25 * aliases.norm(Weight::Shift(rounding))
+                }
+            };
+            outward((between + bend) * (1.0 + self.gain))
         };
         Ok((0..=levels).map(level).collect())
     }

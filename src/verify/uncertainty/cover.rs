@@ -1,14 +1,16 @@
 //! Covers all frequencies with cells and proves a bound in each of them.
 
 use super::super::VerifyError;
-use super::super::spectrum;
+use super::super::ball::Ball;
+use super::super::spectrum::{self, ComplexMatrix};
 use super::angle::{Frequency, cosine_below, outward};
 use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, Work, lower_gain};
 use super::channel::{Channel, Memories, column_norm};
+use super::following::{Following, moved};
 use super::grid::Grid;
 use super::memory::{Lags, Memory};
-use super::{ErrorBox, ErrorPoint, WorstCase};
-use crate::bank::Bank;
+use super::{ErrorBox, ErrorPoint, Taps, WorstCase};
+use crate::bank::{Bank, SynthesisFilters};
 use crate::units::RadiansPerSlowPeriod;
 use std::f64::consts::PI;
 
@@ -36,6 +38,11 @@ const FLOOR: f64 = 1e-10;
 pub(super) struct Cover<'a> {
     bank: &'a Bank,
     errors: &'a ErrorBox,
+    taps: Taps,
+    /// S_j by channel, where the taps follow its delay.
+    slopes: Vec<Option<SynthesisFilters>>,
+    /// Half-widths of the delays in fast periods.
+    halves: Vec<Ball>,
     /// By level; made when needed.
     grids: Vec<Grid>,
     channels: Vec<Channel>,
@@ -62,8 +69,8 @@ struct Best {
 impl<'a> Cover<'a> {
     /// # Errors
     /// See [`super::worst_case`].
-    pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox) -> Result<Self, VerifyError> {
-        let grid = Grid::new(bank, errors, 0)?;
+    pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox, taps: Taps) -> Result<Self, VerifyError> {
+        let grid = Grid::new(bank, errors, level_of_grid(0, taps))?;
         let memories = Memories::new(&grid)?;
         let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
         let channel = |i: usize| {
@@ -72,12 +79,23 @@ impl<'a> Cover<'a> {
         };
         let channels = (0..bank.channel_count()).map(channel).collect();
         let reference = memories.of_sample(0);
-        let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
+        let mut lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
+        let halves: Vec<Ball> =
+            errors.delays.iter().map(|half| fast_periods(half.0, fast_period.0)).collect();
+        let slopes = slopes(bank, taps);
+        for (slope, half) in slopes.iter().zip(&halves) {
+            let Some(slope) = slope else { continue };
+            let moving = Lags::new(slope, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
+            lags.widen(&moving, half.magnitude());
+        }
         let n = grid.period.order();
         let scale = (n..n + bank.ratio).map(|i| grid.period.gram[(i, i)].nearest()).sum::<f64>().sqrt();
         Ok(Self {
             bank,
             errors,
+            taps,
+            slopes,
+            halves,
             grids: vec![grid],
             channels,
             reference,
@@ -101,7 +119,10 @@ impl<'a> Cover<'a> {
     ) -> Result<(), VerifyError> {
         let grid = Grid::at(self.bank, point)?;
         let near = Frequency::near(frequency.0);
-        let at = self.plain(&grid, &near);
+        let mut at = self.plain(&grid, &near);
+        let deltas: Vec<Ball> =
+            point.delays.iter().map(|delay| fast_periods(delay.0, self.fast_period())).collect();
+        at.filters = moved(&at.filters, &self.slopes_at(&near), &deltas);
         let mixes: Vec<Mix> = (0..self.channels.len())
             .map(|i| vec![(grid.channels[i].rows[0][0], 1.0 + point.gains[i])])
             .collect();
@@ -223,8 +244,10 @@ impl<'a> Cover<'a> {
     /// Judges one frequency on coarse grids first.
     fn judge(&mut self, centre: f64, threshold: f64) -> Result<Verdict, VerifyError> {
         let near = Frequency::near(centre);
-        let remainders =
-            self.channels.iter().map(|channel| channel.remainders(&near, self.bank.ratio, MAX_LEVEL));
+        let remainders = self
+            .channels
+            .iter()
+            .map(|channel| channel.remainders(&near, self.bank.ratio, MAX_LEVEL, self.taps));
         let rows = remainders.collect::<Result<Vec<_>, _>>()?;
         let mut verdict = Verdict::Below;
         for level in 0..=MAX_LEVEL {
@@ -257,7 +280,12 @@ impl<'a> Cover<'a> {
         let at = AtFrequency { remainders: remainders.to_vec(), ..self.plain(grid, near) };
         let left = (MAX_OPERATIONS - self.operations).max(0.0) / self.cost_of_gain();
         let mut work = Work { done: 0, limit: left as usize + 1 };
-        let verdict = at.compare(threshold, &mut work);
+        let verdict = match self.taps {
+            Taps::Fixed => at.compare(threshold, &mut work),
+            Taps::Following => {
+                Following::new(at, self.slopes_at(near), &self.halves).compare(threshold, &mut work)
+            }
+        };
         let best = match &verdict {
             Verdict::Below => None,
             Verdict::Above(attained) | Verdict::Open(attained) => best_of(grid, attained),
@@ -268,7 +296,11 @@ impl<'a> Cover<'a> {
     /// Operations for one gain, and for the Gram matrix of a grid.
     fn cost_of_gain(&self) -> f64 {
         let (m, n) = (self.bank.ratio as f64, self.channels.len() as f64);
-        4.0 * m * (m + 1.5 * n) * (2.0 * m + 1.5 * n)
+        let rows = match self.taps {
+            Taps::Fixed => 1.5 * n,
+            Taps::Following => 2.5 * n,
+        };
+        4.0 * m * (m + rows) * (2.0 * m + rows)
     }
 
     fn cost_of_gram(&self, grid: &Grid) -> f64 {
@@ -280,13 +312,24 @@ impl<'a> Cover<'a> {
     fn make_grid(&mut self, level: u32) -> Result<bool, VerifyError> {
         let known = self.grids.len() > level as usize;
         let sides = (0..self.channels.len()).filter(|&i| self.errors.delays[i].0 > 0.0);
-        let points = |i: usize| ((1usize << level) + 1) * self.errors.speeds(i).len();
+        let level_of_grid = level_of_grid(level, self.taps);
+        let points = |i: usize| ((1usize << level_of_grid) + 1) * self.errors.speeds(i).len();
         let rows = self.bank.ratio + self.channels.len() + sides.map(points).sum::<usize>();
         if known || rows > MAX_ROWS {
             return Ok(known);
         }
-        self.grids.push(Grid::new(self.bank, self.errors, level)?);
+        self.grids.push(Grid::new(self.bank, self.errors, level_of_grid)?);
         Ok(true)
+    }
+
+    fn fast_period(&self) -> f64 {
+        self.bank.spec.as_ref().map_or(self.bank.fast_period, |spec| spec.fast_period).0
+    }
+
+    /// S_j at a frequency.
+    fn slopes_at(&self, near: &Frequency) -> Vec<Option<ComplexMatrix>> {
+        let at = |slope: &SynthesisFilters| spectrum::filter_response(slope, self.bank.ratio, &near.z);
+        self.slopes.iter().map(|slope| slope.as_ref().map(at)).collect()
     }
 
     /// The Gram matrix and the filters at a frequency, without remainders.
@@ -301,6 +344,27 @@ impl<'a> Cover<'a> {
             remainders: vec![vec![0.0; MAX_LEVEL as usize + 1]; self.channels.len()],
         }
     }
+}
+
+/// A part of the grid has its ends, and its middle where the taps follow the delays.
+fn level_of_grid(level: u32, taps: Taps) -> u32 {
+    match taps {
+        Taps::Fixed => level,
+        Taps::Following => level + 1,
+    }
+}
+
+/// The slopes of the taps by channel; `None` where they do not follow its delay.
+fn slopes(bank: &Bank, taps: Taps) -> Vec<Option<SynthesisFilters>> {
+    let of = |j: usize| {
+        let slopes = bank.tap_slopes.as_ref().filter(|slopes| slopes.follows(j))?;
+        (taps == Taps::Following).then(|| SynthesisFilters::Fir(slopes.by_delay[j].clone()))
+    };
+    (0..bank.channel_count()).map(of).collect()
+}
+
+fn fast_periods(seconds: f64, fast_period: f64) -> Ball {
+    Ball::from(seconds) / Ball::from(fast_period)
 }
 
 /// The errors at a vertex of `grid`; `None` without a vertex.

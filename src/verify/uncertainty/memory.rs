@@ -100,6 +100,16 @@ impl Lags {
         }
     }
 
+    /// Also holds these filters plus others times factors of at most `most` in size.
+    pub(super) fn widen(&mut self, others: &Self, most: f64) {
+        self.last = self.last.max(others.last);
+        let add = |own: &mut Vec<f64>, others: &[f64]| {
+            own.iter_mut().zip(others).for_each(|(own, other)| *own = outward(*own + most * other));
+        };
+        add(&mut self.sizes, &others.sizes);
+        add(&mut self.tails, &others.tails);
+    }
+
     /// F = d + sum_k c a^k b z^-(k+1).
     fn recursive(form: &BlockForm, negligible: f64) -> Option<Self> {
         let growth = growth(&form.a)?;

@@ -25,12 +25,16 @@
 //! ```
 //!
 //! Only the frequencies near the peak need narrow cells and small boxes, and no norm is computed.
+//!
+//! With [`Taps::Following`] the taps are those of the bank moved to the delays at hand. K_delta is then no
+//! longer affine in the rows, and its bound at a frequency is that of `following`; the rest is the same.
 
 mod aliases;
 mod angle;
 mod at_frequency;
 mod channel;
 mod cover;
+mod following;
 mod grid;
 mod memory;
 mod slopes;
@@ -41,7 +45,7 @@ mod transfer;
 pub use slopes::{Slopes, slopes};
 
 use super::VerifyError;
-use crate::bank::Bank;
+use crate::bank::{Bank, SynthesisFilters};
 use crate::spec::UncertaintySpec;
 use crate::units::{RadiansPerSlowPeriod, Seconds};
 
@@ -66,6 +70,27 @@ pub struct ErrorPoint {
     pub gains: Vec<f64>,
     /// True cut-off over the one in the bank, minus one.
     pub cutoffs: Vec<f64>,
+}
+
+/// Whether the taps stay as they are or follow the delays by the bank's tap slopes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taps {
+    /// The taps of the bank, whatever the delays.
+    Fixed,
+    /// The taps of [`Bank::filters_at`] for the delays at hand.
+    Following,
+}
+
+impl Taps {
+    /// The filters at a point of the box, rounded.
+    pub fn filters(self, bank: &Bank, point: &ErrorPoint) -> SynthesisFilters {
+        let h = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
+        let errors: Vec<_> = point.delays.iter().map(|delay| delay.in_fast_periods(h)).collect();
+        match self {
+            Self::Fixed => bank.filters.clone(),
+            Self::Following => bank.filters_at(&errors),
+        }
+    }
 }
 
 /// The worst case over a box, proven from both sides (h = 1).
@@ -167,11 +192,12 @@ impl ErrorPoint {
 pub fn worst_case(
     bank: &Bank,
     errors: &ErrorBox,
+    taps: Taps,
     accuracy: f64,
     candidates: &[(ErrorPoint, RadiansPerSlowPeriod)],
 ) -> Result<WorstCase, VerifyError> {
     errors.check(bank.channel_count())?;
-    let mut cover = cover::Cover::new(bank, errors)?;
+    let mut cover = cover::Cover::new(bank, errors, taps)?;
     // A first lower end, so that the accuracy has a meaning.
     if candidates.is_empty() {
         cover.try_point(&ErrorPoint::none(bank.channel_count()), RadiansPerSlowPeriod(0.0))?;
@@ -187,19 +213,31 @@ pub fn worst_case(
 ///
 /// # Errors
 /// As [`worst_case`], without [`VerifyError::WideBox`].
-pub fn keeps_within(bank: &Bank, errors: &ErrorBox, gamma: f64) -> Result<bool, VerifyError> {
+pub fn keeps_within(bank: &Bank, errors: &ErrorBox, taps: Taps, gamma: f64) -> Result<bool, VerifyError> {
     errors.check(bank.channel_count())?;
-    cover::Cover::new(bank, errors)?.proves(gamma)
+    cover::Cover::new(bank, errors, taps)?.proves(gamma)
 }
 
-/// Proves the worst case that the bank states for its spec's `[uncertainty]`, if it states one.
+/// Proves the worst cases that the bank states for its spec's `[uncertainty]`: with taps that stay, and with
+/// taps that follow the delays.
 ///
 /// # Errors
-/// [`VerifyError::WorstCase`] if it is not proven or there is no such table; else as [`worst_case`].
+/// [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if one is not proven or there is no such table; else
+/// as [`worst_case`].
 pub fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
-    let Some(stated) = bank.gamma.worst_case else { return Ok(()) };
     let table = bank.spec.as_ref().and_then(|spec| spec.uncertainty.as_ref());
-    let table = table.ok_or(VerifyError::WorstCase { stated })?;
-    let errors = ErrorBox::of(table, bank.channel_count());
-    if keeps_within(bank, &errors, stated)? { Ok(()) } else { Err(VerifyError::WorstCase { stated }) }
+    let errors = table.map(|table| ErrorBox::of(table, bank.channel_count()));
+    let keeps =
+        |taps, stated| errors.as_ref().map_or(Ok(false), |errors| keeps_within(bank, errors, taps, stated));
+    if let Some(stated) = bank.gamma.worst_case
+        && !keeps(Taps::Fixed, stated)?
+    {
+        return Err(VerifyError::WorstCase { stated });
+    }
+    match bank.gamma.tracked {
+        Some(stated) if bank.tap_slopes.is_none() || !keeps(Taps::Following, stated)? => {
+            Err(VerifyError::Tracked { stated })
+        }
+        _ => Ok(()),
+    }
 }

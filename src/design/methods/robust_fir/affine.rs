@@ -1,0 +1,232 @@
+//! Taps that are affine functions of the delays.
+//!
+//! With the delays of the channels off by delta_j, the taps are
+//!
+//! ```text
+//! F(delta) = F_0 + sum_j delta_j S_j,
+//! ```
+//!
+//! and the error system is K(delta) = W - F(delta) H(delta). With factors `[1, delta_1, ..]` of the
+//! measurements this is a design of fixed taps `[F_0 S_1 ..]` for (J + 1) N channels `[H; delta_1 H; ..]`. So
+//! the exchange over scenarios finds the taps of least worst norm, and its dual is a lower bound for all
+//! affine taps of that length.
+//!
+//! The unknowns are delta_j S_j at the end of the box, so that all have the size of taps.
+//!
+//! What a bank can reach changes over the box: as two delays come closer, the noncausal bound rises. A least
+//! worst norm alone would let the error grow wherever it is below that of the worst corner. So the norm of
+//! each scenario counts relative to what can be had there: the noncausal bound, or the least gamma without
+//! errors if that is larger.
+
+use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
+use super::scenarios::{RobustProblem, moved_plant, scenarios};
+use super::sheets::{Sheet, Sheets};
+use crate::bank::TapSlopes;
+use crate::design::DesignError;
+use crate::design::error_grid::ErrorGrid;
+use crate::design::exchange::Exchange;
+use crate::design::filters::impulse_responses;
+use crate::design::methods::{Filters, Settings, Synthesis, fir};
+use crate::design::plant::LiftedPlant;
+use crate::linalg::Mat;
+use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
+use crate::units::{FastPeriods, Seconds};
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+
+/// The comparison of taps that follow the delays with taps that stay.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct TrackingStudy {
+    /// The box.
+    pub errors: ErrorBox,
+    /// Of this bank, its taps following the delays.
+    pub tracked: RobustNorms,
+    /// Of the bank that is optimal without errors, its taps staying.
+    pub fixed: RobustNorms,
+    /// Least norm of a bank that is designed for the delays at which the tracked norm is largest.
+    pub redesigned: f64,
+    /// The largest ratio over the scenarios of the tracked norm to the noncausal bound there, or to the least
+    /// norm without errors if that is larger. This is what the design minimises.
+    pub ratio: f64,
+    /// No affine taps of this length have a smaller ratio (computed).
+    pub least_ratio: f64,
+    /// Points of the box with a plant of their own.
+    pub scenarios: usize,
+    /// Pairs of a frequency and a scenario at the end.
+    pub pairs: usize,
+}
+
+impl TrackingStudy {
+    /// By how much the worst norm exceeds that of a redesign, relative to it.
+    pub fn excess(&self) -> f64 {
+        if self.redesigned > 0.0 { self.tracked.worst / self.redesigned - 1.0 } else { 0.0 }
+    }
+}
+
+/// Slopes of the taps, and what they are worth.
+#[derive(Debug, Clone)]
+pub(crate) struct AffineDesign {
+    pub(crate) slopes: TapSlopes,
+    pub(crate) study: TrackingStudy,
+}
+
+/// The affine taps of least norm over the scenarios, relative to what is within reach there, within 3e-4.
+///
+/// # Errors
+/// As [`fir::synthesise`].
+pub(crate) fn synthesise(
+    plant: &LiftedPlant,
+    settings: &Settings,
+    problem: &RobustProblem,
+) -> Result<Synthesis, DesignError> {
+    let fixed = fir::synthesise(plant, settings)?;
+    let Filters::Fir(fixed_taps) = &fixed.filters else { return Ok(fixed) };
+    let points = scenarios(&problem.errors);
+    let plants =
+        points.iter().map(|point| moved_plant(problem, plant, point)).collect::<Result<Vec<_>, _>>()?;
+    let mut within_reach = Vec::with_capacity(plants.len());
+    for plant in &plants {
+        within_reach.push(plant.noncausal_bound()?.gain.max(fixed.peak.gain));
+    }
+    let sides = Sides::new(problem);
+    let scenarios = Scenarios { plants: &plants, points: &points, within_reach: &within_reach };
+    let mut exchange = sides.exchange((plant, fixed.peak.gain), scenarios, settings)?;
+    let found = exchange.optimise_to(ACCURACY)?;
+    let (taps, slopes) = sides.split(&found.taps, settings.taps);
+    let mut norms = Vec::with_capacity(plants.len());
+    for (plant, point) in plants.iter().zip(&points) {
+        norms.push(plant.fir_norm(&slopes.moved(&taps, &sides.errors(point)))?.gain);
+    }
+    let worst = (0..norms.len()).max_by(|&a, &b| norms[a].total_cmp(&norms[b])).unwrap_or(0);
+    let peak = plant.fir_norm(&taps)?;
+    let tracked = RobustNorms { nominal: peak.gain, worst: norms[worst].max(peak.gain) };
+    let of_fixed = largest(plants.iter().map(|plant| Ok(plant.fir_norm(fixed_taps)?.gain)))?;
+    let ratios = norms.iter().zip(&within_reach).map(|(norm, reach)| norm / reach);
+    let ratio = ratios.fold(peak.gain / fixed.peak.gain, f64::max);
+    let (_, redesigned) = fir::bracket(&plants[worst], settings.taps, ACCURACY, f64::INFINITY)?;
+    let study = TrackingStudy {
+        errors: problem.errors.clone(),
+        tracked,
+        fixed: RobustNorms { nominal: fixed.peak.gain, worst: of_fixed },
+        redesigned,
+        ratio,
+        least_ratio: exchange.lower.min(ratio),
+        scenarios: plants.len(),
+        pairs: exchange.frequencies().count(),
+    };
+    Ok(Synthesis {
+        filters: Filters::Fir(taps),
+        peak,
+        lower: fixed.lower.min(peak.gain),
+        noncausal: fixed.noncausal.min(peak.gain),
+        iterations: fixed.iterations + exchange.iterations,
+        dual: fixed.dual,
+        robust: None,
+        affine: Some(AffineDesign { slopes, study }),
+    })
+}
+
+/// Points of the box with their plants, and the norms that are within reach there.
+#[derive(Clone, Copy)]
+struct Scenarios<'a, 'b> {
+    plants: &'a [LiftedPlant],
+    points: &'b [ErrorPoint],
+    within_reach: &'b [f64],
+}
+
+/// The delays that move.
+struct Sides {
+    /// The channels, from 0.
+    channels: Vec<usize>,
+    /// By how much the delay of each of them may be off.
+    halves: Vec<Seconds>,
+    fast_period: Seconds,
+    /// N.
+    count: usize,
+}
+
+impl Sides {
+    fn new(problem: &RobustProblem) -> Self {
+        let delays = &problem.errors.delays;
+        let channels: Vec<usize> = (0..delays.len()).filter(|&j| delays[j].0 > 0.0).collect();
+        let halves = channels.iter().map(|&j| delays[j]).collect();
+        Self { channels, halves, fast_period: problem.spec.fast_period, count: delays.len() }
+    }
+
+    /// Of one scenario: 1, and the share of each half-width.
+    fn factors(&self, point: &ErrorPoint) -> Vec<f64> {
+        let share = |(&j, half): (&usize, &Seconds)| point.delays[j].0 / half.0;
+        std::iter::once(1.0).chain(self.channels.iter().zip(&self.halves).map(share)).collect()
+    }
+
+    fn errors(&self, point: &ErrorPoint) -> Vec<FastPeriods> {
+        point.delays.iter().map(|delay| delay.in_fast_periods(self.fast_period)).collect()
+    }
+
+    /// F_0 as taps per channel, and the slopes per fast period.
+    fn split(&self, found: &Taps, length: usize) -> (Vec<Vec<f64>>, TapSlopes) {
+        let part = |k: usize, scale: f64| {
+            let lags: Vec<Mat> =
+                found.iter().map(|lag| lag.columns(k * self.count, self.count) / scale).collect();
+            impulse_responses(&lags, length)
+        };
+        let mut by_delay = vec![Vec::new(); self.count];
+        for (k, (&j, half)) in self.channels.iter().zip(&self.halves).enumerate() {
+            by_delay[j] = part(k + 1, half.in_fast_periods(self.fast_period).0);
+        }
+        (part(0, 1.0), TapSlopes { by_delay })
+    }
+
+    fn exchange<'a>(
+        &self,
+        (plant, nominal): (&'a LiftedPlant, f64),
+        scenarios: Scenarios<'a, '_>,
+        settings: &Settings,
+    ) -> Result<Exchange<Sheets<'a>>, DesignError> {
+        let lags = lags(plant.ratio(), settings.taps);
+        let centre = ErrorPoint::none(self.count);
+        let Scenarios { plants, points, within_reach } = scenarios;
+        let moved = plants.iter().zip(points).zip(within_reach);
+        let all = std::iter::once(((plant, &centre), &nominal)).chain(moved);
+        let sheet = |((plant, point), reach): ((&'a LiftedPlant, &ErrorPoint), &f64)| Sheet {
+            grid: ErrorGrid::new(plant, lags[0]),
+            factors: self.factors(point),
+            weight: 1.0 / reach,
+        };
+        let sheets = Sheets { sheets: all.map(sheet).collect(), inputs: plant.channels() + plant.ratio() };
+        let (points, weights) = self.first_points(&sheets);
+        let noise = self.noise(&plant.problem().noise, &sheets);
+        let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
+        let objective = MeanSquareObjective { weights, noise };
+        Exchange::new(sheets, SampledProblem::new(points, lags)?, objective, margin)
+    }
+
+    /// Some points of each sheet with their weights: the sheets take turns, so that there are about as many
+    /// points as for the centre and the ends of each side alone.
+    fn first_points(&self, sheets: &Sheets<'_>) -> (Vec<Point>, Vec<f64>) {
+        let count = sheets.sheets.len();
+        let stride = count.div_ceil(2 * self.channels.len() + 1);
+        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        for (number, sheet) in sheets.sheets.iter().enumerate() {
+            let (coarse, of_coarse) = sheet.grid.coarse();
+            for k in (number % stride..coarse.len()).step_by(stride) {
+                points.push(sheets.point(number, &coarse[k]));
+                weights.push(of_coarse[k] * stride as f64 / count as f64);
+            }
+        }
+        (points, weights)
+    }
+
+    /// Power of the noise of the channels `[H; delta_1 H; ..]`: that of the output's noise, averaged over the
+    /// scenarios, whose shares are uncorrelated.
+    fn noise(&self, of_channels: &[f64], sheets: &Sheets<'_>) -> Vec<f64> {
+        let count = sheets.sheets.len() as f64;
+        let square =
+            |k: usize| sheets.sheets.iter().map(|sheet| sheet.factors[k].powi(2)).sum::<f64>() / count;
+        (0..=self.channels.len())
+            .flat_map(|k| {
+                let square = square(k);
+                of_channels.iter().map(move |power| power * square)
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,73 @@
+//! Points of a box of errors, each with a plant of its own.
+
+use crate::design::DesignError;
+use crate::design::plant::LiftedPlant;
+use crate::design::problem::Problem;
+use crate::design::uncertainty::sides::{Side, point_at, sides};
+use crate::spec::Spec;
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
+
+/// Most scenarios.
+pub(super) const MAX_SCENARIOS: usize = 64;
+/// Points on each side of the box that are tried, most first.
+const STEPS: [usize; 4] = [9, 5, 3, 2];
+
+/// What a robust design is made for.
+#[derive(Debug, Clone)]
+pub(crate) struct RobustProblem {
+    /// The spec with all defaults.
+    pub(crate) spec: Spec,
+    /// The box.
+    pub(crate) errors: ErrorBox,
+}
+
+/// The plant at a point of the box.
+pub(super) fn moved_plant(
+    problem: &RobustProblem,
+    plant: &LiftedPlant,
+    point: &ErrorPoint,
+) -> Result<LiftedPlant, DesignError> {
+    let moved = Problem::with_errors(&problem.spec, plant.problem().latency, point)?;
+    LiftedPlant::new(&moved)
+}
+
+/// Points of the box: a lattice over all sides, or its ends where there are many, or its most different
+/// corners where there are very many.
+pub(super) fn scenarios(errors: &ErrorBox) -> Vec<ErrorPoint> {
+    let sides = sides(errors);
+    // The error is affine in the gains: only their ends matter.
+    let steps = |side: &Side, most: usize| if matches!(side, Side::Gain(_)) { 2 } else { most };
+    let count = |most: usize| sides.iter().fold(1usize, |all, side| all.saturating_mul(steps(side, most)));
+    match STEPS.into_iter().find(|&most| count(most) <= MAX_SCENARIOS) {
+        Some(most) => {
+            let per_side: Vec<usize> = sides.iter().map(|side| steps(side, most)).collect();
+            (0..count(most)).map(|index| lattice_point(errors, &sides, &per_side, index)).collect()
+        }
+        None => corners(errors, &sides),
+    }
+}
+
+fn lattice_point(errors: &ErrorBox, sides: &[Side], per_side: &[usize], index: usize) -> ErrorPoint {
+    let mut rest = index;
+    let shares: Vec<f64> = per_side
+        .iter()
+        .map(|&count| {
+            let step = rest % count;
+            rest /= count;
+            2.0 * step as f64 / (count - 1) as f64 - 1.0
+        })
+        .collect();
+    point_at(errors, sides, &shares)
+}
+
+/// Rows of a Hadamard matrix and their opposites: corners that differ from each other in half of the sides.
+fn corners(errors: &ErrorBox, sides: &[Side]) -> Vec<ErrorPoint> {
+    let sign = |row: usize, side: usize| if (row & side).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
+    (0..MAX_SCENARIOS)
+        .map(|corner| {
+            let (row, opposite) = (corner / 2, if corner % 2 == 0 { 1.0 } else { -1.0 });
+            let shares: Vec<f64> = (0..sides.len()).map(|side| opposite * sign(row, side)).collect();
+            point_at(errors, sides, &shares)
+        })
+        .collect()
+}

@@ -1,0 +1,161 @@
+//! Robust optima against a semidefinite program, and the worst case that the file states.
+
+use super::scenarios::{MAX_SCENARIOS, scenarios};
+use crate::design::uncertainty::norm_of;
+use crate::design::{ProofSearch, design_with};
+use crate::spec::Spec;
+use crate::units::Seconds;
+use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Taps};
+
+/// The thesis example with 22 taps and delays that are off by up to `half`, all of them.
+fn thesis(half: f64) -> Spec {
+    let text = format!(
+        "{}\n[uncertainty]\ndelay = {half}\nreference = 0\n",
+        include_str!("../../../../filters/thesis-fir.toml")
+    );
+    Spec::from_toml(&text, "spec.toml").unwrap()
+}
+
+/// By an independent semidefinite program on 5 x 5 delays and 61 frequencies.
+#[test]
+fn robust_optima_are_those_of_a_semidefinite_program() {
+    for (half, robust, nominal) in
+        [(0.05, 0.0421756, 0.0421799), (0.1, 0.0442877, 0.0478338), (0.2, 0.0635326, 0.0682)]
+    {
+        let designed = design_with(&thesis(half), ProofSearch::Skip).unwrap();
+        let study = designed.robust.unwrap();
+        assert!((study.robust.worst / robust - 1.0).abs() < 1e-3, "{study:?}");
+        assert!((study.nominal.worst / nominal - 1.0).abs() < 1e-3, "{study:?}");
+        assert!(
+            study.lower <= study.robust.worst && study.lower > study.robust.worst * (1.0 - 1e-3),
+            "{study:?}"
+        );
+        assert_eq!(designed.bank.gamma.norm, Some(study.robust.nominal));
+        assert!(study.robust.nominal < 1.04 * 0.039932 && study.pairs < 400, "{study:?}");
+    }
+}
+
+/// The file states a worst case that `verify` proves, and it refuses a smaller one.
+#[test]
+fn the_worst_case_is_stated_and_proven() {
+    let mut bank = design_with(&thesis(0.1), ProofSearch::Run).unwrap().bank;
+    let stated = bank.gamma.worst_case.unwrap();
+    assert!(stated > 0.0442877 * (1.0 - 1e-3) && stated < 0.0442877 * 1.007, "{stated}");
+    assert!(crate::verify::verify(&bank).is_ok());
+    bank.gamma.worst_case = Some(0.98 * stated);
+    let refused = crate::verify::verify(&bank).unwrap_err();
+    assert_eq!(refused, crate::verify::VerifyError::WorstCase { stated: 0.98 * stated });
+}
+
+#[test]
+fn a_table_without_errors_changes_nothing() {
+    let plain = Spec { uncertainty: None, ..thesis(0.1) };
+    let (with, without) = (
+        design_with(&thesis(0.0), ProofSearch::Skip).unwrap(),
+        design_with(&plain, ProofSearch::Skip).unwrap(),
+    );
+    assert_eq!((with.bank.filters, with.robust), (without.bank.filters, None));
+}
+
+#[test]
+fn scenarios_reach_the_ends_of_every_side() {
+    let none = ErrorBox::none(8);
+    let two = ErrorBox { delays: [vec![Seconds(0.1); 2], vec![Seconds(0.0); 6]].concat(), ..none.clone() };
+    let both = ErrorBox { gains: vec![0.01; 8], ..two.clone() };
+    for (errors, count) in [(none.clone(), 1), (two, 25), (both, MAX_SCENARIOS)] {
+        let points = scenarios(&errors);
+        assert_eq!(points.len(), count);
+        for i in 0..8 {
+            let (delay, gain) = (errors.delays[i], errors.gains[i]);
+            assert!(points.iter().any(|point| point.delays[i] == delay && point.gains[i] == gain));
+            assert!(points.iter().any(|point| point.delays[i] == -delay || delay.0 == 0.0));
+            assert!(
+                points.iter().all(|point| point.delays[i].0.abs() <= delay.0 && point.gains[i].abs() <= gain)
+            );
+        }
+    }
+}
+
+/// The thesis example with taps that follow both delays.
+fn following(half: f64) -> Spec {
+    let mut spec = thesis(half);
+    spec.design.tracking = Some(crate::spec::Tracking::Affine);
+    spec
+}
+
+/// The norm of the bank's taps for delays that are off, and the least norm of all banks for these delays.
+fn norm_and_redesign(bank: &crate::bank::Bank, errors: [f64; 2]) -> (f64, f64) {
+    let point = ErrorPoint { delays: errors.map(Seconds).to_vec(), ..ErrorPoint::none(2) };
+    let (norm, _) = norm_of(bank, &point, Taps::Following).unwrap();
+    let mut spec = Spec { uncertainty: None, ..bank.spec.clone().unwrap() };
+    spec.design.tracking = None;
+    spec.channels.iter_mut().zip(errors).for_each(|(channel, error)| channel.delay += Seconds(error));
+    let redesign = design_with(&spec, ProofSearch::Skip).unwrap();
+    (norm, redesign.bank.gamma.norm.unwrap())
+}
+
+/// Redesigns at points of the box are the oracle: no taps are better than they, and at worst the affine taps
+/// are hardly worse.
+#[test]
+fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
+    let designed = design_with(&following(0.1), ProofSearch::Skip).unwrap();
+    let study = designed.tracking.unwrap();
+    let (mut most, mut most_redesigned) = (0.0f64, 0.0f64);
+    for errors in [[0.1, 0.1], [-0.1, 0.1], [0.1, -0.1], [0.04, -0.07], [0.0, 0.0]] {
+        let (norm, redesigned) = norm_and_redesign(&designed.bank, errors);
+        assert!(norm > redesigned * (1.0 - 1e-6), "{errors:?}: {norm} {redesigned}");
+        assert!(norm < 1.02 * redesigned, "{errors:?}: {norm} {redesigned}");
+        most = most.max(norm);
+        most_redesigned = most_redesigned.max(redesigned);
+    }
+    assert!(most <= study.tracked.worst * (1.0 + 1e-3), "{most} {study:?}");
+    assert!(most < 1.01 * most_redesigned, "{most} {most_redesigned}");
+    assert!(study.excess() < 0.01 && study.tracked.worst < 0.95 * study.fixed.worst, "{study:?}");
+    assert!(study.least_ratio <= study.ratio && study.least_ratio > study.ratio * (1.0 - 1e-3), "{study:?}");
+}
+
+/// The file states a worst case of the taps that follow, which `verify` proves; it refuses a smaller one, and
+/// a slope that was changed.
+#[test]
+fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
+    let designed = design_with(&following(0.05), ProofSearch::Run).unwrap();
+    let (mut bank, study) = (designed.bank, designed.tracking.unwrap());
+    let stated = bank.gamma.tracked.unwrap();
+    assert!(
+        stated >= study.tracked.worst * (1.0 - 1e-9) && stated < 1.05 * study.tracked.worst,
+        "{stated} {study:?}"
+    );
+    assert_eq!(bank.gamma.worst_case, None);
+    let read = crate::bank::Bank::from_json(&bank.to_json().unwrap(), "bank.json").unwrap();
+    assert_eq!(read, bank);
+    assert!(crate::verify::verify(&bank).is_ok());
+    let mut altered = bank.clone();
+    altered.tap_slopes.as_mut().unwrap().by_delay[0][1][10] += 0.3;
+    assert_eq!(crate::verify::verify(&altered).unwrap_err(), crate::verify::VerifyError::Tracked { stated });
+    bank.gamma.tracked = Some(0.98 * study.tracked.worst);
+    let refused = crate::verify::verify(&bank).unwrap_err();
+    assert_eq!(refused, crate::verify::VerifyError::Tracked { stated: 0.98 * study.tracked.worst });
+}
+
+/// Four interleaved converters, with HYBANK_SWEEP set: within 0.2 % of a redesign for delays within 10 ps, and
+/// within 3 % for 50 ps.
+#[test]
+fn interleaved_converters_are_followed() {
+    if std::env::var_os("HYBANK_SWEEP").is_none() {
+        return;
+    }
+    for (half, excess) in [(10e-12, 0.002), (50e-12, 0.03)] {
+        let text = include_str!("../../../../filters/interleaved-4x250M.toml");
+        let text = format!("{text}tracking = \"affine\"\n[uncertainty]\ndelay = {half}\nreference = 4\n");
+        let designed = design_with(&Spec::from_toml(&text, "spec.toml").unwrap(), ProofSearch::Run).unwrap();
+        let study = designed.tracking.unwrap();
+        println!(
+            "{half}: {:?} {study:?} excess {} in {:?}",
+            designed.bank.gamma,
+            study.excess(),
+            designed.proof_time
+        );
+        assert!(study.excess() < excess && study.ratio < 1.0 + excess, "{study:?}");
+        assert!(designed.bank.gamma.tracked.is_some());
+    }
+}

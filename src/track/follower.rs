@@ -1,0 +1,303 @@
+//! Follows the delays of a bank's channels block by block, and says how its taps are to change.
+
+use super::filter::{DelayMeasurement, DelayState, DriftModel};
+use super::guide::Guide;
+use super::log::{Logged, TrackWarning};
+use super::readings::{HALF_WIDTH, Reading};
+use super::tracker::{DelayTracker, Lock};
+use super::{Coincidence, TrackError};
+use crate::bank::{Bank, SynthesisFilters};
+use crate::calibrate::Model;
+use crate::spec::Spec;
+use crate::units::{FastPeriods, Hertz, Seconds};
+
+/// A delay counts as known when the half-width of its 95 % interval is below this, in fast periods.
+const KNOWN: f64 = 1e-3;
+/// A delay moves by at most this between two changes of the taps, in fast periods, where a change every
+/// [`LEAST_FRAMES`] frames suffices for that.
+const LARGEST_STEP: f64 = 2e-4;
+const LEAST_FRAMES: usize = 16;
+/// Delays closer than this share of a fast period come together, and how far ahead that is told, in blocks.
+const TOGETHER: f64 = 0.05;
+const HORIZON: f64 = 60.0;
+/// Least distance of a pilot from a multiple of half the slow rate, cycles per block.
+const LEAST_CYCLES: f64 = 2.0;
+
+/// How delays are followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FollowSettings {
+    /// Frames of a block: of one measurement.
+    pub block_frames: usize,
+    /// How delays change.
+    pub model: DriftModel,
+    /// Standard deviation of the rates at the beginning, seconds per second.
+    pub rate_deviation: f64,
+}
+
+/// Delays at which the taps are to be from some frame on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Frame of the block two blocks later, from 0.
+    pub frame: usize,
+    /// True delay minus that of the bank, per channel, within the box for which the taps were designed.
+    pub errors: Vec<FastPeriods>,
+}
+
+/// What a block of samples led to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Followed {
+    /// For the block two blocks later.
+    pub changes: Vec<Change>,
+    /// What is known at the centre of this block.
+    pub log: Logged,
+    /// What a user should know at once; each is said once.
+    pub warnings: Vec<TrackWarning>,
+}
+
+/// Follows the delays of the channels of a bank.
+///
+/// Delays are relative to the reference channel of the spec's `[uncertainty]`. After each block the Kalman
+/// filters take its measurement; without one, or with one that contradicts them, they go on as they are. The
+/// delays for the block after the next one are those expected there.
+#[derive(Debug, Clone)]
+pub struct Follower {
+    spec: Spec,
+    guide: Guide,
+    settings: FollowSettings,
+    reference: usize,
+    /// The channels whose delays the taps follow, from 0; one filter each.
+    followed: Vec<usize>,
+    /// How far their delays may be off.
+    halves: Vec<Seconds>,
+    tracker: DelayTracker,
+    /// The frame for which the filters' states hold.
+    time: f64,
+    /// Something was measured.
+    is_started: bool,
+    blocks: u64,
+    /// All warnings so far, and those of this block.
+    warned: Vec<TrackWarning>,
+    warnings: Vec<TrackWarning>,
+}
+
+impl Follower {
+    /// Begins with the delays of the bank and the intervals of its spec.
+    ///
+    /// # Errors
+    /// [`TrackError`] for a bank whose taps do not follow delays, or a pilot that cannot be measured.
+    pub fn new(bank: &Bank, guide: Guide, settings: FollowSettings) -> Result<Self, TrackError> {
+        if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
+            return Err(TrackError::Recursive);
+        }
+        let slopes = bank.tap_slopes.as_ref().ok_or(TrackError::NoTapSlopes)?;
+        let spec = bank.spec.clone().ok_or(TrackError::NoSpec)?;
+        let table = spec.uncertainty.clone().unwrap_or_default();
+        let reference = table.reference_channel().unwrap_or(0);
+        let of_all = table.delays(spec.channels.len());
+        let is_followed = |&j: &usize| j != reference && slopes.follows(j) && of_all[j] > Seconds(0.0);
+        let followed: Vec<usize> = (0..spec.channels.len()).filter(is_followed).collect();
+        if followed.is_empty() {
+            return Err(TrackError::NoTapSlopes);
+        }
+        if let Guide::Pilot(pilot) = guide {
+            check_pilot(&Model::new(&spec)?, pilot, settings.block_frames)?;
+        }
+        let halves: Vec<Seconds> = followed.iter().map(|&j| of_all[j]).collect();
+        let state = |(&j, half): (&usize, &Seconds)| {
+            DelayState::known(spec.channels[j].delay, half.0 / HALF_WIDTH, settings.rate_deviation)
+        };
+        let states: Vec<DelayState> = followed.iter().zip(&halves).map(state).collect();
+        let wanted = spec.fast_period * (KNOWN / HALF_WIDTH);
+        let tracker = DelayTracker::new(&states, settings.model, wanted);
+        Ok(Self {
+            spec,
+            guide,
+            settings,
+            reference,
+            followed,
+            halves,
+            tracker,
+            time: 0.0,
+            is_started: false,
+            blocks: 0,
+            warned: Vec::new(),
+            warnings: Vec::new(),
+        })
+    }
+
+    /// Frames of a block.
+    pub fn block_frames(&self) -> usize {
+        self.settings.block_frames
+    }
+
+    /// Takes the samples of the next block, a list per channel of the bank; NaN where one is missing.
+    pub fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {
+        let frames = self.settings.block_frames as u64;
+        let first = self.blocks * frames;
+        self.blocks += 1;
+        let centre = first as f64 + 0.5 * (frames as f64 - 1.0);
+        let measured = self.measure(samples, first, centre);
+        self.advance_to(centre);
+        let (measured, reason) = match measured {
+            Ok(measured) => (measured, None),
+            Err(reason) => (vec![None; self.spec.channels.len()], Some(reason)),
+        };
+        let log = self.logged(centre, measured, reason);
+        let changes = self.changes(first + 2 * frames);
+        self.warn_of_delays(centre, &changes);
+        Followed { changes, log, warnings: std::mem::take(&mut self.warnings) }
+    }
+
+    /// Measures the block and lets the filters take what was found; `Err` says why nothing was.
+    fn measure(
+        &mut self,
+        samples: &[Vec<f64>],
+        first: u64,
+        centre: f64,
+    ) -> Result<Vec<Option<DelayMeasurement>>, String> {
+        if let Guide::Readings(readings) = &self.guide {
+            let frames = first..first + self.settings.block_frames as u64;
+            let readings = Reading::within(readings, frames).to_vec();
+            let mut latest = Err("no reading".to_owned());
+            for reading in readings {
+                let of = |delay: &Option<(Seconds, Seconds)>| {
+                    delay.map(|(delay, sigma)| DelayMeasurement { delay, variance: sigma.0 * sigma.0 })
+                };
+                let measured: Vec<_> = reading.delays.iter().map(of).collect();
+                self.advance_to(reading.frame as f64);
+                latest = Ok(self.take(measured));
+            }
+            return latest;
+        }
+        self.advance_to(centre);
+        let mut expected = self.spec.clone();
+        for (&j, state) in self.followed.iter().zip(self.tracker.states()) {
+            expected.channels[j].delay = state.delay;
+        }
+        let measured = self.guide.measure(&expected, self.reference, samples)?;
+        Ok(self.take(measured))
+    }
+
+    /// Updates the filters; a measurement that was refused is none.
+    fn take(&mut self, mut measured: Vec<Option<DelayMeasurement>>) -> Vec<Option<DelayMeasurement>> {
+        for k in 0..self.followed.len() {
+            let j = self.followed[k];
+            let Some(measurement) = measured[j] else { continue };
+            self.is_started = true;
+            let (_, is_taken) = self.tracker.update(k, measurement);
+            let is_lost = self.tracker.locks().nth(k) == Some(Lock::Lost);
+            if is_lost {
+                let sigma = measurement.variance.sqrt();
+                let state = DelayState::known(measurement.delay, sigma, self.settings.rate_deviation);
+                self.tracker.restart(k, state);
+                self.warn(TrackWarning::Lost { channel: j + 1, frame: self.time as u64 });
+            } else if !is_taken {
+                measured[j] = None;
+            }
+        }
+        measured
+    }
+
+    fn frame_time(&self) -> Seconds {
+        self.spec.fast_period * self.spec.ratio as f64
+    }
+
+    fn advance_to(&mut self, frame: f64) {
+        if frame > self.time {
+            // The intervals of the spec are those of the first measurement: what it finds is no drift.
+            if self.is_started {
+                self.tracker.advance(self.frame_time() * (frame - self.time));
+            }
+            self.time = frame;
+        }
+    }
+
+    fn logged(&self, centre: f64, measured: Vec<Option<DelayMeasurement>>, reason: Option<String>) -> Logged {
+        let mut log = Logged::of_reference(&self.spec, centre, self.frame_time(), reason);
+        let states = self.tracker.states().zip(self.tracker.locks());
+        for (&j, (state, lock)) in self.followed.iter().zip(states) {
+            log.put(j, state, lock, measured[j]);
+        }
+        log
+    }
+
+    /// The delays of all channels at a frame.
+    fn errors_at(&self, frame: f64) -> Vec<FastPeriods> {
+        let mut errors = vec![FastPeriods(0.0); self.spec.channels.len()];
+        let h = self.spec.fast_period;
+        let elapsed = self.frame_time() * (frame - self.time);
+        for ((&j, half), state) in self.followed.iter().zip(&self.halves).zip(self.tracker.states()) {
+            let error = state.delay + elapsed * state.rate - self.spec.channels[j].delay;
+            errors[j] = Seconds(error.0.clamp(-half.0, half.0)).in_fast_periods(h);
+        }
+        errors
+    }
+
+    /// Changes within the block that begins at frame `first`, often enough for its drift.
+    fn changes(&self, first: u64) -> Vec<Change> {
+        let frames = self.settings.block_frames;
+        let fastest = self.tracker.states().map(|state| state.rate.abs()).fold(0.0, f64::max);
+        let drift = fastest * (frames * self.spec.ratio) as f64;
+        let most = (frames / LEAST_FRAMES).max(1);
+        // NaN and infinity become the limits.
+        let count = ((drift / LARGEST_STEP).ceil() as usize).clamp(1, most);
+        let begin = |k: usize| k * frames / count;
+        let change = |k: usize| {
+            let middle = 0.5 * (begin(k) + begin(k + 1)) as f64 - 0.5;
+            Change { frame: begin(k), errors: self.errors_at(first as f64 + middle) }
+        };
+        (0..count).map(change).collect()
+    }
+
+    /// Keeps a warning for the end of the block, unless one of its kind was given.
+    fn warn(&mut self, warning: TrackWarning) {
+        if !self.warned.iter().any(|known| known.is_like(&warning)) {
+            self.warned.push(warning.clone());
+            self.warnings.push(warning);
+        }
+    }
+
+    fn warn_of_delays(&mut self, centre: f64, changes: &[Change]) {
+        let h = self.spec.fast_period;
+        for k in 0..self.followed.len() {
+            let (j, half) = (self.followed[k], self.halves[k]);
+            let most = half.in_fast_periods(h).0;
+            if changes.iter().any(|change| change.errors[j].0.abs() >= most) {
+                self.warn(TrackWarning::OutsideTheBox { channel: j + 1, half, frame: centre as u64 });
+            }
+        }
+        if let Some(warning) = self.coincidence() {
+            self.warn(warning);
+        }
+    }
+
+    /// Two channels that will sample at one instant; with more channels than needed, nothing is lost by that.
+    fn coincidence(&self) -> Option<TrackWarning> {
+        let channels = self.spec.channels.len();
+        let is_known = self.tracker.locks().all(|lock| lock == Lock::Locked);
+        if channels > self.spec.ratio || !is_known {
+            return None;
+        }
+        let known = |channel: &crate::spec::ChannelSpec| DelayState::known(channel.delay, 0.0, 0.0);
+        let mut states: Vec<DelayState> = self.spec.channels.iter().map(known).collect();
+        for (&j, state) in self.followed.iter().zip(self.tracker.states()) {
+            states[j] = state;
+        }
+        let horizon = self.frame_time() * (HORIZON * self.settings.block_frames as f64);
+        let distance = self.spec.fast_period * TOGETHER;
+        let found = Coincidence::ahead(&states, self.frame_time(), distance, horizon)?;
+        let [a, b] = found.channels.map(|i| i + 1);
+        Some(TrackWarning::Coincidence { channels: [a, b], after: found.after })
+    }
+}
+
+/// Refuses a pilot at a multiple of half the slow rate.
+fn check_pilot(model: &Model, pilot: Hertz, frames: usize) -> Result<(), TrackError> {
+    let rate = model.slow_rate();
+    let halves = 2.0 * (pilot / rate);
+    let cycles = 0.5 * (halves - halves.round()).abs() * frames as f64;
+    if cycles >= LEAST_CYCLES {
+        return Ok(());
+    }
+    Err(TrackError::PilotPosition { pilot, cycles, frames, half: rate * 0.5 })
+}

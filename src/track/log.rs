@@ -1,0 +1,125 @@
+//! What is known of the delays at some frame, as a line of a log, and what a user should know at once.
+
+use super::filter::{DelayMeasurement, DelayState};
+use super::readings::HALF_WIDTH;
+use super::tracker::Lock;
+use crate::spec::Spec;
+use crate::units::Seconds;
+use serde::Serialize;
+use std::fmt;
+
+/// What is known of all channels. As JSON it is a line that [`super::Reading::parse`] reads.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Logged {
+    /// The frame, from 0.
+    pub frame: u64,
+    /// Its time.
+    pub time: Seconds,
+    /// D_i; the reference has that of the spec.
+    pub delay: Vec<Seconds>,
+    /// Half-widths of their 95 % intervals; zero where a delay counts as exact.
+    pub half_width: Vec<Seconds>,
+    /// Changes of the delays in parts per million.
+    pub rate_ppm: Vec<f64>,
+    /// Whether each delay is known.
+    pub lock: Vec<Lock>,
+    /// The delays that were measured and taken.
+    pub measured: Vec<Option<Seconds>>,
+    /// Why nothing was measured; the delays go on as they were expected to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held: Option<String>,
+}
+
+impl Logged {
+    /// All channels as the spec says.
+    pub(super) fn of_reference(spec: &Spec, frame: f64, period: Seconds, held: Option<String>) -> Self {
+        let count = spec.channels.len();
+        Self {
+            frame: frame as u64,
+            time: period * frame,
+            delay: spec.channels.iter().map(|channel| channel.delay).collect(),
+            half_width: vec![Seconds(0.0); count],
+            rate_ppm: vec![0.0; count],
+            lock: vec![Lock::Locked; count],
+            measured: vec![None; count],
+            held,
+        }
+    }
+
+    /// Channel `i` as it is followed.
+    pub(super) fn put(
+        &mut self,
+        i: usize,
+        state: DelayState,
+        lock: Lock,
+        measured: Option<DelayMeasurement>,
+    ) {
+        self.delay[i] = state.delay;
+        self.half_width[i] = state.deviation() * HALF_WIDTH;
+        self.rate_ppm[i] = 1e6 * state.rate;
+        self.lock[i] = lock;
+        self.measured[i] = measured.map(|measured| measured.delay);
+    }
+}
+
+/// What a user should know at once.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TrackWarning {
+    /// Measurements contradicted a delay again and again; it was taken from the last of them.
+    Lost {
+        /// From 1.
+        channel: usize,
+        /// The frame.
+        frame: u64,
+    },
+    /// A delay leaves the box for which the taps were designed; the taps stay at its end.
+    OutsideTheBox {
+        /// From 1.
+        channel: usize,
+        /// Half-width of the box.
+        half: Seconds,
+        /// The frame.
+        frame: u64,
+    },
+    /// Two channels will sample at one instant.
+    Coincidence {
+        /// From 1.
+        channels: [usize; 2],
+        /// Time until then.
+        after: Seconds,
+    },
+}
+
+impl TrackWarning {
+    /// Whether another warning says the same of the same channels.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Lost { channel: a, .. }, Self::Lost { channel: b, .. }) => a == b,
+            (Self::OutsideTheBox { channel: a, .. }, Self::OutsideTheBox { channel: b, .. }) => a == b,
+            (Self::Coincidence { channels: a, .. }, Self::Coincidence { channels: b, .. }) => a == b,
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for TrackWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lost { channel, frame } => write!(
+                f,
+                "the delay of channel {channel} was lost at frame {frame}: measurements contradicted it again and again; it begins anew"
+            ),
+            Self::OutsideTheBox { channel, half, frame } => write!(
+                f,
+                "the delay of channel {channel} leaves the ± {:e} s for which the taps were designed, at frame {frame}; the taps stay at \
+                 the end of that range: design with a larger [uncertainty] delay",
+                half.0
+            ),
+            Self::Coincidence { channels: [a, b], after } => write!(
+                f,
+                "the channels {a} and {b} will sample at one instant in {:.3e} s: no bank recovers the signal there",
+                after.0
+            ),
+        }
+    }
+}

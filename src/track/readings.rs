@@ -1,0 +1,128 @@
+//! Delays that were measured elsewhere, as JSON lines.
+
+use super::TrackError;
+use crate::units::Seconds;
+use serde::Deserialize;
+use std::ops::Range;
+
+/// Half-widths of 95 % intervals over standard deviations.
+pub(super) const HALF_WIDTH: f64 = 1.96;
+
+/// The delays at one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// The frame, from 0.
+    pub frame: u64,
+    /// D_i and its standard deviation; `None` for a channel of which the line says nothing.
+    pub delays: Vec<Option<(Seconds, Seconds)>>,
+}
+
+/// A line: absolute delays in seconds with half-widths of 95 % intervals, one for all channels or one each.
+/// The other keys of a log are not read.
+#[derive(Deserialize)]
+struct Line {
+    frame: u64,
+    delay: Vec<Option<f64>>,
+    half_width: HalfWidths,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum HalfWidths {
+    Same(f64),
+    Each(Vec<Option<f64>>),
+}
+
+impl HalfWidths {
+    fn of(&self, i: usize) -> Option<f64> {
+        match self {
+            Self::Same(value) => Some(*value),
+            Self::Each(list) => list.get(i).copied().flatten(),
+        }
+    }
+}
+
+impl Reading {
+    /// Reads JSON lines for `channels` channels, in the order of their frames; `file` is used in messages. A
+    /// log of a [`super::Follower`] is such a file.
+    ///
+    /// # Errors
+    /// [`TrackError::Reading`] for the first line that is wrong.
+    pub fn parse(text: &str, file: &str, channels: usize) -> Result<Vec<Self>, TrackError> {
+        let mut readings: Vec<Self> = Vec::new();
+        for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+            let fault = |problem| TrackError::Reading { file: file.to_owned(), line: number + 1, problem };
+            let reading = Self::of_line(line, channels).map_err(fault)?;
+            if readings.last().is_some_and(|last| last.frame > reading.frame) {
+                return Err(fault(format!(
+                    "frame {} comes after a later one; sort the lines",
+                    reading.frame
+                )));
+            }
+            readings.push(reading);
+        }
+        Ok(readings)
+    }
+
+    fn of_line(line: &str, channels: usize) -> Result<Self, String> {
+        let line: Line = serde_json::from_str(line).map_err(|error| error.to_string())?;
+        if line.delay.len() != channels {
+            let given = line.delay.len();
+            return Err(format!("{given} delays for {channels} channels; give one for each, or null"));
+        }
+        let of = |i: usize| {
+            let Some(delay) = line.delay[i] else { return Ok(None) };
+            let half = line.half_width.of(i).ok_or("a delay has no half_width")?;
+            // The half-width of the reference is zero: it is a definition.
+            if half < 0.0 || !half.is_finite() || !delay.is_finite() {
+                return Err(format!("half_width {half} of a delay: it is zero or more, in seconds"));
+            }
+            Ok((half > 0.0).then_some((Seconds(delay), Seconds(half / HALF_WIDTH))))
+        };
+        let delays = (0..channels).map(of).collect::<Result<_, String>>()?;
+        Ok(Self { frame: line.frame, delays })
+    }
+
+    /// Those of some frames.
+    pub(super) fn within(readings: &[Self], frames: Range<u64>) -> &[Self] {
+        let first = readings.partition_point(|reading| reading.frame < frames.start);
+        let end = readings.partition_point(|reading| reading.frame < frames.end);
+        &readings[first..end]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_read_and_found_by_frame() {
+        let text = "{\"frame\": 3, \"delay\": [null, 2e-6], \"half_width\": 1.96e-9}\n\n\
+                    {\"frame\": 9, \"delay\": [0.0, 3e-6], \"half_width\": [0.0, 1.96e-8], \"lock\": [\"held\"]}\n";
+        let readings = Reading::parse(text, "d.jsonl", 2).unwrap();
+        assert_eq!(readings[0].delays[0], None);
+        let (delay, sigma) = readings[1].delays[1].unwrap();
+        assert!(delay == Seconds(3e-6) && (sigma.0 / 1e-8 - 1.0).abs() < 1e-12, "{readings:?}");
+        assert_eq!(readings[1].delays[0], None);
+        assert_eq!(Reading::within(&readings, 4..10), &readings[1..]);
+        assert!(Reading::within(&readings, 4..9).is_empty());
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_line() {
+        for (text, words) in [
+            ("{\"frame\": 3}", "missing field"),
+            ("{\"frame\": 3, \"delay\": [1], \"half_width\": 1}", "1 delays for 2 channels"),
+            ("{\"frame\": 3, \"delay\": [1, 2], \"half_width\": -1}", "zero or more"),
+            ("{\"frame\": 3, \"delay\": [1, 2], \"half_width\": [1]}", "no half_width"),
+            ("{\"frame\": -3, \"delay\": [1, 2], \"half_width\": 1}", "-3"),
+            ("frame", "expected"),
+        ] {
+            let error = Reading::parse(&format!("\n{text}"), "d.jsonl", 2).unwrap_err().to_string();
+            assert!(error.starts_with("d.jsonl: line 2: ") && error.contains(words), "{error}");
+        }
+        let line = |frame: u32| format!("{{\"frame\": {frame}, \"delay\": [1, 2], \"half_width\": 1}}\n");
+        let error = Reading::parse(&(line(5) + &line(4)), "d.jsonl", 2).unwrap_err().to_string();
+        assert!(error.contains("line 2") && error.contains("sort"), "{error}");
+    }
+}

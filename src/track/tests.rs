@@ -1,0 +1,222 @@
+//! The follower on simulated recordings of clocks that drift, against the true delays.
+
+use super::*;
+use crate::bank::{Bank, SynthesisFilters, TapSlopes};
+use crate::design::Problem;
+use crate::random::Random;
+use crate::spec::Spec;
+use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod, Seconds};
+use std::f64::consts::TAU;
+
+/// Two recorders of 48 kHz with a common low-pass. The taps do not matter here.
+fn bank(half: f64) -> Bank {
+    let text = format!(
+        "fast_rate = 96000.0\nratio = 2\nlatency = 10\n\
+         target = {{ filter = {{ family = \"butterworth\", order = 4, cutoff = 20000.0 }} }}\n\
+         channel = [{{ delay_samples = 0.0 }}, {{ delay_samples = 1.0 }}]\n\
+         design = {{ method = \"fir\", taps = 4, tracking = \"affine\" }}\n\
+         [uncertainty]\ndelay_samples = {half}\n"
+    );
+    let spec = Spec::from_toml(&text, "spec.toml").unwrap();
+    let slopes = vec![vec![], vec![vec![0.0; 4]; 2]];
+    Bank {
+        fast_period: spec.fast_period,
+        latency: 10,
+        delays: spec.channels.iter().map(|channel| channel.delay).collect(),
+        tap_slopes: Some(TapSlopes { by_delay: slopes }),
+        spec: Some(spec),
+        ..Bank::bare(SynthesisFilters::Fir(vec![vec![0.0; 4]; 2]), 2)
+    }
+}
+
+fn settings(wander: f64) -> FollowSettings {
+    let model = DriftModel { delay_walk: 0.0, rate_walk: wander * wander };
+    FollowSettings { block_frames: 4096, model, rate_deviation: 1e-4 }
+}
+
+/// A normal number by the sum of twelve uniform ones.
+fn normal(random: &mut Random) -> f64 {
+    (0..12).map(|_| random.part()).sum::<f64>() - 6.0
+}
+
+const PERIOD: f64 = 1.0 / 48_000.0;
+
+/// Blocks of a tone in both recorders, in closed form: the second one is late by `delay(t)` seconds.
+fn block(
+    bank: &Bank,
+    number: usize,
+    tone: f64,
+    noise: f64,
+    delay: impl Fn(f64) -> f64,
+    random: &mut Random,
+) -> Vec<Vec<f64>> {
+    let problem = Problem::new(bank.spec.as_ref().unwrap(), 10).unwrap();
+    let w = RadiansPerFastPeriod(TAU * tone / 96_000.0);
+    let response = problem.front_ends[0].response(w);
+    let amplitude = 0.5 * response.norm();
+    let sample = |k: usize, late: f64, random: &mut Random| {
+        let phase = TAU * tone * (k as f64 * PERIOD - late) + response.arg();
+        amplitude * phase.cos() + noise * normal(random)
+    };
+    let frames = number * 4096..(number + 1) * 4096;
+    let first = frames.clone().map(|k| sample(k, 0.0, random)).collect();
+    let second = frames.map(|k| sample(k, delay(k as f64 * PERIOD), random)).collect();
+    vec![first, second]
+}
+
+/// A clock whose rate changes by 10 ppm in each second, at 60 dB: followed within 1.5 times what the filter
+/// says of itself.
+#[test]
+fn ten_ppm_per_second_are_followed_within_the_prediction() {
+    let (bank, mut random) = (bank(0.9), Random(4));
+    let nominal = bank.delays[1].0;
+    let delay = |t: f64| nominal - 4e-6 + 0.5 * 1e-5 * (t - 0.4) * (t - 0.4);
+    // The rate moves by 10 ppm in a second, so by that times a block between two measurements.
+    let step = 1e-5 * (4096.0 * PERIOD).sqrt();
+    let mut follower = Follower::new(&bank, Guide::Pilot(Hertz(7000.0)), settings(step)).unwrap();
+    let (mut square, mut predicted, mut count) = (0.0, 0.0, 0);
+    // 60 dB for a tone of amplitude 1/2, whose mean square is 1/8.
+    let noise = (0.125e-6f64).sqrt();
+    for number in 0..20 {
+        let found = follower.follow(&block(&bank, number, 7000.0, noise, delay, &mut random));
+        assert_eq!(found.log.held, None);
+        let at = (number as f64 + 0.5) * 4096.0 * PERIOD - 0.5 * PERIOD;
+        if number >= 6 {
+            square += (found.log.delay[1].0 - delay(at)).powi(2);
+            predicted += (found.log.half_width[1].0 / 1.96).powi(2);
+            count += 1;
+            assert_eq!(found.log.lock[1], Lock::Locked);
+        }
+        // The taps of the block after the next one are for the delays of then, up to 2.5 blocks or 0.213 s
+        // ahead, in which the change of the rate moves the delay by 0.022 fast periods.
+        if number >= 6 {
+            for change in found.changes.iter().step_by(16) {
+                let then = ((number + 2) * 4096 + change.frame) as f64 * PERIOD;
+                let error = Seconds(change.errors[1].0 / 96_000.0 + nominal - delay(then));
+                assert!(error.0.abs() < 0.03 / 96_000.0, "{number} {change:?} {error:?}");
+            }
+        }
+    }
+    let ratio = f64::sqrt(square / predicted);
+    assert!(count == 14 && ratio < 1.5, "{ratio}");
+}
+
+/// The pilot's error is that of the Cramér-Rao bound: sqrt(2 / (N SNR)) / w for the difference of two phases.
+#[test]
+fn a_pilot_is_measured_at_the_bound() {
+    let (bank, mut random) = (bank(0.9), Random(7));
+    let (tone, noise, blocks) = (9100.0, 1e-3, 60);
+    let guide = Guide::Pilot(Hertz(tone));
+    let spec = bank.spec.clone().unwrap();
+    let truth = bank.delays[1].0 + 2e-6;
+    let (mut square, mut stated) = (0.0, 0.0);
+    let problem = Problem::new(&spec, 10).unwrap();
+    for number in 0..blocks {
+        let samples = block(&bank, number, tone, noise, |_| truth, &mut random);
+        let found = guide.measure(&spec, 0, &samples).unwrap();
+        let measured = found[1].unwrap();
+        square += (measured.delay.0 - truth).powi(2);
+        stated += measured.variance;
+        assert!(found[0].is_none());
+    }
+    let amplitude = 0.5 * problem.front_ends[0].response(RadiansPerFastPeriod(TAU * tone / 96e3)).norm();
+    let bound = (2.0 / (4096.0 * amplitude * amplitude / (2.0 * noise * noise))).sqrt() / (TAU * tone);
+    assert!((stated / blocks as f64).sqrt() / bound < 1.02, "{stated} {bound}");
+    // 60 squares have a standard deviation of 18 %.
+    let rms = (square / blocks as f64).sqrt();
+    assert!(rms / bound < 1.3 && rms / bound > 0.7, "{rms:e} {bound:e}");
+}
+
+#[test]
+fn silence_holds_the_delays_and_a_tone_takes_them_up_again() {
+    let (bank, mut random) = (bank(0.9), Random(9));
+    let delay = |t: f64| bank.delays[1].0 + 1e-6 + 2e-6 * t;
+    let mut follower = Follower::new(&bank, Guide::Pilot(Hertz(5000.0)), settings(1e-6)).unwrap();
+    let mut logs = Vec::new();
+    for number in 0..20 {
+        let samples = if (8..12).contains(&number) {
+            vec![vec![0.0; 4096]; 2]
+        } else {
+            block(&bank, number, 5000.0, 1e-4, delay, &mut random)
+        };
+        logs.push(follower.follow(&samples).log);
+    }
+    for (number, log) in logs.iter().enumerate() {
+        let is_silent = (8..12).contains(&number);
+        assert_eq!(log.held.as_deref(), is_silent.then_some("silence"), "{number}");
+        let at = (number as f64 + 0.5) * 4096.0 * PERIOD - 0.5 * PERIOD;
+        if number > 4 {
+            let error = (log.delay[1].0 - delay(at)).abs();
+            assert!(error < 3.0 * log.half_width[1].0, "{number} {error:e} {log:?}");
+            assert!((log.rate_ppm[1] - 2.0).abs() < 0.5, "{log:?}");
+        }
+    }
+    assert!(
+        logs[11].half_width[1] > logs[8].half_width[1] * 1.5
+            && logs[13].half_width[1] < logs[11].half_width[1]
+    );
+}
+
+/// Readings give what was measured elsewhere; a log is a file of readings.
+#[test]
+fn a_log_is_read_again() {
+    let (bank, mut random) = (bank(0.9), Random(10));
+    let delay = |_| bank.delays[1].0 - 1.5e-6;
+    let mut first = Follower::new(&bank, Guide::Pilot(Hertz(5000.0)), settings(1e-6)).unwrap();
+    let mut lines = String::new();
+    for number in 0..5 {
+        let found = first.follow(&block(&bank, number, 5000.0, 1e-4, delay, &mut random));
+        lines += &(serde_json::to_string(&found.log).unwrap() + "\n");
+    }
+    let readings = Reading::parse(&lines, "log.jsonl", 2).unwrap();
+    let mut second = Follower::new(&bank, Guide::Readings(readings), settings(1e-6)).unwrap();
+    for number in 0..6 {
+        let log = second.follow(&vec![vec![0.0; 4096]; 2]).log;
+        assert_eq!(log.held.is_some(), number == 5, "{log:?}");
+        assert!((log.delay[1].0 - delay(0.0)).abs() < 1e-8, "{log:?}");
+    }
+}
+
+#[test]
+fn delays_that_leave_the_box_or_come_together_are_told_once() {
+    let bank = bank(0.9);
+    // The delay of channel 2 falls from 1 fast period to that of channel 1, beyond the box.
+    let line = |block: u64| {
+        let delay = bank.delays[1].0 - 2e-6 * block as f64;
+        format!("{{\"frame\": {}, \"delay\": [0, {delay}], \"half_width\": 1e-9}}\n", block * 4096 + 2048)
+    };
+    let lines: String = (0..8).map(line).collect();
+    let readings = Reading::parse(&lines, "d.jsonl", 2).unwrap();
+    let mut follower = Follower::new(&bank, Guide::Readings(readings), settings(1e-6)).unwrap();
+    let mut warnings = Vec::new();
+    for _ in 0..8 {
+        let found = follower.follow(&vec![vec![0.0; 4096]; 2]);
+        let most = FastPeriods(0.9 + 1e-9);
+        assert!(found.changes.iter().all(|change| change.errors[1].0.abs() <= most.0), "{found:?}");
+        warnings.extend(found.warnings);
+    }
+    let is = |warning: &TrackWarning| match warning {
+        TrackWarning::OutsideTheBox { channel: 2, .. } => 1,
+        TrackWarning::Coincidence { channels: [1, 2], .. } => 2,
+        _ => 0,
+    };
+    let mut kinds: Vec<i32> = warnings.iter().map(is).collect();
+    kinds.sort_unstable();
+    assert_eq!(kinds, [1, 2], "{warnings:?}");
+    assert!(warnings.iter().any(|warning| warning.to_string().contains("one instant")));
+}
+
+#[test]
+fn what_cannot_be_followed_is_refused() {
+    let bank = bank(0.5);
+    let refused = |bank: &Bank, guide| Follower::new(bank, guide, settings(1e-6)).unwrap_err();
+    assert_eq!(
+        refused(&Bank { tap_slopes: None, ..bank.clone() }, Guide::AnySignal),
+        TrackError::NoTapSlopes
+    );
+    assert_eq!(refused(&Bank { spec: None, ..bank.clone() }, Guide::AnySignal), TrackError::NoSpec);
+    let iir = include_str!("../../filters/thesis-iir.json");
+    assert_eq!(refused(&Bank::from_json(iir, "b.json").unwrap(), Guide::AnySignal), TrackError::Recursive);
+    let pilot = refused(&bank, Guide::Pilot(Hertz(24_000.0)));
+    assert!(matches!(pilot, TrackError::PilotPosition { frames: 4096, .. }), "{pilot}");
+}

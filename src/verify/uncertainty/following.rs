@@ -1,0 +1,192 @@
+//! The largest gain of the error system at one frequency over a box of errors, with taps that follow the
+//! delays.
+//!
+//! The filters are F(delta) = F_0 + sum_j delta_j S_j, so K(delta) = W - sum_i F_i(delta) h_i(delta_i). In a
+//! part of the box with the half-widths d let t be the distances from its centre. Between -d_i and d_i the row
+//! h_i is the parabola through its values at -d_i, 0 and d_i, h_i(0) + t_i b_i + t_i^2 q_i, plus a remainder
+//! of norm at most c_i ([`super::aliases::Weight::Parabola`]). Put t_i^2 = d_i^2 - (d_i^2 - t_i^2). The first
+//! part leaves a function that is affine in each t_i, so it is a convex mix of the K at the vertices; the
+//! second part is
+//!
+//! ```text
+//! s_i d_i^2 (F_i(delta) q_i + S_ii b_i),   s_i = 1 - t_i^2 / d_i^2 in [0, 1],
+//! ```
+//!
+//! S_ii being column i of S_i. That is affine in each t_j and s_j too. With t and s taken as independent, K is
+//! within sum_i |F_i| c_i of a convex mix over the vertices v and all e in {0, 1}:
+//!
+//! ```text
+//! sigma(K) <= max over v and e of sigma(K_v + sum_i e_i d_i^2 (F_i(v) q_i + S_ii b_i)) + sum_i |F_i| c_i.
+//! ```
+//!
+//! A bound by the norms of the second part, sum_i d_i^2 |F_i q_i + S_ii b_i|, would be larger: what the taps
+//! make up for at the vertices they miss at the centre, and in K_v both have opposite signs.
+
+use super::super::ball::{self, Ball};
+use super::super::spectrum::ComplexMatrix;
+use super::at_frequency::{
+    AtFrequency, Attained, MAX_BOXES, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
+};
+use super::channel::column_norm;
+
+/// Points of a grid that a part needs to be halved: each half has its ends and its middle.
+pub(super) const HALVED: usize = 4;
+
+/// One frequency, with taps that follow the delays.
+pub(super) struct Following<'a> {
+    at: AtFrequency<'a>,
+    /// S_j by channel, M x N, per fast period; `None` where the taps do not follow the delay.
+    slopes: Vec<Option<ComplexMatrix>>,
+    /// Half-width of the box by channel, fast periods.
+    halves: &'a [Ball],
+}
+
+/// What a channel does at a vertex.
+#[derive(Debug, Clone, Copy)]
+struct Choice {
+    vertex: Vertex,
+    /// e_i.
+    bowed: bool,
+}
+
+/// A column of filters times a row of the Gram matrix.
+type Term = (ComplexMatrix, usize);
+
+impl<'a> Following<'a> {
+    pub(super) fn new(at: AtFrequency<'a>, slopes: Vec<Option<ComplexMatrix>>, halves: &'a [Ball]) -> Self {
+        let mut following = Self { at, slopes, halves };
+        let moved = |i: usize| {
+            let of = |(slope, half): (&Option<ComplexMatrix>, &Ball)| {
+                slope.as_ref().map_or(0.0, |slope| column_norm(slope, i) * half.magnitude())
+            };
+            following.slopes.iter().zip(halves).map(of).sum::<f64>()
+        };
+        let columns = following.at.columns.iter().enumerate();
+        let columns = columns.map(|(i, column)| super::angle::outward(column + moved(i))).collect();
+        following.at.columns = columns;
+        following
+    }
+
+    /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
+    pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
+        let mut boxes = vec![self.at.whole()];
+        for _ in 0..MAX_BOXES {
+            let Some(parts) = boxes.pop() else { return Verdict::Below };
+            let limit = threshold - self.at.remainder(&parts);
+            let Some(found) = self.above(&parts, limit, work) else { continue };
+            if found.lower > threshold {
+                return Verdict::Above(found);
+            }
+            match self.at.halved(&parts, HALVED) {
+                Some(halves) if work.done < work.limit => boxes.extend(halves),
+                _ => return Verdict::Open(found),
+            }
+        }
+        Verdict::Open(Attained::unknown())
+    }
+
+    /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none.
+    fn above(&self, parts: &[Part], limit: f64, work: &mut Work) -> Option<Attained> {
+        if limit.is_nan() || limit <= 0.0 {
+            return Some(Attained::unknown());
+        }
+        let choices = |(i, part): (usize, &Part)| -> Vec<Choice> {
+            let bows: &[bool] = if part.first < part.last { &[false, true] } else { &[false] };
+            let at_vertices = self.at.vertices(i, part).into_iter();
+            at_vertices.flat_map(|vertex| bows.iter().map(move |&bowed| Choice { vertex, bowed })).collect()
+        };
+        let sets: Vec<Vec<Choice>> = parts.iter().enumerate().map(choices).collect();
+        let count = sets.iter().fold(1usize, |all, set| all.saturating_mul(set.len()));
+        let mut chosen: Vec<Choice> = Vec::with_capacity(sets.len());
+        for index in 0..count {
+            if work.done >= work.limit {
+                return Some(Attained::unknown());
+            }
+            work.done += 1;
+            chosen.clear();
+            let mut rest = index;
+            for set in &sets {
+                chosen.push(set[rest % set.len()]);
+                rest /= set.len();
+            }
+            if let Some(found) = self.judge(parts, &chosen, limit) {
+                return Some(found);
+            }
+        }
+        None
+    }
+
+    /// `None` if it is proven that the gain of this choice is at most `limit`.
+    fn judge(&self, parts: &[Part], chosen: &[Choice], limit: f64) -> Option<Attained> {
+        let square = self.square(parts, chosen);
+        let upper = upper_gain(&square, limit);
+        if upper <= limit {
+            return None;
+        }
+        // Only at the vertices themselves the gain is attained.
+        let is_attained = chosen.iter().all(|choice| !choice.bowed);
+        let lower = if is_attained { lower_gain(&square) } else { 0.0 };
+        let vertices = if is_attained { chosen.iter().map(|c| c.vertex).collect() } else { Vec::new() };
+        Some(Attained { lower, upper, vertices })
+    }
+
+    /// K K* of a choice.
+    fn square(&self, parts: &[Part], chosen: &[Choice]) -> ComplexMatrix {
+        let deltas: Vec<Ball> = (0..chosen.len()).map(|i| self.delta(i, chosen[i].vertex.error)).collect();
+        let filters = moved(&self.at.filters, &self.slopes, &deltas);
+        let mut terms: Vec<Term> = Vec::with_capacity(3 * chosen.len());
+        for (i, (part, choice)) in parts.iter().zip(chosen).enumerate() {
+            let Choice { vertex, bowed } = *choice;
+            let row = |error: usize| self.at.channels[i].rows[error][vertex.speed];
+            let gain = Ball::from(vertex.gain);
+            let column = scaled(&column(&filters, i), gain);
+            terms.push((scaled(&column, Ball::from(-1.0)), row(vertex.error)));
+            if bowed {
+                let half = Ball::from(0.5);
+                let bow = scaled(&column, half);
+                // d_i / 2 S_ii.
+                let width = self.delta(i, part.last) - self.delta(i, part.first);
+                let lean = self.slopes[i]
+                    .as_ref()
+                    .map(|slope| scaled(&self::column(slope, i), gain * width * Ball::from(0.25)));
+                let ends = [(part.last, 1.0), (part.first, -1.0)];
+                for (error, sign) in ends {
+                    let leaning = lean.as_ref().map(|lean| scaled(lean, Ball::from(sign)));
+                    terms.push((leaning.map_or_else(|| bow.clone(), |lean| bow.plus(&lean)), row(error)));
+                }
+                let middle = (part.first + part.last) / 2;
+                terms.push((scaled(&column, Ball::from(-1.0)), row(middle)));
+            }
+        }
+        self.at.square_of(&terms)
+    }
+
+    /// The error of the delay of channel `i` at a point of its grid, in fast periods.
+    fn delta(&self, i: usize, point: usize) -> Ball {
+        let last = self.at.channels[i].errors.len() - 1;
+        if last == 0 {
+            return Ball::ZERO;
+        }
+        // The share of the half-width is a short binary fraction.
+        Ball::from(2.0 * point as f64 / last as f64 - 1.0) * self.halves[i]
+    }
+}
+
+/// F_0 + sum_j delta_j S_j.
+pub(super) fn moved(
+    filters: &ComplexMatrix,
+    slopes: &[Option<ComplexMatrix>],
+    deltas: &[Ball],
+) -> ComplexMatrix {
+    let followed = slopes.iter().zip(deltas).filter_map(|(slope, delta)| Some((slope.as_ref()?, *delta)));
+    followed.fold(filters.clone(), |sum, (slope, delta)| sum.plus(&scaled(slope, delta)))
+}
+
+fn column(filters: &ComplexMatrix, i: usize) -> ComplexMatrix {
+    let rows: Vec<usize> = (0..filters.re.nrows()).collect();
+    filters.select(&rows, &[i])
+}
+
+fn scaled(m: &ComplexMatrix, by: Ball) -> ComplexMatrix {
+    ComplexMatrix { re: ball::scaled(&m.re, by), im: ball::scaled(&m.im, by) }
+}
