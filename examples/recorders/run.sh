@@ -1,5 +1,5 @@
 #!/bin/sh
-# Two recordings of one event by two recorders become one: their clocks drift apart by 3 ppm, and nobody told
+# Two recordings of one event by two recorders become one: their clocks drift apart by 1.5 ppm, and nobody told
 # when the second one began to the microsecond.
 #
 #   sh examples/recorders/run.sh [FOLDER]      everything goes into FOLDER, by default a new one
@@ -15,7 +15,7 @@ hybank verify bank.json
 
 # What the recorders hear. Only `simulate` knows how their clocks differ.
 hybank simulate bank.json --source tones:440Hz,3.1kHz,9.7kHz --samples 76800 -o heard \
-    --drift 0,3 --delay-error 0,-1.5us --noise 1e-4
+    --drift 0,1.5 --delay-error 0,-0.5us --noise 1e-4
 
 # With taps that stay, and with taps that follow the delay as the recordings show it.
 hybank fuse bank.json heard/ch1.wav heard/ch2.wav -o fixed.wav

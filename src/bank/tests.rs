@@ -197,7 +197,8 @@ fn a_static_block_has_no_states() {
 
 #[test]
 fn tap_slopes_read_back_and_have_the_sizes_of_the_taps() {
-    let slopes = TapSlopes { by_delay: vec![vec![], vec![vec![0.5, -1.0 / 3.0, 0.0], vec![1e-9, 2.0, -0.25]]] };
+    let slopes =
+        TapSlopes { by_delay: vec![vec![], vec![vec![0.5, -1.0 / 3.0, 0.0], vec![1e-9, 2.0, -0.25]]] };
     let gamma = Gamma { tracked: Some(0.041), ..fir().gamma };
     let bank = Bank { tap_slopes: Some(slopes), gamma, ..fir() };
     let text = bank.to_json().unwrap();

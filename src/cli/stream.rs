@@ -240,13 +240,7 @@ impl Args {
     }
 
     /// For an output of `rate` hertz.
-    fn pipeline(
-        &self,
-        bank: &Bank,
-        plan: &Plan,
-        rate: f64,
-        is_complex: bool,
-    ) -> Result<Pipeline, Failure> {
+    fn pipeline(&self, bank: &Bank, plan: &Plan, rate: f64, is_complex: bool) -> Result<Pipeline, Failure> {
         self.track.check_samples(is_complex)?;
         let (format, gaps, workers) = (self.output_format(), self.gaps.policy(), self.threads.workers()?);
         let settings = Settings { format, is_complex, skip: 0, gaps, workers };

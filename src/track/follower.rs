@@ -11,8 +11,10 @@ use crate::calibrate::Model;
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz, Seconds};
 
-/// A delay counts as known when the half-width of its 95 % interval is below this, in fast periods.
+/// A delay counts as known when the half-width of its 95 % interval is below this, in fast periods, or below
+/// this share of the smallest side of the box.
 const KNOWN: f64 = 1e-3;
+const KNOWN_SHARE: f64 = 0.02;
 /// A delay moves by at most this between two changes of the taps, in fast periods, where a change every
 /// [`LEAST_FRAMES`] frames suffices for that.
 const LARGEST_STEP: f64 = 2e-4;
@@ -107,7 +109,8 @@ impl Follower {
             DelayState::known(spec.channels[j].delay, half.0 / HALF_WIDTH, settings.rate_deviation)
         };
         let states: Vec<DelayState> = followed.iter().zip(&halves).map(state).collect();
-        let wanted = spec.fast_period * (KNOWN / HALF_WIDTH);
+        let smallest = halves.iter().map(|half| half.0).fold(f64::INFINITY, f64::min);
+        let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
         let tracker = DelayTracker::new(&states, settings.model, wanted);
         Ok(Self {
             spec,
@@ -174,8 +177,18 @@ impl Follower {
         for (&j, state) in self.followed.iter().zip(self.tracker.states()) {
             expected.channels[j].delay = state.delay;
         }
-        let measured = self.guide.measure(&expected, self.reference, samples)?;
+        let mut measured = self.guide.measure(&expected, self.reference, samples)?;
+        let walked = self.mean_of_block();
+        measured.iter_mut().flatten().for_each(|measurement| measurement.variance += walked);
         Ok(self.take(measured))
+    }
+
+    /// A block shows the mean of a delay over it. With a rate that walks by q and a delay that walks by p in a
+    /// second, the variance of its distance from the delay at the centre of the time T is q T^3 / 320 + p T / 12.
+    fn mean_of_block(&self) -> f64 {
+        let DriftModel { delay_walk, rate_walk } = self.settings.model;
+        let t = self.frame_time().0 * self.settings.block_frames as f64;
+        rate_walk * t.powi(3) / 320.0 + delay_walk * t / 12.0
     }
 
     /// Updates the filters; a measurement that was refused is none.

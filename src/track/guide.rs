@@ -4,12 +4,17 @@ use super::{DelayMeasurement, Reading};
 use crate::calibrate::{Evidence, Fit, Model, Record, Settings, calibrate};
 use crate::sine_fit::{self, Channel, Estimate, ToneFit};
 use crate::spec::Spec;
-use crate::units::{Hertz, Radians, Seconds};
+use crate::units::{Decibels, Hertz, Radians, Seconds};
 use std::f64::consts::{PI, TAU};
 
 /// A pilot's frequency may be off by this share of itself and by this many cycles per block.
 const CLOCK_TOLERANCE: f64 = 1e-4;
 const SEARCH_CYCLES: f64 = 2.0;
+/// Other tones that are fitted with the pilot, how far below the largest tone, and how many cycles per block
+/// apart from it.
+const MOST_OTHERS: usize = 8;
+const OTHERS_RANGE: Decibels = Decibels(60.0);
+const APART: f64 = 3.0;
 /// Mean square of a block below which there is silence, relative to full scale.
 const SILENCE: f64 = 1e-16;
 /// A measurement with a larger standard deviation says nothing, in fast periods.
@@ -81,9 +86,11 @@ fn by_pilot(
         .collect();
     let within = pilot * CLOCK_TOLERANCE + rate * (SEARCH_CYCLES / frames as f64);
     let start = sine_fit::locate(&channels, rate, pilot, within).map_err(|error| error.to_string())?;
+    let all = with_others(&channels, rate, start, frames);
     let mut tones: Vec<(Hertz, ToneFit)> = Vec::with_capacity(channels.len());
     for channel in &channels {
-        let fitted = sine_fit::fit(std::slice::from_ref(channel), rate, &[start]);
+        let alone = std::slice::from_ref(channel);
+        let fitted = sine_fit::fit(alone, rate, &all).or_else(|_| sine_fit::fit(alone, rate, &[start]));
         let fitted = fitted.map_err(|error| error.to_string())?;
         tones.push((fitted.frequencies[0].value, fitted.channels[0].tones[0]));
     }
@@ -102,6 +109,14 @@ fn by_pilot(
         })
     };
     Ok(tones.iter().enumerate().map(measured).collect())
+}
+
+/// The pilot first, and other tones that would count as noise if they were not fitted with it.
+fn with_others(channels: &[Channel<'_>], rate: Hertz, pilot: Hertz, frames: usize) -> Vec<Hertz> {
+    let folded = |f: Hertz| (f / rate - (f / rate).round()).abs();
+    let is_other = |f: &Hertz| (folded(*f) - folded(pilot)).abs() * frames as f64 > APART;
+    let found = sine_fit::find_tones(channels, rate, MOST_OTHERS, OTHERS_RANGE).unwrap_or_default();
+    std::iter::once(pilot).chain(found.into_iter().filter(is_other)).collect()
 }
 
 /// As `hybank calibrate --blind`, from the expected delays.

@@ -16,7 +16,8 @@
 //! What a bank can reach changes over the box: as two delays come closer, the noncausal bound rises. A least
 //! worst norm alone would let the error grow wherever it is below that of the worst corner. So the norm of
 //! each scenario counts relative to what can be had there: the noncausal bound, or the least gamma without
-//! errors if that is larger.
+//! errors if that is larger. Where both are far below the largest of them, a share of that one counts: ideal
+//! interleaving has no error at all at its own delays.
 
 use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
 use super::scenarios::{RobustProblem, moved_plant, scenarios};
@@ -33,6 +34,9 @@ use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem,
 use crate::units::{FastPeriods, Seconds};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
 
+/// Least of what counts as within reach at some delays, relative to the largest over the box.
+const LEAST_REACH: f64 = 0.02;
+
 /// The comparison of taps that follow the delays with taps that stay.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct TrackingStudy {
@@ -44,8 +48,9 @@ pub struct TrackingStudy {
     pub fixed: RobustNorms,
     /// Least norm of a bank that is designed for the delays at which the tracked norm is largest.
     pub redesigned: f64,
-    /// The largest ratio over the scenarios of the tracked norm to the noncausal bound there, or to the least
-    /// norm without errors if that is larger. This is what the design minimises.
+    /// The largest ratio over the scenarios of the tracked norm to what is within reach there: the noncausal
+    /// bound, or the least norm without errors if that is larger, or 2 % of the largest such number. This is
+    /// what the design minimises.
     pub ratio: f64,
     /// No affine taps of this length have a smaller ratio (computed).
     pub least_ratio: f64,
@@ -87,9 +92,12 @@ pub(crate) fn synthesise(
     for plant in &plants {
         within_reach.push(plant.noncausal_bound()?.gain.max(fixed.peak.gain));
     }
+    let floor = LEAST_REACH * within_reach.iter().copied().fold(0.0, f64::max);
+    within_reach.iter_mut().for_each(|reach| *reach = reach.max(floor));
+    let nominal = fixed.peak.gain.max(floor);
     let sides = Sides::new(problem);
     let scenarios = Scenarios { plants: &plants, points: &points, within_reach: &within_reach };
-    let mut exchange = sides.exchange((plant, fixed.peak.gain), scenarios, settings)?;
+    let mut exchange = sides.exchange((plant, nominal), scenarios, settings)?;
     let found = exchange.optimise_to(ACCURACY)?;
     let (taps, slopes) = sides.split(&found.taps, settings.taps);
     let mut norms = Vec::with_capacity(plants.len());
@@ -101,7 +109,7 @@ pub(crate) fn synthesise(
     let tracked = RobustNorms { nominal: peak.gain, worst: norms[worst].max(peak.gain) };
     let of_fixed = largest(plants.iter().map(|plant| Ok(plant.fir_norm(fixed_taps)?.gain)))?;
     let ratios = norms.iter().zip(&within_reach).map(|(norm, reach)| norm / reach);
-    let ratio = ratios.fold(peak.gain / fixed.peak.gain, f64::max);
+    let ratio = ratios.fold(peak.gain / nominal, f64::max);
     let (_, redesigned) = fir::bracket(&plants[worst], settings.taps, ACCURACY, f64::INFINITY)?;
     let study = TrackingStudy {
         errors: problem.errors.clone(),
