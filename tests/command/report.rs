@@ -27,9 +27,7 @@ fn a_page_shows_the_bank_and_loads_nothing() {
     assert_eq!(page.matches("http").count(), page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count());
     assert_eq!((page.matches("<svg").count(), page.matches("</svg>").count()), (6, 6));
     assert!(page.contains("a &lt; b &amp; c") && !page.contains("a < b"), "the name is not escaped");
-    for part in
-        ["proven for this page", "this bank has at most", "multiply-adds", "hybank verify b.json"]
-    {
+    for part in ["proven for this page", "this bank has at most", "multiply-adds", "hybank verify b.json"] {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.contains("NaN") && !page.contains("Captures"));
