@@ -176,6 +176,6 @@ fn captures_that_no_memory_holds_are_refused() {
     let output = shell(&desk, simulate);
     let message = text(&output.stderr);
     assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{message}");
-    assert!(message.contains("2.1 GB of memory") && message.contains("--samples"), "{message}");
+    assert!(message.contains("2.1 GB of memory") && message.contains("fewer samples"), "{message}");
     assert!(!desk.path("captures").exists());
 }
