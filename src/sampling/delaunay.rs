@@ -32,8 +32,8 @@ pub struct PoissonDelaunay {
 impl PoissonDelaunay {
     /// E\[S^a R^{2b}\] of the typical triangle, S its area and R its circumradius.
     ///
-    /// E\[R^2\] = 2 / (pi lambda), E\[S\] = 1 / (2 lambda), E\[S^2\] = 35 / (8 pi^2 lambda^2), E\[S R^2\] = 3 / (2 pi
-    /// lambda^2) (thesis Table 4.1).
+    /// E\[R^2\] = 2 / (pi lambda), E\[S\] = 1 / (2 lambda), E\[S^2\] = 35 / (8 pi^2 lambda^2), E\[S R^2\] =
+    /// 3 / (2 pi lambda^2) (thesis Table 4.1).
     pub fn moment(&self, a: u32, b: u32) -> f64 {
         let scale = (PI * self.density).powi((a + b) as i32);
         2.0_f64.powi(a as i32) * gamma_of_half(2 * (a + b) + 4) / scale * sines(a)
@@ -69,8 +69,8 @@ impl PoissonDelaunay {
     /// S c (1/3 - k (1 - k) / 6),   c = h3 - h1,   k = (h2 - h1) / c
     /// ```
     ///
-    /// and the sum over the 2 lambda triangles per unit area is 2 lambda E\[..\] over the typical triangle and
-    /// all directions.
+    /// and the sum over the 2 lambda triangles per unit area is 2 lambda E\[..\] over the typical triangle
+    /// and all directions.
     pub fn edge_error(&self) -> f64 {
         EDGE_ERROR / self.density.sqrt()
     }
@@ -81,12 +81,12 @@ impl PoissonDelaunay {
     }
 }
 
-/// Factor of E\[S^a R^{2b}\] for N shifted copies of one grid instead of a Poisson process, with `order` = a + b:
-/// prod_{j<order} N / (N + j), the same as that of intervals on the line.
+/// Factor of E\[S^a R^{2b}\] for N shifted copies of one grid instead of a Poisson process, `order` the sum of
+/// a and b: prod_{j<order} N / (N + j), the same as that of intervals on the line.
 ///
-/// A cell of the grid is a torus with N independent uniform points. Three of them are a triangle if the circle
-/// through them is empty, with probability (1 - pi R^2 / cell)^{N-3} instead of exp(-pi lambda R^2), so pi R^2 /
-/// cell is a beta variable of the shapes 2 and N - 2. Circles wider than the cell are neglected.
+/// A cell of the grid is a torus with N independent uniform points. Three of them are a triangle if the
+/// circle through them is empty, with probability (1 - pi R^2 / cell)^{N-3} instead of exp(-pi lambda R^2),
+/// so pi R^2 / cell is a beta variable of the shapes 2 and N - 2. Circles wider than the cell are neglected.
 pub fn superposed_grids(grids: usize, order: u32) -> f64 {
     let n = grids as f64;
     (0..order).map(|j| n / (n + f64::from(j))).product()

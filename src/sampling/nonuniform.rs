@@ -139,9 +139,9 @@ impl PiecewiseLinear {
     /// ( |f''| sum D^3 / 12 + sum D (max(E1, E2) + |f'| max(B1, B2)) ) / sum D.
     /// ```
     ///
-    /// It holds for the samples at hand, however they lie. The bounds of the thesis, such as (3/4) |f''|
-    /// <lambda^-2> in its Theorem 3.1, are expectations over random phases, and fail for samples that
-    /// coincide. `None` if all samples lie at one position.
+    /// It holds for the samples at hand, however they lie. The bounds of the thesis, such as that of its
+    /// Theorem 3.1, are expectations over random phases, and fail for samples that coincide. `None` if all
+    /// samples lie at one position.
     pub fn mean_error_bound(&self, f: Smoothness) -> Option<f64> {
         let length = self.samples[self.samples.len() - 1].x - self.samples[0].x;
         let of_interval = |pair: &[Measured]| {

@@ -228,11 +228,11 @@ impl DepthMap {
         Self { width, height, measure, data, offset, guessed: Vec::new() }
     }
 
-    /// The same map with an error added to every value, which leaves it before the camera: a tenth of its
-    /// disparity or depth remains.
-    pub(crate) fn with_errors(&self, mut error: impl FnMut() -> f32) -> Self {
+    /// The same map with changed values, all of which stay before the camera: a tenth of their disparity or
+    /// depth remains.
+    pub(crate) fn changed(&self, mut change: impl FnMut(f32) -> f32) -> Self {
         let (mut map, offset) = (self.clone(), self.offset as f32);
-        map.data.iter_mut().for_each(|v| *v = (*v + error()).max(0.1 * *v - 0.9 * offset));
+        map.data.iter_mut().for_each(|v| *v = change(*v).max(0.1 * *v - 0.9 * offset));
         map
     }
 

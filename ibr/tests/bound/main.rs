@@ -1,6 +1,7 @@
-//! The predicted error of views against the measured one: on photographs, which are skipped with a note where
-//! the data are not there, and on scenes with exact references.
+//! The predicted error of views against the measured one: on photographs, which are skipped with a note
+//! where the data are not there, and on scenes with exact references.
 
+mod decisions;
 #[path = "../../../tests/support/random.rs"]
 mod random;
 #[path = "../ray_traced/scene.rs"]

@@ -3,7 +3,8 @@
 use super::Fit;
 use crate::sampling::kernel::BSpline;
 
-/// Knots after which the response to one knot has decayed below 1e-6 where samples or filled holes are dense.
+/// Knots after which the response to one knot has decayed below 1e-6 where samples or filled holes are
+/// dense.
 const REACH: usize = 24;
 
 /// The row of A^{-1} that belongs to one position, cut off where it has decayed: J(x) = sum_k z_k r_k with

@@ -166,8 +166,8 @@ impl FlatRig<'_> {
         }
     }
 
-    /// What Theorem 3.1 bounds, estimated for exact inputs: the mean of |f_v''| lambda E\[D^3\] / 12 with the
-    /// exact moments of as many cameras as there are.
+    /// What Theorem 3.1 bounds, estimated for exact inputs: the mean of |f_v''| lambda E\[D^3\] / 12 with
+    /// the exact moments of as many cameras as there are.
     pub fn estimate(&self) -> f64 {
         self.mean(|u| {
             let periods = self.densities(u).iter().map(|d| 1.0 / d).collect();

@@ -1,8 +1,8 @@
-//! Bits for intensities and depths: R_T and R_D per value, R_T + R_D / k^2 = R per pixel where depth is given
-//! for one pixel in k x k.
+//! Bits for intensities and depths: R_T and R_D per value, R_T + R_D / k^2 = R per pixel where depth is
+//! given for one pixel in k x k.
 //!
-//! With errors e_T = A 2^{-R_T} and e_D = D 2^{-R_D} in the view that are independent, the mean square e_T^2 +
-//! e_D^2 is least where its derivatives by the bits of one pixel agree, at e_T = k e_D:
+//! With errors e_T = A 2^{-R_T} and e_D = D 2^{-R_D} in the view that are independent, the mean square e_T^2
+//! + e_D^2 is least where its derivatives by the bits of one pixel agree, at e_T = k e_D:
 //!
 //! ```text
 //! R_T = (R - log2(k D / A) / k^2) / (1 + 1 / k^2),   R_D = R_T + log2(k D / A)
@@ -10,9 +10,16 @@
 //!
 //! For k = 1 this is R_D = R / 2 + (1/2) log2(D / A): more bits of depth for textured scenes, wide baselines
 //! and near objects.
+//!
+//! Rounded disparities err alike at all pixels of a point: half-way between two views they displace its
+//! samples in opposite directions, and to first order the error cancels. The closed form, which takes errors
+//! as independent, then gives too many bits to depth. [`RoundingCosts`] renders the view from rounded
+//! inputs.
 
 use crate::analysis::random::{seeded, within};
 use crate::analysis::view::with_noise;
+use crate::depth::DepthMap;
+use crate::image::Image;
 use crate::pipeline::{RenderError, RenderSettings, rectified};
 use crate::propagate::RectifiedView;
 
@@ -45,9 +52,7 @@ pub fn sensitivity(
     let plain = rectified::render(views, position, &settings)?.image;
     let change = |views: &[RectifiedView<'_>]| {
         let image = rectified::render(views, position, &settings)?.image;
-        let pairs = image.data().iter().zip(plain.data());
-        let square = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / plain.data().len() as f64;
-        Ok::<f64, RenderError>(square.sqrt())
+        Ok::<f64, RenderError>(mean_square(&image, &plain).sqrt())
     };
     let maps = with_noise(views, DISPARITY, 3);
     let moved: Vec<_> =
@@ -82,6 +87,88 @@ impl BitSplit {
     }
 }
 
+/// Mean square change of a view when only intensities, or only disparities, are rounded to so many bits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoundingCosts {
+    /// For 1, 2, .. bits per intensity, in grey levels squared.
+    pub texture: Vec<f64>,
+    /// For 1, 2, .. bits per disparity.
+    pub depth: Vec<f64>,
+}
+
+impl RoundingCosts {
+    /// Renders a view of a rectified rig from inputs rounded to 1 .. `most` bits. `ranges` are the largest
+    /// intensity and disparity; the smallest are 0.
+    ///
+    /// # Errors
+    /// Those of [`rectified::render`].
+    pub fn new(
+        views: &[RectifiedView<'_>],
+        position: f64,
+        settings: &RenderSettings,
+        ranges: (f64, f64),
+        most: u32,
+    ) -> Result<Self, RenderError> {
+        let settings = RenderSettings { keep_exposure: true, ..*settings };
+        let render = |views: &[RectifiedView<'_>]| {
+            Ok::<Image, RenderError>(rectified::render(views, position, &settings)?.image)
+        };
+        let plain = render(views)?;
+        let (mut texture, mut depth) = (Vec::new(), Vec::new());
+        for bits in 1..=most {
+            let step = |range: f64| range * (-f64::from(bits)).exp2();
+            let images: Vec<Image> = views.iter().map(|v| rounded_image(v.image, step(ranges.0))).collect();
+            let coarse: Vec<_> =
+                views.iter().zip(&images).map(|(v, image)| RectifiedView { image, ..*v }).collect();
+            texture.push(mean_square(&render(&coarse)?, &plain));
+            let maps: Vec<DepthMap> =
+                views.iter().map(|v| rounded_map(v.disparity, step(ranges.1))).collect();
+            let coarse: Vec<_> =
+                views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect();
+            depth.push(mean_square(&render(&coarse)?, &plain));
+        }
+        Ok(Self { texture, depth })
+    }
+
+    /// The split of `total` bits per pixel with the least sum, in steps of a hundredth of a bit; depth is
+    /// given for one pixel in `step` x `step`.
+    pub fn best(&self, total: f64, step: usize) -> BitSplit {
+        let area = (step.max(1) as f64).powi(2);
+        let split = |texture: f64| BitSplit { texture, depth: (total - texture) * area };
+        let cost = |s: &BitSplit| between(&self.texture, s.texture) + between(&self.depth, s.depth);
+        let tried = (0..=(100.0 * total.max(0.0)) as usize).map(|i| split(i as f64 / 100.0));
+        tried.min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(split(0.0))
+    }
+}
+
+/// The mean square for any number of bits; its logarithm is linear between whole numbers and beyond them.
+fn between(costs: &[f64], bits: f64) -> f64 {
+    let logarithm = |k: usize| costs.get(k).map_or(0.0, |c| c.max(1e-12).ln());
+    let below = (bits.max(1.0) as usize - 1).min(costs.len().saturating_sub(2));
+    let part = bits - 1.0 - below as f64;
+    (logarithm(below) * (1.0 - part) + logarithm(below + 1) * part).exp()
+}
+
+fn mean_square(a: &Image, b: &Image) -> f64 {
+    let pairs = a.data().iter().zip(b.data());
+    pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / a.data().len() as f64
+}
+
+/// The middle of the step that a value lies in.
+fn middle(value: f32, step: f64) -> f32 {
+    (((f64::from(value) / step).floor() + 0.5) * step) as f32
+}
+
+fn rounded_image(image: &Image, step: f64) -> Image {
+    let mut rounded = image.clone();
+    rounded.data_mut().iter_mut().for_each(|v| *v = middle(*v, step));
+    rounded
+}
+
+fn rounded_map(map: &DepthMap, step: f64) -> DepthMap {
+    map.changed(|v| middle(v, step))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,6 +187,12 @@ mod tests {
             let found = (0..9000).map(|i| f64::from(i) * 1e-3).min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
             assert!((found.unwrap() - best.texture).abs() < 2e-3, "{step}: {found:?} {best:?}");
         }
+        // The same from costs of exact powers of two.
+        let (a, d) = (0.5 * 255.0, 6.0 * 60.0);
+        let powers = |e: f64| (1..=10).map(|b| (e * (-f64::from(b)).exp2()).powi(2)).collect();
+        let costs = RoundingCosts { texture: powers(a), depth: powers(d) };
+        let closed = BitSplit::best(9.0, Sensitivity { texture: 0.5, depth: 6.0 }, (255.0, 60.0), 1);
+        assert!((costs.best(9.0, 1).texture - closed.texture).abs() < 0.011);
         let extreme = BitSplit::best(4.0, Sensitivity { texture: 1e-9, depth: 1.0 }, (255.0, 60.0), 1);
         assert_eq!(extreme, BitSplit { texture: 0.0, depth: 4.0 });
     }

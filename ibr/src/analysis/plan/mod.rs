@@ -1,7 +1,10 @@
-//! What to spend on: where to put cameras, and how many bits to give intensities and depths (thesis 3.7).
+//! What to spend on: where to put cameras, how exact depth must be, and how many bits to give intensities
+//! and depths (thesis 3.7).
 
 mod bits;
+mod depth;
 mod placement;
 
-pub use bits::{BitSplit, Sensitivity, sensitivity};
+pub use bits::{BitSplit, RoundingCosts, Sensitivity, sensitivity};
+pub use depth::price_of_depth_errors;
 pub use placement::{Candidate, Costs, Placement, Wanted};

@@ -1,14 +1,21 @@
 //! Where to put cameras: the error of wanted views, predicted from a model of the surfaces alone.
 //!
-//! A pixel that no camera sees costs the error of a guess. One that cameras see at the distances s_i costs the
-//! noise of their photographs and the displacement by errors of depth, weighted as the renderer weights them:
+//! A pixel that no camera sees costs the error of a guess. One that cameras see at the distances s_i costs
+//! the noise of their photographs, the displacement by errors of depth, and the mixed colour beside a nearer
+//! surface, weighted as the renderer weights them:
 //!
 //! ```text
-//! e^2 = hole^2   or   sum_i g_i^2 (noise^2 + (displacement s_i)^2),   sum_i g_i = 1
+//! e^2 = hole^2   or   sum_i g_i^2 (noise^2 + (displacement s_i)^2 + (edge_i)^2),   sum_i g_i = 1
 //! ```
+//!
+//! Surfaces say what is hidden, and nothing about textures. On six ray-traced scenes of 64 x 48 pixels the
+//! greedy choice of 3 among 10 places lost 0 to 0.7 dB (0.3 dB in the mean) against the best of all subsets,
+//! each of which was rendered. By the criterion itself it lost 0.7 dB against the best 4 of 20 places. An
+//! exchange of single cameras afterwards changed nothing there, and made rendered views elsewhere worse.
 
 use crate::depth::DepthMap;
 use crate::pipeline::Balance;
+use crate::propagate::DOUBTFUL_WEIGHT;
 
 /// Disparities within this share of each other, or within a pixel, belong to one point.
 const SAME_POINT: f64 = 0.05;
@@ -22,12 +29,14 @@ pub struct Costs {
     pub noise: f64,
     /// Error per unit of distance between a camera and the wanted view.
     pub displacement: f64,
+    /// Error of a pixel whose camera sees a nearer surface beside it.
+    pub edge: f64,
 }
 
 impl Default for Costs {
     /// Of photographs such as "Cones", for distances in units of the baseline.
     fn default() -> Self {
-        Self { hole: 40.0, noise: 3.0, displacement: 6.0 }
+        Self { hole: 40.0, noise: 3.0, displacement: 2.0, edge: 15.0 }
     }
 }
 
@@ -58,7 +67,8 @@ pub struct Placement {
 
 struct Sight {
     distance: f64,
-    seen: Vec<bool>,
+    /// How much the samples of each pixel weigh: 0 where the candidate does not see it.
+    trust: Vec<f32>,
 }
 
 impl Placement {
@@ -66,7 +76,7 @@ impl Placement {
     pub fn new(candidates: &[Candidate<'_>], wanted: &[Wanted<'_>], costs: Costs) -> Self {
         let sight = |w: &Wanted<'_>, c: &Candidate<'_>| Sight {
             distance: (c.position - w.position).abs(),
-            seen: seen(w, c),
+            trust: trust(w, c),
         };
         let sights = wanted.iter().map(|w| candidates.iter().map(|c| sight(w, c)).collect()).collect();
         Self { costs, sights }
@@ -80,13 +90,15 @@ impl Placement {
 
     fn mean_square(&self, sights: &[Sight], chosen: &[usize]) -> f64 {
         let sights: Vec<&Sight> = chosen.iter().filter_map(|i| sights.get(*i)).collect();
-        let Some(pixels) = sights.first().map(|s| s.seen.len()) else { return self.costs.hole.powi(2) };
+        let Some(pixels) = sights.first().map(|s| s.trust.len()) else { return self.costs.hole.powi(2) };
         let weights = Balance::by_distance(&sights.iter().map(|s| s.distance).collect::<Vec<_>>());
         let of_pixel = |p: usize| {
             let (mut sum, mut square) = (0.0, 0.0);
-            for (i, s) in sights.iter().enumerate().filter(|(_, s)| s.seen[p]) {
-                let weight = f64::from(weights.weight(i as u16));
-                let error = self.costs.noise.powi(2) + (self.costs.displacement * s.distance).powi(2);
+            for (i, s) in sights.iter().enumerate().filter(|(_, s)| s.trust[p] > 0.0) {
+                let weight = f64::from(weights.weight(i as u16) * s.trust[p]);
+                let edge = if s.trust[p] < 1.0 { self.costs.edge } else { 0.0 };
+                let displacement = self.costs.displacement * s.distance;
+                let error = self.costs.noise.powi(2) + displacement.powi(2) + edge.powi(2);
                 sum += weight;
                 square += weight * weight * error;
             }
@@ -100,9 +112,8 @@ impl Placement {
         let candidates = self.sights.first().map_or(0, Vec::len);
         let mut chosen = Vec::new();
         for _ in 0..count.min(candidates) {
-            let with = |i: &usize| self.predicted(&[&chosen[..], &[*i]].concat());
             let free = (0..candidates).filter(|i| !chosen.contains(i));
-            let scored = free.map(|i| (i, with(&i)));
+            let scored = free.map(|i| (i, self.predicted(&[&chosen[..], &[i]].concat())));
             let best = scored.min_by(|a, b| a.1.total_cmp(&b.1));
             chosen.extend(best.map(|(i, _)| i));
         }
@@ -110,8 +121,9 @@ impl Placement {
     }
 }
 
-/// Which pixels of a wanted view a candidate sees: its map has the same disparity at their place.
-fn seen(wanted: &Wanted<'_>, candidate: &Candidate<'_>) -> Vec<bool> {
+/// How much a candidate's samples of the pixels of a wanted view weigh: its map has the same disparity at
+/// their place, or they are hidden there.
+fn trust(wanted: &Wanted<'_>, candidate: &Candidate<'_>) -> Vec<f32> {
     let (width, height) = wanted.disparity.size();
     let shift = wanted.position - candidate.position;
     let at = |p: usize| {
@@ -119,10 +131,16 @@ fn seen(wanted: &Wanted<'_>, candidate: &Candidate<'_>) -> Vec<bool> {
         let x = ((p % width) as f64 + shift * d).round();
         // Also false for unknown disparities.
         if !(x >= 0.0 && x < width as f64) {
-            return false;
+            return 0.0;
         }
-        let other = candidate.disparity.data().get(p / width * width + x as usize).copied();
-        other.is_some_and(|o| (f64::from(o) - d).abs() <= (SAME_POINT * d).max(1.0))
+        let (column, row) = (x as usize, p / width);
+        let other = f64::from(candidate.disparity.row(row)[column]);
+        let same = (other - d).abs() <= (SAME_POINT * d).max(1.0);
+        match (same, candidate.disparity.relief(column, row).behind_edge) {
+            (false, _) => 0.0,
+            (true, true) => DOUBTFUL_WEIGHT,
+            (true, false) => 1.0,
+        }
     };
     (0..width * height).map(at).collect()
 }

@@ -1,7 +1,7 @@
 //! The three numbers of every pixel, from the survey and the calibrated weights.
 
 use super::calibrate::LeastSquares;
-use super::jitter::{difference, disparity_noise, jitter};
+use super::jitter::{depth_jitter, difference, disparity_noise};
 use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, regressors};
 use super::survey::{Survey, survey};
 use super::variogram::Variogram;
@@ -10,8 +10,8 @@ use crate::image::Image;
 use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering};
 use crate::propagate::RectifiedView;
 
-/// Weights of the mean absolute error for photographs, from "Cones": bias, noise, slope, jitter, edge, doubt,
-/// hole.
+/// Weights of the mean absolute error for photographs, from "Cones": bias, noise, slope, jitter, edge,
+/// doubt, hole.
 const TYPICAL: Regressors = [0.9, 2.3, 0.12, 1.0, 0.08, 0.5, 1.2];
 
 /// Weights of the mean square: those of a normal error of that mean, with heavier tails where the depth is
@@ -165,7 +165,7 @@ fn examine(
     known: &Known,
 ) -> Result<Examined, RenderError> {
     let survey = survey(views, position, settings)?;
-    let jitter = jitter(views, position, settings, &survey.rendering.image, known.noise)?;
+    let jitter = depth_jitter(views, position, settings, &survey.rendering.image, known.noise)?;
     let regressors = regressors(&survey, &jitter, &known.variogram, known.spacing);
     Ok(Examined { survey, regressors })
 }

@@ -16,8 +16,8 @@ const WINDOW: usize = 2;
 /// maps alone: points that one map gives are looked up in the other. 0 for a single view.
 ///
 /// With two maps of the standard deviation s the difference has s^2 (1 + 2/3): the second value is
-/// interpolated between two neighbours. The median makes hidden points harmless. Errors that both maps share,
-/// and offsets between the cameras, do not show.
+/// interpolated between two neighbours. The median makes hidden points harmless. Errors that both maps
+/// share, and offsets between the cameras, do not show.
 pub fn disparity_noise(views: &[RectifiedView<'_>]) -> f64 {
     let mut differences: Vec<f64> = views.windows(2).flat_map(|pair| lookups(&pair[0], &pair[1])).collect();
     if differences.is_empty() {
@@ -53,11 +53,15 @@ pub fn with_noise(views: &[RectifiedView<'_>], deviation: f64, seed: u64) -> Vec
     let random = &mut seeded(seed);
     // The sum of three uniform numbers in [-1, 1) has the variance one, and bounded tails.
     let mut error = || (deviation * (2.0 * (part(random) + part(random) + part(random)) - 3.0)) as f32;
-    views.iter().map(|v| v.disparity.with_errors(&mut error)).collect()
+    views.iter().map(|v| v.disparity.changed(|d| d + error())).collect()
 }
 
-/// Local mean of the change of a view under errors of the disparities, in grey levels per pixel.
-pub(super) fn jitter(
+/// Local mean of the change of a view under errors of the disparities with a standard deviation of
+/// `deviation` pixels for a baseline of one, in grey levels; 0 for deviations below 0.02.
+///
+/// # Errors
+/// Those of [`rectified::render`].
+pub fn depth_jitter(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,

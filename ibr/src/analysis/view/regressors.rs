@@ -19,7 +19,8 @@ pub(super) const CAUSE_OF: [Cause; REGRESSORS] =
 /// Distance in pixels over which a colour of doubtful depth is wrong, for the variogram.
 const DOUBT: usize = 4;
 
-/// The regressors of every pixel of a survey; `jitter` is the local change of the view under errors of depth.
+/// The regressors of every pixel of a survey; `jitter` is the local change of the view under errors of
+/// depth.
 ///
 /// `spacing` is the distance between neighbouring views.
 pub(super) fn regressors(
