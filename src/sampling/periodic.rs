@@ -211,7 +211,7 @@ mod tests {
         let sets = PeriodicSets::new((0..200).map(|i| 1.0 + 0.01 * f64::from(i)).collect()).unwrap();
         let lambda = sets.density();
         for t in [0.0, 0.2, 1.0, 3.0] {
-            let (t, poisson) = (t / lambda, (-t as f64).exp());
+            let (t, poisson) = (t / lambda, (-t).exp());
             assert!((sets.void_probability(t) - poisson).abs() < 0.01, "{t}");
             assert!((sets.longer_than(t) - poisson).abs() < 0.01, "{t}");
         }
