@@ -13,7 +13,7 @@ const LINES: usize = 1024;
 /// Longest line; those of the format have a hundred bytes.
 const LONGEST_LINE: u64 = 4096;
 
-/// A pipe of lines as [`LostSamples`] has them, read while the samples arrive.
+/// A pipe of lines as [`LostSamples`](super::LostSamples) has them, read while the samples arrive.
 ///
 /// Lines must come before their samples: what a line says of samples that have been used comes too late, and
 /// is counted. The first line of an input with `sample_start` only begins its count; the following ones say

@@ -26,8 +26,7 @@ impl Instants {
 /// (phi * f)(t) at the given instants, accurate to rounding.
 ///
 /// Steps and tones have closed forms. A chirp costs one small matrix product per panel of its quadrature;
-/// ask [`panels`] for their number first, since beyond a million panels between two instants digits are
-/// lost.
+/// [`frames`](super::frames) refuses too many. Beyond a million panels between two instants digits are lost.
 pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Instants) -> Vec<f64> {
     match source {
         Source::Step { at, height } => step(filter, at.0, *height, instants),

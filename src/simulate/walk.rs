@@ -15,7 +15,7 @@ const TERMS: usize = 19;
 /// (phi * f)(t) at the given instants in any order, accurate to rounding.
 ///
 /// A tone costs one complex exponential at each instant; steps and chirps a panel for each instant, and
-/// otherwise as many as [`panels`](super::panels) says.
+/// otherwise as many as [`sample`](super::sample) takes.
 pub fn sample_at(filter: &StrictlyProper, source: &NormalisedSource, times: &[FastPeriods]) -> Vec<f64> {
     match source {
         Source::Tones(tones) => {

@@ -118,7 +118,9 @@ fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
 /// a slope that was changed.
 #[test]
 fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
-    let designed = design_with(&following(0.05), ProofSearch::Run).unwrap();
+    let mut spec = following(0.05);
+    spec.uncertainty.as_mut().unwrap().reference = Some(1);
+    let designed = design_with(&spec, ProofSearch::Run).unwrap();
     let (mut bank, study) = (designed.bank, designed.tracking.unwrap());
     let stated = bank.gamma.tracked.unwrap();
     assert!(
@@ -130,7 +132,7 @@ fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     assert_eq!(read, bank);
     assert!(crate::verify::verify(&bank).is_ok());
     let mut altered = bank.clone();
-    altered.tap_slopes.as_mut().unwrap().by_delay[0][1][10] += 0.3;
+    altered.tap_slopes.as_mut().unwrap().by_delay[1][1][10] += 1.0;
     assert_eq!(crate::verify::verify(&altered).unwrap_err(), crate::verify::VerifyError::Tracked { stated });
     bank.gamma.tracked = Some(0.98 * study.tracked.worst);
     let refused = crate::verify::verify(&bank).unwrap_err();
