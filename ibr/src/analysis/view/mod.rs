@@ -3,17 +3,21 @@
 //! Three numbers for each pixel, in grey levels:
 //!
 //! * **sure**: what the error cannot exceed as long as slopes, second differences and residuals nearby are
-//!   at most those of the samples. With h_s the influence of sample s on the pixel at x (the fit is linear),
-//!
-//! ```text |f'| |sum h_s (x_s - x)| + (1/2) |f''| sum |h_s| (x_s - x)^2 + E_T sum |h_s| + E_D |f'| distance
-//! sum |h_s| ```
-//!
-//! and the whole range of values for the part of the pixel that fills a hole. It is Prop. 3.1 for the
-//! smoothing spline that is really used; for linear interpolation it is (1/8) |f''| D^2 + E_T + E_D B |f'|;
+//!   at most those of the samples, by Prop. 3.1 for the smoothing spline that is really used (below);
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!
-//! The last two are sums over causes. The size of each cause is computed ([`survey()`]): the bias of the
+//! With h_s the influence of sample s on the pixel at x (the fit is linear in the samples) the sure bound is
+//!
+//! ```text
+//! |f'| |sum h_s (x_s - x)| + (1/2) |f''| sum |h_s| (x_s - x)^2
+//!      + E_T sum |h_s| + E_D |f'| distance sum |h_s|
+//! ```
+//!
+//! and the whole range of values for the part of the pixel that fills a hole. For linear interpolation it is
+//! (1/8) |f''| D^2 + E_T + E_D B |f'|.
+//!
+//! The other two are sums over causes. The size of each cause is computed ([`survey()`]): the bias of the
 //! fit, by fitting the fit once more; the views that share in a pixel; the slope; the change under errors of
 //! depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the variogram of
 //! the photographs. The weights of the causes are calibrated on the inputs themselves: each view is left out
