@@ -1,5 +1,5 @@
 #!/bin/sh
-# Two recordings of one event by two recorders become one: their clocks drift apart by 1.5 ppm, and nobody told
+# Two recordings of one event by two recorders become one: their clocks drift apart by 1.5 ppm, and it is not known
 # when the second one began to the microsecond.
 #
 #   sh examples/recorders/run.sh [FOLDER]      everything goes into FOLDER, by default a new one

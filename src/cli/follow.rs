@@ -5,10 +5,10 @@ use crate::io::PcmFrames;
 use crate::pipeline::{Gap, Pipeline};
 use std::time::{Duration, Instant};
 
-/// Time after which a gap that goes on is told.
+/// Time after which a gap that goes on is reported.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What has been told of a pipeline.
+/// What has been reported of a pipeline.
 pub(super) struct Follow {
     journal: Journal,
     frames: u64,
@@ -41,18 +41,18 @@ impl Follow {
         let frames = self.frames + parts.iter().map(PcmFrames::frames).min().unwrap_or(0) as u64;
         let (samples, replaced, clipped) = (pipeline.samples(), pipeline.replaced(), pipeline.clipped());
         if replaced > self.replaced {
-            self.journal.tell(Event::Replaced(span(self.frames, frames, replaced - self.replaced)));
+            self.journal.report(Event::Replaced(span(self.frames, frames, replaced - self.replaced)));
         }
         if clipped > self.clipped {
-            self.journal.tell(Event::Clipped(span(self.samples, samples, clipped - self.clipped)));
+            self.journal.report(Event::Clipped(span(self.samples, samples, clipped - self.clipped)));
         }
         (self.frames, self.samples, self.replaced, self.clipped) = (frames, samples, replaced, clipped);
         let gaps = pipeline.gaps();
-        gaps[self.gaps..].iter().for_each(|&gap| self.journal.tell(Event::Gap(gap)));
+        gaps[self.gaps..].iter().for_each(|&gap| self.journal.report(Event::Gap(gap)));
         self.gaps = gaps.len();
         let warnings = pipeline.warnings();
         for text in &warnings[self.warnings..] {
-            self.journal.tell(Event::Warning { text: text.clone() });
+            self.journal.report(Event::Warning { text: text.clone() });
         }
         self.warnings = warnings.len();
         self.follow_open(pipeline);
@@ -66,7 +66,7 @@ impl Follow {
             let new = Open { channel, first, since: Instant::now(), is_told: false };
             let mut open = known.iter().find(is_this).copied().unwrap_or(new);
             if !open.is_told && open.since.elapsed() >= PATIENCE {
-                self.journal.tell(Event::GapGoesOn(gap));
+                self.journal.report(Event::GapGoesOn(gap));
                 open.is_told = true;
             }
             self.open.push(open);

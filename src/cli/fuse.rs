@@ -131,11 +131,11 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     })?;
     pipeline.settle(&mut outputs).map_err(Failure::running)?;
     follow.step(&[], &pipeline);
-    let told = pipeline.warnings().to_vec();
+    let reported = pipeline.warnings().to_vec();
     let frames = reader.consumed();
     pipeline.flush(frames * bank.ratio as u64, &mut outputs).map_err(Failure::running)?;
     let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
-    let run = run.with_warnings(watch.finish()).with_told(told);
+    let run = run.with_warnings(watch.finish()).with_reported(reported);
     let seconds = begin.elapsed().as_secs_f64();
     let shift = plan.latency() as u64 - skip;
     let placement = Placement { ratio: bank.ratio as u64, shift, samples: run.samples };

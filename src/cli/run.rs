@@ -106,9 +106,9 @@ pub(super) struct RunReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     gaps: Option<GapSummary>,
     warnings: Vec<String>,
-    /// How many of the last warnings were told during the run.
+    /// How many of the last warnings were reported during the run.
     #[serde(skip)]
-    told: usize,
+    reported: usize,
 }
 
 impl RunReport {
@@ -122,7 +122,7 @@ impl RunReport {
         let warnings = tolerated.into_iter().chain(outcome.warnings()).map(text).collect();
         let Outcome { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps } = outcome;
         let plan = plan.into();
-        Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, told: 0 }
+        Self { plan, channels, ratio, samples, clipped, replaced, state_resets, gaps, warnings, reported: 0 }
     }
 
     /// The gaps that were filled.
@@ -136,10 +136,10 @@ impl RunReport {
         self
     }
 
-    /// With warnings that were told during the run.
-    pub(super) fn with_told(mut self, told: Vec<String>) -> Self {
-        self.told = told.len();
-        self.with_warnings(told)
+    /// With warnings that were reported during the run.
+    pub(super) fn with_reported(mut self, reported: Vec<String>) -> Self {
+        self.reported = reported.len();
+        self.with_warnings(reported)
     }
 
     /// With `strict` the first warning is an error.
@@ -166,7 +166,7 @@ pub(super) fn complete(
     let are_said = journal.quiet();
     run.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
     judged?;
-    run.warnings[..run.warnings.len() - run.told].iter().for_each(|warning| warn(warning));
+    run.warnings[..run.warnings.len() - run.reported].iter().for_each(|warning| warn(warning));
     Ok(())
 }
 

@@ -131,14 +131,14 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     let ending = ending.map_err(Failure::running)?;
     pipeline.settle(&mut outputs).map_err(Failure::running)?;
     follow.step(&[], &pipeline);
-    let told = pipeline.warnings().to_vec();
+    let reported = pipeline.warnings().to_vec();
     if args.flush {
         let samples = pipeline.plan().flush_frames() * bank.ratio;
         pipeline.flush(pipeline.samples() + samples as u64, &mut outputs).map_err(Failure::running)?;
     }
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
     let run = RunReport::new(pipeline.finish(), tolerated, "--output-format f32le");
-    let run = run.with_told([told, watch.finish()].concat());
+    let run = run.with_reported([reported, watch.finish()].concat());
     let (ratio, shift) = (bank.ratio as u64, plan.latency() as u64);
     let placement = Placement { ratio, shift, samples: run.samples };
     outputs.annotate(carried(&reader, run.gaps(), bank, &args.output, placement)?);

@@ -42,7 +42,7 @@ impl Watch {
         Self { state: State::Idle, journal: None }
     }
 
-    /// Warnings are told as soon as they are known.
+    /// Warnings are reported as soon as they are known.
     pub(super) fn live(self, journal: Journal) -> Self {
         Self { journal: Some(journal), ..self }
     }
@@ -71,8 +71,8 @@ impl Watch {
         let journal = self.journal.clone();
         let judge = move || {
             let found = judged(&spec, samples);
-            let told = journal.iter().flat_map(|journal| found.iter().map(move |text| (journal, text)));
-            told.for_each(|(journal, text)| journal.tell(Event::Warning { text: text.clone() }));
+            let reported = journal.iter().flat_map(|journal| found.iter().map(move |text| (journal, text)));
+            reported.for_each(|(journal, text)| journal.report(Event::Warning { text: text.clone() }));
             found
         };
         // Without a thread nothing is judged: the run matters more.

@@ -161,8 +161,8 @@ pub enum DesignError {
     },
     /// No tap sees a sample that has to do with the reference.
     #[error(
-        "at latency {latency} filters of length {taps} (taps per channel) see no sample that has to do with the output: they \
-         suit latencies from {shortest} to {longest}; choose one of these, leave the latency out to have the best one \
+        "at latency {latency} filters with taps = {taps} see no sample that has to do with the output: they suit latencies \
+         {shortest} to {longest}; choose one of these, leave the latency out to have the best one \
          chosen, or give more taps"
     )]
     OutOfReach {

@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn frames_left_out_may_become_known_during_the_run() {
-        // Three frames are used, a break before frame 5 is told in time and one before frame 6 late.
+        // Three frames are used, a break before frame 5 is reported in time and one before frame 6 late.
         let mut live = input(1, &[Segment::Frames(u64::MAX)], &[]);
         let bytes: Vec<u8> = (0..9i16).flat_map(i16::to_be_bytes).collect();
         let _ = live.refill(Block { filled: bytes.len(), bytes });

@@ -2,7 +2,7 @@
 //!
 //! Cells are separated by commas, semicolons, tabs or spaces. Lines that begin with `#` and empty lines are
 //! skipped. A first line with a cell that is no number is a heading; if its first cell names the time, that
-//! column is not a channel but tells the rate. An empty cell is a missing sample.
+//! column is no channel and gives the rate. An empty cell is a missing sample.
 
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use std::io::{self, BufRead, BufReader, Read};

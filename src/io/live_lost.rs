@@ -1,4 +1,4 @@
-//! Lost samples that are told while the samples arrive.
+//! Lost samples that are reported while the samples arrive.
 
 use super::IoError;
 use super::lost::LostLine;
@@ -64,7 +64,7 @@ impl LiveLines {
     }
 }
 
-/// Sends all lines. If nobody wants them any more, the thread ends.
+/// Sends all lines. The thread ends when they are no longer wanted.
 fn read(path: &PathBuf, name: &str, lines: &Sender<Result<LostLine, IoError>>) {
     let file = match File::open(path) {
         Ok(file) => file,

@@ -21,13 +21,13 @@ pub struct Stall {
     pub is_over: bool,
 }
 
-/// Whom to tell of stalls, and after what time.
+/// Where to report stalls, and after what time.
 #[derive(Clone)]
 pub struct StallWatch {
     /// The time without a sample after which an input counts as stalled.
     pub patience: Duration,
     /// Told once when a stall begins and once when it is over. The samples wait for it.
-    pub tell: Arc<dyn Fn(&Stall) + Send + Sync>,
+    pub report: Arc<dyn Fn(&Stall) + Send + Sync>,
 }
 
 impl fmt::Debug for StallWatch {
@@ -59,7 +59,7 @@ impl<'a> Wait<'a> {
     pub(super) fn passed(&mut self, time: Duration) {
         self.stall.waited += time;
         if let Some(watch) = self.watch.filter(|watch| !self.is_told && self.stall.waited >= watch.patience) {
-            (watch.tell)(&self.stall);
+            (watch.report)(&self.stall);
             self.is_told = true;
         }
     }
@@ -68,7 +68,7 @@ impl<'a> Wait<'a> {
     pub(super) fn end(mut self) {
         if let Some(watch) = self.watch.filter(|_| self.is_told) {
             self.stall.is_over = true;
-            (watch.tell)(&self.stall);
+            (watch.report)(&self.stall);
         }
     }
 }
@@ -80,19 +80,19 @@ mod tests {
 
     #[test]
     fn a_stall_is_told_once_and_its_end_once() {
-        let told = Arc::new(Mutex::new(Vec::new()));
-        let list = Arc::clone(&told);
-        let tell = Arc::new(move |stall: &Stall| list.lock().unwrap().push((stall.waited, stall.is_over)));
-        let watch = StallWatch { patience: Duration::from_millis(100), tell };
+        let reported = Arc::new(Mutex::new(Vec::new()));
+        let list = Arc::clone(&reported);
+        let report = Arc::new(move |stall: &Stall| list.lock().unwrap().push((stall.waited, stall.is_over)));
+        let watch = StallWatch { patience: Duration::from_millis(100), report };
         let wait = |steps: usize| {
             let mut wait = Wait::new(Some(&watch), "x", 2..=2);
             (0..steps).for_each(|_| wait.passed(Duration::from_millis(50)));
             wait.end();
         };
         wait(1);
-        assert!(told.lock().unwrap().is_empty());
+        assert!(reported.lock().unwrap().is_empty());
         wait(5);
         let times = [(100, false), (250, true)].map(|(time, over)| (Duration::from_millis(time), over));
-        assert_eq!(*told.lock().unwrap(), times);
+        assert_eq!(*reported.lock().unwrap(), times);
     }
 }

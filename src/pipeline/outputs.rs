@@ -22,7 +22,7 @@ pub trait Output {
     /// The errors of the destination.
     fn write(&mut self, block: Block<'_>) -> Result<(), IoError>;
 
-    /// Takes a line for the log of a [`Retuner`](super::Retuner); by default nobody reads it.
+    /// Takes a line for the log of a [`Retuner`](super::Retuner); by default it is dropped.
     ///
     /// # Errors
     /// The errors of the destination.

@@ -19,7 +19,7 @@ const KNOWN_SHARE: f64 = 0.02;
 /// [`LEAST_FRAMES`] frames suffices for that.
 const LARGEST_STEP: f64 = 2e-4;
 const LEAST_FRAMES: usize = 16;
-/// Delays closer than this share of a fast period come together, and how far ahead that is told, in blocks.
+/// Delays closer than this share of a fast period come together, and how far ahead that is reported, in blocks.
 const TOGETHER: f64 = 0.05;
 const HORIZON: f64 = 60.0;
 /// Least distance of a pilot from a multiple of half the slow rate, cycles per block.

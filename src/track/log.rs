@@ -107,7 +107,7 @@ impl fmt::Display for TrackWarning {
         match self {
             Self::Lost { channel, frame } => write!(
                 f,
-                "the delay of channel {channel} was lost at frame {frame}: measurements contradicted it again and again; it begins anew"
+                "the delay of channel {channel} was lost at frame {frame}: measurements contradicted it again and again; it starts again"
             ),
             Self::OutsideTheBox { channel, half, frame } => write!(
                 f,

@@ -41,7 +41,8 @@ fn spec(channels: usize, ratio: usize, design: &str) -> String {
 
 #[test]
 fn a_latency_out_of_reach_is_refused_before_anything_is_computed() {
-    let parts = ["at latency 1000 the 32 taps", "latencies 0 to ", "leave the latency out", "more taps"];
+    let parts =
+        ["at latency 1000 filters with taps = 32", "latencies 0 to ", "leave the latency out", "more taps"];
     refused(&spec(4, 4, "taps = 32"), &["--latency", "1000"], &parts);
     refused(&spec(2, 2, "taps = 24"), &["--latency", "1025"], &["at latency 1025", "latencies 0 to "]);
     for method in ["sinc", "separation"] {

@@ -1,4 +1,4 @@
-//! What a run tells while it goes on: gaps, clipping, stalls, lost samples from a FIFO. As a user runs it.
+//! What a run reports while it goes on: gaps, clipping, stalls, lost samples from a FIFO. As a user runs it.
 
 use crate::support::{Desk, bytes, channel, floats, frames, fused, interleaved, text, wav};
 use serde_json::{Value, json};
@@ -48,9 +48,9 @@ fn gaps_clipping_and_stalls_are_told_while_they_happen() {
     let desk = Desk::new();
     ["a", "b"].iter().for_each(|name| fifo(&desk, name));
     let inputs = ["--input", "a", "--input", "b", "--gaps", "zero", "--output-format", "s16le"];
-    let told = ["--report", "report", "--json"];
+    let reported = ["--report", "report", "--json"];
     let begun = Instant::now();
-    let mut child = desk.spawn(&[&["stream", "bank.json"], &inputs[..], &told].concat());
+    let mut child = desk.spawn(&[&["stream", "bank.json"], &inputs[..], &reported].concat());
     let said = lines(&mut child);
     // Multiples of 2^-9, so that 16 bits hold every sum of the small ones; the large ones clip.
     let (mut a, mut b) = (vec![1.0 / 512.0; 40], vec![-1.0 / 512.0; 40]);
@@ -126,19 +126,19 @@ fn lost_samples_from_a_fifo_hold_nothing_up() {
     let mut filled = input.clone();
     (30..33).for_each(|k| filled[2 * k + 1] = 0.0);
     assert!(got == fused(&filled));
-    let told = text(&output.stderr);
-    assert!(told.contains("1 lines about lost samples came after"), "{told}");
-    let report: Value = serde_json::from_str(told.lines().last().unwrap()).unwrap();
+    let reported = text(&output.stderr);
+    assert!(reported.contains("1 lines about lost samples came after"), "{reported}");
+    let report: Value = serde_json::from_str(reported.lines().last().unwrap()).unwrap();
     assert_eq!(report["gaps"]["list"], json!([{ "channel": 2, "first": 30, "length": 3 }]));
 }
 
 #[test]
-fn frames_left_out_may_be_told_by_a_fifo_and_wrong_lines_are_refused() {
+fn frames_left_out_may_come_from_a_fifo_and_wrong_lines_are_refused() {
     let desk = Desk::new();
     fifo(&desk, "lost");
-    let run = |told: &str| {
+    let run = |reported: &str| {
         let mut child = desk.spawn(&["stream", "bank.json", "--gaps", "zero", "--lost", "lost"]);
-        writer(&desk, "lost").write_all(told.as_bytes()).unwrap();
+        writer(&desk, "lost").write_all(reported.as_bytes()).unwrap();
         std::thread::sleep(Duration::from_millis(300));
         // A run that was refused closes its input.
         let _ = child.stdin.take().unwrap().write_all(&bytes(&frames(20)));

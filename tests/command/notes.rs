@@ -115,8 +115,8 @@ fn recordings_in_archives_are_read() {
         let output = desk.run(&["stream", "bank.json", "--input", &archive], &[]);
         assert!(output.status.success() && floats(&output.stdout) == fused(&input), "{format}: {output:?}");
         // No rate is stated, so the run says which one it takes.
-        let told = text(&output.stderr);
-        assert!(told.contains("states no core:sample_rate") && told.lines().count() == 1, "{told}");
+        let message = text(&output.stderr);
+        assert!(message.contains("states no core:sample_rate") && message.lines().count() == 1, "{message}");
         let strict = ["fuse", "bank.json", &archive, "-o", "no.wav", "--strict"];
         desk.refused(1, &strict, &[&archive, "core:sample_rate", "--strict"]);
     }

@@ -37,9 +37,9 @@ fn end(mut child: Child) -> (Option<i32>, String) {
     drop(child.stdin.take());
     let output = child.wait_with_output().unwrap();
     // A slow machine may take a second to come here.
-    let told = text(&output.stderr);
-    let told = told.lines().filter(|line| !line.contains("waiting for") && !line.contains("goes on"));
-    (output.status.code(), told.map(|line| format!("{line}\n")).collect())
+    let lines = text(&output.stderr);
+    let lines = lines.lines().filter(|line| !line.contains("waiting for") && !line.contains("goes on"));
+    (output.status.code(), lines.map(|line| format!("{line}\n")).collect())
 }
 
 #[test]

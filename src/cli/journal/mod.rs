@@ -1,4 +1,4 @@
-//! What happens during a run, told while it happens: lines on standard error, and JSON lines in the file of
+//! What happens during a run, reported while it happens: lines on standard error, and JSON lines in the file of
 //! `--report`. A thread of its own writes them, so that the samples never wait for a reader of messages.
 
 mod event;
@@ -108,7 +108,7 @@ impl Journal {
     }
 
     /// Tells an event, without waiting.
-    pub(super) fn tell(&self, event: Event) {
+    pub(super) fn report(&self, event: Event) {
         match &*self.sink {
             Sink::Thread(messages) => {
                 let has_room = messages.try_send(Message::Event(event)).is_ok();
@@ -118,10 +118,10 @@ impl Journal {
         }
     }
 
-    /// Whom the readers tell of inputs that give nothing.
+    /// Where the readers report inputs that give nothing.
     pub(super) fn stall_watch(&self) -> StallWatch {
         let journal = self.clone();
-        StallWatch { patience: PATIENCE, tell: Arc::new(move |stall| journal.tell(stall.into())) }
+        StallWatch { patience: PATIENCE, report: Arc::new(move |stall| journal.report(stall.into())) }
     }
 
     /// Nothing more is said on standard error; gives whether gaps were.

@@ -3,7 +3,7 @@
 use std::fs;
 
 /// Bytes of memory of the machine, or fewer where the process is limited (`ulimit -v`, a control group);
-/// `None` where the system does not tell.
+/// `None` where the system does not say.
 pub(super) fn machine_memory() -> Option<f64> {
     [physical(), control_group(), address_space()].into_iter().flatten().reduce(f64::min)
 }

@@ -121,7 +121,7 @@ impl OccludedRig<'_> {
         (0..NODES).filter_map(move |k| self.look(&self.view, at(k), None))
     }
 
-    /// The bound above; jumps are in `sampling`, but for the part that jitter displaces.
+    /// The bound above; jumps are in `sampling`, except for the part that jitter displaces.
     pub fn bound(&self, errors: Errors) -> ErrorBound {
         let width = self.window.1 - self.window.0;
         let nodes: Vec<Seen> = self.nodes().collect();
