@@ -75,7 +75,7 @@ impl AlignedInput {
         self.dropouts.add(dropout)
     }
 
-    /// `lost` frames were left out before frame `frame` of the input, which no segment lies behind. True if
+    /// `lost` frames were left out before frame `frame` of the input, and no segment begins later. True if
     /// that frame has been used; then they are lost from now on, so that later frames are in time.
     pub(super) fn leave_out(&mut self, frame: u64, lost: u64) -> bool {
         if lost == 0 {

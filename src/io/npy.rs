@@ -177,7 +177,7 @@ pub(super) struct PlanarReader {
 }
 
 impl PlanarReader {
-    /// The numbers behind the header of `file`, which must have them all.
+    /// The numbers after the header of `file`, which must have them all.
     pub(super) fn new(file: File, header: NpyHeader, name: &str) -> Result<Self, IoError> {
         let known = file.metadata().map_err(IoError::system(name, "read its size"))?;
         let wanted = header.offset + header.data_bytes();

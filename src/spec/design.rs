@@ -210,7 +210,13 @@ impl DesignSpec {
         if self.tracking.is_none() || uncertainty.is_some_and(is_uncertain) {
             return Ok(());
         }
-        let remedy = "tracking needs to know how far the delays may move: give [uncertainty] delay";
+        let remedy = match uncertainty {
+            None => "tracking needs to know how far the delays may move: give [uncertainty] delay",
+            Some(_) => {
+                "no delay moves: the delay of the reference is the origin, and [uncertainty] delay is 0 for all others; \
+                 give a delay above 0 for a channel that is not the reference, or leave tracking out"
+            }
+        };
         Err(SpecProblem::MissingKey { key: "delay", remedy })
     }
 

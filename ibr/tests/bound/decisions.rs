@@ -1,4 +1,4 @@
-//! Decisions that rest on predictions, against what they turn out to be worth.
+//! Decisions that rest on predictions, against what they turn out to cost.
 
 use super::*;
 use hybank_ibr::analysis::plan::{Candidate, Costs, Placement, RoundingCosts, Wanted, price_of_depth_errors};

@@ -90,7 +90,7 @@ fn gradient(image: &Image) -> Vec<f64> {
     (0..image.width() * image.height()).map(slope).collect()
 }
 
-/// What a prediction is worth.
+/// How good a prediction is.
 #[derive(Debug)]
 #[allow(dead_code)]
 struct Verdict {

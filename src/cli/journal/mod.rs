@@ -191,7 +191,7 @@ fn write_all(mut scribe: Scribe, messages: &Receiver<Message>) {
             Ok(Message::End(last, answer)) => {
                 let _ = answer.send(scribe.end(&last, Instant::now()));
             }
-            Err(RecvTimeoutError::Timeout) => scribe.tick(Instant::now()),
+            Err(RecvTimeoutError::Timeout) => scribe.say_due(Instant::now()),
             Err(RecvTimeoutError::Disconnected) => return,
         }
     }

@@ -88,11 +88,11 @@ impl Scribe {
                 (self.say)(&event.to_string());
             }
         }
-        self.tick(now);
+        self.say_due(now);
     }
 
     /// Says what has waited long enough.
-    pub(super) fn tick(&mut self, now: Instant) {
+    pub(super) fn say_due(&mut self, now: Instant) {
         if let Some(Gaps { last, count, missing }) = self.gaps.due(now) {
             let more = match count {
                 1 => String::new(),
@@ -165,16 +165,16 @@ mod tests {
         scribe.take(clipped(0, 9, 3), at(300));
         assert!(said.lock().unwrap().is_empty() && scribe.next() == Some(at(1000)));
         scribe.take(gap(50), at(400));
-        scribe.tick(at(1000));
+        scribe.say_due(at(1000));
         scribe.take(clipped(20, 29, 4), at(1500));
         scribe.take(clipped(30, 39, 1), at(1600));
         assert_eq!(scribe.next(), Some(at(2000)));
-        scribe.tick(at(2000));
+        scribe.say_due(at(2000));
         // Long after the last line it comes at once.
         scribe.take(gap(900), at(5000));
         scribe.take(gap(990), at(5001));
         scribe.quiet(at(5002));
-        scribe.tick(at(9000));
+        scribe.say_due(at(9000));
         let want = [
             "gap: channel 2, sample 50, 10 missing; 2 gaps with 20 samples in the last second",
             "clipped: 3 of the output samples 0 to 9",

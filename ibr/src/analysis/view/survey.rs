@@ -11,7 +11,7 @@ use crate::sample::Sample;
 use hybank::sampling::fit::Response;
 use rayon::prelude::*;
 
-/// Pixels to each side beyond which no sample has an influence worth counting: it falls by four per pixel.
+/// Pixels to each side beyond which no sample has an influence that counts: it falls by four per pixel.
 const INFLUENCE: f64 = 8.0;
 
 /// Pixels to each side over which local suprema are taken.

@@ -67,7 +67,7 @@ impl TrackingStudy {
     }
 }
 
-/// Slopes of the taps, and what they are worth.
+/// Slopes of the taps, and the error that they reach.
 #[derive(Debug, Clone)]
 pub(crate) struct AffineDesign {
     pub(crate) slopes: TapSlopes,
