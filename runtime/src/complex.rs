@@ -1,7 +1,7 @@
 //! Complex samples (IQ) through real filters.
 
 use crate::adapters::{ComplexInput, ComplexOutput, Part};
-use crate::{Plan, ProcessError, Sample, Stream, SwapError};
+use crate::{Plan, ProcessError, Sample, StateError, Stream, SwapError};
 
 /// Filters complex samples: real and imaginary parts are two real [streams](Stream) through one plan.
 ///
@@ -74,6 +74,29 @@ impl ComplexStream {
     pub fn flush<S: Sample>(&mut self, output: &mut [[S; 2]]) -> Result<usize, ProcessError> {
         self.real.flush(&mut ComplexOutput { samples: output, part: Part::Real })?;
         self.imaginary.flush(&mut ComplexOutput { samples: output, part: Part::Imaginary })
+    }
+
+    /// As [`Stream::state`]: the state of the real part, then that of the imaginary part, of one length.
+    pub fn state(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.real.state_bytes() + self.imaginary.state_bytes());
+        self.real.save(&mut bytes);
+        self.imaginary.save(&mut bytes);
+        bytes
+    }
+
+    /// As [`Stream::resume`].
+    ///
+    /// # Errors
+    /// As [`Stream::resume`].
+    pub fn resume(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let (real, imaginary) = state.split_at(state.len() / 2);
+        let (real, imaginary) = (self.real.read(real)?, self.imaginary.read(imaginary)?);
+        if real.0.position != imaginary.0.position {
+            return Err(StateError::Damaged);
+        }
+        self.real.go_on(real.0, real.1);
+        self.imaginary.go_on(imaginary.0, imaginary.1);
+        Ok(())
     }
 
     /// As [`Stream::continue_from`].

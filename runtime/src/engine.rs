@@ -8,6 +8,7 @@
 use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Output};
 use crate::algorithms::{Direct, Facts, FastFir, Filter, OverlapSave, Past, Recursive};
+use crate::state::{Count, Numbers};
 use std::sync::Arc;
 
 /// Coefficients that streams share.
@@ -145,6 +146,59 @@ impl Engine {
     fn past(&self) -> Option<&dyn Past> {
         each!(Self, self, pair => pair.past())
     }
+
+    /// Numbers that make up a state so many frames after a multiple of the alignment, of which the plan has
+    /// `channels`.
+    pub(crate) fn count(&self, channels: usize, place: usize) -> Count {
+        match self.past() {
+            Some(_) => Count { inputs: self.history() * channels, sums: 0 },
+            None => each!(Self, self, pair => pair.filter.count(place)),
+        }
+    }
+
+    /// These numbers; of a state that is recent input the samples, the last frame first.
+    pub(crate) fn save(&self, channels: usize, put: &mut dyn FnMut(f64)) {
+        let Some(past) = self.past() else {
+            return each!(Self, self, pair => pair.filter.save(&pair.state, put));
+        };
+        for age in 1..=self.history() {
+            (0..channels).for_each(|channel| put(past.sample(age, channel)));
+        }
+    }
+
+    /// The state after `position` frames that [`Engine::save`] gave as `numbers`. Does not allocate.
+    pub(crate) fn resume(&mut self, channels: usize, position: u64, numbers: Numbers<'_>) {
+        let frames = SavedFrames { numbers, channels, frames: self.history() };
+        each!(Self, self, pair => {
+            if !pair.filter.load(&mut pair.state, &frames, position) {
+                let place = position % pair.filter.facts().alignment as u64;
+                pair.filter.resume(&mut pair.state, place as usize, numbers);
+            }
+        });
+    }
+
+    /// See [`Filter::resets`].
+    pub(crate) fn set_resets(&mut self, resets: u64) {
+        each!(Self, self, pair => pair.set_resets(resets));
+    }
+
+    /// Frames that the filters look back; 0 for recursions.
+    fn history(&self) -> usize {
+        each!(Self, self, pair => pair.filter.facts().history.unwrap_or(0))
+    }
+}
+
+/// Frames of a state, the last one first.
+struct SavedFrames<'a> {
+    numbers: Numbers<'a>,
+    channels: usize,
+    frames: usize,
+}
+
+impl Past for SavedFrames<'_> {
+    fn sample(&self, age: usize, channel: usize) -> f64 {
+        if age <= self.frames { self.numbers.get((age - 1) * self.channels + channel) } else { 0.0 }
+    }
 }
 
 impl<F: Filter> Pair<F> {
@@ -158,6 +212,10 @@ impl<F: Filter> Pair<F> {
 
     fn resets(&self) -> u64 {
         F::resets(&self.state)
+    }
+
+    fn set_resets(&mut self, resets: u64) {
+        F::set_resets(&mut self.state, resets);
     }
 
     fn past(&self) -> Option<&dyn Past> {

@@ -172,3 +172,19 @@ pub enum SwapError {
         to: &'static str,
     },
 }
+
+/// Bytes from which a stream cannot go on; it is as before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum StateError {
+    /// Other bytes, part of a state, or a state of another version.
+    #[error("these bytes are no state of a stream of this version of hybank; give what `state` returned")]
+    NotAState,
+    /// Another bank, algorithm or number type.
+    #[error(
+        "this state belongs to another plan; go on with the bank, the algorithm and the number type that made it"
+    )]
+    OtherPlan,
+    /// The numbers cannot be those of a stream.
+    #[error("this state was cut short or changed; its numbers do not fit the plan")]
+    Damaged,
+}

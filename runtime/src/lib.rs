@@ -58,6 +58,7 @@ mod plan;
 mod precision;
 mod sample;
 mod simd;
+mod state;
 mod state_space;
 mod stream;
 #[cfg(test)]
@@ -68,12 +69,13 @@ mod thread_pool;
 pub use adapters::{Frames, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
 pub use algorithms::choice::Algorithm;
 pub use complex::ComplexStream;
-pub use error::{BuildError, ProcessError, SwapError};
+pub use error::{BuildError, ProcessError, StateError, SwapError};
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use plan::{Options, Plan, PlanSummary};
 pub use precision::Precision;
 pub use sample::Sample;
 pub use simd::{Isa, multiply_add_chains};
+pub use state::STATE_COUNTS;
 pub use state_space::StateSpace;
 pub use stream::Stream;
 #[cfg(feature = "rayon")]

@@ -4,6 +4,7 @@ use crate::adapters::Offsets;
 use crate::algorithms::choice::{Choice, check_recursive};
 use crate::algorithms::{Direct, Facts, FastFir, OverlapSave, Recursive};
 use crate::engine::{Coefficients, Engine};
+use crate::state::Digest;
 use crate::{Algorithm, BuildError, Isa, Precision, StateSpace};
 use std::sync::Arc;
 
@@ -66,6 +67,8 @@ pub struct Plan {
     /// Of the converters, if any is not zero.
     offsets: Option<Arc<Offsets>>,
     isa: Isa,
+    /// Of all that the bits of outputs depend on.
+    digest: Digest,
 }
 
 impl Plan {
@@ -105,7 +108,9 @@ impl Plan {
                 Coefficients::OverlapSaveF64(Arc::new(OverlapSave::new(taps, ratio, len, isa)?))
             }
         };
-        Ok(Self::new(coefficients, [taps.len(), ratio], latency, isa))
+        let mut plan = Self::new(coefficients, [taps.len(), ratio], latency, isa);
+        plan.digest.add_lists(taps);
+        Ok(plan)
     }
 
     /// Recursive filters for N = `channels` and M = `ratio`; `latency` as in [`Plan::from_taps`].
@@ -130,7 +135,10 @@ impl Plan {
                 Coefficients::RecursiveF64(Arc::new(Recursive::new(filter, channels, ratio, isa)?))
             }
         };
-        Ok(Self::new(coefficients, [channels, ratio], latency, isa))
+        let mut plan = Self::new(coefficients, [channels, ratio], latency, isa);
+        let StateSpace { a, b, c, d } = filter;
+        [a, b, c, d].into_iter().for_each(|rows| plan.digest.add_lists(rows));
+        Ok(plan)
     }
 
     /// The same plan for converters whose samples contain offsets: `offsets[i]` is subtracted from each sample
@@ -143,12 +151,17 @@ impl Plan {
     /// # Errors
     /// [`BuildError::OffsetCount`] unless there is one for each channel; [`BuildError::NotFinite`].
     pub fn with_offsets(self, offsets: &[f64]) -> Result<Self, BuildError> {
+        let mut digest = self.digest;
+        digest.add_list(offsets);
         let offsets = Offsets::new(offsets, self.channels)?.map(Arc::new);
-        Ok(Self { offsets, ..self })
+        Ok(Self { offsets, digest, ..self })
     }
 
     fn new(coefficients: Coefficients, [channels, ratio]: [usize; 2], latency: usize, isa: Isa) -> Self {
         let facts = coefficients.facts();
+        let mut digest = Digest::new(facts.name, coefficients.numbers());
+        let (transform, _) = facts.transform.unwrap_or_default();
+        [channels, ratio, latency, transform].into_iter().for_each(|size| digest.add(size as u64));
         Self {
             coefficients,
             facts,
@@ -157,12 +170,18 @@ impl Plan {
             latency: latency + facts.delay * ratio,
             offsets: None,
             isa,
+            digest,
         }
     }
 
     /// What is subtracted from samples; `None` for nothing.
     pub(crate) fn offsets(&self) -> Option<&Offsets> {
         self.offsets.as_deref()
+    }
+
+    /// What tells this plan from those whose outputs have other bits.
+    pub(crate) fn digest(&self) -> [u64; 2] {
+        self.digest.words()
     }
 
     /// With a state at its beginning.

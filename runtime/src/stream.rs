@@ -4,7 +4,8 @@
 use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Interleaved, Output, Planar, WithoutOffsets, Zeros};
 use crate::engine::Engine;
-use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, SwapError};
+use crate::state::{Count, Header, Numbers};
+use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, StateError, SwapError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
 /// first frame, and x_i the samples without the [offsets](Plan::with_offsets) of their converters.
@@ -277,6 +278,58 @@ impl Stream {
         }
         (self.position, self.replaced) = (running.position, running.replaced);
         Ok(())
+    }
+
+    /// The state as bytes, from which [`Stream::resume`] goes on, in this process or another one, on any
+    /// processor. Allocates them; [`Stream::save`] need not.
+    pub fn state(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.state_bytes());
+        self.save(&mut bytes);
+        bytes
+    }
+
+    /// Bytes of the [state](Stream::state) at this frame. Plans of FIR filters keep their history; overlap-save
+    /// keeps a batch too, and a recursion its states.
+    pub fn state_bytes(&self) -> usize {
+        Header::bytes(self.count(self.position))
+    }
+
+    /// Appends the [state](Stream::state) to `bytes`. Allocates only where these have no room for it.
+    pub fn save(&self, bytes: &mut Vec<u8>) {
+        let Self { position, replaced, .. } = *self;
+        let header = Header { position, replaced, resets: self.state_resets(), digest: self.plan.digest() };
+        header.write(self.alignment(), bytes);
+        let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
+        self.engine.save(self.channels(), &mut put);
+    }
+
+    /// Makes this stream, whatever it was, the continuation of the one that gave `state`: the same frames give
+    /// the same bits and counts. Does not allocate.
+    ///
+    /// # Errors
+    /// [`StateError`] if the bytes are not a state of this plan, that is of the same filters, offsets,
+    /// algorithm, number type and latency; the stream is as before then.
+    pub fn resume(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let (header, numbers) = self.read(state)?;
+        self.go_on(header, numbers);
+        Ok(())
+    }
+
+    /// The parts of a state of this plan.
+    pub(crate) fn read<'a>(&self, state: &'a [u8]) -> Result<(Header, Numbers<'a>), StateError> {
+        let count = |place: usize| self.count(place as u64);
+        Header::read(state, self.plan.digest(), self.alignment(), count)
+    }
+
+    pub(crate) fn go_on(&mut self, header: Header, numbers: Numbers<'_>) {
+        self.engine.resume(self.channels(), header.position, numbers);
+        self.engine.set_resets(header.resets);
+        (self.position, self.replaced) = (header.position, header.replaced);
+    }
+
+    /// Numbers of the state at a frame.
+    fn count(&self, position: u64) -> Count {
+        self.engine.count(self.channels(), (position % self.alignment() as u64) as usize)
     }
 
     /// The samples that will be written, if everything fits.

@@ -3,6 +3,7 @@
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Output};
+use crate::state::{Count, Numbers};
 use crate::{BuildError, Sample};
 use std::fmt::Debug;
 
@@ -63,6 +64,22 @@ pub(crate) trait Filter: Debug + Send + Sync {
     fn take_over(&self, _state: &mut Self::State, _other: (&Self, &Self::State), _same: bool) -> bool {
         false
     }
+
+    /// Numbers that make up a state so many frames after a multiple of the alignment; none if the past tells
+    /// the state.
+    fn count(&self, _place: usize) -> Count {
+        Count { inputs: 0, sums: 0 }
+    }
+
+    /// These numbers.
+    fn save(&self, _state: &Self::State, _put: &mut dyn FnMut(f64)) {}
+
+    /// Makes the state that [`Filter::save`] gave as `numbers`, as many as [`Filter::count`] says. Does not
+    /// allocate.
+    fn resume(&self, _state: &mut Self::State, _place: usize, _numbers: Numbers<'_>) {}
+
+    /// The states of a recursion were reset so many times.
+    fn set_resets(_state: &mut Self::State, _resets: u64) {}
 }
 
 /// Recent input of a stream.

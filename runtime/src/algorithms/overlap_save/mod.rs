@@ -24,6 +24,7 @@ use crate::aligned::Aligned;
 use crate::simd::{
     Frames, Segments, Spectra, Transform, TransformKernel, all_finite, group_lanes, row_samples,
 };
+use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa, Sample};
 use std::ops::Range;
 
@@ -387,6 +388,29 @@ impl<T: Sample> Filter for OverlapSave<T> {
             state.filled = from.filled;
         }
         fits
+    }
+
+    /// The past and the frames of the batch, and the outputs of the batch before that are still to come.
+    fn count(&self, filled: usize) -> Count {
+        let shape = &self.shape;
+        let inputs = (shape.history + filled) * shape.channels;
+        Count { inputs, sums: (shape.delay() - filled) * shape.ratio }
+    }
+
+    fn save(&self, state: &OverlapSaveState<T>, put: &mut dyn FnMut(f64)) {
+        let Count { inputs, sums } = self.count(state.filled);
+        let waiting = &state.output[(state.filled + 1) * self.shape.ratio..][..sums];
+        state.samples[..inputs].iter().chain(waiting).for_each(|value| put(value.to_f64()));
+    }
+
+    fn resume(&self, state: &mut OverlapSaveState<T>, filled: usize, numbers: Numbers<'_>) {
+        let Count { inputs, sums } = self.count(filled);
+        Self::reset(state);
+        state.filled = filled;
+        let waiting = &mut state.output[(filled + 1) * self.shape.ratio..][..sums];
+        for (place, slot) in state.samples[..inputs].iter_mut().chain(waiting).enumerate() {
+            *slot = T::from_f64(numbers.get(place));
+        }
     }
 }
 

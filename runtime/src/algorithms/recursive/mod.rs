@@ -21,6 +21,7 @@ use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, all_finite};
+use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa, Sample, StateSpace};
 
 /// Frames per block. Blocks are counted from the beginning of the stream, so that cuts into calls do not
@@ -32,6 +33,8 @@ pub(crate) const BLOCK: usize = 64;
 pub(crate) struct Recursive<T: Sample> {
     pub(crate) channels: usize,
     pub(crate) ratio: usize,
+    /// Frames that the delay lines look back.
+    history: usize,
     recursion: Recursion<T>,
     advance: RecursionKernel<T>,
     inputs_readout: Polyphase<T>,
@@ -76,6 +79,7 @@ impl<T: Sample> Recursive<T> {
         Ok(Self {
             channels,
             ratio,
+            history: delay_lines.history(),
             recursion: layout.recursion(&delay_lines),
             advance,
             inputs_readout: layout.inputs_readout(&delay_lines, ratio, fir),
@@ -179,6 +183,35 @@ impl<T: Sample> Filter for Recursive<T> {
             state.resets = from.resets;
         }
         same
+    }
+
+    fn count(&self, _place: usize) -> Count {
+        Count { inputs: self.history * self.channels, sums: self.recursion.states }
+    }
+
+    fn save(&self, state: &RecursiveState<T>, put: &mut dyn FnMut(f64)) {
+        for age in 1..=self.history {
+            (0..self.channels).for_each(|channel| put(state.history.past(age, channel).to_f64()));
+        }
+        state.rows[..state.states].iter().for_each(|value| put(value.to_f64()));
+    }
+
+    fn resume(&self, state: &mut RecursiveState<T>, place: usize, numbers: Numbers<'_>) {
+        let n = self.channels;
+        let past = |age: usize, channel: usize| {
+            let known = age <= self.history;
+            T::from_f64(if known { numbers.get((age - 1) * n + channel) } else { 0.0 })
+        };
+        Self::reset(state);
+        state.history.fill(past);
+        for (i, slot) in state.rows[..state.states].iter_mut().enumerate() {
+            *slot = T::from_f64(numbers.get(self.history * n + i));
+        }
+        state.phase_offset = place;
+    }
+
+    fn set_resets(state: &mut RecursiveState<T>, resets: u64) {
+        state.resets = resets;
     }
 }
 
