@@ -7,6 +7,8 @@ mod campaign;
 mod random;
 
 use hybank_ibr::camera::colmap::parse_model;
+use hybank_ibr::camera::middlebury::parse_calibration;
+use hybank_ibr::camera::transforms::parse_transforms;
 use hybank_ibr::image::{Image, encode, pfm, read_image, read_map};
 use hybank_ibr::scene::parse;
 use hybank_ibr::uncalibrated::tracks::Tracks;
@@ -106,9 +108,43 @@ fn colmap_models() {
     });
 }
 
+/// Cameras of all frames are finite, also for the size of an image that the file does not give.
+#[test]
+fn transforms_files() {
+    let seeds: [&[u8]; 2] = [
+        br#"{"camera_angle_x": 0.69, "frames": [{"file_path": "./train/r_0", "transform_matrix": [[1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 1, 4], [0, 0, 0, 1]]}]}"#,
+        br#"{"w": 64, "h": 48, "fl_x": 50.5, "cx": 32, "cy": 24, "k1": -0.1, "p2": 1e-3, "frames": [{"file_path": "a.jpg", "depth_file_path": "a.png", "transform_matrix": [[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0]]}]}"#,
+    ];
+    survive(&seeds, |bytes| {
+        let read = parse_transforms(&String::from_utf8_lossy(bytes), Path::new("t.json"));
+        accepted(read.inspect(|file| {
+            for frame in &file.frames {
+                let camera = file.camera(frame, (9, 7));
+                let finite = |found: &hybank_ibr::camera::colmap::ModelCamera| {
+                    assert!(found.camera.matrix().iter().all(|v| v.is_finite()) && found.size.0 > 0);
+                };
+                accepted(camera.inspect(finite));
+            }
+        }))
+    });
+}
+
+#[test]
+fn calibration_files() {
+    let seed = b"cam0=[3997.684 0 1176.728; 0 3997.684 1011.728; 0 0 1]\ncam1=[3997.684 0 1307.839; 0 3997.684 1011.728; 0 0 1]\ndoffs=131.111\nbaseline=193.001\nwidth=2964\nheight=1988\nndisp=280\n";
+    survive(&[seed], |bytes| {
+        let read = parse_calibration(&String::from_utf8_lossy(bytes), Path::new("calib.txt"));
+        accepted(read.inspect(|found| {
+            assert!(found.focal > 0.0 && found.offset.is_finite() && found.baseline > 0.0);
+            assert!(found.size.0 > 0 && found.size.1 > 0);
+        }))
+    });
+}
+
 #[test]
 fn scenes() {
-    let seeds: [&[u8]; 2] = [
+    let seeds: [&[u8]; 3] = [
+        b"calib = \"c.txt\"\n[[virtual]]\nposition = 0.5\n[[virtual]]\nposition = 0.5\nto_position = 1.0\nframes = 3\n",
         b"[[view]]\nname = \"l\"\nimage = \"a.png\"\nposition = 0.0\ndisparity = \"d.pfm\"\nstep = 2\n[virtual]\nposition = 0.5\n",
         b"matches = \"t\"\n[[view]]\nimage = \"a\"\ncamera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n[virtual]\nsize = [4, 3]\n",
     ];

@@ -1,11 +1,12 @@
 //! Tests whether two names refer to the same file.
 
 use super::FileError;
+use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// The identity of a file, independent of its name.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Identity {
     /// An existing file.
     #[cfg(unix)]
@@ -39,25 +40,33 @@ impl Identity {
 /// True if both names lead to one file (the same device and inode), or to the same place where a file may
 /// come to be. `-` stands for what standard input is connected to.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
-    let identity = |path: &Path| {
-        let input = path.as_os_str() == "-";
-        Identity::of(if input { Path::new("/dev/stdin") } else { path })
-    };
-    matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
+    matches!((identity(a), identity(b)), (Some(a), Some(b)) if a == b)
+}
+
+fn identity(path: &Path) -> Option<Identity> {
+    let input = path.as_os_str() == "-";
+    Identity::of(if input { Path::new("/dev/stdin") } else { path }).ok()
 }
 
 /// Refuses outputs that are also inputs, or that are the same file twice. Inputs may be `-`, outputs are
-/// files.
+/// files. Takes one look at each file: a film may have ten thousand outputs.
 ///
 /// # Errors
 /// [`FileError::InputIsOutput`] and [`FileError::SameOutput`], with the names.
 pub fn refuse_overlaps(outputs: &[&Path], inputs: &[&Path]) -> Result<(), FileError> {
-    for (i, output) in outputs.iter().enumerate() {
-        if let Some(input) = inputs.iter().find(|input| is_same_file(output, input)) {
+    let mut known: HashMap<Identity, &Path> = HashMap::new();
+    // The first of several names of one input is reported.
+    for input in inputs.iter().rev() {
+        known.extend(identity(input).map(|identity| (identity, *input)));
+    }
+    let mut own: HashMap<Identity, &Path> = HashMap::new();
+    for output in outputs {
+        let Some(identity) = identity(output) else { continue };
+        if let Some(input) = known.get(&identity) {
             let (output, input) = (output.display().to_string(), input.display().to_string());
             return Err(FileError::InputIsOutput { output, input });
         }
-        if let Some(other) = outputs[..i].iter().find(|other| is_same_file(output, other)) {
+        if let Some(other) = own.insert(identity, output) {
             let (first, second) = (other.display().to_string(), output.display().to_string());
             return Err(FileError::SameOutput { first, second });
         }

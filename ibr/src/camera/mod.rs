@@ -2,7 +2,9 @@
 
 pub mod colmap;
 mod lens;
+pub mod middlebury;
 mod path;
+pub mod transforms;
 
 pub use lens::Lens;
 
@@ -103,6 +105,11 @@ impl Camera {
     /// The centre C = -M^{-1} m.
     pub fn centre(&self) -> Vector3<f64> {
         -self.inverse * self.matrix.column(3)
+    }
+
+    /// The direction in which the camera looks, of length one, for a metric camera.
+    pub fn axis(&self) -> Vector3<f64> {
+        self.m().row(2).transpose().normalize()
     }
 
     /// The point at depth d on the ray of pixel (x, y): M^{-1} (d x~ - m) (eq. 2.2); NaN outside the

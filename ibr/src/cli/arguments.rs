@@ -1,10 +1,10 @@
 //! Command-line arguments.
 
-use crate::image::Levels;
-use crate::interpolate::{Degree, HoleFill};
-use crate::partial::{Densify, Segmentwise};
-use crate::pipeline::{Method, RenderSettings};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+mod render;
+
+pub(super) use render::RenderArguments;
+
+use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Renders new views from photographs with depth (image-based rendering).
@@ -19,6 +19,7 @@ const EXAMPLES: &str = "Examples:
   hybank-ibr render scene.toml -o middle.png
   hybank-ibr render scene.toml --view centre -o centre.png --truth centre-photo.png
   hybank-ibr render scene.toml --depth-step 6 -o sparse.png --json
+  hybank-ibr render path.toml -o film.y4m
   hybank-ibr bound scene.toml --map error.png
   hybank-ibr demo -o demo.png
 
@@ -35,108 +36,33 @@ pub(super) enum Command {
     Demo(DemoArguments),
 }
 
-const RENDER_EXAMPLES: &str = "Examples:
-  hybank-ibr render scene.toml -o middle.png --truth photo.png
-      renders the view that [virtual] asks for and prints PSNR, SSIM, mean absolute error and coverage
-  hybank-ibr render scene.toml --view left -o left.png
-      leaves out the view \"left\" and renders it from the other views
-  hybank-ibr render - -o - < scene.toml > middle.png
-      reads the scene from standard input (paths are relative to the working directory) and writes a PNG to
-      standard output
-
-A scene of a rectified rig:
-  [[view]]
-  name = \"left\"
-  image = \"im2.png\"
-  position = 0.0
-  disparity = \"disp2.png\"
-  disparity_scale = 4.0
-  [[view]]
-  name = \"right\"
-  image = \"im6.png\"
-  position = 1.0
-  disparity = \"disp6.png\"
-  disparity_scale = 4.0
-  [virtual]
-  position = 0.5
-
-A scene of general cameras has camera = [[..4..],[..],[..]] and depth = \"d.pfm\" in place of position and
-disparity, or colmap = \"folder\"; [virtual] has camera = .. and size = [w, h]. A scene without cameras has
-views with images only, and matches = \"tracks.txt\"; [virtual] has from_tracks = 3 (a column, counted
-from 1) or between = 0.5.";
-
+/// What `render` and `bound` share.
 #[derive(Debug, Args)]
-#[command(after_help = RENDER_EXAMPLES)]
-pub(super) struct RenderArguments {
+pub(super) struct SceneArguments {
     /// Scene file (TOML); `-` is standard input.
-    pub(super) scene: PathBuf,
-    /// Image to write (.png, .jpg, .ppm, .pgm, .pfm); `-` is PNG on standard output.
-    #[arg(short, long, value_name = "FILE")]
-    pub(super) output: PathBuf,
-    /// Leave this view out and render it.
+    #[arg(value_name = "SCENE")]
+    pub(super) file: PathBuf,
+    /// Leave this view out; the virtual view is its place.
     #[arg(long, value_name = "NAME")]
     pub(super) view: Option<String>,
     /// Use only every K-th value of full depth maps, in rows and columns.
     #[arg(long, value_name = "K", default_value_t = 1)]
     pub(super) depth_step: usize,
-    /// Photograph of the virtual view, to compare the rendering with.
+    /// Photograph of the virtual view, to compare the result with.
     #[arg(long, value_name = "FILE")]
     pub(super) truth: Option<PathBuf>,
-    /// Also write a mask: white for seen pixels, grey for cracks, black for disocclusions.
-    #[arg(long, value_name = "FILE")]
-    pub(super) mask: Option<PathBuf>,
-    /// Also write the depth of the virtual view (.pfm): disparities for a baseline of one of a rectified
-    /// rig, else depths; NaN in holes.
-    #[arg(long, value_name = "FILE")]
-    pub(super) depth: Option<PathBuf>,
-    /// Bits per value of a PNG, 8 or 16.
-    #[arg(long, value_name = "N", default_value = "8", value_parser = levels)]
-    pub(super) bits: Levels,
+    /// Offset added to every column of the virtual view, in pixels; overrides that of the scene.
+    #[arg(long, value_name = "PX", allow_hyphen_values = true)]
+    pub(super) offset: Option<f64>,
+    /// Use the brightness of every view as it is, instead of giving all the exposure of the first.
+    #[arg(long)]
+    pub(super) keep_exposure: bool,
     /// Print the results as one JSON object.
     #[arg(long)]
     pub(super) json: bool,
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,
-    /// Offset added to every column of the virtual view, in pixels; overrides that of the scene.
-    #[arg(long, value_name = "PX", allow_hyphen_values = true)]
-    pub(super) offset: Option<f64>,
-    /// How samples are interpolated.
-    #[arg(long, value_enum, default_value_t = MethodName::Auto)]
-    pub(super) method: MethodName,
-    /// Use the brightness of every view as it is, instead of giving all the exposure of the first.
-    #[arg(long)]
-    pub(super) keep_exposure: bool,
-    /// How holes are filled.
-    #[arg(long, value_enum, default_value_t = FillName::Background)]
-    pub(super) fill: FillName,
-    /// How coarse depth is made dense.
-    #[arg(long, value_enum, default_value_t = DensifyName::Segmentwise)]
-    pub(super) densify: DensifyName,
-    /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
-    #[arg(long)]
-    pub(super) drop_unknown: bool,
-    /// Degree of the row splines.
-    #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
-    pub(super) degree: DegreeName,
-    /// Weight of the slope penalty of the row fit, px^2.
-    #[arg(long, value_name = "L", allow_negative_numbers = true)]
-    pub(super) lambda: Option<f64>,
-    /// Weight of the differences of neighbouring coefficients of the row fit.
-    #[arg(long, value_name = "T", allow_negative_numbers = true)]
-    pub(super) tau: Option<f64>,
-    /// Radius of the depth test, px.
-    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
-    pub(super) epsilon: Option<f64>,
-    /// Depth difference from which a sample is hidden, as a share of the nearer depth.
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    pub(super) relative_depth: Option<f64>,
-    /// Seed of the robust estimators (scenes without cameras).
-    #[arg(long, default_value_t = 1)]
-    pub(super) seed: u64,
-    /// Exchange near and far (scenes without cameras).
-    #[arg(long)]
-    pub(super) reverse_order: bool,
     /// Most pixels of the virtual view, and of each image and map. A rendering takes up to 64 bytes of
     /// memory per pixel.
     #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
@@ -161,38 +87,11 @@ Scenes of rectified rigs only; the view is the one that `render --method rows` g
 #[derive(Debug, Args)]
 #[command(after_help = BOUND_EXAMPLES)]
 pub(super) struct BoundArguments {
-    /// Scene file (TOML); `-` is standard input.
-    pub(super) scene: PathBuf,
-    /// Leave this view out and predict the error of its place.
-    #[arg(long, value_name = "NAME")]
-    pub(super) view: Option<String>,
-    /// Use only every K-th value of full depth maps, in rows and columns.
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    pub(super) depth_step: usize,
-    /// Photograph of the virtual view, to compare the prediction with.
-    #[arg(long, value_name = "FILE")]
-    pub(super) truth: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
     /// Write the estimate of every pixel as an image: black is no error, white the largest.
     #[arg(long, value_name = "FILE")]
     pub(super) map: Option<PathBuf>,
-    /// Offset added to every column of the virtual view, in pixels; overrides that of the scene.
-    #[arg(long, value_name = "PX", allow_hyphen_values = true)]
-    pub(super) offset: Option<f64>,
-    /// Use the brightness of every view as it is, instead of giving all the exposure of the first.
-    #[arg(long)]
-    pub(super) keep_exposure: bool,
-    /// Print the results as one JSON object, with the figures of each row.
-    #[arg(long)]
-    pub(super) json: bool,
-    /// Overwrite existing files.
-    #[arg(long)]
-    pub(super) force: bool,
-    /// Most pixels of the virtual view, and of each image and map.
-    #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
-    pub(super) max_pixels: usize,
-    /// Number of threads [default: all cores]. The result has the same bits for every number.
-    #[arg(long, value_name = "N")]
-    pub(super) threads: Option<usize>,
 }
 
 #[derive(Debug, Args)]
@@ -224,95 +123,6 @@ fn size(text: &str) -> Result<(usize, usize), String> {
         _ => Err(format!("{s:?} is not a number from {} to {}", SIDES.start(), SIDES.end())),
     };
     Ok((side(w)?, side(h)?))
-}
-
-fn levels(text: &str) -> Result<Levels, String> {
-    match text {
-        "8" => Ok(Levels::Eight),
-        "16" => Ok(Levels::Sixteen),
-        _ => Err("give 8 or 16".into()),
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum MethodName {
-    /// rows for rectified rigs, plane for other scenes.
-    Auto,
-    /// One spline per row (rectified rigs only).
-    Rows,
-    /// One spline for the whole image.
-    Plane,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum FillName {
-    /// Continue the farther side into holes between surfaces; bridge cracks within one.
-    Background,
-    /// Let the fitted spline bridge all holes.
-    Bridge,
-    /// Leave holes black.
-    Leave,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum DensifyName {
-    /// Interpolate within segments of image and depth.
-    Segmentwise,
-    /// Bilinear interpolation everywhere.
-    Bilinear,
-    /// The value of the nearest sample.
-    Nearest,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum DegreeName {
-    /// Linear B-splines.
-    Linear,
-    /// Cubic B-splines.
-    Cubic,
-}
-
-impl RenderArguments {
-    /// The settings that were typed over the defaults; `offset` is that of the scene.
-    pub(super) fn settings(&self, offset: f64) -> RenderSettings {
-        let offset = self.offset.unwrap_or(offset);
-        let mut settings =
-            RenderSettings { offset, keep_exposure: self.keep_exposure, ..RenderSettings::default() };
-        settings.method = match self.method {
-            MethodName::Auto => Method::Auto,
-            MethodName::Rows => Method::Rows,
-            MethodName::Plane => Method::Plane,
-        };
-        let stage = &mut settings.interpolation;
-        stage.holes.fill = match self.fill {
-            FillName::Background => HoleFill::Background,
-            FillName::Bridge => HoleFill::Bridge,
-            FillName::Leave => HoleFill::Leave,
-        };
-        stage.fit.degree = match self.degree {
-            DegreeName::Linear => Degree::Linear,
-            DegreeName::Cubic => Degree::Cubic,
-        };
-        let mut typed = |slot: fn(&mut crate::interpolate::Settings) -> &mut f64, value: Option<f64>| {
-            if let Some(value) = value {
-                *slot(stage) = value;
-            }
-        };
-        typed(|s| &mut s.fit.lambda, self.lambda);
-        typed(|s| &mut s.fit.tau, self.tau);
-        typed(|s| &mut s.depth_test.epsilon, self.epsilon);
-        typed(|s| &mut s.depth_test.relative, self.relative_depth);
-        settings
-    }
-
-    /// How coarse depth is made dense.
-    pub(super) fn densify(&self) -> Densify {
-        match self.densify {
-            DensifyName::Segmentwise => Densify::Segmentwise(Segmentwise::default()),
-            DensifyName::Bilinear => Densify::Bilinear,
-            DensifyName::Nearest => Densify::Nearest,
-        }
-    }
 }
 
 #[cfg(test)]

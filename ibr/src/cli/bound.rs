@@ -3,13 +3,13 @@
 use super::arguments::BoundArguments;
 use super::failure::Failure;
 use super::progress::Progress;
-use super::{heat, output, render};
+use super::{heat, output};
 use crate::analysis::view::{self, Cause, Totals, ViewError};
-use crate::image::{Image, Levels, quality, read_image_within};
+use crate::image::{Image, Levels, quality};
 use crate::partial::{Densify, Segmentwise};
 use crate::pipeline::{RenderError, RenderSettings};
 use crate::propagate::RectifiedView;
-use crate::scene::{self, Kind, LoadOptions, RectifiedSource, Scene};
+use crate::scene::{Kind, RectifiedSource, Scene};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -53,59 +53,37 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     check(arguments)?;
     let progress = Progress::new(3);
     progress.step("reading");
-    let scene = read(arguments)?;
-    let (sources, position) = rectified(&scene, &arguments.scene)?;
-    let read = |path: &PathBuf| read_image_within(path, arguments.max_pixels).map_err(Failure::input);
-    let truth = arguments.truth.as_ref().map(read).transpose()?;
+    let source = arguments.scene.source()?;
+    source.refuse_overlaps(&arguments.map.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    let scene = arguments.scene.load(&source, Densify::Segmentwise(Segmentwise::default()), true)?;
+    let (sources, position) = rectified(&scene, &arguments.scene.file)?;
+    let truth = arguments.scene.truth()?;
     progress.step("predicting");
-    let predicted = predict(sources, position, &settings(arguments, &scene)).map_err(Failure::input)?;
-    let measured = match (&truth, &arguments.truth) {
+    let predicted =
+        predict(sources, position, &arguments.scene.settings(scene.offset)).map_err(Failure::input)?;
+    let measured = match (&truth, &arguments.scene.truth) {
         (Some(truth), Some(path)) => measure(&predicted, truth, path)?,
         _ => None,
     };
     progress.step("writing");
     let (map, white) = heat::map(&predicted.estimate, predicted.rendering.image.size());
     if let Some(path) = &arguments.map {
-        output::write(&[output::encoded(&map, path, Levels::Eight)?], arguments.force)?;
+        output::write(&[output::encoded(&map, path, Levels::Eight)?], arguments.scene.force)?;
     }
     drop(progress);
-    report(&Summary::new(&predicted, white, measured), arguments.json)
+    report(&Summary::new(&predicted, white, measured), arguments.scene.json)
 }
 
 fn check(arguments: &BoundArguments) -> Result<(), Failure> {
-    if arguments.depth_step == 0 {
-        return Err(Failure::Usage("--depth-step 0: the step must be at least 1".into()));
-    }
+    arguments.scene.check()?;
     let Some(map) = &arguments.map else { return Ok(()) };
     if output::is_standard(map) {
         return Err(Failure::Usage("--map -: the map cannot go to standard output; give it a file".into()));
     }
-    let inputs = [Some(arguments.scene.as_path()), arguments.truth.as_deref()];
-    refuse_overlaps(map, &inputs.into_iter().flatten().collect::<Vec<_>>())?;
+    output::refuse_overlaps(&[map], &arguments.scene.inputs())?;
     output::name_leftovers(&[map]);
-    output::refuse_existing(map, arguments.force)?;
+    output::refuse_existing(map, arguments.scene.force)?;
     output::refuse_format(map, Levels::Eight)
-}
-
-fn refuse_overlaps(map: &Path, inputs: &[&Path]) -> Result<(), Failure> {
-    hybank::files::refuse_overlaps(&[map], inputs).map_err(Failure::input)
-}
-
-fn read(arguments: &BoundArguments) -> Result<Scene, Failure> {
-    let (path, text) = render::scene_text(&arguments.scene)?;
-    let options = LoadOptions {
-        view: arguments.view.clone(),
-        depth_step: arguments.depth_step,
-        densify: Densify::Segmentwise(Segmentwise::default()),
-        fill: true,
-        max_pixels: arguments.max_pixels,
-    };
-    let spec = scene::parse(&text, &path).map_err(Failure::input)?;
-    if let Some(map) = &arguments.map {
-        let files = spec.files(path.parent().unwrap_or(Path::new("")));
-        refuse_overlaps(map, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-    }
-    scene::load(&spec, &path, &options).map_err(Failure::input)
 }
 
 /// The views and the first virtual position of a rectified rig.
@@ -117,11 +95,6 @@ fn rectified<'a>(scene: &'a Scene, path: &Path) -> Result<(&'a [RectifiedSource]
             path.display()
         ))),
     }
-}
-
-fn settings(arguments: &BoundArguments, scene: &Scene) -> RenderSettings {
-    let offset = arguments.offset.unwrap_or(scene.offset);
-    RenderSettings { offset, keep_exposure: arguments.keep_exposure, ..RenderSettings::default() }
 }
 
 fn predict(

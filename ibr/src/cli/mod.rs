@@ -9,6 +9,7 @@ mod heat;
 mod output;
 mod progress;
 mod render;
+mod source;
 mod summary;
 
 use arguments::{Arguments, Command};
@@ -27,8 +28,8 @@ pub fn run() -> ExitCode {
         Err(message) => return show(&message),
     };
     let outcome = match arguments.command {
-        Command::Render(arguments) => in_pool(arguments.threads, || render::run(&arguments)),
-        Command::Bound(arguments) => in_pool(arguments.threads, || bound::run(&arguments)),
+        Command::Render(arguments) => in_pool(arguments.scene.threads, || render::run(&arguments)),
+        Command::Bound(arguments) => in_pool(arguments.scene.threads, || bound::run(&arguments)),
         Command::Demo(arguments) => in_pool(arguments.threads, || demo::run(&arguments)),
     };
     match outcome {

@@ -11,6 +11,11 @@ pub(super) fn is_standard(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
+/// Outputs are different files, and none of them is an input.
+pub(super) fn refuse_overlaps(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
+    hybank::files::refuse_overlaps(outputs, inputs).map_err(Failure::input)
+}
+
 /// Refuses a file that exists, before any work is done.
 pub(super) fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
     if !force && !is_standard(path) && path.exists() {
@@ -78,7 +83,7 @@ pub(super) fn numbered(path: &Path, frame: usize) -> PathBuf {
     path.with_file_name(name)
 }
 
-fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
+pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| Failure::printing(&e))
 }

@@ -2,28 +2,43 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The steps of a command.
 pub(super) struct Progress {
     bar: ProgressBar,
+    begun: AtomicU64,
 }
+
+/// Parts of a step that the bar shows.
+const PARTS: u64 = 100;
 
 impl Progress {
     pub(super) fn new(steps: u64) -> Self {
+        let length = steps * PARTS;
         let bar =
-            if std::io::stderr().is_terminal() { ProgressBar::new(steps) } else { ProgressBar::hidden() };
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg} [{elapsed}]") {
+            if std::io::stderr().is_terminal() { ProgressBar::new(length) } else { ProgressBar::hidden() };
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} % {msg} [{elapsed}]") {
             bar.set_style(style);
         }
-        Self { bar }
+        Self { bar, begun: AtomicU64::new(0) }
     }
 
     /// Begins the next step.
     pub(super) fn step(&self, name: &'static str) {
-        if self.bar.message() != "" {
-            self.bar.inc(1);
-        }
+        let begun = self.begun.fetch_add(1, Ordering::Relaxed);
+        self.bar.set_position(begun * PARTS);
         self.bar.set_message(name);
+    }
+
+    /// The share of the current step that is done, 0 to 1.
+    pub(super) fn within(&self, share: f64) {
+        let before = self.begun.load(Ordering::Relaxed).saturating_sub(1) * PARTS;
+        let here = before + (share.clamp(0.0, 1.0) * PARTS as f64) as u64;
+        // Reports come from several threads; the bar does not go back.
+        if here > self.bar.position() {
+            self.bar.set_position(here);
+        }
     }
 }
 

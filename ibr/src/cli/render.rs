@@ -1,21 +1,21 @@
-//! `hybank-ibr render`: a scene file in, an image and its figures out.
+//! `hybank-ibr render`: a scene file in, images and their figures out.
 
+mod outputs;
 mod path;
 
 use super::arguments::RenderArguments;
 use super::failure::{self, Failure};
-use super::output::{self, Encoded};
+use super::output;
 use super::progress::Progress;
 use super::summary::{Figures, Summary};
-use crate::files;
-use crate::image::{Image, Levels, pfm, quality, read_image_within};
-use crate::interpolate::Cover;
-use crate::pipeline::uncalibrated::{UncalibratedRendering, UncalibratedSettings};
-use crate::pipeline::{RenderSettings, Rendering, calibrated, rectified, uncalibrated};
+use crate::image::{Image, quality};
+use crate::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
+use crate::pipeline::{RenderSettings, Rendering, Watch, calibrated, rectified, uncalibrated};
 use crate::propagate::{CalibratedView, RectifiedView};
-use crate::scene::{self, Kind, LoadOptions, Scene};
+use crate::scene::{self, Kind, Scene};
 use crate::uncalibrated::chirality::Handedness;
-use std::path::{Path, PathBuf};
+use outputs::Outputs;
+use std::path::Path;
 use std::time::Instant;
 
 /// A rendering with the region that is compared, unless that is the whole image.
@@ -36,16 +36,18 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
         drop(progress);
         return path::run(&scene, preparation, arguments);
     }
-    let truth = truth(arguments)?;
+    let truth = arguments.scene.truth()?;
     progress.step("rendering");
-    let (done, mut summary) = timed(&scene, 0, preparation, arguments)?;
+    let (done, mut summary) = timed(&scene, 0, preparation, arguments, &|share| progress.within(share))?;
     progress.step("comparing");
-    if let (Some(truth), Some(path)) = (&truth, &arguments.truth) {
+    if let (Some(truth), Some(path)) = (&truth, &arguments.scene.truth) {
         compare(&mut summary, &done, truth, path)?;
     }
     progress.step("writing");
     let files = Outputs::of(arguments);
-    output::write(&files.encoded(&done.rendering, arguments.bits)?, arguments.force)?;
+    let (encoded, white) = files.encoded(&done.rendering, truth.as_ref(), arguments.fps)?;
+    summary.error_white = white;
+    output::write(&encoded, arguments.scene.force)?;
     drop(progress);
     warn(&done, &scene.kind);
     report(&summary, arguments)
@@ -57,133 +59,58 @@ fn timed(
     frame: usize,
     preparation: f64,
     arguments: &RenderArguments,
+    watch: Watch<'_>,
 ) -> Result<(Rendered, Summary), Failure> {
     let start = Instant::now();
-    let done = render(scene, frame, arguments).map_err(|e| e.in_file(&arguments.scene))?;
+    let done = render(scene, frame, arguments, watch).map_err(|e| e.in_file(&arguments.scene.file))?;
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
     Ok((done, summary))
 }
 
-/// The files of one view.
-struct Outputs {
-    view: PathBuf,
-    mask: Option<PathBuf>,
-    depth: Option<PathBuf>,
-}
-
-impl Outputs {
-    /// Those that were asked for.
-    fn of(arguments: &RenderArguments) -> Self {
-        let RenderArguments { output, mask, depth, .. } = arguments;
-        Self { view: output.clone(), mask: mask.clone(), depth: depth.clone() }
-    }
-
-    fn files(&self) -> impl Iterator<Item = &Path> {
-        let all = [Some(&self.view), self.mask.as_ref(), self.depth.as_ref()];
-        all.into_iter().flatten().map(PathBuf::as_path).filter(|path| !output::is_standard(path))
-    }
-
-    /// The contents of the files.
-    fn encoded(&self, rendering: &Rendering, levels: Levels) -> Result<Vec<Encoded<'_>>, Failure> {
-        let mut outputs = vec![output::encoded(&rendering.image, &self.view, levels)?];
-        if let Some(path) = &self.mask {
-            outputs.push(output::encoded(&mask_image(rendering), path, Levels::Eight)?);
-        }
-        if let Some(path) = &self.depth {
-            let (width, height) = rendering.depth.size();
-            let data = rendering.depth.data().to_vec();
-            let bytes = pfm::encode(&pfm::FloatMap { width, height, channels: 1, data });
-            outputs.push(Encoded { bytes, path });
-        }
-        Ok(outputs)
-    }
-}
-
 /// Checks that need no file.
 fn check(arguments: &RenderArguments) -> Result<(), Failure> {
-    let standard = output::is_standard(&arguments.output);
-    if standard && arguments.json {
+    if output::is_standard(&arguments.output) && arguments.scene.json {
         return Err(Failure::Usage(
             "-o - and --json both want standard output; give the image a file".into(),
         ));
     }
-    if arguments.depth_step == 0 {
-        return Err(Failure::Usage("--depth-step 0: the step must be at least 1".into()));
+    if arguments.nearest == Some(0) {
+        return Err(Failure::Usage("--nearest 0: at least one view must be used".into()));
     }
-    for (name, path) in [("mask", &arguments.mask), ("depth", &arguments.depth)] {
-        let Some(path) = path else { continue };
-        if output::is_standard(path) {
-            return Err(Failure::Usage(format!(
-                "--{name} -: the {name} cannot go to standard output; give it a file"
-            )));
-        }
-        if *path == arguments.output {
-            let path = path.display();
-            return Err(Failure::Usage(format!(
-                "-o and --{name} both name {path}; give the {name} a file of its own"
-            )));
-        }
-    }
-    if let Some(path) = arguments.depth.as_ref().filter(|path| path.extension().is_none_or(|e| e != "pfm")) {
-        return Err(Failure::Usage(format!("--depth {}: depth is written as .pfm", path.display())));
-    }
-    let inputs = [Some(arguments.scene.as_path()), arguments.truth.as_deref()];
-    refuse_overlaps(&[Outputs::of(arguments)], &inputs.into_iter().flatten().collect::<Vec<_>>())?;
+    arguments.scene.check()?;
     let outputs = Outputs::of(arguments);
-    output::name_leftovers(&outputs.files().collect::<Vec<_>>());
-    outputs.files().try_for_each(|path| output::refuse_existing(path, arguments.force))?;
-    output::refuse_format(&arguments.output, arguments.bits)?;
-    arguments.mask.iter().try_for_each(|path| output::refuse_format(path, Levels::Eight))
-}
-
-/// Outputs are different files, and none of them is an input.
-fn refuse_overlaps(outputs: &[Outputs], inputs: &[&Path]) -> Result<(), Failure> {
-    let files: Vec<&Path> = outputs.iter().flat_map(Outputs::files).collect();
-    hybank::files::refuse_overlaps(&files, inputs).map_err(Failure::input)
-}
-
-fn truth(arguments: &RenderArguments) -> Result<Option<Image>, Failure> {
-    let read = |path| read_image_within(path, arguments.max_pixels);
-    arguments.truth.as_deref().map(read).transpose().map_err(Failure::input)
-}
-
-/// The name and the text of a scene file, `-` for standard input.
-pub(super) fn scene_text(path: &Path) -> Result<(PathBuf, String), Failure> {
-    if output::is_standard(path) {
-        let text = files::text(std::io::stdin().lock())
-            .map_err(|e| Failure::Input(format!("standard input: {e}")))?;
-        return Ok((PathBuf::from("<stdin>"), text));
-    }
-    let path = path.to_owned();
-    let text = files::read_text(&path)
-        .map_err(|source| Failure::input(scene::SceneError::Read { path: path.clone(), source }))?;
-    Ok((path, text))
+    outputs.check()?;
+    let files: Vec<&Path> = outputs.files().collect();
+    output::refuse_overlaps(&files, &arguments.scene.inputs())?;
+    output::name_leftovers(&files);
+    files.iter().try_for_each(|path| output::refuse_existing(path, arguments.scene.force))
 }
 
 fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
-    let (path, text) = scene_text(&arguments.scene)?;
-    let options = LoadOptions {
-        view: arguments.view.clone(),
-        depth_step: arguments.depth_step,
-        densify: arguments.densify(),
-        fill: !arguments.drop_unknown,
-        max_pixels: arguments.max_pixels,
+    let source = arguments.scene.source()?;
+    let frames: usize = match arguments.scene.view {
+        Some(_) => 1,
+        None => source.spec.targets.iter().map(|t| t.frames.unwrap_or(1).min(scene::MOST_FRAMES)).sum(),
     };
-    let spec = scene::parse(&text, &path).map_err(Failure::input)?;
-    let files = spec.files(path.parent().unwrap_or(Path::new("")));
-    let target = spec.target.as_ref().filter(|_| arguments.view.is_none());
-    let outputs = match target.and_then(|t| t.frames) {
-        Some(frames) => path::outputs(arguments, frames.min(scene::MOST_FRAMES)),
-        None => vec![Outputs::of(arguments)],
+    let all = match frames {
+        0 | 1 => vec![Outputs::of(arguments)],
+        _ => path::outputs(arguments, frames.min(scene::MOST_FRAMES)),
     };
-    refuse_overlaps(&outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-    scene::load(&spec, &path, &options).map_err(Failure::input)
+    let film = Some(arguments.output.as_path()).filter(|path| frames > 1 && path::is_film(path));
+    let film = film.filter(|path| !output::is_standard(path));
+    source.refuse_overlaps(&all.iter().flat_map(Outputs::files).chain(film).collect::<Vec<_>>())?;
+    arguments.scene.load(&source, arguments.densify(), !arguments.drop_unknown)
 }
 
-/// The virtual view `frame` of a path; 0 without one.
-fn render(scene: &Scene, frame: usize, arguments: &RenderArguments) -> Result<Rendered, Failure> {
+/// The virtual view `frame` of a list or path; 0 if there is one.
+fn render(
+    scene: &Scene,
+    frame: usize,
+    arguments: &RenderArguments,
+    watch: Watch<'_>,
+) -> Result<Rendered, Failure> {
     let settings = arguments.settings(scene.offset);
     let whole = |rendering| Rendered { rendering, hull: None, geometry: None };
     match &scene.kind {
@@ -192,25 +119,30 @@ fn render(scene: &Scene, frame: usize, arguments: &RenderArguments) -> Result<Re
                 .iter()
                 .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
                 .collect();
-            rectified::render(&views, positions[frame], &settings).map(whole).map_err(Failure::input)
+            let done = rectified::render_watched(&views, positions[frame], &settings, watch);
+            done.map(whole).map_err(Failure::input)
         }
         Kind::Calibrated { views, cameras, size } => {
             let views: Vec<CalibratedView<'_>> = views
                 .iter()
                 .map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera })
                 .collect();
-            calibrated::render(&views, &cameras[frame], *size, &settings).map(whole).map_err(Failure::input)
+            let done = calibrated::render_watched(&views, &cameras[frame], *size, &settings, watch);
+            done.map(whole).map_err(Failure::input)
         }
-        Kind::Uncalibrated { .. } => render_uncalibrated(&scene.kind, &settings, arguments),
+        Kind::Uncalibrated { targets, .. } => {
+            render_uncalibrated(&scene.kind, &targets[frame], &settings, arguments)
+        }
     }
 }
 
 fn render_uncalibrated(
     kind: &Kind,
+    target: &Target,
     settings: &RenderSettings,
     arguments: &RenderArguments,
 ) -> Result<Rendered, Failure> {
-    let Kind::Uncalibrated { images, tracks, target, size } = kind else {
+    let Kind::Uncalibrated { images, tracks, size, .. } = kind else {
         return Err(Failure::input("the scene has calibrated views"));
     };
     let images: Vec<&Image> = images.iter().collect();
@@ -245,20 +177,6 @@ fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -
     within.iter().for_each(|q| summary.compare(q));
     summary.whole_image = whole.map(|q| Figures { psnr: q.psnr, ssim: q.ssim, mae: q.mae });
     Ok(())
-}
-
-/// White seen, grey crack, black disocclusion.
-fn mask_image(rendering: &Rendering) -> Image {
-    let (width, height) = rendering.image.size();
-    let mut image = Image::filled(width, height, 1, 0.0);
-    for (pixel, cover) in image.data_mut().iter_mut().zip(&rendering.mask) {
-        *pixel = match cover {
-            Cover::Seen => 255.0,
-            Cover::Crack => 128.0,
-            Cover::Disocclusion => 0.0,
-        };
-    }
-    image
 }
 
 /// Warnings on stderr about what the figures of merit alone do not show.
@@ -296,7 +214,7 @@ fn warn(done: &Rendered, kind: &Kind) {
 }
 
 fn report(summary: &Summary, arguments: &RenderArguments) -> Result<(), Failure> {
-    if arguments.json {
+    if arguments.scene.json {
         let json = serde_json::to_string(summary).map_err(Failure::input)?;
         return output::print(&(json + "\n"));
     }

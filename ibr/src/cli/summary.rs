@@ -21,6 +21,10 @@ pub(super) struct Summary {
     pub(super) seconds: f64,
     /// Time of reading the files and making depth dense.
     pub(super) preparation_seconds: f64,
+    /// The views that were used, by number from 0.
+    pub(super) views: Vec<usize>,
+    /// Error in grey levels that is white in the picture of --error.
+    pub(super) error_white: Option<f32>,
     pub(super) samples: SampleCount,
     pub(super) holes: HoleCount,
     /// Unknown depths filled before propagation.
@@ -65,6 +69,8 @@ impl Summary {
             coverage: rendering.coverage(),
             seconds,
             preparation_seconds: 0.0,
+            views: rendering.views.clone(),
+            error_white: None,
             samples: SampleCount {
                 propagated: r.propagated,
                 occluded: r.occluded,
@@ -97,6 +103,9 @@ impl Summary {
                 "PSNR      {psnr:.2} dB   SSIM {ssim:.4}   MAE {mae:.3}   (on the {})",
                 self.compared_on
             ));
+        }
+        if let Some(white) = self.error_white {
+            lines.push(format!("error     white is {white:.1} grey levels"));
         }
         let s = &self.samples;
         let d = &s.dropped;

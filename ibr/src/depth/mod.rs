@@ -189,6 +189,14 @@ impl DepthMap {
         self.data.iter().filter(|v| v.is_nan()).count()
     }
 
+    /// The median of about a thousand evenly spaced values; none if they are unknown.
+    pub fn middle(&self) -> Option<f32> {
+        let step = self.data.len().div_ceil(1000).max(1);
+        let mut known: Vec<f32> = self.data.iter().copied().step_by(step).filter(|v| !v.is_nan()).collect();
+        known.sort_by(f32::total_cmp);
+        known.get(known.len() / 2).copied()
+    }
+
     /// Every `step`-th value in both directions, from the first, as from a coarse sensor.
     ///
     /// # Errors

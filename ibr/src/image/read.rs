@@ -124,9 +124,13 @@ fn is_deep(picture: &DynamicImage) -> bool {
     matches!(picture, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_))
 }
 
-/// Values on the scale 0..255, times `factor`.
-fn whole_image(picture: &DynamicImage, factor: f32) -> Result<Image, ImageError> {
+/// Values on the scale 0..255, times `factor`; white is 1 in floats.
+pub(super) fn whole_image(picture: &DynamicImage, factor: f32) -> Result<Image, ImageError> {
     let (width, height) = (picture.width() as usize, picture.height() as usize);
+    if matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
+        let data = picture.to_rgb32f().as_raw().iter().map(|v| v * 255.0 * factor).collect();
+        return Image::new(width, height, 3, data);
+    }
     let shallow = |v: &u8| f32::from(*v) * factor;
     // 257 / factor divides exactly for maps (factor 257) and rounds once for images.
     let deep = |v: &u16| f32::from(*v) / (257.0 / factor);

@@ -84,28 +84,85 @@ fn encode_float(image: &Image) -> Vec<u8> {
     pfm::encode(&pfm::FloatMap { width, height, channels: image.channels(), data })
 }
 
+/// A value 0..=255 as one of 65536 levels, rounded half up. 65535 / 255 = 257.
+pub(super) fn deep_level(value: f32) -> u16 {
+    (value.clamp(0.0, 255.0) * 257.0 + 0.5) as u16
+}
+
+/// The encoder takes the numbers in the order of this machine.
+fn deep_bytes(levels: impl Iterator<Item = u16>) -> Vec<u8> {
+    levels.flat_map(u16::to_ne_bytes).collect()
+}
+
 fn encode_deep(image: &Image, path: &Path) -> Result<Vec<u8>, ImageError> {
     let colour = if image.channels() == 3 { ColorType::Rgb16 } else { ColorType::L16 };
-    // 65535 / 255 = 257; the encoder takes the numbers in the order of this machine.
-    let level = |v: &f32| ((v.clamp(0.0, 255.0) * 257.0 + 0.5) as u16).to_ne_bytes();
-    let bytes: Vec<u8> = image.data().iter().flat_map(level).collect();
-    write_buffer(&bytes, image, colour, ImageFormat::Png, path)
+    let bytes = deep_bytes(image.data().iter().map(|v| deep_level(*v)));
+    write_buffer(&bytes, image.size(), colour, ImageFormat::Png, path)
+}
+
+/// The bytes of a PNG file of whole numbers, one per pixel; `path` appears in messages.
+///
+/// # Errors
+/// [`ImageError::Write`] if the encoder fails, [`ImageError::Buffer`] if the numbers do not fill the size.
+pub fn encode_levels(
+    numbers: &[u16],
+    (width, height): (usize, usize),
+    path: &Path,
+) -> Result<Vec<u8>, ImageError> {
+    let expected = width.saturating_mul(height);
+    if numbers.len() != expected {
+        return Err(ImageError::Buffer { width, height, channels: 1, expected, given: numbers.len() });
+    }
+    let bytes = deep_bytes(numbers.iter().copied());
+    write_buffer(&bytes, (width, height), ColorType::L16, ImageFormat::Png, path)
+}
+
+/// The bytes of a PNG file with an alpha channel, 0 to 1; colours are not multiplied by it. `path` appears in
+/// messages.
+///
+/// # Errors
+/// As [`encode_levels`].
+pub fn encode_with_alpha(
+    image: &Image,
+    alpha: &[f32],
+    path: &Path,
+    levels: Levels,
+) -> Result<Vec<u8>, ImageError> {
+    let ((width, height), channels) = (image.size(), image.channels());
+    if alpha.len() != width * height {
+        return Err(ImageError::Buffer {
+            width,
+            height,
+            channels: 1,
+            expected: width * height,
+            given: alpha.len(),
+        });
+    }
+    let pixels = image.data().chunks_exact(channels).zip(alpha);
+    let values = pixels.flat_map(|(pixel, alpha)| pixel.iter().copied().chain([255.0 * alpha]));
+    let (bytes, colour) = match (levels, channels) {
+        (Levels::Eight, 3) => (values.map(super::to_byte).collect(), ColorType::Rgba8),
+        (Levels::Eight, _) => (values.map(super::to_byte).collect(), ColorType::La8),
+        (Levels::Sixteen, 3) => (deep_bytes(values.map(deep_level)), ColorType::Rgba16),
+        (Levels::Sixteen, _) => (deep_bytes(values.map(deep_level)), ColorType::La16),
+    };
+    write_buffer(&bytes, (width, height), colour, ImageFormat::Png, path)
 }
 
 fn encode_whole(image: &Image, format: ImageFormat, path: &Path) -> Result<Vec<u8>, ImageError> {
     let colour = if image.channels() == 3 { ColorType::Rgb8 } else { ColorType::L8 };
-    write_buffer(&image.to_bytes(), image, colour, format, path)
+    write_buffer(&image.to_bytes(), image.size(), colour, format, path)
 }
 
 fn write_buffer(
     values: &[u8],
-    image: &Image,
+    (width, height): (usize, usize),
     colour: ColorType,
     format: ImageFormat,
     path: &Path,
 ) -> Result<Vec<u8>, ImageError> {
     let mut bytes = Cursor::new(Vec::new());
-    let (width, height) = (image.width() as u32, image.height() as u32);
+    let (width, height) = (width as u32, height as u32);
     image::write_buffer_with_format(&mut bytes, values, width, height, colour, format)
         .map_err(|e| ImageError::Write { path: path.into(), reason: e.to_string() })?;
     Ok(bytes.into_inner())

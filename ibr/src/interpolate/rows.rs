@@ -212,6 +212,15 @@ pub fn nearest_depths<const C: usize>(samples: &[Sample<C>], settings: &Settings
     }
 }
 
+/// Adds the samples to the counts of the pixels of their row that are nearest to them.
+pub fn count<const C: usize>(samples: &[Sample<C>], counts: &mut [u16]) {
+    for s in samples.iter().filter(|s| s.x >= -0.5) {
+        if let Some(count) = counts.get_mut((s.x + 0.5) as usize) {
+            *count = count.saturating_add(1);
+        }
+    }
+}
+
 /// The pixels from `low` to `high`, both included.
 fn pixels(low: f64, high: f64, width: usize) -> std::ops::Range<usize> {
     // Casts saturate and cut toward zero: positions outside the image are cut off, and above -1 the

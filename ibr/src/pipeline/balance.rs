@@ -18,9 +18,16 @@ const SOFTENING: f64 = 0.2;
 ///
 /// Half-way between two views both weigh 1. The weights change continuously along any path of the virtual
 /// camera, so a sequence of views does not pulse.
+///
+/// Of general cameras, the distance of a view is the sum of two, both in units of the distance to the scene: that
+/// of the camera centres, and that of the directions from which they look at the middle of the scene. If only the
+/// k nearest views are used, w_i is multiplied by (x_(k+1) - x_i) / (x_(k+1) - x_(1)), with the distances of the
+/// first view that is left out and of the nearest, so that a view enters and leaves without a jump (Buehler et al., Unstructured Lumigraph Rendering,
+/// SIGGRAPH 2001).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Balance {
     weights: Vec<f32>,
+    distances: Vec<f64>,
     /// Factors that give the views one exposure; empty if they have it.
     gains: Vec<f32>,
 }
@@ -30,15 +37,41 @@ impl Balance {
     pub fn by_distance(distances: &[f64]) -> Self {
         let mut sorted = distances.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let scale = match sorted[..] {
-            [first, second, ..] if first + second > 0.0 => first + second,
-            _ => return Self { weights: vec![1.0; distances.len()], gains: Vec::new() },
-        };
+        let scale = sorted.iter().take(2).sum::<f64>();
         let weight = |distance: &f64| {
             let x = (distance / scale).min(1.0);
             ((1.0 - x + SOFTENING) / (x + SOFTENING)) as f32
         };
-        Self { weights: distances.iter().map(weight).collect(), gains: Vec::new() }
+        let weights = match sorted.len() > 1 && scale > 0.0 {
+            true => distances.iter().map(weight).collect(),
+            false => vec![1.0; distances.len()],
+        };
+        Self { weights, distances: distances.to_vec(), gains: Vec::new() }
+    }
+
+    /// The same with the `count` nearest views only; all if there is no number.
+    pub fn nearest(mut self, count: Option<usize>) -> Self {
+        let mut order: Vec<usize> = (0..self.distances.len()).collect();
+        order.sort_by(|a, b| self.distances[*a].total_cmp(&self.distances[*b]));
+        let Some((chosen, rest)) = count.and_then(|count| order.split_at_checked(count)) else { return self };
+        let (Some(first), Some(out)) = (chosen.first(), rest.first()) else { return self };
+        let (least, limit) = (self.distances[*first], self.distances[*out]);
+        for view in chosen {
+            let share = (limit - self.distances[*view]) / (limit - least);
+            self.weights[*view] *= if share.is_nan() { 1.0 } else { share as f32 };
+        }
+        rest.iter().for_each(|view| self.weights[*view] = 0.0);
+        self
+    }
+
+    /// Whether samples of a view count at all.
+    pub fn uses(&self, view: usize) -> bool {
+        self.weights.get(view).is_none_or(|weight| *weight > 0.0)
+    }
+
+    /// The views that count, by number.
+    pub fn views(&self) -> Vec<usize> {
+        (0..self.weights.len()).filter(|view| self.uses(*view)).collect()
     }
 
     /// For a virtual camera on the line of a rectified rig.
@@ -50,6 +83,23 @@ impl Balance {
     pub fn calibrated(views: &[CalibratedView<'_>], camera: &Camera) -> Self {
         let centre = camera.centre();
         Self::by_distance(&views.iter().map(|v| (v.camera.centre() - centre).norm()).collect::<Vec<_>>())
+    }
+
+    /// As [`Balance::calibrated`], with the distances in position and direction.
+    pub fn by_angle(views: &[CalibratedView<'_>], camera: &Camera) -> Self {
+        let centre = camera.centre();
+        let Some(reach) = median(views.iter().filter_map(|v| v.depth.middle()).map(f64::from)) else {
+            return Self::calibrated(views, camera);
+        };
+        let pivot = centre + camera.axis() * reach;
+        let distance = |view: &CalibratedView<'_>| {
+            let from = view.camera.centre();
+            let angle = (from - pivot).angle(&(centre - pivot));
+            // The axis of a view that looks past the scene is far from the direction to its middle.
+            let turn = view.camera.axis().angle(&(pivot - from));
+            (from - centre).norm() / reach + angle + turn
+        };
+        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>())
     }
 
     /// The same with factors for the brightness of the views.
@@ -80,6 +130,13 @@ impl Balance {
     }
 }
 
+/// The middle one of some numbers.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,9 +160,49 @@ mod tests {
     }
 
     #[test]
+    fn the_nearest_views_are_used() {
+        let two = Balance::by_distance(&[3.0, 1.0, 2.0, 9.0]).nearest(Some(2));
+        assert_eq!(two.views(), [1, 2]);
+        assert!(two.weights[1] > two.weights[2] && !two.uses(0));
+        let all = Balance::by_distance(&[3.0, 1.0]);
+        assert_eq!((all.clone().nearest(Some(2)), all.clone().nearest(None)), (all.clone(), all));
+        assert_eq!(Balance::by_distance(&[1.0, 1.0, 1.0]).nearest(Some(2)).views(), [0, 1]);
+    }
+
+    /// Of two views at one distance, the one that looks at the scene from a similar direction is nearer, and one
+    /// that looks away is the farthest.
+    #[test]
+    fn directions_count_too() {
+        let image = crate::image::Image::filled(4, 3, 1, 0.0);
+        let depth =
+            crate::depth::DepthMap::new((4, 3), vec![5.0; 12], 1.0, crate::depth::Measure::Depth).unwrap();
+        let view = |centre: [f64; 3], yaw: f64| {
+            let r = nalgebra::Rotation3::from_euler_angles(0.0, yaw, 0.0);
+            let mut matrix = nalgebra::Matrix3x4::zeros();
+            matrix.fixed_columns_mut::<3>(0).copy_from(r.matrix());
+            matrix.set_column(3, &-(r * nalgebra::Vector3::from(centre)));
+            CalibratedView { image: &image, depth: &depth, camera: Camera::metric(matrix, false).unwrap() }
+        };
+        let beside = view([1.0, 0.0, 0.0], 0.2);
+        let before = view([0.0, 0.0, 1.0], 0.0);
+        let away = view([0.1, 0.0, 0.0], 3.0);
+        let target = view([0.0; 3], 0.0).camera;
+        let found = Balance::by_angle(&[beside, before, away], &target);
+        assert!(found.distances[1] < found.distances[0], "{:?}", found.distances);
+        assert!(found.distances[0] < found.distances[2], "{:?}", found.distances);
+        assert_eq!(found.nearest(Some(1)).views(), [1]);
+    }
+
+    #[test]
     fn weights_change_continuously_along_a_path() {
         let cameras = [0.0, 1.0, 2.5];
         let at = |c: f64| Balance::by_distance(&cameras.map(|p: f64| (p - c).abs())).weights;
+        let two =
+            |c: f64| Balance::by_distance(&cameras.map(|p: f64| (p - c).abs())).nearest(Some(2)).weights;
+        for k in 0..2500 {
+            let (a, b) = (two(f64::from(k) * 1e-3), two(f64::from(k + 1) * 1e-3));
+            assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.05), "{k}: {a:?} {b:?}");
+        }
         let step = 1e-3;
         for k in -500..3000 {
             let (a, b) = (at(f64::from(k) * step), at(f64::from(k + 1) * step));

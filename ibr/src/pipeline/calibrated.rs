@@ -1,6 +1,8 @@
 //! A view from any number of calibrated cameras with depth.
 
-use super::{Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, check_counts};
+use super::{
+    Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, Watch, check_counts,
+};
 use crate::camera::Camera;
 use crate::image::Image;
 use crate::interpolate::HoleCount;
@@ -8,12 +10,16 @@ use crate::interpolate::plane::PlaneProblem;
 use crate::occlusion::{self, DepthTest, LARGEST_SPACING};
 use crate::propagate::{CalibratedView, Frame, Survey};
 use crate::sample::Sample;
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Samples held in memory at a time; larger scenes are rendered in bands of rows.
 const SAMPLES_AT_A_TIME: usize = 1 << 19;
 /// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
 /// are made twice.
 const FEWEST_ROWS: usize = 96;
+/// Share of the first two stages in the work, about.
+const GATHERING: f64 = 0.7;
 
 /// Renders the view of `camera` with `width` x `height` pixels.
 ///
@@ -25,11 +31,25 @@ pub fn render(
     size: (usize, usize),
     settings: &RenderSettings,
 ) -> Result<Rendering, RenderError> {
+    render_watched(views, camera, size, settings, &|_| ())
+}
+
+/// As [`render`]; `watch` hears which share of the work is done.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_watched(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    size: (usize, usize),
+    settings: &RenderSettings,
+    watch: Watch<'_>,
+) -> Result<Rendering, RenderError> {
     check(views, settings)?;
     if views.iter().any(|v| v.image.channels() == 3) {
-        render_with::<3>(views, camera, size, settings)
+        render_with::<3>(views, camera, size, settings, watch)
     } else {
-        render_with::<1>(views, camera, size, settings)
+        render_with::<1>(views, camera, size, settings, watch)
     }
 }
 
@@ -56,41 +76,48 @@ fn render_with<const C: usize>(
     camera: &Camera,
     (width, height): (usize, usize),
     settings: &RenderSettings,
+    watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
-    let pixels: usize = views.iter().map(|v| v.image.width() * v.image.height()).sum();
+    let balance = match settings.nearest {
+        Some(_) => Balance::by_angle(views, camera).nearest(settings.nearest),
+        None => Balance::calibrated(views, camera),
+    };
+    let chosen = balance.views();
+    let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
     let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
     let whole = Frame::whole(width, height, 0.5, settings.offset);
-    let survey = Survey::new(views, camera, &whole);
+    let survey = Survey::of(views, &chosen, camera, &whole);
     let (propagated, dropped) = (survey.samples, survey.dropped);
     if propagated == 0 {
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     let agreement = Agreement::calibrated(views);
-    let mut balance = Balance::calibrated(views, camera);
-    if !settings.keep_exposure {
-        balance = balance.with_gains(&agreement.gains);
-    }
-    let bands = propagated.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS));
-    for band in 0..bands {
-        let rows = band * height / bands..(band + 1) * height / bands;
-        let mut samples = visible_in(rows, height, &survey, views, settings.depth_test());
+    let balance = if settings.keep_exposure { balance } else { balance.with_gains(&agreement.gains) };
+    let count = propagated.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS));
+    let bands: Vec<Range<usize>> =
+        (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
+    let ready = AtomicUsize::new(0);
+    problem.add_bands(&bands, |rows| {
+        let mut samples = visible_in(rows.clone(), height, &survey, views, settings.depth_test());
         balance.apply(&mut samples);
-        problem.add(&samples)?;
-    }
+        watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
+        samples
+    })?;
     let used = problem.samples();
     let mut report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit = problem.solve(None)?;
+    let fit = problem.solve_watched(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
     report.holes = HoleCount::of(&fit.mask);
     report.convergence = Some(fit.convergence);
     let image = Image::from_values((width, height), C, fit.values);
-    Ok(Rendering { image, mask: fit.mask, depth: fit.depth, report, agreement })
+    let (mask, depth, counts) = (fit.mask, fit.depth, fit.counts);
+    Ok(Rendering { image, mask, depth, counts, views: chosen, report, agreement })
 }
 
 /// The first two stages for some rows of the virtual image. The band is widened by the largest radius of the
 /// depth test on both sides, so that it contains every sample that can hide one of the band; only visible
 /// samples of the band itself are returned.
 fn visible_in<const C: usize>(
-    rows: std::ops::Range<usize>,
+    rows: Range<usize>,
     height: usize,
     survey: &Survey,
     views: &[CalibratedView<'_>],

@@ -11,6 +11,7 @@ pub use balance::Balance;
 
 use crate::depth::DepthMap;
 use crate::image::Image;
+pub use crate::interpolate::Watch;
 use crate::interpolate::plane::Convergence;
 use crate::interpolate::{Cover, HoleCount, InterpolationError, Settings};
 use crate::occlusion::{DepthTest, DepthTestError};
@@ -40,6 +41,8 @@ pub struct RenderSettings {
     /// Use the brightness of every view as it is. Otherwise views that are brighter or darker than the first
     /// one are given its exposure.
     pub keep_exposure: bool,
+    /// Use only so many views, those that [`Balance`] finds nearest to the virtual camera; all without it.
+    pub nearest: Option<usize>,
 }
 
 impl RenderSettings {
@@ -55,6 +58,9 @@ impl RenderSettings {
     pub fn check(&self) -> Result<(), RenderError> {
         self.depth_test().check()?;
         self.interpolation.check()?;
+        if self.nearest == Some(0) {
+            return Err(RenderError::NoneNearest);
+        }
         if self.offset.is_finite() { Ok(()) } else { Err(RenderError::Offset { offset: self.offset }) }
     }
 }
@@ -65,6 +71,9 @@ pub enum RenderError {
     /// No view was given.
     #[error("there is no view to render from: give at least one")]
     NoViews,
+    /// No view may be used.
+    #[error("the number of nearest views is 0: at least one view must be used")]
+    NoneNearest,
     /// More views or pixels than the indices of samples can hold.
     #[error("{views} views of up to {pixels} pixels: at most 65535 views of 2^32 - 1 pixels can be used")]
     TooLarge {
@@ -157,6 +166,10 @@ pub struct Rendering {
     /// Depth of each pixel at the virtual camera, NaN in holes: the disparity for a baseline of one of a
     /// rectified rig, the depth of calibrated cameras, and the signed order of depth without cameras.
     pub depth: DepthMap,
+    /// Visible samples that are nearest to each pixel.
+    pub counts: Vec<u16>,
+    /// The views that were used, by number from 0.
+    pub views: Vec<usize>,
     /// Counts.
     pub report: Report,
     /// How well the views agree with each other; empty without depth maps.
@@ -167,6 +180,14 @@ impl Rendering {
     /// Share of the pixels that samples cover.
     pub fn coverage(&self) -> f64 {
         1.0 - HoleCount::of(&self.mask).total() as f64 / self.mask.len() as f64
+    }
+}
+
+impl Rendering {
+    /// Opacity of each pixel: 1 where a surface was seen or bridged, 0 where the value was made up because no view
+    /// shows what is there.
+    pub fn alpha(&self) -> Vec<f32> {
+        self.mask.iter().map(|c| if *c == Cover::Disocclusion { 0.0 } else { 1.0 }).collect()
     }
 }
 

@@ -1,15 +1,18 @@
 //! A view from a rectified rig: the three stages run row by row, rows in parallel.
 
-use super::{Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, check_counts};
+use super::{
+    Agreement, Balance, Method, RenderError, RenderSettings, Rendering, Report, Watch, check_counts,
+};
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneProblem;
-use crate::interpolate::rows::{RowWork, fill_empty_rows, nearest_depths};
+use crate::interpolate::rows::{self, RowWork, fill_empty_rows, nearest_depths};
 use crate::interpolate::{Cover, Degree, HoleCount, HoleFill, InterpolationError, join_rows};
 use crate::occlusion::{self, RowScratch};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::{Dropped, Sample};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Renders the view from `position` on the line of the cameras.
 ///
@@ -23,14 +26,27 @@ pub fn render(
     position: f64,
     settings: &RenderSettings,
 ) -> Result<Rendering, RenderError> {
+    render_watched(views, position, settings, &|_| ())
+}
+
+/// As [`render`]; `watch` hears which share of the work is done.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_watched(
+    views: &[RectifiedView<'_>],
+    position: f64,
+    settings: &RenderSettings,
+    watch: Watch<'_>,
+) -> Result<Rendering, RenderError> {
     check(views, position)?;
     settings.check()?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match (settings.interpolation.fit.degree, colour) {
-        (Degree::Linear, false) => render_with::<2, 1>(views, position, settings),
-        (Degree::Linear, true) => render_with::<2, 3>(views, position, settings),
-        (Degree::Cubic, false) => render_with::<4, 1>(views, position, settings),
-        (Degree::Cubic, true) => render_with::<4, 3>(views, position, settings),
+        (Degree::Linear, false) => render_with::<2, 1>(views, position, settings, watch),
+        (Degree::Linear, true) => render_with::<2, 3>(views, position, settings, watch),
+        (Degree::Cubic, false) => render_with::<4, 1>(views, position, settings, watch),
+        (Degree::Cubic, true) => render_with::<4, 3>(views, position, settings, watch),
     }
 }
 
@@ -60,29 +76,32 @@ struct Job<'a> {
     balance: Balance,
     frame: Frame,
     settings: &'a RenderSettings,
+    watch: Watch<'a>,
 }
 
 fn render_with<const ORDER: usize, const C: usize>(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,
+    watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
     let (width, height) = views[0].image.size();
     let agreement = Agreement::rectified(views);
-    let mut balance = Balance::rectified(views, position);
+    let mut balance = Balance::rectified(views, position).nearest(settings.nearest);
+    let chosen = balance.views();
     if !settings.keep_exposure {
         balance = balance.with_gains(&agreement.gains);
     }
     let whole = |margin| {
         let frame = Frame::whole(width, height, margin, settings.offset);
         let camera = RigCamera::new(views, position);
-        Job { views, camera, balance, frame, settings }
+        Job { views, camera, balance, frame, settings, watch }
     };
     let rendering = match settings.method {
         Method::Plane => render_plane::<C>(&whole(0.5)),
         Method::Auto | Method::Rows => render_rows::<ORDER, C>(&whole(RowWork::<ORDER, C>::MARGIN)),
     }?;
-    Ok(Rendering { agreement, ..rendering })
+    Ok(Rendering { agreement, views: chosen, ..rendering })
 }
 
 fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
@@ -90,21 +109,26 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
     let mut values = vec![0.0; width * height * C];
     let mut mask = vec![Cover::Disocclusion; width * height];
     let mut keys = vec![f32::NAN; width * height];
+    let mut samples = vec![0_u16; width * height];
     let mut counts = vec![RowCount::default(); height];
+    let ready = AtomicUsize::new(0);
     // Blocks of rows share work memory; their borders do not affect the result.
     let block = height.div_ceil(4 * rayon::current_num_threads()).max(1);
     let outputs = values
         .par_chunks_mut(block * width * C)
         .zip(mask.par_chunks_mut(block * width).zip(keys.par_chunks_mut(block * width)))
-        .zip(counts.par_chunks_mut(block));
-    outputs.enumerate().try_for_each(|(b, ((values, (mask, keys)), counts))| {
+        .zip(samples.par_chunks_mut(block * width).zip(counts.par_chunks_mut(block)));
+    outputs.enumerate().try_for_each(|(b, ((values, (mask, keys)), (samples, counts)))| {
         let (mut strip, mut fit) = (Strip::<C>::new(job), RowWork::<ORDER, C>::new(width));
         let masks = mask.chunks_exact_mut(width).zip(keys.chunks_exact_mut(width));
-        let rows = values.chunks_exact_mut(width * C).zip(masks).zip(counts);
-        rows.enumerate().try_for_each(|(k, ((values, (mask, keys)), count))| {
+        let tallies = samples.chunks_exact_mut(width).zip(counts);
+        let rows = values.chunks_exact_mut(width * C).zip(masks).zip(tallies);
+        rows.enumerate().try_for_each(|(k, ((values, (mask, keys)), (samples, count)))| {
             let row = b * block + k;
             *count = strip.survivors_of_row(job, row);
+            rows::count(&strip.samples, samples);
             nearest_depths(&strip.samples, &job.settings.interpolation, keys);
+            (job.watch)((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / height as f64);
             fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
                 .map(|_| ())
                 .map_err(|source| InterpolationError::Fit { row, source })
@@ -120,7 +144,9 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
         join_rows::<C>(&mask, width, &mut values);
     }
     let image = Image::from_values((width, height), C, values);
-    Ok(Rendering { image, mask, depth: job.disparities(keys), report, agreement: Agreement::default() })
+    let depth = job.disparities(keys);
+    let (views, agreement) = (Vec::new(), Agreement::default());
+    Ok(Rendering { image, mask, depth, counts: samples, views, report, agreement })
 }
 
 /// The same with the plane fit as third stage; the second stage still runs row by row.
@@ -135,12 +161,13 @@ fn render_plane<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError>
     }
     let mut report = total(counts.iter(), HoleCount::default());
     enough(job, &report)?;
-    let fit = problem.solve(None)?;
+    let fit = problem.solve_watched(None, job.watch)?;
     report.holes = HoleCount::of(&fit.mask);
     report.convergence = Some(fit.convergence);
     let image = Image::from_values((width, height), C, fit.values);
     let depth = job.disparities(fit.depth.data().to_vec());
-    Ok(Rendering { image, mask: fit.mask, depth, report, agreement: Agreement::default() })
+    let (mask, counts, views) = (fit.mask, fit.counts, Vec::new());
+    Ok(Rendering { image, mask, depth, counts, views, report, agreement: Agreement::default() })
 }
 
 impl Job<'_> {
@@ -196,7 +223,7 @@ impl<const C: usize> Strip<C> {
     fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
         let mut count = RowCount::default();
         self.samples.clear();
-        for (index, view) in job.views.iter().enumerate() {
+        for (index, view) in job.views.iter().enumerate().filter(|(i, _)| job.balance.uses(*i)) {
             let index = index as u16;
             count.dropped +=
                 propagate::rectified_row(view, index, y, &job.camera, &job.frame, &mut self.samples);
@@ -212,7 +239,6 @@ impl<const C: usize> Strip<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interpolate::rows;
 
     fn scene(width: usize, height: usize, channels: usize) -> (Image, DepthMap) {
         let value = |i: usize| 120.0 + 80.0 * ((i / channels % width) as f32 * 0.4).sin() + (i % 7) as f32;

@@ -34,9 +34,15 @@ struct Tile {
 impl Survey {
     /// Propagates every pixel once, in parallel over the rows, and keeps the rows that each tile reaches.
     pub fn new(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> Self {
+        let all: Vec<usize> = (0..views.len()).collect();
+        Self::of(views, &all, camera, frame)
+    }
+
+    /// As [`Survey::new`], for some of the views, by number.
+    pub fn of(views: &[CalibratedView<'_>], chosen: &[usize], camera: &Camera, frame: &Frame) -> Self {
         let maps: Vec<Relative> = views.iter().map(|v| v.camera.relative_to(camera)).collect();
         let rows: Vec<(usize, usize)> =
-            views.iter().enumerate().flat_map(|(i, v)| (0..v.image.height()).map(move |y| (i, y))).collect();
+            chosen.iter().flat_map(|&i| (0..views[i].image.height()).map(move |y| (i, y))).collect();
         let surveyed: Vec<(Vec<Tile>, usize, Dropped)> =
             rows.par_iter().map(|&(i, y)| survey_row(&views[i], i as u16, &maps[i], y, frame)).collect();
         let mut survey =

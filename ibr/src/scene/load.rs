@@ -1,14 +1,22 @@
 //! Reading a scene: determine its kind, read its files in parallel, make maps dense.
 
 mod calibrated;
+mod complete;
+mod goals;
+mod models;
 mod rectified;
 mod uncalibrated;
 
-use super::spec::{SceneSpec, TargetSpec, ViewSpec};
+pub use complete::complete;
+pub use goals::MOST_FRAMES;
+
+use super::spec::{SceneSpec, ViewSpec};
 use super::{Scene, SceneError};
 use crate::depth::{DepthMap, Measure, fill_unknown};
-use crate::image::{Image, MOST_PIXELS, read_image_within, read_map_within, unavailable_memory};
+use crate::image::{Image, MOST_PIXELS, read_image_within, read_map_within};
 use crate::partial::{Densify, densify};
+use goals::Goal;
+use models::Models;
 use std::path::{Path, PathBuf};
 
 /// How a scene is read.
@@ -57,17 +65,17 @@ fn nearest_key(message: &str) -> Option<&str> {
 /// # Errors
 /// [`SceneError`], naming file, view and numbers.
 pub fn load(spec: &SceneSpec, path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
-    Loader { spec, path, folder: path.parent().unwrap_or(Path::new("")), options }.load()
+    let spec = &complete(spec, path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    Loader { spec, path, folder, options, models: Models::default() }.load()
 }
-
-/// Most views on a path.
-pub const MOST_FRAMES: usize = 9999;
 
 struct Loader<'a> {
     spec: &'a SceneSpec,
     path: &'a Path,
     folder: &'a Path,
     options: &'a LoadOptions,
+    models: Models,
 }
 
 type Loaded<T> = Result<T, SceneError>;
@@ -81,16 +89,16 @@ impl Loader<'_> {
         if views.is_empty() {
             return Err(self.incomplete("there is no view to render from; add [[view]] tables"));
         }
-        let target = self.spec.target.clone().unwrap_or_default();
+        let goals = self.goals()?;
         let left_out = left_out.map(|i| &self.spec.view[i]);
         let (kind, filled) = if views.iter().any(|v| v.position.is_some()) {
-            self.rectified(&views, left_out, &target)?
-        } else if views.iter().any(|v| v.camera.is_some() || self.model_of(v).is_some()) {
-            self.calibrated(&views, left_out, &target)?
+            self.rectified(&views, left_out, &goals)?
+        } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
+            self.calibrated(&views, left_out, &goals)?
         } else {
-            (self.uncalibrated(&views, left_out, &target)?, 0)
+            (self.uncalibrated(&views, left_out, &goals)?, 0)
         };
-        Ok(Scene { kind, offset: target.offset.unwrap_or(0.0), filled })
+        Ok(Scene { kind, offset: self.offset(&goals)?, filled })
     }
 
     fn incomplete(&self, reason: impl Into<String>) -> SceneError {
@@ -137,25 +145,6 @@ impl Loader<'_> {
         })
     }
 
-    /// Shares of the way at which the views of a path lie; none if there is no path.
-    fn shares(&self, target: &TargetSpec) -> Loaded<Vec<f64>> {
-        match (target.frames, target.has_end()) {
-            (None, false) => Ok(Vec::new()),
-            (Some(frames), true) if (2..=MOST_FRAMES).contains(&frames) => {
-                Ok((0..frames).map(|k| k as f64 / (frames - 1) as f64).collect())
-            }
-            (Some(frames), true) => Err(self.incomplete(format!(
-                "[virtual] frames = {frames}: a path has 2 to {MOST_FRAMES} views"
-            ))),
-            (Some(_), false) => Err(self.incomplete(
-                "[virtual] has `frames` but no end of the path: `to_position`, `to_camera` or `to_colmap_image`",
-            )),
-            (None, true) => {
-                Err(self.incomplete("[virtual] has the end of a path; say with `frames` how many views it has"))
-            }
-        }
-    }
-
     fn file(&self, path: &Path) -> PathBuf {
         self.folder.join(path)
     }
@@ -168,32 +157,6 @@ impl Loader<'_> {
         let reason =
             || format!("view {:?} has no `{key}`, which every view of a {kind} scene needs", view.label());
         value.ok_or_else(|| self.incomplete(reason()))
-    }
-
-    /// The size of the virtual view: that of the scene, or the default.
-    fn size(&self, target: &TargetSpec, own: (usize, usize)) -> Loaded<(usize, usize)> {
-        let (w, h) = target.size.map_or(own, |[w, h]| (w, h));
-        let pixels = w.saturating_mul(h);
-        let refused =
-            |reason: String| Err(self.incomplete(format!("the virtual view has {w} x {h} pixels: {reason}")));
-        if pixels == 0 {
-            return refused("both sides of its size must be at least one pixel".into());
-        }
-        if pixels > self.options.max_pixels {
-            let most = self.options.max_pixels;
-            return refused(format!(
-                "more than the limit of {most}; make it smaller, or allow so many with --max-pixels"
-            ));
-        }
-        match unavailable_memory(pixels) {
-            Some(bytes) => {
-                let gigabytes = bytes as f64 / 1e9;
-                refused(format!(
-                    "they take {gigabytes:.1} GB of memory, more than the system gives; make it smaller"
-                ))
-            }
-            None => Ok((w, h)),
-        }
     }
 
     /// Image and dense map of a view, and the number of unknown values that were filled.
@@ -341,13 +304,13 @@ mod tests {
             [virtual]
             from_tracks = 2
         "#;
-        let Kind::Uncalibrated { tracks, target, size, .. } =
+        let Kind::Uncalibrated { tracks, targets, size, .. } =
             read(text, &LoadOptions::default()).unwrap().kind
         else {
             panic!()
         };
         assert_eq!(tracks[0], [Some(Point::new(1.0, 2.0)), Some(Point::new(5.0, 6.0))]);
-        assert_eq!(target, Target::Tracks(vec![Some(Point::new(3.0, 4.0)), None]));
+        assert_eq!(targets, [Target::Tracks(vec![Some(Point::new(3.0, 4.0)), None])]);
         assert_eq!(size, (4, 2));
         let outside = text.replace("from_tracks = 2", "from_tracks = 7");
         let message = read(&outside, &LoadOptions::default()).unwrap_err();

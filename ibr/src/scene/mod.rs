@@ -3,10 +3,13 @@
 mod load;
 mod spec;
 
-pub use load::{LoadOptions, MOST_FRAMES, load, parse};
+pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
-use crate::camera::{Camera, CameraError, colmap::ColmapError};
+use crate::camera::colmap::ColmapError;
+use crate::camera::middlebury::CalibrationError;
+use crate::camera::transforms::TransformsError;
+use crate::camera::{Camera, CameraError};
 use crate::depth::{DepthError, DepthMap};
 use crate::image::{Image, ImageError};
 use crate::partial::PartialError;
@@ -51,8 +54,8 @@ pub enum Kind {
         images: Vec<Image>,
         /// Positions of the tracks in the images.
         tracks: Vec<Vec<Option<Point>>>,
-        /// The virtual view.
-        target: Target,
+        /// The virtual views: one, or those of a path.
+        targets: Vec<Target>,
         /// Width and height of the virtual view.
         size: (usize, usize),
     },
@@ -64,7 +67,7 @@ impl Kind {
         match self {
             Self::Rectified { positions, .. } => positions.len(),
             Self::Calibrated { cameras, .. } => cameras.len(),
-            Self::Uncalibrated { .. } => 1,
+            Self::Uncalibrated { targets, .. } => targets.len(),
         }
     }
 }
@@ -167,4 +170,10 @@ pub enum SceneError {
     /// A COLMAP model of the scene.
     #[error(transparent)]
     Colmap(#[from] ColmapError),
+    /// A transforms file of the scene.
+    #[error(transparent)]
+    Transforms(#[from] TransformsError),
+    /// A calibration file of the scene.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
 }

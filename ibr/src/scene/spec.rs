@@ -1,6 +1,9 @@
 //! A scene file as written.
 
 use serde::Deserialize;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// A scene file.
@@ -10,20 +13,26 @@ pub struct SceneSpec {
     /// The views.
     #[serde(default)]
     pub view: Vec<ViewSpec>,
-    /// The virtual view; optional if one of the views is left out and rendered.
-    #[serde(rename = "virtual")]
-    pub target: Option<TargetSpec>,
+    /// The virtual views, `[virtual]` or several `[[virtual]]`; none is needed if one of the views is left out
+    /// and rendered.
+    #[serde(rename = "virtual", default, deserialize_with = "one_or_many")]
+    pub targets: Vec<TargetSpec>,
     /// File of tracks over the views (uncalibrated scenes).
     pub matches: Option<PathBuf>,
     /// Folder of a COLMAP model that holds the cameras of all views.
     pub colmap: Option<PathBuf>,
+    /// File of cameras of neural rendering (`transforms.json`); without `[[view]]` tables its frames with depth
+    /// are the views.
+    pub transforms: Option<PathBuf>,
+    /// Calibration file of the Middlebury benchmark; without `[[view]]` tables the pair beside it is the views.
+    pub calib: Option<PathBuf>,
     /// Whether the world frame of the cameras is left-handed.
     #[serde(default)]
     pub mirrored: bool,
 }
 
 /// A view.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ViewSpec {
     /// Name; defaults to the image file's.
@@ -61,13 +70,15 @@ pub struct TargetSpec {
     pub position: Option<f64>,
     /// 3 x 4 camera matrix, in pixels.
     pub camera: Option<[[f64; 4]; 3]>,
-    /// Name of the image of the COLMAP model whose camera is used.
+    /// Name of the image of the COLMAP model or transforms file whose camera is used.
+    #[serde(alias = "camera_of")]
     pub colmap_image: Option<String>,
     /// Position at the end of a path along the baseline.
     pub to_position: Option<f64>,
     /// Camera at the end of a path.
     pub to_camera: Option<[[f64; 4]; 3]>,
-    /// Image of the COLMAP model with the camera at the end of a path.
+    /// Image of the COLMAP model or transforms file with the camera at the end of a path.
+    #[serde(alias = "to_camera_of")]
     pub to_colmap_image: Option<String>,
     /// Views on the path, both ends included.
     pub frames: Option<usize>,
@@ -77,6 +88,8 @@ pub struct TargetSpec {
     pub from_tracks: Option<usize>,
     /// Position between the first two views, 0 to 1.
     pub between: Option<f64>,
+    /// Position between the first two views at the end of a path.
+    pub to_between: Option<f64>,
     /// Added to every column, in pixels.
     pub offset: Option<f64>,
     /// File of tracks, unless given at the top.
@@ -88,13 +101,13 @@ impl SceneSpec {
     pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
         let images = self.view.iter().map(|view| &view.image);
         let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();
-        let tracks = [Some(&self.matches), self.target.as_ref().map(|target| &target.matches)];
-        let tracks = tracks.into_iter().flatten().flatten();
+        let lists = [&self.matches, &self.transforms, &self.calib].into_iter();
+        let lists = lists.chain(self.targets.iter().map(|target| &target.matches)).flatten();
         let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
         let models = models.flat_map(|model| {
             ["cameras.txt", "images.txt", "cameras.bin", "images.bin"].map(|file| model.join(file))
         });
-        let files = images.chain(maps).chain(tracks).cloned().chain(models);
+        let files = images.chain(maps).chain(lists).cloned().chain(models);
         files.map(|file| folder.join(file)).collect()
     }
 }
@@ -102,7 +115,8 @@ impl SceneSpec {
 impl TargetSpec {
     /// Whether the end of a path is given.
     pub(super) fn has_end(&self) -> bool {
-        self.to_position.is_some() || self.to_camera.is_some() || self.to_colmap_image.is_some()
+        let cameras = self.to_camera.is_some() || self.to_colmap_image.is_some();
+        self.to_position.is_some() || self.to_between.is_some() || cameras
     }
 }
 
@@ -111,4 +125,27 @@ impl ViewSpec {
     pub fn label(&self) -> String {
         self.name.clone().unwrap_or_else(|| self.image.display().to_string())
     }
+}
+
+/// A table, or a list of tables.
+fn one_or_many<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<TargetSpec>, D::Error> {
+    struct Tables;
+
+    impl<'de> Visitor<'de> for Tables {
+        type Value = Vec<TargetSpec>;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+            formatter.write_str("a table [virtual], or several [[virtual]]")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+            Ok(vec![TargetSpec::deserialize(MapAccessDeserializer::new(map))?])
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+            Vec::deserialize(SeqAccessDeserializer::new(seq))
+        }
+    }
+
+    deserializer.deserialize_any(Tables)
 }

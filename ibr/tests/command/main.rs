@@ -10,6 +10,7 @@ use std::process::{Command, Output};
 mod bound;
 #[cfg(unix)]
 mod disturbed;
+mod doors;
 mod refuse;
 mod render;
 #[cfg(unix)]

@@ -153,10 +153,8 @@ fn a_path_gives_numbered_views() {
     }
     let again = run(dir.path(), &["render", "path.toml", "-o", "film.png"]);
     assert!(code(&again) == 1 && stderr(&again).contains("film-0001.png exists"), "{}", stderr(&again));
-    for arguments in [&["-o", "-"][..], &["-o", "x.png", "--truth", "middle.png"]] {
-        let refused = run(dir.path(), &[&["render", "path.toml"], arguments].concat());
-        assert_eq!(code(&refused), 2, "{}", stderr(&refused));
-    }
+    let refused = run(dir.path(), &["render", "path.toml", "-o", "x.png", "--truth", "middle.png"]);
+    assert_eq!(code(&refused), 2, "{}", stderr(&refused));
     // A view that would replace an input is refused before anything is rendered.
     let taken = scene.replace("left.png", "film-0002.png") + "to_position = 1.0\nframes = 3\n";
     std::fs::write(dir.path().join("taken.toml"), taken).unwrap();
@@ -345,7 +343,7 @@ fn odd_images_are_fine() {
     write("little.pfm", b"Pf 2 1 -1\n\0\0\x80\x3f\0\0\x80\x3f");
     write("big.pfm", b"Pf 2 1 1\n\x3f\x80\0\0\x3f\x80\0\0");
     write("one.pgm", b"P5 1 1 255\n\x40");
-    write("flat.pgm", b"P5 2 1 255\n\x10\x10");
+    write("flat.pgm", b"P5 2 1 255\n\x01\x01");
     let view = |name: usize, image: &str, map: &str| {
         format!("[[view]]\nname = \"{name}\"\nimage = \"{image}\"\nposition = 0.0\ndisparity = \"{map}\"\n")
     };
@@ -360,8 +358,10 @@ fn odd_images_are_fine() {
         assert_eq!(figures["coverage"], 1.0, "{a} {b}: {figures}");
         let image = read_image(&dir.path().join("o.png")).unwrap();
         let first = image.data()[0];
-        // The fit smooths a step of 16 grey levels between two pixels by some of them.
-        assert!((first - if a == "one.pgm" { 64.0 } else { 16.0 }).abs() <= 5.0, "{a} {b}: {first}");
+        // The fit smooths the step of 16 grey levels between two pixels by two of them if both views count. All maps
+        // say a disparity of one: a view with nearer samples would hide the other, and one sample per pixel is
+        // smoothed by three.
+        assert!((first - if a == "one.pgm" { 64.0 } else { 16.0 }).abs() <= 2.0, "{a} {b}: {first}");
     }
 }
 

@@ -4,6 +4,7 @@
 use super::multigrid::Multigrid;
 use super::stencil::Stencil;
 use super::{Convergence, PlaneSettings};
+use crate::interpolate::Watch;
 use rayon::prelude::*;
 
 /// Entries per chunk. Partial sums of a dot product follow the chunks, not the threads, so the bits do not
@@ -20,16 +21,19 @@ pub(super) fn solve<const C: usize>(
     stencil: &Stencil,
     mut rhs: Vec<[f32; C]>,
     settings: &PlaneSettings,
+    watch: Watch<'_>,
 ) -> (Vec<f32>, Convergence) {
     let mut ended = Convergence { reached: true, ..Convergence::default() };
     let mut work = Work::new(rhs.len());
     let mut multigrid = None;
     for channel in 0..C {
+        let of_channel = |share: f64| watch((channel as f64 + share) / C as f64);
         let first = PlaneSettings { iterations: settings.iterations.min(DIAGONAL_STEPS), ..*settings };
-        let mut one = work.solve(stencil, |p| f64::from(rhs[p][channel]), &first);
+        let mut one = work.solve(stencil, |p| f64::from(rhs[p][channel]), &first, &of_channel);
         if !one.reached {
             let multigrid = multigrid.get_or_insert_with(|| Multigrid::new(stencil));
-            one = work.continue_with(stencil, multigrid, |p| f64::from(rhs[p][channel]), settings, one.steps);
+            let rhs = |p: usize| f64::from(rhs[p][channel]);
+            one = work.continue_with(stencil, multigrid, rhs, settings, one.steps, &of_channel);
         }
         ended.steps = ended.steps.max(one.steps);
         ended.residual = ended.residual.max(one.residual);
@@ -56,7 +60,13 @@ impl Work {
     }
 
     /// Starts from the splatted image rhs / diag, the solution without smoothing.
-    fn solve(&mut self, a: &Stencil, rhs: impl Fn(usize) -> f64, settings: &PlaneSettings) -> Convergence {
+    fn solve(
+        &mut self,
+        a: &Stencil,
+        rhs: impl Fn(usize) -> f64,
+        settings: &PlaneSettings,
+        watch: &dyn Fn(f64),
+    ) -> Convergence {
         let rows = self.u.len();
         self.partial.resize(a.rows().max(rows.div_ceil(CHUNK)), 0.0);
         (0..rows).for_each(|p| self.u[p] = rhs(p) / a.diagonal(p));
@@ -76,6 +86,7 @@ impl Work {
             self.turn(a, next / energy);
             energy = next;
             steps += 1;
+            watch(done(energy / scale, settings));
         }
         let residual = (energy / scale).sqrt();
         Convergence { steps, residual, reached: residual <= settings.tolerance }
@@ -89,6 +100,7 @@ impl Work {
         rhs: impl Fn(usize) -> f64,
         settings: &PlaneSettings,
         mut steps: usize,
+        watch: &dyn Fn(f64),
     ) -> Convergence {
         let pixels = self.u.len();
         let scale: f64 =
@@ -112,6 +124,7 @@ impl Work {
             self.direction.iter_mut().zip(&preconditioned).for_each(|(d, z)| *d = z + factor * *d);
             product = next;
             steps += 1;
+            watch(done(energy / scale, settings));
         }
         let residual = (energy / scale).sqrt();
         Convergence { steps, residual, reached: residual <= settings.tolerance }
@@ -154,6 +167,12 @@ impl Work {
             }
         });
     }
+}
+
+/// Share of the way to the tolerance: the residual falls by about one factor per step.
+fn done(energy: f64, settings: &PlaneSettings) -> f64 {
+    let (now, end) = (energy.max(f64::MIN_POSITIVE).ln(), 2.0 * settings.tolerance.ln());
+    if end < 0.0 { (now / end).clamp(0.0, 1.0) } else { 1.0 }
 }
 
 /// One partial sum per image row.

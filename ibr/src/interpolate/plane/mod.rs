@@ -16,10 +16,11 @@
 
 mod background;
 mod conjugate;
+mod gather;
 mod multigrid;
 mod stencil;
 
-use super::{Cover, HoleFill, InterpolationError, Settings};
+use super::{Cover, HoleFill, InterpolationError, Settings, Watch};
 use crate::depth::{DepthMap, Measure};
 use crate::sample::Sample;
 use stencil::Stencil;
@@ -65,6 +66,8 @@ pub struct PlaneFit {
     pub mask: Vec<Cover>,
     /// Depth of the sample nearest to each pixel, NaN in holes.
     pub depth: DepthMap,
+    /// Visible samples that are nearest to each pixel.
+    pub counts: Vec<u16>,
     /// Convergence of the solver.
     pub convergence: Convergence,
 }
@@ -84,6 +87,7 @@ pub struct PlaneProblem<const C: usize> {
     depth: Vec<f32>,
     /// Squared distance of that sample.
     distance: Vec<f32>,
+    counts: Vec<u16>,
     settings: Settings,
     added: usize,
 }
@@ -103,28 +107,10 @@ impl<const C: usize> PlaneProblem<C> {
             rhs: vec![[0.0; C]; pixels],
             depth: vec![f32::NAN; pixels],
             distance: vec![f32::INFINITY; pixels],
+            counts: vec![0; pixels],
             settings: *settings,
             added: 0,
         })
-    }
-
-    /// Adds visible samples. Samples more than half a pixel outside the image are ignored; samples less far
-    /// outside are moved to its border.
-    ///
-    /// # Errors
-    /// [`InterpolationError::NotFinite`].
-    pub fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
-        super::check_samples(samples)?;
-        let (right, bottom) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
-        for s in samples {
-            let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
-            if inside {
-                self.register(s);
-                self.splat(s.x.clamp(0.0, right), s.y.clamp(0.0, bottom), s.weight, &s.value);
-                self.added += 1;
-            }
-        }
-        Ok(())
     }
 
     /// Samples that have been added.
@@ -137,42 +123,24 @@ impl<const C: usize> PlaneProblem<C> {
         self.depth.iter().map(|d| !d.is_nan())
     }
 
-    /// Adds a sample to both sides of the normal equations.
-    fn splat(&mut self, x: f64, y: f64, weight: f32, value: &[f32; C]) {
-        let (pixel, weights) = self.stencil.bilinear(x, y);
-        self.stencil.add_sample(pixel, &weights, weight);
-        for (q, w) in self.stencil.corners(pixel, &weights) {
-            let w = weight * w;
-            self.rhs[q].iter_mut().zip(value).for_each(|(r, v)| *r += w * v);
-        }
-    }
-
-    /// Records the depth of the sample at the pixels within its reach, half a gap, unless another sample is
-    /// closer.
-    fn register(&mut self, s: &Sample<C>) {
-        let half = self.settings.holes.reach(s.spacing);
-        let range = |centre: f64, length: usize| {
-            let end = ((centre + half).floor() + 1.0) as usize;
-            ((centre - half).ceil() as usize).min(length)..end.min(length)
-        };
-        for row in range(s.y, self.height) {
-            for column in range(s.x, self.width) {
-                let (dx, dy) = (s.x - column as f64, s.y - row as f64);
-                let squared = dx * dx + dy * dy;
-                let p = row * self.width + column;
-                if squared <= half * half && (squared as f32) < self.distance[p] {
-                    (self.distance[p], self.depth[p]) = (squared as f32, s.depth);
-                }
-            }
-        }
-    }
-
     /// Fits the image. With `region`, only the pixels where it is true are filled and fitted together;
     /// all others become black disocclusions.
     ///
     /// # Errors
     /// [`InterpolationError::NoSamples`] when no sample was added.
-    pub fn solve(mut self, region: Option<&[bool]>) -> Result<PlaneFit, InterpolationError> {
+    pub fn solve(self, region: Option<&[bool]>) -> Result<PlaneFit, InterpolationError> {
+        self.solve_watched(region, &|_| ())
+    }
+
+    /// As [`PlaneProblem::solve`]; `watch` hears which share of the fit is done.
+    ///
+    /// # Errors
+    /// As [`PlaneProblem::solve`].
+    pub fn solve_watched(
+        mut self,
+        region: Option<&[bool]>,
+        watch: Watch<'_>,
+    ) -> Result<PlaneFit, InterpolationError> {
         let (width, height) = (self.width, self.height);
         if self.added == 0 {
             return Err(InterpolationError::NoSamples { width, height });
@@ -187,7 +155,8 @@ impl<const C: usize> PlaneProblem<C> {
         let left_out = self.settings.holes.fill == HoleFill::Leave;
         self.connect(&|p| inside(p) && !(left_out && mask[p] != Cover::Seen));
         self.depth = Vec::new();
-        let (mut values, convergence) = conjugate::solve(&self.stencil, self.rhs, &self.settings.plane);
+        let (mut values, convergence) =
+            conjugate::solve(&self.stencil, self.rhs, &self.settings.plane, watch);
         (0..width * height).filter(|p| !inside(*p)).for_each(|p| {
             mask[p] = Cover::Disocclusion;
             values[p * C..(p + 1) * C].fill(0.0);
@@ -196,7 +165,7 @@ impl<const C: usize> PlaneProblem<C> {
             super::rows::blacken(&mask, &mut values, C);
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
-        Ok(PlaneFit { values, mask, depth, convergence })
+        Ok(PlaneFit { values, mask, depth, counts: self.counts, convergence })
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
@@ -213,7 +182,7 @@ impl<const C: usize> PlaneProblem<C> {
             // pixel centre affects that pixel only, so no source changes in this loop.
             let weight = self.stencil.sample_weight(source);
             let value = self.rhs[source].map(|r| r / weight);
-            self.splat((p % self.width) as f64, (p / self.width) as f64, 1.0, &value);
+            self.add_on_pixel(p, &value);
         }
     }
 

@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 /// f32 suffices: rounding an entry changes the fit by parts in 10^7 of the grey range, and these entries
 /// take most of the memory of the plane fit. All arithmetic is in f64.
 #[derive(Debug, Clone, Copy, Default)]
-struct Couplings {
+pub(super) struct Couplings {
     own: f32,
     right: f32,
     down: f32,
@@ -18,6 +18,52 @@ struct Couplings {
     down_left: f32,
     right_two: f32,
     down_two: f32,
+}
+
+/// Upper left pixel of the cell around a position in an image, and the weights of its four corners (upper
+/// left, upper right, lower left, lower right).
+pub(super) fn bilinear((width, height): (usize, usize), x: f64, y: f64) -> (usize, [f32; 4]) {
+    let column = (x as usize).min(width.saturating_sub(2));
+    let row = (y as usize).min(height.saturating_sub(2));
+    let (s, t) = (x - column as f64, y - row as f64);
+    let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
+    (row * width + column, weights.map(|w| w as f32))
+}
+
+/// The corners of a cell that exist, with their weights; an image one pixel wide has no right corners.
+pub(super) fn corners(
+    (width, height): (usize, usize),
+    pixel: usize,
+    weights: &[f32; 4],
+) -> impl Iterator<Item = (usize, f32)> + use<> {
+    let right = if width > 1 { 1 } else { 0 };
+    let down = if height > 1 { width } else { 0 };
+    let corners = [pixel, pixel + right, pixel + down, pixel + down + right];
+    // A missing corner coincides with an existing one; its weight is 0.
+    corners.into_iter().zip(*weights).filter(|(_, w)| *w != 0.0)
+}
+
+/// Adds the products of the four bilinear weights of a sample, times its own weight.
+pub(super) fn add_sample(entries: &mut [Couplings], width: usize, pixel: usize, w: &[f32; 4], weight: f32) {
+    let v = w.map(|w| weight * w);
+    entries[pixel].own += v[0] * w[0];
+    entries[pixel].right += v[0] * w[1];
+    entries[pixel].down += v[0] * w[2];
+    entries[pixel].down_right += v[0] * w[3];
+    if w[1] != 0.0 || w[3] != 0.0 {
+        let e = &mut entries[pixel + 1];
+        e.own += v[1] * w[1];
+        e.down_left += v[1] * w[2];
+        e.down += v[1] * w[3];
+    }
+    if w[2] != 0.0 || w[3] != 0.0 {
+        let e = &mut entries[pixel + width];
+        e.own += v[2] * w[2];
+        e.right += v[2] * w[3];
+    }
+    if w[3] != 0.0 {
+        entries[pixel + width + 1].own += v[3] * w[3];
+    }
 }
 
 /// The matrix A = B^T B + edges over the pixels of one image.
@@ -33,50 +79,9 @@ impl Stencil {
         Self { width, height, entries: vec![Couplings::default(); width * height] }
     }
 
-    /// Upper left pixel of the cell around a position in the image, and the weights of its four corners
-    /// (upper left, upper right, lower left, lower right).
-    pub(super) fn bilinear(&self, x: f64, y: f64) -> (usize, [f32; 4]) {
-        let column = (x as usize).min(self.width.saturating_sub(2));
-        let row = (y as usize).min(self.height.saturating_sub(2));
-        let (s, t) = (x - column as f64, y - row as f64);
-        let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
-        (row * self.width + column, weights.map(|w| w as f32))
-    }
-
-    /// The corners of a cell that exist, with their weights; an image one pixel wide has no right corners.
-    pub(super) fn corners(
-        &self,
-        pixel: usize,
-        weights: &[f32; 4],
-    ) -> impl Iterator<Item = (usize, f32)> + use<> {
-        let right = if self.width > 1 { 1 } else { 0 };
-        let down = if self.height > 1 { self.width } else { 0 };
-        let corners = [pixel, pixel + right, pixel + down, pixel + down + right];
-        // A missing corner coincides with an existing one; its weight is 0.
-        corners.into_iter().zip(*weights).filter(|(_, w)| *w != 0.0)
-    }
-
-    /// Adds the products of the four bilinear weights of a sample, times its own weight.
-    pub(super) fn add_sample(&mut self, pixel: usize, w: &[f32; 4], weight: f32) {
-        let v = w.map(|w| weight * w);
-        self.entries[pixel].own += v[0] * w[0];
-        self.entries[pixel].right += v[0] * w[1];
-        self.entries[pixel].down += v[0] * w[2];
-        self.entries[pixel].down_right += v[0] * w[3];
-        if w[1] != 0.0 || w[3] != 0.0 {
-            let e = &mut self.entries[pixel + 1];
-            e.own += v[1] * w[1];
-            e.down_left += v[1] * w[2];
-            e.down += v[1] * w[3];
-        }
-        if w[2] != 0.0 || w[3] != 0.0 {
-            let e = &mut self.entries[pixel + self.width];
-            e.own += v[2] * w[2];
-            e.right += v[2] * w[3];
-        }
-        if w[3] != 0.0 {
-            self.entries[pixel + self.width + 1].own += v[3] * w[3];
-        }
+    /// The entries, which [`add_sample`] fills.
+    pub(super) fn entries(&mut self) -> &mut [Couplings] {
+        &mut self.entries
     }
 
     /// Row sum of the sample part, the total weight of the samples at a pixel. Valid before any edge is

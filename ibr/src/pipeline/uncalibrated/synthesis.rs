@@ -63,7 +63,9 @@ pub(super) fn render<const C: usize>(
     report.holes = HoleCount::of(&fit.mask);
     let image = Image::from_values(size, C, fit.values);
     let agreement = Agreement::default();
-    let rendering = Rendering { image, mask: fit.mask, depth: fit.depth, report, agreement };
+    let (mask, depth, counts) = (fit.mask, fit.depth, fit.counts);
+    let views = (0..images.len()).collect();
+    let rendering = Rendering { image, mask, depth, counts, views, report, agreement };
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
 }
 

@@ -1,19 +1,20 @@
-//! Scenes of general cameras: 3 x 4 matrices or COLMAP models, and depths.
+//! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
-use super::{Loaded, Loader, in_order};
-use crate::camera::{Camera, colmap};
+use super::{Goal, Loaded, Loader, in_order};
+use crate::camera::Camera;
 use crate::depth::Measure;
-use crate::scene::{CalibratedSource, Kind, SceneError, TargetSpec, ViewSpec};
+use crate::scene::{CalibratedSource, Kind, SceneError, ViewSpec};
 use nalgebra::Matrix3x4;
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+
+type Matrix = [[f64; 4]; 3];
 
 impl Loader<'_> {
     pub(super) fn calibrated(
         &self,
         views: &[&ViewSpec],
         left_out: Option<&ViewSpec>,
-        target: &TargetSpec,
+        goals: &[Goal],
     ) -> Loaded<(Kind, usize)> {
         let one = |view: &&ViewSpec| {
             let others = [
@@ -22,53 +23,63 @@ impl Loader<'_> {
                 ("disparity_offset", view.disparity_offset.is_some()),
             ];
             self.no_other_kind(view, "calibrated", &others)?;
-            let camera = self.camera_of(view)?;
             let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
             let (image, depth, filled) =
                 self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;
+            let camera = self.camera_of(view, image.size())?;
             Ok((CalibratedSource { image, depth, camera }, filled))
         };
         let sources = in_order(views.par_iter().map(one).collect())?;
         let first = sources[0].0.image.size();
-        let (camera, own) = match left_out {
-            Some(view) => (self.camera_of(view)?, Some(self.image(&view.image)?.size())),
-            None => self.target_camera(target)?,
+        let (cameras, own) = match left_out {
+            Some(view) => {
+                let own = self.image(&view.image)?.size();
+                (vec![self.camera_of(view, own)?], own)
+            }
+            None => self.cameras(goals, first)?,
         };
-        let size = self.size(target, own.unwrap_or(first))?;
+        let size = self.size(goals, own)?;
         let filled = sources.iter().map(|s| s.1).sum();
         let views = sources.into_iter().map(|s| s.0).collect();
-        let cameras = if left_out.is_some() { vec![camera] } else { self.cameras(camera, target)? };
         Ok((Kind::Calibrated { views, cameras, size }, filled))
     }
 
-    /// The camera, or those of the path that begins there.
-    fn cameras(&self, from: Camera, target: &TargetSpec) -> Loaded<Vec<Camera>> {
-        let shares = self.shares(target)?;
-        if shares.is_empty() {
-            return Ok(vec![from]);
-        }
-        let end = TargetSpec {
-            camera: target.to_camera,
-            colmap_image: target.to_colmap_image.clone(),
-            ..TargetSpec::default()
+    /// The virtual cameras, and the size of the image whose camera the first is.
+    fn cameras(&self, goals: &[Goal], first: (usize, usize)) -> Loaded<(Vec<Camera>, (usize, usize))> {
+        let start = |goal: &Goal| {
+            let target = &goal.target;
+            self.target_camera(target.camera.as_ref(), target.colmap_image.as_deref(), goal, first)
         };
-        if !(end.camera.is_some() || end.colmap_image.is_some()) {
-            return Err(
-                self.incomplete("[virtual] needs `to_camera` or `to_colmap_image` for a path of cameras")
-            );
-        }
-        let (to, _) = self.target_camera(&end)?;
-        let on_the_way = |t: f64| {
-            from.towards(&to, t).map_err(|source| SceneError::Camera {
-                path: self.path.into(),
-                which: "the path of [virtual]".into(),
-                source,
-            })
+        let own = match goals.first().map(start).transpose()? {
+            Some((_, Some(size))) => size,
+            _ => first,
         };
-        shares.into_iter().map(on_the_way).collect()
+        let cameras = self.along(
+            goals,
+            |goal| Ok(start(goal)?.0),
+            |goal, from, share| {
+                let to = self.end_of_path(goal, first)?;
+                from.towards(&to, share).map_err(|source| SceneError::Camera {
+                    path: self.path.into(),
+                    which: format!("the path of {}", goal.name),
+                    source,
+                })
+            },
+        )?;
+        Ok((cameras, own))
     }
 
-    fn matrix(&self, rows: &[[f64; 4]; 3], which: &str) -> Loaded<Camera> {
+    fn end_of_path(&self, goal: &Goal, first: (usize, usize)) -> Loaded<Camera> {
+        let (rows, image) = (goal.target.to_camera.as_ref(), goal.target.to_colmap_image.as_deref());
+        if rows.is_none() && image.is_none() {
+            let name = &goal.name;
+            return Err(self
+                .incomplete(format!("{name} needs `to_camera` or `to_colmap_image` for a path of cameras")));
+        }
+        Ok(self.target_camera(rows, image, goal, first)?.0)
+    }
+
+    fn matrix(&self, rows: &Matrix, which: &str) -> Loaded<Camera> {
         let matrix = Matrix3x4::from_fn(|i, j| rows[i][j]);
         Camera::metric(matrix, self.spec.mirrored).map_err(|source| SceneError::Camera {
             path: self.path.into(),
@@ -77,43 +88,36 @@ impl Loader<'_> {
         })
     }
 
-    pub(super) fn model_of(&self, view: &ViewSpec) -> Option<PathBuf> {
-        view.colmap.as_ref().or(self.spec.colmap.as_ref()).map(|folder| self.file(folder))
-    }
-
-    fn camera_of(&self, view: &ViewSpec) -> Loaded<Camera> {
-        match (&view.camera, self.model_of(view)) {
+    fn camera_of(&self, view: &ViewSpec, size: (usize, usize)) -> Loaded<Camera> {
+        match (&view.camera, self.source_of(view)) {
             (Some(rows), _) => self.matrix(rows, &format!("view {:?}", view.label())),
-            (None, Some(folder)) => Ok(self.model_camera(&folder, &view.image.to_string_lossy())?.camera),
+            (None, Some(source)) => {
+                Ok(self.listed_camera(&source, &view.image.to_string_lossy(), size)?.camera)
+            }
             (None, None) => self.need(None, view, "camera", "calibrated"),
         }
     }
 
-    /// The camera of an image in a COLMAP model: by its path, or by the path's last part.
-    fn model_camera(&self, folder: &Path, image: &str) -> Loaded<colmap::ModelCamera> {
-        let model = colmap::read_model(folder)?;
-        let last = |name: &str| name.rsplit('/').next().unwrap_or(name).to_string();
-        let named = model
-            .get(image)
-            .or_else(|| model.iter().find(|(name, _)| last(name) == last(image)).map(|(_, camera)| camera));
-        named.copied().ok_or_else(|| {
-            let reason = format!("{}: the model has no image {image:?}", folder.display());
-            self.incomplete(reason)
-        })
-    }
-
-    fn target_camera(&self, target: &TargetSpec) -> Loaded<(Camera, Option<(usize, usize)>)> {
-        if let Some(rows) = &target.camera {
-            return Ok((self.matrix(rows, "[virtual]")?, None));
+    /// The camera of a matrix or of a listed image, and the size of that image.
+    fn target_camera(
+        &self,
+        rows: Option<&Matrix>,
+        image: Option<&str>,
+        goal: &Goal,
+        first: (usize, usize),
+    ) -> Loaded<(Camera, Option<(usize, usize)>)> {
+        if let Some(rows) = rows {
+            return Ok((self.matrix(rows, &goal.name)?, None));
         }
-        match (&target.colmap_image, &self.spec.colmap) {
-            (Some(image), Some(folder)) => {
-                let found = self.model_camera(&self.file(folder), image)?;
+        match (image, self.common_source()) {
+            (Some(image), Some(source)) => {
+                let found = self.listed_camera(&source, image, first)?;
                 Ok((found.camera, Some(found.size)))
             }
-            _ => Err(self.incomplete(
-                "[virtual] needs a `camera` (3 x 4), or `colmap_image` with a `colmap` folder at the top",
-            )),
+            _ => Err(self.incomplete(format!(
+                "{} needs a `camera` (3 x 4), or `colmap_image` with a `colmap` folder or a `transforms` file at the top",
+                goal.name
+            ))),
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Scenes of a rectified rig: positions and disparities.
 
-use super::{Loaded, Loader, in_order};
+use super::{Goal, Loaded, Loader, in_order};
+use crate::camera::middlebury::read_calibration;
 use crate::depth::Measure;
-use crate::scene::{Kind, RectifiedSource, TargetSpec, ViewSpec};
+use crate::scene::{Kind, RectifiedSource, ViewSpec};
 use rayon::prelude::*;
 
 impl Loader<'_> {
@@ -10,15 +11,11 @@ impl Loader<'_> {
         &self,
         views: &[&ViewSpec],
         left_out: Option<&ViewSpec>,
-        target: &TargetSpec,
+        goals: &[Goal],
     ) -> Loaded<(Kind, usize)> {
-        let position = left_out.map_or(target.position, |v| v.position).ok_or_else(|| {
-            self.incomplete("[virtual] needs a `position` on the line of the rectified rig")
-        })?;
-        let position = self.finite(position, "the virtual view")?;
         let positions = match left_out {
-            Some(_) => vec![position],
-            None => self.positions(position, target)?,
+            Some(view) => vec![self.virtual_position(view.position, "[virtual]")?],
+            None => self.positions(goals)?,
         };
         let one = |view: &&ViewSpec| {
             let others = [
@@ -42,20 +39,44 @@ impl Loader<'_> {
                 (format!("view {:?}", view.label()), format!("view {:?}", views[0].label()));
             source.image.same_size(&name, first, &first_name)?;
         }
+        self.fits_calibration(first)?;
         let filled = sources.iter().map(|s| s.1).sum();
         Ok((Kind::Rectified { views: sources.into_iter().map(|s| s.0).collect(), positions }, filled))
     }
 
-    /// The position, or those of the path that begins there.
-    fn positions(&self, from: f64, target: &TargetSpec) -> Loaded<Vec<f64>> {
-        let shares = self.shares(target)?;
-        if shares.is_empty() {
-            return Ok(vec![from]);
-        }
-        let end = target.to_position.ok_or_else(|| {
-            self.incomplete("[virtual] needs `to_position` for a path on the line of the rectified rig")
+    fn virtual_position(&self, position: Option<f64>, goal: &str) -> Loaded<f64> {
+        let position = position.ok_or_else(|| {
+            self.incomplete(format!("{goal} needs a `position` on the line of the rectified rig"))
         })?;
-        let to = self.finite(end, "the end of the path")?;
-        Ok(shares.into_iter().map(|t| from + (to - from) * t).collect())
+        self.finite(position, "the virtual view")
+    }
+
+    /// The positions, with those of the paths that begin there.
+    fn positions(&self, goals: &[Goal]) -> Loaded<Vec<f64>> {
+        let start = |goal: &Goal| self.virtual_position(goal.target.position, &goal.name);
+        self.along(goals, start, |goal, from, share| {
+            let end = goal.target.to_position.ok_or_else(|| {
+                let name = &goal.name;
+                self.incomplete(format!(
+                    "{name} needs `to_position` for a path on the line of the rectified rig"
+                ))
+            })?;
+            Ok(from + (self.finite(end, "the end of the path")? - from) * share)
+        })
+    }
+
+    /// Refuses images of another size than the calibration file is for: its offset is in their pixels.
+    fn fits_calibration(&self, size: (usize, usize)) -> Loaded<()> {
+        let Some(file) = &self.spec.calib else { return Ok(()) };
+        let (width, height) = read_calibration(&self.file(file))?.size;
+        if (width, height) == size {
+            return Ok(());
+        }
+        Err(self.incomplete(format!(
+            "{} is for images of {width} x {height} pixels, but the views have {} x {}; use the calibration of that size, or give `disparity_offset` (in pixels of these images) in the views instead of `calib`",
+            file.display(),
+            size.0,
+            size.1
+        )))
     }
 }

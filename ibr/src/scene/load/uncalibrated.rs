@@ -1,8 +1,8 @@
 //! Scenes without cameras: images and tracks.
 
-use super::{Loaded, Loader, in_order};
+use super::{Goal, Loaded, Loader, in_order};
 use crate::pipeline::uncalibrated::Target;
-use crate::scene::{Kind, TargetSpec, ViewSpec};
+use crate::scene::{Kind, ViewSpec};
 use crate::uncalibrated::Point;
 use crate::uncalibrated::tracks::Tracks;
 use rayon::prelude::*;
@@ -13,43 +13,53 @@ impl Loader<'_> {
         &self,
         views: &[&ViewSpec],
         left_out: Option<&ViewSpec>,
-        target: &TargetSpec,
+        goals: &[Goal],
     ) -> Loaded<Kind> {
-        let file = self.matches_file(views, target)?;
-        if left_out.is_none() && !self.shares(target)?.is_empty() {
-            return Err(
-                self.incomplete("a path needs cameras or positions; a scene of tracks alone has one view")
-            );
-        }
+        let file = self.matches_file(views, goals)?;
         let tracks = Tracks::read(&self.file(file))?;
-        let virtual_column = match left_out {
-            Some(view) => Some(self.column_in_order(view)?),
-            None => target.from_tracks,
+        let virtual_columns = match left_out {
+            Some(view) => vec![self.column_in_order(view)?],
+            None => goals.iter().filter_map(|goal| goal.target.from_tracks).collect(),
         };
-        let columns = self.columns(views, virtual_column, tracks.columns())?;
+        let columns = self.columns(views, &virtual_columns, tracks.columns())?;
         let images = in_order(views.par_iter().map(|v| self.image(&v.image)).collect())?;
         let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
-        let goal = match (virtual_column, target.between) {
-            (Some(column), _) => Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect()),
-            (None, Some(between)) => Target::Between(between),
-            (None, None) => {
-                let reason =
-                    "[virtual] needs `from_tracks` (a column of the tracks, from 1) or `between` (0 to 1)";
-                return Err(self.incomplete(reason));
-            }
+        let in_column =
+            |column: usize| Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect());
+        let targets = match left_out {
+            Some(_) => virtual_columns.into_iter().map(in_column).collect(),
+            None => self.along(
+                goals,
+                |goal| match (goal.target.from_tracks, goal.target.between) {
+                    (Some(column), _) => Ok(in_column(column)),
+                    (None, Some(between)) => Ok(Target::Between(between)),
+                    (None, None) => Err(self.incomplete(format!(
+                        "{} needs `from_tracks` (a column of the tracks, from 1) or `between` (0 to 1)",
+                        goal.name
+                    ))),
+                },
+                |goal, from, share| match (from, goal.target.to_between) {
+                    (Target::Between(from), Some(to)) => Ok(Target::Between(from + (to - from) * share)),
+                    _ => Err(self.incomplete(format!(
+                        "{} has the end of a path; in a scene of tracks alone a path goes from `between` to `to_between`",
+                        goal.name
+                    ))),
+                },
+            )?,
         };
         let own = match left_out {
             Some(view) => self.image(&view.image)?.size(),
             None => images[0].size(),
         };
-        let size = self.size(target, own)?;
+        let size = self.size(goals, own)?;
         let tracks = tracks.rows().iter().map(pick).collect();
-        Ok(Kind::Uncalibrated { images, tracks, target: goal, size })
+        Ok(Kind::Uncalibrated { images, tracks, targets, size })
     }
 
     /// The file of tracks, if there are at least two views and none has camera keys.
-    fn matches_file<'a>(&'a self, views: &[&ViewSpec], target: &'a TargetSpec) -> Loaded<&'a Path> {
-        let file = self.spec.matches.as_deref().or(target.matches.as_deref()).ok_or_else(|| {
+    fn matches_file<'a>(&'a self, views: &[&ViewSpec], goals: &'a [Goal]) -> Loaded<&'a Path> {
+        let in_goals = || goals.iter().find_map(|goal| goal.target.matches.as_deref());
+        let file = self.spec.matches.as_deref().or_else(in_goals).ok_or_else(|| {
             self.incomplete(
                 "the views have neither `position` and `disparity`, nor `camera` and `depth`, and there is no `matches` file; give cameras or tracks",
             )
@@ -78,13 +88,9 @@ impl Loader<'_> {
     }
 
     /// Columns of the views: their `column`, or the remaining columns in order.
-    fn columns(
-        &self,
-        views: &[&ViewSpec],
-        virtual_column: Option<usize>,
-        count: usize,
-    ) -> Loaded<Vec<usize>> {
-        let given: Vec<usize> = views.iter().filter_map(|v| v.column).chain(virtual_column).collect();
+    fn columns(&self, views: &[&ViewSpec], virtual_columns: &[usize], count: usize) -> Loaded<Vec<usize>> {
+        let given: Vec<usize> =
+            views.iter().filter_map(|v| v.column).chain(virtual_columns.iter().copied()).collect();
         let mut free = (1..=count).filter(|c| !given.contains(c));
         let columns: Vec<usize> = views.iter().filter_map(|v| v.column.or_else(|| free.next())).collect();
         let different = given.iter().enumerate().all(|(i, c)| !given[..i].contains(c));
@@ -92,10 +98,14 @@ impl Loader<'_> {
         if different && known && columns.len() == views.len() {
             return Ok(columns);
         }
+        let and = match virtual_columns {
+            [] => String::new(),
+            [one] => format!(" and the virtual view's column {one}"),
+            many => format!(" and the virtual views' columns {many:?}"),
+        };
         let reason = format!(
-            "the tracks have {count} columns, numbered from 1; {} views{} do not fit, each needs a column of its own",
+            "the tracks have {count} columns, numbered from 1; {} views{and} do not fit, each needs a column of its own",
             views.len(),
-            virtual_column.map_or(String::new(), |w| format!(" and the virtual view's column {w}"))
         );
         Err(self.incomplete(reason))
     }

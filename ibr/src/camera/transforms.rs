@@ -1,0 +1,368 @@
+//! Camera files of neural rendering (`transforms.json` of NeRF, instant-ngp and nerfstudio).
+//!
+//! `transform_matrix` maps camera coordinates to the world: x to the right, y up, z backwards (OpenGL). The
+//! rows y and z of its inverse therefore change their sign. Pixel centres are half-integers there, so the
+//! principal point is shifted by half a pixel on reading.
+
+use super::colmap::ModelCamera;
+use super::{Camera, CameraError, Lens};
+use nalgebra::{Matrix3, Matrix3x4, Matrix4};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Most columns or rows of an image, and the largest focal length in pixels.
+const LARGEST: f64 = 1e6;
+
+/// Errors of a transforms file.
+#[derive(Debug, thiserror::Error)]
+pub enum TransformsError {
+    /// The file cannot be opened.
+    #[error("{}: {source}; check the path (paths in a scene are relative to the scene file)", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is not JSON of the format.
+    #[error("{}: {reason}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        reason: String,
+    },
+    /// A frame that cannot be used.
+    #[error("{}: frame {frame} ({image:?}): {reason}", path.display())]
+    Frame {
+        /// The file.
+        path: PathBuf,
+        /// The frame, from 1.
+        frame: usize,
+        /// Its `file_path`.
+        image: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A frame whose camera cannot be used.
+    #[error("{}: image {image:?}: {source}", path.display())]
+    Camera {
+        /// The file.
+        path: PathBuf,
+        /// Its `file_path`.
+        image: String,
+        /// What is wrong with it.
+        source: CameraError,
+    },
+}
+
+/// The frames of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transforms {
+    path: PathBuf,
+    /// The frames in their order.
+    pub frames: Vec<Frame>,
+}
+
+/// A frame: an image, its pose and the inner parameters of its camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// `file_path`; `.png` is appended to a name without extension.
+    pub image: PathBuf,
+    /// `depth_file_path`.
+    pub depth: Option<PathBuf>,
+    number: usize,
+    /// World to camera, with x to the right, y down and z forwards.
+    pose: Matrix3x4<f64>,
+    inner: Inner,
+}
+
+/// The parameters that a file gives once for all frames, or in each frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+struct Inner {
+    camera_angle_x: Option<f64>,
+    camera_angle_y: Option<f64>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    w: Option<f64>,
+    h: Option<f64>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+    is_fisheye: Option<bool>,
+}
+
+#[derive(Deserialize)]
+struct FileSpec {
+    #[serde(flatten)]
+    inner: Inner,
+    camera_model: Option<String>,
+    frames: Vec<FrameSpec>,
+}
+
+#[derive(Deserialize)]
+struct FrameSpec {
+    file_path: String,
+    depth_file_path: Option<PathBuf>,
+    transform_matrix: Vec<[f64; 4]>,
+    #[serde(flatten)]
+    inner: Inner,
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// [`TransformsError`], with the line or the frame.
+pub fn read_transforms(path: &Path) -> Result<Transforms, TransformsError> {
+    let text = crate::files::read_text(path)
+        .map_err(|source| TransformsError::Read { path: path.into(), source })?;
+    parse_transforms(&text, path)
+}
+
+/// The same from the text of the file; `path` appears in messages.
+///
+/// # Errors
+/// [`TransformsError`].
+pub fn parse_transforms(text: &str, path: &Path) -> Result<Transforms, TransformsError> {
+    let json = |reason: String| TransformsError::Json { path: path.into(), reason };
+    let file: FileSpec = serde_json::from_str(text).map_err(|e| json(e.to_string()))?;
+    let straight = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
+    if let Some(model) = file.camera_model.filter(|model| !straight.contains(&model.as_str())) {
+        let known = straight.join(", ");
+        return Err(json(format!(
+            "camera_model {model:?} is not supported (supported are {known}); undistort the images first"
+        )));
+    }
+    if file.frames.is_empty() {
+        return Err(json("`frames` is empty: there is no image".into()));
+    }
+    let one = |(index, spec): (usize, FrameSpec)| {
+        let number = index + 1;
+        let fault = |reason| TransformsError::Frame {
+            path: path.into(),
+            frame: number,
+            image: spec.file_path.clone(),
+            reason,
+        };
+        let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
+        let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
+        Ok(Frame { image: image_path(&spec.file_path), depth: spec.depth_file_path, number, pose, inner })
+    };
+    let frames = file.frames.into_iter().enumerate().map(one).collect::<Result<_, _>>()?;
+    Ok(Transforms { path: path.into(), frames })
+}
+
+/// The path of an image; the synthetic scenes of NeRF leave the extension out.
+fn image_path(name: &str) -> PathBuf {
+    let path = PathBuf::from(name);
+    if path.extension().is_some() { path } else { PathBuf::from(format!("{name}.png")) }
+}
+
+fn world_to_camera(rows: &[[f64; 4]]) -> Result<Matrix3x4<f64>, String> {
+    if !(3..=4).contains(&rows.len()) {
+        return Err(format!("transform_matrix has {} rows: it needs 3 or 4", rows.len()));
+    }
+    let below = [0.0, 0.0, 0.0, 1.0];
+    if rows.get(3).is_some_and(|last| *last != below) {
+        return Err("the last row of transform_matrix is not 0, 0, 0, 1".into());
+    }
+    let to_world = Matrix4::from_fn(|i, j| rows.get(i).map_or(below[j], |row| row[j]));
+    if to_world.iter().any(|v| !v.is_finite()) {
+        return Err("transform_matrix has numbers that are not finite".into());
+    }
+    let turn = to_world.fixed_view::<3, 3>(0, 0).into_owned();
+    let scale = turn.norm() / 3.0_f64.sqrt();
+    let skew = (turn.transpose() * turn - Matrix3::identity() * scale * scale).norm();
+    if !(scale > 0.0 && skew <= 1e-2 * scale * scale && turn.determinant() > 0.0) {
+        return Err("the left part of transform_matrix is not a rotation".into());
+    }
+    let inverse = to_world.try_inverse().ok_or("transform_matrix has no inverse")?;
+    // Right, down and forwards from right, up and backwards; a scale of the world does not turn rays.
+    let signs = [scale, -scale, -scale];
+    Ok(Matrix3x4::from_fn(|i, j| signs[i] * inverse[(i, j)]))
+}
+
+impl Inner {
+    /// The parameters of the frame, and those of the file where it has none.
+    fn or(self, file: &Self) -> Self {
+        Self {
+            camera_angle_x: self.camera_angle_x.or(file.camera_angle_x),
+            camera_angle_y: self.camera_angle_y.or(file.camera_angle_y),
+            fl_x: self.fl_x.or(file.fl_x),
+            fl_y: self.fl_y.or(file.fl_y),
+            cx: self.cx.or(file.cx),
+            cy: self.cy.or(file.cy),
+            w: self.w.or(file.w),
+            h: self.h.or(file.h),
+            k1: self.k1.or(file.k1),
+            k2: self.k2.or(file.k2),
+            k3: self.k3.or(file.k3),
+            k4: self.k4.or(file.k4),
+            p1: self.p1.or(file.p1),
+            p2: self.p2.or(file.p2),
+            is_fisheye: self.is_fisheye.or(file.is_fisheye),
+        }
+    }
+
+    fn checked(self) -> Result<Self, String> {
+        let bends = [("k3", self.k3), ("k4", self.k4)];
+        if self.is_fisheye == Some(true) || bends.iter().any(|(_, k)| k.is_some_and(|k| k != 0.0)) {
+            return Err("the lens has more than k1, k2, p1 and p2; undistort the images first".into());
+        }
+        if self.fl_x.is_none() && self.camera_angle_x.is_none() {
+            return Err("there is neither `fl_x` nor `camera_angle_x`, which give the focal length".into());
+        }
+        let whole = |v: f64| (1.0..=LARGEST).contains(&v) && v.fract() == 0.0;
+        for (name, side) in [("w", self.w), ("h", self.h)] {
+            if let Some(side) = side.filter(|v| !whole(*v)) {
+                return Err(format!("{name} = {side}: it must be a whole number of pixels"));
+            }
+        }
+        for (name, focal) in [("fl_x", self.fl_x), ("fl_y", self.fl_y)] {
+            if let Some(focal) = focal.filter(|v| !(*v > 0.0 && *v <= LARGEST)) {
+                return Err(format!("{name} = {focal}: it must be a positive number of pixels"));
+            }
+        }
+        for (name, angle) in
+            [("camera_angle_x", self.camera_angle_x), ("camera_angle_y", self.camera_angle_y)]
+        {
+            if let Some(angle) = angle.filter(|v| !(*v > 1e-6 && *v < std::f64::consts::PI)) {
+                return Err(format!("{name} = {angle}: it must be between 0 and pi (radians)"));
+            }
+        }
+        Ok(self)
+    }
+
+    /// The size of the image, if the file gives it.
+    fn size(&self) -> Option<(usize, usize)> {
+        Some((self.w? as usize, self.h? as usize))
+    }
+}
+
+impl Transforms {
+    /// The frame of an image: the one whose path `image` ends with, or else the only one of that name, with or
+    /// without extension.
+    pub fn find(&self, image: &Path) -> Option<&Frame> {
+        let image = plain(image);
+        let mut whole = self.frames.iter().filter(|frame| image.ends_with(plain(&frame.image)));
+        let mut alike = self.frames.iter().filter(|frame| frame.image.file_stem() == image.file_stem());
+        whole.next().or_else(|| alike.next().filter(|_| alike.next().is_none()))
+    }
+
+    /// The camera of a frame. `fallback` is the size of its image if the file does not give it.
+    ///
+    /// # Errors
+    /// [`TransformsError::Camera`].
+    pub fn camera(&self, frame: &Frame, fallback: (usize, usize)) -> Result<ModelCamera, TransformsError> {
+        let inner = &frame.inner;
+        let size = inner.size().unwrap_or(fallback);
+        let (w, h) = (size.0 as f64, size.1 as f64);
+        let from_angle = |side: f64, angle: Option<f64>| angle.map(|a| 0.5 * side / (0.5 * a).tan());
+        let fx = inner.fl_x.or_else(|| from_angle(w, inner.camera_angle_x)).unwrap_or(w);
+        let fy = inner.fl_y.or_else(|| from_angle(h, inner.camera_angle_y)).unwrap_or(fx);
+        let (cx, cy) = (inner.cx.unwrap_or(0.5 * w) - 0.5, inner.cy.unwrap_or(0.5 * h) - 0.5);
+        let k = Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
+        let camera = Camera::metric(k * frame.pose, false).map_err(|source| TransformsError::Camera {
+            path: self.path.clone(),
+            image: frame.image.display().to_string(),
+            source,
+        })?;
+        let bend = |v: Option<f64>| v.unwrap_or(0.0);
+        let radial = [bend(inner.k1), bend(inner.k2)];
+        let tangential = [bend(inner.p1), bend(inner.p2)];
+        let bent = radial.iter().chain(&tangential).any(|b| *b != 0.0);
+        let lens = bent.then(|| Lens::new([fx, fy], [cx, cy], radial, tangential));
+        Ok(ModelCamera { camera: lens.map_or(camera, |lens| camera.with_lens(lens)), size })
+    }
+
+    /// A frame that has no depth.
+    ///
+    /// # Errors
+    /// [`TransformsError::Frame`], always.
+    pub fn without_depth(&self, frame: &Frame) -> TransformsError {
+        TransformsError::Frame {
+            path: self.path.clone(),
+            frame: frame.number,
+            image: frame.image.display().to_string(),
+            reason: "it has no `depth_file_path`, and views are rendered from images with depth; give the scene [[view]] tables with `image` and `depth`".into(),
+        }
+    }
+}
+
+/// A path without the `./` at its beginning.
+fn plain(path: &Path) -> PathBuf {
+    path.components().filter(|part| *part != std::path::Component::CurDir).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    const FILE: &str = r#"{
+        "camera_angle_x": 1.5707963267948966, "w": 200, "h": 100, "k1": 0.0,
+        "frames": [
+            {"file_path": "./train/r_0", "transform_matrix":
+                [[1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 1, 4], [0, 0, 0, 1]]},
+            {"file_path": "b.jpg", "depth_file_path": "b.png", "fl_x": 50, "fl_y": 60, "cx": 90.5, "cy": 40.5,
+             "transform_matrix": [[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]]}
+        ]
+    }"#;
+
+    fn read(text: &str) -> Result<Transforms, String> {
+        parse_transforms(text, Path::new("t.json")).map_err(|e| e.to_string())
+    }
+
+    /// A camera at (2, 3, 4) that looks along -z: right is +x, up is +y. The focal length is half the width.
+    #[test]
+    fn open_gl_axes_become_pixels() {
+        let file = read(FILE).unwrap();
+        let frame = file.find(Path::new("train/r_0.png")).unwrap();
+        let found = file.camera(frame, (7, 7)).unwrap();
+        assert_eq!(found.size, (200, 100));
+        let (x, y, depth) = found.camera.project(&Vector3::new(3.0, 3.5, 2.0));
+        assert!((depth - 2.0).abs() < 1e-12 && (x - (99.5 + 50.0)).abs() < 1e-9, "{x} {depth}");
+        assert!((y - (49.5 - 25.0)).abs() < 1e-9, "{y}");
+        // The second looks along -x of the world: its z axis, which points backwards, is +x.
+        let second = file.find(Path::new("images/b.png")).unwrap();
+        assert_eq!(second.depth.as_deref(), Some(Path::new("b.png")));
+        let camera = file.camera(second, (7, 7)).unwrap().camera;
+        let (x, y, depth) = camera.project(&Vector3::new(-5.0, 1.0, -1.0));
+        assert!((depth - 5.0).abs() < 1e-12, "{depth}");
+        assert!((x - (90.0 + 10.0)).abs() < 1e-9 && (y - (40.0 - 12.0)).abs() < 1e-9, "{x} {y}");
+    }
+
+    #[test]
+    fn a_size_that_the_file_lacks_is_that_of_the_image() {
+        let file = read(&FILE.replace("\"w\": 200, \"h\": 100,", "")).unwrap();
+        let found = file.camera(&file.frames[0], (64, 48)).unwrap();
+        let (x, y, _) = found.camera.project(&Vector3::new(2.0, 3.0, 0.0));
+        assert_eq!((found.size, x, y), ((64, 48), 31.5, 23.5));
+    }
+
+    #[test]
+    fn faults_are_named_with_their_frames() {
+        for (from, to, words) in [
+            ("\"frames\"", "\"frame\"", "missing field `frames`"),
+            ("[0, 0, 1, 4]", "[0, 0, 1, 1e999]", "line"),
+            ("[0, 0, 1, 4]", "[0, 0, 9, 4]", "frame 1 (\"./train/r_0\"): the left part"),
+            ("[0, 0, 0, 1]]},", "[0, 0, 1, 1]]},", "last row"),
+            (", [0, 0, 0, 1]]},", ", [0, 0, 0, 1], [0, 0, 0, 1]]},", "5 rows"),
+            ("\"k1\": 0.0", "\"k3\": 0.1", "undistort"),
+            ("\"k1\": 0.0", "\"camera_model\": \"OPENCV_FISHEYE\"", "OPENCV_FISHEYE"),
+            ("\"w\": 200", "\"w\": 0.5", "w = 0.5"),
+            ("\"camera_angle_x\": 1.57", "\"camera_angle_x\": 9.57", "camera_angle_x = 9.57"),
+            ("\"camera_angle_x\"", "\"angle\"", "neither `fl_x`"),
+            ("\"fl_x\": 50", "\"fl_x\": -50", "fl_x = -50"),
+        ] {
+            let message = read(&FILE.replacen(from, to, 1)).unwrap_err();
+            assert!(message.starts_with("t.json") && message.contains(words), "{to}: {message}");
+        }
+        assert!(read(r#"{"fl_x": 1, "frames": []}"#).unwrap_err().contains("empty"));
+    }
+}

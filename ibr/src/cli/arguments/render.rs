@@ -1,0 +1,199 @@
+//! Arguments of `hybank-ibr render`.
+
+use super::SceneArguments;
+use crate::image::Levels;
+use crate::interpolate::{Degree, HoleFill};
+use crate::partial::{Densify, Segmentwise};
+use crate::pipeline::{Method, RenderSettings};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+const RENDER_EXAMPLES: &str = "Examples:
+  hybank-ibr render scene.toml -o middle.png --truth photo.png
+      renders the view that [virtual] asks for and prints PSNR, SSIM, mean absolute error and coverage
+  hybank-ibr render scene.toml --view left -o left.png
+      leaves out the view \"left\" and renders it from the other views
+  hybank-ibr render - -o - < scene.toml > middle.png
+      reads the scene from standard input (paths are relative to the working directory) and writes a PNG to
+      standard output
+  hybank-ibr render path.toml -o - | ffmpeg -i - film.mp4
+      renders the views on a path as one film; path.toml has several [[virtual]] tables, or an end and frames
+
+A scene of a rectified rig:
+  [[view]]
+  name = \"left\"
+  image = \"im2.png\"
+  position = 0.0
+  disparity = \"disp2.png\"
+  disparity_scale = 4.0
+  [[view]]
+  name = \"right\"
+  image = \"im6.png\"
+  position = 1.0
+  disparity = \"disp6.png\"
+  disparity_scale = 4.0
+  [virtual]
+  position = 0.5
+
+A scene of general cameras has camera = [[..4..],[..],[..]] and depth = \"d.pfm\" in place of position and
+disparity, or colmap = \"folder\" or transforms = \"transforms.json\" at the top; [virtual] has camera = ..
+and size = [w, h], or camera_of = \"image.png\". A scene without cameras has
+views with images only, and matches = \"tracks.txt\"; [virtual] has from_tracks = 3 (a column, counted
+from 1) or between = 0.5.";
+
+#[derive(Debug, Args)]
+#[command(after_help = RENDER_EXAMPLES)]
+pub(in crate::cli) struct RenderArguments {
+    #[command(flatten)]
+    pub(in crate::cli) scene: SceneArguments,
+    /// Image to write (.png, .jpg, .ppm, .pgm, .pfm) or film (.y4m); `-` is standard output: PNG, and Y4M of
+    /// several views.
+    #[arg(short, long, value_name = "FILE")]
+    pub(in crate::cli) output: PathBuf,
+    /// Also write a mask: white for seen pixels, grey for cracks, black for disocclusions.
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) mask: Option<PathBuf>,
+    /// Also write the depth of the virtual view (.pfm): disparities for a baseline of one of a rectified
+    /// rig, else depths; NaN in holes.
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) depth: Option<PathBuf>,
+    /// Also write how many visible samples fall on each pixel (.png of 16 bits or .pfm).
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) count: Option<PathBuf>,
+    /// Also write where the view differs from --truth: as a picture, black is no error and white the largest, or
+    /// as numbers in grey levels (.pfm).
+    #[arg(long, value_name = "FILE", requires = "truth")]
+    pub(in crate::cli) error: Option<PathBuf>,
+    /// Write a PNG with an alpha channel: transparent where no view shows what is there.
+    #[arg(long)]
+    pub(in crate::cli) alpha: bool,
+    /// Frames per second that a film says it has.
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(in crate::cli) fps: u32,
+    /// Use only the K views nearest to the virtual camera, by angle and distance.
+    #[arg(long, value_name = "K")]
+    pub(in crate::cli) nearest: Option<usize>,
+    /// Bits per value of a PNG, 8 or 16.
+    #[arg(long, value_name = "N", default_value = "8", value_parser = levels)]
+    pub(in crate::cli) bits: Levels,
+    /// How samples are interpolated.
+    #[arg(long, value_enum, default_value_t = MethodName::Auto)]
+    pub(in crate::cli) method: MethodName,
+    /// How holes are filled.
+    #[arg(long, value_enum, default_value_t = FillName::Background)]
+    pub(in crate::cli) fill: FillName,
+    /// How coarse depth is made dense.
+    #[arg(long, value_enum, default_value_t = DensifyName::Segmentwise)]
+    pub(in crate::cli) densify: DensifyName,
+    /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
+    #[arg(long)]
+    pub(in crate::cli) drop_unknown: bool,
+    /// Degree of the row splines.
+    #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
+    pub(in crate::cli) degree: DegreeName,
+    /// Weight of the slope penalty of the row fit, px^2.
+    #[arg(long, value_name = "L", allow_negative_numbers = true)]
+    pub(in crate::cli) lambda: Option<f64>,
+    /// Weight of the differences of neighbouring coefficients of the row fit.
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub(in crate::cli) tau: Option<f64>,
+    /// Radius of the depth test, px.
+    #[arg(long, value_name = "PX", allow_negative_numbers = true)]
+    pub(in crate::cli) epsilon: Option<f64>,
+    /// Depth difference from which a sample is hidden, as a share of the nearer depth.
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    pub(in crate::cli) relative_depth: Option<f64>,
+    /// Seed of the robust estimators (scenes without cameras).
+    #[arg(long, default_value_t = 1)]
+    pub(in crate::cli) seed: u64,
+    /// Exchange near and far (scenes without cameras).
+    #[arg(long)]
+    pub(in crate::cli) reverse_order: bool,
+}
+
+fn levels(text: &str) -> Result<Levels, String> {
+    match text {
+        "8" => Ok(Levels::Eight),
+        "16" => Ok(Levels::Sixteen),
+        _ => Err("give 8 or 16".into()),
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(in crate::cli) enum MethodName {
+    /// rows for rectified rigs, plane for other scenes.
+    Auto,
+    /// One spline per row (rectified rigs only).
+    Rows,
+    /// One spline for the whole image.
+    Plane,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(in crate::cli) enum FillName {
+    /// Continue the farther side into holes between surfaces; bridge cracks within one.
+    Background,
+    /// Let the fitted spline bridge all holes.
+    Bridge,
+    /// Leave holes black.
+    Leave,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(in crate::cli) enum DensifyName {
+    /// Interpolate within segments of image and depth.
+    Segmentwise,
+    /// Bilinear interpolation everywhere.
+    Bilinear,
+    /// The value of the nearest sample.
+    Nearest,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(in crate::cli) enum DegreeName {
+    /// Linear B-splines.
+    Linear,
+    /// Cubic B-splines.
+    Cubic,
+}
+
+impl RenderArguments {
+    /// The settings that were typed over the defaults; `offset` is that of the scene.
+    pub(in crate::cli) fn settings(&self, offset: f64) -> RenderSettings {
+        let mut settings = RenderSettings { nearest: self.nearest, ..self.scene.settings(offset) };
+        settings.method = match self.method {
+            MethodName::Auto => Method::Auto,
+            MethodName::Rows => Method::Rows,
+            MethodName::Plane => Method::Plane,
+        };
+        let stage = &mut settings.interpolation;
+        stage.holes.fill = match self.fill {
+            FillName::Background => HoleFill::Background,
+            FillName::Bridge => HoleFill::Bridge,
+            FillName::Leave => HoleFill::Leave,
+        };
+        stage.fit.degree = match self.degree {
+            DegreeName::Linear => Degree::Linear,
+            DegreeName::Cubic => Degree::Cubic,
+        };
+        let mut typed = |slot: fn(&mut crate::interpolate::Settings) -> &mut f64, value: Option<f64>| {
+            if let Some(value) = value {
+                *slot(stage) = value;
+            }
+        };
+        typed(|s| &mut s.fit.lambda, self.lambda);
+        typed(|s| &mut s.fit.tau, self.tau);
+        typed(|s| &mut s.depth_test.epsilon, self.epsilon);
+        typed(|s| &mut s.depth_test.relative, self.relative_depth);
+        settings
+    }
+
+    /// How coarse depth is made dense.
+    pub(in crate::cli) fn densify(&self) -> Densify {
+        match self.densify {
+            DensifyName::Segmentwise => Densify::Segmentwise(Segmentwise::default()),
+            DensifyName::Bilinear => Densify::Bilinear,
+            DensifyName::Nearest => Densify::Nearest,
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The scene of a command: its file, what was typed with it, and the photograph to compare with.
+
+use super::arguments::SceneArguments;
+use super::failure::Failure;
+use super::output;
+use crate::files;
+use crate::image::{Image, read_image_within};
+use crate::partial::Densify;
+use crate::pipeline::RenderSettings;
+use crate::scene::{self, LoadOptions, Scene, SceneSpec};
+use std::path::{Path, PathBuf};
+
+/// A scene file, read but not loaded.
+pub(super) struct Source {
+    path: PathBuf,
+    pub(super) spec: SceneSpec,
+}
+
+impl SceneArguments {
+    /// Checks that need no file.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        match self.depth_step {
+            0 => Err(Failure::Usage("--depth-step 0: the step must be at least 1".into())),
+            _ => Ok(()),
+        }
+    }
+
+    /// The settings that both commands know; `offset` is that of the scene.
+    pub(super) fn settings(&self, offset: f64) -> RenderSettings {
+        let offset = self.offset.unwrap_or(offset);
+        RenderSettings { offset, keep_exposure: self.keep_exposure, ..RenderSettings::default() }
+    }
+
+    /// The input files that were typed.
+    pub(super) fn inputs(&self) -> Vec<&Path> {
+        [Some(self.file.as_path()), self.truth.as_deref()].into_iter().flatten().collect()
+    }
+
+    /// The photograph to compare with.
+    pub(super) fn truth(&self) -> Result<Option<Image>, Failure> {
+        let read = |path| read_image_within(path, self.max_pixels);
+        self.truth.as_deref().map(read).transpose().map_err(Failure::input)
+    }
+
+    /// Reads the scene file, with the views that other files list.
+    pub(super) fn source(&self) -> Result<Source, Failure> {
+        let (path, text) = text(&self.file)?;
+        let spec = scene::parse(&text, &path).map_err(Failure::input)?;
+        let spec = scene::complete(&spec, &path).map_err(Failure::input)?;
+        Ok(Source { path, spec })
+    }
+
+    /// Loads the scene.
+    pub(super) fn load(&self, source: &Source, densify: Densify, fill: bool) -> Result<Scene, Failure> {
+        let options = LoadOptions {
+            view: self.view.clone(),
+            depth_step: self.depth_step,
+            densify,
+            fill,
+            max_pixels: self.max_pixels,
+        };
+        scene::load(&source.spec, &source.path, &options).map_err(Failure::input)
+    }
+}
+
+impl Source {
+    /// Refuses outputs that are one file, or an input of the scene.
+    pub(super) fn refuse_overlaps(&self, outputs: &[&Path]) -> Result<(), Failure> {
+        let files = self.spec.files(self.path.parent().unwrap_or(Path::new("")));
+        output::refuse_overlaps(outputs, &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())
+    }
+}
+
+/// The name and the text of a scene file, `-` for standard input.
+fn text(path: &Path) -> Result<(PathBuf, String), Failure> {
+    if output::is_standard(path) {
+        let text = files::text(std::io::stdin().lock())
+            .map_err(|e| Failure::Input(format!("standard input: {e}")))?;
+        return Ok((PathBuf::from("<stdin>"), text));
+    }
+    let path = path.to_owned();
+    let text = files::read_text(&path)
+        .map_err(|source| Failure::input(scene::SceneError::Read { path: path.clone(), source }))?;
+    Ok((path, text))
+}

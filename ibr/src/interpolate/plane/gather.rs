@@ -1,0 +1,172 @@
+//! Samples enter the normal equations: into the whole image, or into several parts of it at a time.
+
+use super::PlaneProblem;
+use super::stencil::{Couplings, add_sample, bilinear, corners};
+use crate::interpolate::{HoleSettings, InterpolationError, check_samples};
+use crate::occlusion::LARGEST_SPACING;
+use crate::sample::Sample;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Bands that are made at a time. More would use more memory: a band has half a million samples of 48 bytes.
+const AT_A_TIME: usize = 4;
+
+/// Some rows of the image with all that samples change there.
+struct Part<'a, const C: usize> {
+    size: (usize, usize),
+    holes: HoleSettings,
+    /// Index of the first pixel.
+    first: usize,
+    entries: &'a mut [Couplings],
+    rhs: &'a mut [[f32; C]],
+    depth: &'a mut [f32],
+    distance: &'a mut [f32],
+    counts: &'a mut [u16],
+}
+
+impl<'a, const C: usize> Part<'a, C> {
+    /// The part before a pixel of the image, and the rest.
+    fn split(self, pixel: usize) -> (Self, Self) {
+        let at = pixel - self.first;
+        let (entries, rhs) = (self.entries.split_at_mut(at), self.rhs.split_at_mut(at));
+        let (depth, distance) = (self.depth.split_at_mut(at), self.distance.split_at_mut(at));
+        let counts = self.counts.split_at_mut(at);
+        let (size, holes) = (self.size, self.holes);
+        let part = |first, entries, rhs, depth, distance, counts| Self {
+            size,
+            holes,
+            first,
+            entries,
+            rhs,
+            depth,
+            distance,
+            counts,
+        };
+        (
+            part(self.first, entries.0, rhs.0, depth.0, distance.0, counts.0),
+            part(pixel, entries.1, rhs.1, depth.1, distance.1, counts.1),
+        )
+    }
+
+    /// Adds samples that touch this part only; returns how many lie in the image.
+    fn add(&mut self, samples: &[Sample<C>]) -> usize {
+        let (right, bottom) = (self.size.0 as f64 - 1.0, self.size.1 as f64 - 1.0);
+        let mut added = 0;
+        for s in samples {
+            let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
+            if inside {
+                self.register(s);
+                self.splat(s.x.clamp(0.0, right), s.y.clamp(0.0, bottom), s.weight, &s.value);
+                added += 1;
+            }
+        }
+        added
+    }
+
+    /// Adds a sample to both sides of the normal equations.
+    fn splat(&mut self, x: f64, y: f64, weight: f32, value: &[f32; C]) {
+        let (pixel, weights) = bilinear(self.size, x, y);
+        let pixel = pixel - self.first;
+        add_sample(self.entries, self.size.0, pixel, &weights, weight);
+        for (q, w) in corners(self.size, pixel, &weights) {
+            let w = weight * w;
+            self.rhs[q].iter_mut().zip(value).for_each(|(r, v)| *r += w * v);
+        }
+    }
+
+    /// Records the depth of the sample at the pixels within its reach, half a gap, unless another sample is
+    /// closer, and counts it at its nearest pixel.
+    fn register(&mut self, s: &Sample<C>) {
+        let (width, height) = self.size;
+        let half = self.holes.reach(s.spacing);
+        let range = |centre: f64, length: usize| {
+            let end = ((centre + half).floor() + 1.0) as usize;
+            ((centre - half).ceil() as usize).min(length)..end.min(length)
+        };
+        let columns = range(s.x, width);
+        for row in range(s.y, height) {
+            for column in columns.clone() {
+                let (dx, dy) = (s.x - column as f64, s.y - row as f64);
+                let squared = dx * dx + dy * dy;
+                let p = row * width + column - self.first;
+                if squared <= half * half && (squared as f32) < self.distance[p] {
+                    (self.distance[p], self.depth[p]) = (squared as f32, s.depth);
+                }
+            }
+        }
+        let (column, row) = ((s.x + 0.5) as usize, (s.y + 0.5) as usize);
+        let count = &mut self.counts[row.min(height - 1) * width + column.min(width - 1) - self.first];
+        *count = count.saturating_add(1);
+    }
+}
+
+impl<const C: usize> PlaneProblem<C> {
+    fn whole(&mut self) -> Part<'_, C> {
+        Part {
+            size: (self.width, self.height),
+            holes: self.settings.holes,
+            first: 0,
+            entries: self.stencil.entries(),
+            rhs: &mut self.rhs,
+            depth: &mut self.depth,
+            distance: &mut self.distance,
+            counts: &mut self.counts,
+        }
+    }
+
+    /// Adds visible samples. Samples more than half a pixel outside the image are ignored; samples less far
+    /// outside are moved to its border.
+    ///
+    /// # Errors
+    /// [`InterpolationError::NotFinite`].
+    pub fn add(&mut self, samples: &[Sample<C>]) -> Result<(), InterpolationError> {
+        check_samples(samples)?;
+        self.added += self.whole().add(samples);
+        Ok(())
+    }
+
+    /// Adds the samples of bands of rows, which `make` returns: those whose row, cut to the image, lies in the
+    /// band. The bands follow each other and cover the image. Bands that do not touch are made and added at the
+    /// same time; the result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// As [`PlaneProblem::add`].
+    pub fn add_bands(
+        &mut self,
+        bands: &[Range<usize>],
+        make: impl Fn(&Range<usize>) -> Vec<Sample<C>> + Sync,
+    ) -> Result<(), InterpolationError> {
+        // A sample changes the row below it and the rows within its reach.
+        let margin = self.settings.holes.reach(LARGEST_SPACING).ceil() as usize + 1;
+        if bands.iter().any(|band| band.len() < 2 * margin) {
+            return bands.iter().try_for_each(|band| self.add(&make(band)));
+        }
+        for parity in 0..2 {
+            let chosen: Vec<&Range<usize>> = bands.iter().skip(parity).step_by(2).collect();
+            for group in chosen.chunks(AT_A_TIME) {
+                let (parts, height, width) = (Vec::with_capacity(group.len()), self.height, self.width);
+                let mut parts: Vec<(&Range<usize>, Part<'_, C>)> = parts;
+                let mut rest = self.whole();
+                for band in group {
+                    let (_, after) = rest.split(band.start.saturating_sub(margin) * width);
+                    let (part, after) = after.split((band.end + margin).min(height) * width);
+                    parts.push((band, part));
+                    rest = after;
+                }
+                let add = |(band, mut part): (&Range<usize>, Part<'_, C>)| {
+                    let samples = make(band);
+                    check_samples(&samples).map(|()| part.add(&samples))
+                };
+                let added: Result<Vec<usize>, _> = parts.into_par_iter().map(add).collect();
+                self.added += added?.into_iter().sum::<usize>();
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a sample of weight one on a pixel.
+    pub(super) fn add_on_pixel(&mut self, pixel: usize, value: &[f32; C]) {
+        let (x, y) = ((pixel % self.width) as f64, (pixel / self.width) as f64);
+        self.whole().splat(x, y, 1.0, value);
+    }
+}

@@ -1,0 +1,80 @@
+//! Scenes whose views are listed in files of other programs.
+
+use super::Loaded;
+use crate::camera::middlebury::read_calibration;
+use crate::camera::transforms::read_transforms;
+use crate::scene::{SceneError, SceneSpec, ViewSpec};
+use std::path::Path;
+
+/// Stored numbers per unit of depth of a depth map with whole numbers, unless the scene says another one:
+/// millimetres, as nerfstudio writes them.
+const STORED_PER_UNIT: f64 = 1000.0;
+
+/// The scene with what its `transforms` or `calib` file adds: views if it lists none, and disparity offsets.
+/// `path` is the scene file.
+///
+/// # Errors
+/// [`SceneError`] of the file.
+pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
+    let mut whole = spec.clone();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    if let (Some(file), true) = (&spec.transforms, spec.view.is_empty()) {
+        whole.view = transforms_views(file, folder)?;
+    }
+    if let Some(file) = &spec.calib {
+        if spec.view.is_empty() {
+            whole.view = pair_views(file, folder);
+        }
+        let calibration = read_calibration(&folder.join(file))?;
+        for view in &mut whole.view {
+            let offset = *view.disparity_offset.get_or_insert(calibration.offset);
+            if offset != calibration.offset {
+                return Err(SceneError::Incomplete {
+                    path: path.into(),
+                    reason: format!(
+                        "view {:?} has disparity_offset = {offset}, but {} says {}; remove one of them",
+                        view.label(),
+                        file.display(),
+                        calibration.offset
+                    ),
+                });
+            }
+        }
+    }
+    Ok(whole)
+}
+
+/// The frames with depth; paths in the file are relative to it.
+fn transforms_views(file: &Path, folder: &Path) -> Loaded<Vec<ViewSpec>> {
+    let all = read_transforms(&folder.join(file))?;
+    let beside = file.parent().unwrap_or(Path::new(""));
+    let view = |frame: &crate::camera::transforms::Frame| {
+        let depth = frame.depth.as_ref()?;
+        let whole_numbers = depth.extension().is_some_and(|ending| ending == "png");
+        Some(ViewSpec {
+            name: Some(frame.image.display().to_string()),
+            image: beside.join(&frame.image),
+            depth: Some(beside.join(depth)),
+            depth_scale: whole_numbers.then_some(STORED_PER_UNIT),
+            ..ViewSpec::default()
+        })
+    };
+    let views: Vec<ViewSpec> = all.frames.iter().filter_map(view).collect();
+    match all.frames.first() {
+        Some(frame) if views.is_empty() => Err(all.without_depth(frame).into()),
+        _ => Ok(views),
+    }
+}
+
+/// im0.png and im1.png with disp0.pfm and, if it is there, disp1.pfm.
+fn pair_views(file: &Path, folder: &Path) -> Vec<ViewSpec> {
+    let beside = file.parent().unwrap_or(Path::new(""));
+    let view = |k: usize| ViewSpec {
+        image: beside.join(format!("im{k}.png")),
+        position: Some(k as f64),
+        disparity: Some(beside.join(format!("disp{k}.pfm"))),
+        ..ViewSpec::default()
+    };
+    let both = folder.join(beside).join("disp1.pfm").exists();
+    (0..if both { 2 } else { 1 }).map(view).collect()
+}
