@@ -2,7 +2,7 @@
 
 use super::expected::{Expected, Pattern};
 use super::lines::{Found, Lines, fit_lines};
-use super::{Cause, MeasureError, Settings, Spectrum, Window};
+use super::{Cause, MeasureError, Settings, Spectrum, UnsettledEnds, Window};
 use crate::sine_fit::{Channel, Estimate, SineFit, find_tones, fit, locate};
 use crate::units::{Decibels, Hertz, Radians};
 
@@ -68,6 +68,8 @@ pub struct Measurement {
     /// Spurs that cannot be seen, because they coincide with a tone, with the constant or with half the
     /// rate.
     pub hidden: Vec<Cause>,
+    /// The ends of the record, if they hold most of what no line explains.
+    pub unsettled_ends: Option<UnsettledEnds>,
     /// The spectrum of the record without its constant.
     #[serde(skip)]
     pub spectrum: Spectrum,
@@ -187,6 +189,7 @@ impl Figures<'_> {
             noise_bandwidth_bins: window.noise_bandwidth(),
             spurs: self.spurs(),
             hidden,
+            unsettled_ends: UnsettledEnds::of(&self.lines.rest),
             spectrum: Spectrum::new(&self.completed(), self.tones.rate, window),
         }
     }

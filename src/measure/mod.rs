@@ -34,6 +34,7 @@
 mod alignment;
 mod cause;
 mod compare;
+mod ends;
 mod error;
 mod expected;
 mod interpolate;
@@ -47,6 +48,7 @@ mod window;
 
 pub use cause::Cause;
 pub use compare::{Band, Comparison, compare};
+pub use ends::UnsettledEnds;
 pub use error::MeasureError;
 pub use measurement::{Measurement, Spur, Tone, measure};
 pub use spectrum::Spectrum;

@@ -377,3 +377,25 @@ fn recordings_that_cannot_be_compared_are_refused() {
         ));
     }
 }
+
+#[test]
+fn ends_that_have_not_settled_are_found() {
+    let tone: Vec<f64> = (0..8192).map(|n| 0.9 * (0.7317 * n as f64).sin()).collect();
+    let mut random = Random(5);
+    let noisy: Vec<f64> = tone.iter().map(|x| x + 1e-4 * gaussian(&mut random)).collect();
+    let measured = |samples: &[f64]| measure(samples, RATE, &Settings::default()).unwrap();
+    assert_eq!(measured(&noisy).unsettled_ends, None);
+    // A filter with a memory of some ten samples had no input before the first one.
+    let mut late = noisy.clone();
+    late.iter_mut().enumerate().take(200).for_each(|(n, x)| *x *= 1.0 - (-(n as f64) / 10.0).exp());
+    let found = measured(&late);
+    let ends = found.unsettled_ends.unwrap();
+    assert!((64..=256).contains(&ends.samples) && ends.raise.0 > 20.0, "{ends:?}");
+    let rest = measured(&late[ends.samples..late.len() - ends.samples]);
+    assert!(rest.unsettled_ends.is_none());
+    assert!(rest.snr.0 > found.snr.0 + ends.raise.0 - 1.0, "{} {} {ends:?}", rest.snr, found.snr);
+    // Noise that grows all along, and a loud middle, are no ends.
+    let grown: Vec<f64> =
+        tone.iter().zip(&noisy).enumerate().map(|(n, (x, y))| x + (y - x) * n as f64 / 100.0).collect();
+    assert_eq!(measured(&grown).unsettled_ends, None);
+}

@@ -46,6 +46,16 @@ fn the_calibration_loop_runs() {
     for name in ["measured.toml", "measured.json", "measured.wav"] {
         assert!(folder.path().join(name).is_file(), "{name}");
     }
+    // Measured again: interleaving spurs of the bank for the drawing, and of the bank for the converters.
+    let spurs: Vec<f64> =
+        shown.lines().filter_map(|line| line.strip_prefix("interleaving")).map(decibels).collect();
+    assert!(spurs.len() == 2 && spurs[0] > -45.0 && spurs[1] < -75.0, "{spurs:?}");
+}
+
+/// The first number of a line of figures.
+#[cfg(unix)]
+fn decibels(line: &str) -> f64 {
+    line.split_whitespace().next().unwrap().parse().unwrap()
 }
 
 /// Two recordings with clocks of their own become one; the last line is that of the log.

@@ -64,7 +64,7 @@ fn few_states_of_the_thesis_example_are_proven() {
 #[test]
 fn a_loss_allowed_is_kept() {
     for (method, db) in [(Method::Iir, 0.0), (Method::Iir, 3.0), (Method::H2, 1.5)] {
-        let found = reduced(thesis(10, &[1.2, 0.6]), method, Reduction::Loss(db));
+        let found = reduced(thesis(6, &[1.2, 0.6]), method, Reduction::Loss(db));
         let record = found.reduction.clone().unwrap();
         check(&found, record.full.order);
         assert!(record.reduced.order < record.full.order, "{record:?}");

@@ -93,7 +93,7 @@ fn intervals_cover_with_one_alias_and_with_three() {
             let found = calibrate(&spec, &records, Evidence::AnySignal, BLIND).unwrap();
             all.extend(scaled(&truth, &spec, &found));
         }
-        assert_covers(&all, trials.min(100));
+        assert_covers(&all, trials);
         let rms = (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt();
         assert!((0.8..1.15).contains(&rms), "{ratio}: rms error over sigma {rms}");
     }

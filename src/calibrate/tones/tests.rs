@@ -98,7 +98,7 @@ fn three_tones_give_the_cutoff_and_fewer_are_refused() {
         assert!(found.misfit.is_some_and(|misfit| misfit < 2.0), "{:?}", found.misfit);
     }
     assert!(squares.iter().all(|sigma| *sigma < 2e-3), "{squares:?}");
-    assert_covers(&scaled, trials.min(1000));
+    assert_covers(&scaled, trials);
     let truth = with_errors(&spec, &random_errors(&mut dice, 4, SKEWS));
     let records = tones(&truth, &hertz(&list[..2]), 1024, 1e-4, &mut dice);
     assert_eq!(

@@ -37,6 +37,12 @@ pub(in crate::cli) fn warnings(measured: &Measurement) -> Vec<String> {
             names.join("; ")
         ));
     }
+    if let Some(ends) = measured.unsettled_ends {
+        warnings.push(format!(
+            "the first and the last {} samples raise the noise by {:.1} dB or more: a filter may not have settled there; --skip {} leaves them out",
+            ends.samples, ends.raise.0, ends.samples
+        ));
+    }
     warnings
 }
 
