@@ -62,13 +62,13 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
     let channels = channels(&top, &common)?;
     let uncertainty =
         top.optional("uncertainty").map(|v| uncertainty(&v, channels.len(), fast_period)).transpose()?;
-    let is_overriding = overrides.tracking.is_some();
+    let given = [("tracking", overrides.tracking.is_some()), ("solver", overrides.solver.is_some())];
     let design = design(table.as_ref(), &top, overrides, channels.len())?;
-    design.check_tracking(uncertainty.as_ref(), channels.len()).map_err(|problem| {
-        if is_overriding {
-            Fault::overriding("tracking", problem)
+    design.check_beside(uncertainty.as_ref(), channels.len()).map_err(|KeyProblem { key, problem }| {
+        if given.contains(&(key, true)) {
+            Fault::overriding(key, problem)
         } else {
-            table.as_ref().unwrap_or(&top).fault_at(Some("tracking"), problem)
+            table.as_ref().unwrap_or(&top).fault_at(Some(key), problem)
         }
     })?;
     Ok(Spec { name, fast_period, ratio, latency, target, channels, uncertainty, design })

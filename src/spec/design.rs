@@ -200,8 +200,33 @@ impl DesignSpec {
         check_optimised_taps(taps, channels.saturating_mul(functions))
     }
 
+    /// Checks what depends on the errors of the channels.
+    pub(super) fn check_beside(
+        &self,
+        uncertainty: Option<&UncertaintySpec>,
+        channels: usize,
+    ) -> Result<(), KeyProblem> {
+        blame("solver", self.check_robust_solver(uncertainty, channels))?;
+        blame("tracking", self.check_tracking(uncertainty, channels))
+    }
+
+    /// Robust banks are an exchange of frequencies.
+    fn check_robust_solver(
+        &self,
+        uncertainty: Option<&UncertaintySpec>,
+        channels: usize,
+    ) -> Result<(), SpecProblem> {
+        match self.solver {
+            Some(Solver::Kyp) if uncertainty.is_some_and(|table| table.is_a_box(channels)) => {
+                let remedy = "a bank for uncertain channels is designed by solver = \"sampled\"; leave out one of the two";
+                Err(SpecProblem::Conflict { first: "solver = \"kyp\"", second: "[uncertainty]", remedy })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Taps can only follow delays that are uncertain.
-    pub(super) fn check_tracking(
+    fn check_tracking(
         &self,
         uncertainty: Option<&UncertaintySpec>,
         channels: usize,

@@ -32,6 +32,7 @@ pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use crate::units::{FastPeriods, Hertz, Seconds};
+use design::KeyProblem;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A spec with the units resolved (seconds) and the omitted channel filters filled in.
@@ -309,7 +310,8 @@ impl Spec {
             uncertainty.check(self.channels.len(), self.fast_period)?;
         }
         self.design.check(self.channels.len())?;
-        self.design.check_tracking(self.uncertainty.as_ref(), self.channels.len())
+        let beside = self.design.check_beside(self.uncertainty.as_ref(), self.channels.len());
+        beside.map_err(|KeyProblem { problem, .. }| problem)
     }
 
     /// True in normalised time: times are in fast periods, and the rates of recordings are free.

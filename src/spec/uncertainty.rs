@@ -103,6 +103,12 @@ impl UncertaintySpec {
         (0..channels).map(|i| self.offset.as_ref().map_or(0.0, |offset| offset.of(i))).collect()
     }
 
+    /// Whether a delay, a gain or a cut-off is uncertain.
+    pub(super) fn is_a_box(&self, channels: usize) -> bool {
+        self.delays(channels).iter().any(|delay| *delay > Seconds(0.0))
+            || self.gains(channels).into_iter().chain(self.cutoffs(channels)).any(|share| share > 0.0)
+    }
+
     fn relative<T: Copy + Default>(&self, written: Option<&PerChannel<T>>, channels: usize) -> Vec<T> {
         let exact = self.reference_channel();
         let of = |i| written.filter(|_| exact != Some(i)).map_or_else(T::default, |value| value.of(i));

@@ -77,6 +77,12 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     choose_latency(&open, &|_| ())
 }
 
+/// The errors for which the bank of a spec is made robust.
+pub(super) fn robust_box(spec: &Spec) -> Option<ErrorBox> {
+    let errors = ErrorBox::of(spec.uncertainty.as_ref()?, spec.channels.len());
+    (spec.design.method == Method::Fir && !errors.is_point()).then_some(errors)
+}
+
 /// The settings of the method, from a spec with taps.
 ///
 /// # Errors
@@ -87,11 +93,9 @@ pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
         Ok::<_, DesignError>(Problem::new(&slow, 0)?.merge_channels(Repeats::AtOneInstant).problem)
     };
     let separate = spec.design.method == Method::Separation;
-    let errors = spec.uncertainty.as_ref().map(|table| ErrorBox::of(table, spec.channels.len()));
-    let errors = errors.filter(|errors| spec.design.method == Method::Fir && !errors.is_point());
     Ok(Settings {
         taps: taps(spec),
-        robust: errors.map(|errors| RobustProblem { spec: spec.clone(), errors }),
+        robust: robust_box(spec).map(|errors| RobustProblem { spec: spec.clone(), errors }),
         gamma_margin: spec.design.gamma_margin,
         solver: spec.design.solver,
         at_slow_rate: separate.then(at_slow_rate).transpose()?,

@@ -22,6 +22,11 @@ impl Effort {
         Self { seconds: self.seconds * count, ..self }
     }
 
+    /// So many of the same kind, all of them kept.
+    pub(super) fn each(self, count: f64) -> Self {
+        Self { seconds: self.seconds * count, bytes: self.bytes * count }
+    }
+
     /// Both at the same time.
     pub(super) fn with(self, other: Self) -> Self {
         Self { seconds: self.seconds + other.seconds, bytes: self.bytes + other.bytes }

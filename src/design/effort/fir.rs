@@ -21,6 +21,16 @@ pub(super) fn design(sizes: &Sizes) -> Effort {
     exchange.then(norm(sizes).times(NORMS)).then(noncausal(sizes))
 }
 
+/// Plants and norms of all scenarios, and an exchange of pairs of a frequency and a scenario.
+pub(super) fn robust(sizes: &Sizes, scenarios: usize) -> Effort {
+    let scenarios = scenarios as f64;
+    let exchange = grid(sizes)
+        .each(scenarios + 1.0)
+        .with(iteration_on(sizes, 2.0 * sizes.points()).times(ROUNDS * ITERATIONS))
+        .with(errors(sizes).times(scenarios * ROUNDS));
+    exchange.then(norm(sizes).times(2.0 * scenarios)).then(noncausal(sizes).times(scenarios))
+}
+
 /// Scenarios of a box of delays, about.
 const SCENARIOS: f64 = 32.0;
 
@@ -30,7 +40,7 @@ pub(super) fn affine(sizes: &Sizes) -> Effort {
     let points = 2.0 * sizes.channels * sizes.points();
     let rounds = 2.0 * ROUNDS;
     let exchange = grid(sizes)
-        .times(SCENARIOS)
+        .each(SCENARIOS)
         .with(iteration_on(&functions, points).times(rounds * ITERATIONS))
         .with(errors(sizes).times(SCENARIOS * rounds));
     exchange.then(norm(sizes).times(2.0 * SCENARIOS))

@@ -17,7 +17,9 @@ pub use amount::Effort;
 pub use progress::{Observer, Stage, unobserved};
 
 use super::DesignError;
+use super::choices::robust_box;
 use super::merging::Repeats;
+use super::methods::robust_fir::scenario_count;
 use super::problem::Problem;
 use crate::spec::{Method, Solver, Spec};
 use memory::machine_memory;
@@ -68,12 +70,20 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
 fn synthesis(spec: &Spec, sizes: &Sizes) -> Effort {
     match spec.design.method {
         Method::Fir if spec.design.solver == Some(Solver::Kyp) => fir::by_lmi(sizes),
-        Method::Fir if spec.design.tracking.is_some() => fir::design(sizes).then(fir::affine(sizes)),
-        Method::Fir => fir::design(sizes),
+        Method::Fir => fir::design(sizes).then(robust(spec, sizes)),
         Method::Iir => recursive::design(sizes),
         Method::H2 => recursive::mean_square(sizes),
         Method::Sinc => fir::judged(sizes),
         Method::Separation => fir::separation(sizes),
+    }
+}
+
+/// The part of a design that is for uncertain channels.
+fn robust(spec: &Spec, sizes: &Sizes) -> Effort {
+    match robust_box(spec) {
+        None => Effort::default(),
+        Some(_) if spec.design.tracking.is_some() => fir::affine(sizes),
+        Some(errors) => fir::robust(sizes, scenario_count(&errors)),
     }
 }
 
@@ -128,6 +138,9 @@ fn remedy(spec: &Spec) -> &'static str {
         }
         Method::Fir if spec.design.tracking.is_some() => {
             "use fewer taps or channels, a smaller ratio, or leave out tracking"
+        }
+        Method::Fir if spec.uncertainty.is_some() => {
+            "use fewer taps, a smaller ratio or fewer channels, or leave out [uncertainty]"
         }
         Method::Fir => "use fewer taps, a smaller ratio or fewer channels",
         Method::Iir | Method::H2 if spec.design.reduction.is_some() => {

@@ -33,6 +33,21 @@ fn more_of_anything_takes_longer() {
 }
 
 #[test]
+fn each_scenario_of_uncertain_channels_costs_time() {
+    let seconds = |uncertainty: &str| {
+        let text = format!(
+            "ratio = 2\nlatency = 10\n{PAIR}\ndesign = {{ method = \"fir\", taps = 22 }}\n{uncertainty}"
+        );
+        estimate(&spec(&text), false).unwrap().seconds
+    };
+    let (nominal, delays) = (seconds(""), seconds("uncertainty = { delay_samples = 0.1 }"));
+    let both = seconds("uncertainty = { delay_samples = 0.1, cutoff = 0.01 }");
+    assert!(delays > 3.0 * nominal && both > 1.3 * delays, "{nominal} {delays} {both}");
+    let exact = seconds("uncertainty = { delay_samples = [0.1, 0.0] }");
+    assert_eq!(exact, nominal, "the reference channel has no error");
+}
+
+#[test]
 fn what_cannot_end_is_refused_with_the_figure_and_the_way_out() {
     let huge =
         spec(&format!("ratio = 2\nlatency = 1000\n{PAIR}\ndesign = {{ method = \"fir\", taps = 5000 }}"));

@@ -98,6 +98,12 @@ fn every_mistake_has_its_line_and_its_message() {
         ("[design]", "[uncertainty]\ncutoff = 2\n[design]", 17, "0.01 is one per cent"),
         ("[design]", "[uncertainty]\nreference = 3\n[design]", 17, "one of the channels 1 to 2"),
         ("[design]", "[uncertainty]\ndely = 0.1\n[design]", 17, "did you mean \"delay\""),
+        (
+            "taps = 22",
+            "taps = 22\nsolver = 'kyp'\n[uncertainty]\ndelay = 0.1",
+            19,
+            "a bank for uncertain channels is designed by solver = \"sampled\"",
+        ),
         // Design.
         ("method = \"fir\"", "method = \"fri\"", 17, "did you mean \"fir\""),
         ("method = \"fir\"", "method = \"kalman\"", 17, "choose one of fir, iir, h2, sinc, separation"),

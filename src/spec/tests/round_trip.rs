@@ -71,6 +71,7 @@ prop_compose! {
             ..UncertaintySpec::default()
         });
         let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
+        let solver = solver.filter(|solver| *solver != Solver::Kyp || !uncertainty.as_ref().is_some_and(|table| table.is_a_box(channels.len())));
         let follows = method.has_tracking() && solver != Some(Solver::Kyp) && bits.is_none() && moves;
         Spec {
             name, fast_period, ratio, latency, target,

@@ -47,6 +47,11 @@ pub(super) fn scenarios(errors: &ErrorBox) -> Vec<ErrorPoint> {
     }
 }
 
+/// The number of [`scenarios`].
+pub(crate) fn scenario_count(errors: &ErrorBox) -> usize {
+    scenarios(errors).len()
+}
+
 fn lattice_point(errors: &ErrorBox, sides: &[Side], per_side: &[usize], index: usize) -> ErrorPoint {
     let mut rest = index;
     let shares: Vec<f64> = per_side
