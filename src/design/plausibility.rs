@@ -11,6 +11,8 @@ use std::f64::consts::{PI, TAU};
 const NARROW: f64 = 0.01;
 /// Samples nearer to each other than this (in fast periods) hardly differ.
 const NEAR: f64 = 1e-3;
+/// Samples nearer to each other than this are at one instant up to rounding.
+const TOGETHER: f64 = 1e-9;
 /// Bandwidths in rad/s between these look as if one sample were the unit of time.
 const NORMALISED: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 
@@ -48,8 +50,9 @@ pub enum Implausible {
     },
     /// Two channels that sample almost at one instant.
     #[error(
-        "channels {first} and {second} sample {apart:.1e} fast periods apart; channels that sample at one instant \
-         lower the noise and nothing else"
+        "channels {first} and {second} sample {} modulo the slow period; channels that sample at one instant lower \
+         the noise and nothing else",
+        distance(*.apart)
     )]
     SameInstant {
         /// Number of the channel, from 1.
@@ -101,6 +104,10 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<Implau
     }
     // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not.
     (normalised > PI && channel.is_none()).then_some(Implausible::Wide { place, edge, nyquist })
+}
+
+fn distance(apart: f64) -> String {
+    if apart < TOGETHER { "at one instant".to_owned() } else { format!("{apart:.1e} fast periods apart") }
 }
 
 fn remedy(filter: &FilterSpec, edge: Hertz) -> &'static str {
@@ -197,6 +204,9 @@ mod tests {
             };
             assert!((got - apart).abs() < 1e-9, "{delays:?}: {got}");
         }
+        // Two fast periods apart: rounding must not show as a distance.
+        let text = audio("9000.0", [2.6, 0.6])[0].to_string();
+        assert!(text.starts_with("channels 1 and 2 sample at one instant modulo the slow period"), "{text}");
         assert_eq!(audio("9000.0", [2.5, 0.3]), [Implausible::LongSpan { span: 2.2, ratio: 2 }]);
     }
 }
