@@ -164,60 +164,90 @@ impl<'a> Report<'a> {
     }
 
     pub(in crate::cli) fn text(&self) -> String {
-        let size = match (self.taps, self.states) {
+        let parts = [
+            self.heading(),
+            self.gamma_text(),
+            self.mean_text(),
+            self.words.as_ref().map(Words::text).unwrap_or_default(),
+            self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
+            self.robust.map(|study| robust_text(study, self.gamma.worst_case)).unwrap_or_default(),
+            self.tracking.map(|study| tracking_text(study, self.gamma.tracked)).unwrap_or_default(),
+            format!("designed in {:.1} ms, {} iterations\n", self.seconds * 1e3, self.iterations),
+            self.proof.text(),
+        ];
+        parts.concat()
+    }
+}
+
+impl Report<'_> {
+    /// The spec as it was understood, and the sizes of the bank.
+    fn heading(&self) -> String {
+        let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
+        format!(
+            "{}\n{}: {}, {} channels, ratio {}, {}, latency {}{chosen}\n",
+            self.understood,
+            self.bank,
+            self.method.name(),
+            self.channels,
+            self.ratio,
+            self.size(),
+            self.latency,
+        )
+    }
+
+    fn size(&self) -> String {
+        match (self.taps, self.states) {
             (Some(taps), _) if self.taps_chosen => {
                 format!("{taps} taps per channel (chosen; set `taps` to change it)")
             }
             (Some(taps), _) => format!("{taps} taps per channel"),
             (_, Some(states)) => format!("{states} states"),
             _ => String::new(),
-        };
-        let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
+        }
+    }
+
+    /// The worst case, with its scale and its bounds.
+    fn gamma_text(&self) -> String {
+        let Gamma { norm, lower, noncausal, .. } = *self.gamma;
         format!(
-            "{}\n{}: {}, {} channels, ratio {}, {size}, latency {}{chosen}\n\
-             gamma      {} (computed norm of this bank; worst at {:.4} modulo the slow rate)\n\
+            "gamma      {} (computed norm of this bank; worst at {:.4} modulo the slow rate)\n\
              {}lower      {} ({})\n\
-             noncausal  {} ({})\n\
-             H2 error   {} (rms, for white noise of unit density at the analog input)\n\
-             SNR        {} for a signal with the target's spectrum\n\
-             noise gain {} (converters' noise at the output: {:.3e} of full scale)\n\
-             {}{}{}{}designed in {:.1} ms, {} iterations\n{}",
-            self.understood,
-            self.bank,
-            self.method.name(),
-            self.channels,
-            self.ratio,
-            self.latency,
-            number(self.gamma.norm),
+             noncausal  {} ({})\n",
+            number(norm),
             self.peak_hertz,
             self.scale_text(),
-            number(self.gamma.lower),
-            match self.method {
-                _ if self.gamma.lower.is_none() => UNRESOLVED,
-                Method::Fir => "no bank of this length is better",
-                Method::Iir => "no causal bank is better",
-                _ if self.proof.causal() => "no causal bank is better; this method does not aim at gamma",
-                Method::H2 | Method::Sinc | Method::Separation =>
-                    "no bank at all is better; this method does not aim at gamma",
-            },
-            number(self.gamma.noncausal),
-            if self.gamma.noncausal.is_none() { UNRESOLVED } else { "no latency is better" },
-            number(Some(self.mean.rms_error)),
-            decibels(self.scale.rms_reference, self.mean.rms_error),
-            number(Some(self.mean.noise_gain)),
-            self.mean.output_noise,
-            self.words.as_ref().map(Words::text).unwrap_or_default(),
-            self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
-            self.robust.map(|study| robust_text(study, self.gamma.worst_case)).unwrap_or_default(),
-            self.tracking.map(|study| tracking_text(study, self.gamma.tracked)).unwrap_or_default(),
-            self.seconds * 1e3,
-            self.iterations,
-            self.proof.text(),
+            number(lower),
+            self.lower_meaning(),
+            number(noncausal),
+            if noncausal.is_none() { UNRESOLVED } else { "no latency is better" },
         )
     }
-}
 
-impl Report<'_> {
+    fn lower_meaning(&self) -> &'static str {
+        match self.method {
+            _ if self.gamma.lower.is_none() => UNRESOLVED,
+            Method::Fir => "no bank of this length is better",
+            Method::Iir => "no causal bank is better",
+            _ if self.proof.causal() => "no causal bank is better; this method does not aim at gamma",
+            Method::H2 | Method::Sinc | Method::Separation => {
+                "no bank at all is better; this method does not aim at gamma"
+            }
+        }
+    }
+
+    /// What is to be expected of signals and noise that are not the worst ones.
+    fn mean_text(&self) -> String {
+        let MeanAnalysis { rms_error, noise_gain, output_noise, .. } = self.mean;
+        format!(
+            "H2 error   {} (rms, for white noise of unit density at the analog input)\n\
+             SNR        {} for a signal with the target's spectrum\n\
+             noise gain {} (converters' noise at the output: {output_noise:.3e} of full scale)\n",
+            number(Some(rms_error)),
+            decibels(self.scale.rms_reference, rms_error),
+            number(Some(noise_gain)),
+        )
+    }
+
     /// gamma beside that of the simplest banks.
     fn scale_text(&self) -> String {
         let Some(gamma) = self.gamma.norm else { return String::new() };
