@@ -1,11 +1,14 @@
 //! Line charts as SVG text.
 
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 /// plotters rounds SVG points to whole pixels, so charts are drawn larger and the view box scales them down.
 const OVERSIZE: u32 = 4;
 const WIDTH: u32 = 960;
 const HEIGHT: u32 = 420;
+/// Curves nearer to each other than this share of the height look like one.
+const SAME_PLACE: f64 = 0.005;
 const COLOURS: [RGBColor; 6] = [
     RGBColor(31, 119, 180),
     RGBColor(214, 39, 40),
@@ -99,6 +102,7 @@ impl Chart {
     ) -> Result<(), Box<dyn std::error::Error>> {
         let root = SVGBackend::with_string(svg, (WIDTH * OVERSIZE, HEIGHT * OVERSIZE)).into_drawing_area();
         root.fill(&WHITE)?;
+        let height = y.end - y.start;
         let text = |size: u32| ("sans-serif", size * OVERSIZE).into_font();
         let text_style = TextStyle::from(text(10)).color(&RGBColor(60, 60, 60));
         let mut chart = ChartBuilder::on(&root)
@@ -116,14 +120,20 @@ impl Chart {
             .axis_desc_style(text(13))
             .light_line_style(RGBColor(238, 238, 238))
             .draw()?;
-        for (series, colour) in self.series.iter().zip(COLOURS.iter().cycle()) {
+        for ((k, series), colour) in self.series.iter().enumerate().zip(COLOURS.iter().cycle()) {
             let points = series.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
             let style = colour.stroke_width(OVERSIZE + OVERSIZE / 2);
-            let length = 20 * OVERSIZE as i32;
-            chart
-                .draw_series(LineSeries::new(points, style))?
-                .label(&series.label)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + length, y)], style));
+            let covered = self.series[..k].iter().filter(|earlier| covers(series, earlier, height)).count();
+            let line = |(x, y): (i32, i32)| [(x, y), (x + 20 * OVERSIZE as i32, y)];
+            let entry = match Dashes::over(covered) {
+                None => chart
+                    .draw_series(LineSeries::new(points, style))?
+                    .legend(move |at| PathElement::new(line(at), style)),
+                Some(Dashes { on, off }) => chart
+                    .draw_series(DashedLineSeries::new(points, on, off, style))?
+                    .legend(move |at| DashedPathElement::new(line(at).into_iter(), on / 2, off / 2, style)),
+            };
+            entry.label(&series.label);
         }
         for (marks, colour) in marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())) {
             let points = || marks.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
@@ -151,6 +161,29 @@ impl Chart {
         root.present()?;
         Ok(())
     }
+}
+
+/// Dashes of a line, pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Dashes {
+    on: i32,
+    off: i32,
+}
+
+impl Dashes {
+    /// For a line over so many others that lie in the same place; each shows in the gaps of the next one.
+    fn over(covered: usize) -> Option<Self> {
+        let covered = i32::try_from(covered).unwrap_or(i32::MAX);
+        let unit = OVERSIZE as i32;
+        (covered > 0).then(|| Self { on: (12 / covered).max(2) * unit, off: 10 * unit })
+    }
+}
+
+/// Whether most of a curve lies on an earlier one: one colour would hide the other.
+fn covers(series: &Series, earlier: &Series, height: f64) -> bool {
+    let both = series.points.iter().zip(&earlier.points).filter(|(a, b)| a.1.is_finite() && b.1.is_finite());
+    let near = both.clone().filter(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < SAME_PLACE * height).count();
+    near > 0 && 2 * near >= both.count()
 }
 
 fn widened(values: impl Iterator<Item = f64>, share: f64) -> std::ops::Range<f64> {
@@ -190,6 +223,20 @@ mod tests {
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
         assert!(svg.contains("width=\"960\"") && svg.contains("viewBox=\"0 0 3840 1680\""));
         assert!(svg.contains("error &lt;1&gt;"));
+    }
+
+    /// The second curve is dashed, so that the first shows in its gaps; curves apart are solid.
+    #[test]
+    fn curves_in_one_place_are_both_seen() {
+        let lines = |apart: f64| {
+            let mut chart = chart((0..40).map(|x| (f64::from(x), 1.0 + f64::from(x))).collect());
+            let points = chart.series[0].points.iter().map(|(x, y)| (*x, y + apart)).collect();
+            chart.series.push(Series { label: "second".into(), points });
+            chart.to_svg().unwrap().matches("stroke=\"#D62728\"").count()
+        };
+        // A line of the chart and one of the legend.
+        assert_eq!(lines(2.0), 2);
+        assert!(lines(0.0) > 10 && lines(0.05) > 10);
     }
 
     #[test]
