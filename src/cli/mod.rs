@@ -18,6 +18,7 @@ mod file_kind;
 mod folder;
 mod follow;
 mod fuse;
+mod fused;
 mod gaps;
 mod help;
 mod import;

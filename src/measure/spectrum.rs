@@ -37,6 +37,18 @@ impl Spectrum {
         self.bin * k as f64
     }
 
+    /// At most `columns` points, the largest bin of each stretch of equally many: its frequency and amplitude. No
+    /// line is lost, however narrow it is.
+    pub fn columns(&self, columns: usize) -> Vec<(Hertz, f64)> {
+        let width = self.amplitudes.len().div_ceil(columns.max(1)).max(1);
+        let point = |(column, bins): (usize, &[f64])| {
+            let larger = |best: (usize, f64), (i, a): (usize, &f64)| if *a > best.1 { (i, *a) } else { best };
+            let (at, largest) = bins.iter().enumerate().fold((0, 0.0), larger);
+            (self.frequency(column * width + at), largest)
+        };
+        self.amplitudes.chunks(width).enumerate().map(point).collect()
+    }
+
     /// The mean square between two bins (`from` included, `to` not): a sine counts A^2 / 2, noise its
     /// variance.
     pub fn mean_square(&self, from: usize, to: usize) -> f64 {

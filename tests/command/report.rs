@@ -61,6 +61,14 @@ fn captures_are_shown_before_and_after() {
 }
 
 #[test]
+fn captures_that_are_too_short_are_named() {
+    let desk = desk();
+    desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "12", "-o", "cap"]);
+    let args = ["report", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "r.html"];
+    desk.refused(1, &args, &["cap/ch1.wav, cap/ch2.wav: 6 frames", "needs 16", "longer captures"]);
+}
+
+#[test]
 fn what_cannot_be_reported_is_refused() {
     let desk = desk();
     page(&desk, &[]);

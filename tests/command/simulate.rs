@@ -361,7 +361,9 @@ fn the_demo_shows_the_order_of_the_methods() {
     let report = desk.json(&["demo", "-o", "shown", "--json"]);
     let snr = |k: usize| number(&report, &format!("/contenders/{k}/snr_db"));
     assert!(snr(0) > 66.0 && snr(1) > 66.0, "{report}");
-    assert!((2..5).all(|k| snr(k) < 40.0), "{report}");
+    assert!((2..4).all(|k| snr(k) < 40.0) && snr(5) < 20.0, "{report}");
+    // The best of the other methods, as SciPy's `CubicSpline` has it from the same files.
+    assert!((snr(4) - 51.0).abs() < 0.1, "{report}");
     for file in
         ["ch1.wav", "ch2.wav", "target.wav", "fused-fir.wav", "fused-iir.wav", "step.svg", "error.svg"]
     {

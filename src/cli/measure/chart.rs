@@ -4,7 +4,7 @@ use super::super::capture_file::CaptureFile;
 use super::Report;
 use crate::measure::{Cause, Measurement, Settings, Spectrum, Spur};
 use crate::plot::{Chart, Marks, Series};
-use crate::units::Decibels;
+use crate::units::{Decibels, Hertz};
 
 /// Points of a curve; of several bins the largest is drawn.
 const COLUMNS: usize = 1900;
@@ -78,15 +78,8 @@ impl Scale {
 
     /// The largest bin of each column.
     fn points(&self, spectrum: &Spectrum) -> Vec<(f64, f64)> {
-        let width = spectrum.amplitudes.len().div_ceil(COLUMNS).max(1);
-        let point = |(column, bins): (usize, &[f64])| {
-            let (at, largest) = bins
-                .iter()
-                .enumerate()
-                .fold((0, 0.0), |best, (i, a)| if *a > best.1 { (i, *a) } else { best });
-            (spectrum.frequency(column * width + at).0 / self.hertz, self.level(largest))
-        };
-        spectrum.amplitudes.chunks(width).enumerate().map(point).collect()
+        let point = |(frequency, amplitude): (Hertz, f64)| (frequency.0 / self.hertz, self.level(amplitude));
+        spectrum.columns(COLUMNS).into_iter().map(point).collect()
     }
 
     /// The tones and the largest spurs above the noise, by cause.

@@ -1,20 +1,23 @@
 //! The spectra of captures, plainly interleaved and fused.
 
+use super::super::bank_file::name;
 use super::super::capture_file::Whole;
+use super::super::fused::fused;
 use super::super::match_bank::{check_channels, output_rate};
+use super::super::say::warn;
 use super::Failure;
 use super::page::Figure;
 use crate::bank::Bank;
 use crate::io::{MultiReader, ReadOptions};
 use crate::measure::{Spectrum, Window};
 use crate::plot::{Chart, Series};
+use crate::pipeline::WholeSettings;
 use crate::quantity::scale_of;
-use crate::runtime::{Options, Precision, Stream};
 use crate::simulate::interleaved;
 use crate::units::{Decibels, Hertz};
 use std::path::{Path, PathBuf};
 
-/// Frames that are shown; more would only make the lines denser.
+/// Frames that are used; more would only make the lines denser.
 const MOST_FRAMES: usize = 1 << 20;
 /// Frames that the spectra need.
 const LEAST_FRAMES: usize = 16;
@@ -28,6 +31,9 @@ pub(super) struct Spectra {
     rate: Hertz,
     interleaved: Vec<f64>,
     fused: Vec<f64>,
+    /// The captures go on after the frames that were read.
+    is_cut: bool,
+    frames: usize,
 }
 
 impl Spectra {
@@ -38,17 +44,23 @@ impl Spectra {
         let mut reader = reader.ok_or_else(|| Failure::input("interrupted; nothing was written"))?;
         check_channels(bank, path, &reader)?;
         let rate = Hertz(output_rate(bank, &reader)?);
-        let mut channels = Whole::read(&mut reader, MOST_FRAMES)?.channels;
+        let Whole { mut channels, is_cut } = Whole::read(&mut reader, MOST_FRAMES)?;
+        reader.warnings().iter().for_each(|warning| warn(&warning.to_string()));
+        let names = inputs.iter().map(|input| name(input).to_string()).collect::<Vec<_>>().join(", ");
         let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
         if frames < LEAST_FRAMES {
-            let message = format!("the captures have {frames} frames; a spectrum needs {LEAST_FRAMES}");
-            return Err(Failure::Input(message));
+            return Err(Failure::Input(format!(
+                "{names}: {frames} frames, and a spectrum needs {LEAST_FRAMES}; give longer captures, or none"
+            )));
+        }
+        if is_cut {
+            warn(&format!("{names}: only the first {frames} frames are on the page"));
         }
         // What was lost is a zero, as `fuse` has it without --gaps.
         channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
-        let fused = fuse(bank, &channels, frames)?;
+        let fused = fused(bank, &channels, WholeSettings::default())?;
         let interleaved = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
-        Ok(Self { rate, interleaved, fused })
+        Ok(Self { rate, interleaved, fused, is_cut, frames })
     }
 
     /// Both spectra in one chart.
@@ -57,9 +69,12 @@ impl Spectra {
         let all = spectra.iter().flat_map(|spectrum| &spectrum.amplitudes);
         let floor = Decibels::of_amplitude(all.fold(f64::MIN_POSITIVE, |most, a| most.max(*a))).0 - DEPTH;
         let (factor, unit) = scale_of(0.5 * self.rate.0, "Hz");
+        let point = |(frequency, amplitude): (Hertz, f64)| {
+            (frequency.0 * factor, Decibels::of_amplitude(amplitude).0.max(floor))
+        };
         let series = |(label, spectrum): (&str, &Spectrum)| Series {
             label: label.to_owned(),
-            points: points(spectrum, factor, floor),
+            points: spectrum.columns(COLUMNS).into_iter().map(point).collect(),
         };
         let chart = Chart {
             title: "The captures".into(),
@@ -67,31 +82,15 @@ impl Spectra {
             y_label: "amplitude, dB of full scale".into(),
             series: ["plain interleaving", "fused"].into_iter().zip(&spectra).map(series).collect(),
         };
-        let caption = "The same captures, interleaved as if they were taken in turn, and fused by the bank. Lines that \
-                       only the first has are images of the signal: errors of the converters' instants and filters.";
-        Figure::new(&chart, caption).map_err(Failure::input)
+        let part = if self.is_cut {
+            format!("the first {} frames of the captures", self.frames)
+        } else {
+            "the captures".to_owned()
+        };
+        let caption = format!(
+            "The spectra of {part}, interleaved as if they were taken in turn, and fused by the bank. Lines that only \
+             the first has are images of the signal: errors of the converters' instants and filters."
+        );
+        Figure::new(&chart, &caption).map_err(Failure::input)
     }
-}
-
-/// The output of the bank without its latency.
-fn fuse(bank: &Bank, channels: &[Vec<f64>], frames: usize) -> Result<Vec<f64>, Failure> {
-    let options = Options { precision: Precision::Double, ..Options::default() };
-    let mut stream = Stream::new(&bank.plan(options).map_err(Failure::input)?);
-    let samples: Vec<f64> =
-        (0..frames).flat_map(|k| channels.iter().map(move |channel| channel[k])).collect();
-    let mut fast = vec![0.0; frames * bank.ratio];
-    stream.process(&samples, &mut fast).map_err(Failure::input)?;
-    fast.drain(..bank.latency.min(fast.len() / 2));
-    Ok(fast)
-}
-
-/// The largest bin of each column.
-fn points(spectrum: &Spectrum, factor: f64, floor: f64) -> Vec<(f64, f64)> {
-    let width = spectrum.amplitudes.len().div_ceil(COLUMNS).max(1);
-    let point = |(column, bins): (usize, &[f64])| {
-        let largest = bins.iter().fold(0.0, |most: f64, a| most.max(*a));
-        let level = Decibels::of_amplitude(largest).0.max(floor);
-        (spectrum.frequency(column * width).0 * factor, level)
-    };
-    spectrum.amplitudes.chunks(width).enumerate().map(point).collect()
 }
