@@ -1,12 +1,14 @@
 //! Line charts as SVG text.
 
-use plotters::element::DashedPathElement;
+use super::legend::{Dashes, Entry, Legend, Look};
 use plotters::prelude::*;
 
 /// plotters rounds SVG points to whole pixels, so charts are drawn larger and the view box scales them down.
-const OVERSIZE: u32 = 4;
+pub(super) const OVERSIZE: u32 = 4;
 const WIDTH: u32 = 960;
-const HEIGHT: u32 = 420;
+const HEIGHT: u32 = 450;
+/// Pixels left and right of all.
+const SIDE: u32 = 10;
 /// Curves nearer to each other than this share of the height look like one.
 const SAME_PLACE: f64 = 0.005;
 const COLOURS: [RGBColor; 6] = [
@@ -93,6 +95,22 @@ impl Chart {
         Ok((widened(points().map(|p| p.0), 0.0), widened(points().map(|p| p.1), 0.06)))
     }
 
+    fn looks(&self, height: f64) -> Vec<Look> {
+        let covered = |k: usize| {
+            self.series[..k].iter().filter(|earlier| covers(&self.series[k], earlier, height)).count()
+        };
+        (0..self.series.len()).map(|k| Look::Line(dashes_over(covered(k)))).collect()
+    }
+
+    fn entries<'a>(&'a self, looks: &'a [Look], marks: &'a [Marks]) -> impl Iterator<Item = Entry<'a>> {
+        let lines = self.series.iter().zip(looks).map(|(series, look)| (series.label.as_str(), *look));
+        let points = marks.iter().map(|marks| (marks.label.as_str(), Look::Points));
+        lines.chain(points).zip(COLOURS.iter().cycle()).map(|((label, look), colour)| {
+            let style = if look == Look::Points { colour.filled() } else { line_style(colour) };
+            Entry { label, look, style }
+        })
+    }
+
     fn draw(
         &self,
         svg: &mut String,
@@ -102,81 +120,61 @@ impl Chart {
     ) -> Result<(), Box<dyn std::error::Error>> {
         let root = SVGBackend::with_string(svg, (WIDTH * OVERSIZE, HEIGHT * OVERSIZE)).into_drawing_area();
         root.fill(&WHITE)?;
-        let height = y.end - y.start;
         let text = |size: u32| ("sans-serif", size * OVERSIZE).into_font();
-        let text_style = TextStyle::from(text(10)).color(&RGBColor(60, 60, 60));
-        let mut chart = ChartBuilder::on(&root)
-            .caption(&self.title, text(16))
-            .margin(10 * OVERSIZE)
-            .margin_right(24 * OVERSIZE)
-            .x_label_area_size(34 * OVERSIZE)
+        let looks = self.looks(y.end - y.start);
+        let legend = Legend::new(self.entries(&looks, marks), (WIDTH - 2 * SIDE) as i32);
+        let below = root.margin(8 * OVERSIZE, 8 * OVERSIZE, SIDE * OVERSIZE, SIDE * OVERSIZE);
+        let below = below.titled(&self.title, text(16))?;
+        let (above, below) = below.split_vertically(legend.height());
+        legend.draw(&above)?;
+        let (across, up) = (Labels::over(&x), Labels::over(&y));
+        let mut chart = ChartBuilder::on(&below)
+            .margin_top(4 * OVERSIZE)
+            .margin_right(14 * OVERSIZE)
+            .x_label_area_size(38 * OVERSIZE)
             .y_label_area_size(64 * OVERSIZE)
             .build_cartesian_2d(x, y)?;
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
             .y_desc(&self.y_label)
+            .x_label_formatter(&|value| across.text(*value))
+            .y_label_formatter(&|value| up.text(*value))
             .label_style(text(12))
             .axis_desc_style(text(13))
             .light_line_style(RGBColor(238, 238, 238))
             .draw()?;
-        for ((k, series), colour) in self.series.iter().enumerate().zip(COLOURS.iter().cycle()) {
+        for ((series, look), colour) in self.series.iter().zip(looks).zip(COLOURS.iter().cycle()) {
             let points = series.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
-            let style = colour.stroke_width(OVERSIZE + OVERSIZE / 2);
-            let covered = self.series[..k].iter().filter(|earlier| covers(series, earlier, height)).count();
-            let line = |(x, y): (i32, i32)| [(x, y), (x + 20 * OVERSIZE as i32, y)];
-            let entry = match Dashes::over(covered) {
-                None => chart
-                    .draw_series(LineSeries::new(points, style))?
-                    .legend(move |at| PathElement::new(line(at), style)),
-                Some(Dashes { on, off }) => chart
-                    .draw_series(DashedLineSeries::new(points, on, off, style))?
-                    .legend(move |at| DashedPathElement::new(line(at).into_iter(), on / 2, off / 2, style)),
-            };
-            entry.label(&series.label);
+            let style = line_style(colour);
+            match look {
+                Look::Line(Some(Dashes { on, off })) => {
+                    chart.draw_series(DashedLineSeries::new(points, on, off, style))?;
+                }
+                _ => drop(chart.draw_series(LineSeries::new(points, style))?),
+            }
         }
+        let text_style = TextStyle::from(text(10)).color(&RGBColor(60, 60, 60));
         for (marks, colour) in marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())) {
             let points = || marks.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
             let radius = 3 * OVERSIZE as i32;
-            let dot = |(x, y, _): &(f64, f64, String)| Circle::new((*x, *y), radius, colour.filled());
-            let length = 20 * OVERSIZE as i32;
-            chart
-                .draw_series(points().map(dot))?
-                .label(&marks.label)
-                .legend(move |(x, y)| Circle::new((x + length / 2, y), radius, colour.filled()));
+            chart.draw_series(points().map(|(x, y, _)| Circle::new((*x, *y), radius, colour.filled())))?;
             let above = |(x, y, text): &(f64, f64, String)| {
                 let place = (-(text.chars().count() as i32) * radius, -16 * OVERSIZE as i32);
                 EmptyElement::at((*x, *y)) + Text::new(text.clone(), place, text_style.clone())
             };
-            chart.draw_series(points().map(above))?;
+            chart.draw_series(points().filter(|(.., text)| !text.is_empty()).map(above))?;
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .legend_area_size(26 * OVERSIZE)
-            .background_style(WHITE.mix(0.85))
-            .border_style(RGBColor(200, 200, 200))
-            .label_font(text(12))
-            .draw()?;
         root.present()?;
         Ok(())
     }
 }
 
-/// Dashes of a line, pixels.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Dashes {
-    on: i32,
-    off: i32,
-}
-
-impl Dashes {
-    /// For a line over so many others that lie in the same place; each shows in the gaps of the next one.
-    fn over(covered: usize) -> Option<Self> {
-        let covered = i32::try_from(covered).unwrap_or(i32::MAX);
-        let unit = OVERSIZE as i32;
-        (covered > 0).then(|| Self { on: (12 / covered).max(2) * unit, off: 10 * unit })
-    }
+/// For a line over so many others that lie in the same place; each shows in the gaps of the next one.
+fn dashes_over(covered: usize) -> Option<Dashes> {
+    let covered = i32::try_from(covered).unwrap_or(i32::MAX);
+    let unit = OVERSIZE as i32;
+    (covered > 0).then(|| Dashes { on: (12 / covered).max(2) * unit, off: 10 * unit })
 }
 
 /// Whether most of a curve lies on an earlier one: one colour would hide the other.
@@ -184,6 +182,36 @@ fn covers(series: &Series, earlier: &Series, height: f64) -> bool {
     let both = series.points.iter().zip(&earlier.points).filter(|(a, b)| a.1.is_finite() && b.1.is_finite());
     let near = both.clone().filter(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < SAME_PLACE * height).count();
     near > 0 && 2 * near >= both.count()
+}
+
+fn line_style(colour: &RGBColor) -> ShapeStyle {
+    colour.stroke_width(OVERSIZE + OVERSIZE / 2)
+}
+
+/// Numbers at an axis, with the decimals that tell neighbours apart.
+struct Labels {
+    decimals: usize,
+    is_scientific: bool,
+}
+
+impl Labels {
+    fn over(range: &std::ops::Range<f64>) -> Self {
+        let size = (range.end - range.start).log10();
+        Self {
+            decimals: (2.0 - size).ceil().clamp(0.0, 12.0) as usize,
+            is_scientific: !(-9.0..7.0).contains(&size),
+        }
+    }
+
+    fn text(&self, value: f64) -> String {
+        if self.is_scientific {
+            return format!("{value:.3e}");
+        }
+        let text = format!("{value:.*}", self.decimals);
+        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        // A rounded zero may have a sign.
+        if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    }
 }
 
 fn widened(values: impl Iterator<Item = f64>, share: f64) -> std::ops::Range<f64> {
@@ -221,7 +249,7 @@ mod tests {
     fn a_chart_is_svg_with_its_texts() {
         let svg = chart(vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]).to_svg().unwrap();
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
-        assert!(svg.contains("width=\"960\"") && svg.contains("viewBox=\"0 0 3840 1680\""));
+        assert!(svg.contains("width=\"960\"") && svg.contains("viewBox=\"0 0 3840 1800\""));
         assert!(svg.contains("error &lt;1&gt;"));
     }
 
@@ -237,6 +265,16 @@ mod tests {
         // A line of the chart and one of the legend.
         assert_eq!(lines(2.0), 2);
         assert!(lines(0.0) > 10 && lines(0.05) > 10);
+    }
+
+    #[test]
+    fn labels_tell_neighbours_apart() {
+        let label = |range: std::ops::Range<f64>, value: f64| Labels::over(&range).text(value);
+        assert_eq!(label(-1.0..1.0, -1e-17), "0");
+        assert_eq!(label(-1.0..1.0, 0.300_000_000_000_000_04), "0.3");
+        assert_eq!(label(0.0..1200.0, 400.0), "400");
+        assert_eq!(label(0.031_29..0.031_31, 0.031_295), "0.031295");
+        assert_eq!(label(0.0..1e-12, 5e-13), "5.000e-13");
     }
 
     #[test]

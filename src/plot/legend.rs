@@ -1,0 +1,93 @@
+//! The legend of a chart, in rows above it: there it hides nothing.
+
+use super::chart::OVERSIZE;
+use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+
+/// Pixels of a row, a sample of a line, and what separates things; all before enlargement.
+const ROW: i32 = 20;
+const SAMPLE: i32 = 22;
+const GAP: i32 = 8;
+const FONT: u32 = 12;
+/// Mean width of a letter over its height.
+const LETTER: f64 = 0.56;
+
+/// Dashes of a line, enlarged pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Dashes {
+    pub(super) on: i32,
+    pub(super) off: i32,
+}
+
+/// How a curve or a kind of points looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Look {
+    Line(Option<Dashes>),
+    Points,
+}
+
+/// One line of the legend.
+pub(super) struct Entry<'a> {
+    pub(super) label: &'a str,
+    pub(super) look: Look,
+    pub(super) style: ShapeStyle,
+}
+
+impl Entry<'_> {
+    fn width(&self) -> i32 {
+        SAMPLE + 3 * GAP + (f64::from(FONT) * LETTER * self.label.chars().count() as f64) as i32
+    }
+}
+
+/// Entries with their places, and the rows they take.
+pub(super) struct Legend<'a> {
+    entries: Vec<(Entry<'a>, (i32, i32))>,
+    rows: i32,
+}
+
+impl<'a> Legend<'a> {
+    /// As many entries in a row of `width` pixels as have room there.
+    pub(super) fn new(entries: impl Iterator<Item = Entry<'a>>, width: i32) -> Self {
+        let (mut x, mut row) = (GAP, 0);
+        let mut place = |entry: Entry<'a>| {
+            if x > GAP && x + entry.width() > width {
+                (x, row) = (GAP, row + 1);
+            }
+            let at = (x, row * ROW);
+            x += entry.width();
+            (entry, at)
+        };
+        let entries = entries.map(&mut place).collect();
+        Self { entries, rows: row + 1 }
+    }
+
+    /// Enlarged pixels.
+    pub(super) fn height(&self) -> u32 {
+        (self.rows * ROW) as u32 * OVERSIZE
+    }
+
+    /// Draws all entries.
+    pub(super) fn draw<B: DrawingBackend>(
+        &self,
+        area: &DrawingArea<B, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+        let enlarged = |x: i32| x * OVERSIZE as i32;
+        for (Entry { label, look, style }, (x, y)) in &self.entries {
+            let middle = enlarged(y + ROW / 2);
+            let line = [(enlarged(*x), middle), (enlarged(x + SAMPLE), middle)];
+            match look {
+                Look::Line(None) => area.draw(&PathElement::new(line, *style))?,
+                Look::Line(Some(Dashes { on, off })) => {
+                    area.draw(&DashedPathElement::new(line.into_iter(), on / 2, off / 2, *style))?;
+                }
+                Look::Points => {
+                    area.draw(&Circle::new((enlarged(x + SAMPLE / 2), middle), enlarged(3), *style))?;
+                }
+            }
+            let at = (enlarged(x + SAMPLE + GAP), enlarged(y + (ROW - FONT as i32) / 2));
+            area.draw(&Text::new(*label, at, ("sans-serif", FONT * OVERSIZE).into_font()))?;
+        }
+        Ok(())
+    }
+}
