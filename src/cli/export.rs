@@ -1,20 +1,26 @@
 //! `hybank export`: a bank for other tools.
 
 use super::Failure;
-use super::bank_file::{load, refuse_overlap, write_bytes};
-use crate::interchange::{Format, export};
+use super::bank_file::{load, name, refuse_overlap, write_bytes};
+use crate::bank::{Bank, SynthesisFilters};
+use crate::design::analyze;
+use crate::interchange::{Format, block_of_sections, export, sections};
 use std::path::PathBuf;
 
 /// Writes a bank for other tools: C99, CSV, NumPy, MATLAB, FPGA memory
 ///
 /// The order of FIR taps is the same in every format: channel, then phase of the output, then lag in slow
-/// periods. coe and mem hold integer taps (`hybank design --bits`).
+/// periods. coe and mem hold integer taps (`hybank design --bits`). sos is a table of the second-order sections
+/// of a recursive bank at the slow rate: the filter from a channel to a phase of the output is the sum of its
+/// sections z^-delay (b0 + b1 z^-1 + b2 z^-2) / (a0 + a1 z^-1 + a2 z^-2). Its first line is a comment with the
+/// gamma of the sections as they are written.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   hybank export bank.json --to c -o bank.h
   hybank export bank.json --to npz -o bank.npz
-  hybank export fixed.json --to coe -o taps.coe")]
+  hybank export fixed.json --to coe -o taps.coe
+  hybank export recursive.json --to sos -o sections.csv")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
@@ -46,6 +52,8 @@ enum FormatArg {
     Coe,
     /// Hexadecimal words for $readmemh
     Mem,
+    /// Second-order sections (CSV)
+    Sos,
 }
 
 impl From<FormatArg> for Format {
@@ -57,6 +65,7 @@ impl From<FormatArg> for Format {
             FormatArg::Mat => Self::Mat,
             FormatArg::Coe => Self::Coe,
             FormatArg::Mem => Self::Mem,
+            FormatArg::Sos => Self::Sos,
         }
     }
 }
@@ -68,7 +77,23 @@ impl From<FormatArg> for Format {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     refuse_overlap(&args.output, &args.bank)?;
     let bank = load(&args.bank)?;
-    let bytes = export(&bank, args.to.into(), &args.name)
-        .map_err(|error| Failure::Input(format!("{}: {error}", args.bank.display())))?;
+    let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(&args.bank)));
+    let mut bytes = export(&bank, args.to.into(), &args.name).map_err(|error| named(&error))?;
+    if args.to == FormatArg::Sos {
+        let comment = gamma_of_sections(&bank).map_err(|error| named(&error))?;
+        bytes.splice(0..0, comment.bytes());
+    }
     write_bytes(&args.output, &bytes, args.force)
+}
+
+/// A line with the gamma of the numbers that were written; empty where the front ends are unknown.
+fn gamma_of_sections(bank: &Bank) -> Result<String, Box<dyn std::error::Error>> {
+    if bank.spec.is_none() {
+        return Ok(String::new());
+    }
+    let block = block_of_sections(&sections(bank)?, bank.channel_count(), bank.ratio);
+    let written = Bank { filters: SynthesisFilters::StateSpace(block), ..bank.clone() };
+    let gamma = analyze(&written, &[])?.gamma;
+    let bank = bank.gamma.norm.map_or_else(String::new, |gamma| format!("; of the bank {gamma:e}"));
+    Ok(format!("# gamma of these sections {gamma:e}{bank}; z^-1 is one slow period\n"))
 }

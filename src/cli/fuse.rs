@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
+use super::bit_true::{BitTrueArgs, Job};
 use super::capture_args::CaptureArgs;
 use super::follow::Follow;
 use super::gaps::GapArgs;
@@ -36,6 +37,7 @@ Examples:
   hybank fuse bank.json both.wav -o fused.wav --bits 24 --force
   hybank fuse bank.json capture.wav -o fused.wav --interleaved 4
   hybank fuse bank.json tone1.wav tone2.wav -o fused.wav --measure
+  hybank fuse fixed.json ch1.wav ch2.wav -o fused.wav --bit-true --accumulator 40
   hybank fuse bank.json ch1.wav ch2.wav -o fused.wav --track blind --track-log delays.jsonl
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
 pub(super) struct Args {
@@ -67,6 +69,8 @@ pub(super) struct Args {
     track: TrackArgs,
     #[command(flatten)]
     threads: ThreadArgs,
+    #[command(flatten)]
+    bit_true: BitTrueArgs,
     #[command(flatten)]
     before_after: BeforeAfterArgs,
     #[command(flatten)]
@@ -117,6 +121,9 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     let Some(mut reader) = args.start_reader(bank, Some(journal))? else { return Err(interrupted(0)) };
     match_bank::check_channels(bank, &args.bank, &reader)?;
     let rate = match_bank::output_rate(bank, &reader)?;
+    if args.bit_true.is_wanted() {
+        return args.bit_true.fuse(args.job(bank, rate), &mut reader);
+    }
     let plan = args.plan(bank)?;
     let skip = if args.keep_latency { plan.extra_latency() } else { plan.latency() } as u64;
     let is_complex = reader.is_complex();
@@ -204,6 +211,19 @@ impl Args {
         let precision = precision(self.bits.format());
         let algorithm = self.algorithm.resolve(self.track.algorithm(auto));
         Options { precision, algorithm, ..Options::default() }
+    }
+
+    fn job<'a>(&'a self, bank: &'a Bank, rate: f64) -> Job<'a> {
+        Job {
+            bank,
+            bank_path: &self.bank,
+            output: &self.output,
+            rate,
+            keep_latency: self.keep_latency,
+            strict: self.strict,
+            force: self.force,
+            json: self.json,
+        }
     }
 
     /// That drops `skip` samples of an output of `rate` hertz.

@@ -1,6 +1,7 @@
 //! A C99 header with the coefficients of a bank and a streaming function.
 
 use super::ExportError;
+use super::bit_true::{growth_bits, integer_taps};
 use super::layout::{PolyphaseTaps, SparseBlock};
 use crate::bank::{Bank, FixedPoint, SynthesisFilters};
 use std::fmt::Display;
@@ -79,16 +80,8 @@ fn real_fir(bank: &Bank, taps: &PolyphaseTaps<f64>, name: &str) -> String {
 }
 
 fn integer_fir(bank: &Bank, words: &FixedPoint, name: &str) -> Result<String, ExportError> {
-    let nonzero = |(_, offset): &(usize, &f64)| **offset != 0.0;
-    if let Some((i, &offset)) = bank.offsets.iter().enumerate().find(nonzero) {
-        return Err(ExportError::Offset { channel: i + 1, offset });
-    }
-    let taps = PolyphaseTaps::new(&words.integers, bank.ratio);
-    let sum = largest_sum(&taps);
-    if sum >= 1 << 31 {
-        return Err(ExportError::Accumulator { sum });
-    }
-    let growth = u64::BITS - sum.leading_zeros();
+    let taps = integer_taps(bank, words)?;
+    let growth = growth_bits(&taps);
     Ok(fir(&Fir {
         name,
         sizes: [taps.channels, taps.ratio, taps.lags],
@@ -108,15 +101,6 @@ fn integer_fir(bank: &Bank, words: &FixedPoint, name: &str) -> Result<String, Ex
         helper: rounding(name, words.fraction_bits),
         finish: format!("{name}_rounded(sum)"),
     }))
-}
-
-/// Largest sum of the moduli of the taps of a phase.
-fn largest_sum(taps: &PolyphaseTaps<i64>) -> u64 {
-    let of_phase = |p: usize| -> u64 {
-        let entries = (0..taps.channels).flat_map(|i| (0..taps.lags).map(move |j| (i, j)));
-        entries.map(|(i, j)| taps.get(i, p, j).unsigned_abs()).sum()
-    };
-    (0..taps.ratio).map(of_phase).max().unwrap_or(0)
 }
 
 /// The function that turns a sum into an output sample.

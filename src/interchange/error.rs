@@ -29,6 +29,9 @@ pub enum ExportError {
         /// Largest sum of the moduli of a phase.
         sum: u64,
     },
+    /// The bank is no sum of sections.
+    #[error("no second-order sections: {0}")]
+    NoSections(&'static str),
     /// A name that C does not allow.
     #[error("\"{name}\" is no C identifier; use letters, digits and underscores, a letter first")]
     Name {

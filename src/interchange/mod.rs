@@ -8,15 +8,19 @@
 //! ```
 
 mod arrays;
+mod bit_true;
 mod c99;
 mod error;
 mod layout;
 mod read_taps;
+mod sections;
 mod tables;
 
+pub use bit_true::{BitTrue, WordSizes};
 pub use error::ExportError;
 pub use layout::{PolyphaseTaps, SparseBlock};
 pub use read_taps::{TapsError, taps_of_csv, taps_of_npy};
+pub use sections::{Section, block_of_sections, sections};
 
 use crate::bank::Bank;
 
@@ -35,6 +39,8 @@ pub enum Format {
     Coe,
     /// Hexadecimal words for `$readmemh`; integer taps only.
     Mem,
+    /// A table of the second-order sections of a recursive bank; see [`sections`].
+    Sos,
 }
 
 /// The bytes of `bank` in `format`. `name` is the prefix of the C identifiers.
@@ -49,6 +55,7 @@ pub fn export(bank: &Bank, format: Format, name: &str) -> Result<Vec<u8>, Export
         Format::Mat => arrays::mat(bank),
         Format::Coe => tables::coe(bank).map(String::into_bytes),
         Format::Mem => tables::mem(bank).map(String::into_bytes),
+        Format::Sos => sections(bank).map(|list| sections::table(&list).into_bytes()),
     }
 }
 

@@ -6,7 +6,7 @@ use hybank::interchange::{PolyphaseTaps, SparseBlock};
 use std::process::Command;
 
 /// Compiles the header `bank.h` of the desk with a program that pipes samples of `sample` through it.
-fn compiled(desk: &Desk, sample: &str, channels: usize, ratio: usize) -> bool {
+pub(crate) fn compiled(desk: &Desk, sample: &str, channels: usize, ratio: usize) -> bool {
     let program = format!(
         "#include <stdio.h>\n#include <stdint.h>\n#include \"bank.h\"\n\
          int main(void) {{\n    static bank_state state;\n    {sample} input[{channels}], output[{ratio}];\n    \
@@ -39,18 +39,18 @@ fn compiled(desk: &Desk, sample: &str, channels: usize, ratio: usize) -> bool {
     }
 }
 
-fn piped(desk: &Desk, input: Vec<u8>) -> Vec<u8> {
+pub(crate) fn piped(desk: &Desk, input: Vec<u8>) -> Vec<u8> {
     desk.write("in.raw", input);
     let stdin = std::fs::File::open(desk.path("in.raw")).unwrap();
     Command::new(desk.path("run")).stdin(stdin).output().unwrap().stdout
 }
 
-fn bank(desk: &Desk) -> Bank {
+pub(crate) fn bank(desk: &Desk) -> Bank {
     Bank::from_json(&String::from_utf8(desk.read("b.json")).unwrap(), "b.json").unwrap()
 }
 
 /// Samples in [-1, 1] without structure.
-fn samples(count: usize) -> Vec<f64> {
+pub(crate) fn samples(count: usize) -> Vec<f64> {
     (0..count).map(|i| ((i * i * 31 + 7 * i) % 1009) as f64 / 504.5 - 1.0).collect()
 }
 
@@ -238,4 +238,53 @@ fn taps_of_other_tools_are_judged() {
     desk.refused(2, &["import", "spec.toml", "taps.txt", "-o", "x.json"], &["taps.txt", ".csv and .npy"]);
     desk.write("bad.csv", "1,2\n3,four\n");
     desk.refused(1, &["import", "spec.toml", "bad.csv", "-o", "x.json"], &["bad.csv", "line 2, column 2"]);
+}
+
+/// The sections as a user runs them: each a recursion of its own, their outputs added.
+fn by_sections(table: &str, input: &[f64], channels: usize, ratio: usize) -> Vec<f64> {
+    let mut output = vec![0.0; input.len() / channels * ratio];
+    for line in table.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
+        let row: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let [channel, phase, delay] = [row[0] as usize - 1, row[1] as usize, row[2] as usize];
+        let x = |k: usize| input.get(k * channels + channel).copied().unwrap();
+        let mut y: Vec<f64> = Vec::new();
+        for k in 0..input.len() / channels {
+            let past = |back: usize| k.checked_sub(delay + back).map_or(0.0, x);
+            let own = |back: usize| k.checked_sub(back).map_or(0.0, |k| y[k]);
+            let value =
+                row[3] * past(0) + row[4] * past(1) + row[5] * past(2) - row[7] * own(1) - row[8] * own(2);
+            y.push(value / row[6]);
+        }
+        y.iter().enumerate().for_each(|(k, y)| output[k * ratio + phase] += y);
+    }
+    output
+}
+
+#[test]
+fn sections_are_the_bank_and_carry_its_gamma() {
+    for (spec, flags) in [
+        (THESIS.to_owned(), &["--method", "iir"][..]),
+        (THESIS.replace("latency = 10", "latency = 7"), &["--method", "h2", "--order", "6"]),
+    ] {
+        let desk = Desk::with_spec(&spec.replace("delay = 1.2", "delay = 0.9"));
+        desk.good(&[&["design", "spec.toml", "-o", "b.json"], flags].concat());
+        desk.good(&["export", "b.json", "--to", "sos", "-o", "s.csv"]);
+        let table = String::from_utf8(desk.read("s.csv")).unwrap();
+        let input = samples(2 * 500);
+        let difference = worst_difference(&by_sections(&table, &input, 2, 2), &streamed(&desk, &input));
+        assert!(difference < 1e-11, "{flags:?}: {difference:e}");
+        let comment = table.lines().next().unwrap();
+        let gammas: Vec<f64> = comment
+            .split([' ', ';'])
+            .filter_map(|word| word.parse().ok().filter(|gamma| *gamma > 0.0))
+            .collect();
+        assert!((gammas[0] / gammas[1] - 1.0).abs() < 1e-9, "{comment}");
+    }
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    desk.refused(
+        1,
+        &["export", "b.json", "--to", "sos", "-o", "s.csv"],
+        &["b.json", "no poles", "csv and npz"],
+    );
 }

@@ -1,0 +1,246 @@
+//! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
+
+use super::Failure;
+use super::bank_file::{is_dash, name};
+use super::output::Bits;
+use super::print::print_json;
+use super::say::{say, warn};
+use crate::bank::Bank;
+use crate::files::commit_all;
+use crate::interchange::{BitTrue, WordSizes};
+use crate::io::{Arrival, Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, SampleWriter};
+use std::path::Path;
+
+/// The options.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct BitTrueArgs {
+    /// Run the integer taps of the bank on the integers of the captures, as hardware and the exported C do: exact
+    /// sums, each rounded to the nearest integer, halves upwards, and saturated at the bits of the captures. The
+    /// output has their bits
+    #[arg(long, conflicts_with_all = ["gaps", "track", "measure", "algorithm", "bits", "threads", "report"])]
+    bit_true: bool,
+    /// Bits of the accumulator with --bit-true; sums that do not fit wrap around
+    #[arg(long, value_name = "BITS", requires = "bit_true", default_value_t = 64, value_parser = clap::value_parser!(u8).range(8..=64))]
+    accumulator: u8,
+}
+
+/// What is written where.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Job<'a> {
+    pub(super) bank: &'a Bank,
+    pub(super) bank_path: &'a Path,
+    pub(super) output: &'a Path,
+    /// Hertz of the output.
+    pub(super) rate: f64,
+    pub(super) keep_latency: bool,
+    pub(super) strict: bool,
+    pub(super) force: bool,
+    pub(super) json: bool,
+}
+
+/// How the words were used.
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    samples: u64,
+    rate: u64,
+    frames: u64,
+    latency_dropped: usize,
+    bits: u32,
+    accumulator_bits: u32,
+    /// With so many bits no sum can wrap.
+    needed_accumulator_bits: u32,
+    /// Sums that wrapped.
+    wrapped: u64,
+    /// Output samples that saturated.
+    saturated: u64,
+}
+
+impl BitTrueArgs {
+    pub(super) fn is_wanted(self) -> bool {
+        self.bit_true
+    }
+
+    /// Fuses all that `reader` gives.
+    pub(super) fn fuse(self, job: Job<'_>, reader: &mut MultiReader) -> Result<(), Failure> {
+        let format = integer_format(reader)?;
+        let bits = 8 * format.bytes() as u32;
+        let words = WordSizes { accumulator: self.accumulator.into(), output: bits };
+        let model = BitTrue::new(job.bank, words)
+            .map_err(|error| Failure::Input(format!("{}: {error}", name(job.bank_path))))?;
+        let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate: job.rate };
+        let output = SampleWriter::create(job.output, header, job.force).map_err(Failure::running)?;
+        let skip = if job.keep_latency { 0 } else { job.bank.latency };
+        let mut run = Run::new(model, output, format, skip, job.bank);
+        let frames = run.all(reader)?;
+        run.flush(job.bank.channel_count())?;
+        let report = Report {
+            samples: run.samples,
+            rate: job.rate.round() as u64,
+            frames,
+            latency_dropped: skip,
+            bits,
+            accumulator_bits: self.accumulator.into(),
+            needed_accumulator_bits: run.model.needed_bits(bits),
+            wrapped: run.model.wraps(),
+            saturated: run.model.saturations(),
+        };
+        let warnings: Vec<String> =
+            reader.warnings().iter().map(ToString::to_string).chain(report.warnings()).collect();
+        if let (Some(first), true) = (warnings.first(), job.strict) {
+            return Err(Failure::Input(format!("{first} (an error because of --strict)")));
+        }
+        commit_all(run.output.finish().map_err(Failure::running)?).map_err(Failure::input)?;
+        warnings.iter().for_each(|warning| warn(warning));
+        report.print(job)
+    }
+}
+
+impl Report {
+    fn warnings(&self) -> Vec<String> {
+        let Self { wrapped, saturated, needed_accumulator_bits, accumulator_bits, .. } = self;
+        let sums = (*wrapped > 0).then(|| {
+            format!(
+                "{wrapped} sums did not fit the accumulator of {accumulator_bits} bits; {needed_accumulator_bits} \
+                 always suffice"
+            )
+        });
+        let outputs = (*saturated > 0).then(|| format!("{saturated} output samples saturated"));
+        sums.into_iter().chain(outputs).collect()
+    }
+
+    fn print(&self, job: Job<'_>) -> Result<(), Failure> {
+        match (job.json, is_dash(job.output)) {
+            (false, _) => Ok(()),
+            (true, false) => print_json(self),
+            (true, true) => {
+                say(&(serde_json::to_string(self).map_err(Failure::input)? + "\n"));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// The integer format that all inputs have, as it is written.
+fn integer_format(reader: &MultiReader) -> Result<PcmFormat, Failure> {
+    let mut formats =
+        reader.headers().map(|(input, header)| (input, header.layout.format, header.is_complex));
+    let Some((first, format, is_complex)) = formats.next() else {
+        return Err(Failure::input("--bit-true: there is no input"));
+    };
+    let bits = match format {
+        _ if is_complex => None,
+        PcmFormat::S16Le | PcmFormat::S16Be => Some(Bits::I16),
+        PcmFormat::S24Le | PcmFormat::S24Be => Some(Bits::I24),
+        PcmFormat::S32Le | PcmFormat::S32Be => Some(Bits::I32),
+        _ => None,
+    };
+    let Some(bits) = bits else {
+        return Err(Failure::Input(format!(
+            "{first}: --bit-true takes real integers of 16, 24 or 32 bits, and these are {}; convert the capture",
+            format.name()
+        )));
+    };
+    match formats.find(|(_, other, _)| other.bytes() != format.bytes() || other.is_float()) {
+        Some((input, other, _)) => Err(Failure::Input(format!(
+            "{input}: its samples are {}, and those of {first} are {}; --bit-true needs words of the same bits",
+            other.name(),
+            format.name()
+        ))),
+        None => Ok(bits.format()),
+    }
+}
+
+/// A model that runs.
+struct Run {
+    model: BitTrue,
+    output: SampleWriter,
+    format: PcmFormat,
+    /// Output samples that are still to be dropped.
+    skip: usize,
+    /// Those that were dropped and are made up for at the end.
+    owed: usize,
+    ratio: usize,
+    samples: u64,
+}
+
+impl Run {
+    fn new(model: BitTrue, output: SampleWriter, format: PcmFormat, skip: usize, bank: &Bank) -> Self {
+        Self { model, output, format, skip, owed: skip, ratio: bank.ratio, samples: 0 }
+    }
+
+    /// All frames; gives their number.
+    fn all(&mut self, reader: &mut MultiReader) -> Result<u64, Failure> {
+        loop {
+            match reader.wait().map_err(Failure::input)? {
+                Arrival::Frames(count) => {
+                    let (frames, channels) = integers(&reader.frames(), count);
+                    self.process(&frames, channels)?;
+                    reader.consume(count);
+                }
+                Arrival::End => return Ok(reader.consumed()),
+                Arrival::Stopped => {
+                    let frames = reader.consumed();
+                    return Err(Failure::Input(format!(
+                        "interrupted after {frames} frames; nothing was kept, run it again"
+                    )));
+                }
+            }
+        }
+    }
+
+    /// Frames of zeros, until as many samples have come out as were dropped.
+    fn flush(&mut self, channels: usize) -> Result<(), Failure> {
+        let frames = self.owed.div_ceil(self.ratio);
+        let mut fast = self.filtered(&vec![0; frames * channels], channels);
+        fast.truncate(fast.len().min(self.owed + self.skip));
+        self.write(&fast)
+    }
+
+    fn process(&mut self, frames: &[i32], channels: usize) -> Result<(), Failure> {
+        let fast = self.filtered(frames, channels);
+        self.write(&fast)
+    }
+
+    fn filtered(&mut self, frames: &[i32], channels: usize) -> Vec<i32> {
+        let channels = channels.max(1);
+        let mut fast = vec![0; frames.len() / channels * self.ratio];
+        for (frame, fast) in frames.chunks_exact(channels).zip(fast.chunks_exact_mut(self.ratio)) {
+            self.model.process(frame, fast);
+        }
+        fast
+    }
+
+    fn write(&mut self, fast: &[i32]) -> Result<(), Failure> {
+        let dropped = self.skip.min(fast.len());
+        self.skip -= dropped;
+        let fast = &fast[dropped..];
+        let size = self.format.bytes();
+        let full_scale = (8.0 * size as f64 - 1.0).exp2();
+        let mut bytes = vec![0; fast.len() * size];
+        for (slot, y) in bytes.chunks_exact_mut(size).zip(fast) {
+            self.format.encode(f64::from(*y) / full_scale, slot);
+        }
+        self.samples += fast.len() as u64;
+        self.output.write(&bytes).map_err(Failure::running)
+    }
+}
+
+/// The first `count` frames as integers, and the samples of each.
+fn integers(parts: &[PcmFrames<'_>], count: usize) -> (Vec<i32>, usize) {
+    let channels: usize = parts.iter().map(|part| part.channels).sum();
+    let mut frames = vec![0; count * channels];
+    let mut first = 0;
+    for part in parts {
+        let (format, container) = (part.layout.format, part.layout.container);
+        // A power of two: the product is the integer itself.
+        let full_scale = (8.0 * format.bytes() as f64 - 1.0).exp2();
+        let source = part.bytes.chunks_exact(part.frame_bytes());
+        for (frame, slots) in source.zip(frames.chunks_exact_mut(channels.max(1))) {
+            for (sample, slot) in frame.chunks_exact(container).zip(&mut slots[first..]) {
+                *slot = (format.decode(sample) * full_scale) as i32;
+            }
+        }
+        first += part.channels;
+    }
+    (frames, channels)
+}

@@ -1,0 +1,260 @@
+//! Recursive banks as sections of second order.
+
+use super::ExportError;
+use crate::bank::{Bank, BlockFilter, SynthesisFilters};
+use std::fmt::Write as _;
+
+/// The part `z^-delay (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2)` of a filter entry, z^-1 being one
+/// slow period. The entry of a channel and a phase is the sum of its sections.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Section {
+    /// Channel, from 0.
+    pub channel: usize,
+    /// Phase p of the output samples kM + p.
+    pub phase: usize,
+    /// Slow periods by which the section is late.
+    pub delay: usize,
+    /// b0, b1, b2.
+    pub b: [f64; 3],
+    /// a1, a2.
+    pub a: [f64; 2],
+}
+
+/// The states that a section takes in the bank: x+ = f x + (what drives it).
+struct Block {
+    states: Vec<usize>,
+}
+
+/// The sections of a bank: the delays of its FIR head with their taps, two at a time, and its poles.
+///
+/// With the states of a section s, x+ = A x + sum over d of `B_d u[k - d]`, its part of the output is
+/// `c (zI - A)^-1 B_d = (c B_d z + c (A - tr A) B_d) / (z^2 - z tr A + det A)`. Nothing is factored, so the
+/// coefficients have the accuracy of the bank's.
+///
+/// # Errors
+/// [`ExportError::NoSections`] for FIR banks, and for poles that nearly coincide, whose states drive one another.
+pub fn sections(bank: &Bank) -> Result<Vec<Section>, ExportError> {
+    let SynthesisFilters::StateSpace(block) = &bank.filters else {
+        return Err(ExportError::NoSections("this bank has no poles; csv and npz hold its taps"));
+    };
+    let structure = Structure::of(block)?;
+    let mut all = Vec::new();
+    for channel in 0..bank.channel_count() {
+        for phase in 0..bank.ratio {
+            all.extend(structure.entry(block, channel, phase));
+        }
+    }
+    Ok(all)
+}
+
+/// Which state is a delayed input, and which belong to poles.
+struct Structure {
+    /// For each state its channel and delay, if it is an input d >= 1 slow periods ago.
+    delayed: Vec<Option<(usize, usize)>>,
+    poles: Vec<Block>,
+}
+
+impl Structure {
+    fn of(block: &BlockFilter) -> Result<Self, ExportError> {
+        let delayed = delayed_inputs(block);
+        let poles = pole_blocks(block, &delayed).ok_or(ExportError::NoSections(
+            "some of its poles nearly coincide, so that no sections side by side have its accuracy; npz and mat \
+             hold its matrices, and design --order gives fewer poles",
+        ))?;
+        Ok(Self { delayed, poles })
+    }
+
+    fn entry(&self, block: &BlockFilter, channel: usize, phase: usize) -> Vec<Section> {
+        let section = |delay, b, a| Section { channel, phase, delay, b, a };
+        let head = self.head(block, channel, phase);
+        let pairs = head
+            .chunks(2)
+            .enumerate()
+            .map(|(k, taps)| section(2 * k, [taps[0], taps.get(1).copied().unwrap_or(0.0), 0.0], [0.0; 2]));
+        let poles = self.poles.iter().flat_map(|poles| {
+            let a = poles.denominator(block);
+            let part = move |(delay, drive): (usize, Vec<f64>)| {
+                section(delay, poles.numerator(block, phase, &drive), a)
+            };
+            poles.drives(block, &self.delayed, channel).into_iter().map(part).collect::<Vec<_>>()
+        });
+        pairs.chain(poles).filter(|section| section.b.iter().any(|b| *b != 0.0)).collect()
+    }
+
+    /// The taps of the delayed inputs, without delay first.
+    fn head(&self, block: &BlockFilter, channel: usize, phase: usize) -> Vec<f64> {
+        let mut taps = vec![block.d[phase][channel]];
+        for (state, place) in self.delayed.iter().enumerate() {
+            if let Some((_, delay)) = place.filter(|(of, _)| *of == channel) {
+                taps.resize(taps.len().max(delay + 1), 0.0);
+                taps[delay] += block.c[phase][state];
+            }
+        }
+        taps
+    }
+}
+
+/// Each state that holds one input, one coefficient being 1 and all others 0, d periods ago.
+fn delayed_inputs(block: &BlockFilter) -> Vec<Option<(usize, usize)>> {
+    let n = block.a.len();
+    let mut places = vec![None; n];
+    // Each pass finds the states behind those that are known.
+    for _ in 0..n {
+        let mut is_new = false;
+        for state in 0..n {
+            let single = places[state].is_none().then(|| single_one(block, state)).flatten();
+            let place = match single {
+                Some(Source::Input(channel)) => Some((channel, 1)),
+                Some(Source::State(of)) => {
+                    places[of].map(|(channel, delay): (usize, usize)| (channel, delay + 1))
+                }
+                None => None,
+            };
+            is_new |= place.is_some();
+            places[state] = places[state].or(place);
+        }
+        if !is_new {
+            break;
+        }
+    }
+    places
+}
+
+enum Source {
+    State(usize),
+    Input(usize),
+}
+
+/// The state or the input that a state repeats a period later.
+fn single_one(block: &BlockFilter, state: usize) -> Option<Source> {
+    let row = || block.a[state].iter().chain(&block.b[state]).enumerate().filter(|(_, x)| **x != 0.0);
+    let (column, value) = row().next()?;
+    let n = block.a.len();
+    (row().count() == 1 && *value == 1.0)
+        .then(|| if column < n { Source::State(column) } else { Source::Input(column - n) })
+}
+
+/// The states of poles, one or two each; `None` if more of them drive one another.
+fn pole_blocks(block: &BlockFilter, delayed: &[Option<(usize, usize)>]) -> Option<Vec<Block>> {
+    let own: Vec<usize> = (0..delayed.len()).filter(|&state| delayed[state].is_none()).collect();
+    let drives = |i: usize, j: usize| i != j && (block.a[i][j] != 0.0 || block.a[j][i] != 0.0);
+    let mut blocks = Vec::new();
+    for &state in &own {
+        let partners: Vec<usize> = own.iter().copied().filter(|&other| drives(state, other)).collect();
+        match partners[..] {
+            [] => blocks.push(Block { states: vec![state] }),
+            [other] if own.iter().filter(|&&third| drives(other, third)).count() == 1 => {
+                if state < other {
+                    blocks.push(Block { states: vec![state, other] });
+                }
+            }
+            _ => return None,
+        }
+    }
+    Some(blocks)
+}
+
+impl Block {
+    fn a(&self, block: &BlockFilter, row: usize, column: usize) -> f64 {
+        block.a[self.states[row]][self.states[column]]
+    }
+
+    /// -tr A and det A; of one state -A and 0.
+    fn denominator(&self, block: &BlockFilter) -> [f64; 2] {
+        let a = |i, j| self.a(block, i, j);
+        match self.states.len() {
+            1 => [-a(0, 0), 0.0],
+            _ => [-(a(0, 0) + a(1, 1)), a(0, 0) * a(1, 1) - a(0, 1) * a(1, 0)],
+        }
+    }
+
+    /// 0, c B and c (A - tr A) B; of one state 0, c B and 0.
+    fn numerator(&self, block: &BlockFilter, phase: usize, drive: &[f64]) -> [f64; 3] {
+        let c = |i: usize| block.c[phase][self.states[i]];
+        let a = |i, j| self.a(block, i, j);
+        match drive {
+            [single] => [0.0, c(0) * single, 0.0],
+            _ => {
+                let swapped =
+                    [a(0, 1) * drive[1] - a(1, 1) * drive[0], a(1, 0) * drive[0] - a(0, 0) * drive[1]];
+                [0.0, c(0) * drive[0] + c(1) * drive[1], c(0) * swapped[0] + c(1) * swapped[1]]
+            }
+        }
+    }
+
+    /// The coefficients B_d of a channel's input d periods ago, with d.
+    fn drives(
+        &self,
+        block: &BlockFilter,
+        delayed: &[Option<(usize, usize)>],
+        channel: usize,
+    ) -> Vec<(usize, Vec<f64>)> {
+        let direct = self.states.iter().map(|&state| block.b[state][channel]).collect();
+        let mut drives = vec![(0, direct)];
+        for (of, place) in delayed.iter().enumerate() {
+            if let Some((_, delay)) = place.filter(|(source, _)| *source == channel) {
+                drives.push((delay, self.states.iter().map(|&state| block.a[state][of]).collect()));
+            }
+        }
+        drives.retain(|(_, drive): &(usize, Vec<f64>)| drive.iter().any(|x| *x != 0.0));
+        drives
+    }
+}
+
+/// The state-space filters of sections: delay lines of the inputs, and for each pair of poles and each phase two
+/// states in observer form, which all channels drive.
+pub fn block_of_sections(sections: &[Section], channels: usize, ratio: usize) -> BlockFilter {
+    let longest = |channel: usize| {
+        let own = sections.iter().filter(|section| section.channel == channel);
+        own.map(|section| section.delay + if section.a == [0.0; 2] { 2 } else { 0 }).max().unwrap_or(0)
+    };
+    let lines: Vec<usize> = (0..channels).map(longest).collect();
+    let first = |channel: usize| lines[..channel].iter().sum::<usize>();
+    let mut poles: Vec<(usize, [f64; 2])> =
+        sections.iter().filter(|section| section.a != [0.0; 2]).map(|s| (s.phase, s.a)).collect();
+    poles.sort_by(|x, y| x.0.cmp(&y.0).then(x.1[0].total_cmp(&y.1[0])).then(x.1[1].total_cmp(&y.1[1])));
+    poles.dedup();
+    let head = first(channels);
+    let n = head + 2 * poles.len();
+    let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
+    let mut block =
+        BlockFilter { a: zeros(n, n), b: zeros(n, channels), c: zeros(ratio, n), d: zeros(ratio, channels) };
+    for (channel, &length) in lines.iter().enumerate().filter(|(_, length)| **length > 0) {
+        block.b[first(channel)][channel] = 1.0;
+        (1..length).for_each(|k| block.a[first(channel) + k][first(channel) + k - 1] = 1.0);
+    }
+    for (k, (phase, [a1, a2])) in poles.iter().enumerate() {
+        let state = head + 2 * k;
+        (block.a[state][state], block.a[state][state + 1], block.a[state + 1][state]) = (-a1, 1.0, -a2);
+        block.c[*phase][state] = 1.0;
+    }
+    for Section { channel, phase, delay, b, a } in sections {
+        if *a == [0.0; 2] {
+            for (d, b) in (*delay..).zip(b) {
+                match d.checked_sub(1) {
+                    None => block.d[*phase][*channel] += b,
+                    Some(d) if d < lines[*channel] => block.c[*phase][first(*channel) + d] += b,
+                    Some(_) => {}
+                }
+            }
+        } else if let Some(k) = poles.iter().position(|pole| *pole == (*phase, *a)) {
+            // b0 is zero: the poles follow a delay.
+            for (row, b) in b[1..].iter().enumerate() {
+                match delay.checked_sub(1) {
+                    None => block.b[head + 2 * k + row][*channel] += b,
+                    Some(d) => block.a[head + 2 * k + row][first(*channel) + d] += b,
+                }
+            }
+        }
+    }
+    block
+}
+
+/// One section a line, channels from 1, with a line of headings.
+pub(super) fn table(sections: &[Section]) -> String {
+    let mut text = "channel,phase,delay,b0,b1,b2,a0,a1,a2\n".to_owned();
+    for Section { channel, phase, delay, b: [b0, b1, b2], a: [a1, a2] } in sections {
+        let _ = writeln!(text, "{},{phase},{delay},{b0:e},{b1:e},{b2:e},1,{a1:e},{a2:e}", channel + 1);
+    }
+    text
+}
