@@ -6,6 +6,7 @@
 //!
 //! - [`StrictlyProper`] is the type that the designer works with: stable, strictly proper, real, normalised.
 //! - [`families`] are the classical low-passes as [`Zpk`].
+//! - [`fit`] makes filters of measured responses.
 //!
 //! # How a filter is realised
 //! Zeros and poles become a cascade of first- and second-order sections. Each pole pair gets the zeros
@@ -23,6 +24,7 @@
 mod balance;
 mod error;
 pub mod families;
+pub mod fit;
 mod half_power;
 mod pairing;
 mod rational;

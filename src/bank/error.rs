@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::spec::{SpecProblem, WordLengths};
+use crate::spec::{SpecProblem, WordLengths, shown_path};
 
 use super::{FORMAT, VERSION};
 
@@ -164,7 +164,7 @@ impl std::error::Error for BankError {}
 impl fmt::Display for BankError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Inner { file, path, problem } = &*self.inner;
-        for part in [file, path] {
+        for part in [file, &shown_path(path)] {
             if !part.is_empty() {
                 write!(f, "{part}: ")?;
             }

@@ -3,8 +3,9 @@
 use super::Failure;
 use super::file_kind::FileKind;
 use super::interrupt::remove_unfinished;
+use super::measured::Models;
 use super::print::print_bytes;
-use super::say::name_leftovers;
+use super::say::{name_leftovers, say_line};
 use crate::bank::Bank;
 use crate::design::filters;
 use crate::files::{self, AtomicFile, Bound};
@@ -47,10 +48,19 @@ pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec,
         let message = "this is a bank, and a spec is needed; its spec is the table \"spec\" in the file";
         return Err(Failure::Input(format!("{}: {message}", name(path))));
     }
-    Spec::from_toml_with(&text, &name(path), overrides).map_err(|error| match error.overridden() {
+    parse_spec(&text, path, overrides)
+}
+
+/// The spec in the text of the file `path`, with the measurements beside it.
+pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
+    let models = Models::of(path);
+    let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| models.model(wanted));
+    let spec = read.map_err(|error| match error.overridden() {
         Some(key) => bad_flag(key, error.problem()),
         None => Failure::input(error),
-    })
+    })?;
+    models.echo().iter().for_each(|line| say_line(line));
+    Ok(spec)
 }
 
 /// A value of the command line that was given in place of the spec's `key`.

@@ -1,6 +1,6 @@
 //! Turns a document into a [`Spec`]: resolves units, fills in omitted filters, checks all rules.
 
-use crate::units::{FastPeriods, Seconds};
+use crate::units::{Decibels, FastPeriods, Seconds};
 
 use super::Fault;
 use super::design::DesignOverrides;
@@ -9,6 +9,7 @@ use super::limits::{
     check_channel_count, check_delay, check_fast_period, check_fast_rate, check_gain, check_gamma_margin,
     check_latency, check_noise, check_offset, check_order, check_ratio, check_reduction_loss, check_taps,
 };
+use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
 use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{
@@ -44,8 +45,23 @@ const FILTER_FORMS: [&[&str]; 5] = [
     &["cascade"],
 ];
 
-/// Reads the whole spec.
+/// The keys of a filter that is a measurement.
+const MEASURED_KEYS: [&str; 5] = ["touchstone", "response", "order", "parameter", "deembed"];
+
+/// Errors of models below this, in decibels, are not carried into the uncertainty: 1.2e-4 of the gain.
+const NEGLIGIBLE_DB: f64 = 1e-3;
+
+/// Reads the whole spec, whose filters are not measurements.
 pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<Spec, Fault> {
+    spec_with(document, overrides, &no_models)
+}
+
+/// Reads the whole spec.
+pub(crate) fn spec_with(
+    document: &Value<'_>,
+    overrides: DesignOverrides,
+    models: &FilterModels<'_>,
+) -> Result<Spec, Fault> {
     let top = document.fields(&TOP_KEYS)?;
     let name = top.optional("name").map(|v| v.text()).transpose()?.unwrap_or_default().to_owned();
     let fast_period = fast_period(&top)?;
@@ -56,12 +72,15 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
     let target = top
         .required("target", "describe the filter of the ideal fast converter, [target] filter = { .. }")?
         .fields(&["filter"])?;
-    let target = filter(&target.required("filter", "give the target's analog filter")?)?;
+    let target = target.required("filter", "give the target's analog filter")?;
+    let target = front_end(&target, fast_period, models)?;
     let table = top.optional("design").map(|table| table.fields(&DESIGN_KEYS)).transpose()?;
-    let common = Common { fast_period, target: &target, noise: noise(table.as_ref())?.unwrap_or(0.0) };
-    let channels = channels(&top, &common)?;
+    let noise = noise(table.as_ref())?.unwrap_or(0.0);
+    let (channels, errors): (Vec<_>, Vec<_>) =
+        channels(&top, &Common { fast_period, target: &target, noise, models })?.into_iter().unzip();
     let uncertainty =
         top.optional("uncertainty").map(|v| uncertainty(&v, channels.len(), fast_period)).transpose()?;
+    let uncertainty = with_model_errors(uncertainty, &errors);
     let given = [("tracking", overrides.tracking.is_some()), ("solver", overrides.solver.is_some())];
     let design = design(table.as_ref(), &top, overrides, channels.len())?;
     design.check_beside(uncertainty.as_ref(), channels.len()).map_err(|KeyProblem { key, problem }| {
@@ -71,7 +90,21 @@ pub(crate) fn spec(document: &Value<'_>, overrides: DesignOverrides) -> Result<S
             table.as_ref().unwrap_or(&top).fault_at(Some(key), problem)
         }
     })?;
-    Ok(Spec { name, fast_period, ratio, latency, target, channels, uncertainty, design })
+    Ok(Spec { name, fast_period, ratio, latency, target: target.filter, channels, uncertainty, design })
+}
+
+/// The errors of the channels' models as further half-widths of their gains. Without a table each channel has an
+/// error of its own.
+fn with_model_errors(written: Option<UncertaintySpec>, errors: &[Decibels]) -> Option<UncertaintySpec> {
+    if errors.iter().all(|error| error.0 < NEGLIGIBLE_DB) {
+        return written;
+    }
+    let table = written.unwrap_or(UncertaintySpec { reference: Some(0), ..UncertaintySpec::default() });
+    let gain = |(i, error): (usize, &Decibels)| {
+        table.gain.as_ref().map_or(0.0, |gain| gain.of(i)) + 10f64.powf(error.0 / 20.0) - 1.0
+    };
+    let gain = PerChannel::Each(errors.iter().enumerate().map(gain).collect());
+    Some(UncertaintySpec { gain: Some(gain), ..table })
 }
 
 /// h, from one of its two spellings.
@@ -123,8 +156,9 @@ fn checked_count(
 /// Defaults of a channel.
 struct Common<'a> {
     fast_period: Seconds,
-    target: &'a FilterSpec,
+    target: &'a FilterModel,
     noise: f64,
+    models: &'a FilterModels<'a>,
 }
 
 /// sigma, of all channels in `[design]` or of one in its own table.
@@ -132,7 +166,8 @@ fn noise(table: Option<&Fields<'_>>) -> Result<Option<f64>, Fault> {
     table.and_then(|fields| fields.optional("noise")).map(|v| checked_number(&v, check_noise)).transpose()
 }
 
-fn channels(top: &Fields<'_>, common: &Common<'_>) -> Result<Vec<ChannelSpec>, Fault> {
+/// The channels, each with the error of its filter's model.
+fn channels(top: &Fields<'_>, common: &Common<'_>) -> Result<Vec<(ChannelSpec, Decibels)>, Fault> {
     let list = top
         .required("channel", "describe every slow converter in a table of its own, [[channel]] delay = ..")?;
     let items = list.items("a list of tables, each headed [[channel]]")?;
@@ -140,11 +175,11 @@ fn channels(top: &Fields<'_>, common: &Common<'_>) -> Result<Vec<ChannelSpec>, F
     items.iter().map(|item| channel(item, common)).collect()
 }
 
-fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<ChannelSpec, Fault> {
+fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<(ChannelSpec, Decibels), Fault> {
     let fields = item.fields(&CHANNEL_KEYS)?;
     let delay = delay(&fields, common.fast_period)?;
-    let filter = match fields.optional("filter") {
-        Some(value) => filter(&value)?,
+    let FilterModel { filter, error } = match fields.optional("filter") {
+        Some(value) => front_end(&value, common.fast_period, common.models)?,
         None => common.target.clone(),
     };
     // Noise of -0.0 is noise of 0.0, and so is an offset.
@@ -152,7 +187,7 @@ fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<ChannelSpec, Fault> 
     let number = |key, check| fields.optional(key).map(|v| checked_number(&v, check)).transpose();
     let gain = number("gain", check_gain)?.unwrap_or(1.0);
     let offset = number("offset", check_offset)?.unwrap_or(0.0) + 0.0;
-    Ok(ChannelSpec { delay, filter, noise, gain, offset })
+    Ok((ChannelSpec { delay, filter, noise, gain, offset }, error))
 }
 
 /// D_i, from one of its two spellings.
@@ -301,6 +336,36 @@ fn reduction(order: Option<Value<'_>>, loss: Option<Value<'_>>) -> Result<Option
         }
         (None, None) => Ok(None),
     }
+}
+
+/// A filter, which may be a measurement; a filter that is written is exact.
+fn front_end(value: &Value<'_>, h: Seconds, models: &FilterModels<'_>) -> Result<FilterModel, Fault> {
+    let mut known = FILTER_FORMS.concat();
+    known.extend(MEASURED_KEYS.iter().filter(|key| !FILTER_FORMS.concat().contains(key)));
+    let fields = value.fields(&known)?;
+    let (path, measurement) = match (fields.optional("touchstone"), fields.optional("response")) {
+        (None, None) => return Ok(FilterModel { filter: filter(value)?, error: Decibels(0.0) }),
+        (Some(_), Some(second)) => {
+            let remedy = "a filter has one measurement, keep one of them";
+            let problem = SpecProblem::Conflict { first: "touchstone", second: "response", remedy };
+            return Err(second.fault(problem));
+        }
+        (Some(path), None) => {
+            let parameter = fields.optional("parameter").map(|v| v.text().map(str::to_owned)).transpose()?;
+            (path, Measurement::Touchstone(parameter))
+        }
+        (None, Some(path)) => (path, Measurement::Response),
+    };
+    let is_table = measurement == Measurement::Response;
+    let fields = value.fields(if is_table { &["response", "order", "deembed"] } else { &MEASURED_KEYS })?;
+    let order = fields.required("order", "give the number of poles of the model")?.count("poles")?;
+    let deembed = fields.optional("deembed").map(|v| v.time()).transpose()?;
+    let deembed = deembed.map_or(Seconds(0.0), |delay| delay.in_seconds(h));
+    let path = path.text()?.to_owned();
+    let model = models(&MeasuredFilter { path, measurement, order, deembed })
+        .map_err(|message| value.fault(SpecProblem::Measurement { message }))?;
+    model.filter.check().map_err(|problem| value.fault(problem))?;
+    Ok(model)
 }
 
 /// Reads one filter in whichever form it is written.

@@ -63,6 +63,12 @@ pub enum SpecProblem {
         /// The parser's message.
         message: String,
     },
+    /// A measurement that cannot be read or modelled.
+    #[error("{message}")]
+    Measurement {
+        /// File, reason and remedy.
+        message: String,
+    },
     /// A key that no table of this kind has.
     #[error("unknown key \"{key}\"{}; the keys here are {}", suggestion(.nearest), .known.join(", "))]
     UnknownKey {
@@ -148,6 +154,21 @@ fn suggestion(nearest: &Option<&'static str>) -> String {
     nearest.map(|key| format!(", did you mean \"{key}\"?")).unwrap_or_default()
 }
 
+/// A path of keys as people read it: channels count from 1, `channel[0].delay` is `channel 1.delay`.
+pub(crate) fn shown_path(path: &str) -> String {
+    path.split('.')
+        .map(|part| channel_from_one(part).unwrap_or_else(|| part.to_owned()))
+        .collect::<Vec<_>>()
+        .join(".")
+}
+
+fn channel_from_one(part: &str) -> Option<String> {
+    let (list, rest) = part.split_once('[')?;
+    let (index, rest) = rest.split_once(']')?;
+    let index: usize = index.parse().ok()?;
+    matches!(list, "channel" | "channels").then(|| format!("channel {}{rest}", index + 1))
+}
+
 impl SpecError {
     /// A problem with the span of `text` that it is about.
     pub(super) fn new(
@@ -209,7 +230,7 @@ impl fmt::Display for SpecError {
             write!(f, "{}:{}:", location.line, location.column)?;
         }
         if !path.is_empty() {
-            write!(f, " {path}:")?;
+            write!(f, " {}:", shown_path(path))?;
         }
         write!(f, " {problem}")?;
         location.as_ref().map_or(Ok(()), |location| write!(f, "\n{location}"))

@@ -11,6 +11,7 @@ mod error;
 mod filter;
 mod filter_problem;
 mod limits;
+mod measured;
 mod nearest;
 pub(crate) mod reader;
 mod uncertainty;
@@ -18,7 +19,7 @@ mod word_lengths;
 mod write;
 
 pub use design::DesignOverrides;
-pub(crate) use error::Fault;
+pub(crate) use error::{Fault, shown_path};
 pub use error::{Location, SpecError, SpecProblem};
 pub use filter::{MAX_RIPPLE_DB, MIN_RIPPLE_DB};
 pub use filter_problem::{FilterProblem, MAX_ORDER};
@@ -27,6 +28,7 @@ pub(crate) use limits::check_noise;
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub(crate) use limits::{check_gain, check_offset};
+pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use uncertainty::{PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
@@ -258,11 +260,25 @@ impl Spec {
         file_name: &str,
         overrides: DesignOverrides,
     ) -> Result<Self, SpecError> {
+        Self::from_toml_and_files(text, file_name, overrides, &measured::no_models)
+    }
+
+    /// As [`Spec::from_toml_with`], for a spec whose filters may be measurements in other files. `models` makes
+    /// filters of them. Their errors become half-widths of the gains in the uncertainty, where they matter.
+    ///
+    /// # Errors
+    /// As [`Spec::from_toml_with`], and those of `models`.
+    pub fn from_toml_and_files(
+        text: &str,
+        file_name: &str,
+        overrides: DesignOverrides,
+        models: &FilterModels<'_>,
+    ) -> Result<Self, SpecError> {
         let document = document::Node::from_toml(text).map_err(|error| {
             let problem = SpecProblem::Syntax { message: error.message().to_owned() };
             SpecError::new(file_name, text, error.span(), String::new(), problem)
         })?;
-        decode::spec(&reader::Value::root(&document), overrides)
+        decode::spec_with(&reader::Value::root(&document), overrides, models)
             .map_err(|fault| SpecError::of(file_name, text, fault))
     }
 

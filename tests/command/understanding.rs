@@ -158,3 +158,76 @@ fn a_bank_is_drawn_in_six_pictures() {
     }
     desk.refused(1, &["plot", "b.json", "-o", "pictures"], &["exists", "--force"]);
 }
+
+/// A response table of a Butterworth filter of order 4, by its definition.
+fn bode(cutoff: f64, delay: f64) -> String {
+    let mut text = "frequency (kHz), gain (dB), phase (deg)\n".to_owned();
+    for k in 1..=120 {
+        let f = 300.0 * f64::from(k);
+        let x = f / cutoff;
+        // (1 - x^2)^2 - (a b) x^2 .. multiplied out: two sections with the damping 2 cos(pi/8) and 2 cos(3 pi/8).
+        let phase = |angle: f64| (2.0 * angle.cos() * x).atan2(1.0 - x * x);
+        let pi = std::f64::consts::PI;
+        let lag = phase(pi / 8.0) + phase(3.0 * pi / 8.0) + 2.0 * pi * f * delay;
+        text += &format!("{:e},{:e},{:e}\n", f / 1e3, -10.0 * (1.0 + x.powi(8)).log10(), -lag.to_degrees());
+    }
+    text
+}
+
+/// A front end that is measured gives the bank that the filter itself gives; the bank stands alone.
+#[test]
+fn a_measured_front_end_is_modelled() {
+    let desk = Desk::with_spec(AUDIO);
+    let exact = desk.report(&["design", "spec.toml", "-o", "exact.json"]);
+    std::fs::create_dir(desk.path("sub")).unwrap();
+    desk.write("sub/bode.csv", bode(9000.0, 0.0));
+    let family = "{ family = \"butterworth\", order = 4, cutoff = 9000.0 }";
+    let measured = AUDIO.replace(family, "{ response = \"bode.csv\", order = 4 }");
+    desk.write("sub/spec.toml", &measured);
+    let output = desk.run(&["design", "sub/spec.toml", "-o", "b.json"], &[]);
+    let echo = text(&output.stderr);
+    assert!(
+        output.status.success() && echo.contains("bode.csv: 4 poles fitted to 120 frequencies"),
+        "{echo}"
+    );
+    assert!(echo.contains("300 Hz to 36 kHz; error at most"), "{echo}");
+    let bank = desk.read_json("b.json");
+    let gamma = |value: f64, other: f64| (value / other - 1.0).abs();
+    assert!(gamma(number(&bank, "/gamma/norm"), number(&exact, "/gamma/norm")) < 1e-6, "{bank}");
+    assert!(bank["spec"]["target"]["filter"]["a"].is_array() && bank["spec"]["uncertainty"].is_null());
+    std::fs::remove_dir_all(desk.path("sub")).unwrap();
+    desk.good(&["verify", "b.json"]);
+}
+
+/// What the model misses is an error of the gains.
+#[test]
+fn the_error_of_a_model_is_carried_into_the_uncertainty() {
+    let desk = Desk::with_spec(AUDIO);
+    desk.write("bode.csv", bode(9000.0, 0.0));
+    let family = "{ family = \"butterworth\", order = 4, cutoff = 9000.0 }";
+    let spec = AUDIO
+        .replace(family, "{ response = \"bode.csv\", order = 3 }")
+        .replace("method = \"fir\"\ntaps = 24", "method = \"iir\"");
+    desk.write("spec.toml", spec);
+    let output = desk.run(&["design", "spec.toml", "-o", "b.json"], &[]);
+    let echo = text(&output.stderr);
+    let said = echo.split("at most ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    let said: f64 = said.parse().unwrap();
+    let carried = number(&desk.read_json("b.json"), "/spec/uncertainty/gain/1");
+    let decibels = 20.0 * (1.0 + carried).log10();
+    assert!(said > 0.01 && (decibels / said - 1.0).abs() < 0.01, "{echo}: {decibels}");
+    for (filter, parts) in [
+        ("{ response = \"none.csv\", order = 3 }", &["none.csv", "target.filter"][..]),
+        ("{ response = \"bode.csv\" }", &["target.filter", "the key order is missing"]),
+        ("{ touchstone = \"bode.csv\", order = 3 }", &["bode.csv", ".s1p or .s2p"]),
+        ("{ response = \"bode.csv\", order = 3, num = [1.0] }", &["unknown key \"num\""]),
+        ("{ response = \"late.csv\", order = 4 }", &["late.csv", "deembed", "without a delay of 400"]),
+    ] {
+        desk.write("late.csv", bode(9000.0, 400e-6));
+        desk.write("bad.toml", AUDIO.replace(family, filter));
+        desk.refused(1, &["design", "bad.toml", "-o", "bad.json"], parts);
+    }
+    let filter = "{ response = \"late.csv\", order = 4, deembed = \"400 us\" }";
+    desk.write("late.toml", AUDIO.replace(family, filter));
+    assert!(desk.run(&["design", "late.toml", "-o", "late.json"], &[]).status.success());
+}

@@ -3,6 +3,7 @@
 
 use crate::support::campaign::rounds;
 use crate::support::random::Random;
+use hybank::analog::fit::{MeasuredResponse, vector_fit};
 use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::wav::WavReader;
@@ -157,4 +158,31 @@ fn taps_of_other_tools() {
         }
     });
     assert!(answers > 500 && refusals > 1000, "{answers} {refusals}");
+}
+
+#[test]
+fn measured_responses() {
+    let (mut answers, mut refusals, mut models) = (0, 0, 0);
+    damaged("response", |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        for measured in [
+            MeasuredResponse::from_csv(&text),
+            MeasuredResponse::from_touchstone(&text, 1, None),
+            MeasuredResponse::from_touchstone(&text, 2, None),
+        ] {
+            match measured {
+                Err(error) => refusals += usize::from(!error.to_string().is_empty()),
+                Ok(measured) => {
+                    answers += 1;
+                    assert!(measured.points().windows(2).all(|pair| pair[0].0.0 < pair[1].0.0));
+                    // Fits take longer than reading: some of them.
+                    if answers % 50 == 0 {
+                        models +=
+                            usize::from(vector_fit(&measured, 3).is_ok_and(|m| m.filter.check().is_ok()));
+                    }
+                }
+            }
+        }
+    });
+    assert!(answers > 500 && refusals > 1000 && models > 5, "{answers} {refusals} {models}");
 }

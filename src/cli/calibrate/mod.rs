@@ -4,7 +4,7 @@ mod captures;
 mod report;
 
 use super::Failure;
-use super::bank_file::{is_dash, name, read_text, write_text};
+use super::bank_file::{is_dash, parse_spec, read_text, write_text};
 use super::capture_args::CaptureArgs;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading as FileReading};
 use super::say::name_leftovers;
@@ -13,7 +13,7 @@ use super::understood::say_understood;
 use crate::calibrate::{Calibration, Evidence, Fit, Record, Settings, applied, calibrate};
 use crate::files;
 use crate::quantity;
-use crate::spec::Spec;
+use crate::spec::{DesignOverrides, Spec};
 use crate::units::{FastPeriods, Hertz};
 use captures::Reading;
 use report::Report;
@@ -146,7 +146,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn parse(path: &Path, text: &str) -> Result<Spec, Failure> {
-    Spec::from_toml(text, &name(path)).map_err(Failure::input)
+    parse_spec(text, path, DesignOverrides::default())
 }
 
 fn run_on(

@@ -12,7 +12,7 @@ fn data_without_text_read_like_a_file_and_faults_carry_their_path() {
     wrong["channel"][1]["delay"] = toml::Value::Float(f64::INFINITY);
     let error = Spec::from_data(wrong, "spec").unwrap_err();
     assert_eq!((error.path(), error.location()), ("channel[1].delay", None));
-    assert!(error.to_string().starts_with("spec: channel[1].delay: "), "{error}");
+    assert!(error.to_string().starts_with("spec: channel 2.delay: "), "{error}");
 }
 
 #[test]

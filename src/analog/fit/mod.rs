@@ -1,0 +1,19 @@
+//! Models of measured front ends: responses of network analysers and Bode plots, and the stable, strictly proper
+//! filters that are fitted to them.
+//!
+//! - [`MeasuredResponse`] is a response on a list of frequencies, read from Touchstone or CSV text.
+//! - [`vector_fit`] gives a [`FittedModel`] with the error that it leaves.
+
+mod error;
+mod measured;
+mod poles;
+mod table;
+mod touchstone;
+mod vector_fit;
+
+pub use error::{FitError, MeasurementError};
+pub use measured::MeasuredResponse;
+pub use vector_fit::{FittedModel, MAX_FIT_ERROR, vector_fit};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,75 @@
+//! Filters of specs that are measurements in files beside the spec.
+
+use super::bank_file::is_dash;
+use crate::analog::fit::{MeasuredResponse, vector_fit};
+use crate::files::{Bound, read_text};
+use crate::quantity::readable;
+use crate::spec::{FilterModel, MeasuredFilter, Measurement};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+/// Largest file of a measurement.
+const MEASUREMENT: Bound =
+    Bound { bytes: 64 << 20, kind: "a measured response", remedy: "give the file that was meant" };
+
+/// The models of one spec, each fitted once.
+pub(super) struct Models {
+    folder: PathBuf,
+    made: RefCell<Vec<(MeasuredFilter, FilterModel)>>,
+    echo: RefCell<Vec<String>>,
+}
+
+impl Models {
+    /// For the spec `path`: names of files are relative to its folder.
+    pub(super) fn of(path: &Path) -> Self {
+        let folder = path.parent().filter(|_| !is_dash(path)).map(Path::to_owned).unwrap_or_default();
+        Self { folder, made: RefCell::default(), echo: RefCell::default() }
+    }
+
+    /// The model of a measurement.
+    pub(super) fn model(&self, wanted: &MeasuredFilter) -> Result<FilterModel, String> {
+        let known =
+            self.made.borrow().iter().find(|(made, _)| made == wanted).map(|(_, model)| model.clone());
+        if let Some(model) = known {
+            return Ok(model);
+        }
+        let path = self.folder.join(&wanted.path);
+        let text = read_text(&path, MEASUREMENT).map_err(|error| error.to_string())?;
+        let named = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+        let measured = response(&path, &text, wanted).map_err(|error| named(&error))?;
+        let fitted = vector_fit(&measured.without_delay(wanted.deembed), wanted.order);
+        let fitted = fitted.map_err(|error| named(&error))?;
+        let points = measured.points();
+        let at = |k: usize| points.get(k).map_or(0.0, |point| point.0.0);
+        self.echo.borrow_mut().push(format!(
+            "{}: {} poles fitted to {} frequencies, {} to {}; error at most {:.2e} dB",
+            path.display(),
+            wanted.order,
+            points.len(),
+            readable(at(0), "Hz"),
+            readable(at(points.len() - 1), "Hz"),
+            fitted.error.0
+        ));
+        let model = FilterModel { filter: fitted.filter, error: fitted.error };
+        self.made.borrow_mut().push((wanted.clone(), model.clone()));
+        Ok(model)
+    }
+
+    /// What was understood of the measurements, a line each.
+    pub(super) fn echo(self) -> Vec<String> {
+        self.echo.into_inner()
+    }
+}
+
+fn response(path: &Path, text: &str, wanted: &MeasuredFilter) -> Result<MeasuredResponse, String> {
+    let Measurement::Touchstone(parameter) = &wanted.measurement else {
+        return MeasuredResponse::from_csv(text).map_err(|error| error.to_string());
+    };
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let ports = match extension.to_ascii_lowercase().as_str() {
+        "s1p" => 1,
+        "s2p" => 2,
+        _ => return Err("Touchstone files of one or two ports end in .s1p or .s2p".to_owned()),
+    };
+    MeasuredResponse::from_touchstone(text, ports, parameter.as_deref()).map_err(|error| error.to_string())
+}
