@@ -6,6 +6,7 @@
 mod analyze;
 mod bank_file;
 mod before_after;
+mod bit_true;
 mod calibrate;
 mod capture_args;
 mod capture_file;
@@ -28,6 +29,7 @@ mod journal;
 mod man;
 mod match_bank;
 mod measure;
+mod measured;
 mod output;
 mod pictures;
 mod plot;
@@ -36,6 +38,7 @@ mod recordings;
 mod report;
 mod run;
 mod say;
+mod schema;
 mod simulate;
 mod stream;
 mod track;
@@ -95,6 +98,7 @@ enum Command {
     Demo(demo::Args),
     Completions(completions::Args),
     Man(man::Args),
+    Schema(schema::Args),
     Help(help::Args),
 }
 
@@ -136,6 +140,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(&args),
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
+        Command::Schema(args) => schema::run(&args),
         Command::Help(args) => help::run(&args),
     }
 }

@@ -6,6 +6,8 @@ mod support;
 mod abuse;
 mod algorithms;
 mod analyze;
+#[cfg(target_os = "linux")]
+mod bit_true;
 mod calibrate;
 mod cuts;
 mod design;
@@ -27,6 +29,7 @@ mod notes;
 #[cfg(unix)]
 mod outputs;
 mod report;
+mod schema;
 mod simulate;
 mod snapshots;
 #[cfg(unix)]

@@ -6,6 +6,7 @@ pub(crate) mod campaign;
 mod desk;
 pub(crate) mod jobs;
 pub(crate) mod random;
+pub(crate) mod schema;
 pub(crate) mod specs;
 pub(crate) mod sweep;
 pub(crate) mod wav;

@@ -42,10 +42,7 @@ impl Pictures<'_> {
         };
         let marks = |contender: &Contender| Marks {
             label: contender.name.into(),
-            points: window
-                .clone()
-                .map(|n| (time(n) * 1e3, contender.samples[n], String::new()))
-                .collect(),
+            points: window.clone().map(|n| (time(n) * 1e3, contender.samples[n], String::new())).collect(),
         };
         let chart = Chart {
             title: "Around the step: chirp, tones and step through the converters".into(),
@@ -66,9 +63,8 @@ impl Pictures<'_> {
         let interval = ERROR_INTERVAL.in_fast_periods(period).0 as usize;
         let target = &self.captured.target;
         let level = |samples: &[f64], start: usize| {
-            let power: f64 =
-                (start..start + interval).map(|n| (samples[n] - target[n]).powi(2)).sum::<f64>()
-                    / interval as f64;
+            let power: f64 = (start..start + interval).map(|n| (samples[n] - target[n]).powi(2)).sum::<f64>()
+                / interval as f64;
             Decibels::of_power(power.max(1e-30)).0
         };
         let curve = |contender: &Contender| Series {
