@@ -18,15 +18,15 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   hybank export bank.json --to c -o bank.h
-  hybank export bank.json --to npz -o bank.npz
-  hybank export fixed.json --to coe -o taps.coe
+  hybank export bank.json -o bank.npz
+  hybank export fixed.json -o taps.coe
   hybank export recursive.json --to sos -o sections.csv")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
-    /// The format
+    /// The format [default: that of the output's extension: h, csv, npz, mat, coe or mem]
     #[arg(long, value_enum)]
-    to: FormatArg,
+    to: Option<FormatArg>,
     /// The file to write; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
@@ -56,6 +56,25 @@ enum FormatArg {
     Sos,
 }
 
+impl Args {
+    fn format(&self) -> Result<FormatArg, Failure> {
+        let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        let meant = match extension.to_ascii_lowercase().as_str() {
+            "h" => Some(FormatArg::C),
+            "csv" => Some(FormatArg::Csv),
+            "npz" => Some(FormatArg::Npz),
+            "mat" => Some(FormatArg::Mat),
+            "coe" => Some(FormatArg::Coe),
+            "mem" => Some(FormatArg::Mem),
+            _ => None,
+        };
+        self.to.or(meant).ok_or_else(|| {
+            let message = "the name does not say which format it is to have; give --to c, csv, npz, mat, coe, mem or sos";
+            Failure::Usage(format!("{}: {message}", self.output.display()))
+        })
+    }
+}
+
 impl From<FormatArg> for Format {
     fn from(format: FormatArg) -> Self {
         match format {
@@ -75,11 +94,12 @@ impl From<FormatArg> for Format {
 /// # Errors
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let format = args.format()?;
     refuse_overlap(&args.output, &args.bank)?;
     let bank = load(&args.bank)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(&args.bank)));
-    let mut bytes = export(&bank, args.to.into(), &args.name).map_err(|error| named(&error))?;
-    if args.to == FormatArg::Sos {
+    let mut bytes = export(&bank, format.into(), &args.name).map_err(|error| named(&error))?;
+    if format == FormatArg::Sos {
         let comment = gamma_of_sections(&bank).map_err(|error| named(&error))?;
         bytes.splice(0..0, comment.bytes());
     }

@@ -4,7 +4,9 @@
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The format holds integers.
-    #[error("{format} files hold integer taps, and this bank has none; design it with --bits")]
+    #[error(
+        "{format} files hold integer taps, and this bank has none; design it with --method fir and --bits"
+    )]
     NoIntegers {
         /// Name of the format.
         format: &'static str,

@@ -215,6 +215,10 @@ fn refusals_name_the_remedy() {
         desk.good(&["export", "b.json", "--to", "csv", "-o", "-"])
             .starts_with("channel,phase,lag,value\n1,0,0,")
     );
+    // The extension says the format; others need the option.
+    desk.good(&["export", "b.json", "-o", "t.csv"]);
+    assert!(desk.read("t.csv").starts_with(b"channel,phase,lag,value\n1,0,0,"));
+    desk.refused(2, &["export", "b.json", "-o", "t.txt"], &["t.txt", "--to c"]);
 }
 
 /// What was exported comes back with the gamma that it had, proven again.
