@@ -79,7 +79,7 @@ impl<'a> Legend<'a> {
             match look {
                 Look::Line(None) => area.draw(&PathElement::new(line, *style))?,
                 Look::Line(Some(Dashes { on, off })) => {
-                    area.draw(&DashedPathElement::new(line.into_iter(), on / 2, off / 2, *style))?;
+                    area.draw(&DashedPathElement::new(line, on / 2, off / 2, *style))?;
                 }
                 Look::Points => {
                     area.draw(&Circle::new((enlarged(x + SAMPLE / 2), middle), enlarged(3), *style))?;
