@@ -19,7 +19,6 @@ use super::plant::LiftedPlant;
 use super::problem::{Channel, Problem};
 use crate::spec::{Method, Spec};
 use crate::units::FastPeriods;
-use crate::verify::uncertainty::ErrorBox;
 use reach::Reach;
 use recursive::{CausalErrors, NEGLIGIBLE};
 use search::Search;
@@ -77,12 +76,6 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     choose_latency(&open, &|_| ())
 }
 
-/// The errors for which the bank of a spec is made robust.
-pub(super) fn robust_box(spec: &Spec) -> Option<ErrorBox> {
-    let errors = ErrorBox::of(spec.uncertainty.as_ref()?, spec.channels.len());
-    (spec.design.method == Method::Fir && !errors.is_point()).then_some(errors)
-}
-
 /// The settings of the method, from a spec with taps.
 ///
 /// # Errors
@@ -95,7 +88,7 @@ pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
     let separate = spec.design.method == Method::Separation;
     Ok(Settings {
         taps: taps(spec),
-        robust: robust_box(spec).map(|errors| RobustProblem { spec: spec.clone(), errors }),
+        robust: RobustProblem::of(spec),
         gamma_margin: spec.design.gamma_margin,
         solver: spec.design.solver,
         at_slow_rate: separate.then(at_slow_rate).transpose()?,

@@ -17,9 +17,8 @@ pub use amount::Effort;
 pub use progress::{Observer, Stage, unobserved};
 
 use super::DesignError;
-use super::choices::robust_box;
 use super::merging::Repeats;
-use super::methods::robust_fir::scenario_count;
+use super::methods::robust_fir::RobustProblem;
 use super::problem::Problem;
 use crate::spec::{Method, Solver, Spec};
 use memory::machine_memory;
@@ -80,10 +79,10 @@ fn synthesis(spec: &Spec, sizes: &Sizes) -> Effort {
 
 /// The part of a design that is for uncertain channels.
 fn robust(spec: &Spec, sizes: &Sizes) -> Effort {
-    match robust_box(spec) {
+    match RobustProblem::of(spec) {
         None => Effort::default(),
         Some(_) if spec.design.tracking.is_some() => fir::affine(sizes),
-        Some(errors) => fir::robust(sizes, scenario_count(&errors)),
+        Some(problem) => fir::robust(sizes, problem.scenario_count()),
     }
 }
 

@@ -21,4 +21,4 @@ pub(crate) use affine::{AffineDesign, synthesise as synthesise_affine};
 pub use fixed::RobustStudy;
 pub(crate) use fixed::synthesise;
 pub use norms::RobustNorms;
-pub(crate) use scenarios::{RobustProblem, scenario_count};
+pub(crate) use scenarios::RobustProblem;

@@ -4,7 +4,7 @@ use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
 use crate::design::uncertainty::sides::{Side, point_at, sides};
-use crate::spec::Spec;
+use crate::spec::{Method, Spec};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
 
 /// Most scenarios.
@@ -19,6 +19,20 @@ pub(crate) struct RobustProblem {
     pub(crate) spec: Spec,
     /// The box.
     pub(crate) errors: ErrorBox,
+}
+
+impl RobustProblem {
+    /// The problem of a spec whose bank is to be robust: FIR for channels with errors.
+    pub(crate) fn of(spec: &Spec) -> Option<Self> {
+        let errors = ErrorBox::of(spec.uncertainty.as_ref()?, spec.channels.len());
+        let is_robust = spec.design.method == Method::Fir && !errors.is_point();
+        is_robust.then(|| Self { spec: spec.clone(), errors })
+    }
+
+    /// The number of points with a plant of their own.
+    pub(crate) fn scenario_count(&self) -> usize {
+        scenarios(&self.errors).len()
+    }
 }
 
 /// The plant at a point of the box.
@@ -45,11 +59,6 @@ pub(super) fn scenarios(errors: &ErrorBox) -> Vec<ErrorPoint> {
         }
         None => corners(errors, &sides),
     }
-}
-
-/// The number of [`scenarios`].
-pub(crate) fn scenario_count(errors: &ErrorBox) -> usize {
-    scenarios(errors).len()
 }
 
 fn lattice_point(errors: &ErrorBox, sides: &[Side], per_side: &[usize], index: usize) -> ErrorPoint {
