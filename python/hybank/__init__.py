@@ -1,21 +1,29 @@
 """Hybrid multirate filter banks: several slow converters with fractional delays as one fast one.
 
-``design`` makes a ``Bank``; ``Bank.fuse`` runs it on an array, ``Bank.stream`` block by block.
+``design`` makes a ``Bank``; ``Bank.fuse`` runs it on an array, ``Bank.stream`` block by block. ``hybank.dask`` does both
+on many machines, ``hybank.ibr`` renders views.
 """
+
+import importlib
 
 from hybank._hybank import (
     Analysis,
     Bank,
+    Calibration,
     Capture,
     FuseReport,
     Gamma,
     HybankError,
+    Measurement,
+    Recording,
     SpecError,
     Stream,
     Verified,
     __version__,
     analyze,
+    calibrate,
     load,
+    measure,
     simulate,
     verify,
 )
@@ -37,11 +45,14 @@ from hybank._spec import (
 __all__ = [
     "Analysis",
     "Bank",
+    "Calibration",
     "Capture",
     "Channel",
     "FuseReport",
     "Gamma",
     "HybankError",
+    "Measurement",
+    "Recording",
     "SpecError",
     "Stream",
     "Verified",
@@ -49,12 +60,14 @@ __all__ = [
     "analyze",
     "bessel",
     "butterworth",
+    "calibrate",
     "cascade",
     "chebyshev1",
     "chebyshev2",
     "design",
     "elliptic",
     "load",
+    "measure",
     "rc",
     "simulate",
     "ss",
@@ -62,3 +75,10 @@ __all__ = [
     "verify",
     "zpk",
 ]
+
+
+def __getattr__(name):
+    """The parts that need more than NumPy, or that few programs need, are imported when they are used."""
+    if name in ("dask", "gnuradio", "ibr"):
+        return importlib.import_module(f"hybank.{name}")
+    raise AttributeError(f"module 'hybank' has no attribute {name!r}")

@@ -4,6 +4,7 @@ from hybank._hybank import design as _design
 
 _DESIGN_KEYS = (
     "method", "taps", "gamma_margin", "solver", "bits", "fraction_bits", "order", "reduction_loss_db", "noise",
+    "tracking",
 )
 
 

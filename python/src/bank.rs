@@ -9,6 +9,7 @@ use crate::stream::Stream;
 use hybank::bank::{self, BlockFilter, SynthesisFilters};
 use hybank::design;
 use hybank::files::AtomicFile;
+use hybank::interchange::{Format as Exported, export};
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -71,6 +72,16 @@ impl Bank {
         file.commit().map_err(file_error)
     }
 
+    /// Writes the bank for another tool: `c99`, `csv`, `npz`, `mat`, `coe` or `mem`. `name` is the prefix of C
+    /// identifiers.
+    #[pyo3(signature = (path, *, format, name = "bank", overwrite = true))]
+    fn export(&self, path: PathBuf, format: &str, name: &str, overwrite: bool) -> PyResult<()> {
+        let bytes = export(&self.bank, parse_format(format)?, name).map_err(refused)?;
+        let mut file = AtomicFile::create(&path, overwrite).map_err(file_error)?;
+        file.write_all(&bytes)?;
+        file.commit().map_err(file_error)
+    }
+
     /// N.
     #[getter]
     fn channels(&self) -> usize {
@@ -116,8 +127,8 @@ impl Bank {
     /// The worst-case error with its bounds.
     #[getter]
     fn gamma(&self) -> Gamma {
-        let bank::Gamma { norm, upper, lower, noncausal, worst_case, .. } = self.bank.gamma;
-        Gamma { norm, upper, lower, noncausal, worst_case }
+        let bank::Gamma { norm, upper, lower, noncausal, worst_case, tracked } = self.bank.gamma;
+        Gamma { norm, upper, lower, noncausal, worst_case, tracked }
     }
 
     /// The delay of each channel in seconds.
@@ -203,12 +214,20 @@ impl Bank {
     }
 
     /// A causal stream through the bank.
+    ///
+    /// `state`, that of another stream of the same bank, dtype and algorithm, makes it go on from there.
     #[pyo3(
-        signature = (*, axis = -1, dtype = None, algorithm = "auto"),
-        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto')"
+        signature = (*, axis = -1, dtype = None, algorithm = "auto", state = None),
+        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None)"
     )]
-    fn stream(&self, axis: isize, dtype: Option<Bound<'_, PyAny>>, algorithm: &str) -> PyResult<Stream> {
-        Stream::new(&self.bank, axis, dtype.as_ref(), algorithm)
+    fn stream(
+        &self,
+        axis: isize,
+        dtype: Option<Bound<'_, PyAny>>,
+        algorithm: &str,
+        state: Option<&[u8]>,
+    ) -> PyResult<Stream> {
+        Stream::new(&self.bank, axis, dtype.as_ref(), algorithm)?.resumed(state)
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
@@ -260,6 +279,20 @@ impl Bank {
         }
         let filters = design::filters::lifted(&self.bank.filters, self.bank.ratio).map_err(refused)?;
         Ok(design::filters::to_block(&filters))
+    }
+}
+
+fn parse_format(name: &str) -> PyResult<Exported> {
+    match name {
+        "c99" => Ok(Exported::C99),
+        "csv" => Ok(Exported::Csv),
+        "npz" => Ok(Exported::Npz),
+        "mat" => Ok(Exported::Mat),
+        "coe" => Ok(Exported::Coe),
+        "mem" => Ok(Exported::Mem),
+        _ => Err(HybankError::new_err(format!(
+            "format: \"{name}\" is unknown; choose c99, csv, npz, mat, coe or mem"
+        ))),
     }
 }
 

@@ -64,6 +64,20 @@ impl Format {
         }
     }
 
+    /// The name that NumPy knows.
+    pub(crate) fn name(self) -> &'static str {
+        match (self.number, self.complex) {
+            (Number::F32, false) => "f4",
+            (Number::F64, false) => "f8",
+            (Number::F32, true) => "c8",
+            (_, true) => "c16",
+            (Number::I8, false) => "i1",
+            (Number::U8, false) => "u1",
+            (Number::I16, false) => "i2",
+            (Number::I32, false) => "i4",
+        }
+    }
+
     /// What a dtype, or the name of one, stands for.
     pub(crate) fn of_dtype(asked: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = asked.py();

@@ -9,12 +9,16 @@
 mod arrays;
 mod background;
 mod bank;
+mod calibrate;
 mod design;
 mod errors;
 mod formats;
 mod fuse;
+mod ibr;
 mod judge;
+mod measure;
 mod outputs;
+mod recordings;
 mod results;
 mod samples;
 mod simulate;
@@ -38,10 +42,19 @@ fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<results::Verified>()?;
     module.add_class::<results::Analysis>()?;
     module.add_class::<results::Capture>()?;
+    module.add_class::<recordings::Recording>()?;
+    module.add_class::<calibrate::Calibration>()?;
+    module.add_class::<measure::Measurement>()?;
+    module.add_class::<ibr::View>()?;
     module.add_function(wrap_pyfunction!(design::design, module)?)?;
     module.add_function(wrap_pyfunction!(bank::load, module)?)?;
     module.add_function(wrap_pyfunction!(judge::verify, module)?)?;
     module.add_function(wrap_pyfunction!(judge::analyze, module)?)?;
     module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(calibrate::calibrate, module)?)?;
+    module.add_function(wrap_pyfunction!(measure::measure, module)?)?;
+    module.add_function(wrap_pyfunction!(outputs::encode, module)?)?;
+    module.add_function(wrap_pyfunction!(ibr::render_rectified, module)?)?;
+    module.add_function(wrap_pyfunction!(ibr::render_calibrated, module)?)?;
     Ok(())
 }

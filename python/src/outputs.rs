@@ -1,9 +1,10 @@
 //! New arrays for outputs.
 
+use crate::arrays::{Held, Shape};
 use crate::errors::refused;
 use crate::formats::{Format, Number};
-use crate::samples::Room;
-use hybank::runtime::PcmOutput;
+use crate::samples::{Room, Samples};
+use hybank::runtime::{Input, Isa, Output, PcmOutput, Sample};
 use numpy::{Element, PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 
@@ -78,6 +79,33 @@ impl<'py> NewArray<'py> {
             None => Ok(array),
         }
     }
+}
+
+/// Real samples in another number type, as outputs are converted, and how many saturated.
+#[pyfunction]
+pub(crate) fn encode<'py>(
+    y: &Bound<'py, PyAny>,
+    dtype: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyAny>, u64)> {
+    let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
+    let mut array = NewArray::new(y.py(), held.frames(), Format::of_dtype(dtype)?)?;
+    let (samples, mut room) = (held.samples()?, array.room()?);
+    let (frames, is_single) = (held.frames(), held.format.number == Number::F32);
+    let clipped = y.py().detach(|| {
+        if is_single {
+            convert::<f32>(&samples, frames, &mut room);
+        } else {
+            convert::<f64>(&samples, frames, &mut room);
+        }
+        room.clipped()
+    });
+    Ok((array.finish()?, clipped))
+}
+
+fn convert<T: Sample>(samples: &Samples<'_>, frames: usize, room: &mut Room<'_>) {
+    let mut numbers = vec![T::default(); frames];
+    samples.load(Isa::detect(), 0, &mut numbers);
+    room.store(Isa::detect(), 0, &numbers);
 }
 
 fn zeros<T: Element>(py: Python<'_>, len: usize) -> PyResult<PyReadwriteArray1<'_, T>> {

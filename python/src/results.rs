@@ -18,6 +18,8 @@ pub(crate) struct Gamma {
     pub(crate) noncausal: Option<f64>,
     /// An upper bound over all errors that the spec allows for.
     pub(crate) worst_case: Option<f64>,
+    /// The same while the taps follow the delays; None for a bank whose taps do not.
+    pub(crate) tracked: Option<f64>,
 }
 
 #[pymethods]

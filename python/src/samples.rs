@@ -147,7 +147,9 @@ impl Output for Room<'_> {
 }
 
 fn store_part<S: Sample, T: Sample>(room: &mut [S], part: usize, first: usize, samples: &[T]) {
-    for (slot, value) in room[2 * first + part..].iter_mut().step_by(2).zip(samples) {
+    // Where there is no sample, there is no room for a second part either.
+    let room = room.get_mut(2 * first + part..).unwrap_or_default();
+    for (slot, value) in room.iter_mut().step_by(2).zip(samples) {
         *slot = S::from_f64(value.to_f64());
     }
 }

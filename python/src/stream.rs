@@ -1,28 +1,36 @@
 //! `hybank.Stream`: a causal stream, block by block.
 
 use crate::arrays::{Held, Shape};
+use crate::bank::Bank as PyBank;
 use crate::errors::{HybankError, refused};
 use crate::formats::{Format, Number};
 use crate::fuse::{parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::samples::{Room, Samples};
 use hybank::bank::Bank;
-use hybank::runtime::{self, Algorithm, Plan, ProcessError};
+use hybank::runtime::{self, Algorithm, Plan, ProcessError, STATE_COUNTS, StateError};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyBytes, PyTuple};
 use std::fmt;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A stream through a bank: blocks of frames in, M samples per frame out, late by the latency.
 ///
 /// Threads may share a stream; their blocks come one after another.
 #[pyclass(frozen, module = "hybank")]
 pub(crate) struct Stream {
+    bank: Arc<Bank>,
+    /// As it was asked for.
+    asked: String,
     plan: Plan,
     shape: Shape,
     format: Format,
     state: Mutex<State>,
 }
+
+/// How a pickle makes a stream: a function and its arguments.
+type Reduced<'py> =
+    (Bound<'py, PyAny>, (Bound<'py, PyBank>, isize, &'static str, String, Bound<'py, PyBytes>, bool));
 
 #[derive(Clone)]
 struct State {
@@ -34,7 +42,7 @@ struct State {
 
 impl Stream {
     pub(crate) fn new(
-        bank: &Bank,
+        bank: &Arc<Bank>,
         axis: isize,
         dtype: Option<&Bound<'_, PyAny>>,
         algorithm: &str,
@@ -47,7 +55,16 @@ impl Stream {
         let plan = plan(bank, format, parse_algorithm(algorithm)?.unwrap_or(auto))?;
         let streams = vec![runtime::Stream::new(&plan); 1 + usize::from(format.complex)];
         let state = Mutex::new(State { streams, clipped: 0, closed: false });
-        Ok(Self { plan, shape, format, state })
+        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, state })
+    }
+
+    /// The same stream at the place of a state, if one is given.
+    pub(crate) fn resumed(self, state: Option<&[u8]>) -> PyResult<Self> {
+        if let Some(bytes) = state {
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            state.resume(bytes).map_err(refused)?;
+        }
+        Ok(self)
     }
 
     /// To be called without the interpreter lock: the thread that holds the state may wait for that lock.
@@ -146,10 +163,55 @@ impl Stream {
         self.read(py, |state| state.streams.iter().map(runtime::Stream::state_resets).sum())
     }
 
+    /// The state as bytes: `bank.stream(state=..)` goes on from there with the same bits, in any process. A stream can
+    /// be pickled too, with its bank.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.read(py, State::bytes))
+    }
+
+    /// True if from here on this stream and one that goes on from `state` give the same bits to the same input. Counts
+    /// and positions may differ.
+    fn agrees(&self, py: Python<'_>, state: &[u8]) -> bool {
+        self.read(py, |own| own.agrees(state))
+    }
+
     /// A second stream at the same place.
     fn __copy__(&self, py: Python<'_>) -> Self {
-        let state = self.read(py, State::clone);
-        Self { plan: self.plan.clone(), shape: self.shape, format: self.format, state: Mutex::new(state) }
+        let state = Mutex::new(self.read(py, State::clone));
+        let Self { bank, asked, plan, shape, format, .. } = self;
+        Self {
+            bank: Arc::clone(bank),
+            asked: asked.clone(),
+            plan: plan.clone(),
+            shape: *shape,
+            format: *format,
+            state,
+        }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let py = slf.py();
+        let Self { bank, asked, shape, format, .. } = slf.get();
+        let (state, closed) = slf.get().read(py, |state| (state.bytes(), state.closed));
+        let bank = PyBank { bank: Arc::clone(bank) }.into_pyobject(py)?;
+        let arguments = (bank, shape.axis, format.name(), asked.clone(), PyBytes::new(py, &state), closed);
+        Ok((slf.get_type().getattr("_of")?, arguments))
+    }
+
+    /// The stream of a pickle.
+    #[staticmethod]
+    fn _of(
+        bank: &PyBank,
+        axis: isize,
+        dtype: &Bound<'_, PyAny>,
+        algorithm: &str,
+        state: &[u8],
+        closed: bool,
+    ) -> PyResult<Self> {
+        let stream = Self::new(&bank.bank, axis, Some(dtype), algorithm)?.resumed(Some(state))?;
+        stream.state.lock().unwrap_or_else(PoisonError::into_inner).closed = closed;
+        Ok(stream)
     }
 
     fn __enter__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
@@ -212,6 +274,35 @@ impl State {
     fn reset(&mut self) {
         self.streams.iter_mut().for_each(runtime::Stream::reset);
         self.clipped = 0;
+    }
+
+    /// The count of saturated samples, then the state of each part, all of one length.
+    fn bytes(&self) -> Vec<u8> {
+        let mut bytes = self.clipped.to_le_bytes().to_vec();
+        self.streams.iter().for_each(|stream| stream.save(&mut bytes));
+        bytes
+    }
+
+    fn parts<'a>(&self, bytes: &'a [u8]) -> Option<(u64, Vec<&'a [u8]>)> {
+        let (clipped, states) = bytes.split_first_chunk()?;
+        let parts = self.streams.len();
+        let is_whole = !states.is_empty() && states.len() % parts == 0;
+        is_whole.then(|| (u64::from_le_bytes(*clipped), states.chunks_exact(states.len() / parts).collect()))
+    }
+
+    fn resume(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        let (clipped, states) = self.parts(bytes).ok_or(StateError::NotAState)?;
+        let mut streams = self.streams.clone();
+        streams.iter_mut().zip(states).try_for_each(|(stream, state)| stream.resume(state))?;
+        (self.streams, self.clipped) = (streams, clipped);
+        Ok(())
+    }
+
+    fn agrees(&self, bytes: &[u8]) -> bool {
+        let same = |(stream, state): (&runtime::Stream, &[u8])| {
+            stream.state().get(STATE_COUNTS..) == state.get(STATE_COUNTS..)
+        };
+        self.parts(bytes).is_some_and(|(_, states)| self.streams.iter().zip(states).all(same))
     }
 
     fn check_open(&self) -> Result<(), StreamError> {

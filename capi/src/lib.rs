@@ -1,0 +1,97 @@
+//! The C interface: see `include/hybank.h`. Everything here is safe code; pointers become slices in [`abi`].
+
+#[allow(unsafe_code, reason = "C passes pointers")]
+mod abi;
+
+use hybank::bank::Bank;
+use hybank::files::{Bound, read_text};
+use hybank::runtime::{
+    Algorithm, Options, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream,
+};
+use std::cell::RefCell;
+use std::ffi::CString;
+use std::path::Path;
+
+/// The largest bank with its proof is smaller.
+const BANK_FILE: Bound =
+    Bound { bytes: 256 << 20, kind: "a bank file", remedy: "give the file that was meant" };
+
+/// 16-bit samples in the byte order of this machine.
+const INT16: PcmFormat = if cfg!(target_endian = "big") { PcmFormat::S16Be } else { PcmFormat::S16Le };
+
+/// A stream through a bank, which C holds by its address.
+pub struct Handle {
+    stream: Stream,
+}
+
+impl Handle {
+    /// Reads a bank file.
+    fn open(path: &str, algorithm: &str, double_sums: bool) -> Result<Self, String> {
+        let text = read_text(Path::new(path), BANK_FILE).map_err(|error| error.to_string())?;
+        let bank = Bank::from_json(&text, path).map_err(|error| error.to_string())?;
+        let precision = if double_sums { Precision::Double } else { Precision::Single };
+        let options = Options { precision, algorithm: parse(algorithm)?, ..Options::default() };
+        let plan = bank.plan(options).map_err(|error| format!("{path}: {error}"))?;
+        Ok(Self { stream: Stream::new(&plan) })
+    }
+
+    /// N.
+    fn channels(&self) -> usize {
+        self.stream.channels()
+    }
+
+    /// M.
+    fn ratio(&self) -> usize {
+        self.stream.ratio()
+    }
+
+    /// Samples that a flush writes.
+    fn tail(&self) -> usize {
+        self.stream.plan().flush_frames() * self.ratio()
+    }
+
+    /// Frames of 16-bit samples as bytes.
+    fn process_int16(&mut self, input: &[u8], output: &mut [u8]) -> Result<usize, String> {
+        let layout = SampleLayout::packed(INT16);
+        let input = [PcmFrames { layout, channels: self.channels(), bytes: input }];
+        let mut output = PcmOutput { format: INT16, bytes: output, clipped: 0 };
+        self.stream.process_pcm(&input, &mut output).map_err(|error| error.to_string())
+    }
+
+    fn flush(&mut self, output: &mut (impl Output + ?Sized)) -> Result<usize, String> {
+        self.stream.flush(output).map_err(|error| error.to_string())
+    }
+}
+
+fn parse(algorithm: &str) -> Result<Algorithm, String> {
+    match algorithm {
+        "auto" => Ok(Algorithm::Auto { added_latency: false }),
+        "direct" => Ok(Algorithm::Direct),
+        "fast-fir" => Ok(Algorithm::FastFir),
+        "overlap-save" => Ok(Algorithm::OverlapSave { transform: None }),
+        _ => Err(format!(
+            "algorithm: \"{algorithm}\" is unknown; choose auto, direct, fast-fir or overlap-save"
+        )),
+    }
+}
+
+thread_local! {
+    /// The text of `hybank_error`.
+    static FAILURE: RefCell<CString> = RefCell::default();
+}
+
+/// The samples written, or -1 with the reason kept for `hybank_error`.
+fn count(result: Result<usize, String>) -> isize {
+    kept(result).and_then(|count| isize::try_from(count).ok()).unwrap_or(-1)
+}
+
+/// The value; of a failure the text is kept for `hybank_error`.
+fn kept<T>(result: Result<T, String>) -> Option<T> {
+    result.map_err(|text| keep(&text)).ok()
+}
+
+fn keep(text: &str) {
+    // A text without zeros is a C string.
+    let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+    FAILURE.with_borrow_mut(|kept| *kept = text);
+}

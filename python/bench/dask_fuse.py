@@ -1,0 +1,70 @@
+"""CPU and bits of `hybank.dask.fuse` over two processes against one run, and the load of a scheduler by empty tasks.
+
+    python python/bench/dask_fuse.py [FRAMES]      100 million unless given; needs dask and distributed
+"""
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from distributed import Client, LocalCluster, wait
+
+import hybank as hb
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def cpu(client):
+    """CPU seconds of this process and of the workers."""
+    used = lambda: sum(os.times()[:2])  # noqa: E731
+    return used() + sum(client.run(used).values())
+
+
+def archive(path, channels, frames):
+    """Noise, written a part at a time."""
+    x = np.lib.format.open_memmap(path, mode="w+", dtype="f4", shape=(channels, frames))
+    random = np.random.default_rng(1)
+    for first in range(0, frames, 1 << 22):
+        part = x[:, first : first + (1 << 22)]
+        part[:] = random.standard_normal(part.shape, dtype="f4")
+    x.flush()
+
+
+def fused(client, bank, folder, algorithm, frames):
+    x = np.load(folder / "in.npy", mmap_mode="r")
+    begin = cpu(client)
+    want = bank.fuse(x, algorithm=algorithm)
+    one = cpu(client) - begin
+    begin, clock = cpu(client), time.perf_counter()
+    report = hb.dask.fuse(bank, folder / "in.npy", folder / "out.npy", client=client, algorithm=algorithm)
+    many, clock = cpu(client) - begin, time.perf_counter() - clock
+    same = bool((np.load(folder / "out.npy", mmap_mode="r") == want).all())
+    print(
+        f"{algorithm}: {frames} frames, {report.spans} spans, equal {same}, CPU {one:.2f} s alone,"
+        f" {many:.2f} s by tasks (ratio {many / one:.3f}), {clock:.2f} s"
+    )
+
+
+def empty(client, count=20_000):
+    begin = time.perf_counter()
+    wait(client.map(lambda k: k, range(count), pure=False))
+    seconds = time.perf_counter() - begin
+    print(f"scheduler: {count} empty tasks in {seconds:.2f} s, {1e6 * seconds / count:.0f} us each")
+
+
+def main():
+    frames = int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000
+    bank = hb.load(ROOT / "filters" / "thesis-fir.json")
+    settings = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    with tempfile.TemporaryDirectory() as name, LocalCluster(**settings) as cluster, Client(cluster) as client:
+        archive(Path(name) / "in.npy", bank.channels, frames)
+        for algorithm in ("direct", "fast-fir", "overlap-save"):
+            fused(client, bank, Path(name), algorithm, frames)
+        empty(client)
+
+
+if __name__ == "__main__":
+    main()

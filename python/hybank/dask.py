@@ -1,0 +1,343 @@
+"""Fusion of archives and sweeps of designs on many machines, with dask.distributed or any executor.
+
+A task reads its own span of the input and writes its own region of the output, so tasks share nothing and a task that
+dies with its worker is done again elsewhere. The outputs have the bits of one run over the whole input: a span begins
+at the plan's alignment, after a warm-up of as many frames as the plan remembers. A recursion never forgets, so its
+tasks also return their states at both ends; where the states of two spans differ at their seam, the later span is run
+again from the state of the earlier one.
+"""
+
+import math
+import os
+from collections import deque
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from hybank._hybank import Bank, HybankError, Recording, encode
+from hybank._spec import design as _design
+
+SPAN = 1 << 20
+_BLOCK = 1 << 16
+
+
+@dataclass
+class Report:
+    """What a fusion did: its spans, those run again because their seam differed, and counts of samples."""
+
+    algorithm: str
+    frames: int
+    spans: int
+    warm_up: int
+    replaced: int = 0
+    clipped: int = 0
+    reruns: list = field(default_factory=list)
+
+
+def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="auto", span=SPAN, progress=None):
+    """Fuse an archive into a new one; the output has the bits of ``bank.fuse`` over all of it.
+
+    ``source`` is a zarr array, an ``.npy`` file, ``("file.h5", "dataset")``, or a list of WAV or SigMF files with a
+    channel or more each. ``axis`` is the axis of time of arrays. ``sink`` is an ``.npy`` file or a zarr array, which
+    is made anew. ``client`` is a ``dask.distributed.Client``; without one this process does one span after another.
+    ``span`` is the least number of frames of a task. ``progress(done, spans)`` is called after every span.
+    """
+    reader = _open(source, axis)
+    if reader.channels != bank.channels:
+        raise HybankError(f"the source has {reader.channels} channels, the bank has {bank.channels}")
+    plan = _plan(bank, reader.dtype, dtype, algorithm)
+    job = _job(bank, source, sink, axis, plan, reader.frames, span)
+    _create(sink, reader.frames * bank.ratio, plan.output, job.span * bank.ratio)
+    report = Report(plan.algorithm, reader.frames, len(job.spans), job.warm_up)
+    if client is None:
+        ends = {k: _run(job, k) for k in _counted(range(len(job.spans)), progress, len(job.spans))}
+    else:
+        ends = _distributed(client, job, progress)
+    _mend(job, ends, report, client)
+    for end in ends.values():
+        report.replaced += end.replaced
+        report.clipped += end.clipped
+    return report
+
+
+def sweep(specs, *, map=map, client=None, progress=None, **keywords):  # noqa: A002
+    """Design every spec; a list of banks, with the exception in place of a bank that could not be designed.
+
+    ``map`` is the ``map`` of any executor, for example of ``concurrent.futures.ProcessPoolExecutor``; ``client`` a
+    ``dask.distributed.Client`` in its place. ``progress(done, specs)`` is called after every design. Keywords go to
+    ``hybank.design``.
+    """
+    specs = [spec if isinstance(spec, (str, os.PathLike)) else dict(spec) for spec in specs]
+    tasks = [(spec, keywords) for spec in specs]
+    if client is not None:
+        results = client.gather(client.map(_designed, tasks, pure=False))
+    else:
+        results = map(_designed, tasks)
+    return [_loaded(result) for result in _counted(results, progress, len(specs))]
+
+
+# Plans and spans.
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """How spans run: the dtype of streams and of the output, and what the stream says of itself."""
+
+    algorithm: str
+    asked: str
+    stream: str
+    output: str
+    latency: int
+    memory: int | None
+    alignment: int
+
+
+@dataclass(frozen=True)
+class _Job:
+    bank: str
+    source: object
+    sink: str
+    axis: int
+    plan: _Plan
+    warm_up: int
+    span: int
+    spans: tuple
+
+
+@dataclass(frozen=True)
+class _End:
+    """What a task returns: counts, and for recursions the states before and after the span."""
+
+    replaced: int
+    clipped: int
+    before: bytes | None = None
+    after: bytes | None = None
+
+
+def _plan(bank, given, dtype, algorithm):
+    """The plan that ``bank.fuse`` would choose."""
+    shape = (bank.channels, 0)
+    y, info = bank.fuse(np.zeros(shape, given), dtype=dtype, algorithm=algorithm, full_output=True)
+    asked = info.algorithm if bank.taps is not None else "auto"
+    # Integers are made of the floats that the sums are in, so that what saturates is counted where it is written.
+    stream = y.dtype.str[1:] if y.dtype.kind in "fc" else {"f32": "f4", "f64": "f8"}[info.numbers]
+    if np.dtype(given).kind == "c" and np.dtype(stream).kind != "c":
+        stream = {"f4": "c8", "f8": "c16"}[stream]
+    s = bank.stream(axis=0, dtype=stream, algorithm=asked)
+    return _Plan(info.algorithm, asked, stream, y.dtype.str[1:], s.latency, s.memory, s.alignment)
+
+
+def _job(bank, source, sink, axis, plan, frames, span):
+    aligned = lambda count: -(-count // plan.alignment) * plan.alignment  # noqa: E731
+    memory = plan.memory if plan.memory is not None else warm_up(bank)
+    span = aligned(max(int(span), 1))
+    warm = min(aligned(memory), aligned(frames))
+    firsts = range(0, frames, span)
+    spans = tuple((first, min(first + span, frames)) for first in firsts)
+    return _Job(bank.to_json(), source, sink, axis, plan, warm, span, spans)
+
+
+def warm_up(bank):
+    """Frames after which two states of a recursion hardly differ: W = 2 ln eps / ln rho, rho its largest pole."""
+    poles = np.linalg.eigvals(bank.ss[0])
+    rho = max(abs(poles), default=0.0)
+    if rho < 1e-3:
+        return len(poles)
+    return len(poles) + math.ceil(2 * math.log(np.finfo(float).eps) / math.log(rho))
+
+
+def _run(job, k, state=None):
+    """One span; ``state`` is the stream's at its beginning, otherwise it is warmed up."""
+    plan, bank, reader = job.plan, _bank(job.bank), _open(job.source, job.axis)
+    first, last = job.spans[k]
+    keeps = plan.memory is None
+    s = bank.stream(axis=0, dtype=plan.stream, algorithm=plan.asked, state=state)
+    if state is None:
+        for _ in _through(s, reader, max(first - job.warm_up, 0), first):
+            pass
+    before, replaced = s.state if keeps else None, s.replaced
+    region = _Region(job, first * bank.ratio, (last - first) * bank.ratio, plan)
+    for y in _through(s, reader, first, last):
+        region.write(y)
+    replaced, after = s.replaced - replaced, s.state if keeps else None
+    ahead = min(-(-plan.latency // bank.ratio), reader.frames - last)
+    for y in _through(s, reader, last, last + ahead):
+        region.write(y)
+    if last + ahead == reader.frames:
+        region.write(s.flush())
+    region.close()
+    return _End(replaced, region.clipped, before, after)
+
+
+def _through(s, reader, first, last):
+    for start in range(first, last, _BLOCK):
+        yield s.process(reader.read(start, min(_BLOCK, last - start)))
+
+
+class _Region:
+    """The outputs of a span: late by the latency, then so many samples."""
+
+    def __init__(self, job, first, count, plan):
+        self.sink, self.first, self.left, self.skip = _writer(job.sink), first, count, plan.latency
+        self.dtype, self.clipped = np.dtype(plan.output), 0
+
+    def write(self, y):
+        dropped = min(self.skip, len(y))
+        self.skip -= dropped
+        self._store(y[dropped : dropped + self.left])
+
+    def _store(self, y):
+        if self.dtype.kind in "iu":
+            y, clipped = encode(y, self.dtype)
+            self.clipped += clipped
+        self.sink[self.first : self.first + len(y)] = y
+        self.first += len(y)
+        self.left -= len(y)
+
+    def close(self):
+        if hasattr(self.sink, "flush"):
+            self.sink.flush()
+
+
+@lru_cache(maxsize=4)
+def _bank(text):
+    return Bank.from_json(text)
+
+
+# Many spans.
+
+
+def _counted(items, progress, total):
+    for done, item in enumerate(items, 1):
+        yield item
+        if progress is not None:
+            progress(done, total)
+
+
+def _distributed(client, job, progress):
+    """All spans, with a few tasks per thread under way, so that the load of the scheduler does not grow."""
+    from distributed import as_completed
+
+    todo = deque(range(len(job.spans)))
+    shared = client.scatter(job, broadcast=True) if len(job.bank) > 1 << 16 else job
+    submit = lambda k: client.submit(_numbered, shared, k, pure=False, retries=3)  # noqa: E731
+    under_way = 4 * max(sum(client.nthreads().values()), 1)
+    futures = as_completed([submit(todo.popleft()) for _ in range(min(under_way, len(todo)))])
+    ends = {}
+    for future in _counted(futures, progress, len(job.spans)):
+        k, end = future.result()
+        ends[k] = end
+        if todo:
+            futures.add(submit(todo.popleft()))
+    return ends
+
+
+def _numbered(job, k, state=None):
+    return k, _run(job, k, state)
+
+
+def _mend(job, ends, report, client):
+    """Runs spans again whose seam differs, each from the state that the one before hands over."""
+    if job.plan.memory is not None:
+        return
+    bank = _bank(job.bank)
+    for k in range(1, len(job.spans)):
+        handed = ends[k - 1].after
+        s = bank.stream(axis=0, dtype=job.plan.stream, algorithm=job.plan.asked, state=handed)
+        if s.agrees(ends[k].before):
+            continue
+        report.reruns.append(k)
+        again = _run(job, k, handed) if client is None else client.submit(_run, job, k, handed, pure=False).result()
+        ends[k] = again
+
+
+# Designs.
+
+
+def _designed(task):
+    """A bank as text, or the exception as a value: what travels between processes."""
+    spec, keywords = task
+    try:
+        return _design(spec, **keywords).to_json()
+    except (HybankError, OSError) as error:
+        return error
+
+
+def _loaded(result):
+    return Bank.from_json(result) if isinstance(result, str) else result
+
+
+# Sources and sinks.
+
+
+class _Array:
+    """An array of samples on disk, read by frames."""
+
+    def __init__(self, array, axis):
+        if array.ndim not in (1, 2):
+            raise HybankError(f"the source has {array.ndim} dimensions; give one of shape (N, T), or (T, N) with axis=0")
+        self.array, self.by_frames = array, array.ndim == 2 and axis in (0, -2)
+        self.dtype = array.dtype
+        time = 0 if array.ndim == 1 or self.by_frames else 1
+        self.frames, self.channels = array.shape[time], 1 if array.ndim == 1 else array.shape[1 - time]
+
+    def read(self, first, count):
+        if self.array.ndim == 1:
+            return np.asarray(self.array[first : first + count])[:, None]
+        if self.by_frames:
+            return np.asarray(self.array[first : first + count])
+        return np.asarray(self.array[:, first : first + count]).T
+
+
+class _Recordings:
+    """WAV or SigMF files, whose channels are those of the bank one after another."""
+
+    def __init__(self, paths):
+        self.files = [Recording(path) for path in paths]
+        lengths = {file.frames for file in self.files}
+        if len(lengths) != 1:
+            raise HybankError(f"the recordings have {sorted(lengths)} frames; they must be equally long")
+        self.frames, self.channels = lengths.pop(), sum(file.channels for file in self.files)
+        self.dtype = np.result_type(*(file.dtype for file in self.files))
+
+    def read(self, first, count):
+        return np.concatenate([file.read(first, count) for file in self.files], axis=1).astype(self.dtype, copy=False)
+
+
+def _open(source, axis):
+    if isinstance(source, tuple):
+        import h5py
+
+        path, name = source
+        return _Array(h5py.File(path, "r")[name], axis)
+    if isinstance(source, list):
+        return _Recordings(source)
+    name = os.fspath(source)
+    if name.lower().endswith((".wav", ".sigmf-meta", ".sigmf-data")):
+        return _Recordings([name])
+    if name.endswith(".npy"):
+        return _Array(np.load(name, mmap_mode="r"), axis)
+    import zarr
+
+    return _Array(zarr.open_array(name, mode="r"), axis)
+
+
+def _create(sink, samples, dtype, chunk):
+    name = os.fspath(sink)
+    if name.endswith(".npy"):
+        np.lib.format.open_memmap(name, mode="w+", dtype=dtype, shape=(samples,)).flush()
+        return
+    import zarr
+
+    # A chunk is the region of a span, so no two tasks write to one.
+    zarr.create_array(name, shape=(samples,), chunks=(min(chunk, max(samples, 1)),), dtype=dtype, overwrite=True)
+
+
+def _writer(sink):
+    name = os.fspath(sink)
+    if name.endswith(".npy"):
+        return np.load(name, mmap_mode="r+")
+    import zarr
+
+    return zarr.open_array(name, mode="r+")

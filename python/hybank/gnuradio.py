@@ -1,0 +1,32 @@
+"""A block for GNU Radio: N streams of slow samples in, one stream M times as fast out.
+
+Imported as ``hybank.gnuradio`` by the Python that GNU Radio is installed for.
+"""
+
+import numpy as np
+from gnuradio import gr
+
+
+class fuse(gr.interp_block):  # noqa: N801
+    """Runs a bank. Samples are ``float32`` or, with ``dtype="c8"``, ``complex64``."""
+
+    def __init__(self, bank, dtype="f4", algorithm="auto"):
+        kind = np.dtype(dtype)
+        gr.interp_block.__init__(self, "hybank", [kind] * bank.channels, [kind], bank.ratio)
+        self._stream = bank.stream(dtype=kind, algorithm=algorithm)
+        self._ratio = bank.ratio
+        # Calls of a few thousand frames: the cost of a call from Python is shared by many samples.
+        self.set_min_output_buffer(16384 * bank.ratio)
+        self.declare_sample_delay(self._stream.latency)
+
+    def start(self):
+        """A flow graph that starts again begins with silence before it."""
+        self._stream.reset()
+        return True
+
+    def work(self, input_items, output_items):
+        """As many frames as the output has room for."""
+        y = output_items[0]
+        frames = len(y) // self._ratio
+        y[: frames * self._ratio] = self._stream.process(np.stack([x[:frames] for x in input_items]))
+        return frames * self._ratio

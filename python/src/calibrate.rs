@@ -1,0 +1,215 @@
+//! `hybank.calibrate`.
+
+use crate::arrays::{Held, Shape};
+use crate::background;
+use crate::errors::{HybankError, refused};
+use crate::sources;
+use hybank::calibrate::{self as calibration, ChannelEstimate, Evidence, Fit, Record, Settings, applied};
+use hybank::runtime::{Input, Isa};
+use hybank::sine_fit::Estimate;
+use hybank::spec::Spec;
+use hybank::units::{FastPeriods, Hertz};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+
+/// What a calibration found. Arrays have one value per channel; it is NaN where the spec's value stands. `.._sigma`
+/// are standard deviations.
+#[pyclass(frozen, get_all, module = "hybank")]
+pub(crate) struct Calibration {
+    /// The spec with these values and their intervals, as TOML.
+    spec: String,
+    /// Seconds.
+    delay: Py<PyArray1<f64>>,
+    delay_sigma: Py<PyArray1<f64>>,
+    gain: Py<PyArray1<f64>>,
+    gain_sigma: Py<PyArray1<f64>>,
+    offset: Py<PyArray1<f64>>,
+    offset_sigma: Py<PyArray1<f64>>,
+    /// Factors of the cut-off frequencies.
+    cutoff: Py<PyArray1<f64>>,
+    cutoff_sigma: Py<PyArray1<f64>>,
+    /// The reference channel, from 1.
+    reference: usize,
+    /// Tones that were used, in hertz.
+    tones: Vec<f64>,
+    /// Frames that took part.
+    frames: usize,
+    /// Clipped samples of each channel, which were left out.
+    clipped: Vec<usize>,
+    /// 1 where the model fits to the noise; None if nothing is left to judge it by.
+    misfit: Option<f64>,
+    /// What a reader of the values must know.
+    remarks: Vec<String>,
+}
+
+#[pymethods]
+impl Calibration {
+    fn __repr__(&self) -> String {
+        let misfit = self.misfit.map_or_else(|| "None".to_owned(), |misfit| format!("{misfit:.3}"));
+        format!("<hybank.Calibration of {} channels: misfit {misfit}>", self.clipped.len())
+    }
+}
+
+/// Delays, gains and offsets of the channels from captures.
+#[pyfunction]
+#[pyo3(signature = (
+    x, spec, *, tones = None, waveform = None, rate = None, blind = false,
+    fit = vec!["delay".to_owned(), "gain".to_owned(), "offset".to_owned()], reference = None, clip = None, axis = -1
+))]
+#[pyo3(text_signature = "(x, spec, *, tones=None, waveform=None, rate=None, blind=False, \
+    fit=('delay', 'gain', 'offset'), reference=None, clip=None, axis=-1)")]
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub(crate) fn calibrate(
+    x: &Bound<'_, PyAny>,
+    spec: &Bound<'_, PyAny>,
+    tones: Option<Vec<f64>>,
+    waveform: Option<Vec<f64>>,
+    rate: Option<f64>,
+    blind: bool,
+    fit: Vec<String>,
+    reference: Option<usize>,
+    clip: Option<f64>,
+    axis: isize,
+) -> PyResult<Calibration> {
+    let py = x.py();
+    let spec = sources::spec(spec)?;
+    let records = records(x, Shape { axis, channels: spec.channels.len() }, clip)?;
+    let signal = Signal::new(&spec, tones, waveform, rate, blind)?;
+    let settings = Settings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
+    let nominal = spec.clone();
+    let found = background::run(py, None, move |_| {
+        calibration::calibrate(&spec, &records, signal.evidence(), settings)
+    })?;
+    result(py, &nominal, &found.map_err(refused)?)
+}
+
+/// The kind of signal, with its data.
+enum Signal {
+    Tones(Vec<Hertz>),
+    Waveform { samples: Vec<f64>, spacing: FastPeriods },
+    Any,
+}
+
+impl Signal {
+    fn new(
+        spec: &Spec,
+        tones: Option<Vec<f64>>,
+        waveform: Option<Vec<f64>>,
+        rate: Option<f64>,
+        blind: bool,
+    ) -> PyResult<Self> {
+        let wrong = |message: &str| Err(HybankError::new_err(message.to_owned()));
+        match (tones, waveform, blind) {
+            (tones, None, false) => {
+                let tones = tones.unwrap_or_default();
+                if tones.iter().any(|&tone| !(tone > 0.0 && tone.is_finite())) {
+                    return wrong("tones: frequencies are positive numbers, in hertz");
+                }
+                Ok(Self::Tones(tones.into_iter().map(Hertz).collect()))
+            }
+            (None, Some(samples), false) => {
+                let fast = spec.fast_period.rate();
+                let rate = rate.unwrap_or(fast.0);
+                if !(rate > 0.0 && rate.is_finite()) {
+                    return wrong("rate: give the sample rate of the waveform, in hertz");
+                }
+                Ok(Self::Waveform { samples, spacing: FastPeriods(fast.0 / rate) })
+            }
+            (None, None, true) => Ok(Self::Any),
+            _ => wrong("give one of tones, waveform and blind: they are different kinds of captures"),
+        }
+    }
+
+    fn evidence(&self) -> Evidence<'_> {
+        match self {
+            Self::Tones(tones) => Evidence::Tones(tones),
+            Self::Waveform { samples, spacing } => Evidence::Waveform { samples, spacing: *spacing },
+            Self::Any => Evidence::AnySignal,
+        }
+    }
+}
+
+/// One record per channel. Integers clip at the ends of their range, floats where `clip` says.
+fn records(x: &Bound<'_, PyAny>, shape: Shape, clip: Option<f64>) -> PyResult<Vec<Record>> {
+    let held = Held::new(x, shape)?;
+    if held.format.complex {
+        return Err(HybankError::new_err("calibrate takes real samples; give the real part"));
+    }
+    if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
+        return Err(HybankError::new_err("clip: give a positive level"));
+    }
+    let top = held.format.number.pcm().map(|format| 1.0 - 2f64.powi(1 - 8 * format.bytes() as i32));
+    let (lowest, highest) = match (clip, top) {
+        (Some(level), _) => (-level, level),
+        (None, Some(top)) => (-1.0, top),
+        (None, None) => (f64::NEG_INFINITY, f64::INFINITY),
+    };
+    let mut frames = vec![0.0; held.frames() * shape.channels];
+    held.samples()?.load(Isa::detect(), 0, &mut frames);
+    let channel = |i| frames.iter().skip(i).step_by(shape.channels).copied().collect();
+    Ok((0..shape.channels).map(|i| Record::within(channel(i), lowest, highest)).collect())
+}
+
+fn fitted(names: &[String]) -> PyResult<Fit> {
+    let mut fit = Fit { delay: false, gain: false, offset: false, cutoff: false };
+    for name in names {
+        match name.as_str() {
+            "delay" => fit.delay = true,
+            "gain" => fit.gain = true,
+            "offset" => fit.offset = true,
+            "cutoff" => fit.cutoff = true,
+            _ => {
+                return Err(HybankError::new_err(format!(
+                    "fit: \"{name}\" is unknown; choose delay, gain, offset and cutoff"
+                )));
+            }
+        }
+    }
+    Ok(fit)
+}
+
+/// From 0.
+fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize> {
+    match given {
+        Some(0) => Err(HybankError::new_err("reference: channels count from 1")),
+        Some(channel) => Ok(channel - 1),
+        None => Ok(spec.uncertainty.as_ref().and_then(|table| table.reference_channel()).unwrap_or(0)),
+    }
+}
+
+fn result(py: Python<'_>, spec: &Spec, found: &calibration::Calibration) -> PyResult<Calibration> {
+    let (calibrated, more) = applied(spec, found);
+    let columns = |of: &dyn Fn(&ChannelEstimate) -> Option<Estimate<f64>>| {
+        let (values, sigmas): (Vec<f64>, Vec<f64>) = found
+            .channels
+            .iter()
+            .map(|channel| of(channel).map_or((f64::NAN, f64::NAN), |found| (found.value, found.sigma)))
+            .unzip();
+        (PyArray1::from_vec(py, values).unbind(), PyArray1::from_vec(py, sigmas).unbind())
+    };
+    let seconds = |delay: Estimate<FastPeriods>| Estimate {
+        value: delay.value.in_seconds(spec.fast_period).0,
+        sigma: delay.sigma.in_seconds(spec.fast_period).0,
+    };
+    let (delay, delay_sigma) = columns(&|channel| channel.delay.map(seconds));
+    let (gain, gain_sigma) = columns(&|channel| channel.gain);
+    let (offset, offset_sigma) = columns(&|channel| channel.offset);
+    let (cutoff, cutoff_sigma) = columns(&|channel| channel.cutoff);
+    Ok(Calibration {
+        spec: calibrated.to_toml().map_err(refused)?,
+        delay,
+        delay_sigma,
+        gain,
+        gain_sigma,
+        offset,
+        offset_sigma,
+        cutoff,
+        cutoff_sigma,
+        reference: found.reference + 1,
+        tones: found.tones.iter().map(|tone| tone.frequency.value.0).collect(),
+        frames: found.frames,
+        clipped: found.clipped.clone(),
+        misfit: found.misfit,
+        remarks: found.remarks.iter().chain(&more).map(ToString::to_string).collect(),
+    })
+}

@@ -1,0 +1,131 @@
+//! `hybank.measure`.
+
+use crate::arrays::{Held, Shape};
+use crate::background;
+use crate::errors::{HybankError, refused};
+use hybank::measure::{self as quality, Settings, Window};
+use hybank::runtime::{Input, Isa};
+use hybank::units::{Decibels, Hertz};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+
+/// The figures of a converter from the record of a tone.
+#[pyclass(frozen, get_all, module = "hybank")]
+pub(crate) struct Measurement {
+    /// Signal over everything else but the constant, in dB.
+    sinad: f64,
+    /// Effective number of bits, of this tone and of one of full scale.
+    enob: f64,
+    enob_full_scale: f64,
+    /// Signal over what no line explains, harmonics over signal, interleaving spurs over signal, in dB.
+    snr: f64,
+    thd: f64,
+    /// None for a single converter.
+    interleaving: Option<f64>,
+    /// Largest tone over largest line, in dB.
+    sfdr: f64,
+    /// Noise per hertz relative to a sine of full scale, in dB.
+    noise_density: f64,
+    /// The constant part.
+    offset: f64,
+    /// Tones: frequency in hertz, amplitude, phase in radians at the first sample.
+    tones: Vec<(f64, f64, f64)>,
+    /// Lines beside the tones, largest first: frequency in hertz, level in dB relative to the largest tone, causes.
+    spurs: Vec<(f64, f64, String)>,
+    /// Samples at the rails, and samples that are not finite.
+    clipped: usize,
+    left_out: usize,
+    /// The spectrum: hertz, and dB relative to full scale.
+    spectrum: (Py<PyArray1<f64>>, Py<PyArray1<f64>>),
+}
+
+#[pymethods]
+impl Measurement {
+    fn __repr__(&self) -> String {
+        format!(
+            "Measurement(sinad={:.2}, enob={:.2}, snr={:.2}, thd={:.2}, sfdr={:.2})",
+            self.sinad, self.enob, self.snr, self.thd, self.sfdr
+        )
+    }
+}
+
+/// The quality of a record of one or several tones.
+#[pyfunction]
+#[pyo3(signature = (
+    y, rate, *, tones = None, converters = 1, harmonics = 10, full_scale = 1.0, window = "bh7"
+))]
+pub(crate) fn measure(
+    y: &Bound<'_, PyAny>,
+    rate: f64,
+    tones: Option<Vec<f64>>,
+    converters: usize,
+    harmonics: usize,
+    full_scale: f64,
+    window: &str,
+) -> PyResult<Measurement> {
+    if !(rate > 0.0 && rate.is_finite()) {
+        return Err(HybankError::new_err(format!("rate: {rate} is no sample rate; give samples per second")));
+    }
+    let settings = Settings {
+        tones: tones.unwrap_or_default().into_iter().map(Hertz).collect(),
+        converters,
+        harmonics,
+        full_scale,
+        rails: (-full_scale, full_scale),
+        window: parse_window(window)?,
+    };
+    let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
+    if held.format.complex {
+        return Err(HybankError::new_err("measure takes real samples; give the real part"));
+    }
+    let rails = held.format.number.pcm().map(|format| (-1.0, 1.0 - 2f64.powi(1 - 8 * format.bytes() as i32)));
+    let settings = Settings { rails: rails.unwrap_or(settings.rails), ..settings };
+    let mut samples = vec![0.0; held.frames()];
+    held.samples()?.load(Isa::detect(), 0, &mut samples);
+    let found = background::run(y.py(), None, move |_| quality::measure(&samples, Hertz(rate), &settings))?;
+    Ok(result(y.py(), found.map_err(refused)?))
+}
+
+fn parse_window(name: &str) -> PyResult<Window> {
+    match name {
+        "none" => Ok(Window::None),
+        "hann" => Ok(Window::Hann),
+        "bh4" => Ok(Window::Bh4),
+        "bh7" => Ok(Window::Bh7),
+        _ => Err(HybankError::new_err(format!(
+            "window: \"{name}\" is unknown; choose \"none\", \"hann\", \"bh4\" or \"bh7\""
+        ))),
+    }
+}
+
+fn result(py: Python<'_>, found: quality::Measurement) -> Measurement {
+    let decibels = |value: Decibels| value.0;
+    let spur = |spur: &quality::Spur| {
+        let causes: Vec<String> = spur.causes.iter().map(ToString::to_string).collect();
+        (spur.frequency.0, spur.level.0, causes.join("; "))
+    };
+    let spectrum = &found.spectrum;
+    let hertz = (0..spectrum.amplitudes.len()).map(|bin| spectrum.frequency(bin).0);
+    let level = |amplitude: &f64| Decibels::of_amplitude(amplitude / found.full_scale).0;
+    let levels = spectrum.amplitudes.iter().map(level);
+    Measurement {
+        sinad: found.sinad.0,
+        enob: found.enob,
+        enob_full_scale: found.enob_full_scale,
+        snr: found.snr.0,
+        thd: found.thd.0,
+        interleaving: found.interleaving.map(decibels),
+        sfdr: found.sfdr.0,
+        noise_density: found.noise_density.0,
+        offset: found.offset.value,
+        tones: found
+            .tones
+            .iter()
+            .map(|tone| (tone.frequency.value.0, tone.amplitude.value, tone.phase.value.0))
+            .collect(),
+        spurs: found.spurs.iter().map(spur).collect(),
+        clipped: found.clipped,
+        left_out: found.left_out,
+        spectrum: (PyArray1::from_iter(py, hertz).unbind(), PyArray1::from_iter(py, levels).unbind()),
+    }
+}

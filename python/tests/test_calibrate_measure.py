@@ -1,0 +1,104 @@
+"""Calibration, measurement and export: values that are known, refusals, and the files of the command line."""
+
+import subprocess
+
+import numpy as np
+import pytest
+
+import hybank as hb
+
+RATE = 32e6
+TRUE = np.array([60e-9, 29.5e-9])
+GAIN = np.array([1.0, 1.02])
+
+
+def plant(delays):
+    return {
+        "fast_rate": RATE, "ratio": 2, "target": {"filter": hb.butterworth(2, 14e6)},
+        "channel": [hb.Channel(delay=delay) for delay in delays], "design": {"method": "fir", "taps": 8},
+    }  # fmt: skip
+
+
+def capture(frames=4000):
+    """Two tones through the front ends of ``plant``, sampled at the true delays: a closed form."""
+    t = np.arange(frames)[None, :] * 2 / RATE - TRUE[:, None]
+    x = np.zeros(t.shape)
+    for f in (1e6, 7e6):
+        s, w = 2j * np.pi * f, 2 * np.pi * 14e6
+        response = w**2 / (s**2 + np.sqrt(2) * w * s + w**2)
+        x += 0.4 * np.abs(response) * np.sin(2 * np.pi * f * t + np.angle(response))
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(x.shape)
+    return GAIN[:, None] * x + np.array([[0.0], [0.01]]) + noise
+
+
+@pytest.mark.parametrize("axis", [-1, 0])
+def test_tones_give_delays_gains_and_offsets(axis):
+    x = capture()
+    cal = hb.calibrate(x if axis else np.ascontiguousarray(x.T), plant([60e-9, 30e-9]), tones=[1e6, 7e6], axis=axis)
+    assert abs(cal.delay[1] - TRUE[1]) < 5 * cal.delay_sigma[1] < 1e-11
+    assert abs(cal.gain[1] - GAIN[1]) < 5 * cal.gain_sigma[1] < 1e-4
+    assert abs(cal.offset[1] - 0.01) < 5 * cal.offset_sigma[1]
+    assert np.isnan(cal.cutoff).all() and cal.reference == 1 and cal.clipped == [0, 0]
+    np.testing.assert_allclose(cal.tones, [1e6, 7e6], rtol=1e-6)
+    bank = hb.design(cal.spec, proof=False)
+    assert abs(bank.delays[1] - TRUE[1]) < 1e-11 and abs(bank.gains[1] - 1.02) < 1e-3
+
+
+def test_wrong_calibrations_are_refused():
+    x, spec = np.zeros((2, 100)), plant([60e-9, 30e-9])
+    for keywords, words in [
+        ({"tones": [1e6], "blind": True}, "one of tones, waveform and blind"),
+        ({"tones": [-1.0]}, "positive"),
+        ({"fit": ["delays"]}, "choose delay"),
+        ({"reference": 0}, "count from 1"),
+        ({"clip": -1.0}, "positive level"),
+        ({"tones": [1e6]}, "."),
+    ]:
+        with pytest.raises(hb.HybankError, match=words):
+            hb.calibrate(x, spec, **keywords)
+    with pytest.raises(hb.HybankError, match="real samples"):
+        hb.calibrate(x + 0j, spec)
+
+
+def test_a_tone_in_noise_has_the_figures_of_its_formulas():
+    n, rate, amplitude, sigma = 1 << 14, 1e6, 0.5, 1e-3
+    noise = sigma * np.random.default_rng(2).standard_normal(n)
+    t = np.arange(n) / rate
+    y = amplitude * np.sin(2 * np.pi * 12345.6 * t + 0.3) + 5e-4 * np.sin(2 * np.pi * 3 * 12345.6 * t) + noise
+    m = hb.measure(y, rate)
+    snr = 10 * np.log10(amplitude**2 / 2 / sigma**2)
+    assert abs(m.snr - snr) < 0.2
+    assert abs(m.thd - 20 * np.log10(5e-4 / amplitude)) < 0.5
+    assert abs(m.enob - (m.sinad - 10 * np.log10(1.5)) / (20 * np.log10(2))) < 1e-9
+    frequency, size, _ = m.tones[0]
+    assert abs(frequency - 12345.6) < 0.1 and abs(size - amplitude) < 1e-4
+    hertz, level = m.spectrum
+    assert abs(hertz[level.argmax()] - 12345.6) < rate / n and m.interleaving is None
+    assert hb.measure((y * 32767).astype("i2"), rate).snr == pytest.approx(m.snr, abs=0.1)
+    with pytest.raises(hb.HybankError, match="choose"):
+        hb.measure(y, rate, window="kaiser")
+    with pytest.raises(hb.HybankError, match="rate"):
+        hb.measure(y, -1.0)
+
+
+@pytest.mark.parametrize("format, to", [("c99", "c"), ("csv", "csv"), ("npz", "npz"), ("mat", "mat")])
+def test_exports_are_those_of_the_command_line(binary, filters, tmp_path, format, to):  # noqa: A002
+    bank = hb.load(filters / "thesis-fir.json")
+    bank.export(tmp_path / "python", format=format)
+    command = [binary, "export", filters / "thesis-fir.json", "--to", to, "-o", tmp_path / "command"]
+    subprocess.run(command, check=True, capture_output=True)
+    assert (tmp_path / "python").read_bytes() == (tmp_path / "command").read_bytes()
+    with pytest.raises(hb.HybankError, match="choose c99"):
+        bank.export(tmp_path / "other", format="xml")
+    with pytest.raises(hb.HybankError, match="integer taps"):
+        bank.export(tmp_path / "other", format="coe")
+    with pytest.raises(FileExistsError):
+        bank.export(tmp_path / "python", format=format, overwrite=False)
+
+
+def test_tracking_is_a_key_of_a_design():
+    spec = {**plant([60e-9, 30e-9]), "uncertainty": {"delay": [0.0, 1e-10], "reference": 1}}
+    tracked = hb.design({**spec, "design": {"method": "fir", "taps": 8, "tracking": "affine"}})
+    plain = hb.design(spec)
+    assert plain.gamma.tracked is None
+    assert tracked.gamma.norm <= tracked.gamma.tracked < 1.05 * tracked.gamma.norm
