@@ -53,7 +53,8 @@ pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec,
 
 /// The spec in the text of the file `path`, with the measurements beside it.
 pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
-    let models = Models::of(path);
+    let folder = path.parent().filter(|_| !is_dash(path)).unwrap_or(Path::new(""));
+    let models = Models::beside(folder);
     let read = Spec::from_toml_and_files(text, &name(path), overrides, &|wanted| models.model(wanted));
     let spec = read.map_err(|error| match error.overridden() {
         Some(key) => bad_flag(key, error.problem()),

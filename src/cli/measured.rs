@@ -1,6 +1,5 @@
 //! Filters of specs that are measurements in files beside the spec.
 
-use super::bank_file::is_dash;
 use crate::analog::fit::{MeasuredResponse, vector_fit};
 use crate::files::{Bound, read_text};
 use crate::quantity::readable;
@@ -20,10 +19,9 @@ pub(super) struct Models {
 }
 
 impl Models {
-    /// For the spec `path`: names of files are relative to its folder.
-    pub(super) fn of(path: &Path) -> Self {
-        let folder = path.parent().filter(|_| !is_dash(path)).map(Path::to_owned).unwrap_or_default();
-        Self { folder, made: RefCell::default(), echo: RefCell::default() }
+    /// For a spec in `folder`, to which names of files are relative.
+    pub(super) fn beside(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), made: RefCell::default(), echo: RefCell::default() }
     }
 
     /// The model of a measurement.

@@ -1,10 +1,8 @@
 //! Line charts as SVG text.
 
-use super::legend::{Dashes, Entry, Legend, Look};
+use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE};
 use plotters::prelude::*;
 
-/// plotters rounds SVG points to whole pixels, so charts are drawn larger and the view box scales them down.
-pub(super) const OVERSIZE: u32 = 4;
 const WIDTH: u32 = 960;
 const HEIGHT: u32 = 450;
 /// Pixels left and right of all.

@@ -1,9 +1,11 @@
 //! The legend of a chart, in rows above it: there it hides nothing.
 
-use super::chart::OVERSIZE;
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
+
+/// plotters rounds SVG points to whole pixels, so charts are drawn larger and the view box scales them down.
+pub(super) const OVERSIZE: u32 = 4;
 
 /// Pixels of a row, a sample of a line, and what separates things; all before enlargement.
 const ROW: i32 = 20;

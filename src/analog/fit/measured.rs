@@ -1,13 +1,11 @@
 //! A response on a list of frequencies.
 
 use super::MeasurementError;
+use super::text::{MOST_POINTS, Point};
 use super::{table, touchstone};
 use crate::linalg::Complex;
 use crate::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
-
-/// Most frequencies of a measurement.
-pub(super) const MOST_POINTS: usize = 100_000;
 
 /// Values H(j 2 pi f) at frequencies that rise.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +37,7 @@ impl MeasuredResponse {
     }
 
     /// Of lines with their numbers.
-    fn new(points: Vec<(usize, Hertz, Complex<f64>)>) -> Result<Self, MeasurementError> {
+    fn new(points: Vec<Point>) -> Result<Self, MeasurementError> {
         if points.is_empty() {
             return Err(MeasurementError::Empty);
         }
@@ -74,35 +72,4 @@ impl MeasuredResponse {
         let span = TAU * (last.0.0 - first.0.0);
         Seconds(if span > 0.0 { -turns.sum::<f64>() / span } else { 0.0 })
     }
-}
-
-/// The hertz of a unit of frequency.
-pub(super) fn hertz(unit: &str) -> Option<f64> {
-    let units = [("hz", 1.0), ("khz", 1e3), ("mhz", 1e6), ("ghz", 1e9)];
-    units.into_iter().find(|(name, _)| unit.eq_ignore_ascii_case(name)).map(|(_, hertz)| hertz)
-}
-
-/// From decibels and degrees.
-pub(super) fn of_decibels(gain: f64, degrees: f64) -> Complex<f64> {
-    Complex::from_polar(10f64.powf(gain / 20.0), degrees.to_radians())
-}
-
-/// A line as it is quoted in messages.
-pub(super) fn quoted(line: &str) -> String {
-    line.chars().filter(|c| !c.is_control()).take(60).collect()
-}
-
-/// All numbers of a line, if they are finite numbers and nothing else.
-pub(super) fn numbers<'a>(words: impl Iterator<Item = &'a str>) -> Option<Vec<f64>> {
-    words.map(|word| word.parse().ok().filter(|number: &f64| number.is_finite())).collect()
-}
-
-/// A measured point, if frequency and value are in range.
-pub(super) fn point(
-    line: usize,
-    frequency: f64,
-    value: Complex<f64>,
-) -> Option<(usize, Hertz, Complex<f64>)> {
-    let is_good = (0.0..1e18).contains(&frequency) && value.norm() < 1e30;
-    is_good.then_some((line, Hertz(frequency), value))
 }

@@ -8,6 +8,7 @@ mod error;
 mod measured;
 mod poles;
 mod table;
+mod text;
 mod touchstone;
 mod vector_fit;
 

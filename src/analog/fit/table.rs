@@ -1,12 +1,10 @@
 //! Comma-separated frequency, gain and phase.
 
 use super::MeasurementError;
-use super::measured::{MOST_POINTS, hertz, numbers, of_decibels, point, quoted};
-use crate::linalg::Complex;
-use crate::units::Hertz;
+use super::text::{MOST_POINTS, Point, hertz, numbers, of_decibels, point, quoted};
 
 /// The points with their lines.
-pub(super) fn read(text: &str) -> Result<Vec<(usize, Hertz, Complex<f64>)>, MeasurementError> {
+pub(super) fn read(text: &str) -> Result<Vec<Point>, MeasurementError> {
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
     let Some((_, heading)) = lines.next() else { return Err(MeasurementError::Empty) };

@@ -3,9 +3,8 @@
 //! Source: *Touchstone File Format Specification*, version 1.1, EIA/IBIS Open Forum.
 
 use super::MeasurementError;
-use super::measured::{MOST_POINTS, hertz, numbers, of_decibels, point, quoted};
+use super::text::{MOST_POINTS, Point, hertz, numbers, of_decibels, point, quoted};
 use crate::linalg::Complex;
-use crate::units::Hertz;
 
 /// How a pair of numbers is a complex one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,12 +38,12 @@ pub(super) fn read(
     text: &str,
     ports: usize,
     parameter: Option<&str>,
-) -> Result<Vec<(usize, Hertz, Complex<f64>)>, MeasurementError> {
+) -> Result<Vec<Point>, MeasurementError> {
     let column = column(ports, parameter)?;
     let wanted = 1 + 2 * ports * ports;
     let mut options = Options { hertz: 1e9, pairs: Pairs::MagnitudeAngle };
     let mut has_options = false;
-    let mut points: Vec<(usize, Hertz, Complex<f64>)> = Vec::new();
+    let mut points: Vec<Point> = Vec::new();
     for (line, whole) in (1..).zip(text.lines()) {
         let content = whole.split('!').next().unwrap_or_default().trim();
         if let Some(words) = content.strip_prefix('#') {
