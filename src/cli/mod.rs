@@ -41,6 +41,7 @@ mod say;
 mod schema;
 mod simulate;
 mod stream;
+mod sweeps;
 mod track;
 mod turns;
 mod understood;

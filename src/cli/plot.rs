@@ -5,6 +5,7 @@ use super::bank_file::{begin_file, load, name};
 use super::folder::write_together;
 use super::pictures::{Picture, pictures};
 use super::say::name_leftovers;
+use super::sweeps::sweeps;
 use crate::files::refuse_overlaps;
 use std::path::{Path, PathBuf};
 
@@ -16,13 +17,17 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
-  hybank plot bank.json -o pictures")]
+  hybank plot bank.json -o pictures
+  hybank plot bank.json -o pictures --sweeps --force")]
 pub(super) struct Args {
     /// The bank (JSON)
     bank: PathBuf,
     /// The folder for the pictures; created if missing
     #[arg(short, long)]
     output: PathBuf,
+    /// Draw gamma against latency too, and for FIR banks against taps. This designs some twenty further banks
+    #[arg(long)]
+    sweeps: bool,
     /// Replace existing pictures
     #[arg(long)]
     force: bool,
@@ -36,7 +41,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let bank = load(&args.bank)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", name(&args.bank)));
     let mut files = Vec::new();
-    for Picture { name, chart, .. } in pictures(&bank).map_err(|error| named(&error))? {
+    let mut all = pictures(&bank).map_err(|error| named(&error))?;
+    if args.sweeps {
+        all.extend(sweeps(&bank).map_err(|error| named(&error))?);
+    }
+    for Picture { name, chart, .. } in all {
         let svg = chart.to_svg().map_err(|error| named(&error))?;
         files.push((args.output.join(format!("{name}.svg")), svg));
     }

@@ -159,6 +159,20 @@ fn a_bank_is_drawn_in_six_pictures() {
     desk.refused(1, &["plot", "b.json", "-o", "pictures"], &["exists", "--force"]);
 }
 
+/// Longer filters and later outputs are drawn, and the level of the bank goes through its own point.
+#[test]
+fn gamma_is_drawn_against_latency_and_taps() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    let files = desk.good(&["plot", "b.json", "-o", "pictures", "--sweeps"]);
+    assert_eq!(files.lines().count(), 8);
+    for (name, x) in [("latency", "latency, fast samples"), ("taps", "taps per channel")] {
+        let picture = String::from_utf8(desk.read(&format!("pictures/{name}.svg"))).unwrap();
+        assert!([x, "this bank", "gamma, dB"].iter().all(|word| picture.contains(word)), "{name}");
+        assert!(!picture.contains("NaN"), "{name}");
+    }
+}
+
 /// A response table of a Butterworth filter of order 4, by its definition.
 fn bode(cutoff: f64, delay: f64) -> String {
     let mut text = "frequency (kHz), gain (dB), phase (deg)\n".to_owned();
