@@ -62,9 +62,9 @@ fn point(at: usize, spec: &Spec) -> Option<(f64, f64)> {
 
 fn chart(title: &str, x_label: &str, points: Vec<(f64, f64)>, bank: &Bank) -> Chart {
     let own = bank.gamma.norm.filter(|gamma| *gamma > 0.0).map(|gamma| 20.0 * gamma.log10());
-    let ends = points.first().into_iter().chain(points.last()).map(|point| point.0);
-    let level =
-        own.map(|gamma| Series { label: "this bank".into(), points: ends.map(|x| (x, gamma)).collect() });
+    // At the same places as the curve, so that it is dashed where it would hide the curve.
+    let level = |gamma| points.iter().map(|(x, _)| (*x, gamma)).collect();
+    let level = own.map(|gamma| Series { label: "this bank".into(), points: level(gamma) });
     let best = Series { label: "the best of each".into(), points };
     let series = std::iter::once(best).chain(level).collect();
     Chart { title: title.into(), x_label: x_label.into(), y_label: "gamma, dB (h = 1)".into(), series }
