@@ -79,7 +79,7 @@ const BOUND_EXAMPLES: &str = "Examples:
       also writes where the error is, and compares the prediction with a photograph
 
 Three figures, in grey levels:
-  sure       the mean error is not larger, while slopes and residuals are those of the samples
+  bound      not exceeded where slopes and residuals are at most those of the samples nearby
   expected   root mean square error, a bound of the expected mean error
   estimate   mean absolute error, calibrated by leaving out each view in turn
 Scenes of rectified rigs only; the view is the one that `render --method rows` gives.";

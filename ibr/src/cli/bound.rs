@@ -45,8 +45,8 @@ struct Measured {
     psnr: f64,
     /// Estimate divided by the measured mean absolute error.
     ratio: f64,
-    /// Share of the pixels whose error is within the sure bound.
-    within_sure: f64,
+    /// Share of the pixels whose error is within the local bound.
+    within_local_bound: f64,
 }
 
 pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
@@ -113,9 +113,9 @@ fn measure(predicted: &ViewError, truth: &Image, path: &Path) -> Result<Option<M
     let named = |e| Failure::Input(format!("{}: {e}", path.display()));
     let image = &predicted.rendering.image;
     let Some(found) = quality::compare(image, truth, None).map_err(named)? else { return Ok(None) };
-    let within = predicted.within_sure(truth);
+    let within = predicted.within_local_bound(truth);
     let ratio = predicted.totals().estimate / found.mae;
-    Ok(Some(Measured { mae: found.mae, psnr: found.psnr, ratio, within_sure: within }))
+    Ok(Some(Measured { mae: found.mae, psnr: found.psnr, ratio, within_local_bound: within }))
 }
 
 impl Summary {
@@ -140,7 +140,10 @@ impl Summary {
         let mut lines = vec![
             format!("estimate  {:.2} grey levels of mean absolute error", t.estimate),
             format!("expected  {:.2} root mean square, a PSNR of {:.1} dB", t.expected, t.psnr),
-            format!("sure      {:.2} at most in the mean", t.sure),
+            format!(
+                "bound     {:.2} in the mean, if slopes and residuals are nowhere larger than at the samples",
+                t.local_bound
+            ),
         ];
         let part = |c: &CauseShare| format!("{:?} {:.2}", c.cause, c.error).to_lowercase();
         lines.push(format!("causes    {}", self.causes.iter().map(part).collect::<Vec<_>>().join(", ")));
@@ -151,8 +154,8 @@ impl Summary {
         });
         if let Some(m) = &self.measured {
             lines.push(format!(
-                "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the sure bound",
-                m.mae, m.ratio, m.psnr, 100.0 * m.within_sure
+                "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the bound",
+                m.mae, m.ratio, m.psnr, 100.0 * m.within_local_bound
             ));
         }
         lines.join("\n") + "\n"

@@ -205,11 +205,10 @@ fn warn(done: &Rendered, kind: &Kind) {
             c.steps, c.residual
         ));
     }
-    if let Some(g) = done.geometry.as_ref().filter(|g| g.order_agreement < 0.75) {
-        warn(format!(
-            "only {:.0} % of the metric guesses agree on the order of depth; if near objects appear behind far ones, use --reverse-order",
-            100.0 * g.order_agreement
-        ));
+    if done.geometry.as_ref().is_some_and(|g| g.order_by == uncalibrated::OrderBy::Nothing) {
+        warn(
+            "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; if near objects appear behind far ones, use --reverse-order".into(),
+        );
     }
 }
 

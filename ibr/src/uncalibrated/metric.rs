@@ -1,13 +1,11 @@
 //! A metric guess: a calibration with the principal point at the image centre and a guessed focal length.
 //!
-//! It is too coarse for measurements, but sufficient to decide the order of depth (one bit) and to place a
-//! virtual camera between two views.
+//! It is too coarse for measurements, but sufficient to place a virtual camera between two views.
 
-use super::chirality::{self, Handedness};
 use super::triangulate::triangulate;
 use super::{Match, Point, homogeneous};
 use crate::linear;
-use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3};
 
 /// Focal lengths that are tried, in units of the longer side of the image.
 const FOCAL_LENGTHS: [f64; 9] = [0.5, 0.62, 0.76, 0.93, 1.14, 1.39, 1.7, 2.08, 2.5];
@@ -86,41 +84,6 @@ pub fn guesses(f: &Matrix3<f64>, matches: &[Match], sizes: [(usize, usize); 2]) 
     FOCAL_LENGTHS.iter().filter_map(|factor| guess(f, matches, sizes, factor * side)).collect()
 }
 
-/// The order of depth by the majority of the guesses: the sign of the slope of chi_1 against 1 / z in
-/// chi_1 ~ (1/z, x, y, 1).
-///
-/// `points` are the oriented projective points of the matches and `camera` the oriented first camera.
-/// Returns it and the share of the guesses that agree; `None` when no guess could be made.
-pub fn handedness(
-    guesses: &[MetricGuess],
-    matches: &[Match],
-    points: &[Vector4<f64>],
-    camera: &Matrix3x4<f64>,
-) -> Option<(Handedness, f64)> {
-    let votes: Vec<f64> = guesses.iter().filter_map(|g| slope(g, matches, points, camera)).collect();
-    let positive = votes.iter().filter(|s| **s > 0.0).count();
-    let majority = positive.max(votes.len() - positive);
-    let sign = if 2 * positive >= votes.len() { 1.0 } else { -1.0 };
-    (!votes.is_empty()).then(|| (Handedness::from_slope(camera, sign), majority as f64 / votes.len() as f64))
-}
-
-fn slope(
-    guess: &MetricGuess,
-    matches: &[Match],
-    points: &[Vector4<f64>],
-    camera: &Matrix3x4<f64>,
-) -> Option<f64> {
-    let (mut rows, mut values) = (Vec::new(), Vec::new());
-    for ((metric, m), point) in guess.points.iter().zip(matches).zip(points) {
-        let chi = chirality::chi(camera, point);
-        if let (Some(p), true) = (metric, chi.is_finite()) {
-            rows.push([1.0 / p.z, m.first.x / guess.focal, m.first.y / guess.focal, 1.0]);
-            values.push(chi);
-        }
-    }
-    linear::least_squares(&rows, &values).map(|fit| fit[0]).filter(|s| *s != 0.0)
-}
-
 /// The guess that fits F best.
 pub fn best(guesses: &[MetricGuess]) -> Option<&MetricGuess> {
     guesses.iter().max_by(|a, b| a.fit.total_cmp(&b.fit))
@@ -165,26 +128,6 @@ mod tests {
         // Depths agree with the true ones up to one factor.
         let ratio = |j: usize| g.points[j].unwrap().z / (scene.cameras[0] * scene.points[j].push(1.0)).z;
         assert!((0..50).all(|j| (ratio(j) / ratio(0) - 1.0).abs() < 1e-5));
-    }
-
-    #[test]
-    fn guesses_agree_on_the_order_in_both_frames() {
-        let scene = Synthetic::new(50, false);
-        let matches = scene.matches();
-        let f = eight_point(&matches).unwrap();
-        let all = guesses(&f, &matches, SIZES);
-        for last in [[0.02, 0.03, 0.05, 1.0], [0.02, 0.03, -0.4, 1.0]] {
-            for mirror in [1.0, -1.0] {
-                let mut h = nalgebra::Matrix4::from_diagonal(&[mirror, 1.0, 1.0, 1.0].into());
-                h.set_row(3, &nalgebra::RowVector4::from_row_slice(&last));
-                let mut cameras = scene.cameras.map(|c| c * h.try_inverse().unwrap());
-                let mut points: Vec<_> = scene.points.iter().map(|p| h * p.push(1.0)).collect();
-                chirality::orient(&mut cameras, &mut points, |_, _| true);
-                let (hand, share) = handedness(&all, &matches, &points, &cameras[0]).unwrap();
-                assert_eq!(hand.sign(), h.determinant().signum(), "{last:?} {mirror}");
-                assert!(share > 0.8, "{share}");
-            }
-        }
     }
 
     #[test]

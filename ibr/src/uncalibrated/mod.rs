@@ -13,6 +13,7 @@ pub mod fundamental;
 pub mod mesh;
 pub mod metric;
 pub mod normalise;
+pub mod order;
 mod random;
 pub mod resection;
 pub mod tracks;

@@ -99,7 +99,7 @@ struct Verdict {
     rank: f64,
     gradient: f64,
     residual: f64,
-    sure: f64,
+    local_bound: f64,
     psnr: [f64; 2],
 }
 
@@ -114,7 +114,8 @@ fn judge(
     let size = image.size();
     let measured = errors(image, truth);
     let estimate: Vec<f64> = predicted.estimate.iter().map(|v| f64::from(*v)).collect();
-    let held = measured.iter().zip(&predicted.sure).filter(|(e, s)| **e <= f64::from(**s) + 1.0).count();
+    let held =
+        measured.iter().zip(&predicted.local_bound).filter(|(e, b)| **e <= f64::from(**b) + 1.0).count();
     let square =
         mean(image.quantised().data().iter().zip(truth.data()).map(|(a, b)| f64::from(a - b).powi(2)));
     let verdict = Verdict {
@@ -123,7 +124,7 @@ fn judge(
         rank: correlation(&estimate, &measured, size),
         gradient: correlation(&gradient(image), &measured, size),
         residual: correlation(&residual(views, position, image), &measured, size),
-        sure: held as f64 / measured.len() as f64,
+        local_bound: held as f64 / measured.len() as f64,
         psnr: [predicted.totals().psnr, 10.0 * (255.0 * 255.0 / square).log10()],
     };
     println!(
@@ -278,6 +279,6 @@ fn scenes_with_exact_inputs() {
     for (name, rig) in [("ray-traced", ray_traced(&positions)), ("synthetic", synthetic(&positions))] {
         let v = predict(name, &rig, &[0, 1], 0.5, &rig.images[2], 0.0);
         assert!((0.8..1.25).contains(&v.ratio), "{name}: {v:?}");
-        assert!(v.sure > 0.99, "{name}: {v:?}");
+        assert!(v.local_bound > 0.99, "{name}: {v:?}");
     }
 }

@@ -9,9 +9,9 @@ fn an_error_is_predicted_mapped_and_compared() {
     let arguments = ["bound", "scene.toml", "--map", "map.png", "--truth", "middle.png", "--json"];
     let figures = json(&run(dir.path(), &arguments));
     let number = |path: &str| figures.pointer(path).and_then(serde_json::Value::as_f64).unwrap();
-    let (sure, expected, estimate) =
-        (number("/totals/sure"), number("/totals/expected"), number("/totals/estimate"));
-    assert!(estimate > 0.0 && estimate <= expected && number("/measured/mae") < sure, "{figures}");
+    let (bound, expected, estimate) =
+        (number("/totals/local_bound"), number("/totals/expected"), number("/totals/estimate"));
+    assert!(estimate > 0.0 && estimate <= expected && number("/measured/mae") < bound, "{figures}");
     let parts: f64 = (0..5).map(|k| number(&format!("/causes/{k}/error"))).sum();
     assert!((parts / estimate - 1.0).abs() < 1e-4, "{figures}");
     assert!((number("/measured/ratio") - estimate / number("/measured/mae")).abs() < 1e-9);

@@ -46,8 +46,8 @@ pub struct Calibration {
 pub struct ViewError {
     /// The rendering.
     pub rendering: Rendering,
-    /// Sure bound of each pixel, in grey levels, row by row.
-    pub sure: Vec<f32>,
+    /// Local bound of each pixel, in grey levels, row by row.
+    pub local_bound: Vec<f32>,
     /// Expected bound: the root mean square.
     pub expected: Vec<f32>,
     /// Expected absolute error.
@@ -61,8 +61,8 @@ pub struct ViewError {
 /// Figures of a whole view, in grey levels unless named.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Totals {
-    /// Mean of the sure bounds: the mean absolute error is not larger.
-    pub sure: f64,
+    /// Mean of the local bounds.
+    pub local_bound: f64,
     /// Root mean square: the expected bound of the mean absolute error.
     pub expected: f64,
     /// Mean absolute error.
@@ -74,22 +74,24 @@ pub struct Totals {
 impl ViewError {
     /// Figures of the whole view.
     pub fn totals(&self) -> Totals {
-        Totals::over(&self.sure, &self.expected, &self.estimate)
+        Totals::over(&self.local_bound, &self.expected, &self.estimate)
     }
 
     /// Figures of each row.
     pub fn rows(&self) -> Vec<Totals> {
         let width = self.rendering.image.width();
-        let rows = self.sure.chunks(width).zip(self.expected.chunks(width)).zip(self.estimate.chunks(width));
-        rows.map(|((sure, expected), estimate)| Totals::over(sure, expected, estimate)).collect()
+        let rows =
+            self.local_bound.chunks(width).zip(self.expected.chunks(width)).zip(self.estimate.chunks(width));
+        rows.map(|((bound, expected), estimate)| Totals::over(bound, expected, estimate)).collect()
     }
 
-    /// Share of the pixels whose error against a photograph of the same size is within the sure bound, after
+    /// Share of the pixels whose error against a photograph of the same size is within the local bound, after
     /// rounding to 8 bits.
-    pub fn within_sure(&self, truth: &Image) -> f64 {
+    pub fn within_local_bound(&self, truth: &Image) -> f64 {
         let errors = difference(&self.rendering.image.quantised(), truth);
-        let within = errors.iter().zip(&self.sure).filter(|(error, sure)| **error <= **sure + ROUNDING);
-        within.count() as f64 / self.sure.len() as f64
+        let within =
+            errors.iter().zip(&self.local_bound).filter(|(error, bound)| **error <= **bound + ROUNDING);
+        within.count() as f64 / self.local_bound.len() as f64
     }
 
     /// The cause of the largest part of the estimate.
@@ -100,13 +102,13 @@ impl ViewError {
 }
 
 impl Totals {
-    fn over(sure: &[f32], expected: &[f32], estimate: &[f32]) -> Self {
+    fn over(bound: &[f32], expected: &[f32], estimate: &[f32]) -> Self {
         let mean = |values: &[f32], power: i32| {
             values.iter().map(|v| f64::from(*v).powi(power)).sum::<f64>() / values.len() as f64
         };
         let square = mean(expected, 2);
         Self {
-            sure: mean(sure, 1),
+            local_bound: mean(bound, 1),
             expected: square.sqrt(),
             estimate: mean(estimate, 1),
             psnr: 10.0 * (255.0 * 255.0 / square).log10(),
@@ -225,12 +227,12 @@ fn judge(examined: Examined, calibration: Calibration) -> ViewError {
         expected.push(squares.sqrt().max(mean) as f32);
     }
     let reach = (REACH * calibration.disparity_noise) as f32;
-    let sure = survey.evidence.iter().map(|e| sure(e, reach)).collect();
-    ViewError { rendering: survey.rendering, sure, expected, estimate, causes, calibration }
+    let local_bound = survey.evidence.iter().map(|e| local_bound(e, reach)).collect();
+    ViewError { rendering: survey.rendering, local_bound, expected, estimate, causes, calibration }
 }
 
-/// The sure bound of one pixel; `depth_error` bounds the error of disparities for a baseline of one.
-fn sure(e: &Evidence, depth_error: f32) -> f32 {
+/// The local bound of one pixel; `depth_error` bounds the error of disparities for a baseline of one.
+fn local_bound(e: &Evidence, depth_error: f32) -> f32 {
     let geometry = e.steepest * (e.shift.abs() + depth_error * e.distance * e.reach);
     let curvature = e.sharpest / 2.0 * e.spread;
     let unseen = 255.0 * (1.0 - e.held).max(0.0);

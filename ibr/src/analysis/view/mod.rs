@@ -2,12 +2,14 @@
 //!
 //! Three numbers for each pixel, in grey levels:
 //!
-//! * **sure**: what the error cannot exceed as long as slopes, second differences and residuals nearby are
-//!   at most those of the samples, by Prop. 3.1 for the smoothing spline that is really used (below);
+//! * **local bound**: what the error does not exceed if slopes, second differences and residuals nearby are at
+//!   most those of the samples, by Prop. 3.1 for the smoothing spline that is really used (below). Photographs
+//!   break the condition where surfaces reflect or depth is wrong in all views;
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!
-//! With h_s the influence of sample s on the pixel at x (the fit is linear in the samples) the sure bound is
+//! With h_s the influence of sample s on the pixel at x (the fit is linear in the samples) the local bound
+//! is
 //!
 //! ```text
 //! |f'| |sum h_s (x_s - x)| + (1/2) |f''| sum |h_s| (x_s - x)^2

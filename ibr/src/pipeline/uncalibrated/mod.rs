@@ -1,5 +1,6 @@
 //! A view from images and tracks alone (thesis 2.5).
 
+mod colours;
 mod reconstruction;
 mod synthesis;
 
@@ -83,8 +84,24 @@ pub struct GeometryReport {
     pub resection_inliers: usize,
     /// Root mean square reprojection error of the inliers in pixels.
     pub resection_rms: f64,
-    /// Share of the metric guesses that agree on the order of depth; 1 if it was given.
+    /// Share of the weight of the guessed calibrations that agree on the order of depth; 1 if it was given.
     pub order_agreement: f64,
+    /// What decided the order of depth.
+    pub order_by: OrderBy,
+}
+
+/// What decides which of two points on a ray is nearer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OrderBy {
+    /// The settings.
+    Given,
+    /// Guessed calibrations, which agree.
+    Calibrations,
+    /// The photographs: where two points of one view fall on one pixel of the other, it shows the nearer.
+    Colours,
+    /// Neither; the order of more guesses was taken.
+    Nothing,
 }
 
 /// A rendered view and the region that could be rendered: the convex hull of the features in the virtual
@@ -121,7 +138,13 @@ pub fn render(
         return Err(UncalibratedError::Views { images: images.len(), columns });
     }
     settings.check()?;
-    let scene = reconstruction::reconstruct(images, tracks, target, uncalibrated)?;
+    let mut scene = reconstruction::reconstruct(images, tracks, target, uncalibrated)?;
+    if uncalibrated.handedness.is_none() {
+        // Photographs show what is in front, while guessed calibrations err alike if the principal points do.
+        if let Some(hand) = colours::order(images, &scene)? {
+            (scene.hand, scene.geometry.order_by) = (hand, OrderBy::Colours);
+        }
+    }
     let colour = images.iter().any(|i| i.channels() == 3);
     let render = if colour { synthesis::render::<3> } else { synthesis::render::<1> };
     Ok(render(images, &scene, size, settings, uncalibrated)?)

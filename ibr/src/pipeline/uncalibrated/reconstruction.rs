@@ -1,11 +1,12 @@
 //! Cameras and points of a scene from tracks, in a projective frame.
 
-use super::{GeometryReport, Target, UncalibratedError, UncalibratedSettings};
+use super::{GeometryReport, OrderBy, Target, UncalibratedError, UncalibratedSettings};
 use crate::image::Image;
 use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::fundamental::{self, Fundamental};
 use crate::uncalibrated::metric::{self, MetricGuess};
+use crate::uncalibrated::order::Order;
 use crate::uncalibrated::resection::{Resection, Sighting, resect};
 use crate::uncalibrated::triangulate::triangulate;
 use crate::uncalibrated::{GeometryError, Match, Point};
@@ -47,7 +48,7 @@ pub(super) fn reconstruct(
     let found = resections.last().ok_or(GeometryError::Numerical { what: "virtual camera" })?;
     let mut points = base.points.clone();
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
-    let (hand, order_agreement) = base.handedness(&points, &cameras[0], settings)?;
+    let order = base.order(&points, &cameras[0], settings)?;
     let geometry = GeometryReport {
         matches: base.given,
         inliers: base.f.inliers.len(),
@@ -55,9 +56,14 @@ pub(super) fn reconstruct(
         sightings: in_target.iter().flatten().count(),
         resection_inliers: found.inliers.len(),
         resection_rms: found.rms,
-        order_agreement,
+        order_agreement: order.agreement,
+        order_by: match settings.handedness {
+            Some(_) => OrderBy::Given,
+            None if order.is_decided() => OrderBy::Calibrations,
+            None => OrderBy::Nothing,
+        },
     };
-    Ok(Reconstruction { cameras, points, seen, hand, geometry })
+    Ok(Reconstruction { cameras, points, seen, hand: order.hand, geometry })
 }
 
 /// The reconstruction of the first two views.
@@ -112,17 +118,17 @@ impl Base {
         }
     }
 
-    /// The order of depth, given or by the majority of the guesses, and the share of the guesses that agree.
-    fn handedness(
+    /// The order of depth, given or by the guesses, and the share of the guesses that agree.
+    fn order(
         &self,
         points: &[Vector4<f64>],
         camera: &Matrix3x4<f64>,
         settings: &UncalibratedSettings,
-    ) -> Result<(Handedness, f64), GeometryError> {
+    ) -> Result<Order, GeometryError> {
         if let Some(hand) = settings.handedness {
-            return Ok((hand, 1.0));
+            return Ok(Order { hand, agreement: 1.0 });
         }
-        metric::handedness(&self.guesses, &some(&self.matches), &some(points), camera)
+        Order::of(&self.f.matrix, &some(&self.matches), &some(points), camera, self.sizes)
             .ok_or(GeometryError::Numerical { what: "order of depth" })
     }
 }

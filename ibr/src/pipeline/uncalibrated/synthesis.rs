@@ -15,7 +15,7 @@ use crate::uncalibrated::mesh::{self, Feature};
 use crate::uncalibrated::{GeometryError, Point};
 use nalgebra::{Matrix3x4, Vector4};
 
-fn camera(matrix: &Matrix3x4<f64>, which: impl Fn() -> String) -> Result<Camera, RenderError> {
+pub(super) fn camera(matrix: &Matrix3x4<f64>, which: impl Fn() -> String) -> Result<Camera, RenderError> {
     Camera::projective(*matrix)
         .map_err(|source| RenderError::Projective(GeometryError::Camera { which: which(), source }))
 }
@@ -70,7 +70,7 @@ pub(super) fn render<const C: usize>(
 }
 
 /// The features of one view with their chi, without points behind it.
-fn features(scene: &Reconstruction, view: usize) -> Vec<Feature> {
+pub(super) fn features(scene: &Reconstruction, view: usize) -> Vec<Feature> {
     let matrix = &scene.cameras[view];
     let feature = |(point, seen): (&Vector4<f64>, &Vec<Option<Point>>)| {
         let position = seen[view]?;
@@ -91,7 +91,7 @@ fn hull_features(scene: &Reconstruction, target: usize) -> Vec<Feature> {
 }
 
 /// The range from the 1st to the 99th percentile of chi.
-fn chi_range(features: &[Feature]) -> f64 {
+pub(super) fn chi_range(features: &[Feature]) -> f64 {
     let mut values: Vec<f64> = features.iter().map(|f| f.chi).filter(|c| c.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     let at = |share: f64| values.get(((values.len() as f64 - 1.0) * share).round() as usize).copied();
@@ -102,7 +102,7 @@ fn chi_range(features: &[Feature]) -> f64 {
 }
 
 /// Samples of one view from its dense chi: X_p ~ \[Pi; e4\]^{-1} (x~, -chi), hence Pi_v X_p = A x~ - chi b.
-fn propagate_chi<const C: usize>(
+pub(super) fn propagate_chi<const C: usize>(
     image: &Image,
     chi: &[f64],
     view: u16,
