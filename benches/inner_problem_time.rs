@@ -2,8 +2,8 @@
 //!
 //! Run with `cargo bench --bench inner_problem_time`. Data: sampled hybrid filter banks, the same on every run.
 
-use hybank::lmi::kyp;
 use hybank::lmi::sampled::{self, Point, Problem};
+use hybank::lmi::{Settings, kyp};
 use nalgebra::DMatrix;
 
 mod stopwatch;
@@ -43,7 +43,7 @@ fn sampled_worst_case() {
     ] {
         let problem = problem(&bank, taps, points);
         stopwatch::time(&format!("sampled worst case, {name}"), || {
-            sampled::minimise(&problem, &sampled::Settings::default())
+            sampled::minimise(&problem, &Settings::SAMPLED)
         });
     }
 }
@@ -55,7 +55,7 @@ fn mean_square_under_cap() {
         ("N = M = 8, 32 taps, 129 points", testbank::eight_channels(12), 32, 129),
     ] {
         let problem = problem(&bank, taps, points);
-        let settings = sampled::Settings::default();
+        let settings = Settings::SAMPLED;
         let best = sampled::minimise(&problem, &settings).expect("settings are the defaults");
         let square = sampled::MeanSquareObjective::noiseless(vec![1.0; points], problem.channels());
         stopwatch::time(&format!("mean square under cap, {name}"), || {
@@ -67,7 +67,7 @@ fn mean_square_under_cap() {
 /// The thesis's own form: bounded real lemma with P, 35 states and 44 taps.
 fn kyp_thesis() {
     let problem = kyp_problem(&testbank::thesis(), 11);
-    stopwatch::time("KYP, thesis, 22 taps", || kyp::minimise(&problem, &kyp::Settings::default()));
+    stopwatch::time("KYP, thesis, 22 taps", || kyp::minimise(&problem, &Settings::KYP));
 }
 
 /// Taps on a register of `lags` slow samples of all channels.

@@ -22,7 +22,8 @@
 
 use super::DesignError;
 use crate::linalg::CMat;
-use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Settings, Taps};
+use crate::lmi::Settings;
+use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Taps};
 use crate::lti::peak::Peak;
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
@@ -176,7 +177,7 @@ impl<E: AffineError> Exchange<E> {
     }
 
     fn minimise_gamma(&mut self, accuracy: f64, hopeless: f64) -> Result<Candidate, DesignError> {
-        let settings = Settings { tol_gap_rel: POINTS_ACCURACY * accuracy, ..Settings::default() };
+        let settings = Settings { tol_gap_rel: POINTS_ACCURACY * accuracy, ..Settings::SAMPLED };
         let mut best: Option<Candidate> = None;
         for _ in 0..ROUND_LIMIT {
             let solution = sampled::minimise(&self.problem, &settings)?;
@@ -208,7 +209,7 @@ impl<E: AffineError> Exchange<E> {
                 &self.objective,
                 cap_at_points,
                 &start.taps,
-                &Settings::default(),
+                &Settings::SAMPLED,
             );
             // There is nothing to gain if gamma is zero or the iteration stalls.
             let Ok(found) = found else { break };

@@ -23,4 +23,4 @@ mod settings;
 mod testbank;
 
 pub use outcome::Outcome;
-pub use settings::SettingError;
+pub use settings::{SettingError, Settings};

@@ -15,6 +15,7 @@ use super::{Filters, Settings, Synthesis};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Mat;
+use crate::lmi;
 use crate::lmi::kyp::{self, Problem};
 use crate::lti::StateSpace;
 
@@ -34,7 +35,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     if states > MAX_STATES {
         return Err(DesignError::KypTooLarge { states, limit: MAX_STATES });
     }
-    let solution = kyp::minimise(&problem(plant, settings.taps, stored)?, &kyp::Settings::default())?;
+    let solution = kyp::minimise(&problem(plant, settings.taps, stored)?, &lmi::Settings::KYP)?;
     let taps: Vec<Vec<f64>> = solution.x.chunks(settings.taps).map(<[f64]>::to_vec).collect();
     let peak = plant.fir_norm(&taps)?;
     let noncausal = plant.noncausal_bound()?.gain;

@@ -3,7 +3,8 @@
 
 use super::problem::TapError;
 use crate::design::filters::{impulse_responses, polyphase};
-use crate::lmi::sampled::{MeanSquareObjective, Problem, Settings, mean_square_under_cap};
+use crate::lmi::Settings;
+use crate::lmi::sampled::{MeanSquareObjective, Problem, mean_square_under_cap};
 
 /// gamma of the smaller taps over that of the optimal ones, in decibels.
 const LOSSES_DB: [f64; 12] = [0.02, 0.1, 0.3, 1.0, 2.0, 4.0, 7.0, 11.0, 16.0, 24.0, 36.0, 60.0];
@@ -38,7 +39,7 @@ fn under_cap(error: &TapError<'_>, cap: f64) -> Option<SmallerTaps> {
     let problem = Problem::new(points, lags).ok()?;
     let objective = MeanSquareObjective { weights, noise: vec![1.0; channels] };
     let start = polyphase(error.problem.taps, error.ratio);
-    let settings = Settings { tol_gap_rel: ACCURACY, ..Settings::default() };
+    let settings = Settings { tol_gap_rel: ACCURACY, ..Settings::SAMPLED };
     let found = mean_square_under_cap(&problem, &objective, cap, &start, &settings).ok()?;
     Some(SmallerTaps { gamma: cap, taps: impulse_responses(&found.taps, length) })
 }

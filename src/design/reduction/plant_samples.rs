@@ -6,7 +6,8 @@ use crate::design::DesignError;
 use crate::design::exchange::{AffineError, Exchange, Peaks};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{CMat, Complex, Mat};
-use crate::lmi::sampled::{self, MeanSquareObjective, Point, Settings, Taps};
+use crate::lmi::Settings;
+use crate::lmi::sampled::{self, MeanSquareObjective, Point, Taps};
 use crate::lti::peak::{peaks_above, resonances, stable_poles};
 use crate::lti::{FirWithTail, FrequencyResponse};
 use std::f64::consts::PI;
@@ -90,7 +91,7 @@ impl<'a> PlantSamples<'a> {
 
     /// The output matrices of least gamma at the sampled frequencies, to a relative accuracy.
     pub(super) fn worst_case(&self, dynamics: &Dynamics, accuracy: f64) -> Result<WorstCase, DesignError> {
-        let settings = Settings { tol_gap_rel: accuracy, ..Settings::default() };
+        let settings = Settings { tol_gap_rel: accuracy, ..Settings::SAMPLED };
         let mut found = sampled::minimise(&self.problem(dynamics)?, &settings)?;
         Ok(WorstCase { outputs: found.taps.swap_remove(0), gamma: found.gamma, dual: found.dual })
     }

@@ -4,9 +4,9 @@ use super::covariance::Covariance;
 use super::newton::{Direction, Newton};
 use super::problem::KypError;
 use super::reduced::Reduced;
-use super::settings::Settings;
 use super::step::max_step;
 use crate::linalg::{self, LinalgError, Mat};
+use crate::lmi::Settings;
 use crate::lmi::outcome::Outcome;
 
 /// Most doublings of gamma until the start is feasible.

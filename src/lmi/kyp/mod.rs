@@ -34,7 +34,6 @@ mod lyapunov;
 mod newton;
 mod problem;
 mod reduced;
-mod settings;
 mod solver;
 mod step;
 #[cfg(test)]
@@ -42,5 +41,4 @@ mod tests;
 
 pub use iterate::Step;
 pub use problem::{KypError, Problem};
-pub use settings::Settings;
 pub use solver::{Solution, minimise};

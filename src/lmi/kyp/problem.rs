@@ -1,7 +1,7 @@
 //! The data of a KYP problem, checked once.
 
 use crate::linalg::{LinalgError, Mat};
-use crate::lmi::settings::SettingError;
+use crate::lmi::SettingError;
 use crate::lti::LtiError;
 
 /// Why data do not form a KYP problem.

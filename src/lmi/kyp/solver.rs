@@ -3,8 +3,8 @@
 use super::iterate::{Iterate, Step};
 use super::problem::{KypError, Problem};
 use super::reduced::Reduced;
-use super::settings::Settings;
 use crate::linalg::Mat;
+use crate::lmi::Settings;
 use crate::lmi::outcome::Outcome;
 use crate::lti::GramianCoordinates;
 

@@ -2,7 +2,7 @@ use super::*;
 use crate::linalg::Mat;
 use crate::lmi::sampled;
 use crate::lmi::testbank::{self, TestBank};
-use crate::lmi::{Outcome, SettingError};
+use crate::lmi::{Outcome, SettingError, Settings};
 use crate::lti::StateSpace;
 use crate::lti::peak::hinf_norm;
 
@@ -101,7 +101,7 @@ fn report(name: &str, p: &Problem, s: &Solution, seconds: f64) {
 
 fn solve(name: &str, p: &Problem) -> Solution {
     let start = std::time::Instant::now();
-    let s = minimise(p, &Settings::default()).unwrap();
+    let s = minimise(p, &Settings::KYP).unwrap();
     report(name, p, &s, start.elapsed().as_secs_f64());
     if s.outcome != Outcome::Solved {
         for (i, step) in s.steps.iter().enumerate() {
@@ -119,7 +119,7 @@ fn kyp_and_sampled_forms_agree() {
         let fir = Fir::new(n, m, q, outputs, lags, radius);
         let s = solve("fir", &fir.kyp());
         let grid: Vec<f64> = (0..2001).map(|l| std::f64::consts::PI * l as f64 / 2000.0).collect();
-        let f = sampled::minimise(&fir.sampled(&grid), &sampled::Settings::default()).unwrap();
+        let f = sampled::minimise(&fir.sampled(&grid), &Settings::SAMPLED).unwrap();
         println!("sampled {} {}", f.gamma, f.lower.value);
         assert_eq!(s.outcome, Outcome::Solved);
         assert!(f.lower.value <= s.gamma * (1.0 + 1e-9));
@@ -225,7 +225,7 @@ fn what_is_no_problem_is_refused() {
     assert!(matches!(try_a(one(1.0)), Err(KypError::Unstable { .. })));
     assert!(matches!(try_a(one(f64::NAN)), Err(KypError::NotFinite { .. })));
     assert!(matches!(try_a(Mat::zeros(1, 2)), Err(KypError::Size { .. })));
-    let settings = Settings { tol_rank: 2.0, ..Settings::default() };
+    let settings = Settings { tol_rank: 2.0, ..Settings::KYP };
     let refused = minimise(&try_a(one(0.5)).unwrap(), &settings);
     assert!(matches!(refused, Err(KypError::Setting(SettingError { name: "tol_rank", .. }))));
     let term = vec![(Mat::zeros(2, 1), zero.clone())];
@@ -236,9 +236,9 @@ fn what_is_no_problem_is_refused() {
 #[test]
 fn an_exhausted_iteration_limit_keeps_valid_bounds() {
     let problem = Fir::new(4, 2, 2, 1, 3, 0.9).kyp();
-    let full = minimise(&problem, &Settings::default()).unwrap();
+    let full = minimise(&problem, &Settings::KYP).unwrap();
     for max_iterations in 0..8 {
-        let s = minimise(&problem, &Settings { max_iterations, ..Settings::default() }).unwrap();
+        let s = minimise(&problem, &Settings { max_iterations, ..Settings::KYP }).unwrap();
         assert!(s.outcome == Outcome::IterationLimit || s.outcome == Outcome::SolvedInaccurate);
         assert!(s.lower <= full.gamma && s.gamma >= full.lower && s.steps.len() == max_iterations);
         assert!(norm(&problem, &s.x) <= s.gamma * (1.0 + 1e-9));

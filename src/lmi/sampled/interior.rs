@@ -8,9 +8,10 @@ use super::blocks::{Cone, SlackStep};
 use super::newton::{self, ChannelProjection};
 use super::prepare::Reduced;
 use super::quadratic::Quadratic;
-use super::settings::{Settings, Step};
+use super::step::Step;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
+use crate::lmi::Settings;
 use crate::lmi::factor::RegularisedCholesky;
 
 /// The objective.

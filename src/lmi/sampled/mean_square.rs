@@ -9,7 +9,8 @@ use super::interior::{Engine, Objective};
 use super::prepare::Reduced;
 use super::problem::{MeanSquareObjective, Point, Problem, SampledError, Taps};
 use super::quadratic::Quadratic;
-use super::settings::{Settings, Step};
+use super::step::Step;
+use crate::lmi::Settings;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::outcome::Outcome;
 

@@ -39,7 +39,7 @@ mod newton;
 mod prepare;
 mod problem;
 mod quadratic;
-mod settings;
+mod step;
 #[cfg(test)]
 mod tests;
 mod worst_case;
@@ -47,5 +47,5 @@ mod worst_case;
 pub use bound::{Covered, LowerBound, lower_bound};
 pub use mean_square::{MeanSquare, least_squares, mean_square_under_cap};
 pub use problem::{MeanSquareObjective, Point, Problem, SampledError, Taps};
-pub use settings::{Settings, Step};
+pub use step::Step;
 pub use worst_case::{Solution, minimise};

@@ -1,7 +1,7 @@
 //! The data of a sampled problem, checked once.
 
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
-use crate::lmi::settings::SettingError;
+use crate::lmi::SettingError;
 
 /// Real taps: `F_j` is M x N, one matrix for each lag j. Entries beyond a row's own number of lags
 /// are zero.

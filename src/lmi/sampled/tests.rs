@@ -8,7 +8,7 @@ mod mean_square;
 use super::*;
 use crate::linalg::{CMat, Complex};
 use crate::lmi::testbank::{self, TestBank};
-use crate::lmi::{Outcome, SettingError};
+use crate::lmi::{Outcome, SettingError, Settings};
 use crate::random::Random;
 
 fn bank_problem(bank: &TestBank, omegas: &[f64], taps: usize) -> Problem {
@@ -48,7 +48,7 @@ fn report(name: &str, problem: &Problem, s: &Solution, seconds: f64) {
 
 fn solve(name: &str, problem: &Problem) -> Solution {
     let start = std::time::Instant::now();
-    let s = minimise(problem, &Settings::default()).unwrap();
+    let s = minimise(problem, &Settings::SAMPLED).unwrap();
     report(name, problem, &s, start.elapsed().as_secs_f64());
     check(problem, &s);
     s

@@ -5,8 +5,9 @@ use super::bound::{self, Covered, LowerBound};
 use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::{Problem, SampledError, Taps};
-use super::settings::{Settings, Step};
+use super::step::Step;
 use crate::linalg::{self, CMat};
+use crate::lmi::Settings;
 use crate::lmi::outcome::Outcome;
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
