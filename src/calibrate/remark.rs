@@ -1,32 +1,50 @@
 //! What a reader of the estimates must know.
 
 use crate::units::{FastPeriods, Hertz};
-use std::fmt;
 
 /// A property of the captures that limits what the estimates mean.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Remark {
     /// Clipped samples were left out.
+    #[error("clipped samples were left out, per channel: {}", list(counts))]
     Clipped {
         /// One per channel.
         counts: Vec<usize>,
     },
     /// The cut-offs are those of the spec, and errors of them look like delays.
+    #[error(
+        "the cut-offs were not fitted: an error of 1 % in one changes its delay by up to {:.2e} fast periods",
+        delay.0
+    )]
     CutoffAssumed {
         /// By how much the delay of the channel most affected changes per per cent of cut-off.
         delay: FastPeriods,
     },
     /// The tones contradict each other by more than their noise, so all intervals were widened.
+    #[error(
+        "the tones contradict each other {misfit:.1} times as much as their noise explains, and the intervals were \
+         widened by that; the front ends may differ from those of the spec (--fit delay,gain,offset,cutoff fits the \
+         cut-offs)"
+    )]
     TonesDisagree {
         /// The factor.
         misfit: f64,
     },
     /// The lower and the upper half of the frequencies contradict each other by more than their noise.
+    #[error(
+        "low and high frequencies contradict each other {misfit:.1} times as much as their noise explains, and the \
+         intervals were widened by that; the front ends may differ from those of the spec, or aliases be occupied \
+         that the fit takes for noise"
+    )]
     BandsDisagree {
         /// The factor by which the intervals were widened.
         misfit: f64,
     },
     /// What the waveform leaves is not white noise.
+    #[error(
+        "channel {channel}: what the waveform leaves is not white noise, and the intervals were widened {misfit:.1} \
+         times"
+    )]
     ResidualNotWhite {
         /// From 1.
         channel: usize,
@@ -34,6 +52,10 @@ pub enum Remark {
         misfit: f64,
     },
     /// A harmonic falls onto a tone.
+    #[error(
+        "harmonic {order} of the tone at {tone} falls onto the tone itself, so distortion shifts its delays and \
+         gains; choose another frequency"
+    )]
     HarmonicOnTone {
         /// The tone.
         tone: Hertz,
@@ -41,6 +63,10 @@ pub enum Remark {
         order: usize,
     },
     /// The samples of a tone have few distinct phases, so quantisation repeats with them.
+    #[error(
+        "the tone at {tone} is sampled at {phases} distinct phases only, so quantisation is no noise; the intervals \
+         were widened by what repeats with the phase, choose another frequency"
+    )]
     FewPhases {
         /// The tone.
         tone: Hertz,
@@ -48,6 +74,11 @@ pub enum Remark {
         phases: usize,
     },
     /// A delay is so far from nominal that the next value with the same phases is nearly as close.
+    #[error(
+        "channel {channel}: the delay is known modulo {:.4} fast periods only, and the value nearest to the spec was \
+         taken; a lower tone, or several, would settle it",
+        modulus.0
+    )]
     DelayModulo {
         /// From 1.
         channel: usize,
@@ -55,11 +86,15 @@ pub enum Remark {
         modulus: FastPeriods,
     },
     /// Tones were left out of the fit of delays because they are harmonics of another one.
+    #[error("{count} further tones are harmonics and tell nothing of the delays; they were left out")]
     HarmonicsLeftOut {
         /// Their number.
         count: usize,
     },
     /// All delays, and the latency, were raised so that none is negative.
+    #[error(
+        "a delay would be negative, so {periods} fast periods were added to all delays and to the latency"
+    )]
     Shifted {
         /// Whole fast periods.
         periods: usize,
@@ -73,58 +108,7 @@ impl Remark {
     }
 }
 
-impl fmt::Display for Remark {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Clipped { counts } => {
-                let counts: Vec<_> = counts.iter().map(usize::to_string).collect();
-                write!(f, "clipped samples were left out, per channel: {}", counts.join(", "))
-            }
-            Self::CutoffAssumed { delay } => write!(
-                f,
-                "the cut-offs were not fitted: an error of 1 % in one changes its delay by up to {:.2e} fast periods",
-                delay.0
-            ),
-            Self::TonesDisagree { misfit } => write!(
-                f,
-                "the tones contradict each other {misfit:.1} times as much as their noise explains, and the intervals were widened by \
-                 that; the front ends may differ from those of the spec (--fit delay,gain,offset,cutoff fits the cut-offs)"
-            ),
-            Self::BandsDisagree { misfit } => write!(
-                f,
-                "low and high frequencies contradict each other {misfit:.1} times as much as their noise explains, and the intervals were \
-                 widened by that; the front ends may differ from those of the spec, or aliases be occupied that the fit takes for noise"
-            ),
-            Self::ResidualNotWhite { channel, misfit } => write!(
-                f,
-                "channel {channel}: what the waveform leaves is not white noise, and the intervals were widened {misfit:.1} times"
-            ),
-            Self::HarmonicOnTone { tone, order } => write!(
-                f,
-                "harmonic {order} of the tone at {tone} falls onto the tone itself, so distortion shifts its delays and gains; choose \
-                 another frequency"
-            ),
-            Self::FewPhases { tone, phases } => write!(
-                f,
-                "the tone at {tone} is sampled at {phases} distinct phases only, so quantisation is no noise; the intervals were widened \
-                 by what repeats with the phase, choose another frequency"
-            ),
-            Self::DelayModulo { channel, modulus } => write!(
-                f,
-                "channel {channel}: the delay is known modulo {:.4} fast periods only, and the value nearest to the spec was taken; a lower \
-                 tone, or several, would settle it",
-                modulus.0
-            ),
-            Self::HarmonicsLeftOut { count } => {
-                write!(
-                    f,
-                    "{count} further tones are harmonics and tell nothing of the delays; they were left out"
-                )
-            }
-            Self::Shifted { periods } => write!(
-                f,
-                "a delay would be negative, so {periods} fast periods were added to all delays and to the latency"
-            ),
-        }
-    }
+fn list(counts: &[usize]) -> String {
+    let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
+    counts.join(", ")
 }

@@ -10,6 +10,7 @@ use crate::design::filters::impulse_responses;
 use crate::design::methods::{Filters, Settings, Synthesis, fir};
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem as SampledProblem};
+use crate::lti::peak::Peak;
 use crate::verify::uncertainty::ErrorBox;
 
 /// A nominal bank whose worst norm is within this of a lower bound is kept.
@@ -53,44 +54,79 @@ pub(crate) fn synthesise(
     let points = scenarios(&problem.errors);
     let plants =
         points.iter().map(|point| moved_plant(problem, plant, point)).collect::<Result<Vec<_>, _>>()?;
-    let worst = |taps: &[Vec<f64>]| largest(plants.iter().map(|plant| Ok(plant.fir_norm(taps)?.gain)));
-    let of_nominal = RobustNorms { nominal: nominal.peak.gain, worst: worst(taps)? };
+    let study = study_of(&nominal, taps, &plants, problem)?;
+    if study.nominal.worst <= study.lower * (1.0 + NO_GAIN) {
+        return Ok(Synthesis { robust: Some(study), ..nominal });
+    }
+    let found = least_worst_norm(plant, &plants, settings)?;
+    let lower = found.lower.max(study.lower).min(found.norms.worst);
+    let study = RobustStudy { lower, pairs: found.pairs, ..study };
+    // The nominal bank is one of the candidates.
+    if found.norms.worst >= study.nominal.worst {
+        return Ok(Synthesis { robust: Some(study), ..nominal });
+    }
+    let robust = Some(RobustStudy { robust: found.norms, ..study });
+    Ok(Synthesis {
+        lower: nominal.lower.min(found.peak.gain),
+        noncausal: nominal.noncausal.min(found.peak.gain),
+        iterations: nominal.iterations + found.iterations,
+        filters: Filters::Fir(found.taps),
+        peak: found.peak,
+        dual: nominal.dual,
+        robust,
+        affine: None,
+    })
+}
+
+/// The study of a design that keeps the nominal bank.
+fn study_of(
+    nominal: &Synthesis,
+    taps: &[Vec<f64>],
+    plants: &[LiftedPlant],
+    problem: &RobustProblem,
+) -> Result<RobustStudy, DesignError> {
+    let norms = RobustNorms { nominal: nominal.peak.gain, worst: worst_norm(plants, taps)? };
     // Whatever the taps, each scenario alone has the error that no bank avoids.
     let unavoidable =
         largest(plants.iter().map(|plant| Ok(plant.noncausal_bound()?.gain)))?.max(nominal.lower);
-    let study = RobustStudy {
+    Ok(RobustStudy {
         errors: problem.errors.clone(),
-        robust: of_nominal,
-        nominal: of_nominal,
-        lower: unavoidable.min(of_nominal.worst),
+        robust: norms,
+        nominal: norms,
+        lower: unavoidable.min(norms.worst),
         scenarios: plants.len(),
         pairs: 0,
-    };
-    if of_nominal.worst <= unavoidable * (1.0 + NO_GAIN) {
-        return Ok(Synthesis { robust: Some(study), ..nominal });
-    }
-    let mut exchange = exchange(plant, &plants, settings)?;
-    let found = exchange.optimise_to(ACCURACY)?;
-    let robust_taps = impulse_responses(&found.taps, settings.taps);
-    let peak = plant.fir_norm(&robust_taps)?;
-    let robust = RobustNorms { nominal: peak.gain, worst: worst(&robust_taps)? };
-    let lower = exchange.lower.max(unavoidable).min(robust.worst);
-    let pairs = exchange.frequencies().count();
-    let study = RobustStudy { robust, lower, pairs, ..study };
-    // The nominal bank is one of the candidates.
-    if robust.worst >= of_nominal.worst {
-        return Ok(Synthesis { robust: Some(RobustStudy { robust: of_nominal, ..study }), ..nominal });
-    }
-    Ok(Synthesis {
-        filters: Filters::Fir(robust_taps),
-        peak,
-        lower: nominal.lower.min(peak.gain),
-        noncausal: nominal.noncausal.min(peak.gain),
-        iterations: nominal.iterations + exchange.iterations,
-        dual: nominal.dual,
-        robust: Some(study),
-        affine: None,
     })
+}
+
+/// The largest norm of the taps over the scenarios.
+fn worst_norm(plants: &[LiftedPlant], taps: &[Vec<f64>]) -> Result<f64, DesignError> {
+    largest(plants.iter().map(|plant| Ok(plant.fir_norm(taps)?.gain)))
+}
+
+/// Taps of least norm over the scenarios.
+struct RobustTaps {
+    taps: Vec<Vec<f64>>,
+    peak: Peak,
+    norms: RobustNorms,
+    /// No taps have a smaller worst norm.
+    lower: f64,
+    pairs: usize,
+    iterations: usize,
+}
+
+fn least_worst_norm(
+    plant: &LiftedPlant,
+    plants: &[LiftedPlant],
+    settings: &Settings,
+) -> Result<RobustTaps, DesignError> {
+    let mut exchange = exchange(plant, plants, settings)?;
+    let found = exchange.optimise_to(ACCURACY)?;
+    let taps = impulse_responses(&found.taps, settings.taps);
+    let peak = plant.fir_norm(&taps)?;
+    let norms = RobustNorms { nominal: peak.gain, worst: worst_norm(plants, &taps)? };
+    let pairs = exchange.frequencies().count();
+    Ok(RobustTaps { taps, peak, norms, lower: exchange.lower, pairs, iterations: exchange.iterations })
 }
 
 fn exchange<'a>(
