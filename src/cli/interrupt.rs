@@ -28,8 +28,13 @@ mod watch {
         watch(|mut signals| {
             if signals.forever().next().is_some() {
                 // The message may wait for its reader, the files must not.
-                remove_unfinished();
-                say_line("interrupted; no unfinished file is left");
+                let written = remove_unfinished();
+                let after = if written.is_empty() {
+                    String::new()
+                } else {
+                    format!(" after {} was written", written.join(" and "))
+                };
+                say_line(&format!("interrupted{after}; no unfinished file is left"));
                 std::process::exit(1);
             }
         });

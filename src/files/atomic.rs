@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Maximum length of a chain of links, as in Linux.
 const MOST_LINKS: usize = 40;
@@ -15,16 +15,29 @@ const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and
 /// Unfinished files of this process.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
+/// The outputs of this process that have their names, as they were asked for. Whoever gives names holds the lock
+/// meanwhile, so an end by [`remove_unfinished`] comes before or after all names of a set.
+static NAMED: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
 /// Removes all files of this process that have not been committed: for a thread that is about to end the
-/// process while others are writing. Other threads can neither begin nor drop a file afterwards; they
-/// wait for the end.
-pub fn remove_unfinished() {
+/// process while others are writing. Other threads can neither begin, commit nor drop a file afterwards; they
+/// wait for the end. Returns the names of the files that were committed before.
+pub fn remove_unfinished() -> Vec<String> {
+    let named = names_given();
     let files = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     for path in files.iter() {
         // An error cannot be reported from here.
         let _ = fs::remove_file(path);
     }
     std::mem::forget(files);
+    let committed = named.clone();
+    std::mem::forget(named);
+    committed
+}
+
+/// For whoever gives names, until it is done.
+pub(super) fn names_given() -> MutexGuard<'static, Vec<String>> {
+    NAMED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A file that is written under a hidden name beside its target and gets its name by
@@ -91,12 +104,14 @@ impl AtomicFile {
     /// refusal to store the bytes or to give the name; then no file remains.
     pub fn commit(mut self) -> Result<(), FileError> {
         self.seal()?;
+        let mut named = names_given();
         let placed = if self.replace {
             fs::rename(&self.beside, &self.target).map(|()| Placed::Replaced)
         } else {
             place::rename_new(&self.beside, &self.target).map(|()| Placed::New)
         };
         let placed = placed.map_err(|error| self.refused(error))?;
+        named.push(self.name.clone());
         self.keep(placed);
         Ok(())
     }

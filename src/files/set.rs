@@ -1,5 +1,6 @@
 //! Files that belong together.
 
+use super::atomic::names_given;
 use super::{AtomicFile, FileError};
 
 /// Renames several files to their final names: all of them or, as far as the file system allows, none. The
@@ -10,6 +11,7 @@ use super::{AtomicFile, FileError};
 pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
     // Late disk errors occur here, before the first file gets its name.
     files.iter_mut().try_for_each(AtomicFile::seal)?;
+    let mut named = names_given();
     let mut placed = Vec::with_capacity(files.len());
     for mut file in files {
         match file.place() {
@@ -20,6 +22,7 @@ pub fn commit_all(mut files: Vec<AtomicFile>) -> Result<(), FileError> {
             }
         }
     }
+    named.extend(placed.iter().map(|(file, _)| file.name().to_owned()));
     placed.into_iter().for_each(|(file, how)| file.keep(how));
     Ok(())
 }

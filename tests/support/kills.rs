@@ -39,13 +39,18 @@ pub(crate) fn campaign(job: &Job, kills: usize, dice: &mut Random) -> Seen {
     for kill in 0..kills {
         let (hard, old) = (kill % 2 == 0, kill % 4 < 2);
         let before = job.prepare(old);
-        let (status, during) = killed(job.command(), longest.mul_f64(dice.part()), hard);
+        let (status, during, said) = killed(job.command(), longest.mul_f64(dice.part()), hard);
         let what = format!("{:?}, kill {kill}: {status}", job.args);
         check_status(status, hard, &what);
         seen.during += usize::from(during);
-        match job.judge(&before, &what) {
+        let judged = job.judge(&before, &what);
+        match judged {
             Some(whole) => seen.whole += usize::from(whole),
             None => seen.parts_of_sets += 1,
+        }
+        assert!(hard || judged.is_some(), "{what}: a set in part after SIGTERM");
+        if status.code() == Some(1) {
+            assert_eq!(judged, Some(said.contains("was written")), "{what}: {said}");
         }
         let leftovers = job.unfinished();
         assert!(hard || leftovers.is_empty(), "{what}: {leftovers:?}");
@@ -66,9 +71,9 @@ pub(crate) fn campaign(job: &Job, kills: usize, dice: &mut Random) -> Seen {
     seen
 }
 
-/// Ends a run by a signal after `delay`; true if the run had not ended before.
-fn killed(mut command: Command, delay: Duration, hard: bool) -> (ExitStatus, bool) {
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+/// Ends a run by a signal after `delay`; true if the run had not ended before, and what it said.
+fn killed(mut command: Command, delay: Duration, hard: bool) -> (ExitStatus, bool, String) {
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(delay);
     let during = child.try_wait().unwrap().is_none();
     if hard {
@@ -76,7 +81,8 @@ fn killed(mut command: Command, delay: Duration, hard: bool) -> (ExitStatus, boo
     } else if during {
         let _ = Command::new("kill").args(["-TERM", &child.id().to_string()]).stderr(Stdio::null()).status();
     }
-    (child.wait().unwrap(), during)
+    let output = child.wait_with_output().unwrap();
+    (output.status, during, String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
 /// Done, killed, or ended by SIGTERM: at once, in order (1), or after removing files (128 + 15).
