@@ -81,6 +81,16 @@ pub enum DesignError {
         /// The finest scale at which no tap is clipped.
         fitting: i32,
     },
+    /// At the requested scale the integers that fit their bits are so small that they do nothing.
+    #[error(
+        "with fraction_bits = {fraction_bits} the integer taps are too small to do better than zero output: the taps fit their bits up to fraction_bits = {fitting}; give about that, or leave it out"
+    )]
+    TinyTaps {
+        /// The scale.
+        fraction_bits: i32,
+        /// The finest scale at which no tap is clipped.
+        fitting: i32,
+    },
     /// The interior-point method found no taps.
     #[error("no taps were found; please report the spec")]
     NoTaps,

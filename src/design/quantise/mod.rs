@@ -42,8 +42,8 @@ const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
 ///
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
-/// [`DesignError::NoTaps`] if `bits` are out of their range, and [`DesignError::AllZero`] if all taps are
-/// zero at the given scale. Without a given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
+/// [`DesignError::NoTaps`] if `bits` are out of their range, [`DesignError::AllZero`] if all taps are zero at
+/// the given scale, and [`DesignError::TinyTaps`] if they are no better there than zero taps. Without a given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
 pub fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,
@@ -67,6 +67,9 @@ pub fn quantise(
             if asked.fixed_point.is_zero() && problem.taps.iter().flatten().any(|&tap| tap != 0.0) =>
         {
             Err(DesignError::AllZero { fraction_bits, fitting: quantiser.finest_that_fits(bits) })
+        }
+        Some(fraction_bits) if quantiser.does_nothing(&asked)? => {
+            Err(DesignError::TinyTaps { fraction_bits, fitting: quantiser.finest_that_fits(bits) })
         }
         _ => Ok((asked.fixed_point, WordStudy { real_gamma, words })),
     }

@@ -16,6 +16,9 @@ use std::sync::OnceLock;
 pub(super) const INDIFFERENT: f64 = 1e-4;
 /// Relative excess over the gamma of the real taps from which more scales are searched: 0.05 dB.
 const WORTH_MORE: f64 = 5.8e-3;
+/// Shares of the gamma of zero output: removing less is nothing, and real taps that remove more do something.
+const NOTHING: f64 = 1e-6;
+const SOMETHING: f64 = 1e-3;
 /// Scales of few taps that are searched beyond the finest one that holds the optimal taps.
 const MOST_SCALES: i32 = 40;
 
@@ -148,6 +151,18 @@ impl<'a> Quantiser<'a> {
             let joined = threads.into_iter().map(|thread| thread.join());
             joined.map(|result| result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
         })
+    }
+
+    /// Whether integers are no better than zero output, while the real taps are.
+    ///
+    /// # Errors
+    /// [`DesignError::Linalg`] if a decomposition fails.
+    pub(super) fn does_nothing(&self, found: &Quantised) -> Result<bool, DesignError> {
+        let fixed_point = &found.fixed_point;
+        let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
+        let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
+        Ok(found.gamma >= zero_output * (1.0 - NOTHING)
+            && self.error.real_gamma < zero_output * (1.0 - SOMETHING))
     }
 
     pub(super) fn loss(&self, found: &Quantised) -> WordLoss {

@@ -213,6 +213,20 @@ fn a_scale_at_which_nothing_is_left_is_refused() {
 }
 
 #[test]
+fn a_scale_at_which_all_that_is_left_does_nothing_is_refused() {
+    let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 8"));
+    for fraction_bits in [40, MAX_FRACTION_BITS] {
+        let refused = quantise(problem(&plant, &taps), 1.0, &WordLengths::Same(4), Some(fraction_bits));
+        let Err(error @ (DesignError::TinyTaps { .. } | DesignError::AllZero { .. })) = refused else {
+            panic!("{refused:?}")
+        };
+        assert!(error.to_string().contains("up to fraction_bits = 1"), "{error}");
+    }
+    // Taps that are cut off but do something are kept.
+    assert!(quantise(problem(&plant, &taps), 1.0, &WordLengths::Same(4), Some(8)).is_ok());
+}
+
+#[test]
 fn taps_that_can_only_be_zero_do_not_decide_the_scale() {
     let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 8"));
     let size = |n: usize| taps.iter().map(|filter| filter[n].abs()).fold(0.0, f64::max);
