@@ -2,12 +2,16 @@
 
 use super::Failure;
 use super::bank_file::{is_dash, name};
+use crate::design::effort::available_memory;
 use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions};
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
 
 /// Samples that a measurement reads at most: the spectra of more take several gigabytes.
 pub(super) const MOST_MEASURED: usize = 1 << 26;
+
+/// Bytes of work memory for each sample of a recording: the sample, its spectrum and a copy of both.
+const WORK_BYTES: f64 = 64.0;
 
 /// One channel of a recording.
 #[derive(Debug, Clone)]
@@ -115,10 +119,18 @@ impl Whole {
             )));
         }
         let mut channels = vec![Vec::new(); reader.channels()];
+        let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
+        let mut checked = promised.unwrap_or_default().min(most);
+        check_memory(checked, channels.len())?;
         loop {
             match reader.wait().map_err(Failure::input)? {
                 Arrival::Frames(count) => {
-                    let room = most - channels.first().map_or(0, Vec::len);
+                    let known = channels.first().map_or(0, Vec::len);
+                    let room = most - known;
+                    if known + count > checked {
+                        checked = (checked + checked / 4).max(known + count).min(most);
+                        check_memory(checked, channels.len())?;
+                    }
                     append(&reader.frames(), count.min(room), &mut channels);
                     reader.consume(count);
                     if room < count {
@@ -129,6 +141,20 @@ impl Whole {
                 Arrival::Stopped => return Err(interrupted()),
             }
         }
+    }
+}
+
+/// Refuses recordings whose work memory the system does not have; it would end the process without a message.
+fn check_memory(frames: usize, channels: usize) -> Result<(), Failure> {
+    let bytes = WORK_BYTES * frames as f64 * channels as f64;
+    match available_memory() {
+        Some(memory) if bytes > memory => Err(Failure::Input(format!(
+            "{frames} frames of {channels} channels take about {:.1} GB of memory, and this process may use {:.1} GB; \
+             use a shorter part of the recording",
+            bytes / 1e9,
+            memory / 1e9
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -3,6 +3,7 @@
 use super::capture::Analog;
 use super::response::panels;
 use crate::design::Problem;
+use crate::design::effort::available_memory;
 use crate::units::FastPeriods;
 
 /// Least number of fast samples of an analytic source whose length is not given (thesis 5.6).
@@ -82,7 +83,8 @@ pub fn frames(
     let samples = frames * problem.ratio;
     // Jitter, instants, their order, and a power of each jitter.
     let bytes = signal.work_bytes(samples).saturating_add(if jittered { 32 * samples } else { 0 });
-    if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+    let is_available = available_memory().is_none_or(|memory| bytes as f64 <= memory);
+    if !is_available || Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
         return Err(WorkloadError::Memory { samples, gigabytes: bytes as f64 / 1e9 });
     }
     let panels = most_panels(problem, signal, samples, jittered);

@@ -179,3 +179,33 @@ fn captures_that_no_memory_holds_are_refused() {
     assert!(message.contains("2.1 GB of memory") && message.contains("fewer samples"), "{message}");
     assert!(!desk.path("captures").exists());
 }
+
+/// Recordings of zeros, of 400 MB on paper and none on the disk.
+#[test]
+fn recordings_that_no_memory_holds_are_refused() {
+    let desk = Desk::new();
+    desk.write("spec.toml", crate::support::THESIS);
+    let data = 400_000_000u32;
+    let mut header = Vec::new();
+    header.extend(b"RIFF");
+    header.extend((data + 36).to_le_bytes());
+    header.extend(b"WAVEfmt ");
+    header.extend(16u32.to_le_bytes());
+    [3u16, 1].iter().for_each(|x| header.extend(x.to_le_bytes()));
+    [24_000u32, 96_000].iter().for_each(|x| header.extend(x.to_le_bytes()));
+    [4u16, 32].iter().for_each(|x| header.extend(x.to_le_bytes()));
+    header.extend(b"data");
+    header.extend(data.to_le_bytes());
+    for name in ["a.wav", "b.wav"] {
+        std::fs::write(desk.path(name), &header).unwrap();
+        let file = std::fs::File::options().write(true).open(desk.path(name)).unwrap();
+        file.set_len(44 + u64::from(data)).unwrap();
+    }
+    for line in ["$H measure a.wav", "$H calibrate spec.toml a.wav b.wav -o c.toml --blind"] {
+        let output = shell(&desk, &format!("ulimit -v 1000000; {line}"));
+        let message = text(&output.stderr);
+        assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{line}: {message}");
+        assert!(message.contains("GB of memory") && message.contains("shorter part"), "{line}: {message}");
+    }
+    assert!(!desk.path("c.toml").exists());
+}

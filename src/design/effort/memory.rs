@@ -2,16 +2,17 @@
 
 use std::fs;
 
-/// Bytes of memory of the machine, or fewer where the process is limited (`ulimit -v`, a control group);
-/// `None` where the system does not say.
-pub(super) fn machine_memory() -> Option<f64> {
+/// Bytes of memory that are free on the machine, or fewer where the process is limited (`ulimit -v`, a control
+/// group); `None` where the system does not say. A process that takes more is ended by the system without a
+/// message: with overcommit, it grants memory that it does not have.
+pub fn available_memory() -> Option<f64> {
     [physical(), control_group(), address_space()].into_iter().flatten().reduce(f64::min)
 }
 
-/// MemTotal of /proc/meminfo, in kB there.
+/// MemAvailable of /proc/meminfo, in kB there: free, or free after caches are dropped.
 fn physical() -> Option<f64> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("MemTotal:"))?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
     Some(1024.0 * number(line.split_whitespace().nth(1)?)?)
 }
 

@@ -64,6 +64,6 @@ fn what_cannot_end_is_refused_with_the_figure_and_the_way_out() {
 #[test]
 fn the_memory_of_this_machine_is_known_where_it_is_told() {
     if cfg!(target_os = "linux") {
-        assert!(machine_memory().is_some_and(|bytes| bytes > 1e8));
+        assert!(available_memory().is_some_and(|bytes| bytes > 1e8));
     }
 }
