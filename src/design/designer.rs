@@ -102,8 +102,11 @@ pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, Des
     watch.begins(Stage::Filters);
     let settings = settings(&complete)?;
     let repeats = Repeats::of(spec.design.method);
-    let merged =
-        if settings.robust.is_some() { problem.keep_channels() } else { problem.merge_channels(repeats) };
+    let merged = if settings.robust.is_some() {
+        problem.keep_channels()
+    } else {
+        problem.merge_channels(repeats).of_unit_size()?
+    };
     let plant = LiftedPlant::new(&merged.problem)?;
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
     watch.begins(Stage::Realisation);

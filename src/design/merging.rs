@@ -112,8 +112,15 @@ impl Problem {
 
 impl MergedChannels {
     /// Whether the original channels were all distinct.
+    #[cfg(test)]
     pub(super) fn are_all(&self) -> bool {
         self.problem.channels.len() == self.shares.len()
+    }
+
+    /// Whether the channels are the original ones, in their units.
+    pub(super) fn are_unchanged(&self) -> bool {
+        let unchanged = |(i, share): (usize, &Share)| share.representative == i && share.share == 1.0;
+        self.shares.iter().enumerate().all(unchanged)
     }
 
     /// For each merged channel the first of the original channels whose sample is the newest.

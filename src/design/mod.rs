@@ -12,6 +12,7 @@ mod exchange;
 pub mod filters;
 pub mod interleaving;
 mod lifting;
+mod measurement_units;
 mod merging;
 mod methods;
 pub mod plant;

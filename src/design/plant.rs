@@ -157,7 +157,7 @@ impl LiftedPlant {
     /// is not stable.
     pub fn fir_norm(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
         let lags = filters::polyphase(taps, self.ratio());
-        let system = self.error_system(&StateSpace::fir(&lags)?)?;
+        let system = self.error_system(&self.delay_lines(&lags)?)?;
         let (n, m) = (self.channels(), self.ratio());
         let response = |w: f64| {
             let g = self.at_frequency(w);
@@ -168,6 +168,16 @@ impl LiftedPlant {
         let mut initial = self.resonances()?.to_vec();
         initial.extend((1..grid).map(|k| PI * k as f64 / grid as f64));
         Ok(hinf_norm_with_response(&system, &response, initial)?)
+    }
+
+    /// FIR filters whose delay lines hold measurements of about unit size.
+    fn delay_lines(&self, lags: &[Mat]) -> Result<StateSpace, DesignError> {
+        let units = self.problem.measurement_units()?;
+        let mut of_unit_size = lags.to_vec();
+        for lag in &mut of_unit_size {
+            lag.column_iter_mut().zip(&units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
+        }
+        Ok(StateSpace::fir(&of_unit_size)?.scale_inputs(&units)?)
     }
 
     /// ||K|| of a bank's filters, computed from the coefficients in the bank.
@@ -183,20 +193,22 @@ impl LiftedPlant {
     }
 
     /// The absolute error that rounding may cause in the norm of the error system of `filters`: eps ||F||_2
-    /// ||H||_2. A norm that is not larger is unresolved.
+    /// ||H||_2, with measurements of about unit size. A norm that is not larger is unresolved.
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant or `filters` are not stable.
     pub fn rounding(&self, filters: &StateSpace) -> Result<f64, DesignError> {
-        Ok(f64::EPSILON * h2_norm(filters)? * self.measurement_size()?)
+        let inverse: Vec<f64> = self.problem.measurement_units()?.iter().map(|unit| 1.0 / unit).collect();
+        Ok(f64::EPSILON * h2_norm(&filters.scale_inputs(&inverse)?)? * self.measurement_size()?)
     }
 
-    /// ||H||_2.
+    /// ||H||_2 of measurements of about unit size.
     fn measurement_size(&self) -> Result<f64, DesignError> {
         match self.measurement_size.get() {
             Some(&size) => Ok(size),
             None => {
-                let size = h2_norm(&self.measurement()?)?;
+                let units = self.problem.measurement_units()?;
+                let size = h2_norm(&self.measurement()?.scale_outputs(&units)?)?;
                 Ok(*self.measurement_size.get_or_init(|| size))
             }
         }
@@ -211,11 +223,14 @@ impl LiftedPlant {
     /// [`DesignError::Lti`] if the plant is not stable.
     pub fn noncausal_bound(&self) -> Result<Peak, DesignError> {
         let distinct = self.problem.merge_channels(Repeats::AtWholePeriods).representatives();
+        let units = self.problem.measurement_units()?;
+        let scales = distinct.iter().map(|&channel| units[channel]);
+        let scales: Vec<f64> = scales.chain(std::iter::repeat_n(1.0, self.ratio())).collect();
         let references = self.channels()..self.channels() + self.ratio();
         // Delays by whole periods turn the rows of the response, which changes neither the span of the
         // measurements nor the singular values.
         let prompt = self.prompt.select_outputs(distinct.iter().copied().chain(references))?;
-        Ok(unexplained_peak(&prompt, distinct.len())?)
+        Ok(unexplained_peak(&prompt.scale_outputs(&scales)?, distinct.len())?)
     }
 
     /// `[H; W]` at e^{j omega}. A delay by whole periods is a factor of its row, so the time does not depend

@@ -1,7 +1,7 @@
 //! Warnings about specs that are legal but probably not meant.
 
 use super::DesignError;
-use super::problem::Problem;
+use super::problem::{Problem, common_delay};
 use crate::quantity::readable;
 use crate::spec::{FilterSpec, Spec};
 use crate::units::Hertz;
@@ -80,7 +80,7 @@ pub enum Implausible {
 /// # Errors
 /// [`DesignError::Analog`] for a filter that is not stable or not strictly proper.
 pub fn implausible(spec: &Spec) -> Result<Vec<Implausible>, DesignError> {
-    let problem = Problem::new(spec, spec.latency.unwrap_or(0))?;
+    let problem = Problem::new(spec, spec.latency.unwrap_or_else(|| common_delay(spec)))?;
     let mut found: Vec<Implausible> = band(spec, &problem, None).into_iter().collect();
     let other = |i: &usize| spec.channels[*i].filter != spec.target;
     found.extend((0..spec.channels.len()).filter(other).filter_map(|i| band(spec, &problem, Some(i))));

@@ -10,6 +10,9 @@ use crate::verify::uncertainty::ErrorPoint;
 /// one matrix takes 128 MiB. A norm needs several of them, and its time grows with the cube of the states.
 pub const MAX_CHAIN_STATES: usize = 4096;
 
+/// Slow periods of delay up to which latencies that predict are compared, too.
+const KEPT_PERIODS: usize = 16;
+
 /// Front ends, delays and rates in units of the fast period (h = 1).
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -60,6 +63,16 @@ impl Problem {
         let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels, noise };
         problem.check_size()?;
         Ok(problem)
+    }
+
+    /// The same problem `fast_periods` earlier: a common shift of all delays and of the latency changes neither the
+    /// error nor the filters.
+    pub(super) fn earlier(mut self, fast_periods: usize) -> Self {
+        for channel in &mut self.channels {
+            channel.delay.0 -= fast_periods as f64;
+        }
+        self.latency -= fast_periods;
+        self
     }
 
     /// The delays of the channels.
@@ -120,6 +133,14 @@ impl Problem {
     pub fn longest_delay(&self) -> FastPeriods {
         FastPeriods(self.channels.iter().map(|channel| channel.delay.0).fold(0.0, f64::max))
     }
+}
+
+/// The delay in whole slow periods that all channels have, in fast periods, beyond [`KEPT_PERIODS`] of them. No
+/// latency below it is worth a design: it would predict the target from samples that much older.
+pub(super) fn common_delay(spec: &Spec) -> usize {
+    let least = spec.delays_in_fast_periods().iter().map(|delay| delay.0).fold(f64::INFINITY, f64::min);
+    let periods = (least / spec.ratio as f64).floor().max(0.0) as usize;
+    periods.saturating_sub(KEPT_PERIODS) * spec.ratio
 }
 
 /// The index of the filter to which `filter` is proportional, and the factor. A filter that is not

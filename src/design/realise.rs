@@ -51,7 +51,7 @@ pub(super) fn realise(
     merged_plant: &LiftedPlant,
     synthesis: &Synthesis,
 ) -> Result<Realised, DesignError> {
-    let whole = if merged.are_all() { merged_plant.clone() } else { LiftedPlant::new(problem)? };
+    let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem)? };
     let realisation = Realisation { spec, whole: &whole, merged, merged_plant };
     let realised = match &synthesis.filters {
         Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
@@ -72,7 +72,7 @@ struct Realisation<'a> {
 
 impl Realisation<'_> {
     fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Evaluated, DesignError> {
-        if self.merged.are_all() {
+        if self.merged.are_unchanged() {
             return Ok(Evaluated { filters: SynthesisFilters::Fir(taps.to_vec()), peak });
         }
         evaluate(self.whole, SynthesisFilters::Fir(self.merged.share_taps(taps)))

@@ -18,6 +18,8 @@
 //! removed by adding a continuous spectrum in the span of the samples themselves. The root of its energy is
 //! at most |r| / sqrt(lambda). Here lambda is the least eigenvalue of the covariance matrix of the samples
 //! that the taps of one output weight (for white noise at the input).
+//!
+//! The samples of a channel are counted in a unit in which they are of size one, so that gains do not enter lambda.
 
 use super::ball::{self, Ball, Matrix};
 use super::positive;
@@ -70,7 +72,8 @@ pub(super) fn unexplained(
     let reference = ComplexMatrix::column(&witness.reference);
     let known = gram.select(&measured, &measured).realified();
     let cross = gram.select(&measured, &(0..ratio).collect::<Vec<_>>()).product(&reference);
-    let least = least_eigenvalue(&known)?;
+    let units = positive::scales(&known);
+    let least = least_eigenvalue(&positive::scaled(&known, &units))?;
     let factor = positive::cholesky(&known.map(Ball::mid))?;
     let right: Vec<_> = cross.re.iter().chain(&cross.im).map(|x| (-*x).mid()).collect();
     let solution = factor.solve(&right);
@@ -79,7 +82,7 @@ pub(super) fn unexplained(
     let b = reference.above(&ComplexMatrix { re: part(0), im: part(n) });
     let gram = gram.select(&all, &all);
     // The optimal b_h has less energy than the b_h found, by r* Gamma_hh^-1 r with the residual r.
-    let residual = gram.product(&b).rows(ratio, n).square();
+    let residual = gram.product(&b).rows(ratio, n).with_rows_scaled(&units[..n]).square();
     let missed = residual / Ball::from(least);
     root_of_quotient(energy(&gram, &b) - missed, reference.square())
 }
@@ -101,9 +104,13 @@ pub(super) fn of_length(
 ) -> Option<f64> {
     let covariance = Covariance::new(period)?;
     let seen = covariance.of_taps(period, ratio, channels, length.div_ceil(ratio));
+    let lags = length.div_ceil(ratio);
+    let units = positive::scales(&seen);
+    let units_of_channels: Vec<f64> = units.iter().step_by(lags).copied().collect();
     let mut sums = BindingSums::new(ratio, length, channels);
     witnesses.iter().for_each(|witness| sums.add(period, witness));
-    let added = (sums.seen() / Ball::from(least_eigenvalue(&seen)?)).sqrt().upper();
+    let least = least_eigenvalue(&positive::scaled(&seen, &units))?;
+    let added = (sums.seen(&units_of_channels) / Ball::from(least)).sqrt().upper();
     let reference = covariance.of_reference(period, ratio).sqrt().upper();
     let reached = sums.value.lower() - 1.001 * added * reference;
     let paid = (sums.size.upper() + 1.001 * (ratio as f64).sqrt() * added) * (1.0 + 1e-14);
@@ -147,11 +154,12 @@ impl BindingSums {
         }
     }
 
-    /// |r|^2 over the taps that there are.
-    fn seen(&self) -> Ball {
+    /// |r|^2 over the taps that there are, in the units of their channels.
+    fn seen(&self, units: &[f64]) -> Ball {
         let entries = self.residual.iter().enumerate().flat_map(|(lag, r)| {
             let taps = self.length.saturating_sub(lag * self.ratio).min(self.ratio);
-            r.rows(0, taps).iter().copied().collect::<Vec<Ball>>()
+            let r = Matrix::from_fn(taps, units.len(), |p, i| r[(p, i)] * Ball::from(units[i]));
+            r.iter().copied().collect::<Vec<Ball>>()
         });
         entries.fold(Ball::ZERO, |sum, x| sum + x * x)
     }

@@ -69,7 +69,7 @@ impl Factor {
 
 /// Powers of two that bring the diagonal of a matrix to the size of one: the scaling is exact, and the
 /// proof does not depend on units.
-fn scales(m: &Matrix) -> Vec<f64> {
+pub(super) fn scales(m: &Matrix) -> Vec<f64> {
     let power = |i: usize| {
         let diagonal = m[(i, i)].nearest();
         if diagonal > 0.0 && diagonal.is_finite() {
@@ -83,11 +83,14 @@ fn scales(m: &Matrix) -> Vec<f64> {
 
 /// Whether every symmetric matrix in the enclosure `m` (lower triangle read) is positive definite.
 pub(super) fn is_positive_definite(m: &Matrix) -> bool {
-    let scales = scales(m);
-    let scaled = Matrix::from_fn(m.nrows(), m.ncols(), |i, j| {
+    exceeds(&scaled(m, &scales(m)), 0.0)
+}
+
+/// D m D with D diagonal; the lower triangle of m is read.
+pub(super) fn scaled(m: &Matrix, scales: &[f64]) -> Matrix {
+    Matrix::from_fn(m.nrows(), m.ncols(), |i, j| {
         m[(i.max(j), i.min(j))] * Ball::from(scales[i]) * Ball::from(scales[j])
-    });
-    exceeds(&scaled, 0.0)
+    })
 }
 
 /// Whether every symmetric matrix in the enclosure has no eigenvalue below `least`.

@@ -71,6 +71,13 @@ impl ComplexMatrix {
         Self { re: self.re.rows(start, count).into_owned(), im: self.im.rows(start, count).into_owned() }
     }
 
+    /// Row i times `scales[i]`.
+    pub(super) fn with_rows_scaled(&self, scales: &[f64]) -> Self {
+        let part =
+            |m: &Matrix| Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * Ball::from(scales[i]));
+        Self { re: part(&self.re), im: part(&self.im) }
+    }
+
     pub(super) fn above(&self, below: &Self) -> Self {
         let stack = |a: &Matrix, b: &Matrix| {
             Matrix::from_fn(a.nrows() + b.nrows(), a.ncols(), |i, j| {

@@ -159,3 +159,44 @@ fn orders_are_reduced_alike() {
         assert!((amplified / plain - 1.0).abs() < 1e-3, "{gain:e}: {amplified} {plain}");
     }
 }
+
+/// Channels whose gains lie 12 decades apart: neither gamma nor its bounds depend on the gains, and each filter undoes
+/// its own.
+#[test]
+fn gains_twelve_decades_apart_change_no_gamma() {
+    let channels = [0.2, 1.1, 2.4];
+    for method in [Method::Fir, Method::Iir, Method::H2] {
+        let base = alike(&butterworth(3, 0.2), 2, 4, &channels);
+        let spec = if method == Method::Fir { with_taps(base, 12) } else { base };
+        let spec = Spec { design: DesignSpec::new(method, spec.design.taps), ..spec };
+        let mut unequal = spec.clone();
+        let gains = [1e-6, 1.0, 1e6];
+        unequal.channels.iter_mut().zip(gains).for_each(|(channel, gain)| channel.gain = gain);
+        let [plain, unequal] = [spec, unequal].map(|spec| design(&spec).unwrap());
+        let [before, after] = [&plain, &unequal].map(|found| found.bank.gamma.norm.unwrap());
+        assert!((after / before - 1.0).abs() < 1e-9, "{method:?}: {before} {after}");
+        let noncausal = |found: &hybank::design::Design| found.bank.gamma.noncausal.unwrap();
+        assert!(
+            (noncausal(&unequal) / noncausal(&plain) - 1.0).abs() < 1e-6,
+            "{method:?}: {:?}",
+            unequal.bank.gamma
+        );
+        let again = analyze(&unequal.bank, &[]).unwrap();
+        assert!((again.gamma / before - 1.0).abs() < 1e-8, "{method:?}: {again:?}");
+        assert!((again.noncausal.unwrap() / noncausal(&plain) - 1.0).abs() < 1e-6, "{method:?}: {again:?}");
+        let proven = unequal.proof.unwrap_or_else(|error| panic!("{method:?}: {error}"));
+        assert!(proven.upper < before * (1.0 + 1e-5), "{method:?}: {proven:?}");
+        let (SynthesisFilters::Fir(plain), SynthesisFilters::Fir(taps)) =
+            (&plain.bank.filters, &unequal.bank.filters)
+        else {
+            continue;
+        };
+        for ((plain, taps), gain) in plain.iter().zip(taps).zip(gains) {
+            let size = plain.iter().fold(0.0f64, |most, tap| most.max(tap.abs()));
+            assert!(
+                plain.iter().zip(taps).all(|(a, b)| (a - b * gain).abs() < 1e-6 * size),
+                "{gain}: {taps:?}"
+            );
+        }
+    }
+}

@@ -189,3 +189,34 @@ fn a_latency_that_the_taps_do_not_reach_is_refused() {
     let reached = error(&late, shortest);
     assert!(reached > 0.9 * zero_output, "{reached} of {zero_output}");
 }
+
+/// A delay that all channels have adds to the latency and changes nothing else, however many slow periods it lasts.
+#[test]
+fn a_common_delay_adds_to_the_latency() {
+    let with_delay = |method: Method, common: f64| {
+        let filter = butterworth(2, 0.6);
+        let channel = |delay: f64| ChannelSpec::new(Seconds(common + delay), filter.clone());
+        Spec {
+            name: String::new(),
+            fast_period: Seconds(1.0),
+            ratio: 2,
+            latency: None,
+            target: filter.clone(),
+            channels: vec![channel(1.25), channel(0.5)],
+            uncertainty: None,
+            design: DesignSpec::new(method, method.has_taps().then_some(14)),
+        }
+    };
+    // Not so for `separation`, which gives a share of the whole latency to its first step.
+    assert!(design_with(&with_delay(Method::Separation, 20_000.0), ProofSearch::Skip).is_ok());
+    for method in [Method::Fir, Method::Iir, Method::H2, Method::Sinc] {
+        let designed =
+            |common: f64| design_with(&with_delay(method, common), ProofSearch::Skip).unwrap().bank;
+        let (near, far) = (designed(0.0), designed(20_000.0));
+        assert_eq!(far.latency, near.latency + 20_000, "{method:?}");
+        let [near, far] = [near, far].map(|bank| bank.gamma.norm.unwrap());
+        assert!((far / near - 1.0).abs() < 1e-6, "{method:?}: {near} {far}");
+    }
+    let refused = design_with(&with_delay(Method::Fir, 70_000.0), ProofSearch::Skip).unwrap_err();
+    assert!(refused.to_string().contains("latency is in fast samples and at most 65536"), "{refused}");
+}

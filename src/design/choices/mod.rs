@@ -16,7 +16,7 @@ use super::merging::Repeats;
 use super::methods::robust_fir::RobustProblem;
 use super::methods::{self, Settings, fir, iir};
 use super::plant::LiftedPlant;
-use super::problem::{Channel, Problem};
+use super::problem::{Channel, Problem, common_delay};
 use crate::spec::{Method, Spec};
 use crate::units::FastPeriods;
 use reach::Reach;
@@ -53,7 +53,10 @@ pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
 /// As [`latency`].
 pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, DesignError> {
     let latency = spec.latency.map_or_else(|| choose_latency(spec, compared), Ok)?;
-    Ok(Spec { latency: Some(latency), ..spec.clone() })
+    let complete = Spec { latency: Some(latency), ..spec.clone() };
+    // The delays may ask for more than the longest latency.
+    complete.check()?;
+    Ok(complete)
 }
 
 /// Taps per channel: the number in the spec, or 12 M - 1 for the comparison methods (23 for M = 2, as in
@@ -81,9 +84,18 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`] at the slow rate.
 pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
+    settings_earlier(spec, 0)
+}
+
+/// The settings with all delays shorter by so many fast periods, a multiple of the slow period.
+fn settings_earlier(spec: &Spec, fast_periods: usize) -> Result<Settings, DesignError> {
     let at_slow_rate = || {
         let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
-        Ok::<_, DesignError>(Problem::new(&slow, 0)?.merge_channels(Repeats::AtOneInstant).problem)
+        // The method replaces the latency. With this one no delay chain is long.
+        let latency = common_delay(&slow);
+        let problem = Problem::new(&slow, latency.max(fast_periods / spec.ratio))?;
+        let problem = problem.earlier(fast_periods / spec.ratio);
+        Ok::<_, DesignError>(problem.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem)
     };
     let separate = spec.design.method == Method::Separation;
     Ok(Settings {
@@ -97,14 +109,19 @@ pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
 
 fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignError> {
     let repeats = Repeats::of(spec.design.method);
-    let problem = Problem::new(spec, 0)?.merge_channels(repeats).problem;
+    // Delays that all channels have only add to the latency.
+    let common = common_delay(spec);
+    let problem = Problem::new(spec, common)?.earlier(common).merge_channels(repeats).of_unit_size()?.problem;
     compared(0);
-    match spec.design.method {
+    let latency = match spec.design.method {
         Method::Fir => for_fir(&problem, taps(spec), compared),
         Method::Iir => for_iir(&problem, compared),
         Method::H2 => Ok(CausalErrors::new(&problem)?.shortest()),
-        Method::Sinc | Method::Separation => for_comparison(spec, &problem, compared),
-    }
+        Method::Sinc | Method::Separation => {
+            for_comparison(spec.design.method, &problem, &settings_earlier(spec, common)?, compared)
+        }
+    };
+    Ok(common + latency?)
 }
 
 /// The shortest latency whose least gamma with `taps` taps per channel is almost the best.
@@ -135,13 +152,17 @@ fn for_iir(problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignErr
 }
 
 /// The shortest latency whose gamma is almost the best of a method that does not minimise it.
-fn for_comparison(spec: &Spec, problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignError> {
-    let settings = settings(spec)?;
+fn for_comparison(
+    method: Method,
+    problem: &Problem,
+    settings: &Settings,
+    compared: Compared<'_>,
+) -> Result<usize, DesignError> {
     let latencies = reach::candidates(problem, settings.taps);
     let reach = Reach::new(problem, settings.taps, &latencies)?;
     let search = Search::new(latencies.map(|latency| reach.bound_of_choice(latency)), 0.0);
     search.shortest(compared, |latency, _| {
-        let synthesis = methods::synthesise(spec.design.method, &plant(problem, latency)?, &settings)?;
+        let synthesis = methods::synthesise(method, &plant(problem, latency)?, settings)?;
         Ok((synthesis.peak.gain, synthesis.peak.gain))
     })
 }

@@ -126,9 +126,9 @@ pub(super) fn judged(sizes: &Sizes) -> Effort {
 }
 
 /// The scale that is stated beside gamma: the errors of a bank of zeros and of plain interleaving, whose taps
-/// reach back over the latency.
+/// reach back over the latency that the delays leave.
 pub(super) fn scale(sizes: &Sizes) -> Effort {
-    judged(&Sizes { taps: sizes.latency + sizes.ratio, ..*sizes })
+    judged(&Sizes { taps: sizes.look_back + sizes.ratio, ..*sizes })
 }
 
 /// A bank for whole delays and a fractional delay for each channel.

@@ -14,14 +14,14 @@ mod recursive;
 mod sizes;
 
 pub use amount::Effort;
+pub use memory::available_memory;
 pub use progress::{Observer, Stage, unobserved};
 
 use super::DesignError;
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustProblem;
-use super::problem::Problem;
+use super::problem::{Problem, common_delay};
 use crate::spec::{Method, Solver, Spec};
-use memory::machine_memory;
 use sizes::Sizes;
 
 /// A design that takes longer is refused, in seconds.
@@ -33,7 +33,7 @@ const BASE_BYTES: f64 = 10e6;
 const COMPARISONS: f64 = 12.0;
 const MOST_COMPARISONS: f64 = 40.0;
 
-/// Whether a design is refused when its estimate exceeds ten minutes or the memory of the machine.
+/// Whether a design is refused when its estimate exceeds ten minutes or the free memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Limits {
     /// It is refused.
@@ -50,10 +50,11 @@ pub enum Limits {
 /// [`DesignError`] if the spec has no [`Problem`].
 pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     let taps = spec.design.taps.unwrap_or_default();
-    let guess = |problem: &Problem| problem.longest_delay().0.ceil() as usize + taps / 4;
-    let repeats = Repeats::of(spec.design.method);
-    let problem = Problem::new(spec, spec.latency.unwrap_or_default())?.merge_channels(repeats).problem;
-    let latency = spec.latency.unwrap_or_else(|| guess(&problem));
+    let common = if spec.latency.is_none() { common_delay(spec) } else { 0 };
+    let problem = Problem::new(spec, spec.latency.unwrap_or(common))?.earlier(common);
+    let problem = problem.merge_channels(Repeats::of(spec.design.method)).problem;
+    let guess = || problem.longest_delay().0.ceil() as usize + taps / 4;
+    let latency = if spec.latency.is_none() { guess() } else { problem.latency };
     let sizes = Sizes::new(&Problem { latency, ..problem }, taps);
     let design = synthesis(spec, &sizes);
     let finished = design.then(finishing(spec, &sizes)).then(fir::scale(&sizes)).then(if proving {
@@ -111,13 +112,13 @@ fn finishing(spec: &Spec, sizes: &Sizes) -> Effort {
     integers.then(reduction)
 }
 
-/// Refuses what cannot end in ten minutes or needs more memory than the machine has.
+/// Refuses what cannot end in ten minutes or needs more memory than is free.
 ///
 /// # Errors
 /// [`DesignError::TooLong`] or [`DesignError::TooLarge`], with the figures and the way out.
 pub(super) fn check(spec: &Spec, proving: bool, limits: Limits) -> Result<Effort, DesignError> {
     let effort = estimate(spec, proving)?;
-    let memory = machine_memory();
+    let memory = available_memory();
     let remedy = remedy(spec);
     match limits {
         Limits::Off => Ok(effort),

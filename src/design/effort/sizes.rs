@@ -19,8 +19,9 @@ pub(super) struct Sizes {
     pub(super) front_end_states: f64,
     /// Taps per channel at the fast rate.
     pub(super) taps: f64,
-    /// m0 and the longest delay, fast periods.
-    pub(super) latency: f64,
+    /// How far back plain interleaving reaches: the largest m0 - D_i, fast periods.
+    pub(super) look_back: f64,
+    /// Fast periods.
     pub(super) longest_delay: f64,
 }
 
@@ -34,7 +35,7 @@ impl Sizes {
             states: front_end_states as f64 + chain_states(problem),
             front_end_states: front_end_states as f64,
             taps: taps as f64,
-            latency: problem.latency as f64,
+            look_back: look_back(problem),
             longest_delay: problem.longest_delay().0,
         }
     }
@@ -68,6 +69,11 @@ impl Sizes {
     pub(super) fn fir_error_states(&self) -> f64 {
         self.states + self.channels * (self.lags() - 1.0).max(0.0)
     }
+}
+
+fn look_back(problem: &Problem) -> f64 {
+    let ages = problem.channels.iter().map(|channel| problem.latency as f64 - channel.delay.0);
+    ages.fold(0.0, f64::max)
 }
 
 /// States of all delay chains: one for each whole slow period by which a sample is older than the newest.

@@ -206,8 +206,8 @@ impl Search {
 /// The frequency and direction in which the largest part of the reference samples cannot be estimated from
 /// the samples.
 fn noncausal_witness(bank: &Bank) -> Result<DualWitness, DesignError> {
-    let plant =
-        LiftedPlant::new(&analysis::bank_problem(bank)?.merge_channels(Repeats::AtWholePeriods).problem)?;
+    let merged = analysis::bank_problem(bank)?.merge_channels(Repeats::AtWholePeriods).of_unit_size()?;
+    let plant = LiftedPlant::new(&merged.problem)?;
     let (n, m) = (plant.channels(), plant.ratio());
     let frequency = plant.noncausal_bound()?.frequency;
     let l = linalg::lq_factor_c(&FrequencyResponse::new(plant.system()).at_frequency(frequency));
@@ -239,6 +239,8 @@ fn pairs(column: &CMat) -> Vec<[f64; 2]> {
 fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>, DesignError> {
     let SynthesisFilters::Fir(taps) = &bank.filters else { return Ok(Vec::new()) };
     let merged = analysis::bank_problem(bank)?.merge_channels(Repeats::AtOneInstant);
+    let units = merged.problem.measurement_units()?;
+    let merged = merged.of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem)?;
     let parts = &merged.shares;
     let directions = directions(dual)?;
@@ -248,7 +250,8 @@ fn binding_witnesses(bank: &Bank, dual: &[DualPoint]) -> Result<Vec<DualWitness>
     let group = |i: usize| parts[i].representative;
     let first = |i: usize| (0..i).all(|before| group(before) != group(i));
     let spread = |column: CMat| -> Vec<[f64; 2]> {
-        let weight = |i: usize| if first(i) { column[group(i)] } else { Complex::new(0.0, 0.0) };
+        let weight =
+            |i: usize| if first(i) { column[group(i)] * units[group(i)] } else { Complex::new(0.0, 0.0) };
         (0..parts.len()).map(weight).map(|z| [-z.re, -z.im]).collect()
     };
     let directions = directions.iter().enumerate();
