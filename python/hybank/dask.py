@@ -152,7 +152,7 @@ def _run(job, k, state=None):
     plan, bank, reader = job.plan, _bank(job.bank), _open(job.source, job.axis)
     first, last = job.spans[k]
     keeps = plan.memory is None
-    s = bank.stream(axis=0, dtype=plan.stream, algorithm=plan.asked, state=state)
+    s = bank.stream(axis=reader.axis, dtype=plan.stream, algorithm=plan.asked, state=state)
     if state is None:
         for _ in _through(s, reader, max(first - job.warm_up, 0), first):
             pass
@@ -278,20 +278,23 @@ class _Array:
         if array.ndim not in (1, 2):
             raise HybankError(f"the source has {array.ndim} dimensions; give one of shape (N, T), or (T, N) with axis=0")
         self.array, self.by_frames = array, array.ndim == 2 and axis in (0, -2)
+        self.axis = 0 if self.by_frames else -1
         self.dtype = array.dtype
         time = 0 if array.ndim == 1 or self.by_frames else 1
         self.frames, self.channels = array.shape[time], 1 if array.ndim == 1 else array.shape[1 - time]
 
     def read(self, first, count):
         if self.array.ndim == 1:
-            return np.asarray(self.array[first : first + count])[:, None]
+            return np.asarray(self.array[first : first + count])
         if self.by_frames:
             return np.asarray(self.array[first : first + count])
-        return np.asarray(self.array[:, first : first + count]).T
+        return np.ascontiguousarray(self.array[:, first : first + count])
 
 
 class _Recordings:
     """WAV or SigMF files, whose channels are those of the bank one after another."""
+
+    axis = 0
 
     def __init__(self, paths):
         self.files = [Recording(path) for path in paths]
