@@ -181,6 +181,8 @@ class _Region:
     def __init__(self, job, first, count, plan):
         self.sink, self.first, self.left, self.skip = _writer(job.sink), first, count, plan.latency
         self.dtype, self.clipped = np.dtype(plan.output), 0
+        # A chunk of zarr is compressed as a whole, so it is written at once.
+        self.parts = None if isinstance(self.sink, np.memmap) else []
 
     def write(self, y):
         dropped = min(self.skip, len(y))
@@ -191,13 +193,19 @@ class _Region:
         if self.dtype.kind in "iu":
             y, clipped = encode(y, self.dtype)
             self.clipped += clipped
+        self.left -= len(y)
+        if self.parts is not None:
+            self.parts.append(y)
+            return
         self.sink[self.first : self.first + len(y)] = y
         self.first += len(y)
-        self.left -= len(y)
 
     def close(self):
-        if hasattr(self.sink, "flush"):
+        if self.parts is None:
             self.sink.flush()
+        elif self.parts:
+            y = np.concatenate(self.parts)
+            self.sink[self.first : self.first + len(y)] = y
 
 
 @lru_cache(maxsize=4)
