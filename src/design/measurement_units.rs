@@ -20,7 +20,7 @@ impl Problem {
     /// of the converter.
     ///
     /// # Errors
-    /// [`DesignError::Lti`] never: front ends are stable.
+    /// [`DesignError::Lti`] if a decomposition does not converge.
     pub(super) fn measurement_units(&self) -> Result<Vec<f64>, DesignError> {
         let joint = JointState::new(&self.front_ends)?;
         let (transition, input) = joint.over(self.ratio as f64)?;
