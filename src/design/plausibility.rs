@@ -12,7 +12,7 @@ const NARROW: f64 = 0.01;
 /// Samples nearer to each other than this (in fast periods) hardly differ.
 const NEAR: f64 = 1e-3;
 /// Samples nearer to each other than this are at one instant up to rounding.
-const TOGETHER: f64 = 1e-9;
+const TOGETHER: f64 = 1e-12;
 /// Bandwidths in rad/s between these look as if one sample were the unit of time.
 const NORMALISED: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 
