@@ -118,7 +118,7 @@ fn the_unit_of_the_signal_does_not_matter() {
         check(&found, 2).gamma.norm.unwrap() / gain
     };
     let one = gamma(1.0);
-    for gain in [1e-9, 1e3] {
+    for gain in [1e-9, 1e9] {
         let scaled = gamma(gain);
         assert!((scaled / one - 1.0).abs() < 1e-3, "{gain}: {scaled} {one}");
     }
