@@ -157,7 +157,7 @@ struct Run {
     format: PcmFormat,
     /// Output samples that are still to be dropped.
     skip: usize,
-    /// Those that were dropped and are made up for at the end.
+    /// The latency that is dropped, and made up for at the end.
     owed: usize,
     ratio: usize,
     samples: u64,
@@ -188,11 +188,11 @@ impl Run {
         }
     }
 
-    /// Frames of zeros, until as many samples have come out as were dropped.
+    /// Frames of zeros, until M samples have come out for each frame of the captures.
     fn flush(&mut self, channels: usize) -> Result<(), Failure> {
         let frames = self.owed.div_ceil(self.ratio);
         let mut fast = self.filtered(&vec![0; frames * channels], channels);
-        fast.truncate(fast.len().min(self.owed + self.skip));
+        fast.truncate(self.owed);
         self.write(&fast)
     }
 

@@ -1,21 +1,14 @@
 //! `fuse --bit-true` against the exported C and against integers without limits.
 
-use crate::export::{bank, compiled, piped, samples};
+use crate::export::{bank, compiled, piped, samples, with_wild_integers};
 use crate::support::{Desk, THESIS, number};
 use hound::{SampleFormat, WavReader, WavSpec, WavWriter};
-use hybank::bank::SynthesisFilters;
 
 /// A desk with a bank of 8-bit taps of wild values, so that sums round and saturate.
 fn desk(fraction_bits: i32) -> Desk {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "22", "--bits", "8"]);
-    let mut designed = bank(&desk);
-    let words = designed.fixed_point.as_mut().unwrap();
-    words.fraction_bits = fraction_bits;
-    let taps = words.integers.iter_mut().flatten().enumerate();
-    taps.for_each(|(k, tap)| *tap = ((k * 37) % 255) as i64 - 127);
-    designed.filters = SynthesisFilters::Fir(words.taps());
-    (designed.proof, designed.gamma) = (None, Default::default());
+    let designed = with_wild_integers(bank(&desk), fraction_bits);
     desk.write("b.json", designed.to_json().unwrap());
     desk
 }
@@ -61,6 +54,26 @@ fn the_model_has_the_bits_of_the_exported_c() {
         desk.report(&FUSE);
         let shifted = output(&desk);
         assert!(shifted.len() == c.len() && shifted[..c.len() - 10] == c[10..]);
+    }
+}
+
+/// M output samples for each frame, also where captures are shorter than a latency that is no multiple of M.
+#[test]
+fn short_captures_give_as_many_samples_as_without_the_model() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "22", "--bits", "8", "--latency", "9"]);
+    for frames in [1, 2, 5, 40] {
+        let spec =
+            WavSpec { channels: 2, sample_rate: 8000, bits_per_sample: 16, sample_format: SampleFormat::Int };
+        let mut wav = WavWriter::create(desk.path("in.wav"), spec).unwrap();
+        (0..2 * frames).for_each(|k| wav.write_sample((k * 7919 % 20_000) as i16).unwrap());
+        wav.finalize().unwrap();
+        desk.good(&[&FUSE[..], &["--force"]].concat());
+        let model = output(&desk);
+        desk.good(&["fuse", "b.json", "in.wav", "-o", "out.wav", "--bits", "16", "--force"]);
+        let floats = output(&desk);
+        assert_eq!((model.len(), floats.len()), (2 * frames, 2 * frames));
+        assert!(model.iter().zip(&floats).all(|(a, b)| (a - b).abs() <= 1), "{model:?} {floats:?}");
     }
 }
 

@@ -111,6 +111,17 @@ fn c_of_real_taps_has_the_bits_of_its_definition() {
     assert!(worst_difference(&got, &streamed(&desk, &input)) < 1e-14);
 }
 
+/// The bank with 8-bit taps of all sizes, so that sums round and saturate.
+pub(crate) fn with_wild_integers(mut bank: Bank, fraction_bits: i32) -> Bank {
+    let words = bank.fixed_point.as_mut().unwrap();
+    words.fraction_bits = fraction_bits;
+    let taps = words.integers.iter_mut().flatten().enumerate();
+    taps.for_each(|(k, tap)| *tap = ((k * 37) % 255) as i64 - 127);
+    bank.filters = SynthesisFilters::Fir(words.taps());
+    (bank.proof, bank.gamma) = (None, Default::default());
+    bank
+}
+
 /// Sums of integers are exact, so there is one right output: the nearest integer, halves upwards, saturated.
 #[test]
 fn c_of_integer_taps_has_no_differing_bit() {
@@ -118,13 +129,7 @@ fn c_of_integer_taps_has_no_differing_bit() {
     desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "22", "--bits", "8"]);
     let original = bank(&desk);
     for fraction_bits in [6, 0, -2] {
-        let mut designed = original.clone();
-        let words = designed.fixed_point.as_mut().unwrap();
-        words.fraction_bits = fraction_bits;
-        let taps = words.integers.iter_mut().flatten().enumerate();
-        taps.for_each(|(k, tap)| *tap = ((k * 37) % 255) as i64 - 127);
-        designed.filters = SynthesisFilters::Fir(words.taps());
-        (designed.proof, designed.gamma) = (None, Default::default());
+        let designed = with_wild_integers(original.clone(), fraction_bits);
         desk.write("b.json", designed.to_json().unwrap());
         desk.good(&["export", "b.json", "--to", "c", "-o", "bank.h", "--force"]);
         if !compiled(&desk, "int32_t", 2, 2) {
