@@ -56,7 +56,7 @@ pub enum MeasurementError {
         most: usize,
     },
     /// No data.
-    #[error("there are no frequencies in it")]
+    #[error("there are no frequencies in it; give the file that was meant, a line for each frequency")]
     Empty,
 }
 
@@ -64,7 +64,7 @@ pub enum MeasurementError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// The model has more parameters than the measurement determines.
-    #[error("{points} frequencies do not determine {order} poles; measure at {} or more, or give a lower order", 2 * .order)]
+    #[error("too few frequencies above 0 Hz for order {order}: {points}; measure at {} or more, or give a lower order", 2 * .order)]
     TooFew {
         /// Frequencies above zero.
         points: usize,

@@ -184,11 +184,11 @@ impl Report<'_> {
     fn heading(&self) -> String {
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
         format!(
-            "{}\n{}: {}, {} channels, ratio {}, {}, latency {}{chosen}\n",
+            "{}\n{}: {}, {}, ratio {}, {}, latency {}{chosen}\n",
             self.understood,
             self.bank,
             self.method.name(),
-            self.channels,
+            counted(self.channels, "channel"),
             self.ratio,
             self.size(),
             self.latency,
@@ -198,10 +198,10 @@ impl Report<'_> {
     fn size(&self) -> String {
         match (self.taps, self.states) {
             (Some(taps), _) if self.taps_chosen => {
-                format!("{taps} taps per channel (chosen; set `taps` to change it)")
+                format!("{} per channel (chosen; set `taps` to change it)", counted(taps, "tap"))
             }
-            (Some(taps), _) => format!("{taps} taps per channel"),
-            (_, Some(states)) => format!("{states} states"),
+            (Some(taps), _) => format!("{} per channel", counted(taps, "tap")),
+            (_, Some(states)) => counted(states, "state"),
             _ => String::new(),
         }
     }
@@ -269,6 +269,12 @@ pub(in crate::cli) fn decibels(value: f64, reference: f64) -> String {
     } else {
         format!("{:.1} dB", 20.0 * (value / reference).log10())
     }
+}
+
+/// A number of things, with a plural where it is not one.
+fn counted(count: usize, name: &str) -> String {
+    let ending = if count == 1 { "" } else { "s" };
+    format!("{count} {name}{ending}")
 }
 
 /// A robust bank pays if it lowers the worst case by this share.
