@@ -23,13 +23,13 @@ unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<&'a str, String
     text.to_str().map_err(|_| format!("the {what} is not UTF-8"))
 }
 
-/// The bank behind a pointer.
+/// The bank that a pointer leads to.
 unsafe fn handle<'a>(bank: *mut Handle) -> Result<&'a mut Handle, String> {
     // SAFETY: the caller promises NULL or an open bank that no other thread uses.
     bank.as_mut().ok_or_else(|| NO_BANK.to_owned())
 }
 
-/// The bank behind a pointer, to be asked something; 0 for NULL.
+/// A property of the bank that a pointer leads to; 0 for NULL.
 unsafe fn ask(bank: *const Handle, of: impl FnOnce(&Handle) -> usize) -> usize {
     // SAFETY: as for `handle`.
     bank.as_ref().map_or(0, of)

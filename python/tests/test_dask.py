@@ -66,8 +66,8 @@ def test_recursions_have_the_bits_of_one_run_and_reruns_are_reported(tmp_path, r
     assert slow == (rho > 0.99)
     if kind == "silence after a burst" and not slow:
         later = [k for k in range(10) if 2048 * k > max(1500, report.warm_up)]
-        silent = [k for k in later if rho ** (2048 * k - 1500) > 1e-280]
-        assert report.reruns == silent and silent
+        fading = [k for k in later if rho ** (2048 * k - 1500) > 1e-280]
+        assert report.reruns == fading and fading
     else:
         assert report.reruns == []
 

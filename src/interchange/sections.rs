@@ -98,7 +98,7 @@ impl Structure {
 fn delayed_inputs(block: &BlockFilter) -> Vec<Option<(usize, usize)>> {
     let n = block.a.len();
     let mut places = vec![None; n];
-    // Each pass finds the states behind those that are known.
+    // Each pass finds the states that follow those known so far.
     for _ in 0..n {
         let mut is_new = false;
         for state in 0..n {

@@ -207,7 +207,7 @@ fn warn(done: &Rendered, kind: &Kind) {
     }
     if done.geometry.as_ref().is_some_and(|g| g.order_by == uncalibrated::OrderBy::Nothing) {
         warn(
-            "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; if near objects appear behind far ones, use --reverse-order".into(),
+            "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; if far objects hide near ones, use --reverse-order".into(),
         );
     }
 }

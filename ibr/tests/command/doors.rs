@@ -92,7 +92,7 @@ fn alpha_counts_and_errors_are_written() {
     let arguments = [&["render", scene, "-o", "a.png", "--truth", "middle.png"][..], &outputs].concat();
     let figures = json(&run(dir.path(), &arguments));
     let mask = read_image(&at("m.png")).unwrap();
-    // Beyond the right view there are regions that nobody saw.
+    // Beyond the right view there are regions that no view shows.
     let beyond = std::fs::read_to_string(at(scene)).unwrap().replace("position = 0.5", "position = 2.0");
     std::fs::write(at("beyond.toml"), beyond).unwrap();
     good(

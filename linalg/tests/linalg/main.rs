@@ -1,6 +1,6 @@
 //! Decompositions and transforms against their definitions, on structured and nasty matrices.
 //!
-//! They stand outside of the crate so that the generic code behind it is compiled once, not twice.
+//! They stand outside of the crate so that the generic code of its dependencies is compiled once, not twice.
 
 mod assemble;
 mod balance;

@@ -102,13 +102,13 @@ impl Sided {
         };
         let all: Vec<(f64, f64)> = rays.iter().map(depths).collect();
         let on_side = |side: f64| all.iter().filter(|z| z.0 * side > 0.0 && z.1 * side > 0.0).count();
-        let (before, behind) = (on_side(1.0), on_side(-1.0));
-        let side = if before >= behind { 1.0 } else { -1.0 };
+        let (positive, negative) = (on_side(1.0), on_side(-1.0));
+        let side = if positive >= negative { 1.0 } else { -1.0 };
         let near = |z: &(f64, f64)| {
             let in_front = z.0 * side > 0.0 && z.1 * side > 0.0 && z.0.is_finite();
             in_front.then(|| side / z.0)
         };
-        Self { near: all.iter().map(near).collect(), count: before.max(behind) }
+        Self { near: all.iter().map(near).collect(), count: positive.max(negative) }
     }
 
     /// The slope of chi against 1 / z in chi ~ (1/z, x, y, 1).
