@@ -15,8 +15,9 @@ use crate::units::Seconds;
 pub(super) struct FrontEnds {
     /// Each filter with the index of its first state. Proportional filters count once.
     filters: Vec<(usize, StrictlyProper)>,
-    /// The factor of each filter's cut-off: Phi(s / x) has the state equations x a, x b, c.
-    speeds: Vec<f64>,
+    /// The factor of each filter's cut-off, and the filter whose cut-off that is: Phi(s / x) has the state
+    /// equations x a, x b, c.
+    speeds: Vec<(usize, f64)>,
 }
 
 impl FrontEnds {
@@ -49,7 +50,8 @@ impl FrontEnds {
             let time = Instant { whole: 0.0, delay: channel.delay };
             samples.push(SamplingInstant { filter, gain, converter_gain: channel.gain, time });
         }
-        Ok((Self { speeds: vec![1.0; filters.len()], filters }, samples))
+        let speeds = (0..filters.len()).map(|filter| (filter, 1.0)).collect();
+        Ok((Self { speeds, filters }, samples))
     }
 
     /// Number of states.
@@ -69,12 +71,13 @@ impl FrontEnds {
 
     /// Index of the filter `index` with its cut-off multiplied by `speed`, which is added if it is not there.
     pub(super) fn with_speed(&mut self, index: usize, speed: f64) -> usize {
-        if speed == self.speeds[index] {
-            return index;
+        let of = self.speeds[index].0;
+        if let Some(known) = self.speeds.iter().position(|&known| known == (of, speed)) {
+            return known;
         }
         let start = self.order();
-        self.filters.push((start, self.filters[index].1.clone()));
-        self.speeds.push(speed);
+        self.filters.push((start, self.filters[of].1.clone()));
+        self.speeds.push((of, speed));
         self.filters.len() - 1
     }
 
@@ -94,7 +97,7 @@ impl FrontEnds {
     pub(super) fn dynamics<F: Number>(&self) -> (Matrix<F>, Matrix<F>) {
         let order = self.order();
         let (mut a, mut b) = (ball::zeros(order, order), ball::zeros(order, 1));
-        for ((start, filter), &speed) in self.filters.iter().zip(&self.speeds) {
+        for ((start, filter), &(_, speed)) in self.filters.iter().zip(&self.speeds) {
             let fast = |m| {
                 if speed == 1.0 { ball::exact(m) } else { ball::scaled(&ball::exact(m), Ball::from(speed)) }
             };

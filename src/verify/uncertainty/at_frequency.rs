@@ -14,12 +14,17 @@
 //!
 //! The vertices form a tree, channel by channel. With channel i still free, h_i lies within r_i of the mean
 //! of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch.
+//!
+//! Most gains are compared in double precision (`quick`). Balls decide where that does not suffice, and give
+//! the gains that are reported.
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::positive;
 use super::super::spectrum::ComplexMatrix;
 use super::grid::ChannelGrid;
+use super::quick::{Compared, Quick, Terms};
 use crate::linalg;
+use std::collections::HashMap;
 
 /// Steps of the grid that a part needs to be halved.
 const HALVED: usize = 2;
@@ -74,11 +79,35 @@ impl Attained {
     }
 }
 
-/// Gains computed, and how many may be.
+/// Gains computed and the operations on balls that they took, or the like of them in doubles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Work {
-    pub(super) done: usize,
-    pub(super) limit: usize,
+    pub(super) gains: usize,
+    pub(super) operations: f64,
+    pub(super) limit: f64,
+    /// Operations for one gain in balls.
+    pub(super) per_gain: f64,
+}
+
+/// Gains in doubles for the time of one in balls.
+const QUICK_GAINS: f64 = 40.0;
+
+impl Work {
+    pub(super) fn is_used_up(&self) -> bool {
+        self.operations >= self.limit
+    }
+
+    /// Counts a gain in balls.
+    pub(super) fn count(&mut self) {
+        self.gains += 1;
+        self.operations += self.per_gain;
+    }
+
+    /// Counts a gain in doubles.
+    pub(super) fn count_quick(&mut self) {
+        self.gains += 1;
+        self.operations += self.per_gain / QUICK_GAINS;
+    }
 }
 
 /// What is known of the gains over the box.
@@ -103,20 +132,25 @@ pub(super) struct Part {
 impl AtFrequency<'_> {
     /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
     pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
+        let quick = Quick::new(&self.gram, &self.filters);
+        let mut sets = Sets { at: self, known: HashMap::new() };
         let mut boxes = vec![self.whole()];
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
-            let remainder = self.remainder(&parts);
-            let Some(found) = self.above(&parts, threshold - remainder, work) else { continue };
-            if found.vertices.is_empty() {
-                break;
-            }
-            if found.lower > threshold {
-                return Verdict::Above(found);
-            }
-            match self.halved(&parts, HALVED) {
-                Some(halves) => boxes.extend(halves),
-                None => return Verdict::Open(found),
+            let halves = self.halved(&parts, HALVED);
+            let limits = Limits {
+                gain: threshold - self.remainder(&parts),
+                // Where the box can be halved, gains below the threshold need no digits.
+                reported: if halves.is_some() { threshold } else { 0.0 },
+            };
+            let sets = sets.of(&parts);
+            match (Tree { at: self, quick: &quick, sets: &sets, limits, work }.search(), halves) {
+                (Found::Nothing, _) => continue,
+                (Found::UsedUp, _) => break,
+                (Found::Gain(found), _) if found.lower > threshold => return Verdict::Above(found),
+                (Found::Gain(found), None) => return Verdict::Open(found),
+                (Found::Between | Found::Gain(_), Some(halves)) => boxes.extend(halves),
+                (Found::Between, None) => break,
             }
         }
         Verdict::Open(Attained::unknown())
@@ -165,25 +199,6 @@ impl AtFrequency<'_> {
 
     fn mix(&self, i: usize, vertex: &Vertex) -> Mix {
         vec![(self.channels[i].rows[vertex.error][vertex.speed], vertex.gain)]
-    }
-
-    /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none.
-    fn above(&self, parts: &[Part], limit: f64, work: &mut Work) -> Option<Attained> {
-        let sets: Vec<Vec<Vertex>> =
-            parts.iter().enumerate().map(|(i, part)| self.vertices(i, part)).collect();
-        let means: Vec<Mix> = sets.iter().enumerate().map(|(i, set)| self.mean(i, set)).collect();
-        let radii = sets
-            .iter()
-            .zip(&means)
-            .enumerate()
-            .map(|(i, (set, mean))| self.columns[i] * self.radius(i, set, mean));
-        // spread[i] bounds what the channels from i on may add to their means.
-        let mut spread = vec![0.0; sets.len() + 1];
-        for (i, radius) in radii.collect::<Vec<f64>>().into_iter().enumerate().rev() {
-            spread[i] = super::angle::outward(spread[i + 1] + radius);
-        }
-        let mut tree = Tree { at: self, sets: &sets, spread: &spread, limit, work };
-        tree.search(&mut means.clone(), &mut Vec::new())
     }
 
     /// The mean of the rows of a set of vertices.
@@ -253,43 +268,129 @@ impl AtFrequency<'_> {
     }
 }
 
+/// The vertices of a channel over a part of its delays.
+#[derive(Debug, Clone)]
+struct Set {
+    vertices: Vec<Vertex>,
+    mean: Mix,
+    /// Bounds |F_i| times the distance of the rows from their mean.
+    radius: f64,
+}
+
+/// The sets of all parts so far, by channel and ends.
+struct Sets<'a, 'b> {
+    at: &'a AtFrequency<'b>,
+    known: HashMap<(usize, usize, usize), Set>,
+}
+
+impl Sets<'_, '_> {
+    fn of(&mut self, parts: &[Part]) -> Vec<Set> {
+        let at = self.at;
+        let set = |(i, part): (usize, &Part)| {
+            let make = || {
+                let vertices = at.vertices(i, part);
+                let mean = at.mean(i, &vertices);
+                let radius = at.columns[i] * at.radius(i, &vertices, &mean);
+                Set { vertices, mean, radius }
+            };
+            self.known.entry((i, part.first, part.last)).or_insert_with(make).clone()
+        };
+        parts.iter().enumerate().map(set).collect()
+    }
+}
+
+/// What the gains of one box are compared with.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    /// Gains up to this are small enough.
+    gain: f64,
+    /// Gains up to this are not computed to all digits.
+    reported: f64,
+}
+
+/// What a search found.
+enum Found {
+    /// All gains are within the limit.
+    Nothing,
+    /// One is not, but is not to be reported.
+    Between,
+    Gain(Attained),
+    /// The work ended.
+    UsedUp,
+}
+
 /// The search among the vertices of one box.
 struct Tree<'a, 'b> {
     at: &'a AtFrequency<'b>,
-    sets: &'a [Vec<Vertex>],
-    spread: &'a [f64],
-    limit: f64,
+    quick: &'a Quick,
+    sets: &'a [Set],
+    limits: Limits,
     work: &'a mut Work,
 }
 
 impl Tree<'_, '_> {
+    fn search(&mut self) -> Found {
+        // spread[i] bounds what the channels from i on may add to their means.
+        let mut spread = vec![0.0; self.sets.len() + 1];
+        for (i, set) in self.sets.iter().enumerate().rev() {
+            spread[i] = super::angle::outward(spread[i + 1] + set.radius);
+        }
+        let mut mixes: Vec<Mix> = self.sets.iter().map(|set| set.mean.clone()).collect();
+        self.branch(&spread, &mut mixes, &mut Vec::new())
+    }
+
     /// `mixes` are the chosen vertices of the first channels and the means of the others.
-    fn search(&mut self, mixes: &mut [Mix], chosen: &mut Vec<Vertex>) -> Option<Attained> {
+    fn branch(&mut self, spread: &[f64], mixes: &mut [Mix], chosen: &mut Vec<Vertex>) -> Found {
         let channel = chosen.len();
-        if self.work.done >= self.work.limit {
-            return Some(Attained::unknown());
+        if self.work.is_used_up() {
+            return Found::UsedUp;
         }
-        self.work.done += 1;
-        let square = self.at.square(mixes);
-        let upper = upper_gain(&square, self.limit - self.spread[channel]);
-        if upper + self.spread[channel] <= self.limit {
-            return None;
+        if let Some(found) = self.judge(spread[channel], mixes, chosen) {
+            return found;
         }
-        if channel == self.sets.len() {
-            return Some(Attained { lower: lower_gain(&square), upper, vertices: chosen.clone() });
-        }
-        let mean = mixes[channel].clone();
-        for vertex in &self.sets[channel] {
+        let sets = self.sets;
+        for vertex in &sets[channel].vertices {
             mixes[channel] = self.at.mix(channel, vertex);
             chosen.push(*vertex);
-            let found = self.search(mixes, chosen);
+            let found = self.branch(spread, mixes, chosen);
             chosen.pop();
-            if found.is_some() {
+            if !matches!(found, Found::Nothing) {
                 return found;
             }
         }
-        mixes[channel] = mean;
-        None
+        mixes[channel].clone_from(&sets[channel].mean);
+        Found::Nothing
+    }
+
+    /// The verdict on a branch, or `None` if its parts must be looked at.
+    fn judge(&mut self, spread: f64, mixes: &[Mix], chosen: &[Vertex]) -> Option<Found> {
+        let (limit, is_leaf) = (self.limits.gain - spread, chosen.len() == self.sets.len());
+        self.work.count_quick();
+        let terms = self.terms(mixes);
+        match self.quick.compare(&terms, limit) {
+            Compared::Below => return Some(Found::Nothing),
+            Compared::NotBelow if !is_leaf => return None,
+            Compared::NotBelow if self.quick.compare(&terms, self.limits.reported) == Compared::Below => {
+                return Some(Found::Between);
+            }
+            _ => {}
+        }
+        self.work.count();
+        let square = self.at.square(mixes);
+        let upper = upper_gain(&square, limit);
+        if upper <= limit {
+            return Some(Found::Nothing);
+        }
+        let attained = || Attained { lower: lower_gain(&square), upper, vertices: chosen.to_vec() };
+        is_leaf.then(|| Found::Gain(attained()))
+    }
+
+    fn terms(&self, mixes: &[Mix]) -> Terms {
+        let mut terms = Terms::default();
+        for (i, mix) in mixes.iter().enumerate() {
+            mix.iter().for_each(|&(row, weight)| self.quick.subtract(&mut terms, i, row, weight));
+        }
+        terms
     }
 }
 

@@ -25,6 +25,17 @@ pub(super) struct Channel {
     half: f64,
     /// D_i in fast periods, for the rounding of delays.
     delay: f64,
+    /// The first channel with errors that has the same front end and range of cut-offs; none if this one has no
+    /// errors.
+    pub(super) like: Option<usize>,
+}
+
+/// What the front end of a channel does at a frequency, for all its cut-offs.
+#[derive(Debug, Clone)]
+pub(super) struct Response {
+    aliases: Aliases,
+    /// Bounds the distance of the rows from their chord over the cut-offs.
+    bend: f64,
 }
 
 /// The memories of all rows of a grid.
@@ -90,6 +101,7 @@ impl Channel {
             cutoff,
             gain,
             half: half.in_fast_periods(fast_period).0,
+            like: None,
             delay: grid.samples[first].time.delay.in_fast_periods(fast_period).0.abs(),
         }
     }
@@ -104,20 +116,16 @@ impl Channel {
         outward((1.0 + self.gain) * speeds.sqrt() * rows)
     }
 
-    /// Bounds the remainder of the chords or parabolas, after 0, 1, .. `levels` halvings of the delay.
+    /// Whether delay and cut-off are exact.
+    pub(super) fn is_certain(&self) -> bool {
+        self.half == 0.0 && self.cutoff == 0.0
+    }
+
+    /// The moduli at a frequency.
     ///
     /// # Errors
     /// [`VerifyError::LongMemory`].
-    pub(super) fn remainders(
-        &self,
-        near: &Frequency,
-        ratio: usize,
-        levels: u32,
-        taps: Taps,
-    ) -> Result<Vec<f64>, VerifyError> {
-        if self.half == 0.0 && self.cutoff == 0.0 {
-            return Ok(vec![0.0; levels as usize + 1]);
-        }
+    pub(super) fn response(&self, near: &Frequency, ratio: usize) -> Result<Response, VerifyError> {
         let range = [1.0 - self.cutoff, 1.0 + self.cutoff];
         let sum = |transfer: &Transfer| {
             Aliases::new(transfer, near.angle, ratio, range).ok_or(VerifyError::LongMemory)
@@ -130,6 +138,13 @@ impl Channel {
             }
             None => 0.0,
         };
+        Ok(Response { aliases, bend })
+    }
+
+    /// Bounds the remainder of the chords or parabolas, after 0, 1, .. `levels` halvings of the delay; `response`
+    /// is that of a channel like this one.
+    pub(super) fn remainders(&self, response: &Response, levels: u32, taps: Taps) -> Vec<f64> {
+        let Response { aliases, bend } = response;
         // The grid points are rounded.
         let slack = 8.0 * f64::EPSILON * (1.0 + self.delay + self.half);
         let rounding = if self.half > 0.0 { slack } else { 0.0 };
@@ -145,7 +160,7 @@ impl Channel {
             };
             outward((between + bend) * (1.0 + self.gain))
         };
-        Ok((0..=levels).map(level).collect())
+        (0..=levels).map(level).collect()
     }
 }
 

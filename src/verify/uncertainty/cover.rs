@@ -5,7 +5,7 @@ use super::super::ball::Ball;
 use super::super::spectrum::{self, ComplexMatrix};
 use super::angle::{Frequency, cosine_below, outward};
 use super::at_frequency::{AtFrequency, Attained, Mix, Verdict, Work, lower_gain};
-use super::channel::{Channel, Memories, column_norm};
+use super::channel::{Channel, Memories, Response, column_norm};
 use super::following::{Following, moved};
 use super::grid::Grid;
 use super::memory::{Lags, Memory};
@@ -77,7 +77,15 @@ impl<'a> Cover<'a> {
             let largest = (errors.delays[i], errors.gains[i], errors.cutoffs[i]);
             Channel::new(&memories, i, largest, fast_period)
         };
-        let channels = (0..bank.channel_count()).map(channel).collect();
+        let mut channels: Vec<Channel> = (0..bank.channel_count()).map(channel).collect();
+        for i in 0..channels.len() {
+            let same = |&j: &usize| {
+                grid.has_equal_front_ends(i, j)
+                    && errors.cutoffs[i] == errors.cutoffs[j]
+                    && !channels[j].is_certain()
+            };
+            channels[i].like = (0..=i).find(same).filter(|_| !channels[i].is_certain());
+        }
         let reference = memories.of_sample(0);
         let mut lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
         let halves: Vec<Ball> =
@@ -244,20 +252,16 @@ impl<'a> Cover<'a> {
     /// Judges one frequency on coarse grids first.
     fn judge(&mut self, centre: f64, threshold: f64) -> Result<Verdict, VerifyError> {
         let near = Frequency::near(centre);
-        let remainders = self
-            .channels
-            .iter()
-            .map(|channel| channel.remainders(&near, self.bank.ratio, MAX_LEVEL, self.taps));
-        let rows = remainders.collect::<Result<Vec<_>, _>>()?;
+        let rows = self.remainders(&near)?;
         let mut verdict = Verdict::Below;
         for level in 0..=MAX_LEVEL {
             if !self.make_grid(level)? {
                 break;
             }
             let grid = &self.grids[level as usize];
-            let (judged, gains, best) = self.judge_on(grid, &near, &rows, threshold);
-            self.operations += self.cost_of_gram(grid) + gains as f64 * self.cost_of_gain();
-            self.gains_computed += gains;
+            let (judged, work, best) = self.judge_on(grid, &near, &rows, threshold);
+            self.operations += self.cost_of_gram(grid) + work.operations;
+            self.gains_computed += work.gains;
             if let Some(best) = best {
                 self.offer(Best { frequency: centre.min(PI), ..best });
             }
@@ -269,17 +273,32 @@ impl<'a> Cover<'a> {
         Ok(verdict)
     }
 
-    /// The verdict on one grid, the number of gains computed and the largest gain seen.
+    /// Bounds of the remainders of each channel, by halvings.
+    fn remainders(&self, near: &Frequency) -> Result<Vec<Vec<f64>>, VerifyError> {
+        // Equal front ends have one response.
+        let mut responses: Vec<Option<Response>> = Vec::with_capacity(self.channels.len());
+        for (i, channel) in self.channels.iter().enumerate() {
+            let own = channel.like == Some(i);
+            responses.push(own.then(|| channel.response(near, self.bank.ratio)).transpose()?);
+        }
+        let of = |channel: &Channel| match channel.like.and_then(|like| responses[like].as_ref()) {
+            Some(response) => channel.remainders(response, MAX_LEVEL, self.taps),
+            None => vec![0.0; MAX_LEVEL as usize + 1],
+        };
+        Ok(self.channels.iter().map(of).collect())
+    }
+
+    /// The verdict on one grid, the work that it took and the largest gain seen.
     fn judge_on(
         &self,
         grid: &Grid,
         near: &Frequency,
         remainders: &[Vec<f64>],
         threshold: f64,
-    ) -> (Verdict, usize, Option<Best>) {
+    ) -> (Verdict, Work, Option<Best>) {
         let at = AtFrequency { remainders: remainders.to_vec(), ..self.plain(grid, near) };
-        let left = (MAX_OPERATIONS - self.operations).max(0.0) / self.cost_of_gain();
-        let mut work = Work { done: 0, limit: left as usize + 1 };
+        let limit = (MAX_OPERATIONS - self.operations).max(0.0);
+        let mut work = Work { gains: 0, operations: 0.0, limit, per_gain: self.cost_of_gain() };
         let verdict = match self.taps {
             Taps::Fixed => at.compare(threshold, &mut work),
             Taps::Following => {
@@ -290,7 +309,7 @@ impl<'a> Cover<'a> {
             Verdict::Below => None,
             Verdict::Above(attained) | Verdict::Open(attained) => best_of(grid, attained),
         };
-        (verdict, work.done, best)
+        (verdict, work, best)
     }
 
     /// Operations for one gain, and for the Gram matrix of a grid.

@@ -28,6 +28,7 @@ use super::at_frequency::{
     AtFrequency, Attained, MAX_BOXES, Part, Verdict, Vertex, Work, lower_gain, upper_gain,
 };
 use super::channel::column_norm;
+use super::quick::{self, Columns, Compared, Quick, Terms};
 
 /// Points of a grid that a part needs to be halved: each half has its ends and its middle.
 pub(super) const HALVED: usize = 4;
@@ -39,6 +40,16 @@ pub(super) struct Following<'a> {
     slopes: Vec<Option<ComplexMatrix>>,
     /// Half-width of the box by channel, fast periods.
     halves: &'a [Ball],
+    doubles: Doubles,
+}
+
+/// The same for gains in double precision.
+struct Doubles {
+    quick: Quick,
+    filters: Columns,
+    slopes: Vec<Option<Columns>>,
+    /// Errors of the delays by channel and point of the grid, with bounds of their rounding.
+    deltas: Vec<Vec<[f64; 2]>>,
 }
 
 /// What a channel does at a vertex.
@@ -54,7 +65,18 @@ type Term = (ComplexMatrix, usize);
 
 impl<'a> Following<'a> {
     pub(super) fn new(at: AtFrequency<'a>, slopes: Vec<Option<ComplexMatrix>>, halves: &'a [Ball]) -> Self {
-        let mut following = Self { at, slopes, halves };
+        let points = |i: usize| (0..at.channels[i].errors.len()).map(move |point| (i, point));
+        let rounded = |(i, point)| {
+            let exact = delta(&at, halves, i, point);
+            [exact.nearest(), quick::off(exact)]
+        };
+        let doubles = Doubles {
+            quick: Quick::new(&at.gram, &at.filters),
+            filters: Columns::of(&at.filters),
+            slopes: slopes.iter().map(|slope| slope.as_ref().map(Columns::of)).collect(),
+            deltas: (0..halves.len()).map(|i| points(i).map(rounded).collect()).collect(),
+        };
+        let mut following = Self { at, slopes, halves, doubles };
         let moved = |i: usize| {
             let of = |(slope, half): (&Option<ComplexMatrix>, &Ball)| {
                 slope.as_ref().map_or(0.0, |slope| column_norm(slope, i) * half.magnitude())
@@ -73,20 +95,24 @@ impl<'a> Following<'a> {
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
             let limit = threshold - self.at.remainder(&parts);
-            let Some(found) = self.above(&parts, limit, work) else { continue };
+            let halves = self.at.halved(&parts, HALVED);
+            // Where the box can be halved, gains below the threshold need no digits.
+            let reported = if halves.is_some() { threshold } else { 0.0 };
+            let Some(found) = self.above(&parts, [limit, reported], work) else { continue };
             if found.lower > threshold {
                 return Verdict::Above(found);
             }
-            match self.at.halved(&parts, HALVED) {
-                Some(halves) if work.done < work.limit => boxes.extend(halves),
+            match halves {
+                Some(halves) if !work.is_used_up() => boxes.extend(halves),
                 _ => return Verdict::Open(found),
             }
         }
         Verdict::Open(Attained::unknown())
     }
 
-    /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none.
-    fn above(&self, parts: &[Part], limit: f64, work: &mut Work) -> Option<Attained> {
+    /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none. Gains up to `reported`
+    /// are not computed to all digits.
+    fn above(&self, parts: &[Part], [limit, reported]: [f64; 2], work: &mut Work) -> Option<Attained> {
         if limit.is_nan() || limit <= 0.0 {
             return Some(Attained::unknown());
         }
@@ -98,16 +124,25 @@ impl<'a> Following<'a> {
         let sets: Vec<Vec<Choice>> = parts.iter().enumerate().map(choices).collect();
         let count = sets.iter().fold(1usize, |all, set| all.saturating_mul(set.len()));
         let mut chosen: Vec<Choice> = Vec::with_capacity(sets.len());
+        let mut terms = Terms::default();
         for index in 0..count {
-            if work.done >= work.limit {
+            if work.is_used_up() {
                 return Some(Attained::unknown());
             }
-            work.done += 1;
+            work.count_quick();
             chosen.clear();
             let mut rest = index;
             for set in &sets {
                 chosen.push(set[rest % set.len()]);
                 rest /= set.len();
+            }
+            self.terms(parts, &chosen, &mut terms);
+            match self.doubles.quick.compare(&terms, limit) {
+                Compared::Below => continue,
+                Compared::NotBelow if self.doubles.quick.compare(&terms, reported) == Compared::Below => {
+                    return Some(Attained::unknown());
+                }
+                _ => work.count(),
             }
             if let Some(found) = self.judge(parts, &chosen, limit) {
                 return Some(found);
@@ -161,15 +196,70 @@ impl<'a> Following<'a> {
         self.at.square_of(&terms)
     }
 
-    /// The error of the delay of channel `i` at a point of its grid, in fast periods.
     fn delta(&self, i: usize, point: usize) -> Ball {
-        let last = self.at.channels[i].errors.len() - 1;
-        if last == 0 {
-            return Ball::ZERO;
-        }
-        // The share of the half-width is a short binary fraction.
-        Ball::from(2.0 * point as f64 / last as f64 - 1.0) * self.halves[i]
+        delta(&self.at, self.halves, i, point)
     }
+
+    /// As [`Following::square`], in doubles.
+    fn terms(&self, parts: &[Part], chosen: &[Choice], terms: &mut Terms) {
+        terms.clear();
+        for (i, (part, Choice { vertex, bowed })) in parts.iter().zip(chosen).enumerate() {
+            let row = |error: usize| self.at.channels[i].rows[error][vertex.speed];
+            let column = self.doubles.column(i, chosen);
+            let gain = vertex.gain;
+            terms.push(row(vertex.error), -gain, column.iter().copied());
+            if !bowed {
+                continue;
+            }
+            // d_i / 2 S_ii = (delta(last) - delta(first)) / 4 S_ii, beside F_i / 2.
+            let [first, last] = [part.first, part.last].map(|point| self.doubles.deltas[i][point]);
+            let width = [last[0] - first[0], last[1] + first[1] + 2.0 * quick::UNIT * (last[0] - first[0]).abs()];
+            for (error, sign) in [(part.last, 1.0), (part.first, -1.0)] {
+                let mut bow = column.clone();
+                bow.iter_mut().flatten().for_each(|x| *x *= 0.5);
+                if let Some(slope) = &self.doubles.slopes[i] {
+                    add(&mut bow, slope.column(i), [0.25 * sign * width[0], 0.25 * width[1]]);
+                }
+                terms.push(row(error), gain, bow.into_iter());
+            }
+            terms.push(row((part.first + part.last) / 2), -gain, column.into_iter());
+        }
+    }
+}
+
+impl Doubles {
+    /// F_i at the chosen delays.
+    fn column(&self, i: usize, chosen: &[Choice]) -> Vec<[f64; 3]> {
+        let mut column: Vec<[f64; 3]> = self.filters.column(i).collect();
+        for (j, slope) in self.slopes.iter().enumerate() {
+            if let Some(slope) = slope {
+                add(&mut column, slope.column(i), self.deltas[j][chosen[j].vertex.error]);
+            }
+        }
+        column
+    }
+}
+
+/// Adds a column times a factor with a bound of its error.
+fn add(sum: &mut [[f64; 3]], column: impl Iterator<Item = [f64; 3]>, [factor, off]: [f64; 2]) {
+    for ([re, im, error], [x, y, own]) in sum.iter_mut().zip(column) {
+        *re += factor * x;
+        *im += factor * y;
+        let size = x.abs() + y.abs();
+        // Each part is rounded in the product and in the sum.
+        let rounded = 2.0 * quick::UNIT * (factor.abs() * size + re.abs() + im.abs());
+        *error += (factor.abs() + off) * own + off * size + rounded;
+    }
+}
+
+/// The error of the delay of channel `i` at a point of its grid, in fast periods.
+fn delta(at: &AtFrequency<'_>, halves: &[Ball], i: usize, point: usize) -> Ball {
+    let last = at.channels[i].errors.len() - 1;
+    if last == 0 {
+        return Ball::ZERO;
+    }
+    // The share of the half-width is a short binary fraction.
+    Ball::from(2.0 * point as f64 / last as f64 - 1.0) * halves[i]
 }
 
 /// F_0 + sum_j delta_j S_j.

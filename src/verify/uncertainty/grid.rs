@@ -55,6 +55,13 @@ impl Grid {
         Self::of(bank, (0..bank.channel_count()).map(channel).collect())
     }
 
+    /// Whether the front ends of the channels `i` and `j` have one transfer function.
+    pub(super) fn has_equal_front_ends(&self, i: usize, j: usize) -> bool {
+        // The first rows have the least factors of the cut-offs.
+        let [a, b] = [i, j].map(|channel| &self.samples[self.channels[channel].rows[0][0]]);
+        a.filter == b.filter && FrontEnds::gain(a) == FrontEnds::gain(b)
+    }
+
     fn of(bank: &Bank, variants: Vec<(Vec<Seconds>, Vec<f64>)>) -> Result<Self, VerifyError> {
         let (mut front_ends, nominal) = FrontEnds::new(bank)?;
         let mut samples: Vec<SamplingInstant> = nominal[..bank.ratio].to_vec();

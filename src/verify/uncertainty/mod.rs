@@ -37,6 +37,7 @@ mod cover;
 mod following;
 mod grid;
 mod memory;
+mod quick;
 mod slopes;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,321 @@
+//! Gains in double precision with a bound of their rounding. Most gains of a search are far from what they
+//! are compared with, and are decided here at a small part of the cost of balls.
+//!
+//! At a frequency, K = A r with the rows r of the Gram matrix G and A = [I, -F_i w, ..]. As G is positive
+//! semidefinite, |G_cd| <= s_c s_d with s_c = sqrt(G_cc). With a_p = sum_c |A_pc| s_c each entry of the
+//! computed A G A* is wrong by at most eps a_p a_q for some small eps, so its largest eigenvalue is wrong by at
+//! most eps |a|^2.
+
+use super::super::ball::{self, Ball};
+use super::super::spectrum::ComplexMatrix;
+
+/// Relative rounding error of an operation.
+pub(super) const UNIT: f64 = 0.5 * f64::EPSILON;
+/// Smaller squares are left to balls: nothing here may underflow.
+const LEAST: f64 = 1e-200;
+/// Relative error of a squared gain that is no obstacle to a decision.
+const SHARP: f64 = 1e-7;
+
+/// The Gram matrix and the filters of a frequency as doubles.
+#[derive(Debug)]
+pub(super) struct Quick {
+    gram: Complex,
+    filters: Columns,
+    /// s_c, from above.
+    sizes: Vec<f64>,
+    /// |G - gram| <= `spread` s_c s_d.
+    spread: f64,
+}
+
+/// The columns of a matrix of balls as doubles with bounds of their errors.
+#[derive(Debug, Clone)]
+pub(super) struct Columns {
+    pub(super) outputs: usize,
+    entries: Vec<[f64; 3]>,
+}
+
+impl Columns {
+    pub(super) fn of(m: &ComplexMatrix) -> Self {
+        let entries = m.re.iter().zip(&m.im);
+        let entries = entries.map(|(re, im)| [re.nearest(), im.nearest(), off(*re) + off(*im)]).collect();
+        Self { outputs: m.re.nrows(), entries }
+    }
+
+    pub(super) fn column(&self, i: usize) -> impl Iterator<Item = [f64; 3]> {
+        self.entries[i * self.outputs..][..self.outputs].iter().copied()
+    }
+}
+
+/// A complex matrix by rows.
+#[derive(Debug, Clone, Default)]
+struct Complex {
+    columns: usize,
+    re: Vec<f64>,
+    im: Vec<f64>,
+}
+
+impl Complex {
+    fn zeros(rows: usize, columns: usize) -> Self {
+        Self { columns, re: vec![0.0; rows * columns], im: vec![0.0; rows * columns] }
+    }
+
+    fn of(m: &ComplexMatrix) -> Self {
+        let (rows, columns) = m.re.shape();
+        let at = |k: usize| (k / columns, k % columns);
+        let part = |of: &dyn Fn(usize) -> f64| (0..rows * columns).map(of).collect();
+        Self { columns, re: part(&|k| m.re[at(k)].nearest()), im: part(&|k| m.im[at(k)].nearest()) }
+    }
+}
+
+/// Columns of M numbers, each times a row of the Gram matrix: what is added to the reference rows.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Terms {
+    rows: Vec<usize>,
+    /// One column after another.
+    re: Vec<f64>,
+    im: Vec<f64>,
+    /// Bounds of how far the entries are from these.
+    off: Vec<f64>,
+}
+
+impl Terms {
+    pub(super) fn clear(&mut self) {
+        let Self { rows, re, im, off } = self;
+        rows.clear();
+        [re, im, off].into_iter().for_each(Vec::clear);
+    }
+
+    /// Adds a column of numbers with bounds of their errors, times `weight`.
+    pub(super) fn push(&mut self, row: usize, weight: f64, column: impl Iterator<Item = [f64; 3]>) {
+        self.rows.push(row);
+        for [re, im, off] in column {
+            self.re.push(weight * re);
+            self.im.push(weight * im);
+            self.off.push(weight.abs() * (off + UNIT * (re.abs() + im.abs())));
+        }
+    }
+}
+
+/// How a gain compares with a limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compared {
+    /// It is proven to be at most the limit.
+    Below,
+    /// It is larger, or closer to the limit than [`SHARP`].
+    NotBelow,
+    /// Double precision does not suffice.
+    Unclear,
+}
+
+impl Quick {
+    pub(super) fn new(gram: &ComplexMatrix, filters: &ComplexMatrix) -> Self {
+        let n = gram.re.nrows();
+        // A faint row gets a size of its own, so that the quotients below stay finite.
+        let size = |c: usize| gram.re[(c, c)].magnitude().sqrt() * (1.0 + 8.0 * UNIT) + LEAST.sqrt();
+        let sizes: Vec<f64> = (0..n).map(size).collect();
+        let share = |(c, d): (usize, usize)| {
+            (off(gram.re[(c, d)]) + off(gram.im[(c, d)])) / (sizes[c] * sizes[d]) * (1.0 + 8.0 * UNIT)
+        };
+        let pairs = (0..n).flat_map(|c| (0..n).map(move |d| (c, d)));
+        let spread = pairs.map(share).fold(0.0, ball::nan_max);
+        Self { gram: Complex::of(gram), filters: Columns::of(filters), sizes, spread }
+    }
+
+    /// Adds -F_i times `weight` for a row of channel `i`.
+    pub(super) fn subtract(&self, terms: &mut Terms, i: usize, row: usize, weight: f64) {
+        terms.push(row, -weight, self.filters.column(i));
+    }
+
+    /// Compares the gain of K = reference rows + `terms` with `limit`.
+    pub(super) fn compare(&self, terms: &Terms, limit: f64) -> Compared {
+        let square = limit * limit * (1.0 - 8.0 * UNIT);
+        if limit.is_nan() || limit <= 0.0 {
+            return Compared::NotBelow;
+        }
+        let outputs = self.filters.outputs;
+        let (map, error) = self.map(terms, outputs);
+        let rows: Vec<usize> = (0..outputs).chain(terms.rows.iter().copied()).collect();
+        let is_sharp = square > LEAST && error < SHARP * square;
+        if square > LEAST && is_dominated(&self.congruence(&map, &rows), outputs, square - error) {
+            Compared::Below
+        } else if is_sharp {
+            Compared::NotBelow
+        } else {
+            Compared::Unclear
+        }
+    }
+
+    /// A, and a bound of the error of the eigenvalues of A G A* as [`Quick::congruence`] computes it.
+    fn map(&self, terms: &Terms, outputs: usize) -> (Complex, f64) {
+        let count = outputs + terms.rows.len();
+        let mut map = Complex::zeros(outputs, count);
+        // |a|^2 and |d|^2 with d_p = sum_c |A_pc - its double| s_c.
+        let (mut all, mut inexact) = (0.0, 0.0);
+        for p in 0..outputs {
+            map.re[p * count + p] = 1.0;
+            let (mut a, mut d) = (self.sizes[p], 0.0);
+            for (t, &row) in terms.rows.iter().enumerate() {
+                let (at, from) = (p * count + outputs + t, t * outputs + p);
+                (map.re[at], map.im[at]) = (terms.re[from], terms.im[from]);
+                a += self.sizes[row] * (terms.re[from].abs() + terms.im[from].abs() + terms.off[from]);
+                d += self.sizes[row] * terms.off[from];
+            }
+            all += a * a;
+            inexact += d * d;
+        }
+        // Each of the two products sums `count` complex terms, of which each is rounded four times.
+        let rounding = (16 * count + 64) as f64 * UNIT;
+        let error = (self.spread + rounding) * all + 2.0 * (inexact * all).sqrt();
+        (map, error * (1.0 + 1e-10))
+    }
+
+    /// A G A*, in rounded arithmetic.
+    fn congruence(&self, map: &Complex, rows: &[usize]) -> Complex {
+        let (count, n) = (map.columns, self.gram.columns);
+        let outputs = map.re.len() / count;
+        // Rows of the Gram matrix that are read, side by side.
+        let mut gram = Complex::zeros(count, count);
+        for (c, &row) in rows.iter().enumerate() {
+            for (d, &column) in rows.iter().enumerate() {
+                gram.re[c * count + d] = self.gram.re[row * n + column];
+                gram.im[c * count + d] = self.gram.im[row * n + column];
+            }
+        }
+        let mut square = Complex::zeros(outputs, outputs);
+        let (mut re, mut im) = (vec![0.0; count], vec![0.0; count]);
+        for p in 0..outputs {
+            re.copy_from_slice(&gram.re[p * count..][..count]);
+            im.copy_from_slice(&gram.im[p * count..][..count]);
+            for c in outputs..count {
+                let (x, y) = (map.re[p * count + c], map.im[p * count + c]);
+                let (row_re, row_im) = (&gram.re[c * count..][..count], &gram.im[c * count..][..count]);
+                for d in 0..count {
+                    re[d] += x * row_re[d] - y * row_im[d];
+                    im[d] += x * row_im[d] + y * row_re[d];
+                }
+            }
+            for q in 0..=p {
+                let (x, y) = (&map.re[q * count..][..count], &map.im[q * count..][..count]);
+                // Times the conjugate.
+                square.re[p * outputs + q] = (0..count).map(|d| re[d] * x[d] + im[d] * y[d]).sum();
+                square.im[p * outputs + q] = (0..count).map(|d| im[d] * x[d] - re[d] * y[d]).sum();
+            }
+        }
+        square
+    }
+}
+
+/// How far an enclosed number is from its nearest double.
+pub(super) fn off(x: Ball) -> f64 {
+    (x.radius() + UNIT * x.magnitude()) * (1.0 + 8.0 * UNIT)
+}
+
+/// Whether it is proven that the Hermitian matrix (lower triangle read) has no eigenvalue above `bound`: the
+/// Cholesky factorisation of bound I - m, less the bound of its backward error, runs to its end. (See
+/// [`super::super::positive`]; the complex matrix is that of twice the order which acts on (re, im).)
+fn is_dominated(m: &Complex, n: usize, bound: f64) -> bool {
+    let trace: f64 = (0..n).map(|i| bound.abs() + m.re[i * n + i].abs()).sum();
+    // Twice the order, and complex operations that round up to four times.
+    let rounding = (16 * n + 64) as f64 * UNIT * trace;
+    let shift = bound - 2.0 * rounding;
+    if shift.is_nan() || shift < LEAST {
+        return false;
+    }
+    let mut factor = Complex::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            let (mut re, mut im) = (-m.re[i * n + j], -m.im[i * n + j]);
+            for k in 0..j {
+                let (a, b) = (i * n + k, j * n + k);
+                re -= factor.re[a] * factor.re[b] + factor.im[a] * factor.im[b];
+                im -= factor.im[a] * factor.re[b] - factor.re[a] * factor.im[b];
+            }
+            if j < i {
+                let pivot = factor.re[j * n + j];
+                (factor.re[i * n + j], factor.im[i * n + j]) = (re / pivot, im / pivot);
+                continue;
+            }
+            let pivot = re + shift;
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return false;
+            }
+            factor.re[i * n + i] = pivot.sqrt();
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::ball::Matrix;
+    use super::super::at_frequency::{lower_gain, upper_gain};
+    use super::*;
+    use crate::random::Random;
+
+    const WEIGHTS: [(usize, f64); 3] = [(0, 0.3), (0, 0.7), (1, 1.01)];
+
+    fn random(random: &mut Random, rows: usize, columns: usize) -> ComplexMatrix {
+        // Some digits below those of doubles.
+        let mut draw = || {
+            Matrix::from_fn(rows, columns, |_, _| {
+                Ball::from(random.sample()) + Ball::from(1e-18 * random.sample())
+            })
+        };
+        ComplexMatrix { re: draw(), im: draw() }
+    }
+
+    fn widened(m: &ComplexMatrix, by: f64) -> ComplexMatrix {
+        ComplexMatrix { re: m.re.map(|x| x.widened(by)), im: m.im.map(|x| x.widened(by)) }
+    }
+
+    /// K K* in balls, the slow way.
+    fn square(gram: &ComplexMatrix, filters: &ComplexMatrix) -> ComplexMatrix {
+        let outputs = filters.re.nrows();
+        let map = |of: &Matrix, unit: f64| {
+            Matrix::from_fn(outputs, outputs + WEIGHTS.len(), |p, c| match c.checked_sub(outputs) {
+                None => Ball::from(if p == c { unit } else { 0.0 }),
+                Some(t) => of[(p, WEIGHTS[t].0)] * Ball::from(-WEIGHTS[t].1),
+            })
+        };
+        let map = ComplexMatrix { re: map(&filters.re, 1.0), im: map(&filters.im, 0.0) };
+        map.product(gram).product(&map.adjoint())
+    }
+
+    fn compared(gram: &ComplexMatrix, filters: &ComplexMatrix, limit: f64) -> Compared {
+        let quick = Quick::new(gram, filters);
+        let mut terms = Terms::default();
+        for (t, &(i, weight)) in WEIGHTS.iter().enumerate() {
+            quick.subtract(&mut terms, i, filters.re.nrows() + t, weight);
+        }
+        quick.compare(&terms, limit)
+    }
+
+    /// Against balls: no gain is called below a limit that it exceeds, and nearly all that are below are seen.
+    #[test]
+    fn gains_are_compared_as_balls_compare_them() {
+        let mut source = Random(3);
+        for trial in 0..60 {
+            let (outputs, radius) = (1 + trial % 3, [0.0, 1e-10][trial % 2]);
+            // Six rows of five inputs: the Gram matrix is singular.
+            let rows = random(&mut source, outputs + WEIGHTS.len(), 5);
+            let gram = widened(&rows.product(&rows.adjoint()), radius);
+            let filters = widened(&random(&mut source, outputs, 2), radius);
+            let square = square(&gram, &filters);
+            let (lower, upper) = (lower_gain(&square), upper_gain(&square, 0.0));
+            assert_ne!(compared(&gram, &filters, lower * (1.0 - 1e-14)), Compared::Below, "{trial}");
+            assert_eq!(compared(&gram, &filters, upper * (1.0 + 1e-12 + 1e4 * radius)), Compared::Below);
+            assert_eq!(compared(&gram, &filters, 0.9 * lower), Compared::NotBelow);
+            assert_eq!(compared(&gram, &filters, 1e-9 * lower), Compared::Unclear);
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_is_not_below() {
+        let (gram, filters) = (ComplexMatrix::zeros(4, 4), ComplexMatrix::zeros(1, 2));
+        assert_eq!(compared(&gram, &filters, 1e-3), Compared::Below);
+        assert_eq!(compared(&widened(&gram, f64::NAN), &filters, 1e9), Compared::Unclear);
+        assert_eq!(compared(&gram, &widened(&filters, f64::INFINITY), 1e9), Compared::Unclear);
+        assert_eq!(compared(&gram, &filters, f64::NAN), Compared::NotBelow);
+        assert_eq!(compared(&gram, &filters, 0.0), Compared::NotBelow);
+    }
+}
