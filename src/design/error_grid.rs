@@ -14,7 +14,20 @@ use std::f64::consts::PI;
 const POINTS_PER_LAG: usize = 3;
 const LEAST_POINTS: usize = 24;
 /// The grid for peaks is finer by this factor.
-const FINE: usize = 8;
+pub(super) const FINE: usize = 8;
+
+/// Intervals of the grid for peaks, for filters of `lags` slow lags.
+pub(super) fn intervals(lags: usize) -> usize {
+    FINE * LEAST_POINTS.max(POINTS_PER_LAG * lags)
+}
+
+/// Trapezoidal weights of the coarser points that suffice for a mean square.
+pub(super) fn trapezoidal_weights(count: usize) -> Vec<f64> {
+    let last = count - 1;
+    let mut weights = vec![1.0 / last as f64; count];
+    (weights[0], weights[last]) = (0.5 / last as f64, 0.5 / last as f64);
+    weights
+}
 
 /// A plant at equidistant frequencies from 0 to pi.
 pub(super) struct ErrorGrid<'a> {
@@ -25,7 +38,7 @@ pub(super) struct ErrorGrid<'a> {
 impl<'a> ErrorGrid<'a> {
     /// A grid for filters of `lags` slow lags.
     pub(super) fn new(plant: &'a LiftedPlant, lags: usize) -> Self {
-        let intervals = FINE * LEAST_POINTS.max(POINTS_PER_LAG * lags);
+        let intervals = intervals(lags);
         let mut grid = Self { plant, points: Vec::new() };
         grid.points = (0..=intervals).map(|k| grid.at(PI * k as f64 / intervals as f64)).collect();
         grid
@@ -39,9 +52,7 @@ impl<'a> ErrorGrid<'a> {
     /// The coarser points that suffice for a mean square, with their trapezoidal weights.
     pub(super) fn coarse(&self) -> (Vec<Point>, Vec<f64>) {
         let points: Vec<Point> = self.points.iter().step_by(FINE).cloned().collect();
-        let last = points.len() - 1;
-        let mut weights = vec![1.0 / last as f64; points.len()];
-        (weights[0], weights[last]) = (0.5 / last as f64, 0.5 / last as f64);
+        let weights = trapezoidal_weights(points.len());
         (points, weights)
     }
 
@@ -68,23 +79,33 @@ impl<'a> ErrorGrid<'a> {
     /// between them.
     pub(super) fn peaks(&self, taps: &[Mat]) -> Result<Peaks, DesignError> {
         let gains = self.gains(taps)?;
-        let step = self.points[1].omega;
-        // The gain is even about 0 and about pi.
-        let last = gains.len() - 1;
-        let at = |k: isize| gains[last - (last as isize - k.abs()).unsigned_abs()];
-        let mut peaks = Vec::new();
-        for k in 0..=last as isize {
-            if at(k) >= at(k - 1) && at(k) >= at(k + 1) {
-                let (shift, _) = parabola(at(k - 1), at(k), at(k + 1));
-                let frequency = ((k as f64 + shift) * step).clamp(0.0, PI);
-                let between = gain(&self.at(frequency), taps)?;
-                let point = Peak { gain: at(k), frequency: k as f64 * step };
-                peaks.push(if between > point.gain { Peak { gain: between, frequency } } else { point });
-            }
-        }
-        let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
-        Ok(Peaks { estimate, peaks })
+        peaks_between(&gains, self.points[1].omega, 0.0, |omega| gain(&self.at(omega), taps))
     }
+}
+
+/// The local maxima above `level` of a gain that has the values `gains` at the multiples of `step` from 0 to pi.
+/// `gain_at` computes it at any frequency.
+pub(super) fn peaks_between(
+    gains: &[f64],
+    step: f64,
+    level: f64,
+    gain_at: impl Fn(f64) -> Result<f64, DesignError>,
+) -> Result<Peaks, DesignError> {
+    // The gain is even about 0 and about pi.
+    let last = gains.len() - 1;
+    let at = |k: isize| gains[last - (last as isize - k.abs()).unsigned_abs()];
+    let mut peaks = Vec::new();
+    for k in 0..=last as isize {
+        if at(k) >= at(k - 1) && at(k) >= at(k + 1) && at(k) >= level {
+            let (shift, _) = parabola(at(k - 1), at(k), at(k + 1));
+            let frequency = ((k as f64 + shift) * step).clamp(0.0, PI);
+            let between = gain_at(frequency)?;
+            let point = Peak { gain: at(k), frequency: k as f64 * step };
+            peaks.push(if between > point.gain { Peak { gain: between, frequency } } else { point });
+        }
+    }
+    let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
+    Ok(Peaks { estimate, peaks })
 }
 
 impl AffineError for ErrorGrid<'_> {
@@ -102,7 +123,8 @@ pub(super) fn error_at(point: &Point, taps: &[Mat]) -> CMat {
     &point.w - filters::response(taps, point.omega) * &point.h
 }
 
-fn gain(point: &Point, taps: &[Mat]) -> Result<f64, DesignError> {
+/// The largest singular value of K at a point.
+pub(super) fn gain(point: &Point, taps: &[Mat]) -> Result<f64, DesignError> {
     Ok(linalg::largest_singular_value_c(&error_at(point, taps))?)
 }
 

@@ -125,7 +125,6 @@ impl<E: AffineError> Exchange<E> {
     }
 
     /// The error that is minimised.
-    #[cfg(test)]
     pub(super) fn error(&self) -> &E {
         &self.error
     }

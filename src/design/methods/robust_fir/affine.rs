@@ -20,11 +20,11 @@
 //! interleaving has no error at all at its own delays.
 
 use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
+use super::scenario_grid::ScenarioGrid;
 use super::scenarios::{RobustProblem, moved_plant, scenarios};
 use super::sheets::{Sheet, Sheets};
 use crate::bank::TapSlopes;
 use crate::design::DesignError;
-use crate::design::error_grid::ErrorGrid;
 use crate::design::exchange::Exchange;
 use crate::design::filters::impulse_responses;
 use crate::design::methods::{Filters, Settings, Synthesis, fir};
@@ -196,7 +196,7 @@ impl Sides {
         let moved = plants.iter().zip(points).zip(within_reach);
         let all = std::iter::once(((plant, &centre), &nominal)).chain(moved);
         let sheet = |((plant, point), reach): ((&'a LiftedPlant, &ErrorPoint), &f64)| Sheet {
-            grid: ErrorGrid::new(plant, lags[0]),
+            grid: ScenarioGrid::new(plant, lags[0]),
             factors: self.factors(point),
             weight: 1.0 / reach,
         };

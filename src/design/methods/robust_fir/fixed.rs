@@ -2,11 +2,11 @@
 
 use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
 use super::scenarios::{RobustProblem, moved_plant, scenarios};
+use super::scenario_grid::ScenarioGrid;
 use super::sheets::{Sheet, Sheets};
 use crate::design::DesignError;
-use crate::design::error_grid::ErrorGrid;
 use crate::design::exchange::Exchange;
-use crate::design::filters::impulse_responses;
+use crate::design::filters::{impulse_responses, polyphase};
 use crate::design::methods::{Filters, Settings, Synthesis, fir};
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, Problem as SampledProblem};
@@ -15,6 +15,9 @@ use crate::verify::uncertainty::ErrorBox;
 
 /// A nominal bank whose worst norm is within this of a lower bound is kept.
 const NO_GAIN: f64 = 1e-3;
+/// The norm is computed where its estimate is at least this share of the largest estimate: estimates are off by
+/// a per cent or two.
+const NEAR_WORST: f64 = 0.95;
 
 /// The comparison of a robust design with one that takes the errors for zero.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -54,11 +57,12 @@ pub(crate) fn synthesise(
     let points = scenarios(&problem.errors);
     let plants =
         points.iter().map(|point| moved_plant(problem, plant, point)).collect::<Result<Vec<_>, _>>()?;
-    let study = study_of(&nominal, taps, &plants, problem)?;
+    let sheets = sheets(plant, &plants, settings);
+    let study = study_of(&nominal, taps, &sheets, &plants, problem)?;
     if study.nominal.worst <= study.lower * (1.0 + NO_GAIN) {
         return Ok(Synthesis { robust: Some(study), ..nominal });
     }
-    let found = least_worst_norm(plant, &plants, settings)?;
+    let found = least_worst_norm(plant, sheets, settings)?;
     let lower = found.lower.max(study.lower).min(found.norms.worst);
     let study = RobustStudy { lower, pairs: found.pairs, ..study };
     // The nominal bank is one of the candidates.
@@ -82,13 +86,22 @@ pub(crate) fn synthesise(
 fn study_of(
     nominal: &Synthesis,
     taps: &[Vec<f64>],
+    sheets: &Sheets<'_>,
     plants: &[LiftedPlant],
     problem: &RobustProblem,
 ) -> Result<RobustStudy, DesignError> {
-    let norms = RobustNorms { nominal: nominal.peak.gain, worst: worst_norm(plants, taps)? };
-    // Whatever the taps, each scenario alone has the error that no bank avoids.
-    let unavoidable =
-        largest(plants.iter().map(|plant| Ok(plant.noncausal_bound()?.gain)))?.max(nominal.lower);
+    let mut scenarios = estimates(sheets, taps)?;
+    let norms = RobustNorms { nominal: nominal.peak.gain, worst: worst_of(&scenarios, taps)? };
+    // Whatever the taps, each scenario alone has the error that no bank avoids. That is at most the norm of
+    // these taps there, so the scenarios with the largest norms come first.
+    scenarios.sort_by(|a, b| b.estimate.total_cmp(&a.estimate));
+    let mut unavoidable = nominal.lower;
+    for Scenario { plant, estimate } in scenarios {
+        if estimate <= unavoidable {
+            break;
+        }
+        unavoidable = unavoidable.max(plant.noncausal_bound()?.gain);
+    }
     Ok(RobustStudy {
         errors: problem.errors.clone(),
         robust: norms,
@@ -99,9 +112,28 @@ fn study_of(
     })
 }
 
+/// A plant with the estimated norm of some taps.
+#[derive(Clone, Copy)]
+struct Scenario<'a> {
+    plant: &'a LiftedPlant,
+    estimate: f64,
+}
+
+/// The norms of the taps over the scenarios, estimated.
+fn estimates<'a>(sheets: &Sheets<'a>, taps: &[Vec<f64>]) -> Result<Vec<Scenario<'a>>, DesignError> {
+    let of = |sheet: &Sheet<'a>| {
+        let lags = polyphase(taps, sheet.grid.plant().ratio());
+        Ok(Scenario { plant: sheet.grid.plant(), estimate: sheet.grid.estimate(&lags)? })
+    };
+    // The first sheet has no errors.
+    sheets.sheets[1..].iter().map(of).collect()
+}
+
 /// The largest norm of the taps over the scenarios.
-fn worst_norm(plants: &[LiftedPlant], taps: &[Vec<f64>]) -> Result<f64, DesignError> {
-    largest(plants.iter().map(|plant| Ok(plant.fir_norm(taps)?.gain)))
+fn worst_of(scenarios: &[Scenario<'_>], taps: &[Vec<f64>]) -> Result<f64, DesignError> {
+    let most = scenarios.iter().map(|scenario| scenario.estimate).fold(0.0, f64::max);
+    let near = scenarios.iter().filter(|scenario| scenario.estimate >= NEAR_WORST * most);
+    largest(near.map(|scenario| Ok(scenario.plant.fir_norm(taps)?.gain)))
 }
 
 /// Taps of least norm over the scenarios.
@@ -117,30 +149,36 @@ struct RobustTaps {
 
 fn least_worst_norm(
     plant: &LiftedPlant,
-    plants: &[LiftedPlant],
+    sheets: Sheets<'_>,
     settings: &Settings,
 ) -> Result<RobustTaps, DesignError> {
-    let mut exchange = exchange(plant, plants, settings)?;
+    let mut exchange = exchange(plant, sheets, settings)?;
     let found = exchange.optimise_to(ACCURACY)?;
     let taps = impulse_responses(&found.taps, settings.taps);
     let peak = plant.fir_norm(&taps)?;
-    let norms = RobustNorms { nominal: peak.gain, worst: worst_norm(plants, &taps)? };
+    let worst = worst_of(&estimates(exchange.error(), &taps)?, &taps)?;
+    let norms = RobustNorms { nominal: peak.gain, worst };
     let pairs = exchange.frequencies().count();
     Ok(RobustTaps { taps, peak, norms, lower: exchange.lower, pairs, iterations: exchange.iterations })
 }
 
+/// The plant without errors, then the scenarios.
+fn sheets<'a>(plant: &'a LiftedPlant, plants: &'a [LiftedPlant], settings: &Settings) -> Sheets<'a> {
+    let lags = lags(plant.ratio(), settings.taps);
+    let sheet = |plant| Sheet { grid: ScenarioGrid::new(plant, lags[0]), factors: vec![1.0], weight: 1.0 };
+    let sheets = std::iter::once(plant).chain(plants).map(sheet).collect();
+    Sheets { sheets, inputs: plant.channels() + plant.ratio() }
+}
+
 fn exchange<'a>(
-    plant: &'a LiftedPlant,
-    plants: &'a [LiftedPlant],
+    plant: &LiftedPlant,
+    sheets: Sheets<'a>,
     settings: &Settings,
 ) -> Result<Exchange<Sheets<'a>>, DesignError> {
-    let lags = lags(plant.ratio(), settings.taps);
-    let sheet = |plant| Sheet { grid: ErrorGrid::new(plant, lags[0]), factors: vec![1.0], weight: 1.0 };
-    let sheets: Vec<Sheet<'a>> = std::iter::once(plant).chain(plants).map(sheet).collect();
-    let (points, weights) = sheets[0].grid.coarse();
+    let (points, weights) = sheets.sheets[0].grid.coarse();
     let noise = plant.problem().noise.clone();
-    let sheets = Sheets { sheets, inputs: plant.channels() + plant.ratio() };
     let points = points.iter().map(|point| sheets.point(0, point)).collect();
     let margin = settings.gamma_margin.unwrap_or(MARGIN).max(MARGIN);
-    Exchange::new(sheets, SampledProblem::new(points, lags)?, MeanSquareObjective { weights, noise }, margin)
+    let problem = SampledProblem::new(points, lags(plant.ratio(), settings.taps))?;
+    Exchange::new(sheets, problem, MeanSquareObjective { weights, noise }, margin)
 }

@@ -11,6 +11,7 @@
 mod affine;
 mod fixed;
 mod norms;
+mod scenario_grid;
 mod scenarios;
 mod sheets;
 #[cfg(test)]

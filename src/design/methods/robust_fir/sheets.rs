@@ -1,7 +1,7 @@
 //! The errors of all scenarios as one error on one long stretch of frequencies.
 
+use super::scenario_grid::ScenarioGrid;
 use crate::design::DesignError;
-use crate::design::error_grid::ErrorGrid;
 use crate::design::exchange::{AffineError, Peaks};
 use crate::linalg::{CMat, Complex, Mat};
 use crate::lmi::sampled::{Point, Taps};
@@ -18,7 +18,7 @@ pub(super) struct Sheets<'a> {
 /// One scenario. The unknowns are matrices F_0, F_1, .. side by side, and the filters of this scenario are
 /// `sum_k factors[k] F_k`; so its measurements are those of the plant, times each factor, one below another.
 pub(super) struct Sheet<'a> {
-    pub(super) grid: ErrorGrid<'a>,
+    pub(super) grid: ScenarioGrid<'a>,
     pub(super) factors: Vec<f64>,
     /// The error of this scenario counts times this.
     pub(super) weight: f64,
@@ -66,7 +66,7 @@ impl AffineError for Sheets<'_> {
     fn peaks(&self, taps: &Taps, _gamma: f64, level: f64) -> Result<Peaks, DesignError> {
         let mut all = Peaks { estimate: 0.0, peaks: Vec::new() };
         for (number, sheet) in self.sheets.iter().enumerate() {
-            let Peaks { estimate, peaks } = sheet.grid.peaks(&sheet.filters(taps))?;
+            let Peaks { estimate, peaks } = sheet.grid.peaks(&sheet.filters(taps), level / sheet.weight)?;
             all.estimate = all.estimate.max(sheet.weight * estimate);
             let shifted = |peak: Peak| Peak {
                 frequency: peak.frequency + TAU * number as f64,
