@@ -15,15 +15,19 @@ version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Carg
 host=$(rustc -vV | sed -n 's/^host: //p')
 static=${host%%-*}-unknown-linux-musl
 target=$host
+# Without a target of its own the build shares what is compiled already.
+build=${CARGO_TARGET_DIR:-target}
+chosen=()
+programs=$build/$folder
 if rustup target list --installed 2>/dev/null | grep -qx "$static"; then
     target=$static
+    chosen=(--target "$static")
+    programs=$build/$static/$folder
 else
     echo "package: the target $static is not installed (rustup target add $static); the programs use the C library" >&2
 fi
 
-build=${CARGO_TARGET_DIR:-target}
-cargo build --quiet --profile "$profile" --target "$target" --target-dir "$build" -p hybank -p hybank-ibr
-programs=$build/$target/$folder
+cargo build --quiet --profile "$profile" "${chosen[@]}" --target-dir "$build" -p hybank -p hybank-ibr
 
 out=target/package
 tree=$out/tree

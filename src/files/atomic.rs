@@ -266,6 +266,8 @@ fn create_beside(target: &Path, private: bool) -> io::Result<(PathBuf, File)> {
     if private {
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     }
+    #[cfg(not(unix))]
+    let _ = private;
     for number in 0..1000u32 {
         let beside = hidden::beside(target, std::process::id(), number);
         let beside = beside.ok_or(io::ErrorKind::InvalidFilename)?;

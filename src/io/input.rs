@@ -5,10 +5,10 @@ use super::input_thread::{InputSource, Message, read};
 use super::lost::{Dropout, Entry, LostInInput};
 use super::notes::InputNotes;
 use super::stall::Wait;
-#[cfg(target_os = "linux")]
-use super::stdin_reader::StdinReader;
 use super::timestamps::{Timestamp, Timestamps, lost_between};
-use super::{Coding, InputFault, IoError, StreamHeader};
+#[cfg(target_os = "linux")]
+use super::{Coding, stdin_reader::StdinReader};
+use super::{InputFault, IoError, StreamHeader};
 use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::thread;
 
