@@ -112,7 +112,8 @@ impl fmt::Display for TrackWarning {
             Self::OutsideTheBox { channel, half, frame } => write!(
                 f,
                 "the delay of channel {channel} leaves the ± {:e} s for which the taps were designed, at frame {frame}; the taps stay at \
-                 the end of that range: design with a larger [uncertainty] delay",
+                 the end of that range: design with a larger [uncertainty] delay, or cut the recordings there and fuse the rest \
+                 with a bank for its delays",
                 half.0
             ),
             Self::Coincidence { channels: [a, b], after } => write!(
