@@ -1,8 +1,12 @@
 """CPU and bits of `hybank.dask.fuse` over two processes against one run, and the load of a scheduler by empty tasks.
 
-    python python/bench/dask_fuse.py [FRAMES]      100 million unless given; needs dask and distributed
+    python python/bench/dask_fuse.py [FRAMES [TAPS]]      100 million unless given; needs dask and distributed
+
+The bank of the thesis has 22 taps per channel, so that reading and writing cost more than filtering. TAPS makes one
+of so many taps, which are noise.
 """
 
+import json
 import os
 import sys
 import tempfile
@@ -55,9 +59,18 @@ def empty(client, count=20_000):
     print(f"scheduler: {count} empty tasks in {seconds:.2f} s, {1e6 * seconds / count:.0f} us each")
 
 
+def noise_bank(taps):
+    """Two channels with taps that cost as much as designed ones."""
+    random = np.random.default_rng(2)
+    channels = [{"delay": 0.0, "taps": list(random.standard_normal(taps) / taps)} for _ in range(2)]
+    head = {"format": "hybank-bank", "version": 1, "fast_period": 1.0, "ratio": 2, "latency": 0, "method": "fir"}
+    gamma = dict.fromkeys(("norm", "upper", "lower", "noncausal"))
+    return hb.Bank.from_json(json.dumps({**head, "channels": channels, "gamma": gamma}))
+
+
 def main():
     frames = int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000
-    bank = hb.load(ROOT / "filters" / "thesis-fir.json")
+    bank = noise_bank(int(sys.argv[2])) if len(sys.argv) > 2 else hb.load(ROOT / "filters" / "thesis-fir.json")
     settings = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
     with tempfile.TemporaryDirectory() as name, LocalCluster(**settings) as cluster, Client(cluster) as client:
         archive(Path(name) / "in.npy", bank.channels, frames)

@@ -182,7 +182,7 @@ class _Region:
         self.sink, self.first, self.left, self.skip = _writer(job.sink), first, count, plan.latency
         self.dtype, self.clipped = np.dtype(plan.output), 0
         # A chunk of zarr is compressed as a whole, so it is written at once.
-        self.parts = None if isinstance(self.sink, np.memmap) else []
+        self.parts = None if isinstance(self.sink, _NpySink) else []
 
     def write(self, y):
         dropped = min(self.skip, len(y))
@@ -202,7 +202,7 @@ class _Region:
 
     def close(self):
         if self.parts is None:
-            self.sink.flush()
+            self.sink.close()
         elif self.parts:
             y = np.concatenate(self.parts)
             self.sink[self.first : self.first + len(y)] = y
@@ -345,10 +345,28 @@ def _create(sink, samples, dtype, chunk):
     zarr.create_array(name, shape=(samples,), chunks=(min(chunk, max(samples, 1)),), dtype=dtype, overwrite=True)
 
 
+class _NpySink:
+    """The samples of an ``.npy`` file. Writing to the file costs less than faults of a map that is shared."""
+
+    def __init__(self, name):
+        mapped = np.load(name, mmap_mode="r")
+        self.offset, self.dtype = mapped.offset, mapped.dtype
+        self.file = open(name, "r+b", buffering=0)
+
+    def __setitem__(self, region, y):
+        self.file.seek(self.offset + region.start * self.dtype.itemsize)
+        rest = memoryview(np.ascontiguousarray(y, self.dtype)).cast("B")
+        while rest:
+            rest = rest[self.file.write(rest) :]
+
+    def close(self):
+        self.file.close()
+
+
 def _writer(sink):
     name = os.fspath(sink)
     if name.endswith(".npy"):
-        return np.load(name, mmap_mode="r+")
+        return _NpySink(name)
     import zarr
 
     return zarr.open_array(name, mode="r+")
