@@ -213,7 +213,8 @@ impl<'a> Following<'a> {
             }
             // d_i / 2 S_ii = (delta(last) - delta(first)) / 4 S_ii, beside F_i / 2.
             let [first, last] = [part.first, part.last].map(|point| self.doubles.deltas[i][point]);
-            let width = [last[0] - first[0], last[1] + first[1] + 2.0 * quick::UNIT * (last[0] - first[0]).abs()];
+            let width =
+                [last[0] - first[0], last[1] + first[1] + 2.0 * quick::UNIT * (last[0] - first[0]).abs()];
             for (error, sign) in [(part.last, 1.0), (part.first, -1.0)] {
                 let mut bow = column.clone();
                 bow.iter_mut().flatten().for_each(|x| *x *= 0.5);

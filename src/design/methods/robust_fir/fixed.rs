@@ -1,8 +1,8 @@
 //! Taps that stay as they are.
 
 use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
-use super::scenarios::{RobustProblem, moved_plant, scenarios};
 use super::scenario_grid::ScenarioGrid;
+use super::scenarios::{RobustProblem, moved_plant, scenarios};
 use super::sheets::{Sheet, Sheets};
 use crate::design::DesignError;
 use crate::design::exchange::Exchange;

@@ -41,7 +41,8 @@ impl<'a> ScenarioGrid<'a> {
 
     /// Points that suffice for a mean square, with their trapezoidal weights.
     pub(super) fn coarse(&self) -> (Vec<Point>, Vec<f64>) {
-        let points: Vec<Point> = (0..self.points.len()).step_by(FINE).map(|k| self.point(k).clone()).collect();
+        let points: Vec<Point> =
+            (0..self.points.len()).step_by(FINE).map(|k| self.point(k).clone()).collect();
         let weights = trapezoidal_weights(points.len());
         (points, weights)
     }
@@ -112,7 +113,11 @@ mod tests {
                 let all = whole.peaks(&taps).unwrap();
                 for level in [0.0, 0.5, 0.9, 0.999].map(|share| share * all.estimate) {
                     let some = part.peaks(&taps, level).unwrap();
-                    assert_eq!((highest(&some), some.estimate), (highest(&all), all.estimate), "{lags} {level}");
+                    assert_eq!(
+                        (highest(&some), some.estimate),
+                        (highest(&all), all.estimate),
+                        "{lags} {level}"
+                    );
                 }
                 assert!(part.peaks(&taps, 1.01 * all.estimate).unwrap().estimate <= 1.01 * all.estimate);
                 let estimate = part.estimate(&taps).unwrap();
