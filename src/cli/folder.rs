@@ -4,12 +4,12 @@ use super::Failure;
 use crate::files::{AtomicFile, commit_all};
 use std::path::Path;
 
-/// Writes a file to `folder` for each item, as soon as the item is known; the files appear together. A folder
+/// Writes the files of each item to `folder` as soon as the item is known; all files appear together. A folder
 /// that was made for them is removed if they do not.
 pub(super) fn write_together<T>(
     folder: &Path,
     items: impl Iterator<Item = Result<T, Failure>>,
-    begin: impl Fn(T) -> Result<AtomicFile, Failure>,
+    begin: impl Fn(T) -> Result<Vec<AtomicFile>, Failure>,
 ) -> Result<(), Failure> {
     let is_new = !folder.exists();
     let begin = |item: Result<T, Failure>| {
@@ -20,7 +20,8 @@ pub(super) fn write_together<T>(
         begin(item)
     };
     let begun = items.map(begin).collect::<Result<Vec<_>, _>>();
-    let written = begun.and_then(|files| commit_all(files).map_err(Failure::input));
+    let written =
+        begun.and_then(|files| commit_all(files.into_iter().flatten().collect()).map_err(Failure::input));
     if written.is_err() && is_new {
         // It is empty, or another program has put files there.
         let _ = std::fs::remove_dir(folder);

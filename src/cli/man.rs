@@ -32,7 +32,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let commands = program.get_subcommands().cloned();
     let pages = std::iter::once(program.clone()).chain(commands).map(page);
     write_together(&args.folder, pages, |(name, text): (String, Vec<u8>)| {
-        begin_file(&args.folder.join(name), &text, args.force)
+        Ok(vec![begin_file(&args.folder.join(name), &text, args.force)?])
     })
 }
 

@@ -11,14 +11,15 @@ use std::path::{Path, PathBuf};
 
 /// Draws the front ends, the filters and the error of a bank
 ///
-/// Writes six pictures (SVG): front-ends, filters, group-delay, impulse-responses, error and delay-error. The
-/// error is the largest gain from the analog input to the error, by frequency modulo the slow rate; its
-/// maximum is gamma.
+/// Writes eight pictures (SVG): front-ends, analysis, filters, phase, group-delay, impulse-responses, error and
+/// delay-error. The error is the largest gain from the analog input to the error, by frequency modulo the slow
+/// rate; its maximum is gamma. Pictures of pixels are made from these by rsvg-convert, Inkscape or a browser.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   hybank plot bank.json -o pictures
-  hybank plot bank.json -o pictures --sweeps --force")]
+  hybank plot bank.json -o pictures --sweeps --force
+  rsvg-convert -w 1920 pictures/error.svg -o error.png")]
 pub(super) struct Args {
     /// The bank (JSON)
     bank: PathBuf,
@@ -60,6 +61,6 @@ fn write_all(args: &Args, pictures: &[(PathBuf, String)]) -> Result<(), Failure>
     refuse_overlaps(&paths, &[&args.bank]).map_err(Failure::input)?;
     name_leftovers(&paths);
     write_together(&args.output, pictures.iter().map(Ok), |(path, text)| {
-        begin_file(path, text.as_bytes(), args.force)
+        Ok(vec![begin_file(path, text.as_bytes(), args.force)?])
     })
 }

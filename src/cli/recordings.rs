@@ -3,51 +3,71 @@
 use super::Failure;
 use super::interrupt::remove_unfinished;
 use crate::files::{AtomicFile, commit_all};
-use crate::io::PcmFormat;
-use crate::io::wav::WavFile;
-use std::io;
+use crate::io::{Container, OutputHeader, PcmFormat, SampleWriter};
 use std::path::Path;
 
-/// A mono recording to be written.
+/// Format of the numbers.
+const FORMAT: PcmFormat = PcmFormat::F32Le;
+
+/// A recording of one channel to be written with 32-bit floats.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mono<'a> {
     pub(super) samples: &'a [f64],
+    /// The imaginary parts of complex samples, as many.
+    pub(super) imaginary: Option<&'a [f64]>,
     /// Hertz.
-    pub(super) rate: u32,
+    pub(super) rate: f64,
+    /// SigMF recordings are so by their name.
+    pub(super) container: Container,
 }
 
 /// Samples that are encoded at a time.
 const CHUNK: usize = 1 << 16;
 
-/// Writes mono WAV files with 32-bit floats, which appear together when they are whole.
+impl<'a> Mono<'a> {
+    /// Real samples in a WAV file.
+    pub(super) fn wav(samples: &'a [f64], rate: f64) -> Self {
+        Self { samples, imaginary: None, rate, container: Container::Wav }
+    }
+
+    /// Numbers from `from` on, at most [`CHUNK`] samples of them.
+    fn chunk(&self, from: usize, bytes: &mut Vec<u8>) {
+        let to = (from + CHUNK).min(self.samples.len());
+        bytes.resize((to - from) * self.parts() * FORMAT.bytes(), 0);
+        let mut slots = bytes.chunks_exact_mut(FORMAT.bytes());
+        for k in from..to {
+            let parts = std::iter::once(self.samples[k]).chain(self.imaginary.map(|imaginary| imaginary[k]));
+            for (x, slot) in parts.zip(&mut slots) {
+                FORMAT.encode(x, slot);
+            }
+        }
+    }
+
+    fn parts(&self) -> usize {
+        1 + usize::from(self.imaginary.is_some())
+    }
+}
+
+/// Writes recordings, which appear together when they are whole.
 pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Result<(), Failure> {
     let begin = |(path, mono): &(&Path, Mono<'_>)| begin_recording(path, *mono, force);
     let files = files.iter().map(begin).collect::<Result<Vec<_>, _>>()?;
-    commit_all(files).map_err(Failure::input)
+    commit_all(files.into_iter().flatten().collect()).map_err(Failure::input)
 }
 
-/// A mono WAV file with 32-bit floats that is whole but has no name yet.
-pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<AtomicFile, Failure> {
+/// The files of a recording, which are whole but have no names yet: two of a SigMF recording.
+pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<Vec<AtomicFile>, Failure> {
     remove_unfinished();
-    let file = AtomicFile::create(path, force).map_err(Failure::input)?;
-    let written =
-        WavFile::new(file, PcmFormat::F32Le, 1, mono.rate).and_then(|wav| encode(wav, mono.samples));
-    let cannot = |error: io::Error| Failure::Input(format!("{}: cannot write it: {error}", path.display()));
-    let mut file = written.map_err(cannot)?;
-    // One open file at a time, however many there are.
-    file.seal().map_err(Failure::input)?;
-    Ok(file)
-}
-
-fn encode(mut wav: WavFile<AtomicFile>, samples: &[f64]) -> io::Result<AtomicFile> {
-    let format = PcmFormat::F32Le;
-    let mut bytes = vec![0; samples.len().min(CHUNK) * format.bytes()];
-    for chunk in samples.chunks(CHUNK) {
-        let bytes = &mut bytes[..chunk.len() * format.bytes()];
-        for (slot, &x) in bytes.chunks_exact_mut(format.bytes()).zip(chunk) {
-            format.encode(x, slot);
-        }
-        wav.write_bytes(bytes)?;
+    let (container, is_complex, rate) = (mono.container, mono.imaginary.is_some(), mono.rate);
+    let header = OutputHeader { container, format: FORMAT, is_complex, rate };
+    let mut writer = SampleWriter::create(path, header, force).map_err(Failure::input)?;
+    let mut bytes = Vec::new();
+    for from in (0..mono.samples.len()).step_by(CHUNK) {
+        mono.chunk(from, &mut bytes);
+        writer.write(&bytes).map_err(Failure::input)?;
     }
-    wav.finish()
+    let mut files = writer.finish().map_err(Failure::input)?;
+    // One open file at a time, however many there are.
+    files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
+    Ok(files)
 }

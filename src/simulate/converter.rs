@@ -70,8 +70,31 @@ impl Converter {
         &self,
         problem: &Problem,
         channel: usize,
+        signal: (&Analog, f64),
+        periods: usize,
+    ) -> Delivered {
+        self.capture_part(problem, channel, signal, periods, Purpose::Noise)
+    }
+
+    /// As [`Converter::capture`], of the imaginary part of a complex signal: the converter of the other part
+    /// has the same clock and front end, hence the same jitter, and noise of its own.
+    pub fn capture_imaginary(
+        &self,
+        problem: &Problem,
+        channel: usize,
+        signal: (&Analog, f64),
+        periods: usize,
+    ) -> Delivered {
+        self.capture_part(problem, channel, signal, periods, Purpose::ImaginaryNoise)
+    }
+
+    fn capture_part(
+        &self,
+        problem: &Problem,
+        channel: usize,
         (signal, level): (&Analog, f64),
         periods: usize,
+        noise: Purpose,
     ) -> Delivered {
         let Problem { ratio, channels, front_ends, .. } = problem;
         let front_end = &front_ends[channels[channel].front_end];
@@ -85,7 +108,7 @@ impl Converter {
             None => signal.filtered(front_end, instants),
         };
         let gain = level * channels[channel].gain * (1.0 + self.gain_error);
-        self.convert(channel, analog, gain)
+        self.convert(Normal::new(self.seed, channel, noise), analog, gain)
     }
 
     /// The jitter of each sample.
@@ -95,9 +118,8 @@ impl Converter {
         (self.jitter.0 > 0.0).then(shifts)
     }
 
-    /// From voltages to samples.
-    fn convert(&self, channel: usize, mut samples: Vec<f64>, gain: f64) -> Delivered {
-        let normal = Normal::new(self.seed, channel, Purpose::Noise);
+    /// From voltages to samples, with the noise `normal`.
+    fn convert(&self, normal: Normal, mut samples: Vec<f64>, gain: f64) -> Delivered {
         let mut clipped = 0;
         for (k, x) in samples.iter_mut().enumerate() {
             *x *= gain;

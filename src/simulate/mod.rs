@@ -8,6 +8,7 @@
 //! rounding.
 
 mod capture;
+mod complex;
 mod converter;
 mod describe;
 mod normal;
@@ -20,6 +21,7 @@ mod walk;
 mod workload;
 
 pub use capture::{Analog, Captured, capture, interleaved, recordings, target};
+pub use complex::ComplexSource;
 pub use converter::{Converter, Delivered};
 pub use parse::ParseSourceError;
 pub use quantiser::Quantiser;

@@ -8,6 +8,8 @@ use std::f64::consts::TAU;
 pub(super) enum Purpose {
     Jitter = 1,
     Noise = 2,
+    /// Noise of the imaginary part of complex samples.
+    ImaginaryNoise = 3,
 }
 
 /// A sequence of independent numbers of mean 0 and variance 1.
@@ -83,8 +85,13 @@ mod tests {
         for lag in [1, 2, 3, 64] {
             assert!(correlation(&x, &x[lag..]).abs() < 0.008, "lag {lag}");
         }
-        let others =
-            [(7, 1, Purpose::Noise), (7, 0, Purpose::Jitter), (8, 0, Purpose::Noise), (0, 7, Purpose::Noise)];
+        let others = [
+            (7, 1, Purpose::Noise),
+            (7, 0, Purpose::Jitter),
+            (8, 0, Purpose::Noise),
+            (0, 7, Purpose::Noise),
+            (7, 0, Purpose::ImaginaryNoise),
+        ];
         for (seed, converter, purpose) in others {
             let other = numbers(seed, converter, purpose);
             for (a, b) in [(&x[..], &other[..]), (&x[1..], &other), (&x, &other[1..])] {

@@ -11,7 +11,7 @@ use std::str::FromStr;
 pub enum ParseSourceError {
     /// No such kind of source.
     #[error(
-        "`{text}` is not a source; write step@0.3, tones:0.3,0.8 (rad/s), tones:440Hz,1kHz, \
+        "`{text}` is not a source; write step@0.3, tones:0.3,0.8 (rad/s), tones:440Hz,1kHz, ctones:-2kHz (complex), \
          chirp:100Hz..8kHz@2s, several joined by `+`, or the name of a WAV file"
     )]
     Unknown {
@@ -40,14 +40,24 @@ impl FromStr for Source {
     }
 }
 
-/// One term of the sum `text`.
-fn parse_term(text: &str, term: &str) -> Result<Source, ParseSourceError> {
+/// The complex exponentials of a term of the sum `text`, if it is one of these.
+pub(super) fn exponentials(text: &str, term: &str) -> Result<Option<Vec<Tone>>, ParseSourceError> {
+    term.strip_prefix("ctones:").map(|list| tones(text, list)).transpose()
+}
+
+/// Angular frequencies or frequencies, separated by commas.
+fn tones(text: &str, list: &str) -> Result<Vec<Tone>, ParseSourceError> {
+    let tone = |s: &str| angular(text, s).map(|omega| Tone { omega, amplitude: 1.0, phase: 0.0 });
+    list.split(',').map(tone).collect()
+}
+
+/// One real term of the sum `text`.
+pub(super) fn parse_term(text: &str, term: &str) -> Result<Source, ParseSourceError> {
     if let Some(at) = term.strip_prefix("step@") {
         return Ok(Source::Step { at: seconds(text, at)?, height: 1.0 });
     }
     if let Some(list) = term.strip_prefix("tones:") {
-        let tone = |s: &str| angular(text, s).map(|omega| Tone { omega, amplitude: 1.0, phase: 0.0 });
-        return Ok(Source::Tones(list.split(',').map(tone).collect::<Result<_, _>>()?));
+        return Ok(Source::Tones(tones(text, list)?));
     }
     let chirp = term.strip_prefix("chirp:").and_then(|rest| rest.split_once('@'));
     if let Some((range, length)) = chirp

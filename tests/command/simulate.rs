@@ -331,6 +331,82 @@ fn errors_out_of_range_are_refused_by_name() {
 }
 
 /// Two captures of a speech recording with the wanted signal, made elsewhere in the frequency domain.
+/// Complex numbers of little-endian 32-bit floats.
+fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
+    let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));
+    bytes.chunks_exact(8).map(|sample| [number(&sample[..4]), number(&sample[4..])]).collect()
+}
+
+/// Response of 0.25 / (s + 0.5)^2 to e^{j w t}.
+fn exponential(omega: f64, t: f64) -> [f64; 2] {
+    let (gain, phase) = (0.25 / (omega * omega + 0.25), omega * t - 2.0 * (omega / 0.5).atan());
+    [gain * phase.cos(), gain * phase.sin()]
+}
+
+#[test]
+fn complex_captures_have_their_closed_form_and_fuse_to_the_complex_target() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let simulate = ["simulate", "bank.json", "--source", "ctones:0.3,-0.8", "--samples", "400", "-o", "cap"];
+    let report = desk.report(&simulate);
+    assert_eq!((&report["is_complex"], &report["slow_rate"]), (&Value::from(true), &Value::from(24_000)));
+    assert_eq!(report["files"][0], "cap/ch1.sigmf-meta");
+    assert_eq!(desk.read_json("cap/ch1.sigmf-meta")["global"]["core:datatype"], "cf32_le");
+    for (name, delay, period) in [("ch1", 1.2, 2.0), ("ch2", 0.6, 2.0), ("target", 10.0, 1.0)] {
+        let samples = complex(&desk.read(&format!("cap/{name}.sigmf-data")));
+        for (k, [re, im]) in samples.into_iter().enumerate() {
+            let t = k as f64 * period - delay;
+            let (a, b) = (exponential(0.3, t), exponential(-0.8, t));
+            let far = (re - a[0] - b[0]).hypot(im - a[1] - b[1]);
+            assert!(far < 2e-7, "{name}[{k}]: {far:e}");
+        }
+    }
+    let fuse = ["fuse", "bank.json", "cap/ch1.sigmf-meta", "cap/ch2.sigmf-meta", "-o", "y.sigmf-meta"];
+    desk.good(&[&fuse[..], &["--keep-latency"]].concat());
+    let parts = |bytes: &[u8]| complex(bytes).concat();
+    let (fused, target) = (parts(&desk.read("y.sigmf-data")), parts(&desk.read("cap/target.sigmf-data")));
+    let snr = snr_db(&fused, &target, 120);
+    assert!(snr > 45.0, "{snr:.1} dB");
+    // Raw samples are the same numbers.
+    desk.report(&[&simulate[..7], &["cap", "--to", "raw"]].concat());
+    assert_eq!(desk.read("cap/ch2.cf32"), desk.read("cap/ch2.sigmf-data"));
+    desk.refused(2, &[&simulate[..], &["--to", "wav"]].concat(), &["WAV files hold no complex samples"]);
+}
+
+/// I and Q have one clock, hence one jitter, and noise of their own.
+#[test]
+fn an_imaginary_part_has_the_errors_of_its_converters() {
+    let desk = Desk::with_spec(THESIS);
+    let run = |more: &[&str]| {
+        let args =
+            ["simulate", "spec.toml", "--source", "tones:0.3", "--imaginary", "tones:0.3", "-o", "cap"];
+        desk.report(&[&args[..], &["--samples", "4000", "--to", "raw"], more].concat());
+        complex(&desk.read("cap/ch1.cf32"))
+    };
+    assert!(run(&["--jitter", "0.05samples", "--offset", "0.1"]).iter().all(|[re, im]| re == im));
+    let noisy = run(&["--noise", "0.01"]);
+    let apart: f64 = noisy.iter().map(|[re, im]| (re - im).powi(2)).sum::<f64>() / noisy.len() as f64;
+    // 2 sigma^2 with a standard deviation of sqrt(2 / 2000) = 3 %.
+    assert!((apart / 2e-4 - 1.0).abs() < 0.15, "{apart:e}");
+    let both = ["simulate", "spec.toml", "--source", "ctones:1", "--imaginary", "tones:2", "-o", "no"];
+    desk.refused(2, &both, &["--imaginary", "imaginary part of its own"]);
+}
+
+/// WAV cannot state such rates.
+#[test]
+fn captures_at_gigahertz_are_sigmf_recordings() {
+    let filter = r#"filter = { family = "butterworth", order = 3, cutoff = "2 GHz" }"#;
+    let channels = "[[channel]]\ndelay = \"60 ps\"\n[[channel]]\ndelay = 0";
+    let desk = Desk::with_spec(&format!(
+        "fast_rate = \"10 GS/s\"\nratio = 2\nlatency = 4\n[target]\n{filter}\n{channels}"
+    ));
+    let args = ["simulate", "spec.toml", "--source", "tones:1MHz", "-o", "cap"];
+    desk.refused(1, &args, &["do not fit a WAV header", "--to sigmf"]);
+    desk.report(&[&args[..], &["--to", "sigmf"]].concat());
+    assert_eq!(desk.read_json("cap/target.sigmf-meta")["global"]["core:sample_rate"], 1e10);
+    assert_eq!(desk.read_json("cap/ch1.sigmf-meta")["global"]["core:datatype"], "rf32_le");
+}
+
 #[test]
 fn captures_made_elsewhere_are_fused() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");

@@ -107,11 +107,13 @@ impl Args {
         let slow = fast / spec.ratio as u32;
         let channels = captured.channels.iter().enumerate();
         let mut files: Vec<_> = channels
-            .map(|(i, samples)| (folder.join(format!("ch{}.wav", i + 1)), Mono { samples, rate: slow }))
+            .map(|(i, samples)| {
+                (folder.join(format!("ch{}.wav", i + 1)), Mono::wav(samples, f64::from(slow)))
+            })
             .collect();
-        files.push((folder.join("target.wav"), Mono { samples: &captured.target, rate: fast }));
+        files.push((folder.join("target.wav"), Mono::wav(&captured.target, f64::from(fast))));
         let fused = |contender: &'_ Contender| folder.join(&contender.file);
-        files.extend(contenders.iter().map(|c| (fused(c), Mono { samples: &c.samples, rate: fast })));
+        files.extend(contenders.iter().map(|c| (fused(c), Mono::wav(&c.samples, f64::from(fast)))));
         let files: Vec<_> = files.iter().map(|(path, mono)| (path.as_path(), *mono)).collect();
         write_recordings(&files, self.force)?;
         for (name, svg) in pictures.all().map_err(Failure::input)? {

@@ -91,14 +91,18 @@ pub(super) struct Converters {
 }
 
 impl ConverterArgs {
-    /// The converters of `spec` with their errors.
+    /// The converters of `spec` with their errors, for `signals`.
     ///
     /// # Errors
     /// A number out of its range, or a list that has neither one value nor one for each channel.
-    pub(super) fn converters(&self, spec: &Spec, signal: &Analog) -> Result<Converters, Failure> {
+    pub(super) fn converters<'a>(
+        &self,
+        spec: &Spec,
+        mut signals: impl Iterator<Item = &'a Analog>,
+    ) -> Result<Converters, Failure> {
         check_noise(self.noise).map_err(|problem| bad_flag("noise", &problem))?;
         let jitter = self.jitter(spec.fast_period);
-        check_jitter(jitter, spec.fast_period, signal)?;
+        signals.try_for_each(|signal| check_jitter(jitter, spec.fast_period, signal))?;
         let channels = spec.channels.len();
         let drift = of_channels("drift", &self.drift, channels, check_drift)?;
         let most_delay = (spec.fast_period * MAX_LATENCY as f64).0;

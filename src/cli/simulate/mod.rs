@@ -1,31 +1,32 @@
 //! `hybank simulate`: the captures of virtual slow converters.
 
 mod converters;
+mod outputs;
+mod signal;
 
 use self::converters::{CommonReport, ConverterArgs, ConverterReport, Converters};
+use self::outputs::{Kind, Output, Rates, number, outputs};
+use self::signal::{Signal, SignalArgs};
 use super::Failure;
 use super::bank_file::load_spec_or_bank;
-use super::capture_file::{CaptureFile, Reading};
 use super::folder::write_together;
 use super::recordings::{Mono, begin_recording};
 use super::say::name_leftovers;
 use super::understood::understood;
 use crate::design::{self, Problem};
 use crate::files::refuse_overlaps;
-use crate::simulate::{Analog, Delivered, Recording, Source, frames, target};
+use crate::io::SampleWriter;
+use crate::simulate::{Converter, target};
 use crate::spec::Spec;
-use crate::units::{FastPeriods, Hertz};
-use std::path::{Path, PathBuf};
-
-/// Fast rate in the WAV headers of captures in normalised time.
-const NORMALISED_RATE: Hertz = Hertz(48_000.0);
+use std::path::PathBuf;
 
 /// Simulates what the slow converters capture
 ///
 /// Writes ch1.wav, ch2.wav, .. at the slow rate, and target.wav: the samples of the ideal fast converter,
 /// delayed by the latency. The samples of a step, tone or chirp are exact to rounding. A WAV recording is
 /// treated as a periodic, band-limited analog signal. The converters have the gains and offsets of the spec,
-/// and the errors that are asked for; the target is ideal.
+/// and the errors that are asked for; the target is ideal. Complex signals, as a quadrature receiver delivers
+/// them, are written as SigMF recordings or raw: both parts pass the same front ends and clocks.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sources:
@@ -33,6 +34,7 @@ Sources:
   tones:0.3,0.8             cosines of amplitude 1, angular frequencies in rad/s
   tones:440Hz,1kHz          the same, frequencies in hertz
   chirp:50Hz..8kHz@2s       a linear sweep from 50 Hz to 8 kHz in 2 s
+  ctones:100kHz,-250kHz     complex exponentials of amplitude 1, also of negative frequencies
   step@1+tones:440Hz        a sum
   FILE.wav                  a mono recording, or with --channel K one channel of a recording
 
@@ -41,19 +43,20 @@ Examples:
   hybank simulate bank.json --source speech.wav -o captures
   hybank simulate bank.json --source tones:440Hz,1kHz --samples 96000 -o captures
   hybank simulate spec.toml --source music.wav --channel 2 -o captures
-  hybank simulate spec.toml --source tones:440Hz -o captures --bits 12 --delay-error 10ns,-10ns")]
+  hybank simulate spec.toml --source tones:440Hz -o captures --bits 12 --delay-error 10ns,-10ns
+  hybank simulate spec.toml --source ctones:100kHz,-250kHz -o captures --to raw
+  hybank simulate spec.toml --source i.wav --imaginary q.wav -o captures")]
 pub(super) struct Args {
     /// A spec (TOML) or a bank (JSON)
     spec: PathBuf,
-    /// The analog signal
-    #[arg(long)]
-    source: String,
-    /// Channel of the WAV recording, counted from 1; a mono recording needs none
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
-    channel: Option<u16>,
+    #[command(flatten)]
+    signal: SignalArgs,
     /// The folder for the captures; created if missing
     #[arg(short, long)]
     output: PathBuf,
+    /// Kind of the files [default: wav, of complex samples sigmf]
+    #[arg(long, value_name = "KIND")]
+    to: Option<Kind>,
     /// Fast samples to simulate, rounded up to whole frames [default: to the end of the source, at least
     /// 200]
     #[arg(long)]
@@ -79,8 +82,9 @@ struct Report {
     source: String,
     files: Vec<String>,
     frames: usize,
-    slow_rate: u32,
-    fast_rate: u32,
+    is_complex: bool,
+    slow_rate: serde_json::Value,
+    fast_rate: serde_json::Value,
     latency: usize,
     #[serde(flatten)]
     common: CommonReport,
@@ -100,38 +104,38 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", args.spec.display()));
     let latency = design::latency(&spec).map_err(|error| named(&error))?;
     let problem = Problem::new(&spec, latency).map_err(|error| named(&error))?;
-    let (rates, mut warnings) = Rates::of(&spec).map_err(|message| named(&message))?;
+    let signal = Signal::read(&args.signal, &spec)?;
+    let kind = args.kind(signal.is_complex())?;
+    let (rates, mut warnings) = Rates::of(&spec, kind).map_err(|message| named(&message))?;
     if spec.latency.is_none() {
         warnings.push(format!("the spec gives no latency; {latency} fast samples are used"));
     }
-    let signal = args.signal(&spec)?;
-    let Converters { common, each } = args.converters.converters(&spec, &signal)?;
-    let samples = args.samples.unwrap_or_else(|| signal.usual_samples(spec.ratio));
-    let frames = frames(&problem, &signal, samples, args.converters.is_jittered())
-        .map_err(|error| Failure::Input(format!("{}: {error}", args.source)))?;
-    let files = args.files(&rates, spec.channels.len())?;
+    let Converters { common, each } = args.converters.converters(&spec, signal.parts())?;
+    let jittered = args.converters.is_jittered();
+    let frames = signal.frames(&problem, args.samples, jittered)?;
+    let outputs = outputs(&args.output, kind, signal.is_complex(), &rates, spec.channels.len());
+    args.check_outputs(&outputs)?;
     let (converters, mut reports): (Vec<_>, Vec<_>) = each.into_iter().unzip();
-    let captures = converters.iter().zip(&mut reports).enumerate().map(|(i, (converter, report))| {
-        let Delivered { samples, clipped } = converter.capture(&problem, i, (&signal, args.gain), frames);
-        report.clipped = clipped;
-        samples
-    });
-    let reference = std::iter::once_with(|| args.amplified(target(&problem, &signal, frames)));
-    let recordings = files.iter().zip(captures.chain(reference));
-    let recordings = recordings.map(|(file, samples)| Ok((file, args.checked(samples)?)));
-    write_together(&args.output, recordings, |(file, samples)| {
-        begin_recording(&file.path, Mono { samples: &samples, rate: file.rate }, args.force)
+    let run = Run { args, problem: &problem, signal: &signal, frames };
+    let captures = converters.iter().zip(&mut reports).enumerate();
+    let captures = captures.map(|(i, (converter, report))| run.capture(i, converter, &mut report.clipped));
+    let recordings = outputs.iter().zip(captures.chain(std::iter::once_with(|| run.target())));
+    let recordings = recordings.map(|(output, samples)| Ok((output, run.checked(samples)?)));
+    write_together(&args.output, recordings, |(output, parts)| {
+        let (samples, imaginary) = (&parts.0, parts.1.as_deref());
+        let mono = Mono { samples, imaginary, rate: output.rate, container: kind.container() };
+        begin_recording(&output.path, mono, args.force)
     })?;
-    let files: Vec<String> = files.iter().map(|file| file.path.display().to_string()).collect();
+    let files: Vec<String> = outputs.iter().map(|output| output.path.display().to_string()).collect();
     warnings.extend(clipping(&files, &reports));
-    let (slow_rate, fast_rate) = (rates.slow, rates.fast);
     Report {
         understood: understood(&Spec { latency: Some(latency), ..spec }),
-        source: args.source_text(),
+        source: signal.text,
         files,
         frames,
-        slow_rate,
-        fast_rate,
+        is_complex: signal.imaginary.is_some(),
+        slow_rate: number(rates.slow),
+        fast_rate: number(rates.fast),
         latency,
         common,
         converters: reports,
@@ -146,101 +150,73 @@ fn clipping<'a>(files: &'a [String], reports: &'a [ConverterReport]) -> impl Ite
     clipped.map(|(file, report)| format!("{file}: {} samples were clipped at full scale", report.clipped))
 }
 
-/// A file to be written.
-struct Output {
-    path: PathBuf,
-    /// Hertz.
-    rate: u32,
+/// Real parts, and imaginary parts of complex samples.
+type Parts = (Vec<f64>, Option<Vec<f64>>);
+
+/// What is captured.
+struct Run<'a> {
+    args: &'a Args,
+    problem: &'a Problem,
+    signal: &'a Signal,
+    frames: usize,
 }
 
-impl Args {
-    /// The source as it was understood.
-    fn source_text(&self) -> String {
-        self.source.parse().map_or_else(|_| self.source.clone(), |source: Source| source.to_string())
+impl Run<'_> {
+    /// The samples of channel `i`, and how many of their parts `clipped`.
+    fn capture(&self, i: usize, converter: &Converter, clipped: &mut usize) -> Parts {
+        let Self { problem, signal, frames, .. } = *self;
+        let level = self.args.gain;
+        let real = converter.capture(problem, i, (&signal.real, level), frames);
+        let imaginary = signal.imaginary.as_ref();
+        let imaginary =
+            imaginary.map(|signal| converter.capture_imaginary(problem, i, (signal, level), frames));
+        *clipped = real.clipped + imaginary.as_ref().map_or(0, |imaginary| imaginary.clipped);
+        (real.samples, imaginary.map(|imaginary| imaginary.samples))
     }
 
-    /// The signal in normalised time.
-    fn signal(&self, spec: &Spec) -> Result<Analog, Failure> {
-        let path = Path::new(&self.source);
-        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("wav")) {
-            let reading = Reading::channel(self.channel.map(usize::from), crate::simulate::MOST_SAMPLES);
-            let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
-            // In normalised time the recording's own rate is the fast rate.
-            let fast = if spec.is_normalised() { rate } else { spec.fast_period.rate() };
-            let recording = Recording::new(&samples, FastPeriods(fast / rate));
-            return Ok(Analog::Recorded(recording));
-        }
-        if let Some(channel) = self.channel {
-            return Err(Failure::Usage(format!(
-                "--channel {channel}: the source {} is no WAV recording; leave the option out",
-                self.source
-            )));
-        }
-        let source: Source =
-            self.source.parse().map_err(|error| Failure::Usage(format!("--source: {error}")))?;
-        Ok(Analog::Known(source.normalised(spec.fast_period)))
-    }
-
-    /// The channels' files and the target's; none of them may be an input.
-    fn files(&self, rates: &Rates, channels: usize) -> Result<Vec<Output>, Failure> {
-        let slow = (1..=channels).map(|i| (format!("ch{i}.wav"), rates.slow));
-        let names = slow.chain([("target.wav".to_owned(), rates.fast)]);
-        let files: Vec<_> = names.map(|(name, rate)| Output { path: self.output.join(name), rate }).collect();
-        let outputs: Vec<_> = files.iter().map(|file| file.path.as_path()).collect();
-        refuse_overlaps(&outputs, &[&self.spec, Path::new(&self.source)]).map_err(Failure::input)?;
-        name_leftovers(&outputs);
-        Ok(files)
-    }
-
-    fn amplified(&self, mut samples: Vec<f64>) -> Vec<f64> {
-        samples.iter_mut().for_each(|x| *x *= self.gain);
-        samples
+    fn target(&self) -> Parts {
+        let amplified = |analog| {
+            let mut samples = target(self.problem, analog, self.frames);
+            samples.iter_mut().for_each(|x| *x *= self.args.gain);
+            samples
+        };
+        (amplified(&self.signal.real), self.signal.imaginary.as_ref().map(amplified))
     }
 
     /// A sample beyond the range of a 32-bit float is an error, not an infinity in the file.
-    fn checked(&self, samples: Vec<f64>) -> Result<Vec<f64>, Failure> {
-        match samples.iter().find(|x| x.is_nan() || x.abs() > f64::from(f32::MAX)) {
-            None => Ok(samples),
+    fn checked(&self, parts: Parts) -> Result<Parts, Failure> {
+        let mut all = parts.0.iter().chain(parts.1.iter().flatten());
+        match all.find(|x| x.is_nan() || x.abs() > f64::from(f32::MAX)) {
+            None => Ok(parts),
             Some(x) => Err(Failure::Input(format!(
                 "{}: a captured sample is {x:e}, beyond the range of a 32-bit float; use a smaller --gain",
-                self.source
+                self.signal.text
             ))),
         }
     }
 }
 
-/// Rates for WAV headers, whole hertz.
-struct Rates {
-    slow: u32,
-    fast: u32,
-}
+impl Args {
+    /// The kind of the files that are written.
+    fn kind(&self, is_complex: bool) -> Result<Kind, Failure> {
+        match self.to {
+            Some(Kind::Wav) if is_complex => Err(Failure::Usage(
+                "--to wav: WAV files hold no complex samples; leave it out for SigMF recordings, or take --to raw"
+                    .into(),
+            )),
+            Some(kind) => Ok(kind),
+            None => Ok(if is_complex { Kind::Sigmf } else { Kind::Wav }),
+        }
+    }
 
-impl Rates {
-    fn of(spec: &Spec) -> Result<(Self, Vec<String>), String> {
-        let ratio = spec.ratio as f64;
-        let slow = if spec.is_normalised() {
-            (NORMALISED_RATE / ratio).0.round().max(1.0)
-        } else {
-            (spec.fast_period * ratio).rate().0
-        };
-        let fast = slow * ratio;
-        if fast > f64::from(u32::MAX) || slow < 0.5 {
-            return Err(format!(
-                "the rates of {slow} Hz and {fast} Hz do not fit a WAV header (1 to {} Hz); simulate a spec in \
-                 normalised time (fast_period = 1)",
-                u32::MAX
-            ));
-        }
-        let mut warnings = Vec::new();
-        for rate in [slow, fast] {
-            if (rate - rate.round()).abs() > 1e-6 * rate {
-                warnings.push(format!(
-                    "WAV headers hold whole hertz: {rate} Hz is written as {} Hz",
-                    rate.round()
-                ));
-            }
-        }
-        Ok((Self { slow: slow.round() as u32, fast: fast.round() as u32 }, warnings))
+    /// Refuses outputs that are inputs.
+    fn check_outputs(&self, outputs: &[Output]) -> Result<(), Failure> {
+        let files: Vec<_> = outputs.iter().flat_map(|output| SampleWriter::files(&output.path)).collect();
+        let files: Vec<_> = files.iter().map(PathBuf::as_path).collect();
+        let inputs: Vec<_> = std::iter::once(self.spec.as_path()).chain(self.signal.names()).collect();
+        refuse_overlaps(&files, &inputs).map_err(Failure::input)?;
+        name_leftovers(&files);
+        Ok(())
     }
 }
 

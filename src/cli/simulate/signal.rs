@@ -1,0 +1,145 @@
+//! The analog signal that is asked for.
+
+use crate::cli::Failure;
+use crate::cli::capture_file::{CaptureFile, Reading};
+use crate::design::Problem;
+use crate::simulate::{Analog, ComplexSource, MOST_SAMPLES, Recording, Source, frames};
+use crate::spec::Spec;
+use crate::units::FastPeriods;
+use std::path::Path;
+
+/// What the signal is.
+#[derive(Debug, clap::Args)]
+pub(super) struct SignalArgs {
+    /// The analog signal
+    #[arg(long)]
+    source: String,
+    /// The imaginary part of a complex signal: a real source or FILE.wav
+    #[arg(long, value_name = "SOURCE")]
+    imaginary: Option<String>,
+    /// Channel of each WAV recording, counted from 1; a mono recording needs none
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    channel: Option<u16>,
+}
+
+impl SignalArgs {
+    /// The sources, which may be names of files.
+    pub(super) fn names(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.source).chain(&self.imaginary).map(Path::new)
+    }
+}
+
+/// An analog signal in normalised time.
+pub(super) struct Signal {
+    pub(super) real: Analog,
+    /// The imaginary part, if the signal is complex.
+    pub(super) imaginary: Option<Analog>,
+    /// As it was understood.
+    pub(super) text: String,
+    ratio: usize,
+}
+
+impl Signal {
+    /// From --source and --imaginary.
+    pub(super) fn read(args: &SignalArgs, spec: &Spec) -> Result<Self, Failure> {
+        let reader = Reader { args, spec };
+        reader.check_channel()?;
+        let (real, quadrature, text) = reader.source()?;
+        let ratio = spec.ratio;
+        let Some(given) = &args.imaginary else {
+            return Ok(Self { real, imaginary: quadrature, text, ratio });
+        };
+        if quadrature.is_some() {
+            return Err(Failure::Usage(format!(
+                "--imaginary: the source {} has an imaginary part of its own; give one of the two",
+                args.source
+            )));
+        }
+        let (imaginary, its_text) = reader.imaginary(given)?;
+        let text = format!("{text}, and as imaginary part {its_text}");
+        Ok(Self { real, imaginary: Some(imaginary), text, ratio })
+    }
+
+    pub(super) fn is_complex(&self) -> bool {
+        self.imaginary.is_some()
+    }
+
+    /// Real and imaginary part.
+    pub(super) fn parts(&self) -> impl Iterator<Item = &Analog> + Clone {
+        std::iter::once(&self.real).chain(&self.imaginary)
+    }
+
+    /// The frames of `samples` fast samples, or of the longer part.
+    pub(super) fn frames(
+        &self,
+        problem: &Problem,
+        samples: Option<usize>,
+        jittered: bool,
+    ) -> Result<usize, Failure> {
+        let usual = || self.parts().map(|part| part.usual_samples(self.ratio)).max().unwrap_or(0);
+        let samples = samples.unwrap_or_else(usual);
+        let count = |part| frames(problem, part, samples, jittered);
+        let counts = self.parts().map(count).collect::<Result<Vec<_>, _>>();
+        let counts = counts.map_err(|error| Failure::Input(format!("{}: {error}", self.text)))?;
+        Ok(counts.into_iter().max().unwrap_or(0))
+    }
+}
+
+struct Reader<'a> {
+    args: &'a SignalArgs,
+    spec: &'a Spec,
+}
+
+impl Reader<'_> {
+    /// Refuses --channel where there is no recording.
+    fn check_channel(&self) -> Result<(), Failure> {
+        let given = [Some(&self.args.source), self.args.imaginary.as_ref()];
+        match self.args.channel {
+            Some(channel) if !given.into_iter().flatten().any(|source| is_recording(source)) => {
+                Err(Failure::Usage(format!(
+                    "--channel {channel}: the source {} is no WAV recording; leave the option out",
+                    self.args.source
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Both parts of the source, and its text.
+    fn source(&self) -> Result<(Analog, Option<Analog>, String), Failure> {
+        let text = &self.args.source;
+        if is_recording(text) {
+            return Ok((self.recording(text)?, None, text.clone()));
+        }
+        let source: ComplexSource =
+            text.parse().map_err(|error| Failure::Usage(format!("--source: {error}")))?;
+        let (real, imaginary) = source.parts();
+        let imaginary = (!source.is_real()).then(|| self.known(&imaginary));
+        Ok((self.known(&real), imaginary, source.to_string()))
+    }
+
+    fn imaginary(&self, text: &str) -> Result<(Analog, String), Failure> {
+        if is_recording(text) {
+            return Ok((self.recording(text)?, text.to_owned()));
+        }
+        let source: Source = text.parse().map_err(|error| Failure::Usage(format!("--imaginary: {error}")))?;
+        Ok((self.known(&source), source.to_string()))
+    }
+
+    fn known(&self, source: &Source) -> Analog {
+        Analog::Known(source.normalised(self.spec.fast_period))
+    }
+
+    fn recording(&self, text: &str) -> Result<Analog, Failure> {
+        let path = Path::new(text);
+        let reading = Reading::channel(self.args.channel.map(usize::from), MOST_SAMPLES);
+        let CaptureFile { samples, rate, .. } = CaptureFile::read(path, reading)?.finite(path)?;
+        // In normalised time the recording's own rate is the fast rate.
+        let fast = if self.spec.is_normalised() { rate } else { self.spec.fast_period.rate() };
+        Ok(Analog::Recorded(Recording::new(&samples, FastPeriods(fast / rate))))
+    }
+}
+
+fn is_recording(source: &str) -> bool {
+    Path::new(source).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("wav"))
+}
