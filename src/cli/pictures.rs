@@ -1,14 +1,15 @@
 //! The pictures of a bank, for `plot` and `report`.
 
 use crate::bank::Bank;
-use crate::design::responses::{fir_response, front_end_gains, impulse_responses};
+use crate::design::responses::{analysis_gains, fir_response, front_end_gains, impulse_responses};
 use crate::design::uncertainty::{delay_derivatives, norm_at};
 use crate::design::{self, DesignError};
+use crate::linalg::Complex;
 use crate::plot::{Chart, Series};
 use crate::quantity::scale_of;
 use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
 use crate::verify::uncertainty::ErrorPoint;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// Frequencies of a curve.
 const POINTS: usize = 601;
@@ -37,7 +38,14 @@ pub(super) fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
     let picture = |name, caption, chart| Picture { name, caption, chart };
     Ok(vec![
         picture("front-ends", "What the target and the converters pass.", front_ends(bank)?),
+        picture(
+            "analysis",
+            "The gains of the norm-equivalent analysis filters: what reaches the samples of each front end at the fast \
+             rate, with all that aliases there.",
+            analysis(bank)?,
+        ),
         picture("filters", "What each synthesis filter passes, at the fast rate.", gains(bank, &responses)),
+        picture("phase", "The phase of each synthesis filter, where it passes.", phases(bank, &responses)),
         picture(
             "group-delay",
             "By how much each synthesis filter delays, where it passes.",
@@ -82,33 +90,41 @@ fn nyquist(bank: &Bank) -> Hertz {
 }
 
 fn front_ends(bank: &Bank) -> Result<Chart, DesignError> {
-    let all = front_end_gains(bank, POINTS)?;
+    Ok(of_target_and_channels(bank, "Front ends", &front_end_gains(bank, POINTS)?))
+}
+
+fn analysis(bank: &Bank) -> Result<Chart, DesignError> {
+    Ok(of_target_and_channels(bank, "Equivalent analysis filters", &analysis_gains(bank, POINTS)?))
+}
+
+/// Gains of the target and of each channel.
+fn of_target_and_channels(bank: &Bank, title: &str, all: &[(Hertz, Vec<f64>)]) -> Chart {
     let (factor, x_label) = axis(nyquist(bank));
     let curve = |index: usize| Series {
         label: index.checked_sub(1).map_or_else(|| "target".to_owned(), channel),
         points: all.iter().map(|(f, gains)| (f.0 * factor, decibels(gains[index]))).collect(),
     };
     let count = 1 + bank.channel_count().min(MOST_CHANNELS - 1);
-    Ok(Chart {
-        title: "Front ends".into(),
+    Chart {
+        title: title.into(),
         x_label,
         y_label: "gain, dB".into(),
         series: (0..count).map(curve).collect(),
-    })
+    }
 }
 
 /// One curve per channel of a function of its response and group delay.
 fn by_frequency(
     bank: &Bank,
     responses: &[Vec<f64>],
-    value: impl Fn(f64, f64) -> f64,
+    value: impl Fn(Complex<f64>, f64) -> f64,
 ) -> (String, Vec<Series>) {
     let (factor, x_label) = axis(nyquist(bank));
     let curve = |(i, taps): (usize, &Vec<f64>)| {
         let point = |k: usize| {
             let share = k as f64 / (POINTS - 1) as f64;
             let (response, delay) = fir_response(taps, RadiansPerFastPeriod(PI * share));
-            (share * nyquist(bank).0 * factor, value(response.norm(), delay))
+            (share * nyquist(bank).0 * factor, value(response, delay))
         };
         Series { label: channel(i), points: (0..POINTS).map(point).collect() }
     };
@@ -116,18 +132,39 @@ fn by_frequency(
 }
 
 fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
-    let (x_label, series) = by_frequency(bank, responses, |gain, _| decibels(gain));
+    let (x_label, series) = by_frequency(bank, responses, |response, _| decibels(response.norm()));
     Chart { title: "Synthesis filters".into(), x_label, y_label: "gain, dB".into(), series }
 }
 
 fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
-    let (_, gains) = by_frequency(bank, responses, |gain, _| gain);
-    let largest = gains.iter().flat_map(|curve| &curve.points).map(|point| point.1).fold(0.0, f64::max);
-    let least = largest * 10f64.powf(-PASS_BAND_DB / 20.0);
-    let delay = |gain: f64, delay: f64| if gain >= least { delay } else { f64::NAN };
+    let least = pass_band(bank, responses);
+    let delay = |response: Complex<f64>, delay: f64| if response.norm() >= least { delay } else { f64::NAN };
     let (x_label, series) = by_frequency(bank, responses, delay);
     let y_label = "group delay, fast samples".to_owned();
     Chart { title: "Synthesis filters, where they pass".into(), x_label, y_label, series }
+}
+
+/// The phases without jumps of whole turns; where a filter does not pass they have no meaning.
+fn phases(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
+    let least = pass_band(bank, responses);
+    let phase = |response: Complex<f64>, _| if response.norm() >= least { response.arg() } else { f64::NAN };
+    let (x_label, mut series) = by_frequency(bank, responses, phase);
+    for curve in &mut series {
+        let mut last = 0.0;
+        for (_, phase) in curve.points.iter_mut().filter(|point| point.1.is_finite()) {
+            *phase += TAU * ((last - *phase) / TAU).round();
+            last = *phase;
+        }
+    }
+    let y_label = "phase, rad".to_owned();
+    Chart { title: "Phase of the synthesis filters, where they pass".into(), x_label, y_label, series }
+}
+
+/// The least gain at which a filter passes.
+fn pass_band(bank: &Bank, responses: &[Vec<f64>]) -> f64 {
+    let (_, gains) = by_frequency(bank, responses, |response, _| response.norm());
+    let largest = gains.iter().flat_map(|curve| &curve.points).map(|point| point.1).fold(0.0, f64::max);
+    largest * 10f64.powf(-PASS_BAND_DB / 20.0)
 }
 
 fn impulses(responses: &[Vec<f64>]) -> Chart {

@@ -1,10 +1,11 @@
 //! Impulse responses and frequency responses of synthesis filters and front ends, for those who look at them.
 
 use super::analysis::bank_problem;
-use super::{DesignError, filters};
+use super::problem::{Channel, Problem};
+use super::{DesignError, LiftedPlant, filters};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::linalg::{Complex, Mat};
-use crate::units::{Hertz, RadiansPerFastPeriod};
+use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
 use std::f64::consts::TAU;
 
 /// Energy of a recursive filter's response beyond which it counts as over, relative to all of it.
@@ -80,10 +81,53 @@ pub fn front_end_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64
     Ok((0..points).map(at).collect())
 }
 
+/// The gains `||H_i(e^{j w})||` of the norm-equivalent analysis filters (thesis 5.16) of the target and of each
+/// channel at the fast rate, gains included, at `points` frequencies from 0 to 1/(2 h).
+///
+/// H_i is a row whose entries depend on the choice of a square root; its norm does not. It is the gain of the front
+/// end with all its aliases: the square is the sum over k of `|Phi_i(j (w + 2 pi k))|^2`.
+///
+/// # Errors
+/// As [`front_end_gains`].
+pub fn analysis_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64>)>, DesignError> {
+    let problem = bank_problem(bank)?;
+    // Delays change the phase only, and noise is none of the front ends'.
+    let undelayed = |channel: &Channel| Channel { delay: FastPeriods(0.0), ..*channel };
+    let channels: Vec<Channel> = problem.channels.iter().map(undelayed).collect();
+    let noise = vec![0.0; channels.len()];
+    let plant = LiftedPlant::new(&Problem { ratio: 1, latency: 0, channels, noise, ..problem })?;
+    let at = |k: usize| {
+        let cycles = 0.5 * k as f64 / points.saturating_sub(1).max(1) as f64;
+        let (h, w) = plant.response(TAU * cycles);
+        let gains = w.row_iter().chain(h.row_iter()).map(|row| row.norm()).collect();
+        (Hertz(cycles / bank.fast_period.0), gains)
+    };
+    Ok((0..points).map(at).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::bank::BlockFilter;
+
+    /// The sum over 20,000 aliases on either side; the rest is below (0.5 / (2 pi 20,000))^3.
+    #[test]
+    fn analysis_filters_are_the_front_ends_with_their_aliases() {
+        let text = "fast_period = 0.5\nratio = 2\nlatency = 4\n\
+             channel = [{ delay = 0.6, gain = -2.0 }, { delay = 0.1 }]\n\
+             target = { filter = { num = [1.0], den = [1.0, 2.0, 1.0] } }\ndesign = { method = \"sinc\", taps = 4 }";
+        let spec = crate::spec::Spec::from_toml(text, "spec.toml").unwrap();
+        let bank = crate::design::design_with(&spec, crate::design::ProofSearch::Skip).unwrap().bank;
+        for (hertz, gains) in analysis_gains(&bank, 5).unwrap() {
+            // h = 0.5: 1 / (s + 1)^2 is 0.25 / (s + 0.5)^2 in fast periods.
+            let square = |w: f64| (0.25 / (w * w + 0.25)).powi(2);
+            let w = TAU * hertz.0 * 0.5;
+            let sum: f64 = (-20_000..=20_000).map(|k| square(w + TAU * f64::from(k))).sum();
+            for (gain, factor) in gains.iter().zip([1.0, 2.0, 1.0]) {
+                assert!((gain / (factor * sum.sqrt()) - 1.0).abs() < 1e-9, "{hertz:?} {gains:?} {sum}");
+            }
+        }
+    }
 
     #[test]
     fn a_recursion_has_the_impulse_response_of_its_closed_form() {

@@ -25,6 +25,28 @@ fn every_example_runs() {
     }
 }
 
+/// All ten figures and the table, with the numbers that are known of the thesis's FIR example.
+#[test]
+fn the_thesis_is_drawn_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = Path::new(env!("CARGO_BIN_EXE_hybank")).with_file_name("examples").join("thesis");
+    let output = Command::new(program).arg(folder.path()).output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    let page = fs::read_to_string(folder.path().join("index.html")).unwrap();
+    for number in 8..=17 {
+        assert!(page.contains(&format!("<h2>Figure 5.{number}: ")), "{number}");
+    }
+    let pictures = fs::read_dir(folder.path()).unwrap().count() - 1;
+    assert_eq!((pictures, page.matches("<svg").count()), (12, 12));
+    assert!(page.contains("4.68 %") && page.contains("gamma 3.9932 % with 22 taps"), "{page}");
+    // RMSE on the step and on the cosines: an independent design has 0.000822 and 0.00177, and the optimum is not
+    // unique.
+    let shown = text(&output.stdout);
+    let row = shown.lines().find(|line| line.starts_with("hybank, FIR")).unwrap();
+    let errors: Vec<f64> = row.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    assert!(errors[1] < 0.9e-3 && errors[3] < 1.9e-3, "{row}");
+}
+
 /// Runs the script of a folder of examples in a folder of its own; gives what it printed.
 #[cfg(unix)]
 fn run_script(example: &str, folder: &Path) -> String {

@@ -1,6 +1,7 @@
 //! The page about a bank, and the manual pages.
 
-use crate::support::{Desk, THESIS};
+use crate::support::{Desk, THESIS, text, wav};
+use std::process::Command;
 
 /// Tags that load something, or could.
 const LOADING: [&str; 6] = ["<script", "<img", "<iframe", "src=", "@import", "url("];
@@ -25,7 +26,7 @@ fn a_page_shows_the_bank_and_loads_nothing() {
     assert!(LOADING.iter().all(|tag| !page.contains(tag)), "something is loaded");
     // Addresses occur as the names of XML only.
     assert_eq!(page.matches("http").count(), page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count());
-    assert_eq!((page.matches("<svg").count(), page.matches("</svg>").count()), (6, 6));
+    assert_eq!((page.matches("<svg").count(), page.matches("</svg>").count()), (8, 8));
     assert!(page.contains("a &lt; b &amp; c") && !page.contains("a < b"), "the name is not escaped");
     for part in ["proven for this page", "this bank has at most", "multiply-adds", "hybank verify b.json"] {
         assert!(page.contains(part), "{part}");
@@ -52,12 +53,62 @@ fn captures_are_shown_before_and_after() {
     let desk = desk();
     desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "4000", "-o", "cap"]);
     let page = page(&desk, &["cap/ch1.wav", "cap/ch2.wav"]);
-    assert_eq!(page.matches("<svg").count(), 7);
+    assert_eq!(page.matches("<svg").count(), 9);
     for part in ["Captures", "plain interleaving", "fused", "hybank fuse b.json cap/ch1.wav cap/ch2.wav"] {
         assert!(page.contains(part), "{part}");
     }
     desk.refused(1, &["report", "b.json", "cap/ch1.wav", "-o", "other.html"], &["2 channels", "1"]);
     assert!(!desk.path("other.html").exists());
+}
+
+/// The first 2^20 frames are on the page, which the warning and the caption say.
+#[test]
+fn long_captures_are_cut_with_a_warning() {
+    let desk = Desk::new();
+    desk.write("spec.toml", THESIS.replace("taps = 22", "taps = 4"));
+    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    let frames = (1 << 20) + 5;
+    wav::write(&desk, "long.wav", 2, 24_000, &vec![0.25; 2 * frames]);
+    let output = desk.run(&["report", "b.json", "long.wav", "-o", "r.html"], &[]);
+    let message = text(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    assert!(message.contains("long.wav: only the first 1048576 frames are on the page"), "{message}");
+    let page = String::from_utf8(desk.read("r.html")).unwrap();
+    assert!(page.contains("the first 1048576 frames of the captures"));
+}
+
+/// In Chromium: nothing on the console, and nothing is fetched. A script that is added for the test counts what
+/// the page asked for, and writes how wide it is.
+#[test]
+fn a_browser_has_nothing_to_complain_of() {
+    let Some(browser) = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
+        Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success())
+    }) else {
+        println!("no Chromium is here: the page was not opened in a browser");
+        return;
+    };
+    const COUNT: &str = "<script>addEventListener('load', () => document.body.dataset.seen = \
+        performance.getEntriesByType('resource').length + ' fetched, ' + \
+        (document.documentElement.scrollWidth - document.documentElement.clientWidth) + ' too wide');</script></body>";
+    let desk = desk();
+    let page = page(&desk, &[]).replace("</body>", COUNT);
+    desk.write("counted.html", page);
+    for width in [400, 1200] {
+        let profile = desk.path(&format!("profile-{width}"));
+        let output = Command::new(browser)
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"])
+            .args(["--disable-component-update", "--disable-sync", "--enable-logging=stderr", "--dump-dom"])
+            .arg("--host-resolver-rules=MAP * ~NOTFOUND")
+            .arg(format!("--user-data-dir={}", profile.display()))
+            .arg(format!("--window-size={width},2000"))
+            .arg(format!("file://{}", desk.path("counted.html").display()))
+            .output()
+            .unwrap();
+        let (dom, log) = (text(&output.stdout), text(&output.stderr));
+        assert!(output.status.success() && !log.contains("CONSOLE"), "{log}");
+        let seen = dom.split_once("data-seen=\"").and_then(|(_, rest)| rest.split('"').next());
+        assert_eq!(seen, Some("0 fetched, 0 too wide"), "{width}: {log}");
+    }
 }
 
 #[test]

@@ -136,16 +136,18 @@ fn help_has_the_reference_of_specs() {
 
 /// The curve that must be in a picture is there, and no number is missing.
 #[test]
-fn a_bank_is_drawn_in_six_pictures() {
+fn a_bank_is_drawn_in_eight_pictures() {
     let desk = Desk::with_spec(AUDIO);
     for flags in [&[][..], &["--method", "iir"]] {
         let spec = if flags.is_empty() { AUDIO.to_owned() } else { AUDIO.replace("taps = 24\n", "") };
         assert_eq!(designed(&desk, &spec, flags), (Some(0), String::new()));
         let files = desk.good(&["plot", "b.json", "-o", "pictures", "--force"]);
-        assert_eq!(files.lines().count(), 6);
+        assert_eq!(files.lines().count(), 8);
         for (name, words) in [
             ("front-ends", &["target", "channel 2", "kHz"][..]),
             ("filters", &["channel 1", "channel 2", "dB"]),
+            ("analysis", &["target", "channel 2", "kHz"]),
+            ("phase", &["channel 1", "rad"]),
             ("group-delay", &["fast samples"]),
             ("impulse-responses", &["channel 2"]),
             ("error", &["upper bound", "lower bound", "modulo the slow rate"]),
@@ -165,7 +167,7 @@ fn gamma_is_drawn_against_latency_and_taps() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json"]);
     let files = desk.good(&["plot", "b.json", "-o", "pictures", "--sweeps"]);
-    assert_eq!(files.lines().count(), 8);
+    assert_eq!(files.lines().count(), 10);
     for (name, x) in [("latency", "latency, fast samples"), ("taps", "taps per channel")] {
         let picture = String::from_utf8(desk.read(&format!("pictures/{name}.svg"))).unwrap();
         assert!([x, "this bank", "gamma, dB"].iter().all(|word| picture.contains(word)), "{name}");

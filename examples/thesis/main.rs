@@ -1,0 +1,87 @@
+//! The examples of the thesis on hybrid filter banks (H. T. Nguyen, UIUC 2007, section 5.6): figures 5.8 to 5.17
+//! as charts, table 5.1, and a page that sets each beside what is known of the thesis's own.
+//!
+//! ```text
+//! cargo run --release --example thesis -- [FOLDER]
+//! ```
+//!
+//! writes `index.html` and the charts to FOLDER (`thesis`).
+
+mod filters;
+mod jitter;
+mod page;
+mod signals;
+
+use hybank::bank::Bank;
+use hybank::design::{ProofSearch, design_with};
+use hybank::plot::Chart;
+use hybank::spec::Spec;
+use page::Page;
+use std::path::PathBuf;
+
+/// Phi = 0.25 / (s + 0.5)^2 for the target and both channels; 10 slow samples of memory beside the newest.
+const SPEC: &str = r#"
+fast_period = 1.0
+ratio = 2
+latency = 10
+[target]
+filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
+[[channel]]
+delay = 1.2
+[[channel]]
+delay = 0.6
+[design]
+"#;
+
+/// The latency of the spec.
+const LATENCY: usize = 10;
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+/// A figure of the thesis, drawn again.
+struct Figure {
+    number: &'static str,
+    title: &'static str,
+    charts: Vec<Chart>,
+    /// What is known of the thesis's figure.
+    thesis: &'static str,
+    found: String,
+}
+
+/// The banks that the thesis compares, all for [`SPEC`].
+struct Banks {
+    iir: Bank,
+    fir: Bank,
+    sinc: Bank,
+    separation: Bank,
+}
+
+impl Banks {
+    fn design() -> Outcome<Self> {
+        let bank = |method: &str| -> Outcome<Bank> {
+            let spec = Spec::from_toml(&format!("{SPEC}{method}\n"), "thesis")?;
+            Ok(design_with(&spec, ProofSearch::Skip)?.bank)
+        };
+        Ok(Self {
+            iir: bank("method = \"iir\"")?,
+            fir: bank("method = \"fir\"\ntaps = 22")?,
+            sinc: bank("method = \"sinc\"\ntaps = 22")?,
+            separation: bank("method = \"separation\"\ntaps = 22")?,
+        })
+    }
+}
+
+fn main() -> Outcome<()> {
+    let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "thesis".into()));
+    std::fs::create_dir_all(&folder)?;
+    let banks = Banks::design()?;
+    let mut figures = filters::figures(&banks)?;
+    figures.push(jitter::figure(&banks.fir)?);
+    let (compared, table) = signals::compare(&banks)?;
+    figures.extend(compared);
+    let page = Page { figures, table };
+    page.write(&folder)?;
+    print!("{}", page.summary());
+    println!("\nThe page and its charts are in {}.", folder.display());
+    Ok(())
+}
