@@ -1,9 +1,9 @@
 #!/bin/sh
 # Builds one fuzz target with coverage on the stable toolchain and runs it.
-# usage: ./run.sh spec|bank|taps|response|wav|sigmf|lost|csv|npy|tar|pfm|tracks|colmap|transforms|calib|scene [seconds]
+# usage: ./run.sh spec|bank|taps|response|wav|sigmf|lost|csv|npy|mat|tar|pfm|tracks|colmap|transforms|calib|scene [seconds]
 set -eu
 cd "$(dirname "$0")"
-target=${1:?usage: ./run.sh spec|bank|taps|response|wav|sigmf|lost|csv|npy|tar|pfm|tracks|colmap|transforms|calib|scene [seconds]}
+target=${1:?usage: ./run.sh spec|bank|taps|response|wav|sigmf|lost|csv|npy|mat|tar|pfm|tracks|colmap|transforms|calib|scene [seconds]}
 host=$(rustc -vV | sed -n 's/^host: //p')
 RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \

@@ -43,7 +43,7 @@ Examples:
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
     bank: PathBuf,
-    /// One mono recording per channel (WAV, SigMF, .csv, .npy, or raw with --format), or one of N channels; `-`
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), or one of N channels; `-`
     /// is standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,

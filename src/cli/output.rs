@@ -4,7 +4,7 @@ use super::Failure;
 use super::bank_file::is_dash;
 use super::say::name_leftovers;
 use crate::files::refuse_overlaps;
-use crate::io::{PcmFormat, SampleWriter, is_sigmf, sigmf_files};
+use crate::io::{PcmFormat, SampleWriter, is_sigmf, mat_variable, sigmf_files};
 use crate::runtime::Precision;
 use std::path::Path;
 
@@ -72,7 +72,10 @@ pub(super) fn check_files(output: &Path, others: &[&Path], inputs: &[&Path]) -> 
     // A SigMF recording has two files, and only one of them is named.
     let pairs: Vec<_> =
         inputs.iter().filter(|path| is_sigmf(path)).flat_map(|path| sigmf_files(path)).collect();
-    let inputs: Vec<_> = inputs.iter().copied().chain(pairs.iter().map(|path| path.as_path())).collect();
+    // Of x.mat:name the file is x.mat.
+    let arrays: Vec<_> = inputs.iter().filter_map(|path| mat_variable(path)).map(|(file, _)| file).collect();
+    let more = pairs.iter().chain(&arrays).map(|path| path.as_path());
+    let inputs: Vec<_> = inputs.iter().copied().chain(more).collect();
     refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
     name_leftovers(&outputs);
     Ok(())

@@ -103,6 +103,15 @@ pub enum IoError {
         /// Place, reason and remedy.
         problem: String,
     },
+    /// A recording that this program was built without the decoders for.
+    #[error(
+        "{file}: this hybank was built without decoders for FLAC, MP3, AIFF and Ogg; build it with them (cargo install \
+         --path . --features audio), or give a pipe: ffmpeg -i {file} -f wav -c:a pcm_f32le - | hybank fuse BANK.json -"
+    )]
+    Encoded {
+        /// Name of the file.
+        file: String,
+    },
     /// An input lacks the channel that was chosen.
     #[error("--channel {channel}: {file} has {channels} channels, counted from 1")]
     NoChannel {

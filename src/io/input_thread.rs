@@ -2,6 +2,7 @@
 
 use super::csv::CsvReader;
 use super::kind::Kind;
+use super::mat::{MatArray, MatReader, mat_variable};
 use super::notes::InputNotes;
 use super::npy::{NpyHeader, PlanarReader};
 use super::pipe::{stdin_file, widen_pipe};
@@ -111,6 +112,8 @@ pub(super) fn read(source: InputSource, messages: Sender<Result<Message, IoError
         Kind::Archive => reader.read_archive(),
         Kind::Csv => reader.read_csv(),
         Kind::Npy => reader.read_npy(),
+        Kind::Mat => reader.read_mat(),
+        Kind::Audio => reader.read_audio(),
         Kind::Raw => reader.read_raw(),
         Kind::Wav => reader.read_wav(),
     };
@@ -177,6 +180,40 @@ impl Reader {
         };
         self.send_header(chosen, Timestamps::default());
         self.send_turns(FrameReader::new(reader, frame, Some(bytes)), header)
+    }
+
+    fn read_mat(&self) -> Result<Message, IoError> {
+        let named = mat_variable(&self.source.path);
+        let (path, wanted) = named.unwrap_or_else(|| (self.source.path.clone(), None));
+        let mut file = open_file(&path)?;
+        if !file.metadata().is_ok_and(|found| found.is_file()) {
+            let problem =
+                "its variables are in any order, which a pipe cannot give; save it to a file".into();
+            return Err(IoError::Malformed {
+                file: self.name.clone(),
+                kind: "a MATLAB file of samples",
+                problem,
+            });
+        }
+        let array = MatArray::read(&mut file, wanted, &path.display().to_string())?;
+        let header = array.stream_header();
+        self.send_header(self.source.chosen(header)?, Timestamps::default());
+        self.send_turns(FrameReader::new(MatReader::new(array), header.frame_bytes(), None), header)
+    }
+
+    #[cfg(feature = "audio")]
+    fn read_audio(&self) -> Result<Message, IoError> {
+        let reader = super::audio::DecodedReader::open(&self.source.path, &self.name)?;
+        let header = reader.stream_header();
+        self.send_header(self.source.chosen(header)?, Timestamps::default());
+        self.send_turns(FrameReader::new(reader, header.frame_bytes(), None), header)
+    }
+
+    #[cfg(not(feature = "audio"))]
+    fn read_audio(&self) -> Result<Message, IoError> {
+        // A name that does not exist is the more useful message.
+        open_file(&self.source.path)?;
+        Err(IoError::Encoded { file: self.name.clone() })
     }
 
     /// Sends frames of one channel or more, or turns.

@@ -1,6 +1,6 @@
 //! Which kind of file an input is, by its name.
 
-use super::{Coding, is_sigmf};
+use super::{Coding, is_sigmf, mat_variable};
 use std::path::Path;
 
 /// A kind of input.
@@ -11,6 +11,9 @@ pub(super) enum Kind {
     Archive,
     Csv,
     Npy,
+    Mat,
+    /// A recording that must be decoded.
+    Audio,
     Raw,
     Wav,
 }
@@ -24,6 +27,8 @@ impl Kind {
             Some("sigmf") => Self::Archive,
             Some("csv") => Self::Csv,
             Some("npy") => Self::Npy,
+            Some("flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga") => Self::Audio,
+            _ if mat_variable(path).is_some() => Self::Mat,
             _ if coding == Coding::Wav => Self::Wav,
             _ => Self::Raw,
         }
@@ -31,7 +36,7 @@ impl Kind {
 }
 
 /// True for inputs that state their own format and channels whatever the [`Coding`] is: SigMF recordings and
-/// archives, tables and arrays.
+/// archives, tables, arrays, and recordings that are decoded.
 pub fn is_self_describing(path: &Path) -> bool {
     !matches!(Kind::of(path, Coding::Wav), Kind::Wav | Kind::Raw)
 }

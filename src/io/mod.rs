@@ -1,9 +1,11 @@
-//! Input and output of samples: WAV, SigMF, tables, NumPy arrays, raw PCM, and lists of lost samples.
+//! Input and output of samples: WAV, SigMF, tables, NumPy and MATLAB arrays, raw PCM, and lists of lost samples.
 //!
 //! A *frame* holds one sample of each channel of a file or stream. A sample is stored in one of the
 //! [`PcmFormat`]s; the full scale of integer formats is 1.0.
 
 mod aligned_input;
+#[cfg(feature = "audio")]
+mod audio;
 mod csv;
 mod dropouts;
 mod error;
@@ -14,6 +16,7 @@ mod input_thread;
 mod kind;
 mod live_lost;
 mod lost;
+mod mat;
 mod multi_reader;
 mod notes;
 mod npy;
@@ -38,6 +41,7 @@ pub use frames::FrameReader;
 pub use kind::is_self_describing;
 pub use live_lost::LiveLost;
 pub use lost::LostSamples;
+pub use mat::{MatArray, MatReader, mat_variable};
 pub use multi_reader::{Arrival, MultiReader};
 pub use notes::{OutputNotes, Placement};
 pub use npy::NpyHeader;

@@ -156,6 +156,73 @@ fn measure_and_calibrate_take_the_same_kinds() {
     desk.refused(2, &["measure", "2.raw", "--format", "f31"], &["f31"]);
 }
 
+/// Files that SciPy wrote (tools/mat_fixtures.py): the two channels of one array, and two arrays of one file.
+#[test]
+fn captures_of_matlab_are_fused() {
+    let desk = Desk::new();
+    let seeds = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/mat");
+    for name in ["compressed.mat", "several.mat", "complex.mat"] {
+        std::fs::copy(seeds.join(name), desk.path(name)).unwrap();
+    }
+    let formula = |k: usize, c: usize| ((7 * k + 3 * c) % 11) as f32 / 8.0 - 0.625;
+    let want = fused(&(0..40).flat_map(|k| [formula(k, 0), formula(k, 1)]).collect::<Vec<_>>());
+    for inputs in [&["compressed.mat"][..], &["several.mat:left", "several.mat:right"]] {
+        desk.report(&[&["fuse", "bank.json"], inputs, &["-o", "y.wav", "--keep-latency"]].concat());
+        let (spec, got) = wav::read(&desk.path("y.wav"));
+        // Only one of the files states a rate.
+        let rate = if inputs.len() == 1 { 48_000 } else { 1 };
+        assert_eq!((got, spec.sample_rate), (want.clone(), rate), "{inputs:?}");
+    }
+    let streamed = desk.run(&["stream", "bank.json", "--input", "compressed.mat"], &[]);
+    assert!(floats(&streamed.stdout) == want, "{streamed:?}");
+    let measured = desk.report(&["measure", "compressed.mat", "--channel", "1"]);
+    assert_eq!(measured["rate_hertz"], 24_000.0, "{measured}");
+    desk.refused(
+        1,
+        &["fuse", "bank.json", "several.mat", "-o", "n.wav"],
+        &["choose one, as several.mat:left"],
+    );
+    let same = ["fuse", "bank.json", "several.mat:left", "several.mat:right", "-o", "several.mat", "--force"];
+    desk.refused(1, &same, &["several.mat"]);
+}
+
+/// Without the feature `audio`: which build reads it, and which pipe does without.
+#[cfg(not(feature = "audio"))]
+#[test]
+fn encoded_recordings_name_the_feature_and_the_pipe() {
+    let desk = Desk::new();
+    desk.write("a.flac", "fLaC");
+    let parts = ["a.flac", "--features audio", "ffmpeg -i a.flac -f wav", "| hybank fuse BANK.json -"];
+    desk.refused(1, &["fuse", "bank.json", "a.flac", "-o", "y.wav"], &parts);
+    desk.refused(1, &["measure", "b.mp3"], &["b.mp3: cannot open it"]);
+}
+
+/// Recordings made by ffmpeg and sox (audio/tests/make.sh), as captures.
+#[cfg(feature = "audio")]
+#[test]
+fn encoded_recordings_are_captures() {
+    let desk = Desk::new();
+    let fixtures = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("audio/tests/fixtures");
+    let sample =
+        |n: usize, f: f64| (16e3 * (std::f64::consts::TAU * f * n as f64 / 24e3).sin()).round() as f32;
+    let input: Vec<f32> =
+        (0..3000).flat_map(|n| [sample(n, 1e3), sample(n, 1.7e3)].map(|x| x / 32768.0)).collect();
+    for name in ["two.flac", "two.aiff"] {
+        std::fs::copy(fixtures.join(name), desk.path(name)).unwrap();
+        let report = desk.report(&["fuse", "bank.json", name, "-o", "y.wav", "--keep-latency"]);
+        assert_eq!(report["samples"], 6000);
+        assert!(wav::read(&desk.path("y.wav")).1 == fused(&input), "{name}");
+    }
+    for name in ["two.mp3", "two.ogg"] {
+        std::fs::copy(fixtures.join(name), desk.path(name)).unwrap();
+        let measured = desk.report(&["measure", name, "--channel", "2"]);
+        let found = measured["tones"][0]["frequency_hertz"]["value"].as_f64().unwrap();
+        assert!((found - 1700.0).abs() < 1.0, "{measured}");
+    }
+    let page = desk.run(&["fuse", "bank.json", "two.flac", "-o", "y.flac"], &[]);
+    assert_eq!(page.status.code(), Some(2));
+}
+
 /// Complex frames of two channels, and their real and imaginary parts as real frames.
 fn complex(count: usize) -> (Vec<f32>, [Vec<f32>; 2]) {
     let parts = [frames(count), frames(count + 100)[200..].to_vec()];

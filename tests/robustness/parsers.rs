@@ -7,10 +7,10 @@ use hybank::analog::fit::{MeasuredResponse, vector_fit};
 use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::wav::WavReader;
-use hybank::io::{CsvReader, LostSamples, NpyHeader, SigmfMeta, tar_files};
+use hybank::io::{CsvReader, LostSamples, MatArray, MatReader, NpyHeader, SigmfMeta, tar_files};
 use hybank::spec::Spec;
 use std::fs;
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// Damaged copies of each seed.
@@ -100,6 +100,22 @@ fn tables_and_arrays_of_samples() {
         Some(header) => {
             answers += 1;
             assert!(header.channels > 0 && header.offset <= bytes.len() as u64);
+        }
+    });
+    assert!(answers > 1000 && refusals > 1000, "{answers} {refusals}");
+}
+
+#[test]
+fn arrays_of_matlab() {
+    let (mut answers, mut refusals) = (0, 0);
+    damaged("mat", |bytes| match answered(MatArray::read(&mut Cursor::new(bytes), None, "seed")) {
+        None => refusals += 1,
+        Some(array) => {
+            answers += 1;
+            let header = array.stream_header();
+            let mut frames = Vec::new();
+            MatReader::new(array).read_to_end(&mut frames).unwrap();
+            assert_eq!(frames.len() as u64, header.promised.unwrap() * header.frame_bytes() as u64);
         }
     });
     assert!(answers > 1000 && refusals > 1000, "{answers} {refusals}");

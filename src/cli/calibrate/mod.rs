@@ -42,7 +42,7 @@ takes their zones from the delays of the spec.")]
 pub(super) struct Args {
     /// The spec (TOML) with the nominal values; `-` is standard input
     spec: PathBuf,
-    /// One mono recording per channel (WAV, SigMF, .csv, .npy, or raw with --format), in the order of the spec,
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), in the order of the spec,
     /// or one of N channels
     #[arg(required = true)]
     captures: Vec<PathBuf>,

@@ -26,7 +26,7 @@ Examples:
   hybank measure fused.wav --skip 200 --json | jq .sinad_db
   hybank measure fused.wav --ref captures/target.wav")]
 pub(super) struct Args {
-    /// The recording (WAV, SigMF, .csv, .npy, or raw with --format); `-` is standard input
+    /// The recording (WAV, SigMF, .csv, .npy, .mat, or raw with --format); `-` is standard input
     file: PathBuf,
     /// Tones of the recording (9kHz, 1.2GHz, or hertz), in any Nyquist zone, to within 0.1 % of the sample
     /// rate; auto: the largest tone [default: auto, or none with --ref]

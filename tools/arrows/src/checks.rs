@@ -8,8 +8,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Libraries of the workspace, each with its folder; `hybank` is divided into rooms, the others are rooms themselves.
-const LIBRARIES: [(&str, &str); 4] = [
+const LIBRARIES: [(&str, &str); 5] = [
     ("hybank", "src"),
+    ("hybank_audio", "audio/src"),
     ("hybank_linalg", "linalg/src"),
     ("hybank_runtime", "runtime/src"),
     ("hybank_ibr", "ibr/src"),

@@ -1,0 +1,209 @@
+//! Data elements: a tag with type and size, and bytes; some of them compressed.
+
+use miniz_oxide::inflate::stream::{InflateState, inflate};
+use miniz_oxide::{DataFormat, MZError, MZFlush, MZStatus};
+use std::io::{self, Read};
+
+/// Most bytes of the numbers of an array, which are held in memory.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Order of the bytes of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    Little,
+    Big,
+}
+
+impl Order {
+    pub(super) fn u32(self, bytes: [u8; 4]) -> u32 {
+        match self {
+            Self::Little => u32::from_le_bytes(bytes),
+            Self::Big => u32::from_be_bytes(bytes),
+        }
+    }
+
+    /// The first `N` bytes, the least significant one first.
+    fn little<const N: usize>(self, bytes: &[u8]) -> Option<[u8; N]> {
+        let mut bytes: [u8; N] = bytes.get(..N)?.try_into().ok()?;
+        if self == Self::Big {
+            bytes.reverse();
+        }
+        Some(bytes)
+    }
+}
+
+/// Type and size of an element.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tag {
+    pub(super) kind: u32,
+    pub(super) size: u64,
+    /// The bytes of an element of up to four of them, which stand in its tag.
+    small: Option<[u8; 4]>,
+}
+
+/// Type of a variable, and of a compressed one.
+pub(super) const MATRIX: u32 = 14;
+pub(super) const COMPRESSED: u32 = 15;
+
+impl Tag {
+    /// Bytes of a tag.
+    pub(super) const BYTES: u64 = 8;
+
+    /// `None` at the end.
+    pub(super) fn read(reader: &mut impl Read, order: Order) -> io::Result<Option<Self>> {
+        let mut bytes = [0; 8];
+        match fill(reader, &mut bytes)? {
+            0 => return Ok(None),
+            8 => {}
+            _ => return Err(io::ErrorKind::UnexpectedEof.into()),
+        }
+        let [a, b, c, d, e, f, g, h] = bytes;
+        let (first, second) = (order.u32([a, b, c, d]), [e, f, g, h]);
+        let small = u64::from(first >> 16);
+        Ok(Some(match small {
+            0 => Self { kind: first, size: u64::from(order.u32(second)), small: None },
+            _ => Self { kind: first & 0xFFFF, size: small, small: Some(second) },
+        }))
+    }
+
+    /// Bytes after the tag.
+    pub(super) fn after(self) -> u64 {
+        if self.small.is_some() { 0 } else { self.size }
+    }
+
+    /// The bytes of the element after its tag, at most `most`.
+    pub(super) fn content(self, reader: &mut impl Read, most: u64) -> Result<Vec<u8>, String> {
+        if let Some(bytes) = self.small {
+            let known = bytes.get(..self.size as usize).ok_or("a tag is damaged; save the file again")?;
+            return Ok(known.to_vec());
+        }
+        if self.size > most {
+            return Err(format!("{} bytes, more than {most}; save a part of it", self.size));
+        }
+        let mut bytes = Vec::new();
+        // Elements are filled up to eight bytes; the last one of a file may not be.
+        let padding = self.size.next_multiple_of(8) - self.size;
+        let read = reader.by_ref().take(self.size).read_to_end(&mut bytes);
+        read.and_then(|_| io::copy(&mut reader.by_ref().take(padding), &mut io::sink()))
+            .map_err(unreadable)?;
+        if (bytes.len() as u64) < self.size {
+            return Err(format!("it ends after {} of {} bytes; copy it again", bytes.len(), self.size));
+        }
+        Ok(bytes)
+    }
+}
+
+/// As a problem of a file.
+pub(super) fn unreadable(error: io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => "it ends inside a variable; copy it again".into(),
+        _ => format!("cannot read it: {error}"),
+    }
+}
+
+/// Reads until `bytes` are full or the end; gives how many there are.
+pub(super) fn fill(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while filled < bytes.len() {
+        match reader.read(&mut bytes[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(filled)
+}
+
+/// The numbers of one part of an array, as stored.
+#[derive(Debug)]
+pub(super) struct Numbers {
+    kind: u32,
+    bytes: Vec<u8>,
+}
+
+impl Numbers {
+    /// `count` numbers; they may have fewer bytes than their class.
+    pub(super) fn read(reader: &mut impl Read, order: Order, count: u64) -> Result<Self, String> {
+        let tag = Tag::read(reader, order).map_err(unreadable)?;
+        let tag = tag.ok_or("its numbers are missing; copy it again")?;
+        let size = Self::size(tag.kind)
+            .ok_or_else(|| format!("numbers of type {}, which is unknown; save it again", tag.kind))?;
+        if count.checked_mul(size) != Some(tag.size) {
+            let stored = tag.size / size;
+            return Err(format!("its shape needs {count} numbers, but there are {stored}; save it again"));
+        }
+        Ok(Self { kind: tag.kind, bytes: tag.content(reader, MOST_BYTES)? })
+    }
+
+    /// Bytes of a number of this type.
+    fn size(kind: u32) -> Option<u64> {
+        match kind {
+            1 | 2 => Some(1),
+            3 | 4 => Some(2),
+            5..=7 => Some(4),
+            9 | 12 | 13 => Some(8),
+            _ => None,
+        }
+    }
+
+    /// Number `index`.
+    pub(super) fn get(&self, index: usize, order: Order) -> Option<f64> {
+        let size = Self::size(self.kind)? as usize;
+        let bytes = self.bytes.get(index.checked_mul(size)?..)?;
+        Some(match self.kind {
+            1 => f64::from(i8::from_le_bytes(order.little(bytes)?)),
+            2 => f64::from(u8::from_le_bytes(order.little(bytes)?)),
+            3 => f64::from(i16::from_le_bytes(order.little(bytes)?)),
+            4 => f64::from(u16::from_le_bytes(order.little(bytes)?)),
+            5 => f64::from(i32::from_le_bytes(order.little(bytes)?)),
+            6 => f64::from(u32::from_le_bytes(order.little(bytes)?)),
+            7 => f64::from(f32::from_le_bytes(order.little(bytes)?)),
+            9 => f64::from_le_bytes(order.little(bytes)?),
+            12 => i64::from_le_bytes(order.little(bytes)?) as f64,
+            _ => u64::from_le_bytes(order.little(bytes)?) as f64,
+        })
+    }
+}
+
+/// Compressed bytes (zlib), read as what they stand for.
+pub(super) struct Inflater<R> {
+    compressed: R,
+    state: Box<InflateState>,
+    input: Vec<u8>,
+    used: usize,
+}
+
+impl<R: Read> Inflater<R> {
+    pub(super) fn new(compressed: R) -> Self {
+        Self { compressed, state: InflateState::new_boxed(DataFormat::Zlib), input: Vec::new(), used: 0 }
+    }
+
+    fn refill(&mut self) -> io::Result<()> {
+        self.input.resize(1 << 14, 0);
+        let filled = fill(&mut self.compressed, &mut self.input)?;
+        self.input.truncate(filled);
+        self.used = 0;
+        Ok(())
+    }
+}
+
+impl<R: Read> Read for Inflater<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        loop {
+            if self.used == self.input.len() {
+                self.refill()?;
+            }
+            let step = inflate(&mut self.state, &self.input[self.used..], bytes, MZFlush::None);
+            self.used += step.bytes_consumed;
+            let is_stuck = step.bytes_consumed == 0;
+            match step.status {
+                _ if step.bytes_written > 0 || bytes.is_empty() => return Ok(step.bytes_written),
+                Ok(MZStatus::StreamEnd) => return Ok(0),
+                Ok(_) | Err(MZError::Buf) if !is_stuck => {}
+                Ok(_) | Err(MZError::Buf) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Err(_) => return Err(io::Error::other("its compressed bytes are damaged; copy it again")),
+            }
+        }
+    }
+}
