@@ -24,18 +24,25 @@ pub(super) fn say_understood(spec: Option<&Spec>) {
 }
 
 fn rates(spec: &Spec) -> String {
-    let converters = spec.channels.len();
+    let (converters, ratio) = (spec.channels.len(), spec.ratio);
     if spec.is_normalised() {
-        return format!("normalised time (fast period 1) from {converters} x 1/{} of the rate", spec.ratio);
+        let who = if converters == 1 { "one converter".into() } else { format!("{converters} converters") };
+        let rate =
+            if ratio == 1 { "the output rate".into() } else { format!("1/{ratio} of the output rate") };
+        return format!("normalised time (fast period 1) from {who} at {rate}");
     }
     let fast = spec.fast_period.rate().0;
-    let slow = readable(fast / spec.ratio as f64, "S/s");
-    format!("{} from {converters} x {slow}", readable(fast, "S/s"))
+    let (output, slow) = (readable(fast, "S/s"), readable(fast / ratio as f64, "S/s"));
+    match converters {
+        1 if ratio == 1 => format!("{output} from one converter of the same rate"),
+        1 => format!("{output} from one converter at {slow}"),
+        _ => format!("{output} from {converters} x {slow}"),
+    }
 }
 
 fn target(spec: &Spec) -> Option<String> {
     let edge = StrictlyProper::new(&spec.target, spec.fast_period).ok()?.half_power_frequency().0;
-    let share = format!("{:.2} of Nyquist", edge / PI);
+    let share = format!("{} of Nyquist", two_digits(edge / PI));
     if spec.is_normalised() {
         return Some(format!("target -3 dB at {share}"));
     }
@@ -47,16 +54,30 @@ fn delays(spec: &Spec) -> String {
     let all = spec.delays_in_fast_periods();
     let shown: Vec<String> = all.iter().take(MOST_DELAYS).map(|delay| rounded(delay.0)).collect();
     let rest = if all.len() > MOST_DELAYS { ", .." } else { "" };
-    format!("delays {}{rest} samples", shown.join(", "))
+    match shown[..] {
+        [ref only] => format!("delay {}", samples(only)),
+        _ => format!("delays {}{rest} samples", shown.join(", ")),
+    }
 }
 
 fn latency(spec: &Spec) -> Option<String> {
-    let samples = spec.latency?;
-    if spec.is_normalised() {
-        return Some(format!("latency {samples} samples"));
+    let latency = spec.latency?;
+    let text = format!("latency {}", samples(&latency.to_string()));
+    if spec.is_normalised() || latency == 0 {
+        return Some(text);
     }
-    let time = readable(spec.fast_period.0 * samples as f64, "s");
-    Some(format!("latency {samples} samples = {time}"))
+    Some(format!("{text} = {}", readable(spec.fast_period.0 * latency as f64, "s")))
+}
+
+/// A number of samples, which is a plural unless it is 1.
+fn samples(count: &str) -> String {
+    format!("{count} sample{}", if count == "1" { "" } else { "s" })
+}
+
+/// A share with two digits after the point, or more where both would be zeros.
+fn two_digits(share: f64) -> String {
+    let leading = if share > 0.0 { (-share.log10()).ceil().clamp(1.0, 12.0) as usize } else { 1 };
+    format!("{share:.*}", leading + 1)
 }
 
 /// In at most seven digits after the point, without trailing zeros.
@@ -84,6 +105,39 @@ mod tests {
         );
     }
 
+    /// One channel, the ratio 1, no latency, a low cut-off.
+    #[test]
+    fn odd_specs_are_said_plainly() {
+        let said = |rate: &str, ratio: usize, latency: usize, delay: &str| {
+            let spec = Spec::from_toml(
+                &format!(
+                    "{rate}\nratio = {ratio}\nlatency = {latency}\nchannel = [{{ delay = {delay} }}]\n\
+                     target = {{ filter = {{ num = [0.025], den = [1.0, 0.025] }} }}\ndesign = {{ method = \"iir\" }}"
+                ),
+                "spec.toml",
+            );
+            understood(&spec.unwrap())
+        };
+        let normalised = "normalised time (fast period 1) from one converter at";
+        assert_eq!(
+            said("fast_period = 1.0", 1, 1, "1"),
+            format!(
+                "{normalised} the output rate; target -3 dB at 0.0080 of Nyquist; delay 1 sample; latency 1 sample"
+            )
+        );
+        assert!(
+            said("fast_period = 1.0", 3, 0, "0")
+                .starts_with(&format!("{normalised} 1/3 of the output rate;"))
+        );
+        assert!(
+            said("fast_rate = \"8 S/s\"", 1, 0, "0")
+                .starts_with("8 S/s from one converter of the same rate;")
+        );
+        let last = said("fast_rate = \"8 S/s\"", 2, 0, "0");
+        assert!(last.starts_with("8 S/s from one converter at 4 S/s;"), "{last}");
+        assert!(last.ends_with("; delay 0 samples; latency 0 samples"), "{last}");
+    }
+
     #[test]
     fn normalised_time_has_no_unit() {
         let spec = Spec::from_toml(
@@ -94,7 +148,7 @@ mod tests {
         );
         assert_eq!(
             understood(&spec.unwrap()),
-            "normalised time (fast period 1) from 2 x 1/2 of the rate; target -3 dB at 0.10 of Nyquist; \
+            "normalised time (fast period 1) from 2 converters at 1/2 of the output rate; target -3 dB at 0.10 of Nyquist; \
              delays 1.2, 0.6 samples; latency 10 samples"
         );
     }

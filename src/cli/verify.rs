@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::bank_file::{is_a_spec, name, read_text};
+use super::design::report::counted;
 use super::file_kind::FileKind;
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
@@ -124,7 +125,7 @@ impl Report {
             BoundedBanks::Any => "no bank at all is better".to_owned(),
             BoundedBanks::Causal => "no causal bank of this latency is better".to_owned(),
             BoundedBanks::FirOfThisLength => {
-                format!("no FIR bank of {} taps per channel is better", self.taps)
+                format!("no FIR bank of {} per channel is better", counted(self.taps, "tap"))
             }
         }
     }

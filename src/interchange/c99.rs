@@ -37,7 +37,7 @@ fn about(bank: &Bank, name: &str) -> String {
     format!(
         "/* {title}\n   Written by hybank. C99, no allocation, no library.\n\n   \
          {name}_reset clears a state. {name}_process takes the samples of one slow period, one of each of the {}\n   \
-         channels, and writes the {} output samples of that period. The output is {} samples late.\n   \
+         channels, and writes the {} output samples of that period. Its latency is {} (output samples).\n   \
          gamma of these coefficients in exact arithmetic: {}, upper bound {}, lower bound {}.\n   \
          Sums are taken in the order written; -ffp-contract=off gives the same bits with every compiler. */\n",
         bank.channel_count(),

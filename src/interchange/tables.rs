@@ -90,7 +90,7 @@ fn description(bank: &Bank, words: &FixedPoint, taps: &PolyphaseTaps<i64>) -> [S
     let PolyphaseTaps { channels, ratio, lags, .. } = taps;
     [
         format!(
-            "hybank: {channels} channels x {ratio} phases x {lags} lags, lags fastest; latency {} samples",
+            "hybank: {channels} channels x {ratio} phases x {lags} lags, lags fastest; latency {} (output samples)",
             bank.latency
         ),
         format!(

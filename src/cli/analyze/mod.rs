@@ -6,7 +6,7 @@ mod worst_case;
 
 use super::Failure;
 use super::bank_file::{is_dash, load, refuse_overlap};
-use super::design::report::{against, decibels};
+use super::design::report::{against, decibels, frequency};
 use super::understood::understood;
 use crate::bank::Bank;
 use crate::design::{self, Analysis, Certified, DesignError, GammaScale, MeanAnalysis};
@@ -101,6 +101,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let report = Report {
         understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
+        is_normalised: bank.is_normalised(),
         scale: GammaScale::new(&bank).map_err(named)?,
         analysis,
         certified,
@@ -147,6 +148,8 @@ impl Args {
 struct Report {
     /// The spec in units of the user.
     understood: String,
+    #[serde(skip)]
+    is_normalised: bool,
     scale: GammaScale,
     #[serde(flatten)]
     analysis: Analysis,
@@ -174,16 +177,22 @@ impl Report {
             "{}\n\
              gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n\
              scale        {}, {}\n{proof}\
-             worst at     {peak_hertz:.6} modulo the slow rate\n\
+             worst at     {} modulo the slow rate\n\
              noncausal    {noncausal}\n\
              rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
              SNR          {} for a signal with the target's spectrum\n\
              noise gain   {noise_gain:.6}      for independent noise on the slow samples\n\
-             output noise {output_noise:.6e}  of full scale, for the converters' noise in the spec\n{}",
+             output noise {}\n{}",
             self.understood,
             against(gamma, self.scale.zero_output, "zero output"),
             against(gamma, self.scale.interleaving, "plain interleaving"),
+            frequency(peak_hertz, self.is_normalised),
             decibels(self.scale.rms_reference, rms_error),
+            if output_noise == 0.0 {
+                "none: the spec gives the converters no noise".to_owned()
+            } else {
+                format!("{output_noise:.6e}  of full scale, for the converters' noise in the spec")
+            },
             self.errors.text()
         )
     }

@@ -41,6 +41,8 @@ pub(in crate::cli) struct Report<'a> {
     scale: GammaScale,
     /// Hertz, at the slow rate to which all frequencies alias.
     peak_hertz: Hertz,
+    #[serde(skip)]
+    is_normalised: bool,
     iterations: usize,
     seconds: f64,
     #[serde(flatten)]
@@ -157,6 +159,7 @@ impl<'a> Report<'a> {
             mean,
             scale,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
+            is_normalised: bank.is_normalised(),
             iterations: design.iterations,
             seconds,
             proof: ProofReport::of(design),
@@ -172,7 +175,7 @@ impl<'a> Report<'a> {
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.robust.map(|study| robust_text(study, self.gamma.worst_case)).unwrap_or_default(),
             self.tracking.map(|study| tracking_text(study, self.gamma.tracked)).unwrap_or_default(),
-            format!("designed in {:.1} ms, {} iterations\n", self.seconds * 1e3, self.iterations),
+            format!("designed in {:.1} ms, {}\n", self.seconds * 1e3, counted(self.iterations, "iteration")),
             self.proof.text(),
         ];
         parts.concat()
@@ -210,11 +213,11 @@ impl Report<'_> {
     fn gamma_text(&self) -> String {
         let Gamma { norm, lower, noncausal, .. } = *self.gamma;
         format!(
-            "gamma      {} (computed norm of this bank; worst at {:.4} modulo the slow rate)\n\
+            "gamma      {} (computed norm of this bank; worst at {} modulo the slow rate)\n\
              {}lower      {} ({})\n\
              noncausal  {} ({})\n",
             number(norm),
-            self.peak_hertz,
+            frequency(self.peak_hertz, self.is_normalised),
             self.scale_text(),
             number(lower),
             self.lower_meaning(),
@@ -241,10 +244,15 @@ impl Report<'_> {
         format!(
             "H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              SNR        {} for a signal with the target's spectrum\n\
-             noise gain {} (converters' noise at the output: {output_noise:.3e} of full scale)\n",
+             noise gain {} ({})\n",
             number(Some(rms_error)),
             decibels(self.scale.rms_reference, rms_error),
             number(Some(noise_gain)),
+            if output_noise == 0.0 {
+                "the spec gives the converters no noise".to_owned()
+            } else {
+                format!("converters' noise at the output: {output_noise:.3e} of full scale")
+            },
         )
     }
 
@@ -259,6 +267,9 @@ impl Report<'_> {
 
 /// gamma beside that of another bank.
 pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
+    if other == 0.0 {
+        return format!("{what} makes no error at all");
+    }
     format!("{} against {what} ({})", decibels(gamma, other), number(Some(other)))
 }
 
@@ -267,12 +278,18 @@ pub(in crate::cli) fn decibels(value: f64, reference: f64) -> String {
     if reference == 0.0 {
         "inf dB".to_owned()
     } else {
-        format!("{:.1} dB", 20.0 * (value / reference).log10())
+        // Adding zero takes the sign from a zero.
+        format!("{:.1} dB", (200.0 * (value / reference).log10()).round() / 10.0 + 0.0)
     }
 }
 
+/// A frequency with its unit; in normalised time it is a share of the output rate.
+pub(in crate::cli) fn frequency(hertz: Hertz, is_normalised: bool) -> String {
+    if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { format!("{hertz:.4}") }
+}
+
 /// A number of things, with a plural where it is not one.
-fn counted(count: usize, name: &str) -> String {
+pub(in crate::cli) fn counted(count: usize, name: &str) -> String {
     let ending = if count == 1 { "" } else { "s" };
     format!("{count} {name}{ending}")
 }
