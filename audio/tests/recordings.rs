@@ -68,7 +68,7 @@ fn what_cannot_be_decoded_is_refused() {
     let text = message(&write("text.flac", b"no recording at all"));
     assert!(text.contains("no FLAC, MP3, AIFF or Ogg"), "{text}");
     let whole = fs::read(fixture("two.flac")).unwrap();
-    let cut = message(&write("cut.flac", &whole[..whole.len() / 2]));
+    let cut = message(&write("cut.flac", &whole[..whole.len() - 1000]));
     assert!(cut.contains("damaged after"), "{cut}");
     let absent = message(&folder.join("absent.flac"));
     assert!(absent.contains("cannot read it"), "{absent}");

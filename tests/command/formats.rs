@@ -175,7 +175,7 @@ fn captures_of_matlab_are_fused() {
     }
     let streamed = desk.run(&["stream", "bank.json", "--input", "compressed.mat"], &[]);
     assert!(floats(&streamed.stdout) == want, "{streamed:?}");
-    let measured = desk.report(&["measure", "compressed.mat", "--channel", "1"]);
+    let measured = desk.report(&["measure", "compressed.mat", "--channel", "1", "--harmonics", "1"]);
     assert_eq!(measured["rate_hertz"], 24_000.0, "{measured}");
     desk.refused(
         1,
