@@ -72,7 +72,6 @@ pub(super) use register;
 
 impl Vector for Avx2F32 {
     type Sample = f32;
-    type Group = Self;
     const LANES: usize = 8;
     // Of 16 registers: 12 sums, 3 inputs and a coefficient.
     const SUMS: usize = 12;
@@ -234,7 +233,6 @@ impl Avx2F32 {
 
 impl Vector for Avx2F64 {
     type Sample = f64;
-    type Group = Self;
     const LANES: usize = 4;
     const SUMS: usize = 12;
 

@@ -92,7 +92,7 @@ pub(super) unsafe fn tile_f32<V, const D: usize, const P: usize, const R: usize>
     w: *const f32,
     steps: usize,
 ) -> Option<[[V; R]; P]> {
-    if cfg!(miri) || P != 4 || R != 3 {
+    if const { cfg!(miri) || P != 4 || R != 3 } {
         return None;
     }
     let zero = _mm256_setzero_ps();
@@ -118,7 +118,7 @@ pub(super) unsafe fn tile_f64<V, const D: usize, const P: usize, const R: usize>
     w: *const f64,
     steps: usize,
 ) -> Option<[[V; R]; P]> {
-    if cfg!(miri) || P != 4 || R != 3 {
+    if const { cfg!(miri) || P != 4 || R != 3 } {
         return None;
     }
     let zero = _mm256_setzero_pd();

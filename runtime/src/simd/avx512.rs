@@ -199,7 +199,6 @@ impl Avx512F32 {
 
 impl Vector for Avx512F32 {
     type Sample = f32;
-    type Group = Avx2F32;
     const LANES: usize = 16;
     // Of 32 registers: 24 sums, and the fewer of inputs and coefficients.
     const SUMS: usize = 24;
@@ -314,7 +313,6 @@ impl Avx512F64 {
 
 impl Vector for Avx512F64 {
     type Sample = f64;
-    type Group = Avx2F64;
     const LANES: usize = 8;
     const SUMS: usize = 24;
 

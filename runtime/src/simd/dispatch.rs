@@ -112,6 +112,17 @@ instruction_sets! {
     "aarch64" Neon neon "neon";
 }
 
+/// The function of a kernel that gains nothing from vectors wider than one lane group. Others are not compiled.
+pub(crate) fn compiled_narrow<K: Kernel>(isa: Isa) -> Compiled<K> {
+    match isa.kind() {
+        Kind::Portable => portable::<K>,
+        #[cfg(target_arch = "x86_64")]
+        Kind::Avx2 | Kind::Avx512 => avx2::<K>,
+        #[cfg(target_arch = "aarch64")]
+        Kind::Neon => neon::<K>,
+    }
+}
+
 unsafe fn portable<K: Kernel>(job: K::Job<'_>) -> K::Output {
     // SAFETY: every processor has these instructions; the rest is the caller's.
     unsafe { K::run::<<K::Sample as Element>::Portable>(job) }

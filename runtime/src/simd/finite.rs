@@ -1,6 +1,6 @@
 //! Whether samples are numbers.
 
-use super::dispatch::{Element, Kernel, compiled};
+use super::dispatch::{Element, Kernel, compiled_narrow};
 use super::isa::Isa;
 use super::vector::Vector;
 use std::marker::PhantomData;
@@ -11,7 +11,7 @@ const LANES: usize = 8;
 /// True only if all samples are finite; false also for sums past the largest number.
 pub(crate) fn all_finite<T: Element>(isa: Isa, samples: &[T]) -> bool {
     // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled::<AllFinite<T>>(isa.narrow())(samples) }
+    unsafe { compiled_narrow::<AllFinite<T>>(isa)(samples) }
 }
 
 struct AllFinite<T>(PhantomData<T>);

@@ -97,16 +97,6 @@ impl Isa {
         }
     }
 
-    /// The set with vectors of one lane group that this one includes: for kernels that gain nothing from
-    /// wider ones.
-    pub(super) const fn narrow(self) -> Self {
-        match self.0 {
-            #[cfg(target_arch = "x86_64")]
-            Kind::Avx512 => Self(Kind::Avx2),
-            kind => Self(kind),
-        }
-    }
-
     /// True if a multiply-add rounds once. The portable kernels round the product as well on processors
     /// without a fused multiply-add (x86-64 before 2013), so that their bits differ from those of all other
     /// sets.

@@ -25,7 +25,6 @@ macro_rules! neon {
     ($vector:ident, $sample:ty, $lanes:literal, $dup:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $fma:ident $fms:ident) => {
         impl Vector for $vector {
             type Sample = $sample;
-            type Group = Self;
             const LANES: usize = $lanes;
             // Of 32 registers: 12 sums of two, and room for inputs and coefficients.
             const SUMS: usize = 12;

@@ -5,7 +5,7 @@
 //! number is made by the same few operations, none of which could be fused, so the bits are the same
 //! everywhere.
 
-use super::dispatch::{Element, Kernel, compiled};
+use super::dispatch::{Element, Kernel, compiled_narrow};
 use super::isa::Isa;
 use super::vector::Vector;
 use std::marker::PhantomData;
@@ -49,14 +49,14 @@ macro_rules! with_constant {
 /// Frames of `n` samples apart, for whole pairs; each half has room for them.
 pub(crate) fn split<T: Element>(isa: Isa, frames: &[T], n: usize, to: Halves<'_, T>) {
     // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled::<Split<T>>(isa.narrow())((frames, n, to)) }
+    unsafe { compiled_narrow::<Split<T>>(isa)((frames, n, to)) }
 }
 
 /// The `m` samples of the first frame of each pair: even + odd of the pair before; those of the second one:
 /// 4 mean - even - odd.
 pub(crate) fn join<T: Element>(isa: Isa, from: Products<'_, T>, m: usize, out: &mut [T]) {
     // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled::<Join<T>>(isa.narrow())((from, m, out)) }
+    unsafe { compiled_narrow::<Join<T>>(isa)((from, m, out)) }
 }
 
 struct Split<T>(PhantomData<T>);

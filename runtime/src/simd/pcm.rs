@@ -1,6 +1,6 @@
 //! Samples of PCM formats to f32 and back, and frames from rows, a lane group at a time.
 
-use super::dispatch::{Kernel, compiled};
+use super::dispatch::{Kernel, compiled_narrow};
 use super::fir::widths;
 use super::isa::Isa;
 use super::vector::Vector;
@@ -13,13 +13,14 @@ const GROUP: usize = 8;
 /// Decodes samples from the first on as far as there is a fast way; returns how many. The caller does the
 /// rest.
 pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32]) -> usize {
-    let isa = isa.narrow();
     // SAFETY: the kernels ask nothing of their jobs.
     unsafe {
         match format {
-            PcmFormat::F32Le if cfg!(target_endian = "little") => compiled::<Decode<F32>>(isa)((bytes, out)),
-            PcmFormat::S16Le => compiled::<Decode<S16>>(isa)((bytes, out)),
-            PcmFormat::S32Le => compiled::<Decode<S32>>(isa)((bytes, out)),
+            PcmFormat::F32Le if cfg!(target_endian = "little") => {
+                compiled_narrow::<Decode<F32>>(isa)((bytes, out))
+            }
+            PcmFormat::S16Le => compiled_narrow::<Decode<S16>>(isa)((bytes, out)),
+            PcmFormat::S32Le => compiled_narrow::<Decode<S32>>(isa)((bytes, out)),
             _ => 0,
         }
     }
@@ -32,7 +33,7 @@ pub(crate) fn decode(isa: Isa, format: PcmFormat, bytes: &[u8], out: &mut [f32])
 pub(crate) fn encode(isa: Isa, format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
     assert!(samples.len() * format.bytes() <= out.len());
     // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled::<Encode>(isa.narrow())((format, samples, out)) }
+    unsafe { compiled_narrow::<Encode>(isa)((format, samples, out)) }
 }
 
 /// Sample p of frame k of `out` = `rows[p * stride + k]`, for frames of `m` samples; returns the
@@ -52,7 +53,7 @@ pub(crate) fn interleave(
     assert!(m == 0 || (m - 1) * stride + frames.next_multiple_of(GROUP) <= rows.len());
     let rows = rows.as_ptr();
     // SAFETY: the bounds are asserted above.
-    unsafe { compiled::<Interleave>(isa.narrow())(Rows { rows, stride, m, frames, out: out.as_mut_ptr() }) }
+    unsafe { compiled_narrow::<Interleave>(isa)(Rows { rows, stride, m, frames, out: out.as_mut_ptr() }) }
 }
 
 /// A format that has a fast way.

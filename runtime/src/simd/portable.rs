@@ -11,7 +11,6 @@ where
     T: Number,
 {
     type Sample = T;
-    type Group = Self;
     const LANES: usize = L;
     // 16 registers of 16 bytes hold 8 groups.
     const SUMS: usize = 4;

@@ -6,7 +6,7 @@
 //!
 //! Bits: each state is one chain of fused multiply-adds, over the inputs first, in one lane.
 
-use super::dispatch::{Compiled, Element, Kernel, compiled};
+use super::dispatch::{Compiled, Element, Kernel, compiled_narrow};
 use super::isa::Isa;
 use super::vector::{Vector, group_lanes};
 use crate::aligned::Aligned;
@@ -80,7 +80,7 @@ impl<T: Element> RecursionKernel<T> {
     /// The kernel for an instruction set, in vectors of one group: the few sections of a usual bank would
     /// leave wider ones empty.
     pub(crate) fn new(isa: Isa) -> Self {
-        Self { lanes: group_lanes::<T>(), run: compiled::<Body<T>>(isa.narrow()) }
+        Self { lanes: group_lanes::<T>(), run: compiled_narrow::<Body<T>>(isa) }
     }
 
     /// Goes on by `frames` frames: row 0 of `rows` (rows of S states) is the state before them, row t + 1

@@ -87,8 +87,6 @@ const MOST_LANES: usize = 16;
 pub(crate) trait Vector: Copy {
     /// The type of a lane.
     type Sample: Number;
-    /// A vector of one group.
-    type Group: Vector<Sample = Self::Sample, Group = Self::Group>;
     /// Lanes of the vector.
     const LANES: usize;
     /// Lanes of a group.

@@ -1,6 +1,6 @@
 //! The FIR kernels of an instruction set, by the samples of a step and the phases of a group.
 
-use super::super::dispatch::{Element, Kernel, compiled, vector_lanes};
+use super::super::dispatch::{Element, Kernel, compiled, compiled_narrow, vector_lanes};
 use super::super::isa::Isa;
 use super::super::vector::{Vector, group_lanes};
 use super::phases::Phases;
@@ -26,12 +26,7 @@ impl<T: Element, const D: usize, const P: usize> Kernel for Fir<T, D, P> {
         }
         // SAFETY: the caller's.
         unsafe {
-            if P == 1 {
-                // Groups are as wide as all that is gained.
-                Single::<V::Group, D>::new(job).run()
-            } else {
-                Phases::<V, D, P>::new(job).run()
-            }
+            if const { P == 1 } { Single::<V, D>::new(job).run() } else { Phases::<V, D, P>::new(job).run() }
         }
     }
 }
@@ -67,7 +62,7 @@ impl<T: Element> FirKernel<T> {
 
     fn of_depth<const D: usize>(self, width: usize) -> FirFn<T> {
         match width {
-            1 => compiled::<Fir<T, D, 1>>(self.isa.narrow()),
+            1 => compiled_narrow::<Fir<T, D, 1>>(self.isa),
             2 => compiled::<Fir<T, D, 2>>(self.isa),
             3 => compiled::<Fir<T, D, 3>>(self.isa),
             _ => compiled::<Fir<T, D, 4>>(self.isa),

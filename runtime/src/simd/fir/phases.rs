@@ -27,6 +27,8 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     const FRAMES: usize = V::LANES / D;
     /// Vectors of the largest tile.
     const MOST: usize = V::SUMS / P;
+    /// Whether tiles end in two parts.
+    const IN_PARTS: bool = D == 8;
 
     /// Samples from vector to vector; a constant where D = hop does not fill a group.
     #[inline(always)]
@@ -68,8 +70,10 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
             first += vectors * Self::FRAMES;
             left -= vectors;
         }
-        // SAFETY: the caller's.
-        unsafe { self.flush() };
+        if const { Self::IN_PARTS } {
+            // SAFETY: the caller's.
+            unsafe { self.flush() };
+        }
     }
 
     /// R vectors from frame `first` on.
@@ -82,12 +86,13 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         // SAFETY: the caller's.
         unsafe {
             // Where frames of a whole group follow each other the compiler can see it.
-            let sums = match self.job.tiling.hop {
-                hop if V::GROUPS > 1 && D == V::GROUP && hop == D => self.multiply::<R>(first, D),
-                hop => self.multiply::<R>(first, hop),
+            let hop = self.job.tiling.hop;
+            let sums = if const { V::GROUPS > 1 && D == V::GROUP } && hop == D {
+                self.multiply::<R>(first, D)
+            } else {
+                self.multiply::<R>(first, hop)
             };
-            self.flush();
-            if D < 8 {
+            if const { !Self::IN_PARTS } {
                 // Where outputs follow each other too.
                 match self.job.out_hop {
                     hop if hop == P => self.store(&sums, first, P),
@@ -95,6 +100,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
                 }
                 self.check(&sums[0]);
             } else {
+                self.flush();
                 self.check(&sums[0]);
                 (self.first, self.waiting) = (first, R);
                 self.reduce(&sums);
@@ -103,15 +109,17 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     }
 
     /// Remembers whether inputs are finite: they reach the sums of every phase, whatever the coefficients.
+    // Indices, because iterators of this many kernels are most of what is compiled here.
+    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn check<const R: usize>(&mut self, sums: &[V; R]) {
         let checked = self.job.tiling.checked;
         // Long filters are asked once a tile.
         if checked & const { (1 << (R - 1)) - 1 } != 0 {
-            for (r, sum) in sums[..R - 1].iter().enumerate() {
+            for r in 0..R - 1 {
                 if checked >> r & 1 == 1 {
                     keep_branch();
-                    self.total = self.total.add(*sum);
+                    self.total = self.total.add(sums[r]);
                 }
             }
         }
@@ -127,7 +135,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
             let sum = |p: usize, r: usize| sums[p.min(P - 1)][r];
             let at = |r: usize| out.add(r * Self::FRAMES * hop);
             for r in 0..R {
-                if P == 2 && D == 4 {
+                if const { P == 2 && D == 4 } {
                     let next = (r + 1).min(R - 1);
                     if r % 2 == 0 {
                         let halves = [sum(0, r), sum(1, r), sum(0, next), sum(1, next)];
@@ -184,7 +192,10 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
             // The smaller side waits in registers, the other one streams through a single one:
             // together with the sums they just fit.
             if const { P < R } {
-                let held: [V; P] = std::array::from_fn(|p| V::broadcast::<D>(w.add(p * D)));
+                let mut held = [V::zero(); P];
+                for p in 0..P {
+                    held[p] = V::broadcast::<D>(w.add(p * D));
+                }
                 for r in 0..R {
                     let input = V::frames::<D>(x.add(r * stride), hop);
                     for p in 0..P {
@@ -192,7 +203,10 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
                     }
                 }
             } else {
-                let held: [V; R] = std::array::from_fn(|r| V::frames::<D>(x.add(r * stride), hop));
+                let mut held = [V::zero(); R];
+                for r in 0..R {
+                    held[r] = V::frames::<D>(x.add(r * stride), hop);
+                }
                 for p in 0..P {
                     let coefficient = V::broadcast::<D>(w.add(p * D));
                     for r in 0..R {
@@ -242,7 +256,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         // SAFETY: the caller's.
         unsafe {
             let out = self.chunk.out.add(self.first * hop);
-            if P > 2 {
+            if const { P > 2 } {
                 return V::add_halves(self.job.scratch, vectors, out, hop);
             }
             for (twos, g) in (0..vectors.div_ceil(2)).flat_map(|twos| (0..V::GROUPS).map(move |g| (twos, g)))

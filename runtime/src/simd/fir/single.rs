@@ -60,7 +60,7 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
                     let to = if D < V::GROUP { out.add(first) } else { scratch.add(q * D) };
                     self.tiles(blocks * vectors, x, to);
                 }
-                if D == V::GROUP {
+                if const { D == V::GROUP } {
                     for block in 0..blocks {
                         let sums = scratch.add(block * V::GROUP * D);
                         let outputs = V::sum_frames::<D>(|t| V::load(sums.add(t * D)));
@@ -96,12 +96,14 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         let Pairing { apart, tiles, .. } = self.job.tiling.pairing;
         // SAFETY: the caller's.
         unsafe {
-            if vectors <= V::SUMS {
+            if const { D < V::GROUP } {
                 return self.tile_of(vectors, x, to);
             }
-            let half = vectors / 2;
-            self.tile_of(half, x, to);
-            self.tile_of(half, x.add(half * Self::stride(apart)), to.add(half * tiles * V::GROUP));
+            let parts = if vectors > V::SUMS { 2 } else { 1 };
+            let size = vectors / parts;
+            for first in (0..parts).map(|part| part * size) {
+                self.tile_of(size, x.add(first * Self::stride(apart)), to.add(first * tiles * V::GROUP));
+            }
         }
     }
 
@@ -125,12 +127,12 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         // read.
         unsafe {
             let mut sums = [V::zero(); R];
-            for _ in 0..blocks {
-                Self::pairs(x, w, apart, apart, &mut sums);
-                (x, w) = (x.wrapping_sub(2 * apart * D), w.wrapping_add(2 * apart * D));
+            // The pairs of the rest come after the last block.
+            for block in 0..=blocks {
+                let (count, steps) = if block < blocks { (apart, 2 * apart) } else { (pairs, pairs) };
+                Self::pairs(x, w, count, apart, &mut sums);
+                (x, w) = (x.wrapping_sub(steps * D), w.wrapping_add(2 * count * D));
             }
-            Self::pairs(x, w, pairs, apart, &mut sums);
-            (x, w) = (x.wrapping_sub(pairs * D), w.wrapping_add(2 * pairs * D));
             for _ in 0..singles {
                 let coefficient = V::broadcast::<D>(w);
                 for (r, sum) in sums.iter_mut().enumerate() {
@@ -138,7 +140,7 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
                 }
                 (x, w) = (x.wrapping_sub(D), w.wrapping_add(D));
             }
-            if D == V::GROUP {
+            if const { D == V::GROUP } {
                 for (r, sum) in sums.into_iter().enumerate() {
                     sum.store(to.add(r * tiles * V::GROUP));
                 }

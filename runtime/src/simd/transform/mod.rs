@@ -21,7 +21,7 @@ mod passes;
 mod product;
 mod scatter;
 
-use super::dispatch::{Element, compiled};
+use super::dispatch::{Element, compiled_narrow};
 use super::isa::Isa;
 use super::vector::group_lanes;
 use crate::aligned::Aligned;
@@ -232,10 +232,10 @@ impl<T: Element> TransformKernel<T> {
 macro_rules! by_depth {
     ($kernel:ident, $isa:expr) => {
         [
-            compiled::<$kernel<T, 1>>($isa),
-            compiled::<$kernel<T, 2>>($isa),
-            compiled::<$kernel<T, 4>>($isa),
-            compiled::<$kernel<T, 8>>($isa),
+            compiled_narrow::<$kernel<T, 1>>($isa),
+            compiled_narrow::<$kernel<T, 2>>($isa),
+            compiled_narrow::<$kernel<T, 4>>($isa),
+            compiled_narrow::<$kernel<T, 8>>($isa),
         ]
     };
 }
@@ -243,11 +243,10 @@ macro_rules! by_depth {
 impl<T: Element> TransformKernel<T> {
     /// The kernels for an instruction set, in vectors of one group.
     pub(crate) fn new(isa: Isa) -> Self {
-        let isa = isa.narrow();
         Self {
             forward: by_depth!(Forward, isa),
             product: by_depth!(Product, isa),
-            inverse: compiled::<Inverse<T>>(isa),
+            inverse: compiled_narrow::<Inverse<T>>(isa),
             scatter: by_depth!(Scatter, isa),
         }
     }
