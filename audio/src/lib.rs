@@ -1,8 +1,8 @@
 //! Reads recordings in FLAC, MP3, AIFF and Ogg Vorbis as interleaved samples.
 //!
-//! The decoders are those of symphonia, which are safe Rust. A recording is read to its end or refused: a packet
-//! that cannot be decoded is an error, not a gap that nobody hears of. Integers have the full scale 1.0 and keep all
-//! their bits.
+//! The decoders are those of symphonia, which are safe Rust. A recording is read to its end or refused: a
+//! packet that cannot be decoded is an error, not a gap that nobody hears of. Integers have the full scale
+//! 1.0 and keep all their bits.
 //!
 //! ```no_run
 //! let mut reader = hybank_audio::AudioReader::open("ch1.flac".as_ref())?;
@@ -161,8 +161,8 @@ impl AudioReader {
     }
 }
 
-/// Whether the number of frames in the file is exact. Lossy codecs have no bits per sample, and their number is
-/// often an estimate.
+/// Whether the number of frames in the file is exact. Lossy codecs have no bits per sample, and their number
+/// is often an estimate.
 fn is_lossless(codec: &AudioCodecParameters) -> bool {
     codec.bits_per_sample.is_some()
 }

@@ -1,5 +1,5 @@
-//! The examples of the thesis on hybrid filter banks (H. T. Nguyen, UIUC 2007, section 5.6): figures 5.8 to 5.17
-//! as charts, table 5.1, and a page that sets each beside what is known of the thesis's own.
+//! The examples of the thesis on hybrid filter banks (H. T. Nguyen, UIUC 2007, section 5.6): figures 5.8 to
+//! 5.17 as charts, table 5.1, and a page that sets each beside what is known of the thesis's own.
 //!
 //! ```text
 //! cargo run --release --example thesis -- [FOLDER]

@@ -1,4 +1,5 @@
-//! Impulse responses and frequency responses of synthesis filters and front ends, for those who look at them.
+//! Impulse responses and frequency responses of synthesis filters and front ends, for those who look at
+//! them.
 
 use super::analysis::bank_problem;
 use super::problem::{Channel, Problem};
@@ -81,11 +82,11 @@ pub fn front_end_gains(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Vec<f64
     Ok((0..points).map(at).collect())
 }
 
-/// The gains `||H_i(e^{j w})||` of the norm-equivalent analysis filters (thesis 5.16) of the target and of each
-/// channel at the fast rate, gains included, at `points` frequencies from 0 to 1/(2 h).
+/// The gains `||H_i(e^{j w})||` of the norm-equivalent analysis filters (thesis 5.16) of the target and of
+/// each channel at the fast rate, gains included, at `points` frequencies from 0 to 1/(2 h).
 ///
-/// H_i is a row whose entries depend on the choice of a square root; its norm does not. It is the gain of the front
-/// end with all its aliases: the square is the sum over k of `|Phi_i(j (w + 2 pi k))|^2`.
+/// H_i is a row whose entries depend on the choice of a square root; its norm does not. It is the gain of
+/// the front end with all its aliases: the square is the sum over k of `|Phi_i(j (w + 2 pi k))|^2`.
 ///
 /// # Errors
 /// As [`front_end_gains`].

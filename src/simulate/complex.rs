@@ -8,7 +8,8 @@ use std::str::FromStr;
 
 /// f(t) = sum of A e^{j (w t + phase)} over the exponentials, plus a real signal.
 ///
-/// A bank is real, so it runs on both parts, and so do virtual converters: sample the two [parts](Self::parts).
+/// A bank is real, so it runs on both parts, and so do virtual converters: sample the two
+/// [parts](Self::parts).
 ///
 /// ```
 /// use hybank::simulate::ComplexSource;

@@ -7,8 +7,8 @@ use super::response::Instants;
 use crate::design::Problem;
 use crate::units::FastPeriods;
 
-/// How a converter differs from the ideal sampler of a channel. Sample k of channel i, with the front end Phi_i
-/// and the gain g_i of the problem, is
+/// How a converter differs from the ideal sampler of a channel. Sample k of channel i, with the front end
+/// Phi_i and the gain g_i of the problem, is
 ///
 /// ```text
 /// q(level g_i (1 + gain error) (phi_i * f)(t_k) + offset + noise n_k)
