@@ -74,3 +74,44 @@ fn what_cannot_be_decoded_is_refused() {
     assert!(absent.contains("cannot read it"), "{absent}");
     fs::remove_dir_all(&folder).unwrap();
 }
+
+/// Damaged copies: an answer or a message, never a panic. `HYBANK_CAMPAIGN=N` damages N times as many.
+#[test]
+fn damaged_recordings_are_answered() {
+    let path = std::env::temp_dir().join(format!("hybank-audio-damaged-{}", std::process::id()));
+    let rounds = 150 * std::env::var("HYBANK_CAMPAIGN").ok().and_then(|n| n.parse().ok()).unwrap_or(1);
+    // Knuth's generator of linear congruences; its upper bits are used.
+    let mut state = 1u64;
+    let mut below = move |n: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % n
+    };
+    let (mut answers, mut refusals) = (0, 0);
+    for name in ["two.flac", "two.aiff", "two.mp3", "two.ogg"] {
+        let whole = fs::read(fixture(name)).unwrap();
+        for _ in 0..rounds {
+            let mut bytes = whole.clone();
+            for _ in 0..=below(4) {
+                // Half of the faults are in the header.
+                let room = if below(2) == 0 { bytes.len().min(200) } else { bytes.len() };
+                let place = below(room.max(1)).min(bytes.len() - 1);
+                match below(4) {
+                    0 => bytes.truncate(place.max(1)),
+                    1 => bytes[place] ^= 1 << below(8),
+                    2 => bytes[place] = [0, 0xFF, 0x7F, 0x80][below(4)],
+                    _ => drop(bytes.drain(place..(place + 1 + below(8)).min(bytes.len() - 1).max(place))),
+                }
+            }
+            fs::write(&path, &bytes).unwrap();
+            match read(&path) {
+                Ok((reader, samples)) => {
+                    answers += 1;
+                    assert_eq!(samples.len() % reader.channels(), 0);
+                }
+                Err(error) => refusals += usize::from(!error.to_string().is_empty()),
+            }
+        }
+    }
+    fs::remove_file(&path).unwrap();
+    assert!(answers > rounds / 3 && refusals > rounds / 3, "{answers} {refusals}");
+}
