@@ -142,6 +142,8 @@ pub(super) fn delay(z: &ComplexMatrix, periods: usize) -> ComplexMatrix {
 
 /// Maximum number of refinement steps. The better the condition, the more digits each step gains.
 const REFINEMENTS: usize = 6;
+/// They end where the residual falls by less than this.
+const LEAST_GAIN: f64 = 0.1;
 
 /// (z I - a)^-1 right, as a real system B x = r of twice the order.
 ///
@@ -159,12 +161,21 @@ fn resolved(a: &Matrix, z: &ComplexMatrix, right: &ComplexMatrix) -> ComplexMatr
     let right = right.stacked();
     let inverse = linalg::inverse(&ball::nearest(&shifted));
     let residual = |x: &Matrix| ball::subtract(&right, &ball::product(&shifted, x));
+    let size = |m: &Matrix| m.iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let mut x = ball::zeros(2 * n, right.ncols());
+    let mut rest = right.clone();
+    let mut largest = size(&rest);
     for _ in 0..REFINEMENTS {
-        let step = ball::exact(&(&inverse * ball::nearest(&residual(&x))));
-        x = ball::add(&x, &step).map(|x| Ball::exactly(x.mid()));
+        let step = ball::exact(&(&inverse * ball::nearest(&rest)));
+        let next = ball::add(&x, &step).map(|x| Ball::exactly(x.mid()));
+        let next_rest = residual(&next);
+        let before = std::mem::replace(&mut largest, size(&next_rest));
+        (x, rest) = (next, next_rest);
+        // No further digits are gained, or the residual is not a number.
+        if largest.is_nan() || largest > LEAST_GAIN * before {
+            break;
+        }
     }
-    let largest = residual(&x).iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let error = 1.01 * inverse_norm(&shifted, &inverse) * largest;
     let part = |start: usize| x.rows(start, n).map(|x| x.widened(error));
     ComplexMatrix { re: part(0), im: part(n) }
@@ -191,15 +202,44 @@ pub(super) fn gram(period: &SlowPeriod, z: &ComplexMatrix) -> ComplexMatrix {
         z,
         &ComplexMatrix::real(ball::identity(n)),
     ));
-    let mut rows = ComplexMatrix::zeros(samples, n + samples);
-    for s in 0..samples {
-        let phase = delay(z, period.periods_late[s]);
-        let row = from_state.rows(s, 1).times(&phase);
-        rows.re.view_mut((s, 0), (1, n)).copy_from(&row.re);
-        rows.im.view_mut((s, 0), (1, n)).copy_from(&row.im);
-        (rows.re[(s, n + s)], rows.im[(s, n + s)]) = (phase.re[(0, 0)], phase.im[(0, 0)]);
+    let phases: Vec<ComplexMatrix> = period.periods_late.iter().map(|&late| delay(z, late)).collect();
+    // G = [A D], A from the states and D = diag(d) of the inputs of this period.
+    let rows: Vec<ComplexMatrix> = (0..samples).map(|s| from_state.rows(s, 1).times(&phases[s])).collect();
+    let a = |s: usize, k: usize| [rows[s].re[(0, k)], rows[s].im[(0, k)]];
+    let d = |s: usize| [phases[s].re[(0, 0)], phases[s].im[(0, 0)]];
+    let q = |i: usize, j: usize| period.gram[(i, j)];
+    let mut gram = ComplexMatrix::zeros(samples, samples);
+    for i in 0..samples {
+        // Row i of [A D] times the Gram matrix of states and inputs.
+        let sum = |column: usize| {
+            let own = scaled_by(d(i), q(n + i, column));
+            (0..n).fold(own, |sum, k| plus(sum, scaled_by(a(i, k), q(k, column))))
+        };
+        let of_states: Vec<[Ball; 2]> = (0..n).map(sum).collect();
+        // The matrix is Hermitian.
+        for j in 0..=i {
+            let own = times_conjugate(sum(n + j), d(j));
+            let [re, im] = (0..n).fold(own, |sum, k| plus(sum, times_conjugate(of_states[k], a(j, k))));
+            (gram.re[(i, j)], gram.re[(j, i)]) = (re, re);
+            if i != j {
+                (gram.im[(i, j)], gram.im[(j, i)]) = (im, -im);
+            }
+        }
     }
-    rows.product(&ComplexMatrix::real(period.gram.clone())).product(&rows.adjoint())
+    gram
+}
+
+fn plus(x: [Ball; 2], y: [Ball; 2]) -> [Ball; 2] {
+    [x[0] + y[0], x[1] + y[1]]
+}
+
+fn scaled_by(x: [Ball; 2], by: Ball) -> [Ball; 2] {
+    [x[0] * by, x[1] * by]
+}
+
+/// x times the conjugate of y.
+fn times_conjugate(x: [Ball; 2], y: [Ball; 2]) -> [Ball; 2] {
+    [x[0] * y[0] + x[1] * y[1], x[1] * y[0] - x[0] * y[1]]
 }
 
 /// F(z), M x N, of the bank's filters.
