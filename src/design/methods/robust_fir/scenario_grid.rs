@@ -66,10 +66,10 @@ impl<'a> ScenarioGrid<'a> {
         let is_near = |k: usize| gains[k] >= NEAR * level;
         let near: Vec<usize> = (0..count).step_by(STRIDE).filter(|&k| is_near(k)).collect();
         for &centre in &near {
-            for k in centre.saturating_sub(STRIDE - 1)..(centre + STRIDE).min(count) {
-                if gains[k] == 0.0 {
-                    gains[k] = gain(self.point(k), taps)?;
-                }
+            let first = centre.saturating_sub(STRIDE - 1);
+            let around = &mut gains[first..(centre + STRIDE).min(count)];
+            for (k, known) in around.iter_mut().enumerate().filter(|(_, known)| **known == 0.0) {
+                *known = gain(self.point(first + k), taps)?;
             }
         }
         let most = gains.iter().copied().fold(0.0, f64::max);
