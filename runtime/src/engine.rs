@@ -7,7 +7,7 @@
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Output};
-use crate::algorithms::{Direct, Facts, FastFir, Filter, OverlapSave, Past, Recursive};
+use crate::algorithms::{Direct, Facts, FastFir, Filter, OverlapSave, RecentInput, Recursive};
 use crate::state::{Count, Numbers};
 use std::sync::Arc;
 
@@ -127,8 +127,8 @@ impl Engine {
     /// false, with the state as before, if that cannot be known.
     pub(crate) fn continue_from(&mut self, running: &Self, position: u64) -> bool {
         self.take_over(running)
-            || running.past().is_some_and(
-                |past| each!(Self, self, pair => pair.filter.load(&mut pair.state, past, position)),
+            || running.recent_input().is_some_and(
+                |recent| each!(Self, self, pair => pair.filter.load(&mut pair.state, recent, position)),
             )
     }
 
@@ -138,19 +138,19 @@ impl Engine {
             (Self::OverlapSaveF64(pair), Self::OverlapSaveF64(other)) => pair.take_over(other),
             (Self::RecursiveF32(pair), Self::RecursiveF32(other)) => pair.take_over(other),
             (Self::RecursiveF64(pair), Self::RecursiveF64(other)) => pair.take_over(other),
-            // The history distinguishes the others.
+            // The others hold recent input in different ways, and `load` takes it over.
             _ => false,
         }
     }
 
-    fn past(&self) -> Option<&dyn Past> {
-        each!(Self, self, pair => pair.past())
+    fn recent_input(&self) -> Option<&dyn RecentInput> {
+        each!(Self, self, pair => pair.recent_input())
     }
 
     /// Numbers that make up a state so many frames after a multiple of the alignment, of which the plan has
     /// `channels`.
     pub(crate) fn count(&self, channels: usize, place: usize) -> Count {
-        match self.past() {
+        match self.recent_input() {
             Some(_) => Count { inputs: self.history() * channels, sums: 0 },
             None => each!(Self, self, pair => pair.filter.count(place)),
         }
@@ -158,11 +158,11 @@ impl Engine {
 
     /// These numbers; of a state that is recent input the samples, the last frame first.
     pub(crate) fn save(&self, channels: usize, put: &mut dyn FnMut(f64)) {
-        let Some(past) = self.past() else {
+        let Some(recent) = self.recent_input() else {
             return each!(Self, self, pair => pair.filter.save(&pair.state, put));
         };
         for age in 1..=self.history() {
-            (0..channels).for_each(|channel| put(past.sample(age, channel)));
+            (0..channels).for_each(|channel| put(recent.sample(age, channel)));
         }
     }
 
@@ -195,7 +195,7 @@ struct SavedFrames<'a> {
     frames: usize,
 }
 
-impl Past for SavedFrames<'_> {
+impl RecentInput for SavedFrames<'_> {
     fn sample(&self, age: usize, channel: usize) -> f64 {
         if age <= self.frames { self.numbers.get((age - 1) * self.channels + channel) } else { 0.0 }
     }
@@ -218,8 +218,8 @@ impl<F: Filter> Pair<F> {
         F::set_resets(&mut self.state, resets);
     }
 
-    fn past(&self) -> Option<&dyn Past> {
-        F::past(&self.state)
+    fn recent_input(&self) -> Option<&dyn RecentInput> {
+        F::recent_input(&self.state)
     }
 
     fn take_over(&mut self, other: &Self) -> bool {

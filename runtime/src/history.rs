@@ -75,7 +75,7 @@ impl<T: Sample> History<T> {
 
     /// The sample of `channel` that came `age` >= 1 frames before the next one; 0 where the history does not
     /// reach.
-    pub(crate) fn past(&self, age: usize, channel: usize) -> T {
+    pub(crate) fn sample(&self, age: usize, channel: usize) -> T {
         let back = age.saturating_mul(self.channels) - channel;
         if back > self.len { T::default() } else { self.samples[self.next - back] }
     }
@@ -97,13 +97,16 @@ mod tests {
         for k in 0..20 {
             history.room(1).copy_from_slice(&[k as f32, -(k as f32)]);
             history.advance(1);
-            assert_eq!(history.past(1, 0), k as f32);
-            assert_eq!(history.past(2, 1), -(f32::from(i16::try_from(k).unwrap()) - 1.0).max(0.0));
+            assert_eq!(history.sample(1, 0), k as f32);
+            assert_eq!(history.sample(2, 1), -(f32::from(i16::try_from(k).unwrap()) - 1.0).max(0.0));
         }
         // Five samples: channel 1 reaches one frame further back than channel 0.
-        assert_eq!((history.past(3, 0), history.past(3, 1), history.past(usize::MAX, 1)), (0.0, -17.0, 0.0));
+        assert_eq!(
+            (history.sample(3, 0), history.sample(3, 1), history.sample(usize::MAX, 1)),
+            (0.0, -17.0, 0.0)
+        );
         let mut copy = History::<f32>::new(2, 5, 8, 3);
-        copy.fill(|age, channel| history.past(age, channel));
+        copy.fill(|age, channel| history.sample(age, channel));
         assert_eq!(copy.view()[..5], history.view()[..5]);
     }
 }

@@ -1,7 +1,7 @@
 //! A bank made ready to run: coefficients in the order of use, shared by any number of streams.
 
 use crate::adapters::Offsets;
-use crate::algorithms::choice::{Choice, check_recursive};
+use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
 use crate::algorithms::{Direct, Facts, FastFir, OverlapSave, Recursive};
 use crate::engine::{Coefficients, Engine};
 use crate::state::Digest;
@@ -89,22 +89,22 @@ impl Plan {
         let isa = options.isa;
         let choice = options.algorithm.choose(taps, ratio, options.precision)?;
         let coefficients = match (choice, options.precision) {
-            (Choice::Direct, Precision::Single) => {
+            (ChosenAlgorithm::Direct, Precision::Single) => {
                 Coefficients::DirectF32(Arc::new(Direct::new(taps, ratio, isa)?))
             }
-            (Choice::Direct, Precision::Double) => {
+            (ChosenAlgorithm::Direct, Precision::Double) => {
                 Coefficients::DirectF64(Arc::new(Direct::new(taps, ratio, isa)?))
             }
-            (Choice::FastFir, Precision::Single) => {
+            (ChosenAlgorithm::FastFir, Precision::Single) => {
                 Coefficients::FastFirF32(Arc::new(FastFir::new(taps, ratio, isa)?))
             }
-            (Choice::FastFir, Precision::Double) => {
+            (ChosenAlgorithm::FastFir, Precision::Double) => {
                 Coefficients::FastFirF64(Arc::new(FastFir::new(taps, ratio, isa)?))
             }
-            (Choice::OverlapSave(len), Precision::Single) => {
+            (ChosenAlgorithm::OverlapSave(len), Precision::Single) => {
                 Coefficients::OverlapSaveF32(Arc::new(OverlapSave::new(taps, ratio, len, isa)?))
             }
-            (Choice::OverlapSave(len), Precision::Double) => {
+            (ChosenAlgorithm::OverlapSave(len), Precision::Double) => {
                 Coefficients::OverlapSaveF64(Arc::new(OverlapSave::new(taps, ratio, len, isa)?))
             }
         };

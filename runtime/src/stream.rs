@@ -13,12 +13,9 @@ use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, StateError, SwapEr
 /// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls
 /// take whole frames and return the samples written. They allocate nothing and lock nothing (except those of
 /// a [`ThreadPool`](crate::ThreadPool)), and the same frames give the same bits however they are cut into
-/// calls.
+/// calls. [Offsets](Plan::with_offsets) cost a copy of the samples.
 ///
 /// # Worst case of a call
-/// [Offsets](Plan::with_offsets) are subtracted where the samples are copied, which all algorithms do with
-/// samples that are not in memory as they need them; a plan without offsets copies no more than before.
-///
 /// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. Whatever the input
 /// holds, a frame is filtered at most twice, so that a call does at most twice the multiply-adds that it
 /// would do for ordinary numbers:

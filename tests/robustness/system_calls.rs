@@ -37,23 +37,41 @@ fn is_there() -> bool {
     Command::new("strace").args(["-o", "/dev/null", "true"]).status().is_ok_and(|status| status.success())
 }
 
-/// How often the busiest thread of an undisturbed run makes each call.
-fn counts(job: &Job) -> Vec<usize> {
+/// The calls of an undisturbed run, a line each in the order of time.
+fn calls(job: &Job) -> String {
     let names: Vec<_> = CALLS.iter().map(|(name, _)| *name).collect();
     let log = job.folder.join("strace.log");
     job.prepare(true);
     let trace = format!("trace={}", names.join(","));
     let status = strace(job, &["-o", log.to_str().unwrap(), "-e", &trace]).output().unwrap().status;
     assert!(status.success());
-    let log = fs::read_to_string(log).unwrap();
-    let calls = |name: &&str| {
+    fs::read_to_string(log).unwrap()
+}
+
+/// Each output is on the disk before it gets its name: after a crash of the system the name means a whole file.
+fn assert_synced_before_named(log: &str) {
+    let mut synced = 0;
+    for line in log.lines() {
+        if line.contains(" fsync(") {
+            synced += 1;
+        }
+        if line.contains(" rename") {
+            synced -= 1;
+            assert!(synced >= 0, "a file got its name before it was synced:\n{log}");
+        }
+    }
+}
+
+/// How often the busiest thread makes each call.
+fn counts(log: &str) -> Vec<usize> {
+    let calls = |(name, _): &(&str, &[&str])| {
         let mut of_thread = BTreeMap::new();
         let made = log.lines().filter(|line| line.contains(&format!(" {name}(")));
         made.filter_map(|line| line.split_whitespace().next())
             .for_each(|thread| *of_thread.entry(thread).or_insert(0) += 1);
         of_thread.into_values().max().unwrap_or(0)
     };
-    names.iter().map(calls).collect()
+    CALLS.iter().map(calls).collect()
 }
 
 #[derive(Default)]
@@ -76,7 +94,9 @@ fn a_failing_call_is_an_error_of_one_line_or_none_at_all() {
     let desk = desk(20_000);
     let mut dice = Random(76);
     for job in jobs(&desk) {
-        let counts = counts(&job);
+        let log = calls(&job);
+        assert_synced_before_named(&log);
+        let counts = counts(&log);
         let called: Vec<_> = (0..CALLS.len()).filter(|&call| counts[call] > 0).collect();
         let mut tally = Tally::default();
         for round in 0..rounds(12) {

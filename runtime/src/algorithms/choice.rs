@@ -39,7 +39,7 @@ pub enum Algorithm {
 
 /// The algorithm that a bank runs by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Choice {
+pub(crate) enum ChosenAlgorithm {
     Direct,
     FastFir,
     /// By transforms of F frames.
@@ -80,7 +80,7 @@ impl Algorithm {
         taps: &[Vec<f64>],
         ratio: usize,
         precision: Precision,
-    ) -> Result<Choice, BuildError> {
+    ) -> Result<ChosenAlgorithm, BuildError> {
         let size = Size {
             channels: taps.len(),
             ratio,
@@ -90,13 +90,13 @@ impl Algorithm {
         let refused =
             |len| BuildError::Transform { len, phase_taps: size.phase_taps, shortest: SHORTEST_TRANSFORM };
         match self {
-            Self::Direct => Ok(Choice::Direct),
+            Self::Direct => Ok(ChosenAlgorithm::Direct),
             Self::FastFir if size.phase_taps < 2 => Err(BuildError::TooShort { phase_taps: size.phase_taps }),
-            Self::FastFir => Ok(Choice::FastFir),
+            Self::FastFir => Ok(ChosenAlgorithm::FastFir),
             Self::OverlapSave { transform: Some(len) } if !size.holds(len) => Err(refused(len)),
-            Self::OverlapSave { transform: Some(len) } => Ok(Choice::OverlapSave(len)),
+            Self::OverlapSave { transform: Some(len) } => Ok(ChosenAlgorithm::OverlapSave(len)),
             Self::OverlapSave { transform: None } => match size.best_transform() {
-                Some((len, _)) => Ok(Choice::OverlapSave(len)),
+                Some((len, _)) => Ok(ChosenAlgorithm::OverlapSave(len)),
                 None => Err(refused(LONGEST_TRANSFORM)),
             },
             Self::Auto { added_latency: true } => Ok(size.fastest()),
@@ -186,19 +186,19 @@ impl Size {
     }
 
     /// The algorithm that adds no latency, and its cost.
-    fn fastest_without_latency(&self) -> (Choice, f64) {
+    fn fastest_without_latency(&self) -> (ChosenAlgorithm, f64) {
         let (direct, fast) = (self.direct(), self.fast());
         if self.phase_taps > 1 && fast < WORTH_CHANGE * direct {
-            (Choice::FastFir, fast)
+            (ChosenAlgorithm::FastFir, fast)
         } else {
-            (Choice::Direct, direct)
+            (ChosenAlgorithm::Direct, direct)
         }
     }
 
-    fn fastest(&self) -> Choice {
+    fn fastest(&self) -> ChosenAlgorithm {
         let (prompt, cost) = self.fastest_without_latency();
-        let worth = |&(_, late): &(usize, f64)| late < WORTH_CHANGE * cost;
-        self.best_transform().filter(worth).map_or(prompt, |(len, _)| Choice::OverlapSave(len))
+        let worth = |&(_, transformed): &(usize, f64)| transformed < WORTH_CHANGE * cost;
+        self.best_transform().filter(worth).map_or(prompt, |(len, _)| ChosenAlgorithm::OverlapSave(len))
     }
 }
 
@@ -209,7 +209,12 @@ mod tests {
     const ANY: Algorithm = Algorithm::Auto { added_latency: true };
     const PROMPT: Algorithm = Algorithm::Auto { added_latency: false };
 
-    fn chosen(n: usize, m: usize, phase_taps: usize, algorithm: Algorithm) -> Result<Choice, BuildError> {
+    fn chosen(
+        n: usize,
+        m: usize,
+        phase_taps: usize,
+        algorithm: Algorithm,
+    ) -> Result<ChosenAlgorithm, BuildError> {
         algorithm.choose(&vec![vec![1.0; phase_taps * m]; n], m, Precision::Single)
     }
 
@@ -220,11 +225,14 @@ mod tests {
         for (n, m, short, long) in
             [(1, 1, 16, 512), (2, 2, 8, 128), (4, 4, 4, 64), (8, 8, 4, 16), (16, 16, 2, 8)]
         {
-            assert_eq!(chosen(n, m, short, ANY), Ok(Choice::Direct), "N {n} M {m} K {short}");
+            assert_eq!(chosen(n, m, short, ANY), Ok(ChosenAlgorithm::Direct), "N {n} M {m} K {short}");
             let choice = chosen(n, m, long, ANY).unwrap();
-            assert!(matches!(choice, Choice::OverlapSave(_)), "N {n} M {m} K {long}: {choice:?}");
+            assert!(matches!(choice, ChosenAlgorithm::OverlapSave(_)), "N {n} M {m} K {long}: {choice:?}");
         }
-        assert_eq!(chosen(8, 8, 16, Algorithm::OverlapSave { transform: None }), Ok(Choice::OverlapSave(64)));
+        assert_eq!(
+            chosen(8, 8, 16, Algorithm::OverlapSave { transform: None }),
+            Ok(ChosenAlgorithm::OverlapSave(64))
+        );
     }
 
     #[test]
@@ -233,8 +241,8 @@ mod tests {
         for (n, m, short, long) in
             [(1, 1, 64, 512), (2, 2, 32, 128), (4, 4, 16, 64), (8, 8, 8, 64), (16, 16, 4, 32)]
         {
-            assert_eq!(chosen(n, m, short, PROMPT), Ok(Choice::Direct), "N {n} M {m} K {short}");
-            assert_eq!(chosen(n, m, long, PROMPT), Ok(Choice::FastFir), "N {n} M {m} K {long}");
+            assert_eq!(chosen(n, m, short, PROMPT), Ok(ChosenAlgorithm::Direct), "N {n} M {m} K {short}");
+            assert_eq!(chosen(n, m, long, PROMPT), Ok(ChosenAlgorithm::FastFir), "N {n} M {m} K {long}");
         }
     }
 
@@ -243,8 +251,9 @@ mod tests {
         for (n, m) in (1..=17).flat_map(|n| (1..=17).map(move |m| (n, m))) {
             let size = |phase_taps| Size { channels: n, ratio: m, phase_taps, group: 8 };
             let transformed =
-                |phase_taps: usize| matches!(size(phase_taps).fastest(), Choice::OverlapSave(_));
-            let fast = |phase_taps: usize| size(phase_taps).fastest_without_latency().0 == Choice::FastFir;
+                |phase_taps: usize| matches!(size(phase_taps).fastest(), ChosenAlgorithm::OverlapSave(_));
+            let fast =
+                |phase_taps: usize| size(phase_taps).fastest_without_latency().0 == ChosenAlgorithm::FastFir;
             for wins in [&transformed as &dyn Fn(usize) -> bool, &fast] {
                 let first = (0..14).map(|i| 1usize << i).find(|&phase_taps| wins(phase_taps)).unwrap();
                 assert!((0..6).map(|i| first << i).all(wins), "N {n} M {m}: first at K = {first}");
@@ -255,8 +264,8 @@ mod tests {
     #[test]
     fn one_frame_is_never_halved() {
         for (n, m) in (1..=17).flat_map(|n| (1..=17).map(move |m| (n, m))) {
-            assert_eq!(chosen(n, m, 1, PROMPT), Ok(Choice::Direct));
-            assert_ne!(chosen(n, m, 1, ANY), Ok(Choice::FastFir));
+            assert_eq!(chosen(n, m, 1, PROMPT), Ok(ChosenAlgorithm::Direct));
+            assert_ne!(chosen(n, m, 1, ANY), Ok(ChosenAlgorithm::FastFir));
         }
         assert_eq!(chosen(1, 1, 1, Algorithm::FastFir), Err(BuildError::TooShort { phase_taps: 1 }));
     }
@@ -269,7 +278,7 @@ mod tests {
         }
         assert_eq!(
             chosen(2, 2, 40, Algorithm::OverlapSave { transform: Some(64) }),
-            Ok(Choice::OverlapSave(64))
+            Ok(ChosenAlgorithm::OverlapSave(64))
         );
     }
 }

@@ -10,7 +10,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::filter::{Facts, Filter, Past, check_finite, phase_taps, replace_not_finite};
+use super::filter::{Facts, Filter, RecentInput, check_finite, phase_taps, replace_not_finite};
 use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
 use crate::history::History;
@@ -67,7 +67,7 @@ impl<T: Sample> Direct<T> {
             * BLOCK_UNIT;
         let coefficient = |element, phase| T::from_f64(coefficient(taps, ratio, element, phase));
         let filters = Polyphase::new(kernel, tiling, ratio, coefficient);
-        let history_frames = tiling.past.div_ceil(channels);
+        let history_frames = tiling.history.div_ceil(channels);
         Ok(Self { channels, ratio, history: phase_taps - 1, history_frames, block, filters, isa })
     }
 
@@ -84,8 +84,8 @@ impl<T: Sample> Direct<T> {
 
     /// Zeros, for blocks of at most `block` frames, and with `more` frames than the filters look back.
     pub(super) fn history(&self, block: usize, more: usize) -> History<T> {
-        let (n, &Tiling { past, vector, .. }) = (self.channels, self.filters.tiling());
-        History::new(n, past + more * n, block * n, vector * n)
+        let (n, &Tiling { history, vector, .. }) = (self.channels, self.filters.tiling());
+        History::new(n, history + more * n, block * n, vector * n)
     }
 
     /// Frames at the beginning of a call that go through the state's history although the others need not:
@@ -112,11 +112,11 @@ impl<T: Sample> Direct<T> {
         out: &mut [T],
     ) -> usize {
         let Some(head) = self.head(frames) else { return 0 };
-        let (n, &Tiling { past, vector, .. }) = (self.channels, self.filters.tiling());
+        let (n, &Tiling { history: before, vector, .. }) = (self.channels, self.filters.tiling());
         history.room(head).copy_from_slice(&samples[..head * n]);
         let begin = Segment { x: history.view(), first: 0, frames: head };
         let segment = |first: usize, end: usize| {
-            let x = &samples[first * n - past..end * n];
+            let x = &samples[first * n - before..end * n];
             Segment { x, first, frames: end - first }
         };
         let len = if self.filters.reads_once() { SEGMENT_BLOCKS * self.block } else { self.block };
@@ -252,12 +252,12 @@ impl<T: Sample> Filter for Direct<T> {
         crate::parallel::process(self, state, input, output, pool)
     }
 
-    fn past(state: &DirectState<T>) -> Option<&dyn Past> {
+    fn recent_input(state: &DirectState<T>) -> Option<&dyn RecentInput> {
         Some(state)
     }
 
-    fn load(&self, state: &mut DirectState<T>, past: &dyn Past, _position: u64) -> bool {
-        state.history.fill(|age, channel| T::from_f64(past.sample(age, channel)));
+    fn load(&self, state: &mut DirectState<T>, recent: &dyn RecentInput, _position: u64) -> bool {
+        state.history.fill(|age, channel| T::from_f64(recent.sample(age, channel)));
         true
     }
 }
@@ -287,9 +287,9 @@ impl<T: Sample> crate::parallel::Chunked for Direct<T> {
     }
 }
 
-impl<T: Sample> Past for DirectState<T> {
+impl<T: Sample> RecentInput for DirectState<T> {
     fn sample(&self, age: usize, channel: usize) -> f64 {
-        self.history.past(age, channel).to_f64()
+        self.history.sample(age, channel).to_f64()
     }
 }
 

@@ -48,13 +48,13 @@ pub(crate) trait Filter: Debug + Send + Sync {
     }
 
     /// The recent input, if the state is nothing else.
-    fn past(_state: &Self::State) -> Option<&dyn Past> {
+    fn recent_input(_state: &Self::State) -> Option<&dyn RecentInput> {
         None
     }
 
-    /// Makes the state what it would be after `position` frames, of which the last ones are `past`. Does not
-    /// allocate; false, with the state as before, if the past does not tell.
-    fn load(&self, _state: &mut Self::State, _past: &dyn Past, _position: u64) -> bool {
+    /// Makes the state what it would be after `position` frames, of which the last ones are `recent`. Does not
+    /// allocate; false, with the state as before, if recent input does not determine the state.
+    fn load(&self, _state: &mut Self::State, _recent: &dyn RecentInput, _position: u64) -> bool {
         false
     }
 
@@ -65,13 +65,13 @@ pub(crate) trait Filter: Debug + Send + Sync {
         false
     }
 
-    /// Numbers that make up a state so many frames after a multiple of the alignment; none if the past tells
-    /// the state.
+    /// How many numbers make up a state `place` frames after a multiple of the alignment; none if recent
+    /// input determines the state.
     fn count(&self, _place: usize) -> Count {
         Count { inputs: 0, sums: 0 }
     }
 
-    /// These numbers.
+    /// Passes the numbers that [`Filter::count`] counts to `put`, one after another.
     fn save(&self, _state: &Self::State, _put: &mut dyn FnMut(f64)) {}
 
     /// Makes the state that [`Filter::save`] gave as `numbers`, as many as [`Filter::count`] says. Does not
@@ -83,7 +83,7 @@ pub(crate) trait Filter: Debug + Send + Sync {
 }
 
 /// Recent input of a stream.
-pub(crate) trait Past {
+pub(crate) trait RecentInput {
     /// The sample of `channel` that came `age` >= 1 frames before the next one; 0 where it is not known.
     fn sample(&self, age: usize, channel: usize) -> f64;
 }

@@ -12,6 +12,6 @@ pub(crate) mod recursive;
 
 pub(crate) use direct::Direct;
 pub(crate) use fast_fir::FastFir;
-pub(crate) use filter::{Facts, Filter, Past};
+pub(crate) use filter::{Facts, Filter, RecentInput};
 pub(crate) use overlap_save::OverlapSave;
 pub(crate) use recursive::Recursive;

@@ -69,9 +69,10 @@ pub(crate) trait Kernel {
 /// To call it, what the kernel asks of its job must hold.
 pub(crate) type Compiled<K> = for<'a> unsafe fn(<K as Kernel>::Job<'a>) -> <K as Kernel>::Output;
 
-/// Declares [`compiled`] and a function with the given target features for each instruction set.
+/// Declares [`compiled`], [`compiled_narrow`] and, for each instruction set, a function with the given target
+/// features. Before them stand the kind, the function, and that for vectors of one lane group.
 macro_rules! instruction_sets {
-    ($($arch:literal $kind:ident $function:ident $features:literal;)*) => {
+    ($($arch:literal $kind:ident $function:ident $narrow:ident $features:literal;)*) => {
         /// The function of kernel `K` for an instruction set.
         pub(crate) fn compiled<K: Kernel>(isa: Isa) -> Compiled<K> {
             match isa.kind() {
@@ -79,6 +80,18 @@ macro_rules! instruction_sets {
                 $(
                     #[cfg(target_arch = $arch)]
                     Kind::$kind => $function::<K>,
+                )*
+            }
+        }
+
+        /// As [`compiled`], for a kernel that gains nothing from vectors wider than one lane group: it is
+        /// compiled for such vectors only.
+        pub(crate) fn compiled_narrow<K: Kernel>(isa: Isa) -> Compiled<K> {
+            match isa.kind() {
+                Kind::Portable => portable::<K>,
+                $(
+                    #[cfg(target_arch = $arch)]
+                    Kind::$kind => $narrow::<K>,
                 )*
             }
         }
@@ -98,8 +111,8 @@ macro_rules! instruction_sets {
             #[cfg(target_arch = $arch)]
             #[target_feature(enable = $features)]
             unsafe fn $function<K: Kernel>(job: K::Job<'_>) -> K::Output {
-                // SAFETY: this function is compiled for the set, and `compiled` returns it only for an `Isa`
-                // that is it; the rest is the caller's.
+                // SAFETY: this function is compiled for the set, and is returned only for an `Isa` that
+                // includes it; the rest is the caller's.
                 unsafe { K::run::<<K::Sample as Element>::$kind>(job) }
             }
         )*
@@ -107,20 +120,9 @@ macro_rules! instruction_sets {
 }
 
 instruction_sets! {
-    "x86_64" Avx2 avx2 "avx2,fma";
-    "x86_64" Avx512 avx512 "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma";
-    "aarch64" Neon neon "neon";
-}
-
-/// The function of a kernel that gains nothing from vectors wider than one lane group. Others are not compiled.
-pub(crate) fn compiled_narrow<K: Kernel>(isa: Isa) -> Compiled<K> {
-    match isa.kind() {
-        Kind::Portable => portable::<K>,
-        #[cfg(target_arch = "x86_64")]
-        Kind::Avx2 | Kind::Avx512 => avx2::<K>,
-        #[cfg(target_arch = "aarch64")]
-        Kind::Neon => neon::<K>,
-    }
+    "x86_64" Avx2 avx2 avx2 "avx2,fma";
+    "x86_64" Avx512 avx512 avx2 "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma";
+    "aarch64" Neon neon neon "neon";
 }
 
 unsafe fn portable<K: Kernel>(job: K::Job<'_>) -> K::Output {

@@ -9,8 +9,9 @@
 //! ```
 //!
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
-//! `unsafe` is needed for two things only: to call such a function after the processor was asked, and to
-//! load and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call.
+//! `unsafe` is needed for three things only: to call such a function after the processor was asked, to load
+//! and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call, and for
+//! two pieces of assembly.
 //!
 //! Bits: an output is a sum of a fixed shape, lanes of fused multiply-adds and a tree over the lanes (see
 //! `vector`), the same for every instruction set. So it does not depend on vector width, block size, address

@@ -30,7 +30,7 @@
 mod tests;
 
 use super::direct::Direct;
-use super::filter::{Facts, Filter, Past, check_finite, phase_taps, replace_not_finite};
+use super::filter::{Facts, Filter, RecentInput, check_finite, phase_taps, replace_not_finite};
 use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
 use crate::history::History;
@@ -99,23 +99,25 @@ struct HalfRate<T: Sample> {
     history: History<T>,
     /// One frame, then a block.
     products: Aligned<T>,
-    /// Those of the last frame.
+    /// The products of the last frame.
     last: Vec<T>,
 }
 
 /// How the frames of a block are first and second ones of pairs.
 #[derive(Debug, Clone, Copy)]
 struct Parity {
-    /// 1 if the first frame of the block is the second one of its pair.
-    late: usize,
+    /// 1 if the block begins with the second frame of a pair, else 0.
+    begins_odd: usize,
+    /// First frames of pairs.
     evens: usize,
+    /// Second frames of pairs.
     odds: usize,
 }
 
 impl Parity {
-    fn new(late: usize, frames: usize) -> Self {
-        let odds = (frames + late) / 2;
-        Self { late, evens: frames - odds, odds }
+    fn new(begins_odd: usize, frames: usize) -> Self {
+        let odds = (frames + begins_odd) / 2;
+        Self { begins_odd, evens: frames - odds, odds }
     }
 }
 
@@ -189,8 +191,8 @@ impl<T: Sample> FastFir<T> {
     /// Frames to the histories.
     fn split(&self, pairs: &mut Pairs<T>, parity: Parity, samples: &[T]) {
         let n = self.channels;
-        let (late, whole) = (parity.late * n, parity.odds - parity.late);
-        let (second, samples) = samples.split_at(late);
+        let (head, whole) = (parity.begins_odd * n, parity.odds - parity.begins_odd);
+        let (second, samples) = samples.split_at(head);
         let (whole, first) = samples.split_at(2 * whole * n);
         let even = pairs.even.history.room(parity.evens);
         let odd = pairs.odd.history.room(parity.odds);
@@ -200,7 +202,7 @@ impl<T: Sample> FastFir<T> {
             pair[n..].copy_from_slice(second);
             split(self.isa, pair, n, Halves { even: again, odd, mean });
         }
-        let halves = Halves { even, odd: &mut odd[late..], mean: &mut mean[late..] };
+        let halves = Halves { even, odd: &mut odd[head..], mean: &mut mean[head..] };
         split(self.isa, whole, n, halves);
         if !first.is_empty() {
             even[whole.len() / 2..].copy_from_slice(first);
@@ -211,20 +213,20 @@ impl<T: Sample> FastFir<T> {
     /// Products of the frames in the histories to outputs.
     fn join(&self, pairs: &mut Pairs<T>, parity: Parity, out: &mut [T]) {
         let m = self.ratio;
-        let late = parity.late * m;
+        let head = parity.begins_odd * m;
         let Pairs { even, odd, mean, outputs, .. } = pairs;
         let a = even.filter(&self.even, parity.evens);
         let b = odd.filter(&self.odd, parity.odds);
         let c = &mut mean.filter(&self.mean, parity.odds)[m..];
-        let (second, out) = out.split_at_mut(late);
+        let (second, out) = out.split_at_mut(head);
         if !second.is_empty() {
             join(self.isa, Products { even: &mut a[..m], odd: b, mean: c }, m, outputs);
             second.copy_from_slice(&outputs[m..]);
         }
-        let products = Products { even: &mut a[m..], odd: &b[late..], mean: &mut c[late..] };
+        let products = Products { even: &mut a[m..], odd: &b[head..], mean: &mut c[head..] };
         join(self.isa, products, m, out);
         let whole = out.len() / (2 * m) * m;
-        let first = a[m + whole..].iter().zip(&b[late + whole..]);
+        let first = a[m + whole..].iter().zip(&b[head + whole..]);
         for (slot, (&a, &b)) in out[2 * whole..].iter_mut().zip(first) {
             *slot = a + b;
         }
@@ -233,7 +235,7 @@ impl<T: Sample> FastFir<T> {
     /// Computes outputs that are not finite once more.
     #[cold]
     fn repair(&self, pairs: &Pairs<T>, parity: Parity, out: &mut [T]) {
-        for (frame, out) in (parity.late..).zip(out.chunks_exact_mut(self.ratio)) {
+        for (frame, out) in (parity.begins_odd..).zip(out.chunks_exact_mut(self.ratio)) {
             for (phase, slot) in out.iter_mut().enumerate().filter(|(_, slot)| !slot.finite()) {
                 *slot = T::from_f64(self.definition(pairs, parity, frame, phase));
             }
@@ -260,9 +262,9 @@ impl<T: Sample> FastFir<T> {
     }
 
     /// Histories before the last whole pair, of which `offset` frames of the next pair have come since.
-    fn load_histories(&self, pairs: &mut Pairs<T>, past: &dyn Past, offset: usize) {
-        let first = |pair: usize, i: usize| past.sample(offset + PAIR + PAIR * pair, i);
-        let second = |pair: usize, i: usize| past.sample(offset + PAIR * pair + 1, i);
+    fn load_histories(&self, pairs: &mut Pairs<T>, recent: &dyn RecentInput, offset: usize) {
+        let first = |pair: usize, i: usize| recent.sample(offset + PAIR + PAIR * pair, i);
+        let second = |pair: usize, i: usize| recent.sample(offset + PAIR * pair + 1, i);
         pairs.even.history.fill(|pair, i| T::from_f64(first(pair, i)));
         pairs.odd.history.fill(|pair, i| T::from_f64(second(pair, i)));
         let rounded = |value: f64| T::from_f64(value).to_f64();
@@ -338,21 +340,21 @@ impl<T: Sample> Filter for FastFir<T> {
         crate::parallel::process(self, state, input, output, pool)
     }
 
-    fn past(state: &FastFirState<T>) -> Option<&dyn Past> {
+    fn recent_input(state: &FastFirState<T>) -> Option<&dyn RecentInput> {
         Some(&state.pairs)
     }
 
     /// The last whole pair is filtered again, for the products that the next one needs.
-    fn load(&self, state: &mut FastFirState<T>, past: &dyn Past, position: u64) -> bool {
+    fn load(&self, state: &mut FastFirState<T>, recent: &dyn RecentInput, position: u64) -> bool {
         let offset = (position % PAIR as u64) as usize;
         let FastFirState { pairs, input, output } = state;
-        self.load_histories(pairs, past, offset);
+        self.load_histories(pairs, recent, offset);
         pairs.phase_offset = 0;
         let frames = PAIR + offset;
         let samples = &mut input[..frames * self.channels];
         for (frame, slots) in samples.chunks_exact_mut(self.channels).enumerate() {
             let age = frames - frame;
-            slots.iter_mut().enumerate().for_each(|(i, slot)| *slot = T::from_f64(past.sample(age, i)));
+            slots.iter_mut().enumerate().for_each(|(i, slot)| *slot = T::from_f64(recent.sample(age, i)));
         }
         self.filter(pairs, samples, &mut output[..frames * self.ratio]);
         true
@@ -399,22 +401,22 @@ struct Frames<'a, T> {
 }
 
 #[cfg(feature = "rayon")]
-impl<T: Sample> Past for Frames<'_, T> {
+impl<T: Sample> RecentInput for Frames<'_, T> {
     fn sample(&self, age: usize, channel: usize) -> f64 {
         let place = self.samples.len().checked_sub(age * self.channels);
         place.map_or(0.0, |place| self.samples[place + channel].to_f64())
     }
 }
 
-impl<T: Sample> Past for Pairs<T> {
+impl<T: Sample> RecentInput for Pairs<T> {
     fn sample(&self, age: usize, channel: usize) -> f64 {
         // Frames since the end of the last whole pair; the first frame of the next one is among the even
         // ones already.
         let back = age - self.phase_offset;
         let half = if back.is_multiple_of(2) {
-            self.even.history.past(self.phase_offset + back / 2, channel)
+            self.even.history.sample(self.phase_offset + back / 2, channel)
         } else {
-            self.odd.history.past(back.div_ceil(2), channel)
+            self.odd.history.sample(back.div_ceil(2), channel)
         };
         half.to_f64()
     }
@@ -427,7 +429,7 @@ impl<T: Sample> Pairs<T> {
         let pair = frame.div_euclid(2);
         let (half, frame) = match frame.rem_euclid(2) {
             // The history had it before the block if the block begins after it.
-            0 => (&self.even, pair - parity.late as isize),
+            0 => (&self.even, pair - parity.begins_odd as isize),
             _ => (&self.odd, pair),
         };
         let n = (self.samples.len() / 3) as isize;

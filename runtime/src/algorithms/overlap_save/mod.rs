@@ -113,7 +113,7 @@ pub(crate) struct OverlapSave<T: Sample> {
 /// What a stream remembers.
 #[derive(Debug, Clone)]
 pub(crate) struct OverlapSaveState<T: Sample> {
-    /// K - 1 frames of the past, then the batch that is being filled.
+    /// K - 1 frames of history, then the batch that is being filled.
     samples: Aligned<T>,
     /// Frames of the batch that are there.
     filled: usize,
@@ -184,7 +184,7 @@ impl<T: Sample> OverlapSave<T> {
         outside
     }
 
-    /// The state's past is that of frame `first` again, if the frames before stayed in the caller's memory.
+    /// Makes the state's history that of frame `first` again, if the frames before stayed in the caller's memory.
     fn load_history(
         &self,
         state: &mut OverlapSaveState<T>,
@@ -194,8 +194,8 @@ impl<T: Sample> OverlapSave<T> {
     ) {
         let Shape { channels, history, .. } = self.shape;
         if let (true, Some(samples)) = (progress.known < first, input.in_memory::<T>()) {
-            let past = &samples[(first - history) * channels..first * channels];
-            state.samples[..past.len()].copy_from_slice(past);
+            let recent = &samples[(first - history) * channels..first * channels];
+            state.samples[..recent.len()].copy_from_slice(recent);
         }
     }
 
@@ -238,7 +238,7 @@ impl<T: Sample> OverlapSave<T> {
         frame + 1
     }
 
-    /// The frames of a whole batch with their past as they lie in the caller's memory, if they are all there
+    /// The frames of a whole batch with their history as they lie in the caller's memory, if they are all there
     /// and finite.
     fn in_place<'a>(&self, samples: &'a [T], clean: usize, frames: &Range<usize>) -> Option<&'a [T]> {
         let Shape { channels, history, .. } = self.shape;
@@ -359,13 +359,14 @@ impl<T: Sample> Filter for OverlapSave<T> {
             let end = first + (input.frames() - first).min(self.shape.batch() - state.filled);
             let outside = self.take(state, input, first..end, &mut progress);
             let complete = state.filled + end - first == self.shape.batch();
-            // The last frame of a batch already takes the first output of it, the others take the next ones.
-            let late = end - usize::from(complete);
-            self.pass_on(state, output, first, progress.written.max(first)..late);
+            // The frame that completes a batch already takes an output of it; those before take outputs of the
+            // batch before.
+            let before = end - usize::from(complete);
+            self.pass_on(state, output, first, progress.written.max(first)..before);
             state.filled += end - first;
             if complete {
-                let left = input.frames() - late;
-                progress.written = self.complete(state, outside, output, late, left);
+                let left = input.frames() - before;
+                progress.written = self.complete(state, outside, output, before, left);
             }
             first = end;
         }
@@ -390,7 +391,7 @@ impl<T: Sample> Filter for OverlapSave<T> {
         fits
     }
 
-    /// The past and the frames of the batch, and the outputs of the batch before that are still to come.
+    /// The history and the frames of the batch, and the outputs of the batch before that are still to come.
     fn count(&self, filled: usize) -> Count {
         let shape = &self.shape;
         let inputs = (shape.history + filled) * shape.channels;

@@ -4,16 +4,16 @@ use crate::StateSpace;
 use std::collections::BTreeMap;
 
 /// An input some frames ago: (channel, frames).
-pub(super) type PastInput = (usize, usize);
+pub(super) type DelayedInput = (usize, usize);
 
 /// A state-space filter with its delay lines taken out:
 /// y = sum taps u + sum c x, x+ = sum a x + sum b u, where u are inputs of this frame and of earlier ones.
 #[derive(Debug)]
 pub(crate) struct DelayLines {
     /// For each past input that the output takes, its M factors.
-    pub(crate) taps: BTreeMap<PastInput, Vec<f64>>,
+    pub(crate) taps: BTreeMap<DelayedInput, Vec<f64>>,
     /// For each past input that the states take, a factor for each state.
-    pub(crate) b: BTreeMap<PastInput, Vec<f64>>,
+    pub(crate) b: BTreeMap<DelayedInput, Vec<f64>>,
     /// Row by row.
     pub(crate) a: Vec<Vec<f64>>,
     /// One list of M factors for each state.
@@ -23,8 +23,8 @@ pub(crate) struct DelayLines {
 impl DelayLines {
     /// The matrices have fitting shapes.
     pub(crate) fn new(filter: &StateSpace) -> Self {
-        let past = past_inputs(filter);
-        let core: Vec<usize> = (0..past.len()).filter(|&s| past[s].is_none()).collect();
+        let delayed = delayed_inputs(filter);
+        let core: Vec<usize> = (0..delayed.len()).filter(|&s| delayed[s].is_none()).collect();
         let read = |s: usize| filter.c.iter().map(move |row| row[s]);
         let mut delay_lines = Self {
             taps: BTreeMap::new(),
@@ -37,7 +37,7 @@ impl DelayLines {
             add(&mut delay_lines.taps, (i, 0), filter.d.iter().map(|row| row[i]));
             add(&mut delay_lines.b, (i, 0), core.iter().map(|&r| filter.b[r][i]));
         }
-        for (s, &place) in past.iter().enumerate() {
+        for (s, &place) in delayed.iter().enumerate() {
             let Some(place) = place else { continue };
             add(&mut delay_lines.taps, place, read(s));
             add(&mut delay_lines.b, place, core.iter().map(|&r| filter.a[r][s]));
@@ -74,7 +74,11 @@ impl DelayLines {
     }
 }
 
-fn add(terms: &mut BTreeMap<PastInput, Vec<f64>>, place: PastInput, factors: impl Iterator<Item = f64>) {
+fn add(
+    terms: &mut BTreeMap<DelayedInput, Vec<f64>>,
+    place: DelayedInput,
+    factors: impl Iterator<Item = f64>,
+) {
     let factors: Vec<f64> = factors.collect();
     if factors.iter().all(|&factor| factor == 0.0) {
         return;
@@ -86,11 +90,11 @@ fn add(terms: &mut BTreeMap<PastInput, Vec<f64>>, place: PastInput, factors: imp
 }
 
 /// Which states are inputs of earlier frames: those that take over an input, or such a state, unchanged.
-fn past_inputs(filter: &StateSpace) -> Vec<Option<PastInput>> {
+fn delayed_inputs(filter: &StateSpace) -> Vec<Option<DelayedInput>> {
     let ones: Vec<(Option<usize>, Option<usize>)> =
         filter.a.iter().zip(&filter.b).map(|(a, b)| (only_one(a), only_one(b))).collect();
     let zero = |row: &[f64]| row.iter().all(|&x| x == 0.0);
-    let mut past = vec![None; filter.a.len()];
+    let mut delayed = vec![None; filter.a.len()];
     let mut followers = vec![Vec::new(); filter.a.len()];
     let mut found = Vec::new();
     for (s, &(from_state, from_input)) in ones.iter().enumerate() {
@@ -101,10 +105,10 @@ fn past_inputs(filter: &StateSpace) -> Vec<Option<PastInput>> {
         }
     }
     while let Some((s, (i, frames))) = found.pop() {
-        past[s] = Some((i, frames));
+        delayed[s] = Some((i, frames));
         found.extend(followers[s].iter().map(|&next| (next, (i, frames + 1))));
     }
-    past
+    delayed
 }
 
 /// The place of the one in a row of zeros and a one.

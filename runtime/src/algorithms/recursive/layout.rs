@@ -1,6 +1,6 @@
 //! Where things lie when a state-space bank runs, and its coefficients in that order.
 
-use super::delay_lines::{DelayLines, PastInput};
+use super::delay_lines::{DelayLines, DelayedInput};
 use crate::aligned::Aligned;
 use crate::simd::{ColumnTile, FirKernel, Form, Polyphase, Recursion, SectionVector, Tiling, group_lanes};
 use crate::{BuildError, Sample};
@@ -42,7 +42,7 @@ impl Layout {
             .max()
             .map_or(0, |place| place + 1)
             .next_multiple_of((2 * lanes).max(group_lanes::<T>()));
-        // Where there is no state, the readout is not used.
+        // Without states this output matrix is not used.
         let state_rows = kernel.tiling(states.max(group_lanes::<T>()), states, ratio);
         Ok(Self {
             lanes,
@@ -55,8 +55,8 @@ impl Layout {
         })
     }
 
-    fn place(&self, (channel, frames): PastInput) -> u32 {
-        (self.inputs.past - frames * self.channels + channel) as u32
+    fn place(&self, (channel, frames): DelayedInput) -> u32 {
+        (self.inputs.history - frames * self.channels + channel) as u32
     }
 
     /// The state at each place; `None` for padding.
@@ -66,7 +66,7 @@ impl Layout {
         occupants
     }
 
-    pub(super) fn inputs_readout<T: Sample>(
+    pub(super) fn feedthrough<T: Sample>(
         &self,
         delay_lines: &DelayLines,
         ratio: usize,
@@ -78,7 +78,7 @@ impl Layout {
         Polyphase::new(kernel, self.inputs, ratio, |e, p| T::from_f64(tap(e, p)))
     }
 
-    pub(super) fn states_readout<T: Sample>(
+    pub(super) fn output_matrix<T: Sample>(
         &self,
         delay_lines: &DelayLines,
         ratio: usize,
@@ -126,10 +126,10 @@ impl Columns<'_> {
         let (p, q) = (first, first + lanes);
         let mut coefficients: Vec<T> = a(p, p).chain(a(p, q)).chain(a(q, p)).chain(a(q, q)).collect();
         let mut inputs = Vec::new();
-        for (&past, factors) in &self.delay_lines.b {
+        for (&input, factors) in &self.delay_lines.b {
             let column: Vec<T> = self.column(|state| factors[state], first, 2 * lanes);
             if column.iter().any(|&factor| factor != T::default()) {
-                inputs.push(self.layout.place(past));
+                inputs.push(self.layout.place(input));
                 coefficients.extend(column);
             }
         }
@@ -158,8 +158,8 @@ impl Columns<'_> {
             }
         };
         let count = vectors * self.layout.lanes;
-        for (&past, factors) in &self.delay_lines.b {
-            keep(&mut inputs, self.layout.place(past), self.column(|i| factors[i], first, count));
+        for (&input, factors) in &self.delay_lines.b {
+            keep(&mut inputs, self.layout.place(input), self.column(|i| factors[i], first, count));
         }
         for (j, &place) in self.layout.places.iter().enumerate() {
             keep(&mut columns, place as u32, self.column(|i| self.delay_lines.a[i][j], first, count));

@@ -37,8 +37,8 @@ pub(crate) struct Recursive<T: Sample> {
     history: usize,
     recursion: Recursion<T>,
     advance: RecursionKernel<T>,
-    inputs_readout: Polyphase<T>,
-    states_readout: Polyphase<T>,
+    feedthrough: Polyphase<T>,
+    output_matrix: Polyphase<T>,
     isa: Isa,
 }
 
@@ -82,8 +82,8 @@ impl<T: Sample> Recursive<T> {
             history: delay_lines.history(),
             recursion: layout.recursion(&delay_lines),
             advance,
-            inputs_readout: layout.inputs_readout(&delay_lines, ratio, fir),
-            states_readout: layout.states_readout(&delay_lines, ratio, fir),
+            feedthrough: layout.feedthrough(&delay_lines, ratio, fir),
+            output_matrix: layout.output_matrix(&delay_lines, ratio, fir),
             isa,
         })
     }
@@ -97,9 +97,9 @@ impl<T: Sample> Recursive<T> {
     fn filter(&self, state: &mut RecursiveState<T>, frames: usize) {
         let RecursiveState { history, rows, output, state_output, .. } = state;
         self.advance.run(&self.recursion, rows, history.view(), self.channels, frames);
-        self.inputs_readout.run(&[Segment { x: history.view(), first: 0, frames }], output);
+        self.feedthrough.run(&[Segment { x: history.view(), first: 0, frames }], output);
         if self.recursion.states > 0 {
-            self.states_readout.run(&[Segment { x: rows, first: 0, frames }], state_output);
+            self.output_matrix.run(&[Segment { x: rows, first: 0, frames }], state_output);
             output.iter_mut().zip(&state_output[..frames * self.ratio]).for_each(|(y, more)| *y = *y + *more);
         }
     }
@@ -120,13 +120,13 @@ impl<T: Sample> Filter for Recursive<T> {
     }
 
     fn state(&self) -> RecursiveState<T> {
-        let tiling = self.inputs_readout.tiling();
+        let tiling = self.feedthrough.tiling();
         let padding = tiling.vector * self.channels;
         let states = self.recursion.states;
         // A vector may read the rows of some more frames, which mean nothing.
-        let rows = (BLOCK + self.states_readout.tiling().vector) * states;
+        let rows = (BLOCK + self.output_matrix.tiling().vector) * states;
         RecursiveState {
-            history: History::new(self.channels, tiling.past, BLOCK * self.channels, padding),
+            history: History::new(self.channels, tiling.history, BLOCK * self.channels, padding),
             rows: Aligned::new(rows),
             states,
             output: Aligned::new(self.ratio * BLOCK),
@@ -191,7 +191,7 @@ impl<T: Sample> Filter for Recursive<T> {
 
     fn save(&self, state: &RecursiveState<T>, put: &mut dyn FnMut(f64)) {
         for age in 1..=self.history {
-            (0..self.channels).for_each(|channel| put(state.history.past(age, channel).to_f64()));
+            (0..self.channels).for_each(|channel| put(state.history.sample(age, channel).to_f64()));
         }
         state.rows[..state.states].iter().for_each(|value| put(value.to_f64()));
     }

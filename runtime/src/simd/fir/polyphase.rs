@@ -37,7 +37,7 @@ struct PhaseGroup<T: Element> {
 /// Frames that lie one after another.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Segment<'a, T> {
-    /// From the history of the first frame on, see [`Tiling::past`].
+    /// From the history of the first frame on, see [`Tiling::history`].
     pub(crate) x: &'a [T],
     /// The frame of the output that is the first one.
     pub(crate) first: usize,
@@ -75,7 +75,7 @@ impl<T: Element> Polyphase<T> {
         self.groups.len() == 1
     }
 
-    /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at `x[tiling.past + t *
+    /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at `x[tiling.history + t *
     /// tiling.hop]`; frames past the last one, up to whole vectors, are read too and mean nothing.
     ///
     /// Returns false if an input of these frames is not finite: it makes all outputs of its frame so,
@@ -124,11 +124,11 @@ impl<T: Element> Polyphase<T> {
     #[inline(always)]
     fn chunk(&self, segment: &Segment<'_, T>, room: *mut T, len: usize) -> Chunk<T> {
         let Segment { x, first, frames } = *segment;
-        let Tiling { past, hop, depth, vector, .. } = self.tiling;
+        let Tiling { history, hop, depth, vector, .. } = self.tiling;
         let padded = (frames + vector - 1) & !(vector - 1);
-        assert!(past + padded * hop <= x.len() && (first + frames) * self.ratio <= len);
+        assert!(history + padded * hop <= x.len() && (first + frames) * self.ratio <= len);
         Chunk {
-            x: x.as_ptr().wrapping_add(past + hop - depth),
+            x: x.as_ptr().wrapping_add(history + hop - depth),
             out: room.wrapping_add(first * self.ratio),
             frames: frames.saturating_sub(usize::from(self.ratio == 3)) & !(vector - 1),
         }

@@ -10,7 +10,7 @@ pub(crate) struct Tiling {
     /// Samples from frame to frame; equal to D unless D fills a group.
     pub(crate) hop: usize,
     /// Samples before a frame that its window reaches back.
-    pub(crate) past: usize,
+    pub(crate) history: usize,
     /// Frames of a vector, a power of two: calls for a multiple of them read nothing past their last frame.
     pub(crate) vector: usize,
     /// Bit r: whether the sums of vector r of each tile are checked. Those of its last vector always are.
@@ -30,7 +30,7 @@ impl Tiling {
             depth,
             steps,
             hop,
-            past: steps * depth - hop,
+            history: steps * depth - hop,
             vector,
             checked: checked_vectors(steps * depth / hop, vector),
             pairing: Pairing::new(depth, hop, group, steps),
