@@ -1,43 +1,15 @@
-//! `calib.txt` of the Middlebury stereo benchmark (2014 and later): inner parameters of both cameras, baseline
-//! and the difference of the principal points.
+//! `calib.txt` of the Middlebury stereo benchmark (2014 and later): inner parameters of both cameras,
+//! baseline and the difference of the principal points.
 
-use std::path::{Path, PathBuf};
+use super::CameraFileError;
+use super::file_error::CHECK_THE_PATH;
+use std::path::Path;
 
 /// Difference between `doffs` and the principal points that rounding explains, in pixels.
 const ROUNDING: f64 = 0.1;
 
-/// Errors of a calibration file.
-#[derive(Debug, thiserror::Error)]
-pub enum CalibrationError {
-    /// The file cannot be opened.
-    #[error("{}: {source}; check the path (paths in a scene are relative to the scene file)", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// A line that cannot be used.
-    #[error("{}:{line}: {reason}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A key that is missing, or keys that contradict each other.
-    #[error("{}: {reason}", path.display())]
-    Incomplete {
-        /// The file.
-        path: PathBuf,
-        /// What is missing or wrong.
-        reason: String,
-    },
-}
-
-/// What a calibration file says about a rectified pair. Depth is `baseline` `focal` / (disparity + `offset`).
+/// What a calibration file says about a rectified pair. Depth is `baseline` `focal` / (disparity +
+/// `offset`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibration {
     /// Focal length of both cameras in pixels.
@@ -53,18 +25,21 @@ pub struct Calibration {
 /// Reads a file.
 ///
 /// # Errors
-/// [`CalibrationError`], with the line.
-pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrationError> {
-    let text = crate::files::read_text(path)
-        .map_err(|source| CalibrationError::Read { path: path.into(), source })?;
+/// [`CameraFileError`], with the line.
+pub fn read_calibration(path: &Path) -> Result<Calibration, CameraFileError> {
+    let text = crate::files::read_text(path).map_err(|source| CameraFileError::Read {
+        path: path.into(),
+        source,
+        remedy: CHECK_THE_PATH,
+    })?;
     parse_calibration(&text, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.
 ///
 /// # Errors
-/// [`CalibrationError`].
-pub fn parse_calibration(text: &str, path: &Path) -> Result<Calibration, CalibrationError> {
+/// [`CameraFileError`].
+pub fn parse_calibration(text: &str, path: &Path) -> Result<Calibration, CameraFileError> {
     let keys = Keys::new(text, path)?;
     let [left, right] = [keys.matrix("cam0")?, keys.matrix("cam1")?];
     let focal = left[0];
@@ -77,7 +52,7 @@ pub fn parse_calibration(text: &str, path: &Path) -> Result<Calibration, Calibra
     let between = right[2] - left[2];
     let offset = match keys.number("doffs") {
         Ok(offset) => offset,
-        Err(CalibrationError::Incomplete { .. }) => between,
+        Err(CameraFileError::Content { .. }) => between,
         Err(other) => return Err(other),
     };
     if (offset - between).abs() > ROUNDING {
@@ -98,7 +73,7 @@ struct Keys<'a> {
     lines: Vec<(usize, &'a str, &'a str)>,
 }
 
-type Read<T> = Result<T, CalibrationError>;
+type Read<T> = Result<T, CameraFileError>;
 
 impl<'a> Keys<'a> {
     fn new(text: &'a str, path: &'a Path) -> Read<Self> {
@@ -116,11 +91,11 @@ impl<'a> Keys<'a> {
     }
 
     fn at<T>(&self, line: usize, reason: String) -> Read<T> {
-        Err(CalibrationError::Line { path: self.path.into(), line, reason })
+        Err(CameraFileError::Line { path: self.path.into(), line, reason })
     }
 
     fn contradiction<T>(&self, reason: String) -> Read<T> {
-        Err(CalibrationError::Incomplete { path: self.path.into(), reason })
+        Err(CameraFileError::Content { path: self.path.into(), reason })
     }
 
     fn value(&self, key: &str) -> Read<(usize, &'a str)> {

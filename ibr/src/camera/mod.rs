@@ -1,11 +1,13 @@
 //! Cameras: 3 x 4 matrices, d x~ = Pi X~ (thesis eq. 2.1), pixel centres at integers.
 
 pub mod colmap;
+mod file_error;
 mod lens;
 pub mod middlebury;
 mod path;
 pub mod transforms;
 
+pub use file_error::CameraFileError;
 pub use lens::Lens;
 
 use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
@@ -161,6 +163,12 @@ pub struct Relative {
 }
 
 impl Relative {
+    /// Whether no lens bends the map.
+    #[inline]
+    pub fn is_linear(&self) -> bool {
+        self.from.is_none() && self.to.is_none()
+    }
+
     /// Pixel and depth at the other camera of pixel (x, y) with depth d; the pixel is NaN outside the
     /// domain of a lens.
     #[inline]
@@ -169,21 +177,6 @@ impl Relative {
         let p = self.a * Vector3::new(x, y, 1.0) * d + self.b;
         let (x, y) = through(self.to.as_ref(), p.x / p.z, p.y / p.z, Lens::record);
         (x, y, p.z)
-    }
-
-    /// The displacements at the other camera, in pixels, of a step of one pixel to the right and of one
-    /// down, on a surface whose depth changes by `slopes` per pixel in these directions.
-    ///
-    /// With q = A x~ and p = d q + b, dp = d A e + q d' and d(p.x / p.z) = (dp.x - p.x / p.z dp.z) / p.z.
-    /// Lenses are left out: they change distances between neighbours by a few per cent.
-    #[inline]
-    pub fn steps(&self, x: f64, y: f64, d: f64, slopes: [f64; 2]) -> [Vector2<f64>; 2] {
-        let q = self.a * Vector3::new(x, y, 1.0);
-        let p = q * d + self.b;
-        [0, 1].map(|k| {
-            let dp = self.a.column(k) * d + q * slopes[k];
-            Vector2::new(dp.x - p.x / p.z * dp.z, dp.y - p.y / p.z * dp.z) / p.z
-        })
     }
 }
 

@@ -5,56 +5,14 @@
 //! principal point is shifted by half a pixel on reading.
 
 use super::colmap::ModelCamera;
-use super::{Camera, CameraError, Lens};
+use super::file_error::CHECK_THE_PATH;
+use super::{Camera, CameraFileError, Lens};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// Most columns or rows of an image, and the largest focal length in pixels.
 const LARGEST: f64 = 1e6;
-
-/// Errors of a transforms file.
-#[derive(Debug, thiserror::Error)]
-pub enum TransformsError {
-    /// The file cannot be opened.
-    #[error("{}: {source}; check the path (paths in a scene are relative to the scene file)", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The file is not JSON of the format.
-    #[error("{}: {reason}", path.display())]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, with line and column.
-        reason: String,
-    },
-    /// A frame that cannot be used.
-    #[error("{}: frame {frame} ({image:?}): {reason}", path.display())]
-    Frame {
-        /// The file.
-        path: PathBuf,
-        /// The frame, from 1.
-        frame: usize,
-        /// Its `file_path`.
-        image: String,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A frame whose camera cannot be used.
-    #[error("{}: image {image:?}: {source}", path.display())]
-    Camera {
-        /// The file.
-        path: PathBuf,
-        /// Its `file_path`.
-        image: String,
-        /// What is wrong with it.
-        source: CameraError,
-    },
-}
 
 /// The frames of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,19 +75,22 @@ struct FrameSpec {
 /// Reads a file.
 ///
 /// # Errors
-/// [`TransformsError`], with the line or the frame.
-pub fn read_transforms(path: &Path) -> Result<Transforms, TransformsError> {
-    let text = crate::files::read_text(path)
-        .map_err(|source| TransformsError::Read { path: path.into(), source })?;
+/// [`CameraFileError`], with the line or the frame.
+pub fn read_transforms(path: &Path) -> Result<Transforms, CameraFileError> {
+    let text = crate::files::read_text(path).map_err(|source| CameraFileError::Read {
+        path: path.into(),
+        source,
+        remedy: CHECK_THE_PATH,
+    })?;
     parse_transforms(&text, path)
 }
 
 /// The same from the text of the file; `path` appears in messages.
 ///
 /// # Errors
-/// [`TransformsError`].
-pub fn parse_transforms(text: &str, path: &Path) -> Result<Transforms, TransformsError> {
-    let json = |reason: String| TransformsError::Json { path: path.into(), reason };
+/// [`CameraFileError`].
+pub fn parse_transforms(text: &str, path: &Path) -> Result<Transforms, CameraFileError> {
+    let json = |reason: String| CameraFileError::Content { path: path.into(), reason };
     let file: FileSpec = serde_json::from_str(text).map_err(|e| json(e.to_string()))?;
     let straight = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
     if let Some(model) = file.camera_model.filter(|model| !straight.contains(&model.as_str())) {
@@ -143,7 +104,7 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<Transforms, Transform
     }
     let one = |(index, spec): (usize, FrameSpec)| {
         let number = index + 1;
-        let fault = |reason| TransformsError::Frame {
+        let fault = |reason| CameraFileError::Frame {
             path: path.into(),
             frame: number,
             image: spec.file_path.clone(),
@@ -245,8 +206,8 @@ impl Inner {
 }
 
 impl Transforms {
-    /// The frame of an image: the one whose path `image` ends with, or else the only one of that name, with or
-    /// without extension.
+    /// The frame of an image: the one whose path `image` ends with, or else the only one of that name, with
+    /// or without extension.
     pub fn find(&self, image: &Path) -> Option<&Frame> {
         let image = plain(image);
         let mut whole = self.frames.iter().filter(|frame| image.ends_with(plain(&frame.image)));
@@ -257,8 +218,8 @@ impl Transforms {
     /// The camera of a frame. `fallback` is the size of its image if the file does not give it.
     ///
     /// # Errors
-    /// [`TransformsError::Camera`].
-    pub fn camera(&self, frame: &Frame, fallback: (usize, usize)) -> Result<ModelCamera, TransformsError> {
+    /// [`CameraFileError::Camera`].
+    pub fn camera(&self, frame: &Frame, fallback: (usize, usize)) -> Result<ModelCamera, CameraFileError> {
         let inner = &frame.inner;
         let size = inner.size().unwrap_or(fallback);
         let (w, h) = (size.0 as f64, size.1 as f64);
@@ -267,7 +228,7 @@ impl Transforms {
         let fy = inner.fl_y.or_else(|| from_angle(h, inner.camera_angle_y)).unwrap_or(fx);
         let (cx, cy) = (inner.cx.unwrap_or(0.5 * w) - 0.5, inner.cy.unwrap_or(0.5 * h) - 0.5);
         let k = Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
-        let camera = Camera::metric(k * frame.pose, false).map_err(|source| TransformsError::Camera {
+        let camera = Camera::metric(k * frame.pose, false).map_err(|source| CameraFileError::Camera {
             path: self.path.clone(),
             image: frame.image.display().to_string(),
             source,
@@ -283,9 +244,9 @@ impl Transforms {
     /// A frame that has no depth.
     ///
     /// # Errors
-    /// [`TransformsError::Frame`], always.
-    pub fn without_depth(&self, frame: &Frame) -> TransformsError {
-        TransformsError::Frame {
+    /// [`CameraFileError::Frame`], always.
+    pub fn without_depth(&self, frame: &Frame) -> CameraFileError {
+        CameraFileError::Frame {
             path: self.path.clone(),
             frame: frame.number,
             image: frame.image.display().to_string(),

@@ -23,29 +23,35 @@ pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) ->
 }
 
 /// Which samples are hidden.
-fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
+pub(crate) fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
     if samples.is_empty() {
         return Vec::new();
     }
     let extent = Extent::of(samples);
-    let grids: Vec<Grid> = by_radius(samples)
-        .into_iter()
-        .enumerate()
-        .filter(|(_, members)| !members.is_empty())
-        .map(|(level, members)| Grid::new(samples, &members, &extent, test.radius((1 << level) as f32)))
-        .collect();
-    let hidden = |s: &Sample<C>| grids.iter().any(|grid| grid.hides(samples, s, test));
-    samples.par_iter().with_min_len(4096).map(hidden).collect()
+    let mut next = vec![NONE; samples.len()];
+    let mut grids: [Option<Grid>; LEVELS] = [const { None }; LEVELS];
+    for (i, s) in samples.iter().enumerate() {
+        let level = level(s.spacing);
+        let radius = || test.radius((1 << level) as f32);
+        let grid = grids[level].get_or_insert_with(|| Grid::new(samples.len(), &extent, radius()));
+        next[i] = grid.insert(i as u32, s);
+    }
+    let grids: Vec<Grid> = grids.into_iter().flatten().map(Grid::with_neighbours).collect();
+    let members = Members { samples, next: &next, test };
+    let hidden = |s: &Sample<C>| grids.iter().any(|grid| grid.hides(s, &members));
+    samples.par_iter().with_min_len(16_384).map(hidden).collect()
 }
 
-/// Indices of the samples of spacing up to 1, 2, 4 and 8.
-fn by_radius<const C: usize>(samples: &[Sample<C>]) -> [Vec<u32>; 4] {
-    let mut levels = [const { Vec::new() }; 4];
-    for (i, s) in samples.iter().enumerate() {
-        let level = [1.0, 2.0, 4.0].iter().filter(|limit| s.spacing > **limit).count();
-        levels[level].push(i as u32);
-    }
-    levels
+/// Grids for samples of spacing up to 1, 2, 4 and 8.
+const LEVELS: usize = 4;
+
+/// No sample.
+const NONE: u32 = u32::MAX;
+
+/// The grid of a sample.
+#[inline]
+fn level(spacing: f32) -> usize {
+    [1.0, 2.0, 4.0].iter().map(|limit| usize::from(spacing > *limit)).sum()
 }
 
 /// The rectangle that holds all samples.
@@ -58,127 +64,123 @@ struct Extent {
 
 impl Extent {
     fn of<const C: usize>(samples: &[Sample<C>]) -> Self {
-        let bounds = |of: fn(&Sample<C>) -> f64| {
-            samples.iter().map(of).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)))
-        };
-        let ((left, right), (top, bottom)) = (bounds(|s| s.x), bounds(|s| s.y));
-        Self { left, right, top, bottom }
+        let none = Self { left: f64::MAX, right: f64::MIN, top: f64::MAX, bottom: f64::MIN };
+        samples.iter().fold(none, |e, s| Self {
+            left: e.left.min(s.x),
+            right: e.right.max(s.x),
+            top: e.top.min(s.y),
+            bottom: e.bottom.max(s.y),
+        })
     }
 }
 
-/// Samples of similar radius sorted into square cells.
+/// Samples of similar radius in square cells, those of a cell as a linked list: neighbouring samples of a
+/// view come one after the other, so building it touches one cell after the other.
 struct Grid {
     left: f64,
     top: f64,
-    edge: f64,
+    /// Cells per pixel.
+    scale: f64,
     columns: usize,
     rows: usize,
-    /// Start of each cell in `order`, with one entry more than cells.
-    starts: Vec<u32>,
-    order: Vec<u32>,
-    /// Least depth of the members in each cell and its eight neighbours.
+    /// The last member of each cell.
+    heads: Vec<u32>,
+    /// Least depth of the members in each cell, and later in it and its eight neighbours.
     least: Vec<f32>,
 }
 
+/// All samples, and the one before each in its cell.
+struct Members<'a, const C: usize> {
+    samples: &'a [Sample<C>],
+    next: &'a [u32],
+    test: &'a DepthTest,
+}
+
 impl Grid {
-    /// A grid over the extent of all samples, with the members in cells no smaller than `radius`.
-    fn new<const C: usize>(samples: &[Sample<C>], members: &[u32], extent: &Extent, radius: f64) -> Self {
+    /// An empty grid over the extent of all samples, with cells no smaller than `radius`.
+    fn new(samples: usize, extent: &Extent, radius: f64) -> Self {
         let Extent { left, right, top, bottom } = *extent;
-        let mut edge = radius;
-        let limit = (CELLS_A_SAMPLE * samples.len() + 16) as f64;
+        // Members within the radius lie in neighbouring cells, even if the positions in the grid round.
+        let mut edge = 1.0001 * radius;
+        let limit = (CELLS_A_SAMPLE * samples + 16) as f64;
         // The doubling ends at the latest when one cell holds all samples.
         while ((right - left) / edge + 1.0) * ((bottom - top) / edge + 1.0) > limit {
             edge *= 2.0;
         }
-        let columns = ((right - left) / edge) as usize + 1;
-        let rows = ((bottom - top) / edge) as usize + 1;
-        let (starts, order, least) = (Vec::new(), Vec::new(), Vec::new());
-        let mut grid = Self { left, top, edge, columns, rows, starts, order, least };
-        grid.distribute(samples, members);
-        grid.least = grid.least_around(samples);
-        grid
+        let scale = 1.0 / edge;
+        let columns = ((right - left) * scale) as usize + 1;
+        let rows = ((bottom - top) * scale) as usize + 1;
+        let (heads, least) = (vec![NONE; columns * rows], vec![f32::INFINITY; columns * rows]);
+        Self { left, top, scale, columns, rows, heads, least }
     }
 
-    /// Counting sort of the members into the cells.
-    fn distribute<const C: usize>(&mut self, samples: &[Sample<C>], members: &[u32]) {
-        self.starts = vec![0; self.columns * self.rows + 2];
-        for i in members {
-            let cell = self.cell(&samples[*i as usize]);
-            self.starts[cell + 2] += 1;
-        }
-        for i in 2..self.starts.len() {
-            self.starts[i] += self.starts[i - 1];
-        }
-        self.order = vec![0; members.len()];
-        for i in members {
-            let cell = self.cell(&samples[*i as usize]);
-            let next = &mut self.starts[cell + 1];
-            self.order[*next as usize] = *i;
-            *next += 1;
-        }
+    /// Adds a member; returns the one before it in its cell.
+    #[inline]
+    fn insert<const C: usize>(&mut self, index: u32, s: &Sample<C>) -> u32 {
+        let (column, row) = self.cell(s);
+        let cell = row * self.columns + column;
+        self.least[cell] = least(self.least[cell], s.depth);
+        std::mem::replace(&mut self.heads[cell], index)
     }
 
-    /// Least depth over the nine cells around each cell: first along the rows, then down the columns.
-    fn least_around<const C: usize>(&self, samples: &[Sample<C>]) -> Vec<f32> {
-        let mut least = vec![f32::INFINITY; self.columns * self.rows];
-        for (cell, bounds) in least.iter_mut().zip(self.starts.windows(2)) {
-            let members = &self.order[bounds[0] as usize..bounds[1] as usize];
-            *cell = members.iter().fold(f32::INFINITY, |d, i| d.min(samples[*i as usize].depth));
+    /// Spreads the least depths over the nine cells around each: first along the rows, then down the
+    /// columns.
+    fn with_neighbours(mut self) -> Self {
+        let columns = self.columns;
+        let mut along = self.least.clone();
+        for (wide, row) in along.chunks_exact_mut(columns).zip(self.least.chunks_exact(columns)) {
+            wide.iter_mut().skip(1).zip(row).for_each(|(w, before)| *w = least(*w, *before));
+            wide.iter_mut().zip(&row[1..]).for_each(|(w, after)| *w = least(*w, *after));
         }
-        let of_three = |from: &[f32], at: usize, stride: usize, first: bool, last: bool| {
-            let before = if first { f32::INFINITY } else { from[at - stride] };
-            let after = if last { f32::INFINITY } else { from[at + stride] };
-            from[at].min(before).min(after)
-        };
-        let (columns, rows) = (self.columns, self.rows);
-        let cells = 0..columns * rows;
-        let along: Vec<f32> = cells
-            .clone()
-            .into_par_iter()
-            .with_min_len(4096)
-            .map(|c| of_three(&least, c, 1, c % columns == 0, (c + 1) % columns == 0))
-            .collect();
-        cells
-            .into_par_iter()
-            .with_min_len(4096)
-            .map(|c| of_three(&along, c, columns, c < columns, c / columns + 1 == rows))
-            .collect()
+        self.least.copy_from_slice(&along);
+        self.least.iter_mut().skip(columns).zip(&along).for_each(|(l, above)| *l = least(*l, *above));
+        self.least.iter_mut().zip(&along[columns..]).for_each(|(l, below)| *l = least(*l, *below));
+        self
     }
 
-    fn cell<const C: usize>(&self, s: &Sample<C>) -> usize {
-        let column = ((s.x - self.left) / self.edge) as usize;
-        let row = ((s.y - self.top) / self.edge) as usize;
-        row * self.columns + column
+    /// Column and row of the cell of a sample.
+    #[inline]
+    fn cell<const C: usize>(&self, s: &Sample<C>) -> (usize, usize) {
+        (((s.x - self.left) * self.scale) as usize, ((s.y - self.top) * self.scale) as usize)
     }
 
     /// Whether any member hides `s`.
-    fn hides<const C: usize>(&self, samples: &[Sample<C>], s: &Sample<C>, test: &DepthTest) -> bool {
-        // The cell size is at least the radius, so only neighbouring cells matter; the bound guards against
-        // rounding of the quotient.
-        let column = ((s.x - self.left) / self.edge) as usize;
-        let row = ((s.y - self.top) / self.edge) as usize;
-        if !test.hides(f64::from(self.least[row * self.columns + column]), f64::from(s.depth)) {
-            return false;
-        }
-        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
-        (row.saturating_sub(1)..(row + 2).min(self.rows))
-            .any(|r| columns.clone().any(|c| self.cell_hides(r * self.columns + c, samples, s, test)))
+    #[inline]
+    fn hides<const C: usize>(&self, s: &Sample<C>, members: &Members<'_, C>) -> bool {
+        let (column, row) = self.cell(s);
+        let least = self.least[row * self.columns + column];
+        members.test.hides(f64::from(least), f64::from(s.depth)) && self.search(s, (column, row), members)
     }
 
-    fn cell_hides<const C: usize>(
+    /// The same by comparison with the members of the nine cells around.
+    fn search<const C: usize>(
         &self,
-        cell: usize,
-        samples: &[Sample<C>],
         s: &Sample<C>,
-        test: &DepthTest,
+        (column, row): (usize, usize),
+        members: &Members<'_, C>,
     ) -> bool {
-        let members = &self.order[self.starts[cell] as usize..self.starts[cell + 1] as usize];
-        members
-            .iter()
-            .map(|i| &samples[*i as usize])
-            .filter(|y| test.hides(f64::from(y.depth), f64::from(s.depth)))
-            .any(|y| DepthTest::close(s.x - y.x, s.y - y.y, test.radius(y.spacing)))
+        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
+        (row.saturating_sub(1)..(row + 2).min(self.rows))
+            .any(|r| columns.clone().any(|c| members.hide(self.heads[r * self.columns + c], s)))
     }
+}
+
+impl<const C: usize> Members<'_, C> {
+    /// Whether a sample of the list that begins with `head` hides `s`.
+    fn hide(&self, head: u32, s: &Sample<C>) -> bool {
+        let member = |i: u32| (i != NONE).then_some(i);
+        std::iter::successors(member(head), |i| member(self.next[*i as usize])).any(|i| {
+            let y = &self.samples[i as usize];
+            self.test.hides(f64::from(y.depth), f64::from(s.depth))
+                && DepthTest::close(s.x - y.x, s.y - y.y, self.test.radius(y.spacing))
+        })
+    }
+}
+
+/// The lesser of two numbers, the first if the second is not a number.
+#[inline]
+fn least(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@
 mod grid;
 mod row;
 
+pub(crate) use grid::hidden;
 pub use grid::remove;
 pub use row::{RowScratch, remove_in_row};
 

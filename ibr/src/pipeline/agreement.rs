@@ -4,6 +4,7 @@
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::propagate::{CalibratedView, RectifiedView};
+use rayon::prelude::*;
 
 /// Pixels of each view that are compared, about.
 const PIXELS: usize = 20_000;
@@ -76,7 +77,7 @@ impl Agreement {
     }
 
     /// `map(i, j)` takes a pixel of view i and its depth to view j.
-    fn of<M: Fn(f64, f64, f64) -> (f64, f64, f64)>(
+    fn of<M: Fn(f64, f64, f64) -> (f64, f64, f64) + Sync>(
         inputs: &[(&Image, &DepthMap)],
         distance: impl Fn(usize, usize) -> f64,
         map: impl Fn(usize, usize) -> M,
@@ -112,30 +113,36 @@ impl Comparison {
     fn new(
         (image, depth): (&Image, &DepthMap),
         (other, other_depth): (&Image, &DepthMap),
-        map: impl Fn(f64, f64, f64) -> (f64, f64, f64),
+        map: impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync,
     ) -> Self {
         let (width, height) = image.size();
         let step = ((width * height / PIXELS) as f64).sqrt().ceil().max(1.0) as usize;
-        let mut all = Self { points: 0, matched: Vec::new() };
-        for (y, x) in (0..height).step_by(step).flat_map(|y| (0..width).step_by(step).map(move |x| (y, x))) {
-            let (u, v, d) = map(x as f64, y as f64, f64::from(depth.row(y)[x]));
-            let inside = |v: f64, side: usize| v > -0.5 && v < side as f64 - 0.5;
-            // False for NaN, hence for pixels without depth.
-            if !(inside(u, other.width()) && inside(v, other.height())) {
-                continue;
+        let rows: Vec<usize> = (0..height).step_by(step).collect();
+        let of_row = |y: &usize| {
+            let mut all = Self { points: 0, matched: Vec::new() };
+            for x in (0..width).step_by(step) {
+                let (u, v, d) = map(x as f64, *y as f64, f64::from(depth.row(*y)[x]));
+                let inside = |v: f64, side: usize| v > -0.5 && v < side as f64 - 0.5;
+                // False for NaN, hence for pixels without depth.
+                if !(inside(u, other.width()) && inside(v, other.height())) {
+                    continue;
+                }
+                let (column, row) = ((u + 0.5) as usize, (v + 0.5) as usize);
+                let there = other_depth.row(row)[column];
+                if there.is_nan() {
+                    continue;
+                }
+                all.points += 1;
+                if same_depth(d as f32, there, other_depth) {
+                    let q = row * other.width() + column;
+                    all.matched.push([brightness(image, y * width + x), brightness(other, q)]);
+                }
             }
-            let (column, row) = ((u + 0.5) as usize, (v + 0.5) as usize);
-            let there = other_depth.row(row)[column];
-            if there.is_nan() {
-                continue;
-            }
-            all.points += 1;
-            if same_depth(d as f32, there, other_depth) {
-                let q = row * other.width() + column;
-                all.matched.push([brightness(image, y * width + x), brightness(other, q)]);
-            }
-        }
-        all
+            all
+        };
+        let parts: Vec<Self> = rows.par_iter().with_min_len(16).map(of_row).collect();
+        let points = parts.iter().map(|part| part.points).sum();
+        Self { points, matched: parts.into_iter().flat_map(|part| part.matched).collect() }
     }
 
     fn verdict(&self, views: [usize; 2]) -> Option<PairAgreement> {

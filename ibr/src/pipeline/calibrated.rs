@@ -14,10 +14,10 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Samples held in memory at a time; larger scenes are rendered in bands of rows.
-const SAMPLES_AT_A_TIME: usize = 1 << 19;
+const SAMPLES_AT_A_TIME: usize = 1 << 16;
 /// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
 /// are made twice.
-const FEWEST_ROWS: usize = 96;
+const FEWEST_ROWS: usize = 40;
 /// Share of the first two stages in the work, about.
 const GATHERING: f64 = 0.7;
 
@@ -87,23 +87,24 @@ fn render_with<const C: usize>(
     let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
     let whole = Frame::whole(width, height, 0.5, settings.offset);
     let survey = Survey::of(views, &chosen, camera, &whole);
-    let (propagated, dropped) = (survey.samples, survey.dropped);
-    if propagated == 0 {
-        return Err(RenderError::NoOverlap { pixels, dropped });
-    }
     let agreement = Agreement::calibrated(views);
     let balance = if settings.keep_exposure { balance } else { balance.with_gains(&agreement.gains) };
-    let count = propagated.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS));
+    let count = survey.most_samples().div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1);
     let bands: Vec<Range<usize>> =
         (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
-    let ready = AtomicUsize::new(0);
+    let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
     problem.add_bands(&bands, |rows| {
-        let mut samples = visible_in(rows.clone(), height, &survey, views, settings.depth_test());
+        let (mut samples, all) = visible_in(rows.clone(), height, &survey, views, settings.depth_test());
         balance.apply(&mut samples);
+        propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         samples
     })?;
-    let used = problem.samples();
+    let propagated = propagated.into_inner();
+    let (used, dropped) = (problem.samples(), survey.dropped(propagated));
+    if propagated == 0 {
+        return Err(RenderError::NoOverlap { pixels, dropped });
+    }
     let mut report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
     let fit = problem.solve_watched(None, &|share| watch(GATHERING + (1.0 - GATHERING) * share))?;
     report.holes = HoleCount::of(&fit.mask);
@@ -113,25 +114,30 @@ fn render_with<const C: usize>(
     Ok(Rendering { image, mask, depth, counts, views: chosen, report, agreement })
 }
 
-/// The first two stages for some rows of the virtual image. The band is widened by the largest radius of the
-/// depth test on both sides, so that it contains every sample that can hide one of the band; only visible
-/// samples of the band itself are returned.
+/// The first two stages for some rows of the virtual image: the visible samples of these rows, and the
+/// number of all of their samples. The band is widened by the largest radius of the depth test on both
+/// sides, so that it contains every sample that can hide one of the band.
 fn visible_in<const C: usize>(
     rows: Range<usize>,
     height: usize,
     survey: &Survey,
     views: &[CalibratedView<'_>],
     test: &DepthTest,
-) -> Vec<Sample<C>> {
+) -> (Vec<Sample<C>>, usize) {
     let last = rows.end == height;
     let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
     let bottom = if last { f64::MAX } else { rows.end as f64 };
     // A little more than the radius: the distance test rounds.
     let reach = 1.01 * test.radius(LARGEST_SPACING);
     let mut samples = survey.samples_between::<C>(views, top - reach, bottom + reach);
-    occlusion::remove(&mut samples, test);
-    samples.retain(|s| s.y >= top && (s.y < bottom || last));
-    samples
+    let hidden = occlusion::hidden(&samples, test);
+    let (mut flags, mut all) = (hidden.iter(), 0);
+    samples.retain(|s| {
+        let own = s.y >= top && (s.y < bottom || last);
+        all += usize::from(own);
+        own & !flags.next().copied().unwrap_or(false)
+    });
+    (samples, all)
 }
 
 #[cfg(test)]
@@ -177,7 +183,7 @@ mod tests {
         let survey = Survey::new(&views, &target, &frame);
         let mut problem = PlaneProblem::<1>::new((40, 30), &settings.interpolation).unwrap();
         for rows in [0..7, 7..8, 8..30] {
-            let mut band = visible_in(rows, 30, &survey, &views, settings.depth_test());
+            let (mut band, _) = visible_in(rows, 30, &survey, &views, settings.depth_test());
             Balance::calibrated(&views, &target).apply(&mut band);
             problem.add(&band).unwrap();
         }

@@ -8,31 +8,38 @@ use rayon::prelude::*;
 /// Pixels of a tile: part of one row of a view.
 const TILE: usize = 64;
 
-/// Where the pixels of all views fall in the virtual image: one propagation of every pixel, after which the
-/// samples of any band of rows are found without looking at the pixels that miss it.
+/// Least depth at the virtual camera for which the corners of a tile say where its pixels fall, as a share
+/// of the largest one.
+const IN_FRONT: f64 = 1e-6;
+
+/// Where the pixels of all views fall in the virtual image, tile by tile, so that the samples of any band of
+/// rows are found without looking at the pixels that miss it.
+///
+/// For one row of a view v = (d q2(x) + b2) / (d q3(x) + b3), with q affine in the column x. In front of the
+/// virtual camera v is monotone in x and in d, so its extremes over a tile lie at the four corners of the
+/// ranges of x and d: four projections for 64 pixels.
 #[derive(Debug, Clone)]
 pub struct Survey {
     maps: Vec<Relative>,
     frame: Frame,
     tiles: Vec<Tile>,
-    /// Samples in the frame.
-    pub samples: usize,
-    /// Pixels outside the frame or without depth.
-    pub dropped: Dropped,
+    pixels: usize,
+    unknown: usize,
+    behind: usize,
 }
 
-/// Some neighbouring pixels of a view, at least one of which is a sample.
+/// Some neighbouring pixels of a view, at least one of which may be a sample.
 #[derive(Debug, Clone, Copy)]
 struct Tile {
     view: u16,
     row: u32,
     column: u32,
-    /// First and last virtual row of its samples.
+    /// Bounds of the virtual rows of its samples.
     rows: (f64, f64),
 }
 
 impl Survey {
-    /// Propagates every pixel once, in parallel over the rows, and keeps the rows that each tile reaches.
+    /// Looks at the tiles of all views, in parallel over the rows.
     pub fn new(views: &[CalibratedView<'_>], camera: &Camera, frame: &Frame) -> Self {
         let all: Vec<usize> = (0..views.len()).collect();
         Self::of(views, &all, camera, frame)
@@ -43,20 +50,31 @@ impl Survey {
         let maps: Vec<Relative> = views.iter().map(|v| v.camera.relative_to(camera)).collect();
         let rows: Vec<(usize, usize)> =
             chosen.iter().flat_map(|&i| (0..views[i].image.height()).map(move |y| (i, y))).collect();
-        let surveyed: Vec<(Vec<Tile>, usize, Dropped)> =
-            rows.par_iter().map(|&(i, y)| survey_row(&views[i], i as u16, &maps[i], y, frame)).collect();
-        let mut survey =
-            Self { maps, frame: *frame, tiles: Vec::new(), samples: 0, dropped: Dropped::default() };
-        for (tiles, samples, dropped) in surveyed {
-            survey.tiles.extend(tiles);
-            survey.samples += samples;
-            survey.dropped += dropped;
+        let surveyed: Vec<RowSurvey> =
+            rows.par_iter().map(|&(i, y)| RowSurvey::new(&views[i], i as u16, &maps[i], y, frame)).collect();
+        let pixels = rows.iter().map(|&(i, _)| views[i].image.width()).sum();
+        let mut survey = Self { maps, frame: *frame, tiles: Vec::new(), pixels, unknown: 0, behind: 0 };
+        for row in surveyed {
+            survey.tiles.extend(row.tiles);
+            survey.unknown += row.unknown;
+            survey.behind += row.behind;
         }
         survey
     }
 
+    /// Samples in the frame, at most.
+    pub fn most_samples(&self) -> usize {
+        self.tiles.len() * TILE
+    }
+
+    /// Pixels outside the frame or without depth, if this many are samples.
+    pub fn dropped(&self, samples: usize) -> Dropped {
+        let (unknown, behind) = (self.unknown, self.behind);
+        Dropped { unknown, behind, outside: self.pixels.saturating_sub(unknown + behind + samples) }
+    }
+
     /// The samples between two rows of the frame, both included: view by view and row by row (eq. 2.2 and
-    /// 2.3). In parallel; the order does not depend on the number of threads.
+    /// 2.3).
     pub fn samples_between<const C: usize>(
         &self,
         views: &[CalibratedView<'_>],
@@ -64,18 +82,18 @@ impl Survey {
         bottom: f64,
     ) -> Vec<Sample<C>> {
         let band = self.frame.band(top, bottom);
-        self.reaching(&band)
-            .flat_map_iter(|tile| {
-                let view = usize::from(tile.view);
-                tile_samples(&views[view], &self.maps[view], tile, &band)
-            })
-            .collect()
+        let mut samples = Vec::with_capacity(self.reaching(&band).count() * TILE);
+        for tile in self.reaching(&band) {
+            let view = usize::from(tile.view);
+            tile_samples(&views[view], &self.maps[view], tile, &band, &mut samples);
+        }
+        samples
     }
 
     /// The tiles that may have samples in a band.
-    fn reaching<'a>(&'a self, band: &Frame) -> impl ParallelIterator<Item = &'a Tile> + use<'a> {
+    fn reaching<'a>(&'a self, band: &Frame) -> impl Iterator<Item = &'a Tile> + use<'a> {
         let (top, bottom) = band.rows;
-        self.tiles.par_iter().with_min_len(64).filter(move |t| t.rows.0 <= bottom && t.rows.1 >= top)
+        self.tiles.iter().filter(move |t| t.rows.0 <= bottom && t.rows.1 >= top)
     }
 }
 
@@ -86,94 +104,214 @@ pub fn calibrated<const C: usize>(
     frame: &Frame,
 ) -> (Vec<Sample<C>>, Dropped) {
     let survey = Survey::new(views, camera, frame);
-    (survey.samples_between(views, f64::MIN, f64::MAX), survey.dropped)
+    let samples = survey.samples_between(views, f64::MIN, f64::MAX);
+    let dropped = survey.dropped(samples.len());
+    (samples, dropped)
 }
 
-/// The outcome for one pixel.
+/// The tiles of one row of a view, and its pixels that cannot be samples.
+#[derive(Default)]
+struct RowSurvey {
+    tiles: Vec<Tile>,
+    unknown: usize,
+    behind: usize,
+}
+
+impl RowSurvey {
+    fn new(view: &CalibratedView<'_>, index: u16, map: &Relative, y: usize, frame: &Frame) -> Self {
+        let (mut survey, row) = (Self::default(), RowMap::new(map, y));
+        for (k, depths) in view.depth.row(y).chunks(TILE).enumerate() {
+            let column = k * TILE;
+            let unknown = depths.iter().filter(|d| d.is_nan()).count();
+            survey.unknown += unknown;
+            if unknown == depths.len() {
+                continue;
+            }
+            let reach = row.corners(column, depths).unwrap_or_else(|| {
+                let (reach, behind) = row.each(column, depths, frame);
+                survey.behind += behind;
+                reach
+            });
+            if reach.meets(frame) {
+                let (row, column) = (y as u32, column as u32);
+                survey.tiles.push(Tile { view: index, row, column, rows: reach.rows });
+            }
+        }
+        survey
+    }
+}
+
+/// Bounds of the positions of some samples in the virtual image.
+struct Reach {
+    columns: (f64, f64),
+    rows: (f64, f64),
+}
+
+impl Reach {
+    fn meets(&self, frame: &Frame) -> bool {
+        let right = frame.width as f64 - 1.0 + frame.margin;
+        let (left, end) = (self.columns.0 + frame.offset, self.columns.1 + frame.offset);
+        left <= right && end >= -frame.margin && self.rows.0 <= frame.rows.1 && self.rows.1 >= frame.rows.0
+    }
+}
+
+/// The map of the pixels of one row: A x~ is affine in the column.
+struct RowMap<'a> {
+    map: &'a Relative,
+    y: f64,
+    start: [f64; 3],
+    /// Change of A x~ for a step to the right, and for one down.
+    step: [f64; 3],
+    down: [f64; 3],
+    shift: [f64; 3],
+    linear: bool,
+}
+
+/// A pixel with depth at the virtual camera.
+struct Landing {
+    /// Position and depth.
+    at: (f64, f64, f64),
+    /// A x~.
+    ray: [f64; 3],
+    /// Position without lenses.
+    ideal: [f64; 2],
+    /// 1 / depth.
+    inverse: f64,
+}
+
+impl<'a> RowMap<'a> {
+    fn new(map: &'a Relative, y: usize) -> Self {
+        let (a, b, y) = (&map.a, &map.b, y as f64);
+        let start = std::array::from_fn(|k| a[(k, 1)] * y + a[(k, 2)]);
+        let [step, down] = [0, 1].map(|column| std::array::from_fn(|k| a[(k, column)]));
+        Self { map, y, start, step, down, shift: [b.x, b.y, b.z], linear: map.is_linear() }
+    }
+
+    #[inline]
+    fn land(&self, x: f64, depth: f64) -> Landing {
+        // Written out: closures over the three coordinates are calls in this innermost loop.
+        let ray = [
+            self.start[0] + self.step[0] * x,
+            self.start[1] + self.step[1] * x,
+            self.start[2] + self.step[2] * x,
+        ];
+        let p =
+            [ray[0] * depth + self.shift[0], ray[1] * depth + self.shift[1], ray[2] * depth + self.shift[2]];
+        let inverse = 1.0 / p[2];
+        let ideal = [p[0] * inverse, p[1] * inverse];
+        let at = if self.linear { (ideal[0], ideal[1], p[2]) } else { self.map.map(x, self.y, depth) };
+        Landing { at, ray, ideal, inverse }
+    }
+
+    /// What one pixel of known depth becomes.
+    #[inline]
+    fn fate(&self, x: f64, depth: f32, frame: &Frame) -> Fate {
+        let landing = self.land(x, f64::from(depth));
+        let (u, v, d) = landing.at;
+        let u = u + frame.offset;
+        // NaN: outside the domain of the lens model.
+        if d <= 0.0 || u.is_infinite() || v.is_infinite() {
+            Fate::Behind
+        } else if frame.holds_column(u) && frame.holds_row(v) {
+            Fate::Sample(landing)
+        } else {
+            Fate::Outside
+        }
+    }
+
+    /// The displacements of a landing, in virtual pixels, for a step of one pixel to the right and for one
+    /// down, on a surface whose depth changes by `slopes` per pixel in these directions.
+    ///
+    /// With q = A x~ and p = d q + b, dp = d A e + q d' and d(p.x / p.z) = (dp.x - p.x / p.z dp.z) / p.z.
+    /// Lenses are left out: they change distances between neighbours by a few per cent.
+    #[inline]
+    fn steps(&self, landing: &Landing, depth: f64, slopes: [f64; 2]) -> [[f64; 2]; 2] {
+        [self.moved(landing, depth, self.step, slopes[0]), self.moved(landing, depth, self.down, slopes[1])]
+    }
+
+    /// The displacement for the change `a` of A x~ and a change of the depth by `slope`.
+    #[inline]
+    fn moved(&self, landing: &Landing, depth: f64, a: [f64; 3], slope: f64) -> [f64; 2] {
+        let Landing { ray, ideal, inverse, .. } = landing;
+        let away = a[2] * depth + ray[2] * slope;
+        let across = a[0] * depth + ray[0] * slope - ideal[0] * away;
+        let along = a[1] * depth + ray[1] * slope - ideal[1] * away;
+        [across * inverse, along * inverse]
+    }
+
+    /// Bounds of the samples of a tile, if all of it lies in front of the virtual camera and no lens bends
+    /// the map.
+    fn corners(&self, column: usize, depths: &[f32]) -> Option<Reach> {
+        let (near, far) =
+            depths.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), d| (a.min(*d), b.max(*d)));
+        let ends = [column as f64, (column + depths.len() - 1) as f64];
+        let corners = ends.map(|x| [near, far].map(|d| self.land(x, f64::from(d)).at));
+        let all = || corners.iter().flatten();
+        let bounds = |of: fn(&(f64, f64, f64)) -> f64| {
+            all().map(of).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+        };
+        let (least, largest) = bounds(|p| p.2);
+        // The computed positions round: a millionth of a pixel is more than enough.
+        let wide =
+            |(low, high): (f64, f64)| (low - 1e-6 * (1.0 + low.abs()), high + 1e-6 * (1.0 + high.abs()));
+        (self.linear && largest > 0.0 && least > IN_FRONT * largest)
+            .then(|| Reach { columns: wide(bounds(|p| p.0)), rows: wide(bounds(|p| p.1)) })
+    }
+
+    /// The same from every pixel, and the number of pixels behind the virtual camera.
+    fn each(&self, column: usize, depths: &[f32], frame: &Frame) -> (Reach, usize) {
+        let mut behind = 0;
+        let mut rows = (f64::INFINITY, f64::NEG_INFINITY);
+        for (x, depth) in depths.iter().enumerate().filter(|(_, d)| !d.is_nan()) {
+            match self.fate((column + x) as f64, *depth, frame) {
+                Fate::Sample(landing) => rows = (rows.0.min(landing.at.1), rows.1.max(landing.at.1)),
+                Fate::Behind => behind += 1,
+                Fate::Outside => {}
+            }
+        }
+        (Reach { columns: (f64::MIN, f64::MAX), rows }, behind)
+    }
+}
+
+/// The outcome for one pixel of known depth.
 enum Fate {
-    Sample(f64, f64, f64),
-    Unknown,
+    Sample(Landing),
     Behind,
     Outside,
 }
 
-/// Propagates one pixel of a calibrated view.
-#[inline]
-fn fate(map: &Relative, x: f64, y: f64, depth: f32, frame: &Frame) -> Fate {
-    if depth.is_nan() {
-        return Fate::Unknown;
-    }
-    let (u, v, d) = map.map(x, y, f64::from(depth));
-    let u = u + frame.offset;
-    // NaN: outside the domain of the lens model, or 0 * d of an infinite depth.
-    if d <= 0.0 || u.is_infinite() || v.is_infinite() {
-        Fate::Behind
-    } else if frame.holds_column(u) && frame.holds_row(v) {
-        Fate::Sample(u, v, d)
-    } else {
-        Fate::Outside
-    }
-}
-
-/// Tiles, samples and dropped pixels of one row of a view.
-fn survey_row(
-    view: &CalibratedView<'_>,
-    index: u16,
-    map: &Relative,
-    y: usize,
-    frame: &Frame,
-) -> (Vec<Tile>, usize, Dropped) {
-    let (mut tiles, mut samples, mut dropped) = (Vec::new(), 0, Dropped::default());
-    for (k, depths) in view.depth.row(y).chunks(TILE).enumerate() {
-        let column = k * TILE;
-        let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (x, &depth) in depths.iter().enumerate() {
-            match fate(map, (column + x) as f64, y as f64, depth, frame) {
-                Fate::Sample(_, v, _) => {
-                    samples += 1;
-                    (first, last) = (first.min(v), last.max(v));
-                }
-                Fate::Unknown => dropped.unknown += 1,
-                Fate::Behind => dropped.behind += 1,
-                Fate::Outside => dropped.outside += 1,
-            }
-        }
-        if first <= last {
-            tiles.push(Tile { view: index, row: y as u32, column: column as u32, rows: (first, last) });
-        }
-    }
-    (tiles, samples, dropped)
-}
-
-/// The samples of a tile that lie in the frame.
+/// Appends the samples of a tile that lie in the frame.
 fn tile_samples<const C: usize>(
     view: &CalibratedView<'_>,
     map: &Relative,
     tile: &Tile,
     frame: &Frame,
-) -> impl Iterator<Item = Sample<C>> {
+    samples: &mut Vec<Sample<C>>,
+) {
     let (y, start) = (tile.row as usize, tile.column as usize);
-    let (index, frame, map) = (tile.view, *frame, *map);
-    let width = view.image.width();
-    (start..(start + TILE).min(width)).filter_map(move |x| {
-        let depth = view.depth.row(y)[x];
-        let Fate::Sample(u, v, d) = fate(&map, x as f64, y as f64, depth, &frame) else { return None };
+    let (row, width) = (RowMap::new(map, y), view.image.width());
+    for (x, &depth) in view.depth.row(y).iter().enumerate().skip(start).take(TILE) {
+        if depth.is_nan() {
+            continue;
+        }
+        let Fate::Sample(landing) = row.fate(x as f64, depth, frame) else { continue };
         let relief = view.depth.relief(x, y);
-        let [a, b] = map.steps(x as f64, y as f64, f64::from(depth), [relief.across, relief.down]);
+        let [a, b] = row.steps(&landing, f64::from(depth), [relief.across, relief.down]);
         let pixel = y * width + x;
         let doubtful = relief.behind_edge || view.depth.is_guessed(pixel);
-        Some(Sample {
-            x: u,
-            y: v,
-            depth: d as f32,
+        let distance = ((a[0] * a[0] + a[1] * a[1] + b[0] * b[0] + b[1] * b[1]) / 2.0).sqrt();
+        samples.push(Sample {
+            x: landing.at.0 + frame.offset,
+            y: landing.at.1,
+            depth: landing.at.2 as f32,
             value: view.image.pixel::<C>(pixel),
-            spacing: spacing(((a.norm_squared() + b.norm_squared()) / 2.0).sqrt(), &relief),
-            weight: weight((a.x * b.y - a.y * b.x).abs(), doubtful),
+            spacing: spacing(distance, &relief),
+            weight: weight((a[0] * b[1] - a[1] * b[0]).abs(), doubtful),
             pixel: pixel as u32,
-            view: index,
+            view: tile.view,
             doubtful,
-        })
-    })
+        });
+    }
 }
 
 #[cfg(test)]

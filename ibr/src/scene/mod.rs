@@ -6,9 +6,7 @@ mod spec;
 pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
-use crate::camera::colmap::ColmapError;
-use crate::camera::middlebury::CalibrationError;
-use crate::camera::transforms::TransformsError;
+use crate::camera::CameraFileError;
 use crate::camera::{Camera, CameraError};
 use crate::depth::{DepthError, DepthMap};
 use crate::image::{Image, ImageError};
@@ -167,13 +165,7 @@ pub enum SceneError {
     /// The tracks of the scene.
     #[error(transparent)]
     Tracks(#[from] TrackError),
-    /// A COLMAP model of the scene.
+    /// A COLMAP model, transforms file or calibration file of the scene.
     #[error(transparent)]
-    Colmap(#[from] ColmapError),
-    /// A transforms file of the scene.
-    #[error(transparent)]
-    Transforms(#[from] TransformsError),
-    /// A calibration file of the scene.
-    #[error(transparent)]
-    Calibration(#[from] CalibrationError),
+    Cameras(#[from] CameraFileError),
 }

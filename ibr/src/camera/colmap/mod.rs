@@ -4,53 +4,13 @@
 
 mod binary;
 
-use super::{Camera, CameraError, Lens};
+use super::{Camera, CameraFileError, Lens};
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Errors of a COLMAP model.
-#[derive(Debug, thiserror::Error)]
-pub enum ColmapError {
-    /// A file cannot be opened.
-    #[error("{}: {source}; a COLMAP model has cameras.txt and images.txt, or cameras.bin and images.bin", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// A line that does not follow the format.
-    #[error("{}:{line}: {reason}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A record of a binary file that does not follow the format.
-    #[error("{}: record {record}: {reason}", path.display())]
-    Record {
-        /// The file.
-        path: PathBuf,
-        /// The record, from 1.
-        record: usize,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A camera that cannot be used.
-    #[error("{}: image {name:?}: {source}", path.display())]
-    Camera {
-        /// The file.
-        path: PathBuf,
-        /// The image.
-        name: String,
-        /// What is wrong with it.
-        source: CameraError,
-    },
-}
+/// What to do if a file of a model cannot be opened.
+const FILES: &str = "a COLMAP model has cameras.txt and images.txt, or cameras.bin and images.bin";
 
 /// A camera of the model with the size of its image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,9 +31,9 @@ pub type Model = BTreeMap<String, ModelCamera>;
 /// Images of other models have to be undistorted first, so these are refused.
 ///
 /// # Errors
-/// [`ColmapError`], with file and line or record.
-pub fn read_model(folder: &Path) -> Result<Model, ColmapError> {
-    let named = |name: &str, source| ColmapError::Read { path: folder.join(name), source };
+/// [`CameraFileError`], with file and line or record.
+pub fn read_model(folder: &Path) -> Result<Model, CameraFileError> {
+    let named = |name: &str, source| CameraFileError::Read { path: folder.join(name), source, remedy: FILES };
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
         let load = |name: &str| crate::files::read(&folder.join(name)).map_err(|e| named(name, e));
         return parse_binary(&load("cameras.bin")?, &load("images.bin")?, folder);
@@ -82,9 +42,9 @@ pub fn read_model(folder: &Path) -> Result<Model, ColmapError> {
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
 }
 
-fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<Model, ColmapError> {
+fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<Model, CameraFileError> {
     let fault =
-        |name: &str, (record, reason)| ColmapError::Record { path: folder.join(name), record, reason };
+        |name: &str, (record, reason)| CameraFileError::Record { path: folder.join(name), record, reason };
     let inners = binary::cameras(cameras).map_err(|e| fault("cameras.bin", e))?;
     let poses = binary::images(images).map_err(|e| fault("images.bin", e))?;
     join(&inners, poses, &folder.join("images.bin"), |at| fault("images.bin", at))
@@ -93,9 +53,9 @@ fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<Model, C
 /// The same from the texts of the two files; `folder` appears in messages.
 ///
 /// # Errors
-/// [`ColmapError`].
-pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<Model, ColmapError> {
-    let fault = |name: &str, (line, reason)| ColmapError::Line { path: folder.join(name), line, reason };
+/// [`CameraFileError`].
+pub fn parse_model(cameras: &str, images: &str, folder: &Path) -> Result<Model, CameraFileError> {
+    let fault = |name: &str, (line, reason)| CameraFileError::Line { path: folder.join(name), line, reason };
     let inners = parse_cameras(cameras).map_err(|e| fault("cameras.txt", e))?;
     let poses = parse_images(images).map_err(|e| fault("images.txt", e))?;
     join(&inners, poses, &folder.join("images.txt"), |at| fault("images.txt", at))
@@ -106,16 +66,16 @@ fn join(
     inners: &BTreeMap<u64, Inner>,
     poses: Vec<Pose>,
     path: &Path,
-    fault: impl Fn((usize, String)) -> ColmapError,
-) -> Result<Model, ColmapError> {
+    fault: impl Fn((usize, String)) -> CameraFileError,
+) -> Result<Model, CameraFileError> {
     let mut model = Model::new();
     for (at, id, pose, name) in poses {
         let inner = inners.get(&id).ok_or_else(|| {
             fault((at, format!("image {name:?} has camera {id}, which the cameras do not list")))
         })?;
-        let camera = Camera::metric(inner.k * pose, false).map_err(|source| ColmapError::Camera {
+        let camera = Camera::metric(inner.k * pose, false).map_err(|source| CameraFileError::Camera {
             path: path.into(),
-            name: name.clone(),
+            image: name.clone(),
             source,
         })?;
         let camera = inner.lens.map_or(camera, |lens| camera.with_lens(lens));

@@ -1,15 +1,19 @@
-//! Conjugate gradients, one channel after the other: with diagonal preconditioner, and with multigrid from
-//! there on where that does not converge soon.
+//! Conjugate gradients, all channels at a time: with diagonal preconditioner, and with multigrid from there
+//! on where that does not converge soon.
+//!
+//! Each channel has step lengths of its own, but the matrix, most of the memory that a step reads, is read
+//! once. The vectors are in single precision, whose rounding is a hundredth of the tolerance; scalar
+//! products are in double precision.
 
 use super::multigrid::Multigrid;
-use super::stencil::Stencil;
+use super::stencil::{Stencil, add_product, total};
 use super::{Convergence, PlaneSettings};
 use crate::interpolate::Watch;
 use rayon::prelude::*;
 
-/// Entries per chunk. Partial sums of a dot product follow the chunks, not the threads, so the bits do not
+/// Pixels per chunk. Partial sums of a dot product follow the chunks, not the threads, so the bits do not
 /// depend on them.
-const CHUNK: usize = 8192;
+const CHUNK: usize = 4096;
 
 /// Steps with the diagonal preconditioner. Fits without large holes end earlier; a multigrid step costs four
 /// times as much.
@@ -19,163 +23,263 @@ const DIAGONAL_STEPS: usize = 50;
 /// sides.
 pub(super) fn solve<const C: usize>(
     stencil: &Stencil,
+    rhs: Vec<[f32; C]>,
+    settings: &PlaneSettings,
+    watch: Watch<'_>,
+) -> (Vec<f32>, Convergence) {
+    match C {
+        1 => solve_in::<C, 1>(stencil, rhs, settings, watch),
+        // Four channels fill a vector register; the last one is 0.
+        _ => solve_in::<C, 4>(stencil, rhs, settings, watch),
+    }
+}
+
+fn solve_in<const C: usize, const L: usize>(
+    stencil: &Stencil,
     mut rhs: Vec<[f32; C]>,
     settings: &PlaneSettings,
     watch: Watch<'_>,
 ) -> (Vec<f32>, Convergence) {
-    let mut ended = Convergence { reached: true, ..Convergence::default() };
-    let mut work = Work::new(rhs.len());
-    let mut multigrid = None;
-    for channel in 0..C {
-        let of_channel = |share: f64| watch((channel as f64 + share) / C as f64);
-        let first = PlaneSettings { iterations: settings.iterations.min(DIAGONAL_STEPS), ..*settings };
-        let mut one = work.solve(stencil, |p| f64::from(rhs[p][channel]), &first, &of_channel);
-        if !one.reached {
-            let multigrid = multigrid.get_or_insert_with(|| Multigrid::new(stencil));
-            let rhs = |p: usize| f64::from(rhs[p][channel]);
-            one = work.continue_with(stencil, multigrid, rhs, settings, one.steps, &of_channel);
-        }
-        ended.steps = ended.steps.max(one.steps);
-        ended.residual = ended.residual.max(one.residual);
-        ended.reached &= one.reached;
-        rhs.iter_mut().zip(&work.u).for_each(|(r, u)| r[channel] = *u as f32);
+    let mut work = Work::<L>::new(stencil);
+    let right = |p: usize| std::array::from_fn(|c| rhs[p].get(c).copied().unwrap_or(0.0));
+    let first = PlaneSettings { iterations: settings.iterations.min(DIAGONAL_STEPS), ..*settings };
+    let mut ended = work.solve(stencil, &right, &first, watch);
+    if !ended.reached {
+        let mut multigrid = Multigrid::new(stencil);
+        ended = work.continue_with(stencil, &mut multigrid, &right, settings, ended.steps, watch);
     }
+    rhs.par_iter_mut().zip(&work.u).for_each(|(r, u)| r.copy_from_slice(&u[..C]));
     (rhs.into_flattened(), ended)
 }
 
-/// The four vectors of the iteration.
-struct Work {
-    u: Vec<f64>,
-    residual: Vec<f64>,
-    direction: Vec<f64>,
-    image: Vec<f64>,
-    /// Partial sums of dot products: one per image row or per chunk, never more than pixels.
-    partial: Vec<f64>,
+/// The vectors of the iteration.
+struct Work<const L: usize> {
+    u: Vec<[f32; L]>,
+    residual: Vec<[f32; L]>,
+    direction: Vec<[f32; L]>,
+    image: Vec<[f32; L]>,
+    /// 1 / diagonal.
+    inverse: Vec<f32>,
+    /// Partial sums of dot products: one per image row or per chunk.
+    partial: Vec<[f64; L]>,
 }
 
-impl Work {
-    fn new(n: usize) -> Self {
-        let zeros = || vec![0.0; n];
-        Self { u: zeros(), residual: zeros(), direction: zeros(), image: zeros(), partial: Vec::new() }
+/// A number for each channel.
+type PerChannel<const L: usize> = [f64; L];
+
+/// How far each channel is.
+struct Progress<const L: usize> {
+    /// Squares of the right-hand sides in the norm of the preconditioner.
+    scale: PerChannel<L>,
+    /// Squares of the residuals.
+    energy: PerChannel<L>,
+    tolerance: f64,
+}
+
+impl<const L: usize> Progress<L> {
+    /// Whether a channel is not yet at its tolerance.
+    fn open(&self, c: usize) -> bool {
+        self.energy[c] > self.scale[c] * self.tolerance * self.tolerance
     }
 
-    /// Starts from the splatted image rhs / diag, the solution without smoothing.
+    fn any_open(&self) -> bool {
+        (0..L).any(|c| self.open(c))
+    }
+
+    /// Largest square of a relative residual.
+    fn relative(&self) -> f64 {
+        (0..L).map(|c| self.energy[c] / self.scale[c]).fold(0.0, f64::max)
+    }
+
+    fn ended(&self, steps: usize) -> Convergence {
+        let residual = self.relative().sqrt();
+        Convergence { steps, residual, reached: residual <= self.tolerance }
+    }
+
+    /// Lengths of the steps, 0 for channels that are there; nothing if a channel cannot go on.
+    fn lengths(&self, product: PerChannel<L>, curvature: PerChannel<L>) -> Option<PerChannel<L>> {
+        let sound = |c: usize| curvature[c].is_finite() && curvature[c] > 0.0;
+        let open = |c: &usize| self.open(*c);
+        (0..L)
+            .filter(open)
+            .all(sound)
+            .then(|| std::array::from_fn(|c| if self.open(c) { product[c] / curvature[c] } else { 0.0 }))
+    }
+}
+
+impl<const L: usize> Work<L> {
+    fn new(a: &Stencil) -> Self {
+        let zeros = || vec![[0.0; L]; a.pixels()];
+        let inverse =
+            (0..a.pixels()).into_par_iter().with_min_len(CHUNK).map(|p| 1.0 / a.diagonal(p)).collect();
+        let partial = vec![[0.0; L]; a.rows().max(a.pixels().div_ceil(CHUNK))];
+        Self { u: zeros(), residual: zeros(), direction: zeros(), image: zeros(), inverse, partial }
+    }
+
+    /// Starts from the mean of the samples around each pixel: rhs / A 1, the solution for constant values.
     fn solve(
         &mut self,
         a: &Stencil,
-        rhs: impl Fn(usize) -> f64,
+        rhs: &(impl Fn(usize) -> [f32; L] + Sync),
         settings: &PlaneSettings,
-        watch: &dyn Fn(f64),
+        watch: Watch<'_>,
     ) -> Convergence {
-        let rows = self.u.len();
-        self.partial.resize(a.rows().max(rows.div_ceil(CHUNK)), 0.0);
-        (0..rows).for_each(|p| self.u[p] = rhs(p) / a.diagonal(p));
+        self.u.fill([1.0; L]);
         self.multiply_start(a);
-        (0..rows).for_each(|p| self.residual[p] = rhs(p) - self.image[p]);
-        (0..rows).for_each(|p| self.direction[p] = self.residual[p] / a.diagonal(p));
-        let scale: f64 =
-            (0..rows).map(|p| rhs(p) * rhs(p) / a.diagonal(p)).sum::<f64>().max(f64::MIN_POSITIVE);
-        let mut energy: f64 = (0..rows).map(|p| self.residual[p] * self.direction[p]).sum();
+        self.u.par_iter_mut().zip(&self.image).enumerate().with_min_len(CHUNK).for_each(|(p, (u, sum))| {
+            let share = 1.0 / sum[0].max(LEAST_SUM * a.diagonal(p));
+            *u = rhs(p).map(|r| r * share);
+        });
+        let mut progress = self.residuals(a, rhs, settings);
+        self.turn([0.0; L]);
         let mut steps = 0;
-        while steps < settings.iterations && energy > scale * settings.tolerance * settings.tolerance {
-            let curvature = a.multiply(&self.direction, &mut self.image, partials(&mut self.partial, a));
-            if !(curvature.is_finite() && curvature > 0.0) {
-                break;
-            }
-            let next = self.step(a, energy / curvature);
-            self.turn(a, next / energy);
-            energy = next;
+        while steps < settings.iterations && progress.any_open() {
+            let curvature = a.multiply(&self.direction, &mut self.image, &mut self.partial[..a.rows()]);
+            let Some(lengths) = progress.lengths(progress.energy, curvature) else { break };
+            let next = self.step(lengths);
+            self.turn(ratio(next, progress.energy));
+            progress.energy = next;
             steps += 1;
-            watch(done(energy / scale, settings));
+            watch(done(progress.relative(), settings));
         }
-        let residual = (energy / scale).sqrt();
-        Convergence { steps, residual, reached: residual <= settings.tolerance }
+        progress.ended(steps)
     }
 
     /// Goes on from u with the multigrid preconditioner.
     fn continue_with(
         &mut self,
         a: &Stencil,
-        multigrid: &mut Multigrid,
-        rhs: impl Fn(usize) -> f64,
+        multigrid: &mut Multigrid<L>,
+        rhs: &(impl Fn(usize) -> [f32; L] + Sync),
         settings: &PlaneSettings,
         mut steps: usize,
-        watch: &dyn Fn(f64),
+        watch: Watch<'_>,
     ) -> Convergence {
-        let pixels = self.u.len();
-        let scale: f64 =
-            (0..pixels).map(|p| rhs(p) * rhs(p) / a.diagonal(p)).sum::<f64>().max(f64::MIN_POSITIVE);
-        self.multiply_start(a);
-        (0..pixels).for_each(|p| self.residual[p] = rhs(p) - self.image[p]);
+        let mut progress = self.residuals(a, rhs, settings);
         multigrid.apply(a, &self.residual, &mut self.direction);
-        let mut preconditioned = vec![0.0; pixels];
-        let mut product = self.dot(&self.direction);
-        let mut energy =
-            (0..pixels).map(|p| self.residual[p] * self.residual[p] / a.diagonal(p)).sum::<f64>();
-        while steps < settings.iterations && energy > scale * settings.tolerance * settings.tolerance {
-            let curvature = a.multiply(&self.direction, &mut self.image, partials(&mut self.partial, a));
-            if !(curvature.is_finite() && curvature > 0.0) {
-                break;
-            }
-            energy = self.step(a, product / curvature);
+        let mut preconditioned = vec![[0.0; L]; a.pixels()];
+        let mut product = dot(&self.residual, &self.direction);
+        while steps < settings.iterations && progress.any_open() {
+            let curvature = a.multiply(&self.direction, &mut self.image, &mut self.partial[..a.rows()]);
+            let Some(lengths) = progress.lengths(product, curvature) else { break };
+            progress.energy = self.step(lengths);
             multigrid.apply(a, &self.residual, &mut preconditioned);
-            let next = self.dot(&preconditioned);
-            let factor = next / product;
-            self.direction.iter_mut().zip(&preconditioned).for_each(|(d, z)| *d = z + factor * *d);
+            let next = dot(&self.residual, &preconditioned);
+            let factor = ratio(next, product).map(|f| f as f32);
+            self.direction.par_iter_mut().zip(&preconditioned).with_min_len(CHUNK).for_each(|(d, z)| {
+                (0..L).for_each(|c| d[c] = z[c] + factor[c] * d[c]);
+            });
             product = next;
             steps += 1;
-            watch(done(energy / scale, settings));
+            watch(done(progress.relative(), settings));
         }
-        let residual = (energy / scale).sqrt();
-        Convergence { steps, residual, reached: residual <= settings.tolerance }
+        progress.ended(steps)
     }
 
-    /// residual . v
-    fn dot(&self, v: &[f64]) -> f64 {
-        self.residual.iter().zip(v).map(|(r, v)| r * v).sum()
+    /// residual = rhs - A u, and the norms.
+    fn residuals(
+        &mut self,
+        a: &Stencil,
+        rhs: &(impl Fn(usize) -> [f32; L] + Sync),
+        settings: &PlaneSettings,
+    ) -> Progress<L> {
+        self.multiply_start(a);
+        let inputs = self.image.par_chunks(CHUNK).zip(self.inverse.par_chunks(CHUNK));
+        let blocks = self.residual.par_chunks_mut(CHUNK).zip(inputs);
+        let sums: Vec<[[f64; L]; 2]> = blocks
+            .enumerate()
+            .map(|(k, (r, (image, inverse)))| {
+                let mut sums = [[0.0; L]; 2];
+                for (i, r) in r.iter_mut().enumerate() {
+                    let right = rhs(k * CHUNK + i);
+                    for c in 0..L {
+                        r[c] = right[c] - image[i][c];
+                        sums[0][c] += f64::from(right[c] * right[c] * inverse[i]);
+                        sums[1][c] += f64::from(r[c] * r[c] * inverse[i]);
+                    }
+                }
+                sums
+            })
+            .collect();
+        let of = |k: usize| total(&sums.iter().map(|s| s[k]).collect::<Vec<_>>());
+        let scale = of(0).map(|s| s.max(f64::MIN_POSITIVE));
+        Progress { scale, energy: of(1), tolerance: settings.tolerance }
     }
 
     /// image = A u.
     fn multiply_start(&mut self, a: &Stencil) {
-        a.multiply(&self.u, &mut self.image, partials(&mut self.partial, a));
+        a.multiply(&self.u, &mut self.image, &mut self.partial[..a.rows()]);
     }
 
-    /// Steps by `length` along the direction; returns r . D^{-1} r of the new residual.
-    fn step(&mut self, a: &Stencil, length: f64) -> f64 {
+    /// Steps by `lengths` along the direction; returns r . D^{-1} r of the new residual.
+    fn step(&mut self, lengths: PerChannel<L>) -> PerChannel<L> {
+        let lengths = lengths.map(|length| length as f32);
         let chunks = self.u.len().div_ceil(CHUNK);
         let blocks = self.u.par_chunks_mut(CHUNK).zip(self.residual.par_chunks_mut(CHUNK));
         let inputs = self.direction.par_chunks(CHUNK).zip(self.image.par_chunks(CHUNK));
-        blocks.zip(inputs).zip(self.partial[..chunks].par_iter_mut()).enumerate().for_each(
-            |(k, (((u, r), (p, q)), sum))| {
-                *sum = 0.0;
-                for i in 0..u.len() {
-                    u[i] += length * p[i];
-                    r[i] -= length * q[i];
-                    *sum += r[i] * r[i] / a.diagonal(k * CHUNK + i);
+        let inputs = inputs.zip(self.inverse.par_chunks(CHUNK));
+        blocks.zip(inputs).zip(self.partial[..chunks].par_iter_mut()).for_each(
+            |((blocks, ((p, q), inverse)), sum)| {
+                let ((u, r), mut i) = (blocks, 0);
+                *sum = [0.0; L];
+                while i < u.len() {
+                    let mut c = 0;
+                    while c < L {
+                        u[i][c] += lengths[c] * p[i][c];
+                        r[i][c] -= lengths[c] * q[i][c];
+                        c += 1;
+                    }
+                    add_product(sum, &r[i], &r[i], inverse[i]);
+                    i += 1;
                 }
             },
         );
-        self.partial[..chunks].iter().sum()
+        total(&self.partial[..chunks])
     }
 
     /// direction = D^{-1} residual + factor direction.
-    fn turn(&mut self, a: &Stencil, factor: f64) {
-        let blocks = self.direction.par_chunks_mut(CHUNK).zip(self.residual.par_chunks(CHUNK));
-        blocks.enumerate().for_each(|(k, (p, r))| {
-            for i in 0..p.len() {
-                p[i] = r[i] / a.diagonal(k * CHUNK + i) + factor * p[i];
+    fn turn(&mut self, factor: PerChannel<L>) {
+        let factor = factor.map(|f| f as f32);
+        let inputs = self.residual.par_chunks(CHUNK).zip(self.inverse.par_chunks(CHUNK));
+        self.direction.par_chunks_mut(CHUNK).zip(inputs).for_each(|(p, (r, inverse))| {
+            let mut i = 0;
+            while i < p.len() {
+                let mut c = 0;
+                while c < L {
+                    p[i][c] = r[i][c] * inverse[i] + factor[c] * p[i][c];
+                    c += 1;
+                }
+                i += 1;
             }
         });
     }
+}
+
+/// u . v in every channel.
+fn dot<const L: usize>(u: &[[f32; L]], v: &[[f32; L]]) -> PerChannel<L> {
+    let of_chunk = |(u, v): (&[[f32; L]], &[[f32; L]])| {
+        let mut sum = [0.0; L];
+        let mut i = 0;
+        while i < u.len() {
+            add_product(&mut sum, &u[i], &v[i], 1.0);
+            i += 1;
+        }
+        sum
+    };
+    total(&u.par_chunks(CHUNK).zip(v.par_chunks(CHUNK)).map(of_chunk).collect::<Vec<_>>())
+}
+
+/// The sums of the rows of A are the weights of the samples around each pixel, and 0 where there are none;
+/// the start divides by this share of the diagonal there.
+const LEAST_SUM: f32 = 0.05;
+
+/// a / b in every channel, 0 where b is 0.
+fn ratio<const L: usize>(a: PerChannel<L>, b: PerChannel<L>) -> PerChannel<L> {
+    std::array::from_fn(|c| if b[c] == 0.0 { 0.0 } else { a[c] / b[c] })
 }
 
 /// Share of the way to the tolerance: the residual falls by about one factor per step.
 fn done(energy: f64, settings: &PlaneSettings) -> f64 {
     let (now, end) = (energy.max(f64::MIN_POSITIVE).ln(), 2.0 * settings.tolerance.ln());
     if end < 0.0 { (now / end).clamp(0.0, 1.0) } else { 1.0 }
-}
-
-/// One partial sum per image row.
-fn partials<'a>(partial: &'a mut [f64], a: &Stencil) -> &'a mut [f64] {
-    &mut partial[..a.rows()]
 }

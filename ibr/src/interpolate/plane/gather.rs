@@ -8,9 +8,6 @@ use crate::sample::Sample;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Bands that are made at a time. More would use more memory: a band has half a million samples of 48 bytes.
-const AT_A_TIME: usize = 4;
-
 /// Some rows of the image with all that samples change there.
 struct Part<'a, const C: usize> {
     size: (usize, usize),
@@ -80,8 +77,10 @@ impl<'a, const C: usize> Part<'a, C> {
         let (width, height) = self.size;
         let half = self.holes.reach(s.spacing);
         let range = |centre: f64, length: usize| {
-            let end = ((centre + half).floor() + 1.0) as usize;
-            ((centre - half).ceil() as usize).min(length)..end.min(length)
+            // Casts cut toward zero; rounding functions are library calls on baseline x86-64. A pixel too
+            // many fails the test of the distance below.
+            let (low, end) = ((centre - half).max(0.0) as usize, (centre + half).max(0.0) as usize + 1);
+            low.min(length)..end.min(length)
         };
         let columns = range(s.x, width);
         for row in range(s.y, height) {
@@ -125,9 +124,9 @@ impl<const C: usize> PlaneProblem<C> {
         Ok(())
     }
 
-    /// Adds the samples of bands of rows, which `make` returns: those whose row, cut to the image, lies in the
-    /// band. The bands follow each other and cover the image. Bands that do not touch are made and added at the
-    /// same time; the result does not depend on the number of threads.
+    /// Adds the samples of bands of rows, which `make` returns: those whose row, cut to the image, lies in
+    /// the band. The bands follow each other and cover the image. Bands that do not touch are made and added
+    /// at the same time; the result does not depend on the number of threads.
     ///
     /// # Errors
     /// As [`PlaneProblem::add`].
@@ -142,24 +141,21 @@ impl<const C: usize> PlaneProblem<C> {
             return bands.iter().try_for_each(|band| self.add(&make(band)));
         }
         for parity in 0..2 {
-            let chosen: Vec<&Range<usize>> = bands.iter().skip(parity).step_by(2).collect();
-            for group in chosen.chunks(AT_A_TIME) {
-                let (parts, height, width) = (Vec::with_capacity(group.len()), self.height, self.width);
-                let mut parts: Vec<(&Range<usize>, Part<'_, C>)> = parts;
-                let mut rest = self.whole();
-                for band in group {
-                    let (_, after) = rest.split(band.start.saturating_sub(margin) * width);
-                    let (part, after) = after.split((band.end + margin).min(height) * width);
-                    parts.push((band, part));
-                    rest = after;
-                }
-                let add = |(band, mut part): (&Range<usize>, Part<'_, C>)| {
-                    let samples = make(band);
-                    check_samples(&samples).map(|()| part.add(&samples))
-                };
-                let added: Result<Vec<usize>, _> = parts.into_par_iter().map(add).collect();
-                self.added += added?.into_iter().sum::<usize>();
+            let (height, width) = (self.height, self.width);
+            let mut parts: Vec<(&Range<usize>, Part<'_, C>)> = Vec::new();
+            let mut rest = self.whole();
+            for band in bands.iter().skip(parity).step_by(2) {
+                let (_, after) = rest.split(band.start.saturating_sub(margin) * width);
+                let (part, after) = after.split((band.end + margin).min(height) * width);
+                parts.push((band, part));
+                rest = after;
             }
+            let add = |(band, mut part): (&Range<usize>, Part<'_, C>)| {
+                let samples = make(band);
+                check_samples(&samples).map(|()| part.add(&samples))
+            };
+            let added: Result<Vec<usize>, _> = parts.into_par_iter().with_max_len(1).map(add).collect();
+            self.added += added?.into_iter().sum::<usize>();
         }
         Ok(())
     }

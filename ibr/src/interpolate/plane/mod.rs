@@ -11,18 +11,20 @@
 //!
 //! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in
 //! units of the depth test's sigma. The bending term smooths like a cubic spline: it removes noise and keeps
-//! slopes. Each equation has thirteen unknowns; conjugate gradients solve them channel by channel, with a
-//! multigrid preconditioner where holes are large.
+//! slopes. Each equation has thirteen unknowns; conjugate gradients solve them for all channels together,
+//! with a multigrid preconditioner where holes are large.
 
 mod background;
 mod conjugate;
 mod gather;
 mod multigrid;
+mod springs;
 mod stencil;
 
 use super::{Cover, HoleFill, InterpolationError, Settings, Watch};
 use crate::depth::{DepthMap, Measure};
 use crate::sample::Sample;
+use springs::Springs;
 use stencil::Stencil;
 
 /// Settings of the plane fit.
@@ -42,7 +44,7 @@ pub struct PlaneSettings {
 
 impl Default for PlaneSettings {
     fn default() -> Self {
-        Self { stiffness: 0.12, bending: 0.02, edge_stiffness: 1e-3, tolerance: 1e-5, iterations: 500 }
+        Self { stiffness: 0.12, bending: 0.02, edge_stiffness: 1e-3, tolerance: 3e-5, iterations: 500 }
     }
 }
 
@@ -149,11 +151,13 @@ impl<const C: usize> PlaneProblem<C> {
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         self.distance = Vec::new();
         let depth = DepthMap::from_known((width, height), self.depth.clone(), Measure::Depth);
-        if self.settings.holes.fill == HoleFill::Background {
+        let background = self.settings.holes.fill == HoleFill::Background;
+        if background && mask.contains(&Cover::Disocclusion) {
             self.fill_background(&mask, &inside);
         }
         let left_out = self.settings.holes.fill == HoleFill::Leave;
-        self.connect(&|p| inside(p) && !(left_out && mask[p] != Cover::Seen));
+        let fitted = |p: usize| inside(p) && !(left_out && mask[p] != Cover::Seen);
+        self.connect(&(0..width * height).map(fitted).collect::<Vec<_>>());
         self.depth = Vec::new();
         let (mut values, convergence) =
             conjugate::solve(&self.stencil, self.rhs, &self.settings.plane, watch);
@@ -187,65 +191,13 @@ impl<const C: usize> PlaneProblem<C> {
     }
 
     /// Adds the edges between neighbouring pixels and the bends of triples.
-    fn connect(&mut self, inside: &dyn Fn(usize) -> bool) {
-        for p in 0..self.depth.len() {
-            if !inside(p) {
-                self.stencil.isolate(p);
-                continue;
-            }
-            for direction in [Direction::Right, Direction::Down] {
-                let Some(q) = self.next(p, direction).filter(|q| inside(*q)) else { continue };
-                self.add_edge(p, q, direction);
-                if let Some(r) = self.next(q, direction).filter(|r| inside(*r)) {
-                    self.add_bend([p, q, r], direction);
-                }
-            }
+    fn connect(&mut self, inside: &[bool]) {
+        for down in [false, true] {
+            let springs = Springs::new(&self.depth, self.width, inside, &self.settings, down);
+            self.stencil.add_springs(&springs.edge, &springs.bend, down);
         }
+        inside.iter().enumerate().filter(|(_, i)| !**i).for_each(|(p, _)| self.stencil.isolate(p));
     }
-
-    fn next(&self, p: usize, direction: Direction) -> Option<usize> {
-        match direction {
-            Direction::Right => (p % self.width + 1 < self.width).then_some(p + 1),
-            Direction::Down => (p + self.width < self.depth.len()).then_some(p + self.width),
-        }
-    }
-
-    fn add_edge(&mut self, p: usize, q: usize, direction: Direction) {
-        let plane = &self.settings.plane;
-        let steps = self.steps(&[p, q]);
-        let g = (plane.stiffness / (1.0 + steps * steps) + plane.edge_stiffness) as f32;
-        match direction {
-            Direction::Right => self.stencil.add_edge_right(p, g),
-            Direction::Down => self.stencil.add_edge_down(p, g),
-        }
-    }
-
-    fn add_bend(&mut self, triple: [usize; 3], direction: Direction) {
-        let steps = self.steps(&triple);
-        let h = (self.settings.plane.bending / (1.0 + steps * steps)) as f32;
-        match direction {
-            Direction::Right => self.stencil.add_bend_right(triple[0], h),
-            Direction::Down => self.stencil.add_bend_down(triple[0], h),
-        }
-    }
-
-    /// Range of the depths of some pixels in units of the depth test's sigma. Unknown depths (bridged holes)
-    /// count as lying on the surface of the others.
-    fn steps(&self, pixels: &[usize]) -> f64 {
-        let test = &self.settings.depth_test;
-        let depths = pixels.iter().map(|p| self.depth[*p]).filter(|d| !d.is_nan());
-        let (near, far) = depths.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), d| (a.min(d), b.max(d)));
-        if far <= near {
-            return 0.0;
-        }
-        f64::from(far - near) / (test.relative * f64::from(near) + test.absolute)
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Direction {
-    Right,
-    Down,
 }
 
 /// The complete third stage for samples at any position: a value for every pixel, and the mask.

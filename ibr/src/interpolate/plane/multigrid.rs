@@ -8,35 +8,35 @@ use super::stencil::Stencil;
 use rayon::prelude::*;
 
 /// Damping of the Jacobi steps. The eigenvalues of D^{-1} A stay below 8/3 (bending), so the steps contract.
-const DAMPING: f64 = 0.6;
+const DAMPING: f32 = 0.6;
 /// Factor of the coarse correction; below 2 the preconditioner stays positive definite.
-const CORRECTION: f64 = 1.5;
+const CORRECTION: f32 = 1.5;
 /// Unknowns of the coarsest matrix, at most, and Jacobi steps on it.
 const COARSEST: usize = 64;
 const COARSEST_STEPS: usize = 40;
 
 /// The matrices from the second finest down, with work memory for all levels.
-pub(super) struct Multigrid {
+pub(super) struct Multigrid<const L: usize> {
     coarse: Vec<Stencil>,
-    work: Vec<Work>,
+    work: Vec<Work<L>>,
 }
 
 /// Vectors of one level.
-struct Work {
-    rhs: Vec<f64>,
-    solution: Vec<f64>,
-    image: Vec<f64>,
-    partial: Vec<f64>,
+struct Work<const L: usize> {
+    rhs: Vec<[f32; L]>,
+    solution: Vec<[f32; L]>,
+    image: Vec<[f32; L]>,
+    partial: Vec<[f64; L]>,
 }
 
-impl Work {
+impl<const L: usize> Work<L> {
     fn of(stencil: &Stencil) -> Self {
-        let zeros = || vec![0.0; stencil.pixels()];
-        Self { rhs: zeros(), solution: zeros(), image: zeros(), partial: vec![0.0; stencil.rows()] }
+        let zeros = || vec![[0.0; L]; stencil.pixels()];
+        Self { rhs: zeros(), solution: zeros(), image: zeros(), partial: vec![[0.0; L]; stencil.rows()] }
     }
 }
 
-impl Multigrid {
+impl<const L: usize> Multigrid<L> {
     pub(super) fn new(finest: &Stencil) -> Self {
         let mut coarse: Vec<Stencil> = Vec::new();
         loop {
@@ -51,7 +51,7 @@ impl Multigrid {
     }
 
     /// out = M^{-1} residual: one symmetric V-cycle.
-    pub(super) fn apply(&mut self, finest: &Stencil, residual: &[f64], out: &mut [f64]) {
+    pub(super) fn apply(&mut self, finest: &Stencil, residual: &[[f32; L]], out: &mut [[f32; L]]) {
         self.work[0].rhs.copy_from_slice(residual);
         self.cycle(finest, 0);
         out.copy_from_slice(&self.work[0].solution);
@@ -60,7 +60,7 @@ impl Multigrid {
     fn cycle(&mut self, finest: &Stencil, level: usize) {
         let last = level == self.coarse.len();
         let a = if level == 0 { finest } else { &self.coarse[level - 1] };
-        self.work[level].solution.fill(0.0);
+        self.work[level].solution.fill([0.0; L]);
         (0..if last { COARSEST_STEPS } else { 1 }).for_each(|_| smooth(a, &mut self.work[level]));
         if last {
             return;
@@ -76,28 +76,38 @@ impl Multigrid {
 }
 
 /// solution += DAMPING D^{-1} (rhs - A solution).
-fn smooth(a: &Stencil, work: &mut Work) {
+fn smooth<const L: usize>(a: &Stencil, work: &mut Work<L>) {
     let Work { rhs, solution, image, partial } = work;
     a.multiply(solution, image, partial);
     let rows =
         solution.par_chunks_mut(a.width()).zip(rhs.par_chunks(a.width())).zip(image.par_chunks(a.width()));
     rows.enumerate().with_min_len(8).for_each(|(y, ((solution, rhs), image))| {
-        for x in 0..solution.len() {
-            solution[x] += DAMPING * (rhs[x] - image[x]) / a.diagonal(y * a.width() + x);
+        let mut x = 0;
+        while x < solution.len() {
+            let (share, mut c) = (DAMPING / a.diagonal(y * a.width() + x), 0);
+            while c < L {
+                solution[x][c] += share * (rhs[x][c] - image[x][c]);
+                c += 1;
+            }
+            x += 1;
         }
     });
 }
 
 /// The residual of a level, summed over blocks: the right-hand side of the next.
-fn restrict(a: &Stencil, work: &mut Work, next: &mut Work) {
+fn restrict<const L: usize>(a: &Stencil, work: &mut Work<L>, next: &mut Work<L>) {
     a.multiply(&work.solution, &mut work.image, &mut work.partial);
-    next.rhs.fill(0.0);
+    next.rhs.fill([0.0; L]);
     for (p, (rhs, image)) in work.rhs.iter().zip(&work.image).enumerate() {
-        next.rhs[a.block(p)] += rhs - image;
+        let sum = &mut next.rhs[a.block(p)];
+        (0..L).for_each(|c| sum[c] += rhs[c] - image[c]);
     }
 }
 
 /// Adds the coarse solution to all pixels of its blocks.
-fn correct(a: &Stencil, work: &mut Work, coarse: &[f64]) {
-    work.solution.iter_mut().enumerate().for_each(|(p, u)| *u += CORRECTION * coarse[a.block(p)]);
+fn correct<const L: usize>(a: &Stencil, work: &mut Work<L>, coarse: &[[f32; L]]) {
+    work.solution.par_iter_mut().enumerate().with_min_len(4096).for_each(|(p, u)| {
+        let block = &coarse[a.block(p)];
+        (0..L).for_each(|c| u[c] += CORRECTION * block[c]);
+    });
 }

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 /// the pixels two to the right and two down.
 ///
 /// f32 suffices: rounding an entry changes the fit by parts in 10^7 of the grey range, and these entries
-/// take most of the memory of the plane fit. All arithmetic is in f64.
+/// take most of the memory of the plane fit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Couplings {
     own: f32,
@@ -18,6 +18,13 @@ pub(super) struct Couplings {
     down_left: f32,
     right_two: f32,
     down_two: f32,
+}
+
+impl Couplings {
+    /// The couplings to the next pixel and the one after it, to the right or down.
+    fn towards(&mut self, down: bool) -> (&mut f32, &mut f32) {
+        if down { (&mut self.down, &mut self.down_two) } else { (&mut self.right, &mut self.right_two) }
+    }
 }
 
 /// Upper left pixel of the cell around a position in an image, and the weights of its four corners (upper
@@ -72,11 +79,14 @@ pub(super) struct Stencil {
     width: usize,
     height: usize,
     entries: Vec<Couplings>,
+    /// A row without couplings.
+    none: Vec<Couplings>,
 }
 
 impl Stencil {
     pub(super) fn new(width: usize, height: usize) -> Self {
-        Self { width, height, entries: vec![Couplings::default(); width * height] }
+        let entries = vec![Couplings::default(); width * height];
+        Self { width, height, entries, none: vec![Couplings::default(); width] }
     }
 
     /// The entries, which [`add_sample`] fills.
@@ -101,44 +111,22 @@ impl Stencil {
             + at(up.map(|q| q + 1)).down_left
     }
 
-    /// Adds g (u_p - u_{p+1})^2.
-    pub(super) fn add_edge_right(&mut self, p: usize, g: f32) {
-        self.entries[p].own += g;
-        self.entries[p].right -= g;
-        self.entries[p + 1].own += g;
-    }
-
-    /// Adds g (u_p - u_{p+width})^2.
-    pub(super) fn add_edge_down(&mut self, p: usize, g: f32) {
-        self.entries[p].own += g;
-        self.entries[p].down -= g;
-        self.entries[p + self.width].own += g;
-    }
-
-    /// Adds h (u_{p-1} - 2 u_p + u_{p+1})^2, p - 1 being `first`.
-    pub(super) fn add_bend_right(&mut self, first: usize, h: f32) {
-        self.add_bend(first, 1, h, |e| &mut e.right, |e| &mut e.right_two);
-    }
-
-    /// Adds h (u_{p-width} - 2 u_p + u_{p+width})^2, p - width being `first`.
-    pub(super) fn add_bend_down(&mut self, first: usize, h: f32) {
-        self.add_bend(first, self.width, h, |e| &mut e.down, |e| &mut e.down_two);
-    }
-
-    fn add_bend(
-        &mut self,
-        first: usize,
-        stride: usize,
-        h: f32,
-        one: fn(&mut Couplings) -> &mut f32,
-        two: fn(&mut Couplings) -> &mut f32,
-    ) {
-        for (k, share) in [1.0, 4.0, 1.0].into_iter().enumerate() {
-            self.entries[first + k * stride].own += share * h;
-        }
-        *one(&mut self.entries[first]) -= 2.0 * h;
-        *one(&mut self.entries[first + stride]) -= 2.0 * h;
-        *two(&mut self.entries[first]) += h;
+    /// Adds edge_p (u_p - u_{p+s})^2 + bend_p (u_p - 2 u_{p+s} + u_{p+2s})^2 for all pixels p, s being one
+    /// pixel to the right or a row down. Both are 0 where p + s or p + 2 s is not there.
+    pub(super) fn add_springs(&mut self, edge: &[f32], bend: &[f32], down: bool) {
+        let (stride, width) = (if down { self.width } else { 1 }, self.width);
+        let at = |values: &[f32], p: Option<usize>| p.map_or(0.0, |p| values[p]);
+        self.entries.par_chunks_mut(width).enumerate().with_min_len(8).for_each(|(y, row)| {
+            for (x, e) in row.iter_mut().enumerate() {
+                let p = y * width + x;
+                let (one, two) = (p.checked_sub(stride), p.checked_sub(2 * stride));
+                let (g, h, before) = (edge[p], bend[p], at(bend, one));
+                e.own += g + at(edge, one) + h + 4.0 * before + at(bend, two);
+                let (next, after) = e.towards(down);
+                *next -= g + 2.0 * (h + before);
+                *after += h;
+            }
+        });
     }
 
     /// Makes the row of a pixel without samples and edges nonsingular.
@@ -201,72 +189,111 @@ impl Stencil {
     }
 
     /// Diagonal entry of a pixel.
-    pub(super) fn diagonal(&self, p: usize) -> f64 {
-        f64::from(self.entries[p].own)
+    pub(super) fn diagonal(&self, p: usize) -> f32 {
+        self.entries[p].own
     }
 
-    /// out = A u, and u . A u. Rows in parallel; the dot product is summed row by row in order.
-    pub(super) fn multiply(&self, u: &[f64], out: &mut [f64], partial: &mut [f64]) -> f64 {
+    /// out = A u in all channels, and u . A u of each. Rows in parallel; the products are summed row by row
+    /// in order.
+    pub(super) fn multiply<const L: usize>(
+        &self,
+        u: &[[f32; L]],
+        out: &mut [[f32; L]],
+        partial: &mut [[f64; L]],
+    ) -> [f64; L] {
         let width = self.width;
         out.par_chunks_exact_mut(width).zip(partial.par_iter_mut()).enumerate().with_min_len(8).for_each(
             |(y, (out, dot))| {
                 self.multiply_row(y, u, out);
-                let row = &u[y * width..(y + 1) * width];
-                *dot = row.iter().zip(out.iter()).map(|(a, b)| a * b).sum();
+                let (u, mut x) = (&u[y * width..(y + 1) * width], 0);
+                *dot = [0.0; L];
+                while x < width {
+                    add_product(dot, &u[x], &out[x], 1.0);
+                    x += 1;
+                }
             },
         );
-        partial.iter().sum()
+        total(partial)
     }
 
-    fn multiply_row(&self, y: usize, u: &[f64], out: &mut [f64]) {
-        let width = self.width;
-        let start = y * width;
-        let here = &u[start..start + width];
-        let e = &self.entries[start..start + width];
-        for x in 0..width {
-            out[x] = f64::from(e[x].own) * here[x];
-        }
-        for x in 1..width {
-            out[x - 1] += f64::from(e[x - 1].right) * here[x];
-            out[x] += f64::from(e[x - 1].right) * here[x - 1];
-        }
-        for x in 2..width {
-            out[x - 2] += f64::from(e[x - 2].right_two) * here[x];
-            out[x] += f64::from(e[x - 2].right_two) * here[x - 2];
-        }
-        if y + 2 < self.height {
-            let below = &u[start + 2 * width..start + 3 * width];
-            for x in 0..width {
-                out[x] += f64::from(e[x].down_two) * below[x];
+    /// One row of the product. A pixel gathers the couplings that it stores and those that the pixels above
+    /// and to the left store; couplings across the border of the image are 0.
+    fn multiply_row<const L: usize>(&self, y: usize, u: &[[f32; L]], out: &mut [[f32; L]]) {
+        let (width, start) = (self.width, y * self.width);
+        let (e, here) = (&self.entries[start..start + width], &u[start..start + width]);
+        let (up, above) = self.earlier(y, 1, u);
+        let (up_two, above_two) = self.earlier(y, 2, u);
+        // Below the last row all couplings are 0, so any row will do.
+        let below = if y + 1 < self.height { &u[start + width..start + 2 * width] } else { here };
+        let below_two = if y + 2 < self.height { &u[start + 2 * width..start + 3 * width] } else { here };
+        let out = &mut out[..width];
+        let mut x = 0;
+        while x < width {
+            let c = &e[x];
+            let mut sum = [0.0; L];
+            add(&mut sum, c.own, &here[x]);
+            add(&mut sum, c.down, &below[x]);
+            add(&mut sum, c.down_two, &below_two[x]);
+            add(&mut sum, up[x].down, &above[x]);
+            add(&mut sum, up_two[x].down_two, &above_two[x]);
+            if x > 0 {
+                add(&mut sum, e[x - 1].right, &here[x - 1]);
+                add(&mut sum, c.down_left, &below[x - 1]);
+                add(&mut sum, up[x - 1].down_right, &above[x - 1]);
             }
-        }
-        if y > 1 {
-            let above = &u[start - 2 * width..start - width];
-            let e = &self.entries[start - 2 * width..start - width];
-            for x in 0..width {
-                out[x] += f64::from(e[x].down_two) * above[x];
+            if x > 1 {
+                add(&mut sum, e[x - 2].right_two, &here[x - 2]);
             }
-        }
-        if y + 1 < self.height {
-            let below = &u[start + width..start + 2 * width];
-            for x in 0..width {
-                out[x] += f64::from(e[x].down) * below[x];
+            if x + 1 < width {
+                add(&mut sum, c.right, &here[x + 1]);
+                add(&mut sum, c.down_right, &below[x + 1]);
+                add(&mut sum, up[x + 1].down_left, &above[x + 1]);
             }
-            for x in 1..width {
-                out[x - 1] += f64::from(e[x - 1].down_right) * below[x];
-                out[x] += f64::from(e[x].down_left) * below[x - 1];
+            if x + 2 < width {
+                add(&mut sum, c.right_two, &here[x + 2]);
             }
-        }
-        if y > 0 {
-            let above = &u[start - width..start];
-            let e = &self.entries[start - width..start];
-            for x in 0..width {
-                out[x] += f64::from(e[x].down) * above[x];
-            }
-            for x in 1..width {
-                out[x] += f64::from(e[x - 1].down_right) * above[x - 1];
-                out[x - 1] += f64::from(e[x].down_left) * above[x];
-            }
+            out[x] = sum;
+            x += 1;
         }
     }
+
+    /// Entries and values of a row above; entries of 0 and some row where there is none.
+    fn earlier<'a, const L: usize>(
+        &'a self,
+        y: usize,
+        rows: usize,
+        u: &'a [[f32; L]],
+    ) -> (&'a [Couplings], &'a [[f32; L]]) {
+        let width = self.width;
+        match y.checked_sub(rows) {
+            Some(y) => (&self.entries[y * width..(y + 1) * width], &u[y * width..(y + 1) * width]),
+            None => (&self.none, &u[..width]),
+        }
+    }
+}
+
+/// sum += coupling * u in all channels. A loop without an iterator, here and below: these are the innermost
+/// loops, and in builds with little optimisation iterators are calls.
+#[inline(always)]
+fn add<const L: usize>(sum: &mut [f32; L], coupling: f32, u: &[f32; L]) {
+    let mut c = 0;
+    while c < L {
+        sum[c] += coupling * u[c];
+        c += 1;
+    }
+}
+
+/// sum += factor u v in all channels.
+#[inline(always)]
+pub(super) fn add_product<const L: usize>(sum: &mut [f64; L], u: &[f32; L], v: &[f32; L], factor: f32) {
+    let mut c = 0;
+    while c < L {
+        sum[c] += (u[c] * v[c] * factor) as f64;
+        c += 1;
+    }
+}
+
+/// The sum of partial sums in all channels.
+pub(super) fn total<const L: usize>(partial: &[[f64; L]]) -> [f64; L] {
+    partial.iter().fold([0.0; L], |sum, part| std::array::from_fn(|c| sum[c] + part[c]))
 }

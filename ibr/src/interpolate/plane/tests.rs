@@ -156,16 +156,17 @@ fn blocks_move_as_one() {
     let scattered: Vec<_> =
         (0..40).map(|i| (f64::from(i * 37 % 60) / 10.0, f64::from(i * 23 % 40) / 10.0)).collect();
     problem.add(&scattered.iter().map(|(x, y)| sample(*x, *y, 1.0, 1.0)).collect::<Vec<_>>()).unwrap();
-    problem.connect(&|_| true);
+    problem.connect(&[true; 35]);
     let (fine, coarse) = (&problem.stencil, problem.stencil.coarsened());
-    let product = |a: &Stencil, u: &[f64]| {
-        let (mut image, mut partial) = (vec![0.0; u.len()], vec![0.0; a.rows()]);
-        a.multiply(u, &mut image, &mut partial);
-        image
+    let product = |a: &Stencil, u: &[f32]| {
+        let u: Vec<[f32; 1]> = u.iter().map(|v| [*v]).collect();
+        let (mut image, mut partial) = (vec![[0.0]; u.len()], vec![[0.0]; a.rows()]);
+        a.multiply(&u, &mut image, &mut partial);
+        image.into_iter().map(|[v]| v).collect::<Vec<f32>>()
     };
     for unit in 0..coarse.pixels() {
-        let block: Vec<f64> =
-            (0..width * height).map(|p| f64::from(u8::from(fine.block(p) == unit))).collect();
+        let block: Vec<f32> =
+            (0..width * height).map(|p| f32::from(u8::from(fine.block(p) == unit))).collect();
         let mut want = vec![0.0; coarse.pixels()];
         product(fine, &block).iter().enumerate().for_each(|(p, v)| want[fine.block(p)] += v);
         let mut one = vec![0.0; coarse.pixels()];
