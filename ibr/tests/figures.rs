@@ -176,16 +176,16 @@ fn house_tracks(path: &Path, views: &[usize]) -> Vec<Vec<Option<Point>>> {
     text("house.nview-corners".into()).lines().map(row).collect()
 }
 
-fn house(first: usize, second: usize, wanted: usize) -> Option<(f64, usize, usize)> {
+fn house(from: &[usize], wanted: usize) -> Option<(f64, usize, usize)> {
     let path = data("model_house")?;
-    let image = |v: usize| read_image(&path.join(format!("house.{v:03}.png"))).unwrap();
-    let (a, b, truth) = (image(first), image(second), image(wanted));
-    let tracks = house_tracks(&path, &[first, second]);
+    let image = |v: &usize| read_image(&path.join(format!("house.{v:03}.png"))).unwrap();
+    let (images, truth) = (from.iter().map(image).collect::<Vec<_>>(), image(&wanted));
+    let tracks = house_tracks(&path, from);
     let target = Target::Tracks(house_tracks(&path, &[wanted]).into_iter().map(|t| t[0]).collect());
     let settings = RenderSettings::default();
     let start = std::time::Instant::now();
     let got = uncalibrated::render(
-        &[&a, &b],
+        &images.iter().collect::<Vec<_>>(),
         &tracks,
         &target,
         truth.size(),
@@ -197,15 +197,23 @@ fn house(first: usize, second: usize, wanted: usize) -> Option<(f64, usize, usiz
     let image = &got.rendering.image;
     let q = quality::compare(image, &truth, Some(&got.region)).unwrap().unwrap();
     let share = q.pixels as f64 / got.region.len() as f64;
-    println!("({first}, {second}) -> {wanted}: {q:?} {share:.4} {seconds:.2} s");
+    println!("{from:?} -> {wanted}: {q:?} {share:.4} {seconds:.2} s");
     println!("{:?} {:?}", got.geometry, got.rendering.report);
     Some((q.psnr, got.geometry.inliers, got.geometry.matches))
 }
 
+/// A third view beside the two shows 5 % more of the hull, which is harder to render, and its mesh bridges edges
+/// in another way. Without the adjustment over all views and the weights of the views it is 29.3 dB.
+#[test]
+fn model_house_from_three_views() {
+    let Some((three, ..)) = house(&[2, 4, 1], 3) else { return };
+    assert!(three >= 29.8, "{three}");
+}
+
 #[test]
 fn model_house() {
-    let Some((psnr, inliers, matches)) = house(2, 4, 3) else { return };
-    let (second, all, of) = house(1, 3, 2).unwrap();
+    let Some((psnr, inliers, matches)) = house(&[2, 4], 3) else { return };
+    let (second, all, of) = house(&[1, 3], 2).unwrap();
     assert_eq!((inliers, matches), (340, 344));
     assert_eq!((all, of), (182, 182));
     assert!(psnr >= 30.7, "{psnr}");

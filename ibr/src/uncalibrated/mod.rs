@@ -14,7 +14,7 @@ pub mod mesh;
 pub mod metric;
 pub mod normalise;
 pub mod order;
-mod random;
+pub(crate) mod random;
 pub mod resection;
 pub mod tracks;
 pub mod triangulate;

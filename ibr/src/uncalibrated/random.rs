@@ -41,6 +41,26 @@ pub(super) fn trials_needed(inliers: usize, total: usize, size: i32, confidence:
     if clean >= 1.0 { 1.0 } else { (1.0 - confidence).ln() / (-clean).ln_1p() }
 }
 
+/// Random numbers for trials.
+#[cfg(test)]
+pub(crate) struct Dice(Pcg64);
+
+#[cfg(test)]
+impl Dice {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Pcg64::seed_from_u64(seed))
+    }
+
+    pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Nearly normal, of variance one.
+    pub(crate) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.within(-0.5, 0.5)).sum()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -21,37 +21,66 @@ const FEWEST: usize = 40;
 /// Standard deviations that a verdict needs. Neighbouring pixels err together, so they are many.
 const DEVIATIONS: f64 = 5.0;
 
-/// Mean advantage that a verdict needs, in grey levels: folds of the meshes at outlines favour one order by less.
+/// Mean advantage that a verdict needs, in grey levels: folds of the meshes at outlines favour one order by
+/// less.
 const LEAST: f64 = 12.0;
 
-/// The order under which the first two photographs show the nearer of two points that fall on one of their pixels.
-/// `None` if there are few such pixels, or both orders fit alike: then it hardly matters.
-pub(super) fn order(images: &[&Image], scene: &Reconstruction) -> Result<Option<Handedness>, RenderError> {
-    let (mut sum, mut squares, mut count) = (0.0, 0.0, 0_usize);
-    for (from, to) in [(0, 1), (1, 0)] {
-        for advantage in advantages(images, scene, from, to)? {
-            sum += advantage;
-            squares += advantage * advantage;
-            count += 1;
-        }
-    }
-    let significant = sum * sum >= DEVIATIONS * DEVIATIONS * squares && sum.abs() >= LEAST * count as f64;
-    if count < FEWEST || !significant {
-        return Ok(None);
-    }
-    Ok(Some(if sum > 0.0 { Handedness::Kept } else { Handedness::Reversed }))
+/// How much better the colours fit if the order is kept, over all pixels on which two surfaces fall.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Advantage {
+    sum: f64,
+    squares: f64,
+    count: usize,
 }
 
-/// For each pixel of view `to` on which points of two surfaces of view `from` fall: by how much the one that is
-/// nearer if the order is kept has the better colour.
+impl Advantage {
+    /// From both photographs of the base pair.
+    pub(super) fn of(images: &[&Image], scene: &Reconstruction) -> Result<Self, RenderError> {
+        let mut all = Self::default();
+        for (from, to) in [(0, 1), (1, 0)] {
+            for advantage in advantages(images, scene, from, to)? {
+                all.sum += advantage;
+                all.squares += advantage * advantage;
+                all.count += 1;
+            }
+        }
+        Ok(all)
+    }
+
+    /// Mean over the pixels in grey levels, positive if the order is kept.
+    pub(super) fn mean(&self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
+
+    /// The sum in standard deviations.
+    pub(super) fn deviations(&self) -> f64 {
+        self.sum / self.squares.max(f64::MIN_POSITIVE).sqrt()
+    }
+
+    /// Pixels.
+    pub(super) fn pixels(&self) -> usize {
+        self.count
+    }
+
+    /// The order under which the photographs show the nearer of two points that fall on one of their pixels.
+    /// `None` if there are few such pixels, or both orders fit alike: then it hardly matters.
+    pub(super) fn order(&self) -> Option<Handedness> {
+        let sure = self.deviations().abs() >= DEVIATIONS && self.mean().abs() >= LEAST;
+        let hand = if self.sum > 0.0 { Handedness::Kept } else { Handedness::Reversed };
+        (self.pixels() >= FEWEST && sure).then_some(hand)
+    }
+}
+
+/// For each pixel of view `to` on which points of two surfaces of view `from` fall: by how much the one that
+/// is nearer if the order is kept has the better colour.
 fn advantages(
     images: &[&Image],
     scene: &Reconstruction,
     from: usize,
     to: usize,
 ) -> Result<Vec<f64>, RenderError> {
-    let source = camera(&scene.cameras[from], || format!("the camera of view {}", from + 1))?;
-    let target = camera(&scene.cameras[to], || format!("the camera of view {}", to + 1))?;
+    let source = camera(&scene.cameras[from], || scene.name(from))?;
+    let target = camera(&scene.cameras[to], || scene.name(to))?;
     let known = features(scene, from);
     let chi = mesh::dense_chi(&known, images[from].size());
     let (width, height) = images[to].size();

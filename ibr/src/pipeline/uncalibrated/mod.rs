@@ -1,5 +1,7 @@
 //! A view from images and tracks alone (thesis 2.5).
 
+mod all_views;
+mod base_pair;
 mod colours;
 mod reconstruction;
 mod synthesis;
@@ -9,6 +11,7 @@ use crate::image::Image;
 use crate::interpolate::plane::PlaneSettings;
 use crate::uncalibrated::chirality::Handedness;
 use crate::uncalibrated::{GeometryError, Point, RobustSettings};
+use colours::Advantage;
 
 /// The virtual camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,8 +123,9 @@ pub struct UncalibratedRendering {
 
 /// Renders a view of `size` from images and `tracks[track][image]`.
 ///
-/// The scene is reconstructed from the first two images; the cameras of further images are resected from
-/// the tracks.
+/// The scene is reconstructed from two images first: the pair of most matches and parallax, or the first two
+/// if the virtual camera lies between them. The cameras of further images are resected from the tracks, and
+/// then all cameras and points are adjusted together.
 ///
 /// # Errors
 /// [`UncalibratedError`].
@@ -138,14 +142,32 @@ pub fn render(
         return Err(UncalibratedError::Views { images: images.len(), columns });
     }
     settings.check()?;
-    let mut scene = reconstruction::reconstruct(images, tracks, target, uncalibrated)?;
+    let numbers = match target {
+        Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated),
+        _ => (0..columns).collect(),
+    };
+    let images: &[&Image] = &numbers.iter().map(|i| images[*i]).collect::<Vec<_>>();
+    // A row of another length was refused when the tracks were read.
+    let reordered = |t: &Vec<Option<Point>>| numbers.iter().map(|i| t.get(*i).copied().flatten()).collect();
+    let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
+    let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated)?;
+    scene.numbers = numbers;
     if uncalibrated.handedness.is_none() {
-        // Photographs show what is in front, while guessed calibrations err alike if the principal points do.
-        if let Some(hand) = colours::order(images, &scene)? {
-            (scene.hand, scene.geometry.order_by) = (hand, OrderBy::Colours);
-        }
+        decide(images, &mut scene)?;
     }
     let colour = images.iter().any(|i| i.channels() == 3);
     let render = if colour { synthesis::render::<3> } else { synthesis::render::<1> };
     Ok(render(images, &scene, size, settings, uncalibrated)?)
 }
+
+/// Lets the photographs decide the order of depth. They show what is in front, while guessed calibrations
+/// err alike if the principal points do.
+fn decide(images: &[&Image], scene: &mut reconstruction::Reconstruction) -> Result<(), RenderError> {
+    if let Some(hand) = Advantage::of(images, scene)?.order() {
+        (scene.hand, scene.geometry.order_by) = (hand, OrderBy::Colours);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod trials;

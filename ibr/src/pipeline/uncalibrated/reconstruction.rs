@@ -1,5 +1,6 @@
 //! Cameras and points of a scene from tracks, in a projective frame.
 
+use super::all_views;
 use super::{GeometryReport, OrderBy, Target, UncalibratedError, UncalibratedSettings};
 use crate::image::Image;
 use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
@@ -23,6 +24,15 @@ pub(super) struct Reconstruction {
     pub(super) seen: Vec<Vec<Option<Point>>>,
     pub(super) hand: Handedness,
     pub(super) geometry: GeometryReport,
+    /// The numbers that the caller gave to the views.
+    pub(super) numbers: Vec<usize>,
+}
+
+impl Reconstruction {
+    /// A view by its name for messages.
+    pub(super) fn name(&self, view: usize) -> String {
+        format!("the camera of view {}", self.numbers.get(view).unwrap_or(&view) + 1)
+    }
 }
 
 /// Reconstructs the scene from the first two images and resects all further cameras, the virtual one last.
@@ -49,6 +59,16 @@ pub(super) fn reconstruct(
     let mut points = base.points.clone();
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
     let order = base.order(&points, &cameras[0], settings)?;
+    let mut seen = seen;
+    if let (Target::Tracks(positions), 3..) = (target, images.len()) {
+        let whole = |(track, position): (&Vec<Option<Point>>, &Option<Point>)| {
+            track.iter().copied().chain([*position]).collect()
+        };
+        let all: Vec<Vec<Option<Point>>> = tracks.iter().zip(positions).map(whole).collect();
+        let cloud = all_views::adjust(&mut cameras, &all, settings.robust.reprojection);
+        (points, seen) = (cloud.points, cloud.seen);
+        chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
+    }
     let geometry = GeometryReport {
         matches: base.given,
         inliers: base.f.inliers.len(),
@@ -63,7 +83,7 @@ pub(super) fn reconstruct(
             None => OrderBy::Nothing,
         },
     };
-    Ok(Reconstruction { cameras, points, seen, hand: order.hand, geometry })
+    Ok(Reconstruction { cameras, points, seen, hand: order.hand, geometry, numbers: Vec::new() })
 }
 
 /// The reconstruction of the first two views.

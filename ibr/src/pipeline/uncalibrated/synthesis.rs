@@ -1,5 +1,6 @@
 //! The virtual view from a reconstructed scene: propagation by chi, occlusion removal, plane fit.
 
+use super::base_pair::{matches, parallax};
 use super::reconstruction::Reconstruction;
 use super::{UncalibratedRendering, UncalibratedSettings};
 use crate::camera::{Camera, Relative};
@@ -7,7 +8,7 @@ use crate::image::Image;
 use crate::interpolate::HoleCount;
 use crate::interpolate::plane::PlaneProblem;
 use crate::occlusion::{self, DepthTest};
-use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering, Report};
+use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, Report};
 use crate::propagate::Frame;
 use crate::sample::{Dropped, Sample};
 use crate::uncalibrated::chirality;
@@ -35,12 +36,15 @@ pub(super) fn render<const C: usize>(
     let mut report = Report::default();
     let mut samples: Vec<Sample<C>> = Vec::new();
     for (i, image) in images.iter().enumerate() {
-        let source = camera(&scene.cameras[i], || format!("the camera of view {}", i + 1))?;
+        let source = camera(&scene.cameras[i], || scene.name(i))?;
         let chi = mesh::dense_chi(&features(scene, i), image.size());
         let map = source.relative_to(&target);
         report.dropped += propagate_chi(image, &chi, i as u16, &map, sign, &frame, &mut samples);
     }
     report.propagated = samples.len();
+    if images.len() > 2 {
+        balance(scene, images.len()).apply(&mut samples);
+    }
     if samples.is_empty() {
         let pixels = images.iter().map(|i| i.width() * i.height()).sum();
         return Err(RenderError::NoOverlap { pixels, dropped: report.dropped });
@@ -67,6 +71,25 @@ pub(super) fn render<const C: usize>(
     let views = (0..images.len()).collect();
     let rendering = Rendering { image, mask, depth, counts, views, report, agreement };
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
+}
+
+/// Weights of the views: near ones count more. The distance of a view is the parallax between it and the
+/// virtual one, in pixels.
+fn balance(scene: &Reconstruction, target: usize) -> Balance {
+    let positions: Vec<Vec<Option<Point>>> = scene
+        .points
+        .iter()
+        .zip(&scene.seen)
+        .map(|(point, seen)| {
+            let p = scene.cameras[target] * point;
+            let there = (p.z > 0.0).then(|| p.xy() / p.z);
+            seen[..target].iter().copied().chain([there]).collect()
+        })
+        .collect();
+    let distance = |view| parallax(&matches(&positions, view, target));
+    let distances: Option<Vec<f64>> = (0..target).map(distance).collect();
+    // Too few points for a distance: all views count alike.
+    Balance::by_distance(&distances.unwrap_or_else(|| vec![1.0; target]))
 }
 
 /// The features of one view with their chi, without points behind it.

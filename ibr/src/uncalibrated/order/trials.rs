@@ -4,10 +4,9 @@ use super::*;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::canonical::canonical_pair;
 use crate::uncalibrated::fundamental::eight_point;
+use crate::uncalibrated::random::Dice;
 use crate::uncalibrated::triangulate::triangulate;
 use nalgebra::Rotation3;
-use rand_core::{Rng, SeedableRng};
-use rand_pcg::Pcg64;
 
 const SIZE: (usize, usize) = (640, 480);
 
@@ -19,23 +18,9 @@ enum Kind {
     UnequalFocal,
 }
 
-struct Dice(Pcg64);
-
-impl Dice {
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Nearly normal, of variance one.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.within(-0.5, 0.5)).sum()
-    }
-}
-
 /// The votes on one pair, and the true sign.
 fn pair(kind: Kind, seed: u64) -> Option<(Vec<Vote>, f64)> {
-    let mut dice = Dice(Pcg64::seed_from_u64(seed));
-    let dice = &mut dice;
+    let dice = &mut Dice::new(seed);
     let focal = 640.0 * dice.within(0.7, 2.0);
     let ratio = if kind == Kind::UnequalFocal { 2.0_f64.powf(dice.within(-0.75, 0.75)) } else { 1.0 };
     let off = match kind {
@@ -104,7 +89,8 @@ fn pair(kind: Kind, seed: u64) -> Option<(Vec<Vote>, f64)> {
     Some((votes(&f, &matches, &points, &projective[0], [SIZE; 2]), sign))
 }
 
-/// Few pairs are wrong and most are decided, in every run a few of them; HYBANK_CAMPAIGN=10 makes ten times as many.
+/// Few pairs are wrong and most are decided, in every run a few of them; HYBANK_CAMPAIGN=10 makes ten times
+/// as many.
 #[test]
 fn few_orders_are_wrong() {
     let factor = std::env::var("HYBANK_CAMPAIGN").ok().and_then(|text| text.parse().ok()).unwrap_or(1);
@@ -112,17 +98,22 @@ fn few_orders_are_wrong() {
         (Kind::SideBySide, 0.005),
         (Kind::UnequalFocal, 0.005),
         (Kind::SlightlyCropped, 0.005),
-        (Kind::Cropped, 0.15),
+        (Kind::Cropped, 0.01),
     ] {
         let found: Vec<(f64, f64, f64)> = (0..30 * factor)
             .filter_map(|seed| pair(kind, seed))
             .filter_map(|(votes, truth)| mean_sign(&votes).map(|(mean, agreement)| (mean, agreement, truth)))
             .collect();
+        for least in [0.75, 0.85, 0.9, 0.95, 0.97, 0.99] {
+            let decided = found.iter().filter(|f| f.1 >= least);
+            let wrong = decided.clone().filter(|f| f.0 * f.2 < 0.0).count();
+            println!("{kind:?}: agreement {least}: {} decided, {wrong} wrong", decided.count());
+        }
         let decided = found.iter().filter(|f| f.1 >= LEAST_AGREEMENT);
         let wrong = decided.clone().filter(|f| f.0 * f.2 < 0.0).count();
         let (all, decided) = (found.len() as f64, decided.count() as f64);
         println!("{kind:?}: {all} pairs, {decided} decided, {wrong} of them wrong");
-        assert!(wrong as f64 <= most * all && decided > 0.5 * all, "{kind:?}: {wrong} {decided} of {all}");
+        assert!(wrong as f64 <= most * all && decided > 0.2 * all, "{kind:?}: {wrong} {decided} of {all}");
     }
 }
 
@@ -141,7 +132,7 @@ fn the_frame_does_not_matter() {
             chirality::orient(&mut cameras, &mut points, |_, _| true);
             let order = Order::of(&f, &matches, &points, &cameras[0], [(641, 481); 2]).unwrap();
             assert_eq!(order.hand.sign(), h.determinant().signum(), "{last:?} {mirror}");
-            assert!(order.is_decided(), "{order:?}");
+            assert!(order.agreement > 0.75, "{order:?}");
         }
     }
 }
