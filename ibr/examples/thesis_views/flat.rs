@@ -1,8 +1,7 @@
 //! Figures 3.5 to 3.7: scenes of the plane without occlusion, ten cameras.
 
 use crate::page::Verdict;
-use crate::{Effort, Figure, Outcome, decades, mean, series, slope};
-use hybank::plot::Chart;
+use crate::{Curve, Effort, Figure, Outcome, chart, decades, mean, slope, swept};
 use hybank_ibr::analysis::flat::scenes::{Wave, cameras, virtual_camera};
 use hybank_ibr::analysis::flat::{Errors, FlatCamera, FlatRig, UNIFORM_ERROR_SHARE, trial};
 
@@ -38,16 +37,15 @@ pub(crate) fn pixels(effort: Effort) -> Outcome<Figure> {
             least > 1.0,
         ),
     ];
-    let chart = Chart {
-        title: "Figure 3.5: error against the number of pixels".into(),
-        x_label: "log10 of the focal length in pixels".into(),
-        y_label: "log10 MAE".into(),
-        series: vec![
-            series("measured", decades(&measured)),
-            series("estimate, exact moments", decades(&estimates)),
-            series("bound of Theorem 3.1", decades(&bounds)),
+    let chart = chart(
+        "Figure 3.5: error against the number of pixels",
+        ["log10 of the focal length in pixels", "log10 MAE"],
+        vec![
+            ("measured", decades(&measured)),
+            ("estimate, exact moments", decades(&estimates)),
+            ("bound of Theorem 3.1", decades(&bounds)),
         ],
-    };
+    );
     Ok(Figure { file: "figure-3.5.svg", chart, verdicts })
 }
 
@@ -56,7 +54,7 @@ pub(crate) fn texture_errors(effort: Effort) -> Outcome<Figure> {
     let focal = effort.of(512.0, 64.0);
     let levels = [0.0, 0.02, 0.04, 0.06, 0.08, 0.1];
     let errors = |texture| Errors { texture, depth: 0.0 };
-    let (measured, bounds) = swept(focal, &levels, errors, effort)?;
+    let (measured, bounds) = levels_of(focal, &levels, errors, effort)?;
     let share = measured[5].1 / 0.1;
     let verdicts = vec![
         Verdict::new(
@@ -66,12 +64,11 @@ pub(crate) fn texture_errors(effort: Effort) -> Outcome<Figure> {
         ),
         above(&measured, &bounds),
     ];
-    let chart = Chart {
-        title: "Figure 3.6: error against the errors of intensity".into(),
-        x_label: "E_T".into(),
-        y_label: "MAE".into(),
-        series: vec![series("measured", measured), series("bound of Theorem 3.1", bounds)],
-    };
+    let chart = chart(
+        "Figure 3.6: error against the errors of intensity",
+        ["E_T", "MAE"],
+        vec![("measured", measured), ("bound of Theorem 3.1", bounds)],
+    );
     Ok(Figure { file: "figure-3.6.svg", chart, verdicts })
 }
 
@@ -80,7 +77,7 @@ pub(crate) fn depth_errors(effort: Effort) -> Outcome<Figure> {
     let focal = effort.of(512.0, 64.0);
     let levels = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2];
     let errors = |depth| Errors { texture: 0.0, depth };
-    let (measured, bounds) = swept(focal, &levels, errors, effort)?;
+    let (measured, bounds) = levels_of(focal, &levels, errors, effort)?;
     let (first, last) = (measured[2].1 / 0.05, measured[5].1 / 0.2);
     let verdicts = vec![
         Verdict::new(
@@ -90,19 +87,16 @@ pub(crate) fn depth_errors(effort: Effort) -> Outcome<Figure> {
         ),
         above(&measured, &bounds),
     ];
-    let chart = Chart {
-        title: "Figure 3.7: error against the errors of depth".into(),
-        x_label: "E_D".into(),
-        y_label: "MAE".into(),
-        series: vec![series("measured", measured), series("bound of Theorem 3.1", bounds)],
-    };
+    let chart = chart(
+        "Figure 3.7: error against the errors of depth",
+        ["E_D", "MAE"],
+        vec![("measured", measured), ("bound of Theorem 3.1", bounds)],
+    );
     Ok(Figure { file: "figure-3.7.svg", chart, verdicts })
 }
 
-type Curve = Vec<(f64, f64)>;
-
 /// Measured errors and bounds at some levels of one kind of error.
-fn swept(
+fn levels_of(
     focal: f64,
     levels: &[f64],
     errors: impl Fn(f64) -> Errors,
@@ -110,14 +104,10 @@ fn swept(
 ) -> Outcome<(Curve, Curve)> {
     let cameras = cameras(10, focal);
     let rig = rig(&cameras, focal);
-    let draws = effort.of(12, 2);
-    let (mut measured, mut bounds) = (Vec::new(), Vec::new());
-    for level in levels {
-        let errors = errors(*level);
-        measured.push((*level, mean(draws, |seed| trial::image_space(&rig, errors, seed))?));
-        bounds.push((*level, rig.image_space(errors).total()));
-    }
-    Ok((measured, bounds))
+    swept(levels, |level| {
+        let measured = mean(effort.of(12, 2), |seed| trial::image_space(&rig, errors(level), seed))?;
+        Ok((measured, rig.image_space(errors(level)).total()))
+    })
 }
 
 /// Whether a bound lies above the measured errors.

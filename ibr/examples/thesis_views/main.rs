@@ -1,12 +1,13 @@
-//! The virtual experiments of the thesis on image-based rendering, chapters 3 and 4: figures 3.5 to 3.7, 3.9 and
-//! 4.6 to 4.8 as charts, tables 3.1 and 4.1, and a page that sets them beside what the thesis claims.
+//! The virtual experiments of the thesis on image-based rendering, chapters 3 and 4: figures 3.5 to 3.7, 3.9
+//! and 4.6 to 4.8 as charts, tables 3.1 and 4.1, and a page that sets them beside what the thesis claims.
 //!
 //! ```text
 //! cargo run --release --example thesis_views -- [FOLDER] [--few]
 //! ```
 //!
-//! writes `index.html` and the charts to FOLDER (`thesis_views`). Figure 3.9 takes the photographs "Cones" from
-//! the folder HYBANK_DATA, and a synthetic scene if they are not there. `--few` makes the experiments small.
+//! writes `index.html` and the charts to FOLDER (`thesis_views`). Figure 3.9 takes the photographs "Cones"
+//! from the folder HYBANK_DATA, and a synthetic scene if they are not there. `--few` makes the experiments
+//! small.
 
 mod flat;
 mod page;
@@ -72,13 +73,28 @@ fn main() -> Outcome<()> {
     }
 }
 
+type Curve = Vec<(f64, f64)>;
+
 /// Points of decimal logarithms, for decays.
 fn decades(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.iter().map(|(x, y)| (x.log10(), y.log10())).collect()
 }
 
-fn series(label: &str, points: Vec<(f64, f64)>) -> Series {
-    Series { label: label.into(), points }
+/// A chart of labelled curves.
+fn chart(title: impl Into<String>, [x, y]: [&str; 2], curves: Vec<(&str, Curve)>) -> Chart {
+    let series = curves.into_iter().map(|(label, points)| Series { label: label.into(), points }).collect();
+    Chart { title: title.into(), x_label: x.into(), y_label: y.into(), series }
+}
+
+/// What is measured and what is predicted at some levels.
+fn swept(levels: &[f64], at: impl Fn(f64) -> Outcome<(f64, f64)>) -> Outcome<(Curve, Curve)> {
+    let (mut measured, mut predicted) = (Vec::new(), Vec::new());
+    for level in levels {
+        let found = at(*level)?;
+        measured.push((*level, found.0));
+        predicted.push((*level, found.1));
+    }
+    Ok((measured, predicted))
 }
 
 /// Slope of the least-squares line through points.

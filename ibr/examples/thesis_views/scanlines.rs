@@ -1,8 +1,7 @@
 //! Figure 3.9: the error of every row of a rendered view, measured and predicted.
 
 use crate::page::Verdict;
-use crate::{Effort, Figure, Outcome, series};
-use hybank::plot::Chart;
+use crate::{Effort, Figure, Outcome, chart};
 use hybank_ibr::analysis::view;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
@@ -36,7 +35,8 @@ pub(crate) fn rows(effort: Effort) -> Outcome<Figure> {
         .map(|(a, b)| a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / stride as f64)
         .collect();
     let rows = predicted.rows();
-    let (estimates, bounds): (Vec<f64>, Vec<f64>) = rows.iter().map(|r| (r.estimate, r.local_bound)).unzip();
+    let estimates: Vec<f64> = rows.iter().map(|r| r.estimate).collect();
+    let bounds: Vec<f64> = rows.iter().filter_map(|r| r.local_bound).collect();
     let above = bounds.iter().zip(&measured).filter(|(bound, error)| bound >= error).count();
     let related = correlation(&estimates, &measured);
     let verdicts = vec![
@@ -52,16 +52,15 @@ pub(crate) fn rows(effort: Effort) -> Outcome<Figure> {
         ),
     ];
     let by_row = |values: &[f64]| values.iter().enumerate().map(|(y, v)| (y as f64, *v)).collect();
-    let chart = Chart {
-        title: format!("Figure 3.9: error of the rows of {}", pair.name),
-        x_label: "row".into(),
-        y_label: "MAE in grey levels".into(),
-        series: vec![
-            series("measured", by_row(&measured)),
-            series("estimate", by_row(&estimates)),
-            series("local bound", by_row(&bounds)),
+    let chart = chart(
+        format!("Figure 3.9: error of the rows of {}", pair.name),
+        ["row", "MAE in grey levels"],
+        vec![
+            ("measured", by_row(&measured)),
+            ("estimate", by_row(&estimates)),
+            ("local bound", by_row(&bounds)),
         ],
-    };
+    );
     Ok(Figure { file: "figure-3.9.svg", chart, verdicts })
 }
 

@@ -2,8 +2,7 @@
 
 use crate::flat::above;
 use crate::page::Verdict;
-use crate::{Effort, Figure, Outcome, decades, mean, series, slope};
-use hybank::plot::Chart;
+use crate::{Curve, Effort, Figure, Outcome, chart, decades, mean, slope, swept};
 use hybank_ibr::analysis::flat::Errors;
 use hybank_ibr::analysis::spatial::scenes::{Hill, camera_at};
 use hybank_ibr::analysis::spatial::{SpatialRig, trial};
@@ -54,23 +53,22 @@ pub(crate) fn pixels(effort: Effort) -> Outcome<Figure> {
         ),
         above(&measured, &bounds),
     ];
-    let chart = Chart {
-        title: "Figure 4.6: error against the number of pixels".into(),
-        x_label: "log10 of the pixels per square focal length".into(),
-        y_label: "log10 MAE".into(),
-        series: vec![
-            series("measured", decades(&measured)),
-            series("estimate", decades(&estimates)),
-            series("bound of Theorem 4.3", decades(&bounds)),
+    let chart = chart(
+        "Figure 4.6: error against the number of pixels",
+        ["log10 of the pixels per square focal length", "log10 MAE"],
+        vec![
+            ("measured", decades(&measured)),
+            ("estimate", decades(&estimates)),
+            ("bound of Theorem 4.3", decades(&bounds)),
         ],
-    };
+    );
     Ok(Figure { file: "figure-4.6.svg", chart, verdicts })
 }
 
 /// Figure 4.7: errors of intensity.
 pub(crate) fn texture_errors(effort: Effort) -> Outcome<Figure> {
     let levels: &[f64] = &[0.0, 0.02, 0.05, 0.1];
-    let (measured, bounds) = swept(levels, |texture| Errors { texture, depth: 0.0 }, effort)?;
+    let (measured, bounds) = levels_of(levels, |texture| Errors { texture, depth: 0.0 }, effort)?;
     let share = measured[3].1 / 0.1;
     let verdicts = vec![
         Verdict::new(
@@ -80,19 +78,18 @@ pub(crate) fn texture_errors(effort: Effort) -> Outcome<Figure> {
         ),
         above(&measured, &bounds),
     ];
-    let chart = Chart {
-        title: "Figure 4.7: error against the errors of intensity".into(),
-        x_label: "E_T".into(),
-        y_label: "MAE".into(),
-        series: vec![series("measured", measured), series("bound of Theorem 4.3", bounds)],
-    };
+    let chart = chart(
+        "Figure 4.7: error against the errors of intensity",
+        ["E_T", "MAE"],
+        vec![("measured", measured), ("bound of Theorem 4.3", bounds)],
+    );
     Ok(Figure { file: "figure-4.7.svg", chart, verdicts })
 }
 
 /// Figure 4.8: errors of depth.
 pub(crate) fn depth_errors(effort: Effort) -> Outcome<Figure> {
     let levels: &[f64] = &[0.0, 0.05, 0.1, 0.2];
-    let (measured, bounds) = swept(levels, |depth| Errors { texture: 0.0, depth }, effort)?;
+    let (measured, bounds) = levels_of(levels, |depth| Errors { texture: 0.0, depth }, effort)?;
     let verdicts = vec![
         Verdict::new(
             "the error grows with E_D, linearly where E_D outweighs the sampling",
@@ -101,25 +98,20 @@ pub(crate) fn depth_errors(effort: Effort) -> Outcome<Figure> {
         ),
         above(&measured, &bounds),
     ];
-    let chart = Chart {
-        title: "Figure 4.8: error against the errors of depth".into(),
-        x_label: "E_D".into(),
-        y_label: "MAE".into(),
-        series: vec![series("measured", measured), series("bound of Theorem 4.3", bounds)],
-    };
+    let chart = chart(
+        "Figure 4.8: error against the errors of depth",
+        ["E_D", "MAE"],
+        vec![("measured", measured), ("bound of Theorem 4.3", bounds)],
+    );
     Ok(Figure { file: "figure-4.8.svg", chart, verdicts })
 }
 
-type Curve = Vec<(f64, f64)>;
-
-fn swept(levels: &[f64], errors: impl Fn(f64) -> Errors, effort: Effort) -> Outcome<(Curve, Curve)> {
+/// Measured errors and bounds at some levels of one kind of error.
+fn levels_of(levels: &[f64], errors: impl Fn(f64) -> Errors, effort: Effort) -> Outcome<(Curve, Curve)> {
     let setup = Setup::new(effort.of(0.01, 0.03))?;
     let rig = setup.rig();
-    let (mut measured, mut bounds) = (Vec::new(), Vec::new());
-    for level in levels {
-        let errors = errors(*level);
-        measured.push((*level, mean(effort.of(3, 1), |seed| trial::image_space(&rig, errors, seed))?));
-        bounds.push((*level, rig.bound(errors).total()));
-    }
-    Ok((measured, bounds))
+    swept(levels, |level| {
+        let measured = mean(effort.of(3, 1), |seed| trial::image_space(&rig, errors(level), seed))?;
+        Ok((measured, rig.bound(errors(level)).total()))
+    })
 }

@@ -63,7 +63,7 @@ pub(super) struct SceneArguments {
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,
-    /// Most pixels of the virtual view, and of each image and map. A rendering takes up to 64 bytes of
+    /// Most pixels of the virtual view, and of each image and map. A rendering takes up to 160 bytes of
     /// memory per pixel.
     #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
     pub(super) max_pixels: usize,
@@ -82,7 +82,8 @@ Three figures, in grey levels:
   bound      not exceeded where slopes and residuals are at most those of the samples nearby
   expected   root mean square error, a bound of the expected mean error
   estimate   mean absolute error, calibrated by leaving out each view in turn
-Scenes of rectified rigs only; the view is the one that `render --method rows` gives.";
+The view of a rectified rig is the one that `render --method rows` gives. Of general cameras, estimate and
+expected are given, and no bound; scenes without cameras are refused.";
 
 #[derive(Debug, Args)]
 #[command(after_help = BOUND_EXAMPLES)]

@@ -8,8 +8,8 @@ use crate::analysis::view::{self, Cause, Totals, ViewError};
 use crate::image::{Image, Levels, quality};
 use crate::partial::{Densify, Segmentwise};
 use crate::pipeline::{RenderError, RenderSettings};
-use crate::propagate::RectifiedView;
-use crate::scene::{Kind, RectifiedSource, Scene};
+use crate::propagate::{CalibratedView, RectifiedView};
+use crate::scene::{Kind, Scene};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,8 @@ struct Summary {
     remedy: &'static str,
     /// Views that were left out in turn to calibrate the estimate; 0 if typical weights were used.
     calibrated_on: usize,
-    /// Standard deviation of the disparities' errors for a baseline of one, in pixels.
+    /// Standard deviation of the disparities' errors for a baseline of one, in pixels; of general cameras
+    /// that of the relative errors of depth.
     disparity_noise: f64,
     /// Estimate that is white in the map.
     white: f32,
@@ -45,8 +46,8 @@ struct Measured {
     psnr: f64,
     /// Estimate divided by the measured mean absolute error.
     ratio: f64,
-    /// Share of the pixels whose error is within the local bound.
-    within_local_bound: f64,
+    /// Share of the pixels whose error is within the local bound, if there is one.
+    within_local_bound: Option<f64>,
 }
 
 pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
@@ -56,11 +57,10 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     let source = arguments.scene.source()?;
     source.refuse_overlaps(&arguments.map.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     let scene = arguments.scene.load(&source, Densify::Segmentwise(Segmentwise::default()), true)?;
-    let (sources, position) = rectified(&scene, &arguments.scene.file)?;
+    refuse_unknown_cameras(&scene, &arguments.scene.file)?;
     let truth = arguments.scene.truth()?;
     progress.step("predicting");
-    let predicted =
-        predict(sources, position, &arguments.scene.settings(scene.offset)).map_err(Failure::input)?;
+    let predicted = predict(&scene.kind, &arguments.scene.settings(scene.offset)).map_err(Failure::input)?;
     let measured = match (&truth, &arguments.scene.truth) {
         (Some(truth), Some(path)) => measure(&predicted, truth, path)?,
         _ => None,
@@ -86,27 +86,36 @@ fn check(arguments: &BoundArguments) -> Result<(), Failure> {
     output::refuse_format(map, Levels::Eight)
 }
 
-/// The views and the first virtual position of a rectified rig.
-fn rectified<'a>(scene: &'a Scene, path: &Path) -> Result<(&'a [RectifiedSource], f64), Failure> {
+fn refuse_unknown_cameras(scene: &Scene, path: &Path) -> Result<(), Failure> {
     match &scene.kind {
-        Kind::Rectified { views, positions } => Ok((views, positions.first().copied().unwrap_or(0.0))),
-        _ => Err(Failure::Input(format!(
-            "{}: bound predicts the errors of rectified rigs only; the views of this scene have no `position`",
+        Kind::Uncalibrated { .. } => Err(Failure::Input(format!(
+            "{}: bound predicts the errors of views with depth; the cameras of this scene are unknown",
             path.display()
         ))),
+        _ => Ok(()),
     }
 }
 
-fn predict(
-    sources: &[RectifiedSource],
-    position: f64,
-    settings: &RenderSettings,
-) -> Result<ViewError, RenderError> {
-    let views: Vec<RectifiedView<'_>> = sources
-        .iter()
-        .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
-        .collect();
-    view::rectified(&views, position, settings)
+/// The error of the first virtual view.
+fn predict(kind: &Kind, settings: &RenderSettings) -> Result<ViewError, RenderError> {
+    match kind {
+        Kind::Rectified { views, positions } => {
+            let views: Vec<RectifiedView<'_>> = views
+                .iter()
+                .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
+                .collect();
+            view::rectified(&views, positions.first().copied().unwrap_or(0.0), settings)
+        }
+        Kind::Calibrated { views, cameras, size } => {
+            let views: Vec<CalibratedView<'_>> = views
+                .iter()
+                .map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera })
+                .collect();
+            let camera = cameras.first().ok_or(RenderError::NoViews)?;
+            view::calibrated(&views, camera, *size, settings)
+        }
+        Kind::Uncalibrated { .. } => Err(RenderError::NoViews),
+    }
 }
 
 fn measure(predicted: &ViewError, truth: &Image, path: &Path) -> Result<Option<Measured>, Failure> {
@@ -140,11 +149,10 @@ impl Summary {
         let mut lines = vec![
             format!("estimate  {:.2} grey levels of mean absolute error", t.estimate),
             format!("expected  {:.2} root mean square, a PSNR of {:.1} dB", t.expected, t.psnr),
-            format!(
-                "bound     {:.2} in the mean, if slopes and residuals are nowhere larger than at the samples",
-                t.local_bound
-            ),
         ];
+        lines.extend(t.local_bound.map(|bound| {
+            format!("bound     {bound:.2} in the mean, if slopes and residuals are nowhere larger than at the samples")
+        }));
         let part = |c: &CauseShare| format!("{:?} {:.2}", c.cause, c.error).to_lowercase();
         lines.push(format!("causes    {}", self.causes.iter().map(part).collect::<Vec<_>>().join(", ")));
         lines.push(format!("next      {}", self.remedy));
@@ -153,9 +161,13 @@ impl Summary {
             views => format!("weights   calibrated on {views} views, each left out in turn"),
         });
         if let Some(m) = &self.measured {
+            let within = |share: f64| format!("; {:.1} % of the pixels within the bound", 100.0 * share);
             lines.push(format!(
-                "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the bound",
-                m.mae, m.ratio, m.psnr, 100.0 * m.within_local_bound
+                "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB{}",
+                m.mae,
+                m.ratio,
+                m.psnr,
+                m.within_local_bound.map_or(String::new(), within)
             ));
         }
         lines.join("\n") + "\n"

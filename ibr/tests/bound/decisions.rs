@@ -116,18 +116,21 @@ fn sweep() -> bool {
     std::env::var_os("HYBANK_SWEEP").is_some()
 }
 
-/// 4 of 20 cameras, chosen greedily, against all 4845 subsets by the predicted error: 10 scenes with
-/// `HYBANK_SWEEP=1`.
+/// 4 of 20 cameras, searched from greedy choices, against all 4845 subsets by the predicted error: 10 scenes
+/// with `HYBANK_SWEEP=1`.
 #[test]
-fn greedy_placement_is_close_to_the_best() {
+fn a_searched_placement_is_close_to_the_best() {
     for seed in 0..if sweep() { 10 } else { 1 } {
         let (rig, targets) = sites(seed, 20);
         let placement = placement(&rig, &targets);
-        let greedy = placement.predicted(&placement.greedy(4));
+        let [greedy, searched] =
+            [placement.greedy(4), placement.searched(4)].map(|chosen| placement.predicted(&chosen));
         let best = subsets(20, 4).iter().map(|s| placement.predicted(s)).fold(f64::MAX, f64::min);
-        let loss = 20.0 * (greedy / best).log10();
-        println!("scene {seed}: greedy {greedy:.3}, best {best:.3} grey levels, {loss:.3} dB");
-        assert!(loss.abs() < 1.0, "scene {seed}: {loss}");
+        let loss = 20.0 * (searched / best).log10();
+        println!(
+            "scene {seed}: greedy {greedy:.3}, searched {searched:.3}, best {best:.3} grey levels, {loss:.3} dB"
+        );
+        assert!(loss.abs() < 0.3, "scene {seed}: {loss}");
     }
 }
 

@@ -13,7 +13,7 @@ use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, read_image, read_map};
 use hybank_ibr::pipeline::RenderSettings;
-use hybank_ibr::propagate::RectifiedView;
+use hybank_ibr::propagate::{CalibratedView, RectifiedView};
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use random::Random;
 use std::path::PathBuf;
@@ -281,4 +281,43 @@ fn scenes_with_exact_inputs() {
         assert!((0.8..1.25).contains(&v.ratio), "{name}: {v:?}");
         assert!(v.local_bound > 0.99, "{name}: {v:?}");
     }
+}
+
+/// General cameras: three that do not stand on a line, one nearer, with noise; the view between them.
+#[test]
+fn views_of_general_cameras() {
+    let eyes = [scene::eye(-0.25, 0.0, 0.0), scene::eye(0.2, 0.05, 0.3), scene::eye(0.0, -0.2, 0.1)];
+    let target = scene::eye(0.0, 0.0, 0.1);
+    let mut random = Random(11);
+    let shots: Vec<(Image, DepthMap)> = eyes.iter().map(scene::shoot).collect();
+    let mut bell = || 2.0 * (random.part() + random.part() + random.part()) - 3.0;
+    let mut worn: Vec<(Image, DepthMap)> = Vec::new();
+    for (image, depth) in &shots {
+        let mut image = image.clone();
+        image.data_mut().iter_mut().for_each(|v| *v = (*v + 2.0 * bell() as f32).clamp(0.0, 255.0).round());
+        let values = depth.data().iter().map(|d| d * (1.0 + 0.004 * bell() as f32)).collect();
+        worn.push((image, DepthMap::new(scene::SIZE, values, 1.0, Measure::Depth).unwrap()));
+    }
+    let views: Vec<CalibratedView<'_>> = worn
+        .iter()
+        .zip(&eyes)
+        .map(|((image, depth), eye)| CalibratedView { image, depth, camera: eye.camera() })
+        .collect();
+    let mut truth = scene::shoot(&target).0;
+    truth.data_mut().iter_mut().for_each(|v| *v = (*v + 2.0 * bell() as f32).clamp(0.0, 255.0).round());
+    let settings = RenderSettings::default();
+    let predicted = view::calibrated(&views, &target.camera(), scene::SIZE, &settings).unwrap();
+    let image = &predicted.rendering.image;
+    let measured = errors(image, &truth);
+    let estimate: Vec<f64> = predicted.estimate.iter().map(|v| f64::from(*v)).collect();
+    let ratio = mean(estimate.iter().copied()) / mean(measured.iter().copied());
+    let rank = correlation(&estimate, &measured, scene::SIZE);
+    let noise = predicted.calibration.disparity_noise;
+    println!(
+        "general cameras: ratio {ratio:.3}, rank {rank:.3}, depth noise {noise:.4}, {:.2?}",
+        predicted.causes
+    );
+    assert!((0.8..1.25).contains(&ratio) && rank > 0.4, "{ratio} {rank}");
+    assert!((noise / 0.004 - 1.0).abs() < 0.25, "{noise}");
+    assert!(predicted.totals().local_bound.is_none() && predicted.totals().expected >= mean(estimate));
 }

@@ -44,7 +44,11 @@ fn what_cannot_be_predicted_is_refused() {
     let lines: String = (0..20).map(|i| format!("{} {} {} {}\n", 5 * i, 4 * i, 5 * i + 1, 4 * i)).collect();
     std::fs::write(dir.path().join("t.txt"), lines).unwrap();
     let refused = run(dir.path(), &["bound", "free.toml"]);
-    assert!(code(&refused) == 1 && stderr(&refused).contains("rectified rigs only"), "{}", stderr(&refused));
+    assert!(
+        code(&refused) == 1 && stderr(&refused).contains("the cameras of this scene are unknown"),
+        "{}",
+        stderr(&refused)
+    );
     let usage = run(dir.path(), &["bound", "scene.toml", "--map", "-"]);
     assert_eq!(code(&usage), 2);
     let over = run(dir.path(), &["bound", "scene.toml", "--map", "left.png", "--force"]);

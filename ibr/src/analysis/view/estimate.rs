@@ -37,7 +37,8 @@ pub struct Calibration {
     square: Regressors,
     /// Views that were left out to find the weights; 0 where typical ones are used.
     pub views: usize,
-    /// Standard deviation of the disparities' errors, in pixels for a baseline of one.
+    /// Standard deviation of the disparities' errors, in pixels for a baseline of one; for general cameras
+    /// that of the relative errors of depth.
     pub disparity_noise: f64,
 }
 
@@ -46,7 +47,7 @@ pub struct Calibration {
 pub struct ViewError {
     /// The rendering.
     pub rendering: Rendering,
-    /// Local bound of each pixel, in grey levels, row by row.
+    /// Local bound of each pixel, in grey levels, row by row; empty for general cameras.
     pub local_bound: Vec<f32>,
     /// Expected bound: the root mean square.
     pub expected: Vec<f32>,
@@ -61,8 +62,8 @@ pub struct ViewError {
 /// Figures of a whole view, in grey levels unless named.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Totals {
-    /// Mean of the local bounds.
-    pub local_bound: f64,
+    /// Mean of the local bounds; none for general cameras.
+    pub local_bound: Option<f64>,
     /// Root mean square: the expected bound of the mean absolute error.
     pub expected: f64,
     /// Mean absolute error.
@@ -80,18 +81,19 @@ impl ViewError {
     /// Figures of each row.
     pub fn rows(&self) -> Vec<Totals> {
         let width = self.rendering.image.width();
-        let rows =
-            self.local_bound.chunks(width).zip(self.expected.chunks(width)).zip(self.estimate.chunks(width));
-        rows.map(|((bound, expected), estimate)| Totals::over(bound, expected, estimate)).collect()
+        let bounds = self.local_bound.chunks(width).chain(std::iter::repeat(&[][..]));
+        let rows = self.expected.chunks(width).zip(self.estimate.chunks(width)).zip(bounds);
+        rows.map(|((expected, estimate), bound)| Totals::over(bound, expected, estimate)).collect()
     }
 
-    /// Share of the pixels whose error against a photograph of the same size is within the local bound, after
-    /// rounding to 8 bits.
-    pub fn within_local_bound(&self, truth: &Image) -> f64 {
+    /// Share of the pixels whose error against a photograph of the same size is within the local bound,
+    /// after rounding to 8 bits; none if there is no local bound.
+    pub fn within_local_bound(&self, truth: &Image) -> Option<f64> {
         let errors = difference(&self.rendering.image.quantised(), truth);
         let within =
             errors.iter().zip(&self.local_bound).filter(|(error, bound)| **error <= **bound + ROUNDING);
-        within.count() as f64 / self.local_bound.len() as f64
+        let all = self.local_bound.len();
+        (all > 0).then(|| within.count() as f64 / all as f64)
     }
 
     /// The cause of the largest part of the estimate.
@@ -108,7 +110,7 @@ impl Totals {
         };
         let square = mean(expected, 2);
         Self {
-            local_bound: mean(bound, 1),
+            local_bound: (!bound.is_empty()).then(|| mean(bound, 1)),
             expected: square.sqrt(),
             estimate: mean(estimate, 1),
             psnr: 10.0 * (255.0 * 255.0 / square).log10(),
@@ -125,24 +127,33 @@ pub fn rectified(
     position: f64,
     settings: &RenderSettings,
 ) -> Result<ViewError, RenderError> {
-    let images = equalised(views, settings);
+    let gains = if settings.keep_exposure { Vec::new() } else { Agreement::rectified(views).gains };
+    let images = equalised(views.iter().map(|v| v.image), &gains);
     let views: Vec<RectifiedView<'_>> =
         views.iter().zip(&images).map(|(v, image)| RectifiedView { image, ..*v }).collect();
     let settings = RenderSettings { keep_exposure: true, ..*settings };
     let variogram = Variogram::of(images.iter());
     let noise = disparity_noise(&views);
     let known = Known { variogram, noise, spacing: spacing(&views, position) };
-    let calibration = calibrate(&views, &settings, &known)?;
-    let causes = examine(&views, position, &settings, &known)?;
-    Ok(judge(causes, calibration))
+    let calibration = calibrate(&views, &known, |others, truth| {
+        // A registration offset belongs to the virtual view only.
+        let settings = RenderSettings { offset: 0.0, ..settings };
+        let examined = examine(others, truth.position, &settings, &known)?;
+        Ok((examined.regressors, difference(&examined.survey.rendering.image.quantised(), truth.image)))
+    })?;
+    let Examined { survey, regressors } = examine(&views, position, &settings, &known)?;
+    let reach = (REACH * calibration.disparity_noise) as f32;
+    let bounds = survey.evidence.iter().map(|e| local_bound(e, reach)).collect();
+    Ok(judge(survey.rendering, &regressors, calibration, bounds))
 }
 
 /// What is known of the views together.
-struct Known {
-    variogram: Variogram,
-    /// Standard deviation of the errors of disparity.
-    noise: f64,
-    spacing: f64,
+pub(super) struct Known {
+    pub(super) variogram: Variogram,
+    /// Standard deviation of the errors of disparity, or of the relative errors of depth.
+    pub(super) noise: f64,
+    /// Distance between neighbouring views.
+    pub(super) spacing: f64,
 }
 
 /// Mean distance between neighbouring views; for views at one place that of the virtual camera, or one.
@@ -172,34 +183,30 @@ fn examine(
     Ok(Examined { survey, regressors })
 }
 
-/// The photographs with one exposure.
-fn equalised(views: &[RectifiedView<'_>], settings: &RenderSettings) -> Vec<Image> {
-    let gains = if settings.keep_exposure { Vec::new() } else { Agreement::rectified(views).gains };
-    let scaled = |(i, view): (usize, &RectifiedView<'_>)| {
-        let (mut image, gain) = (view.image.clone(), gains.get(i).map_or(1.0, |g| *g as f32));
+/// Photographs with one exposure.
+pub(super) fn equalised<'a>(images: impl Iterator<Item = &'a Image>, gains: &[f64]) -> Vec<Image> {
+    let scaled = |(i, image): (usize, &Image)| {
+        let (mut image, gain) = (image.clone(), gains.get(i).map_or(1.0, |g| *g as f32));
         image.data_mut().iter_mut().for_each(|v| *v *= gain);
         image
     };
-    views.iter().enumerate().map(scaled).collect()
+    images.enumerate().map(scaled).collect()
 }
 
-/// Leaves views out in turn, renders them from the others, and explains the errors by the causes.
-fn calibrate(
-    views: &[RectifiedView<'_>],
-    settings: &RenderSettings,
+/// Leaves views out in turn and explains the errors of their renderings by the causes. `examine` renders a
+/// view from the others and gives regressors and errors of its pixels.
+pub(super) fn calibrate<View: Copy>(
+    views: &[View],
     known: &Known,
+    examine: impl Fn(&[View], &View) -> Result<(Vec<Regressors>, Vec<f32>), RenderError>,
 ) -> Result<Calibration, RenderError> {
     let (mut absolute, mut square) = (LeastSquares::default(), LeastSquares::default());
     let used = if views.len() < 2 { 0 } else { views.len().min(LEFT_OUT) };
-    // A registration offset belongs to the virtual view only.
-    let settings = RenderSettings { offset: 0.0, ..*settings };
     for k in 0..used {
-        let left_out = k * views.len() / used;
         let mut others = views.to_vec();
-        let truth = others.remove(left_out);
-        let examined = examine(&others, truth.position, &settings, known)?;
-        let errors = difference(&examined.survey.rendering.image.quantised(), truth.image);
-        for (x, error) in examined.regressors.iter().zip(errors) {
+        let truth = others.remove(k * views.len() / used);
+        let (regressors, errors) = examine(&others, &truth)?;
+        for (x, error) in regressors.iter().zip(errors) {
             absolute.add(x, f64::from(error));
             square.add(&x.map(|v| v * v), f64::from(error * error));
         }
@@ -212,11 +219,16 @@ fn calibrate(
     })
 }
 
-fn judge(examined: Examined, calibration: Calibration) -> ViewError {
-    let Examined { survey, regressors } = examined;
+/// Expected error, estimate and causes from the regressors and their weights.
+pub(super) fn judge(
+    rendering: Rendering,
+    regressors: &[Regressors],
+    calibration: Calibration,
+    local_bound: Vec<f32>,
+) -> ViewError {
     let mut causes = [0.0; 5];
     let (mut expected, mut estimate) = (Vec::new(), Vec::new());
-    for x in &regressors {
+    for x in regressors {
         let parts: Regressors = std::array::from_fn(|k| calibration.absolute[k] * x[k]);
         let squares: f64 = (0..REGRESSORS).map(|k| calibration.square[k] * x[k] * x[k]).sum();
         for (part, cause) in parts.iter().zip(CAUSE_OF) {
@@ -226,9 +238,7 @@ fn judge(examined: Examined, calibration: Calibration) -> ViewError {
         estimate.push(mean as f32);
         expected.push(squares.sqrt().max(mean) as f32);
     }
-    let reach = (REACH * calibration.disparity_noise) as f32;
-    let local_bound = survey.evidence.iter().map(|e| local_bound(e, reach)).collect();
-    ViewError { rendering: survey.rendering, local_bound, expected, estimate, causes, calibration }
+    ViewError { rendering, local_bound, expected, estimate, causes, calibration }
 }
 
 /// The local bound of one pixel; `depth_error` bounds the error of disparities for a baseline of one.

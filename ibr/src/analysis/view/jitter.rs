@@ -87,7 +87,7 @@ pub(super) fn difference(a: &Image, b: &Image) -> Vec<f32> {
 }
 
 /// Means over windows of 5 x 5 pixels, smaller at the border.
-fn local_mean(values: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
+pub(super) fn local_mean(values: &[f32], (width, height): (usize, usize)) -> Vec<f32> {
     let range = |at: usize, side: usize| at.saturating_sub(WINDOW)..(at + WINDOW + 1).min(side);
     let mean = |p: usize| {
         let (columns, rows) = (range(p % width, width), range(p / width, height));

@@ -28,12 +28,14 @@
 
 mod calibrate;
 mod estimate;
+mod general;
 mod jitter;
 mod regressors;
 mod survey;
 mod variogram;
 
 pub use estimate::{Calibration, Totals, ViewError, rectified};
+pub use general::{calibrated, depth_noise};
 pub use jitter::{depth_jitter, disparity_noise, with_noise};
 pub use survey::{Evidence, Survey, survey};
 

@@ -75,7 +75,7 @@ pub(super) fn slopes(image: &Image) -> Vec<f32> {
 }
 
 /// Distance of every pixel of a hole to the nearest seen pixel of its row, 0 for seen pixels.
-fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
+pub(super) fn hole_distances(mask: &[Cover], width: usize) -> Vec<usize> {
     let mut distances = vec![usize::MAX; mask.len()];
     for (row, mask) in distances.chunks_mut(width).zip(mask.chunks(width)) {
         let mut away = width;

@@ -1,0 +1,228 @@
+//! The error of a view of general cameras, from its rendering by the plane fit: the same causes as for
+//! rectified rigs, their sizes taken from the rendered view, its depths and its sample counts.
+
+use super::estimate::{Calibration, Known, ViewError, calibrate, equalised, judge};
+use super::jitter::{difference, local_mean};
+use super::regressors::{Regressors, hole_distances, slopes};
+use super::variogram::Variogram;
+use crate::analysis::random::{part, seeded};
+use crate::camera::Camera;
+use crate::depth::DepthMap;
+use crate::image::Image;
+use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, calibrated as pipeline};
+use crate::propagate::CalibratedView;
+
+/// Errors of depth below this share change nothing that can be seen.
+const LEAST: f64 = 1e-4;
+
+/// Largest relative difference of two depths of one surface.
+const SAME_SURFACE: f64 = 0.05;
+
+/// Largest share of its depth by which a noisy depth is wrong, in standard deviations.
+const TAIL: f64 = 3.0;
+
+/// The error of the view of `camera` with `size` pixels. It has no local bound: the influence of each sample
+/// on a pixel of the plane fit is not computed.
+///
+/// # Errors
+/// Those of [`crate::pipeline::calibrated::render`].
+pub fn calibrated(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    size: (usize, usize),
+    settings: &RenderSettings,
+) -> Result<ViewError, RenderError> {
+    let gains = if settings.keep_exposure { Vec::new() } else { Agreement::calibrated(views).gains };
+    let images = equalised(views.iter().map(|v| v.image), &gains);
+    let views: Vec<CalibratedView<'_>> =
+        views.iter().zip(&images).map(|(v, image)| CalibratedView { image, ..*v }).collect();
+    let settings = RenderSettings { keep_exposure: true, ..*settings };
+    let known = Known {
+        variogram: Variogram::of(images.iter()),
+        noise: depth_noise(&views),
+        spacing: spacing(&views, camera),
+    };
+    let calibration: Calibration = calibrate(&views, &known, |others, truth| {
+        // A registration offset belongs to the virtual view only.
+        let settings = RenderSettings { offset: 0.0, ..settings };
+        let (rendering, x) = examine(others, &truth.camera, truth.image.size(), &settings, &known)?;
+        Ok((x, difference(&rendering.image.quantised(), truth.image)))
+    })?;
+    let (rendering, regressors) = examine(&views, camera, size, &settings, &known)?;
+    Ok(judge(rendering, &regressors, calibration, Vec::new()))
+}
+
+/// Mean distance between a view and the one nearest to it; for views at one place that of the virtual
+/// camera, or one.
+fn spacing(views: &[CalibratedView<'_>], camera: &Camera) -> f64 {
+    let between = |a: &Camera, b: &Camera| (a.centre() - b.centre()).norm();
+    let nearest = |i: usize| {
+        let others = views.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, v)| between(&v.camera, &views[i].camera)).fold(f64::INFINITY, f64::min)
+    };
+    let mean = (0..views.len()).map(nearest).sum::<f64>() / views.len() as f64;
+    let away = views.iter().map(|v| between(&v.camera, camera)).fold(f64::INFINITY, f64::min);
+    [mean, away].into_iter().find(|s| *s > 0.0 && s.is_finite()).unwrap_or(1.0)
+}
+
+/// Standard deviation of independent errors of the depths as a share of the depth, from the maps alone:
+/// points of one map are looked up in that of the nearest other view. 0 for a single view.
+///
+/// The second depth is interpolated between four, which leaves 4/9 of its variance, so the difference has
+/// s^2 (1 + 4/9). The median makes hidden points harmless.
+pub fn depth_noise(views: &[CalibratedView<'_>]) -> f64 {
+    let distance = |i: usize, j: usize| (views[i].camera.centre() - views[j].camera.centre()).norm();
+    let mut differences: Vec<f64> = (1..views.len())
+        .filter_map(|j| Some(((0..j).min_by(|a, b| distance(*a, j).total_cmp(&distance(*b, j)))?, j)))
+        .flat_map(|(i, j)| lookups(&views[i], &views[j]))
+        .collect();
+    if differences.is_empty() {
+        return 0.0;
+    }
+    let middle = differences.len() / 2;
+    let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
+    1.4826 * median / (13.0_f64 / 9.0).sqrt()
+}
+
+/// Relative differences of the depths of a point in two maps, for every seventh pixel of the first.
+fn lookups(a: &CalibratedView<'_>, b: &CalibratedView<'_>) -> Vec<f64> {
+    let map = a.camera.relative_to(&b.camera);
+    let ((width, height), (columns, rows)) = (a.depth.size(), b.depth.size());
+    let lookup = |p: usize| {
+        if a.depth.is_guessed(p) {
+            return None;
+        }
+        let (u, v, d) = map.map((p % width) as f64, (p / width) as f64, f64::from(a.depth.data()[p]));
+        // Also false for unknown depths.
+        if !(u >= 0.0 && v >= 0.0 && u < columns as f64 - 1.0 && v < rows as f64 - 1.0) {
+            return None;
+        }
+        let (x, y, s, t) = (u as usize, v as usize, u.fract(), v.fract());
+        let at = |i: usize, j: usize| f64::from(b.depth.row(y + j)[x + i]);
+        let upper = at(0, 0) * (1.0 - s) + at(1, 0) * s;
+        let lower = at(0, 1) * (1.0 - s) + at(1, 1) * s;
+        let difference = ((upper * (1.0 - t) + lower * t) / d - 1.0).abs();
+        // Points that another surface hides say nothing. NaN beside unknown depths.
+        (difference <= SAME_SURFACE).then_some(difference)
+    };
+    (0..width * height).step_by(7).filter_map(lookup).collect()
+}
+
+/// A rendering and the regressors of its pixels.
+fn examine(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    size: (usize, usize),
+    settings: &RenderSettings,
+    known: &Known,
+) -> Result<(Rendering, Vec<Regressors>), RenderError> {
+    let rendering = pipeline::render(views, camera, size, settings)?;
+    let jitter = jitter(views, camera, settings, &rendering.image, known.noise)?;
+    let (shares, lever) = shares(views, camera);
+    let lever = lever / (known.spacing * known.spacing);
+    let image = &rendering.image;
+    let (slopes, bends) = (slopes(image), bends(image));
+    let edges = edges(image, &rendering.depth, settings);
+    let distances = hole_distances(&rendering.mask, size.0);
+    let of_pixel = |p: usize| {
+        if distances[p] > 0 {
+            return [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, known.variogram.at(distances[p])];
+        }
+        // At most as many views share in a pixel as samples lie on it.
+        let shares = f64::max(shares, 1.0 / f64::from(rendering.counts[p].max(1)));
+        let displacement = ((shares + lever) / 2.0).sqrt();
+        let slope = f64::from(slopes[p]) * displacement;
+        [
+            f64::from(bends[p]),
+            (1.0 + shares).sqrt(),
+            slope,
+            f64::from(jitter[p]),
+            f64::from(edges[p]),
+            0.0,
+            0.0,
+        ]
+    };
+    let regressors = (0..size.0 * size.1).map(of_pixel).collect();
+    Ok((rendering, regressors))
+}
+
+/// Sum of the squared shares of the views in a pixel that all of them see, and the same times their squared
+/// distances.
+fn shares(views: &[CalibratedView<'_>], camera: &Camera) -> (f64, f64) {
+    let balance = Balance::calibrated(views, camera);
+    let weight = |i: usize| f64::from(balance.weight(i as u16));
+    let total: f64 = (0..views.len()).map(weight).sum();
+    let square = |i: usize| (weight(i) / total).powi(2);
+    let away = |i: usize| (views[i].camera.centre() - camera.centre()).norm_squared();
+    ((0..views.len()).map(square).sum(), (0..views.len()).map(|i| square(i) * away(i)).sum())
+}
+
+/// Local mean of the change of a view under errors of the depths of this relative standard deviation.
+fn jitter(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    settings: &RenderSettings,
+    view: &Image,
+    deviation: f64,
+) -> Result<Vec<f32>, RenderError> {
+    let size = view.size();
+    if deviation < LEAST {
+        return Ok(vec![0.0; size.0 * size.1]);
+    }
+    let random = &mut seeded(1);
+    // The sum of three uniform numbers in [-1, 1) has the variance one, and bounded tails.
+    let mut error = || (2.0 * (part(random) + part(random) + part(random)) - TAIL) * deviation;
+    let maps: Vec<DepthMap> = views.iter().map(|v| v.depth.changed(|d| d * (1.0 + error()) as f32)).collect();
+    let noisy: Vec<CalibratedView<'_>> =
+        views.iter().zip(&maps).map(|(v, depth)| CalibratedView { depth, ..*v }).collect();
+    let changed = pipeline::render(&noisy, camera, size, settings)?.image;
+    Ok(local_mean(&difference(&changed, view), size))
+}
+
+/// (|f_xx| + |f_yy|) / 8, mean over the channels: the error of linear interpolation between samples a pixel
+/// apart.
+fn bends(image: &Image) -> Vec<f32> {
+    let ((width, height), channels) = (image.size(), image.channels());
+    let at = |x: usize, y: usize, c: usize| image.data()[(y * width + x) * channels + c];
+    let bend = |p: usize| {
+        let (x, y) = ((p % width).clamp(1, width.max(3) - 2), (p / width).clamp(1, height.max(3) - 2));
+        let of_channel = |c: usize| {
+            let middle = 2.0 * at(x, y, c);
+            let across = (at(x - 1, y, c) - middle + at(x + 1, y, c)).abs();
+            across + (at(x, y - 1, c) - middle + at(x, y + 1, c)).abs()
+        };
+        (0..channels).map(of_channel).sum::<f32>() / (8.0 * channels as f32)
+    };
+    if width < 3 || height < 3 {
+        return vec![0.0; width * height];
+    }
+    (0..width * height).map(bend).collect()
+}
+
+/// Share of the height of a jump in its two pixels, which lie half a pixel away: 1 - 0.5 / 1.5.
+const BESIDE: f32 = 2.0 / 3.0;
+
+/// For pixels beside a jump of the rendered depth, the difference of the colours on both sides of it.
+fn edges(image: &Image, depth: &DepthMap, settings: &RenderSettings) -> Vec<f32> {
+    let ((width, height), channels) = (image.size(), image.channels());
+    let test = settings.depth_test();
+    let known = |p: usize| Some(f64::from(depth.data()[p])).filter(|d| !d.is_nan());
+    let mut edges = vec![0.0_f32; width * height];
+    for p in 0..width * height {
+        let across = (p % width + 1 < width).then_some((p + 1, 1));
+        let down = (p / width + 1 < height).then_some((p + width, width));
+        for (q, stride) in across.into_iter().chain(down) {
+            let Some((a, b)) = known(p).zip(known(q)) else { continue };
+            if !test.hides(a.min(b), a.max(b)) {
+                continue;
+            }
+            // The pixels of the jump itself are mixed: compare those behind them.
+            let (before, after) = (p.saturating_sub(stride), (q + stride).min(width * height - 1));
+            let value = |p: usize, c: usize| image.data()[p * channels + c];
+            let height = (0..channels).map(|c| (value(before, c) - value(after, c)).abs()).sum::<f32>();
+            let beside = BESIDE * height / channels as f32;
+            (edges[p], edges[q]) = (edges[p].max(beside), edges[q].max(beside));
+        }
+    }
+    edges
+}
