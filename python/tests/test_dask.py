@@ -133,6 +133,16 @@ def test_sources_and_sinks(fir, tmp_path):
     np.testing.assert_array_equal(file.read(FRAMES - 3, 10), x[:1, -3:].T / np.float32(32768))
 
 
+def test_a_dataset_of_hdf5_is_a_source(fir, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    x = drawn("noise", 2).astype("f4")
+    with h5py.File(tmp_path / "in.h5", "w") as file:
+        file["rows"], file["frames"] = x, x.T
+    for name, axis in (("rows", -1), ("frames", 0)):
+        hb.dask.fuse(fir, (tmp_path / "in.h5", name), tmp_path / "out.npy", axis=axis, span=3000)
+        assert np.load(tmp_path / "out.npy").tobytes() == fir.fuse(x).tobytes(), name
+
+
 def test_wrong_archives_are_refused(fir, tmp_path):
     np.save(tmp_path / "in.npy", np.zeros((3, 10)))
     with pytest.raises(hb.HybankError, match="3 channels, the bank has 2"):
@@ -194,3 +204,13 @@ def test_a_sweep_designs_every_plant_with_any_executor():
     del results[1], specs[1]
     assert results == [hb.design(spec, proof=False) for spec in specs]
     assert len({bank.gamma.norm for bank in results}) == 3 and threads == {threading.main_thread()}
+
+
+def test_a_sweep_runs_on_a_cluster():
+    distributed = pytest.importorskip("distributed")
+    specs = [{**SPEC, "latency": latency} for latency in (4, 5)] + [{**SPEC, "ratio": -1}]
+    settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**settings) as cluster, distributed.Client(cluster) as client:
+        results = hb.dask.sweep(specs, client=client, proof=False)
+    assert results[:2] == [hb.design(spec, proof=False) for spec in specs[:2]]
+    assert isinstance(results[2], hb.SpecError)
