@@ -4,6 +4,7 @@
 
 #[cfg(feature = "files")]
 pub mod files;
+pub mod memory;
 pub mod quantity;
 pub mod sampling;
 pub mod units;

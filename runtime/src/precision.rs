@@ -9,3 +9,13 @@ pub enum Precision {
     /// Coefficients and sums in f64, at half the speed.
     Double,
 }
+
+impl Precision {
+    /// Bytes of a number.
+    pub(crate) fn bytes(self) -> f64 {
+        match self {
+            Self::Single => 4.0,
+            Self::Double => 8.0,
+        }
+    }
+}

@@ -29,6 +29,18 @@ impl Bank {
         };
         plan?.with_offsets(&self.offsets)
     }
+
+    /// Bytes of memory that the plan of an FIR bank and one of its streams take, about; 0 for recursive
+    /// banks.
+    ///
+    /// # Errors
+    /// As [`Bank::plan`].
+    pub fn plan_bytes(&self, options: Options) -> Result<f64, BuildError> {
+        match &self.filters {
+            SynthesisFilters::Fir(taps) => Plan::bytes_of_taps(taps, self.ratio, options),
+            SynthesisFilters::StateSpace(_) => Ok(0.0),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,8 @@ use super::say::{name_leftovers, say_line};
 use crate::bank::Bank;
 use crate::design::filters;
 use crate::files::{self, AtomicFile, Bound};
+use crate::memory::available_memory;
+use crate::runtime::{Options, Plan};
 use crate::spec::{DesignOverrides, Spec, SpecProblem};
 use std::io::Write;
 use std::path::Path;
@@ -16,6 +18,9 @@ use std::path::Path;
 /// Maximum size of a spec or bank file; the largest bank with its proof is smaller.
 const TEXT_FILE: Bound =
     Bound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
+
+/// Bytes of memory that a number of a bank takes while it is read.
+const VALUE_BYTES: f64 = 200.0;
 
 /// Whether a path stands for standard input or output.
 pub(super) fn is_dash(path: &Path) -> bool {
@@ -28,9 +33,32 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
     if FileKind::of(&text) == FileKind::Spec {
         return Err(is_a_spec(path));
     }
+    let values = text.bytes().filter(|&byte| byte == b',').count() as f64;
+    check_memory(path, "to read it", VALUE_BYTES * values, "give the file that was meant")?;
     let bank = Bank::from_json(&text, &name(path)).map_err(Failure::input)?;
     filters::check_stable(&bank).map_err(|error| Failure::Input(format!("{}: {error}", name(path))))?;
     Ok(bank)
+}
+
+/// Compiles the bank of the file `path`, if the process may use as much memory as that takes.
+pub(super) fn plan(bank: &Bank, options: Options, path: &Path) -> Result<Plan, Failure> {
+    let in_file = |error| Failure::Input(format!("{}: {error}", name(path)));
+    let bytes = bank.plan_bytes(options).map_err(in_file)?;
+    check_memory(path, "to filter with it", bytes, "use shorter filters, or --algorithm direct")?;
+    bank.plan(options).map_err(in_file)
+}
+
+/// Refuses work on the file `path` for which there is no memory; the system would end the process.
+fn check_memory(path: &Path, work: &str, bytes: f64, remedy: &str) -> Result<(), Failure> {
+    match available_memory() {
+        Some(memory) if bytes > memory => Err(Failure::Input(format!(
+            "{}: {work} takes about {:.1} GB of memory, and this process may use {:.1} GB; {remedy}",
+            name(path),
+            bytes / 1e9,
+            memory / 1e9
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// A spec was given in place of a bank.

@@ -2,8 +2,8 @@
 
 use super::Failure;
 use super::bank_file::{is_dash, name};
-use crate::design::effort::available_memory;
 use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions};
+use crate::memory::available_memory;
 use crate::units::Hertz;
 use std::path::{Path, PathBuf};
 

@@ -223,8 +223,7 @@ impl Args {
     }
 
     fn plan(&self, bank: &Bank) -> Result<Plan, Failure> {
-        let plan = bank.plan(self.options());
-        plan.map_err(|error| Failure::Input(format!("{}: {error}", self.bank.display())))
+        bank_file::plan(bank, self.options(), &self.bank)
     }
 
     fn options(&self) -> Options {

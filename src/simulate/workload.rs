@@ -3,7 +3,7 @@
 use super::capture::Analog;
 use super::response::panels;
 use crate::design::Problem;
-use crate::design::effort::available_memory;
+use crate::memory::available_memory;
 use crate::units::FastPeriods;
 
 /// Least number of fast samples of an analytic source whose length is not given (thesis 5.6).

@@ -209,3 +209,32 @@ fn recordings_that_no_memory_holds_are_refused() {
     }
     assert!(!desk.path("c.toml").exists());
 }
+
+/// A bank made elsewhere with very many taps: neither reading it nor filtering with it ends the process.
+#[test]
+fn banks_that_no_memory_holds_are_refused() {
+    let desk = Desk::new();
+    let bank = |taps: usize| {
+        let channel = format!("{{\"delay\":0.0,\"taps\":[{}]}}", vec!["1e-3"; taps].join(","));
+        format!(
+            "{{\"format\":\"hybank-bank\",\"version\":1,\"spec\":null,\"fast_period\":1.0,\"ratio\":2,\"latency\":1,\
+             \"method\":\"fir\",\"channels\":[{channel},{channel}],\"state_space\":null,\
+             \"gamma\":{{\"norm\":null,\"upper\":null,\"lower\":null,\"noncausal\":null}}}}"
+        )
+    };
+    desk.write("long.json", bank(300_000));
+    desk.write("longest.json", bank(1_000_000));
+    desk.write("in", bytes(&frames(50)));
+    crate::support::wav::write_pair(&desk, &[0.0; 8], &[0.0; 8]);
+    for (name, work) in [("long.json", "to filter with it"), ("longest.json", "to read it")] {
+        for command in
+            [format!("fuse {name} a.wav b.wav -o out.wav"), format!("stream {name} --input in -o out")]
+        {
+            let line = format!("ulimit -v 330000; $H {command} --algorithm overlap-save </dev/null");
+            let output = shell(&desk, &line);
+            let message = text(&output.stderr);
+            assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{command}: {message}");
+            assert!(message.contains(name) && message.contains(work), "{command}: {message}");
+        }
+    }
+}

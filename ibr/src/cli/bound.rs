@@ -2,6 +2,7 @@
 
 use super::arguments::BoundArguments;
 use super::failure::Failure;
+use super::memory::{self, Work};
 use super::progress::Progress;
 use super::{heat, output};
 use crate::analysis::view::{self, Cause, Totals, ViewError};
@@ -58,6 +59,7 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     source.refuse_overlaps(&arguments.map.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     let scene = arguments.scene.load(&source, Densify::Segmentwise(Segmentwise::default()), true)?;
     refuse_unknown_cameras(&scene, &arguments.scene.file)?;
+    memory::check(&scene, Work::Bound).map_err(|e| e.in_file(&arguments.scene.file))?;
     let truth = arguments.scene.truth()?;
     progress.step("predicting");
     let predicted = predict(&scene.kind, &arguments.scene.settings(scene.offset)).map_err(Failure::input)?;

@@ -5,6 +5,7 @@ mod path;
 
 use super::arguments::RenderArguments;
 use super::failure::{self, Failure};
+use super::memory::{self, Work};
 use super::output;
 use super::progress::Progress;
 use super::summary::{Figures, Summary};
@@ -32,6 +33,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let start = Instant::now();
     let scene = read(arguments)?;
     let preparation = start.elapsed().as_secs_f64();
+    let method = arguments.settings(scene.offset).method;
+    memory::check(&scene, Work::Render(method)).map_err(|e| e.in_file(&arguments.scene.file))?;
     if scene.kind.frames() > 1 {
         drop(progress);
         return path::run(&scene, preparation, arguments);

@@ -2,6 +2,7 @@
 
 use super::{Image, ImageError, colmap_map, pfm};
 use crate::files;
+use hybank::memory::available_memory;
 use image::{DynamicImage, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
@@ -12,10 +13,11 @@ pub const MOST_PIXELS: usize = 1 << 25;
 /// Bytes of work memory per pixel of a rendering, at most.
 const PIXEL_BYTES: usize = 64;
 
-/// Bytes that the work on so many pixels takes, if the system refuses them.
+/// Bytes that the work on so many pixels takes, if there is less memory or the system refuses them.
 pub(crate) fn unavailable_memory(pixels: usize) -> Option<usize> {
     let bytes = pixels.saturating_mul(PIXEL_BYTES);
-    Vec::<u8>::new().try_reserve_exact(bytes).is_err().then_some(bytes)
+    let lacks = available_memory().is_some_and(|memory| bytes as f64 > memory);
+    (lacks || Vec::<u8>::new().try_reserve_exact(bytes).is_err()).then_some(bytes)
 }
 
 /// Reads a grey or RGB image of at most [`MOST_PIXELS`] pixels; 16-bit values are scaled to 0..255, PFM

@@ -92,3 +92,28 @@ fn too_many_pixels_are_refused_before_any_work() {
     assert_eq!((code(&refused), message.lines().count()), (1, 1), "{message}");
     assert!(message.contains("wide.pgm") && message.contains("GB of memory"), "{message}");
 }
+
+/// Images that are read, and then too little memory for the work on them.
+#[cfg(target_os = "linux")]
+#[test]
+fn renderings_that_no_memory_holds_are_refused() {
+    let dir = rig();
+    let (width, height) = (2000, 2000);
+    let pixels = [format!("P5 {width} {height} 255\n").into_bytes(), vec![7; width * height]].concat();
+    let data = vec![4.0; width * height];
+    let map = pfm::encode(&pfm::FloatMap { width, height, channels: 1, data });
+    let view = |k: usize| {
+        format!("[[view]]\nname = \"{k}\"\nimage = \"a.pgm\"\nposition = {k}.0\ndisparity = \"a.pfm\"\n")
+    };
+    let scene = view(0) + &view(1) + "[virtual]\nposition = 0.5\n";
+    for (name, bytes) in [("a.pgm", pixels), ("a.pfm", map), ("large.toml", scene.into_bytes())] {
+        std::fs::write(dir.path().join(name), bytes).unwrap();
+    }
+    for line in ["bound large.toml --map map.png", "render large.toml -o out.png --method plane"] {
+        let refused = shell(dir.path(), &format!("ulimit -v 500000; $H {line} --threads 1"));
+        let message = stderr(&refused);
+        assert_eq!((code(&refused), message.lines().count()), (1, 1), "{line}: {message}");
+        assert!(message.contains("from 2 views") && message.contains("GB of memory"), "{line}: {message}");
+    }
+    assert!(!dir.path().join("map.png").exists() && !dir.path().join("out.png").exists());
+}

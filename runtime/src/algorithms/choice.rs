@@ -81,12 +81,7 @@ impl Algorithm {
         ratio: usize,
         precision: Precision,
     ) -> Result<ChosenAlgorithm, BuildError> {
-        let size = Size {
-            channels: taps.len(),
-            ratio,
-            phase_taps: phase_taps(taps, ratio),
-            group: group(precision),
-        };
+        let size = Size::new(taps, ratio, precision);
         let refused =
             |len| BuildError::Transform { len, phase_taps: size.phase_taps, shortest: SHORTEST_TRANSFORM };
         match self {
@@ -102,6 +97,21 @@ impl Algorithm {
             Self::Auto { added_latency: true } => Ok(size.fastest()),
             Self::Auto { added_latency: false } => Ok(size.fastest_without_latency().0),
         }
+    }
+}
+
+impl ChosenAlgorithm {
+    /// Bytes of the coefficients and of the state of one stream, about.
+    pub(crate) fn bytes(self, taps: &[Vec<f64>], ratio: usize, precision: Precision) -> f64 {
+        let size = Size::new(taps, ratio, precision);
+        let numbers = match self {
+            Self::OverlapSave(len) => size.shape(len).numbers(),
+            // The filters of all phases and the history, both rounded up to whole vectors.
+            Self::Direct | Self::FastFir => {
+                2.0 * (size.phase_taps * size.channels) as f64 * (size.ratio + 2) as f64
+            }
+        };
+        numbers * precision.bytes()
     }
 }
 
@@ -134,6 +144,10 @@ struct Size {
 }
 
 impl Size {
+    fn new(taps: &[Vec<f64>], ratio: usize, precision: Precision) -> Self {
+        Self { channels: taps.len(), ratio, phase_taps: phase_taps(taps, ratio), group: group(precision) }
+    }
+
     fn holds(&self, len: usize) -> bool {
         len.is_power_of_two() && (self.phase_taps.max(SHORTEST_TRANSFORM)..=LONGEST_TRANSFORM).contains(&len)
     }

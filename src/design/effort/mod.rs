@@ -8,19 +8,18 @@
 pub(super) mod amount;
 mod cost;
 mod fir;
-mod memory;
 mod progress;
 mod recursive;
 mod sizes;
 
 pub use amount::Effort;
-pub use memory::available_memory;
 pub use progress::{Observer, Stage, unobserved};
 
 use super::DesignError;
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustProblem;
 use super::problem::{Problem, common_delay};
+use crate::memory::available_memory;
 use crate::spec::{Method, Solver, Spec};
 use sizes::Sizes;
 

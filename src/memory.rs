@@ -21,14 +21,34 @@ fn control_group() -> Option<f64> {
     number(fs::read_to_string("/sys/fs/cgroup/memory.max").ok()?.trim())
 }
 
-/// The soft limit of the address space.
+/// What the soft limit of the address space leaves beside what is in use.
 fn address_space() -> Option<f64> {
     let text = fs::read_to_string("/proc/self/limits").ok()?;
     let line = text.lines().find(|line| line.starts_with("Max address space"))?;
-    number(line.split_whitespace().nth(3)?)
+    let limit = number(line.split_whitespace().nth(3)?)?;
+    Some((limit - used().unwrap_or(0.0)).max(0.0))
+}
+
+/// The address space in use, in kB there.
+fn used() -> Option<f64> {
+    let text = fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find(|line| line.starts_with("VmSize:"))?;
+    Some(1024.0 * number(line.split_whitespace().nth(1)?)?)
 }
 
 /// A positive number; "max" and "unlimited" are none.
 fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|bytes| *bytes > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_of_this_machine_is_known_where_it_is_told() {
+        if cfg!(target_os = "linux") {
+            assert!(available_memory().is_some_and(|bytes| bytes > 1e8));
+        }
+    }
 }
