@@ -8,7 +8,8 @@ use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
 use super::timeline::{SamplingInstant, Timeline};
 use super::{
-    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, lower, positive, spectrum, statements, upper,
+    BoundedBanks, MAX_STATES, Strictness, Verified, VerifyError, fir_length, lower, positive, spectrum,
+    statements, upper,
 };
 use crate::arithmetic::{BigFloat, DoubleDouble};
 use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, Proof, SynthesisFilters};
@@ -24,6 +25,7 @@ pub struct EnclosedErrorSystem<'a> {
     timeline: Timeline,
     pub(super) period: SlowPeriod,
     equations: ErrorSystem,
+    long_period: OnceLock<SlowPeriod<BigFloat>>,
     short: OnceLock<Option<CausalPlant<DoubleDouble>>>,
     long: OnceLock<Option<CausalPlant<BigFloat>>>,
 }
@@ -60,8 +62,8 @@ impl<'a> EnclosedErrorSystem<'a> {
         }
         let period = SlowPeriod::new(&front_ends, &timeline, &samples);
         let equations = ErrorSystem::new(&period, &BlockForm::new(&bank.filters, bank.ratio));
-        let (short, long) = (OnceLock::new(), OnceLock::new());
-        Ok(Self { bank, front_ends, samples, timeline, period, equations, short, long })
+        let (long_period, short, long) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        Ok(Self { bank, front_ends, samples, timeline, period, equations, long_period, short, long })
     }
 
     /// Number of states of the error system, the order of P.
@@ -144,11 +146,24 @@ impl<'a> EnclosedErrorSystem<'a> {
         lower::unexplained(&self.period, self.bank.ratio, &channels, witness)
     }
 
+    /// The channels that are not multiples of one before them.
+    pub(crate) fn distinct_channels(&self) -> Vec<usize> {
+        self.first_channels(|i, j| self.same(i, j))
+    }
+
     /// A proven lower bound for FIR banks as long as this one.
     pub fn fir_bound(&self, witnesses: &[DualWitness]) -> Option<f64> {
         let SynthesisFilters::Fir(taps) = &self.bank.filters else { return None };
-        let channels = self.first_channels(|i, j| self.same(i, j));
-        lower::of_length(&self.period, self.bank.ratio, &channels, taps[0].len(), witnesses)
+        let channels = self.distinct_channels();
+        let (ratio, length) = (self.bank.ratio, taps[0].len());
+        let short = || fir_length::of_length(&self.period, ratio, &channels, length, witnesses);
+        let long = || fir_length::of_length(self.long_period(), ratio, &channels, length, witnesses);
+        if witnesses.is_empty() { None } else { short().or_else(long) }
+    }
+
+    /// The slow period in 512 bits.
+    pub(super) fn long_period(&self) -> &SlowPeriod<BigFloat> {
+        self.long_period.get_or_init(|| SlowPeriod::new(&self.front_ends, &self.timeline, &self.samples))
     }
 
     /// Runs the recursion for causal banks at `gamma` over `periods` slow periods.
@@ -160,10 +175,7 @@ impl<'a> EnclosedErrorSystem<'a> {
                 plant.as_ref().map_or(Recursion::Undecided, |plant| plant.recursion(gamma, periods))
             }
             Precision::Long => {
-                let plant = self.long.get_or_init(|| {
-                    let period = SlowPeriod::new(&self.front_ends, &self.timeline, &self.samples);
-                    CausalPlant::new(&period, m, &measured())
-                });
+                let plant = self.long.get_or_init(|| CausalPlant::new(self.long_period(), m, &measured()));
                 plant.as_ref().map_or(Recursion::Undecided, |plant| plant.recursion(gamma, periods))
             }
         }

@@ -34,12 +34,15 @@
 
 mod ball;
 mod causal;
+mod covariance;
 mod enclosed;
 mod error;
 mod error_system;
+mod fir_length;
 mod front_ends;
 mod lower;
 mod positive;
+pub(crate) mod precise;
 mod slow_period;
 mod spectrum;
 mod state_transition;

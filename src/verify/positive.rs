@@ -12,15 +12,15 @@ use nalgebra::DMatrix;
 
 /// Lower triangular.
 #[derive(Debug, Clone)]
-pub(super) struct Factor {
-    rows: Vec<Vec<DoubleDouble>>,
+pub(super) struct Factor<F = DoubleDouble> {
+    rows: Vec<Vec<F>>,
 }
 
-/// L L' = m in rounded arithmetic of 106 bits; `None` at the first pivot that is not positive.
-pub(super) fn cholesky(m: &DMatrix<DoubleDouble>) -> Option<Factor> {
-    let mut rows: Vec<Vec<DoubleDouble>> = Vec::with_capacity(m.nrows());
+/// L L' = m in rounded arithmetic; `None` at the first pivot that is not positive.
+pub(super) fn cholesky<F: Number>(m: &DMatrix<F>) -> Option<Factor<F>> {
+    let mut rows: Vec<Vec<F>> = Vec::with_capacity(m.nrows());
     for i in 0..m.nrows() {
-        let mut row: Vec<DoubleDouble> = Vec::with_capacity(i + 1);
+        let mut row: Vec<F> = Vec::with_capacity(i + 1);
         for j in 0..i {
             let above = &rows[j];
             let sum = (0..j).fold(m[(i, j)], |sum, k| sum - row[k] * above[k]);
@@ -51,10 +51,10 @@ pub(super) fn root(m: &Matrix) -> Option<Matrix> {
     }))
 }
 
-impl Factor {
+impl<F: Number> Factor<F> {
     /// (L L')^-1 v, rounded.
-    pub(super) fn solve(&self, v: &[DoubleDouble]) -> Vec<DoubleDouble> {
-        let mut x: Vec<DoubleDouble> = Vec::with_capacity(v.len());
+    pub(super) fn solve(&self, v: &[F]) -> Vec<F> {
+        let mut x: Vec<F> = Vec::with_capacity(v.len());
         for (row, &value) in self.rows.iter().zip(v) {
             let sum = x.iter().zip(row).fold(value, |sum, (&x, &l)| sum - l * x);
             x.push(sum / row[row.len() - 1]);
@@ -69,7 +69,7 @@ impl Factor {
 
 /// Powers of two that bring the diagonal of a matrix to the size of one: the scaling is exact, and the
 /// proof does not depend on units.
-pub(super) fn scales(m: &Matrix) -> Vec<f64> {
+pub(super) fn scales<F: Number>(m: &Matrix<F>) -> Vec<f64> {
     let power = |i: usize| {
         let diagonal = m[(i, i)].nearest();
         if diagonal > 0.0 && diagonal.is_finite() {
@@ -87,23 +87,64 @@ pub(super) fn is_positive_definite(m: &Matrix) -> bool {
 }
 
 /// D m D with D diagonal; the lower triangle of m is read.
-pub(super) fn scaled(m: &Matrix, scales: &[f64]) -> Matrix {
+pub(super) fn scaled<F: Number>(m: &Matrix<F>, scales: &[f64]) -> Matrix<F> {
     Matrix::from_fn(m.nrows(), m.ncols(), |i, j| {
         m[(i.max(j), i.min(j))] * Ball::from(scales[i]) * Ball::from(scales[j])
     })
 }
 
 /// Whether every symmetric matrix in the enclosure has no eigenvalue below `least`.
-pub(super) fn exceeds(m: &Matrix, least: f64) -> bool {
+pub(super) fn exceeds<F: Number>(m: &Matrix<F>, least: f64) -> bool {
     let n = m.nrows();
-    let trace: f64 = (0..n).map(|i| m[(i, i)].magnitude()).sum();
-    let factoring = 2.0 * (n + 2) as f64 * DoubleDouble::ROUNDING * (trace + n as f64 * least.abs());
-    let shift = (ball::radius_sum(m) + factoring) * 1.001 + least;
+    let shift = (ball::radius_sum(m) + factoring(m, least)) * 1.001 + least;
     let shifted = DMatrix::from_fn(n, n, |i, j| {
         let (i, j) = (i.max(j), i.min(j));
         if i == j { (m[(i, j)] - Ball::from(shift)).mid() } else { m[(i, j)].mid() }
     });
     shift.is_finite() && cholesky(&shifted).is_some()
+}
+
+/// A bound on the error of a factorisation of `m` less a shift of about `least`.
+fn factoring<F: Number>(m: &Matrix<F>, least: f64) -> f64 {
+    let n = m.nrows();
+    let trace: f64 = (0..n).map(|i| m[(i, i)].magnitude()).sum();
+    2.0 * (n + 2) as f64 * F::ROUNDING * (trace + n as f64 * least.abs())
+}
+
+/// A symmetric matrix of which every one in its enclosure is positive definite.
+#[derive(Debug, Clone)]
+pub(super) struct Definite<F> {
+    matrix: Matrix<F>,
+    factor: Factor<F>,
+    /// No eigenvalue is less.
+    least: f64,
+}
+
+impl<F: Number> Definite<F> {
+    /// `None` if that is not shown with the precision of F.
+    pub(super) fn new(matrix: Matrix<F>) -> Option<Self> {
+        // The error that any proof must grant, times two: this is the least bound that can be shown.
+        let least = 2.0 * (ball::radius_sum(&matrix) + factoring(&matrix, 0.0));
+        let shown = least > 0.0 && exceeds(&matrix, least);
+        let factor = if shown { cholesky(&matrix.map(Ball::mid)) } else { None };
+        factor.map(|factor| Self { matrix, factor, least })
+    }
+
+    pub(super) fn order(&self) -> usize {
+        self.matrix.nrows()
+    }
+
+    /// At least r' M^-1 r, for all in the enclosures: with any v and rho = r - M v it is v' r + v' rho +
+    /// rho' M^-1 rho.
+    pub(super) fn inverse_form(&self, r: &Matrix<F>) -> Ball<F> {
+        let right: Vec<F> = r.iter().map(|x| x.mid()).collect();
+        let v = self.factor.solve(&right);
+        let v = Matrix::from_fn(v.len(), 1, |i, _| Ball::exactly(v[i]));
+        let rho = ball::subtract(r, &ball::product(&self.matrix, &v));
+        let inner =
+            |x: &Matrix<F>, y: &Matrix<F>| x.iter().zip(y).fold(Ball::ZERO, |sum, (&x, &y)| sum + x * y);
+        inner(&v, r) + inner(&v, &rho) + inner(&rho, &rho) / Ball::from(self.least)
+    }
 }
 
 #[cfg(test)]

@@ -5,22 +5,23 @@
 use super::ball::{self, Ball, Matrix};
 use super::error_system::BlockForm;
 use super::slow_period::SlowPeriod;
+use crate::arithmetic::{DoubleDouble, Number};
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, Mat};
 
 /// A complex matrix.
 #[derive(Debug, Clone)]
-pub(super) struct ComplexMatrix {
-    pub(super) re: Matrix,
-    pub(super) im: Matrix,
+pub(super) struct ComplexMatrix<F = DoubleDouble> {
+    pub(super) re: Matrix<F>,
+    pub(super) im: Matrix<F>,
 }
 
-impl ComplexMatrix {
+impl<F: Number> ComplexMatrix<F> {
     pub(super) fn zeros(rows: usize, columns: usize) -> Self {
         Self { re: ball::zeros(rows, columns), im: ball::zeros(rows, columns) }
     }
 
-    fn real(re: Matrix) -> Self {
+    fn real(re: Matrix<F>) -> Self {
         Self { im: ball::zeros(re.nrows(), re.ncols()), re }
     }
 
@@ -34,7 +35,7 @@ impl ComplexMatrix {
     pub(super) fn unit(half: [f64; 2]) -> Self {
         let [c, s] = half.map(Ball::from);
         let (cc, ss, cs) = (c * c, s * s, c * s);
-        let number = |x: Ball| Matrix::from_element(1, 1, x / (cc + ss));
+        let number = |x: Ball<F>| Matrix::from_element(1, 1, x / (cc + ss));
         Self { re: number(cc - ss), im: number(cs + cs) }
     }
 
@@ -74,12 +75,23 @@ impl ComplexMatrix {
     /// Row i times `scales[i]`.
     pub(super) fn with_rows_scaled(&self, scales: &[f64]) -> Self {
         let part =
-            |m: &Matrix| Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * Ball::from(scales[i]));
+            |m: &Matrix<F>| Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * Ball::from(scales[i]));
         Self { re: part(&self.re), im: part(&self.im) }
     }
 
+    /// Row i replaced by what `map` makes of it.
+    fn each_row(&self, map: impl Fn(usize, Self) -> Self) -> Self {
+        let mut all = Self::zeros(self.re.nrows(), self.re.ncols());
+        for i in 0..self.re.nrows() {
+            let row = map(i, self.rows(i, 1));
+            all.re.row_mut(i).copy_from(&row.re);
+            all.im.row_mut(i).copy_from(&row.im);
+        }
+        all
+    }
+
     pub(super) fn above(&self, below: &Self) -> Self {
-        let stack = |a: &Matrix, b: &Matrix| {
+        let stack = |a: &Matrix<F>, b: &Matrix<F>| {
             Matrix::from_fn(a.nrows() + b.nrows(), a.ncols(), |i, j| {
                 if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] }
             })
@@ -88,12 +100,13 @@ impl ComplexMatrix {
     }
 
     pub(super) fn select(&self, rows: &[usize], columns: &[usize]) -> Self {
-        let part = |m: &Matrix| Matrix::from_fn(rows.len(), columns.len(), |i, j| m[(rows[i], columns[j])]);
+        let part =
+            |m: &Matrix<F>| Matrix::from_fn(rows.len(), columns.len(), |i, j| m[(rows[i], columns[j])]);
         Self { re: part(&self.re), im: part(&self.im) }
     }
 
     /// A Hermitian matrix as the real symmetric one of twice the order that acts on (re, im).
-    pub(super) fn realified(&self) -> Matrix {
+    pub(super) fn realified(&self) -> Matrix<F> {
         let n = self.re.nrows();
         Matrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
             (true, true) => self.re[(i, j)],
@@ -104,7 +117,7 @@ impl ComplexMatrix {
     }
 
     /// Real parts over imaginary parts.
-    fn stacked(&self) -> Matrix {
+    fn stacked(&self) -> Matrix<F> {
         let n = self.re.nrows();
         Matrix::from_fn(
             2 * n,
@@ -114,20 +127,21 @@ impl ComplexMatrix {
     }
 
     /// sum |x|^2 over all entries.
-    pub(super) fn square(&self) -> Ball {
+    pub(super) fn square(&self) -> Ball<F> {
         self.re.iter().chain(&self.im).fold(Ball::ZERO, |sum, &x| sum + x * x)
     }
 
     /// Re <self, other> = Re tr(self* other).
-    pub(super) fn inner(&self, other: &Self) -> Ball {
-        let part =
-            |a: &Matrix, b: &Matrix| a.iter().zip(b.iter()).fold(Ball::ZERO, |sum, (&x, &y)| sum + x * y);
+    pub(super) fn inner(&self, other: &Self) -> Ball<F> {
+        let part = |a: &Matrix<F>, b: &Matrix<F>| {
+            a.iter().zip(b.iter()).fold(Ball::ZERO, |sum, (&x, &y)| sum + x * y)
+        };
         part(&self.re, &other.re) + part(&self.im, &other.im)
     }
 }
 
 /// z^-k on the unit circle.
-pub(super) fn delay(z: &ComplexMatrix, periods: usize) -> ComplexMatrix {
+pub(super) fn delay<F: Number>(z: &ComplexMatrix<F>, periods: usize) -> ComplexMatrix<F> {
     let (mut power, mut square) = (ComplexMatrix::real(ball::identity(1)), z.adjoint());
     let mut rest = periods;
     while rest > 0 {
@@ -140,7 +154,7 @@ pub(super) fn delay(z: &ComplexMatrix, periods: usize) -> ComplexMatrix {
     power
 }
 
-/// Maximum number of refinement steps. The better the condition, the more digits each step gains.
+/// Maximum number of refinement steps per 106 bits. The better the condition, the more digits each step gains.
 const REFINEMENTS: usize = 6;
 /// They end where the residual falls by less than this.
 const LEAST_GAIN: f64 = 0.1;
@@ -148,7 +162,7 @@ const LEAST_GAIN: f64 = 0.1;
 /// (z I - a)^-1 right, as a real system B x = r of twice the order.
 ///
 /// Any approximate solution will do: it is wrong by at most ||B^-1|| times its residual, which is enclosed.
-fn resolved(a: &Matrix, z: &ComplexMatrix, right: &ComplexMatrix) -> ComplexMatrix {
+fn resolved<F: Number>(a: &Matrix<F>, z: &ComplexMatrix<F>, right: &ComplexMatrix<F>) -> ComplexMatrix<F> {
     let n = a.nrows();
     if n == 0 {
         return right.clone();
@@ -160,12 +174,12 @@ fn resolved(a: &Matrix, z: &ComplexMatrix, right: &ComplexMatrix) -> ComplexMatr
     .realified();
     let right = right.stacked();
     let inverse = linalg::inverse(&ball::nearest(&shifted));
-    let residual = |x: &Matrix| ball::subtract(&right, &ball::product(&shifted, x));
-    let size = |m: &Matrix| m.iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
+    let residual = |x: &Matrix<F>| ball::subtract(&right, &ball::product(&shifted, x));
+    let size = |m: &Matrix<F>| m.iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let mut x = ball::zeros(2 * n, right.ncols());
     let mut rest = right.clone();
     let mut largest = size(&rest);
-    for _ in 0..REFINEMENTS {
+    for _ in 0..refinements::<F>() {
         let step = ball::exact(&(&inverse * ball::nearest(&rest)));
         let next = ball::add(&x, &step).map(|x| Ball::exactly(x.mid()));
         let next_rest = residual(&next);
@@ -181,9 +195,14 @@ fn resolved(a: &Matrix, z: &ComplexMatrix, right: &ComplexMatrix) -> ComplexMatr
     ComplexMatrix { re: part(0), im: part(n) }
 }
 
+fn refinements<F: Number>() -> usize {
+    let digits = -F::ROUNDING.log10() / -DoubleDouble::ROUNDING.log10();
+    (REFINEMENTS as f64 * digits).ceil() as usize
+}
+
 /// A bound on the row sums of B^-1 from an approximate inverse R: ||R|| / (1 - q) with q = ||I - R B|| <
 /// 1/2, else NaN. The product R B is taken in double precision; its rounding is at most n eps |R| |B|.
-fn inverse_norm(matrix: &Matrix, inverse: &Mat) -> f64 {
+fn inverse_norm<F: Number>(matrix: &Matrix<F>, inverse: &Mat) -> f64 {
     let n = matrix.nrows();
     let near = ball::nearest(matrix);
     let sums = |m: &Mat| m.row_iter().map(|row| row.iter().map(|x| x.abs()).sum()).fold(0.0, ball::nan_max);
@@ -195,16 +214,16 @@ fn inverse_norm(matrix: &Matrix, inverse: &Mat) -> f64 {
 
 /// Gram matrix of all samples of a slow period at the point z of the unit circle: G G* of their responses G
 /// to the input.
-pub(super) fn gram(period: &SlowPeriod, z: &ComplexMatrix) -> ComplexMatrix {
+pub(super) fn gram<F: Number>(period: &SlowPeriod<F>, z: &ComplexMatrix<F>) -> ComplexMatrix<F> {
     let (n, samples) = (period.order(), period.samples());
     let from_state = ComplexMatrix::real(period.outputs.clone()).product(&resolved(
         &period.transition,
         z,
         &ComplexMatrix::real(ball::identity(n)),
     ));
-    let phases: Vec<ComplexMatrix> = period.periods_late.iter().map(|&late| delay(z, late)).collect();
+    let phases: Vec<ComplexMatrix<F>> = period.periods_late.iter().map(|&late| delay(z, late)).collect();
     // G = [A D], A from the states and D = diag(d) of the inputs of this period.
-    let rows: Vec<ComplexMatrix> = (0..samples).map(|s| from_state.rows(s, 1).times(&phases[s])).collect();
+    let rows: Vec<ComplexMatrix<F>> = (0..samples).map(|s| from_state.rows(s, 1).times(&phases[s])).collect();
     let a = |s: usize, k: usize| [rows[s].re[(0, k)], rows[s].im[(0, k)]];
     let d = |s: usize| [phases[s].re[(0, 0)], phases[s].im[(0, 0)]];
     let q = |i: usize, j: usize| period.gram[(i, j)];
@@ -215,7 +234,7 @@ pub(super) fn gram(period: &SlowPeriod, z: &ComplexMatrix) -> ComplexMatrix {
             let own = scaled_by(d(i), q(n + i, column));
             (0..n).fold(own, |sum, k| plus(sum, scaled_by(a(i, k), q(k, column))))
         };
-        let of_states: Vec<[Ball; 2]> = (0..n).map(sum).collect();
+        let of_states: Vec<[Ball<F>; 2]> = (0..n).map(sum).collect();
         // The matrix is Hermitian.
         for j in 0..=i {
             let own = times_conjugate(sum(n + j), d(j));
@@ -229,17 +248,34 @@ pub(super) fn gram(period: &SlowPeriod, z: &ComplexMatrix) -> ComplexMatrix {
     gram
 }
 
-fn plus(x: [Ball; 2], y: [Ball; 2]) -> [Ball; 2] {
+fn plus<F: Number>(x: [Ball<F>; 2], y: [Ball<F>; 2]) -> [Ball<F>; 2] {
     [x[0] + y[0], x[1] + y[1]]
 }
 
-fn scaled_by(x: [Ball; 2], by: Ball) -> [Ball; 2] {
+fn scaled_by<F: Number>(x: [Ball<F>; 2], by: Ball<F>) -> [Ball<F>; 2] {
     [x[0] * by, x[1] * by]
 }
 
 /// x times the conjugate of y.
-fn times_conjugate(x: [Ball; 2], y: [Ball; 2]) -> [Ball; 2] {
+fn times_conjugate<F: Number>(x: [Ball<F>; 2], y: [Ball<F>; 2]) -> [Ball<F>; 2] {
     [x[0] * y[0] + x[1] * y[1], x[1] * y[0] - x[0] * y[1]]
+}
+
+/// Gamma b, without Gamma.
+pub(super) fn gram_times<F: Number>(
+    period: &SlowPeriod<F>,
+    z: &ComplexMatrix<F>,
+    b: &ComplexMatrix<F>,
+) -> ComplexMatrix<F> {
+    let (n, samples) = (period.order(), period.samples());
+    let outputs = ComplexMatrix::real(period.outputs.clone());
+    let phases: Vec<ComplexMatrix<F>> = period.periods_late.iter().map(|&late| delay(z, late)).collect();
+    // G* b: late samples weigh the input earlier.
+    let late = b.each_row(|s, x| x.times(&phases[s].adjoint()));
+    let state = resolved(&period.transition.transpose(), &z.adjoint(), &outputs.adjoint().product(&late));
+    let input = ComplexMatrix::real(period.gram.clone()).product(&state.above(&late));
+    let state = resolved(&period.transition, z, &input.rows(0, n));
+    outputs.product(&state).plus(&input.rows(n, samples)).each_row(|s, x| x.times(&phases[s]))
 }
 
 /// F(z), M x N, of the bank's filters.
@@ -267,11 +303,12 @@ pub(super) fn filter_response(filters: &SynthesisFilters, ratio: usize, z: &Comp
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::BigFloat;
 
     #[test]
     fn any_two_doubles_name_a_point_of_the_circle() {
         for half in [[1.0, 0.0], [0.0, 1.0], [0.8, -0.6], [1e-100, 3e-100], [0.1, 7.0]] {
-            let z = ComplexMatrix::unit(half);
+            let z: ComplexMatrix = ComplexMatrix::unit(half);
             let angle = 2.0 * f64::atan2(half[1], half[0]);
             assert!((z.re[(0, 0)].nearest() - angle.cos()).abs() < 1e-15, "{half:?}");
             assert!((z.im[(0, 0)].nearest() - angle.sin()).abs() < 1e-15, "{half:?}");
@@ -283,20 +320,30 @@ mod tests {
     #[test]
     fn resolvents_invert() {
         let a = Matrix::from_fn(4, 4, |i, j| Ball::from(0.3 * ((3 * i + 5 * j) as f64).sin()));
-        let z = ComplexMatrix::unit([0.3, 0.9]);
+        let z: ComplexMatrix = ComplexMatrix::unit([0.3, 0.9]);
         let r = resolved(&a, &z, &ComplexMatrix::real(ball::identity(4)));
         let shifted = ComplexMatrix::real(ball::identity(4)).times(&z).minus(&ComplexMatrix::real(a));
         let rest = shifted.product(&r).minus(&ComplexMatrix::real(ball::identity(4)));
         assert!(rest.square().magnitude().sqrt() < 1e-25);
         assert!(rest.re.iter().chain(&rest.im).all(|x| x.nearest().abs() <= x.radius()));
         // At a pole on the unit circle there is no response.
-        let one = ComplexMatrix::real(ball::identity(1));
+        let one: ComplexMatrix = ComplexMatrix::real(ball::identity(1));
         assert!(resolved(&ball::identity(1), &one, &one).re[(0, 0)].radius().is_nan());
     }
 
     #[test]
+    fn residuals_of_512_bits_reach_their_precision() {
+        let a = Matrix::<BigFloat>::from_fn(4, 4, |i, j| Ball::from(0.3 * ((3 * i + 5 * j) as f64).sin()));
+        let z: ComplexMatrix<BigFloat> = ComplexMatrix::unit([0.3, 0.9]);
+        let one = ComplexMatrix::real(ball::identity(4));
+        let inverse = resolved(&a, &z, &one);
+        let rest = one.times(&z).minus(&ComplexMatrix::real(a)).product(&inverse).minus(&one);
+        assert!(rest.re.iter().chain(&rest.im).all(|x| x.magnitude() < 1e-140));
+    }
+
+    #[test]
     fn delays_are_powers() {
-        let z = ComplexMatrix::unit([0.7, 0.2]);
+        let z: ComplexMatrix = ComplexMatrix::unit([0.7, 0.2]);
         let step = delay(&z, 1);
         let mut power = delay(&z, 0);
         for periods in 0..20 {

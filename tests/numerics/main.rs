@@ -7,6 +7,7 @@ mod adc_tools;
 mod causal_optima;
 mod equivalence;
 mod filters;
+mod fir_bounds;
 mod gains;
 mod golden;
 mod hard_designs;

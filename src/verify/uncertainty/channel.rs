@@ -2,8 +2,8 @@
 
 use super::super::VerifyError;
 use super::super::ball::{self, Ball, Matrix};
+use super::super::covariance::Covariance;
 use super::super::front_ends::FrontEnds;
-use super::super::lower::Covariance;
 use super::Taps;
 use super::aliases::{Aliases, Weight};
 use super::angle::{Frequency, outward};

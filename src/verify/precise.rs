@@ -1,0 +1,41 @@
+//! Second moments of the samples in 512 bits, for the search for witnesses of long filters. Only their
+//! midpoints: the proof does not use them.
+
+use super::ball::{self, Ball};
+use super::covariance::Covariance;
+use super::enclosed::EnclosedErrorSystem;
+use super::spectrum::{self, ComplexMatrix};
+use crate::arithmetic::{BigFloat, Matrix};
+
+/// Real and imaginary part.
+pub(crate) type ComplexParts = [Matrix<BigFloat>; 2];
+
+impl EnclosedErrorSystem<'_> {
+    /// The point z of the unit circle that `half` names, 1 x 1, and the Gram matrix at it: that of the M
+    /// reference samples and the samples of the `channels`.
+    pub(crate) fn precise_gram(&self, half: [f64; 2], channels: &[usize]) -> [ComplexParts; 2] {
+        let m = self.bank.ratio;
+        let z = ComplexMatrix::unit(half);
+        let rows: Vec<usize> = (0..m).chain(channels.iter().map(|i| m + i)).collect();
+        let gram = spectrum::gram(self.long_period(), &z).select(&rows, &rows);
+        [&z, &gram].map(|of| [midpoints(&of.re), midpoints(&of.im)])
+    }
+
+    /// Covariance of the samples of the `channels` over `lags` slow periods, for white noise of unit density
+    /// at the input, the channels of the latest period first; and the correlations of the M reference samples
+    /// (rows) with these.
+    pub(crate) fn precise_covariance(
+        &self,
+        channels: &[usize],
+        lags: usize,
+    ) -> Option<[Matrix<BigFloat>; 2]> {
+        let (period, ratio) = (self.long_period(), self.bank.ratio);
+        let covariance = Covariance::new(period)?;
+        let own = covariance.of_taps(period, ratio, channels, lags);
+        Some([own, covariance.with_reference(period, ratio, channels, lags)].map(|m| midpoints(&m)))
+    }
+}
+
+fn midpoints(m: &ball::Matrix<BigFloat>) -> Matrix<BigFloat> {
+    Matrix::from_fn(m.nrows(), m.ncols(), |i, j| Ball::mid(m[(i, j)]))
+}
