@@ -150,9 +150,10 @@ fn steep_front_ends_of_much_gain_are_designed() {
 #[test]
 fn gains_twelve_decades_apart_change_no_gamma() {
     let channels = [0.2, 1.1, 2.4];
-    for method in [Method::Fir, Method::Iir, Method::H2] {
-        let base = alike(&butterworth(3, 0.2), 2, 4, &channels);
-        let spec = if method == Method::Fir { with_taps(base, 12) } else { base };
+    for method in [Method::Fir, Method::Iir, Method::H2, Method::Sinc, Method::Separation] {
+        let ratio = if method == Method::Sinc { 3 } else { 2 };
+        let base = alike(&butterworth(3, 0.2), ratio, 4, &channels);
+        let spec = if method.has_taps() { with_taps(base, 12) } else { base };
         let spec = Spec { design: DesignSpec::new(method, spec.design.taps), ..spec };
         let mut unequal = spec.clone();
         let gains = [1e-6, 1.0, 1e6];

@@ -22,7 +22,8 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     for (i, synthesis) in bank.iter().enumerate() {
         let shift = FastPeriods(grid[i] as f64 / problem.ratio as f64);
         let fractional = fir_taps(&alone(slow, i, shift, split.periods), split.delay_taps)?;
-        taps.push(cascade(&fractional[0], synthesis, problem.ratio));
+        let unscaled = cascade(&fractional[0], synthesis, problem.ratio);
+        taps.push(unscaled.iter().map(|tap| tap / problem.channels[i].gain).collect());
     }
     Synthesis::of_taps(plant, taps)
 }
@@ -37,13 +38,13 @@ fn fir_taps(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError
     }
 }
 
-/// The channels as inputs of the second step: with integer delays, and with the latency that the first step
-/// leaves.
+/// The channels as inputs of the second step: with integer delays, with the latency that the first step
+/// leaves, and without their gains, which the taps undo at the end.
 fn on_grid(problem: &Problem, grid: &[usize], split: &Split) -> Problem {
     let mut on_grid = problem.clone();
     on_grid.latency -= split.periods * problem.ratio;
     for (channel, &delay) in on_grid.channels.iter_mut().zip(grid) {
-        channel.delay = FastPeriods(delay as f64);
+        *channel = Channel { delay: FastPeriods(delay as f64), gain: 1.0, converter_gain: 1.0, ..*channel };
     }
     on_grid
 }
@@ -61,6 +62,12 @@ fn alone(slow: &Problem, i: usize, shift: FastPeriods, latency: usize) -> Proble
     }
 }
 
+/// Whole fast samples that all channels are late: they delay the result, and no filter undoes them.
+fn common_delay(problem: &Problem) -> usize {
+    let least = problem.channels.iter().map(|channel| channel.delay.0).fold(f64::INFINITY, f64::min);
+    least.max(0.0) as usize
+}
+
 /// How taps and latency are shared between the two steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Split {
@@ -73,10 +80,11 @@ struct Split {
 }
 
 impl Split {
-    /// A quarter of the latency goes to the fractional delays, as far as the taps allow.
+    /// A quarter of the latency beyond the common delay goes to the fractional delays, as far as the taps
+    /// allow.
     fn new(problem: &Problem, length: usize) -> Self {
-        let periods =
-            (problem.latency / (4 * problem.ratio)).min(length.saturating_sub(1) / (4 * problem.ratio));
+        let latency = problem.latency.saturating_sub(common_delay(problem));
+        let periods = (latency / (4 * problem.ratio)).min(length.saturating_sub(1) / (4 * problem.ratio));
         let delay_taps = 2 * periods + 1;
         Self { periods, delay_taps, bank_taps: length - problem.ratio * (delay_taps - 1) }
     }
@@ -86,10 +94,11 @@ impl Split {
 /// phases are taken, the nearest delay).
 fn grid_delays(problem: &Problem) -> Vec<usize> {
     let mut taken = vec![false; problem.ratio];
+    let common = common_delay(problem);
     let chosen = |channel: &Channel| {
-        let chosen = nearest(channel.delay.0, &taken);
+        let chosen = nearest(channel.delay.0 - common as f64, &taken);
         taken[chosen % problem.ratio] = true;
-        chosen
+        common + chosen
     };
     problem.channels.iter().map(chosen).collect()
 }
