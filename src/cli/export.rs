@@ -42,7 +42,7 @@ pub(super) struct Args {
 enum FormatArg {
     /// A C99 header with a streaming function
     C,
-    /// Comma-separated values, one coefficient a line
+    /// Comma-separated values, one coefficient per line
     Csv,
     /// A NumPy archive
     Npz,

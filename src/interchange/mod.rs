@@ -29,7 +29,7 @@ use crate::bank::Bank;
 pub enum Format {
     /// A C99 header with the coefficients and a streaming function.
     C99,
-    /// Comma-separated values, one coefficient a line.
+    /// Comma-separated values, one coefficient per line.
     Csv,
     /// A NumPy archive: `taps` (N, M, lags), or the matrices `a`, `b`, `c`, `d`.
     Npz,

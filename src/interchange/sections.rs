@@ -20,6 +20,13 @@ pub struct Section {
     pub a: [f64; 2],
 }
 
+impl Section {
+    /// Whether it has no poles.
+    fn is_fir(&self) -> bool {
+        self.a == [0.0; 2]
+    }
+}
+
 /// The states that a section takes in the bank: x+ = f x + (what drives it).
 struct Block {
     states: Vec<usize>,
@@ -204,50 +211,96 @@ impl Block {
 /// The state-space filters of sections: delay lines of the inputs, and for each pair of poles and each phase two
 /// states in observer form, which all channels drive.
 pub fn block_of_sections(sections: &[Section], channels: usize, ratio: usize) -> BlockFilter {
-    let longest = |channel: usize| {
-        let own = sections.iter().filter(|section| section.channel == channel);
-        own.map(|section| section.delay + if section.a == [0.0; 2] { 2 } else { 0 }).max().unwrap_or(0)
-    };
-    let lines: Vec<usize> = (0..channels).map(longest).collect();
-    let first = |channel: usize| lines[..channel].iter().sum::<usize>();
-    let mut poles: Vec<(usize, [f64; 2])> =
-        sections.iter().filter(|section| section.a != [0.0; 2]).map(|s| (s.phase, s.a)).collect();
-    poles.sort_by(|x, y| x.0.cmp(&y.0).then(x.1[0].total_cmp(&y.1[0])).then(x.1[1].total_cmp(&y.1[1])));
-    poles.dedup();
-    let head = first(channels);
-    let n = head + 2 * poles.len();
-    let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
-    let mut block =
-        BlockFilter { a: zeros(n, n), b: zeros(n, channels), c: zeros(ratio, n), d: zeros(ratio, channels) };
-    for (channel, &length) in lines.iter().enumerate().filter(|(_, length)| **length > 0) {
-        block.b[first(channel)][channel] = 1.0;
-        (1..length).for_each(|k| block.a[first(channel) + k][first(channel) + k - 1] = 1.0);
-    }
-    for (k, (phase, [a1, a2])) in poles.iter().enumerate() {
-        let state = head + 2 * k;
-        (block.a[state][state], block.a[state][state + 1], block.a[state + 1][state]) = (-a1, 1.0, -a2);
-        block.c[*phase][state] = 1.0;
-    }
-    for Section { channel, phase, delay, b, a } in sections {
-        if *a == [0.0; 2] {
-            for (d, b) in (*delay..).zip(b) {
-                match d.checked_sub(1) {
-                    None => block.d[*phase][*channel] += b,
-                    Some(d) if d < lines[*channel] => block.c[*phase][first(*channel) + d] += b,
-                    Some(_) => {}
-                }
-            }
-        } else if let Some(k) = poles.iter().position(|pole| *pole == (*phase, *a)) {
-            // b0 is zero: the poles follow a delay.
-            for (row, b) in b[1..].iter().enumerate() {
-                match delay.checked_sub(1) {
-                    None => block.b[head + 2 * k + row][*channel] += b,
-                    Some(d) => block.a[head + 2 * k + row][first(*channel) + d] += b,
-                }
-            }
+    let states = SectionStates::of(sections, channels);
+    let mut block = states.undriven(ratio);
+    for section in sections {
+        if section.is_fir() {
+            states.add_taps(&mut block, section);
+        } else {
+            states.drive_poles(&mut block, section);
         }
     }
     block
+}
+
+/// Where the states of sections stand: the delay lines, then two for each pair of poles.
+struct SectionStates {
+    /// States of the delay line of each channel.
+    lines: Vec<usize>,
+    /// The phase and the denominator of each pair.
+    poles: Vec<(usize, [f64; 2])>,
+}
+
+impl SectionStates {
+    fn of(sections: &[Section], channels: usize) -> Self {
+        let longest = |channel: usize| {
+            let own = sections.iter().filter(|section| section.channel == channel);
+            own.map(|section| section.delay + if section.is_fir() { 2 } else { 0 }).max().unwrap_or(0)
+        };
+        let mut poles: Vec<(usize, [f64; 2])> =
+            sections.iter().filter(|section| !section.is_fir()).map(|s| (s.phase, s.a)).collect();
+        poles.sort_by(|x, y| x.0.cmp(&y.0).then(x.1[0].total_cmp(&y.1[0])).then(x.1[1].total_cmp(&y.1[1])));
+        poles.dedup();
+        Self { lines: (0..channels).map(longest).collect(), poles }
+    }
+
+    /// The state that holds the input of a channel one slow period ago.
+    fn line(&self, channel: usize) -> usize {
+        self.lines[..channel].iter().sum()
+    }
+
+    /// The first state of a pair.
+    fn pair(&self, pair: usize) -> usize {
+        self.line(self.lines.len()) + 2 * pair
+    }
+
+    /// Delay lines with their inputs, and poles that nothing drives yet.
+    fn undriven(&self, ratio: usize) -> BlockFilter {
+        let (n, channels) = (self.pair(self.poles.len()), self.lines.len());
+        let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
+        let mut block = BlockFilter {
+            a: zeros(n, n),
+            b: zeros(n, channels),
+            c: zeros(ratio, n),
+            d: zeros(ratio, channels),
+        };
+        for (channel, &length) in self.lines.iter().enumerate().filter(|(_, length)| **length > 0) {
+            let first = self.line(channel);
+            block.b[first][channel] = 1.0;
+            (first + 1..first + length).for_each(|state| block.a[state][state - 1] = 1.0);
+        }
+        for (k, (phase, [a1, a2])) in self.poles.iter().enumerate() {
+            let state = self.pair(k);
+            (block.a[state][state], block.a[state][state + 1], block.a[state + 1][state]) = (-a1, 1.0, -a2);
+            block.c[*phase][state] = 1.0;
+        }
+        block
+    }
+
+    /// Taps to the outputs of the delay line.
+    fn add_taps(&self, block: &mut BlockFilter, section: &Section) {
+        for (delay, b) in (section.delay..).zip(section.b) {
+            match delay.checked_sub(1) {
+                None => block.d[section.phase][section.channel] += b,
+                Some(d) if d < self.lines[section.channel] => {
+                    block.c[section.phase][self.line(section.channel) + d] += b;
+                }
+                Some(_) => {}
+            }
+        }
+    }
+
+    /// The numerator to the inputs of the pair. b0 is zero: the poles follow a delay.
+    fn drive_poles(&self, block: &mut BlockFilter, section: &Section) {
+        let own = |pole: &(usize, [f64; 2])| *pole == (section.phase, section.a);
+        let Some(pair) = self.poles.iter().position(own) else { return };
+        for (state, b) in (self.pair(pair)..).zip(&section.b[1..]) {
+            match section.delay.checked_sub(1) {
+                None => block.b[state][section.channel] += b,
+                Some(d) => block.a[state][self.line(section.channel) + d] += b,
+            }
+        }
+    }
 }
 
 /// One section a line, channels from 1, with a line of headings.

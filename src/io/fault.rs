@@ -20,7 +20,7 @@ pub enum InputFault {
     /// A SigMF recording does not state its rate.
     NoRate,
     /// Lines about lost samples came after their samples had been used.
-    ToldLate {
+    LateLostLines {
         /// Number of lines.
         lines: u64,
     },
@@ -46,8 +46,9 @@ impl fmt::Display for InputFault {
                 write!(f, "it ends before the last of the samples whose number is given")
             }
             Self::NoRate => write!(f, "it states no core:sample_rate; the rate of the bank is assumed"),
-            Self::ToldLate { lines } => {
-                write!(f, "{lines} lines about lost samples came after these samples had been used")
+            Self::LateLostLines { lines } => {
+                let ending = if *lines == 1 { "" } else { "s" };
+                write!(f, "{lines} line{ending} about lost samples came after these samples had been used")
             }
             Self::Unused { frames, at_least } => {
                 let at_least = if *at_least { "at least " } else { "" };

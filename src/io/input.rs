@@ -214,7 +214,7 @@ impl Input {
 
     pub(super) fn faults(&self) -> impl Iterator<Item = InputFault> {
         let beyond = self.aligned.is_over() && self.aligned.has_unreached_segments();
-        let late = (self.live.late > 0).then_some(InputFault::ToldLate { lines: self.live.late });
+        let late = (self.live.late > 0).then_some(InputFault::LateLostLines { lines: self.live.late });
         let unrated = self.notes.sigmf.is_some() && self.aligned.header.rate.is_none();
         let unrated = unrated.then_some(InputFault::NoRate);
         unrated

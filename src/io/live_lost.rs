@@ -91,7 +91,7 @@ fn next_line(reader: &mut impl BufRead, name: &str, number: usize) -> Option<Res
         Err(error) => Some(Err(IoError::system(name, "read it")(error))),
         Ok(0) => None,
         Ok(length) if length as u64 > LONGEST_LINE => Some(Err(fault(format!(
-            "line {number} is longer than {LONGEST_LINE} bytes; give one object a line"
+            "line {number} is longer than {LONGEST_LINE} bytes; give one object per line"
         )))),
         Ok(_) => Some(String::from_utf8(line).map_err(|_| fault(format!("line {number} is not UTF-8")))),
     }

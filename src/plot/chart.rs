@@ -1,6 +1,7 @@
 //! Line charts as SVG text.
 
 use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 const WIDTH: u32 = 960;
@@ -35,6 +36,11 @@ pub struct Marks {
     /// Points (x, y) and their texts; points that are not finite are left out.
     pub points: Vec<(f64, f64, String)>,
 }
+
+/// The axes of a chart that is being drawn.
+type Axes<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 /// Curves over a common axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,23 +121,30 @@ impl Chart {
         marks: &[Marks],
         x: std::ops::Range<f64>,
         y: std::ops::Range<f64>,
-    ) -> Result<(), Box<dyn std::error::Error>> {
+    ) -> Drawn {
         let root = SVGBackend::with_string(svg, (WIDTH * OVERSIZE, HEIGHT * OVERSIZE)).into_drawing_area();
         root.fill(&WHITE)?;
-        let text = |size: u32| ("sans-serif", size * OVERSIZE).into_font();
         let looks = self.looks(y.end - y.start);
         let legend = Legend::new(self.entries(&looks, marks), (WIDTH - 2 * SIDE) as i32);
         let below = root.margin(8 * OVERSIZE, 8 * OVERSIZE, SIDE * OVERSIZE, SIDE * OVERSIZE);
         let below = below.titled(&self.title, text(16))?;
         let (above, below) = below.split_vertically(legend.height());
         legend.draw(&above)?;
-        let (across, up) = (Labels::over(&x), Labels::over(&y));
         let mut chart = ChartBuilder::on(&below)
             .margin_top(4 * OVERSIZE)
             .margin_right(14 * OVERSIZE)
             .x_label_area_size(38 * OVERSIZE)
             .y_label_area_size(64 * OVERSIZE)
             .build_cartesian_2d(x, y)?;
+        self.draw_axes(&mut chart)?;
+        self.draw_lines(&mut chart, &looks)?;
+        self.draw_marks(&mut chart, marks)?;
+        root.present()?;
+        Ok(())
+    }
+
+    fn draw_axes(&self, chart: &mut Axes<'_>) -> Drawn {
+        let (across, up) = (Labels::over(&chart.x_range()), Labels::over(&chart.y_range()));
         chart
             .configure_mesh()
             .x_desc(&self.x_label)
@@ -142,16 +155,25 @@ impl Chart {
             .axis_desc_style(text(13))
             .light_line_style(RGBColor(238, 238, 238))
             .draw()?;
+        Ok(())
+    }
+
+    fn draw_lines(&self, chart: &mut Axes<'_>, looks: &[Look]) -> Drawn {
         for ((series, look), colour) in self.series.iter().zip(looks).zip(COLOURS.iter().cycle()) {
             let points = series.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
             let style = line_style(colour);
-            match look {
+            match *look {
                 Look::Line(Some(Dashes { on, off })) => {
                     chart.draw_series(DashedLineSeries::new(points, on, off, style))?;
                 }
                 _ => drop(chart.draw_series(LineSeries::new(points, style))?),
             }
         }
+        Ok(())
+    }
+
+    /// Circles with their texts above them.
+    fn draw_marks(&self, chart: &mut Axes<'_>, marks: &[Marks]) -> Drawn {
         let text_style = TextStyle::from(text(10)).color(&RGBColor(60, 60, 60));
         for (marks, colour) in marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())) {
             let points = || marks.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
@@ -163,9 +185,12 @@ impl Chart {
             };
             chart.draw_series(points().filter(|(.., text)| !text.is_empty()).map(above))?;
         }
-        root.present()?;
         Ok(())
     }
+}
+
+fn text(size: u32) -> FontDesc<'static> {
+    ("sans-serif", size * OVERSIZE).into_font()
 }
 
 /// For a line over so many others that lie in the same place; each shows in the gaps of the next one.

@@ -7,7 +7,7 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "init",
     "design",
     "analyze",
@@ -24,6 +24,7 @@ const COMMANDS: [&str; 17] = [
     "demo",
     "completions",
     "man",
+    "schema",
     "help",
 ];
 
