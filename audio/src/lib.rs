@@ -1,7 +1,7 @@
 //! Reads recordings in FLAC, MP3, AIFF and Ogg Vorbis as interleaved samples.
 //!
 //! The decoders are those of symphonia, which are safe Rust. A recording is read to its end or refused: a
-//! packet that cannot be decoded is an error, not a gap that nobody hears of. Integers have the full scale
+//! packet that cannot be decoded is an error and never an unreported gap. Integers have the full scale
 //! 1.0 and keep all their bits.
 //!
 //! ```no_run

@@ -36,7 +36,7 @@ fn lossless_recordings_keep_every_bit() {
     }
 }
 
-/// What an encoder adds in front and behind is cut off, so that the samples are at their place.
+/// The padding that an encoder adds at both ends is cut off, so that the samples are at their place.
 #[test]
 fn lossy_recordings_are_near_and_in_time() {
     for (name, least) in [("two.mp3", 25.0), ("two.ogg", 20.0)] {

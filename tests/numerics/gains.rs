@@ -22,17 +22,17 @@ fn example(method: Method) -> Spec {
 fn check(what: &str, spec: &Spec, wanted: f64) -> Bank {
     let found = design(spec).unwrap_or_else(|error| panic!("{what}: {error}"));
     let gamma = &found.bank.gamma;
-    let upper = gamma.norm.unwrap();
-    assert!((upper / wanted - 1.0).abs() < 1e-6, "{what}: {gamma:?}, wanted {wanted:e}");
+    let norm = gamma.norm.unwrap();
+    assert!((norm / wanted - 1.0).abs() < 1e-6, "{what}: {gamma:?}, wanted {wanted:e}");
     let (lower, noncausal) = (gamma.lower.unwrap(), gamma.noncausal.unwrap());
     assert!(lower > wanted * (1.0 - 2e-6) && noncausal > wanted * (1.0 - 2e-6), "{what}: {gamma:?}");
     let again = analyze(&found.bank, &[]).unwrap().gamma;
-    assert!((again / upper - 1.0).abs() < 1e-8, "{what}: {again:e}, {upper:e}");
+    assert!((again / norm - 1.0).abs() < 1e-8, "{what}: {again:e}, {norm:e}");
     let bank = found.bank;
     found.proof.unwrap_or_else(|error| panic!("{what}: {error}"));
     let read = Bank::from_json(&bank.to_json().unwrap(), "bank.json").unwrap();
     let proven = verify(&read).unwrap_or_else(|error| panic!("{what}: {error}"));
-    assert!(proven.upper <= wanted * (1.0 + 2e-6) && proven.upper >= upper, "{what}: {proven:?}");
+    assert!(proven.upper <= wanted * (1.0 + 2e-6) && proven.upper >= norm, "{what}: {proven:?}");
     assert!(proven.lower > wanted * (1.0 - 3e-6), "{what}: {proven:?}");
     bank
 }

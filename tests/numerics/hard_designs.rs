@@ -148,10 +148,10 @@ fn the_interval_of_the_thesis_bank_is_proved_in_floating_point() {
     for method in [Method::Fir, Method::Iir] {
         let bank = design(&case.spec(method)).unwrap().bank;
         let proof = certify(&bank).unwrap();
-        let upper = bank.gamma.norm.unwrap();
+        let norm = bank.gamma.norm.unwrap();
         assert!(
-            proof.attained <= proof.gamma && proof.gamma >= upper && proof.gamma <= upper * (1.0 + 1e-5),
-            "{proof:?} {upper}"
+            proof.attained <= proof.gamma && proof.gamma >= norm && proof.gamma <= norm * (1.0 + 1e-5),
+            "{proof:?} {norm}"
         );
     }
 }

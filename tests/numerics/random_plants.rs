@@ -93,22 +93,22 @@ fn end_of(seed: u64) -> End {
         assert!(block.a.len() <= order, "plant {seed}: {} states of {order}", block.a.len());
     }
     let gamma = &found.bank.gamma;
-    let (upper, lower) = (gamma.norm.unwrap(), gamma.lower.unwrap());
+    let (norm, lower) = (gamma.norm.unwrap(), gamma.lower.unwrap());
     assert!(
-        upper.is_finite() && gamma.noncausal.unwrap() <= upper && lower <= upper,
+        norm.is_finite() && gamma.noncausal.unwrap() <= norm && lower <= norm,
         "plant {seed}: {gamma:?}"
     );
     let again = analyze(&found.bank, &[]).unwrap().gamma;
-    assert!((again - upper).abs() <= 1e-8 * upper + 1e-12, "plant {seed}: {again} {upper}");
+    assert!((again - norm).abs() <= 1e-8 * norm + 1e-12, "plant {seed}: {again} {norm}");
     match &found.proof {
         Ok(proven) => {
-            let slack = 1e-6 * upper + 1e-9;
+            let slack = 1e-6 * norm + 1e-9;
             assert!(
                 proven.lower <= proven.upper && proven.attained <= proven.upper,
                 "plant {seed}: {proven:?}"
             );
             assert!(
-                proven.upper <= upper + slack || proven.upper <= 1.11 * upper,
+                proven.upper <= norm + slack || proven.upper <= 1.11 * norm,
                 "plant {seed}: {proven:?}"
             );
             End::Proven

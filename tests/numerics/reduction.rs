@@ -30,17 +30,17 @@ fn check(design: &Design, order: usize) -> Bank {
     let states = block(&design.bank).a.len();
     let record = design.reduction.as_ref().unwrap();
     assert!(states <= order && record.reduced.order == states, "{states} {record:?}");
-    let upper = design.bank.gamma.norm.unwrap();
-    assert!((upper / record.reduced.figures.gamma - 1.0).abs() < 1e-8, "{upper} {record:?}");
-    assert!(design.bank.gamma.lower.unwrap() <= upper);
+    let norm = design.bank.gamma.norm.unwrap();
+    assert!((norm / record.reduced.figures.gamma - 1.0).abs() < 1e-8, "{norm} {record:?}");
+    assert!(design.bank.gamma.lower.unwrap() <= norm);
     assert!(design.proof.is_ok(), "{:?}", design.proof);
     let proven = &design.bank;
     let read = Bank::from_json(&proven.to_json().unwrap(), "bank.json").unwrap();
     assert_eq!(read.spec, proven.spec);
     let verified = verify(&read).unwrap();
-    assert!(verified.upper >= upper && verified.upper <= upper * (1.0 + 1e-3), "{verified:?} {upper}");
+    assert!(verified.upper >= norm && verified.upper <= norm * (1.0 + 1e-3), "{verified:?} {norm}");
     let again = analyze(&read, &[]).unwrap().gamma;
-    assert!((again / upper - 1.0).abs() < 1e-9, "{again} {upper}");
+    assert!((again / norm - 1.0).abs() < 1e-9, "{again} {norm}");
     read
 }
 
@@ -55,8 +55,8 @@ fn few_states_of_the_thesis_example_are_proven() {
     ] {
         let found = reduced(thesis(10, &[1.2, 0.6]), method, Reduction::Order(order));
         let bank = check(&found, order);
-        let upper = bank.gamma.norm.unwrap();
-        assert!(upper < gamma * 1.01, "{} {order}: {upper}", method.name());
+        let norm = bank.gamma.norm.unwrap();
+        assert!(norm < gamma * 1.01, "{} {order}: {norm}", method.name());
         assert_eq!(bank.spec.unwrap().design.reduction, Some(Reduction::Order(order)));
     }
 }

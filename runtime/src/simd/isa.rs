@@ -14,7 +14,7 @@ use std::fmt;
 ///
 /// No other can be named:
 ///
-/// ```compile_fail
+/// ```compile_fail,E0599
 /// use hybank_runtime::{Isa, Options};
 /// let options = Options { isa: Isa::Avx2, ..Options::default() };
 /// ```
