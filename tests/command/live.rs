@@ -127,7 +127,7 @@ fn lost_samples_from_a_fifo_hold_nothing_up() {
     (30..33).for_each(|k| filled[2 * k + 1] = 0.0);
     assert!(got == fused(&filled));
     let reported = text(&output.stderr);
-    assert!(reported.contains("1 lines about lost samples came after"), "{reported}");
+    assert!(reported.contains("1 line about lost samples came after"), "{reported}");
     let report: Value = serde_json::from_str(reported.lines().last().unwrap()).unwrap();
     assert_eq!(report["gaps"]["list"], json!([{ "channel": 2, "first": 30, "length": 3 }]));
 }

@@ -94,10 +94,7 @@ fn end_of(seed: u64) -> End {
     }
     let gamma = &found.bank.gamma;
     let (norm, lower) = (gamma.norm.unwrap(), gamma.lower.unwrap());
-    assert!(
-        norm.is_finite() && gamma.noncausal.unwrap() <= norm && lower <= norm,
-        "plant {seed}: {gamma:?}"
-    );
+    assert!(norm.is_finite() && gamma.noncausal.unwrap() <= norm && lower <= norm, "plant {seed}: {gamma:?}");
     let again = analyze(&found.bank, &[]).unwrap().gamma;
     assert!((again - norm).abs() <= 1e-8 * norm + 1e-12, "plant {seed}: {again} {norm}");
     match &found.proof {
@@ -107,10 +104,7 @@ fn end_of(seed: u64) -> End {
                 proven.lower <= proven.upper && proven.attained <= proven.upper,
                 "plant {seed}: {proven:?}"
             );
-            assert!(
-                proven.upper <= norm + slack || proven.upper <= 1.11 * norm,
-                "plant {seed}: {proven:?}"
-            );
+            assert!(proven.upper <= norm + slack || proven.upper <= 1.11 * norm, "plant {seed}: {proven:?}");
             End::Proven
         }
         Err(refusal) => refused(seed, refusal, End::Unproven),

@@ -190,7 +190,7 @@ impl Run<'_> {
             None => Ok(parts),
             Some(x) => Err(Failure::Input(format!(
                 "{}: a captured sample is {x:e}, beyond the range of a 32-bit float; use a smaller --gain",
-                self.signal.text
+                self.signal.given
             ))),
         }
     }

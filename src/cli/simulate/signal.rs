@@ -36,6 +36,8 @@ pub(super) struct Signal {
     pub(super) imaginary: Option<Analog>,
     /// As it was understood.
     pub(super) text: String,
+    /// As it was given.
+    pub(super) given: String,
     ratio: usize,
 }
 
@@ -46,8 +48,8 @@ impl Signal {
         reader.check_channel()?;
         let (real, quadrature, text) = reader.source()?;
         let ratio = spec.ratio;
-        let Some(given) = &args.imaginary else {
-            return Ok(Self { real, imaginary: quadrature, text, ratio });
+        let Some(part) = &args.imaginary else {
+            return Ok(Self { real, imaginary: quadrature, text, given: args.source.clone(), ratio });
         };
         if quadrature.is_some() {
             return Err(Failure::Usage(format!(
@@ -55,9 +57,10 @@ impl Signal {
                 args.source
             )));
         }
-        let (imaginary, its_text) = reader.imaginary(given)?;
+        let (imaginary, its_text) = reader.imaginary(part)?;
         let text = format!("{text}, and as imaginary part {its_text}");
-        Ok(Self { real, imaginary: Some(imaginary), text, ratio })
+        let given = format!("{} --imaginary {part}", args.source);
+        Ok(Self { real, imaginary: Some(imaginary), text, given, ratio })
     }
 
     pub(super) fn is_complex(&self) -> bool {
@@ -80,7 +83,7 @@ impl Signal {
         let samples = samples.unwrap_or_else(usual);
         let count = |part| frames(problem, part, samples, jittered);
         let counts = self.parts().map(count).collect::<Result<Vec<_>, _>>();
-        let counts = counts.map_err(|error| Failure::Input(format!("{}: {error}", self.text)))?;
+        let counts = counts.map_err(|error| Failure::Input(format!("{}: {error}", self.given)))?;
         Ok(counts.into_iter().max().unwrap_or(0))
     }
 }
