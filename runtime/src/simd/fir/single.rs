@@ -127,12 +127,12 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         // read.
         unsafe {
             let mut sums = [V::zero(); R];
-            // The pairs of the rest come after the last block.
-            for block in 0..=blocks {
-                let (count, steps) = if block < blocks { (apart, 2 * apart) } else { (pairs, pairs) };
-                Self::pairs(x, w, count, apart, &mut sums);
-                (x, w) = (x.wrapping_sub(steps * D), w.wrapping_add(2 * count * D));
+            for _ in 0..blocks {
+                Self::pairs(x, w, apart, apart, &mut sums);
+                (x, w) = (x.wrapping_sub(2 * apart * D), w.wrapping_add(2 * apart * D));
             }
+            Self::pairs(x, w, pairs, apart, &mut sums);
+            (x, w) = (x.wrapping_sub(pairs * D), w.wrapping_add(2 * pairs * D));
             for _ in 0..singles {
                 let coefficient = V::broadcast::<D>(w);
                 for (r, sum) in sums.iter_mut().enumerate() {
