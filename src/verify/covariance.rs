@@ -7,6 +7,17 @@ use crate::arithmetic::{DoubleDouble, Number};
 /// Remainder of the sum over the past, relative to the rounding error of an operation.
 const NEGLIGIBLE: f64 = 1e-9;
 
+/// The samples that the taps of one output weight: those of distinct channels over whole periods.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TapSamples<'a> {
+    /// M.
+    pub(super) ratio: usize,
+    /// The channels, from 0.
+    pub(super) channels: &'a [usize],
+    /// Periods, K.
+    pub(super) lags: usize,
+}
+
 /// Second moments of the samples for white noise of unit density at the input.
 pub(super) struct Covariance<F = DoubleDouble> {
     /// Of the analog state.
@@ -51,15 +62,9 @@ impl<F: Number> Covariance<F> {
         values
     }
 
-    /// Covariance matrix of the samples of `channels` over `lags` periods, the channels of the latest period
-    /// first.
-    pub(super) fn of_taps(
-        &self,
-        period: &SlowPeriod<F>,
-        ratio: usize,
-        channels: &[usize],
-        lags: usize,
-    ) -> Matrix<F> {
+    /// Covariance matrix of the samples, N K x N K, the channels of the latest period first.
+    pub(super) fn of_taps(&self, period: &SlowPeriod<F>, samples: TapSamples<'_>) -> Matrix<F> {
+        let TapSamples { ratio, channels, lags } = samples;
         let late = |i: usize| period.periods_late[ratio + channels[i]];
         let span = lags + (0..channels.len()).map(late).max().unwrap_or(0);
         let n = channels.len();
@@ -81,14 +86,9 @@ impl<F: Number> Covariance<F> {
         matrix
     }
 
-    /// Correlations of the M reference samples (rows) with the samples of [`Covariance::of_taps`] (columns).
-    pub(super) fn with_reference(
-        &self,
-        period: &SlowPeriod<F>,
-        ratio: usize,
-        channels: &[usize],
-        lags: usize,
-    ) -> Matrix<F> {
+    /// Correlations of the M reference samples with the samples of [`Covariance::of_taps`], M x N K.
+    pub(super) fn with_reference(&self, period: &SlowPeriod<F>, samples: TapSamples<'_>) -> Matrix<F> {
+        let TapSamples { ratio, channels, lags } = samples;
         let late = |sample: usize| period.periods_late[sample];
         let span = lags + period.periods_late.iter().max().copied().unwrap_or(0);
         let mut matrix = ball::zeros(ratio, channels.len() * lags);

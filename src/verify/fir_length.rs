@@ -18,7 +18,7 @@
 //! as for long filters; then numbers of 512 bits are needed to see that C is positive definite.
 
 use super::ball::{self, Ball, Matrix};
-use super::covariance::Covariance;
+use super::covariance::{Covariance, TapSamples};
 use super::positive;
 use super::slow_period::SlowPeriod;
 use super::spectrum::{self, ComplexMatrix};
@@ -35,7 +35,7 @@ pub(super) fn of_length<F: Number>(
     witnesses: &[DualWitness],
 ) -> Option<f64> {
     let covariance = Covariance::new(period)?;
-    let measured = covariance.of_taps(period, ratio, channels, length.div_ceil(ratio));
+    let measured = covariance.of_taps(period, TapSamples { ratio, channels, lags: length.div_ceil(ratio) });
     let units = positive::scales(&measured);
     let measured = Matrices::new(positive::scaled(&measured, &units), ratio, length)?;
     let mut sums = BindingSums::new(ratio, length, channels);

@@ -2,7 +2,7 @@
 //! midpoints: the proof does not use them.
 
 use super::ball::{self, Ball};
-use super::covariance::Covariance;
+use super::covariance::{Covariance, TapSamples};
 use super::enclosed::EnclosedErrorSystem;
 use super::spectrum::{self, ComplexMatrix};
 use crate::arithmetic::{BigFloat, Matrix};
@@ -31,8 +31,9 @@ impl EnclosedErrorSystem<'_> {
     ) -> Option<[Matrix<BigFloat>; 2]> {
         let (period, ratio) = (self.long_period(), self.bank.ratio);
         let covariance = Covariance::new(period)?;
-        let own = covariance.of_taps(period, ratio, channels, lags);
-        Some([own, covariance.with_reference(period, ratio, channels, lags)].map(|m| midpoints(&m)))
+        let samples = TapSamples { ratio, channels, lags };
+        let own = covariance.of_taps(period, samples);
+        Some([own, covariance.with_reference(period, samples)].map(|m| midpoints(&m)))
     }
 }
 
