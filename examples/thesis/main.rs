@@ -15,26 +15,15 @@ mod signals;
 use hybank::bank::Bank;
 use hybank::design::{ProofSearch, design_with};
 use hybank::plot::Chart;
-use hybank::spec::Spec;
+use hybank::spec::{Method, Spec};
 use page::Page;
 use std::path::PathBuf;
 
-/// Phi = 0.25 / (s + 0.5)^2 for the target and both channels; 10 slow samples of memory beside the newest.
-const SPEC: &str = r#"
-fast_period = 1.0
-ratio = 2
-latency = 10
-[target]
-filter = { num = [0.25], den = [1.0, 1.0, 0.25] }
-[[channel]]
-delay = 1.2
-[[channel]]
-delay = 0.6
-[design]
-"#;
-
-/// The latency of the spec.
-const LATENCY: usize = 10;
+/// The FIR example: Phi = 0.25 / (s + 0.5)^2 for the target and both channels, m0 = 10, and 10 slow samples of
+/// memory beside the newest.
+fn spec() -> Outcome<Spec> {
+    Ok(Spec::from_toml(include_str!("../../filters/thesis-fir.toml"), "filters/thesis-fir.toml")?)
+}
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -48,7 +37,7 @@ struct Figure {
     found: String,
 }
 
-/// The banks that the thesis compares, all for [`SPEC`].
+/// The banks that the thesis compares, all for [`spec`].
 struct Banks {
     iir: Bank,
     fir: Bank,
@@ -58,15 +47,17 @@ struct Banks {
 
 impl Banks {
     fn design() -> Outcome<Self> {
-        let bank = |method: &str| -> Outcome<Bank> {
-            let spec = Spec::from_toml(&format!("{SPEC}{method}\n"), "thesis")?;
+        let bank = |method: Method| -> Outcome<Bank> {
+            let mut spec = spec()?;
+            spec.design.method = method;
+            spec.design.taps = spec.design.taps.filter(|_| method.has_taps());
             Ok(design_with(&spec, ProofSearch::Skip)?.bank)
         };
         Ok(Self {
-            iir: bank("method = \"iir\"")?,
-            fir: bank("method = \"fir\"\ntaps = 22")?,
-            sinc: bank("method = \"sinc\"\ntaps = 22")?,
-            separation: bank("method = \"separation\"\ntaps = 22")?,
+            iir: bank(Method::Iir)?,
+            fir: bank(Method::Fir)?,
+            sinc: bank(Method::Sinc)?,
+            separation: bank(Method::Separation)?,
         })
     }
 }

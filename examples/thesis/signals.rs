@@ -2,13 +2,12 @@
 
 use crate::filters::chart;
 use crate::page::Row;
-use crate::{Banks, Figure, LATENCY, Outcome, SPEC};
+use crate::{Banks, Figure, Outcome, spec};
 use hybank::bank::Bank;
-use hybank::design::Problem;
+use hybank::design::{Problem, latency};
 use hybank::pipeline::{WholeSettings, fuse};
 use hybank::runtime::{Options, Planar, Precision};
 use hybank::simulate::{Analog, Captured, Source, capture};
-use hybank::spec::Spec;
 use hybank::units::Seconds;
 
 /// f(t) = 1 from t = 0.3 (thesis 5.42).
@@ -27,10 +26,10 @@ pub(super) struct Signal {
 
 impl Signal {
     pub(super) fn capture(source: &str) -> Outcome<Self> {
-        let spec = Spec::from_toml(&format!("{SPEC}method = \"iir\""), "thesis")?;
+        let spec = spec()?;
         let source: Source = source.parse()?;
         let signal = Analog::Known(source.normalised(Seconds(1.0)));
-        Ok(Self { captured: capture(&Problem::new(&spec, LATENCY)?, &signal, FRAMES) })
+        Ok(Self { captured: capture(&Problem::new(&spec, latency(&spec)?)?, &signal, FRAMES) })
     }
 
     /// y_0.
