@@ -211,8 +211,8 @@ impl Size {
 
     fn fastest(&self) -> ChosenAlgorithm {
         let (prompt, cost) = self.fastest_without_latency();
-        let worth = |&(_, transformed): &(usize, f64)| transformed < WORTH_CHANGE * cost;
-        self.best_transform().filter(worth).map_or(prompt, |(len, _)| ChosenAlgorithm::OverlapSave(len))
+        let pays = |&(_, transformed): &(usize, f64)| transformed < WORTH_CHANGE * cost;
+        self.best_transform().filter(pays).map_or(prompt, |(len, _)| ChosenAlgorithm::OverlapSave(len))
     }
 }
 
