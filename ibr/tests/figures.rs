@@ -202,12 +202,13 @@ fn house(from: &[usize], wanted: usize) -> Option<(f64, usize, usize)> {
     Some((q.psnr, got.geometry.inliers, got.geometry.matches))
 }
 
-/// A third view beside the two shows 5 % more of the hull, which is harder to render, and its mesh bridges edges
-/// in another way. Without the adjustment over all views and the weights of the views it is 29.3 dB.
+/// A third view beside the two shows 5 % more of the hull, which is harder to render, and its mesh bridges
+/// edges in another way: on the pixels of both it is still 0.6 dB below two views. It is 29.9 dB if
+/// triangles that no other view confirms hide others, and Delaunay's edges are kept.
 #[test]
 fn model_house_from_three_views() {
     let Some((three, ..)) = house(&[2, 4, 1], 3) else { return };
-    assert!(three >= 29.8, "{three}");
+    assert!(three >= 30.4, "{three}");
 }
 
 #[test]
@@ -216,6 +217,6 @@ fn model_house() {
     let (second, all, of) = house(&[1, 3], 2).unwrap();
     assert_eq!((inliers, matches), (340, 344));
     assert_eq!((all, of), (182, 182));
-    assert!(psnr >= 30.7, "{psnr}");
-    assert!(second >= 31.4, "{second}");
+    assert!(psnr >= 31.0, "{psnr}");
+    assert!(second >= 31.7, "{second}");
 }

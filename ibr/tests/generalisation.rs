@@ -1,5 +1,6 @@
-//! The same defaults on scenes of quite different kinds: synthetic ones with an exact truth, and photographs that
-//! the defaults were not chosen on. Each is compared with rounding every pixel to the nearest position and keeping the nearest sample.
+//! The same defaults on scenes of quite different kinds: synthetic ones with an exact truth, and photographs
+//! that the defaults were not chosen on. Each is compared with rounding every pixel to the nearest position
+//! and keeping the nearest sample.
 
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, quality, read_image, read_map};
@@ -12,7 +13,8 @@ use std::path::PathBuf;
 const WIDTH: usize = 200;
 const HEIGHT: usize = 120;
 
-/// A painted layer of disparity a + b X over the scene's column X: the camera at c sees X at X - c (a + b X).
+/// A painted layer of disparity a + b X over the scene's column X: the camera at c sees X at X - c (a + b
+/// X).
 struct Layer {
     a: f64,
     b: f64,
@@ -29,7 +31,8 @@ fn look(layers: &[Layer], c: f64, x: f64, y: f64) -> (f64, f64) {
     hits.max_by(|p, q| p.1.total_cmp(&q.1)).expect("the last layer covers everything")
 }
 
-/// What a camera records: brightness averaged over 3 x 3 positions per pixel, 8 bits; disparity of the pixel's centre.
+/// What a camera records: brightness averaged over 3 x 3 positions per pixel, 8 bits; disparity of the
+/// pixel's centre.
 fn record(layers: &[Layer], c: f64) -> (Image, DepthMap) {
     let position_of = |i: usize| ((i % WIDTH) as f64, (i / WIDTH) as f64);
     let grey = |i: usize| {
@@ -111,8 +114,8 @@ fn scenes() -> Vec<(&'static str, Vec<Layer>, [f64; 2])> {
     ]
 }
 
-/// The baseline: each view rounded half up to whole pixels, nearest kept; views averaged where they agree within
-/// 1 px, else the nearer; holes from the deeper side of the row.
+/// The baseline: each view rounded half up to whole pixels, nearest kept; views averaged where they agree
+/// within 1 px, else the nearer; holes from the deeper side of the row.
 fn rounded(views: &[RectifiedView<'_>], position: f64) -> Image {
     let (width, height) = views[0].image.size();
     let channels = views[0].image.channels();
@@ -161,10 +164,10 @@ fn psnr(image: &Image, truth: &Image, region: Option<&[bool]>) -> f64 {
     quality::compare(image, truth, region).unwrap().unwrap().psnr
 }
 
-/// The margins are negative where rounding is hard to beat: half-way between the views it errs by the same fraction
-/// of a pixel in both, in opposite directions, so that their mean is right to first order, and what remains is the
-/// smoothing that the defaults put on texture of five pixels; at 0.3 the bars' shift happens to be nearly whole in
-/// one view.
+/// The margins are negative where rounding is hard to beat: half-way between the views it errs by the same
+/// fraction of a pixel in both, in opposite directions, so that their mean is right to first order, and what
+/// remains is the smoothing that the defaults put on texture of five pixels; at 0.3 the bars' shift happens
+/// to be nearly whole in one view.
 #[test]
 fn every_kind_of_scene_is_held_against_rounding() {
     let mut behind = Vec::new();
@@ -213,8 +216,8 @@ fn every_kind_of_scene_profits_from_segments_where_depth_is_coarse() {
     }
 }
 
-/// Teddy has no picture between its views: each view is rendered from the other one alone. Skipped, with a note,
-/// where the data are not there.
+/// Teddy has no picture between its views: each view is rendered from the other one alone. Skipped, with a
+/// note, where the data are not there.
 #[test]
 fn teddy_from_one_view() {
     let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");

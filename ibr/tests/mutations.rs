@@ -1,5 +1,5 @@
-//! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and never
-//! panics. `fuzz/` looks deeper with the same checks.
+//! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and
+//! never panics. `fuzz/` looks deeper with the same checks.
 
 #[path = "../../tests/support/campaign.rs"]
 mod campaign;
@@ -51,8 +51,8 @@ fn mutated(seed: &[u8], round: u64) -> Vec<u8> {
     bytes
 }
 
-/// Runs `check` on every mutation of the seeds; it says whether the input was accepted. Both must occur, or the
-/// mutations would test nothing.
+/// Runs `check` on every mutation of the seeds; it says whether the input was accepted. Both must occur, or
+/// the mutations would test nothing.
 fn survive(seeds: &[&[u8]], check: impl Fn(&[u8]) -> bool) {
     survive_rounds(campaign::rounds(ROUNDS), seeds, check);
 }

@@ -108,8 +108,8 @@ fn the_order_is_found_and_the_other_one_is_worse() {
     }
 }
 
-/// Principal points far beside the middle mislead most guesses of a calibration, in two of these pairs nearly all.
-/// The photographs decide, and they are right.
+/// Principal points far beside the middle mislead most guesses of a calibration, in two of these pairs
+/// nearly all. The photographs decide, and they are right.
 #[test]
 fn colours_decide_where_calibrations_mislead() {
     for shift in [-24.0, -16.0, 16.0, 24.0] {

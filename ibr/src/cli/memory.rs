@@ -15,8 +15,9 @@ pub(super) enum Work {
     Bound,
 }
 
-/// Bytes beside those of the scene: of each pixel of each view, of each pixel of the virtual view, and of its
-/// colours. Fitted to the largest resident memory of renderings of 1 to 4 million pixels from 2 and 4 views.
+/// Bytes beside those of the scene: of each pixel of each view, of each pixel of the virtual view, and of
+/// its colours. Fitted to the largest resident memory of renderings of 1 to 4 million pixels from 2 and 4
+/// views.
 struct Rates {
     view: f64,
     pixel: f64,
@@ -25,6 +26,8 @@ struct Rates {
 
 const ROWS: Rates = Rates { view: 4.0, pixel: 12.0, colour: 10.0 };
 const PLANE: Rates = Rates { view: 8.0, pixel: 100.0, colour: 12.0 };
+/// All samples are in memory at once, 40 bytes each, or 48 with colours.
+const UNCALIBRATED: Rates = Rates { view: 80.0, pixel: 100.0, colour: 12.0 };
 const BOUND: Rates = Rates { view: 24.0, pixel: 110.0, colour: 20.0 };
 /// Threads, and bands of samples whose size does not depend on the views.
 const BASE: f64 = 5e7;
@@ -33,6 +36,7 @@ impl Work {
     fn rates(self, kind: &Kind) -> Rates {
         match (self, kind) {
             (Self::Bound, _) => BOUND,
+            (_, Kind::Uncalibrated { .. }) => UNCALIBRATED,
             (Self::Render(Method::Auto | Method::Rows), Kind::Rectified { .. }) => ROWS,
             (Self::Render(_), _) => PLANE,
         }

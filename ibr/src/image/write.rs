@@ -117,8 +117,8 @@ pub fn encode_levels(
     write_buffer(&bytes, (width, height), ColorType::L16, ImageFormat::Png, path)
 }
 
-/// The bytes of a PNG file with an alpha channel, 0 to 1; colours are not multiplied by it. `path` appears in
-/// messages.
+/// The bytes of a PNG file with an alpha channel, 0 to 1; colours are not multiplied by it. `path` appears
+/// in messages.
 ///
 /// # Errors
 /// As [`encode_levels`].

@@ -1,7 +1,7 @@
 //! Uncompressed films (YUV4MPEG2), which video encoders read from files and pipes.
 //!
-//! Colour is written as Y'CbCr of ITU-R BT.601 with full chroma resolution (C444), 16 to 235 and 16 to 240; grey
-//! as Y' alone (Cmono).
+//! Colour is written as Y'CbCr of ITU-R BT.601 with full chroma resolution (C444), 16 to 235 and 16 to 240;
+//! grey as Y' alone (Cmono).
 
 use super::Image;
 

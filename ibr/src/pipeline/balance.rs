@@ -19,11 +19,11 @@ const SOFTENING: f64 = 0.2;
 /// Half-way between two views both weigh 1. The weights change continuously along any path of the virtual
 /// camera, so a sequence of views does not pulse.
 ///
-/// Of general cameras, the distance of a view is the sum of two, both in units of the distance to the scene: that
-/// of the camera centres, and that of the directions from which they look at the middle of the scene. If only the
-/// k nearest views are used, w_i is multiplied by (x_(k+1) - x_i) / (x_(k+1) - x_(1)), with the distances of the
-/// first view that is left out and of the nearest, so that a view enters and leaves without a jump (Buehler et al., Unstructured Lumigraph Rendering,
-/// SIGGRAPH 2001).
+/// Of general cameras, the distance of a view is the sum of two, both in units of the distance to the scene:
+/// that of the camera centres, and that of the directions from which they look at the middle of the scene.
+/// If only the k nearest views are used, w_i is multiplied by (x_(k+1) - x_i) / (x_(k+1) - x_(1)), with the
+/// distances of the first view that is left out and of the nearest, so that a view enters and leaves without
+/// a jump (Buehler et al., Unstructured Lumigraph Rendering, SIGGRAPH 2001).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Balance {
     weights: Vec<f32>,
@@ -169,8 +169,8 @@ mod tests {
         assert_eq!(Balance::by_distance(&[1.0, 1.0, 1.0]).nearest(Some(2)).views(), [0, 1]);
     }
 
-    /// Of two views at one distance, the one that looks at the scene from a similar direction is nearer, and one
-    /// that looks away is the farthest.
+    /// Of two views at one distance, the one that looks at the scene from a similar direction is nearer, and
+    /// one that looks away is the farthest.
     #[test]
     fn directions_count_too() {
         let image = crate::image::Image::filled(4, 3, 1, 0.0);

@@ -184,8 +184,8 @@ impl Rendering {
 }
 
 impl Rendering {
-    /// Opacity of each pixel: 1 where a surface was seen or bridged, 0 where the value was made up because no view
-    /// shows what is there.
+    /// Opacity of each pixel: 1 where a surface was seen or bridged, 0 where the value was made up because
+    /// no view shows what is there.
     pub fn alpha(&self) -> Vec<f32> {
         self.mask.iter().map(|c| if *c == Cover::Disocclusion { 0.0 } else { 1.0 }).collect()
     }

@@ -13,18 +13,19 @@ pub struct SceneSpec {
     /// The views.
     #[serde(default)]
     pub view: Vec<ViewSpec>,
-    /// The virtual views, `[virtual]` or several `[[virtual]]`; none is needed if one of the views is left out
-    /// and rendered.
+    /// The virtual views, `[virtual]` or several `[[virtual]]`; none is needed if one of the views is left
+    /// out and rendered.
     #[serde(rename = "virtual", default, deserialize_with = "one_or_many")]
     pub targets: Vec<TargetSpec>,
     /// File of tracks over the views (uncalibrated scenes).
     pub matches: Option<PathBuf>,
     /// Folder of a COLMAP model that holds the cameras of all views.
     pub colmap: Option<PathBuf>,
-    /// File of cameras of neural rendering (`transforms.json`); without `[[view]]` tables its frames with depth
-    /// are the views.
+    /// File of cameras of neural rendering (`transforms.json`); without `[[view]]` tables its frames with
+    /// depth are the views.
     pub transforms: Option<PathBuf>,
-    /// Calibration file of the Middlebury benchmark; without `[[view]]` tables the pair beside it is the views.
+    /// Calibration file of the Middlebury benchmark; without `[[view]]` tables the pair beside it is the
+    /// views.
     pub calib: Option<PathBuf>,
     /// Whether the world frame of the cameras is left-handed.
     #[serde(default)]

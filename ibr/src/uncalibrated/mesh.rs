@@ -18,9 +18,17 @@ pub struct Feature {
     pub chi: f64,
 }
 
+/// Triangles between features of one view, which cover their convex hull.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mesh {
+    pub(super) corners: Vec<Feature>,
+    /// Corners of each triangle by number, all in the same sense of rotation.
+    pub(super) triangles: Vec<[usize; 3]>,
+}
+
 struct Vertex {
     position: Point2<f64>,
-    chi: f64,
+    feature: Feature,
 }
 
 impl HasPosition for Vertex {
@@ -30,18 +38,42 @@ impl HasPosition for Vertex {
     }
 }
 
-/// chi at every pixel centre within the convex hull of the features, NaN outside; rows from the top.
-///
-/// Features that are not finite, or too far out for the triangulation's exact predicates, are left out. A
-/// pixel on an edge belongs to the triangles on both sides, which agree there.
-pub fn dense_chi(features: &[Feature], (width, height): (usize, usize)) -> Vec<f64> {
-    let mut chi = vec![f64::NAN; width * height];
-    let triangulation = triangulate(features);
-    for face in triangulation.inner_faces() {
-        let corner = face.vertices().map(|v| (v.position(), v.data().chi));
-        fill_triangle(&corner, (width, height), &mut chi);
+impl Mesh {
+    /// The Delaunay triangulation.
+    ///
+    /// Features that are not finite, or too far out for the triangulation's exact predicates, are left out.
+    pub fn delaunay(features: &[Feature]) -> Self {
+        let triangulation = triangulate(features);
+        let corners = triangulation.vertices().map(|v| v.data().feature).collect();
+        let triangles = triangulation.inner_faces().map(|f| f.vertices().map(|v| v.index())).collect();
+        Self { corners, triangles }
     }
-    chi
+
+    /// The number of triangles.
+    pub fn triangles(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// chi at every pixel centre within the hull, NaN outside; rows from the top.
+    pub fn chi(&self, size: (usize, usize)) -> Vec<f64> {
+        let mut chi = vec![f64::NAN; size.0 * size.1];
+        self.visit(size, |_, pixel, value| chi[pixel] = value);
+        chi
+    }
+
+    /// Calls `visit` with triangle, pixel and chi for every pixel centre of every triangle. A pixel on an
+    /// edge belongs to the triangles on both sides, which agree there.
+    pub fn visit(&self, size: (usize, usize), mut visit: impl FnMut(usize, usize, f64)) {
+        for (number, triangle) in self.triangles.iter().enumerate() {
+            let corner = triangle.map(|i| self.corners[i]);
+            visit_triangle(&corner, size, |pixel, chi| visit(number, pixel, chi));
+        }
+    }
+}
+
+/// chi at every pixel centre within the convex hull of the features by their Delaunay triangulation.
+pub fn dense_chi(features: &[Feature], size: (usize, usize)) -> Vec<f64> {
+    Mesh::delaunay(features).chi(size)
 }
 
 fn triangulate(features: &[Feature]) -> DelaunayTriangulation<Vertex> {
@@ -56,34 +88,53 @@ fn triangulate(features: &[Feature]) -> DelaunayTriangulation<Vertex> {
         if f.chi.is_finite() && apart {
             // The library refuses coordinates beyond the range of its exact predicates; such features are
             // skipped.
-            let _ = triangulation.insert(Vertex { position, chi: f.chi });
+            let _ = triangulation.insert(Vertex { position, feature: *f });
         }
     }
     triangulation
 }
 
-/// Writes the linear interpolant at the pixel centres of a triangle, row by row.
-fn fill_triangle(corner: &[(Point2<f64>, f64); 3], (width, height): (usize, usize), chi: &mut [f64]) {
-    let [(a, fa), (b, fb), (c, fc)] = *corner;
-    let area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
-    if area == 0.0 {
-        return;
+/// chi as an affine function of the position: the plane through three features.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Facet {
+    origin: Feature,
+    slope: Point,
+}
+
+impl Facet {
+    /// `None` for features on a line.
+    pub(super) fn new(corner: &[Feature; 3]) -> Option<Self> {
+        let [a, b, c] = corner;
+        let (ab, ac) = (b.position - a.position, c.position - a.position);
+        let area = ab.perp(&ac);
+        let (up, vp) = (b.chi - a.chi, c.chi - a.chi);
+        let slope = Point::new(up * ac.y - vp * ab.y, vp * ab.x - up * ac.x) / area;
+        (area != 0.0).then_some(Self { origin: *a, slope })
     }
-    let gx = ((fb - fa) * (c.y - a.y) - (fc - fa) * (b.y - a.y)) / area;
-    let gy = ((fc - fa) * (b.x - a.x) - (fb - fa) * (c.x - a.x)) / area;
+
+    pub(super) fn chi(&self, position: &Point) -> f64 {
+        self.origin.chi + self.slope.dot(&(position - self.origin.position))
+    }
+}
+
+/// The linear interpolant at the pixel centres of a triangle, row by row.
+fn visit_triangle(corner: &[Feature; 3], (width, height): (usize, usize), mut visit: impl FnMut(usize, f64)) {
+    let Some(facet) = Facet::new(corner) else { return };
+    let positions = corner.map(|f| f.position);
+    let [a, b, c] = positions;
     let top = a.y.min(b.y).min(c.y).ceil().max(0.0) as usize;
     let bottom = a.y.max(b.y).max(c.y).floor().min(height as f64 - 1.0);
     for y in top..(bottom + 1.0).max(0.0) as usize {
-        let Some((left, right)) = span(&[a, b, c], y as f64) else { continue };
+        let Some((left, right)) = span(&positions, y as f64) else { continue };
         let end = (right.floor().min(width as f64 - 1.0) + 1.0).max(0.0) as usize;
         for x in left.ceil().max(0.0) as usize..end {
-            chi[y * width + x] = fa + gx * (x as f64 - a.x) + gy * (y as f64 - a.y);
+            visit(y * width + x, facet.chi(&Point::new(x as f64, y as f64)));
         }
     }
 }
 
 /// The columns between which a row meets a triangle.
-fn span(corners: &[Point2<f64>; 3], y: f64) -> Option<(f64, f64)> {
+fn span(corners: &[Point; 3], y: f64) -> Option<(f64, f64)> {
     let mut ends: Option<(f64, f64)> = None;
     for (p, q) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (corners[i], corners[j])) {
         if (p.y <= y) == (q.y <= y) && p.y != y && q.y != y {

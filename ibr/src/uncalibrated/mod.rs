@@ -1,7 +1,7 @@
 //! Rendering from images and correspondences alone (thesis 2.5): the cameras are unknown.
 //!
 //! matches -> F (eight points, RANSAC) -> a pair of projective cameras -> points, chi and its order ->
-//! chi on a Delaunay triangulation in each view -> the virtual camera -> the view.
+//! chi on triangles in each view, whose edges the photographs choose -> the virtual camera -> the view.
 //!
 //! All geometry happens in a projective frame X_p = H X with an unknown 4 x 4 matrix H. Depth is replaced
 //! by chi = -(X_p)_4 / (pi3_p . X_p), which along every viewing ray is an affine function of the true
@@ -9,6 +9,7 @@
 
 pub mod canonical;
 pub mod chirality;
+pub mod flips;
 pub mod fundamental;
 pub mod mesh;
 pub mod metric;

@@ -1,8 +1,12 @@
 //! Decisions that rest on predictions, against what they turn out to cost.
 
 use super::*;
-use hybank_ibr::analysis::plan::{Candidate, Costs, Placement, RoundingCosts, Wanted, price_of_depth_errors};
+use hybank_ibr::analysis::plan::{
+    Candidate, Costs, Placement, RoundingCosts, Search, Wanted, price_of_depth_errors,
+};
 use hybank_ibr::pipeline::rectified;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 fn mean_square(image: &Image, truth: &Image) -> f64 {
     mean(image.data().iter().zip(truth.data()).map(|(a, b)| f64::from(a - b).powi(2)))
@@ -116,16 +120,17 @@ fn sweep() -> bool {
     std::env::var_os("HYBANK_SWEEP").is_some()
 }
 
-/// 4 of 20 cameras, searched from greedy choices, against all 4845 subsets by the predicted error: 10 scenes
-/// with `HYBANK_SWEEP=1`.
+/// 3 of 12 cameras, searched from greedy choices, against all 220 subsets by the predicted error; 4 of 20
+/// against 4845 in 10 scenes with `HYBANK_SWEEP=1`.
 #[test]
 fn a_searched_placement_is_close_to_the_best() {
-    for seed in 0..if sweep() { 10 } else { 1 } {
-        let (rig, targets) = sites(seed, 20);
+    let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 12, 3) };
+    for seed in 0..scenes {
+        let (rig, targets) = sites(seed, places);
         let placement = placement(&rig, &targets);
         let [greedy, searched] =
-            [placement.greedy(4), placement.searched(4)].map(|chosen| placement.predicted(&chosen));
-        let best = subsets(20, 4).iter().map(|s| placement.predicted(s)).fold(f64::MAX, f64::min);
+            [placement.greedy(count), placement.searched(count)].map(|chosen| placement.predicted(&chosen));
+        let best = subsets(places, count).iter().map(|s| placement.predicted(s)).fold(f64::MAX, f64::min);
         let loss = 20.0 * (searched / best).log10();
         println!(
             "scene {seed}: greedy {greedy:.3}, searched {searched:.3}, best {best:.3} grey levels, {loss:.3} dB"
@@ -134,29 +139,45 @@ fn a_searched_placement_is_close_to_the_best() {
     }
 }
 
-/// The same choice against the best of all subsets by rendering, 3 of 9 places. The criterion knows surfaces
-/// and no textures, so it loses some tenths of a decibel; most subsets lose much more.
+/// The same choice against the best of all subsets by rendering: 3 of 9 places, or 4 of 20 with
+/// `HYBANK_SWEEP=1`. The criterion knows surfaces and no textures, so it loses up to 0.9 dB. With the
+/// rendered views themselves as the criterion, exchanges after a greedy choice lose less than 0.3 dB.
 #[test]
-fn placement_by_surfaces_gives_good_views() {
+fn placement_gives_good_views() {
+    let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 9, 3) };
     let mut losses = Vec::new();
-    for seed in 0..if sweep() { 10 } else { 2 } {
-        let (rig, targets) = sites(seed, 9);
-        let psnr = |chosen: &[usize]| {
+    for seed in 0..scenes {
+        let (rig, targets) = sites(seed, places);
+        let known = RefCell::new(BTreeMap::new());
+        let render = |chosen: &[usize]| {
             let views = rig.views(chosen);
             let of_target = |i: usize| {
                 let settings = RenderSettings::default();
                 let image = rectified::render(&views, targets.positions[i], &settings).unwrap().image;
                 mean_square(&image, &targets.images[i])
             };
-            10.0 * (255.0 * 255.0 / mean((0..3).map(of_target))).log10()
+            mean((0..3).map(of_target))
         };
-        let chosen = psnr(&placement(&rig, &targets).greedy(3));
-        let mut all: Vec<f64> = subsets(9, 3).iter().map(|s| psnr(s)).collect();
+        let error = |chosen: &[usize]| {
+            let mut key = chosen.to_vec();
+            key.sort_unstable();
+            *known.borrow_mut().entry(key).or_insert_with_key(|key| render(key))
+        };
+        let psnr = |chosen: &[usize]| 10.0 * (255.0 * 255.0 / error(chosen)).log10();
+        let surfaces = psnr(&placement(&rig, &targets).greedy(count));
+        let search = Search { candidates: places, error: &error };
+        let [greedy, exchanged] = [search.greedy(count), search.exchanged(count)].map(|c| psnr(&c));
+        let rendered = known.borrow().len();
+        let mut all: Vec<f64> = subsets(places, count).iter().map(|s| psnr(s)).collect();
         all.sort_by(f64::total_cmp);
         let (best, median) = (all[all.len() - 1], all[all.len() / 2]);
-        println!("scene {seed}: greedy {chosen:.2} dB, best {best:.2}, median {median:.2}");
-        assert!(best - chosen < 1.0 && chosen > median, "scene {seed}: {chosen} {best} {median}");
-        losses.push(best - chosen);
+        println!(
+            "scene {seed}: by surfaces {surfaces:.2} dB, by views greedy {greedy:.2}, exchanged {exchanged:.2} \
+             ({rendered} sets), best {best:.2}, median {median:.2}"
+        );
+        assert!(best - surfaces < 1.0, "scene {seed}: {surfaces} {best} {median}");
+        assert!(best - exchanged < 0.3, "scene {seed}: {exchanged} {best}");
+        losses.push(best - surfaces);
     }
-    assert!(mean(losses.iter().copied()) < 0.5, "{losses:.2?}");
+    assert!(mean(losses.iter().copied()) < 0.7, "{losses:.2?}");
 }

@@ -109,8 +109,17 @@ fn renderings_that_no_memory_holds_are_refused() {
     for (name, bytes) in [("a.pgm", pixels), ("a.pfm", map), ("large.toml", scene.into_bytes())] {
         std::fs::write(dir.path().join(name), bytes).unwrap();
     }
-    for line in ["bound large.toml --map map.png", "render large.toml -o out.png --method plane"] {
-        let refused = shell(dir.path(), &format!("ulimit -v 500000; $H {line} --threads 1"));
+    let tracks = (0..9).map(|i| format!("{i} 1 {i} 2 {i} 3\n")).collect::<String>();
+    std::fs::write(dir.path().join("tracks.txt"), tracks).unwrap();
+    let views = "[[view]]\nimage = \"a.pgm\"\n".repeat(2);
+    let scene = format!("matches = \"tracks.txt\"\n{views}[virtual]\nfrom_tracks = 3\n");
+    std::fs::write(dir.path().join("tracked.toml"), scene).unwrap();
+    for (line, limit) in [
+        ("bound large.toml --map map.png", 500_000),
+        ("render large.toml -o out.png --method plane", 500_000),
+        ("render tracked.toml -o out.png", 900_000),
+    ] {
+        let refused = shell(dir.path(), &format!("ulimit -v {limit}; $H {line} --threads 1"));
         let message = stderr(&refused);
         assert_eq!((code(&refused), message.lines().count()), (1, 1), "{line}: {message}");
         assert!(message.contains("from 2 views") && message.contains("GB of memory"), "{line}: {message}");

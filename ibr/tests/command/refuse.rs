@@ -33,7 +33,8 @@ fn wrong_input_has_one_clear_message() {
     assert!(!dir.path().join("o.png").exists());
 }
 
-/// Contradictions, numbers out of range and files that are no files: exit code 1 and one message with the words.
+/// Contradictions, numbers out of range and files that are no files: exit code 1 and one message with the
+/// words.
 #[test]
 fn hostile_scenes_are_refused_by_name() {
     let dir = rig();

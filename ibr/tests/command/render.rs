@@ -358,9 +358,9 @@ fn odd_images_are_fine() {
         assert_eq!(figures["coverage"], 1.0, "{a} {b}: {figures}");
         let image = read_image(&dir.path().join("o.png")).unwrap();
         let first = image.data()[0];
-        // The fit smooths the step of 16 grey levels between two pixels by two of them if both views count. All maps
-        // say a disparity of one: a view with nearer samples would hide the other, and one sample per pixel is
-        // smoothed by three.
+        // The fit smooths the step of 16 grey levels between two pixels by two of them if both views count.
+        // All maps say a disparity of one: a view with nearer samples would hide the other, and one sample
+        // per pixel is smoothed by three.
         assert!((first - if a == "one.pgm" { 64.0 } else { 16.0 }).abs() <= 2.0, "{a} {b}: {first}");
     }
 }

@@ -1,8 +1,9 @@
 //! Bits for intensities and depths: R_T and R_D per value, R_T + R_D / k^2 = R per pixel where depth is
 //! given for one pixel in k x k.
 //!
-//! With errors e_T = A 2^{-R_T} and e_D = D 2^{-R_D} in the view that are independent, the mean square is the
-//! sum of their squares. It is least where its derivatives by the bits of one pixel agree, at e_T = k e_D:
+//! With errors e_T = A 2^{-R_T} and e_D = D 2^{-R_D} in the view that are independent, the mean square is
+//! the sum of their squares. It is least where its derivatives by the bits of one pixel agree, at
+//! e_T = k e_D:
 //!
 //! ```text
 //! R_T = (R - log2(k D / A) / k^2) / (1 + 1 / k^2),   R_D = R_T + log2(k D / A)

@@ -4,7 +4,9 @@
 mod bits;
 mod depth;
 mod placement;
+mod search;
 
 pub use bits::{BitSplit, RoundingCosts, Sensitivity, sensitivity};
 pub use depth::price_of_depth_errors;
 pub use placement::{Candidate, Costs, Placement, Wanted};
+pub use search::Search;

@@ -14,12 +14,10 @@
 //! and [`Placement::searched`] lost nothing on the first scene of the tests. Of the rendered views
 //! `searched` lost more there, 0.4 and 0.7 dB in two scenes: the criterion is no finer than that.
 
+use super::search::Search;
 use crate::depth::DepthMap;
 use crate::pipeline::Balance;
 use crate::propagate::DOUBTFUL_WEIGHT;
-
-/// Passes of exchanges, at most.
-const PASSES: usize = 4;
 
 /// Disparities within this share of each other, or within a pixel, belong to one point.
 const SAME_POINT: f64 = 0.05;
@@ -111,57 +109,19 @@ impl Placement {
         (0..pixels).map(of_pixel).sum::<f64>() / pixels as f64
     }
 
-    /// `count` candidates, each of which reduces the predicted error the most, given those before it.
+    /// As [`Search::greedy`], by the predicted error.
     pub fn greedy(&self, count: usize) -> Vec<usize> {
-        self.grown(Vec::new(), count)
+        self.search().greedy(count)
     }
 
-    /// `count` candidates: greedy choices from each candidate as the first, exchanges of single cameras as
-    /// long as they help, and of all these the choice of least predicted error.
-    ///
-    /// The first camera of a greedy choice stands where a single camera is best, which often is wrong for
-    /// several.
+    /// As [`Search::from_each`], by the predicted error.
     pub fn searched(&self, count: usize) -> Vec<usize> {
-        let choices = (0..self.candidates()).map(|first| self.exchanged(self.grown(vec![first], count)));
-        let scored = choices.map(|chosen| (self.predicted(&chosen), chosen));
-        let best = scored.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Vec::new(), |(_, chosen)| chosen);
-        best.into_iter().take(count).collect()
+        self.search().from_each(count)
     }
 
-    fn candidates(&self) -> usize {
-        self.sights.first().map_or(0, Vec::len)
-    }
-
-    /// The candidates chosen and further ones, each of which reduces the predicted error the most.
-    fn grown(&self, mut chosen: Vec<usize>, count: usize) -> Vec<usize> {
-        while chosen.len() < count.min(self.candidates()) {
-            let Some((next, _)) = self.best_beside(&chosen) else { break };
-            chosen.push(next);
-        }
-        chosen
-    }
-
-    /// Replaces one camera after the other by the best candidate in its place, until nothing changes.
-    fn exchanged(&self, mut chosen: Vec<usize>) -> Vec<usize> {
-        for _ in 0..PASSES {
-            let before = chosen.clone();
-            for k in 0..chosen.len() {
-                let own = chosen.remove(k);
-                let best = self.best_beside(&chosen).map_or(own, |(best, _)| best);
-                chosen.insert(k, best);
-            }
-            if chosen == before {
-                break;
-            }
-        }
-        chosen
-    }
-
-    /// The candidate that reduces the error the most beside those chosen, and the error.
-    fn best_beside(&self, chosen: &[usize]) -> Option<(usize, f64)> {
-        let free = (0..self.candidates()).filter(|i| !chosen.contains(i));
-        let scored = free.map(|i| (i, self.predicted(&[chosen, &[i]].concat())));
-        scored.min_by(|a, b| a.1.total_cmp(&b.1))
+    fn search(&self) -> Search<impl Fn(&[usize]) -> f64> {
+        let candidates = self.sights.first().map_or(0, Vec::len);
+        Search { candidates, error: |chosen: &[usize]| self.predicted(chosen) }
     }
 }
 

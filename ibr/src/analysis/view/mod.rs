@@ -2,9 +2,9 @@
 //!
 //! Three numbers for each pixel, in grey levels:
 //!
-//! * **local bound**: what the error does not exceed if slopes, second differences and residuals nearby are at
-//!   most those of the samples, by Prop. 3.1 for the smoothing spline that is really used (below). Photographs
-//!   break the condition where surfaces reflect or depth is wrong in all views;
+//! * **local bound**: what the error does not exceed if slopes, second differences and residuals nearby are
+//!   at most those of the samples, by Prop. 3.1 for the smoothing spline that is really used (below).
+//!   Photographs break the condition where surfaces reflect or depth is wrong in all views;
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!

@@ -60,8 +60,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Also write how many visible samples fall on each pixel (.png of 16 bits or .pfm).
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) count: Option<PathBuf>,
-    /// Also write where the view differs from --truth: as a picture, black is no error and white the largest, or
-    /// as numbers in grey levels (.pfm).
+    /// Also write where the view differs from --truth: as a picture, black is no error and white the
+    /// largest, or as numbers in grey levels (.pfm).
     #[arg(long, value_name = "FILE", requires = "truth")]
     pub(in crate::cli) error: Option<PathBuf>,
     /// Write a PNG with an alpha channel: transparent where no view shows what is there.

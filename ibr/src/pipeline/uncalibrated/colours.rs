@@ -1,13 +1,15 @@
 //! The order of depth from the photographs themselves.
 
+use super::OrderBy;
+use super::consistency::Surface;
 use super::reconstruction::Reconstruction;
-use super::synthesis::{camera, chi_range, features, propagate_chi};
+use super::synthesis::{chi_range, propagate_chi};
 use crate::image::Image;
 use crate::pipeline::RenderError;
 use crate::propagate::Frame;
 use crate::sample::Sample;
 use crate::uncalibrated::chirality::{self, Handedness};
-use crate::uncalibrated::mesh;
+use crate::uncalibrated::order::Order;
 
 /// Share of the range of chi by which two points lie on different surfaces.
 const APART: f64 = 0.2;
@@ -18,12 +20,15 @@ const LARGEST: f32 = 60.0;
 /// Fewest pixels for a verdict.
 const FEWEST: usize = 40;
 
-/// Standard deviations that a verdict needs. Neighbouring pixels err together, so they are many.
-const DEVIATIONS: f64 = 5.0;
+/// Standard deviations of a verdict against guessed calibrations. Neighbouring pixels err together, so
+/// they are many.
+const ALONE: f64 = 8.0;
 
-/// Mean advantage that a verdict needs, in grey levels: folds of the meshes at outlines favour one order by
-/// less.
-const LEAST: f64 = 12.0;
+/// Standard deviations of a verdict that guessed calibrations share, or of an objection against them.
+const TOGETHER: f64 = 5.0;
+
+/// Mean advantage of a verdict, in grey levels: folds of the meshes at outlines favour one order by less.
+const LEAST: f64 = 10.0;
 
 /// How much better the colours fit if the order is kept, over all pixels on which two surfaces fall.
 #[derive(Debug, Clone, Copy, Default)]
@@ -35,10 +40,14 @@ pub(super) struct Advantage {
 
 impl Advantage {
     /// From both photographs of the base pair.
-    pub(super) fn of(images: &[&Image], scene: &Reconstruction) -> Result<Self, RenderError> {
+    pub(super) fn of(
+        images: &[&Image],
+        surfaces: &[Surface],
+        scene: &Reconstruction,
+    ) -> Result<Self, RenderError> {
         let mut all = Self::default();
         for (from, to) in [(0, 1), (1, 0)] {
-            for advantage in advantages(images, scene, from, to)? {
+            for advantage in advantages(images, &surfaces[from], scene, from, to)? {
                 all.sum += advantage;
                 all.squares += advantage * advantage;
                 all.count += 1;
@@ -62,12 +71,23 @@ impl Advantage {
         self.count
     }
 
-    /// The order under which the photographs show the nearer of two points that fall on one of their pixels.
-    /// `None` if there are few such pixels, or both orders fit alike: then it hardly matters.
-    pub(super) fn order(&self) -> Option<Handedness> {
-        let sure = self.deviations().abs() >= DEVIATIONS && self.mean().abs() >= LEAST;
-        let hand = if self.sum > 0.0 { Handedness::Kept } else { Handedness::Reversed };
-        (self.pixels() >= FEWEST && sure).then_some(hand)
+    /// The order of depth by the photographs and the guessed calibrations. Each of them errs now and
+    /// then, the ones by folded meshes and the others by principal points beside the middle, so a verdict
+    /// of 5 deviations needs both. Weaker hints of both together were wrong in 3 of 100 cropped pairs.
+    pub(super) fn order(&self, guess: &Order) -> (Handedness, OrderBy) {
+        let shown = if self.sum > 0.0 { Handedness::Kept } else { Handedness::Reversed };
+        let clear = self.pixels() >= FEWEST && self.mean().abs() >= LEAST;
+        let (deviations, agree) = (self.deviations().abs(), shown == guess.hand);
+        let firm = clear && deviations >= TOGETHER;
+        if clear && deviations >= ALONE {
+            (shown, OrderBy::Colours)
+        } else if agree && firm {
+            (shown, OrderBy::Both)
+        } else if guess.is_decided() && !firm {
+            (guess.hand, OrderBy::Calibrations)
+        } else {
+            (guess.hand, OrderBy::Nothing)
+        }
     }
 }
 
@@ -75,20 +95,20 @@ impl Advantage {
 /// is nearer if the order is kept has the better colour.
 fn advantages(
     images: &[&Image],
+    surface: &Surface,
     scene: &Reconstruction,
     from: usize,
     to: usize,
 ) -> Result<Vec<f64>, RenderError> {
-    let source = camera(&scene.cameras[from], || scene.name(from))?;
-    let target = camera(&scene.cameras[to], || scene.name(to))?;
-    let known = features(scene, from);
-    let chi = mesh::dense_chi(&known, images[from].size());
+    let source = scene.camera(from)?;
+    let target = scene.camera(to)?;
+    let chi = surface.chi(images[from].size());
     let (width, height) = images[to].size();
     let sign = chirality::order_sign(&scene.cameras[to], Handedness::Kept);
     let mut samples: Vec<Sample<3>> = Vec::new();
     let frame = Frame::whole(width, height, 0.0, 0.0);
     propagate_chi(images[from], &chi, 0, &source.relative_to(&target), sign, &frame, &mut samples);
-    let apart = (APART * chi_range(&features(scene, to))) as f32;
+    let apart = (APART * chi_range(&scene.features(to))) as f32;
     let mut ends: Vec<Option<(Sample<3>, Sample<3>)>> = vec![None; width * height];
     for s in samples {
         let p = (s.y + 0.5) as usize * width + (s.x + 0.5) as usize;
@@ -110,4 +130,32 @@ fn advantages(
         Some(f64::from(miss(far) - miss(near)))
     };
     Ok(ends.iter().enumerate().filter_map(advantage).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `count` pixels of which all but one in eight favour the order by 20 grey levels.
+    fn advantage(count: usize, sign: f64) -> Advantage {
+        let one = |i: usize| if i.is_multiple_of(8) { -20.0 } else { 20.0 } * sign;
+        let sum = (0..count).map(one).sum();
+        Advantage { sum, squares: 400.0 * count as f64, count }
+    }
+
+    #[test]
+    fn photographs_and_calibrations_decide_together() {
+        let guess = |hand, agreement| Order { hand, agreement };
+        let (kept, reversed) = (Handedness::Kept, Handedness::Reversed);
+        let (many, some, few) = (advantage(400, 1.0), advantage(64, 1.0), advantage(24, 1.0));
+        assert!(many.deviations() > ALONE && some.deviations() < ALONE && some.deviations() > TOGETHER);
+        assert_eq!(many.order(&guess(reversed, 1.0)), (kept, OrderBy::Colours));
+        assert_eq!(some.order(&guess(kept, 0.6)), (kept, OrderBy::Both));
+        assert_eq!(some.order(&guess(reversed, 0.99)), (reversed, OrderBy::Nothing));
+        assert_eq!(few.order(&guess(kept, 0.9)), (kept, OrderBy::Nothing));
+        assert_eq!(few.order(&guess(reversed, 0.99)), (reversed, OrderBy::Calibrations));
+        let none = Advantage::default();
+        assert_eq!(none.order(&guess(reversed, 0.99)), (reversed, OrderBy::Calibrations));
+        assert_eq!(none.order(&guess(reversed, 0.9)), (reversed, OrderBy::Nothing));
+    }
 }

@@ -3,6 +3,7 @@
 mod all_views;
 mod base_pair;
 mod colours;
+mod consistency;
 mod reconstruction;
 mod synthesis;
 
@@ -10,8 +11,11 @@ use super::{RenderError, RenderSettings, Rendering};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneSettings;
 use crate::uncalibrated::chirality::Handedness;
+use crate::uncalibrated::order::Order;
 use crate::uncalibrated::{GeometryError, Point, RobustSettings};
 use colours::Advantage;
+use consistency::Surface;
+use reconstruction::Reconstruction;
 
 /// The virtual camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,6 +107,8 @@ pub enum OrderBy {
     Calibrations,
     /// The photographs: where two points of one view fall on one pixel of the other, it shows the nearer.
     Colours,
+    /// Photographs and guessed calibrations together; neither would suffice alone.
+    Both,
     /// Neither; the order of more guesses was taken.
     Nothing,
 }
@@ -152,20 +158,21 @@ pub fn render(
     let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
     let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated)?;
     scene.numbers = numbers;
+    let surfaces = consistency::surfaces(images, &scene)?;
     if uncalibrated.handedness.is_none() {
-        decide(images, &mut scene)?;
+        decide(images, &surfaces, &mut scene)?;
     }
     let colour = images.iter().any(|i| i.channels() == 3);
     let render = if colour { synthesis::render::<3> } else { synthesis::render::<1> };
-    Ok(render(images, &scene, size, settings, uncalibrated)?)
+    Ok(render(images, &surfaces, &scene, size, settings, uncalibrated)?)
 }
 
-/// Lets the photographs decide the order of depth. They show what is in front, while guessed calibrations
-/// err alike if the principal points do.
-fn decide(images: &[&Image], scene: &mut reconstruction::Reconstruction) -> Result<(), RenderError> {
-    if let Some(hand) = Advantage::of(images, scene)?.order() {
-        (scene.hand, scene.geometry.order_by) = (hand, OrderBy::Colours);
-    }
+/// Decides the order of depth from the photographs, which show what is in front, and the guessed
+/// calibrations.
+fn decide(images: &[&Image], surfaces: &[Surface], scene: &mut Reconstruction) -> Result<(), RenderError> {
+    let guess = Order { hand: scene.hand, agreement: scene.geometry.order_agreement };
+    let decided = Advantage::of(images, surfaces, scene)?.order(&guess);
+    (scene.hand, scene.geometry.order_by) = decided;
     Ok(())
 }
 

@@ -2,10 +2,13 @@
 
 use super::all_views;
 use super::{GeometryReport, OrderBy, Target, UncalibratedError, UncalibratedSettings};
+use crate::camera::Camera;
 use crate::image::Image;
+use crate::pipeline::RenderError;
 use crate::uncalibrated::canonical::{CanonicalPair, canonical_pair};
 use crate::uncalibrated::chirality::{self, Handedness};
 use crate::uncalibrated::fundamental::{self, Fundamental};
+use crate::uncalibrated::mesh::Feature;
 use crate::uncalibrated::metric::{self, MetricGuess};
 use crate::uncalibrated::order::Order;
 use crate::uncalibrated::resection::{Resection, Sighting, resect};
@@ -29,9 +32,30 @@ pub(super) struct Reconstruction {
 }
 
 impl Reconstruction {
+    /// The camera of a view; the virtual one comes after all views.
+    pub(super) fn camera(&self, view: usize) -> Result<Camera, RenderError> {
+        Camera::projective(self.cameras[view]).map_err(|source| {
+            RenderError::Projective(GeometryError::Camera { which: self.name(view), source })
+        })
+    }
+
     /// A view by its name for messages.
-    pub(super) fn name(&self, view: usize) -> String {
+    fn name(&self, view: usize) -> String {
+        if view + 1 == self.cameras.len() {
+            return "the virtual camera".into();
+        }
         format!("the camera of view {}", self.numbers.get(view).unwrap_or(&view) + 1)
+    }
+
+    /// The features of one view with their chi, without points behind it.
+    pub(super) fn features(&self, view: usize) -> Vec<Feature> {
+        let matrix = &self.cameras[view];
+        let feature = |(point, seen): (&Vector4<f64>, &Vec<Option<Point>>)| {
+            let position = seen[view]?;
+            let front = chirality::depth(matrix, point) > 0.0;
+            front.then(|| Feature { position, chi: chirality::chi(matrix, point) })
+        };
+        self.points.iter().zip(&self.seen).filter_map(feature).collect()
     }
 }
 
@@ -79,7 +103,7 @@ pub(super) fn reconstruct(
         order_agreement: order.agreement,
         order_by: match settings.handedness {
             Some(_) => OrderBy::Given,
-            None if order.is_decided() => OrderBy::Calibrations,
+            // Until the photographs have been asked.
             None => OrderBy::Nothing,
         },
     };

@@ -1,9 +1,10 @@
 //! The virtual view from a reconstructed scene: propagation by chi, occlusion removal, plane fit.
 
 use super::base_pair::{matches, parallax};
+use super::consistency::Surface;
 use super::reconstruction::Reconstruction;
 use super::{UncalibratedRendering, UncalibratedSettings};
-use crate::camera::{Camera, Relative};
+use crate::camera::Relative;
 use crate::image::Image;
 use crate::interpolate::HoleCount;
 use crate::interpolate::plane::PlaneProblem;
@@ -11,35 +12,34 @@ use crate::occlusion::{self, DepthTest};
 use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, Report};
 use crate::propagate::Frame;
 use crate::sample::{Dropped, Sample};
+use crate::uncalibrated::Point;
 use crate::uncalibrated::chirality;
 use crate::uncalibrated::mesh::{self, Feature};
-use crate::uncalibrated::{GeometryError, Point};
-use nalgebra::{Matrix3x4, Vector4};
-
-pub(super) fn camera(matrix: &Matrix3x4<f64>, which: impl Fn() -> String) -> Result<Camera, RenderError> {
-    Camera::projective(*matrix)
-        .map_err(|source| RenderError::Projective(GeometryError::Camera { which: which(), source }))
-}
+use nalgebra::Vector4;
 
 /// Renders the virtual view from the reconstructed scene.
 pub(super) fn render<const C: usize>(
     images: &[&Image],
+    surfaces: &[Surface],
     scene: &Reconstruction,
     size: (usize, usize),
     settings: &RenderSettings,
     special: &UncalibratedSettings,
 ) -> Result<UncalibratedRendering, RenderError> {
     let target_matrix = &scene.cameras[images.len()];
-    let target = camera(target_matrix, || "the virtual camera".into())?;
+    let target = scene.camera(images.len())?;
     let sign = chirality::order_sign(target_matrix, scene.hand);
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
     let mut report = Report::default();
     let mut samples: Vec<Sample<C>> = Vec::new();
-    for (i, image) in images.iter().enumerate() {
-        let source = camera(&scene.cameras[i], || scene.name(i))?;
-        let chi = mesh::dense_chi(&features(scene, i), image.size());
+    for (i, (image, surface)) in images.iter().zip(surfaces).enumerate() {
+        let source = scene.camera(i)?;
+        let chi = surface.chi(image.size());
         let map = source.relative_to(&target);
+        let first = samples.len();
         report.dropped += propagate_chi(image, &chi, i as u16, &map, sign, &frame, &mut samples);
+        let doubtful = surface.doubtful(image.size());
+        samples[first..].iter_mut().for_each(|s| s.doubtful = doubtful[s.pixel as usize]);
     }
     report.propagated = samples.len();
     if images.len() > 2 {
@@ -54,7 +54,7 @@ pub(super) fn render<const C: usize>(
     let absolute = special.sigma_share * chi_range(&hull);
     let test = DepthTest { relative: 0.0, absolute, ..*settings.depth_test() };
     test.check()?;
-    report.occluded = occlusion::remove(&mut samples, &test);
+    report.occluded = remove_occluded(&mut samples, &test);
     report.used = samples.len();
     let mut interpolation = settings.interpolation;
     interpolation.depth_test = test;
@@ -71,6 +71,21 @@ pub(super) fn render<const C: usize>(
     let views = (0..images.len()).collect();
     let rendering = Rendering { image, mask, depth, counts, views, report, agreement };
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
+}
+
+/// Removes what lies behind other samples. Doubtful samples hide doubtful ones only: a triangle that
+/// bridges a depth edge lies before the surface that other views see there.
+fn remove_occluded<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
+    // In place, since the list may take most of the memory.
+    samples.sort_unstable_by_key(|s| (s.doubtful, s.view, s.pixel));
+    let (before, sound) = (samples.len(), samples.partition_point(|s| !s.doubtful));
+    let mut hidden = occlusion::hidden(samples, test);
+    if sound < before {
+        hidden[..sound].copy_from_slice(&occlusion::hidden(&samples[..sound], test));
+    }
+    let mut flags = hidden.into_iter();
+    samples.retain(|_| flags.next() == Some(false));
+    before - samples.len()
 }
 
 /// Weights of the views: near ones count more. The distance of a view is the parallax between it and the
@@ -90,17 +105,6 @@ fn balance(scene: &Reconstruction, target: usize) -> Balance {
     let distances: Option<Vec<f64>> = (0..target).map(distance).collect();
     // Too few points for a distance: all views count alike.
     Balance::by_distance(&distances.unwrap_or_else(|| vec![1.0; target]))
-}
-
-/// The features of one view with their chi, without points behind it.
-pub(super) fn features(scene: &Reconstruction, view: usize) -> Vec<Feature> {
-    let matrix = &scene.cameras[view];
-    let feature = |(point, seen): (&Vector4<f64>, &Vec<Option<Point>>)| {
-        let position = seen[view]?;
-        let front = chirality::depth(matrix, point) > 0.0;
-        front.then(|| Feature { position, chi: chirality::chi(matrix, point) })
-    };
-    scene.points.iter().zip(&scene.seen).filter_map(feature).collect()
 }
 
 /// All points in front of the virtual camera, projected into its image.

@@ -38,8 +38,8 @@ impl Loader<'_> {
         Ok(goals)
     }
 
-    /// The virtual views of all tables: `start` gives the view of a table, `on_the_way` that at a share of its
-    /// path.
+    /// The virtual views of all tables: `start` gives the view of a table, `on_the_way` that at a share of
+    /// its path.
     pub(super) fn along<T>(
         &self,
         goals: &[Goal],

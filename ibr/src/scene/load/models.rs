@@ -57,8 +57,8 @@ impl Loader<'_> {
         colmap.or_else(|| self.spec.transforms.as_ref().map(|file| Source::Transforms(self.file(file))))
     }
 
-    /// The camera of an image: by its path, or by the path's last part. `fallback` is the size of the image if
-    /// the file does not give it.
+    /// The camera of an image: by its path, or by the path's last part. `fallback` is the size of the image
+    /// if the file does not give it.
     pub(super) fn listed_camera(
         &self,
         source: &Source,

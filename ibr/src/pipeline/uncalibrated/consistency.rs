@@ -1,0 +1,155 @@
+//! The surfaces that the views see: meshes whose edges the photographs choose, and which of their
+//! triangles no other photograph shows.
+
+use super::reconstruction::Reconstruction;
+use crate::camera::Relative;
+use crate::image::Image;
+use crate::pipeline::RenderError;
+use crate::uncalibrated::Point;
+use crate::uncalibrated::flips;
+use crate::uncalibrated::mesh::Mesh;
+use rayon::prelude::*;
+
+/// Difference of colours that counts at most, in grey levels: where another surface hides the point in the
+/// other view, the difference says nothing.
+const LARGEST_MISS: f64 = 30.0;
+
+/// Times the median of all triangles from which on the mean difference of a triangle is unusual.
+const UNUSUAL: f64 = 2.0;
+
+/// Median in grey levels below which differences are noise.
+const LEAST_USUAL: f64 = 2.0;
+
+/// Views with which each one is compared, at most: those that share most points with it.
+const MOST_OTHERS: usize = 4;
+
+/// The surfaces that one view sees.
+pub(super) struct Surface {
+    mesh: Mesh,
+    /// Triangles whose colours no other view shows at their place.
+    doubtful: Vec<bool>,
+}
+
+impl Surface {
+    /// chi at every pixel, NaN outside of the hull.
+    pub(super) fn chi(&self, size: (usize, usize)) -> Vec<f64> {
+        self.mesh.chi(size)
+    }
+
+    /// Whether each pixel lies in a doubtful triangle.
+    pub(super) fn doubtful(&self, size: (usize, usize)) -> Vec<bool> {
+        let mut doubtful = vec![false; size.0 * size.1];
+        self.mesh.visit(size, |triangle, pixel, _| doubtful[pixel] |= self.doubtful[triangle]);
+        doubtful
+    }
+}
+
+/// The surfaces of each view.
+pub(super) fn surfaces(images: &[&Image], scene: &Reconstruction) -> Result<Vec<Surface>, RenderError> {
+    let grey: Vec<Image> = images.par_iter().map(|image| image.to_grey()).collect();
+    let all: Vec<_> = (0..images.len()).into_par_iter().map(|view| surface(&grey, scene, view)).collect();
+    // Of several errors the first, for any number of threads.
+    all.into_iter().collect()
+}
+
+fn surface(grey: &[Image], scene: &Reconstruction, view: usize) -> Result<Surface, RenderError> {
+    let mut mesh = Mesh::delaunay(&scene.features(view));
+    let others = others(grey, scene, view)?;
+    // A surface is right if one other view shows it: nearer ones may hide it in the rest.
+    let miss = |p: &Point, chi: f64| {
+        let own = value_at(&grey[view], p)?;
+        let misses = others.iter().filter_map(|(image, map)| {
+            let there = value_at(image, &transferred(map, p, chi)?)?;
+            Some((there - own).abs().min(LARGEST_MISS))
+        });
+        misses.min_by(f64::total_cmp)
+    };
+    flips::exchange(&mut mesh, miss);
+    let doubtful = unusual(&mean_misses(&mesh, grey[view].size(), miss));
+    Ok(Surface { mesh, doubtful })
+}
+
+/// The mean of `miss` over the pixels of each triangle, NaN for triangles without any.
+fn mean_misses(mesh: &Mesh, size: (usize, usize), miss: impl Fn(&Point, f64) -> Option<f64>) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); mesh.triangles()];
+    mesh.visit(size, |triangle, pixel, chi| {
+        let p = Point::new((pixel % size.0) as f64, (pixel / size.0) as f64);
+        if let Some(miss) = miss(&p, chi) {
+            let (sum, count) = sums[triangle];
+            sums[triangle] = (sum + miss, count + 1.0);
+        }
+    });
+    sums.iter().map(|(sum, count)| sum / count).collect()
+}
+
+/// Which numbers are far above the median.
+fn unusual(misses: &[f64]) -> Vec<bool> {
+    let mut sorted: Vec<f64> = misses.iter().copied().filter(|m| m.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let limit = UNUSUAL * usual.max(LEAST_USUAL);
+    misses.iter().map(|miss| *miss > limit).collect()
+}
+
+/// The views that share most points with one, and the maps to them.
+fn others<'a>(
+    grey: &'a [Image],
+    scene: &Reconstruction,
+    view: usize,
+) -> Result<Vec<(&'a Image, Relative)>, RenderError> {
+    let shared = |other: &usize| {
+        scene.seen.iter().filter(|seen| seen[view].is_some() && seen[*other].is_some()).count()
+    };
+    let mut others: Vec<usize> = (0..grey.len()).filter(|i| *i != view).collect();
+    others.sort_by_key(|other| std::cmp::Reverse(shared(other)));
+    others.truncate(MOST_OTHERS);
+    let source = scene.camera(view)?;
+    let map = |other: usize| {
+        let target = scene.camera(other)?;
+        Ok((&grey[other], source.relative_to(&target)))
+    };
+    others.into_iter().map(map).collect()
+}
+
+/// The position in another view of a pixel with chi: X_p ~ \[Pi; e4\]^{-1} (x~, -chi), hence
+/// Pi_v X_p = A x~ - chi b.
+fn transferred(map: &Relative, p: &Point, chi: f64) -> Option<Point> {
+    let q = map.a * p.push(1.0) - map.b * chi;
+    (q.z > 0.0).then(|| q.xy() / q.z)
+}
+
+/// The value of a grey image between its pixels, bilinear; `None` outside.
+fn value_at(image: &Image, p: &Point) -> Option<f64> {
+    let (right, bottom) = (image.width() - 1, image.height() - 1);
+    if !(p.x >= 0.0 && p.y >= 0.0 && p.x <= right as f64 && p.y <= bottom as f64) {
+        return None;
+    }
+    let (column, row) = (p.x as usize, p.y as usize);
+    let (u, v) = (p.x - column as f64, p.y - row as f64);
+    let pixel = |i: usize, j: usize| f64::from(image.row((row + j).min(bottom))[(column + i).min(right)]);
+    let along = |j: usize| pixel(0, j) * (1.0 - u) + pixel(1, j) * u;
+    Some(along(0) * (1.0 - v) + along(1) * v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unusual_triangles_stand_out_from_the_median() {
+        assert_eq!(unusual(&[5.0, 4.0, 6.0, 10.1, f64::NAN]), [false, false, false, false, false]);
+        assert_eq!(unusual(&[5.0, 4.0, 4.0, 10.1, f64::NAN]), [false, false, false, true, false]);
+        assert_eq!(unusual(&[0.1, 0.1, 0.1, 3.9, 4.1]), [false, false, false, false, true]);
+        assert!(unusual(&[]).is_empty());
+    }
+
+    #[test]
+    fn values_between_pixels_are_bilinear() {
+        let image = Image::new(3, 2, 1, vec![0.0, 10.0, 20.0, 100.0, 110.0, 120.0]).unwrap();
+        assert_eq!(value_at(&image, &Point::new(0.5, 0.25)), Some(30.0));
+        assert_eq!(value_at(&image, &Point::new(2.0, 1.0)), Some(120.0));
+        for (x, y) in [(-0.1, 0.0), (2.01, 0.0), (0.0, 1.1), (f64::NAN, 0.0)] {
+            assert_eq!(value_at(&image, &Point::new(x, y)), None);
+        }
+    }
+}
