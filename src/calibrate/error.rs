@@ -7,6 +7,28 @@ use crate::units::{FastPeriods, Hertz};
 /// Why captures do not calibrate a spec.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CalibrateError {
+    /// Complex samples beside real ones, or without tones.
+    #[error(
+        "{complex} of {records} captures are complex: such captures are calibrated by tones (--tone), and all are complex or none is"
+    )]
+    ComplexSamples {
+        /// Complex records.
+        complex: usize,
+        /// All records.
+        records: usize,
+    },
+    /// A tone of complex captures at the negative of the frequency given.
+    #[error("the tone is not at {tone}, but at minus that: complex samples tell the sign of a frequency")]
+    OtherSign {
+        /// The frequency given.
+        tone: Hertz,
+    },
+    /// A tone of real captures at a negative frequency.
+    #[error("the tone at {tone}: real samples do not tell the sign of a frequency; give it above 0")]
+    NegativeTone {
+        /// The frequency given.
+        tone: Hertz,
+    },
     /// A filter of the spec cannot be realised.
     #[error("filter of channel {channel}: {source}")]
     Analog {

@@ -8,6 +8,11 @@
 //! - [`Evidence::Waveform`]: a waveform whose samples are known.
 //! - [`Evidence::AnySignal`]: any signal that leaves fewer aliases occupied than there are channels.
 //!
+//! Complex captures ([`Record::complex`]) are calibrated by tones, whose frequencies then have a sign. Both
+//! parts of a channel have its delay, gain and cut-off; what its parts lack of quadrature counts as a gain
+//! and a phase of the channel. Each part has an offset of its own, and a spec has one per channel, so those
+//! are only noted.
+//!
 //! A delay, a gain and a cut-off that all channels have in common cannot be observed. One channel is the
 //! reference and keeps the values of the spec.
 //!
@@ -19,6 +24,7 @@
 //! ```text
 //! tone:      sigma(D_i - D_r) = sqrt(2 / (N SNR)) / w      sigma(g_i / g_r) = sqrt(2 / (N SNR))
 //!            sigma(o_i) = s / sqrt(N)
+//! complex:   sigma(D_i - D_r) = sqrt(1 / (N SNR)) / w      sigma(g_i / g_r) = sqrt(1 / (N SNR))
 //! waveform:  sigma(D_i)^2 = s^2 / (g^2 sum v'^2), v' without its parts along 1 and v
 //! blind:     the inverse of the Fisher information of the Whittle likelihood
 //! ```
@@ -70,6 +76,7 @@ pub fn calibrate(
     settings: Settings,
 ) -> Result<Calibration, CalibrateError> {
     check(spec, records, settings)?;
+    check_parts(records, evidence)?;
     let model = Model::new(spec)?;
     let Settings { fit, reference } = settings;
     let mut tones = None;
@@ -95,6 +102,20 @@ pub fn calibrate(
     let channels = fitted.channels(&model);
     let Fitted { misfit, frames, remarks, .. } = fitted;
     Ok(Calibration { reference, channels, tones, modulus, frames, clipped, misfit, remarks })
+}
+
+/// All records are real, or all are complex and hold tones.
+fn check_parts(records: &[Record], evidence: Evidence<'_>) -> Result<(), CalibrateError> {
+    let complex = records.iter().filter(|record| record.imaginary.is_some()).count();
+    match evidence {
+        Evidence::Tones(_) if complex == records.len() => Ok(()),
+        Evidence::Tones(tones) if complex == 0 => match tones.iter().find(|tone| tone.0 < 0.0) {
+            Some(&tone) => Err(CalibrateError::NegativeTone { tone }),
+            None => Ok(()),
+        },
+        _ if complex == 0 => Ok(()),
+        _ => Err(CalibrateError::ComplexSamples { complex, records: records.len() }),
+    }
 }
 
 fn check(spec: &Spec, records: &[Record], settings: Settings) -> Result<(), CalibrateError> {

@@ -8,8 +8,10 @@ const SAME: f64 = 0.999;
 /// The samples of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// The samples; the full scale of integer formats is 1.
+    /// The samples, or the real parts of complex ones; the full scale of integer formats is 1.
     pub samples: Vec<f64>,
+    /// The imaginary parts of complex samples, as many.
+    pub imaginary: Option<Vec<f64>>,
     /// False where a sample is clipped or not finite.
     pub keep: Vec<bool>,
     /// Number of clipped samples.
@@ -28,12 +30,30 @@ impl Record {
         let clips = |x: f64| x.is_finite() && (x <= lowest || x >= highest);
         let clipped = samples.iter().filter(|&&x| clips(x)).count();
         let keep = samples.iter().map(|&x| x.is_finite() && !clips(x)).collect();
-        Self { samples, keep, clipped }
+        Self { samples, imaginary: None, keep, clipped }
     }
 
-    /// The kept samples, for a sine fit.
-    pub(super) fn channel(&self) -> Channel<'_> {
-        Channel { keep: Some(&self.keep), ..Channel::new(&self.samples) }
+    /// Complex samples from the records of both parts: what is left out of one is left out of both, and what
+    /// is beyond the shorter one too.
+    pub fn complex(real: Self, imaginary: Self) -> Self {
+        let both = real.keep.iter().zip(&imaginary.keep);
+        let keep: Vec<bool> = both.map(|(&real, &imaginary)| real && imaginary).collect();
+        let (mut samples, mut others) = (real.samples, imaginary.samples);
+        samples.truncate(keep.len());
+        others.truncate(keep.len());
+        let is_clipped = |&n: &usize| !keep[n] && samples[n].is_finite() && others[n].is_finite();
+        let clipped = (0..keep.len()).filter(is_clipped).count();
+        Self { samples, imaginary: Some(others), keep, clipped }
+    }
+
+    /// The kept samples of each part, for a sine fit.
+    pub(super) fn channels(&self) -> impl Iterator<Item = Channel<'_>> {
+        self.parts().map(|part| Channel { keep: Some(&self.keep), ..Channel::new(part) })
+    }
+
+    /// The samples, or the real and the imaginary parts of complex ones.
+    pub(super) fn parts(&self) -> impl Iterator<Item = &[f64]> {
+        std::iter::once(self.samples.as_slice()).chain(self.imaginary.as_deref())
     }
 
     /// Samples that are not clipped and finite.
@@ -83,6 +103,15 @@ mod tests {
         assert_eq!(record.keep, [false, true, false, false, false, true]);
         assert_eq!((record.clipped, record.used()), (3, 2));
         assert_eq!(longest_run(&[record, Record::new(vec![0.0; 6])]), (1, 1));
+    }
+
+    #[test]
+    fn what_a_part_lacks_the_complex_sample_lacks() {
+        let real = Record::within(vec![0.0, 1.0, f64::NAN, 0.5, 0.1], -1.0, 1.0);
+        let imaginary = Record::within(vec![-1.0, 1.0, 1.0, 0.5], -1.0, 1.0);
+        let record = Record::complex(real, imaginary);
+        assert_eq!((record.keep.as_slice(), record.clipped), (&[false, false, false, true][..], 2));
+        assert_eq!(record.parts().map(<[f64]>::len).collect::<Vec<_>>(), [4, 4]);
     }
 
     #[test]

@@ -11,6 +11,16 @@ pub enum Remark {
         /// One per channel.
         counts: Vec<usize>,
     },
+    /// Offsets of complex captures, which a spec cannot hold.
+    #[error(
+        "the parts of complex samples have offsets of their own, of which a spec holds one per channel, so they were \
+         not written (real, imaginary): {}",
+        pairs(offsets)
+    )]
+    ComplexOffsets {
+        /// Of the real and the imaginary part of each channel.
+        offsets: Vec<Vec<f64>>,
+    },
     /// The cut-offs are those of the spec, and errors of them look like delays.
     #[error(
         "the cut-offs were not fitted: an error of 1 % in one changes its delay by up to {:.2e} fast periods",
@@ -106,6 +116,11 @@ impl Remark {
     pub fn is_warning(&self) -> bool {
         !matches!(self, Self::CutoffAssumed { .. } | Self::HarmonicsLeftOut { .. } | Self::Shifted { .. })
     }
+}
+
+fn pairs(offsets: &[Vec<f64>]) -> String {
+    let numbers = |parts: &Vec<f64>| parts.iter().map(|x| format!("{x:.3e}")).collect::<Vec<_>>().join(", ");
+    offsets.iter().map(|parts| format!("({})", numbers(parts))).collect::<Vec<_>>().join(", ")
 }
 
 fn list(counts: &[usize]) -> String {

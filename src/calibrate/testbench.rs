@@ -44,13 +44,41 @@ pub(super) fn tones(
     noise: f64,
     dice: &mut Random,
 ) -> Vec<Record> {
-    let h = truth.fast_period;
     let phases: Vec<f64> = frequencies.iter().map(|_| TAU * dice.part()).collect();
+    let records = waves(truth, frequencies, &phases, frames);
+    records.into_iter().map(|samples| noisy(samples, noise, dice)).collect()
+}
+
+/// The same of tones e^{j w t} of either sign, with noise in both parts. Both parts have the offset.
+pub(super) fn complex_tones(
+    truth: &Spec,
+    frequencies: &[Hertz],
+    frames: usize,
+    noise: f64,
+    dice: &mut Random,
+) -> Vec<Record> {
+    let phases: Vec<f64> = frequencies.iter().map(|_| TAU * dice.part()).collect();
+    let turned: Vec<f64> = phases.iter().map(|phase| phase - 0.25 * TAU).collect();
+    let parts = [phases, turned].map(|phases| waves(truth, frequencies, &phases, frames));
+    let [real, imaginary] = parts.map(|records| -> Vec<Record> {
+        records.into_iter().map(|samples| noisy(samples, noise, dice)).collect()
+    });
+    real.into_iter().zip(imaginary).map(|(real, imaginary)| Record::complex(real, imaginary)).collect()
+}
+
+fn noisy(mut samples: Vec<f64>, noise: f64, dice: &mut Random) -> Record {
+    samples.iter_mut().for_each(|sample| *sample += noise * gaussian(dice));
+    Record::new(samples)
+}
+
+/// Cosines of these phases as the true converters deliver them.
+fn waves(truth: &Spec, frequencies: &[Hertz], phases: &[f64], frames: usize) -> Vec<Vec<f64>> {
+    let h = truth.fast_period;
     let channel = |channel: &crate::spec::ChannelSpec| {
         let filter = StrictlyProper::new(&channel.filter, h).unwrap();
         let delay = channel.delay / h;
         let mut samples = vec![channel.offset; frames];
-        for (frequency, phase) in frequencies.iter().zip(&phases) {
+        for (frequency, phase) in frequencies.iter().zip(phases) {
             let cycles = frequency.per_fast_period(h).0;
             let response = filter.response(RadiansPerFastPeriod(TAU * cycles));
             let step = cycles * truth.ratio as f64;
@@ -62,9 +90,7 @@ pub(super) fn tones(
         }
         samples
     };
-    let mut records: Vec<Vec<f64>> = truth.channels.iter().map(channel).collect();
-    records.iter_mut().flatten().for_each(|sample| *sample += noise * gaussian(dice));
-    records.into_iter().map(Record::new).collect()
+    truth.channels.iter().map(channel).collect()
 }
 
 /// A Gaussian number of unit variance (Box and Muller, 1958).

@@ -17,6 +17,8 @@ const WORK_BYTES: f64 = 64.0;
 #[derive(Debug, Clone)]
 pub(super) struct CaptureFile {
     pub(super) samples: Vec<f64>,
+    /// The imaginary parts of complex samples, as many; only of [`CaptureFile::read_any`].
+    pub(super) imaginary: Option<Vec<f64>>,
     pub(super) rate: Hertz,
     /// Lowest and highest value of an integer format; `None` for floats.
     pub(super) rails: Option<(f64, f64)>,
@@ -42,8 +44,21 @@ impl Reading {
 }
 
 impl CaptureFile {
-    /// Reads a recording; `-` is standard input.
+    /// Reads a recording of real samples; `-` is standard input.
     pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
+        Self::read_with(path, reading, Whole::read)
+    }
+
+    /// Reads a recording of real or complex samples; `-` is standard input.
+    pub(super) fn read_any(path: &Path, reading: Reading) -> Result<Self, Failure> {
+        Self::read_with(path, reading, Whole::read_parts)
+    }
+
+    fn read_with(
+        path: &Path,
+        reading: Reading,
+        whole: fn(&mut MultiReader, usize) -> Result<Whole, Failure>,
+    ) -> Result<Self, Failure> {
         let stop = crossbeam_channel::never();
         let reader = MultiReader::start(&[path.to_owned()], reading.options, stop).map_err(Failure::input)?;
         let mut reader = reader.ok_or_else(interrupted)?;
@@ -61,16 +76,17 @@ impl CaptureFile {
             Failure::Input(format!("{}: {message}", name(path)))
         })?;
         let rails = header.and_then(|header| rails(header.layout.format));
-        let Whole { mut channels, is_cut } = Whole::read(&mut reader, reading.most)?;
+        let Whole { channels, is_cut } = whole(&mut reader, reading.most)?;
         reader.warnings().iter().for_each(|warning| super::warn(&warning.to_string()));
-        let samples = channels.pop().unwrap_or_default();
+        let mut parts = channels.into_iter();
+        let (samples, imaginary) = (parts.next().unwrap_or_default(), parts.next());
         if samples.is_empty() {
             return Err(Failure::Input(format!("{}: no samples (the length is zero)", name(path))));
         }
         if is_cut {
             super::warn(&format!("{}: only the first {} samples are used", name(path), samples.len()));
         }
-        Ok(Self { samples, rate, rails })
+        Ok(Self { samples, imaginary, rate, rails })
     }
 
     /// Refuses samples that are not finite.
@@ -95,13 +111,15 @@ impl CaptureFile {
                 count.div_ceil(2)
             )));
         }
-        self.samples.truncate(count - skip);
-        self.samples.drain(..skip);
+        for part in [Some(&mut self.samples), self.imaginary.as_mut()].into_iter().flatten() {
+            part.truncate(count - skip);
+            part.drain(..skip);
+        }
         Ok(self)
     }
 }
 
-/// All channels of a reader.
+/// All channels of a reader; of complex samples each part is a channel.
 #[derive(Debug)]
 pub(super) struct Whole {
     /// Lost samples are NaN.
@@ -115,10 +133,16 @@ impl Whole {
     pub(super) fn read(reader: &mut MultiReader, most: usize) -> Result<Self, Failure> {
         if let Some((input, _)) = reader.headers().find(|(_, header)| header.is_complex) {
             return Err(Failure::Input(format!(
-                "{input}: complex samples, which only `fuse` and `stream` take; extract the real or the imaginary part"
+                "{input}: complex samples, which `fuse`, `stream`, `measure` and `calibrate` take; extract the real or the imaginary part"
             )));
         }
-        let mut channels = vec![Vec::new(); reader.channels()];
+        Self::read_parts(reader, most)
+    }
+
+    /// At most `most` samples of each channel.
+    pub(super) fn read_parts(reader: &mut MultiReader, most: usize) -> Result<Self, Failure> {
+        let parts = if reader.is_complex() { 2 } else { 1 };
+        let mut channels = vec![Vec::new(); parts * reader.channels()];
         let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
         let mut checked = promised.unwrap_or_default().min(most);
         check_memory(checked, channels.len())?;
@@ -144,7 +168,8 @@ impl Whole {
     }
 }
 
-/// Refuses recordings whose work memory the system does not have; it would end the process without a message.
+/// Refuses recordings whose work memory the system does not have; it would end the process without a
+/// message.
 fn check_memory(frames: usize, channels: usize) -> Result<(), Failure> {
     let bytes = WORK_BYTES * frames as f64 * channels as f64;
     match available_memory() {

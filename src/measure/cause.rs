@@ -14,7 +14,7 @@ pub enum Cause {
         of: usize,
     },
     /// Unequal gains or sampling instants of `of` converters in turn: a line at |k fs / of + f| or
-    /// |k fs / of - f|. One tone does not tell gain from skew.
+    /// |k fs / of - f|, in complex records without the bars. One tone does not tell gain from skew.
     GainOrSkew {
         /// k.
         k: usize,
@@ -43,7 +43,15 @@ pub enum Cause {
         /// Converters in turn.
         of: usize,
     },
-    /// A product of two tones, at |a f1 + b f2|.
+    /// Parts of a complex record that are not in quadrature or not of one gain: a line at minus the
+    /// frequency of a tone or of its harmonic.
+    Image {
+        /// Multiple of the tone's frequency; 1 for the tone.
+        order: usize,
+        /// The tone.
+        tone: usize,
+    },
+    /// A product of two tones, at |a f1 + b f2|; in complex records at a f1 + b f2.
     Intermodulation {
         /// a.
         a: i32,
@@ -82,6 +90,8 @@ impl fmt::Display for Cause {
                 write!(f, "harmonic, {order} {}{}", name(tone), if folded { ", folded" } else { "" })
             }
             Self::HarmonicImage { order, k, of } => write!(f, "harmonic {order} displaced by {k}/{of} fs"),
+            Self::Image { order: 1, tone } => write!(f, "image, -{}", name(tone)),
+            Self::Image { order, tone } => write!(f, "image of a harmonic, -{order} {}", name(tone)),
             Self::Intermodulation { a, first, b, second } => {
                 write!(f, "intermodulation, {a} {} {b:+} {}", name(first), name(second))
             }

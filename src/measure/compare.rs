@@ -16,9 +16,9 @@ const NO_ERROR: f64 = 1e-10;
 /// Bands of the error spectrum.
 const BANDS: usize = 16;
 
-/// A record y against a reference r: `y[n] = gain r(n - lag) + offset + error`, with the least mean square of
-/// the error. r is interpolated between its samples by a windowed sinc of 257 samples, which is exact for a
-/// lag of whole samples and else good to -118 dB up to 0.485 fs; 128 samples at each end are not compared.
+/// A record y against a reference r: `y[n] = gain r(n - lag) + offset + error`, with the least mean square
+/// of the error. r is interpolated between its samples by a windowed sinc of 257 samples, which is exact for
+/// a lag of whole samples and else good to -118 dB up to 0.485 fs; 128 samples at each end are not compared.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Comparison {
     /// Samples by which the record comes later.

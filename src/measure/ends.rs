@@ -13,8 +13,8 @@ const RAISED: f64 = 4.0;
 pub struct UnsettledEnds {
     /// Samples at either end.
     pub samples: usize,
-    /// Power of the rest of the whole record over that without these samples. The gain of leaving them out is
-    /// larger, because they pull at the fit of the tones too.
+    /// Power of the rest of the whole record over that without these samples. The gain of leaving them out
+    /// is larger, because they pull at the fit of the tones too.
     #[serde(rename = "raise_db")]
     pub raise: Decibels,
 }

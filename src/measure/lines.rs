@@ -1,8 +1,9 @@
 //! The amplitudes of lines, and what is left without them.
 
-use super::expected::{Expected, Pattern, unexpected};
+use super::expected::{Expected, Pattern, Sides, folded, unexpected};
+use super::record::Record;
 use super::{Cause, MeasureError};
-use crate::sine_fit::{Channel, SineFit, find_tones, fit, fit_known};
+use crate::sine_fit::{Direction, SineFit, find_tones, fit, fit_known};
 use crate::units::{Decibels, Hertz};
 use std::f64::consts::SQRT_2;
 
@@ -15,9 +16,9 @@ const SAMPLES_PER_PARAMETER: usize = 4;
 /// An amplitude A of a line without a spur exceeds a with the probability exp(-a^2 N / (4 s^2)), s^2 the
 /// variance of the noise. This is -ln of the probability that one of all lines counts as a spur.
 const SIGNIFICANCE: f64 = 7.0;
-/// Times that tones and lines are fitted in turn. Each time reduces the error that spurs cause in the
-/// frequency of a tone by their correlation with it, which is below 1 / (3 d) for a distance of d cycles per
-/// record.
+/// Times that tones and lines, and expected and unexpected lines, are fitted in turn. Each time reduces the
+/// error that spurs cause in the frequency of a tone by their correlation with it, which is below 1 / (3 d)
+/// for a distance of d cycles per record.
 const ALTERNATIONS: usize = 3;
 
 /// A line and its amplitude.
@@ -34,8 +35,8 @@ pub(super) struct Found {
 pub(super) struct Lines {
     pub(super) found: Vec<Found>,
     /// What is left without tones, constant and lines; 0 where a sample is missing.
-    pub(super) rest: Vec<f64>,
-    /// Variance of the noise.
+    pub(super) rest: Record<'static>,
+    /// Variance of the noise of a part.
     pub(super) noise_power: f64,
     /// Amplitude above which a line counts as a spur.
     pub(super) threshold: f64,
@@ -44,83 +45,116 @@ pub(super) struct Lines {
 /// Fits all expected lines together with the tones, whose frequencies are known, and searches the rest for
 /// more.
 pub(super) fn fit_lines(
-    samples: &[f64],
+    record: &Record<'_>,
     tones: &SineFit,
     expected: &Expected,
     pattern: &Pattern<'_>,
 ) -> Result<Lines, MeasureError> {
-    let (rate, channel) = (tones.rate, Channel::new(samples));
-    let used = channel.used();
+    let used = record.used();
     let lines = tones.frequencies.len() + expected.lines.len();
     let parameters = 1 + 2 * lines + usize::from(expected.half_rate.is_some());
     let needed = SAMPLES_PER_PARAMETER * parameters;
     if used < needed {
         return Err(MeasureError::TooShort { samples: used, lines, needed });
     }
-    let Together { fit, half_rate, mut rest } = Together::fit(samples, tones, expected)?;
-    let amplitudes = fit.channels[0].tones[tones.frequencies.len()..].iter();
-    let mut found: Vec<Found> = amplitudes
-        .zip(&expected.lines)
-        .map(|(tone, line)| Found {
-            frequency: rate * line.cycles,
-            amplitude: tone.amplitude.value,
-            causes: line.causes.clone(),
-        })
-        .collect();
-    found.extend(expected.half_rate.map(|cause| Found {
-        frequency: rate * 0.5,
-        amplitude: SQRT_2 * half_rate.abs(),
-        causes: vec![cause],
-    }));
-    let more = take_unexpected(&mut rest, rate, pattern, expected);
-    let parameters = parameters + 3 * more.len();
-    found.extend(more);
-    rest.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
-    let noise_power = rest.iter().map(|x| x * x).sum::<f64>() / used.saturating_sub(parameters).max(1) as f64;
-    let log_probability = SIGNIFICANCE + (found.len().max(1) as f64).ln();
-    let threshold = (4.0 * noise_power / used as f64 * log_probability).sqrt();
-    Ok(Lines { found, rest, noise_power, threshold })
+    let mut together = Together::fit(record, tones, expected)?;
+    let mut unexpected = Unexpected::search(&together.rest, tones.rate, pattern, expected);
+    let finish = |together: &Together, unexpected: &Unexpected| {
+        let mut found = together.found(record, pattern, expected);
+        found.extend(unexpected.found.iter().cloned());
+        let parameters = parameters + 3 * unexpected.found.len() / record.parts().len();
+        Lines::new(found, unexpected.rest.filled(), (used, parameters))
+    };
+    let mut lines = finish(&together, &unexpected);
+    // Large unexpected lines leak into the expected ones, so these are fitted again without them.
+    for _ in 1..ALTERNATIONS {
+        if unexpected.largest <= lines.threshold {
+            break;
+        }
+        together = Together::fit(&record.minus(&unexpected.waves), tones, expected)?;
+        let rest = together.rest.plus(&unexpected.waves);
+        unexpected = Unexpected::search(&rest, tones.rate, pattern, expected);
+        lines = finish(&together, &unexpected);
+    }
+    Ok(lines)
+}
+
+impl Lines {
+    /// Of what a fit of so many parameters to so many samples leaves.
+    fn new(found: Vec<Found>, rest: Record<'static>, (used, parameters): (usize, usize)) -> Self {
+        let noise_power = rest.energy() / used.saturating_sub(parameters).max(1) as f64;
+        let log_probability = SIGNIFICANCE + (found.len().max(1) as f64).ln();
+        let values = (used * rest.parts().len()) as f64;
+        let threshold = (4.0 * noise_power / values * log_probability).sqrt();
+        Self { found, rest, noise_power, threshold }
+    }
 }
 
 /// Tones and lines, fitted together.
 struct Together {
     /// The tones, then the expected lines.
     fit: SineFit,
-    /// a of the line (-1)^n a.
-    half_rate: f64,
+    /// a of the line (-1)^n a, for each part.
+    half_rate: Vec<f64>,
     /// What is left.
-    rest: Vec<f64>,
+    rest: Record<'static>,
 }
 
 impl Together {
     /// The lines disturb the first fit of the tones, so these are fitted again in what is left without
     /// lines.
-    fn fit(samples: &[f64], tones: &SineFit, expected: &Expected) -> Result<Self, MeasureError> {
+    fn fit(record: &Record<'_>, tones: &SineFit, expected: &Expected) -> Result<Self, MeasureError> {
         let rate = tones.rate;
         let mut found: Vec<Hertz> = tones.frequencies.iter().map(|f| f.value).collect();
         let lines = found.len()..found.len() + expected.lines.len();
-        let mut samples = samples.to_vec();
-        let mut half_rate = 0.0;
+        let mut record = record.map(|_, part| part.to_vec());
+        let mut half_rate = vec![0.0; record.parts().len()];
         let mut rounds = ALTERNATIONS;
         loop {
             let places = expected.lines.iter().map(|line| rate * line.cycles);
             let all: Vec<Hertz> = found.iter().copied().chain(places).collect();
-            let whole = fit_known(&[Channel::new(&samples)], rate, &all)?;
-            let mut rest = whole.residual(0, &samples);
+            let whole = fit_known(&record.channels(), rate, &all)?;
+            let mut rest = record.residual(&whole);
             if expected.half_rate.is_some() {
-                let a = half_rate_of(&rest);
-                half_rate += a;
-                take_half_rate(&mut samples, a);
-                take_half_rate(&mut rest, a);
+                let more: Vec<f64> = rest.parts().iter().map(|part| half_rate_of(part)).collect();
+                half_rate.iter_mut().zip(&more).for_each(|(sum, a)| *sum += a);
+                record = record.map(|i, part| without_half_rate(part, more[i]));
+                rest = rest.map(|i, part| without_half_rate(part, more[i]));
             }
             rounds -= 1;
             if rounds == 0 {
                 return Ok(Self { fit: whole, half_rate, rest });
             }
-            let cleaned = whole.without(0, &samples, lines.clone());
-            let tones = fit(&[Channel::new(&cleaned)], rate, &found)?;
+            let cleaned = record.map(|i, part| whole.without(i, part, lines.clone()));
+            let tones = fit(&cleaned.channels(), rate, &found)?;
             found = tones.frequencies.iter().map(|f| f.value).collect();
         }
+    }
+
+    /// The expected lines, and in complex records the images of the tones.
+    fn found(&self, record: &Record<'_>, pattern: &Pattern<'_>, expected: &Expected) -> Vec<Found> {
+        let (rate, tones) = (self.fit.rate, pattern.tones.len());
+        let images =
+            pattern.tones.iter().enumerate().filter(|_| pattern.is_complex).map(|(k, cycles)| Found {
+                frequency: rate * -pattern.seen(*cycles),
+                amplitude: self.fit.exponential([0, 1], k, Direction::Backward).amplitude.value,
+                causes: vec![Cause::Image { order: 1, tone: pattern.number(k) }],
+            });
+        let lines = expected.lines.iter().enumerate().flat_map(|(k, line)| {
+            let of_line = record.lines_of(&self.fit, tones + k, &line.causes);
+            of_line.into_iter().map(move |(direction, amplitude, causes)| Found {
+                frequency: rate * (direction.sign() * line.cycles),
+                amplitude,
+                causes,
+            })
+        });
+        let size = self.half_rate.iter().fold(0.0, |size: f64, a| size.hypot(*a));
+        let half_rate = expected.half_rate.map(|cause| Found {
+            frequency: rate * 0.5,
+            amplitude: size * if record.is_complex() { 1.0 } else { SQRT_2 },
+            causes: vec![cause],
+        });
+        images.chain(lines).chain(half_rate).collect()
     }
 }
 
@@ -134,31 +168,52 @@ fn half_rate_of(samples: &[f64]) -> f64 {
     finite().map(|(n, x)| sign(n) * x).sum::<f64>() / finite().count().max(1) as f64
 }
 
-/// Subtracts (-1)^n a.
-fn take_half_rate(samples: &mut [f64], a: f64) {
-    samples.iter_mut().enumerate().for_each(|(n, x)| *x -= sign(n) * a);
+/// x[n] - (-1)^n a.
+fn without_half_rate(samples: &[f64], a: f64) -> Vec<f64> {
+    samples.iter().enumerate().map(|(n, x)| x - sign(n) * a).collect()
 }
 
-/// Fits and subtracts the largest lines of the rest, one after the other.
-fn take_unexpected(
-    rest: &mut Vec<f64>,
-    rate: Hertz,
-    pattern: &Pattern<'_>,
-    expected: &Expected,
-) -> Vec<Found> {
-    let mut found: Vec<Found> = Vec::new();
-    while found.len() < MOST_UNEXPECTED {
-        let channels = [Channel::new(rest)];
-        let Ok(start) = find_tones(&channels, rate, 1, RANGE) else { break };
-        let Ok(line) = fit(&channels, rate, &start) else { break };
-        let (frequency, tone) = (line.frequencies[0].value, line.channels[0].tones[0]);
-        let is_faint = |first: &Found| tone.amplitude.value < first.amplitude * (-RANGE).amplitude_ratio();
-        if found.first().is_some_and(is_faint) {
-            break;
+/// The largest lines that nothing announces.
+struct Unexpected {
+    found: Vec<Found>,
+    /// The sum of those that are apart from tones and expected lines. What is left of a line beside it is
+    /// that line's own.
+    waves: Record<'static>,
+    /// The largest amplitude of these.
+    largest: f64,
+    /// What is left without any of them.
+    rest: Record<'static>,
+}
+
+impl Unexpected {
+    /// Fits and subtracts the largest lines of the rest, one after the other; those of complex records with
+    /// what is at minus their frequency.
+    fn search(rest: &Record<'static>, rate: Hertz, pattern: &Pattern<'_>, expected: &Expected) -> Self {
+        let waves = rest.map(|_, part| vec![0.0; part.len()]);
+        let mut all = Self { found: Vec::new(), waves, largest: 0.0, rest: rest.clone() };
+        for _ in 0..MOST_UNEXPECTED {
+            let channels = all.rest.channels();
+            let Ok(start) = find_tones(&channels, rate, 1, RANGE) else { break };
+            let Ok(line) = fit(&channels, rate, &start) else { break };
+            let cycles = line.frequencies[0].value / rate;
+            let sides = all.rest.lines_of(&line, 0, &Sides::default());
+            let largest = sides.iter().fold(0.0, |largest: f64, side| largest.max(side.1));
+            let faint = |first: &Found| largest < first.amplitude * (-RANGE).amplitude_ratio();
+            if all.found.first().is_some_and(faint) {
+                break;
+            }
+            all.found.extend(sides.into_iter().map(|(direction, amplitude, _)| {
+                let cycles = direction.sign() * cycles;
+                let causes = vec![unexpected(pattern, expected, cycles)];
+                Found { frequency: rate * cycles, amplitude, causes }
+            }));
+            let rest = all.rest.residual(&line);
+            if !expected.holds(pattern, folded(cycles)) {
+                all.waves = all.waves.plus(&all.rest.minus(&rest));
+                all.largest = all.largest.max(largest);
+            }
+            all.rest = rest;
         }
-        let causes = vec![unexpected(pattern, expected, frequency / rate)];
-        found.push(Found { frequency, amplitude: tone.amplitude.value, causes });
-        *rest = line.residual(0, rest);
+        all
     }
-    found
 }

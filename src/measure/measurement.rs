@@ -2,8 +2,10 @@
 
 use super::expected::{Expected, Pattern};
 use super::lines::{Found, Lines, fit_lines};
+use super::quadrature::Quadrature;
+use super::record::Record;
 use super::{Cause, MeasureError, Settings, Spectrum, UnsettledEnds, Window};
-use crate::sine_fit::{Channel, Estimate, SineFit, find_tones, fit, locate};
+use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate};
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
@@ -27,8 +29,11 @@ pub struct Measurement {
     pub converters: usize,
     /// X.
     pub full_scale: f64,
-    /// The constant part of the record.
+    /// The constant part of the record; of complex records that of the real parts.
     pub offset: Estimate<f64>,
+    /// The two parts of a complex record; `None` for a real one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quadrature: Option<Quadrature>,
     /// The tones.
     pub tones: Vec<Tone>,
     /// Signal over everything else but the constant.
@@ -78,7 +83,7 @@ pub struct Measurement {
 /// A fitted tone.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Tone {
-    /// In its own Nyquist zone.
+    /// In its own Nyquist zone; in complex records with its sign.
     #[serde(rename = "frequency_hertz")]
     pub frequency: Estimate<Hertz>,
     /// Where the spectrum shows it.
@@ -117,35 +122,85 @@ pub struct Spur {
 /// # Errors
 /// [`MeasureError`], but not those of a comparison.
 pub fn measure(samples: &[f64], rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
+    if let Some(tone) = settings.tones.iter().find(|tone| tone.0 <= 0.0) {
+        let rule = "give a frequency above 0, for only complex samples tell its sign";
+        return Err(MeasureError::Setting { setting: "a tone of a real record", value: tone.0, rule });
+    }
+    measured(&Record::real(samples), rate, settings)
+}
+
+/// Measures a complex record of one or several tones e^{2 pi j f t}, each with the sign of its frequency.
+/// The powers of all figures are those of one part, so that equal converters of both parts have the figures
+/// that each has alone.
+///
+/// # Errors
+/// [`MeasureError`], but not those of a comparison.
+pub fn measure_complex(
+    real: &[f64],
+    imaginary: &[f64],
+    rate: Hertz,
+    settings: &Settings,
+) -> Result<Measurement, MeasureError> {
+    if real.len() != imaginary.len() {
+        let (setting, value) = ("the number of imaginary parts", imaginary.len() as f64);
+        return Err(MeasureError::Setting { setting, value, rule: "there is one for each real part" });
+    }
+    measured(&Record::complex(real, imaginary), rate, settings)
+}
+
+fn measured(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     settings.check()?;
-    let channels = [Channel::new(samples)];
-    let tones = fit(&channels, rate, &starts(&channels, rate, settings)?)?;
+    let tones = fit_tones(record, rate, settings)?;
     let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
     let pattern = Pattern {
         tones: &cycles,
+        is_complex: record.is_complex(),
         converters: settings.converters,
         harmonics: settings.harmonics,
-        resolution: 1.0 / samples.len() as f64,
+        resolution: 1.0 / record.len() as f64,
     };
     let expected = Expected::of(&pattern);
-    let lines = fit_lines(samples, &tones, &expected, &pattern)?;
-    let rest = Spectrum::new(&lines.rest, rate, settings.window);
-    Ok(Figures { samples, tones: &tones, lines: &lines, rest, settings }.assemble(expected.hidden))
+    let lines = fit_lines(record, &tones, &expected, &pattern)?;
+    let rest = spectrum(&lines.rest, rate, settings.window);
+    Ok(Figures { record, pattern: &pattern, tones: &tones, lines: &lines, rest, settings }
+        .assemble(expected.hidden))
+}
+
+/// The tones and, in complex records, their images. The largest tone of a complex record has the sign of its
+/// larger exponential.
+fn fit_tones(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<SineFit, MeasureError> {
+    let channels = record.channels();
+    let found = fit(&channels, rate, &starts(record, rate, settings)?)?;
+    let size = |direction| found.exponential([0, 1], 0, direction).amplitude.value;
+    let is_given = !settings.tones.is_empty() || !record.is_complex();
+    if is_given || size(Direction::Forward) >= size(Direction::Backward) {
+        return Ok(found);
+    }
+    Ok(fit(&channels, rate, &[-found.frequencies[0].value])?)
 }
 
 /// Frequencies at which the fit begins.
-fn starts(channels: &[Channel<'_>], rate: Hertz, settings: &Settings) -> Result<Vec<Hertz>, MeasureError> {
+fn starts(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<Hertz>, MeasureError> {
+    let channels = record.channels();
     if settings.tones.is_empty() {
-        return Ok(find_tones(channels, rate, 1, Decibels(0.0))?);
+        return Ok(find_tones(&channels, rate, 1, Decibels(0.0))?);
     }
-    let within = rate * NEAR.max(NEAR_BINS / channels[0].samples.len().max(1) as f64);
-    let start = |tone: &Hertz| Ok(locate(channels, rate, *tone, within)?);
+    let within = rate * NEAR.max(NEAR_BINS / record.len().max(1) as f64);
+    let start = |tone: &Hertz| Ok(locate(&channels, rate, *tone, within)?);
     settings.tones.iter().map(start).collect()
+}
+
+fn spectrum(record: &Record<'_>, rate: Hertz, window: Window) -> Spectrum {
+    match record.parts() {
+        [real, imaginary] => Spectrum::complex(real, imaginary, rate, window),
+        parts => Spectrum::new(&parts[0], rate, window),
+    }
 }
 
 /// What the figures are computed from.
 struct Figures<'a> {
-    samples: &'a [f64],
+    record: &'a Record<'a>,
+    pattern: &'a Pattern<'a>,
     tones: &'a SineFit,
     lines: &'a Lines,
     /// The spectrum of what is left without lines.
@@ -158,7 +213,7 @@ impl Figures<'_> {
         let Settings { converters, harmonics, full_scale, rails, window, .. } = *self.settings;
         let own = &self.tones.channels[0];
         let signal = self.signal_power();
-        let sinad = Decibels::of_power(signal / own.residual_rms.powi(2));
+        let sinad = Decibels::of_power(signal / self.other_power());
         let enob = (sinad.0 - 10.0 * 1.5f64.log10()) / (20.0 * 2f64.log10());
         let is_turned = converters > 1;
         let total = |counts: &dyn Fn(&Cause) -> bool| {
@@ -166,13 +221,14 @@ impl Figures<'_> {
             Decibels::of_power(counted.map(|line| 0.5 * line.amplitude.powi(2)).sum::<f64>() / signal)
         };
         Measurement {
-            samples: self.samples.len(),
+            samples: self.record.len(),
             left_out: own.left_out,
-            clipped: self.samples.iter().filter(|&&x| x <= rails.0 || x >= rails.1).count(),
+            clipped: self.clipped(rails),
             rate: self.tones.rate,
             converters,
             full_scale,
             offset: own.constant,
+            quadrature: self.record.is_complex().then(|| Quadrature::of(self.tones)),
             tones: self.tones(),
             sinad,
             enob,
@@ -189,13 +245,36 @@ impl Figures<'_> {
             noise_bandwidth_bins: window.noise_bandwidth(),
             spurs: self.spurs(),
             hidden,
-            unsettled_ends: UnsettledEnds::of(&self.lines.rest),
-            spectrum: Spectrum::new(&self.completed(), self.tones.rate, window),
+            unsettled_ends: UnsettledEnds::of(&self.lines.rest.size()),
+            spectrum: spectrum(&self.completed(), self.tones.rate, window),
+        }
+    }
+
+    /// Samples with a part at the rails.
+    fn clipped(&self, (lowest, highest): (f64, f64)) -> usize {
+        let is_clipped = |part: &[f64], n: usize| part[n] <= lowest || part[n] >= highest;
+        (0..self.record.len()).filter(|&n| self.record.parts().iter().any(|part| is_clipped(part, n))).count()
+    }
+
+    /// The tone k: the sine, or the exponential of a complex record.
+    fn tone(&self, k: usize) -> ToneFit {
+        match self.record.is_complex() {
+            true => self.tones.exponential([0, 1], k, Direction::Forward),
+            false => self.tones.channels[0].tones[k],
         }
     }
 
     fn amplitudes(&self) -> impl Iterator<Item = f64> {
-        self.tones.channels[0].tones.iter().map(|tone| tone.amplitude.value)
+        (0..self.tones.tones()).map(|k| self.tone(k).amplitude.value)
+    }
+
+    /// The mean square of what tones and constant leave; the images of the tones are part of it.
+    fn other_power(&self) -> f64 {
+        let parts = self.tones.channels.iter().map(|part| part.residual_rms.powi(2));
+        let rest = parts.sum::<f64>() / self.tones.channels.len() as f64;
+        let image = |k| 0.5 * self.tones.exponential([0, 1], k, Direction::Backward).amplitude.value.powi(2);
+        let images = (0..self.tones.tones()).filter(|_| self.record.is_complex()).map(image);
+        rest + images.sum::<f64>()
     }
 
     /// Sum of A^2 / 2.
@@ -209,14 +288,17 @@ impl Figures<'_> {
 
     fn tones(&self) -> Vec<Tone> {
         let rate = self.tones.rate;
-        let tone = |(fitted, frequency): (&crate::sine_fit::ToneFit, &Estimate<Hertz>)| Tone {
-            frequency: *frequency,
-            alias: rate * super::expected::folded(frequency.value / rate),
-            amplitude: fitted.amplitude,
-            level: Decibels::of_amplitude(fitted.amplitude.value / self.settings.full_scale),
-            phase: fitted.phase,
+        let tone = |(k, frequency): (usize, &Estimate<Hertz>)| {
+            let ToneFit { amplitude, phase } = self.tone(k);
+            Tone {
+                frequency: *frequency,
+                alias: rate * self.pattern.seen(frequency.value / rate),
+                amplitude,
+                level: Decibels::of_amplitude(amplitude.value / self.settings.full_scale),
+                phase,
+            }
         };
-        self.tones.channels[0].tones.iter().zip(&self.tones.frequencies).map(tone).collect()
+        self.tones.frequencies.iter().enumerate().map(tone).collect()
     }
 
     /// The largest tone over the largest line that counts, or the largest bin of the rest.
@@ -228,11 +310,10 @@ impl Figures<'_> {
     }
 
     fn noise_density(&self) -> Decibels {
-        let used = self.tones.channels[0].used as f64;
-        let power = self.lines.rest.iter().map(|x| x * x).sum::<f64>() / self.lines.rest.len() as f64;
+        let (used, all) = (self.tones.channels[0].used as f64, self.record.len() as f64);
+        let power = self.lines.rest.energy() / all;
         // Lines and missing samples took a share of the noise with them.
-        let share =
-            if power > 0.0 { self.lines.noise_power / power } else { self.lines.rest.len() as f64 / used };
+        let share = if power > 0.0 { self.lines.noise_power / power } else { all / used };
         Decibels::of_power(self.rest.density() * share / (0.5 * self.settings.full_scale.powi(2)))
     }
 
@@ -251,13 +332,15 @@ impl Figures<'_> {
     }
 
     /// The samples without their constant; the fitted tones where one is missing.
-    fn completed(&self) -> Vec<f64> {
-        let offset = self.tones.channels[0].constant.value;
-        if self.samples.iter().all(|x| x.is_finite()) {
-            return self.samples.iter().map(|x| x - offset).collect();
-        }
-        let fitted = self.tones.residual(0, &vec![offset; self.samples.len()]);
-        let value = |(x, tones): (&f64, &f64)| if x.is_finite() { x - offset } else { -tones };
-        self.samples.iter().zip(&fitted).map(value).collect()
+    fn completed(&self) -> Record<'static> {
+        self.record.map(|i, part| {
+            let offset = self.tones.channels[i].constant.value;
+            if part.iter().all(|x| x.is_finite()) {
+                return part.iter().map(|x| x - offset).collect();
+            }
+            let fitted = self.tones.residual(i, &vec![offset; part.len()]);
+            let value = |(x, tones): (&f64, &f64)| if x.is_finite() { x - offset } else { -tones };
+            part.iter().zip(&fitted).map(value).collect()
+        })
     }
 }

@@ -30,6 +30,13 @@
 //!
 //! The amplitude of a line is that of a sine of its power; a line at fs / 2 has no phase, and the power a^2
 //! of its size a.
+//!
+//! # Complex records
+//!
+//! A tone of a complex record ([`measure_complex`]) is A e^{j (w n + phi)}, w from -pi to pi. All powers are
+//! means over both parts, so a tone has A^2 / 2 there too, and the noise density is that of fs hertz. Parts
+//! that are not alike give an image of the tone at -w: [`Quadrature`]. It counts as neither harmonic nor
+//! noise. Spurs of interleaving lie at f + k fs / M, and their images at the negative frequencies.
 
 mod alignment;
 mod cause;
@@ -41,6 +48,8 @@ mod interpolate;
 mod lag;
 mod lines;
 mod measurement;
+mod quadrature;
+mod record;
 mod spectrum;
 #[cfg(test)]
 mod tests;
@@ -50,7 +59,8 @@ pub use cause::Cause;
 pub use compare::{Band, Comparison, compare};
 pub use ends::UnsettledEnds;
 pub use error::MeasureError;
-pub use measurement::{Measurement, Spur, Tone, measure};
+pub use measurement::{Measurement, Spur, Tone, measure, measure_complex};
+pub use quadrature::{Imbalance, Quadrature};
 pub use spectrum::Spectrum;
 pub use window::Window;
 
@@ -62,7 +72,8 @@ const MOST: usize = 1024;
 /// What is measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// The tones, each in its own Nyquist zone; empty for the largest one.
+    /// The tones, each in its own Nyquist zone and in complex records with its sign; empty for the largest
+    /// one.
     pub tones: Vec<Hertz>,
     /// M, converters in turn; 1 for a single one.
     pub converters: usize,

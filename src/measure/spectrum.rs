@@ -1,20 +1,25 @@
 //! Amplitude spectra.
 
 use super::Window;
-use crate::linalg::fourier;
+use crate::linalg::{Complex, fourier};
 use crate::units::Hertz;
 use std::f64::consts::SQRT_2;
 
-/// The spectrum of a record: bin k is the amplitude of the sine that has the power of the bin, at the
-/// frequency k fs / N.
+const J: Complex<f64> = Complex::new(0.0, 1.0);
+
+/// The spectrum of a record: each bin is the amplitude of the sine that has the power of the bin, or in
+/// complex records of the exponential. Bin k lies k fs / N above the first one, which is at 0; complex
+/// records begin with the bin after -fs / 2.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spectrum {
     /// The window of the record.
     pub window: Window,
     /// fs / N.
     pub bin: Hertz,
+    /// The number of bins below 0; 0 for real samples.
+    pub negative: usize,
     /// 2 |X_k| / sum w for k = 0 ..= N/2; sqrt 2 in place of 2 for k = 0 and k = N/2, which have no mirror
-    /// image.
+    /// image. Of complex samples |Z_k| / sum w for -N/2 < k <= N/2.
     pub amplitudes: Vec<f64>,
 }
 
@@ -25,20 +30,33 @@ impl Spectrum {
         let transform = fourier::real_spectrum(&window.apply(samples));
         let scale = 1.0 / (window.coefficients()[0] * count as f64);
         let is_single = |k: usize| k == 0 || 2 * k == count;
-        let amplitude = |(k, x): (usize, &crate::linalg::Complex<f64>)| {
-            x.norm() * scale * if is_single(k) { SQRT_2 } else { 2.0 }
-        };
+        let amplitude =
+            |(k, x): (usize, &Complex<f64>)| x.norm() * scale * if is_single(k) { SQRT_2 } else { 2.0 };
         let amplitudes = transform.iter().enumerate().map(amplitude).collect();
-        Self { window, bin: rate / count as f64, amplitudes }
+        Self { window, bin: rate / count as f64, negative: 0, amplitudes }
     }
 
-    /// Frequency of bin k.
+    /// Of finite complex samples, as many real as imaginary parts.
+    ///
+    /// The transforms X and Y of the parts give those of both signs: Z_k = X_k + j Y_k and
+    /// Z_-k = conj(X_k - j Y_k).
+    pub fn complex(real: &[f64], imaginary: &[f64], rate: Hertz, window: Window) -> Self {
+        let count = real.len().max(1);
+        let [x, y] = [real, imaginary].map(|part| fourier::real_spectrum(&window.apply(part)));
+        let scale = 1.0 / (window.coefficients()[0] * count as f64);
+        let negative = (count - 1) / 2;
+        let below = (1..=negative).rev().map(|k| (x[k] - J * y[k]).norm() * scale);
+        let above = x.iter().zip(&y).map(|(x, y)| (x + J * y).norm() * scale);
+        Self { window, bin: rate / count as f64, negative, amplitudes: below.chain(above).collect() }
+    }
+
+    /// Frequency of bin k, from the first one on.
     pub fn frequency(&self, k: usize) -> Hertz {
-        self.bin * k as f64
+        self.bin * (k as f64 - self.negative as f64)
     }
 
-    /// At most `columns` points, the largest bin of each stretch of equally many: its frequency and amplitude. No
-    /// line is lost, however narrow it is.
+    /// At most `columns` points, the largest bin of each stretch of equally many: its frequency and
+    /// amplitude. No line is lost, however narrow it is.
     pub fn columns(&self, columns: usize) -> Vec<(Hertz, f64)> {
         let width = self.amplitudes.len().div_ceil(columns.max(1)).max(1);
         let point = |(column, bins): (usize, &[f64])| {
@@ -58,8 +76,9 @@ impl Spectrum {
 
     /// The largest amplitude of bins beyond the main lobe of the constant.
     pub fn largest(&self) -> f64 {
-        let skipped = self.window.coefficients().len();
-        self.amplitudes.iter().skip(skipped).fold(0.0, |most, a| most.max(*a))
+        let lobe = self.window.coefficients().len();
+        let beyond = self.amplitudes.iter().enumerate().filter(|(k, _)| k.abs_diff(self.negative) >= lobe);
+        beyond.fold(0.0, |most, (_, a)| most.max(*a))
     }
 
     /// Mean noise density in squared units of the samples per hertz: the mean of A_k^2 / 2 over the bins,
@@ -69,7 +88,7 @@ impl Spectrum {
         if count < 3 {
             return f64::NAN;
         }
-        // The first and the last bin are half as wide as the others and are left out.
+        // The first and the last bin of real samples are half as wide as the others and are left out.
         self.mean_square(1, count - 1) / (self.bin.0 * (count - 2) as f64)
     }
 }

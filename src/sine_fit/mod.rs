@@ -24,8 +24,10 @@
 //! sigma(2 pi f T)^2 = 12 / (SNR N (N^2 - 1))
 //! ```
 //!
-//! The frequency of C joint channels has 1/C of that variance. Noise that repeats with the tone, such as the
-//! quantisation of few distinct phases, is not independent, and sigma is then too small.
+//! A complex record is two channels, its real and its imaginary part, fitted jointly:
+//! [`SineFit::exponential`]. The frequency of C joint channels has 1/C of that variance. Noise that repeats
+//! with the tone, such as the quantisation of few distinct phases, is not independent, and sigma is then too
+//! small.
 //!
 //! # Cost
 //!
@@ -36,6 +38,7 @@
 mod columns;
 mod error;
 mod estimate;
+mod exponential;
 mod gauss_newton;
 mod normal;
 mod result;
@@ -45,6 +48,7 @@ mod tests;
 
 pub use error::SineFitError;
 pub use estimate::Estimate;
+pub use exponential::{ComplexChannel, Direction};
 pub use gauss_newton::{fit, fit_known};
 pub use result::{ChannelFit, SineFit, ToneFit};
 pub use search::{find_tones, locate};

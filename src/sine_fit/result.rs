@@ -188,16 +188,26 @@ impl SineFit {
         if channel == reference {
             return Estimate { value: Seconds(0.0), sigma: Seconds(0.0) };
         }
-        let (mut one, mut two) = (self.phase_gradient(channel, tone), self.phase_gradient(reference, tone));
-        two.channels[0].1.neg_mut();
-        one.channels.append(&mut two.channels);
-        one.frequencies -= two.frequencies;
+        let mut one = self.phase_difference_gradient(channel, reference, tone);
         // d(phase / omega) also contains the error of omega.
         one.frequencies[(tone, 0)] -= difference / (TAU * self.cycles[tone] * self.covariance.unit);
         Estimate {
             value: Seconds(-difference / omega),
             sigma: Seconds(self.covariance.sigma(&one) / omega.abs()),
         }
+    }
+
+    /// The phase of tone `tone` in `channel` minus that in `reference` (all from 0), in -pi ..= pi.
+    ///
+    /// # Panics
+    /// If there is no such channel or tone.
+    pub fn phase_between(&self, channel: usize, reference: usize, tone: usize) -> Estimate<Radians> {
+        if channel == reference {
+            return Estimate { value: Radians(0.0), sigma: Radians(0.0) };
+        }
+        let sigma = self.covariance.sigma(&self.phase_difference_gradient(channel, reference, tone));
+        let difference = wrapped(self.phase(channel, tone) - self.phase(reference, tone));
+        Estimate { value: Radians(difference), sigma: Radians(sigma) }
     }
 
     /// The amplitude of tone `tone` in `channel` divided by that in `reference` (all from 0).
@@ -220,7 +230,7 @@ impl SineFit {
         self.cycles.len()
     }
 
-    fn coefficients(&self, channel: usize, tone: usize) -> (f64, f64) {
+    pub(super) fn coefficients(&self, channel: usize, tone: usize) -> (f64, f64) {
         let linear = &self.linear[channel];
         (linear[linear_count(tone)], linear[linear_count(tone) + 1])
     }
@@ -258,16 +268,35 @@ impl SineFit {
     }
 
     /// Samples from the instant 0 to the centre of the record.
-    fn distance(&self, channel: usize) -> f64 {
+    pub(super) fn distance(&self, channel: usize) -> f64 {
         (self.offsets[channel] * self.rate.0).0 + self.centres[channel]
     }
 
     /// The phase at the instant 0; a cos + b sin has the phase atan2(-b, a) at the centre.
     fn phase(&self, channel: usize, tone: usize) -> f64 {
         let (a, b) = self.coefficients(channel, tone);
+        wrapped((-b).atan2(a) - self.phase_to_centre(channel, tone))
+    }
+
+    /// 2 pi f t from the instant 0 to the centre of the record, without whole turns.
+    pub(super) fn phase_to_centre(&self, channel: usize, tone: usize) -> f64 {
         let whole = fraction_of_turn(self.cycles[tone], self.centres[channel])
             + fraction_of_turn(self.cycles[tone], (self.offsets[channel] * self.rate.0).0);
-        wrapped((-b).atan2(a) - TAU * whole)
+        TAU * whole
+    }
+
+    /// The standard deviation of a quantity with the derivatives `by_pairs` by the cosine and the sine of a
+    /// tone in some channels, and `by_frequency` by its frequency in radians per sample.
+    pub(super) fn sigma_of(&self, tone: usize, by_pairs: &[(usize, (f64, f64))], by_frequency: f64) -> f64 {
+        let own = |&(channel, (a, b)): &(usize, (f64, f64))| {
+            let mut own = Mat::zeros(self.linear[channel].len(), 1);
+            own[(linear_count(tone), 0)] = a;
+            own[(linear_count(tone) + 1, 0)] = b;
+            (channel, own)
+        };
+        let mut frequencies = Mat::zeros(self.cycles.len(), 1);
+        frequencies[(tone, 0)] = by_frequency / self.covariance.unit;
+        self.covariance.sigma(&Gradient { channels: by_pairs.iter().map(own).collect(), frequencies })
     }
 
     /// A gradient by the coefficients of one channel.
@@ -293,10 +322,19 @@ impl SineFit {
         gradient.frequencies[(tone, 0)] = -self.distance(channel) / self.covariance.unit;
         gradient
     }
+
+    /// The gradient of the phase in `channel` minus that in `reference`, which is another one.
+    fn phase_difference_gradient(&self, channel: usize, reference: usize, tone: usize) -> Gradient {
+        let (mut one, mut two) = (self.phase_gradient(channel, tone), self.phase_gradient(reference, tone));
+        two.channels[0].1.neg_mut();
+        one.channels.append(&mut two.channels);
+        one.frequencies -= two.frequencies;
+        one
+    }
 }
 
 /// An angle in -pi ..= pi.
-fn wrapped(angle: f64) -> f64 {
+pub(super) fn wrapped(angle: f64) -> f64 {
     let whole = (angle / TAU).round();
     (angle - whole * TAU).clamp(-PI, PI)
 }

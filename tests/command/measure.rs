@@ -50,6 +50,41 @@ fn a_recording_is_measured() {
     assert_eq!(single["spurs"][0]["causes"][0]["kind"], "unknown");
 }
 
+/// An exponential of negative frequency whose imaginary part is 1 % larger.
+#[test]
+fn a_complex_recording_is_measured() {
+    let desk = Desk::with_spec(THESIS);
+    let mut random = Random(4);
+    let mut noisy = |x: f64| (x + 1e-5 * random.sample()) as f32;
+    let pair = |n: usize| (0.5 * (-TAU * 0.17 * n as f64).cos(), 0.505 * (-TAU * 0.17 * n as f64).sin());
+    let bytes = (0..8000).map(pair).flat_map(|(x, y)| [noisy(0.01 + x), noisy(y - 0.02)]);
+    desk.write("x.cf32", bytes.flat_map(f32::to_le_bytes).collect::<Vec<u8>>());
+    let args = ["measure", "x.cf32", "--format", "cf32", "--rate", "1MHz"];
+    let found = desk.json(&[&args[..], &["--json"]].concat());
+    let near = |path: &str, want: f64, tolerance: f64| {
+        let got = number(&found, path);
+        assert!((got - want).abs() < tolerance, "{path}: {got} instead of {want}");
+    };
+    near("/tones/0/frequency_hertz/value", -170_000.0, 0.01);
+    near("/tones/0/amplitude/value", 0.5025, 1e-6);
+    near("/offset/value", 0.01, 1e-6);
+    near("/quadrature/offset/value", -0.02, 1e-6);
+    near("/quadrature/imbalances/0/gain/value", 1.01, 3e-6);
+    near("/quadrature/imbalances/0/phase_radians/value", 0.0, 3e-6);
+    near("/quadrature/imbalances/0/image_rejection_db", db(2.01 / 0.01), 0.01);
+    near("/spurs/0/frequency_hertz", 170_000.0, 0.01);
+    assert_eq!(found["spurs"][0]["causes"][0]["kind"], "image");
+    let report = desk.good(&[&args[..], &["--tone", "-170kHz", "--plot", "x.svg"]].concat());
+    for part in ["-170000.0", "offset, imag.", "image rejection 46.06 dB", "image, -f"] {
+        assert!(report.contains(part), "{part}: {report}");
+    }
+    assert!(fs::read_to_string(desk.path("x.svg")).unwrap().contains("\n-400\n"));
+    let compared = [&args[..], &["--ref", "x.cf32"]].concat();
+    desk.refused(1, &compared, &["x.cf32: complex samples", "--ref"]);
+    wav::write(&desk, "x.wav", 1, 48_000, &capture(2000, 4321.0));
+    desk.refused(1, &["measure", "x.wav", "--tone", "-4321Hz"], &["-4321", "above 0"]);
+}
+
 #[test]
 fn the_spectrum_is_drawn_with_its_spurs() {
     let desk = Desk::with_spec(THESIS);
@@ -61,6 +96,8 @@ fn the_spectrum_is_drawn_with_its_spurs() {
         assert!(svg.contains(part), "{part}");
     }
     desk.refused(1, &args, &["x.svg", "exists", "--force"]);
+    desk.good(&["measure", "x.wav", "--plot", "x.PNG"]);
+    assert!(desk.read("x.PNG").starts_with(b"\x89PNG"));
     desk.refused(2, &["measure", "x.wav", "--plot", "-"], &["--plot -", "file"]);
     desk.refused(1, &["measure", "x.wav", "--plot", "x.wav", "--force"], &["x.wav"]);
 }
@@ -142,15 +179,16 @@ fn what_cannot_be_measured_is_refused() {
     desk.refused(1, &["measure", "short.wav", "--interleaved", "16"], &["short.wav", "too few", "harmonics"]);
     desk.refused(1, &["measure", "x.wav", "--tone", "9kHz"], &["x.wav", "no tone found near 9000 Hz"]);
     desk.refused(2, &["measure", "x.wav", "--tone", "fast"], &["fast", "auto"]);
-    desk.refused(2, &["measure", "x.wav", "--tone", "-3"], &["unexpected argument"]);
-    desk.refused(2, &["measure", "x.wav", "--tone", "0"], &["above 0"]);
+    desk.refused(1, &["measure", "x.wav", "--tone", "-3"], &["x.wav", "-3", "above 0"]);
+    desk.refused(2, &["measure", "x.wav", "--tone", "0"], &["other than 0"]);
     desk.refused(2, &["measure", "x.wav", "--tone", "auto,4321"], &["not both"]);
     desk.refused(2, &["measure", "x.wav", "--full-scale", "0"], &["--full-scale 0", "positive"]);
     desk.refused(2, &["measure", "x.wav", "--interleaved", "0"], &["0"]);
     desk.refused(1, &["measure", "none.wav"], &["none.wav"]);
 }
 
-/// Two channels 0.4 fast samples off their places: plain interleaving has the spurs of that skew, the bank not.
+/// Two channels 0.4 fast samples off their places: plain interleaving has the spurs of that skew, the bank
+/// not.
 #[test]
 fn fuse_measures_before_and_after() {
     let desk = Desk::with_spec(THESIS);

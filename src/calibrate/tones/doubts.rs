@@ -1,9 +1,9 @@
 //! Tones whose intervals would be too short.
 
 use super::super::measured::Measured;
-use super::super::record::Record;
 use super::super::remark::Remark;
-use crate::sine_fit::SineFit;
+use super::captured::Captures;
+use crate::sine_fit::{Direction, SineFit};
 
 /// Harmonics that are looked at.
 const HARMONICS: std::ops::RangeInclusive<usize> = 2..=10;
@@ -30,17 +30,17 @@ pub(super) fn of_tone(
     tone: &mut Measured,
     sines: &SineFit,
     t: usize,
-    records: &[Record],
+    captures: &Captures<'_>,
     reference: usize,
 ) -> Vec<Remark> {
-    let frames = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
+    let frames = captures.frames();
     let falls = |h: &usize| distance(*h as f64 * tone.cycles, tone.cycles) * (frames as f64) < RESOLUTION;
     let harmonic = HARMONICS.into_iter().find(falls);
     let mut remarks: Vec<Remark> =
         harmonic.map(|order| Remark::HarmonicOnTone { tone: tone.frequency, order }).into_iter().collect();
     if let Some(phases) = few_phases(tone.cycles, frames) {
         remarks.push(Remark::FewPhases { tone: tone.frequency, phases });
-        widen(tone, sines, t, records, Pattern { phases, reference });
+        widen(tone, sines, t, captures, Pattern { phases, reference });
     }
     remarks
 }
@@ -61,19 +61,25 @@ struct Pattern {
 }
 
 /// What the residual repeats with the phase also hides in the tone itself: a pattern of q values of variance
-/// u^2 adds 2 u^2 / q to the variance of each part of the amplitude.
-fn widen(tone: &mut Measured, sines: &SineFit, t: usize, records: &[Record], pattern: Pattern) {
+/// u^2 adds 2 u^2 / q to the variance of each part of the amplitude. An exponential has a quarter of that of
+/// the real and of the imaginary part.
+fn widen(tone: &mut Measured, sines: &SineFit, t: usize, captures: &Captures<'_>, pattern: Pattern) {
     let Pattern { phases, reference } = pattern;
     if phases <= FITTED {
         return;
     }
-    let relative = |(i, record): (usize, &Record)| {
-        let channel = &sines.channels[i];
-        let residual = sines.residual(i, &record.samples);
-        let variance = pattern_variance(&residual, &record.keep, phases, channel.noise);
-        2.0 * variance / phases as f64 / channel.tones[t].amplitude.value.powi(2)
+    let relative = |i: usize| {
+        let (record, parts) = (captures.record(i), captures.parts(i));
+        let share = 1.0 / parts.len().pow(2) as f64;
+        let variance = |(part, samples): (usize, &[f64])| {
+            let residual = sines.residual(part, samples);
+            share * pattern_variance(&residual, &record.keep, phases, sines.channels[part].noise)
+        };
+        let variance: f64 = parts.zip(record.parts()).map(variance).sum();
+        let amplitude = captures.tone(sines, i, t, Direction::Forward).amplitude.value;
+        2.0 * variance / phases as f64 / amplitude.powi(2)
     };
-    let added: Vec<f64> = records.iter().enumerate().map(relative).collect();
+    let added: Vec<f64> = (0..tone.sigmas.len()).map(relative).collect();
     for (sigmas, own) in tone.sigmas.iter_mut().zip(&added) {
         let more = (own + added[reference]).sqrt();
         *sigmas = (sigmas.0.hypot(more), sigmas.1.hypot(more));

@@ -12,6 +12,7 @@
 //! their covariance.
 
 mod branch;
+mod captured;
 mod doubts;
 mod least_squares;
 #[cfg(test)]
@@ -28,10 +29,12 @@ use super::record::Record;
 use super::remark::Remark;
 use super::settings::Settings;
 use crate::linalg::{Complex, Mat};
-use crate::sine_fit::{self, Channel, SineFit};
+use crate::sine_fit::{self, Channel, Direction, SineFit};
 use crate::units::{Decibels, FastPeriods, Hertz};
+use captured::Captures;
 use least_squares::{Equations, Row};
 use std::f64::consts::TAU;
+use zones::Alias;
 
 /// Most tones that are looked for, and how far below the largest.
 const MOST_TONES: usize = 16;
@@ -59,26 +62,31 @@ pub(super) fn fit(
     settings: Settings,
 ) -> Result<(Fitted, Found), CalibrateError> {
     let rate = model.slow_rate();
-    let channels: Vec<Channel<'_>> = records.iter().map(Record::channel).collect();
-    let frames = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
+    let captures = Captures::new(records);
+    let (channels, frames) = (captures.channels(), captures.frames());
     let mut remarks = Vec::new();
     let (starts, used) = match given {
-        [] => found(model, &channels, frames, settings.reference, &mut remarks)?,
+        [] => found(model, &captures, settings.reference, &mut remarks)?,
         _ => (located(&channels, rate, given, frames)?, (0..given.len()).collect()),
     };
     let sines = sine_fit::fit(&channels, rate, &starts)?;
+    check_signs(&captures, &sines)?;
     if settings.fit.cutoff && used.len() < CUTOFF_TONES {
         return Err(CalibrateError::TooFewTones { tones: used.len() });
     }
     let mut measured: Vec<Measured> =
-        used.iter().map(|&t| measure(model, &sines, t, settings.reference)).collect();
+        used.iter().map(|&t| measure(model, &captures, &sines, t, settings.reference)).collect();
     for (tone, &t) in measured.iter_mut().zip(&used) {
-        remarks.extend(doubts::of_tone(tone, &sines, t, records, settings.reference));
+        remarks.extend(doubts::of_tone(tone, &sines, t, &captures, settings.reference));
     }
     check_order(model, &measured, settings.reference)?;
     let modulus = branch::modulus(&measured);
     let mut fitted = solve(model, &measured, &modulus, settings, &mut remarks)?;
-    if settings.fit.offset {
+    if settings.fit.offset && captures.is_complex {
+        let values = |i| captures.constants(&sines, i).map(|constant| constant.value);
+        let offsets = (0..model.channels()).map(|i| values(i).collect()).collect();
+        fitted.remarks.push(Remark::ComplexOffsets { offsets });
+    } else if settings.fit.offset {
         let constants = sines.channels.iter().map(|c| (c.constant.value, c.constant.sigma));
         fitted.offsets = Some(constants.collect());
     }
@@ -86,8 +94,8 @@ pub(super) fn fit(
     fitted.remarks.extend(remarks);
     let tone = |&t: &usize| Tone {
         frequency: sines.frequencies[t],
-        zone: (2.0 * (sines.frequencies[t].value / rate)).floor() as usize + 1,
-        amplitude: sines.channels[settings.reference].tones[t].amplitude,
+        zone: (2.0 * (sines.frequencies[t].value / rate).abs()).floor() as usize + 1,
+        amplitude: captures.tone(&sines, settings.reference, t, Direction::Forward).amplitude,
     };
     Ok((fitted, Found { tones: used.iter().map(tone).collect(), modulus }))
 }
@@ -101,10 +109,19 @@ fn located(
 ) -> Result<Vec<Hertz>, CalibrateError> {
     let near = |&tone: &Hertz| {
         check_position(tone, rate, frames)?;
-        let within = tone * CLOCK_TOLERANCE + rate * (SEARCH_CYCLES / frames as f64);
+        let within = Hertz(tone.0.abs()) * CLOCK_TOLERANCE + rate * (SEARCH_CYCLES / frames as f64);
         Ok(sine_fit::locate(channels, rate, tone, within)?)
     };
     given.iter().map(near).collect()
+}
+
+/// Refuses tones of complex samples whose images are larger.
+fn check_signs(captures: &Captures<'_>, sines: &SineFit) -> Result<(), CalibrateError> {
+    let is_image = |&t: &usize| captures.direction(sines, t) == Direction::Backward;
+    match (0..sines.tones()).find(is_image) {
+        Some(t) => Err(CalibrateError::OtherSign { tone: sines.frequencies[t].value }),
+        None => Ok(()),
+    }
 }
 
 /// Refuses a tone at a multiple of half the slow rate.
@@ -120,49 +137,45 @@ fn check_position(tone: Hertz, rate: Hertz, frames: usize) -> Result<(), Calibra
 /// The tones in the captures, in their zones, and which of them tell something of the delays.
 fn found(
     model: &Model,
-    channels: &[Channel<'_>],
-    frames: usize,
+    captures: &Captures<'_>,
     reference: usize,
     remarks: &mut Vec<Remark>,
 ) -> Result<(Vec<Hertz>, Vec<usize>), CalibrateError> {
-    let rate = model.slow_rate();
-    let aliases = sine_fit::find_tones(channels, rate, MOST_TONES, TONE_RANGE)?;
-    let sines = sine_fit::fit(channels, rate, &aliases)?;
-    let cycles: Vec<f64> = sines.frequencies.iter().map(|f| f.value / rate).collect();
+    let (rate, channels, frames) = (model.slow_rate(), captures.channels(), captures.frames());
+    let aliases = sine_fit::find_tones(&channels, rate, MOST_TONES, TONE_RANGE)?;
+    let sines = sine_fit::fit(&channels, rate, &aliases)?;
+    let directions: Vec<Direction> = (0..sines.tones()).map(|t| captures.direction(&sines, t)).collect();
+    let signed = sines.frequencies.iter().zip(&directions);
+    let cycles: Vec<f64> = signed.map(|(f, direction)| direction.sign() * (f.value / rate)).collect();
     let is_own = |&k: &usize| !(0..k).any(|j| doubts::is_harmonic(cycles[k], cycles[j], frames));
     let used: Vec<usize> = (0..cycles.len()).filter(is_own).collect();
     if used.len() < cycles.len() {
         remarks.push(Remark::HarmonicsLeftOut { count: cycles.len() - used.len() });
     }
-    let mut starts: Vec<Hertz> = sines.frequencies.iter().map(|f| f.value).collect();
+    let mut starts: Vec<Hertz> = cycles.iter().map(|&cycles| rate * cycles).collect();
     for &t in &used {
         check_position(starts[t], rate, frames)?;
-        let phases: Vec<f64> = sines.channels.iter().map(|c| c.tones[t].phase.value.0).collect();
-        starts[t] = rate * zones::resolve(model, cycles[t], &phases, reference)?;
+        let phase = |i| captures.tone(&sines, i, t, directions[t]).phase.value.0;
+        let phases: Vec<f64> = (0..model.channels()).map(phase).collect();
+        let alias = Alias { cycles: cycles[t], is_complex: captures.is_complex };
+        starts[t] = rate * zones::resolve(model, alias, &phases, reference)?;
     }
     Ok((starts, used))
 }
 
 /// The ratios of one tone and their errors.
-fn measure(model: &Model, sines: &SineFit, t: usize, reference: usize) -> Measured {
+fn measure(model: &Model, captures: &Captures<'_>, sines: &SineFit, t: usize, reference: usize) -> Measured {
     let frequency = sines.frequencies[t].value;
-    let w = TAU * frequency.per_fast_period(model.fast_period).0;
-    let amplitude = |i: usize| {
-        let tone = sines.channels[i].tones[t];
-        Complex::from_polar(tone.amplitude.value, tone.phase.value.0)
-    };
+    let w = TAU * frequency.per_fast_period(model.fast_period).0.abs();
+    let amplitude = |i: usize| captures.amplitude(sines, i, t);
     let expected = |i: usize| model.nominal(i, w) / model.nominal(reference, w);
     let ratio = |i: usize| amplitude(i) / amplitude(reference) / expected(i);
-    let sigma = |i: usize| {
-        let (gain, lag) = (sines.gain_between(i, reference, t), sines.lag_between(i, reference, t));
-        (gain.sigma / gain.value, TAU * frequency.0 * lag.sigma.0)
-    };
     Measured {
         w,
         cycles: frequency / sines.rate,
         frequency,
         ratios: (0..model.channels()).map(ratio).collect(),
-        sigmas: (0..model.channels()).map(sigma).collect(),
+        sigmas: (0..model.channels()).map(|i| captures.sigmas(sines, i, reference, t)).collect(),
     }
 }
 

@@ -19,32 +19,57 @@ struct Candidate {
     distance: f64,
 }
 
-/// The frequency, in cycles per slow sample, of a tone that appears at `alias` (0 to 1/2) with `phases`:
-/// the zone below half the fast rate whose nominal phases agree. Odd zones (from 0) turn the phases round.
+/// Where the captures show a tone.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Alias {
+    /// Cycles per slow sample: 0 to 1/2, of complex samples -1/2 to 1/2.
+    pub(super) cycles: f64,
+    pub(super) is_complex: bool,
+}
+
+impl Alias {
+    /// The frequencies below half the fast rate with this alias, in cycles per slow sample, and whether the
+    /// phases are turned round there: those of real samples are in odd zones (from 0).
+    fn frequencies(self, ratio: usize) -> Vec<(f64, bool)> {
+        let alias = self.cycles;
+        if self.is_complex {
+            let most = 0.5 * ratio as f64;
+            let all = (-(ratio as i64)..=ratio as i64).map(|turns| turns as f64 + alias);
+            return all.filter(|cycles| cycles.abs() < most).map(|cycles| (cycles, false)).collect();
+        }
+        let of_zone = |zone: usize| match zone % 2 {
+            1 => (zone.div_ceil(2) as f64 - alias, true),
+            _ => ((zone / 2) as f64 + alias, false),
+        };
+        (0..ratio).map(of_zone).collect()
+    }
+}
+
+/// The frequency, in cycles per slow sample, of a tone that appears at `alias` with `phases`: the one below
+/// half the fast rate whose nominal phases agree.
 pub(super) fn resolve(
     model: &Model,
-    alias: f64,
+    alias: Alias,
     phases: &[f64],
     reference: usize,
 ) -> Result<f64, CalibrateError> {
+    let all = alias.frequencies(model.ratio).into_iter();
     let mut candidates: Vec<Candidate> =
-        (0..model.ratio).map(|zone| candidate(model, alias, zone, phases, reference)).collect();
+        all.map(|place| candidate(model, place, phases, reference)).collect();
     candidates.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     match candidates[..] {
         [only] => Ok(only.cycles),
         [best, second, ..] if best.distance > CLEAR * second.distance || best.distance > CLOSE => {
             let rate = model.slow_rate();
-            let (alias, best, other) = (rate * alias, rate * best.cycles, rate * second.cycles);
+            let (alias, best, other) = (rate * alias.cycles, rate * best.cycles, rate * second.cycles);
             Err(CalibrateError::AmbiguousZone { alias, best, other })
         }
         [best, ..] => Ok(best.cycles),
-        [] => Ok(alias),
+        [] => Ok(alias.cycles),
     }
 }
 
-fn candidate(model: &Model, alias: f64, zone: usize, phases: &[f64], reference: usize) -> Candidate {
-    let is_turned = zone % 2 == 1;
-    let cycles = if is_turned { zone.div_ceil(2) as f64 - alias } else { (zone / 2) as f64 + alias };
+fn candidate(model: &Model, (cycles, is_turned): (f64, bool), phases: &[f64], reference: usize) -> Candidate {
     let w = TAU * cycles / model.ratio as f64;
     let off = |i: usize| {
         let measured = phases[i] - phases[reference];

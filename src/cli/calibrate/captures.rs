@@ -35,18 +35,28 @@ pub(super) fn read(
     let mut reader = reader.ok_or_else(|| Failure::input("interrupted; nothing was written"))?;
     check_channels(spec, &reader)?;
     check_rate(spec, &reader)?;
-    let most = MOST_SAMPLES / reader.channels().max(1);
+    let parts = if reader.is_complex() { 2 } else { 1 };
+    let most = MOST_SAMPLES / (parts * reader.channels()).max(1);
     let headers = reader.headers();
-    let formats = headers.flat_map(|(_, header)| std::iter::repeat_n(header.layout.format, header.channels));
+    let formats =
+        headers.flat_map(|(_, header)| std::iter::repeat_n(header.layout.format, parts * header.channels));
     let formats: Vec<PcmFormat> = formats.collect();
-    let Whole { channels, is_cut } = Whole::read(&mut reader, most)?;
+    let Whole { channels, is_cut } = Whole::read_parts(&mut reader, most)?;
     let mut warnings: Vec<String> = reader.warnings().iter().map(ToString::to_string).collect();
     if is_cut {
         warnings.push(format!("only the first {most} frames are used"));
     }
     let records = channels.into_iter().zip(formats);
-    let records = records.map(|(samples, format)| record(samples, format, reading.clip));
-    Ok((records.collect(), warnings))
+    let mut records = records.map(|(samples, format)| record(samples, format, reading.clip));
+    let mut all = Vec::new();
+    while let Some(record) = records.next() {
+        let imaginary = if parts == 2 { records.next() } else { None };
+        all.push(match imaginary {
+            Some(imaginary) => Record::complex(record, imaginary),
+            None => record,
+        });
+    }
+    Ok((all, warnings))
 }
 
 fn check_channels(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
@@ -76,8 +86,8 @@ fn check_rate(spec: &Spec, reader: &MultiReader) -> Result<(), Failure> {
     }
 }
 
-/// Integers clip at the ends of their range. Floats within +-1 clip there, or at 1 - q if that is their largest
-/// value and all are multiples of q, a power of two: the steps of a converter.
+/// Integers clip at the ends of their range. Floats within +-1 clip there, or at 1 - q if that is their
+/// largest value and all are multiples of q, a power of two: the steps of a converter.
 fn record(samples: Vec<f64>, format: PcmFormat, clip: Option<f64>) -> Record {
     if let Some(level) = clip {
         return Record::within(samples, -level, level);

@@ -8,8 +8,8 @@ use super::bank_file::{is_dash, parse_spec, read_text, write_text};
 use super::capture_args::CaptureArgs;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading as FileReading};
 use super::say::name_leftovers;
+use super::say::say_understood;
 use super::turns::TurnArgs;
-use super::understood::say_understood;
 use crate::calibrate::{Calibration, Evidence, Fit, Record, Settings, applied, calibrate};
 use crate::files;
 use crate::quantity;
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// spec is kept.
 ///
 /// The captures hold sine tones (--tone, the default), a waveform that is known (--training), or any signal
-/// that leaves fewer aliases occupied than there are channels (--blind).
+/// that leaves fewer aliases occupied than there are channels (--blind). Complex captures hold tones.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -42,15 +42,16 @@ takes their zones from the delays of the spec.")]
 pub(super) struct Args {
     /// The spec (TOML) with the nominal values; `-` is standard input
     spec: PathBuf,
-    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), in the order of the spec,
-    /// or one of N channels
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), in the order of
+    /// the spec, or one of N channels
     #[arg(required = true)]
     captures: Vec<PathBuf>,
     /// The calibrated spec; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
-    /// Frequencies of tones (Hz, kHz, MHz, GHz; hertz if left out) to about 100 ppm, or auto
-    #[arg(long, value_name = "F,..|auto", conflicts_with_all = ["training", "blind"])]
+    /// Frequencies of tones (Hz, kHz, MHz, GHz; hertz if left out) to about 100 ppm, or auto; of complex
+    /// samples also negative
+    #[arg(long, value_name = "F,..|auto", conflicts_with_all = ["training", "blind"], allow_hyphen_values = true)]
     tone: Option<String>,
     /// A mono recording of the waveform that was played
     #[arg(long, value_name = "WAV", conflicts_with = "blind")]
@@ -240,5 +241,5 @@ impl Args {
 fn tone(text: &str) -> Result<Hertz, Failure> {
     let usage = |reason: &dyn std::fmt::Display| Failure::Usage(format!("--tone {text}: {reason}"));
     let frequency = quantity::frequency(text.trim()).map_err(|error| usage(&error))?;
-    if frequency.0 > 0.0 { Ok(frequency) } else { Err(usage(&"a tone has a positive frequency")) }
+    if frequency.0 != 0.0 { Ok(frequency) } else { Err(usage(&"a tone has a frequency other than 0")) }
 }

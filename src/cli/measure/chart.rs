@@ -106,6 +106,7 @@ fn kind(spur: &Spur) -> &'static str {
         Some(Cause::GainOrSkew { .. }) => "gain or skew",
         Some(Cause::Harmonic { .. }) => "harmonic",
         Some(Cause::HarmonicImage { .. }) => "harmonic, displaced",
+        Some(Cause::Image { .. }) => "image",
         Some(Cause::Intermodulation { .. }) => "intermodulation",
         Some(Cause::Unknown) | None => "unknown",
     }
@@ -120,6 +121,8 @@ fn text(spur: &Spur) -> String {
         }
         Some(Cause::Harmonic { order, .. }) => format!("H{order}"),
         Some(Cause::HarmonicImage { order, k, of }) => format!("H{order} {k}/{of}"),
+        Some(Cause::Image { order: 1, .. }) => "-f".into(),
+        Some(Cause::Image { order, .. }) => format!("-H{order}"),
         _ => String::new(),
     }
 }

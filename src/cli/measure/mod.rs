@@ -4,10 +4,13 @@ mod chart;
 mod report;
 
 use super::Failure;
-use super::bank_file::{is_dash, name, refuse_overlap, write_text};
+use super::bank_file::{is_dash, name, refuse_overlap, write_bytes};
 use super::capture_args::CaptureArgs;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
-use crate::measure::{Comparison, Measurement, Settings, Window, compare, measure};
+use super::picture_format::PictureFormat;
+use crate::measure::{
+    Comparison, MeasureError, Measurement, Settings, Window, compare, measure, measure_complex,
+};
 use crate::quantity;
 use crate::units::Hertz;
 pub(super) use report::{column, warnings};
@@ -16,8 +19,8 @@ use std::path::{Path, PathBuf};
 /// Measures a recording of a tone: SINAD, ENOB, SNR, THD, SFDR, noise density and spurs with their causes
 ///
 /// The figures come from a least-squares fit of the tone (IEEE 1057 and 1241), so the tone need not lie on a
-/// bin of the spectrum. With --ref the recording is compared with another one of the same signal: lag, gain,
-/// SNR and error.
+/// bin of the spectrum. Tones of complex samples have a sign, and their image is a spur (I/Q imbalance).
+/// With --ref the recording is compared with another one of the same signal: lag, gain, SNR and error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -29,8 +32,8 @@ pub(super) struct Args {
     /// The recording (WAV, SigMF, .csv, .npy, .mat, or raw with --format); `-` is standard input
     file: PathBuf,
     /// Tones of the recording (9kHz, 1.2GHz, or hertz), in any Nyquist zone, to within 0.1 % of the sample
-    /// rate; auto: the largest tone [default: auto, or none with --ref]
-    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone)]
+    /// rate, of complex samples also negative; auto: the largest tone [default: auto, or none with --ref]
+    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, allow_hyphen_values = true)]
     tone: Vec<ToneArg>,
     /// Number of converters that take turns in the recording: tells which spurs are interleaving spurs
     #[arg(long, value_name = "M", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -55,8 +58,8 @@ pub(super) struct Args {
     /// Samples at either end that are not measured, such as those before a filter has settled
     #[arg(long, value_name = "SAMPLES", default_value_t = 0)]
     skip: usize,
-    /// Write the spectrum with its spurs as SVG
-    #[arg(long, value_name = "OUT.svg")]
+    /// Write the spectrum with its spurs: PNG if the name ends in .png, else SVG
+    #[arg(long, value_name = "OUT.svg|.png")]
     plot: Option<PathBuf>,
     /// Replace an existing plot
     #[arg(long)]
@@ -107,14 +110,14 @@ fn rate(text: &str) -> Result<Hertz, String> {
     }
 }
 
-/// Reads `auto` or a frequency above 0.
+/// Reads `auto` or a frequency other than 0.
 pub(super) fn tone(text: &str) -> Result<ToneArg, String> {
     if text.trim() == "auto" {
         return Ok(ToneArg::Auto);
     }
     match quantity::frequency(text) {
-        Ok(frequency) if frequency.0 > 0.0 => Ok(ToneArg::Near(frequency)),
-        Ok(frequency) => Err(format!("the tone is at {frequency}; give a frequency above 0, or auto")),
+        Ok(frequency) if frequency.0 != 0.0 => Ok(ToneArg::Near(frequency)),
+        Ok(frequency) => Err(format!("the tone is at {frequency}; give a frequency other than 0, or auto")),
         Err(error) => Err(format!("{error}; or auto")),
     }
 }
@@ -157,11 +160,12 @@ struct ReferenceReport {
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
-    let capture = CaptureFile::read(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
+    let capture = CaptureFile::read_any(&args.file, args.reading())?.trimmed(&args.file, args.skip)?;
+    args.check_parts(&capture)?;
     let settings = args.settings(&capture)?;
     let measurement = match args.reference.is_some() && args.tone.is_empty() {
         true => None,
-        false => Some(measure(&capture.samples, capture.rate, &settings).map_err(|e| args.named(&e))?),
+        false => Some(measured(&capture, &settings).map_err(|e| args.named(&e))?),
     };
     let reference = match &args.reference {
         None => None,
@@ -171,14 +175,31 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let report = Report { file: name(&args.file), measurement, reference, warnings };
     if let Some(path) = &args.plot {
         let (chart, marks) = chart::chart(&report, &settings, &capture);
-        let svg = chart.to_svg_with(&marks).map_err(|e| args.named(&e))?;
-        write_text(path, &svg, args.force)?;
+        let format = PictureFormat::of(path).unwrap_or(PictureFormat::Svg);
+        let picture = format.file(&chart, &marks).map_err(|e| args.named(&e))?;
+        write_bytes(path, &picture, args.force)?;
     }
     report.warnings.iter().for_each(|warning| super::warn(&format!("{}: {warning}", report.file)));
     if args.json { super::print_json(&report) } else { super::print(&report.text()) }
 }
 
+fn measured(capture: &CaptureFile, settings: &Settings) -> Result<Measurement, MeasureError> {
+    match &capture.imaginary {
+        None => measure(&capture.samples, capture.rate, settings),
+        Some(imaginary) => measure_complex(&capture.samples, imaginary, capture.rate, settings),
+    }
+}
+
 impl Args {
+    /// A comparison is one of real samples.
+    fn check_parts(&self, capture: &CaptureFile) -> Result<(), Failure> {
+        match capture.imaginary.is_some() && self.reference.is_some() {
+            true => Err(self
+                .named(&"complex samples, and --ref compares real ones; extract a part of both recordings")),
+            false => Ok(()),
+        }
+    }
+
     /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
         self.reading.check(false)?;

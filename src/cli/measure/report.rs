@@ -1,7 +1,7 @@
 //! The figures as text.
 
 use super::Report;
-use crate::measure::{Comparison, Measurement, Spur};
+use crate::measure::{Comparison, Imbalance, Measurement, Quadrature, Spur};
 use std::fmt::Write as _;
 
 /// Spurs that the text lists.
@@ -110,10 +110,30 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
         }
     }
     let _ = writeln!(text, "offset           {:.6} +- {:.2e}", measured.offset.value, measured.offset.sigma);
+    if let Some(quadrature) = &measured.quadrature {
+        write_quadrature(text, quadrature);
+    }
     for Figure { name, value, unit, meaning } in column(measured) {
         let _ = writeln!(text, "{name:<16} {value:>9} {unit:<7}   {meaning}");
     }
     write_spurs(text, measured);
+}
+
+/// Of complex recordings.
+fn write_quadrature(text: &mut String, quadrature: &Quadrature) {
+    let Quadrature { offset, imbalances } = quadrature;
+    let _ = writeln!(text, "offset, imag.    {:.6} +- {:.2e}", offset.value, offset.sigma);
+    for Imbalance { gain, phase, image_rejection } in imbalances {
+        let _ = writeln!(
+            text,
+            "I/Q imbalance    gain {:.6} +- {:.1e}, phase {:.4} +- {:.1e} degrees, image rejection {:.2} dB",
+            gain.value,
+            gain.sigma,
+            phase.value.0.to_degrees(),
+            phase.sigma.0.to_degrees(),
+            image_rejection.0
+        );
+    }
 }
 
 fn write_spurs(text: &mut String, measured: &Measurement) {

@@ -1,24 +1,23 @@
 //! `hybank report`: all that is known of a bank, on one page.
 
-mod facts;
 mod page;
 mod recordings;
 
 use super::Failure;
 use super::bank_file::{is_dash, load, name, write_text};
-use super::pictures::pictures;
 use super::say::name_leftovers;
 use crate::design::DesignError;
 use crate::files::refuse_overlaps;
-use facts::Facts;
+use crate::overview::{Facts, pictures};
 use page::{Figure, Page};
 use recordings::Spectra;
 use std::path::{Path, PathBuf};
 
-/// Writes a page (HTML) about a bank: what it is for, its error with the proven bounds, its filters, its cost
+/// Writes a page (HTML) about a bank: what it is for, its error with the proven bounds, its filters, its
+/// cost
 ///
-/// The page is one file that loads nothing. With captures it also shows their spectra, plainly interleaved and
-/// fused by the bank.
+/// The page is one file that loads nothing. With captures it also shows their spectra, plainly interleaved
+/// and fused by the bank.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

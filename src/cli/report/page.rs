@@ -1,6 +1,6 @@
 //! The page as HTML.
 
-use super::facts::{ChannelFact, Fact, Facts};
+use crate::overview::{ChannelFact, Fact, Facts};
 use crate::plot::{Chart, PlotError};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

@@ -9,22 +9,16 @@ use super::Failure;
 use super::page::Figure;
 use crate::bank::Bank;
 use crate::io::{MultiReader, ReadOptions};
-use crate::measure::{Spectrum, Window};
+use crate::overview::spectra;
 use crate::pipeline::WholeSettings;
-use crate::plot::{Chart, Series};
-use crate::quantity::scale_of;
 use crate::simulate::interleaved;
-use crate::units::{Decibels, Hertz};
+use crate::units::Hertz;
 use std::path::{Path, PathBuf};
 
 /// Frames that are used; more would only make the lines denser.
 const MOST_FRAMES: usize = 1 << 20;
 /// Frames that the spectra need.
 const LEAST_FRAMES: usize = 16;
-/// Points of a curve; of several bins the largest is drawn.
-const COLUMNS: usize = 800;
-/// Decibels below the largest bin at which the picture ends.
-const DEPTH: f64 = 160.0;
 
 /// Both recordings at the fast rate.
 pub(super) struct Spectra {
@@ -65,23 +59,8 @@ impl Spectra {
 
     /// Both spectra in one chart.
     pub(super) fn figure(&self) -> Result<Figure, Failure> {
-        let spectra = [&self.interleaved, &self.fused].map(|x| Spectrum::new(x, self.rate, Window::Bh7));
-        let all = spectra.iter().flat_map(|spectrum| &spectrum.amplitudes);
-        let floor = Decibels::of_amplitude(all.fold(f64::MIN_POSITIVE, |most, a| most.max(*a))).0 - DEPTH;
-        let (factor, unit) = scale_of(0.5 * self.rate.0, "Hz");
-        let point = |(frequency, amplitude): (Hertz, f64)| {
-            (frequency.0 * factor, Decibels::of_amplitude(amplitude).0.max(floor))
-        };
-        let series = |(label, spectrum): (&str, &Spectrum)| Series {
-            label: label.to_owned(),
-            points: spectrum.columns(COLUMNS).into_iter().map(point).collect(),
-        };
-        let chart = Chart {
-            title: "The captures".into(),
-            x_label: format!("frequency, {unit}"),
-            y_label: "amplitude, dB of full scale".into(),
-            series: ["plain interleaving", "fused"].into_iter().zip(&spectra).map(series).collect(),
-        };
+        let recordings = [("plain interleaving", &self.interleaved[..]), ("fused", &self.fused)];
+        let chart = spectra(self.rate, &recordings);
         let part = if self.is_cut {
             format!("the first {} frames of the captures", self.frames)
         } else {

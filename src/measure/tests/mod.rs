@@ -1,3 +1,7 @@
+//! Records with known figures.
+
+mod complex;
+
 use super::*;
 use crate::linalg::Complex;
 use crate::random::Random;
@@ -119,6 +123,26 @@ fn interleaving_spurs_are_those_of_the_closed_forms() {
             assert!(measured.sfdr_without_interleaving.unwrap().0 > measured.sfdr.0 + 20.0);
         }
     }
+}
+
+/// The leakage of a large tone beside the measured one is not taken for its harmonics.
+#[test]
+fn a_large_second_tone_is_no_distortion() {
+    let mut random = Random(9);
+    let cycles = [1000.37 / 48e3, 3.0 * 1000.37 / 48e3, 7321.1 / 48e3];
+    let amplitudes = [0.6, 1e-3, 0.3];
+    let sample = |n: usize, noise: f64| {
+        let wave = |(f, a): (&f64, f64)| a * (TAU * (f * n as f64).fract()).cos();
+        cycles.iter().zip(amplitudes).map(wave).sum::<f64>() + 1e-5 * noise
+    };
+    let samples: Vec<f64> = (0..8192).map(|n| sample(n, gaussian(&mut random))).collect();
+    let measured = measure(&samples, RATE, &Settings::default()).unwrap();
+    close(measured.thd.0, 20.0 * (1e-3f64 / 0.6).log10(), 0.02);
+    close(measured.sfdr.0, 20.0 * 2f64.log10(), 0.01);
+    let [first, second, rest @ ..] = &measured.spurs[..] else { panic!("{:?}", measured.spurs) };
+    close(first.frequency / RATE, cycles[2], 1e-7);
+    close(second.frequency / RATE, cycles[1], 1e-7);
+    assert!(rest.iter().all(|spur| spur.level.0 < -100.0), "{rest:?}");
 }
 
 #[test]
