@@ -1,11 +1,15 @@
-//! Line charts as SVG text.
+//! Line charts, and their SVG text.
 
+use super::font::letters;
 use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use std::ops::Range;
 
 const WIDTH: u32 = 960;
 const HEIGHT: u32 = 450;
+/// The size of the drawing.
+pub(super) const ENLARGED: (u32, u32) = (WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
 /// Pixels left and right of all.
 const SIDE: u32 = 10;
 /// Curves nearer to each other than this share of the height look like one.
@@ -38,9 +42,12 @@ pub struct Marks {
 }
 
 /// The axes of a chart that is being drawn.
-type Axes<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Axes<'a, B> = ChartContext<'a, B, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+/// The ranges of both axes.
+pub(super) type Ranges = (Range<f64>, Range<f64>);
+
+pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 /// Curves over a common axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,14 +89,18 @@ impl Chart {
 
     /// The chart as SVG text with points over the curves, in the colours that follow those of the curves.
     pub fn to_svg_with(&self, marks: &[Marks]) -> Result<String, PlotError> {
-        let (x, y) = self.ranges(marks)?;
+        let ranges = self.ranges(marks)?;
         let mut svg = String::new();
-        self.draw(&mut svg, marks, x, y)
-            .map_err(|e| PlotError::Drawing { title: self.title.clone(), reason: e.to_string() })?;
+        self.draw(SVGBackend::with_string(&mut svg, ENLARGED), marks, ranges)
+            .map_err(|error| self.failed(&error))?;
         Ok(scale_by_view_box(&svg))
     }
 
-    fn ranges(&self, marks: &[Marks]) -> Result<(std::ops::Range<f64>, std::ops::Range<f64>), PlotError> {
+    pub(super) fn failed(&self, error: &dyn std::fmt::Display) -> PlotError {
+        PlotError::Drawing { title: self.title.clone(), reason: error.to_string() }
+    }
+
+    pub(super) fn ranges(&self, marks: &[Marks]) -> Result<Ranges, PlotError> {
         let marked = || marks.iter().flat_map(|m| &m.points).map(|(x, y, _)| (*x, *y));
         let drawn = || self.series.iter().flat_map(|s| &s.points).copied().chain(marked());
         let points = || drawn().filter(|p| p.0.is_finite() && p.1.is_finite());
@@ -115,14 +126,8 @@ impl Chart {
         })
     }
 
-    fn draw(
-        &self,
-        svg: &mut String,
-        marks: &[Marks],
-        x: std::ops::Range<f64>,
-        y: std::ops::Range<f64>,
-    ) -> Drawn {
-        let root = SVGBackend::with_string(svg, (WIDTH * OVERSIZE, HEIGHT * OVERSIZE)).into_drawing_area();
+    pub(super) fn draw<B: DrawingBackend>(&self, backend: B, marks: &[Marks], (x, y): Ranges) -> Drawn<B> {
+        let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
         let looks = self.looks(y.end - y.start);
         let legend = Legend::new(self.entries(&looks, marks), (WIDTH - 2 * SIDE) as i32);
@@ -143,7 +148,7 @@ impl Chart {
         Ok(())
     }
 
-    fn draw_axes(&self, chart: &mut Axes<'_>) -> Drawn {
+    fn draw_axes<B: DrawingBackend>(&self, chart: &mut Axes<'_, B>) -> Drawn<B> {
         let (across, up) = (Labels::over(&chart.x_range()), Labels::over(&chart.y_range()));
         chart
             .configure_mesh()
@@ -158,7 +163,7 @@ impl Chart {
         Ok(())
     }
 
-    fn draw_lines(&self, chart: &mut Axes<'_>, looks: &[Look]) -> Drawn {
+    fn draw_lines<B: DrawingBackend>(&self, chart: &mut Axes<'_, B>, looks: &[Look]) -> Drawn<B> {
         for ((series, look), colour) in self.series.iter().zip(looks).zip(COLOURS.iter().cycle()) {
             let points = series.points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
             let style = line_style(colour);
@@ -173,7 +178,7 @@ impl Chart {
     }
 
     /// Circles with their texts above them.
-    fn draw_marks(&self, chart: &mut Axes<'_>, marks: &[Marks]) -> Drawn {
+    fn draw_marks<B: DrawingBackend>(&self, chart: &mut Axes<'_, B>, marks: &[Marks]) -> Drawn<B> {
         let text_style = TextStyle::from(text(10)).color(&RGBColor(60, 60, 60));
         for (marks, colour) in marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())) {
             let points = || marks.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
@@ -190,7 +195,7 @@ impl Chart {
 }
 
 fn text(size: u32) -> FontDesc<'static> {
-    ("sans-serif", size * OVERSIZE).into_font()
+    letters(size * OVERSIZE)
 }
 
 /// For a line over so many others that lie in the same place; each shows in the gaps of the next one.
@@ -218,7 +223,7 @@ struct Labels {
 }
 
 impl Labels {
-    fn over(range: &std::ops::Range<f64>) -> Self {
+    fn over(range: &Range<f64>) -> Self {
         let size = (range.end - range.start).log10();
         Self {
             decimals: (2.0 - size).ceil().clamp(0.0, 12.0) as usize,
@@ -237,7 +242,7 @@ impl Labels {
     }
 }
 
-fn widened(values: impl Iterator<Item = f64>, share: f64) -> std::ops::Range<f64> {
+fn widened(values: impl Iterator<Item = f64>, share: f64) -> Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let span = if high > low { high - low } else { high.abs().max(1.0) };
     let margin = if high > low { share * span } else { 0.5 * span };
@@ -245,7 +250,7 @@ fn widened(values: impl Iterator<Item = f64>, share: f64) -> std::ops::Range<f64
 }
 
 fn scale_by_view_box(svg: &str) -> String {
-    let large = format!("width=\"{}\" height=\"{}\"", WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
+    let large = format!("width=\"{}\" height=\"{}\"", ENLARGED.0, ENLARGED.1);
     svg.replacen(&large, &format!("width=\"{WIDTH}\" height=\"{HEIGHT}\""), 1)
 }
 
@@ -292,7 +297,7 @@ mod tests {
 
     #[test]
     fn labels_tell_neighbours_apart() {
-        let label = |range: std::ops::Range<f64>, value: f64| Labels::over(&range).text(value);
+        let label = |range: Range<f64>, value: f64| Labels::over(&range).text(value);
         assert_eq!(label(-1.0..1.0, -1e-17), "0");
         assert_eq!(label(-1.0..1.0, 0.300_000_000_000_000_04), "0.3");
         assert_eq!(label(0.0..1200.0, 400.0), "400");

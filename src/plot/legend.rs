@@ -1,8 +1,10 @@
 //! The legend of a chart, in rows above it: there it hides nothing.
 
+use super::font::letters;
 use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// plotters rounds SVG points to whole pixels, so charts are drawn larger and the view box scales them down.
 pub(super) const OVERSIZE: u32 = 4;
@@ -87,8 +89,8 @@ impl<'a> Legend<'a> {
                     area.draw(&Circle::new((enlarged(x + SAMPLE / 2), middle), enlarged(3), *style))?;
                 }
             }
-            let at = (enlarged(x + SAMPLE + GAP), enlarged(y + (ROW - FONT as i32) / 2));
-            area.draw(&Text::new(*label, at, ("sans-serif", FONT * OVERSIZE).into_font()))?;
+            let style = TextStyle::from(letters(FONT * OVERSIZE)).pos(Pos::new(HPos::Left, VPos::Center));
+            area.draw(&Text::new(*label, (enlarged(x + SAMPLE + GAP), middle), style))?;
         }
         Ok(())
     }

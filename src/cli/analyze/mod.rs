@@ -6,10 +6,10 @@ mod worst_case;
 
 use super::Failure;
 use super::bank_file::{is_dash, load, refuse_overlap};
-use super::design::report::{against, decibels, frequency};
-use super::understood::understood;
+use super::design::report::{against, frequency};
 use crate::bank::Bank;
 use crate::design::{self, Analysis, Certified, DesignError, GammaScale, MeanAnalysis};
+use crate::overview::{decibels, understood};
 use crate::quantity;
 use crate::units::Seconds;
 use std::path::PathBuf;
@@ -19,8 +19,9 @@ use worst_case::Questions;
 /// Computes the gamma of a bank, with the delays of its spec or with others
 ///
 /// gamma is the worst-case gain from the analog input to the error. The command builds the error system from
-/// the coefficients and the spec in the bank file and computes its H-infinity norm (relative error about 1e-9, more where large coefficients of opposite sign cancel).
-/// The gammas that the file states are not used.
+/// the coefficients and the spec in the bank file and computes its H-infinity norm (relative error about
+/// 1e-9, more where large coefficients of opposite sign cancel). The gammas that the file states are not
+/// used.
 ///
 /// With a box of errors the command proves the worst case over all delays, gains and cut-offs in the box,
 /// from both sides, and names the floor that no bank beats there.
@@ -52,8 +53,8 @@ pub(super) struct Args {
     /// Also print the derivatives of gamma with respect to the delays
     #[arg(long)]
     sensitivity: bool,
-    /// Write gamma against the errors of the delays in the box (CSV, or SVG by extension); `-` prints the
-    /// table in place of the report
+    /// Write gamma against the errors of the delays in the box (CSV, or SVG or PNG by extension); `-` prints
+    /// the table in place of the report
     #[arg(long, value_name = "OUT")]
     sweep: Option<PathBuf>,
     /// Replace the file of --sweep if it exists

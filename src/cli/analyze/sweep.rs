@@ -1,6 +1,7 @@
-//! gamma against the errors of the delays, as CSV or SVG.
+//! gamma against the errors of the delays, as CSV or as a picture.
 
-use super::super::bank_file::write_text;
+use super::super::bank_file::write_bytes;
+use super::super::picture_format::PictureFormat;
 use super::Failure;
 use crate::bank::Bank;
 use crate::design::DesignError;
@@ -49,11 +50,13 @@ impl Sweep {
         Ok(Self { half_widths: errors.delays.clone(), shares, curves })
     }
 
-    /// Writes the file that `path` names: SVG if its extension says so, else CSV.
+    /// Writes the file that `path` names: SVG or PNG if its extension says so, else CSV.
     pub(super) fn write(&self, path: &Path, force: bool) -> Result<(), Failure> {
-        let is_svg = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
-        let text = if is_svg { self.chart().to_svg().map_err(Failure::input)? } else { self.csv() };
-        write_text(path, &text, force)
+        let bytes = match PictureFormat::of(path) {
+            Some(format) => format.file(&self.chart(), &[]).map_err(Failure::input)?,
+            None => self.csv().into_bytes(),
+        };
+        write_bytes(path, &bytes, force)
     }
 
     fn csv(&self) -> String {
