@@ -1,8 +1,9 @@
 //! The functions of `include/hybank.h`: pointers in, slices for the safe code.
 //!
-//! The caller promises what the header says: a bank is one that `hybank_open` returned and `hybank_close` has not yet
-//! taken, no other thread uses it meanwhile, and arrays are as long as the header says and do not overlap. NULL is
-//! refused where it can be recognised. These promises are the contract of every function here.
+//! The caller promises what the header says: a bank is one that `hybank_open` returned and `hybank_close`
+//! has not yet taken, no other thread uses it meanwhile, and arrays are as long as the header says and do
+//! not overlap. NULL is refused where it can be recognised. These promises are the contract of every
+//! function here.
 
 #![allow(unsafe_op_in_unsafe_fn, reason = "each function has the one contract above")]
 
@@ -82,7 +83,8 @@ pub unsafe extern "C" fn hybank_open(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hybank_close(bank: *mut Handle) {
     if !bank.is_null() {
-        // SAFETY: the caller promises a bank that `hybank_open` made by `Box::into_raw` and that was not closed.
+        // SAFETY: the caller promises a bank that `hybank_open` made by `Box::into_raw` and that was not
+        // closed.
         drop(Box::from_raw(bank));
     }
 }

@@ -45,8 +45,8 @@ enum Numbers<'py> {
 }
 
 impl<'py> Held<'py> {
-    /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it is. Others
-    /// (slices with steps, foreign byte orders, lists) are copied first.
+    /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it
+    /// is. Others (slices with steps, foreign byte orders, lists) are copied first.
     pub(crate) fn new(x: &Bound<'py, PyAny>, shape: Shape) -> PyResult<Self> {
         let Ok(array) = x.cast::<PyUntypedArray>() else {
             return Self::new(&x.py().import("numpy")?.call_method1("asarray", (x,))?, shape);

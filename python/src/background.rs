@@ -38,8 +38,9 @@ impl<T> Reporter<T> {
     }
 }
 
-/// Runs `work` on a thread of its own, without the interpreter lock. A signal whose handler raises ends the wait at
-/// once; the thread ends with the step that it is in. `progress(step, seconds)` is called for every step.
+/// Runs `work` on a thread of its own, without the interpreter lock. A signal whose handler raises ends the
+/// wait at once; the thread ends with the step that it is in. `progress(step, seconds)` is called for every
+/// step.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,

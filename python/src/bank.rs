@@ -72,8 +72,8 @@ impl Bank {
         file.commit().map_err(file_error)
     }
 
-    /// Writes the bank for another tool: `c99`, `csv`, `npz`, `mat`, `coe` or `mem`. `name` is the prefix of C
-    /// identifiers.
+    /// Writes the bank for another tool: `c99`, `csv`, `npz`, `mat`, `coe` or `mem`. `name` is the prefix of
+    /// C identifiers.
     #[pyo3(signature = (path, *, format, name = "bank", overwrite = true))]
     fn export(&self, path: PathBuf, format: &str, name: &str, overwrite: bool) -> PyResult<()> {
         let bytes = export(&self.bank, parse_format(format)?, name).map_err(refused)?;

@@ -12,8 +12,8 @@ use hybank::units::{FastPeriods, Hertz};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
-/// What a calibration found. Arrays have one value per channel; it is NaN where the spec's value stands. `.._sigma`
-/// are standard deviations.
+/// What a calibration found. Arrays have one value per channel; it is NaN where the spec's value stands.
+/// `.._sigma` are standard deviations.
 #[pyclass(frozen, get_all, module = "hybank")]
 pub(crate) struct Calibration {
     /// The spec with these values and their intervals, as TOML.

@@ -40,8 +40,8 @@ impl Request {
         Ok(Self { workers, gaps, algorithm: parse_algorithm(algorithm)?, keep_latency })
     }
 
-    /// As the command line chooses: the fastest, and direct where gaps are filled, so that outputs that no gap
-    /// affects have the same bits as without gaps.
+    /// As the command line chooses: the fastest, and direct where gaps are filled, so that outputs that no
+    /// gap affects have the same bits as without gaps.
     fn algorithm(&self) -> Algorithm {
         let auto =
             if self.gaps.is_some() { Algorithm::Direct } else { Algorithm::Auto { added_latency: true } };

@@ -28,7 +28,7 @@ pub(crate) struct View {
 /// Where the views and the virtual one are.
 enum Rig {
     Rectified { positions: Vec<f64>, at: f64 },
-    Calibrated { cameras: Vec<Camera>, camera: Camera, size: (usize, usize) },
+    Calibrated { cameras: Vec<Camera>, camera: Box<Camera>, size: (usize, usize) },
 }
 
 /// The view from `at` on the line of rectified cameras, from images (H, W, C) and maps (H, W).
@@ -63,7 +63,7 @@ pub(crate) fn render_calibrated(
 ) -> PyResult<View> {
     let views = Views::new(&images, &maps, Measure::Depth, fill)?;
     let cameras = cameras.iter().map(metric).collect::<PyResult<_>>()?;
-    let rig = Rig::Calibrated { cameras, camera: metric(&camera)?, size: (size.1, size.0) };
+    let rig = Rig::Calibrated { cameras, camera: Box::new(metric(&camera)?), size: (size.1, size.0) };
     render(py, views, rig, settings(method)?)
 }
 

@@ -1,8 +1,8 @@
-//! The extension module of the Python package `hybank`: design, banks, streams and proofs of the crate `hybank`
-//! for NumPy arrays.
+//! The extension module of the Python package `hybank`: design, banks, streams and proofs of the crate
+//! `hybank` for NumPy arrays.
 //!
-//! Nothing is computed here. These files convert arguments, hold arrays while the interpreter lock is released,
-//! and turn errors into exceptions.
+//! Nothing is computed here. These files convert arguments, hold arrays while the interpreter lock is
+//! released, and turn errors into exceptions.
 
 #![deny(unsafe_code)]
 

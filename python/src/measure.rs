@@ -30,7 +30,8 @@ pub(crate) struct Measurement {
     offset: f64,
     /// Tones: frequency in hertz, amplitude, phase in radians at the first sample.
     tones: Vec<(f64, f64, f64)>,
-    /// Lines beside the tones, largest first: frequency in hertz, level in dB relative to the largest tone, causes.
+    /// Lines beside the tones, largest first: frequency in hertz, level in dB relative to the largest tone,
+    /// causes.
     spurs: Vec<(f64, f64, String)>,
     /// Samples at the rails, and samples that are not finite.
     clipped: usize,

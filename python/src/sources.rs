@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 const TEXT_FILE: SizeBound =
     SizeBound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
 
-/// The spec that `source` is, names or carries: a path, a TOML text of several lines, a mapping, or a bank. A bank
-/// stands for its spec with the latency of the bank.
+/// The spec that `source` is, names or carries: a path, a TOML text of several lines, a mapping, or a bank.
+/// A bank stands for its spec with the latency of the bank.
 pub(crate) fn spec(source: &Bound<'_, PyAny>) -> PyResult<Spec> {
     let py = source.py();
     if let Ok(bank) = source.cast::<Bank>() {

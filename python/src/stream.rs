@@ -126,8 +126,8 @@ impl Stream {
         self.plan.history()
     }
 
-    /// Frames by which the stream is processed: a second stream that begins a multiple of so many frames later, with
-    /// `memory` frames before that, has the same bits.
+    /// Frames by which the stream is processed: a second stream that begins a multiple of so many frames
+    /// later, with `memory` frames before that, has the same bits.
     #[getter]
     fn alignment(&self) -> usize {
         self.plan.alignment()
@@ -163,15 +163,15 @@ impl Stream {
         self.read(py, |state| state.streams.iter().map(runtime::Stream::state_resets).sum())
     }
 
-    /// The state as bytes: `bank.stream(state=..)` goes on from there with the same bits, in any process. A stream can
-    /// be pickled too, with its bank.
+    /// The state as bytes: `bank.stream(state=..)` goes on from there with the same bits, in any process. A
+    /// stream can be pickled too, with its bank.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.read(py, State::bytes))
     }
 
-    /// True if from here on this stream and one that goes on from `state` give the same bits to the same input. Counts
-    /// and positions may differ.
+    /// True if from here on this stream and one that goes on from `state` give the same bits to the same
+    /// input. Counts and positions may differ.
     fn agrees(&self, py: Python<'_>, state: &[u8]) -> bool {
         self.read(py, |own| own.agrees(state))
     }

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyComplex, PyFloat, PyInt, PyMapping, PyString};
 use toml::{Table, Value};
 
-/// A mapping as a table; entries that are None are left out. NumPy scalars and arrays count as the numbers and
-/// lists that they hold.
+/// A mapping as a table; entries that are None are left out. NumPy scalars and arrays count as the numbers
+/// and lists that they hold.
 pub(crate) fn table(object: &Bound<'_, PyAny>) -> PyResult<Table> {
     match value(object, "")? {
         Some(Value::Table(table)) => Ok(table),

@@ -6,9 +6,9 @@ pub(super) mod report;
 use super::Failure;
 use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text};
 use super::interrupt::end_at_interrupt;
-use super::understood::say_understood;
-use crate::bank::FixedPoint;
-use crate::design::{self, Design, DesignError, GammaScale, Limits, MeanAnalysis, Options};
+use super::say::say_understood;
+use crate::design::{self, DesignError, GammaScale, Limits, Options};
+use crate::overview::doubts;
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use progress::Progress;
@@ -119,35 +119,6 @@ fn overrides(args: &Args) -> DesignOverrides {
     }
 }
 
-/// Warning for a bank whose taps are all zero.
-const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no better integers of these bits were found; \
-                        give more bits or another fraction_bits";
-
-/// Warning for a bank that reaches nothing.
-const USELESS_BANK: &str = "gamma is no better than that of zero output: the front ends or the delays leave nothing to \
-                            reconstruct, or the latency does not suit the taps";
-
-/// Noise gains above this cause a warning: 20 dB.
-const LARGE_NOISE_GAIN: f64 = 10.0;
-/// A gamma above this share of that of zero output is no better than zero output.
-const USELESS: f64 = 0.99;
-
-/// Warning for a bank with large coefficients.
-fn large_noise_gain(method: Method, noise_gain: f64) -> String {
-    let rounding = match method {
-        Method::Iir | Method::H2 => "",
-        _ => ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)",
-    };
-    let weighed = match method {
-        Method::Fir => "; `noise` with a large `gamma_margin` trades gamma for less noise",
-        _ => "",
-    };
-    format!(
-        "noise gain {noise_gain:.1e}: the bank amplifies the converters' noise that much{rounding}{weighed}; \
-         look for nearly equal delays and for front ends of little gain"
-    )
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -176,7 +147,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
     let scale = GammaScale::new(&found.bank).map_err(named)?;
-    warn_or_refuse(&bank_warnings(&found, &mean, &scale), args.strict)?;
+    warn_or_refuse(&doubts(&found.bank, &mean, &scale), args.strict)?;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
     let report = Report::new(args.output.display().to_string(), &found, mean, scale, seconds);
@@ -194,18 +165,6 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 fn spec_warnings(spec: &Spec, path: &Path) -> Vec<String> {
     let found = design::implausible(spec).unwrap_or_default();
     found.iter().map(|problem| format!("{}: {problem}", path.display())).collect()
-}
-
-/// What a user of the bank should know.
-fn bank_warnings(design: &Design, mean: &MeanAnalysis, scale: &GammaScale) -> Vec<String> {
-    let bank = &design.bank;
-    let is_useless = bank.gamma.norm.is_some_and(|gamma| gamma > USELESS * scale.zero_output);
-    let warnings = [
-        bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero).then(|| ALL_ZERO.to_owned()),
-        is_useless.then(|| USELESS_BANK.to_owned()),
-        (mean.noise_gain > LARGE_NOISE_GAIN).then(|| large_noise_gain(bank.method, mean.noise_gain)),
-    ];
-    warnings.into_iter().flatten().collect()
 }
 
 /// Prints the warnings; with `strict` the first one is an error.

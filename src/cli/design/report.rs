@@ -1,11 +1,11 @@
 //! The report of `hybank design` on a finished bank, as text and as JSON.
 
 use crate::bank::{Gamma, SynthesisFilters};
-use crate::cli::understood::understood;
 use crate::design::quantise::WordStudy;
 use crate::design::{
     Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy,
 };
+use crate::overview::{counted, decibels, understood};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -273,25 +273,9 @@ pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
     format!("{} against {what} ({})", decibels(gamma, other), number(Some(other)))
 }
 
-/// A ratio in decibels.
-pub(in crate::cli) fn decibels(value: f64, reference: f64) -> String {
-    if reference == 0.0 {
-        "inf dB".to_owned()
-    } else {
-        // Adding zero takes the sign from a zero.
-        format!("{:.1} dB", (200.0 * (value / reference).log10()).round() / 10.0 + 0.0)
-    }
-}
-
 /// A frequency with its unit; in normalised time it is a share of the output rate.
 pub(in crate::cli) fn frequency(hertz: Hertz, is_normalised: bool) -> String {
     if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { format!("{hertz:.4}") }
-}
-
-/// A number of things, with a plural where it is not one.
-pub(in crate::cli) fn counted(count: usize, name: &str) -> String {
-    let ending = if count == 1 { "" } else { "s" };
-    format!("{count} {name}{ending}")
 }
 
 /// A robust bank pays if it lowers the worst case by this share.

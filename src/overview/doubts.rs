@@ -1,0 +1,45 @@
+//! Warnings about a bank.
+
+use crate::bank::{Bank, FixedPoint};
+use crate::design::{GammaScale, MeanAnalysis};
+use crate::spec::Method;
+
+/// Warning for a bank whose taps are all zero.
+const ALL_ZERO: &str = "all integer taps are zero, so the output is zero: no better integers of these bits were found; \
+                        give more bits or another fraction_bits";
+
+/// Warning for a bank that reaches nothing.
+const USELESS_BANK: &str = "gamma is no better than that of zero output: the front ends or the delays leave nothing to \
+                            reconstruct, or the latency does not suit the taps";
+
+/// Noise gains above this cause a warning: 20 dB.
+const LARGE_NOISE_GAIN: f64 = 10.0;
+/// A gamma above this share of that of zero output is no better than zero output.
+const USELESS: f64 = 0.99;
+
+/// Warning for a bank with large coefficients.
+fn large_noise_gain(method: Method, noise_gain: f64) -> String {
+    let rounding = match method {
+        Method::Iir | Method::H2 => "",
+        _ => ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)",
+    };
+    let weighed = match method {
+        Method::Fir => "; `noise` with a large `gamma_margin` trades gamma for less noise",
+        _ => "",
+    };
+    format!(
+        "noise gain {noise_gain:.1e}: the bank amplifies the converters' noise that much{rounding}{weighed}; \
+         look for nearly equal delays and for front ends of little gain"
+    )
+}
+
+/// What a user of the bank should know: that it does nothing, is no better than silence, or amplifies noise.
+pub fn doubts(bank: &Bank, mean: &MeanAnalysis, scale: &GammaScale) -> Vec<String> {
+    let is_useless = bank.gamma.norm.is_some_and(|gamma| gamma > USELESS * scale.zero_output);
+    let warnings = [
+        bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero).then(|| ALL_ZERO.to_owned()),
+        is_useless.then(|| USELESS_BANK.to_owned()),
+        (mean.noise_gain > LARGE_NOISE_GAIN).then(|| large_noise_gain(bank.method, mean.noise_gain)),
+    ];
+    warnings.into_iter().flatten().collect()
+}

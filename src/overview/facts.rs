@@ -1,0 +1,215 @@
+//! The figures of a bank.
+
+use super::text::decibels;
+use super::understood::understood;
+use crate::bank::{Bank, SynthesisFilters};
+use crate::design::uncertainty::{DelayDerivatives, delay_derivatives};
+use crate::design::{DesignError, GammaScale, MeanAnalysis, analyze_mean};
+use crate::quantity::readable;
+use crate::runtime::Options;
+use crate::spec::Spec;
+use crate::verify::{BoundedBanks, verify};
+
+/// The error of a delay, fast samples, for which the change of gamma is stated.
+const SMALL_ERROR: f64 = 1e-3;
+
+/// A figure with its name and its meaning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fact {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// With its unit.
+    pub value: String,
+    /// In a sentence.
+    pub meaning: String,
+}
+
+/// A channel and what an error of its delay does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelFact {
+    /// In fast samples and in seconds.
+    pub delay: String,
+    /// Of the converter.
+    pub gain: String,
+    /// Relative change of gamma per thousandth of a fast sample; none where gamma has no derivative.
+    pub sensitivity: Option<f64>,
+}
+
+/// All figures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facts {
+    /// The name of the spec.
+    pub title: String,
+    /// The spec in units of the user.
+    pub understood: String,
+    /// gamma, its bounds, the signal-to-noise ratio and the noise gain.
+    pub error: Vec<Fact>,
+    /// Method, latency, size and operations.
+    pub cost: Vec<Fact>,
+    /// In the order of the spec.
+    pub channels: Vec<ChannelFact>,
+}
+
+fn fact(name: &'static str, value: impl Into<String>, meaning: impl Into<String>) -> Fact {
+    Fact { name, value: value.into(), meaning: meaning.into() }
+}
+
+/// At most six significant digits.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
+        let decimals = (5.0 - value.abs().max(1e-4).log10().floor()).clamp(1.0, 9.0) as usize;
+        let text = format!("{value:.decimals$}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.5e}")
+    }
+}
+
+impl Facts {
+    /// Of a bank and its spec. The bounds are proven again: of a file, only what `verify` proves is told.
+    ///
+    /// # Errors
+    /// [`DesignError`] if the bank does not fit its spec, or its norm cannot be computed.
+    pub fn new(bank: &Bank, spec: &Spec) -> Result<Self, DesignError> {
+        let name = if spec.name.is_empty() { "A bank without a name" } else { &spec.name };
+        Ok(Self {
+            title: name.to_owned(),
+            understood: understood(&Spec { latency: Some(bank.latency), ..spec.clone() }),
+            error: error_facts(bank, &GammaScale::new(bank)?, &analyze_mean(bank)?),
+            cost: cost_facts(bank),
+            channels: channel_facts(bank, spec, &delay_derivatives(bank)?),
+        })
+    }
+}
+
+fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact> {
+    let mut facts = Vec::new();
+    if let Some(gamma) = bank.gamma.norm {
+        let below = |other: f64| decibels(gamma, other);
+        facts.push(fact(
+            "gamma",
+            number(gamma),
+            format!(
+                "worst-case gain from the analog input to the error (h = 1, computed): {} against zero output, {} \
+                 against plain interleaving",
+                below(scale.zero_output),
+                below(scale.interleaving)
+            ),
+        ));
+    }
+    facts.push(match verify(bank) {
+        Ok(proven) => fact(
+            "proven",
+            format!("{} to {}", number(proven.lower), number(proven.upper)),
+            format!(
+                "this bank has at most the larger value, and {} has less than the smaller one; proven for this page",
+                match proven.lower_banks {
+                    BoundedBanks::Any => "no bank at all",
+                    BoundedBanks::Causal => "no causal bank of this latency",
+                    BoundedBanks::FirOfThisLength => "no FIR bank of this length",
+                }
+            ),
+        ),
+        Err(error) => fact("proven", "nothing", format!("the bounds of the file were not proven: {error}")),
+    });
+    if let Some(noncausal) = bank.gamma.noncausal {
+        facts.push(fact("noncausal", number(noncausal), "no latency makes gamma smaller"));
+    }
+    facts.push(fact(
+        "SNR",
+        decibels(scale.rms_reference, mean.rms_error),
+        "of a signal with the spectrum of the target, against the ideal fast converter",
+    ));
+    facts.push(fact("noise gain", number(mean.noise_gain), noise(mean)));
+    facts
+}
+
+fn noise(mean: &MeanAnalysis) -> String {
+    let gain = "rms noise at the output per rms noise of the converters";
+    match mean.output_noise {
+        0.0 => format!("{gain}; the spec gives them none"),
+        noise => format!("{gain}; theirs gives {noise:.3e} of full scale"),
+    }
+}
+
+fn cost_facts(bank: &Bank) -> Vec<Fact> {
+    let time = readable(bank.fast_period.0 * bank.latency as f64, "s");
+    let latency =
+        if bank.is_normalised() { "fast samples".to_owned() } else { format!("fast samples = {time}") };
+    let (size, meaning) = size(&bank.filters);
+    let mut facts = vec![
+        fact("method", bank.method.name(), ""),
+        fact("latency", bank.latency.to_string(), latency),
+        fact("size", size, meaning),
+    ];
+    if let Ok(plan) = bank.plan(Options::default()) {
+        let summary = plan.summary();
+        let operations = summary.multiply_adds.unwrap_or_else(|| recursion(bank));
+        facts.push(fact(
+            "cost",
+            number(operations),
+            format!("multiply-adds per output sample ({}, {})", summary.algorithm, summary.numbers),
+        ));
+    }
+    facts
+}
+
+fn size(filters: &SynthesisFilters) -> (String, String) {
+    match filters {
+        SynthesisFilters::Fir(taps) => {
+            let nonzero = taps.iter().flatten().filter(|tap| **tap != 0.0).count();
+            (
+                format!("{} taps", taps.first().map_or(0, Vec::len)),
+                format!("per channel; {nonzero} taps of all channels are not zero"),
+            )
+        }
+        SynthesisFilters::StateSpace(block) => (format!("{} states", block.a.len()), "recursive".to_owned()),
+    }
+}
+
+/// Multiply-adds per output sample of a recursion that skips zeros.
+fn recursion(bank: &Bank) -> f64 {
+    match &bank.filters {
+        SynthesisFilters::Fir(_) => 0.0,
+        SynthesisFilters::StateSpace(block) => {
+            let all = [&block.a, &block.b, &block.c, &block.d].into_iter().flatten().flatten();
+            all.filter(|x| **x != 0.0).count() as f64 / bank.ratio as f64
+        }
+    }
+}
+
+fn channel_facts(bank: &Bank, spec: &Spec, derivatives: &DelayDerivatives) -> Vec<ChannelFact> {
+    let gamma = bank.gamma.norm.filter(|gamma| *gamma > 0.0);
+    let delays = bank.delays_in_fast_periods();
+    let channels = spec.channels.iter().zip(&delays).zip(&derivatives.per_fast_period);
+    channels
+        .map(|((channel, delay), slope)| {
+            let time = readable(channel.delay.0, "s");
+            let samples = format!("{} samples", number(delay.0));
+            ChannelFact {
+                delay: if spec.is_normalised() { samples } else { format!("{samples} = {time}") },
+                gain: number(channel.gain),
+                sensitivity: gamma.map(|gamma| slope * SMALL_ERROR / gamma).filter(|share| share.is_finite()),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_have_six_digits_at_most() {
+        for (value, text) in [
+            (0.0, "0"),
+            (24.0, "24"),
+            (0.031_293_64, "0.0312936"),
+            (-1.5, "-1.5"),
+            (123_456.78, "123456.8"),
+            (1e-9, "1.00000e-9"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

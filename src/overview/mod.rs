@@ -1,0 +1,16 @@
+//! What people are told of a bank: its figures with their meaning, pictures, and what is doubtful about it.
+//! The commands `design`, `plot` and `report` and the page of `playground/` show it.
+
+mod doubts;
+mod facts;
+mod pictures;
+mod spectra;
+mod text;
+mod understood;
+
+pub use doubts::doubts;
+pub use facts::{ChannelFact, Fact, Facts};
+pub use pictures::{Picture, pictures};
+pub use spectra::spectra;
+pub use text::{counted, decibels};
+pub use understood::understood;

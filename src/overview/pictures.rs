@@ -1,0 +1,231 @@
+//! The pictures of a bank.
+
+use crate::bank::Bank;
+use crate::design::responses::{analysis_gains, fir_response, front_end_gains, impulse_responses};
+use crate::design::uncertainty::{delay_derivatives, norm_at};
+use crate::design::{self, DesignError};
+use crate::linalg::Complex;
+use crate::plot::{Chart, Series};
+use crate::quantity::scale_of;
+use crate::units::{FastPeriods, Hertz, RadiansPerFastPeriod};
+use crate::verify::uncertainty::ErrorPoint;
+use std::f64::consts::{PI, TAU};
+
+/// Frequencies of a curve.
+const POINTS: usize = 601;
+/// Gains below this are drawn there, in decibels.
+const FLOOR_DB: f64 = -200.0;
+/// Group delays are drawn where the gain is within this many decibels of the largest.
+const PASS_BAND_DB: f64 = 60.0;
+/// Channels that a picture shows.
+const MOST_CHANNELS: usize = 6;
+/// Largest error of the delays that is drawn, fast samples, and the points up to it on either side.
+const DELAY_ERROR: FastPeriods = FastPeriods(0.02);
+const DELAY_ERRORS: i32 = 10;
+
+/// A picture and what it shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Of its file, without extension.
+    pub name: &'static str,
+    /// For a reader who sees it for the first time.
+    pub caption: &'static str,
+    /// The curves.
+    pub chart: Chart,
+}
+
+/// All pictures of a bank with a spec.
+///
+/// # Errors
+/// [`DesignError`] if the bank has no spec or does not fit it.
+pub fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
+    let responses = impulse_responses(bank)?;
+    let picture = |name, caption, chart| Picture { name, caption, chart };
+    Ok(vec![
+        picture("front-ends", "What the target and the converters pass.", front_ends(bank)?),
+        picture(
+            "analysis",
+            "The gains of the norm-equivalent analysis filters: what reaches the samples of each front end at the fast \
+             rate, with all that aliases there.",
+            analysis(bank)?,
+        ),
+        picture("filters", "What each synthesis filter passes, at the fast rate.", gains(bank, &responses)),
+        picture("phase", "The phase of each synthesis filter, where it passes.", phases(bank, &responses)),
+        picture(
+            "group-delay",
+            "By how much each synthesis filter delays, where it passes.",
+            group_delays(bank, &responses),
+        ),
+        picture(
+            "impulse-responses",
+            "What each synthesis filter gives for one sample; its phases are the polyphase filters.",
+            impulses(&responses),
+        ),
+        picture(
+            "error",
+            "The largest gain from the analog input to the error. Its maximum is gamma; no bank of the class goes \
+             below the lower bound everywhere.",
+            error(bank)?,
+        ),
+        picture(
+            "delay-error",
+            "gamma if the true delays are not those of the bank: each channel is off by this much, in the \
+             direction that is worse.",
+            delay_error(bank)?,
+        ),
+    ])
+}
+
+fn decibels(gain: f64) -> f64 {
+    (20.0 * gain.log10()).max(FLOOR_DB)
+}
+
+fn channel(i: usize) -> String {
+    format!("channel {}", i + 1)
+}
+
+/// The unit of a frequency axis up to `most`, and the factor that brings hertz there.
+fn axis(most: Hertz) -> (f64, String) {
+    let (factor, unit) = scale_of(most.0, "Hz");
+    (factor, format!("frequency, {unit}"))
+}
+
+fn nyquist(bank: &Bank) -> Hertz {
+    Hertz(0.5 / bank.fast_period.0)
+}
+
+fn front_ends(bank: &Bank) -> Result<Chart, DesignError> {
+    Ok(of_target_and_channels(bank, "Front ends", &front_end_gains(bank, POINTS)?))
+}
+
+fn analysis(bank: &Bank) -> Result<Chart, DesignError> {
+    Ok(of_target_and_channels(bank, "Equivalent analysis filters", &analysis_gains(bank, POINTS)?))
+}
+
+/// Gains of the target and of each channel.
+fn of_target_and_channels(bank: &Bank, title: &str, all: &[(Hertz, Vec<f64>)]) -> Chart {
+    let (factor, x_label) = axis(nyquist(bank));
+    let curve = |index: usize| Series {
+        label: index.checked_sub(1).map_or_else(|| "target".to_owned(), channel),
+        points: all.iter().map(|(f, gains)| (f.0 * factor, decibels(gains[index]))).collect(),
+    };
+    let count = 1 + bank.channel_count().min(MOST_CHANNELS - 1);
+    Chart {
+        title: title.into(),
+        x_label,
+        y_label: "gain, dB".into(),
+        series: (0..count).map(curve).collect(),
+    }
+}
+
+/// One curve per channel of a function of its response and group delay.
+fn by_frequency(
+    bank: &Bank,
+    responses: &[Vec<f64>],
+    value: impl Fn(Complex<f64>, f64) -> f64,
+) -> (String, Vec<Series>) {
+    let (factor, x_label) = axis(nyquist(bank));
+    let curve = |(i, taps): (usize, &Vec<f64>)| {
+        let point = |k: usize| {
+            let share = k as f64 / (POINTS - 1) as f64;
+            let (response, delay) = fir_response(taps, RadiansPerFastPeriod(PI * share));
+            (share * nyquist(bank).0 * factor, value(response, delay))
+        };
+        Series { label: channel(i), points: (0..POINTS).map(point).collect() }
+    };
+    (x_label, responses.iter().enumerate().take(MOST_CHANNELS).map(curve).collect())
+}
+
+fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
+    let (x_label, series) = by_frequency(bank, responses, |response, _| decibels(response.norm()));
+    Chart { title: "Synthesis filters".into(), x_label, y_label: "gain, dB".into(), series }
+}
+
+fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
+    let least = pass_band(bank, responses);
+    let delay = |response: Complex<f64>, delay: f64| if response.norm() >= least { delay } else { f64::NAN };
+    let (x_label, series) = by_frequency(bank, responses, delay);
+    let y_label = "group delay, fast samples".to_owned();
+    Chart { title: "Synthesis filters, where they pass".into(), x_label, y_label, series }
+}
+
+/// The phases without jumps of whole turns; where a filter does not pass they have no meaning.
+fn phases(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
+    let least = pass_band(bank, responses);
+    let phase = |response: Complex<f64>, _| if response.norm() >= least { response.arg() } else { f64::NAN };
+    let (x_label, mut series) = by_frequency(bank, responses, phase);
+    for curve in &mut series {
+        let mut last = 0.0;
+        for (_, phase) in curve.points.iter_mut().filter(|point| point.1.is_finite()) {
+            *phase += TAU * ((last - *phase) / TAU).round();
+            last = *phase;
+        }
+    }
+    let y_label = "phase, rad".to_owned();
+    Chart { title: "Phase of the synthesis filters, where they pass".into(), x_label, y_label, series }
+}
+
+/// The least gain at which a filter passes.
+fn pass_band(bank: &Bank, responses: &[Vec<f64>]) -> f64 {
+    let (_, gains) = by_frequency(bank, responses, |response, _| response.norm());
+    let largest = gains.iter().flat_map(|curve| &curve.points).map(|point| point.1).fold(0.0, f64::max);
+    largest * 10f64.powf(-PASS_BAND_DB / 20.0)
+}
+
+fn impulses(responses: &[Vec<f64>]) -> Chart {
+    let curve = |(i, taps): (usize, &Vec<f64>)| Series {
+        label: channel(i),
+        points: taps.iter().enumerate().map(|(n, tap)| (n as f64, *tap)).collect(),
+    };
+    Chart {
+        title: "Impulse responses of the synthesis filters".into(),
+        x_label: "fast samples".into(),
+        y_label: "tap".into(),
+        series: responses.iter().enumerate().take(MOST_CHANNELS).map(curve).collect(),
+    }
+}
+
+fn error(bank: &Bank) -> Result<Chart, DesignError> {
+    let response = design::error_response(bank, POINTS)?;
+    let (factor, x_label) = axis(Hertz(0.5 / bank.slow_period().0));
+    let mut series = vec![Series {
+        label: "error".into(),
+        points: response.iter().map(|(f, gain)| (f.0 * factor, decibels(*gain))).collect(),
+    }];
+    let ends = [Hertz(0.0), Hertz(0.5 / bank.slow_period().0)];
+    for (label, bound) in [("gamma, upper bound", bank.gamma.upper), ("lower bound", bank.gamma.lower)] {
+        series.extend(bound.filter(|bound| *bound > 0.0).map(|bound| Series {
+            label: label.into(),
+            points: ends.iter().map(|f| (f.0 * factor, decibels(bound))).collect(),
+        }));
+    }
+    let title = "Largest gain from the analog input to the error".to_owned();
+    Ok(Chart {
+        title,
+        x_label: x_label + ", modulo the slow rate",
+        y_label: "gain, dB (h = 1)".into(),
+        series,
+    })
+}
+
+/// gamma where each delay is off, in the direction in which gamma grows.
+fn delay_error(bank: &Bank) -> Result<Chart, DesignError> {
+    let slopes = delay_derivatives(bank)?.per_fast_period;
+    let gamma = |step: i32| -> Result<(f64, f64), DesignError> {
+        let size = DELAY_ERROR * (f64::from(step) / f64::from(DELAY_ERRORS));
+        // Without a derivative all delays move the same way.
+        let moved = |slope: &f64| (size * if *slope < 0.0 { -1.0 } else { 1.0 }).in_seconds(bank.fast_period);
+        let delays = slopes.iter().map(moved).collect();
+        let point = ErrorPoint { delays, ..ErrorPoint::none(bank.channel_count()) };
+        Ok((size.0, norm_at(bank, &point)?.0))
+    };
+    Ok(Chart {
+        title: "gamma with delays that are not those of the bank".into(),
+        x_label: "error of each delay, fast samples".into(),
+        y_label: "gamma (h = 1)".into(),
+        series: vec![Series {
+            label: "gamma".into(),
+            points: (-DELAY_ERRORS..=DELAY_ERRORS).map(gamma).collect::<Result<_, _>>()?,
+        }],
+    })
+}

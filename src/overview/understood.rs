@@ -1,0 +1,143 @@
+//! What was understood from a spec, in one line of the user's units.
+
+use super::text::counted;
+use crate::analog::StrictlyProper;
+use crate::quantity::readable;
+use crate::spec::Spec;
+use crate::units::Hertz;
+use std::f64::consts::{PI, TAU};
+
+/// Delays that a line holds.
+const MOST_DELAYS: usize = 8;
+
+/// The rates, the band of the target, the delays and the latency of `spec`.
+pub fn understood(spec: &Spec) -> String {
+    let parts = [Some(rates(spec)), target(spec), Some(delays(spec)), latency(spec)];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
+}
+
+fn rates(spec: &Spec) -> String {
+    let (converters, ratio) = (spec.channels.len(), spec.ratio);
+    if spec.is_normalised() {
+        let who = if converters == 1 { "one converter".into() } else { format!("{converters} converters") };
+        let rate =
+            if ratio == 1 { "the output rate".into() } else { format!("1/{ratio} of the output rate") };
+        return format!("normalised time (fast period 1) from {who} at {rate}");
+    }
+    let fast = spec.fast_period.rate().0;
+    let (output, slow) = (readable(fast, "S/s"), readable(fast / ratio as f64, "S/s"));
+    match converters {
+        1 if ratio == 1 => format!("{output} from one converter of the same rate"),
+        1 => format!("{output} from one converter at {slow}"),
+        _ => format!("{output} from {converters} x {slow}"),
+    }
+}
+
+fn target(spec: &Spec) -> Option<String> {
+    let edge = StrictlyProper::new(&spec.target, spec.fast_period).ok()?.half_power_frequency().0;
+    let share = format!("{} of Nyquist", two_digits(edge / PI));
+    if spec.is_normalised() {
+        return Some(format!("target -3 dB at {share}"));
+    }
+    let hertz = Hertz(edge / TAU / spec.fast_period.0);
+    Some(format!("target -3 dB at {} ({share})", readable(hertz.0, "Hz")))
+}
+
+fn delays(spec: &Spec) -> String {
+    let all = spec.delays_in_fast_periods();
+    let shown: Vec<String> = all.iter().take(MOST_DELAYS).map(|delay| rounded(delay.0)).collect();
+    let rest = if all.len() > MOST_DELAYS { ", .." } else { "" };
+    match shown[..] {
+        [ref only] => format!("delay {}", counted(only, "sample")),
+        _ => format!("delays {}{rest} samples", shown.join(", ")),
+    }
+}
+
+fn latency(spec: &Spec) -> Option<String> {
+    let latency = spec.latency?;
+    let text = format!("latency {}", counted(latency, "sample"));
+    if spec.is_normalised() || latency == 0 {
+        return Some(text);
+    }
+    Some(format!("{text} = {}", readable(spec.fast_period.0 * latency as f64, "s")))
+}
+
+/// A share with two digits after the point, or more where both would be zeros.
+fn two_digits(share: f64) -> String {
+    let leading = if share > 0.0 { (-share.log10()).ceil().clamp(1.0, 12.0) as usize } else { 1 };
+    format!("{share:.*}", leading + 1)
+}
+
+/// In at most seven digits after the point, without trailing zeros.
+fn rounded(value: f64) -> String {
+    let text = format!("{value:.7}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spec_is_one_line_in_units_of_the_user() {
+        let spec = Spec::from_toml(
+            "fast_rate = \"1 GS/s\"\nratio = 2\nlatency = 16\n\
+             target = { filter = { family = \"butterworth\", order = 4, cutoff = \"450 MHz\" } }\n\
+             channel = [{ delay = \"1.0062 ns\" }, { delay = \"0.25 samples\" }]\ndesign = { method = \"iir\" }",
+            "spec.toml",
+        );
+        assert_eq!(
+            understood(&spec.unwrap()),
+            "1 GS/s from 2 x 500 MS/s; target -3 dB at 450 MHz (0.90 of Nyquist); delays 1.0062, 0.25 samples; \
+             latency 16 samples = 16 ns"
+        );
+    }
+
+    /// One channel, the ratio 1, no latency, a low cut-off.
+    #[test]
+    fn odd_specs_are_said_plainly() {
+        let said = |rate: &str, ratio: usize, latency: usize, delay: &str| {
+            let spec = Spec::from_toml(
+                &format!(
+                    "{rate}\nratio = {ratio}\nlatency = {latency}\nchannel = [{{ delay = {delay} }}]\n\
+                     target = {{ filter = {{ num = [0.025], den = [1.0, 0.025] }} }}\ndesign = {{ method = \"iir\" }}"
+                ),
+                "spec.toml",
+            );
+            understood(&spec.unwrap())
+        };
+        let normalised = "normalised time (fast period 1) from one converter at";
+        assert_eq!(
+            said("fast_period = 1.0", 1, 1, "1"),
+            format!(
+                "{normalised} the output rate; target -3 dB at 0.0080 of Nyquist; delay 1 sample; latency 1 sample"
+            )
+        );
+        assert!(
+            said("fast_period = 1.0", 3, 0, "0")
+                .starts_with(&format!("{normalised} 1/3 of the output rate;"))
+        );
+        assert!(
+            said("fast_rate = \"8 S/s\"", 1, 0, "0")
+                .starts_with("8 S/s from one converter of the same rate;")
+        );
+        let last = said("fast_rate = \"8 S/s\"", 2, 0, "0");
+        assert!(last.starts_with("8 S/s from one converter at 4 S/s;"), "{last}");
+        assert!(last.ends_with("; delay 0 samples; latency 0 samples"), "{last}");
+    }
+
+    #[test]
+    fn normalised_time_has_no_unit() {
+        let spec = Spec::from_toml(
+            "fast_period = 1.0\nratio = 2\nlatency = 10\n\
+             target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
+             channel = [{ delay = 1.2 }, { delay = 0.6 }]\ndesign = { method = \"iir\" }",
+            "spec.toml",
+        );
+        assert_eq!(
+            understood(&spec.unwrap()),
+            "normalised time (fast period 1) from 2 converters at 1/2 of the output rate; target -3 dB at 0.10 of Nyquist; \
+             delays 1.2, 0.6 samples; latency 10 samples"
+        );
+    }
+}
