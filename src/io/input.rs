@@ -184,8 +184,8 @@ impl Input {
         Ok(())
     }
 
-    /// Takes what became known of lost samples during the run: of a channel of this input, from 0, or of all.
-    /// At most `max_lost` frames may be left out.
+    /// Takes what became known of lost samples during the run: of a channel of this input, from 0, or of
+    /// all. At most `max_lost` frames may be left out.
     pub(super) fn lose_live(
         &mut self,
         channel: Option<usize>,

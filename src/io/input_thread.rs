@@ -53,8 +53,8 @@ impl InputSource {
         StreamHeader { is_complex: self.coding.is_complex(), ..StreamHeader::real(layout, channels) }
     }
 
-    /// As the consumer sees an input that states `header`: converters that take turns as channels, or the only
-    /// channel that is read.
+    /// As the consumer sees an input that states `header`: converters that take turns as channels, or the
+    /// only channel that is read.
     pub(super) fn chosen(&self, header: StreamHeader) -> Result<StreamHeader, IoError> {
         match self.only {
             None => self.in_turns(header),
@@ -85,8 +85,8 @@ impl InputSource {
         })
     }
 
-    /// Puts the samples of whole frames, which are those of `header`, into the order of the channels, or keeps
-    /// those of the only one. Gives the bytes that remain.
+    /// Puts the samples of whole frames, which are those of `header`, into the order of the channels, or
+    /// keeps those of the only one. Gives the bytes that remain.
     pub(super) fn arrange(&self, frames: &mut [u8], header: &StreamHeader) -> usize {
         let sample = header.layout.container * header.parts();
         self.turns.iter().for_each(|turns| turns.reorder(frames, sample));

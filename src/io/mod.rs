@@ -1,4 +1,5 @@
-//! Input and output of samples: WAV, SigMF, tables, NumPy and MATLAB arrays, raw PCM, and lists of lost samples.
+//! Input and output of samples: WAV, SigMF, tables, NumPy and MATLAB arrays, raw PCM, and lists of lost
+//! samples.
 //!
 //! A *frame* holds one sample of each channel of a file or stream. A sample is stored in one of the
 //! [`PcmFormat`]s; the full scale of integer formats is 1.0.

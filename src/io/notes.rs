@@ -1,7 +1,8 @@
 //! What recordings say besides their samples, and what of it holds for the output.
 //!
-//! Frame k of the time axis gives the output samples kM + shift to kM + shift + M - 1, where the shift is the
-//! latency that is not dropped. Positions in the inputs are carried over by this rule, with lost frames counted.
+//! Frame k of the time axis gives the output samples kM + shift to kM + shift + M - 1, where the shift is
+//! the latency that is not dropped. Positions in the inputs are carried over by this rule, with lost frames
+//! counted.
 
 use super::sigmf::{SigmfAnnotation, SigmfCapture, SigmfMeta};
 use super::timestamps::Timestamps;
@@ -67,8 +68,8 @@ pub struct OutputNotes {
 
 impl OutputNotes {
     /// Of the notes of all inputs, whose time begins at number `origin` of the converters. The members of
-    /// `global`, the captures and the chunks are those of the first input that has any; annotations are those of
-    /// all, each once.
+    /// `global`, the captures and the chunks are those of the first input that has any; annotations are
+    /// those of all, each once.
     pub(super) fn of(inputs: &[&InputNotes], origin: u64, placement: Placement) -> Self {
         let mut notes = Self::default();
         for input in inputs {

@@ -1,8 +1,8 @@
 //! Captures as NumPy arrays (.npy).
 //!
-//! Source: NumPy, *NEP 1: a simple file format for NumPy arrays*, versions 1 to 3. Of two axes the shorter one
-//! holds the channels, and the rows do if both are equal: `(N, T)` as the Python package has it, `(T, N)` as
-//! sound files have it. Integers have the full scale 1.0, as in every other format.
+//! Source: NumPy, *NEP 1: a simple file format for NumPy arrays*, versions 1 to 3. Of two axes the shorter
+//! one holds the channels, and the rows do if both are equal: `(N, T)` as the Python package has it,
+//! `(T, N)` as sound files have it. Integers have the full scale 1.0, as in every other format.
 
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use std::fs::File;

@@ -1,7 +1,7 @@
 //! The metadata file of SigMF recordings, which accompanies a file of raw samples.
 //!
-//! Real or complex samples, one or several interleaved channels. If `core:global_index` increases by more than
-//! `core:sample_start` between captures, samples were lost.
+//! Real or complex samples, one or several interleaved channels. If `core:global_index` increases by more
+//! than `core:sample_start` between captures, samples were lost.
 
 use super::tar::{TarFile, tar_files};
 use super::timestamps::{Timestamp, Timestamps};
@@ -227,8 +227,8 @@ pub fn sigmf_files(path: &Path) -> [PathBuf; 2] {
     file_pair(path, meta.as_ref()).into()
 }
 
-/// The metadata of the only recording in an archive called `file`, the name of it for messages, and where the
-/// samples are.
+/// The metadata of the only recording in an archive called `file`, the name of it for messages, and where
+/// the samples are.
 pub(super) fn archived(
     archive: &mut (impl Read + Seek),
     file: &str,

@@ -29,8 +29,8 @@ impl Coding {
     }
 }
 
-/// `wav`, the name of a sample format, or that name with a `c` before it for complex samples. `cs16`, `cs32`,
-/// `cf32` and `cf64` are little-endian.
+/// `wav`, the name of a sample format, or that name with a `c` before it for complex samples. `cs16`,
+/// `cs32`, `cf32` and `cf64` are little-endian.
 impl FromStr for Coding {
     type Err = ParsePcmFormatError;
 

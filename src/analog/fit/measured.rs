@@ -14,8 +14,8 @@ pub struct MeasuredResponse {
 }
 
 impl MeasuredResponse {
-    /// A scattering parameter of a Touchstone file, version 1, of one or two ports; `parameter` is S11, S21, S12
-    /// or S22, and by default S21, with one port S11.
+    /// A scattering parameter of a Touchstone file, version 1, of one or two ports; `parameter` is S11, S21,
+    /// S12 or S22, and by default S21, with one port S11.
     ///
     /// # Errors
     /// [`MeasurementError`] with the line of the first thing that is wrong.
@@ -63,7 +63,8 @@ impl MeasuredResponse {
         Self { points: self.points.iter().map(turned).collect() }
     }
 
-    /// By how much the phase falls per unit of angular frequency, on average: the delay if there is nothing else.
+    /// By how much the phase falls per unit of angular frequency, on average: the delay if there is nothing
+    /// else.
     pub(super) fn mean_delay(&self) -> Seconds {
         let (Some(first), Some(last)) = (self.points.first(), self.points.last()) else {
             return Seconds(0.0);

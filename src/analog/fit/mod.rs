@@ -1,5 +1,5 @@
-//! Models of measured front ends: responses of network analysers and Bode plots, and the stable, strictly proper
-//! filters that are fitted to them.
+//! Models of measured front ends: responses of network analysers and Bode plots, and the stable, strictly
+//! proper filters that are fitted to them.
 //!
 //! - [`MeasuredResponse`] is a response on a list of frequencies, read from Touchstone or CSV text.
 //! - [`vector_fit`] gives a [`FittedModel`] with the error that it leaves.

@@ -13,7 +13,8 @@ pub(super) enum Pole {
     Pair(Complex<f64>),
 }
 
-/// Poles as they are known before anything else is: lightly damped, spread evenly over the band up to `most`.
+/// Poles as they are known before anything else is: lightly damped, spread evenly over the band up to
+/// `most`.
 ///
 /// Source: Gustavsen and Semlyen 1999, section 3.2.
 pub(super) fn starting_poles(order: usize, most: f64) -> Vec<Pole> {

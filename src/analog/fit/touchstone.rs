@@ -33,55 +33,97 @@ struct Options {
     pairs: Pairs,
 }
 
+impl Default for Options {
+    fn default() -> Self {
+        Self { hertz: 1e9, pairs: Pairs::MagnitudeAngle }
+    }
+}
+
 /// The points of one parameter, with their lines.
 pub(super) fn read(
     text: &str,
     ports: usize,
     parameter: Option<&str>,
 ) -> Result<Vec<Point>, MeasurementError> {
-    let column = column(ports, parameter)?;
-    let wanted = 1 + 2 * ports * ports;
-    let mut options = Options { hertz: 1e9, pairs: Pairs::MagnitudeAngle };
-    let mut has_options = false;
-    let mut points: Vec<Point> = Vec::new();
+    let mut network = Network { ports, column: column(ports, parameter)?, options: None, points: Vec::new() };
     for (line, whole) in (1..).zip(text.lines()) {
         let content = whole.split('!').next().unwrap_or_default().trim();
-        if let Some(words) = content.strip_prefix('#') {
-            // Only the first option line counts.
-            if !has_options {
-                options = option_line(line, words)?;
-                has_options = true;
+        match content.as_bytes().first() {
+            None => {}
+            Some(b'#') => network.options(line, &content[1..])?,
+            Some(b'[') => {
+                let what = "this is Touchstone version 2; export the measurement as version 1".to_owned();
+                return Err(MeasurementError::Unsupported { line, what });
             }
-            continue;
-        }
-        if content.starts_with('[') {
-            let what = "this is Touchstone version 2; export the measurement as version 1".to_owned();
-            return Err(MeasurementError::Unsupported { line, what });
-        }
-        if content.is_empty() {
-            continue;
-        }
-        let row = numbers(content.split_whitespace());
-        // Noise parameters follow the last point of two ports, and begin again at a low frequency.
-        let is_noise =
-            |row: &Vec<f64>| row.len() == 5 && points.last().is_some_and(|p| row[0] * options.hertz <= p.1.0);
-        if ports == 2 && row.as_ref().is_some_and(is_noise) {
-            break;
-        }
-        let made = row.filter(|row| row.len() == wanted).and_then(|row| {
-            let value = options.pairs.value(row[1 + 2 * column], row[2 + 2 * column]);
-            point(line, row[0] * options.hertz, value)
-        });
-        points.push(made.ok_or_else(|| MeasurementError::Line {
-            line,
-            wanted: format!("a frequency and {} numbers", wanted - 1),
-            found: quoted(whole),
-        })?);
-        if points.len() > MOST_POINTS {
-            return Err(MeasurementError::TooMany { most: MOST_POINTS });
+            Some(_) => {
+                let row = numbers(content.split_whitespace());
+                if row.as_ref().is_some_and(|row| network.is_noise(row)) {
+                    break;
+                }
+                let point = row.and_then(|row| network.point(line, &row));
+                network.add(point.ok_or_else(|| network.malformed(line, whole))?)?;
+            }
         }
     }
-    Ok(points)
+    Ok(network.points)
+}
+
+/// What is known of a file while it is read.
+struct Network {
+    ports: usize,
+    /// Of the parameter, among those of a line.
+    column: usize,
+    /// Of the option line, once it was there.
+    options: Option<Options>,
+    points: Vec<Point>,
+}
+
+impl Network {
+    /// Only the first option line counts.
+    fn options(&mut self, line: usize, words: &str) -> Result<(), MeasurementError> {
+        if self.options.is_none() {
+            self.options = Some(option_line(line, words)?);
+        }
+        Ok(())
+    }
+
+    fn frequency(&self, row: &[f64]) -> f64 {
+        row[0] * self.options.unwrap_or_default().hertz
+    }
+
+    /// Numbers of a line: the frequency and a pair per parameter.
+    fn width(&self) -> usize {
+        1 + 2 * self.ports * self.ports
+    }
+
+    /// Noise parameters follow the last point of two ports, and begin again at a low frequency.
+    fn is_noise(&self, row: &[f64]) -> bool {
+        let last = self.points.last();
+        self.ports == 2 && row.len() == 5 && last.is_some_and(|last| self.frequency(row) <= last.1.0)
+    }
+
+    /// None for another number of numbers, or numbers that are no point.
+    fn point(&self, line: usize, row: &[f64]) -> Option<Point> {
+        if row.len() != self.width() {
+            return None;
+        }
+        let pairs = self.options.unwrap_or_default().pairs;
+        let value = pairs.value(row[1 + 2 * self.column], row[2 + 2 * self.column]);
+        point(line, self.frequency(row), value)
+    }
+
+    fn malformed(&self, line: usize, found: &str) -> MeasurementError {
+        let wanted = format!("a frequency and {} numbers", self.width() - 1);
+        MeasurementError::Line { line, wanted, found: quoted(found) }
+    }
+
+    fn add(&mut self, point: Point) -> Result<(), MeasurementError> {
+        self.points.push(point);
+        if self.points.len() > MOST_POINTS {
+            return Err(MeasurementError::TooMany { most: MOST_POINTS });
+        }
+        Ok(())
+    }
 }
 
 /// Where a parameter stands in a line: for two ports S11, S21, S12, S22.
@@ -95,7 +137,7 @@ fn column(ports: usize, parameter: Option<&str>) -> Result<usize, MeasurementErr
 
 /// `# GHz S MA R 50`, its parts in any order and each with a default.
 fn option_line(line: usize, words: &str) -> Result<Options, MeasurementError> {
-    let mut options = Options { hertz: 1e9, pairs: Pairs::MagnitudeAngle };
+    let mut options = Options::default();
     let mut words = words.split_whitespace();
     while let Some(word) = words.next() {
         if let Some(hertz) = hertz(word) {

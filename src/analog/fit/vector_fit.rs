@@ -1,8 +1,8 @@
 //! Relaxed vector fitting.
 //!
 //! Sources: B. Gustavsen and A. Semlyen, *Rational approximation of frequency domain responses by vector
-//! fitting*, IEEE Trans. Power Delivery 14(3), 1999; B. Gustavsen, *Improving the pole relocating properties of
-//! vector fitting*, IEEE Trans. Power Delivery 21(3), 2006.
+//! fitting*, IEEE Trans. Power Delivery 14(3), 1999; B. Gustavsen, *Improving the pole relocating properties
+//! of vector fitting*, IEEE Trans. Power Delivery 21(3), 2006.
 
 use super::FitError;
 use super::measured::MeasuredResponse;
@@ -35,13 +35,14 @@ pub struct FittedModel {
     pub at: Hertz,
 }
 
-/// The model of `order` poles that has the least mean-square error, as far as relaxed vector fitting finds it.
+/// The model of `order` poles that has the least mean-square error, as far as relaxed vector fitting finds
+/// it.
 ///
 /// All frequencies have the same weight. Poles that would be unstable are mirrored at the imaginary axis.
 ///
 /// # Errors
-/// [`FitError`]; a model that misses the measurement by more than [`MAX_FIT_ERROR`] is refused, with the delay
-/// that would have to be taken out first, if that is the reason.
+/// [`FitError`]; a model that misses the measurement by more than [`MAX_FIT_ERROR`] is refused, with the
+/// delay that would have to be taken out first, if that is the reason.
 pub fn vector_fit(measured: &MeasuredResponse, order: usize) -> Result<FittedModel, FitError> {
     if order == 0 || order > MAX_ORDER {
         return Err(FitError::Order { order, most: MAX_ORDER });
@@ -142,8 +143,9 @@ impl Candidate {
     }
 }
 
-/// The zeros of the weight function sigma = d + sum of c~_n times fraction n, where sigma H is nearest to partial
-/// fractions with the same poles: `sum c_n phi_n - H (sum c~_n phi_n + d) = 0`, and the mean real part of sigma 1.
+/// The zeros of the weight function sigma = d + sum of c~_n times fraction n, where sigma H is nearest to
+/// partial fractions with the same poles: `sum c_n phi_n - H (sum c~_n phi_n + d) = 0`, and the mean real
+/// part of sigma 1.
 fn relocated(data: &Data, poles: &[Pole]) -> Result<Vec<Pole>, FitError> {
     let n = order(poles);
     let (points, columns) = (data.values.len(), 2 * n + 1);
@@ -172,8 +174,8 @@ fn relocated(data: &Data, poles: &[Pole]) -> Result<Vec<Pole>, FitError> {
     Ok(from_eigenvalues(&zeros))
 }
 
-/// x of least |A x - y|; `rows` are those of [A y], with `columns` columns of A. Columns are scaled to length 1,
-/// and directions that are not determined stay zero.
+/// x of least |A x - y|; `rows` are those of [A y], with `columns` columns of A. Columns are scaled to
+/// length 1, and directions that are not determined stay zero.
 fn least_squares(rows: &[f64], columns: usize) -> Result<Vec<f64>, FitError> {
     let width = columns + 1;
     // The transpose, column by column.
