@@ -151,8 +151,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The same plan for converters whose samples contain offsets: `offsets[i]` is subtracted from each sample
-    /// of channel i, in the number type of the kernels, before anything else happens to it.
+    /// The same plan for converters whose samples contain offsets: `offsets[i]` is subtracted from each
+    /// sample of channel i, in the number type of the kernels, before anything else happens to it.
     ///
     /// The sum is then over x_i - o_i. Samples before the first frame, samples that are not finite, and the
     /// frames of [`Stream::flush`](crate::Stream::flush) are 0 after the subtraction. If all offsets are 0,

@@ -1,13 +1,13 @@
 //! The state of a stream as bytes, so that another process can go on from there.
 //!
-//! Little-endian words of 64 bits: format, position and counts of the stream; digest of the plan, place in the
-//! alignment, and numbers of the algorithm as f64, which holds f32 exactly. Only what later outputs depend on
-//! is written: two states that agree in the second part have the same future.
+//! Little-endian words of 64 bits: format, position and counts of the stream; digest of the plan, place in
+//! the alignment, and numbers of the algorithm as f64, which holds f32 exactly. Only what later outputs
+//! depend on is written: two states that agree in the second part have the same future.
 
 use crate::error::StateError;
 
-/// Bytes at the beginning of a state that later outputs do not depend on: the format, and what the stream has
-/// counted. Streams whose states agree in all bytes after these give the same bits from there on.
+/// Bytes at the beginning of a state that later outputs do not depend on: the format, and what the stream
+/// has counted. Streams whose states agree in all bytes after these give the same bits from there on.
 pub const STATE_COUNTS: usize = 8 * COUNTS;
 
 /// The format: a name and a version.
@@ -131,7 +131,8 @@ impl Digest {
     }
 }
 
-/// The finaliser of SplitMix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014).
+/// The finaliser of SplitMix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*,
+/// 2014).
 fn mix(word: u64) -> u64 {
     let word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -23,9 +23,9 @@ use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, StateError, SwapEr
 /// | | NaN or infinity in the input | sums that overflow |
 /// |---|---|---|
 /// | direct | seen in the outputs; filtered again with zeros | filtered again at most once |
-/// | fast FIR | replaced first; filtered once | each such output once more by the definition in f64: N K multiply-adds |
+/// | fast FIR | replaced first; filtered once | each such output by the definition in f64: N K multiply-adds |
 /// | overlap-save | replaced first; filtered once | the batch once more, from smaller numbers |
-/// | recursive | replaced first; filtered once | filtered once; the state becomes 0 and is [counted](Stream::state_resets) |
+/// | recursive | replaced first; filtered once | filtered once; the state becomes 0, [counted](Stream::state_resets) |
 ///
 /// Only the repair of fast FIR may cost more than filtering twice, because it is not vectorised. The search
 /// for what is not finite passes over the input at most three times.
@@ -285,8 +285,8 @@ impl Stream {
         bytes
     }
 
-    /// Bytes of the [state](Stream::state) at this frame. Plans of FIR filters keep their history; overlap-save
-    /// keeps a batch too, and a recursion its states.
+    /// Bytes of the [state](Stream::state) at this frame. Plans of FIR filters keep their history;
+    /// overlap-save keeps a batch too, and a recursion its states.
     pub fn state_bytes(&self) -> usize {
         Header::bytes(self.count(self.position))
     }
@@ -300,8 +300,8 @@ impl Stream {
         self.engine.save(self.channels(), &mut put);
     }
 
-    /// Makes this stream, whatever it was, the continuation of the one that gave `state`: the same frames give
-    /// the same bits and counts. Does not allocate.
+    /// Makes this stream, whatever it was, the continuation of the one that gave `state`: the same frames
+    /// give the same bits and counts. Does not allocate.
     ///
     /// # Errors
     /// [`StateError`] if the bytes are not a state of this plan, that is of the same filters, offsets,

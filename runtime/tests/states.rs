@@ -1,5 +1,5 @@
-//! States as bytes: a stream goes on from them with the bits of the one that never stopped, and refuses what is
-//! no state of its plan.
+//! States as bytes: a stream goes on from them with the bits of the one that never stopped, and refuses what
+//! is no state of its plan.
 
 use hybank_runtime::{
     Algorithm, ComplexStream, Options, Plan, Precision, STATE_COUNTS, StateError, StateSpace, Stream,
@@ -24,8 +24,8 @@ fn fir(channels: usize, phase_taps: usize, algorithm: Algorithm, precision: Prec
     Plan::from_taps(&taps, M, 4, options(algorithm, precision)).unwrap()
 }
 
-/// States in a row after a delay line of two frames of channel 1; all of them depend on the next one (`dense`),
-/// or two on each other (`parallel-form`).
+/// States in a row after a delay line of two frames of channel 1; all of them depend on the next one
+/// (`dense`), or two on each other (`parallel-form`).
 fn recursion(channels: usize, order: usize, precision: Precision) -> Plan {
     let size = order + 2;
     let mut a = vec![vec![0.0; size]; size];

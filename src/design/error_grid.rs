@@ -16,9 +16,14 @@ const LEAST_POINTS: usize = 24;
 /// The grid for peaks is finer by this factor.
 pub(super) const FINE: usize = 8;
 
-/// Intervals of the grid for peaks, for filters of `lags` slow lags.
+/// Intervals of the grid for mean squares, for filters of `lags` slow lags.
+pub(super) fn coarse_intervals(lags: usize) -> usize {
+    LEAST_POINTS.max(POINTS_PER_LAG * lags)
+}
+
+/// Intervals of the grid for peaks.
 pub(super) fn intervals(lags: usize) -> usize {
-    FINE * LEAST_POINTS.max(POINTS_PER_LAG * lags)
+    FINE * coarse_intervals(lags)
 }
 
 /// Trapezoidal weights of the coarser points that suffice for a mean square.
@@ -83,8 +88,8 @@ impl<'a> ErrorGrid<'a> {
     }
 }
 
-/// The local maxima above `level` of a gain that has the values `gains` at the multiples of `step` from 0 to pi.
-/// `gain_at` computes it at any frequency.
+/// The local maxima above `level` of a gain that has the values `gains` at the multiples of `step` from 0 to
+/// pi. `gain_at` computes it at any frequency.
 pub(super) fn peaks_between(
     gains: &[f64],
     step: f64,

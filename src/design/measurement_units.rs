@@ -1,8 +1,8 @@
 //! Units in which every measurement is of about unit size.
 //!
-//! A gain g of channel i is undone by its filter: `F_i H_i = (F_i / g) (g H_i)`, so gamma does not depend on it. The
-//! decompositions of double precision do: next to a large measurement a small one is lost to rounding. The units are
-//! powers of two, so a change of units rounds nothing.
+//! A gain g of channel i is undone by its filter: `F_i H_i = (F_i / g) (g H_i)`, so gamma does not depend on
+//! it. The decompositions of double precision do: next to a large measurement a small one is lost to
+//! rounding. The units are powers of two, so a change of units rounds nothing.
 
 use super::DesignError;
 use super::lifting::JointState;
@@ -15,9 +15,9 @@ use crate::lti::gramian::controllability_root;
 const USUAL: f64 = 16.0;
 
 impl Problem {
-    /// For each channel the unit u_i in which it is designed: u_i times the measurement has about unit size. The size
-    /// is the root mean square of the samples for white noise of unit density at the analog input, without the noise
-    /// of the converter.
+    /// For each channel the unit u_i in which it is designed: u_i times the measurement has about unit size.
+    /// The size is the root mean square of the samples for white noise of unit density at the analog input,
+    /// without the noise of the converter.
     ///
     /// # Errors
     /// [`DesignError::Lti`] if a decomposition does not converge.

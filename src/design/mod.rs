@@ -4,6 +4,7 @@
 pub mod analysis;
 mod choices;
 mod designer;
+mod doubling;
 pub mod effort;
 mod error;
 mod error_grid;

@@ -65,8 +65,8 @@ impl Problem {
         Ok(problem)
     }
 
-    /// The same problem `fast_periods` earlier: a common shift of all delays and of the latency changes neither the
-    /// error nor the filters.
+    /// The same problem `fast_periods` earlier: a common shift of all delays and of the latency changes
+    /// neither the error nor the filters.
     pub(super) fn earlier(mut self, fast_periods: usize) -> Self {
         for channel in &mut self.channels {
             channel.delay.0 -= fast_periods as f64;
@@ -135,8 +135,8 @@ impl Problem {
     }
 }
 
-/// The delay in whole slow periods that all channels have, in fast periods, beyond [`KEPT_PERIODS`] of them. A
-/// bank of less latency would predict the target from samples that much older.
+/// The delay in whole slow periods that all channels have, in fast periods, beyond [`KEPT_PERIODS`] of them.
+/// A bank of less latency would predict the target from samples that much older.
 pub(super) fn common_delay(spec: &Spec) -> usize {
     let least = spec.delays_in_fast_periods().iter().map(|delay| delay.0).fold(f64::INFINITY, f64::min);
     let periods = (least / spec.ratio as f64).floor().max(0.0) as usize;

@@ -12,9 +12,13 @@ use super::{
     statements, upper,
 };
 use crate::arithmetic::{BigFloat, DoubleDouble};
-use crate::bank::{Bank, CausalWitness, DualWitness, LowerProof, Proof, SynthesisFilters};
+use crate::bank::{Bank, CausalWitness, Certificate, DualWitness, LowerProof, Proof, SynthesisFilters};
 use crate::linalg::Mat;
 use std::sync::OnceLock;
+
+/// Maximum number of states of an error system whose certificate is checked in 512 bits: some seconds of
+/// computing.
+const MAX_LONG_STATES: usize = 128;
 
 /// The error system of a bank, enclosed.
 #[derive(Debug, Clone)]
@@ -25,6 +29,7 @@ pub struct EnclosedErrorSystem<'a> {
     timeline: Timeline,
     pub(super) period: SlowPeriod,
     equations: ErrorSystem,
+    long_equations: OnceLock<ErrorSystem<BigFloat>>,
     long_period: OnceLock<SlowPeriod<BigFloat>>,
     short: OnceLock<Option<CausalPlant<DoubleDouble>>>,
     long: OnceLock<Option<CausalPlant<BigFloat>>>,
@@ -62,8 +67,18 @@ impl<'a> EnclosedErrorSystem<'a> {
         }
         let period = SlowPeriod::new(&front_ends, &timeline, &samples);
         let equations = ErrorSystem::new(&period, &BlockForm::new(&bank.filters, bank.ratio));
-        let (long_period, short, long) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
-        Ok(Self { bank, front_ends, samples, timeline, period, equations, long_period, short, long })
+        Ok(Self {
+            bank,
+            front_ends,
+            samples,
+            timeline,
+            period,
+            equations,
+            long_equations: OnceLock::new(),
+            long_period: OnceLock::new(),
+            short: OnceLock::new(),
+            long: OnceLock::new(),
+        })
     }
 
     /// Number of states of the error system, the order of P.
@@ -130,9 +145,18 @@ impl<'a> EnclosedErrorSystem<'a> {
         kept
     }
 
-    /// Whether `factor` proves ||K|| <= `gamma`.
-    pub fn keeps(&self, factor: &[Vec<f64>], gamma: f64) -> bool {
-        upper::proves(&self.equations, factor, gamma)
+    /// Whether `certificate` proves its gamma. Only one with a correction is tried in 512 bits.
+    pub fn keeps(&self, certificate: &Certificate) -> bool {
+        let long = !certificate.correction.is_empty() && self.states() <= MAX_LONG_STATES;
+        upper::proves(&self.equations, certificate)
+            || long && upper::proves(self.long_equations(), certificate)
+    }
+
+    /// The error system in 512 bits.
+    pub(super) fn long_equations(&self) -> &ErrorSystem<BigFloat> {
+        self.long_equations.get_or_init(|| {
+            ErrorSystem::new(self.long_period(), &BlockForm::new(&self.bank.filters, self.bank.ratio))
+        })
     }
 
     /// A proven lower bound of ||K||, from the gain at a frequency.
@@ -235,7 +259,7 @@ impl<'a> EnclosedErrorSystem<'a> {
         }
         let attained =
             self.attains(&certificate.peak).ok_or(VerifyError::Void { place: "proof.upper.peak" })?;
-        if !self.keeps(&certificate.factor, upper) {
+        if !self.keeps(certificate) {
             return Err(VerifyError::NotProven { gamma: upper });
         }
         let noncausal = match &proof.noncausal {

@@ -9,20 +9,20 @@
 
 use super::ball::{self, Ball, Matrix};
 use super::slow_period::SlowPeriod;
-use crate::arithmetic::Number;
+use crate::arithmetic::{DoubleDouble, Number};
 use crate::bank::{BlockFilter, SynthesisFilters};
 use std::ops::Range;
 
 /// A filter bank in block form, exactly as the file has it.
 #[derive(Debug, Clone)]
-pub(super) struct BlockForm {
-    pub(super) a: Matrix,
-    pub(super) b: Matrix,
-    pub(super) c: Matrix,
-    pub(super) d: Matrix,
+pub(super) struct BlockForm<F = DoubleDouble> {
+    pub(super) a: Matrix<F>,
+    pub(super) b: Matrix<F>,
+    pub(super) c: Matrix<F>,
+    pub(super) d: Matrix<F>,
 }
 
-impl BlockForm {
+impl<F: Number> BlockForm<F> {
     pub(super) fn new(filters: &SynthesisFilters, ratio: usize) -> Self {
         match filters {
             SynthesisFilters::Fir(taps) => Self::from_taps(taps, ratio),
@@ -72,13 +72,13 @@ impl BlockForm {
 
 /// `[xi+; e] = system xi + inputs u`, rows of the state first.
 #[derive(Debug, Clone)]
-pub(super) struct ErrorSystem {
+pub(super) struct ErrorSystem<F = DoubleDouble> {
     /// [A; C], (n + M) x n.
-    pub(super) system: Matrix,
+    pub(super) system: Matrix<F>,
     /// [J; L], (n + M) x (number of u).
-    pub(super) inputs: Matrix,
+    pub(super) inputs: Matrix<F>,
     /// Gram matrix of u.
-    pub(super) gram: Matrix,
+    pub(super) gram: Matrix<F>,
     /// M.
     pub(super) outputs: usize,
 }
@@ -168,8 +168,8 @@ pub(super) fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: 
     (next, delivered)
 }
 
-impl ErrorSystem {
-    pub(super) fn new(period: &SlowPeriod, filters: &BlockForm) -> Self {
+impl<F: Number> ErrorSystem<F> {
+    pub(super) fn new(period: &SlowPeriod<F>, filters: &BlockForm<F>) -> Self {
         let outputs = filters.d.nrows();
         let layout = Layout::new(period, filters.a.nrows());
         let order = layout.order();
@@ -183,6 +183,11 @@ impl ErrorSystem {
         whole.subtract(order, &ball::identity(outputs).map(|x| -x), &delivered, reference);
         whole.subtract(order, &filters.d, &delivered, measured);
         Self { system: whole.state, inputs: whole.input, gram: period.gram.clone(), outputs }
+    }
+
+    /// [J; L] S [J; L]', the energy of the input.
+    pub(super) fn fresh(&self) -> Matrix<F> {
+        ball::congruence(&self.inputs, &self.gram)
     }
 
     /// n, the number of states.

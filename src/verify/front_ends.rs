@@ -69,7 +69,8 @@ impl FrontEnds {
         sample.gain * sample.converter_gain
     }
 
-    /// Index of the filter `index` with its cut-off multiplied by `speed`, which is added if it is not there.
+    /// Index of the filter `index` with its cut-off multiplied by `speed`, which is added if it is not
+    /// there.
     pub(super) fn with_speed(&mut self, index: usize, speed: f64) -> usize {
         let of = self.speeds[index].0;
         if let Some(known) = self.speeds.iter().position(|&known| known == (of, speed)) {

@@ -22,10 +22,11 @@
 //! The proof starts from these doubles, taken as exact: the state equations of the front ends in normalised
 //! time that [`crate::analog`] realises from the spec (their rounding, some 1e-15 relative, is tested
 //! there, not proven here), the delays and the fast period in seconds, the gains of the converters, the
-//! latency, and the coefficients in the file. Everything computed from them is enclosed. Delays in fast periods are quotients that are
-//! compared exactly. Exponentials and Gramians are Taylor series with a bound of the remainder. Frequency
-//! responses are bounded by a residual. A Cholesky factorisation in double-double arithmetic shows positive
-//! definiteness (Rump, 2006). Everything else is computed in intervals of 106 or 512 bits.
+//! latency, and the coefficients in the file. Everything computed from them is enclosed. Delays in fast
+//! periods are quotients that are compared exactly. Exponentials and Gramians are Taylor series with a bound
+//! of the remainder. Frequency responses are bounded by a residual. A Cholesky factorisation in
+//! double-double arithmetic shows positive definiteness (Rump, 2006). Everything else is computed in
+//! intervals of 106 or 512 bits.
 //!
 //! For the lower bounds, samples of proportional filters count as one if their instants agree, or lie whole
 //! slow periods apart, within 4 eps (1 + D_1 / h + D_2 / h) fast periods: the rounding of the delays.

@@ -82,7 +82,7 @@ pub(super) fn scales<F: Number>(m: &Matrix<F>) -> Vec<f64> {
 }
 
 /// Whether every symmetric matrix in the enclosure `m` (lower triangle read) is positive definite.
-pub(super) fn is_positive_definite(m: &Matrix) -> bool {
+pub(super) fn is_positive_definite<F: Number>(m: &Matrix<F>) -> bool {
     exceeds(&scaled(m, &scales(m)), 0.0)
 }
 

@@ -1,5 +1,5 @@
-//! Second moments of the samples in 512 bits, for the search for witnesses of long filters. Only their
-//! midpoints: the proof does not use them.
+//! The error system and second moments of its samples in 512 bits, for the search for certificates and for
+//! witnesses of long filters. Only their midpoints: the proof does not use them.
 
 use super::ball::{self, Ball};
 use super::covariance::{Covariance, TapSamples};
@@ -10,7 +10,21 @@ use crate::arithmetic::{BigFloat, Matrix};
 /// Real and imaginary part.
 pub(crate) type ComplexParts = [Matrix<BigFloat>; 2];
 
+/// An error system xi+ = A xi + J u, e = C xi + L u with the Gram matrix S of u.
+pub(crate) struct PreciseErrorSystem {
+    /// [A; C], (n + M) x n.
+    pub(crate) system: Matrix<BigFloat>,
+    /// [J; L] S [J; L]'.
+    pub(crate) fresh: Matrix<BigFloat>,
+}
+
 impl EnclosedErrorSystem<'_> {
+    /// The error system in 512 bits.
+    pub(crate) fn in_512_bits(&self) -> PreciseErrorSystem {
+        let error = self.long_equations();
+        PreciseErrorSystem { system: midpoints(&error.system), fresh: midpoints(&error.fresh()) }
+    }
+
     /// The point z of the unit circle that `half` names, 1 x 1, and the Gram matrix at it: that of the M
     /// reference samples and the samples of the `channels`.
     pub(crate) fn precise_gram(&self, half: [f64; 2], channels: &[usize]) -> [ComplexParts; 2] {
@@ -22,8 +36,8 @@ impl EnclosedErrorSystem<'_> {
     }
 
     /// Covariance of the samples of the `channels` over `lags` slow periods, for white noise of unit density
-    /// at the input, the channels of the latest period first; and the correlations of the M reference samples
-    /// (rows) with these.
+    /// at the input, the channels of the latest period first; and the correlations of the M reference
+    /// samples (rows) with these.
     pub(crate) fn precise_covariance(
         &self,
         channels: &[usize],

@@ -154,7 +154,8 @@ pub(super) fn delay<F: Number>(z: &ComplexMatrix<F>, periods: usize) -> ComplexM
     power
 }
 
-/// Maximum number of refinement steps per 106 bits. The better the condition, the more digits each step gains.
+/// Maximum number of refinement steps per 106 bits. The better the condition, the more digits each step
+/// gains.
 const REFINEMENTS: usize = 6;
 /// They end where the residual falls by less than this.
 const LEAST_GAIN: f64 = 0.1;

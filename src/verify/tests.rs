@@ -3,7 +3,7 @@
 
 use super::spectrum::{self, ComplexMatrix};
 use super::*;
-use crate::bank::{BlockFilter, Gamma, LowerProof, SynthesisFilters};
+use crate::bank::{BlockFilter, Certificate, Gamma, LowerProof, SynthesisFilters};
 use crate::design::{LiftedPlant, Problem, filters};
 use crate::linalg::{CMat, symmetric_eigenvalues};
 use crate::lti::FrequencyResponse;
@@ -226,9 +226,10 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
         // A certificate proves its gamma and no lower one.
         let certificate = bank.proof.as_ref().unwrap().upper.clone().unwrap();
         let error = EnclosedErrorSystem::new(&bank).unwrap();
-        assert!(error.keeps(&certificate.factor, certificate.gamma));
-        assert!(!error.keeps(&certificate.factor, norm * (1.0 - 1e-6)));
-        assert!(!error.keeps(&certificate.factor, norm * (1.0 - 1e-12)));
+        assert!(error.keeps(&certificate));
+        for below in [1e-6, 1e-12] {
+            assert!(!error.keeps(&Certificate { gamma: norm * (1.0 - below), ..certificate.clone() }));
+        }
     }
 }
 
@@ -238,15 +239,35 @@ fn a_norm_that_is_stated_too_low_or_too_high_is_refused() {
 fn no_certificate_passes_below_the_norm() {
     let (bank, proven) = designed(Method::Fir, 10, 22);
     let error = EnclosedErrorSystem::new(&bank).unwrap();
-    let factor = bank.proof.as_ref().unwrap().upper.as_ref().unwrap().factor.clone();
+    let certificate = bank.proof.as_ref().unwrap().upper.as_ref().unwrap();
+    let keeps =
+        |factor: Vec<Vec<f64>>, gamma| error.keeps(&Certificate { factor, gamma, ..certificate.clone() });
+    let factor = &certificate.factor;
     for scale in [0.5, 0.999999, 1.0, 1.000001, 1.5, 1e3] {
         let scaled: Vec<Vec<f64>> =
             factor.iter().map(|row| row.iter().map(|x| x * scale).collect()).collect();
-        assert!(!error.keeps(&scaled, proven.attained), "{scale}");
-        assert!(!error.keeps(&scaled, 0.9 * proven.attained), "{scale}");
+        assert!(!keeps(scaled.clone(), proven.attained), "{scale}");
+        assert!(!keeps(scaled, 0.9 * proven.attained), "{scale}");
     }
     let zero: Vec<Vec<f64>> = factor.iter().map(|row| vec![0.0; row.len()]).collect();
-    assert!(!error.keeps(&zero, 1e9) && !error.keeps(&factor[1..], 1e9));
+    assert!(!keeps(zero, 1e9) && !keeps(factor[1..].to_vec(), 1e9));
+}
+
+/// After a steep filter doubles are too coarse for the certificate: what they leave is in the correction.
+#[test]
+fn a_corrected_certificate_passes_and_proves_no_less_than_the_norm() {
+    let steep = family(Family::Butterworth, 8, 0.1 * TAU);
+    let mut spec = bank(steep.clone(), vec![steep], &[0.6], 2, 1, 1).spec.unwrap();
+    spec.design = DesignSpec::new(Method::Iir, None);
+    let design = crate::design::design(&spec).unwrap();
+    let proven = design.proof.unwrap();
+    assert!(proven.upper - proven.lower <= 1e-4 * proven.upper, "{proven:?}");
+    let certificate = design.bank.proof.as_ref().unwrap().upper.clone().unwrap();
+    assert_eq!(certificate.correction.len(), certificate.factor.len());
+    let error = EnclosedErrorSystem::new(&design.bank).unwrap();
+    assert!(error.keeps(&certificate));
+    assert!(!error.keeps(&Certificate { gamma: proven.attained, ..certificate.clone() }));
+    assert!(!error.keeps(&Certificate { correction: Vec::new(), ..certificate }));
 }
 
 #[test]

@@ -10,33 +10,39 @@
 //!
 //! The first block says P - A P A' > 0, so all eigenvalues of A lie inside the unit circle; and with Psi =
 //! C (zI - A)^-1 the product [Psi, I] (..) [Psi, I]* is gamma^2 I - K(z) K(z)* on it. So ||K|| < gamma. The
-//! certificate in the file is a lower triangular factor of P = R R'.
+//! certificate in the file is a lower triangular factor of P = R R', with a correction of it where doubles
+//! are too coarse.
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::ErrorSystem;
 use super::positive;
+use crate::arithmetic::Number;
+use crate::bank::Certificate;
 
-/// Whether `factor` (rows of a lower triangular R) proves `||K|| <= gamma`.
-pub(super) fn proves(error: &ErrorSystem, factor: &[Vec<f64>], gamma: f64) -> bool {
-    factor.len() == error.order() && positive::is_positive_definite(&inequality(error, factor, gamma))
+/// Whether `certificate` proves `||K|| <= gamma` in the precision of F.
+pub(super) fn proves<F: Number>(error: &ErrorSystem<F>, certificate: &Certificate) -> bool {
+    certificate.factor.len() == error.order()
+        && positive::is_positive_definite(&inequality(error, certificate))
 }
 
-/// Rows of a triangle as a matrix.
-fn triangular(rows: &[Vec<f64>]) -> Matrix {
-    let n = rows.len();
-    Matrix::from_fn(n, n, |i, j| rows[i].get(j).map_or(Ball::ZERO, |&x| Ball::from(x)))
+/// R, enclosed.
+fn triangular<F: Number>(certificate: &Certificate) -> Matrix<F> {
+    let n = certificate.factor.len();
+    let entry = |rows: &[Vec<f64>], i: usize, j: usize| {
+        rows.get(i).and_then(|row| row.get(j)).map_or(Ball::ZERO, |&x| Ball::from(x))
+    };
+    Matrix::from_fn(n, n, |i, j| entry(&certificate.factor, i, j) + entry(&certificate.correction, i, j))
 }
 
 /// The matrix that has to be positive definite.
-fn inequality(error: &ErrorSystem, factor: &[Vec<f64>], gamma: f64) -> Matrix {
+fn inequality<F: Number>(error: &ErrorSystem<F>, certificate: &Certificate) -> Matrix<F> {
     let (n, m) = (error.order(), error.outputs);
-    let root = triangular(factor);
+    let root = triangular(certificate);
     let p = ball::product_transposed(&root, &root);
     let mut left = ball::zeros(n + m, n + m);
     left.view_mut((0, 0), (n, n)).copy_from(&p);
-    let square = Ball::from(gamma) * Ball::from(gamma);
+    let square = Ball::from(certificate.gamma) * Ball::from(certificate.gamma);
     (n..n + m).for_each(|i| left[(i, i)] = square);
     let moved = ball::congruence(&error.system, &p);
-    let fresh = ball::congruence(&error.inputs, &error.gram);
-    ball::subtract(&left, &ball::add(&moved, &fresh))
+    ball::subtract(&left, &ball::add(&moved, &error.fresh()))
 }

@@ -1,7 +1,7 @@
 //! The figures of `measure` beside those of two public tools, on records that the tools made.
 //!
-//! `tools/adc_tools.py` wrote the records and `figures.json` with adctoolbox 0.9.1 and python-adc-eval 0.4.0;
-//! docs/measure.md says where the definitions differ.
+//! `tools/adc_tools.py` wrote the records and `figures.json` with adctoolbox 0.9.1 and python-adc-eval
+//! 0.4.0; docs/measure.md says where the definitions differ.
 
 use crate::support::{number, wav};
 use hybank::measure::{Measurement, Settings, Window, measure};
@@ -53,7 +53,8 @@ fn coherent_records_have_the_figures_of_the_tools() {
 #[test]
 fn a_record_off_a_bin_has_the_figures_of_the_coherent_one() {
     let (off, coherent) = (measured("off-bin", 1), measured("converter", 1));
-    // The quantisation errors of two records of 4096 samples differ by as much: their own ENOB are 12.010 and 11.984.
+    // The quantisation errors of two records of 4096 samples differ by as much: their own ENOB are 12.010
+    // and 11.984.
     assert!((off.enob - coherent.enob).abs() < 0.03, "{} {}", off.enob, coherent.enob);
     // The tools without a window lose ten bits there.
     assert!(number(&figures(), "/off-bin/adctoolbox, no window/enob") < coherent.enob - 9.0);

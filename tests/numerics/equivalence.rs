@@ -1,8 +1,9 @@
 //! The exact equivalent against brute force: a finely discretised continuous-time system.
 //!
-//! Inputs are sums of short pulses of unit energy over a finite stretch of time, outputs the error samples that the
-//! definition gives for them (analog step responses, sample instants, convolution with the taps). Fewer inputs and
-//! fewer outputs can only lower the largest gain, so it must approach the computed norm from below.
+//! Inputs are sums of short pulses of unit energy over a finite stretch of time, outputs the error samples
+//! that the definition gives for them (analog step responses, sample instants, convolution with the taps).
+//! Fewer inputs and fewer outputs can only lower the largest gain, so it must approach the computed norm
+//! from below.
 
 use hybank::analog::StrictlyProper;
 use hybank::bank::SynthesisFilters;

@@ -1,5 +1,5 @@
-//! The proven interval of FIR banks: how wide it is, what class of banks its lower end bounds, and the time of
-//! search and proof. `HYBANK_FIR_BANKS=81` goes through all, `HYBANK_FIR_BANKS=17..18` through that one.
+//! The proven interval of FIR banks: how wide it is, what class of banks its lower end bounds, and the time
+//! of search and proof. `HYBANK_FIR_BANKS=81` goes through all, `HYBANK_FIR_BANKS=17..18` through that one.
 
 use crate::support::specs::{alike, butterworth, low_pass, with_taps};
 use crate::support::sweep::wanted;

@@ -1,5 +1,5 @@
-//! The unit of a signal does not matter: K = W - F H is linear in the target's gain, and a channel's gain is undone by its
-//! filter. Designed, proven and read back over 18 decades.
+//! The unit of a signal does not matter: K = W - F H is linear in the target's gain, and a channel's gain is
+//! undone by its filter. Designed, proven and read back over 18 decades.
 
 use crate::support::specs::{alike, amplified, amplify, butterworth, tf, thesis, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
@@ -145,8 +145,8 @@ fn steep_front_ends_of_much_gain_are_designed() {
     }
 }
 
-/// Channels whose gains lie 12 decades apart: neither gamma nor its bounds depend on the gains, and each filter undoes
-/// its own.
+/// Channels whose gains lie 12 decades apart: neither gamma nor its bounds depend on the gains, and each
+/// filter undoes its own.
 #[test]
 fn gains_twelve_decades_apart_change_no_gamma() {
     let channels = [0.2, 1.1, 2.4];

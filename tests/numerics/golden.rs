@@ -1,8 +1,8 @@
 //! The golden numbers of the thesis example and its relatives.
 //!
 //! Origin: H. T. Nguyen's thesis (UIUC 2007), chapter 5, for the problem; the digits were computed
-//! independently of this code (general conic solver on the bounded-real LMI, dense frequency grids) and are good to
-//! 1e-6 relative unless more digits stand here.
+//! independently of this code (general conic solver on the bounded-real LMI, dense frequency grids) and are
+//! good to 1e-6 relative unless more digits stand here.
 
 use crate::support::specs::{alike, butterworth, tf, thesis, thesis_filter, with_taps};
 use hybank::design::filters::lifted;
@@ -199,8 +199,8 @@ fn g15_errors_on_the_thesis_inputs() {
     }
 }
 
-/// The second objective: with noisy converters the output noise falls, the sum of both powers is least, and gamma stays under
-/// its margin.
+/// The second objective: with noisy converters the output noise falls, the sum of both powers is least, and
+/// gamma stays under its margin.
 #[test]
 fn noise_of_the_converters_is_weighed_within_the_gamma_margin() {
     let noisy = |sigma: [f64; 2], gamma_margin| {

@@ -1,6 +1,6 @@
-//! Steep and high-order front ends, low latency, late and crowded channels: what the two designers, which share no
-//! solver, say about one another. A state-space bank can do all that an FIR bank can, so its gamma must not be larger;
-//! and no lower bound may exceed what any bank of the kind achieves.
+//! Steep and high-order front ends, low latency, late and crowded channels: what the two designers, which
+//! share no solver, say about one another. A state-space bank can do all that an FIR bank can, so its gamma
+//! must not be larger; and no lower bound may exceed what any bank of the kind achieves.
 
 use crate::support::specs::{alike, low_pass};
 use hybank::design::{Design, DesignError, ProofSearch, analyze, certify, design_with};

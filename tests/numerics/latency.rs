@@ -1,5 +1,6 @@
-//! A latency that the spec leaves open: the shortest whose error is within 0.1 % of the best, against designs at every latency.
-//! `HYBANK_LATENCIES=300` tries that many random plants, `HYBANK_LATENCIES=17..18` that one.
+//! A latency that the spec leaves open: the shortest whose error is within 0.1 % of the best, against
+//! designs at every latency. `HYBANK_LATENCIES=300` tries that many random plants, `HYBANK_LATENCIES=17..18`
+//! that one.
 
 use crate::support::random::Random;
 use crate::support::specs::{butterworth, low_pass, with_taps};
@@ -106,7 +107,8 @@ fn h2_takes_the_shortest_latency_that_is_almost_the_best() {
     assert_eq!(faults(Method::H2, 3), Vec::<String>::new());
 }
 
-/// Where the designer of recursive banks misses the optimum or fails, the choice is judged by what it delivers.
+/// Where the designer of recursive banks misses the optimum or fails, the choice is judged by what it
+/// delivers.
 #[test]
 fn iir_takes_the_shortest_latency_that_is_almost_the_best() {
     let faults = faults(Method::Iir, 3);
@@ -190,7 +192,8 @@ fn a_latency_that_the_taps_do_not_reach_is_refused() {
     assert!(reached > 0.9 * zero_output, "{reached} of {zero_output}");
 }
 
-/// A delay that all channels have adds to the latency and changes nothing else, however many slow periods it lasts.
+/// A delay that all channels have adds to the latency and changes nothing else, however many slow periods it
+/// lasts.
 #[test]
 fn a_common_delay_adds_to_the_latency() {
     let with_delay = |method: Method, common: f64| {

@@ -1,6 +1,6 @@
-//! Two channels whose delays differ by less than the data's precision. What the samples' difference tells depends on
-//! digits that neither the spec nor a double has, so no bound may rest on it. `HYBANK_NEAR_DELAYS=200` tries that many
-//! random plants.
+//! Two channels whose delays differ by less than the data's precision. What the samples' difference tells
+//! depends on digits that neither the spec nor a double has, so no bound may rest on it.
+//! `HYBANK_NEAR_DELAYS=200` tries that many random plants.
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
@@ -9,8 +9,8 @@ use hybank::bank::Gamma;
 use hybank::design::{DesignError, ProofSearch, design_with};
 use hybank::spec::{DesignSpec, Family, Method, Spec};
 
-/// Distances at which doubles resolve the difference of two samples. As the distance shrinks, gamma tends to that of a
-/// sample and a sample of the derivative.
+/// Distances at which doubles resolve the difference of two samples. As the distance shrinks, gamma tends to
+/// that of a sample and a sample of the derivative.
 const RESOLVED: [f64; 2] = [1e-3, 1e-4];
 /// How far gamma may still be from that limit.
 const NEAR_THE_LIMIT: f64 = 0.1;

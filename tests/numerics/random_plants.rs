@@ -1,5 +1,6 @@
-//! Random plants, from one channel to eight, steep and flat, delays down to equal: each ends as a bank with an interval that
-//! holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many, `HYBANK_PLANTS=124..125` that one.
+//! Random plants, from one channel to eight, steep and flat, delays down to equal: each ends as a bank with
+//! an interval that holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many,
+//! `HYBANK_PLANTS=124..125` that one.
 
 use crate::support::random::Random;
 use crate::support::sweep::{each, wanted};
@@ -113,7 +114,8 @@ fn end_of(seed: u64) -> End {
 
 fn refused(seed: u64, refusal: &DesignError, end: End) -> End {
     println!("plant {seed}: {end:?}: {refusal}");
-    // A plant within the limits of a spec may be too hard for doubles; an answer that blames anything else is a fault of ours.
+    // A plant within the limits of a spec may be too hard for doubles; an answer that blames anything else
+    // is a fault of ours.
     let too_hard = matches!(
         refusal,
         DesignError::NotCertified
@@ -135,6 +137,7 @@ fn every_plant_ends_as_a_proven_bank_or_as_a_refusal() {
     let count = |end: End| ends.iter().filter(|&&other| other == end).count();
     let (proven, unproven, refused) = (count(End::Proven), count(End::Unproven), count(End::Refused));
     println!("of plants {plants:?} {proven} proven, {unproven} designed and not proven, {refused} refused");
-    // Delays a thousandth apart and cutoffs far below the rate, of which there are many here, are beyond a proof in doubles.
+    // Delays a thousandth apart and cutoffs far below the rate, of which there are many here, are beyond a
+    // proof in doubles.
     assert!(refused * 10 <= ends.len() && proven * 2 >= ends.len());
 }

@@ -1,6 +1,7 @@
 //! Order reduction as a user meets it: banks of few states, proven, beside FIR banks of the same cost.
 
 use crate::support::specs::{alike, amplified, butterworth, thesis};
+use crate::support::sweep::long_tests;
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::design::{Design, analyze, design};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
@@ -97,8 +98,8 @@ fn with_all_its_states_it_is_the_full_bank() {
 
 #[test]
 fn it_is_worth_its_cost_beside_taps() {
-    // The target has a slow pole that the channels do not have: taps would have to last as long. (Of a mere delay they make nothing,
-    // where a recursion spends its states.)
+    // The target has a slow pole that the channels do not have: taps would have to last as long. (Of a mere
+    // delay they make nothing, where a recursion spends its states.)
     let mut spec = thesis(4, &[1.2, 0.6]);
     spec.target = FilterSpec::TransferFunction { num: vec![0.005], den: vec![1.0, 0.51, 0.005] };
     let found = reduced(spec.clone(), Method::Iir, Reduction::Order(1));
@@ -141,7 +142,7 @@ fn nasty_front_ends_end_as_banks_of_that_order() {
         alike(&butterworth(2, 0.05), 2, 4, &[0.3, 1.1]),
     ];
     // One order each, in turn, unless all are asked for.
-    let all = std::env::var_os("HYBANK_LONG_TESTS").is_some();
+    let all = long_tests();
     for (case, spec) in cases.into_iter().enumerate() {
         for order in
             [0, 1, 3].into_iter().enumerate().filter(|(k, _)| all || case % 3 == *k).map(|(_, order)| order)

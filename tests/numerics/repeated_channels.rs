@@ -1,5 +1,5 @@
-//! Channels that repeat what others measure: the same filter, up to a gain, sampled whole slow periods later.
-//! `HYBANK_SWEEP=200` tries so many random plants.
+//! Channels that repeat what others measure: the same filter, up to a gain, sampled whole slow periods
+//! later. `HYBANK_SWEEP=200` tries so many random plants.
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, amplify, low_pass, thesis};

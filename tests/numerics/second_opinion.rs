@@ -3,6 +3,7 @@
 
 use crate::golden::{g8, g9, g10, g11, g12};
 use crate::support::specs::{alike, butterworth, tf, thesis, with_taps};
+use crate::support::sweep::long_tests;
 use hybank::bank::Gamma;
 use hybank::design::{DesignError, design};
 use hybank::spec::{Method, Solver, Spec};
@@ -51,7 +52,7 @@ const QUICK: usize = 64;
 
 #[test]
 fn the_fir_specs_in_filters() {
-    let limit = if std::env::var_os("HYBANK_LONG_TESTS").is_some() { usize::MAX } else { QUICK };
+    let limit = if long_tests() { usize::MAX } else { QUICK };
     for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("filters")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|extension| extension != "toml") {

@@ -1,4 +1,5 @@
-//! The form in which recursive banks are written: delay lines and parallel sections, which the runtime recognises.
+//! The form in which recursive banks are written: delay lines and parallel sections, which the runtime
+//! recognises.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::design::{Design, DesignError, ProofSearch, analyze, design_with};

@@ -1,7 +1,9 @@
-//! What `verify` must not say: delays next to whole numbers against a closed form, and files whose gammas are false.
+//! What `verify` must not say: delays next to whole numbers against a closed form, and files whose gammas
+//! are false.
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
+use crate::support::sweep::wanted;
 use hybank::bank::{Bank, CausalWitness, Gamma, LowerProof, SynthesisFilters};
 use hybank::design::{certify, design};
 use hybank::spec::{DesignSpec, Method, Spec};
@@ -32,8 +34,9 @@ impl OnePole {
         }
     }
 
-    /// ||K|| of x(k) - x(k - d), d = |D / h - latency| < 1, by its closed form: with E = e^{-w}, e = e^{-w d} - 1 and the
-    /// energies g_v = w (1 - e^{-2 w d}) / 2, g_u = w (1 - e^{-2 w (1 - d)}) / 2 of the input's two parts of a period,
+    /// ||K|| of x(k) - x(k - d), d = |D / h - latency| < 1, by its closed form: with E = e^{-w},
+    /// e = e^{-w d} - 1 and the energies g_v = w (1 - e^{-2 w d}) / 2, g_u = w (1 - e^{-2 w (1 - d)}) / 2 of
+    /// the input's two parts of a period,
     /// |K|^2 = g_v |1 + e e^{-w (1 - d)} z^-1 / (1 - E z^-1)|^2 + g_u |e / (1 - E z^-1)|^2.
     fn norm(&self) -> f64 {
         let w = self.pole;
@@ -53,7 +56,8 @@ impl OnePole {
     }
 }
 
-/// A delay that is a whole number up to 1e-13 relative is none: these were proven to be far better than they are.
+/// A delay that is a whole number up to 1e-13 relative is none: these were proven to be far better than they
+/// are.
 #[test]
 fn delays_next_to_whole_numbers_are_not_rounded() {
     for (pole, delay, latency, norm) in [
@@ -217,14 +221,14 @@ fn files_whose_gammas_are_false_are_refused() {
     }
 }
 
-/// Random factors on any of the numbers: what passes is true.
+/// Random factors on any of the numbers: what passes is true. `HYBANK_FACTORS=1000` tries that many.
 #[test]
 fn statements_that_pass_are_true() {
     let mut random = Random(7);
     let (mut passed, mut refused) = (0, 0);
     for bank in examples() {
         let truth = verify(&bank).unwrap();
-        for _ in 0..200 {
+        for _ in wanted("HYBANK_FACTORS", 50) {
             let mut forged = bank.clone();
             let size = 10f64.powf(-14.0 * random.part());
             let factor = 1.0 + if random.part() < 0.5 { -size } else { size };

@@ -1,4 +1,5 @@
-//! Forged banks: stated numbers are changed, the digest is computed again, and what `verify` then proves must be true.
+//! Forged banks: stated numbers are changed, the digest is computed again, and what `verify` then proves
+//! must be true.
 
 use crate::norm::norm;
 use crate::support::campaign::rounds;
@@ -14,6 +15,9 @@ use std::f64::consts::SQRT_2;
 /// Relative error of the oracle: its sum over aliases ends, and it may miss the top of a peak by a little.
 const ORACLE: f64 = 1e-6;
 
+/// The bank whose proof needs more than doubles.
+const CORRECTED: &str = "recursive after a steep filter, latency 1";
+
 /// A proven bank as a document, with its true norm.
 struct Example {
     name: &'static str,
@@ -24,16 +28,34 @@ struct Example {
 
 fn examples() -> Vec<Example> {
     let butterworth = tf(&[0.36], &[1.0, 0.6 * SQRT_2, 0.36]);
-    let list: [(&str, Spec); 5] = [
+    // Of order 8 at 0.1: `scipy.signal.butter(8, 0.2 * pi, analog=True)`. Its certificate has a correction.
+    let steep = tf(
+        &[0.024290639401140676],
+        &[
+            1.0,
+            3.220654536958605,
+            5.186307823216022,
+            5.418942410806815,
+            4.003647042306509,
+            2.1393127146779487,
+            0.8083096494112137,
+            0.19816335795656187,
+            0.024290639401140676,
+        ],
+    );
+    let list: [(&str, Spec); 6] = [
         ("FIR, latency 10", with_taps(thesis(10, &[1.2, 0.6]), 12)),
         ("FIR, latency 1", with_taps(thesis(1, &[1.2, 0.6]), 8)),
         ("FIR, three channels", with_taps(alike(&butterworth, 3, 6, &[0.0, 1.1, 2.3]), 12)),
         ("FIR, one channel", with_taps(alike(&butterworth, 1, 2, &[0.4]), 6)),
         ("recursive, latency 3", thesis(3, &[1.2, 0.6])),
+        (CORRECTED, alike(&steep, 2, 1, &[0.6])),
     ];
     let example = |(name, spec): (&'static str, Spec)| {
         let bank = design(&spec).unwrap().bank;
         verify(&bank).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let proof = bank.proof.as_ref().unwrap().upper.as_ref().unwrap();
+        assert_eq!(name == CORRECTED, !proof.correction.is_empty(), "{name}");
         let document = serde_json::from_str(&bank.to_json().unwrap()).unwrap();
         Example { name, norm: norm(&bank), bank, document }
     };
@@ -50,7 +72,8 @@ fn numbers(value: &mut Value) -> Vec<&mut Value> {
     }
 }
 
-/// The parts of a file that hold numbers; gamma, spec and coefficients would be rare among the numbers of the proof.
+/// The parts of a file that hold numbers; gamma, spec and coefficients would be rare among the numbers of
+/// the proof.
 fn parts(document: &mut Value) -> Vec<&mut Value> {
     let mut parts = Vec::new();
     for (key, value) in document.as_object_mut().unwrap() {
@@ -100,7 +123,8 @@ fn check(example: &Example, forged: &Bank, proven: &Verified, what: &str) {
     let (above, below) = (true_norm * (1.0 + ORACLE) + 1e-9, true_norm * (1.0 - ORACLE) - 1e-9);
     assert!(proven.attained <= above && below <= proven.upper, "{what}");
     assert!(proven.lower <= above && proven.noncausal <= above, "{what}");
-    // On the same front ends and with as many taps the original is a bank of the class that the bounds speak of.
+    // On the same front ends and with as many taps the original is a bank of the class that the bounds speak
+    // of.
     let same_class = |a: &Bank, b: &Bank| a.spec == b.spec && a.latency == b.latency;
     if same_class(&example.bank, forged) {
         assert!(proven.lower <= example.norm * (1.0 + ORACLE), "{what}");

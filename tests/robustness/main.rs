@@ -1,7 +1,8 @@
 //! Campaigns of random trials: killed runs, failing system calls, full disks, forged banks, damaged inputs.
 //!
-//! Every run makes a short campaign with the same seeds. `HYBANK_CAMPAIGN=50 cargo test --release --test robustness
-//! -- --nocapture` makes 50 times as many trials; the counts are printed. `docs/robustness.md` has them.
+//! Every run makes a short campaign with the same seeds.
+//! `HYBANK_CAMPAIGN=50 cargo test --release --test robustness -- --nocapture` makes 50 times as many trials;
+//! the counts are printed. `docs/robustness.md` has them.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,8 +1,8 @@
 //! The norm of a bank by brute force, without a state of any front end.
 //!
-//! Time in fast periods, z = e^{j omega} per slow period. An input e^{j nu t} with nu = (omega + 2 pi k) / M gives the
-//! error samples v_k\[p\] = Phi_0(j nu) e^{j nu (p - m0)} - sum_i F_{p,i}(z) Phi_i(j nu) e^{-j nu D_i}, and so
-//! K K* = (1 / M) sum_k v_k v_k*. The sum converges as the front ends fall.
+//! Time in fast periods, z = e^{j omega} per slow period. An input e^{j nu t} with nu = (omega + 2 pi k) / M
+//! gives the error samples v_k\[p\] = Phi_0(j nu) e^{j nu (p - m0)} - sum_i F_{p,i}(z) Phi_i(j nu) e^{-j nu
+//! D_i}, and so K K* = (1 / M) sum_k v_k v_k*. The sum converges as the front ends fall.
 
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::spec::FilterSpec;

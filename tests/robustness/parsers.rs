@@ -1,5 +1,5 @@
-//! Damaged files, by the thousand: every parser gives an answer or a message that names the file, and never panics.
-//! The seeds are those of the fuzz targets, the damage is the same in every run.
+//! Damaged files, by the thousand: every parser gives an answer or a message that names the file, and never
+//! panics. The seeds are those of the fuzz targets, the damage is the same in every run.
 
 use crate::support::campaign::rounds;
 use crate::support::random::Random;

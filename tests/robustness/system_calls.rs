@@ -48,7 +48,8 @@ fn calls(job: &Job) -> String {
     fs::read_to_string(log).unwrap()
 }
 
-/// Each output is on the disk before it gets its name: after a crash of the system the name means a whole file.
+/// Each output is on the disk before it gets its name: after a crash of the system the name means a whole
+/// file.
 fn assert_synced_before_named(log: &str) {
     let mut synced = 0;
     for line in log.lines() {

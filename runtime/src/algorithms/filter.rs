@@ -52,8 +52,8 @@ pub(crate) trait Filter: Debug + Send + Sync {
         None
     }
 
-    /// Makes the state what it would be after `position` frames, of which the last ones are `recent`. Does not
-    /// allocate; false, with the state as before, if recent input does not determine the state.
+    /// Makes the state what it would be after `position` frames, of which the last ones are `recent`. Does
+    /// not allocate; false, with the state as before, if recent input does not determine the state.
     fn load(&self, _state: &mut Self::State, _recent: &dyn RecentInput, _position: u64) -> bool {
         false
     }

@@ -69,8 +69,8 @@ pub(crate) trait Kernel {
 /// To call it, what the kernel asks of its job must hold.
 pub(crate) type Compiled<K> = for<'a> unsafe fn(<K as Kernel>::Job<'a>) -> <K as Kernel>::Output;
 
-/// Declares [`compiled`], [`compiled_narrow`] and, for each instruction set, a function with the given target
-/// features. Before them stand the kind, the function, and that for vectors of one lane group.
+/// Declares [`compiled`], [`compiled_narrow`] and, for each instruction set, a function with the given
+/// target features. Before them stand the kind, the function, and that for vectors of one lane group.
 macro_rules! instruction_sets {
     ($($arch:literal $kind:ident $function:ident $narrow:ident $features:literal;)*) => {
         /// The function of kernel `K` for an instruction set.

@@ -175,8 +175,8 @@ fn plant(problem: &Problem, latency: usize) -> Result<LiftedPlant, DesignError> 
 }
 
 /// A lower bound of gamma for all filters of any latency: the noncausal bound. Delays by whole slow periods
-/// do not change it, so it is computed without them. Gammas that are [`NEGLIGIBLE`] relative to `zero_output`
-/// count as equal.
+/// do not change it, so it is computed without them. Gammas that are [`NEGLIGIBLE`] relative to
+/// `zero_output` count as equal.
 fn floor(problem: &Problem, zero_output: f64) -> Result<f64, DesignError> {
     let within_a_period = |channel: &Channel| Channel {
         delay: FastPeriods(channel.delay.0.rem_euclid(problem.ratio as f64)),

@@ -17,7 +17,8 @@ use crate::spec::MAX_LATENCY;
 use crate::units::FastPeriods;
 use std::ops::RangeInclusive;
 
-/// Share of the target's power that some phase must be able to remove. Below it gamma is that of zero output.
+/// Share of the target's power that some phase must be able to remove. Below it gamma is that of zero
+/// output.
 const LEAST_REMOVED: f64 = 1e-3;
 /// Front ends with more states in all are replaced by the target's, so that the errors cost little.
 const MOST_STATES: usize = 64;

@@ -2,6 +2,7 @@
 
 use super::amount::Effort;
 use super::sizes::Sizes;
+use crate::design::prove::MAX_LONG_STATES;
 
 /// Bytes of a real and of a complex number.
 pub(super) const REAL: f64 = 8.0;
@@ -13,14 +14,25 @@ pub(super) const PRODUCT: f64 = 6e-11;
 pub(super) const SMALL: f64 = 4e-10;
 const SOLUTION: f64 = 1.2e-10;
 /// Seconds per n^3 of the decompositions of complex n x n matrices, at n = `BLOCK`. Larger matrices are
-/// decomposed at a higher rate.
+/// decomposed at a higher rate, by this power of the size below and above.
 const COMPLEX_CUBE: f64 = 4.4e-9;
 const BLOCK: f64 = 66.0;
 const GROWTH: f64 = 0.9;
+const LARGE_GROWTH: f64 = 0.6;
 /// Seconds per n^3 of the search for certificates of a system with n states, with their proof.
 const CERTIFICATE: f64 = 9e-8;
 /// Larger systems get no proof.
 const MOST_PROVEN: f64 = 512.0;
+/// The same for a certificate in 512 bits.
+const LONG_CERTIFICATE: f64 = 1.3e-5;
+/// Seconds per n^2 and per row, a sample or a front end's state, of a period of the causal recursion in 512
+/// bits; periods of all gammas that are tried; and the states of the largest plant.
+const RECURSION: f64 = 1e-7;
+const RECURSION_PERIODS: f64 = 9.0 * 128.0;
+const MOST_RECURSION_STATES: f64 = 128.0;
+/// Fast periods of latency beyond the longest delay with which the noncausal bound explains nearly any
+/// optimum.
+const NONCAUSAL_LATENCY: f64 = 32.0;
 
 /// All eigenvalues of a real matrix of this order.
 pub(super) fn eigenvalues(order: f64) -> Effort {
@@ -30,7 +42,8 @@ pub(super) fn eigenvalues(order: f64) -> Effort {
 /// Factorisations and products of one complex matrix of this order in an interior-point iteration, or the
 /// largest singular value of such a matrix.
 pub(super) fn complex_cube(order: f64) -> f64 {
-    COMPLEX_CUBE * order.powi(3) * (BLOCK / order.max(1.0)).powf(GROWTH)
+    let growth = if order > BLOCK { LARGE_GROWTH } else { GROWTH };
+    COMPLEX_CUBE * order.powi(3) * (BLOCK / order.max(1.0)).powf(growth)
 }
 
 /// The response of the plant at one frequency, compressed to a triangular factor. Delays by whole periods
@@ -49,10 +62,27 @@ pub(super) fn peak(states: f64, gain: Effort) -> Effort {
     grid.then(eigenvalues(2.0 * states).times(2.0))
 }
 
-/// The search for a proof of the norm of an error system with so many states.
+/// The search for a proof of the norm of an error system with so many states. It is counted as if 512 bits
+/// were needed where they are tried.
 pub(super) fn proof(states: f64) -> Effort {
     if states > MOST_PROVEN {
         return Effort::default();
     }
-    Effort { seconds: CERTIFICATE * states.powi(3), bytes: 30.0 * REAL * states * states }
+    let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { LONG_CERTIFICATE };
+    Effort { seconds: (CERTIFICATE + long) * states.powi(3), bytes: 30.0 * REAL * states * states }
+}
+
+/// Whether the noncausal bound explains the optimum, so that no other bound is searched.
+pub(super) fn is_noncausal(sizes: &Sizes) -> bool {
+    sizes.latency - sizes.longest_delay > NONCAUSAL_LATENCY
+}
+
+/// The search for the causal bound.
+pub(super) fn causal_bound(sizes: &Sizes) -> Effort {
+    if sizes.states > MOST_RECURSION_STATES || is_noncausal(sizes) {
+        return Effort::default();
+    }
+    let rows = sizes.outputs() + sizes.front_end_states;
+    let seconds = RECURSION * RECURSION_PERIODS * sizes.states.powi(2) * rows;
+    Effort { seconds, bytes: 0.0 }
 }

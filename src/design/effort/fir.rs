@@ -1,12 +1,14 @@
 //! The effort of FIR designs.
 
 use super::amount::Effort;
-use super::cost::{COMPLEX, PRODUCT, REAL, SMALL, complex_cube, peak, proof, response};
+use super::cost::{
+    COMPLEX, PRODUCT, REAL, SMALL, causal_bound, complex_cube, is_noncausal, peak, proof, response,
+};
 use super::sizes::Sizes;
+use crate::design::error_grid::FINE;
 use crate::design::methods::fir_kyp::MAX_STATES;
+use crate::design::prove::MOST_LONG_TAPS;
 
-/// The grid on which peaks are looked for is finer by this factor.
-const FINE: f64 = 8.0;
 /// Interior-point iterations and rounds of the exchange of one design.
 const ITERATIONS: f64 = 25.0;
 const ROUNDS: f64 = 4.0;
@@ -14,6 +16,9 @@ const ROUNDS: f64 = 4.0;
 const COARSE: f64 = 0.4;
 /// Norms of one design: of the taps, and of those after a peak that the grid missed.
 const NORMS: f64 = 2.0;
+
+/// Seconds per cube of the taps of a search for witnesses in 512 bits.
+const LONG_WITNESSES: f64 = 1.1e-7;
 
 /// A design by the exchange of frequencies.
 pub(super) fn design(sizes: &Sizes) -> Effort {
@@ -54,7 +59,7 @@ pub(super) fn comparison(sizes: &Sizes) -> Effort {
 /// The plant at all frequencies of the fine grid, with a copy of the coarse one.
 fn grid(sizes: &Sizes) -> Effort {
     let kept = COMPLEX * sizes.outputs() * sizes.outputs().min(sizes.inputs());
-    let points = FINE * sizes.points();
+    let points = FINE as f64 * sizes.points();
     let Effort { seconds, bytes } = response(sizes).times(points);
     Effort { seconds, bytes: bytes + (points + 2.0 * sizes.points()) * kept }
 }
@@ -81,7 +86,7 @@ fn iteration_on(sizes: &Sizes, points: f64) -> Effort {
 
 /// The error of taps on the fine grid.
 fn errors(sizes: &Sizes) -> Effort {
-    gain(sizes).times(FINE * sizes.points())
+    gain(sizes).times(FINE as f64 * sizes.points())
 }
 
 /// The error of taps at one frequency and its largest singular value.
@@ -112,7 +117,10 @@ pub(super) fn proven(sizes: &Sizes) -> Effort {
         return certificate;
     }
     let seconds = 4.0 * 2.2e-10 * rows * unknowns * rows.min(unknowns);
-    certificate.then(Effort { seconds: 0.5 * seconds, bytes: 5.0 * REAL * rows * unknowns })
+    let is_short = unknowns > MOST_LONG_TAPS as f64 || is_noncausal(sizes);
+    let long = if is_short { 0.0 } else { LONG_WITNESSES * unknowns.powi(3) };
+    let witnesses = Effort { seconds: 0.5 * seconds + long, bytes: 5.0 * REAL * rows * unknowns };
+    certificate.then(witnesses).then(causal_bound(sizes))
 }
 
 /// The noncausal bound.
@@ -125,8 +133,8 @@ pub(super) fn judged(sizes: &Sizes) -> Effort {
     norm(sizes).then(noncausal(sizes))
 }
 
-/// The scale that is stated beside gamma: the errors of a bank of zeros and of plain interleaving, whose taps
-/// reach back over the latency that the delays leave.
+/// The scale that is stated beside gamma: the errors of a bank of zeros and of plain interleaving, whose
+/// taps reach back over the latency that the delays leave.
 pub(super) fn scale(sizes: &Sizes) -> Effort {
     judged(&Sizes { taps: sizes.look_back + sizes.ratio, ..*sizes })
 }
@@ -153,7 +161,7 @@ pub(super) fn by_lmi(sizes: &Sizes) -> Effort {
 pub(super) fn integers(sizes: &Sizes) -> Effort {
     let phase = sizes.unknowns() / sizes.ratio;
     let lattice = sizes.ratio * (phase.powi(3) / 3.0 * PRODUCT + 130.0 * phase * phase * SMALL) * 60.0;
-    let change = FINE * sizes.points() * changed(sizes).seconds;
+    let change = FINE as f64 * sizes.points() * changed(sizes).seconds;
     let descent = 0.5 * sizes.unknowns() * change * 5.0;
     let grid = grid(sizes);
     grid.with(Effort { seconds: lattice + descent, bytes: 3.0 * REAL * phase * phase })

@@ -1,7 +1,7 @@
 //! The effort of recursive designs.
 
 use super::amount::Effort;
-use super::cost::{COMPLEX, REAL, SMALL, peak, proof, response};
+use super::cost::{COMPLEX, REAL, SMALL, causal_bound, peak, proof, response};
 use super::sizes::Sizes;
 
 /// Riccati equations of an H-infinity design of many states, where the noncausal bound is nearly always
@@ -37,9 +37,9 @@ fn noncausal(sizes: &Sizes) -> Effort {
     peak(sizes.front_end_states, response(sizes))
 }
 
-/// The search for a proof of the norm.
+/// The search for a proof of the norm and of the lower bound.
 pub(super) fn proven(sizes: &Sizes) -> Effort {
-    proof(2.0 * sizes.states)
+    proof(2.0 * sizes.states).then(causal_bound(sizes))
 }
 
 /// Order reduction: a norm for each order that is visited, and the refinement of poles.

@@ -1,10 +1,7 @@
 //! The sizes of a design problem, as numbers to compute with.
 
+use crate::design::error_grid::coarse_intervals;
 use crate::design::problem::Problem;
-
-/// The least number of intervals of the grid of frequencies, and the intervals per lag; see `error_grid`.
-const LEAST_POINTS: f64 = 24.0;
-const POINTS_PER_LAG: f64 = 3.0;
 
 /// The sizes of all matrices follow from these.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +20,8 @@ pub(super) struct Sizes {
     pub(super) look_back: f64,
     /// Fast periods.
     pub(super) longest_delay: f64,
+    /// m0, fast samples.
+    pub(super) latency: f64,
 }
 
 impl Sizes {
@@ -37,6 +36,7 @@ impl Sizes {
             taps: taps as f64,
             look_back: look_back(problem),
             longest_delay: problem.longest_delay().0,
+            latency: problem.latency as f64,
         }
     }
 
@@ -62,7 +62,7 @@ impl Sizes {
 
     /// Points of the frequency grid of FIR designs on which the optimum is computed.
     pub(super) fn points(&self) -> f64 {
-        LEAST_POINTS.max(POINTS_PER_LAG * self.lags()) + self.lags()
+        coarse_intervals(self.lags() as usize) as f64 + self.lags()
     }
 
     /// States of the error system of FIR filters.

@@ -23,13 +23,26 @@ fn more_of_anything_takes_longer() {
     let base = ("ratio = 2", "latency = 10", "taps = 22");
     let of = |(ratio, latency, taps): (&str, &str, &str)| {
         let text = format!("{ratio}\n{latency}\n{PAIR}\ndesign = {{ method = \"fir\", {taps} }}");
-        estimate(&spec(&text), true).unwrap().seconds
+        estimate(&spec(&text), false).unwrap().seconds
     };
     let small = of(base);
     assert!(small < 1.0, "{small}");
     assert!(of(("ratio = 4", base.1, "taps = 44")) > small);
     assert!(of((base.0, "latency = 100", "taps = 220")) > 2.0 * small);
     assert!(of((base.0, "", base.2)) > 2.0 * small);
+}
+
+/// The bounds that are not noncausal, and certificates of up to 48 states, are searched in 512 bits.
+#[test]
+fn the_search_for_a_proof_costs_time() {
+    let proof = |latency: usize, taps: usize| {
+        let text =
+            format!("ratio = 2\nlatency = {latency}\n{PAIR}\ndesign = {{ method = \"fir\", taps = {taps} }}");
+        let seconds = |proving| estimate(&spec(&text), proving).unwrap().seconds;
+        seconds(true) - seconds(false)
+    };
+    assert!(proof(10, 24) > 0.3, "{}", proof(10, 24));
+    assert!(proof(10, 96) > 0.5 && proof(10, 96) > proof(60, 96), "{} {}", proof(10, 96), proof(60, 96));
 }
 
 #[test]

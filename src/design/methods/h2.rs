@@ -10,7 +10,8 @@ use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::lti::gramian::h2_norm;
 
-/// Feedthrough of a measurement, relative to its size, below which 106 bits may lose the digits of its noise.
+/// Feedthrough of a measurement, relative to its size, below which 106 bits may lose the digits of its
+/// noise.
 const FAINT_FEEDTHROUGH: f64 = 1e-4;
 /// Errors up to this multiple of the least one count as the least.
 const SAME_ERROR: f64 = 1.0 + 1e-6;

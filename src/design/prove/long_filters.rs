@@ -1,21 +1,22 @@
 //! Witnesses that bind the taps of long filters, found in 512 bits.
 //!
-//! For directions a at some frequencies, the taps of least sum of ||a* K||^2 leave an error that no change of
-//! the taps correlates with; it gives the witnesses. Long filters have changes of the taps that hardly change
-//! this sum, down to 1e-40 of the strongest. Double precision loses them, but they lower the sum. They raise
-//! the error between the frequencies, so the energy of the error for a faint white input is added to the sum.
+//! For directions a at some frequencies, the taps of least sum of ||a* K||^2 leave an error that no change
+//! of the taps correlates with; it gives the witnesses. Long filters have changes of the taps that hardly
+//! change this sum, down to 1e-40 of the strongest. Double precision loses them, but they lower the sum.
+//! They raise the error between the frequencies, so the energy of the error for a faint white input is added
+//! to the sum.
 
 use crate::arithmetic::{BigFloat, Matrix, Number};
 use crate::bank::DualWitness;
 use crate::verify::EnclosedErrorSystem;
 use crate::verify::precise::ComplexParts;
 
-/// Weight of the white input relative to that of all directions, times the size of the reference samples over
-/// gamma. The bound loses about this much of itself.
+/// Weight of the white input relative to that of all directions, times the size of the reference samples
+/// over gamma. The bound loses about this much of itself.
 pub(super) const RIDGES: [f64; 2] = [1e-7, 1e-5];
 /// Most taps of all channels: for more, the factorisations take seconds, and no bank of the tests gained by
 /// them.
-const MOST_TAPS: usize = 256;
+pub(in crate::design) const MOST_LONG_TAPS: usize = 256;
 
 /// A direction a of the reference samples at a frequency: weight included.
 pub(super) struct Direction {
@@ -38,8 +39,9 @@ struct Normal<'a> {
     times: Vec<(usize, usize)>,
 }
 
-/// The witnesses of `directions` for the taps of the distinct `channels`, of `length` each; `all` channels are
-/// in the bank, whose gamma is about `gamma`. `None` if there are too many taps, or 512 bits do not suffice.
+/// The witnesses of `directions` for the taps of the distinct `channels`, of `length` each; `all` channels
+/// are in the bank, whose gamma is about `gamma`. `None` if there are too many taps, or 512 bits do not
+/// suffice.
 pub(super) fn witnesses(
     error: &EnclosedErrorSystem<'_>,
     directions: &[Direction],
@@ -47,7 +49,7 @@ pub(super) fn witnesses(
     (length, ratio): (usize, usize),
     (gamma, ridge): (f64, f64),
 ) -> Option<Vec<DualWitness>> {
-    if channels.len() * length > MOST_TAPS {
+    if channels.len() * length > MOST_LONG_TAPS {
         return None;
     }
     let [covariance, cross] = error.precise_covariance(channels, length.div_ceil(ratio))?;

@@ -2,48 +2,31 @@
 //! [`crate::verify`] checks them.
 
 mod causal;
+mod certificate;
 mod long_filters;
+mod long_riccati;
 mod units;
 
 use super::merging::Repeats;
 use super::methods::DualPoint;
 use super::plant::LiftedPlant;
 use super::{DesignError, analysis};
-use crate::bank::{Bank, Certificate, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters};
+use crate::bank::{Bank, DualWitness, Gamma, LowerProof, Proof, SynthesisFilters};
 use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
-use crate::lti::peak::hinf_norm;
-use crate::lti::{FrequencyResponse, GramianCoordinates, StateSpace, bounded_real_riccati};
+use crate::lti::FrequencyResponse;
 use crate::spec::Method;
-use crate::verify::{EnclosedErrorSystem, Midpoint, Strictness, Verified};
+use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
+pub(super) use certificate::MAX_LONG_STATES;
+use certificate::certificate;
+pub(super) use long_filters::MOST_LONG_TAPS;
 use long_filters::{Direction, RIDGES};
-use units::Units;
 
-/// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
-/// first.
-const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
-/// The same in units of `FLOOR`, for norms that are zero up to rounding.
-const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
-/// Weights on all states, relative to the excess.
-const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
-/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
-const FLOOR: f64 = 1e-10;
-/// Significant digits of the certificate's numbers in the file.
-const DIGITS: [usize; 4] = [9, 12, 15, 17];
 /// Directions with less than this share of the dual's weight are ignored.
 const NEGLIGIBLE: f64 = 1e-9;
-/// Maximum number of states of an error system for which the search tries to find a certificate. It needs
-/// eigenvalues of matrices twice as large.
-const MAX_SEARCHED: usize = 512;
 /// Maximum number of witnesses.
 const MAX_WITNESSES: usize = 64;
 /// Directions of tap space with less effect than this, relative to the strongest, are not used.
 const RANK: f64 = 1e-13;
-/// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess
-/// (and of the number of states). With it no direction is unobservable. The noise would raise the norm by
-/// only a hundredth of the excess.
-const STATE_NOISE: f64 = 0.1;
-/// Relative excess of a stated norm over the one computed here that counts as rounding.
-const SAME_NORM: f64 = 1e-6;
 /// Relative distance below the designer's bound at which a proven bound still counts as its proof.
 const SHORTFALL: f64 = 0.5e-6;
 /// Relative distance of a stated lower bound below the proven one: another machine may round an approximate
@@ -138,82 +121,6 @@ fn lower_proof(
         Some(witness) if witness.gamma > reached => Some(LowerProof::Causal(witness)),
         _ => (reached > interval.0).then_some(LowerProof::Fir(witnesses)),
     })
-}
-
-/// The certificate with the least gamma, of those tried, that passes.
-fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
-    if error.states() > MAX_SEARCHED {
-        return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED });
-    }
-    let raw = error.midpoint().ok_or(DesignError::NotCertified)?;
-    let units = Units::of(&raw, error.scale())?;
-    let middle = units.of_one(&raw);
-    let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
-    let peak = hinf_norm(&system)?;
-    // The norm in the file may differ from the one computed here in the last digits; if the difference is
-    // larger, the stated number is not the norm.
-    let stated = bank.gamma.norm.map(|stated| stated / units.reference);
-    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
-    let norm = credible.unwrap_or(0.0).max(peak.gain);
-    let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
-    let peak_witness = witness(peak.frequency, &leading_direction(&response)?);
-    let floor = FLOOR * error.scale() / units.reference;
-    let relative: &[f64] = if norm > floor { &EXCESSES } else { &FLOOR_EXCESSES };
-    for excess in relative.iter().map(|excess| excess * norm.max(floor)) {
-        let gamma = (norm + excess) * units.reference;
-        let Ok(search) = Search::new(&middle, STATE_NOISE * (excess * (norm + excess)).sqrt()) else {
-            continue;
-        };
-        for weight in STATE_WEIGHTS {
-            let Some(factor) = search.factor(norm + 0.5 * excess, weight * excess) else { continue };
-            if let Some(factor) = shortest(units.factor(factor), |factor| error.keeps(factor, gamma)) {
-                return Ok(Certificate { gamma, peak: peak_witness, factor });
-            }
-        }
-    }
-    Err(DesignError::NotCertified)
-}
-
-/// The factor with the fewest digits that still prove the bound; `None` if it proves nothing.
-fn shortest(factor: Vec<Vec<f64>>, proves: impl Fn(&[Vec<f64>]) -> bool) -> Option<Vec<Vec<f64>>> {
-    let rounded = |digits: usize| -> Vec<Vec<f64>> {
-        let round = |x: &f64| format!("{x:.digits$e}").parse().unwrap_or(*x);
-        factor.iter().map(|row| row.iter().map(round).collect()).collect()
-    };
-    DIGITS.iter().map(|&digits| rounded(digits - 1)).find(|short| proves(short))
-}
-
-/// The bounded-real Riccati equation of the transposed error system, in coordinates in which its
-/// controllability Gramian (the observability Gramian of the system) is the identity.
-struct Search {
-    a: Mat,
-    b: Mat,
-    c: Mat,
-    d: Mat,
-    /// From the states to the coordinates.
-    inverse: Mat,
-}
-
-impl Search {
-    /// Coordinates for the system with a total of `noise` added to the states.
-    fn new(middle: &Midpoint, noise: f64) -> Result<Self, DesignError> {
-        let Midpoint { a, b, c, d } = middle;
-        let (n, m) = (a.nrows(), c.nrows());
-        let state_noise = Mat::from_diagonal_element(n, n, noise / (n.max(1) as f64).sqrt());
-        let inputs = linalg::hstack(&[&c.transpose(), &state_noise])?;
-        let k = GramianCoordinates::new(&a.transpose(), &inputs, 0.0)?;
-        let outputs = k.b.columns(0, m).into_owned();
-        Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: outputs, d: d.transpose(), inverse: k.inverse })
-    }
-
-    /// Rows of R with P = R R' at `gamma`, with a weight on all states that keeps the inequality strictly
-    /// feasible.
-    fn factor(&self, gamma: f64, weight: f64) -> Option<Vec<Vec<f64>>> {
-        let p = bounded_real_riccati(&self.a, &self.b, &self.c, &self.d, gamma, weight)?;
-        let half = linalg::cholesky(&p).ok()?;
-        let root = linalg::lq_factor(&(self.inverse.tr_mul(&half) * gamma.sqrt()));
-        Some((0..root.nrows()).map(|i| root.row(i).iter().take(i + 1).copied().collect()).collect())
-    }
 }
 
 /// The frequency and direction in which the largest part of the reference samples cannot be estimated from

@@ -10,7 +10,7 @@ use crate::verify::Midpoint;
 
 /// Units of states and references. They are powers of two, so that a change of units rounds nothing.
 pub(super) struct Units {
-    states: Vec<f64>,
+    pub(super) states: Vec<f64>,
     /// Unit of the reference samples, and so of gamma.
     pub(super) reference: f64,
 }

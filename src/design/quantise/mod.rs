@@ -42,8 +42,9 @@ const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
 ///
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
-/// [`DesignError::NoTaps`] if `bits` are out of their range, [`DesignError::AllZero`] if all taps are zero at
-/// the given scale, and [`DesignError::TinyTaps`] if they are no better there than zero taps. Without a given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
+/// [`DesignError::NoTaps`] if `bits` are out of their range, [`DesignError::AllZero`] if all taps are zero
+/// at the given scale, and [`DesignError::TinyTaps`] if they are no better there than zero taps. Without a
+/// given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
 pub fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,

@@ -93,7 +93,8 @@ impl AffineErrors {
         Weights(vec![CMat::from_diagonal_element(self.ratio, self.ratio, share); self.count()])
     }
 
-    /// Moves `weights` towards the worst points and directions of the error of `taps`, which exceeds `floor`.
+    /// Moves `weights` towards the worst points and directions of the error of `taps`, which exceeds
+    /// `floor`.
     pub(super) fn emphasise(&self, weights: &Weights, taps: &[f64], floor: f64) -> Option<Weights> {
         let errors: Vec<CMat> = (0..self.count()).map(|k| self.at(k, taps)).collect();
         let gains: Vec<f64> =

@@ -11,12 +11,14 @@ use crate::design::DesignError;
 use crate::spec::{MAX_FRACTION_BITS, WordLengths};
 use std::ops::RangeInclusive;
 use std::sync::OnceLock;
+use std::thread::ScopedJoinHandle;
 
 /// Relative difference of gamma below which the mean square decides: 0.001 dB.
 pub(super) const INDIFFERENT: f64 = 1e-4;
 /// Relative excess over the gamma of the real taps from which more scales are searched: 0.05 dB.
 const WORTH_MORE: f64 = 5.8e-3;
-/// Shares of the gamma of zero output: removing less is nothing, and real taps that remove more do something.
+/// Shares of the gamma of zero output: removing less is nothing, and real taps that remove more do
+/// something.
 const NOTHING: f64 = 1e-6;
 const SOMETHING: f64 = 1e-3;
 /// Scales of few taps that are searched beyond the finest one that holds the optimal taps.
@@ -139,17 +141,24 @@ impl<'a> Quantiser<'a> {
         Ok(())
     }
 
-    /// [`Self::quantise`] for each word length, on one thread each.
+    /// [`Self::quantise`] for each word length, on one thread each where threads can be had.
     pub(super) fn quantise_all(
         &self,
         all: &[WordLengths],
         fraction_bits: Option<i32>,
     ) -> Result<Vec<Quantised>, DesignError> {
         std::thread::scope(|scope| {
-            let search = |bits| scope.spawn(move || self.quantise(bits, fraction_bits));
-            let threads: Vec<_> = all.iter().map(search).collect();
-            let joined = threads.into_iter().map(|thread| thread.join());
-            joined.map(|result| result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+            let begin = |bits| {
+                let search = move || self.quantise(bits, fraction_bits);
+                (bits, std::thread::Builder::new().spawn_scoped(scope, search))
+            };
+            let searches: Vec<_> = all.iter().map(begin).collect();
+            let end = |(bits, thread): (&WordLengths, std::io::Result<ScopedJoinHandle<'_, _>>)| match thread
+            {
+                Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+                Err(_) => self.quantise(bits, fraction_bits),
+            };
+            searches.into_iter().map(end).collect()
         })
     }
 

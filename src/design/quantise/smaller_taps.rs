@@ -19,7 +19,8 @@ pub(super) struct SmallerTaps {
     pub(super) taps: Vec<Vec<f64>>,
 }
 
-/// For each of some gammas below that of zero output the taps of least Euclidean norm, the largest taps first.
+/// For each of some gammas below that of zero output the taps of least Euclidean norm, the largest taps
+/// first.
 pub(super) fn smaller_taps(error: &TapError<'_>) -> Vec<SmallerTaps> {
     let zero_output = zero_output(error);
     let caps = LOSSES_DB.map(|db| error.real_gamma * 10f64.powf(db / 20.0));

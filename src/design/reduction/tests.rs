@@ -63,9 +63,9 @@ fn truncated(bank: &StateSpace, order: usize) -> StateSpace {
 
 #[test]
 fn every_order_has_the_gamma_that_is_reported_and_beats_truncation() {
-    let plant = thesis(10);
+    let plant = thesis(6);
     let bank = bank_of(Method::Iir, &plant);
-    for order in [0, 3, 6] {
+    for order in [0, 3] {
         let (smaller, record) =
             reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(order)).unwrap();
         let smaller = smaller.unwrap().realise().unwrap();
@@ -179,18 +179,18 @@ fn no_other_outputs_is_better() {
 
 #[test]
 fn a_bank_without_error_keeps_what_it_needs() {
-    // The measurement is the reference, ten fast samples earlier: gamma is zero up to rounding errors.
-    let plant = plant(10, "{ delay = 0.0 }, { delay = 1.0 }");
+    // The measurement is the reference, six fast samples earlier: gamma is zero up to rounding errors.
+    let plant = plant(6, "{ delay = 0.0 }, { delay = 1.0 }");
     let bank = bank_of(Method::Iir, &plant);
     let problem = problem(&plant, &bank, Aim::WorstCase);
     let (_, record) = reduce(&problem, Reduction::Loss(0.0)).unwrap();
     assert!(record.full.figures.gamma < 1e-11 && record.reduced.figures.gamma < 1e-11, "{record:?}");
-    assert!(record.reduced.loss_db < 1e-3 && record.reduced.order >= 9, "{record:?}");
+    assert!(record.reduced.loss_db < 1e-3 && record.reduced.order >= 5, "{record:?}");
 }
 
 #[test]
 fn the_same_bits_every_time() {
-    let plant = thesis(5);
+    let plant = thesis(3);
     let bank = bank_of(Method::Iir, &plant);
     let once = || reduce(&problem(&plant, &bank, Aim::WorstCase), Reduction::Order(2)).unwrap();
     assert_eq!(once(), once());

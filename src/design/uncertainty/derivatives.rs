@@ -1,8 +1,8 @@
 //! The exact derivatives of gamma with respect to the delays.
 //!
-//! Sample i is C_i x(kM - D_i), so its derivative with respect to D_i is -C_i A x at the same instant: H'_i is
-//! the lifted plant with the output row C_i A in place of C_i, and dK/dD_i = F_i H'_i. At a simple peak with
-//! the singular vectors u, v of K
+//! Sample i is C_i x(kM - D_i), so its derivative with respect to D_i is -C_i A x at the same instant: H'_i
+//! is the lifted plant with the output row C_i A in place of C_i, and dK/dD_i = F_i H'_i. At a simple peak
+//! with the singular vectors u, v of K
 //!
 //! ```text
 //! d gamma / d D_i = Re (u* F_i)(H'_i v).
@@ -31,8 +31,8 @@ const DIRECT: f64 = 1e-12;
 /// The derivatives of gamma with respect to the delays.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct DelayDerivatives {
-    /// Change of gamma per fast period of each delay; not a number for front ends of relative degree 1, whose
-    /// samples are not differentiable.
+    /// Change of gamma per fast period of each delay; not a number for front ends of relative degree 1,
+    /// whose samples are not differentiable.
     pub per_fast_period: Vec<f64>,
     /// Frequency of the peak.
     pub peak_hertz: Hertz,

@@ -1,8 +1,9 @@
 //! What no bank can do better over a box of errors.
 //!
 //! A shift common to all channels cannot be seen. If the box holds the delays D + d and D - d for all
-//! channels, the input g advanced by d and the input g delayed by d give the same samples, so the same output
-//! y. The errors are W g(. + d) - y and W g(. - d) - y; one of them is at least half their difference:
+//! channels, the input g advanced by d and the input g delayed by d give the same samples, so the same
+//! output y. The errors are W g(. + d) - y and W g(. - d) - y; one of them is at least half their
+//! difference:
 //!
 //! ```text
 //! gamma >= max over theta of [ sum_k |Phi_0(j nu_k)|^2 sin^2(nu_k d) ]^(1/2),  nu_k = theta + 2 pi k,

@@ -1,5 +1,5 @@
-//! What errors of delays, gains and cut-offs cost a finished bank: where gamma is worst in a box, how fast it
-//! changes, and what no bank can do better.
+//! What errors of delays, gains and cut-offs cost a finished bank: where gamma is worst in a box, how fast
+//! it changes, and what no bank can do better.
 //!
 //! The two ends of the worst case are proven by [`crate::verify::uncertainty`]. Here they are searched, in
 //! double precision.

@@ -52,8 +52,8 @@ fn floors_are_those_of_a_common_shift() {
     assert_eq!(floor(&bank("thesis"), &relative, &ErrorPoint::none(2)).unwrap().common_shift, 0.0);
 }
 
-/// The worst case of the interleaved converters at 10 ps: 0.01190629 by numpy on 65 frequencies; no bank beats
-/// the floor.
+/// The worst case of the interleaved converters at 10 ps: 0.01190629 by numpy on 65 frequencies; no bank
+/// beats the floor.
 #[test]
 fn ten_picoseconds_cost_what_no_bank_can_save() {
     let bank = bank("interleaved");

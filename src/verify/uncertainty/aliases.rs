@@ -36,9 +36,9 @@ pub(super) enum Weight {
     /// min(nu^2 d^2 / 2, 2): the distance of e^{-j nu t}, |t| <= d, from the chord between its ends. (A
     /// function with second derivative at most nu^2 lies within (2 d)^2 nu^2 / 8 of its chord.)
     Chord(f64),
-    /// min(|nu|^3 d^3 / (9 sqrt 3), 9/4): the distance of e^{-j nu t}, |t| <= d, from the parabola through its
-    /// values at -d, 0 and d. (The error is the third derivative over 6 times |t (t^2 - d^2)|, which is at
-    /// most 2 d^3 / (3 sqrt 3); and the parabola is at most 5/4.)
+    /// min(|nu|^3 d^3 / (9 sqrt 3), 9/4): the distance of e^{-j nu t}, |t| <= d, from the parabola through
+    /// its values at -d, 0 and d. (The error is the third derivative over 6 times |t (t^2 - d^2)|, which is
+    /// at most 2 d^3 / (3 sqrt 3); and the parabola is at most 5/4.)
     Parabola(f64),
     /// min(|nu| s, 2): the distance of e^{-j nu t} from e^{-j nu (t + s)}.
     Shift(f64),
@@ -169,8 +169,8 @@ impl Bent {
             let (largest, integral) = plain(p, far);
             return (square * largest, square * integral);
         }
-        // limit^2 (nu / bend)^(2 power) nu^-2p up to the bend, then limit^2 nu^-2p. The power of the integral
-        // is odd, so never zero.
+        // limit^2 (nu / bend)^(2 power) nu^-2p up to the bend, then limit^2 nu^-2p. The power of the
+        // integral is odd, so never zero.
         let factor = square * self.bend.powi(-2 * self.power);
         let (rise, power) = (2 * (self.power - p), 2 * (self.power - p) + 1);
         let below = factor * (self.bend.powi(power) - far.powi(power)) / f64::from(power);

@@ -25,8 +25,8 @@ pub(super) struct Channel {
     half: f64,
     /// D_i in fast periods, for the rounding of delays.
     delay: f64,
-    /// The first channel with errors that has the same front end and range of cut-offs; none if this one has no
-    /// errors.
+    /// The first channel with errors that has the same front end and range of cut-offs; none if this one has
+    /// no errors.
     pub(super) like: Option<usize>,
 }
 
@@ -141,8 +141,8 @@ impl Channel {
         Ok(Response { aliases, bend })
     }
 
-    /// Bounds the remainder of the chords or parabolas, after 0, 1, .. `levels` halvings of the delay; `response`
-    /// is that of a channel like this one.
+    /// Bounds the remainder of the chords or parabolas, after 0, 1, .. `levels` halvings of the delay;
+    /// `response` is that of a channel like this one.
     pub(super) fn remainders(&self, response: &Response, levels: u32, taps: Taps) -> Vec<f64> {
         let Response { aliases, bend } = response;
         // The grid points are rounded.

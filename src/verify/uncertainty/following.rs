@@ -2,18 +2,18 @@
 //! delays.
 //!
 //! The filters are F(delta) = F_0 + sum_j delta_j S_j, so K(delta) = W - sum_i F_i(delta) h_i(delta_i). In a
-//! part of the box with the half-widths d let t be the distances from its centre. Between -d_i and d_i the row
-//! h_i is the parabola through its values at -d_i, 0 and d_i, h_i(0) + t_i b_i + t_i^2 q_i, plus a remainder
-//! of norm at most c_i ([`super::aliases::Weight::Parabola`]). Put t_i^2 = d_i^2 - (d_i^2 - t_i^2). The first
-//! part leaves a function that is affine in each t_i, so it is a convex mix of the K at the vertices; the
-//! second part is
+//! part of the box with the half-widths d let t be the distances from its centre. Between -d_i and d_i the
+//! row h_i is the parabola through its values at -d_i, 0 and d_i, h_i(0) + t_i b_i + t_i^2 q_i, plus a
+//! remainder of norm at most c_i ([`super::aliases::Weight::Parabola`]). Put t_i^2 = d_i^2 - (d_i^2 -
+//! t_i^2). The first part leaves a function that is affine in each t_i, so it is a convex mix of the K at
+//! the vertices; the second part is
 //!
 //! ```text
 //! s_i d_i^2 (F_i(delta) q_i + S_ii b_i),   s_i = 1 - t_i^2 / d_i^2 in [0, 1],
 //! ```
 //!
-//! S_ii being column i of S_i. That is affine in each t_j and s_j too. With t and s taken as independent, K is
-//! within sum_i |F_i| c_i of a convex mix over the vertices v and all e in {0, 1}:
+//! S_ii being column i of S_i. That is affine in each t_j and s_j too. With t and s taken as independent, K
+//! is within sum_i |F_i| c_i of a convex mix over the vertices v and all e in {0, 1}:
 //!
 //! ```text
 //! sigma(K) <= max over v and e of sigma(K_v + sum_i e_i d_i^2 (F_i(v) q_i + S_ii b_i)) + sum_i |F_i| c_i.
@@ -110,8 +110,8 @@ impl<'a> Following<'a> {
         Verdict::Open(Attained::unknown())
     }
 
-    /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none. Gains up to `reported`
-    /// are not computed to all digits.
+    /// A vertex whose gain may exceed `limit`; `None` if it is proven that there is none. Gains up to
+    /// `reported` are not computed to all digits.
     fn above(&self, parts: &[Part], [limit, reported]: [f64; 2], work: &mut Work) -> Option<Attained> {
         if limit.is_nan() || limit <= 0.0 {
             return Some(Attained::unknown());

@@ -223,8 +223,8 @@ pub fn keeps_within(bank: &Bank, errors: &ErrorBox, taps: Taps, gamma: f64) -> R
 /// taps that follow the delays.
 ///
 /// # Errors
-/// [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if one is not proven or there is no such table; else
-/// as [`worst_case`].
+/// [`VerifyError::WorstCase`] or [`VerifyError::Tracked`] if one is not proven or there is no such table;
+/// else as [`worst_case`].
 pub fn check_stated(bank: &Bank) -> Result<(), VerifyError> {
     let table = bank.spec.as_ref().and_then(|spec| spec.uncertainty.as_ref());
     let errors = table.map(|table| ErrorBox::of(table, bank.channel_count()));

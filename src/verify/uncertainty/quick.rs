@@ -3,8 +3,8 @@
 //!
 //! At a frequency, K = A r with the rows r of the Gram matrix G and A = [I, -F_i w, ..]. As G is positive
 //! semidefinite, |G_cd| <= s_c s_d with s_c = sqrt(G_cc). With a_p = sum_c |A_pc| s_c each entry of the
-//! computed A G A* is wrong by at most eps a_p a_q for some small eps, so its largest eigenvalue is wrong by at
-//! most eps |a|^2.
+//! computed A G A* is wrong by at most eps a_p a_q for some small eps, so its largest eigenvalue is wrong by
+//! at most eps |a|^2.
 
 use super::super::ball::{self, Ball};
 use super::super::spectrum::ComplexMatrix;
@@ -290,7 +290,8 @@ mod tests {
         quick.compare(&terms, limit)
     }
 
-    /// Against balls: no gain is called below a limit that it exceeds, and nearly all that are below are seen.
+    /// Against balls: no gain is called below a limit that it exceeds, and nearly all that are below are
+    /// seen.
     #[test]
     fn gains_are_compared_as_balls_compare_them() {
         let mut source = Random(3);

@@ -35,12 +35,12 @@ pub struct Slopes {
 }
 
 impl Slopes {
-    /// A bound of `||K_jittered - K||` for sampling instants that are off by at most `jitter[i]`, differently
-    /// at each sample: `sqrt(2) sum_i jitter_i ||F_i|| max g_i`.
+    /// A bound of `||K_jittered - K||` for sampling instants that are off by at most `jitter[i]`,
+    /// differently at each sample: `sqrt(2) sum_i jitter_i ||F_i|| max g_i`.
     ///
-    /// A sample is off by the integral of v' over at most jitter_i, so by Cauchy-Schwarz its square is at most
-    /// jitter_i times the integral of v'^2 over both sides; and for every shift the samples of v' have at most
-    /// g_i^2 times the energy of the input.
+    /// A sample is off by the integral of v' over at most jitter_i, so by Cauchy-Schwarz its square is at
+    /// most jitter_i times the integral of v'^2 over both sides; and for every shift the samples of v' have
+    /// at most g_i^2 times the energy of the input.
     pub fn jitter(&self, jitter: &[Seconds], fast_period: Seconds) -> f64 {
         let terms = jitter.iter().zip(&self.columns).zip(&self.steepness);
         let term = |((time, column), steep): ((&Seconds, &f64), &f64)| {

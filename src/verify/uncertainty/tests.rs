@@ -166,8 +166,8 @@ fn slopes_bound_every_difference() {
     }
 }
 
-/// Jitter that repeats after 16 slow periods makes a periodic system, whose gain for inputs of that period is
-/// the norm of a matrix.
+/// Jitter that repeats after 16 slow periods makes a periodic system, whose gain for inputs of that period
+/// is the norm of a matrix.
 #[test]
 fn no_jitter_adds_more_than_its_bound() {
     const PERIODS: usize = 16;
@@ -189,7 +189,8 @@ fn no_jitter_adds_more_than_its_bound() {
                 })
             })
             .collect();
-        // Columns: tones of period 2 PERIODS up to 6 times the fast rate; rows: the fast samples of one period.
+        // Columns: tones of period 2 PERIODS up to 6 times the fast rate; rows: the fast samples of one
+        // period.
         let tones: Vec<f64> =
             (-6 * fast as i32..=6 * fast as i32).map(|q| TAU * f64::from(q) / fast as f64).collect();
         let change = CMat::from_fn(fast, tones.len(), |n, c| {

@@ -1,8 +1,8 @@
 //! The best integer taps of a small bank, by trying all of them at all scales.
 //!
-//! The row of phase p of the error depends on the taps of that phase alone, and no row of a matrix has a larger norm
-//! than the matrix. So the integers of each phase are tried apart, and those whose row is already too large are
-//! dropped. What is left is tried in all combinations.
+//! The row of phase p of the error depends on the taps of that phase alone, and no row of a matrix has a
+//! larger norm than the matrix. So the integers of each phase are tried apart, and those whose row is
+//! already too large are dropped. What is left is tried in all combinations.
 
 use hybank::design::LiftedPlant;
 use hybank::linalg::{CMat, Complex};

@@ -1,5 +1,5 @@
-//! Integer taps of small banks against all integers at all scales. `HYBANK_INTEGER_CASES=926` tries that many random
-//! banks, `HYBANK_INTEGER_CASES=12..13` that one.
+//! Integer taps of small banks against all integers at all scales. `HYBANK_INTEGER_CASES=926` tries that
+//! many random banks, `HYBANK_INTEGER_CASES=12..13` that one.
 
 mod brute_force;
 
@@ -111,7 +111,8 @@ fn small_banks_are_within_a_tenth_of_a_decibel_of_all_integers() {
     assert!(above(0.1) * 100 <= all.len(), "{} of {}", above(0.1), all.len());
 }
 
-/// Nearly equal delays make real taps of opposite sign that no scale of few bits holds. Much smaller taps are nearly as good.
+/// Nearly equal delays make real taps of opposite sign that no scale of few bits holds. Much smaller taps
+/// are nearly as good.
 #[test]
 fn nearly_equal_channels_find_a_scale() {
     for apart in [1e-2, 1e-4, 1e-6] {

@@ -194,7 +194,8 @@ impl<T: Sample> OverlapSave<T> {
         outside
     }
 
-    /// Makes the state's history that of frame `first` again, if the frames before stayed in the caller's memory.
+    /// Makes the state's history that of frame `first` again, if the frames before stayed in the caller's
+    /// memory.
     fn load_history(
         &self,
         state: &mut OverlapSaveState<T>,
@@ -248,8 +249,8 @@ impl<T: Sample> OverlapSave<T> {
         frame + 1
     }
 
-    /// The frames of a whole batch with their history as they lie in the caller's memory, if they are all there
-    /// and finite.
+    /// The frames of a whole batch with their history as they lie in the caller's memory, if they are all
+    /// there and finite.
     fn in_place<'a>(&self, samples: &'a [T], clean: usize, frames: &Range<usize>) -> Option<&'a [T]> {
         let Shape { channels, history, .. } = self.shape;
         let whole = frames.len() == self.shape.batch();
@@ -369,8 +370,8 @@ impl<T: Sample> Filter for OverlapSave<T> {
             let end = first + (input.frames() - first).min(self.shape.batch() - state.filled);
             let outside = self.take(state, input, first..end, &mut progress);
             let complete = state.filled + end - first == self.shape.batch();
-            // The frame that completes a batch already takes an output of it; those before take outputs of the
-            // batch before.
+            // The frame that completes a batch already takes an output of it; those before take outputs of
+            // the batch before.
             let before = end - usize::from(complete);
             self.pass_on(state, output, first, progress.written.max(first)..before);
             state.filled += end - first;

@@ -75,8 +75,9 @@ impl<T: Element> Polyphase<T> {
         self.groups.len() == 1
     }
 
-    /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at `x[tiling.history + t *
-    /// tiling.hop]`; frames past the last one, up to whole vectors, are read too and mean nothing.
+    /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at
+    /// `x[tiling.history + t * tiling.hop]`; frames past the last one, up to whole vectors, are read too and
+    /// mean nothing.
     ///
     /// Returns false if an input of these frames is not finite: it makes all outputs of its frame so,
     /// whatever the coefficients. It is false also where finite inputs led to sums, or to a total of sums,

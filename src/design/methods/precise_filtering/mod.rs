@@ -20,15 +20,13 @@
 //!
 //! whose limit doubling reaches in a few steps.
 
-mod doubling;
-
 use super::filtering::{RiccatiSolver, Trial, output_sizes};
 use crate::arithmetic::{Matrix, Number};
 use crate::design::DesignError;
+use crate::design::doubling::{gramian, riccati_limit};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::Mat;
 use crate::lti::StateSpace;
-use doubling::{gramian, riccati_limit};
 use std::ops::Range;
 
 /// Rounding moves no eigenvalue of a scaled semidefinite matrix this far below zero.

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! and the error system is K(delta) = W - F(delta) H(delta). With factors `[1, delta_1, ..]` of the
-//! measurements this is a design of fixed taps `[F_0 S_1 ..]` for (J + 1) N channels `[H; delta_1 H; ..]`. So
-//! the exchange over scenarios finds the taps of least worst norm, and its dual is a lower bound for all
+//! measurements this is a design of fixed taps `[F_0 S_1 ..]` for (J + 1) N channels `[H; delta_1 H; ..]`.
+//! So the exchange over scenarios finds the taps of least worst norm, and its dual is a lower bound for all
 //! affine taps of that length.
 //!
 //! The unknowns are delta_j S_j at the end of the box, so that all have the size of taps.
@@ -88,22 +88,16 @@ pub(crate) fn synthesise(
     let points = scenarios(&problem.errors);
     let plants =
         points.iter().map(|point| moved_plant(problem, plant, point)).collect::<Result<Vec<_>, _>>()?;
-    let mut within_reach = Vec::with_capacity(plants.len());
-    for plant in &plants {
-        within_reach.push(plant.noncausal_bound()?.gain.max(fixed.peak.gain));
-    }
-    let floor = LEAST_REACH * within_reach.iter().copied().fold(0.0, f64::max);
-    within_reach.iter_mut().for_each(|reach| *reach = reach.max(floor));
-    let nominal = fixed.peak.gain.max(floor);
+    let (nominal, within_reach) = within_reach(&plants, fixed.peak.gain)?;
     let sides = Sides::new(problem);
     let scenarios = Scenarios { plants: &plants, points: &points, within_reach: &within_reach };
     let mut exchange = sides.exchange((plant, nominal), scenarios, settings)?;
     let found = exchange.optimise_to(ACCURACY)?;
     let (taps, slopes) = sides.split(&found.taps, settings.taps);
-    let mut norms = Vec::with_capacity(plants.len());
-    for (plant, point) in plants.iter().zip(&points) {
-        norms.push(plant.fir_norm(&slopes.moved(&taps, &sides.errors(point)))?.gain);
-    }
+    let norm = |(plant, point): (&LiftedPlant, &ErrorPoint)| {
+        Ok(plant.fir_norm(&slopes.moved(&taps, &sides.errors(point)))?.gain)
+    };
+    let norms = plants.iter().zip(&points).map(norm).collect::<Result<Vec<_>, DesignError>>()?;
     let worst = (0..norms.len()).max_by(|&a, &b| norms[a].total_cmp(&norms[b])).unwrap_or(0);
     let peak = plant.fir_norm(&taps)?;
     let tracked = RobustNorms { nominal: peak.gain, worst: norms[worst].max(peak.gain) };
@@ -131,6 +125,15 @@ pub(crate) fn synthesise(
         robust: None,
         affine: Some(AffineDesign { slopes, study }),
     })
+}
+
+/// The norms that are within reach without errors, where a fixed bank has gain `nominal`, and of each plant.
+fn within_reach(plants: &[LiftedPlant], nominal: f64) -> Result<(f64, Vec<f64>), DesignError> {
+    let bounds = plants.iter().map(|plant| Ok(plant.noncausal_bound()?.gain.max(nominal)));
+    let mut within_reach = bounds.collect::<Result<Vec<_>, DesignError>>()?;
+    let floor = LEAST_REACH * within_reach.iter().copied().fold(0.0, f64::max);
+    within_reach.iter_mut().for_each(|reach| *reach = reach.max(floor));
+    Ok((nominal.max(floor), within_reach))
 }
 
 /// Points of the box with their plants, and the norms that are within reach there.
@@ -224,8 +227,8 @@ impl Sides {
         (points, weights)
     }
 
-    /// Power of the noise of the channels `[H; delta_1 H; ..]`: that of the output's noise, averaged over the
-    /// scenarios, whose shares are uncorrelated.
+    /// Power of the noise of the channels `[H; delta_1 H; ..]`: that of the output's noise, averaged over
+    /// the scenarios, whose shares are uncorrelated.
     fn noise(&self, of_channels: &[f64], sheets: &Sheets<'_>) -> Vec<f64> {
         let count = sheets.sheets.len() as f64;
         let square =

@@ -15,8 +15,8 @@ use crate::verify::uncertainty::ErrorBox;
 
 /// A nominal bank whose worst norm is within this of a lower bound is kept.
 const NO_GAIN: f64 = 1e-3;
-/// The norm is computed where its estimate is at least this share of the largest estimate: estimates are off by
-/// a per cent or two.
+/// The norm is computed where its estimate is at least this share of the largest estimate: estimates are off
+/// by a per cent or two.
 const NEAR_WORST: f64 = 0.95;
 
 /// The comparison of a robust design with one that takes the errors for zero.

@@ -1,5 +1,5 @@
-//! The error of one scenario on a fine grid of frequencies, of which only the part near its peaks is computed:
-//! at most of the scenarios the error is far below that of the worst one.
+//! The error of one scenario on a fine grid of frequencies, of which only the part near its peaks is
+//! computed: at most of the scenarios the error is far below that of the worst one.
 
 use crate::design::DesignError;
 use crate::design::error_grid::{FINE, error_at, gain, intervals, peaks_between, trapezoidal_weights};
@@ -9,9 +9,9 @@ use crate::lmi::sampled::{Point, Taps};
 use std::cell::OnceCell;
 use std::f64::consts::PI;
 
-/// Every so many points are looked at first: six for each slow lag. Between two of them, pi / (6 lags) apart,
-/// the gain falls from a maximum by 1 % at most (M. Riesz: cos(lags t / 2) with t = pi / (12 lags)), and the
-/// memory of the front ends adds some.
+/// Every so many points are looked at first: six for each slow lag. Between two of them, pi / (6 lags)
+/// apart, the gain falls from a maximum by 1 % at most (M. Riesz: cos(lags t / 2) with t = pi / (12 lags)),
+/// and the memory of the front ends adds some.
 const STRIDE: usize = FINE / 2;
 /// Around points below this share of the level there is no peak above the level.
 const NEAR: f64 = 0.96;
@@ -96,8 +96,8 @@ mod tests {
     use crate::random::Random;
     use crate::spec::Spec;
 
-    /// Against the grid that computes all points: the highest peak has the same bits wherever it is above the
-    /// level, and nothing above the level is missed.
+    /// Against the grid that computes all points: the highest peak has the same bits wherever it is above
+    /// the level, and nothing above the level is missed.
     #[test]
     fn the_highest_peak_is_that_of_the_whole_grid() {
         let spec = Spec::from_toml(include_str!("../../../../filters/thesis-fir.toml"), "spec.toml").unwrap();

@@ -57,7 +57,8 @@ impl Sheets<'_> {
 
 impl AffineError for Sheets<'_> {
     fn at(&self, omega: f64) -> Point {
-        // Frequencies lie in [0, pi] of their stretch; half a radian keeps clear of the rounding at its ends.
+        // Frequencies lie in [0, pi] of their stretch; half a radian keeps clear of the rounding at its
+        // ends.
         let sheet = (((omega + 0.5) / TAU).floor() as usize).min(self.sheets.len() - 1);
         let frequency = (omega - TAU * sheet as f64).clamp(0.0, PI);
         Point { omega, ..self.point(sheet, &self.sheets[sheet].grid.at(frequency)) }

@@ -114,8 +114,8 @@ fn taps_that_follow_the_delays_are_nearly_as_good_as_a_redesign() {
     assert!(study.least_ratio <= study.ratio && study.least_ratio > study.ratio * (1.0 - 1e-3), "{study:?}");
 }
 
-/// The file states a worst case of the taps that follow, which `verify` proves; it refuses a smaller one, and
-/// a slope that was changed.
+/// The file states a worst case of the taps that follow, which `verify` proves; it refuses a smaller one,
+/// and a slope that was changed.
 #[test]
 fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     let mut spec = following(0.05);
@@ -139,8 +139,8 @@ fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     assert_eq!(refused, crate::verify::VerifyError::Tracked { stated: 0.98 * study.tracked.worst });
 }
 
-/// Four interleaved converters, with HYBANK_SWEEP set: within 0.2 % of a redesign for delays within 10 ps, and
-/// within 3 % for 50 ps.
+/// Four interleaved converters, with HYBANK_SWEEP set: within 0.2 % of a redesign for delays within 10 ps,
+/// and within 3 % for 50 ps.
 #[test]
 fn interleaved_converters_are_followed() {
     if std::env::var_os("HYBANK_SWEEP").is_none() {

@@ -8,7 +8,7 @@ const STEPS: usize = 40;
 const CONVERGED: f64 = 1e-25;
 
 /// X = A X A' + B B' for a stable A: the sum of A^k B B' A'^k. `None` without convergence.
-pub(super) fn gramian<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Option<Matrix<F>> {
+pub(in crate::design) fn gramian<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Option<Matrix<F>> {
     let (mut transition, mut sum) = (a.clone(), (b * &b.transpose()).symmetric());
     for _ in 0..STEPS {
         let more = transition.congruence(&sum);
@@ -25,7 +25,11 @@ pub(super) fn gramian<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Option<Matrix<
 /// The limit of X+ = F X (I + G X)^-1 F' + H from X = 0 by the structure-preserving doubling algorithm
 /// (E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, *Structure-preserving algorithms for periodic
 /// discrete-time algebraic Riccati equations*, Int. J. Control 77, 2004). `None` without convergence.
-pub(super) fn riccati_limit<F: Number>(f: &Matrix<F>, g: &Matrix<F>, h: &Matrix<F>) -> Option<Matrix<F>> {
+pub(in crate::design) fn riccati_limit<F: Number>(
+    f: &Matrix<F>,
+    g: &Matrix<F>,
+    h: &Matrix<F>,
+) -> Option<Matrix<F>> {
     let (mut a, mut g, mut h) = (f.transpose(), g.clone(), h.clone());
     let one = Matrix::identity(a.nrows());
     for _ in 0..STEPS {

@@ -1,0 +1,176 @@
+//! Searches for the certificate of the upper end: a solution of the bounded-real Riccati equation at a gamma
+//! slightly above the norm.
+//!
+//! Double precision finds it for most banks. After steep filters, whose samples are nearly dependent, the
+//! error is a small difference of large numbers; the equation is then solved in 512 bits.
+
+use super::units::Units;
+use super::{leading_direction, long_riccati, witness};
+use crate::bank::{Bank, Certificate, DualWitness};
+use crate::design::DesignError;
+use crate::linalg::{self, Complex, Mat};
+use crate::lti::peak::hinf_norm;
+use crate::lti::{GramianCoordinates, StateSpace, bounded_real_riccati};
+use crate::verify::{EnclosedErrorSystem, Midpoint};
+
+/// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
+/// first.
+const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+/// The relative excesses that are tried in double precision before 512 bits are used.
+const FINE_EXCESSES: usize = 3;
+/// The relative excesses that are tried in 512 bits.
+const LONG_EXCESSES: [f64; 3] = [1e-7, 1e-5, 1e-3];
+/// The same in units of `FLOOR`, for norms that are zero up to rounding.
+const FLOOR_EXCESSES: [f64; 3] = [1.0, 1e2, 1e4];
+/// Weights on all states, relative to the excess.
+const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
+/// Norms below this, relative to the scale of the reference samples, are zero up to rounding.
+const FLOOR: f64 = 1e-10;
+/// Significant digits of the certificate's numbers in the file.
+const DIGITS: [usize; 4] = [9, 12, 15, 17];
+/// Significant digits of the corrections.
+const CORRECTION_DIGITS: [usize; 2] = [9, 17];
+/// Part of the excess that white noise on the states may take in 512 bits.
+const NOISE: f64 = 1e-3;
+/// Maximum number of states of an error system whose certificate is searched in 512 bits: some seconds per
+/// gamma that is tried.
+pub(in crate::design) const MAX_LONG_STATES: usize = 48;
+/// Maximum number of states of an error system for which the search tries to find a certificate. It needs
+/// eigenvalues of matrices twice as large.
+const MAX_SEARCHED: usize = 512;
+/// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess
+/// (and of the number of states). With it no direction is unobservable. The noise would raise the norm by
+/// only a hundredth of the excess.
+const STATE_NOISE: f64 = 0.1;
+/// Relative excess of a stated norm over the one computed here that counts as rounding.
+const SAME_NORM: f64 = 1e-6;
+
+/// The certificate with the least gamma, of those tried, that passes.
+pub(super) fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
+    if error.states() > MAX_SEARCHED {
+        return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED });
+    }
+    let raw = error.midpoint().ok_or(DesignError::NotCertified)?;
+    let units = Units::of(&raw, error.scale())?;
+    let middle = units.of_one(&raw);
+    let system = StateSpace::new(middle.a.clone(), middle.b.clone(), middle.c.clone(), middle.d.clone())?;
+    let peak = hinf_norm(&system)?;
+    // The norm in the file may differ from the one computed here in the last digits; if the difference is
+    // larger, the stated number is not the norm.
+    let stated = bank.gamma.norm.map(|stated| stated / units.reference);
+    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
+    let norm = credible.unwrap_or(0.0).max(peak.gain);
+    let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
+    let peak_witness = witness(peak.frequency, &leading_direction(&response)?);
+    let floor = FLOOR * error.scale() / units.reference;
+    let search = Search { error, units: &units, middle: &middle, peak: peak_witness };
+    let level = |excess: &f64| Level { norm, excess: excess * norm.max(floor) };
+    let doubles = |excesses: &[f64]| excesses.iter().find_map(|excess| search.in_doubles(level(excess)));
+    let long = || LONG_EXCESSES.iter().find_map(|excess| search.in_512_bits(level(excess)));
+    let is_zero = norm <= floor;
+    let (fine, coarse) =
+        if is_zero { (&FLOOR_EXCESSES[..], &[][..]) } else { EXCESSES.split_at(FINE_EXCESSES) };
+    doubles(fine).or_else(long).or_else(|| doubles(coarse)).ok_or(DesignError::NotCertified)
+}
+
+/// A gamma that is tried.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    norm: f64,
+    excess: f64,
+}
+
+impl Level {
+    /// The gamma that is proven.
+    fn gamma(self) -> f64 {
+        self.norm + self.excess
+    }
+
+    /// The level of the Riccati equation.
+    fn middle(self) -> f64 {
+        self.norm + 0.5 * self.excess
+    }
+}
+
+/// What is certified.
+struct Search<'a> {
+    error: &'a EnclosedErrorSystem<'a>,
+    units: &'a Units,
+    /// The system in these units.
+    middle: &'a Midpoint,
+    peak: DualWitness,
+}
+
+impl Search<'_> {
+    /// The certificate of these numbers in units of one, if it proves its gamma.
+    fn passes(&self, level: Level, factor: Vec<Vec<f64>>, correction: Vec<Vec<f64>>) -> Option<Certificate> {
+        let gamma = level.gamma() * self.units.reference;
+        let [factor, correction] = [factor, correction].map(|rows| self.units.factor(rows));
+        let found = Certificate { gamma, peak: self.peak.clone(), factor, correction };
+        self.error.keeps(&found).then_some(found)
+    }
+
+    fn in_doubles(&self, level: Level) -> Option<Certificate> {
+        let noise = STATE_NOISE * (level.excess * level.gamma()).sqrt();
+        let riccati = Riccati::new(self.middle, noise).ok()?;
+        let tried = |weight: &f64| {
+            let factor = riccati.factor(level.middle(), weight * level.excess)?;
+            DIGITS.iter().find_map(|&digits| self.passes(level, rounded(&factor, digits), Vec::new()))
+        };
+        STATE_WEIGHTS.iter().find_map(tried)
+    }
+
+    /// In 512 bits, R as two doubles per entry where one does not do. `None` also for many states.
+    fn in_512_bits(&self, level: Level) -> Option<Certificate> {
+        if self.error.states() > MAX_LONG_STATES {
+            return None;
+        }
+        let system = self.error.in_512_bits();
+        let noise = NOISE * level.excess;
+        let [factor, correction] =
+            long_riccati::root(self.units, &system, self.middle, level.middle(), noise)?;
+        let passes = |correction| self.passes(level, factor.clone(), correction);
+        let corrected = || CORRECTION_DIGITS.iter().find_map(|&digits| passes(rounded(&correction, digits)));
+        passes(Vec::new()).or_else(corrected)
+    }
+}
+
+/// Rows with so many significant digits.
+fn rounded(rows: &[Vec<f64>], digits: usize) -> Vec<Vec<f64>> {
+    let places = digits - 1;
+    let round = |x: &f64| format!("{x:.places$e}").parse().unwrap_or(*x);
+    rows.iter().map(|row| row.iter().map(round).collect()).collect()
+}
+
+/// The bounded-real Riccati equation of the transposed error system, in coordinates in which its
+/// controllability Gramian (the observability Gramian of the system) is the identity.
+struct Riccati {
+    a: Mat,
+    b: Mat,
+    c: Mat,
+    d: Mat,
+    /// From the states to the coordinates.
+    inverse: Mat,
+}
+
+impl Riccati {
+    /// Coordinates for the system with a total of `noise` added to the states.
+    fn new(middle: &Midpoint, noise: f64) -> Result<Self, DesignError> {
+        let Midpoint { a, b, c, d } = middle;
+        let (n, m) = (a.nrows(), c.nrows());
+        let state_noise = Mat::from_diagonal_element(n, n, noise / (n.max(1) as f64).sqrt());
+        let inputs = linalg::hstack(&[&c.transpose(), &state_noise])?;
+        let k = GramianCoordinates::new(&a.transpose(), &inputs, 0.0)?;
+        let outputs = k.b.columns(0, m).into_owned();
+        Ok(Self { c: b.tr_mul(&k.basis), a: k.a, b: outputs, d: d.transpose(), inverse: k.inverse })
+    }
+
+    /// Rows of R with P = R R' at `gamma`, with a weight on all states that keeps the inequality strictly
+    /// feasible.
+    fn factor(&self, gamma: f64, weight: f64) -> Option<Vec<Vec<f64>>> {
+        let p = bounded_real_riccati(&self.a, &self.b, &self.c, &self.d, gamma, weight)?;
+        let half = linalg::cholesky(&p).ok()?;
+        let root = linalg::lq_factor(&(self.inverse.tr_mul(&half) * gamma.sqrt()));
+        Some((0..root.nrows()).map(|i| root.row(i).iter().take(i + 1).copied().collect()).collect())
+    }
+}
