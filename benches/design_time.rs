@@ -38,7 +38,8 @@ fn four() -> Spec {
     with_taps(alike(&butterworth(4, 1.2), 4, 12, &[0.0, 1.3, 2.1, 2.95]), 24)
 }
 
-/// N = M channels after Butterworth filters of order 6 at 0.2 of the fast rate, delays uneven, latency one fast sample.
+/// N = M channels after Butterworth filters of order 6 at 0.2 of the fast rate, delays uneven, latency one
+/// fast sample.
 fn many(channels: usize, taps: usize) -> Spec {
     let delays: Vec<f64> = (0..channels).map(|i| 0.83 * i as f64 + 0.07 * ((i * i) % 5) as f64).collect();
     with_taps(alike(&butterworth(6, 0.2 * TAU), channels, channels, &delays), taps)

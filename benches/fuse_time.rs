@@ -1,5 +1,5 @@
-//! How long `hybank fuse` takes for a recording on file: ten minutes of two 24 kHz channels of 32-bit floats through
-//! 24 taps. One hour is six times that.
+//! How long `hybank fuse` takes for a recording on file: ten minutes of two 24 kHz channels of 32-bit floats
+//! through 24 taps. One hour is six times that.
 //!
 //! `cargo bench --bench fuse_time`; set TMPDIR to a folder in memory to leave the disk out.
 

@@ -1,6 +1,7 @@
 //! How long does a FIR design's inner problem take, along a ladder of sizes?
 //!
-//! Run with `cargo bench --bench inner_problem_time`. Data: sampled hybrid filter banks, the same on every run.
+//! Run with `cargo bench --bench inner_problem_time`. Data: sampled hybrid filter banks, the same on every
+//! run.
 
 use hybank::lmi::sampled::{self, Point, Problem};
 use hybank::lmi::{Settings, kyp};

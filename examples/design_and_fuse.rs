@@ -1,5 +1,5 @@
-//! From a spec to fused samples without any file: design a bank, let virtual converters capture a signal, fuse the captures
-//! frame by frame, and compare with what an ideal fast converter gives.
+//! From a spec to fused samples without any file: design a bank, let virtual converters capture a signal,
+//! fuse the captures frame by frame, and compare with what an ideal fast converter gives.
 //!
 //! `cargo run --release --example design_and_fuse`
 

@@ -1,5 +1,5 @@
-//! What an error in the delays costs: the exact gamma of one bank over a table of delay errors, beside the least that
-//! any bank could do had it known the true delays.
+//! What an error in the delays costs: the exact gamma of one bank over a table of delay errors, beside the
+//! least that any bank could do had it known the true delays.
 //!
 //! `cargo run --release --example jitter_study`
 

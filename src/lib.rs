@@ -55,6 +55,9 @@ pub mod verify;
 #[cfg(feature = "plot")]
 pub mod plot;
 
+#[cfg(all(feature = "design", feature = "plot"))]
+pub mod overview;
+
 #[cfg(feature = "cli")]
 pub mod cli;
 

@@ -2,11 +2,11 @@
 
 use std::fs;
 
-/// Bytes of memory that are free on the machine, or fewer where the process is limited (`ulimit -v`, a control
-/// group); `None` where the system does not say. A process that takes more is ended by the system without a
-/// message: with overcommit, it grants memory that it does not have.
+/// Bytes of memory that are free on the machine, or fewer where the process is limited (`ulimit -v`, a
+/// control group, addresses of 32 bits); `None` where the system does not say. A process that takes more is
+/// ended by the system without a message: with overcommit, it grants memory that it does not have.
 pub fn available_memory() -> Option<f64> {
-    [physical(), control_group(), address_space()].into_iter().flatten().reduce(f64::min)
+    [physical(), control_group(), address_space(), addressable()].into_iter().flatten().reduce(f64::min)
 }
 
 /// MemAvailable of /proc/meminfo, in kB there: free, or free after caches are dropped.
@@ -27,6 +27,11 @@ fn address_space() -> Option<f64> {
     let line = text.lines().find(|line| line.starts_with("Max address space"))?;
     let limit = number(line.split_whitespace().nth(3)?)?;
     Some((limit - used().unwrap_or(0.0)).max(0.0))
+}
+
+/// What addresses of 32 bits reach, as in WebAssembly.
+fn addressable() -> Option<f64> {
+    (usize::BITS <= 32).then_some(usize::MAX as f64)
 }
 
 /// The address space in use, in kB there.

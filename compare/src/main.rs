@@ -1,15 +1,17 @@
-//! hybank's FIR design beside Clarabel, a general interior-point solver for conic problems, on the same plants:
-//! `cargo run --release` in this folder (it needs the system's OpenBLAS, on Debian `apt install libopenblas-dev`) prints seconds, gammas and ratios.
+//! hybank's FIR design beside Clarabel, a general interior-point solver for conic problems, on the same
+//! plants: `cargo run --release` in this folder (it needs the system's OpenBLAS, on Debian
+//! `apt install libopenblas-dev`) prints seconds, gammas and ratios.
 //!
-//! Clarabel gets what a user of a modelling tool would write down: gamma^2 = t minimal such that at each frequency of a fixed grid
+//! Clarabel gets what a user of a modelling tool would write down: gamma^2 = t minimal such that at each
+//! frequency of a fixed grid
 //!
 //! ```text
 //! [ t I - G   K ]
 //! [ K*        I ]  >= 0,    K = W1 - sum_j e^{-i omega j} F_j H1,
 //! ```
 //!
-//! as a real matrix of twice the order. hybank's time is that of the whole design: the exchange of frequencies, the second objective, and
-//! the exact norm.
+//! as a real matrix of twice the order. hybank's time is that of the whole design: the exchange of
+//! frequencies, the second objective, and the exact norm.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SupportedConeT};
@@ -67,7 +69,8 @@ struct Cones {
 }
 
 impl Cones {
-    /// Requires `constant + sum_k x_k part_k >= 0` for Hermitian matrices; `parts` names the unknowns that occur.
+    /// Requires `constant + sum_k x_k part_k >= 0` for Hermitian matrices; `parts` names the unknowns that
+    /// occur.
     fn require(&mut self, constant: &CMat, parts: &[(usize, CMat)]) {
         let first = self.right.len();
         self.right.extend(real_triangle(constant));

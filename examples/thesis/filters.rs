@@ -90,8 +90,8 @@ fn frequency(k: usize) -> f64 {
     PI * k as f64 / (POINTS - 1) as f64
 }
 
-/// |Phi| and the row norms of the norm-equivalent H_i. H_i itself depends on the choice of a square root, its row
-/// norm does not.
+/// |Phi| and the row norms of the norm-equivalent H_i. H_i itself depends on the choice of a square
+/// root, its row norm does not.
 fn analysis(bank: &Bank) -> Outcome<Chart> {
     let analog = front_end_gains(bank, POINTS)?;
     let equivalent = analysis_gains(bank, POINTS)?;

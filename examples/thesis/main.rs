@@ -19,8 +19,8 @@ use hybank::spec::{Method, Spec};
 use page::Page;
 use std::path::PathBuf;
 
-/// The FIR example: Phi = 0.25 / (s + 0.5)^2 for the target and both channels, m0 = 10, and 10 slow samples of
-/// memory beside the newest.
+/// The FIR example: Phi = 0.25 / (s + 0.5)^2 for the target and both channels, m0 = 10, and 10 slow samples
+/// of memory beside the newest.
 fn spec() -> Outcome<Spec> {
     Ok(Spec::from_toml(include_str!("../../filters/thesis-fir.toml"), "filters/thesis-fir.toml")?)
 }

@@ -1,4 +1,5 @@
-//! Any text is a measured response or a message; frequencies rise, and small models of it are stable or refused.
+//! Any text is a measured response or a message; frequencies rise, and small models of it are stable or
+//! refused.
 #![no_main]
 
 use hybank::analog::fit::{MeasuredResponse, vector_fit};

@@ -1,4 +1,5 @@
-//! Any text is a spec or a message; a spec writes, reads back equal, and its filters are realised or refused.
+//! Any text is a spec or a message; a spec writes, reads back equal, and its filters are realised or
+//! refused.
 #![no_main]
 
 use hybank::analog::StrictlyProper;

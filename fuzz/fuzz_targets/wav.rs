@@ -1,4 +1,5 @@
-//! Any bytes are a WAV file or a message; the frames are whole, of the header's size, and the same for every buffer.
+//! Any bytes are a WAV file or a message; the frames are whole, of the header's size, and the same for every
+//! buffer.
 #![no_main]
 
 use hybank::io::wav::WavReader;

@@ -313,11 +313,22 @@ fn check_certificate(certificate: &Certificate) -> Checked {
         let rule = "a norm is zero or more, and finite";
         return out_of_range("proof.upper.gamma", certificate.gamma, "(h = 1)", rule);
     }
-    for (i, row) in certificate.factor.iter().enumerate() {
-        let path = format!("proof.upper.factor[{i}]");
+    check_triangle("proof.upper.factor", &certificate.factor)?;
+    let (found, expected) = (certificate.correction.len(), certificate.factor.len());
+    if found != 0 && found != expected {
+        let rule = "the correction has as many rows as the factor";
+        let problem = BankProblem::Length { found, expected, unit: "rows", rule };
+        return refuse("proof.upper.correction".to_owned(), problem);
+    }
+    check_triangle("proof.upper.correction", &certificate.correction)
+}
+
+fn check_triangle(path: &str, rows: &[Vec<f64>]) -> Checked {
+    for (i, row) in rows.iter().enumerate() {
+        let path = format!("{path}[{i}]");
         if row.len() != i + 1 {
             let (found, expected, rule) =
-                (row.len(), i + 1, "the factor is lower triangular, each row one longer");
+                (row.len(), i + 1, "the matrix is lower triangular, each row one longer");
             return refuse(path, BankProblem::Length { found, expected, unit: "columns", rule });
         }
         check_finite(&path, row)?;

@@ -50,8 +50,8 @@ pub struct Bank {
     pub delays: Vec<Seconds>,
     /// The gain g_i of each converter relative to nominal. The filters are designed for it.
     pub gains: Vec<f64>,
-    /// The offset o_i of each converter, relative to full scale. It is subtracted from the samples before the
-    /// filters.
+    /// The offset o_i of each converter, relative to full scale. It is subtracted from the samples before
+    /// the filters.
     pub offsets: Vec<f64>,
     /// The synthesis filters F_1 .. F_N.
     pub filters: SynthesisFilters,
@@ -97,8 +97,8 @@ pub struct BlockFilter {
 pub struct Gamma {
     /// Norm computed from the coefficients of this bank. Its relative error is at most
     /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), below [`TINY`](Self::TINY) at most
-    /// [`TINY_ACCURACY`](Self::TINY_ACCURACY), and rounding in the products of filters and front ends adds an
-    /// absolute one.
+    /// [`TINY_ACCURACY`](Self::TINY_ACCURACY), and rounding in the products of filters and front ends adds
+    /// an absolute one.
     pub norm: Option<f64>,
     /// An upper bound of the true norm of these coefficients: proven if the bank carries a proof, else the
     /// computed norm plus its stated error.

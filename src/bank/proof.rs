@@ -54,6 +54,9 @@ pub struct Certificate {
     /// Lower triangular R, row by row, with P = R R' of the bounded-real lemma in the coordinates of
     /// [`crate::verify`].
     pub factor: Vec<Vec<f64>>,
+    /// A triangle that is added to `factor` where R needs more digits than a double has; empty elsewhere.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub correction: Vec<Vec<f64>>,
 }
 
 /// Weights of the samples at the point e^{i w} = (c + i s)^2 / (c^2 + s^2) of the unit circle, w in radians

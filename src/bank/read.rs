@@ -209,11 +209,12 @@ fn lower_proof(value: &Value<'_>) -> Result<LowerProof, Fault> {
 }
 
 fn certificate(value: &Value<'_>) -> Result<Certificate, Fault> {
-    let fields = value.fields(&["gamma", "peak", "factor"])?;
+    let fields = value.fields(&["gamma", "peak", "factor", "correction"])?;
     Ok(Certificate {
         gamma: fields.required("gamma", WITNESS)?.number()?,
         peak: witness(&fields.required("peak", WITNESS)?)?,
         factor: fields.required("factor", WITNESS)?.matrix()?,
+        correction: fields.optional("correction").map(|v| v.matrix()).transpose()?.unwrap_or_default(),
     })
 }
 

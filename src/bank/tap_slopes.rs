@@ -16,8 +16,8 @@ pub struct TapSlopes {
 }
 
 impl TapSlopes {
-    /// The `taps` of the bank's delays moved to delays that differ by `errors`, one per channel. The sum goes
-    /// from the first channel to the last one.
+    /// The `taps` of the bank's delays moved to delays that differ by `errors`, one per channel. The sum
+    /// goes from the first channel to the last one.
     pub fn moved(&self, taps: &[Vec<f64>], errors: &[FastPeriods]) -> Vec<Vec<f64>> {
         let mut moved = taps.to_vec();
         for (slopes, error) in self.by_delay.iter().zip(errors) {

@@ -114,7 +114,8 @@ fn with_proof() -> Bank {
         measured,
     };
     let factor = vec![vec![0.1], vec![0.2, 1.0 / 3.0], vec![1e-9, -2.5, 7.0]];
-    let upper = Some(Certificate { gamma: 0.04, peak: witness(vec![]), factor });
+    let correction = vec![vec![1e-18], vec![-3e-18, 0.0], vec![0.0, 2e-17, 1e-17]];
+    let upper = Some(Certificate { gamma: 0.04, peak: witness(vec![]), factor, correction });
     let lower = Some(LowerProof::Fir(vec![witness(vec![[0.5, 0.0], [1.5e-300, 2.0]])]));
     Bank { proof: Some(Proof { upper, lower, noncausal: Some(witness(vec![])) }), ..fir() }
 }
@@ -144,6 +145,8 @@ fn every_mistake_in_a_proof_names_its_place() {
     let text = with_proof().to_json().unwrap();
     for (from, to, path, words) in [
         ("[0.2, 0.3333333333333333]", "[0.2]", "proof.upper.factor[1]", "lower triangular"),
+        ("[-3e-18, 0.0]", "[-3e-18]", "proof.upper.correction[1]", "lower triangular"),
+        ("[[1e-18], ", "[", "proof.upper.correction", "as many rows as the factor"),
         ("\"gamma\": 0.04", "\"gamma\": -0.04", "proof.upper.gamma", "zero or more"),
         ("\"half\": [0.8, -0.6]", "\"half\": [0, 0]", "proof.upper.peak.half", "cannot be zero"),
         ("\"half\": [0.8, -0.6]", "\"half\": [0.8]", "proof.upper.peak.half", "a pair of numbers"),

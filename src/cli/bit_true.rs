@@ -14,9 +14,9 @@ use std::path::Path;
 /// The options.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct BitTrueArgs {
-    /// Run the integer taps of the bank on the integers of the captures, as hardware and the exported C do: exact
-    /// sums, each rounded to the nearest integer, halves upwards, and saturated at the bits of the captures. The
-    /// output has their bits
+    /// Run the integer taps of the bank on the integers of the captures, as hardware and the exported C do:
+    /// exact sums, each rounded to the nearest integer, halves upwards, and saturated at the bits of the
+    /// captures. The output has their bits
     #[arg(long, conflicts_with_all = ["gaps", "track", "measure", "algorithm", "bits", "threads", "report"])]
     bit_true: bool,
     /// Bits of the accumulator with --bit-true; sums that do not fit wrap around

@@ -10,10 +10,10 @@ use std::path::PathBuf;
 /// Writes a bank for other tools: C99, CSV, NumPy, MATLAB, FPGA memory
 ///
 /// The order of FIR taps is the same in every format: channel, then phase of the output, then lag in slow
-/// periods. coe and mem hold integer taps (`hybank design --bits`). sos is a table of the second-order sections
-/// of a recursive bank at the slow rate: the filter from a channel to a phase of the output is the sum of its
-/// sections z^-delay (b0 + b1 z^-1 + b2 z^-2) / (a0 + a1 z^-1 + a2 z^-2). Its first line is a comment with the
-/// gamma of the sections as they are written.
+/// periods. coe and mem hold integer taps (`hybank design --bits`). sos is a table of the second-order
+/// sections of a recursive bank at the slow rate: the filter from a channel to a phase of the output is the
+/// sum of its sections z^-delay (b0 + b1 z^-1 + b2 z^-2) / (a0 + a1 z^-1 + a2 z^-2). Its first line is a
+/// comment with the gamma of the sections as they are written.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

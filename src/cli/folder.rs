@@ -4,8 +4,8 @@ use super::Failure;
 use crate::files::{AtomicFile, commit_all};
 use std::path::Path;
 
-/// Writes the files of each item to `folder` as soon as the item is known; all files appear together. A folder
-/// that was made for them is removed if they do not.
+/// Writes the files of each item to `folder` as soon as the item is known; all files appear together. A
+/// folder that was made for them is removed if they do not.
 pub(super) fn write_together<T>(
     folder: &Path,
     items: impl Iterator<Item = Result<T, Failure>>,

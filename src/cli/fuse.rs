@@ -10,9 +10,9 @@ use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
 use super::output::{Bits, check_files, precision};
 use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_report};
+use super::say::say_understood;
 use super::track::TrackArgs;
 use super::turns::TurnArgs;
-use super::understood::say_understood;
 use super::watch::Watch;
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
@@ -28,8 +28,9 @@ use std::time::Instant;
 /// Fuses slow recordings into one fast recording
 ///
 /// The recordings are one mono WAV file per channel, in the order of the bank, or one N-channel WAV
-/// file, or with --interleaved one mono file in which the converters take turns. The output lines up with the time axis of the inputs and has exactly M samples per input frame: the
-/// first m0 samples, the latency of the bank, are dropped, and the end is flushed with zeros.
+/// file, or with --interleaved one mono file in which the converters take turns. The output lines up with
+/// the time axis of the inputs and has exactly M samples per input frame: the first m0 samples, the latency
+/// of the bank, are dropped, and the end is flushed with zeros.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -43,8 +44,8 @@ Examples:
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
     bank: PathBuf,
-    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), or one of N channels; `-`
-    /// is standard input
+    /// One mono recording per channel (WAV, SigMF, .csv, .npy, .mat, or raw with --format), or one of N
+    /// channels; `-` is standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// The fused WAV file (or SigMF recording, if it ends in sigmf-meta) or a FIFO; `-` is standard output

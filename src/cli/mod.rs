@@ -31,7 +31,7 @@ mod match_bank;
 mod measure;
 mod measured;
 mod output;
-mod pictures;
+mod picture_format;
 mod plot;
 mod print;
 mod recordings;
@@ -44,7 +44,6 @@ mod stream;
 mod sweeps;
 mod track;
 mod turns;
-mod understood;
 mod verify;
 mod watch;
 

@@ -1,7 +1,9 @@
 //! Prints messages to standard error.
 
 use crate::files::leftovers;
-use std::io::Write;
+use crate::overview::understood;
+use crate::spec::Spec;
+use std::io::{IsTerminal, Write};
 use std::path::Path;
 
 /// Prints text to standard error. Errors are ignored, so that no result is lost.
@@ -17,6 +19,13 @@ pub(super) fn say_line(line: &str) {
 /// A warning on standard error.
 pub(super) fn warn(warning: &str) {
     say_line(&format!("warning: {warning}"));
+}
+
+/// What was understood from a spec, where a person reads it.
+pub(super) fn say_understood(spec: Option<&Spec>) {
+    if std::io::stderr().is_terminal() {
+        spec.iter().for_each(|spec| say(&format!("{}\n", understood(spec))));
+    }
 }
 
 /// Names the unfinished files that killed runs left beside `outputs`.

@@ -4,9 +4,9 @@ use super::Failure;
 
 /// Prints the JSON schema (draft 2020-12) of spec files, bank files or reports
 ///
-/// An editor that knows schemas of TOML files completes keys and marks mistakes with the schema of the spec. The
-/// report is that of `hybank design --json` and `hybank import --json`. A schema cannot state every rule: a
-/// file that fits it may still be refused, with the reason.
+/// An editor that knows schemas of TOML files completes keys and marks mistakes with the schema of the spec.
+/// The report is that of `hybank design --json` and `hybank import --json`. A schema cannot state every
+/// rule: a file that fits it may still be refused, with the reason.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -1,8 +1,8 @@
 //! gamma against latency and taps: pictures that need further designs.
 
-use super::pictures::Picture;
 use crate::bank::Bank;
 use crate::design::{DesignError, ProofSearch, design_with};
+use crate::overview::Picture;
 use crate::plot::{Chart, Series};
 use crate::spec::{DesignSpec, Method, Spec};
 
@@ -11,7 +11,8 @@ const MOST_LATENCIES: usize = 17;
 /// Lengths of filters, relative to that of the bank.
 const LENGTHS: [f64; 8] = [0.25, 0.35, 0.5, 0.7, 0.85, 1.0, 1.4, 2.0];
 
-/// gamma of the best banks of other latencies, and for FIR banks of other lengths, as real taps for exact channels.
+/// gamma of the best banks of other latencies, and for FIR banks of other lengths, as real taps for exact
+/// channels.
 pub(super) fn sweeps(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let design = DesignSpec {
@@ -54,7 +55,8 @@ fn by_taps(taps: usize, plain: &Spec) -> Vec<(f64, f64)> {
     lengths.into_iter().filter_map(|taps| point(taps, &Spec { design: of(taps), ..plain.clone() })).collect()
 }
 
-/// gamma of a design in decibels; none where there is no such bank, as for latencies that the taps do not reach.
+/// gamma of a design in decibels; none where there is no such bank, as for latencies that the taps do not
+/// reach.
 fn point(at: usize, spec: &Spec) -> Option<(f64, f64)> {
     let gamma = design_with(spec, ProofSearch::Skip).ok()?.bank.gamma.norm?;
     (gamma > 0.0).then(|| (at as f64, 20.0 * gamma.log10()))

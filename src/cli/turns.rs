@@ -9,9 +9,9 @@ use std::path::Path;
 /// The option of the commands that read captures of a bank.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct TurnArgs {
-    /// The input is one recording of one channel in which M converters take turns: its sample k, counted from
-    /// 0, comes from converter k mod M. Converters count in the order in which they sample, so converter 0 is
-    /// the channel with the largest delay
+    /// The input is one recording of one channel in which M converters take turns: its sample k, counted
+    /// from 0, comes from converter k mod M. Converters count in the order in which they sample, so
+    /// converter 0 is the channel with the largest delay
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u16).range(1..=1024))]
     interleaved: Option<u16>,
 }

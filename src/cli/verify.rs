@@ -2,10 +2,10 @@
 
 use super::Failure;
 use super::bank_file::{is_a_spec, name, read_text};
-use super::design::report::counted;
 use super::file_kind::FileKind;
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
+use crate::overview::counted;
 use crate::verify::uncertainty::check_stated;
 use crate::verify::{BoundedBanks, Verified, verify};
 use std::path::PathBuf;

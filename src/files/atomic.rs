@@ -15,13 +15,13 @@ const OTHER_KIND: &str = "a device, pipe or socket, not a file; write to `-` and
 /// Unfinished files of this process.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// The outputs of this process that have their names, as they were asked for. Whoever gives names holds the lock
-/// meanwhile, so an end by [`remove_unfinished`] comes before or after all names of a set.
+/// The outputs of this process that have their names, as they were asked for. Whoever gives names holds the
+/// lock meanwhile, so an end by [`remove_unfinished`] comes before or after all names of a set.
 static NAMED: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Removes all files of this process that have not been committed: for a thread that is about to end the
-/// process while others are writing. Other threads can neither begin, commit nor drop a file afterwards; they
-/// wait for the end. Returns the names of the files that were committed before.
+/// process while others are writing. Other threads can neither begin, commit nor drop a file afterwards;
+/// they wait for the end. Returns the names of the files that were committed before.
 pub fn remove_unfinished() -> Vec<String> {
     let named = names_given();
     let files = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);

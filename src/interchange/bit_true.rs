@@ -39,8 +39,8 @@ impl BitTrue {
     /// Of a bank with integer taps; the history is zero.
     ///
     /// # Errors
-    /// [`ExportError::NoIntegers`], [`ExportError::Offset`], [`ExportError::Accumulator`] for taps whose sums of
-    /// 32-bit samples may not fit 64 bits.
+    /// [`ExportError::NoIntegers`], [`ExportError::Offset`], [`ExportError::Accumulator`] for taps whose
+    /// sums of 32-bit samples may not fit 64 bits.
     pub fn new(bank: &Bank, words: WordSizes) -> Result<Self, ExportError> {
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "bit-true" })?;
         let taps = integer_taps(bank, integers)?;

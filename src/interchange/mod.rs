@@ -1,4 +1,5 @@
-//! Banks for other tools (C99, tables, memory images of FPGAs, NumPy and MATLAB files), and taps of other tools.
+//! Banks for other tools (C99, tables, memory images of FPGAs, NumPy and MATLAB files), and taps of other
+//! tools.
 //!
 //! The order of FIR taps is the same in every format: channel, then phase p of the output, then lag j in
 //! slow periods. Entry (i, p, j) is the tap `f_i[p + j M]`, so

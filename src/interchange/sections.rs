@@ -39,7 +39,8 @@ struct Block {
 /// coefficients have the accuracy of the bank's.
 ///
 /// # Errors
-/// [`ExportError::NoSections`] for FIR banks, and for poles that nearly coincide, whose states drive one another.
+/// [`ExportError::NoSections`] for FIR banks, and for poles that nearly coincide, whose states drive one
+/// another.
 pub fn sections(bank: &Bank) -> Result<Vec<Section>, ExportError> {
     let SynthesisFilters::StateSpace(block) = &bank.filters else {
         return Err(ExportError::NoSections("this bank has no poles; csv and npz hold its taps"));
@@ -208,8 +209,8 @@ impl Block {
     }
 }
 
-/// The state-space filters of sections: delay lines of the inputs, and for each pair of poles and each phase two
-/// states in observer form, which all channels drive.
+/// The state-space filters of sections: delay lines of the inputs, and for each pair of poles and each phase
+/// two states in observer form, which all channels drive.
 pub fn block_of_sections(sections: &[Section], channels: usize, ratio: usize) -> BlockFilter {
     let states = SectionStates::of(sections, channels);
     let mut block = states.undriven(ratio);

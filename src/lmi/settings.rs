@@ -18,16 +18,16 @@ pub struct SettingError {
 pub struct Settings {
     /// Maximum number of predictor-corrector steps (80).
     pub max_iterations: usize,
-    /// Duality gap at which the iteration ends, relative to gamma (1e-9; 1e-7 for `kyp`, where rounding errors in the
-    /// Newton matrix end the progress near 1e-9).
+    /// Duality gap at which the iteration ends, relative to gamma (1e-9; 1e-7 for `kyp`, where rounding
+    /// errors in the Newton matrix end the progress near 1e-9).
     pub tol_gap_rel: f64,
-    /// Duality gap that counts as zero, relative to the size of the data: the largest `sigma_max(W_l)`, or the norm of
-    /// the matrices for `kyp` (1e-13).
+    /// Duality gap that counts as zero, relative to the size of the data: the largest `sigma_max(W_l)`, or
+    /// the norm of the matrices for `kyp` (1e-13).
     pub tol_gap_abs: f64,
     /// Relative duality gap up to which a stalled run still counts as solved (1e-5).
     pub tol_gap_reduced: f64,
-    /// Combinations of unknowns, and for `kyp` states, whose effect is below this, relative to the largest, are
-    /// dropped; `sampled` drops them in its least-squares start only (1e-11; 1e-12 for `kyp`).
+    /// Combinations of unknowns, and for `kyp` states, whose effect is below this, relative to the largest,
+    /// are dropped; `sampled` drops them in its least-squares start only (1e-11; 1e-12 for `kyp`).
     pub tol_rank: f64,
     /// Largest fraction of the way to the boundary of the cone that a step goes (0.98).
     pub step_fraction: f64,

@@ -14,8 +14,8 @@ use std::borrow::Cow;
 /// Maximum number of gaps that a report lists; further gaps are only counted, so that memory stays bounded.
 const LISTED: usize = 65_536;
 
-/// The replacement of a missing sample. What is replaced are the samples as the converters deliver them, so a
-/// converter without a signal delivers its offset.
+/// The replacement of a missing sample. What is replaced are the samples as the converters deliver them, so
+/// a converter without a signal delivers its offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GapPolicy {
     /// Zero after the offset is subtracted: the channel's offset.

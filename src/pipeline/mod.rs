@@ -8,7 +8,8 @@
 //! A [`Pipeline`] takes frames as they arrive. It fills missing samples, runs the bank, drops the latency,
 //! and passes encoded samples to an [`Output`], with a mask of the samples that missing inputs affect.
 //! [`run`] processes all frames of a [`MultiReader`](crate::io::MultiReader). The result is an [`Outcome`]
-//! with counts and [`Warning`]s; nothing is printed. A [`Retuner`] changes the filters on the way. [`fuse`] does the same with a signal that is in memory.
+//! with counts and [`Warning`]s; nothing is printed. A [`Retuner`] changes the filters on the way. [`fuse`]
+//! does the same with a signal that is in memory.
 
 mod complex;
 mod error;

@@ -108,8 +108,8 @@ impl Tuning {
         (self.block - gathered).min(usize::try_from(to_change).unwrap_or(usize::MAX))
     }
 
-    /// Takes frames that were processed, at most [`Tuning::frames_ahead`], and returns the stream that goes on
-    /// from here if the filters change.
+    /// Takes frames that were processed, at most [`Tuning::frames_ahead`], and returns the stream that goes
+    /// on from here if the filters change.
     ///
     /// # Errors
     /// [`PipelineError::Build`] for filters that do not run.
@@ -190,7 +190,8 @@ mod tests {
     const CHANNELS: usize = 2;
     const RATIO: usize = 2;
 
-    /// Taps that differ from block to block and at frame 13 of a block, by what was in the block before last.
+    /// Taps that differ from block to block and at frame 13 of a block, by what was in the block before
+    /// last.
     struct Changing;
 
     fn taps(seed: f64) -> Vec<Vec<f64>> {

@@ -133,8 +133,8 @@ impl RealPipeline {
         self.push_at_most(parts, u64::MAX, output, true)
     }
 
-    /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples have
-    /// been written since the beginning.
+    /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples
+    /// have been written since the beginning.
     ///
     /// # Errors
     /// The errors of the output.

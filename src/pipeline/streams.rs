@@ -52,8 +52,8 @@ impl Pipeline {
         Ok(Self { real: part()?, imaginary })
     }
 
-    /// The same pipeline, whose filters change as `retuner` says; `bank` and `options` are those of its plan,
-    /// which adds no latency. Of complex samples the filters do not change.
+    /// The same pipeline, whose filters change as `retuner` says; `bank` and `options` are those of its
+    /// plan, which adds no latency. Of complex samples the filters do not change.
     ///
     /// # Errors
     /// [`PipelineError::Thread`] if there is no thread for it.
@@ -127,8 +127,8 @@ impl Pipeline {
         }
     }
 
-    /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples have
-    /// been written since the beginning.
+    /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples
+    /// have been written since the beginning.
     ///
     /// # Errors
     /// The errors of the output.

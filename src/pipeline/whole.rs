@@ -35,9 +35,9 @@ pub struct Whole {
 /// Fuses a whole signal: M output samples for each of its frames, without the latency of the bank.
 ///
 /// Output sample n belongs to the time of fast sample n: the first samples, as many as the latency, are
-/// dropped, and as many come out at the end with zeros for input. These are the samples of `hybank fuse`, bit
-/// for bit. `plan` must be the plan of `bank`. Samples are read where they are and written where they shall
-/// be; the memory used does not grow with the signal.
+/// dropped, and as many come out at the end with zeros for input. These are the samples of `hybank fuse`,
+/// bit for bit. `plan` must be the plan of `bank`. Samples are read where they are and written where they
+/// shall be; the memory used does not grow with the signal.
 ///
 /// # Errors
 /// [`PipelineError::Process`] if the channels do not match the bank or the output is too short.

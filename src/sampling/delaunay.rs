@@ -81,8 +81,8 @@ impl PoissonDelaunay {
     }
 }
 
-/// Factor of E\[S^a R^{2b}\] for N shifted copies of one grid instead of a Poisson process, `order` the sum of
-/// a and b: prod_{j<order} N / (N + j), the same as that of intervals on the line.
+/// Factor of E\[S^a R^{2b}\] for N shifted copies of one grid instead of a Poisson process, `order` the sum
+/// of a and b: prod_{j<order} N / (N + j), the same as that of intervals on the line.
 ///
 /// A cell of the grid is a torus with N independent uniform points. Three of them are a triangle if the
 /// circle through them is empty, with probability (1 - pi R^2 / cell)^{N-3} instead of exp(-pi lambda R^2),

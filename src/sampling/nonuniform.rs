@@ -7,8 +7,8 @@
 //!
 //! Here x is time, mu the aperture jitter and e the error of quantisation. A signal whose spectrum ends at
 //! the frequency F and that stays within A has |f'| <= 2 pi F A and |f''| <= (2 pi F)^2 A (Bernstein), which
-//! is [`Smoothness::band_limited`]. Jitter is equivalent to a value error of |f'| B, so B seconds cost no more than
-//! half a step of an n-bit converter, A 2^{-n}, up to F = 2^{-n} / (2 pi B):
+//! is [`Smoothness::band_limited`]. Jitter is equivalent to a value error of |f'| B, so B seconds cost no
+//! more than half a step of an n-bit converter, A 2^{-n}, up to F = 2^{-n} / (2 pi B):
 //!
 //! ```
 //! use hybank::sampling::nonuniform::Smoothness;

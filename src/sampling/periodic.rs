@@ -23,7 +23,8 @@
 //! ```
 //!
 //! Sets that share a phase, for example several cameras at one position, are not superposed sets: their
-//! samples coincide, and N of them say no more than one. [`super::nonuniform`] has the bound that holds for them.
+//! samples coincide, and N of them say no more than one. [`super::nonuniform`] has the bound that holds for
+//! them.
 
 use super::error::SamplingError;
 use super::quadrature::{gauss_legendre, integral};

@@ -22,7 +22,8 @@ pub enum Analog {
 /// The slow samples of all channels and the reference fast samples over the same time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Captured {
-    /// `channels[i][k]` = g_i (phi_i * f)(k M - D_i), with the gain g_i of the converter and without its offset.
+    /// `channels[i][k]` = g_i (phi_i * f)(k M - D_i), with the gain g_i of the converter and without its
+    /// offset.
     pub channels: Vec<Vec<f64>>,
     /// `target[n]` = (phi_0 * f)(n - m0), M samples per slow period.
     pub target: Vec<f64>,

@@ -4,8 +4,8 @@
 //! Channel i captures (phi_i * f)(k M - D_i), time in fast periods. The response to an analytic [`Source`]
 //! is computed by closed forms, matrix exponentials and quadrature that is exact to rounding; the response
 //! to a [`Recording`] by Fourier synthesis. No time grid is involved, so the result at an instant does not
-//! depend on the other instants. A [`Converter`] adds errors of delay, gain, offset and clock, jitter, noise and
-//! rounding.
+//! depend on the other instants. A [`Converter`] adds errors of delay, gain, offset and clock, jitter, noise
+//! and rounding.
 
 mod capture;
 mod complex;

@@ -1,5 +1,5 @@
-//! Normal random numbers that are a function of seed, converter, purpose and index, so that neither the order
-//! of computing nor the number of threads or converters changes them.
+//! Normal random numbers that are a function of seed, converter, purpose and index, so that neither the
+//! order of computing nor the number of threads or converters changes them.
 
 use std::f64::consts::TAU;
 

@@ -62,11 +62,11 @@ impl Recording {
         chirp_z(&self.filtered(filter, instants.first), instants.step / self.duration(), instants.count)
     }
 
-    /// (phi * f)(t) at the given instants, each later by its shift: the Taylor series around the instants, each
-    /// of whose terms is a sum as in [`Recording::sample`].
+    /// (phi * f)(t) at the given instants, each later by its shift: the Taylor series around the instants,
+    /// each of whose terms is a sum as in [`Recording::sample`].
     ///
-    /// Its error relative to the largest value is some 1e-16 e^z with z = pi |shift| / T; keep the shifts below
-    /// [`Recording::most_shift`].
+    /// Its error relative to the largest value is some 1e-16 e^z with z = pi |shift| / T; keep the shifts
+    /// below [`Recording::most_shift`].
     pub fn sample_near(
         &self,
         filter: &StrictlyProper,

@@ -1,8 +1,8 @@
 //! The response of a front end to an analytic source at arbitrary instants.
 //!
-//! x(t + l) = e^{A l} x(t) + int_0^l e^{A (l - s)} B f(t + s) ds. A panel is so short that the exponents change
-//! by one at most: then series of [`TERMS`] terms give the exponentials, and a Gauss-Legendre rule gives the
-//! integral, both to rounding. No matrix depends on l, so panels of any length cost the same.
+//! x(t + l) = e^{A l} x(t) + int_0^l e^{A (l - s)} B f(t + s) ds. A panel is so short that the exponents
+//! change by one at most: then series of [`TERMS`] terms give the exponentials, and a Gauss-Legendre rule
+//! gives the integral, both to rounding. No matrix depends on l, so panels of any length cost the same.
 
 use super::response::{RULE, panel_rate};
 use super::source::{NormalisedSource, Source};

@@ -62,8 +62,8 @@ impl Analog {
     }
 }
 
-/// The frames of `samples` fast samples, if they are not more than can be simulated; `jittered`: the instants
-/// of the converters jitter.
+/// The frames of `samples` fast samples, if they are not more than can be simulated; `jittered`: the
+/// instants of the converters jitter.
 ///
 /// # Errors
 /// [`WorkloadError`]: no sample or too many, more memory than the system gives, or a chirp or a front end so

@@ -93,8 +93,8 @@ pub(crate) fn spec_with(
     Ok(Spec { name, fast_period, ratio, latency, target: target.filter, channels, uncertainty, design })
 }
 
-/// The errors of the channels' models as further half-widths of their gains. Without a table each channel has an
-/// error of its own.
+/// The errors of the channels' models as further half-widths of their gains. Without a table each channel
+/// has an error of its own.
 fn with_model_errors(written: Option<UncertaintySpec>, errors: &[Decibels]) -> Option<UncertaintySpec> {
     if errors.iter().all(|error| error.0 < NEGLIGIBLE_DB) {
         return written;

@@ -79,8 +79,8 @@ impl FilterSpec {
         }
     }
 
-    /// Phi(s / `factor`): every frequency of the filter, the cut-off among them, is multiplied by `factor`, and
-    /// the gain at 0 stays. The written form stays too.
+    /// Phi(s / `factor`): every frequency of the filter, the cut-off among them, is multiplied by `factor`,
+    /// and the gain at 0 stays. The written form stays too.
     #[must_use]
     pub fn with_cutoff_scaled(&self, factor: f64) -> Self {
         let scaled = |list: &[[f64; 2]]| list.iter().map(|x| x.map(|part| part * factor)).collect();

@@ -70,8 +70,8 @@ pub struct ChannelSpec {
     /// sigma_i: rms of the converter's own white noise, relative to full scale.
     #[serde(skip_serializing_if = "is_zero")]
     pub noise: f64,
-    /// g_i: the converter's gain relative to nominal. With y the output of Phi_i at the sampling instant, the
-    /// converter delivers the sample g_i y + o_i.
+    /// g_i: the converter's gain relative to nominal. With y the output of Phi_i at the sampling instant,
+    /// the converter delivers the sample g_i y + o_i.
     #[serde(skip_serializing_if = "is_one")]
     pub gain: f64,
     /// o_i: the converter's offset, relative to full scale.
@@ -263,8 +263,9 @@ impl Spec {
         Self::from_toml_and_files(text, file_name, overrides, &measured::no_models)
     }
 
-    /// As [`Spec::from_toml_with`], for a spec whose filters may be measurements in other files. `models` makes
-    /// filters of them. Their errors become half-widths of the gains in the uncertainty, where they matter.
+    /// As [`Spec::from_toml_with`], for a spec whose filters may be measurements in other files. `models`
+    /// makes filters of them. Their errors become half-widths of the gains in the uncertainty, where they
+    /// matter.
     ///
     /// # Errors
     /// As [`Spec::from_toml_with`], and those of `models`.
@@ -282,8 +283,8 @@ impl Spec {
             .map_err(|fault| SpecError::of(file_name, text, fault))
     }
 
-    /// Reads a spec from data that have no text: the tables and lists of another language, with the keys of a
-    /// spec file. `name` is used only in messages.
+    /// Reads a spec from data that have no text: the tables and lists of another language, with the keys of
+    /// a spec file. `name` is used only in messages.
     ///
     /// # Errors
     /// As [`Spec::from_toml`], without a location; the path of keys says where.

@@ -14,8 +14,8 @@ pub struct Coincidence {
 }
 
 impl Coincidence {
-    /// The first pair whose delays come within `distance` of each other modulo `slow_period`, at their present
-    /// rates; `None` if there is none within `horizon`.
+    /// The first pair whose delays come within `distance` of each other modulo `slow_period`, at their
+    /// present rates; `None` if there is none within `horizon`.
     pub fn ahead(
         states: &[DelayState],
         slow_period: Seconds,
@@ -34,7 +34,8 @@ impl Coincidence {
     }
 }
 
-/// Time until a distance that lies in 0 .. `period` and grows by `rate` is within `near` of 0 or of the period.
+/// Time until a distance that lies in 0 .. `period` and grows by `rate` is within `near` of 0 or of the
+/// period.
 fn time_to_meet(apart: f64, rate: f64, period: f64, near: f64) -> Option<f64> {
     if apart <= near || apart >= period - near {
         return Some(0.0);

@@ -2,8 +2,8 @@
 
 use crate::units::Seconds;
 
-/// How a delay changes between measurements: d delay = rate dt + a random walk, d rate = a random walk, both of
-/// independent increments. The walks of the clocks of oscillators are of this kind (white and random-walk
+/// How a delay changes between measurements: d delay = rate dt + a random walk, d rate = a random walk, both
+/// of independent increments. The walks of the clocks of oscillators are of this kind (white and random-walk
 /// frequency noise).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriftModel {
@@ -124,8 +124,8 @@ impl DelayFilter {
     pub fn advance(&mut self, elapsed: Seconds) {
         let (t, DriftModel { delay_walk, rate_walk }) = (elapsed.0, self.model);
         self.delay += Seconds(self.rate * t);
-        // The rate as it was and its walk are independent parts of the new rate, to which the delays u + T and
-        // T / 2 belong: their weighted mean is the new u, and their spread belongs to the delay alone.
+        // The rate as it was and its walk are independent parts of the new rate, to which the delays u + T
+        // and T / 2 belong: their weighted mean is the new u, and their spread belongs to the delay alone.
         let (known, walked) = (self.rate_variance, rate_walk * t);
         let apart = self.delay_per_rate + 0.5 * t;
         let share = if known > 0.0 { known / (known + walked) } else { 0.0 };
@@ -190,8 +190,8 @@ mod tests {
 
     /// The second difference of the measurements is a moving average of the innovations, e[k] + b e[k-1] +
     /// c e[k-2] with b = alpha + beta - 2 and c = 1 - alpha (alpha and beta / T are the gains). Its
-    /// autocovariances are those of second differences of white noise, r (6, -4, 1), and of a delay whose rate
-    /// walks, q T^3 (2/3, 1/6, 0).
+    /// autocovariances are those of second differences of white noise, r (6, -4, 1), and of a delay whose
+    /// rate walks, q T^3 (2/3, 1/6, 0).
     #[test]
     fn a_rate_that_walks_gives_the_gains_of_the_spectral_factor() {
         for (q, t, r) in [(1.0, 1.0, 1.0), (1e-18, 0.01, 1e-24), (1e-20, 0.1, 1e-22), (5.0, 2.0, 0.1)] {
@@ -223,8 +223,8 @@ mod tests {
         let count = 60_000;
         let (mut square, mut product, mut sum, mut last) = (0.0, 0.0, 0.0, 0.0);
         for _ in 0..count {
-            // Exact increments: the integral of the rate's walk has the variance q t^3 / 3 and the correlation
-            // sqrt(3) / 2 with the walk itself.
+            // Exact increments: the integral of the rate's walk has the variance q t^3 / 3 and the
+            // correlation sqrt(3) / 2 with the walk itself.
             let (a, b) = (normal(&mut random), normal(&mut random));
             let step = (model.rate_walk * t).sqrt();
             delay += rate * t + step * t * (0.5 * a + b / 12f64.sqrt());
@@ -245,8 +245,9 @@ mod tests {
         assert!((sum / count - 1.0).abs() < 0.03 && (product / count).abs() < 0.02);
     }
 
-    /// A clock whose rate changes by 10 ppm in each second, measured at 60 dB: the lag of the filter behind the
-    /// acceleration a is a T^2 (1 - alpha) / beta, and with a matching model the error is that of the prediction.
+    /// A clock whose rate changes by 10 ppm in each second, measured at 60 dB: the lag of the filter behind
+    /// the acceleration a is a T^2 (1 - alpha) / beta, and with a matching model the error is that of the
+    /// prediction.
     #[test]
     fn a_steady_change_of_the_rate_is_followed_within_the_prediction() {
         let mut random = Random(12);

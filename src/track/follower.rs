@@ -19,7 +19,8 @@ const KNOWN_SHARE: f64 = 0.02;
 /// [`LEAST_FRAMES`] frames suffices for that.
 const LARGEST_STEP: f64 = 2e-4;
 const LEAST_FRAMES: usize = 16;
-/// Delays closer than this share of a fast period come together, and how far ahead that is reported, in blocks.
+/// Delays closer than this share of a fast period come together, and how far ahead that is reported, in
+/// blocks.
 const TOGETHER: f64 = 0.05;
 const HORIZON: f64 = 60.0;
 /// Least distance of a pilot from a multiple of half the slow rate, cycles per block.
@@ -183,8 +184,9 @@ impl Follower {
         Ok(self.take(measured))
     }
 
-    /// A block shows the mean of a delay over it. With a rate that walks by q and a delay that walks by p in a
-    /// second, the variance of its distance from the delay at the centre of the time T is q T^3 / 320 + p T / 12.
+    /// A block shows the mean of a delay over it. With a rate that walks by q and a delay that walks by p in
+    /// a second, the variance of its distance from the delay at the centre of the time T is q T^3 / 320 + p
+    /// T / 12.
     fn mean_of_block(&self) -> f64 {
         let DriftModel { delay_walk, rate_walk } = self.settings.model;
         let t = self.frame_time().0 * self.settings.block_frames as f64;
@@ -284,7 +286,8 @@ impl Follower {
         }
     }
 
-    /// Two channels that will sample at one instant; with more channels than needed, nothing is lost by that.
+    /// Two channels that will sample at one instant; with more channels than needed, nothing is lost by
+    /// that.
     fn coincidence(&self) -> Option<TrackWarning> {
         let channels = self.spec.channels.len();
         let is_known = self.tracker.locks().all(|lock| lock == Lock::Locked);

@@ -32,8 +32,8 @@ pub enum Guide {
 }
 
 impl Guide {
-    /// The delays of the channels relative to `reference`, which keeps that of `spec`; those of the others in
-    /// `spec` are what is expected. `Err` says why nothing was measured.
+    /// The delays of the channels relative to `reference`, which keeps that of `spec`; those of the others
+    /// in `spec` are what is expected. `Err` says why nothing was measured.
     pub(super) fn measure(
         &self,
         spec: &Spec,

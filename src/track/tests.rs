@@ -101,7 +101,8 @@ fn ten_ppm_per_second_are_followed_within_the_prediction() {
     assert!(count == 14 && ratio < 1.5, "{ratio}");
 }
 
-/// The pilot's error is that of the Cramér-Rao bound: sqrt(2 / (N SNR)) / w for the difference of two phases.
+/// The pilot's error is that of the Cramér-Rao bound: sqrt(2 / (N SNR)) / w for the difference of two
+/// phases.
 #[test]
 fn a_pilot_is_measured_at_the_bound() {
     let (bank, mut random) = (bank(0.9), Random(7));

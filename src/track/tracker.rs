@@ -6,7 +6,8 @@ use crate::units::Seconds;
 
 /// Innovations beyond this many standard deviations are refused: one in 1.7 million by chance.
 const GATE: f64 = 5.0;
-/// Refused measurements in a row after which a channel is lost: then the model is wrong, not the measurement.
+/// Refused measurements in a row after which a channel is lost: then the model is wrong, not the
+/// measurement.
 const MOST_REFUSED: u32 = 5;
 
 /// Whether a channel's delay is known.
@@ -54,8 +55,8 @@ impl DelayTracker {
         self.channels.is_empty()
     }
 
-    /// Lets the time `elapsed` pass for all channels. Without measurements the delays go on at their rates, and
-    /// their variances grow.
+    /// Lets the time `elapsed` pass for all channels. Without measurements the delays go on at their rates,
+    /// and their variances grow.
     pub fn advance(&mut self, elapsed: Seconds) {
         self.channels.iter_mut().for_each(|channel| channel.filter.advance(elapsed));
     }

@@ -1,5 +1,5 @@
-//! The snippets of README.md and docs/ work as they stand: specs and banks can be read, and command lines run in the order
-//! of the text.
+//! The snippets of README.md and docs/ work as they stand: specs and banks can be read, and command lines
+//! run in the order of the text.
 
 use crate::support::Desk;
 use hybank::bank::Bank;
@@ -70,7 +70,8 @@ impl Folder {
             "toml" => self.check_spec(snippet),
             "json" => self.check_bank(snippet),
             "sh" => self.run(snippet),
-            // Python has tests of its own; Rust is a documentation test; lines of lost samples run with the stream that reads them.
+            // Python has tests of its own; Rust is a documentation test; lines of lost samples run with the
+            // stream that reads them.
             "rust" | "text" | "jsonl" | "python" => {}
             other => panic!("{}: no check for a snippet of {other:?}", self.place(snippet)),
         }

@@ -1,4 +1,5 @@
-//! Designs that cannot be: a latency out of reach, too long, too large, numbers too large; and long ones that are interrupted.
+//! Designs that cannot be: a latency out of reach, too long, too large, numbers too large; and long ones
+//! that are interrupted.
 
 use crate::support::{THESIS, names, text};
 use std::fs;

@@ -39,8 +39,8 @@ fn the_thesis_is_drawn_again() {
     let pictures = fs::read_dir(folder.path()).unwrap().count() - 1;
     assert_eq!((pictures, page.matches("<svg").count()), (12, 12));
     assert!(page.contains("4.68 %") && page.contains("gamma 3.9932 % with 22 taps"), "{page}");
-    // RMSE on the step and on the cosines: an independent design has 0.000822 and 0.00177, and the optimum is not
-    // unique.
+    // RMSE on the step and on the cosines: an independent design has 0.000822 and 0.00177, and the optimum
+    // is not unique.
     let shown = text(&output.stdout);
     let row = shown.lines().find(|line| line.starts_with("hybank, FIR")).unwrap();
     let errors: Vec<f64> = row.split_whitespace().filter_map(|word| word.parse().ok()).collect();

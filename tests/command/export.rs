@@ -1,4 +1,5 @@
-//! Exported banks as their users take them: C compiled by the system's compiler, arrays read by NumPy and SciPy.
+//! Exported banks as their users take them: C compiled by the system's compiler, arrays read by NumPy and
+//! SciPy.
 
 use crate::support::{Desk, THESIS, number};
 use hybank::bank::{Bank, SynthesisFilters};

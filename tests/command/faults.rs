@@ -1,4 +1,5 @@
-//! Systems that refuse: standard streams that cannot be written, threads that cannot be started, inputs without end.
+//! Systems that refuse: standard streams that cannot be written, threads that cannot be started, inputs
+//! without end.
 
 use crate::support::{Desk, bytes, frames, fused, names, text};
 use std::io::Write;

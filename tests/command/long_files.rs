@@ -1,8 +1,10 @@
 //! Memory does not grow with the recording: sparse files through fuse and stream, into a pipe.
 //!
-//! The ordinary suite takes 192 MiB. With HYBANK_LONG_TESTS=1 it is 10 GiB, which takes a minute and no disk.
+//! The ordinary suite takes 192 MiB. With HYBANK_LONG_TESTS=1 it is 10 GiB, which takes a minute and no
+//! disk.
 
 use crate::support::Desk;
+use crate::support::sweep::long_tests;
 use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::process::Child;
@@ -11,7 +13,7 @@ use std::process::Child;
 const MOST_RESIDENT: u64 = 64 << 10;
 
 fn recording_bytes() -> u64 {
-    if std::env::var_os("HYBANK_LONG_TESTS").is_some() {
+    if long_tests() {
         return 10 << 30;
     }
     println!("192 MiB only; HYBANK_LONG_TESTS=1 makes it 10 GiB");

@@ -77,8 +77,8 @@ fn long_captures_are_cut_with_a_warning() {
     assert!(page.contains("the first 1048576 frames of the captures"));
 }
 
-/// In Chromium: nothing on the console, and nothing is fetched. A script that is added for the test counts what
-/// the page asked for, and writes how wide it is.
+/// In Chromium: nothing on the console, and nothing is fetched. A script that is added for the test counts
+/// what the page asked for, and writes how wide it is.
 #[test]
 fn a_browser_has_nothing_to_complain_of() {
     let Some(browser) = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {

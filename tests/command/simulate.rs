@@ -130,8 +130,8 @@ fn gains_and_offsets_of_converters_are_undone() {
     assert!(unaware < 10.0, "{unaware:.2} dB");
 }
 
-/// Converters without a signal deliver their offsets. The output is silence from the first sample to the last
-/// one of the flush, and where samples are missing.
+/// Converters without a signal deliver their offsets. The output is silence from the first sample to the
+/// last one of the flush, and where samples are missing.
 #[test]
 fn converters_without_a_signal_give_silence() {
     let desk = Desk::with_spec(&imperfect([1.0, 1.0], [0.01, -0.3]));

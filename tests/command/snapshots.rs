@@ -1,7 +1,8 @@
-//! Help and reports, word by word. What a number says is tested elsewhere: here each is a `#`, and runs of spaces are one.
+//! Help and reports, word by word. What a number says is tested elsewhere: here each is a `#`, and runs of
+//! spaces are one.
 //!
-//! The texts lie in `snapshots/`; `HYBANK_SNAPSHOTS=write cargo test --test command snapshots` writes them again, for `git diff`
-//! to show.
+//! The texts lie in `snapshots/`; `HYBANK_SNAPSHOTS=write cargo test --test command snapshots` writes them
+//! again, for `git diff` to show.
 
 use crate::support::{Desk, THESIS, text};
 use std::fs;

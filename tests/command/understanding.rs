@@ -1,4 +1,5 @@
-//! What the user meant: units, implausible specs, the scale of gamma, files of the wrong kind, specs to begin with.
+//! What the user meant: units, implausible specs, the scale of gamma, files of the wrong kind, specs to
+//! begin with.
 
 use crate::support::{Desk, THESIS, number, text};
 
@@ -159,6 +160,13 @@ fn a_bank_is_drawn_in_eight_pictures() {
         }
     }
     desk.refused(1, &["plot", "b.json", "-o", "pictures"], &["exists", "--force"]);
+    let files = desk.good(&["plot", "b.json", "-o", "pixels", "--format", "png"]);
+    assert_eq!(files.lines().filter(|name| name.ends_with(".png")).count(), 8);
+    // The size stands in the header (RFC 2083): 1920 by 900 pixels.
+    assert_eq!(
+        desk.read("pixels/error.png")[..24],
+        *b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x07\x80\0\0\x03\x84"
+    );
 }
 
 /// Longer filters and later outputs are drawn, and the level of the bank goes through its own point.
@@ -181,7 +189,8 @@ fn bode(cutoff: f64, delay: f64) -> String {
     for k in 1..=120 {
         let f = 300.0 * f64::from(k);
         let x = f / cutoff;
-        // (1 - x^2)^2 - (a b) x^2 .. multiplied out: two sections with the damping 2 cos(pi/8) and 2 cos(3 pi/8).
+        // (1 - x^2)^2 - (a b) x^2 .. multiplied out: two sections with the damping 2 cos(pi/8) and 2 cos(3
+        // pi/8).
         let phase = |angle: f64| (2.0 * angle.cos() * x).atan2(1.0 - x * x);
         let pi = std::f64::consts::PI;
         let lag = phase(pi / 8.0) + phase(3.0 * pi / 8.0) + 2.0 * pi * f * delay;

@@ -1,7 +1,8 @@
 //! `hybank verify` as a user runs it, and random mutations of bank files: none may pass.
 //!
-//! A mutation is any change of the text after which it no longer says the same: another number, key, text or structure.
-//! Changes of layout, and of digits beyond the precision of a double, are none. `HYBANK_MUTATIONS=100000` runs that many.
+//! A mutation is any change of the text after which it no longer says the same: another number, key, text or
+//! structure. Changes of layout, and of digits beyond the precision of a double, are none.
+//! `HYBANK_MUTATIONS=100000` runs that many.
 
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS};

@@ -30,7 +30,8 @@ impl fmt::Display for Seen {
     }
 }
 
-/// Kills `job` so often, with SIGKILL and SIGTERM by turns, at times from its start to a little after its end.
+/// Kills `job` so often, with SIGKILL and SIGTERM by turns, at times from its start to a little after its
+/// end.
 pub(crate) fn campaign(job: &Job, kills: usize, dice: &mut Random) -> Seen {
     let begin = Instant::now();
     assert!(job.command().stdout(Stdio::null()).status().unwrap().success());

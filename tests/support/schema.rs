@@ -1,4 +1,5 @@
-//! A validator of the keywords of JSON Schema that the schemas here use; any other keyword is a fault of its own.
+//! A validator of the keywords of JSON Schema that the schemas here use; any other keyword is a fault of its
+//! own.
 
 use serde_json::Value;
 

@@ -16,7 +16,8 @@ pub(crate) fn thesis_filter() -> FilterSpec {
     tf(&[0.25], &[1.0, 1.0, 0.25])
 }
 
-/// A low-pass with its cutoff in rad/s; 0.5 dB of ripple and 55 dB of attenuation where the family has these.
+/// A low-pass with its cutoff in rad/s; 0.5 dB of ripple and 55 dB of attenuation where the family has
+/// these.
 pub(crate) fn low_pass(family: Family, order: usize, omega: f64) -> FilterSpec {
     FilterSpec::Family {
         family,

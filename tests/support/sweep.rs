@@ -15,6 +15,11 @@ pub(crate) fn wanted(variable: &str, usual: u64) -> Range<u64> {
     number(first)..number(end)
 }
 
+/// Whether `HYBANK_LONG_TESTS` asks for all cases of tests that try a few otherwise.
+pub(crate) fn long_tests() -> bool {
+    std::env::var_os("HYBANK_LONG_TESTS").is_some()
+}
+
 /// The results for all numbers of a range.
 pub(crate) fn each<T: Send>(range: Range<u64>, task: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let next = AtomicU64::new(range.start);

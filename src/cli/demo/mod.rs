@@ -27,8 +27,8 @@ const SETTLING: usize = 200;
 ///
 /// Two virtual 24 kHz converters with delays of 1.2 and 0.6 fast samples capture a chirp, three tones and a
 /// step. Two hybank banks, separate fractional delays, sinc interpolation, a cubic spline and plain
-/// interleaving fuse the captures to 48 kHz. Each result is compared with the exact fast samples. WAV files and charts are
-/// written to a folder.
+/// interleaving fuse the captures to 48 kHz. Each result is compared with the exact fast samples. WAV files
+/// and charts are written to a folder.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -29,8 +29,8 @@ impl Pictures<'_> {
         Ok([("step.svg", step.to_svg_with(&marks)?), ("error.svg", self.errors().to_svg()?)])
     }
 
-    /// The samples around the step: those of the first and the last contender as marks on the exact curve, and
-    /// the step without the other signals.
+    /// The samples around the step: those of the first and the last contender as marks on the exact curve,
+    /// and the step without the other signals.
     fn around_the_step(&self) -> (Chart, Vec<Marks>) {
         let latency = self.spec.latency.unwrap_or(0);
         let centre = STEP_AT.in_fast_periods(self.spec.fast_period).0 as usize + latency;
@@ -57,7 +57,8 @@ impl Pictures<'_> {
         (chart, shown.map(marks).collect())
     }
 
-    /// RMS error in decibels over intervals of 20 ms. The chirp sweeps with time, so time stands for frequency.
+    /// RMS error in decibels over intervals of 20 ms. The chirp sweeps with time, so time stands for
+    /// frequency.
     fn errors(&self) -> Chart {
         let period = self.spec.fast_period;
         let interval = ERROR_INTERVAL.in_fast_periods(period).0 as usize;

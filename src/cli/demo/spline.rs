@@ -22,8 +22,8 @@ impl Samples {
         Self { instants, values }
     }
 
-    /// The natural cubic spline at `count` instants, `first` and every fast period after it; before the first
-    /// and after the last sample its outer pieces go on.
+    /// The natural cubic spline at `count` instants, `first` and every fast period after it; before the
+    /// first and after the last sample its outer pieces go on.
     pub(super) fn spline(&self, first: FastPeriods, count: usize) -> Vec<f64> {
         let (t, y) = (&self.instants, &self.values);
         if t.len() < 2 {
@@ -44,8 +44,8 @@ impl Samples {
         (0..count).map(at).collect()
     }
 
-    /// Second derivatives at the samples: h_i m_i-1 + 2 (h_i + h_i+1) m_i + h_i+1 m_i+1 = 6 times the change of
-    /// slope, with zeros at the ends. The system is diagonally dominant and needs no pivots.
+    /// Second derivatives at the samples: h_i m_i-1 + 2 (h_i + h_i+1) m_i + h_i+1 m_i+1 = 6 times the change
+    /// of slope, with zeros at the ends. The system is diagonally dominant and needs no pivots.
     fn curvatures(&self) -> Vec<f64> {
         let (t, y) = (&self.instants, &self.values);
         let count = t.len();

@@ -1,5 +1,5 @@
-//! What happens during a run, reported while it happens: lines on standard error, and JSON lines in the file of
-//! `--report`. A thread of its own writes them, so that the samples never wait for a reader of messages.
+//! What happens during a run, reported while it happens: lines on standard error, and JSON lines in the file
+//! of `--report`. A thread of its own writes them, so that the samples never wait for a reader of messages.
 
 mod event;
 mod report_file;
@@ -29,8 +29,8 @@ const LONG: Duration = Duration::from_secs(3600);
 /// The option of the commands that fuse.
 #[derive(Debug, clap::Args)]
 pub(super) struct JournalArgs {
-    /// Write what happens as JSON lines while it happens: gaps, clipping, stalls, warnings, and the report at
-    /// the end as the last line. A FIFO will do; `-` is standard output
+    /// Write what happens as JSON lines while it happens: gaps, clipping, stalls, warnings, and the report
+    /// at the end as the last line. A FIFO will do; `-` is standard output
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 }

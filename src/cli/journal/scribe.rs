@@ -5,8 +5,8 @@ use super::report_file::ReportFile;
 use crate::pipeline::Gap;
 use std::time::{Duration, Instant};
 
-/// Least time between two lines of one kind. The first one comes no earlier than this after the beginning: what
-/// ends before then has its report at once.
+/// Least time between two lines of one kind. The first one comes no earlier than this after the beginning:
+/// what ends before then has its report at once.
 const INTERVAL: Duration = Duration::from_secs(1);
 /// Most gaps of a report, as in [`GapFiller::gaps`](crate::pipeline::GapFiller::gaps).
 const MOST_GAPS: u64 = 65_536;

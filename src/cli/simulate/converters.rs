@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::bank_file::bad_flag;
-use crate::quantity::{self, Time};
+use crate::quantity::{self, Time, readable};
 use crate::simulate::{Analog, Converter, Quantiser};
 use crate::spec::{ChannelSpec, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset};
 use crate::units::{FastPeriods, Seconds};
@@ -24,7 +24,8 @@ pub(super) struct ConverterArgs {
     /// Round to so many bits, 2 to 24, with full scale 1; samples beyond it are clipped and counted
     #[arg(long, value_name = "B", value_parser = quantiser)]
     bits: Option<(u32, Quantiser)>,
-    /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default: 0]
+    /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default:
+    /// 0]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = quantity::time)]
     jitter: Option<Time>,
     /// By how many parts per million the clocks are too fast, one value for all or one per channel
@@ -226,11 +227,11 @@ impl CommonReport {
         if self.is_ideal() {
             return String::new();
         }
-        let bits = self.bits.map_or_else(|| "not rounded".to_owned(), |bits| format!("{bits} bits"));
-        let Self { noise, jitter, seed, .. } = self;
-        format!(
-            "converters: noise {noise:e} of full scale rms, jitter {jitter:e} s rms, {bits}, seed {seed}\n"
-        )
+        let noise = (self.noise > 0.0).then(|| format!("noise {} of full scale rms", self.noise));
+        let jitter = (self.jitter > 0.0).then(|| format!("jitter {} rms", readable(self.jitter, "s")));
+        let bits = self.bits.map(|bits| format!("{bits} bits"));
+        let errors: Vec<String> = [noise, jitter, bits].into_iter().flatten().collect();
+        format!("converters: {}, seed {}\n", errors.join(", "), self.seed)
     }
 }
 
@@ -245,10 +246,10 @@ impl ConverterReport {
         if self.is_ideal() {
             return String::new();
         }
-        let Self { delay, delay_error, gain, offset, drift, .. } = self;
+        let Self { gain, offset, drift, .. } = self;
+        let (delay, error) = (readable(self.delay, "s"), readable(self.delay_error, "s"));
         format!(
-            "converter {channel}: delay {delay:e} s (error {delay_error:e} s), gain {gain}, offset {offset:e}, \
-             drift {drift} ppm\n"
+            "converter {channel}: delay {delay} (error {error}), gain {gain}, offset {offset}, drift {drift} ppm\n"
         )
     }
 }

@@ -3,8 +3,8 @@
 use crate::support::{Desk, bytes, interleaved, wav};
 use serde_json::json;
 
-/// A bank of three converters with the delays 0, 2 and 1 of a slow period of 3, whose channels go unchanged to
-/// the phases: they sample in the order channel 2, 3, 1.
+/// A bank of three converters with the delays 0, 2 and 1 of a slow period of 3, whose channels go unchanged
+/// to the phases: they sample in the order channel 2, 3, 1.
 fn write_bank(desk: &Desk, delays: [f64; 3]) {
     let channel = |i: usize| {
         let tap = |n: usize| f64::from(u8::from(n == i));

@@ -7,7 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Libraries of the workspace, each with its folder; `hybank` is divided into rooms, the others are rooms themselves.
+/// Libraries of the workspace, each with its folder; `hybank` is divided into rooms, the others are rooms
+/// themselves.
 const LIBRARIES: [(&str, &str); 5] = [
     ("hybank", "src"),
     ("hybank_audio", "audio/src"),
@@ -108,7 +109,8 @@ impl Survey {
             .collect()
     }
 
-    /// A module and the files below it are one: it may use them, and they its names. Any other circle is a fault.
+    /// A module and the files below it are one: it may use them, and they its names. Any other circle is a
+    /// fault.
     fn circles_of_files(&self) -> Vec<String> {
         let closing: Vec<_> =
             self.arrows.iter().filter(|arrow| !arrow.down).map(|arrow| (arrow.from, arrow.to)).collect();

@@ -1,7 +1,9 @@
 //! Who imports whom: fails on a circle of files and on an arrow that ARCHITECTURE.md does not allow.
 //!
-//! `cargo run -p arrows`, with the folder of another workspace if it is not this one; `cargo run -p arrows -- --list` prints the arrows between rooms with a file that draws each.
-//! Imports are `use` lines and paths in the code, followed to the file that holds what they name. Tests may import anything.
+//! `cargo run -p arrows`, with the folder of another workspace if it is not this one;
+//! `cargo run -p arrows -- --list` prints the arrows between rooms with a file that draws each. Imports are
+//! `use` lines and paths in the code, followed to the file that holds what they name. Tests may import
+//! anything.
 
 mod checks;
 mod circles;

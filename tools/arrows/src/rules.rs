@@ -1,7 +1,7 @@
 //! The arrows that ARCHITECTURE.md allows, read from the first block of code below "Who may import whom".
 //!
-//! One or more statements a line, two spaces apart: `rooms -> rooms`, both separated by commas; `everything` and `nothing`
-//! are rooms, and what stands in parentheses is left out.
+//! One or more statements a line, two spaces apart: `rooms -> rooms`, both separated by commas; `everything`
+//! and `nothing` are rooms, and what stands in parentheses is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 

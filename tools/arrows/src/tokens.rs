@@ -1,4 +1,5 @@
-//! Rust source as a list of tokens, without comments and without the content of literals (except strings, which name files).
+//! Rust source as a list of tokens, without comments and without the content of literals (except strings,
+//! which name files).
 
 /// What an import is made of.
 #[derive(Debug, Clone, PartialEq)]
