@@ -94,8 +94,8 @@ fn largest_by_gram(m: &CMat) -> Result<f64, LinalgError> {
     Ok(values.last().copied().unwrap_or(0.0).max(0.0).sqrt())
 }
 
-/// For two vectors u, v as rows or columns: `sigma^2 = (a + c) / 2 + hypot((a - c) / 2, |b|)` with `a =
-/// |u|^2`, `c = |v|^2`, `b = <u, v>`.
+/// For two vectors u, v as rows or columns: `sigma^2 = (a + c) / 2 + hypot((a - c) / 2, |b|)` with
+/// `a = |u|^2`, `c = |v|^2`, `b = <u, v>`.
 fn largest_of_two<'a>(
     u: impl Iterator<Item = &'a Complex<f64>>,
     v: impl Iterator<Item = &'a Complex<f64>>,

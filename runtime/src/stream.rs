@@ -103,11 +103,6 @@ impl Stream {
         self.engine.resets()
     }
 
-    /// A stream of the same plan at its beginning.
-    pub fn fresh(&self) -> Self {
-        Self::new(&self.plan)
-    }
-
     /// Back to the beginning, without allocating; gives the same bits as a new stream.
     pub fn reset(&mut self) {
         self.engine.reset();

@@ -21,10 +21,10 @@ const FIRST_RATE: f64 = 100.0;
 /// Options of the commands that can follow delays.
 #[derive(Debug, clap::Args)]
 pub(super) struct TrackArgs {
-    /// Follow the delays of the channels while the bank runs, which needs taps designed with tracking =
-    /// "affine". pilot=F measures them by a tone of the frequency F that sounds all the time, blind by any
-    /// signal that leaves fewer aliases occupied than there are channels, and FILE.jsonl holds delays that
-    /// were measured before: {"frame": 4096, "delay": [0, 12.5e-6], "half_width": 1e-9}
+    /// Follow the delays of the channels while the bank runs, which needs taps designed with
+    /// tracking = "affine". pilot=F measures them by a tone of the frequency F that sounds all the time,
+    /// blind by any signal that leaves fewer aliases occupied than there are channels, and FILE.jsonl holds
+    /// delays that were measured before: {"frame": 4096, "delay": [0, 12.5e-6], "half_width": 1e-9}
     #[arg(long, value_name = "pilot=F|blind|FILE.jsonl")]
     track: Option<String>,
     /// Write what is known of the delays as JSON lines, one per measurement; --track reads such a file

@@ -30,8 +30,8 @@ pub struct Analysis {
 pub struct MeanAnalysis {
     /// Root mean square of e for white noise f of unit density (h = 1): `||K||_2 / sqrt(M)`.
     pub rms_error: f64,
-    /// RMS of the output noise for independent noise of unit RMS on all slow samples: `sqrt(sum_i ||f_i||^2
-    /// / M)`.
+    /// RMS of the output noise for independent noise of unit RMS on all slow samples:
+    /// `sqrt(sum_i ||f_i||^2 / M)`.
     pub noise_gain: f64,
     /// RMS of the output noise for the noise of the converters as the spec gives it, relative to full scale:
     /// `sqrt(sum_i sigma_i^2 ||f_i||^2 / M)`.

@@ -62,7 +62,7 @@ pub struct Options<'a> {
     pub proof: ProofSearch,
     /// Whether a design that takes too long or needs too much memory is refused.
     pub limits: Limits,
-    /// Told which step begins.
+    /// Called with the step that begins.
     pub observer: Observer<'a>,
 }
 

@@ -132,8 +132,8 @@ impl LiftedPlant {
         Ok(self.driving(filters)?.map_outputs(&linalg::hstack(&[&-&unity, &unity])?)?)
     }
 
-    /// (H, W) at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N +
-    /// M, which keeps `[H; W] [H; W]*`.
+    /// (H, W) at e^{j omega}, omega in radians per slow period. The columns are compressed to at most N + M,
+    /// which keeps `[H; W] [H; W]*`.
     pub fn response(&self, omega: f64) -> (CMat, CMat) {
         let g = linalg::lq_factor_c(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());

@@ -16,9 +16,9 @@ impl Turns {
         Self { channels: (0..converters).collect() }
     }
 
-    /// The converters in the order in which they sample. Channel i takes sample k at the time k M -
-    /// `delays[i]`, so converter 0 is the channel with the largest delay. Channels of equal delay stay in
-    /// their order.
+    /// The converters in the order in which they sample. Channel i takes sample k at the time
+    /// k M - `delays[i]`, so converter 0 is the channel with the largest delay. Channels of equal delay stay
+    /// in their order.
     pub fn by_delay(delays: &[f64]) -> Self {
         let mut channels: Vec<usize> = (0..delays.len()).collect();
         channels.sort_by(|&a, &b| delays[b].total_cmp(&delays[a]));

@@ -66,7 +66,7 @@ fn number(value: f64) -> String {
 }
 
 impl Facts {
-    /// Of a bank and its spec. The bounds are proven again: of a file, only what `verify` proves is told.
+    /// Of a bank and its spec. The bounds are proven again: only what `verify` proves of a file is reported.
     ///
     /// # Errors
     /// [`DesignError`] if the bank does not fit its spec, or its norm cannot be computed.

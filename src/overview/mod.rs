@@ -1,4 +1,4 @@
-//! What people are told of a bank: its figures with their meaning, pictures, and what is doubtful about it.
+//! What reports show of a bank: its figures with their meaning, pictures, and what is doubtful about it.
 //! The commands `design`, `plot` and `report` and the page of `playground/` show it.
 
 mod doubts;

@@ -32,8 +32,8 @@ pub struct PoissonDelaunay {
 impl PoissonDelaunay {
     /// E\[S^a R^{2b}\] of the typical triangle, S its area and R its circumradius.
     ///
-    /// E\[R^2\] = 2 / (pi lambda), E\[S\] = 1 / (2 lambda), E\[S^2\] = 35 / (8 pi^2 lambda^2), E\[S R^2\] =
-    /// 3 / (2 pi lambda^2) (thesis Table 4.1).
+    /// E\[R^2\] = 2 / (pi lambda), E\[S\] = 1 / (2 lambda), E\[S^2\] = 35 / (8 pi^2 lambda^2),
+    /// E\[S R^2\] = 3 / (2 pi lambda^2) (thesis Table 4.1).
     pub fn moment(&self, a: u32, b: u32) -> f64 {
         let scale = (PI * self.density).powi((a + b) as i32);
         2.0_f64.powi(a as i32) * gamma_of_half(2 * (a + b) + 4) / scale * sines(a)

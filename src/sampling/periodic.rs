@@ -15,8 +15,8 @@
 //! E[D^k] = k (k - 1) / lambda  integral_0^{min p} t^{k-2} Q(t) dt   (k >= 2),    E[D] = 1 / lambda
 //! ```
 //!
-//! For many sparse sets Q(t) tends to exp(-lambda t): the samples look like a Poisson process, with E\[D^k\]
-//! = k! / lambda^k. A density that varies along the axis gives the sums of powers of all intervals:
+//! For many sparse sets Q(t) tends to exp(-lambda t): the samples look like a Poisson process, with
+//! E\[D^k\] = k! / lambda^k. A density that varies along the axis gives the sums of powers of all intervals:
 //!
 //! ```text
 //! sum_m D_m^k ~= integral lambda(y) E[D^k](y) dy,   for Poisson  k! integral lambda(y)^{1-k} dy

@@ -67,8 +67,8 @@ pub struct Tone<T: Time = Seconds> {
 }
 
 impl Source {
-    /// The same signal in normalised time: t' = t / h, f' = f h, w' = w h. Values do not change: f'(t / h)
-    /// = f(t).
+    /// The same signal in normalised time: t' = t / h, f' = f h, w' = w h. Values do not change:
+    /// f'(t / h) = f(t).
     pub fn normalised(&self, fast_period: Seconds) -> NormalisedSource {
         let time = |t: Seconds| t.in_fast_periods(fast_period);
         let frequency = |f: Hertz| f.per_fast_period(fast_period);

@@ -73,8 +73,8 @@ impl SineFit {
     }
 
     /// The standard deviations of ln abs(a / a') and of the phase of a / a', a and a' being the exponentials
-    /// at +f of tone `tone` in two complex records. For equal noise and known frequencies both are sqrt(1 /
-    /// (N SNR)).
+    /// at +f of tone `tone` in two complex records. For equal noise and known frequencies both are
+    /// sqrt(1 / (N SNR)).
     ///
     /// # Panics
     /// If there is no such tone or channel.

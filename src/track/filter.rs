@@ -188,10 +188,10 @@ mod tests {
         }
     }
 
-    /// The second difference of the measurements is a moving average of the innovations, e[k] + b e[k-1] +
-    /// c e[k-2] with b = alpha + beta - 2 and c = 1 - alpha (alpha and beta / T are the gains). Its
-    /// autocovariances are those of second differences of white noise, r (6, -4, 1), and of a delay whose
-    /// rate walks, q T^3 (2/3, 1/6, 0).
+    /// The second difference of the measurements is a moving average of the innovations,
+    /// e[k] + b e[k-1] + c e[k-2] with b = alpha + beta - 2 and c = 1 - alpha (alpha and beta / T are the
+    /// gains). Its autocovariances are those of second differences of white noise, r (6, -4, 1), and of a
+    /// delay whose rate walks, q T^3 (2/3, 1/6, 0).
     #[test]
     fn a_rate_that_walks_gives_the_gains_of_the_spectral_factor() {
         for (q, t, r) in [(1.0, 1.0, 1.0), (1e-18, 0.01, 1e-24), (1e-20, 0.1, 1e-22), (5.0, 2.0, 0.1)] {

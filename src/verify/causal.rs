@@ -4,10 +4,10 @@
 //! # The game over T periods
 //! Let the plant start from rest, xi_0 = 0, and let W and H map the inputs w of the periods 0..T-1 to the
 //! reference samples z and the measured samples y of these periods. If y = 0 then the output of every
-//! causal bank over these periods is zero too, and its error is z. So a w with `H w = 0` and `|W w| >=
-//! gamma |w|` shows that no causal bank, linear or not, has a norm below gamma: the error after period T
-//! only increases the norm. (By Arveson's distance formula for nests these bounds tend to the optimum as T
-//! grows.)
+//! causal bank over these periods is zero too, and its error is z. So a w with `H w = 0` and
+//! `|W w| >= gamma |w|` shows that no causal bank, linear or not, has a norm below gamma: the error after
+//! period T only increases the norm. (By Arveson's distance formula for nests these bounds tend to the
+//! optimum as T grows.)
 //!
 //! Such a w exists if the Gram matrix of all y and z less gamma^2 on z,
 //!
@@ -50,8 +50,8 @@ use super::error_system::{Layout, Rows, sampled};
 use super::slow_period::SlowPeriod;
 use crate::arithmetic::Number;
 
-/// Maximum number of states, including delay lines.
-const MAX_STATES: usize = 128;
+/// Maximum number of states of the recursion, including delay lines.
+pub(crate) const MAX_RECURSION_STATES: usize = 128;
 
 /// Relative change of P per period below which it has settled.
 const SETTLED: f64 = 1e-13;
@@ -86,7 +86,7 @@ pub(super) struct CausalPlant<F> {
     /// [A; C_2; C_1].
     system: Matrix<F>,
     /// [J; L_2; L_1] S [J; L_2; L_1]'.
-    fresh: Matrix<F>,
+    input_gram: Matrix<F>,
     /// For each measured sample the first period in which it is not zero.
     first: Vec<usize>,
 }
@@ -96,13 +96,13 @@ impl<F: Number> CausalPlant<F> {
     /// many states.
     pub(super) fn new(period: &SlowPeriod<F>, ratio: usize, measured: &[usize]) -> Option<Self> {
         let used = |s: usize| s < ratio || measured.contains(&s);
-        let late = period.periods_late.iter().enumerate();
-        let periods_late: Vec<usize> = late.map(|(s, &late)| if used(s) { late } else { 0 }).collect();
-        if periods_late.iter().sum::<usize>() + period.order() > MAX_STATES {
+        let late = period.delay_periods.iter().enumerate();
+        let delay_periods: Vec<usize> = late.map(|(s, &late)| if used(s) { late } else { 0 }).collect();
+        if delay_periods.iter().sum::<usize>() + period.order() > MAX_RECURSION_STATES {
             return None;
         }
-        let first = measured.iter().map(|&s| periods_late[s]).collect();
-        let period = SlowPeriod { periods_late, ..period.clone() };
+        let first = measured.iter().map(|&s| delay_periods[s]).collect();
+        let period = SlowPeriod { delay_periods, ..period.clone() };
         let (next, samples) = sampled(&period, &Layout::new(&period, 0), 0);
         let order = |rows: &dyn Fn(&Rows<F>) -> Matrix<F>| {
             let (next, samples) = (rows(&next), rows(&samples));
@@ -114,7 +114,7 @@ impl<F: Number> CausalPlant<F> {
         };
         let inputs = order(&|rows| rows.input.clone());
         let system = order(&|rows| rows.state.clone());
-        Some(Self { system, fresh: ball::congruence(&inputs, &period.gram), first })
+        Some(Self { system, input_gram: ball::congruence(&inputs, &period.gram), first })
     }
 
     /// Runs the recursion at `gamma` for at most `periods` periods.
@@ -124,7 +124,7 @@ impl<F: Number> CausalPlant<F> {
         let square = Ball::from(gamma) * Ball::from(gamma);
         let mut p: Matrix<F> = ball::zeros(n, n);
         for period in 0..periods {
-            let mut gram = ball::add(&ball::congruence(&self.system, &p), &self.fresh);
+            let mut gram = ball::add(&ball::congruence(&self.system, &p), &self.input_gram);
             (measured..rows).for_each(|i| gram[(i, i)] = gram[(i, i)] - square);
             for (row, _) in (n..).zip(&self.first).filter(|&(_, &first)| first <= period) {
                 if gram[(row, row)].lower().is_nan() || gram[(row, row)].lower() <= 0.0 {

@@ -65,7 +65,7 @@ impl<F: Number> Covariance<F> {
     /// Covariance matrix of the samples, N K x N K, the channels of the latest period first.
     pub(super) fn of_taps(&self, period: &SlowPeriod<F>, samples: TapSamples<'_>) -> Matrix<F> {
         let TapSamples { ratio, channels, lags } = samples;
-        let late = |i: usize| period.periods_late[ratio + channels[i]];
+        let late = |i: usize| period.delay_periods[ratio + channels[i]];
         let span = lags + (0..channels.len()).map(late).max().unwrap_or(0);
         let n = channels.len();
         let mut matrix = ball::zeros(n * lags, n * lags);
@@ -89,8 +89,8 @@ impl<F: Number> Covariance<F> {
     /// Correlations of the M reference samples with the samples of [`Covariance::of_taps`], M x N K.
     pub(super) fn with_reference(&self, period: &SlowPeriod<F>, samples: TapSamples<'_>) -> Matrix<F> {
         let TapSamples { ratio, channels, lags } = samples;
-        let late = |sample: usize| period.periods_late[sample];
-        let span = lags + period.periods_late.iter().max().copied().unwrap_or(0);
+        let late = |sample: usize| period.delay_periods[sample];
+        let span = lags + period.delay_periods.iter().max().copied().unwrap_or(0);
         let mut matrix = ball::zeros(ratio, channels.len() * lags);
         for p in 0..ratio {
             for (i, sample) in channels.iter().map(|channel| ratio + channel).enumerate() {

@@ -18,7 +18,7 @@ use std::sync::OnceLock;
 
 /// Maximum number of states of an error system whose certificate is checked in 512 bits: some seconds of
 /// computing.
-const MAX_LONG_STATES: usize = 128;
+const MAX_CORRECTED_STATES: usize = 128;
 
 /// The error system of a bank, enclosed.
 #[derive(Debug, Clone)]
@@ -61,7 +61,7 @@ impl<'a> EnclosedErrorSystem<'a> {
         let analog = front_ends.order();
         let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
         let timeline = Timeline::new(&samples, fast_period, bank.ratio)?;
-        let states = error_system::order(analog, timeline.periods_late(), &bank.filters, bank.ratio);
+        let states = error_system::order(analog, timeline.delay_periods(), &bank.filters, bank.ratio);
         if states > MAX_STATES {
             return Err(VerifyError::TooLarge { states });
         }
@@ -147,7 +147,7 @@ impl<'a> EnclosedErrorSystem<'a> {
 
     /// Whether `certificate` proves its gamma. Only one with a correction is tried in 512 bits.
     pub fn keeps(&self, certificate: &Certificate) -> bool {
-        let long = !certificate.correction.is_empty() && self.states() <= MAX_LONG_STATES;
+        let long = !certificate.correction.is_empty() && self.states() <= MAX_CORRECTED_STATES;
         upper::proves(&self.equations, certificate)
             || long && upper::proves(self.long_equations(), certificate)
     }

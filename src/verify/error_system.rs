@@ -96,7 +96,7 @@ impl Layout {
             next += count;
             next - count..next
         };
-        let lines = period.periods_late.iter().map(|&late| take(late)).collect();
+        let lines = period.delay_periods.iter().map(|&late| take(late)).collect();
         Self { lines, filter: take(filter_states) }
     }
 
@@ -109,7 +109,7 @@ impl Layout {
 /// Number of states of the error system of a bank, computed before any matrix of that size is allocated.
 pub(super) fn order(
     analog: usize,
-    periods_late: &[usize],
+    delay_periods: &[usize],
     filters: &SynthesisFilters,
     ratio: usize,
 ) -> usize {
@@ -117,7 +117,7 @@ pub(super) fn order(
         SynthesisFilters::Fir(taps) => taps.len() * (taps[0].len().div_ceil(ratio) - 1),
         SynthesisFilters::StateSpace(block) => block.a.len(),
     };
-    periods_late.iter().fold(analog + own, |sum, &late| sum.saturating_add(late))
+    delay_periods.iter().fold(analog + own, |sum, &late| sum.saturating_add(late))
 }
 
 /// Linear maps from the state xi and the inputs u, row by row.
@@ -186,7 +186,7 @@ impl<F: Number> ErrorSystem<F> {
     }
 
     /// [J; L] S [J; L]', the energy of the input.
-    pub(super) fn fresh(&self) -> Matrix<F> {
+    pub(super) fn input_gram(&self) -> Matrix<F> {
         ball::congruence(&self.inputs, &self.gram)
     }
 

@@ -9,8 +9,8 @@
 //! ||a|| ||b* G|| ||K|| >= Re a* K G* b = Re a* (Gamma b)_w - Re a* F (Gamma b)_h.
 //! ```
 //!
-//! *Any bank*: if (Gamma b)_h = 0, the right-hand side does not depend on the filters. The best such b =
-//! [a; b_h] gives a* S a with the Schur complement S of Gamma_hh, the part of the reference samples that
+//! *Any bank*: if (Gamma b)_h = 0, the right-hand side does not depend on the filters. The best such
+//! b = [a; b_h] gives a* S a with the Schur complement S of Gamma_hh, the part of the reference samples that
 //! cannot be estimated from the measured ones.
 //!
 //! [`super::fir_length`] binds the taps of all banks of one length.

@@ -134,8 +134,8 @@ impl<F: Number> Definite<F> {
         self.matrix.nrows()
     }
 
-    /// At least r' M^-1 r, for all in the enclosures: with any v and rho = r - M v it is v' r + v' rho +
-    /// rho' M^-1 rho.
+    /// At least r' M^-1 r, for all in the enclosures: with any v and rho = r - M v it is
+    /// v' r + v' rho + rho' M^-1 rho.
     pub(super) fn inverse_form(&self, r: &Matrix<F>) -> Ball<F> {
         let right: Vec<F> = r.iter().map(|x| x.mid()).collect();
         let v = self.factor.solve(&right);

@@ -15,14 +15,14 @@ pub(crate) struct PreciseErrorSystem {
     /// [A; C], (n + M) x n.
     pub(crate) system: Matrix<BigFloat>,
     /// [J; L] S [J; L]'.
-    pub(crate) fresh: Matrix<BigFloat>,
+    pub(crate) input_gram: Matrix<BigFloat>,
 }
 
 impl EnclosedErrorSystem<'_> {
     /// The error system in 512 bits.
     pub(crate) fn in_512_bits(&self) -> PreciseErrorSystem {
         let error = self.long_equations();
-        PreciseErrorSystem { system: midpoints(&error.system), fresh: midpoints(&error.fresh()) }
+        PreciseErrorSystem { system: midpoints(&error.system), input_gram: midpoints(&error.input_gram()) }
     }
 
     /// The point z of the unit circle that `half` names, 1 x 1, and the Gram matrix at it: that of the M

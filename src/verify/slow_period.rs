@@ -12,7 +12,7 @@ use super::state_transition::{StateTransition, state_transition};
 use super::timeline::{SamplingInstant, Timeline};
 use crate::arithmetic::{DoubleDouble, Number};
 
-/// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `periods_late` slow periods
+/// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `delay_periods` slow periods
 /// later.
 #[derive(Debug, Clone)]
 pub(super) struct SlowPeriod<F = DoubleDouble> {
@@ -23,7 +23,7 @@ pub(super) struct SlowPeriod<F = DoubleDouble> {
     /// Gram matrix of (w, v), states first.
     pub(super) gram: Matrix<F>,
     /// For each sample.
-    pub(super) periods_late: Vec<usize>,
+    pub(super) delay_periods: Vec<usize>,
 }
 
 impl<F: Number> SlowPeriod<F> {
@@ -46,8 +46,8 @@ impl<F: Number> SlowPeriod<F> {
             .map(|k| state_transition(&a, &b, timeline.since_previous(k)).transition)
             .collect();
         correlate(&mut gram, timeline, &since_start, &between, &rows);
-        let periods_late = timeline.periods_late().to_vec();
-        Self { transition: end.transition.clone(), outputs, gram: ball::symmetric(&gram), periods_late }
+        let delay_periods = timeline.delay_periods().to_vec();
+        Self { transition: end.transition.clone(), outputs, gram: ball::symmetric(&gram), delay_periods }
     }
 
     /// Number of analog states.

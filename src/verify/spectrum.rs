@@ -1,6 +1,6 @@
-//! Frequency responses, enclosed. Points of the unit circle are rational: e^{i w} = (c + i s)^2 / (c^2 +
-//! s^2) for any two doubles c, s (about cos(w/2) and sin(w/2)), so that no transcendental function is
-//! needed.
+//! Frequency responses, enclosed. Points of the unit circle are rational: e^{i w} =
+//! (c + i s)^2 / (c^2 + s^2) for any two doubles c, s (about cos(w/2) and sin(w/2)), so that no
+//! transcendental function is needed.
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::BlockForm;
@@ -201,8 +201,9 @@ fn refinements<F: Number>() -> usize {
     (REFINEMENTS as f64 * digits).ceil() as usize
 }
 
-/// A bound on the row sums of B^-1 from an approximate inverse R: ||R|| / (1 - q) with q = ||I - R B|| <
-/// 1/2, else NaN. The product R B is taken in double precision; its rounding is at most n eps |R| |B|.
+/// A bound on the row sums of B^-1 from an approximate inverse R: ||R|| / (1 - q) with
+/// q = ||I - R B|| < 1/2, else NaN. The product R B is taken in double precision; its rounding is at most n
+/// eps |R| |B|.
 fn inverse_norm<F: Number>(matrix: &Matrix<F>, inverse: &Mat) -> f64 {
     let n = matrix.nrows();
     let near = ball::nearest(matrix);
@@ -222,7 +223,7 @@ pub(super) fn gram<F: Number>(period: &SlowPeriod<F>, z: &ComplexMatrix<F>) -> C
         z,
         &ComplexMatrix::real(ball::identity(n)),
     ));
-    let phases: Vec<ComplexMatrix<F>> = period.periods_late.iter().map(|&late| delay(z, late)).collect();
+    let phases: Vec<ComplexMatrix<F>> = period.delay_periods.iter().map(|&late| delay(z, late)).collect();
     // G = [A D], A from the states and D = diag(d) of the inputs of this period.
     let rows: Vec<ComplexMatrix<F>> = (0..samples).map(|s| from_state.rows(s, 1).times(&phases[s])).collect();
     let a = |s: usize, k: usize| [rows[s].re[(0, k)], rows[s].im[(0, k)]];
@@ -270,7 +271,7 @@ pub(super) fn gram_times<F: Number>(
 ) -> ComplexMatrix<F> {
     let (n, samples) = (period.order(), period.samples());
     let outputs = ComplexMatrix::real(period.outputs.clone());
-    let phases: Vec<ComplexMatrix<F>> = period.periods_late.iter().map(|&late| delay(z, late)).collect();
+    let phases: Vec<ComplexMatrix<F>> = period.delay_periods.iter().map(|&late| delay(z, late)).collect();
     // G* b: late samples weigh the input earlier.
     let late = b.each_row(|s, x| x.times(&phases[s].adjoint()));
     let state = resolved(&period.transition.transpose(), &z.adjoint(), &outputs.adjoint().product(&late));

@@ -2,8 +2,8 @@
 //! enclosed.
 //!
 //! Both are computed from their Taylor series over a time that is short relative to the dynamics, with the
-//! remainder of the series in the radius, and then by doubling: e^{2 A t} = (e^{A t})^2, G(2 t) = G(t) +
-//! e^{A t} G(t) e^{A' t}. Only sums and products occur.
+//! remainder of the series in the radius, and then by doubling: e^{2 A t} = (e^{A t})^2,
+//! G(2 t) = G(t) + e^{A t} G(t) e^{A' t}. Only sums and products occur.
 
 use super::ball::{self, Ball, Matrix};
 use crate::arithmetic::{DoubleDouble, Number};

@@ -43,7 +43,7 @@ pub(super) struct Timeline {
     /// Index of each sample's instant.
     of: Vec<usize>,
     /// Whole slow periods from a sample's instant to that in which it is counted.
-    periods_late: Vec<usize>,
+    delay_periods: Vec<usize>,
 }
 
 /// Sign of a sum of three numbers of at most 106 bits: exact, because the two largest are added first,
@@ -120,7 +120,7 @@ impl Timeline {
             start: latest.later_by_periods(-1.0, ratio),
             of: folded.iter().map(of).collect(),
             instants,
-            periods_late: late.iter().map(|&periods| periods as usize).collect(),
+            delay_periods: late.iter().map(|&periods| periods as usize).collect(),
         })
     }
 
@@ -147,8 +147,8 @@ impl Timeline {
     }
 
     /// For each sample.
-    pub(super) fn periods_late(&self) -> &[usize] {
-        &self.periods_late
+    pub(super) fn delay_periods(&self) -> &[usize] {
+        &self.delay_periods
     }
 
     /// Time from the start of the period to the instant `k`, in fast periods.
@@ -201,7 +201,7 @@ mod tests {
             2,
         )
         .unwrap();
-        assert_eq!(line.periods_late(), [0, 0, 1, 2]);
+        assert_eq!(line.delay_periods(), [0, 0, 1, 2]);
         assert_eq!((line.of(0), line.of(1), line.of(2), line.of(3)), (1, 2, 0, 1));
         let times: Vec<f64> = (0..3).map(|k| line.since_start::<BigFloat>(k).nearest()).collect();
         assert_eq!(times, [0.5, 1.0, 2.0]);

@@ -8,10 +8,10 @@
 //! [ 0  gamma^2 I ] - [C] P [C]  - [L] S [L]   > 0.
 //! ```
 //!
-//! The first block says P - A P A' > 0, so all eigenvalues of A lie inside the unit circle; and with Psi =
-//! C (zI - A)^-1 the product [Psi, I] (..) [Psi, I]* is gamma^2 I - K(z) K(z)* on it. So ||K|| < gamma. The
-//! certificate in the file is a lower triangular factor of P = R R', with a correction of it where doubles
-//! are too coarse.
+//! The first block says P - A P A' > 0, so all eigenvalues of A lie inside the unit circle; and with
+//! Psi = C (zI - A)^-1 the product [Psi, I] (..) [Psi, I]* is gamma^2 I - K(z) K(z)* on it. So ||K|| <
+//! gamma. The certificate in the file is a lower triangular factor of P = R R', with a correction of it
+//! where doubles are too coarse.
 
 use super::ball::{self, Ball, Matrix};
 use super::error_system::ErrorSystem;
@@ -44,5 +44,5 @@ fn inequality<F: Number>(error: &ErrorSystem<F>, certificate: &Certificate) -> M
     let square = Ball::from(certificate.gamma) * Ball::from(certificate.gamma);
     (n..n + m).for_each(|i| left[(i, i)] = square);
     let moved = ball::congruence(&error.system, &p);
-    ball::subtract(&left, &ball::add(&moved, &error.fresh()))
+    ball::subtract(&left, &ball::add(&moved, &error.input_gram()))
 }

@@ -213,9 +213,9 @@ fn a_bank_made_elsewhere_is_proven_afresh() {
         let bank = Bank::from_json(&text, &name).unwrap();
         let known = verify(&bank).unwrap();
         let bare = Bank { proof: None, ..bank };
-        let (proof, fresh) = prove(&bare).unwrap();
+        let (proof, found) = prove(&bare).unwrap();
         let agree = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-6;
-        assert!(agree(fresh.upper, known.upper) && agree(fresh.noncausal, known.noncausal), "{name}");
+        assert!(agree(found.upper, known.upper) && agree(found.noncausal, known.noncausal), "{name}");
         assert!(proof != Proof::default());
     }
 }

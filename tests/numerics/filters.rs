@@ -50,12 +50,12 @@ fn each_bank_keeps_the_gamma_in_its_file() {
 #[test]
 fn a_fresh_design_agrees() {
     for (name, spec, bank) in pairs() {
-        let fresh = design(&spec).unwrap().bank.gamma;
+        let designed = design(&spec).unwrap().bank.gamma;
         let values = [
-            (fresh.norm, bank.gamma.norm),
-            (fresh.upper, bank.gamma.upper),
-            (fresh.lower, bank.gamma.lower),
-            (fresh.noncausal, bank.gamma.noncausal),
+            (designed.norm, bank.gamma.norm),
+            (designed.upper, bank.gamma.upper),
+            (designed.lower, bank.gamma.lower),
+            (designed.noncausal, bank.gamma.noncausal),
         ];
         for (now, then) in values {
             let (now, then) = (now.unwrap(), then.unwrap());

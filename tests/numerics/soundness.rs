@@ -41,7 +41,7 @@ impl OnePole {
     fn norm(&self) -> f64 {
         let w = self.pole;
         let d = ((self.latency as f64).mul_add(-self.fast_period, self.delay) / self.fast_period).abs();
-        let (fresh, old) = (-0.5 * w * (-2.0 * w * d).exp_m1(), -0.5 * w * (-2.0 * w * (1.0 - d)).exp_m1());
+        let (g_v, g_u) = (-0.5 * w * (-2.0 * w * d).exp_m1(), -0.5 * w * (-2.0 * w * (1.0 - d)).exp_m1());
         let (decay, change, between) = ((-w).exp(), (-w * d).exp_m1(), (-w * (1.0 - d)).exp());
         let square = |angle: f64| {
             // 1 - E cos and E sin of z^-1 = e^{-i angle}.
@@ -50,7 +50,7 @@ impl OnePole {
             let (c, s) = (angle.cos(), -angle.sin());
             let (x, y) = (c * re + s * im, s * re - c * im);
             let factor = change * between / size;
-            fresh * ((1.0 + factor * x).powi(2) + (factor * y).powi(2)) + old * change * change / size
+            g_v * ((1.0 + factor * x).powi(2) + (factor * y).powi(2)) + g_u * change * change / size
         };
         (0..=2000).map(|k| square(PI * f64::from(k) / 2000.0)).fold(0.0, f64::max).sqrt()
     }

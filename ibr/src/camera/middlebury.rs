@@ -8,8 +8,8 @@ use std::path::Path;
 /// Difference between `doffs` and the principal points that rounding explains, in pixels.
 const ROUNDING: f64 = 0.1;
 
-/// What a calibration file says about a rectified pair. Depth is `baseline` `focal` / (disparity +
-/// `offset`).
+/// What a calibration file says about a rectified pair. Depth is
+/// `baseline` `focal` / (disparity + `offset`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibration {
     /// Focal length of both cameras in pixels.

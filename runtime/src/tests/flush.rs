@@ -54,7 +54,7 @@ fn flushing_brings_out_all_outputs_of_the_definition_and_no_more() {
             let want = outputs(&bank, &padded);
             for call in [1, 7, 64, 65, 1000] {
                 let case = format!("{} N {n} M {m}, {frames} frames by {call}", plan.algorithm());
-                let mut stream = stream.fresh();
+                let mut stream = Stream::new(stream.plan());
                 let all = flushed(&mut stream, &input, call);
                 // The samples of the whole input, moved by the latency; the last frame may have some more.
                 assert!((0..m).contains(&(all.len() - m * frames - plan.latency())), "{case}: {}", all.len());
@@ -83,7 +83,7 @@ fn a_flush_without_room_leaves_the_stream_as_it_was() {
 /// input.
 fn outputs_from(stream: &Stream, input: &[f64], begin: usize, from: usize) -> Vec<f64> {
     let (n, m) = (stream.channels(), stream.ratio());
-    let all = flushed(&mut stream.fresh(), &input[begin * n..], 64);
+    let all = flushed(&mut Stream::new(stream.plan()), &input[begin * n..], 64);
     all[stream.extra_latency() + (from - begin) * m..].to_vec()
 }
 

@@ -25,7 +25,7 @@ fn resets_fresh_streams_and_clones_have_the_bits_of_a_new_one() {
         let mut out = vec![0.0; want.len()];
         for cut in [100, 101, 102, 103] {
             stream.process(&noise.samples(n * 333), &mut out).unwrap();
-            stream.fresh().process(&input, &mut out).unwrap();
+            Stream::new(stream.plan()).process(&input, &mut out).unwrap();
             assert_eq!(out, want, "{:?}", options.algorithm);
             stream.reset();
             stream.process(&input[..n * cut], &mut out).unwrap();

@@ -1,13 +1,15 @@
 //! Calls on several threads have the bits of calls on one.
 
 use super::support::{Bank, Noise, by, fir_bank, precise, random_taps, rotation_bank, start};
-use crate::{Algorithm, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, ThreadPool};
+use crate::{
+    Algorithm, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream, ThreadPool,
+};
 
 /// Calls of one thread and of several have the same bits, about calls of `long` frames, and count the same.
 fn threads_agree(bank: &Bank, options: Options, pools: &[ThreadPool], long: usize, noise: &mut Noise) {
     let mut one = start(bank, options).unwrap();
     let (n, m) = (one.channels(), one.ratio());
-    let mut many = vec![one.fresh(); pools.len()];
+    let mut many = vec![Stream::new(one.plan()); pools.len()];
     for frames in [1, long, 4096, 2, long - 12_345] {
         let mut input = noise.samples(n * frames);
         input[n * frames / 2] = f32::NAN;
@@ -66,7 +68,7 @@ fn overlap_save_and_recursions_stay_on_their_thread() {
     for (bank, options) in [(fir, overlap_save), (rotation_bank(), Options::default())] {
         let input = noise.samples(50_000);
         let mut one = start(&bank, options).unwrap();
-        let mut many = one.fresh();
+        let mut many = Stream::new(one.plan());
         let mut out = [(); 2].map(|()| vec![0.0; input.len() / one.channels() * one.ratio()]);
         one.process(&input, &mut out[0]).unwrap();
         many.process_parallel(&input, &mut out[1], &ThreadPool::new(3).unwrap()).unwrap();
@@ -83,7 +85,7 @@ fn threads_do_not_change_a_byte() {
     {
         // Loud enough to clip.
         let mut one = start(&fir_bank(random_taps(n, 80, &mut noise), m), Options::default()).unwrap();
-        let mut many = one.fresh();
+        let mut many = Stream::new(one.plan());
         let bytes: Vec<u8> =
             (0..n * 70_001 * format.bytes()).map(|_| (128.0 * noise.next()) as i8 as u8).collect();
         let layout = SampleLayout::packed(format);

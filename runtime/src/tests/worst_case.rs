@@ -90,11 +90,11 @@ fn each_work<S: Sample>(stream: &Stream, mut check: impl FnMut(Nasty, usize, &[u
         let mut noise = Noise(70);
         let numbers: Vec<f64> = (0..n * FRAMES).map(|_| noise.next()).collect();
         let clean: Vec<S> = numbers.iter().map(|&x| S::from_f64(x)).collect();
-        let (usual, _) = work_of(&mut stream.fresh(), &clean, call);
+        let (usual, _) = work_of(&mut Stream::new(stream.plan()), &clean, call);
         for nasty in Nasty::ALL {
             let sample = |(index, &x): (usize, &f64)| nasty.sample::<S>(x, index, [n, call]);
             let input: Vec<S> = numbers.iter().enumerate().map(sample).collect();
-            let (work, out) = work_of(&mut stream.fresh(), &input, call);
+            let (work, out) = work_of(&mut Stream::new(stream.plan()), &input, call);
             if nasty.sums_are_finite() {
                 assert!(out.iter().all(|y| y.finite()), "{nasty:?} in calls of {call} frames");
             }

@@ -42,8 +42,8 @@ fn frequency(w: f64, alias: i32) -> f64 {
     w + TAU * f64::from(alias)
 }
 
-/// A_ik = g_i Phi_i(j nu_k / c_i) e^{-2 pi j k D_i / M} with nu_k = (W + 2 pi k) / M: the phase e^{-j W D_i
-/// / M} that all aliases share is removed from the matrices.
+/// A_ik = g_i Phi_i(j nu_k / c_i) e^{-2 pi j k D_i / M} with nu_k = (W + 2 pi k) / M: the phase
+/// e^{-j W D_i / M} that all aliases share is removed from the matrices.
 pub(super) fn steering(model: &Model, point: &Point, w: f64, aliases: &[i32]) -> CMat {
     let m = model.ratio as f64;
     CMat::from_fn(model.channels(), aliases.len(), |i, column| {

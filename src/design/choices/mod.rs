@@ -26,7 +26,7 @@ use search::Search;
 /// Relative accuracy of the gammas of `fir` that are compared.
 const ACCURACY: f64 = 1e-4;
 
-/// Told how many designs were compared.
+/// Called with the number of designs that were compared.
 type Compared<'a> = &'a dyn Fn(usize);
 
 /// The spec with the number of taps that the methods which make FIR filters use, and with a latency that

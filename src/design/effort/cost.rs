@@ -2,7 +2,8 @@
 
 use super::amount::Effort;
 use super::sizes::Sizes;
-use crate::design::prove::MAX_LONG_STATES;
+use crate::design::prove::{MAX_LONG_STATES, MAX_SEARCHED_STATES, SEARCHED_PERIODS};
+use crate::verify::MAX_RECURSION_STATES;
 
 /// Bytes of a real and of a complex number.
 pub(super) const REAL: f64 = 8.0;
@@ -21,15 +22,11 @@ const GROWTH: f64 = 0.9;
 const LARGE_GROWTH: f64 = 0.6;
 /// Seconds per n^3 of the search for certificates of a system with n states, with their proof.
 const CERTIFICATE: f64 = 9e-8;
-/// Larger systems get no proof.
-const MOST_PROVEN: f64 = 512.0;
 /// The same for a certificate in 512 bits.
 const LONG_CERTIFICATE: f64 = 1.3e-5;
 /// Seconds per n^2 and per row, a sample or a front end's state, of a period of the causal recursion in 512
-/// bits; periods of all gammas that are tried; and the states of the largest plant.
+/// bits.
 const RECURSION: f64 = 1e-7;
-const RECURSION_PERIODS: f64 = 9.0 * 128.0;
-const MOST_RECURSION_STATES: f64 = 128.0;
 /// Fast periods of latency beyond the longest delay with which the noncausal bound explains nearly any
 /// optimum.
 const NONCAUSAL_LATENCY: f64 = 32.0;
@@ -65,7 +62,7 @@ pub(super) fn peak(states: f64, gain: Effort) -> Effort {
 /// The search for a proof of the norm of an error system with so many states. It is counted as if 512 bits
 /// were needed where they are tried.
 pub(super) fn proof(states: f64) -> Effort {
-    if states > MOST_PROVEN {
+    if states > MAX_SEARCHED_STATES as f64 {
         return Effort::default();
     }
     let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { LONG_CERTIFICATE };
@@ -79,10 +76,10 @@ pub(super) fn is_noncausal(sizes: &Sizes) -> bool {
 
 /// The search for the causal bound.
 pub(super) fn causal_bound(sizes: &Sizes) -> Effort {
-    if sizes.states > MOST_RECURSION_STATES || is_noncausal(sizes) {
+    if sizes.states > MAX_RECURSION_STATES as f64 || is_noncausal(sizes) {
         return Effort::default();
     }
     let rows = sizes.outputs() + sizes.front_end_states;
-    let seconds = RECURSION * RECURSION_PERIODS * sizes.states.powi(2) * rows;
+    let seconds = RECURSION * SEARCHED_PERIODS as f64 * sizes.states.powi(2) * rows;
     Effort { seconds, bytes: 0.0 }
 }

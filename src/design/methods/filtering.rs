@@ -27,8 +27,8 @@ const CLEARLY_NEGATIVE: f64 = 1e-5;
 ///
 /// Measurements are of two kinds. Those *with feedthrough* depend on the inputs of the period itself: y_f =
 /// L (C_f x + w1) with L triangular. *Delayed* ones (channels delayed by whole periods) are states of a
-/// delay chain, a noise-free measurement y_d = s C_d x with their size s, so that R is singular. With yw =
-/// [L^-1 y_f; y_d / s],
+/// delay chain, a noise-free measurement y_d = s C_d x with their size s, so that R is singular. With
+/// yw = [L^-1 y_f; y_d / s],
 ///
 /// x+ = F x + B1 L^-1 y_f + B2 w2,  yw = C2 x + [w1; 0],  z = C1 x + X L^-1 y_f + Y w2.
 ///

@@ -15,6 +15,9 @@ const WIDTH: f64 = 1e-5;
 const SHORT_BISECTIONS: usize = 24;
 /// Maximum number of bisections in 512-bit arithmetic.
 const LONG_BISECTIONS: usize = 6;
+/// Maximum number of slow periods of one search in 512-bit arithmetic.
+pub(in crate::design) const SEARCHED_PERIODS: usize =
+    LONG_PERIODS * (FIRST_SHORTFALLS.len() + LONG_BISECTIONS);
 
 /// The largest gamma found in the interval that no causal bank achieves.
 pub(super) fn witness(error: &EnclosedErrorSystem<'_>, (lower, upper): (f64, f64)) -> Option<CausalWitness> {

@@ -37,7 +37,7 @@ const NOISE: f64 = 1e-3;
 pub(in crate::design) const MAX_LONG_STATES: usize = 48;
 /// Maximum number of states of an error system for which the search tries to find a certificate. It needs
 /// eigenvalues of matrices twice as large.
-const MAX_SEARCHED: usize = 512;
+pub(in crate::design) const MAX_SEARCHED_STATES: usize = 512;
 /// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess
 /// (and of the number of states). With it no direction is unobservable. The noise would raise the norm by
 /// only a hundredth of the excess.
@@ -47,8 +47,8 @@ const SAME_NORM: f64 = 1e-6;
 
 /// The certificate with the least gamma, of those tried, that passes.
 pub(super) fn certificate(error: &EnclosedErrorSystem<'_>, bank: &Bank) -> Result<Certificate, DesignError> {
-    if error.states() > MAX_SEARCHED {
-        return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED });
+    if error.states() > MAX_SEARCHED_STATES {
+        return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED_STATES });
     }
     let raw = error.midpoint().ok_or(DesignError::NotCertified)?;
     let units = Units::of(&raw, error.scale())?;

@@ -40,10 +40,12 @@ pub(super) fn root(
 /// The system with its states and references in `units`.
 fn in_units(units: &Units, error: &PreciseErrorSystem) -> PreciseErrorSystem {
     let unit = |i: usize| BigFloat::from(*units.states.get(i).unwrap_or(&units.reference));
-    let PreciseErrorSystem { system, fresh } = error;
+    let PreciseErrorSystem { system, input_gram } = error;
     PreciseErrorSystem {
         system: Matrix::from_fn(system.nrows(), system.ncols(), |i, j| system[(i, j)] * unit(j) / unit(i)),
-        fresh: Matrix::from_fn(fresh.nrows(), fresh.ncols(), |i, j| fresh[(i, j)] / unit(i) / unit(j)),
+        input_gram: Matrix::from_fn(input_gram.nrows(), input_gram.ncols(), |i, j| {
+            input_gram[(i, j)] / unit(i) / unit(j)
+        }),
     }
 }
 
@@ -51,7 +53,7 @@ struct Riccati {
     a: Matrix<BigFloat>,
     c: Matrix<BigFloat>,
     /// J S J' + N.
-    fresh: Matrix<BigFloat>,
+    input_gram: Matrix<BigFloat>,
     /// L S J'.
     cross: Matrix<BigFloat>,
     /// L S L'.
@@ -68,21 +70,21 @@ impl Riccati {
         Self {
             a: error.system.select_rows(&states),
             c: error.system.select_rows(&outputs),
-            fresh: &error.fresh.select(&states, &states) + &noise,
-            cross: error.fresh.select(&outputs, &states),
-            direct: error.fresh.select(&outputs, &outputs),
+            input_gram: &error.input_gram.select(&states, &states) + &noise,
+            cross: error.input_gram.select(&outputs, &states),
+            direct: error.input_gram.select(&outputs, &outputs),
         }
     }
 
     /// P at the level `gamma`; `None` if the recursion has no limit.
     fn limit(&self, gamma: f64) -> Option<Matrix<BigFloat>> {
-        let Self { a, c, fresh, cross, direct } = self;
+        let Self { a, c, input_gram, cross, direct } = self;
         let mut re = direct.clone();
         (0..re.nrows()).for_each(|i| re[(i, i)] = re[(i, i)] - BigFloat::from(gamma) * BigFloat::from(gamma));
         let (weighted_c, weighted_t) = (re.solve(c)?, re.solve(cross)?);
         let f = a - &(&cross.transpose() * &weighted_c);
         let g = (&c.transpose() * &weighted_c).symmetric();
-        let h = (fresh - &(&cross.transpose() * &weighted_t)).symmetric();
+        let h = (input_gram - &(&cross.transpose() * &weighted_t)).symmetric();
         riccati_limit(&f, &g, &h)
     }
 }
@@ -99,7 +101,7 @@ mod tests {
         };
         let error = PreciseErrorSystem {
             system: number(2, 1, &[0.5, 1.0]),
-            fresh: number(2, 2, &[1.0, 0.0, 0.0, 0.0]),
+            input_gram: number(2, 2, &[1.0, 0.0, 0.0, 0.0]),
         };
         Some(Riccati::new(&error, 0.0).limit(gamma)?[(0, 0)].nearest())
     }

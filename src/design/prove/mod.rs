@@ -16,8 +16,9 @@ use crate::linalg::{self, CMat, Complex, Mat, power_of_two};
 use crate::lti::FrequencyResponse;
 use crate::spec::Method;
 use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
-pub(super) use certificate::MAX_LONG_STATES;
+pub(super) use causal::SEARCHED_PERIODS;
 use certificate::certificate;
+pub(super) use certificate::{MAX_LONG_STATES, MAX_SEARCHED_STATES};
 pub(super) use long_filters::MOST_LONG_TAPS;
 use long_filters::{Direction, RIDGES};
 

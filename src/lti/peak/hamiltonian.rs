@@ -48,9 +48,9 @@ fn cayley<T: ComplexField>((a, b, c, d): Parts<T>, solve: Solve<T>) -> Parts<T> 
     (&inverse * (a - identity), b * root2.clone(), c * inverse * root2, d)
 }
 
-/// The Hamiltonian matrix of a continuous-time system whose eigenvalues on the imaginary axis mark gain =
-/// `level`. The gain is that of the outputs from `measurements` on, after subtraction of the part that the
-/// outputs before explain.
+/// The Hamiltonian matrix of a continuous-time system whose eigenvalues on the imaginary axis mark
+/// gain = `level`. The gain is that of the outputs from `measurements` on, after subtraction of the part
+/// that the outputs before explain.
 fn hamiltonian<T: ComplexField>(
     (a, b, c, d): &Parts<T>,
     measurements: usize,

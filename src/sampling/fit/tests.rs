@@ -167,11 +167,11 @@ fn a_used_workspace_gives_the_bits_of_a_fresh_one() {
         fit.coefficients().to_vec()
     };
     let mut fit = Fit::<4, 1>::covering(10);
-    let fresh = run(&mut fit);
+    let again = run(&mut fit);
     fit.reset(-7, 40);
     fit.add(3.0, &[1e9], 1e9, 1e9);
     fit.reset(-3, 17);
-    assert_eq!(run(&mut fit), fresh);
+    assert_eq!(run(&mut fit), again);
 }
 
 proptest! {

@@ -232,7 +232,7 @@ impl<'a> Cover<'a> {
                 break;
             }
         }
-        let late = &self.grids[0].period.periods_late;
+        let late = &self.grids[0].period.delay_periods;
         let (references, channels) = late.split_at(self.bank.ratio);
         let most = |list: &[usize]| list.iter().copied().max().unwrap_or(0);
         let last = (most(references)).max(most(channels) + self.lags.last);

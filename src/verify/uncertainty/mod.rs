@@ -17,8 +17,8 @@
 //! *Between frequencies, for fixed errors*: with its memory cut off after J slow periods (`memory`) K is a
 //! polynomial in z^-1, and |a* K|^2 is a nonnegative trigonometric polynomial p of some degree d for every
 //! direction a. By M. Riesz's lemma, p(omega + t) >= max p cos^2(d t / 2) around its maximum, |t| <= pi / d.
-//! (P. Borwein, T. Erdelyi, *Polynomials and Polynomial Inequalities*, 1995, lemma E.3 of section 5.1, for p
-//! - max p / 2.) So if every frequency lies within y of one that was judged,
+//! (P. Borwein, T. Erdelyi, *Polynomials and Polynomial Inequalities*, 1995, lemma E.3 of section 5.1, for
+//! p - max p / 2.) So if every frequency lies within y of one that was evaluated,
 //!
 //! ```text
 //! ||K_delta|| <= max over these frequencies of (sigma(K_delta) + tail) / cos(d y / 2) + tail.

@@ -13,9 +13,9 @@ pub(super) struct Transfer {
 }
 
 impl Transfer {
-    /// `gain` c (s I - a)^-1 b, by the recursion of Faddeev and Le Verrier: M_0 = I, M_k = a M_{k-1} + d_k
-    /// I, d_k = -tr(a M_{k-1}) / k; then D = s^n + sum_k d_k s^(n-k) and N = sum_k c M_k b s^(n-1-k). It
-    /// loses many digits, so it runs with 512 bits.
+    /// `gain` c (s I - a)^-1 b, by the recursion of Faddeev and Le Verrier: M_0 = I,
+    /// M_k = a M_{k-1} + d_k I, d_k = -tr(a M_{k-1}) / k; then D = s^n + sum_k d_k s^(n-k) and
+    /// N = sum_k c M_k b s^(n-1-k). It loses many digits, so it runs with 512 bits.
     pub(super) fn new(filter: &StrictlyProper, gain: f64) -> Self {
         let (a, b): (Matrix<BigFloat>, Matrix<BigFloat>) = (ball::exact(filter.a()), ball::exact(filter.b()));
         let c: Matrix<BigFloat> = ball::scaled(&ball::exact(filter.c()), Ball::from(gain));

@@ -34,8 +34,8 @@ pub trait PaintedSurface: Sync {
 
 /// Pixel and depth of a surface point, and d(x, y) / d(u, v).
 ///
-/// |det J| = |det M| |(S - C) . (S_u x S_v)| / d^3, six times the volume of the tetrahedron S, S + S_u, S +
-/// S_v, C over d^3 (thesis A.3).
+/// |det J| = |det M| |(S - C) . (S_u x S_v)| / d^3, six times the volume of the tetrahedron
+/// S, S + S_u, S + S_v, C over d^3 (thesis A.3).
 pub(crate) fn see(camera: &Camera, s: &SurfacePoint) -> (Vector2<f64>, f64, Matrix2<f64>) {
     let (x, y, d) = camera.project(&s.point);
     let column = |tangent: &Vector3<f64>| {

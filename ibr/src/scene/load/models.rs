@@ -35,12 +35,12 @@ impl Models {
         if let Some(found) = read.get(path) {
             return Ok(found.clone());
         }
-        let fresh = match source {
+        let loaded = match source {
             Source::Colmap(folder) => Read::Colmap(Arc::new(read_model(folder)?)),
             Source::Transforms(file) => Read::Transforms(Arc::new(read_transforms(file)?)),
         };
-        read.insert(path.clone(), fresh.clone());
-        Ok(fresh)
+        read.insert(path.clone(), loaded.clone());
+        Ok(loaded)
     }
 }
 

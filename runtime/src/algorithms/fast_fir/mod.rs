@@ -1,9 +1,9 @@
 //! The two-parallel fast FIR algorithm: filters of K / 2 taps per phase at half the rate do three quarters
 //! of the work.
 //!
-//! With the lags H[j] of a bank (M by N matrices) and the frames of the stream apart, H0[j] = H[2j], H1[j] =
-//! H[2j + 1], u0[n] = x[2n], u1[n] = x[2n + 1], a pair of frames is (Karatsuba's identity; Mou and Duhamel,
-//! *Short-length FIR filters and their use in fast nonrecursive filtering*, 1991)
+//! With the lags H[j] of a bank (M by N matrices) and the frames of the stream apart, H0[j] = H[2j],
+//! H1[j] = H[2j + 1], u0[n] = x[2n], u1[n] = x[2n + 1], a pair of frames is (Karatsuba's identity; Mou and
+//! Duhamel, *Short-length FIR filters and their use in fast nonrecursive filtering*, 1991)
 //!
 //! ```text
 //! y[2n]     = A[n] + B[n - 1]          A = H0 * u0     B = H1 * u1

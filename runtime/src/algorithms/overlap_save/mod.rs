@@ -153,8 +153,8 @@ struct Work<T: Sample> {
 }
 
 impl<T: Sample> OverlapSave<T> {
-    /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters, in transforms of length F =
-    /// `len`, a power of two from 16 on that is longer than the filters' memory.
+    /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters, in transforms of length
+    /// F = `len`, a power of two from 16 on that is longer than the filters' memory.
     pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, len: usize, isa: Isa) -> Result<Self, BuildError> {
         check_finite::<T>(taps)?;
         let history = phase_taps(taps, ratio) - 1;

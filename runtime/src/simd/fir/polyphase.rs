@@ -28,8 +28,8 @@ struct PhaseGroup<T: Element> {
     first: usize,
     /// P; 1 only where there is no other phase.
     width: usize,
-    /// Coefficient of lane d in the step that comes s-th for the p-th sum ([`Tiling::phase`]) at (s P + p) D
-    /// + d.
+    /// Coefficient of lane d in the step that comes s-th for the p-th sum ([`Tiling::phase`]) at
+    /// (s P + p) D + d.
     coefficients: Aligned<T>,
     kernel: FirFn<T>,
 }

@@ -50,7 +50,7 @@ pub(super) struct PreciseFiltering<F> {
     /// [A; C_2; C_1].
     system: Matrix<F>,
     /// [B; D_2; D_1] [B; D_2; D_1]'.
-    fresh: Matrix<F>,
+    input_gram: Matrix<F>,
     /// Number of states.
     order: usize,
     /// Number of measurements.
@@ -78,7 +78,7 @@ impl<F: Number> PreciseFiltering<F> {
         let inputs = stacked(system.b(), system.d());
         Ok(Self {
             system: stacked(system.a(), system.c()),
-            fresh: (&inputs * &inputs.transpose()).symmetric(),
+            input_gram: (&inputs * &inputs.transpose()).symmetric(),
             order: system.order(),
             measured,
             sizes: output_sizes(system)?.into_iter().take(measured).collect(),
@@ -129,7 +129,7 @@ impl<F: Number> PreciseFiltering<F> {
 
     /// [S, T'; T, Re] for the covariance `p`, states first; Re without gamma.
     fn gram(&self, p: &Matrix<F>) -> Matrix<F> {
-        &self.system.congruence(p) + &self.fresh
+        &self.system.congruence(p) + &self.input_gram
     }
 
     /// The step from `p`. A measurement that is zero so far adds nothing.
@@ -154,7 +154,7 @@ impl<F: Number> PreciseFiltering<F> {
     fn is_right(&self, covariance: &Matrix<F>, gamma: f64) -> Option<bool> {
         let Step { next, innovation, .. } = self.step(covariance, Some(gamma))?;
         let change = |i: usize| (next[(i, i)] - covariance[(i, i)]).nearest().abs();
-        let size = |i: usize| covariance[(i, i)].nearest().abs() + KNOWN * self.fresh[(i, i)].nearest();
+        let size = |i: usize| covariance[(i, i)].nearest().abs() + KNOWN * self.input_gram[(i, i)].nearest();
         let settled = self.states().all(|i| change(i) <= SETTLED * size(i));
         let pivots: Vec<f64> = innovation.pivots().into_iter().map(Number::nearest).collect();
         if !settled || !pivots.iter().all(|pivot| pivot.is_finite()) {
