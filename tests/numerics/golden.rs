@@ -89,17 +89,20 @@ fn g5_wanted_samples_are_passed_on() {
     }
 }
 
+/// The thesis's plant with fast periods of `h` seconds.
+pub(crate) fn g6(h: f64, method: Method) -> Spec {
+    let filter = tf(&[0.25 / (h * h)], &[1.0, 1.0 / h, 0.25 / (h * h)]);
+    let mut spec = alike(&filter, 2, 10, &[1.2 * h, 0.6 * h]);
+    spec.fast_period = Seconds(h);
+    spec.design = DesignSpec::new(method, (method == Method::Fir).then_some(22));
+    spec
+}
+
 #[test]
 fn g6_the_unit_of_time_does_not_matter() {
     for (h, method) in [(1e-6, Method::Iir), (1e-9, Method::Iir), (1e-6, Method::Fir), (1e3, Method::H2)] {
-        let at_one = |h: f64| {
-            let filter = tf(&[0.25 / (h * h)], &[1.0, 1.0 / h, 0.25 / (h * h)]);
-            let mut spec = alike(&filter, 2, 10, &[1.2 * h, 0.6 * h]);
-            spec.fast_period = Seconds(h);
-            spec.design = DesignSpec::new(method, (method == Method::Fir).then_some(22));
-            design(&spec).unwrap().bank
-        };
-        let (scaled, unscaled) = (at_one(h), at_one(1.0));
+        let designed = |h: f64| design(&g6(h, method)).unwrap().bank;
+        let (scaled, unscaled) = (designed(h), designed(1.0));
         let (a, b) = (scaled.gamma.norm.unwrap(), unscaled.gamma.norm.unwrap());
         assert!((a / b - 1.0).abs() < 1e-9, "G6 at h = {h}: {a} {b}");
         assert!((a / 0.0399320 - 1.0).abs() < 2e-6, "G6 at h = {h}: {a}");
@@ -136,12 +139,19 @@ fn g12b_fir_optima() {
 
 const EIGHT_DELAYS: [f64; 8] = [0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];
 
+/// With 32 taps, at latency 12.
+pub(crate) fn g12c() -> Spec {
+    with_taps(alike(&butterworth(4, 1.8), 8, 12, &EIGHT_DELAYS), 32)
+}
+
+pub(crate) fn g12d() -> Spec {
+    with_taps(alike(&butterworth(4, 1.8), 4, 6, &[0.075, 1.238, 2.165, 2.835]), 16)
+}
+
 #[test]
 fn g12c_g12d_larger_banks() {
-    let four = alike(&butterworth(4, 1.8), 4, 6, &[0.075, 1.238, 2.165, 2.835]);
-    check("G12d", &with_taps(four, 16), 0.0782456, printed(0.0782456));
-    let eight = alike(&butterworth(4, 1.8), 8, 12, &EIGHT_DELAYS);
-    check("G12c, 32 taps", &with_taps(eight, 32), 0.0900756, printed(0.0900756));
+    check("G12d", &g12d(), 0.0782456, printed(0.0782456));
+    check("G12c, 32 taps", &g12c(), 0.0900756, printed(0.0900756));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! FIR designs by two methods that share no numerics: the exchange of frequencies (`sampled`) and the
 //! bounded-real LMI of thesis 5.4 (`kyp`).
 
-use crate::golden::{g8, g9, g10, g11, g12};
+use crate::golden::{g6, g8, g9, g10, g11, g12, g12c, g12d};
 use crate::support::specs::{alike, butterworth, tf, thesis, with_taps};
 use crate::support::sweep::long_tests;
 use hybank::bank::Gamma;
@@ -37,6 +37,8 @@ fn the_golden_fir_plants() {
         check("G2, G3", &with_taps(thesis(10, &[1.2, 0.6]), taps));
     }
     check("G4b", &with_taps(thesis(1, &[1.2, 0.6]), 12));
+    check("G5", &with_taps(thesis(10, &[0.0, 1.0]), 22));
+    check("G6", &g6(1e-6, Method::Fir));
     for delays in [[0.1, 0.2], [0.0, 0.01], [1.9, 0.1], [0.5, 1.5]] {
         check("G7", &with_taps(thesis(10, &delays), 22));
     }
@@ -45,6 +47,12 @@ fn the_golden_fir_plants() {
     check("G10", &with_taps(g10(), 24));
     check("G11", &with_taps(g11(), 18));
     check("G12", &with_taps(g12(), 16));
+    check("G12d", &g12d());
+}
+
+#[test]
+fn a_bank_with_256_unknowns() {
+    check("G12c", &g12c());
 }
 
 /// Unknowns up to which `kyp` is quick; the larger specs are tried where `HYBANK_LONG_TESTS` is set.
