@@ -107,41 +107,52 @@ impl Summary {
         if let Some(white) = self.error_white {
             lines.push(format!("error     white is {white:.1} grey levels"));
         }
+        lines.push(format!("coverage  {:.2} %", 100.0 * self.coverage));
+        lines.extend(self.counts());
+        lines.extend(self.agreement_line());
+        lines.extend(self.geometry_line());
+        lines.push(format!(
+            "time      {:.3} s, after {:.3} s of reading and making depth dense",
+            self.seconds, self.preparation_seconds
+        ));
+        lines.join("\n") + "\n"
+    }
+
+    /// Samples, holes and depths that were filled.
+    fn counts(&self) -> Vec<String> {
         let s = &self.samples;
         let d = &s.dropped;
-        lines.push(format!("coverage  {:.2} %", 100.0 * self.coverage));
-        lines.push(format!(
-            "samples   {} propagated, {} occluded, {} used; dropped: {} unknown depth, {} behind, {} outside",
-            s.propagated, s.occluded, s.used, d.unknown, d.behind, d.outside
-        ));
-        lines.push(format!(
-            "holes     {} px cracks, {} px disocclusions",
-            self.holes.crack, self.holes.disocclusion
-        ));
+        let mut lines = vec![
+            format!(
+                "samples   {} propagated, {} occluded, {} used; dropped: {} unknown depth, {} behind, {} outside",
+                s.propagated, s.occluded, s.used, d.unknown, d.behind, d.outside
+            ),
+            format!("holes     {} px cracks, {} px disocclusions", self.holes.crack, self.holes.disocclusion),
+        ];
         if self.filled_depths > 0 {
             lines.push(format!(
                 "depth     {} unknown values filled from the farther neighbour",
                 self.filled_depths
             ));
         }
-        if let Some(worst) = self.agreement.worst() {
-            let exposures = self.agreement.gains.iter().any(|g| *g != 1.0);
-            lines.push(format!(
-                "inputs    views agree in depth and colour at {:.0} % of the points{}",
-                100.0 * worst.share,
-                if exposures { "; exposures differ and are matched" } else { "" }
-            ));
-        }
-        if let Some(g) = &self.geometry {
-            lines.push(format!(
-                "geometry  {} of {} matches agree (RMS {:.3} px); virtual camera from {} of {} (RMS {:.3} px)",
-                g.inliers, g.matches, g.sampson_rms, g.resection_inliers, g.sightings, g.resection_rms
-            ));
-        }
-        lines.push(format!(
-            "time      {:.3} s, after {:.3} s of reading and making depth dense",
-            self.seconds, self.preparation_seconds
-        ));
-        lines.join("\n") + "\n"
+        lines
+    }
+
+    fn agreement_line(&self) -> Option<String> {
+        let worst = self.agreement.worst()?;
+        let exposures = self.agreement.gains.iter().any(|g| *g != 1.0);
+        Some(format!(
+            "inputs    views agree in depth and colour at {:.0} % of the points{}",
+            100.0 * worst.share,
+            if exposures { "; exposures differ and are matched" } else { "" }
+        ))
+    }
+
+    fn geometry_line(&self) -> Option<String> {
+        let g = self.geometry.as_ref()?;
+        Some(format!(
+            "geometry  {} of {} matches agree (RMS {:.3} px); virtual camera from {} of {} (RMS {:.3} px)",
+            g.inliers, g.matches, g.sampson_rms, g.resection_inliers, g.sightings, g.resection_rms
+        ))
     }
 }

@@ -120,12 +120,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let captures = converters.iter().zip(&mut reports).enumerate();
     let captures = captures.map(|(i, (converter, report))| run.capture(i, converter, &mut report.clipped));
     let recordings = outputs.iter().zip(captures.chain(std::iter::once_with(|| run.target())));
-    let recordings = recordings.map(|(output, samples)| Ok((output, run.checked(samples)?)));
-    write_together(&args.output, recordings, |(output, parts)| {
-        let (samples, imaginary) = (&parts.0, parts.1.as_deref());
-        let mono = Mono { samples, imaginary, rate: output.rate, container: kind.container() };
-        begin_recording(&output.path, mono, args.force)
-    })?;
+    run.write(recordings, kind.container())?;
     let files: Vec<String> = outputs.iter().map(|output| output.path.display().to_string()).collect();
     warnings.extend(clipping(&files, &reports));
     Report {
@@ -181,6 +176,20 @@ impl Run<'_> {
             samples
         };
         (amplified(&self.signal.real), self.signal.imaginary.as_ref().map(amplified))
+    }
+
+    /// All files appear together or not at all.
+    fn write<'o>(
+        &self,
+        recordings: impl Iterator<Item = (&'o Output, Parts)>,
+        container: Container,
+    ) -> Result<(), Failure> {
+        let checked = recordings.map(|(output, samples)| Ok((output, self.checked(samples)?)));
+        write_together(&self.args.output, checked, |(output, parts)| {
+            let (samples, imaginary) = (&parts.0, parts.1.as_deref());
+            let mono = Mono { samples, imaginary, rate: output.rate, container };
+            begin_recording(&output.path, mono, self.args.force)
+        })
     }
 
     /// A sample beyond the range of a 32-bit float is an error, not an infinity in the file.

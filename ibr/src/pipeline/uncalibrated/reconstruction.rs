@@ -68,27 +68,18 @@ pub(super) fn reconstruct(
 ) -> Result<Reconstruction, UncalibratedError> {
     let base = Base::new(images, tracks, settings)?;
     let in_target = base.points_in(target)?;
-    let last = images.len();
-    let positions =
-        |(j, target): (&usize, &Option<Point>)| tracks[*j].iter().copied().chain([*target]).collect();
-    let seen: Vec<Vec<Option<Point>>> = base.tracks.iter().zip(&in_target).map(positions).collect();
+    let mut seen = with_target(base.tracks.iter().map(|j| &tracks[*j]), &in_target);
+    let resections: Vec<Resection> = (2..=images.len())
+        .map(|column| resected(&base.points, &seen, column, settings))
+        .collect::<Result<_, _>>()?;
     let mut cameras = base.cameras.to_vec();
-    let mut resections = Vec::new();
-    for column in 2..=last {
-        let resection = resected(&base.points, &seen, column, settings)?;
-        cameras.push(resection.camera);
-        resections.push(resection);
-    }
+    cameras.extend(resections.iter().map(|resection| resection.camera));
     let found = resections.last().ok_or(GeometryError::Numerical { what: "virtual camera" })?;
     let mut points = base.points.clone();
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
     let order = base.order(&points, &cameras[0], settings)?;
-    let mut seen = seen;
     if let (Target::Tracks(positions), 3..) = (target, images.len()) {
-        let whole = |(track, position): (&Vec<Option<Point>>, &Option<Point>)| {
-            track.iter().copied().chain([*position]).collect()
-        };
-        let all: Vec<Vec<Option<Point>>> = tracks.iter().zip(positions).map(whole).collect();
+        let all = with_target(tracks.iter(), positions);
         let cloud = all_views::adjust(&mut cameras, &all, settings.robust.reprojection);
         (points, seen) = (cloud.points, cloud.seen);
         chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
@@ -101,13 +92,18 @@ pub(super) fn reconstruct(
         resection_inliers: found.inliers.len(),
         resection_rms: found.rms,
         order_agreement: order.agreement,
-        order_by: match settings.handedness {
-            Some(_) => OrderBy::Given,
-            // Until the photographs have been asked.
-            None => OrderBy::Nothing,
-        },
+        // Until the photographs have been asked.
+        order_by: settings.handedness.map_or(OrderBy::Nothing, |_| OrderBy::Given),
     };
     Ok(Reconstruction { cameras, points, seen, hand: order.hand, geometry, numbers: Vec::new() })
+}
+
+/// Tracks with their positions in the virtual view as last column.
+fn with_target<'a>(
+    tracks: impl Iterator<Item = &'a Vec<Option<Point>>>,
+    target: &[Option<Point>],
+) -> Vec<Vec<Option<Point>>> {
+    tracks.zip(target).map(|(track, position)| track.iter().copied().chain([*position]).collect()).collect()
 }
 
 /// The reconstruction of the first two views.

@@ -6,8 +6,8 @@ use super::reconstruction::Reconstruction;
 use super::{UncalibratedRendering, UncalibratedSettings};
 use crate::camera::Relative;
 use crate::image::Image;
-use crate::interpolate::HoleCount;
 use crate::interpolate::plane::PlaneProblem;
+use crate::interpolate::{self, HoleCount};
 use crate::occlusion::{self, DepthTest};
 use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, Report};
 use crate::propagate::Frame;
@@ -26,39 +26,18 @@ pub(super) fn render<const C: usize>(
     settings: &RenderSettings,
     special: &UncalibratedSettings,
 ) -> Result<UncalibratedRendering, RenderError> {
-    let target_matrix = &scene.cameras[images.len()];
-    let target = scene.camera(images.len())?;
-    let sign = chirality::order_sign(target_matrix, scene.hand);
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
-    let mut report = Report::default();
-    let mut samples: Vec<Sample<C>> = Vec::new();
-    for (i, (image, surface)) in images.iter().zip(surfaces).enumerate() {
-        let source = scene.camera(i)?;
-        let chi = surface.chi(image.size());
-        let map = source.relative_to(&target);
-        let first = samples.len();
-        report.dropped += propagate_chi(image, &chi, i as u16, &map, sign, &frame, &mut samples);
-        let doubtful = surface.doubtful(image.size());
-        samples[first..].iter_mut().for_each(|s| s.doubtful = doubtful[s.pixel as usize]);
-    }
-    report.propagated = samples.len();
-    if images.len() > 2 {
-        balance(scene, images.len()).apply(&mut samples);
-    }
-    if samples.is_empty() {
-        let pixels = images.iter().map(|i| i.width() * i.height()).sum();
-        return Err(RenderError::NoOverlap { pixels, dropped: report.dropped });
-    }
+    let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame)?;
+    let mut report = Report { dropped, propagated: samples.len(), ..Report::default() };
     let hull = hull_features(scene, images.len());
-    let mut region: Vec<bool> = mesh::dense_chi(&hull, size).iter().map(|c| !c.is_nan()).collect();
     let absolute = special.sigma_share * chi_range(&hull);
     let test = DepthTest { relative: 0.0, absolute, ..*settings.depth_test() };
     test.check()?;
     report.occluded = remove_occluded(&mut samples, &test);
     report.used = samples.len();
-    let mut interpolation = settings.interpolation;
-    interpolation.depth_test = test;
-    interpolation.plane = special.plane;
+    let mut region: Vec<bool> = mesh::dense_chi(&hull, size).iter().map(|c| !c.is_nan()).collect();
+    let interpolation =
+        interpolate::Settings { depth_test: test, plane: special.plane, ..settings.interpolation };
     let mut problem = PlaneProblem::<C>::new(size, &interpolation)?;
     problem.add(&samples)?;
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
@@ -71,6 +50,34 @@ pub(super) fn render<const C: usize>(
     let views = (0..images.len()).collect();
     let rendering = Rendering { image, mask, depth, counts, views, report, agreement };
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
+}
+
+/// The samples of all views in the virtual one, with their weights, and what was dropped.
+fn propagated<const C: usize>(
+    images: &[&Image],
+    surfaces: &[Surface],
+    scene: &Reconstruction,
+    frame: &Frame,
+) -> Result<(Vec<Sample<C>>, Dropped), RenderError> {
+    let target = scene.camera(images.len())?;
+    let sign = chirality::order_sign(&scene.cameras[images.len()], scene.hand);
+    let (mut samples, mut dropped) = (Vec::new(), Dropped::default());
+    for (i, (image, surface)) in images.iter().zip(surfaces).enumerate() {
+        let map = scene.camera(i)?.relative_to(&target);
+        let first = samples.len();
+        dropped +=
+            propagate_chi(image, &surface.chi(image.size()), i as u16, &map, sign, frame, &mut samples);
+        let doubtful = surface.doubtful(image.size());
+        samples[first..].iter_mut().for_each(|s: &mut Sample<C>| s.doubtful = doubtful[s.pixel as usize]);
+    }
+    if samples.is_empty() {
+        let pixels = images.iter().map(|i| i.width() * i.height()).sum();
+        return Err(RenderError::NoOverlap { pixels, dropped });
+    }
+    if images.len() > 2 {
+        balance(scene, images.len()).apply(&mut samples);
+    }
+    Ok((samples, dropped))
 }
 
 /// Removes what lies behind other samples. Doubtful samples hide doubtful ones only: a triangle that

@@ -28,24 +28,7 @@ impl Loader<'_> {
             |column: usize| Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect());
         let targets = match left_out {
             Some(_) => virtual_columns.into_iter().map(in_column).collect(),
-            None => self.along(
-                goals,
-                |goal| match (goal.target.from_tracks, goal.target.between) {
-                    (Some(column), _) => Ok(in_column(column)),
-                    (None, Some(between)) => Ok(Target::Between(between)),
-                    (None, None) => Err(self.incomplete(format!(
-                        "{} needs `from_tracks` (a column of the tracks, from 1) or `between` (0 to 1)",
-                        goal.name
-                    ))),
-                },
-                |goal, from, share| match (from, goal.target.to_between) {
-                    (Target::Between(from), Some(to)) => Ok(Target::Between(from + (to - from) * share)),
-                    _ => Err(self.incomplete(format!(
-                        "{} has the end of a path; in a scene of tracks alone a path goes from `between` to `to_between`",
-                        goal.name
-                    ))),
-                },
-            )?,
+            None => self.targets(goals, in_column)?,
         };
         let own = match left_out {
             Some(view) => self.image(&view.image)?.size(),
@@ -54,6 +37,25 @@ impl Loader<'_> {
         let size = self.size(goals, own)?;
         let tracks = tracks.rows().iter().map(pick).collect();
         Ok(Kind::Uncalibrated { images, tracks, targets, size })
+    }
+
+    /// What the goals ask for; `in_column` gives the positions in a column of the tracks.
+    fn targets(&self, goals: &[Goal], in_column: impl Fn(usize) -> Target) -> Loaded<Vec<Target>> {
+        let start = |goal: &Goal| match (goal.target.from_tracks, goal.target.between) {
+            (Some(column), _) => Ok(in_column(column)),
+            (None, Some(between)) => Ok(Target::Between(between)),
+            (None, None) => Err(self.incomplete(format!(
+                "{} needs `from_tracks` (a column of the tracks, from 1) or `between` (0 to 1)",
+                goal.name
+            ))),
+        };
+        self.along(goals, start, |goal, from, share| match (from, goal.target.to_between) {
+            (Target::Between(from), Some(to)) => Ok(Target::Between(from + (to - from) * share)),
+            _ => Err(self.incomplete(format!(
+                "{} has the end of a path; in a scene of tracks alone a path goes from `between` to `to_between`",
+                goal.name
+            ))),
+        })
     }
 
     /// The file of tracks, if there are at least two views and none has camera keys.
