@@ -14,7 +14,7 @@ use super::recordings::{Mono, begin_recording};
 use super::say::name_leftovers;
 use crate::design::{self, Problem};
 use crate::files::refuse_overlaps;
-use crate::io::SampleWriter;
+use crate::io::{Container, SampleWriter};
 use crate::overview::understood;
 use crate::simulate::{Converter, target};
 use crate::spec::Spec;
