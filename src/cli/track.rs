@@ -6,7 +6,7 @@ use super::bank_file::read_text;
 use super::run::AlgorithmArg;
 use crate::bank::Bank;
 use crate::files::AtomicFile;
-use crate::pipeline::{Pipeline, Retuned, Retuner};
+use crate::pipeline::{Pipeline, Retuned, Retuner, Retuning};
 use crate::quantity;
 use crate::runtime::{Algorithm, Options};
 use crate::track::{Change, DriftModel, FollowSettings, Followed, Follower, Guide, Reading};
@@ -167,9 +167,13 @@ impl Retuner for Following {
 
     fn retune(&mut self, samples: &[Vec<f64>]) -> Retuned {
         let Followed { changes, log, warnings } = self.follower.follow(samples);
-        let filters = |change: &Change| (change.frame, self.bank.filters_at(&change.errors));
+        let retuning = |Change { frame, errors, shifts }: Change| Retuning {
+            frame,
+            filters: self.bank.filters_at(&errors),
+            shifts,
+        };
         Retuned {
-            changes: changes.iter().map(filters).collect(),
+            changes: changes.into_iter().map(retuning).collect(),
             record: serde_json::to_string(&log).unwrap_or_default(),
             warnings: warnings.iter().map(ToString::to_string).collect(),
         }

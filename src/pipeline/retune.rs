@@ -8,11 +8,15 @@
 //! A change takes over the history of the stream. The outputs after it are those that the new filters would
 //! have given from the beginning, so that a change of the taps by dF changes an output by dF times the
 //! samples that it sees, at most ||dF|| ||x||, without a transient.
+//!
+//! A change may shift channels against each other by whole frames (`shifted`). The outputs after it are
+//! those of the new filters on channels that were shifted so from the beginning.
 
+use super::shifted::ShiftedFrames;
 use super::{Output, PipelineError};
 use crate::bank::{Bank, SynthesisFilters};
-use crate::io::PcmFrames;
-use crate::runtime::{BuildError, Options, Stream};
+use crate::io::{PcmFormat, PcmFrames};
+use crate::runtime::{BuildError, Options, PcmOutput, Stream};
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::Builder;
@@ -22,43 +26,65 @@ pub trait Retuner: Send {
     /// Frames of a block.
     fn block_frames(&self) -> usize;
 
-    /// Takes the samples of the next block, one list per channel as they came in, and says what changes two
-    /// blocks later.
+    /// Takes the samples of the next block, one list per channel, and says what changes two blocks later. In
+    /// the whole block each channel has the shift that holds at its first frame.
     fn retune(&mut self, samples: &[Vec<f64>]) -> Retuned;
 }
 
 /// What a block changes.
 #[derive(Debug, Clone, Default)]
 pub struct Retuned {
-    /// Filters with the frame of the block, from 0, from which on they hold, in ascending order.
-    pub changes: Vec<(usize, SynthesisFilters)>,
+    /// In ascending order of their frames.
+    pub changes: Vec<Retuning>,
     /// A line for a log; empty for none.
     pub record: String,
     /// What a user should know at once.
     pub warnings: Vec<String>,
 }
 
+/// Filters that hold from some frame on.
+#[derive(Debug, Clone)]
+pub struct Retuning {
+    /// Frame of the block, from 0.
+    pub frame: usize,
+    /// The filters.
+    pub filters: SynthesisFilters,
+    /// s_i: frame k takes sample k + s_i of channel i. One per channel.
+    pub shifts: Vec<i64>,
+}
+
 /// A [`Retuned`] whose filters are ready to run.
 struct Ready {
-    changes: Vec<(usize, Stream)>,
+    changes: Vec<Change>,
     record: String,
     warnings: Vec<String>,
+}
+
+/// A [`Retuning`] that is ready to run. The frame is that of the block, and then that of the stream.
+#[derive(Debug)]
+struct Change {
+    frame: u64,
+    stream: Stream,
+    shifts: Vec<i64>,
 }
 
 /// The changes of one pipeline.
 #[derive(Debug)]
 pub(super) struct Tuning {
     block: usize,
-    /// The frames of the present block.
-    samples: Vec<Vec<f64>>,
+    frames: ShiftedFrames,
+    /// The first frame of the present block, and the shifts that hold there.
+    first: u64,
+    shifts: Vec<i64>,
     jobs: Sender<Vec<Vec<f64>>>,
     results: Receiver<Result<Ready, BuildError>>,
     /// The other thread has a block.
     is_waiting: bool,
-    /// Frames so far.
-    position: u64,
-    /// Frame and stream of changes to come.
-    changes: VecDeque<(u64, Stream)>,
+    /// Changes to come.
+    changes: VecDeque<Change>,
+    /// The stream that goes on from the next frame, for channels that were shifted before it. Its history
+    /// waits for that frame, since it may need samples as far ahead.
+    shifted: Option<Stream>,
     /// Lines for the log.
     records: Vec<String>,
     /// All so far.
@@ -75,9 +101,10 @@ impl Tuning {
         options: Options,
         mut retuner: Box<dyn Retuner>,
     ) -> Result<Self, PipelineError> {
-        let (block, channels) = (retuner.block_frames().max(1), bank.channel_count());
+        let block = retuner.block_frames().max(1);
         let (jobs, blocks) = channel::<Vec<Vec<f64>>>();
         let (ready, results) = channel();
+        let (frames, channels) = (ShiftedFrames::new(&bank.offsets), bank.offsets.len());
         let mut bank = bank.clone();
         let work = move || {
             for samples in blocks {
@@ -90,53 +117,98 @@ impl Tuning {
         Builder::new().spawn(work).map_err(PipelineError::Thread)?;
         Ok(Self {
             block,
-            samples: vec![Vec::with_capacity(block); channels],
+            frames,
+            first: 0,
+            shifts: vec![0; channels],
             jobs,
             results,
             is_waiting: false,
-            position: 0,
             changes: VecDeque::new(),
+            shifted: None,
             records: Vec::new(),
             warnings: Vec::new(),
         })
     }
 
-    /// Frames until the next change or the end of the block; at least one.
-    pub(super) fn frames_ahead(&self) -> usize {
-        let gathered = self.samples.first().map_or(0, Vec::len);
-        let to_change = self.changes.front().map_or(u64::MAX, |(frame, _)| frame - self.position);
-        (self.block - gathered).min(usize::try_from(to_change).unwrap_or(usize::MAX))
+    /// Takes samples of the inputs.
+    pub(super) fn push(&mut self, parts: &[PcmFrames<'_>]) {
+        self.frames.push(parts);
     }
 
-    /// Takes frames that were processed, at most [`Tuning::frames_ahead`], and returns the stream that goes
-    /// on from here if the filters change.
+    /// No samples come any more.
+    pub(super) fn end(&mut self) {
+        self.frames.end();
+    }
+
+    /// The next frames, interleaved: at most `most`, and none beyond the next change or the end of the
+    /// block; `None` if more samples must come first.
+    pub(super) fn next(&self, most: usize) -> Option<Vec<u8>> {
+        let position = self.frames.position();
+        let to_end = self.first + self.block as u64 - position;
+        let to_change = self.changes.front().map_or(u64::MAX, |change| change.frame - position);
+        let ahead = usize::try_from(to_end.min(to_change)).unwrap_or(usize::MAX);
+        let count = self.frames.ready(&self.shifts).min(ahead).min(most);
+        (count > 0).then(|| self.frames.next(count))
+    }
+
+    /// Frames as [`Tuning::next`] gives them.
+    pub(super) fn packed<'a>(&self, bytes: &'a [u8]) -> PcmFrames<'a> {
+        self.frames.packed(bytes)
+    }
+
+    /// The stream that takes the frames that [`Tuning::next`] gave, if the channels were shifted before
+    /// them. It has the history of the shifted channels.
+    ///
+    /// # Errors
+    /// [`PipelineError::Process`] for a stream of other channels.
+    pub(super) fn shifted(&mut self) -> Result<Option<Stream>, PipelineError> {
+        let Some(mut stream) = self.shifted.take() else { return Ok(None) };
+        let count = stream.history().unwrap_or(0);
+        let history = self.frames.history(count);
+        let mut bytes = vec![0; count * stream.ratio() * size_of::<f64>()];
+        let mut output = PcmOutput { format: PcmFormat::F64Le, bytes: &mut bytes, clipped: 0 };
+        stream.process_pcm(&[self.frames.packed(&history)], &mut output)?;
+        Ok(Some(stream))
+    }
+
+    /// Leaves the frames behind that [`Tuning::next`] gave, and returns the stream that goes on from here,
+    /// with the history of the running one, if the filters change.
     ///
     /// # Errors
     /// [`PipelineError::Build`] for filters that do not run.
-    pub(super) fn passed(&mut self, parts: &[PcmFrames<'_>]) -> Result<Option<Stream>, PipelineError> {
-        let before = self.samples.first().map_or(0, Vec::len);
-        let mut channels = self.samples.iter_mut();
-        for part in parts {
-            for (c, samples) in channels.by_ref().take(part.channels).enumerate() {
-                let (format, container) = (part.layout.format, part.layout.container);
-                let frames = part.bytes.chunks_exact(part.frame_bytes());
-                samples.extend(frames.map(|frame| format.decode(&frame[c * container..])));
-            }
-        }
-        let gathered = self.samples.first().map_or(0, Vec::len);
-        self.position += (gathered - before) as u64;
-        if gathered == self.block {
+    pub(super) fn passed(&mut self, count: usize) -> Result<Option<Stream>, PipelineError> {
+        self.frames.advance(count, self.first);
+        let is_end = self.frames.position() == self.first + self.block as u64;
+        if is_end {
             self.end_block()?;
         }
-        let is_due = self.changes.front().is_some_and(|(frame, _)| *frame == self.position);
-        Ok(is_due.then(|| self.changes.pop_front()).flatten().map(|(_, stream)| stream))
+        let position = self.frames.position();
+        let is_due = self.changes.front().is_some_and(|change| change.frame == position);
+        let due = is_due.then(|| self.changes.pop_front()).flatten();
+        let next = due.and_then(|change| self.begin(change));
+        if is_end {
+            self.shifts = self.frames.shifts();
+        }
+        Ok(next)
+    }
+
+    /// Begins a change; the stream if no channel is shifted.
+    fn begin(&mut self, change: Change) -> Option<Stream> {
+        let Change { stream, shifts, .. } = change;
+        if shifts == self.frames.shifts() {
+            return Some(stream);
+        }
+        self.frames.shift_by(&shifts);
+        self.shifted = Some(stream);
+        None
     }
 
     /// Hands the block over, once the changes of the one before are known.
     fn end_block(&mut self) -> Result<(), PipelineError> {
-        self.receive()?;
-        let next = vec![Vec::with_capacity(self.block); self.samples.len()];
-        let block = std::mem::replace(&mut self.samples, next);
+        let next = self.first + self.block as u64;
+        self.receive(next)?;
+        let block = self.frames.block(self.first, self.block, &self.shifts);
+        self.first = next;
         self.is_waiting = self.jobs.send(block).is_ok();
         Ok(())
     }
@@ -149,19 +221,21 @@ impl Tuning {
         Ok(())
     }
 
-    /// Waits for the changes of the block that the other thread has; they hold from the present frame on.
-    pub(super) fn receive(&mut self) -> Result<(), PipelineError> {
+    /// Waits for the changes of the block that the other thread has.
+    pub(super) fn settle(&mut self) -> Result<(), PipelineError> {
+        self.receive(self.first + self.block as u64)
+    }
+
+    /// As [`Tuning::settle`]; the changes are those of the block that begins at frame `first`.
+    fn receive(&mut self, first: u64) -> Result<(), PipelineError> {
         if !std::mem::take(&mut self.is_waiting) {
             return Ok(());
         }
         // A thread that is gone changes nothing any more.
         let Ok(found) = self.results.recv() else { return Ok(()) };
         let Ready { changes, record, warnings } = found?;
-        self.changes = changes
-            .into_iter()
-            .filter(|(frame, _)| *frame < self.block)
-            .map(|(frame, stream)| (self.position + frame as u64, stream))
-            .collect();
+        let within = changes.into_iter().filter(|change| change.frame < self.block as u64);
+        self.changes.extend(within.map(|change| Change { frame: first + change.frame, ..change }));
         self.records.extend(Some(record).filter(|record| !record.is_empty()));
         self.warnings.extend(warnings);
         Ok(())
@@ -170,12 +244,12 @@ impl Tuning {
 
 fn prepared(bank: &mut Bank, options: Options, found: Retuned) -> Result<Ready, BuildError> {
     let Retuned { changes, record, warnings } = found;
-    let mut streams = Vec::with_capacity(changes.len());
-    for (frame, filters) in changes {
+    let mut ready = Vec::with_capacity(changes.len());
+    for Retuning { frame, filters, shifts } in changes {
         bank.filters = filters;
-        streams.push((frame, Stream::new(&bank.plan(options)?)));
+        ready.push(Change { frame: frame as u64, stream: Stream::new(&bank.plan(options)?), shifts });
     }
-    Ok(Ready { changes: streams, record, warnings })
+    Ok(Ready { changes: ready, record, warnings })
 }
 
 #[cfg(test)]
@@ -191,8 +265,17 @@ mod tests {
     const RATIO: usize = 2;
 
     /// Taps that differ from block to block and at frame 13 of a block, by what was in the block before
-    /// last.
-    struct Changing;
+    /// last; the channels are shifted as [`shifts`] says.
+    struct Changing {
+        blocks: usize,
+        is_shifting: bool,
+    }
+
+    /// The shifts at a frame: no two of them in a row are the same.
+    fn shifts(block: usize, is_late: bool) -> Vec<i64> {
+        let k = 2 * block + usize::from(is_late);
+        vec![[0, 1, 0, -1][k % 4], [3, 0, -4, 5, 1][k % 5]]
+    }
 
     fn taps(seed: f64) -> Vec<Vec<f64>> {
         (0..CHANNELS).map(|i| (0..9).map(|n| (seed + (3 * n + 5 * i) as f64).sin()).collect()).collect()
@@ -205,7 +288,12 @@ mod tests {
 
         fn retune(&mut self, samples: &[Vec<f64>]) -> Retuned {
             assert!(samples.iter().all(|list| list.len() == BLOCK));
-            let at = |frame: usize| (frame, SynthesisFilters::Fir(taps(samples[0][frame])));
+            self.blocks += 1;
+            let at = |frame: usize| Retuning {
+                frame,
+                filters: SynthesisFilters::Fir(taps(samples[0][frame])),
+                shifts: if self.is_shifting { shifts(self.blocks + 1, frame > 0) } else { vec![0; CHANNELS] },
+            };
             Retuned { changes: vec![at(0), at(13)], record: samples[1][0].to_string(), warnings: Vec::new() }
         }
     }
@@ -238,11 +326,17 @@ mod tests {
     }
 
     fn run(samples: &[f64], cut: usize) -> (Vec<f64>, Vec<String>) {
+        run_with(samples, cut, false)
+    }
+
+    /// The output, flushed to as many frames as came in, and the log.
+    fn run_with(samples: &[f64], cut: usize, is_shifting: bool) -> (Vec<f64>, Vec<String>) {
         let (bank, options) =
             (bank(), Options { precision: crate::runtime::Precision::Double, ..Options::default() });
         let plan = bank.plan(options).unwrap();
         let pipeline = Pipeline::new(&bank, &plan, Settings::plain(PcmFormat::F64Le)).unwrap();
-        let mut pipeline = pipeline.retuned_by(&bank, options, Box::new(Changing)).unwrap();
+        let mut pipeline =
+            pipeline.retuned_by(&bank, options, Box::new(Changing { blocks: 0, is_shifting })).unwrap();
         let mut out = Logging::default();
         for piece in samples.chunks(cut * CHANNELS) {
             let layout = SampleLayout::packed(PcmFormat::F64Le);
@@ -250,6 +344,7 @@ mod tests {
             pipeline.push(&[PcmFrames { layout, channels: CHANNELS, bytes: &bytes }], &mut out).unwrap();
         }
         pipeline.settle(&mut out).unwrap();
+        pipeline.flush((samples.len() / CHANNELS * RATIO) as u64, &mut out).unwrap();
         let values = out.samples.chunks_exact(8).map(|x| f64::from_le_bytes(x.try_into().unwrap()));
         (values.collect(), out.lines)
     }
@@ -292,6 +387,55 @@ mod tests {
         }
         let want: Vec<String> = (0..5).map(|b| samples[b * BLOCK * CHANNELS + 1].to_string()).collect();
         assert_eq!(records, want);
+    }
+
+    /// Sample n of channel i; none beyond both ends.
+    fn sample(samples: &[f64], n: i64, i: usize) -> f64 {
+        usize::try_from(n).ok().and_then(|n| samples.get(n * CHANNELS + i)).copied().unwrap_or(0.0)
+    }
+
+    /// Each output is that of the taps and the shifts of its frame: by the definition of the sum, over
+    /// samples that lie before the shifted ones too.
+    #[test]
+    fn channels_are_shifted_by_whole_frames() {
+        let samples = noise(6 * BLOCK + 17);
+        let (out, records) = run_with(&samples, 1000, true);
+        assert_eq!(out.len(), samples.len());
+        let shifts_at = |frame: usize| match frame / BLOCK {
+            0 | 1 => vec![0; CHANNELS],
+            block => shifts(block, frame % BLOCK >= 13),
+        };
+        // Of a block the other thread sees the samples with the shifts of its first frame.
+        let seen = |frame: usize| {
+            let shift = shifts_at(frame - frame % BLOCK);
+            [0, 1].map(|i| sample(&samples, frame as i64 + shift[i], i))
+        };
+        for frame in 0..samples.len() / CHANNELS {
+            let (block, inside) = (frame / BLOCK, frame % BLOCK);
+            let cause = block.checked_sub(2).map(|b| b * BLOCK + if inside < 13 { 0 } else { 13 });
+            let (taps, shift) = (taps(cause.map_or(0.0, |cause| seen(cause)[0])), shifts_at(frame));
+            for p in 0..RATIO {
+                let term = |i: usize, j: usize| {
+                    let tap = taps[i].get(p + j * RATIO).copied().unwrap_or(0.0);
+                    tap * sample(&samples, frame as i64 - j as i64 + shift[i], i)
+                };
+                let want: f64 =
+                    (0..CHANNELS).flat_map(|i| (0..5).map(move |j| (i, j))).map(|(i, j)| term(i, j)).sum();
+                let have = out[frame * RATIO + p];
+                assert!((have - want).abs() < 1e-12, "{frame} {p}: {have} {want}");
+            }
+        }
+        let want: Vec<String> = (0..6).map(|b| seen(b * BLOCK)[1].to_string()).collect();
+        assert_eq!(records, want);
+    }
+
+    #[test]
+    fn the_cut_of_the_stream_changes_no_bit_of_shifted_channels() {
+        let samples = noise(6 * BLOCK + 7);
+        let whole = run_with(&samples, 10_000, true);
+        for cut in [1, 7, 40, 41, 133] {
+            assert_eq!(run_with(&samples, cut, true), whole, "{cut}");
+        }
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub(super) struct RealPipeline {
     skip: u64,
     samples: u64,
     clipped: u64,
+    /// Samples that earlier streams replaced; see [`RealPipeline::replaced`].
+    replaced: u64,
     buffer: Vec<u8>,
     /// What the converters deliver without a signal.
     offsets: Vec<f64>,
@@ -58,6 +60,7 @@ impl RealPipeline {
             skip,
             samples: 0,
             clipped: 0,
+            replaced: 0,
             buffer: Vec::new(),
             offsets: bank.offsets.clone(),
             tuning: None,
@@ -87,7 +90,7 @@ impl RealPipeline {
     /// As [`super::Pipeline::settle`].
     pub(super) fn settle(&mut self, output: &mut impl Output) -> Result<(), PipelineError> {
         let Some(tuning) = &mut self.tuning else { return Ok(()) };
-        tuning.receive()?;
+        tuning.settle()?;
         tuning.log(output)
     }
 
@@ -108,7 +111,7 @@ impl RealPipeline {
 
     /// Input samples so far that were NaN or infinite and became 0.
     pub(super) fn replaced(&self) -> u64 {
-        self.stream.replaced()
+        self.replaced + self.stream.replaced()
     }
 
     /// The gaps that have ended, as in [`GapFiller::gaps`].
@@ -130,7 +133,13 @@ impl RealPipeline {
         parts: &[PcmFrames<'_>],
         output: &mut impl Output,
     ) -> Result<(), PipelineError> {
-        self.push_at_most(parts, u64::MAX, output, true)
+        match &mut self.tuning {
+            Some(tuning) => {
+                tuning.push(parts);
+                self.run_tuned(output)
+            }
+            None => self.push_at_most(parts, u64::MAX, output),
+        }
     }
 
     /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples
@@ -139,6 +148,11 @@ impl RealPipeline {
     /// # Errors
     /// The errors of the output.
     pub(super) fn flush(&mut self, samples: u64, output: &mut impl Output) -> Result<(), PipelineError> {
+        if let Some(tuning) = &mut self.tuning {
+            tuning.end();
+            self.run_tuned(output)?;
+            self.settle(output)?;
+        }
         let layout = SampleLayout::packed(PcmFormat::F64Le);
         let (channels, ratio) = (self.stream.channels(), self.stream.ratio() as u64);
         let silence: Vec<u8> = self.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
@@ -149,7 +163,7 @@ impl RealPipeline {
             let part =
                 PcmFrames { layout, channels, bytes: &silence[..frames * channels * layout.container] };
             // What is no signal says nothing of the filters.
-            self.push_at_most(&[part], wanted, output, false)?;
+            self.push_at_most(&[part], wanted, output)?;
         }
         Ok(())
     }
@@ -167,7 +181,7 @@ impl RealPipeline {
             ratio: self.stream.ratio(),
             samples: self.samples,
             clipped: self.clipped,
-            replaced: self.stream.replaced(),
+            replaced: self.replaced(),
             state_resets: self.stream.state_resets(),
             gaps,
         }
@@ -179,32 +193,45 @@ impl RealPipeline {
         parts: &[PcmFrames<'_>],
         limit: u64,
         output: &mut impl Output,
-        is_signal: bool,
     ) -> Result<(), PipelineError> {
         let frames = parts.iter().map(PcmFrames::frames).min().unwrap_or(0);
-        let step = (self.step_bytes / self.stream.ratio() / self.format.bytes()).max(1);
+        let step = self.step_frames();
         let (mut limit, mut first) = (limit, 0);
         while first < frames {
-            let ahead = self.tuning.as_ref().filter(|_| is_signal).map_or(usize::MAX, Tuning::frames_ahead);
-            let count = step.min(frames - first).min(ahead);
-            let parts = ranges(parts, first..first + count);
-            limit -= self.step(&parts, limit, output)?;
-            if is_signal {
-                self.change_filters(&parts, output)?;
-            }
+            let count = step.min(frames - first);
+            limit -= self.step(&ranges(parts, first..first + count), limit, output)?;
             first += count;
         }
         Ok(())
     }
 
-    /// Lets the stream go on with other filters after `parts`, if they change there.
-    fn change_filters(
-        &mut self,
-        parts: &[PcmFrames<'_>],
-        output: &mut impl Output,
-    ) -> Result<(), PipelineError> {
+    /// Frames of a step, at most.
+    fn step_frames(&self) -> usize {
+        (self.step_bytes / self.stream.ratio() / self.format.bytes()).max(1)
+    }
+
+    /// Processes the frames that can be made of the samples so far, with filters that change on the way.
+    fn run_tuned(&mut self, output: &mut impl Output) -> Result<(), PipelineError> {
+        let step = self.step_frames();
+        while let Some(tuning) = &mut self.tuning
+            && let Some(bytes) = tuning.next(step)
+        {
+            if let Some(stream) = tuning.shifted()? {
+                self.replaced += self.stream.replaced();
+                self.stream = stream;
+            }
+            let frames = tuning.packed(&bytes);
+            let count = frames.frames();
+            self.step(&[frames], u64::MAX, output)?;
+            self.change_filters(count, output)?;
+        }
+        Ok(())
+    }
+
+    /// Lets the stream go on with other filters after `count` frames, if they change there.
+    fn change_filters(&mut self, count: usize, output: &mut impl Output) -> Result<(), PipelineError> {
         let Some(tuning) = &mut self.tuning else { return Ok(()) };
-        let next = tuning.passed(parts)?;
+        let next = tuning.passed(count)?;
         tuning.log(output)?;
         if let Some(mut stream) = next {
             stream.continue_from(&self.stream)?;

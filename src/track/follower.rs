@@ -1,6 +1,7 @@
 //! Follows the delays of a bank's channels block by block, and says how its taps are to change.
 
 use super::filter::{DelayMeasurement, DelayState, DriftModel};
+use super::frame_shift::{least_half, shift_for};
 use super::guide::Guide;
 use super::log::{Logged, TrackWarning};
 use super::readings::{HALF_WIDTH, Reading};
@@ -10,6 +11,7 @@ use crate::bank::{Bank, SynthesisFilters};
 use crate::calibrate::Model;
 use crate::spec::Spec;
 use crate::units::{FastPeriods, Hertz, Seconds};
+use std::collections::VecDeque;
 
 /// A delay counts as known when the half-width of its 95 % interval is below this, in fast periods, or below
 /// this share of the smallest side of the box.
@@ -42,8 +44,12 @@ pub struct FollowSettings {
 pub struct Change {
     /// Frame of the block two blocks later, from 0.
     pub frame: usize,
-    /// True delay minus that of the bank, per channel, within the box for which the taps were designed.
+    /// True delay minus that of the bank, per channel, with its shift; within the box for which the taps
+    /// were designed.
     pub errors: Vec<FastPeriods>,
+    /// Shift of each channel: frame k takes its sample k + s, whose delay is smaller by s slow periods. Not
+    /// zero only where the box holds all delays of a slow period.
+    pub shifts: Vec<i64>,
 }
 
 /// What a block of samples led to.
@@ -78,6 +84,10 @@ pub struct Follower {
     /// Something was measured.
     is_started: bool,
     blocks: u64,
+    /// The shifts at the first frames of this block and of those whose changes are decided.
+    shifts: VecDeque<Vec<i64>>,
+    /// Those that were decided last.
+    last_shifts: Vec<i64>,
     /// All warnings so far, and those of this block.
     warned: Vec<TrackWarning>,
     warnings: Vec<TrackWarning>,
@@ -113,6 +123,7 @@ impl Follower {
         let smallest = halves.iter().map(|half| half.0).fold(f64::INFINITY, f64::min);
         let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
         let tracker = DelayTracker::new(&states, settings.model, wanted);
+        let no_shifts = vec![0; spec.channels.len()];
         Ok(Self {
             spec,
             guide,
@@ -124,6 +135,8 @@ impl Follower {
             time: 0.0,
             is_started: false,
             blocks: 0,
+            shifts: VecDeque::from([no_shifts.clone(), no_shifts.clone()]),
+            last_shifts: no_shifts,
             warned: Vec::new(),
             warnings: Vec::new(),
         })
@@ -134,7 +147,8 @@ impl Follower {
         self.settings.block_frames
     }
 
-    /// Takes the samples of the next block, a list per channel of the bank; NaN where one is missing.
+    /// Takes the samples of the next block, a list per channel of the bank; NaN where one is missing. Each
+    /// channel has the shift of the change at the first frame of the block, without one none.
     pub fn follow(&mut self, samples: &[Vec<f64>]) -> Followed {
         let frames = self.settings.block_frames as u64;
         let first = self.blocks * frames;
@@ -147,7 +161,9 @@ impl Follower {
             Err(reason) => (vec![None; self.spec.channels.len()], Some(reason)),
         };
         let log = self.logged(centre, measured, reason);
+        self.shifts.pop_front();
         let changes = self.changes(first + 2 * frames);
+        self.shifts.extend(changes.first().map(|change| change.shifts.clone()));
         self.warn_of_delays(centre, &changes);
         Followed { changes, log, warnings: std::mem::take(&mut self.warnings) }
     }
@@ -176,12 +192,26 @@ impl Follower {
         self.advance_to(centre);
         let mut expected = self.spec.clone();
         for (&j, state) in self.followed.iter().zip(self.tracker.states()) {
-            expected.channels[j].delay = state.delay;
+            expected.channels[j].delay = state.delay - self.shifted(j);
         }
         let mut measured = self.guide.measure(&expected, self.reference, samples)?;
         let walked = self.mean_of_block();
-        measured.iter_mut().flatten().for_each(|measurement| measurement.variance += walked);
+        for (j, measurement) in measured.iter_mut().enumerate() {
+            if let Some(measurement) = measurement {
+                measurement.delay += self.shifted(j);
+                measurement.variance += walked;
+            }
+        }
         Ok(self.take(measured))
+    }
+
+    /// By how much the samples of this block have a smaller delay than the channel.
+    fn shifted(&self, j: usize) -> Seconds {
+        self.frame_time() * self.block_shifts()[j] as f64
+    }
+
+    fn block_shifts(&self) -> &[i64] {
+        self.shifts.front().map_or(&self.last_shifts, |shifts| shifts)
     }
 
     /// A block shows the mean of a delay over it. With a rate that walks by q and a delay that walks by p in
@@ -232,24 +262,28 @@ impl Follower {
         let states = self.tracker.states().zip(self.tracker.locks());
         for (&j, (state, lock)) in self.followed.iter().zip(states) {
             log.put(j, state, lock, measured[j]);
+            log.shift[j] = self.block_shifts()[j];
         }
         log
     }
 
-    /// The delays of all channels at a frame.
-    fn errors_at(&self, frame: f64) -> Vec<FastPeriods> {
+    /// The shifts and delays of all channels at a frame of the stream.
+    fn change(&mut self, frame: usize, at: f64) -> Change {
         let mut errors = vec![FastPeriods(0.0); self.spec.channels.len()];
-        let h = self.spec.fast_period;
-        let elapsed = self.frame_time() * (frame - self.time);
-        for ((&j, half), state) in self.followed.iter().zip(&self.halves).zip(self.tracker.states()) {
+        let (h, period) = (self.spec.fast_period, self.frame_time());
+        let elapsed = period * (at - self.time);
+        for ((&j, &half), state) in self.followed.iter().zip(&self.halves).zip(self.tracker.states()) {
             let error = state.delay + elapsed * state.rate - self.spec.channels[j].delay;
-            errors[j] = Seconds(error.0.clamp(-half.0, half.0)).in_fast_periods(h);
+            let shift = &mut self.last_shifts[j];
+            *shift = shift_for(error, half, period, *shift);
+            let rest = error - period * *shift as f64;
+            errors[j] = Seconds(rest.0.clamp(-half.0, half.0)).in_fast_periods(h);
         }
-        errors
+        Change { frame, errors, shifts: self.last_shifts.clone() }
     }
 
     /// Changes within the block that begins at frame `first`, often enough for its drift.
-    fn changes(&self, first: u64) -> Vec<Change> {
+    fn changes(&mut self, first: u64) -> Vec<Change> {
         let frames = self.settings.block_frames;
         let fastest = self.tracker.states().map(|state| state.rate.abs()).fold(0.0, f64::max);
         let drift = fastest * (frames * self.spec.ratio) as f64;
@@ -259,7 +293,7 @@ impl Follower {
         let begin = |k: usize| k * frames / count;
         let change = |k: usize| {
             let middle = 0.5 * (begin(k) + begin(k + 1)) as f64 - 0.5;
-            Change { frame: begin(k), errors: self.errors_at(first as f64 + middle) }
+            self.change(begin(k), first as f64 + middle)
         };
         (0..count).map(change).collect()
     }
@@ -278,12 +312,20 @@ impl Follower {
             let (j, half) = (self.followed[k], self.halves[k]);
             let most = half.in_fast_periods(h).0;
             if changes.iter().any(|change| change.errors[j].0.abs() >= most) {
-                self.warn(TrackWarning::OutsideTheBox { channel: j + 1, half, frame: centre as u64 });
+                let (frame, enough) = (centre as u64, self.enough());
+                self.warn(TrackWarning::OutsideTheBox { channel: j + 1, half, frame, enough });
             }
         }
         if let Some(warning) = self.coincidence() {
             self.warn(warning);
         }
+    }
+
+    /// The box that no delay leaves, where there is one: with as many channels as the ratio it holds delays
+    /// that coincide.
+    fn enough(&self) -> Option<Seconds> {
+        let has_more = self.spec.channels.len() > self.spec.ratio;
+        has_more.then(|| least_half(self.frame_time()))
     }
 
     /// Two channels that will sample at one instant; with more channels than needed, nothing is lost by

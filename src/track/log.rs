@@ -17,6 +17,8 @@ pub struct Logged {
     pub time: Seconds,
     /// D_i; the reference has that of the spec.
     pub delay: Vec<Seconds>,
+    /// s_i: frames hold sample k + s_i of the channel; see [`super::Change::shifts`].
+    pub shift: Vec<i64>,
     /// Half-widths of their 95 % intervals; zero where a delay counts as exact.
     pub half_width: Vec<Seconds>,
     /// Changes of the delays in parts per million.
@@ -38,6 +40,7 @@ impl Logged {
             frame: frame as u64,
             time: period * frame,
             delay: spec.channels.iter().map(|channel| channel.delay).collect(),
+            shift: vec![0; count],
             half_width: vec![Seconds(0.0); count],
             rate_ppm: vec![0.0; count],
             lock: vec![Lock::Locked; count],
@@ -80,6 +83,8 @@ pub enum TrackWarning {
         half: Seconds,
         /// The frame.
         frame: u64,
+        /// Half-width of a box that no delay leaves, if taps can be designed for one.
+        enough: Option<Seconds>,
     },
     /// Two channels will sample at one instant.
     Coincidence {
@@ -109,13 +114,20 @@ impl fmt::Display for TrackWarning {
                 f,
                 "the delay of channel {channel} was lost at frame {frame}: measurements contradicted it again and again; it starts again"
             ),
-            Self::OutsideTheBox { channel, half, frame } => write!(
-                f,
-                "the delay of channel {channel} leaves the ± {:e} s for which the taps were designed, at frame {frame}; the taps stay at \
-                 the end of that range: design with a larger [uncertainty] delay, or cut the recordings there and fuse the rest \
-                 with a bank for its delays",
-                half.0
-            ),
+            Self::OutsideTheBox { channel, half, frame, enough } => {
+                let remedy = match enough {
+                    Some(enough) => format!("(from ± {:e} s on no delay leaves it)", enough.0),
+                    None => {
+                        "or cut the recordings there and fuse the rest with a bank for its delays".to_owned()
+                    }
+                };
+                write!(
+                    f,
+                    "the delay of channel {channel} leaves the ± {:e} s for which the taps were designed, at frame {frame}; the taps \
+                     stay at the end of that range: design with a larger [uncertainty] delay {remedy}",
+                    half.0
+                )
+            }
             Self::Coincidence { channels: [a, b], after } => write!(
                 f,
                 "the channels {a} and {b} will sample at one instant in {:.3e} s: no bank recovers the signal there",

@@ -27,6 +27,7 @@ mod coincidence;
 mod error;
 mod filter;
 mod follower;
+mod frame_shift;
 mod guide;
 mod log;
 mod readings;

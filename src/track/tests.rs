@@ -101,6 +101,45 @@ fn ten_ppm_per_second_are_followed_within_the_prediction() {
     assert!(count == 14 && ratio < 1.5, "{ratio}");
 }
 
+/// A clock that is fast by 60 ppm passes many slow periods: the frames are shifted, and what is left is the
+/// delay within the box.
+#[test]
+fn a_delay_of_many_periods_is_followed_by_shifts() {
+    let (bank, mut random) = (bank(1.05), Random(5));
+    let nominal = bank.delays[1].0;
+    let delay = |t: f64| nominal + 60e-6 * t;
+    let mut follower = Follower::new(&bank, Guide::Pilot(Hertz(7000.0)), settings(1e-6)).unwrap();
+    let mut shifts = vec![0; 2];
+    let mut largest = 0;
+    for number in 0..45 {
+        // Sample k + s of the second channel, at the frame k.
+        let ahead = shifts.remove(0) as f64 * PERIOD;
+        let found =
+            follower.follow(&block(&bank, number, 7000.0, 1e-4, |t| delay(t + ahead) - ahead, &mut random));
+        shifts.push(found.changes[0].shifts[1]);
+        assert_eq!(found.log.shift[1] as f64 * PERIOD, ahead);
+        let at = (number as f64 + 0.5) * 4096.0 * PERIOD - 0.5 * PERIOD;
+        let is_box_left = |w: &TrackWarning| matches!(w, TrackWarning::OutsideTheBox { .. });
+        assert!(!found.warnings.iter().any(is_box_left), "{number} {:?}", found.warnings);
+        if number < 6 {
+            continue;
+        }
+        // The delay is that of sample k + s: 60 ppm of the shift later than that of sample k.
+        assert!((found.log.delay[1].0 - delay(at + ahead)).abs() < 1e-8, "{number} {:?}", found.log);
+        for change in &found.changes {
+            let then = ((number + 2) * 4096 + change.frame) as f64 * PERIOD;
+            let ahead = change.shifts[1] as f64 * PERIOD;
+            let error = change.errors[1].0 / 96_000.0 + nominal + ahead - delay(then + ahead);
+            assert!(error.abs() < 0.03 / 96_000.0, "{number} {change:?} {error:e}");
+            assert!(change.errors[1].0.abs() < 1.05 && change.shifts[0] == 0, "{change:?}");
+            assert!(change.shifts[1] >= largest, "shifted back: {change:?}");
+            largest = change.shifts[1];
+        }
+    }
+    // 47 blocks of 85 ms, at 60 ppm.
+    assert!((10..=12).contains(&largest), "{largest}");
+}
+
 /// The pilot's error is that of the Cramér-Rao bound: sqrt(2 / (N SNR)) / w for the difference of two
 /// phases.
 #[test]

@@ -35,6 +35,7 @@ mod snapshots;
 #[cfg(unix)]
 mod stream;
 mod track;
+mod two_clocks;
 mod understanding;
 mod usage;
 mod verify;
