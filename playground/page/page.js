@@ -35,7 +35,7 @@ class Program {
 
   get busy() { return this.pending !== undefined; }
 
-  /** Runs the program; resolves to what it answers. `line` is told what it says meanwhile. */
+  /** Runs the program; resolves to its answer. `line` takes each line of its messages. */
   ask(args, input, line = () => {}) {
     this.stop();
     return new Promise((resolve, reject) => {
@@ -276,9 +276,9 @@ function silence() {
   $('sound-status').textContent = '';
 }
 
-const chosen = () => Number(document.querySelector('input[name="heard"]:checked').value);
+const chosen = () => Number(document.querySelector('input[name="playback"]:checked').value);
 
-/** All three recordings run at once, and one of them is heard: a change is heard in the middle of a sound. */
+/** All three recordings run at once and one of them sounds, so the choice can change in the middle. */
 function play() {
   if (player.sources.length) {
     stopPlaying();
@@ -301,7 +301,7 @@ function play() {
   $('play').textContent = 'Stop';
 }
 
-function chooseHeard() {
+function choosePlayback() {
   player.gains.forEach((gain, i) => gain.gain.setTargetAtTime(i === chosen() ? 1 : 0, player.context.currentTime, 0.01));
 }
 
@@ -396,7 +396,7 @@ async function begin() {
   $('signal').onchange = () => { $('file').hidden = $('signal').value !== 'recording'; };
   $('capture').onclick = () => capture(listener);
   $('play').onclick = play;
-  document.querySelectorAll('input[name="heard"]').forEach(input => { input.onchange = chooseHeard; });
+  document.querySelectorAll('input[name="playback"]').forEach(input => { input.onchange = choosePlayback; });
   later(0);
 }
 

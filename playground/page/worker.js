@@ -21,7 +21,7 @@ function joined(parts) {
   return bytes;
 }
 
-/** The calls of WASI for one run. `line` is told what the program says on standard error. */
+/** The calls of WASI for one run. `line` takes each line that the program writes to standard error. */
 function system(args, input, line) {
   const words = args.map(word => new TextEncoder().encode(word + '\0'));
   const output = [];

@@ -1,4 +1,4 @@
-//! Virtual converters capture a signal, and the bank fuses it: what is heard before and after.
+//! Virtual converters capture a signal, and the bank fuses it: the sound before and after.
 
 use crate::answer::{Answer, Refusal, bank};
 use hybank::analog::StrictlyProper;
@@ -15,10 +15,10 @@ use hybank::units::{FastPeriods, Hertz, Seconds};
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// Rates at which browsers play; a bank of another rate is heard slower or faster, at [`USUAL_RATE`].
+/// Rates at which browsers play; a bank of another rate is played slower or faster, at [`USUAL_RATE`].
 const PLAYABLE: std::ops::RangeInclusive<f64> = 8e3..=192e3;
 const USUAL_RATE: f64 = 48e3;
-/// Seconds that are heard of the signals that are made here, and of a recording at most.
+/// Seconds of the signals that are made here, and of a recording at most.
 const LENGTH: f64 = 2.0;
 const MOST_SECONDS: f64 = 30.0;
 /// Tones of the chord, and where the sweep begins and ends, relative to the band of the target.
@@ -28,14 +28,14 @@ const SWEEP: [f64; 2] = [0.01, 0.95];
 const SETTLING: usize = 200;
 
 #[derive(Serialize)]
-struct Heard {
+struct Playback {
     /// Samples per second at which to play.
     rate: f64,
     /// Samples of each of the three recordings, which follow: ideal, interleaved, fused.
     samples: usize,
     interleaved_snr: f64,
     fused_snr: f64,
-    /// What is heard, in a sentence.
+    /// The signal, in a sentence.
     text: String,
     /// The spectra.
     svg: String,
@@ -61,10 +61,10 @@ pub(crate) fn listen(signal: &str, input: &[u8]) -> Result<Answer, Refusal> {
         "recording" => recording(spec, input.get(split + 1..).unwrap_or_default())?,
         _ => return Err(Refusal::new(format!("\"{signal}\": the signals are sweep, chord and recording"))),
     };
-    heard(&bank, spec, &signal)
+    playback(&bank, spec, &signal)
 }
 
-fn heard(bank: &Bank, spec: &Spec, signal: &Signal) -> Result<Answer, Refusal> {
+fn playback(bank: &Bank, spec: &Spec, signal: &Signal) -> Result<Answer, Refusal> {
     // Latency 0: what is fused lines up with the time of the signal.
     let problem = Problem::new(spec, 0).map_err(Refusal::new)?;
     let frames = frames(&problem, &signal.analog, signal.samples, false).map_err(Refusal::new)?;
@@ -74,18 +74,18 @@ fn heard(bank: &Bank, spec: &Spec, signal: &Signal) -> Result<Answer, Refusal> {
     }
     let before = interleaved(&bank.delays_in_fast_periods(), bank.ratio, 0, &channels);
     let after = fused(bank, &channels)?;
-    let judged = |output: &[f64]| snr(&target, output, SETTLING + bank.latency);
+    let snr_of = |output: &[f64]| snr(&target, output, SETTLING + bank.latency);
     let chart =
         overview::spectra(spec.fast_period.rate(), &[("plain interleaving", &before), ("fused", &after)]);
-    let heard = Heard {
+    let playback = Playback {
         rate: played_at(spec),
         samples: target.len(),
-        interleaved_snr: judged(&before),
-        fused_snr: judged(&after),
+        interleaved_snr: snr_of(&before),
+        fused_snr: snr_of(&after),
         text: signal.text.clone(),
         svg: chart.to_svg().map_err(Refusal::new)?,
     };
-    Answer::with_samples(&heard, &[&target, &before, &after])
+    Answer::with_samples(&playback, &[&target, &before, &after])
 }
 
 fn fused(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Refusal> {
@@ -101,10 +101,10 @@ fn fused(bank: &Bank, channels: &[Vec<f64>]) -> Result<Vec<f64>, Refusal> {
 /// 10 log10 of the power of the target over that of the error, without `skipped` samples at either end.
 fn snr(target: &[f64], output: &[f64], skipped: usize) -> f64 {
     let skipped = skipped.min(target.len() / 4);
-    let judged = skipped..target.len() - skipped;
+    let compared = skipped..target.len() - skipped;
     let power = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>();
-    let error = power(&mut judged.clone().map(|n| output[n] - target[n]));
-    10.0 * (power(&mut target[judged].iter().copied()) / error).log10()
+    let error = power(&mut compared.clone().map(|n| output[n] - target[n]));
+    10.0 * (power(&mut target[compared].iter().copied()) / error).log10()
 }
 
 fn is_playable(spec: &Spec) -> bool {
@@ -127,8 +127,8 @@ fn band(spec: &Spec) -> Result<Hertz, Refusal> {
     Ok(Hertz(edge / TAU / spec.fast_period.0))
 }
 
-/// What is said of a signal that is made here.
-fn said(spec: &Spec, signal: String) -> String {
+/// The description of a signal that is made here, with the rate at which it is played.
+fn with_rate(spec: &Spec, signal: String) -> String {
     if is_playable(spec) {
         return signal;
     }
@@ -141,7 +141,7 @@ fn sweep(spec: &Spec) -> Result<Signal, Refusal> {
     let [start, end] = SWEEP.map(|share| Hertz(share * band.0));
     let length = Seconds(spec.fast_period.0 * samples as f64);
     let source = Source::Chirp { start, end, length, amplitude: 1.0 };
-    let text = said(spec, format!("A sweep from {} to {}", readable(start.0, "Hz"), readable(end.0, "Hz")));
+    let text = with_rate(spec, format!("A sweep from {} to {}", readable(start.0, "Hz"), readable(end.0, "Hz")));
     Ok(Signal { analog: Analog::Known(source.normalised(spec.fast_period)), samples, text })
 }
 
@@ -151,7 +151,7 @@ fn chord(spec: &Spec) -> Result<Signal, Refusal> {
     let tone = |f: Hertz| Tone { omega: f.angular(), amplitude: 1.0 / CHORD.len() as f64, phase: 0.3 };
     let source = Source::Tones(tones.map(tone).to_vec());
     let listed = tones.map(|f| readable(f.0, "Hz")).join(", ");
-    let text = said(spec, format!("Tones of {listed}"));
+    let text = with_rate(spec, format!("Tones of {listed}"));
     Ok(Signal {
         analog: Analog::Known(source.normalised(spec.fast_period)),
         samples: usual_samples(spec),
@@ -180,11 +180,11 @@ fn recording(spec: &Spec, file: &[u8]) -> Result<Signal, Refusal> {
     Ok(Signal {
         samples: analog.usual_samples(spec.ratio),
         analog,
-        text: said_of_recording(spec, header.channels, filled > most * header.frame_bytes()),
+        text: recording_text(spec, header.channels, filled > most * header.frame_bytes()),
     })
 }
 
-fn said_of_recording(spec: &Spec, channels: usize, is_cut: bool) -> String {
+fn recording_text(spec: &Spec, channels: usize, is_cut: bool) -> String {
     let mut text = String::from("The recording");
     if channels > 1 {
         text += ", its first channel";

@@ -173,7 +173,7 @@ async function sounds() {
   }
   await click('play');
   assert.equal(await text('play'), 'Stop');
-  await chromium.value(`document.querySelector('input[name="heard"][value="1"]').click()`);
+  await chromium.value(`document.querySelector('input[name="playback"][value="1"]').click()`);
   await click('play');
   assert.equal(await text('play'), 'Play');
   return said.join(', ');
