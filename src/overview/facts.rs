@@ -65,6 +65,21 @@ fn number(value: f64) -> String {
     }
 }
 
+/// A proven interval. Its ends are rounded outwards, so that what is printed is proven too.
+fn interval(lower: f64, upper: f64) -> String {
+    format!("{} to {}", beyond(lower, -1.0), beyond(upper, 1.0))
+}
+
+/// The [`number`] next to the value in `direction`, 1 or -1.
+fn beyond(value: f64, direction: f64) -> String {
+    let text = number(value);
+    if text.parse().is_ok_and(|rounded: f64| direction * (rounded - value) >= 0.0) {
+        return text;
+    }
+    let last_digit = 10f64.powi(value.abs().log10().floor() as i32 - 5);
+    number(value + direction * last_digit)
+}
+
 impl Facts {
     /// Of a bank and its spec. The bounds are proven again: only what `verify` proves of a file is reported.
     ///
@@ -100,7 +115,7 @@ fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact
     facts.push(match verify(bank) {
         Ok(proven) => fact(
             "proven",
-            format!("{} to {}", number(proven.lower), number(proven.upper)),
+            interval(proven.lower, proven.upper),
             format!(
                 "this bank has at most the larger value, and {} has less than the smaller one; proven for this page",
                 match proven.lower_banks {
@@ -210,6 +225,19 @@ mod tests {
             (1e-9, "1.00000e-9"),
         ] {
             assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn proven_ends_are_rounded_outwards() {
+        for (lower, upper, text) in [
+            (0.031_293_64, 0.031_293_64, "0.0312936 to 0.0312937"),
+            (0.031_293_69, 0.031_293_69, "0.0312936 to 0.0312937"),
+            (0.25, 0.5, "0.25 to 0.5"),
+            (0.0, 0.999_999_9, "0 to 1"),
+            (1.000_001e-9, 1.000_001e-9, "1.00000e-9 to 1.00001e-9"),
+        ] {
+            assert_eq!(interval(lower, upper), text);
         }
     }
 }
