@@ -6,6 +6,7 @@ on many machines, ``hybank.ibr`` renders views.
 
 import importlib
 
+from hybank import _pickles  # noqa: F401
 from hybank._hybank import (
     Analysis,
     Bank,

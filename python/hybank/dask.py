@@ -7,9 +7,11 @@ tasks also return their states at both ends; where the states of two spans diffe
 again from the state of the earlier one.
 """
 
+import json
 import math
 import os
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -38,11 +40,14 @@ class Report:
 def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="auto", span=SPAN, progress=None):
     """Fuse an archive into a new one; the output has the bits of ``bank.fuse`` over all of it.
 
-    ``source`` is a zarr array, an ``.npy`` file, ``("file.h5", "dataset")``, or a list of WAV or SigMF files with a
-    channel or more each. ``axis`` is the axis of time of arrays. ``sink`` is an ``.npy`` file or a zarr array, which
-    is made anew. ``client`` is a ``dask.distributed.Client``; without one this process does one span after another.
-    ``span`` is the least number of frames of a task. ``progress(done, spans)`` is called after every span.
+    ``source`` is the path of a zarr array or of an ``.npy`` file, ``("file.h5", "dataset")``, or a list of WAV or SigMF
+    files with a channel or more each. ``axis`` is the axis of time of arrays. ``sink`` is the path of an ``.npy`` file
+    or of a zarr array, which is made anew; a source or another kind of file is refused. ``client`` is a
+    ``dask.distributed.Client``; without one this process does one span after another. ``span`` is the least number of
+    frames of a task. ``progress(done, spans)`` is called after every span.
     """
+    source, sink = _located(source), _location(sink)
+    _check_sink(sink, source)
     reader = _open(source, axis)
     if reader.channels != bank.channels:
         raise HybankError(f"the source has {reader.channels} channels, the bank has {bank.channels}")
@@ -68,6 +73,8 @@ def sweep(specs, *, map=map, client=None, progress=None, **keywords):  # noqa: A
     ``dask.distributed.Client`` in its place. ``progress(done, specs)`` is called after every design. Keywords go to
     ``hybank.design``.
     """
+    if isinstance(specs, (str, os.PathLike, Mapping)):
+        raise TypeError("specs: give a list of specs; for a single one, call hybank.design")
     specs = [spec if isinstance(spec, (str, os.PathLike)) else dict(spec) for spec in specs]
     tasks = [(spec, keywords) for spec in specs]
     if client is not None:
@@ -283,6 +290,8 @@ class _Array:
     """An array of samples on disk, read by frames."""
 
     def __init__(self, array, axis):
+        if axis not in (-2, -1, 0, 1):
+            raise HybankError(f"axis {axis} is not the axis of time; give 0 or 1")
         if array.ndim not in (1, 2):
             raise HybankError(f"the source has {array.ndim} dimensions; give one of shape (N, T), or (T, N) with axis=0")
         self.array, self.by_frames = array, array.ndim == 2 and axis in (0, -2)
@@ -305,6 +314,8 @@ class _Recordings:
     axis = 0
 
     def __init__(self, paths):
+        if not paths:
+            raise HybankError("the list of recordings is empty; give one file or more")
         self.files = [Recording(path) for path in paths]
         lengths = {file.frames for file in self.files}
         if len(lengths) != 1:
@@ -324,25 +335,75 @@ def _open(source, axis):
         return _Array(h5py.File(path, "r")[name], axis)
     if isinstance(source, list):
         return _Recordings(source)
-    name = os.fspath(source)
-    if name.lower().endswith((".wav", ".sigmf-meta", ".sigmf-data")):
-        return _Recordings([name])
-    if name.endswith(".npy"):
-        return _Array(np.load(name, mmap_mode="r"), axis)
+    if _is_npy(source):
+        return _Array(np.load(source, mmap_mode="r"), axis)
     import zarr
 
-    return _Array(zarr.open_array(name, mode="r"), axis)
+    return _Array(zarr.open_array(source, mode="r"), axis)
+
+
+_RECORDINGS = (".wav", ".sigmf-meta", ".sigmf-data")
+_OTHER_FILES = (*_RECORDINGS, ".sigmf", ".h5", ".hdf5", ".npz", ".mat", ".csv", ".flac", ".bin", ".raw")
+
+
+def _is_npy(name):
+    return name.lower().endswith(".npy")
+
+
+def _is_recording(name):
+    return isinstance(name, (str, os.PathLike)) and os.fspath(name).lower().endswith(_RECORDINGS)
+
+
+def _location(path):
+    """An absolute path or a URL: workers may be in another folder."""
+    try:
+        name = os.fspath(path)
+    except TypeError:
+        raise TypeError(f"give the path of a file or of a zarr array, not {type(path).__name__}") from None
+    return name if "://" in name else os.path.abspath(name)
+
+
+def _located(source):
+    """The source with absolute paths: a path, a pair of a file and a dataset, or a list of recordings."""
+    if isinstance(source, (list, tuple)) and (isinstance(source, list) or all(map(_is_recording, source))):
+        return [_location(path) for path in source]
+    if isinstance(source, tuple):
+        path, dataset = source
+        return _location(path), dataset
+    return [_location(source)] if _is_recording(source) else _location(source)
+
+
+def _check_sink(sink, source):
+    """Refuses a sink that would replace a source, or anything that is no array."""
+    sources = source if isinstance(source, list) else [source[0] if isinstance(source, tuple) else source]
+    if os.path.realpath(sink) in map(os.path.realpath, sources):
+        raise HybankError(f"{sink} is the source; give another sink")
+    if _is_npy(sink):
+        return
+    if sink.lower().endswith(_OTHER_FILES) or os.path.isfile(sink):
+        raise HybankError(f"{sink}: a sink is an .npy file or a zarr array, not another kind of file")
+    if os.path.isdir(sink) and os.listdir(sink) and not _is_zarr_array(sink):
+        raise HybankError(f"{sink} is a folder that is no zarr array, and its files would be lost; give another sink")
+
+
+def _is_zarr_array(folder):
+    if os.path.exists(os.path.join(folder, ".zarray")):
+        return True
+    try:
+        with open(os.path.join(folder, "zarr.json"), encoding="utf-8") as file:
+            return json.load(file).get("node_type") == "array"
+    except (OSError, ValueError):
+        return False
 
 
 def _create(sink, samples, dtype, chunk):
-    name = os.fspath(sink)
-    if name.endswith(".npy"):
-        np.lib.format.open_memmap(name, mode="w+", dtype=dtype, shape=(samples,)).flush()
+    if _is_npy(sink):
+        np.lib.format.open_memmap(sink, mode="w+", dtype=dtype, shape=(samples,)).flush()
         return
     import zarr
 
     # A chunk is the region of a span, so no two tasks write to one.
-    zarr.create_array(name, shape=(samples,), chunks=(min(chunk, max(samples, 1)),), dtype=dtype, overwrite=True)
+    zarr.create_array(sink, shape=(samples,), chunks=(min(chunk, max(samples, 1)),), dtype=dtype, overwrite=True)
 
 
 class _NpySink:
@@ -364,9 +425,8 @@ class _NpySink:
 
 
 def _writer(sink):
-    name = os.fspath(sink)
-    if name.endswith(".npy"):
-        return _NpySink(name)
+    if _is_npy(sink):
+        return _NpySink(sink)
     import zarr
 
-    return zarr.open_array(name, mode="r+")
+    return zarr.open_array(sink, mode="r+")

@@ -1,10 +1,20 @@
 """Image-based rendering: virtual views from views with depth, as arrays."""
 
+import operator
+
 import numpy as np
 
-from hybank._hybank import HybankError, View, render_calibrated, render_rectified
+from hybank._hybank import (
+    MOST_PIXELS,
+    Geometry,
+    HybankError,
+    View,
+    render_calibrated,
+    render_rectified,
+    render_uncalibrated,
+)
 
-__all__ = ["View", "render"]
+__all__ = ["Geometry", "View", "render"]
 
 
 def render(
@@ -16,38 +26,101 @@ def render(
     depth=None,
     cameras=None,
     camera=None,
+    tracks=None,
+    points=None,
     size=None,
     method="auto",
     fill=True,
+    reverse_order=False,
 ):
     """Render the view of a virtual camera.
 
-    ``images`` are arrays (H, W) or (H, W, 3) with intensities 0 to 255. A rectified rig has a ``disparity`` map (H, W)
-    per image, in pixels for a baseline of one, ``positions`` along the baseline, and renders the view ``at`` a position.
-    Other rigs have a ``depth`` map per image, ``cameras`` (3, 4), and render the view of ``camera`` with ``size``
-    (H, W), that of the first image unless given. NaN and 0 are unknown depth; ``fill=False`` leaves such pixels out.
+    ``images`` are arrays (H, W) or (H, W, 3) with intensities 0 to 255. There are three kinds of views:
+
+    - A rectified rig has a ``disparity`` map (H, W) per image, in pixels for a baseline of one, ``positions`` along the
+      baseline, and renders the view ``at`` a position.
+    - Calibrated cameras have a ``depth`` map per image and ``cameras`` (3, 4), and render the view of ``camera``.
+    - Views without cameras have ``tracks`` (P, V, 2): x and y of P points in V images, NaN where a point is not seen.
+      The virtual camera is given by ``points`` (P, 2), the same points in it, or lies ``at`` 0 to 1 between the first
+      two views. A ``UserWarning`` says that the order of depth is undecided; ``reverse_order=True`` takes the other one.
+
+    ``size`` (H, W) is that of the first image unless given; a rectified rig has that of its images. NaN and 0 are
+    unknown depth; ``fill=False`` leaves such pixels out. ``method`` is ``"rows"`` or ``"plane"`` for rectified rigs,
+    which take rows unless told otherwise.
     """
     images = [_image(image) for image in images]
-    if disparity is not None and positions is not None and at is not None:
+    rectified = disparity is not None and positions is not None and at is not None
+    calibrated = depth is not None and cameras is not None and camera is not None
+    uncalibrated = tracks is not None and (points is None) != (at is None)
+    if rectified + calibrated + uncalibrated != 1:
+        raise HybankError(
+            "give disparity, positions and at of a rectified rig, or depth, cameras and camera of another one, or tracks"
+            " and either points or at of views without cameras"
+        )
+    if rectified:
         maps = _maps(images, disparity, "disparity", positions, "positions")
         return render_rectified(images, maps, [float(p) for p in positions], float(at), method, fill)
-    if depth is not None and cameras is not None and camera is not None:
+    size = _size(images, size)
+    if calibrated:
         maps = _maps(images, depth, "depth", cameras, "cameras")
-        size = images[0].shape[:2] if size is None else tuple(size)
-        matrices = [np.ascontiguousarray(matrix, float) for matrix in cameras]
-        return render_calibrated(images, maps, matrices, np.ascontiguousarray(camera, float), size, method, fill)
-    raise HybankError("give disparity, positions and at of a rectified rig, or depth, cameras and camera of another one")
+        matrices = [_camera(matrix) for matrix in cameras]
+        return render_calibrated(images, maps, matrices, _camera(camera), size, method, fill)
+    tracks, points = _tracks(tracks, points, len(images))
+    return render_uncalibrated(images, tracks, points, 0.0 if at is None else float(at), size, bool(reverse_order))
+
+
+def _size(images, size):
+    if size is None:
+        return images[0].shape[:2] if images else (0, 0)
+    height, width = map(operator.index, size)
+    if height < 1 or width < 1 or height * width > MOST_PIXELS:
+        raise HybankError(f"size ({height}, {width}): a view has a pixel or more in each direction, {MOST_PIXELS} at most")
+    return height, width
+
+
+def _camera(matrix):
+    matrix = _floats(matrix, float, "a camera")
+    if matrix.shape != (3, 4):
+        raise HybankError(f"a camera is a matrix of shape (3, 4), not {matrix.shape}")
+    return matrix
+
+
+def _tracks(tracks, points, views):
+    tracks = _floats(tracks, float, "the array of tracks")
+    if tracks.ndim != 3 or tracks.shape[1:] != (views, 2):
+        raise HybankError(f"the tracks of {views} images have the shape (P, {views}, 2), not {tracks.shape}")
+    if points is not None:
+        points = _floats(points, float, "the array of points")
+        if points.shape != (len(tracks), 2):
+            raise HybankError(f"points has the shape ({len(tracks)}, 2) for {len(tracks)} tracks, not {points.shape}")
+    if np.isinf(tracks).any() or (points is not None and np.isinf(points).any()):
+        raise HybankError("a position of a point is infinite; NaN marks points that are not seen")
+    return tracks, points
 
 
 def _image(image):
     image = np.asarray(image)
-    if image.ndim not in (2, 3):
+    if image.ndim not in (2, 3) or image.shape[2:] not in ((), (1,), (3,)) or 0 in image.shape:
         raise HybankError(f"an image has the shape (H, W) or (H, W, 3), not {image.shape}")
-    return np.ascontiguousarray(image if image.ndim == 3 else image[:, :, None], np.float32)
+    image = _floats(image if image.ndim == 3 else image[:, :, None], np.float32, "an image")
+    if not np.isfinite(image).all():
+        raise HybankError("an image has values that are not finite; intensities are numbers from 0 to 255")
+    return image
 
 
 def _maps(images, maps, name, others, other):
-    maps = [np.ascontiguousarray(map_, np.float32) for map_ in maps]
+    maps = [_floats(map_, np.float32, f"a map of {name}") for map_ in maps]
     if not len(images) == len(maps) == len(others):
         raise HybankError(f"{len(images)} images need as many of {name} and {other}, not {len(maps)} and {len(others)}")
+    for image, map_ in zip(images, maps, strict=True):
+        if map_.shape != image.shape[:2]:
+            raise HybankError(
+                f"a map of {name} has the shape {map_.shape}; it needs the pixels of its image, {image.shape[:2]}"
+            )
     return maps
+
+
+def _floats(array, dtype, name):
+    if np.iscomplexobj(array):
+        raise HybankError(f"{name} is complex; give its real part")
+    return np.ascontiguousarray(array, dtype)

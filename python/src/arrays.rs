@@ -3,12 +3,19 @@
 use crate::errors::{HybankError, refused};
 use crate::formats::{Format, Number};
 use crate::samples::{Part, Samples};
-use hybank::runtime::{Interleaved, PcmFrames, SampleLayout};
+use hybank::memory::available_memory;
+use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, SampleLayout};
 use numpy::{
     Complex32, Complex64, Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
+
+/// Lists of doubles that a computation on samples holds at once, about: the samples, those of each channel,
+/// transforms and spectra.
+const WORK: usize = 8;
 
 /// What an array of samples must look like.
 #[derive(Debug, Clone, Copy)]
@@ -46,10 +53,10 @@ enum Numbers<'py> {
 
 impl<'py> Held<'py> {
     /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it
-    /// is. Others (slices with steps, foreign byte orders, lists) are copied first.
+    /// is. Others (slices with steps, foreign byte orders, float16, lists) are copied first.
     pub(crate) fn new(x: &Bound<'py, PyAny>, shape: Shape) -> PyResult<Self> {
-        let Ok(array) = x.cast::<PyUntypedArray>() else {
-            return Self::new(&x.py().import("numpy")?.call_method1("asarray", (x,))?, shape);
+        let Ok(array) = x.cast_exact::<PyUntypedArray>() else {
+            return Self::new(&plain(x)?, shape);
         };
         let [channels, frames] = shape.of(array)?;
         let (by_rows, by_columns) = (array.is_c_contiguous(), array.is_fortran_contiguous());
@@ -80,16 +87,19 @@ impl<'py> Held<'py> {
         Self::converted(array, shape)
     }
 
-    /// From another byte order.
+    /// From another byte order, or from floats of half precision.
     fn converted(array: &Bound<'py, PyUntypedArray>, shape: Shape) -> PyResult<Self> {
         let dtype = array.getattr("dtype")?;
         if !dtype.getattr("isnative")?.extract::<bool>()? {
             let native = dtype.call_method1("newbyteorder", ("=",))?;
             return Self::new(&array.call_method1("astype", (native,))?, shape);
         }
+        if dtype.getattr("char")?.eq("e")? {
+            return Self::new(&array.call_method1("astype", ("f4",))?, shape);
+        }
         Err(HybankError::new_err(format!(
-            "samples of {dtype} have no full scale; convert them to float32, float64, int16, int32, int8, uint8, complex64 \
-             or complex128"
+            "samples of {dtype} cannot be read; convert them to float32, float64, int16, int32, int8, uint8, complex64 or \
+             complex128"
         )))
     }
 
@@ -122,6 +132,30 @@ impl<'py> Held<'py> {
             Numbers::I16(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
             Numbers::I32(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
         })
+    }
+
+    /// Frame after frame as doubles: the samples, or the real (0) or imaginary (1) parts of complex ones.
+    ///
+    /// Raises `MemoryError` if there is no memory for [`WORK`] such lists.
+    pub(crate) fn doubles(&self, part: usize) -> PyResult<Vec<f64>> {
+        let count = self.layout.frames.saturating_mul(self.layout.channels);
+        let bytes = count.saturating_mul(WORK * size_of::<f64>());
+        if available_memory().is_some_and(|memory| bytes as f64 > memory) {
+            let text =
+                format!("{count} samples need about {:.0} GB of memory; give fewer", bytes as f64 / 1e9);
+            return Err(PyMemoryError::new_err(text));
+        }
+        let mut frames = vec![0.0; count];
+        let mut samples = self.samples()?;
+        samples.select(part);
+        samples.load(Isa::detect(), 0, &mut frames);
+        Ok(frames)
+    }
+
+    /// Lowest and highest value of a sample of integers; `None` for floats.
+    pub(crate) fn rails(&self) -> Option<(f64, f64)> {
+        let pcm = self.format.number.pcm()?;
+        Some((-1.0, 1.0 - 2f64.powi(1 - 8 * pcm.bytes() as i32)))
     }
 }
 
@@ -162,7 +196,7 @@ impl Shape {
             (false, _) => "",
         };
         Err(HybankError::new_err(format!(
-            "the samples {sizes:?} have {channels} channels (time along axis {}), the bank has {wanted}{remedy}",
+            "the samples {sizes:?} have {channels} channels (time along axis {}) instead of {wanted}{remedy}",
             self.axis
         )))
     }
@@ -224,6 +258,23 @@ impl<'py> Numbers<'py> {
             Self::I16(_) => Number::I16,
             Self::I32(_) => Number::I32,
         }
+    }
+}
+
+/// The array of a list, of an object of another package, or of a subclass.
+fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let numpy = x.py().import("numpy")?;
+    if numpy.getattr("ma")?.call_method1("is_masked", (x,))?.extract()? {
+        return Err(HybankError::new_err(
+            "samples are masked; x.filled(np.nan) marks them as missing, x.data takes them as they are",
+        ));
+    }
+    let array = numpy.call_method1("asarray", (x,))?;
+    // Numbers of a list are no samples of a converter.
+    let is_list = x.is_instance_of::<PyList>() || x.is_instance_of::<PyTuple>();
+    match is_list && array.getattr("dtype")?.getattr("kind")?.eq("i")? {
+        true => array.call_method1("astype", ("f8",)),
+        false => Ok(array),
     }
 }
 

@@ -10,8 +10,8 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::Duration;
 
-/// Time between two looks for signals.
-const LOOK: Duration = Duration::from_millis(20);
+/// Time between two checks for signals.
+const POLL: Duration = Duration::from_millis(20);
 /// Recursions of the solvers fit the stack of a main thread.
 const STACK_BYTES: usize = 16 << 20;
 
@@ -56,9 +56,9 @@ pub(crate) fn run<T: Send + 'static>(
     })?;
     let mut wait = || loop {
         let inbox = &mut messages;
-        match py.detach(move || inbox.recv_timeout(LOOK)) {
+        match py.detach(move || inbox.recv_timeout(POLL)) {
             Ok(Message::Done(result)) => return Ok(result),
-            Ok(Message::Stage(stage, seconds)) => tell(progress, stage, seconds)?,
+            Ok(Message::Stage(stage, seconds)) => report(progress, stage, seconds)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(HybankError::new_err(
@@ -73,7 +73,7 @@ pub(crate) fn run<T: Send + 'static>(
     result
 }
 
-fn tell(progress: Option<&Bound<'_, PyAny>>, stage: Stage, seconds: f64) -> PyResult<()> {
+fn report(progress: Option<&Bound<'_, PyAny>>, stage: Stage, seconds: f64) -> PyResult<()> {
     let Some(progress) = progress else { return Ok(()) };
     progress.call1((stage.to_string(), seconds)).map(drop)
 }

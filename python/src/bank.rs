@@ -1,6 +1,7 @@
 //! `hybank.Bank` and `hybank.load`.
 
 use crate::arrays::Shape;
+use crate::background;
 use crate::errors::{HybankError, file_error, refused};
 use crate::fuse::{self, Request};
 use crate::results::Gamma;
@@ -19,6 +20,9 @@ use std::sync::Arc;
 
 /// Most states of a realisation as dense matrices: 128 MiB.
 const MOST_DENSE_STATES: usize = 4096;
+
+/// Most frequencies of a response, which take a minute.
+const MOST_FREQUENCIES: usize = 10_000_000;
 
 /// Reads a bank file.
 #[pyfunction]
@@ -173,9 +177,13 @@ impl Bank {
 
     /// The largest gain of the error system at `n` frequencies from 0 to half the slow rate: (hertz, gain).
     #[pyo3(signature = (n = 512))]
-    fn error_response<'py>(&self, py: Python<'py>, n: usize) -> PyResult<(Array<'py>, Array<'py>)> {
+    fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Array<'py>, Array<'py>)> {
+        let count = usize::try_from(n).ok().filter(|&count| count <= MOST_FREQUENCIES).ok_or_else(|| {
+            HybankError::new_err(format!("n: {n} frequencies; give 0 to {MOST_FREQUENCIES}"))
+        })?;
         let bank = Arc::clone(&self.bank);
-        let points = py.detach(|| design::error_response(&bank, n)).map_err(refused)?;
+        let points = background::run(py, None, move |_| design::error_response(&bank, count))?;
+        let points = points.map_err(refused)?;
         let (hertz, gain): (Vec<f64>, Vec<f64>) =
             points.into_iter().map(|(hertz, gain)| (hertz.0, gain)).unzip();
         Ok((PyArray1::from_vec(py, hertz), PyArray1::from_vec(py, gain)))
@@ -201,7 +209,7 @@ impl Bank {
         x: &Bound<'py, PyAny>,
         axis: isize,
         dtype: Option<Bound<'py, PyAny>>,
-        threads: u16,
+        threads: i64,
         gaps: Option<&str>,
         algorithm: &str,
         keep_latency: bool,

@@ -5,7 +5,6 @@ use crate::background;
 use crate::errors::{HybankError, refused};
 use crate::sources;
 use hybank::calibrate::{self as calibration, ChannelEstimate, Evidence, Fit, Record, Settings, applied};
-use hybank::runtime::{Input, Isa};
 use hybank::sine_fit::Estimate;
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -15,6 +14,7 @@ use pyo3::prelude::*;
 /// What a calibration found. Arrays have one value per channel; it is NaN where the spec's value stands.
 /// `.._sigma` are standard deviations.
 #[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
 pub(crate) struct Calibration {
     /// The spec with these values and their intervals, as TOML.
     spec: String,
@@ -36,7 +36,7 @@ pub(crate) struct Calibration {
     frames: usize,
     /// Clipped samples of each channel, which were left out.
     clipped: Vec<usize>,
-    /// 1 where the model fits to the noise; None if nothing is left to judge it by.
+    /// 1 where the model fits to the noise; None if there are no degrees of freedom left.
     misfit: Option<f64>,
     /// What a reader of the values must know.
     remarks: Vec<String>,
@@ -73,8 +73,10 @@ pub(crate) fn calibrate(
 ) -> PyResult<Calibration> {
     let py = x.py();
     let spec = sources::spec(spec)?;
-    let records = records(x, Shape { axis, channels: spec.channels.len() }, clip)?;
+    let held = Held::new(x, Shape { axis, channels: spec.channels.len() })?;
     let signal = Signal::new(&spec, tones, waveform, rate, blind)?;
+    signal.check(held.format.complex)?;
+    let records = records(&held, spec.channels.len(), clip)?;
     let settings = Settings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found = background::run(py, None, move |_| {
@@ -101,11 +103,7 @@ impl Signal {
         let wrong = |message: &str| Err(HybankError::new_err(message.to_owned()));
         match (tones, waveform, blind) {
             (tones, None, false) => {
-                let tones = tones.unwrap_or_default();
-                if tones.iter().any(|&tone| !(tone > 0.0 && tone.is_finite())) {
-                    return wrong("tones: frequencies are positive numbers, in hertz");
-                }
-                Ok(Self::Tones(tones.into_iter().map(Hertz).collect()))
+                Ok(Self::Tones(tones.unwrap_or_default().into_iter().map(Hertz).collect()))
             }
             (None, Some(samples), false) => {
                 let fast = spec.fast_period.rate();
@@ -120,6 +118,21 @@ impl Signal {
         }
     }
 
+    /// Refuses what real samples, or complex ones, cannot hold.
+    fn check(&self, is_complex: bool) -> PyResult<()> {
+        let refuse = |message| Err(HybankError::new_err(message));
+        let is_frequency = |tone: &Hertz| tone.0.is_finite() && (tone.0 > 0.0 || is_complex && tone.0 < 0.0);
+        match self {
+            Self::Tones(tones) if tones.iter().all(is_frequency) => Ok(()),
+            Self::Tones(_) if is_complex => refuse("tones: frequencies are finite and not 0, in hertz"),
+            Self::Tones(_) => refuse("tones: frequencies of real samples are positive numbers, in hertz"),
+            _ if is_complex => refuse(
+                "complex samples are calibrated by tones; for waveform and blind give the real or the imaginary parts",
+            ),
+            _ => Ok(()),
+        }
+    }
+
     fn evidence(&self) -> Evidence<'_> {
         match self {
             Self::Tones(tones) => Evidence::Tones(tones),
@@ -130,24 +143,21 @@ impl Signal {
 }
 
 /// One record per channel. Integers clip at the ends of their range, floats where `clip` says.
-fn records(x: &Bound<'_, PyAny>, shape: Shape, clip: Option<f64>) -> PyResult<Vec<Record>> {
-    let held = Held::new(x, shape)?;
-    if held.format.complex {
-        return Err(HybankError::new_err("calibrate takes real samples; give the real part"));
-    }
+fn records(held: &Held<'_>, channels: usize, clip: Option<f64>) -> PyResult<Vec<Record>> {
     if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
         return Err(HybankError::new_err("clip: give a positive level"));
     }
-    let top = held.format.number.pcm().map(|format| 1.0 - 2f64.powi(1 - 8 * format.bytes() as i32));
-    let (lowest, highest) = match (clip, top) {
-        (Some(level), _) => (-level, level),
-        (None, Some(top)) => (-1.0, top),
-        (None, None) => (f64::NEG_INFINITY, f64::INFINITY),
+    let unbounded = (f64::NEG_INFINITY, f64::INFINITY);
+    let (lowest, highest) = clip.map(|level| (-level, level)).or(held.rails()).unwrap_or(unbounded);
+    let part = |part| -> PyResult<Vec<Record>> {
+        let frames = held.doubles(part)?;
+        let channel = |i| frames.iter().skip(i).step_by(channels).copied().collect();
+        Ok((0..channels).map(|i| Record::within(channel(i), lowest, highest)).collect())
     };
-    let mut frames = vec![0.0; held.frames() * shape.channels];
-    held.samples()?.load(Isa::detect(), 0, &mut frames);
-    let channel = |i| frames.iter().skip(i).step_by(shape.channels).copied().collect();
-    Ok((0..shape.channels).map(|i| Record::within(channel(i), lowest, highest)).collect())
+    if !held.format.complex {
+        return part(0);
+    }
+    Ok(part(0)?.into_iter().zip(part(1)?).map(|(real, imaginary)| Record::complex(real, imaginary)).collect())
 }
 
 fn fitted(names: &[String]) -> PyResult<Fit> {

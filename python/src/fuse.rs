@@ -11,6 +11,9 @@ use hybank::runtime::{Algorithm, Options, Plan, ThreadPool};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
+/// Most threads: more than any processor has, and as many as start at once.
+const MOST_THREADS: i64 = 1024;
+
 /// How an array is to be fused.
 pub(crate) struct Request {
     workers: Option<ThreadPool>,
@@ -21,7 +24,7 @@ pub(crate) struct Request {
 
 impl Request {
     pub(crate) fn new(
-        threads: u16,
+        threads: i64,
         gaps: Option<&str>,
         algorithm: &str,
         keep_latency: bool,
@@ -36,8 +39,7 @@ impl Request {
                 )));
             }
         };
-        let workers = if threads == 1 { None } else { Some(ThreadPool::new(threads.into())?) };
-        Ok(Self { workers, gaps, algorithm: parse_algorithm(algorithm)?, keep_latency })
+        Ok(Self { workers: workers(threads)?, gaps, algorithm: parse_algorithm(algorithm)?, keep_latency })
     }
 
     /// As the command line chooses: the fastest, and direct where gaps are filled, so that outputs that no
@@ -46,6 +48,17 @@ impl Request {
         let auto =
             if self.gaps.is_some() { Algorithm::Direct } else { Algorithm::Auto { added_latency: true } };
         self.algorithm.unwrap_or(auto)
+    }
+}
+
+/// The threads beside the caller's; `None` for a single one.
+fn workers(threads: i64) -> PyResult<Option<ThreadPool>> {
+    match usize::try_from(threads) {
+        Ok(1) => Ok(None),
+        Ok(count) if threads <= MOST_THREADS => Ok(Some(ThreadPool::new(count)?)),
+        _ => Err(HybankError::new_err(format!(
+            "threads: {threads} is not from 1 to {MOST_THREADS}, or 0 for one per processor"
+        ))),
     }
 }
 
@@ -89,8 +102,8 @@ pub(crate) fn fuse<'py>(
     };
     let mut report = Report::default();
     for part in 0..=usize::from(format.complex) {
-        input.turn_to(part);
-        room.turn_to(part);
+        input.select(part);
+        room.select(part);
         let whole = py.detach(|| pipeline::fuse(bank, &plan, &input, &mut room, settings));
         report.add(whole.map_err(refused)?);
     }
@@ -129,8 +142,8 @@ impl Report {
         let mask = self.whole.mask;
         let gaps = self.whole.gaps;
         FuseReport {
-            algorithm: summary.algorithm,
-            numbers: summary.numbers,
+            algorithm: summary.algorithm.to_owned(),
+            numbers: summary.numbers.to_owned(),
             isa: summary.isa,
             latency_dropped: if keep_latency { plan.extra_latency() } else { plan.latency() },
             clipped: self.clipped,

@@ -15,9 +15,10 @@ mod errors;
 mod formats;
 mod fuse;
 mod ibr;
-mod judge;
 mod measure;
 mod outputs;
+mod pickles;
+mod proofs;
 mod recordings;
 mod results;
 mod samples;
@@ -33,6 +34,7 @@ use pyo3::prelude::*;
 fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("MOST_PIXELS", hybank_ibr::image::MOST_PIXELS)?;
     module.add("HybankError", py.get_type::<errors::HybankError>())?;
     module.add("SpecError", py.get_type::<errors::SpecError>())?;
     module.add_class::<bank::Bank>()?;
@@ -46,15 +48,18 @@ fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<calibrate::Calibration>()?;
     module.add_class::<measure::Measurement>()?;
     module.add_class::<ibr::View>()?;
+    module.add_class::<ibr::Geometry>()?;
     module.add_function(wrap_pyfunction!(design::design, module)?)?;
     module.add_function(wrap_pyfunction!(bank::load, module)?)?;
-    module.add_function(wrap_pyfunction!(judge::verify, module)?)?;
-    module.add_function(wrap_pyfunction!(judge::analyze, module)?)?;
+    module.add_function(wrap_pyfunction!(proofs::verify, module)?)?;
+    module.add_function(wrap_pyfunction!(proofs::analyze, module)?)?;
     module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(calibrate::calibrate, module)?)?;
     module.add_function(wrap_pyfunction!(measure::measure, module)?)?;
     module.add_function(wrap_pyfunction!(outputs::encode, module)?)?;
+    module.add_function(wrap_pyfunction!(pickles::restored, module)?)?;
     module.add_function(wrap_pyfunction!(ibr::render_rectified, module)?)?;
     module.add_function(wrap_pyfunction!(ibr::render_calibrated, module)?)?;
+    module.add_function(wrap_pyfunction!(ibr::render_uncalibrated, module)?)?;
     Ok(())
 }

@@ -3,14 +3,15 @@
 use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::errors::{HybankError, refused};
-use hybank::measure::{self as quality, Settings, Window};
-use hybank::runtime::{Input, Isa};
+use hybank::measure::{self as quality, Imbalance, Settings, Window};
 use hybank::units::{Decibels, Hertz};
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyComplex;
 
 /// The figures of a converter from the record of a tone.
 #[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
 pub(crate) struct Measurement {
     /// Signal over everything else but the constant, in dB.
     sinad: f64,
@@ -26,13 +27,16 @@ pub(crate) struct Measurement {
     sfdr: f64,
     /// Noise per hertz relative to a sine of full scale, in dB.
     noise_density: f64,
-    /// The constant part.
-    offset: f64,
+    /// The constant part; of complex samples that of the real and of the imaginary parts.
+    offset: Py<PyAny>,
     /// Tones: frequency in hertz, amplitude, phase in radians at the first sample.
     tones: Vec<(f64, f64, f64)>,
     /// Lines beside the tones, largest first: frequency in hertz, level in dB relative to the largest tone,
     /// causes.
     spurs: Vec<(f64, f64, String)>,
+    /// Of complex samples, per tone: gain of the imaginary part relative to the real one, error of their
+    /// quadrature in radians, and image rejection in dB. None for real samples.
+    imbalances: Option<Vec<(f64, f64, f64)>>,
     /// Samples at the rails, and samples that are not finite.
     clipped: usize,
     left_out: usize,
@@ -76,15 +80,14 @@ pub(crate) fn measure(
         window: parse_window(window)?,
     };
     let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
-    if held.format.complex {
-        return Err(HybankError::new_err("measure takes real samples; give the real part"));
-    }
-    let rails = held.format.number.pcm().map(|format| (-1.0, 1.0 - 2f64.powi(1 - 8 * format.bytes() as i32)));
-    let settings = Settings { rails: rails.unwrap_or(settings.rails), ..settings };
-    let mut samples = vec![0.0; held.frames()];
-    held.samples()?.load(Isa::detect(), 0, &mut samples);
-    let found = background::run(y.py(), None, move |_| quality::measure(&samples, Hertz(rate), &settings))?;
-    Ok(result(y.py(), found.map_err(refused)?))
+    let settings = Settings { rails: held.rails().unwrap_or(settings.rails), ..settings };
+    let (real, rate) = (held.doubles(0)?, Hertz(rate));
+    let imaginary = if held.format.complex { Some(held.doubles(1)?) } else { None };
+    let found = background::run(y.py(), None, move |_| match imaginary {
+        Some(imaginary) => quality::measure_complex(&real, &imaginary, rate, &settings),
+        None => quality::measure(&real, rate, &settings),
+    })?;
+    result(y.py(), found.map_err(refused)?)
 }
 
 fn parse_window(name: &str) -> PyResult<Window> {
@@ -99,7 +102,7 @@ fn parse_window(name: &str) -> PyResult<Window> {
     }
 }
 
-fn result(py: Python<'_>, found: quality::Measurement) -> Measurement {
+fn result(py: Python<'_>, found: quality::Measurement) -> PyResult<Measurement> {
     let decibels = |value: Decibels| value.0;
     let spur = |spur: &quality::Spur| {
         let causes: Vec<String> = spur.causes.iter().map(ToString::to_string).collect();
@@ -109,7 +112,7 @@ fn result(py: Python<'_>, found: quality::Measurement) -> Measurement {
     let hertz = (0..spectrum.amplitudes.len()).map(|bin| spectrum.frequency(bin).0);
     let level = |amplitude: &f64| Decibels::of_amplitude(amplitude / found.full_scale).0;
     let levels = spectrum.amplitudes.iter().map(level);
-    Measurement {
+    Ok(Measurement {
         sinad: found.sinad.0,
         enob: found.enob,
         enob_full_scale: found.enob_full_scale,
@@ -118,15 +121,29 @@ fn result(py: Python<'_>, found: quality::Measurement) -> Measurement {
         interleaving: found.interleaving.map(decibels),
         sfdr: found.sfdr.0,
         noise_density: found.noise_density.0,
-        offset: found.offset.value,
+        offset: offset(py, &found)?,
         tones: found
             .tones
             .iter()
             .map(|tone| (tone.frequency.value.0, tone.amplitude.value, tone.phase.value.0))
             .collect(),
         spurs: found.spurs.iter().map(spur).collect(),
+        imbalances: found.quadrature.as_ref().map(|parts| parts.imbalances.iter().map(imbalance).collect()),
         clipped: found.clipped,
         left_out: found.left_out,
         spectrum: (PyArray1::from_iter(py, hertz).unbind(), PyArray1::from_iter(py, levels).unbind()),
-    }
+    })
+}
+
+/// A float, or a complex number for complex samples.
+fn offset(py: Python<'_>, found: &quality::Measurement) -> PyResult<Py<PyAny>> {
+    let real = found.offset.value;
+    Ok(match &found.quadrature {
+        Some(parts) => PyComplex::from_doubles(py, real, parts.offset.value).into_any().unbind(),
+        None => real.into_pyobject(py)?.into_any().unbind(),
+    })
+}
+
+fn imbalance(found: &Imbalance) -> (f64, f64, f64) {
+    (found.gain.value, found.phase.value.0, found.image_rejection.0)
 }

@@ -8,6 +8,10 @@ use hybank::runtime::{Input, Isa, Output, PcmOutput, Sample};
 use numpy::{Element, PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 
+/// Numbers for which there is always memory. More are asked of NumPy by name, which raises `MemoryError` and
+/// takes a little longer.
+const SURE: usize = 1 << 16;
+
 /// A new array of output samples that is being written.
 pub(crate) struct NewArray<'py> {
     numbers: Numbers<'py>,
@@ -109,5 +113,9 @@ fn convert<T: Sample>(samples: &Samples<'_>, frames: usize, room: &mut Room<'_>)
 }
 
 fn zeros<T: Element>(py: Python<'_>, len: usize) -> PyResult<PyReadwriteArray1<'_, T>> {
-    PyArray1::zeros(py, len, false).try_readwrite().map_err(refused)
+    if len <= SURE {
+        return PyArray1::zeros(py, len, false).try_readwrite().map_err(refused);
+    }
+    let zeros = py.import("numpy")?.call_method1("zeros", (len, T::get_dtype(py)))?;
+    zeros.cast_into::<PyArray1<T>>()?.try_readwrite().map_err(refused)
 }

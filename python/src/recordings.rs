@@ -13,6 +13,8 @@ use std::path::{Path, PathBuf};
 /// A recording whose frames are read from any place.
 #[pyclass(frozen, module = "hybank")]
 pub(crate) struct Recording {
+    /// As it was given.
+    path: PathBuf,
     /// The file of the samples.
     data: PathBuf,
     /// Where they begin.
@@ -56,9 +58,19 @@ impl Recording {
 
     /// `count` frames from frame `first` on, (count, channels); fewer at the end.
     fn read<'py>(&self, py: Python<'py>, first: u64, count: usize) -> PyResult<Bound<'py, PyAny>> {
+        let first = first.min(self.frames);
         let count = self.frames.saturating_sub(first).min(count as u64) as usize;
         let bytes = py.detach(|| self.bytes(first, count))?;
         if self.is_double() { self.array::<f64>(py, &bytes) } else { self.array::<f32>(py, &bytes) }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (PathBuf,)) {
+        (slf.get_type().into_any(), (slf.get().path.clone(),))
+    }
+
+    fn __repr__(&self) -> String {
+        let Self { path, frames, .. } = self;
+        format!("<hybank.Recording {}: {frames} frames of {} channels>", path.display(), self.channels())
     }
 }
 
@@ -73,7 +85,7 @@ impl Recording {
         let header =
             StreamHeader { rate: Some(wav.rate.into()), ..StreamHeader::real(wav.layout, wav.channels) };
         let frames = bytes / header.frame_bytes() as u64;
-        Ok(Self { data: path, offset: wav.data_offset, header, frames })
+        Ok(Self { data: path.clone(), path, offset: wav.data_offset, header, frames })
     }
 
     fn sigmf(path: &Path) -> PyResult<Self> {
@@ -91,7 +103,7 @@ impl Recording {
         let size =
             File::open(&data).and_then(|file| file.metadata()).map_err(|error| system(&data, error))?;
         let frames = size.len() / header.frame_bytes() as u64;
-        Ok(Self { data, offset: 0, header, frames })
+        Ok(Self { path: path.to_owned(), data, offset: 0, header, frames })
     }
 
     fn is_double(&self) -> bool {

@@ -2,11 +2,12 @@
 
 use hybank::design;
 use hybank::verify::{self, BoundedBanks};
-use numpy::{PyArray1, PyArray2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 
 /// The worst-case error gamma with its bounds, in normalised time; None where a bound is not known.
 #[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
 pub(crate) struct Gamma {
     /// Norm computed from the coefficients.
     pub(crate) norm: Option<f64>,
@@ -37,11 +38,12 @@ fn known(bound: Option<f64>) -> String {
 
 /// What happened while a bank was run on an array.
 #[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
 pub(crate) struct FuseReport {
     /// `direct`, `fast-fir`, `overlap-save`, `parallel-form` or `dense`.
-    pub(crate) algorithm: &'static str,
+    pub(crate) algorithm: String,
     /// Number type of the sums: `f32` or `f64`.
-    pub(crate) numbers: &'static str,
+    pub(crate) numbers: String,
     /// Instruction set of the kernels.
     pub(crate) isa: String,
     /// Output samples dropped at the beginning.
@@ -71,11 +73,12 @@ impl FuseReport {
 
 /// Proven bounds of gamma.
 #[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
 pub(crate) struct Verified {
     /// No bank of the class `lower_banks` has a smaller gamma.
     lower: f64,
     /// `any`, `causal` or `fir_of_this_length`.
-    lower_banks: &'static str,
+    lower_banks: String,
     /// Gamma of this bank is at most this.
     upper: f64,
     /// Gamma of this bank is at least this.
@@ -97,7 +100,8 @@ impl Verified {
             BoundedBanks::Any => "any",
             BoundedBanks::Causal => "causal",
             BoundedBanks::FirOfThisLength => "fir_of_this_length",
-        };
+        }
+        .to_owned();
         Self { lower, lower_banks, upper, attained, noncausal, states, digest, certificate_in_bank }
     }
 }
@@ -114,6 +118,7 @@ impl Verified {
 
 /// The error of a bank with given delays.
 #[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
 pub(crate) struct Analysis {
     /// The worst-case gain, in normalised time.
     gamma: f64,
@@ -154,11 +159,12 @@ impl Analysis {
 
 /// What virtual converters capture.
 #[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
 pub(crate) struct Capture {
-    /// Slow samples, (N, T).
-    pub(crate) channels: Py<PyArray2<f64>>,
+    /// Slow samples, (N, T); complex for a complex signal.
+    pub(crate) channels: Py<PyAny>,
     /// Samples of the ideal fast converter, delayed by the latency: M T of them.
-    pub(crate) target: Py<PyArray1<f64>>,
+    pub(crate) target: Py<PyAny>,
     /// The latency in fast samples.
     pub(crate) latency: usize,
 }

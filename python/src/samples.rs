@@ -44,7 +44,7 @@ impl<S: Sample> Part<'_, S> {
 
 impl Samples<'_> {
     /// Of complex samples, from now on the real parts (0) or the imaginary parts (1).
-    pub(crate) fn turn_to(&mut self, part: usize) {
+    pub(crate) fn select(&mut self, part: usize) {
         match self {
             Self::Part32(samples) => samples.part = part,
             Self::Part64(samples) => samples.part = part,
@@ -203,7 +203,7 @@ fn pcm_halves<'h, R>(
 
 impl Room<'_> {
     /// Of complex samples, from now on the real parts (0) or the imaginary parts (1).
-    pub(crate) fn turn_to(&mut self, which: usize) {
+    pub(crate) fn select(&mut self, which: usize) {
         if let Self::Part32(_, part) | Self::Part64(_, part) = self {
             *part = which;
         }

@@ -253,8 +253,8 @@ impl State {
     fn process(&mut self, input: &mut Samples<'_>, room: &mut Room<'_>) -> Result<(), StreamError> {
         self.check_open()?;
         for (part, stream) in self.streams.iter_mut().enumerate() {
-            input.turn_to(part);
-            room.turn_to(part);
+            input.select(part);
+            room.select(part);
             stream.run(input, room)?;
         }
         self.clipped += room.clipped();
@@ -264,7 +264,7 @@ impl State {
     fn flush(&mut self, room: &mut Room<'_>) -> Result<(), StreamError> {
         self.check_open()?;
         for (part, stream) in self.streams.iter_mut().enumerate() {
-            room.turn_to(part);
+            room.select(part);
             stream.flush(room)?;
         }
         self.clipped += room.clipped();

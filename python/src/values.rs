@@ -2,13 +2,27 @@
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyComplex, PyFloat, PyInt, PyMapping, PyString};
+use pyo3::types::{PyBool, PyBytes, PyComplex, PyFloat, PyInt, PyMapping, PyString};
 use toml::{Table, Value};
+
+/// Deepest nesting: a spec has less, and what contains itself has no end.
+const DEEPEST: usize = 32;
+/// Longest list: a spec has less, and some iterators have no end.
+const LONGEST: usize = 1_000_000;
+
+/// Where an object is in a spec.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    /// The path of keys.
+    path: &'a str,
+    /// Containers around it.
+    depth: usize,
+}
 
 /// A mapping as a table; entries that are None are left out. NumPy scalars and arrays count as the numbers
 /// and lists that they hold.
 pub(crate) fn table(object: &Bound<'_, PyAny>) -> PyResult<Table> {
-    match value(object, "")? {
+    match value(object, Place { path: "", depth: 0 })? {
         Some(Value::Table(table)) => Ok(table),
         _ => Err(PyTypeError::new_err(format!(
             "a spec is a path, a TOML text of several lines, a mapping or keywords, not {}",
@@ -17,19 +31,22 @@ pub(crate) fn table(object: &Bound<'_, PyAny>) -> PyResult<Table> {
     }
 }
 
-/// The object at `path` in a spec; `None` for None.
-fn value(object: &Bound<'_, PyAny>, path: &str) -> PyResult<Option<Value>> {
+/// The object at a place in a spec; `None` for None.
+fn value(object: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<Option<Value>> {
     if object.is_none() {
         return Ok(None);
     }
+    if place.depth > DEEPEST {
+        return Err(wrong(place, &format!("nested more than {DEEPEST} deep; it seems to contain itself")));
+    }
     // NumPy's scalars and arrays, and what resembles them.
     if object.hasattr("tolist")? {
-        return value(&object.call_method0("tolist")?, path);
+        return value(&object.call_method0("tolist")?, place.inside(place.path));
     }
-    plain(object, path).map(Some)
+    plain(object, place).map(Some)
 }
 
-fn plain(object: &Bound<'_, PyAny>, path: &str) -> PyResult<Value> {
+fn plain(object: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<Value> {
     if object.is_instance_of::<PyBool>() {
         return Ok(Value::Boolean(object.extract()?));
     }
@@ -37,7 +54,8 @@ fn plain(object: &Bound<'_, PyAny>, path: &str) -> PyResult<Value> {
         return Ok(Value::String(object.extract()?));
     }
     if object.is_instance_of::<PyInt>() {
-        return Ok(object.extract().map(Value::Integer).unwrap_or(Value::Float(object.extract()?)));
+        let whole = object.extract().map(Value::Integer).or_else(|_| object.extract().map(Value::Float));
+        return whole.map_err(|_| wrong(place, "the number is too large"));
     }
     if object.is_instance_of::<PyFloat>() {
         return Ok(Value::Float(object.extract()?));
@@ -46,48 +64,60 @@ fn plain(object: &Bound<'_, PyAny>, path: &str) -> PyResult<Value> {
         return Ok(Value::Array(vec![Value::Float(number.real()), Value::Float(number.imag())]));
     }
     if let Ok(mapping) = object.cast::<PyMapping>() {
-        return entries(mapping, path);
+        return entries(mapping, place);
     }
     match object.try_iter() {
-        Ok(items) => list(items, path),
+        Ok(items) if !object.is_instance_of::<PyBytes>() => list(items, place),
         // Fractions, decimals and the like.
-        Err(_) => {
-            object.call_method0("__float__").and_then(|x| x.extract()).map(Value::Float).map_err(|_| {
-                PyTypeError::new_err(format!(
-                    "{path}: a number, a text, a list or a mapping is needed, not {}",
-                    type_name(object)
-                ))
-            })
-        }
+        _ => number(object, place),
     }
 }
 
-fn entries(mapping: &Bound<'_, PyMapping>, path: &str) -> PyResult<Value> {
+fn number(object: &Bound<'_, PyAny>, place: Place<'_>) -> PyResult<Value> {
+    object.call_method0("__float__").and_then(|x| x.extract()).map(Value::Float).map_err(|_| {
+        let found = type_name(object);
+        wrong(place, &format!("a number, a text, a list or a mapping is needed, not {found}"))
+    })
+}
+
+fn entries(mapping: &Bound<'_, PyMapping>, place: Place<'_>) -> PyResult<Value> {
     let mut table = Table::new();
     for item in mapping.items()? {
         let (key, object): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
         let key: String = key.extract().map_err(|_| {
-            PyTypeError::new_err(format!(
-                "{path}: the keys of a mapping must be texts, not {}",
-                type_name(&key)
-            ))
+            wrong(place, &format!("the keys of a mapping must be texts, not {}", type_name(&key)))
         })?;
-        let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-        if let Some(value) = value(&object, &inner)? {
+        let path = if place.path.is_empty() { key.clone() } else { format!("{}.{key}", place.path) };
+        if let Some(value) = value(&object, place.inside(&path))? {
             table.insert(key, value);
         }
     }
     Ok(Value::Table(table))
 }
 
-fn list<'py>(items: impl Iterator<Item = PyResult<Bound<'py, PyAny>>>, path: &str) -> PyResult<Value> {
-    let none =
-        |place: &str| PyTypeError::new_err(format!("{place}: None has no meaning in a list; leave it out"));
-    let item = |(i, item): (usize, PyResult<Bound<'py, PyAny>>)| {
-        let place = format!("{path}[{i}]");
-        value(&item?, &place)?.ok_or_else(|| none(&place))
-    };
-    items.enumerate().map(item).collect::<PyResult<_>>().map(Value::Array)
+fn list<'py>(items: impl Iterator<Item = PyResult<Bound<'py, PyAny>>>, place: Place<'_>) -> PyResult<Value> {
+    let mut list = Vec::new();
+    for (i, item) in items.enumerate() {
+        if i == LONGEST {
+            return Err(wrong(place, &format!("more than {LONGEST} entries")));
+        }
+        let path = format!("{}[{i}]", place.path);
+        let inner = place.inside(&path);
+        let none = || wrong(inner, "None has no meaning in a list; leave it out");
+        list.push(value(&item?, inner)?.ok_or_else(none)?);
+    }
+    Ok(Value::Array(list))
+}
+
+impl Place<'_> {
+    fn inside(self, path: &str) -> Place<'_> {
+        Place { path, depth: self.depth + 1 }
+    }
+}
+
+fn wrong(place: Place<'_>, problem: &str) -> PyErr {
+    let path = if place.path.is_empty() { "the spec" } else { place.path };
+    PyTypeError::new_err(format!("{path}: {problem}"))
 }
 
 fn type_name(object: &Bound<'_, PyAny>) -> String {

@@ -56,8 +56,66 @@ def test_wrong_calibrations_are_refused():
     ]:
         with pytest.raises(hb.HybankError, match=words):
             hb.calibrate(x, spec, **keywords)
-    with pytest.raises(hb.HybankError, match="real samples"):
-        hb.calibrate(x + 0j, spec)
+    for keywords, words in [({"blind": True}, "by tones"), ({"tones": [0.0]}, "not 0"), ({"tones": [np.nan]}, "finite")]:
+        with pytest.raises(hb.HybankError, match=words):
+            hb.calibrate(x + 0j, spec, **keywords)
+
+
+def test_complex_captures_are_calibrated_by_tones_of_either_sign():
+    t = np.arange(4000) * 2 / RATE - TRUE[:, None]
+    x = np.zeros(t.shape, complex)
+    for f in (1e6, -7e6):
+        s, w = 2j * np.pi * f, 2 * np.pi * 14e6
+        x += 0.4 * w**2 / (s**2 + np.sqrt(2) * w * s + w**2) * np.exp(s * t)
+    random = np.random.default_rng(3)
+    x = GAIN[:, None] * x + 1e-4 * (random.standard_normal(x.shape) + 1j * random.standard_normal(x.shape))
+    cal = hb.calibrate(x, plant([60e-9, 30e-9]), tones=[1e6, -7e6])
+    assert abs(cal.delay[1] - TRUE[1]) < 5 * cal.delay_sigma[1] < 1e-11
+    assert abs(cal.gain[1] - GAIN[1]) < 5 * cal.gain_sigma[1] < 1e-4
+    np.testing.assert_allclose(cal.tones, [1e6, -7e6], rtol=1e-6)
+    with pytest.raises(hb.HybankError, match="sign of a frequency"):
+        hb.calibrate(x, plant([60e-9, 30e-9]), tones=[-1e6, 7e6])
+
+
+@pytest.mark.parametrize("dtype", ["c16", "c8"])
+def test_a_complex_tone_has_its_sign_and_the_imbalance_of_its_parts(dtype):
+    n, rate, gain, error = np.arange(1 << 13), 1e6, 1.01, 0.02
+    phase = 2 * np.pi * -12345.6 / rate * n
+    # The imaginary part of e^(j w t) is g sin(w t + p); for negative frequencies p changes its sign.
+    y = 0.5 * (np.cos(phase) + 1j * gain * np.sin(phase + error)) + 0.01 - 0.02j
+    random = np.random.default_rng(5)
+    y = (y + 1e-4 * (random.standard_normal(len(n)) + 1j * random.standard_normal(len(n)))).astype(dtype)
+    m = hb.measure(y, rate)
+    assert abs(m.tones[0][0] + 12345.6) < 0.01
+    assert isinstance(m.offset, complex) and abs(m.offset - (0.01 - 0.02j)) < 1e-5
+    (found_gain, found_error, rejection), = m.imbalances
+    assert abs(found_gain - gain) < 1e-4 and abs(abs(found_error) - error) < 1e-4
+    cos = np.cos(error)
+    want = 10 * np.log10((1 + 2 * gain * cos + gain**2) / (1 - 2 * gain * cos + gain**2))
+    assert abs(rejection - want) < 0.1 and m.sfdr == pytest.approx(want, abs=0.1)
+    hertz, level = m.spectrum
+    assert hertz.min() < 0 < hertz.max() and abs(hertz[level.argmax()] + 12345.6) < rate / len(n)
+    real = hb.measure(np.ascontiguousarray(y.real), rate)
+    assert real.imbalances is None and isinstance(real.offset, float)
+
+
+def test_complex_signals_are_captured_part_by_part():
+    spec = plant([60e-9, 30e-9])
+    captured = hb.simulate(spec, "ctones:-3MHz", samples=400)
+    assert captured.channels.dtype == captured.target.dtype == np.complex128
+    # The steady state of one exponential: the front end's response and the delay, in closed form.
+    k, w, s = np.arange(200), 2 * np.pi * 14e6, -2j * np.pi * 3e6
+    response = w**2 / (s**2 + np.sqrt(2) * w * s + w**2)
+    for row, delay in zip(captured.channels, (60e-9, 30e-9), strict=True):
+        np.testing.assert_allclose(row[50:], (response * np.exp(s * (k * 2 / RATE - delay)))[50:], atol=1e-9)
+    signal = np.exp(0.2j * np.arange(300))
+    both = hb.simulate(spec, signal)
+    parts = [hb.simulate(spec, np.ascontiguousarray(part)) for part in (signal.real, signal.imag)]
+    np.testing.assert_array_equal(both.channels, parts[0].channels + 1j * parts[1].channels)
+    np.testing.assert_array_equal(both.target, parts[0].target + 1j * parts[1].target)
+    assert hb.simulate(spec, [0, 1, 2, 3]).channels.dtype == np.float64
+    with pytest.raises(hb.HybankError, match="sample 1 of the signal is NaN"):
+        hb.simulate(spec, [0.0, np.nan])
 
 
 def test_a_tone_in_noise_has_the_figures_of_its_formulas():

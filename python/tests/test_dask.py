@@ -1,4 +1,4 @@
-"""Spans of an archive have the bits of one run, whatever the algorithm, the signal, the files and the fate of workers."""
+"""Spans of an archive have the bits of one run, whatever the algorithm, the signal, the files and the workers that die."""
 
 import json
 import os
@@ -160,6 +160,50 @@ def test_wrong_archives_are_refused(fir, tmp_path):
         hb.Recording(tmp_path / "lost.sigmf-meta")
 
 
+def test_a_sink_replaces_neither_its_source_nor_other_files(fir, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("in.npy", np.zeros((2, 10)))
+    (tmp_path / "link.npy").symlink_to(tmp_path / "in.npy")
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "kept.txt").write_text("kept")
+    (folder / "zarr.json").write_text('{"node_type": "group"}')
+    for sink, words in [
+        ("in.npy", "is the source"),
+        (tmp_path / "in.npy", "is the source"),
+        ("link.npy", "is the source"),
+        ("folder", "no zarr array"),
+        ("folder/kept.txt", "not another kind of file"),
+        ("out.wav", "an .npy file or a zarr array"),
+    ]:
+        with pytest.raises(hb.HybankError, match=words):
+            hb.dask.fuse(fir, "in.npy", sink)
+    assert np.load("in.npy").shape == (2, 10) and (folder / "kept.txt").read_text() == "kept"
+    for source, words in [(np.zeros((2, 10)), "not ndarray"), (3, "not int")]:
+        with pytest.raises(TypeError, match=words):
+            hb.dask.fuse(fir, source, "out.npy")
+    with pytest.raises(hb.HybankError, match="axis 2"):
+        hb.dask.fuse(fir, "in.npy", "out.npy", axis=2)
+    with pytest.raises(hb.HybankError, match="list of recordings is empty"):
+        hb.dask.fuse(fir, [], "out.npy")
+
+
+def test_paths_hold_in_any_folder(fir, tmp_path, monkeypatch):
+    """The folder of the process changes after the first span; workers are in folders of their own, too."""
+    (tmp_path / "first").mkdir()
+    (tmp_path / "second").mkdir()
+    monkeypatch.chdir(tmp_path / "first")
+    x = drawn("noise", 2).astype("f4")
+    for i in range(2):
+        write_wav(tmp_path / "first" / f"{i}.wav", x[i], 24000)
+    np.save("in.npy", x)
+    for source in ("in.npy", ["0.wav", "1.wav"], ("0.wav", "1.wav")):
+        monkeypatch.chdir(tmp_path / "first")
+        hb.dask.fuse(fir, source, "out.npy", span=3000, progress=lambda *_: monkeypatch.chdir(tmp_path / "second"))
+        assert np.load(tmp_path / "first" / "out.npy").tobytes() == fir.fuse(x).tobytes()
+    assert not list((tmp_path / "second").iterdir())
+
+
 def test_a_killed_worker_loses_nothing(tmp_path):
     """Two processes; one of them is killed after the first span. The cluster starts another one."""
     distributed = pytest.importorskip("distributed")
@@ -192,18 +236,24 @@ def test_a_sweep_designs_every_plant_with_any_executor():
     cutoffs = [8e3, 9e3, 10e3]
     specs = [{**SPEC, "target": {"filter": hb.butterworth(2, cutoff)}} for cutoff in cutoffs]
     specs.insert(1, {**SPEC, "ratio": -1})
-    told, threads = [], set()
+    reported, threads = [], set()
 
     def noted(*progress):
-        told.append(progress)
+        reported.append(progress)
         threads.add(threading.current_thread())
 
     with ThreadPoolExecutor(2) as executor:
         results = hb.dask.sweep(specs, map=executor.map, proof=False, progress=noted)
-    assert isinstance(results[1], hb.SpecError) and told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert isinstance(results[1], hb.SpecError) and reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
     del results[1], specs[1]
     assert results == [hb.design(spec, proof=False) for spec in specs]
     assert len({bank.gamma.norm for bank in results}) == 3 and threads == {threading.main_thread()}
+
+
+def test_a_single_spec_is_no_sweep():
+    for specs in ("spec.toml", SPEC):
+        with pytest.raises(TypeError, match="hybank.design"):
+            hb.dask.sweep(specs)
 
 
 def test_a_sweep_runs_on_a_cluster():

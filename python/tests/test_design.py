@@ -127,7 +127,7 @@ def test_implausible_specs_warn_at_the_line_of_the_caller():
     assert caught[0].filename == __file__
 
 
-def test_progress_is_told():
+def test_progress_is_reported():
     steps = []
     hb.design(TEXT, progress=lambda step, seconds: steps.append((step, seconds)))
     assert any("filters" in step for step, _ in steps) and all(seconds > 0 for _, seconds in steps)

@@ -1,4 +1,4 @@
-"""Views as arrays: a plane whose every view is known, for rectified and for general cameras."""
+"""Views as arrays: scenes whose every view is known, for rectified, general and unknown cameras."""
 
 import numpy as np
 import pytest
@@ -45,9 +45,92 @@ def test_a_plane_between_two_calibrated_cameras():
     assert small.image.shape == (10, 12)
 
 
+NEAR, FAR = 4.0, 8.0
+SIZE = (120, 160)
+
+
+class Square:
+    """A near square before a far wall, and a camera that sees it."""
+
+    def __init__(self, x, turn):
+        cos, sin = np.cos(turn), np.sin(turn)
+        self.rotation = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+        self.centre = np.array([x, 0.2 * x, 0.0])
+        self.intrinsic = np.array([[150.0, 0, 79.5], [0, 150, 59.5], [0, 0, 1]])
+
+    def seen(self, x, y):
+        """Brightness and whether the square is seen, at pixels."""
+        ray = np.linalg.solve(self.intrinsic @ self.rotation, np.stack([x, y, np.ones_like(x)]).reshape(3, -1))
+        at = lambda z: self.centre[:, None] + ray * ((z - self.centre[2]) / ray[2])  # noqa: E731
+        near, far = at(NEAR), at(FAR)
+        square = (np.abs(near[0]) <= 0.6) & (np.abs(near[1]) <= 0.5)
+        front = 200 + 30 * np.sin(9 * near[0]) * np.cos(8 * near[1])
+        wall = 80 + 40 * np.sin(4 * far[0]) * np.cos(5 * far[1] + far[0])
+        return np.where(square, front, wall).reshape(x.shape), square.reshape(x.shape)
+
+    def image(self):
+        y, x = np.mgrid[: SIZE[0], : SIZE[1]].astype(float)
+        return self.seen(x, y)[0]
+
+    def positions(self, points):
+        """Positions of points (P, 3), NaN where they are hidden or outside."""
+        p = (points - self.centre) @ (self.intrinsic @ self.rotation).T
+        x, y = p[:, 0] / p[:, 2], p[:, 1] / p[:, 2]
+        outside = (x < 0) | (y < 0) | (x > SIZE[1] - 1) | (y > SIZE[0] - 1)
+        hidden = (points[:, 2] == FAR) & self.seen(x, y)[1]
+        return np.where((outside | hidden)[:, None], np.nan, np.stack([x, y], 1))
+
+
+def grid(count, width, height, z):
+    x, y = np.meshgrid(np.linspace(-width, width, count), np.linspace(-height, height, count))
+    return np.stack([x.ravel(), y.ravel(), np.full(count**2, z)], 1)
+
+
+@pytest.fixture(scope="module")
+def square():
+    """Images and tracks of two cameras, and image and positions of a third one between them."""
+    cameras = [Square(-0.5, 0.02), Square(0.5, -0.03), Square(0.05, 0.0)]
+    points = np.concatenate([grid(17, 0.6, 0.5, NEAR), grid(41, 4.2, 3.1, FAR)])
+    tracks = np.stack([camera.positions(points) for camera in cameras], 1)
+    images = [camera.image() for camera in cameras]
+    return images[:2], tracks[:, :2], images[2], tracks[:, 2]
+
+
+def test_views_without_cameras(square):
+    images, tracks, truth, points = square
+    view = hb.ibr.render(images, tracks=tracks, points=points)
+    error = lambda view: np.sqrt(np.mean((view.image - truth)[view.region] ** 2))  # noqa: E731
+    assert view.image.shape == view.region.shape == SIZE and view.region.dtype == bool
+    assert view.region.mean() > 0.7 and error(view) < 12
+    assert (view.image[~view.region] == 0).all()
+    found = view.geometry
+    assert found.matches == np.isfinite(tracks).all((1, 2)).sum() >= found.inliers > 0.99 * found.matches
+    assert found.sampson_rms < 0.01 and found.resection_rms < 0.01
+    assert found.order_by in ("calibrations", "colours", "both") and 0.5 < found.order_agreement <= 1
+    other = hb.ibr.render(images, tracks=tracks, points=points, reverse_order=True)
+    assert other.geometry.order_by == "given" and error(other) > 1.05 * error(view)
+    # Colours, another size, and a camera between the two.
+    colour = hb.ibr.render([np.dstack([i, i / 2, i]) for i in images], tracks=tracks, at=0.5, size=(60, 80))
+    assert colour.image.shape == (60, 80, 3) and colour.region.any()
+    np.testing.assert_allclose(colour.image[..., 1], colour.image[..., 0] / 2, atol=0.5)
+
+
+def test_an_undecided_order_of_depth_is_a_warning():
+    """A surface of one colour, nearly flat, from positions with noise: nothing shows which points are nearer."""
+    random = np.random.default_rng(2)
+    points = random.uniform((-2, -1.5, 7.7), (2, 1.5, 8.3), (150, 3))
+    tracks = np.stack([Square(-0.5, 0.02).positions(points), Square(0.5, -0.03).positions(points)], 1)
+    tracks += 0.3 * random.standard_normal(tracks.shape)
+    with pytest.warns(UserWarning, match="reverse_order=True") as caught:
+        view = hb.ibr.render([np.full(SIZE, 9.0)] * 2, tracks=tracks, points=tracks[:, 0])
+    assert caught[0].filename == __file__ and view.geometry.order_by == "nothing"
+
+
 def test_what_does_not_fit_is_refused():
     image, map_ = np.zeros((H, W)), np.ones((H, W))
     rig = {"disparity": [map_], "positions": [0.0], "at": 0.0}
+    camera, tracks = np.eye(3, 4), np.ones((5, 2, 2))
+    calibrated = {"depth": [map_], "cameras": [camera], "camera": camera}
     for images, keywords, words in [
         ([image], {}, "give disparity, positions and at"),
         ([image, image], rig, "2 images need as many"),
@@ -55,6 +138,20 @@ def test_what_does_not_fit_is_refused():
         ([image], {**rig, "disparity": [np.ones((3, 3))]}, "pixels"),
         ([image], {**rig, "method": "best"}, "choose"),
         ([image], {"depth": [map_], "cameras": [np.eye(3)], "camera": np.eye(3)}, r"\(3, 4\)"),
+        ([image], {**calibrated, "size": (10**6, 10**6)}, "33554432 at most"),
+        ([image], {**calibrated, "size": (0, 5)}, "a pixel or more"),
+        ([image], {**calibrated, **rig}, "give disparity, positions and at of a rectified rig"),
+        ([np.dstack([image] * 4)], rig, r"\(H, W, 3\)"),
+        ([np.zeros((0, 4))], rig, r"\(H, W, 3\)"),
+        ([np.full((H, W), np.nan)], rig, "not finite"),
+        ([image + 0j], rig, "real part"),
+        ([], {**rig, "disparity": [], "positions": []}, "no view"),
+        ([image] * 2, {"tracks": tracks}, "either points or at"),
+        ([image] * 2, {"tracks": tracks, "at": 0.5}, "at least 8"),
+        ([image] * 2, {"tracks": tracks[:, :1], "at": 0.5}, r"\(P, 2, 2\)"),
+        ([image] * 2, {"tracks": tracks, "points": np.zeros((3, 2))}, r"\(5, 2\)"),
+        ([image] * 2, {"tracks": tracks * np.inf, "at": 0.5}, "NaN marks"),
+        ([image], {"tracks": tracks[:, :1], "at": 0.5}, "at least two views"),
     ]:
         with pytest.raises(hb.HybankError, match=words):
             hb.ibr.render(images, **keywords)

@@ -1,0 +1,133 @@
+//! `hybank.ibr.render`: virtual views from arrays.
+
+mod uncalibrated;
+mod views;
+
+use crate::background;
+use crate::errors::{HybankError, refused};
+use hybank_ibr::camera::Camera;
+use hybank_ibr::depth::Measure;
+use hybank_ibr::interpolate::Cover;
+use hybank_ibr::pipeline::{Method, RenderSettings, Rendering, calibrated, rectified};
+use hybank_ibr::propagate::{CalibratedView, RectifiedView};
+use nalgebra::Matrix3x4;
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+pub(crate) use uncalibrated::{Geometry, render_uncalibrated};
+use views::Views;
+
+/// A rendered view.
+#[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
+pub(crate) struct View {
+    /// Intensities 0 to 255: (H, W), or (H, W, 3) if an image has colours.
+    image: Py<PyAny>,
+    /// Depth at the virtual camera, NaN in holes: (H, W). Without cameras only its order has a meaning.
+    depth: Py<PyAny>,
+    /// 0 where a view saw the pixel, 1 in cracks, 2 where no view saw it: (H, W).
+    mask: Py<PyAny>,
+    /// Share of the pixels that samples cover.
+    coverage: f64,
+    /// True where the view was rendered: (H, W). Without cameras that is the convex hull of the points.
+    region: Py<PyAny>,
+    /// The estimated geometry of views without cameras; None for others.
+    geometry: Option<Py<Geometry>>,
+}
+
+/// The view from `at` on the line of rectified cameras, from images (H, W, C) and maps (H, W).
+#[pyfunction]
+#[pyo3(signature = (images, maps, positions, at, method, fill))]
+pub(crate) fn render_rectified(
+    py: Python<'_>,
+    images: Vec<PyReadonlyArray3<'_, f32>>,
+    maps: Vec<PyReadonlyArray2<'_, f32>>,
+    positions: Vec<f64>,
+    at: f64,
+    method: &str,
+    fill: bool,
+) -> PyResult<View> {
+    let (views, settings) = (Views::new(&images, &maps, Measure::Disparity, fill)?, settings(method)?);
+    let rendering = background::run(py, None, move |_| {
+        let view = |((image, disparity), &position): (_, &f64)| RectifiedView { image, disparity, position };
+        let views: Vec<_> = views.both().zip(&positions).map(view).collect();
+        rectified::render(&views, at, &settings)
+    })?;
+    View::new(py, &rendering.map_err(refused)?, None, None)
+}
+
+/// The view of `camera` with `size` (H, W), from images, depths and cameras (3, 4).
+#[pyfunction]
+#[pyo3(signature = (images, maps, cameras, camera, size, method, fill))]
+#[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub(crate) fn render_calibrated(
+    py: Python<'_>,
+    images: Vec<PyReadonlyArray3<'_, f32>>,
+    maps: Vec<PyReadonlyArray2<'_, f32>>,
+    cameras: Vec<PyReadonlyArray2<'_, f64>>,
+    camera: PyReadonlyArray2<'_, f64>,
+    size: (usize, usize),
+    method: &str,
+    fill: bool,
+) -> PyResult<View> {
+    let (views, settings) = (Views::new(&images, &maps, Measure::Depth, fill)?, settings(method)?);
+    let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
+    let camera = metric(&camera)?;
+    let rendering = background::run(py, None, move |_| {
+        let view = |((image, depth), &camera): (_, &Camera)| CalibratedView { image, depth, camera };
+        let views: Vec<_> = views.both().zip(&cameras).map(view).collect();
+        calibrated::render(&views, &camera, (size.1, size.0), &settings)
+    })?;
+    View::new(py, &rendering.map_err(refused)?, None, None)
+}
+
+fn settings(method: &str) -> PyResult<RenderSettings> {
+    let method = match method {
+        "auto" => Method::Auto,
+        "rows" => Method::Rows,
+        "plane" => Method::Plane,
+        _ => {
+            return Err(HybankError::new_err(format!(
+                "method: \"{method}\" is unknown; choose \"auto\", \"rows\" or \"plane\""
+            )));
+        }
+    };
+    Ok(RenderSettings { method, ..RenderSettings::default() })
+}
+
+/// The camera of a matrix (3, 4).
+fn metric(matrix: &PyReadonlyArray2<'_, f64>) -> PyResult<Camera> {
+    let rows = matrix.as_array();
+    Camera::metric(Matrix3x4::from_fn(|i, j| rows[[i, j]]), false).map_err(refused)
+}
+
+impl View {
+    /// A rendering as arrays; without a region it is the whole image.
+    fn new(
+        py: Python<'_>,
+        rendering: &Rendering,
+        region: Option<Vec<bool>>,
+        geometry: Option<Geometry>,
+    ) -> PyResult<Self> {
+        let (width, height) = rendering.image.size();
+        let image = PyArray1::from_slice(py, rendering.image.data());
+        let image = match rendering.image.channels() {
+            1 => image.reshape([height, width])?.into_any(),
+            channels => image.reshape([height, width, channels])?.into_any(),
+        };
+        let mask = rendering.mask.iter().map(|cover| match cover {
+            Cover::Seen => 0u8,
+            Cover::Crack => 1,
+            Cover::Disocclusion => 2,
+        });
+        let region = region.unwrap_or_else(|| vec![true; width * height]);
+        let depth = PyArray1::from_slice(py, rendering.depth.data());
+        Ok(Self {
+            image: image.unbind(),
+            depth: depth.reshape([height, width])?.into_any().unbind(),
+            mask: PyArray1::from_iter(py, mask).reshape([height, width])?.into_any().unbind(),
+            coverage: rendering.coverage(),
+            region: PyArray1::from_vec(py, region).reshape([height, width])?.into_any().unbind(),
+            geometry: geometry.map(|geometry| Py::new(py, geometry)).transpose()?,
+        })
+    }
+}
