@@ -212,7 +212,7 @@ fn channel_facts(bank: &Bank, spec: &Spec, derivatives: &DelayDerivatives) -> Ve
 
 #[cfg(test)]
 mod tests {
-    use super::number;
+    use super::{interval, number};
 
     #[test]
     fn numbers_have_six_digits_at_most() {
