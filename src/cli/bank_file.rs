@@ -1,7 +1,7 @@
 //! Reads specs and banks, and writes text files.
 
 use super::Failure;
-use super::file_kind::FileKind;
+use super::file_kind::{FileKind, refuse_other};
 use super::interrupt::remove_unfinished;
 use super::measured::Models;
 use super::print::print_bytes;
@@ -29,10 +29,7 @@ pub(super) fn is_dash(path: &Path) -> bool {
 
 /// Reads a bank file; `-` is standard input.
 pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
-    let text = read_text(path)?;
-    if FileKind::of(&text) == FileKind::Spec {
-        return Err(is_a_spec(path));
-    }
+    let text = read_kind(path, FileKind::Bank)?;
     let values = text.bytes().filter(|&byte| byte == b',').count() as f64;
     check_memory(path, "to read it", VALUE_BYTES * values, "give the file that was meant")?;
     let bank = Bank::from_json(&text, &name(path)).map_err(Failure::input)?;
@@ -61,21 +58,9 @@ fn check_memory(path: &Path, work: &str, bytes: f64, remedy: &str) -> Result<(),
     }
 }
 
-/// A spec was given in place of a bank.
-pub(super) fn is_a_spec(path: &Path) -> Failure {
-    let name = name(path);
-    Failure::Input(format!(
-        "{name}: this is a spec, and a bank is needed; design it first: hybank design {name} -o bank.json"
-    ))
-}
-
 /// Reads a spec file; `-` is standard input.
 pub(super) fn load_spec(path: &Path, overrides: DesignOverrides) -> Result<Spec, Failure> {
-    let text = read_text(path)?;
-    if FileKind::of(&text) == FileKind::Bank {
-        let message = "this is a bank, and a spec is needed; its spec is the table \"spec\" in the file";
-        return Err(Failure::Input(format!("{}: {message}", name(path))));
-    }
+    let text = read_kind(path, FileKind::Spec)?;
     parse_spec(&text, path, overrides)
 }
 
@@ -152,10 +137,21 @@ pub(super) fn name(path: &Path) -> String {
 
 /// The text of a file; `-` is standard input.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    let read = if is_dash(path) {
-        files::text_of(std::io::stdin().lock(), &name(path), TEXT_FILE)
+    files::text_in(read_file(path)?, &name(path)).map_err(Failure::input)
+}
+
+/// The text of a bank or a spec, whichever is wanted.
+pub(super) fn read_kind(path: &Path, wanted: FileKind) -> Result<String, Failure> {
+    let bytes = read_file(path)?;
+    refuse_other(&name(path), FileKind::of(&bytes), wanted)?;
+    files::text_in(bytes, &name(path)).map_err(Failure::input)
+}
+
+fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bytes = if is_dash(path) {
+        files::bytes_of(std::io::stdin().lock(), &name(path), TEXT_FILE)
     } else {
-        files::read_text(path, TEXT_FILE)
+        files::read_bytes(path, TEXT_FILE)
     };
-    read.map_err(Failure::input)
+    bytes.map_err(Failure::input)
 }

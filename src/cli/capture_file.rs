@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::bank_file::{is_dash, name};
+use super::file_kind::unreadable;
 use crate::io::{Arrival, MultiReader, PcmFormat, PcmFrames, ReadOptions};
 use crate::memory::available_memory;
 use crate::units::Hertz;
@@ -60,7 +61,7 @@ impl CaptureFile {
         whole: fn(&mut MultiReader, usize) -> Result<Whole, Failure>,
     ) -> Result<Self, Failure> {
         let stop = crossbeam_channel::never();
-        let reader = MultiReader::start(&[path.to_owned()], reading.options, stop).map_err(Failure::input)?;
+        let reader = MultiReader::start(&[path.to_owned()], reading.options, stop).map_err(unreadable)?;
         let mut reader = reader.ok_or_else(interrupted)?;
         let channels = reader.channels();
         if channels != 1 {

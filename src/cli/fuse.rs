@@ -4,6 +4,7 @@ use super::Failure;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
 use super::bit_true::{BitTrueArgs, Job};
 use super::capture_args::CaptureArgs;
+use super::file_kind::unreadable;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
@@ -172,7 +173,7 @@ impl Args {
         let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
         self.track.check(self.algorithm)?;
         let others = self.gaps.mask().into_iter().chain(self.journal.report()).chain(self.track.log());
-        check_files(&self.output, &others.collect::<Vec<&Path>>(), &inputs)
+        check_files((&self.output, Container::Wav), &others.collect::<Vec<&Path>>(), &inputs)
     }
 
     /// `None` if an interrupt came first.
@@ -185,7 +186,7 @@ impl Args {
         let captures = self.reading.options(self.inputs.len(), bank.channel_count());
         let files = ReadOptions { block_bytes, turns, stalls, ..captures };
         let options = self.gaps.read_options(&lost, files);
-        MultiReader::start(&self.inputs, options, interrupts()).map_err(Failure::input)
+        MultiReader::start(&self.inputs, options, interrupts()).map_err(unreadable)
     }
 
     /// Reads the inputs once more, and the output.

@@ -4,7 +4,7 @@ use super::Failure;
 use super::bank_file::is_dash;
 use super::say::name_leftovers;
 use crate::files::refuse_overlaps;
-use crate::io::{PcmFormat, SampleWriter, is_sigmf, mat_variable, sigmf_files};
+use crate::io::{Container, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files};
 use crate::runtime::Precision;
 use std::path::Path;
 
@@ -49,23 +49,49 @@ pub(super) fn precision(format: PcmFormat) -> Precision {
 
 /// Encoded formats, which are not written.
 const ENCODED: [&str; 9] = ["flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff"];
+/// Endings of WAV files.
+const WAV: [&str; 4] = ["wav", "wave", "bwf", "rf64"];
+/// Formats with a structure, which are not written either.
+const STRUCTURED: [&str; 10] = ["npy", "npz", "mat", "csv", "txt", "json", "toml", "h5", "hdf5", "zip"];
 
-/// Refuses a name that promises another format than the one written.
-fn check_extension(output: &Path) -> Result<(), Failure> {
+/// Refuses a name that promises another format than the one written; pipes have any name.
+fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
     let extension = output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     let extension = extension.to_ascii_lowercase();
-    if !ENCODED.contains(&extension.as_str()) {
-        return Ok(());
-    }
+    let remedy = match (extension.as_str(), container) {
+        _ if is_pipe(output) => return Ok(()),
+        ("sigmf-meta", _) => return Ok(()),
+        ("sigmf" | "sigmf-data", _) => {
+            format!("name it {}", output.with_extension("sigmf-meta").display())
+        }
+        (encoded, _) if ENCODED.contains(&encoded) => {
+            format!("write it to a pipe: hybank fuse .. -o - | sox -t wav - {}", output.display())
+        }
+        (other, Container::Wav) if other.is_empty() || WAV.contains(&other) || is_pipe(output) => {
+            return Ok(());
+        }
+        (_, Container::Wav) => {
+            let raw = "hybank stream BANK.json --input CH1.wav .. --output-format f32le";
+            format!("name it {}, or write raw samples: {raw}", output.with_extension("wav").display())
+        }
+        (wav, Container::Raw) if WAV.contains(&wav) => "give --output-format wav".to_owned(),
+        (other, Container::Raw) if STRUCTURED.contains(&other) => {
+            format!("name it {}", output.with_extension("raw").display())
+        }
+        (_, Container::Raw) => return Ok(()),
+    };
+    let written = if container == Container::Wav { "WAV" } else { "raw samples" };
     let name = output.display();
-    Err(Failure::Usage(format!(
-        "{name}: the output is WAV or raw samples, not {extension}; write it to a pipe: hybank fuse .. -o - | sox -t wav - {name}"
-    )))
+    Err(Failure::Usage(format!("{name}: the output is {written}, not {extension}; {remedy}")))
 }
 
-/// Checks that no output of a run is also an input or another output.
-pub(super) fn check_files(output: &Path, others: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
-    check_extension(output)?;
+/// Checks that no output of a run is also an input or another output, and that the name of the samples says
+/// what they are in.
+pub(super) fn check_files(
+    (output, container): (&Path, Container),
+    others: &[&Path],
+    inputs: &[&Path],
+) -> Result<(), Failure> {
     let mut outputs = SampleWriter::files(output);
     outputs.extend(others.iter().copied().filter(|path| !is_dash(path)).map(Path::to_owned));
     let outputs: Vec<_> = outputs.iter().map(|path| path.as_path()).collect();
@@ -77,6 +103,7 @@ pub(super) fn check_files(output: &Path, others: &[&Path], inputs: &[&Path]) -> 
     let more = pairs.iter().chain(&arrays).map(|path| path.as_path());
     let inputs: Vec<_> = inputs.iter().copied().chain(more).collect();
     refuse_overlaps(&outputs, &inputs).map_err(Failure::input)?;
+    check_extension(output, container)?;
     name_leftovers(&outputs);
     Ok(())
 }

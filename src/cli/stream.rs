@@ -1,6 +1,7 @@
 //! `hybank stream`: fuses slow samples as they arrive.
 
 use super::capture_args::coding;
+use super::file_kind::unreadable;
 use super::follow::Follow;
 use super::gaps::GapArgs;
 use super::interrupt::interrupts;
@@ -168,7 +169,7 @@ impl Args {
         let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).chain(self.track.input()).collect();
         self.track.check(self.algorithm)?;
         let others = self.gaps.mask().into_iter().chain(self.journal.report()).chain(self.track.log());
-        check_files(&self.output, &others.collect::<Vec<&Path>>(), &inputs)
+        check_files((&self.output, self.container()), &others.collect::<Vec<&Path>>(), &inputs)
     }
 
     /// Raw inputs are one interleaved or one per channel; other formats state their channels.
@@ -198,7 +199,11 @@ impl Args {
         let (coding, stalls) = (self.format, Some(&stalls));
         let raw = ReadOptions { coding, channels, turns, block_bytes, stalls, ..ReadOptions::files() };
         let options = self.gaps.read_options(&lost, raw);
-        MultiReader::start(inputs, options, interrupts()).map_err(Failure::input)
+        MultiReader::start(inputs, options, interrupts()).map_err(unreadable)
+    }
+
+    fn container(&self) -> Container {
+        if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw }
     }
 
     fn output_coding(&self) -> Coding {
@@ -250,8 +255,8 @@ impl Args {
     /// The outputs at their beginning, of `rate` hertz.
     fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
         let mask = self.gaps.begin_mask(self.force)?;
-        let container = if self.output_coding() == Coding::Wav { Container::Wav } else { Container::Raw };
-        let header = OutputHeader { container, format: self.output_format(), is_complex, rate };
+        let header =
+            OutputHeader { container: self.container(), format: self.output_format(), is_complex, rate };
         let samples = SampleWriter::create(&self.output, header, self.force);
         let log = self.track.begin_log(self.force)?;
         Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log))

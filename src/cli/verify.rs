@@ -1,7 +1,7 @@
 //! `hybank verify`: proves a bank's gammas from its file alone.
 
 use super::Failure;
-use super::bank_file::{is_a_spec, name, read_text};
+use super::bank_file::{name, read_kind};
 use super::file_kind::FileKind;
 use crate::bank::{Bank, FixedPoint, SynthesisFilters, check_digest};
 use crate::design;
@@ -75,10 +75,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 fn report(args: &Args) -> Result<Report, Failure> {
     let file = name(&args.bank);
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{file}: {error}"));
-    let text = read_text(&args.bank)?;
-    if FileKind::of(&text) == FileKind::Spec {
-        return Err(is_a_spec(&args.bank));
-    }
+    let text = read_kind(&args.bank, FileKind::Bank)?;
     let bank = Bank::from_json(&text, &file).map_err(Failure::input)?;
     let digest = check_digest(&text, &file).map_err(Failure::input)?;
     let certificate_in_file = bank.proof.as_ref().is_some_and(|proof| proof.upper.is_some());

@@ -31,7 +31,7 @@ pub fn read_bytes(path: &Path, bound: Bound) -> Result<Vec<u8>, FileError> {
 /// # Errors
 /// As [`read_bytes`], or [`FileError::NotText`].
 pub fn read_text(path: &Path, bound: Bound) -> Result<String, FileError> {
-    text(read_bytes(path, bound)?, &path.display().to_string())
+    text_in(read_bytes(path, bound)?, &path.display().to_string())
 }
 
 /// The text of a stream called `name`.
@@ -39,10 +39,14 @@ pub fn read_text(path: &Path, bound: Bound) -> Result<String, FileError> {
 /// # Errors
 /// As [`read_text`].
 pub fn text_of(stream: impl Read, name: &str, bound: Bound) -> Result<String, FileError> {
-    text(bytes_of(stream, name, bound)?, name)
+    text_in(bytes_of(stream, name, bound)?, name)
 }
 
-fn bytes_of(stream: impl Read, name: &str, bound: Bound) -> Result<Vec<u8>, FileError> {
+/// The bytes of a stream called `name`.
+///
+/// # Errors
+/// As [`read_bytes`].
+pub fn bytes_of(stream: impl Read, name: &str, bound: Bound) -> Result<Vec<u8>, FileError> {
     let mut bytes = Vec::new();
     let read = stream.take(bound.bytes.saturating_add(1)).read_to_end(&mut bytes);
     read.map_err(FileError::system(name, "read it"))?;
@@ -53,7 +57,11 @@ fn bytes_of(stream: impl Read, name: &str, bound: Bound) -> Result<Vec<u8>, File
     Ok(bytes)
 }
 
-fn text(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
+/// The text that `bytes`, read from what is called `name`, hold.
+///
+/// # Errors
+/// [`FileError::NotText`].
+pub fn text_in(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
     String::from_utf8(bytes).map_err(|error| FileError::NotText {
         file: name.to_owned(),
         offset: error.utf8_error().valid_up_to(),

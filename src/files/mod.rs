@@ -32,7 +32,7 @@ mod set;
 pub(crate) mod signals;
 
 pub use atomic::{AtomicFile, remove_unfinished};
-pub use bounded::{Bound, read_bytes, read_text, text_of};
+pub use bounded::{Bound, bytes_of, read_bytes, read_text, text_in, text_of};
 pub use error::FileError;
 pub use hidden::{Leftover, leftovers};
 pub use identity::{is_same_file, refuse_overlaps};

@@ -47,6 +47,12 @@ pub enum IoError {
         /// The bytes found, printable.
         found: String,
     },
+    /// A WAV header among raw samples.
+    #[error("{file}: it begins with a WAV header, but raw samples are expected; give --format wav")]
+    WavAmongRaw {
+        /// Name of the input.
+        file: String,
+    },
     /// The header is truncated.
     #[error(
         "{file}: the header ends at byte {offset} inside {place}; the file is truncated, record or copy it again"

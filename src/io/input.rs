@@ -113,7 +113,7 @@ impl Input {
                         Err(_) => return Err(IoError::ReaderDied { file: self.name.clone() }),
                     },
                     recv(stop) -> _ => break None,
-                    default(wait.patience()) => wait.passed(wait.patience()),
+                    default(wait.patience()) => wait.go_on(),
                 }
             },
             #[cfg(target_os = "linux")]

@@ -3,6 +3,7 @@
 use super::csv::CsvReader;
 use super::kind::Kind;
 use super::mat::{MatArray, MatReader, mat_variable};
+use super::not_wav::NotWav;
 use super::notes::InputNotes;
 use super::npy::{NpyHeader, PlanarReader};
 use super::pipe::{stdin_file, widen_pipe};
@@ -283,7 +284,7 @@ impl Reader {
     }
 
     fn send_raw_frames(&self, bytes: impl Read, header: StreamHeader) -> Result<Message, IoError> {
-        let mut frames = FrameReader::new(bytes, header.frame_bytes(), None);
+        let mut frames = FrameReader::new(NotWav::new(bytes, &self.name), header.frame_bytes(), None);
         self.send_frames(&mut frames, header)?;
         Ok(Message::End { faults: cut_frame(frames.cut_bytes()), chunks: Vec::new() })
     }

@@ -1,6 +1,6 @@
 //! Which kind of file an input is, by its name.
 
-use super::{Coding, is_sigmf, mat_variable};
+use super::{Coding, PcmFormat, is_sigmf, mat_variable};
 use std::path::Path;
 
 /// A kind of input.
@@ -29,14 +29,15 @@ impl Kind {
             Some("npy") => Self::Npy,
             Some("flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga") => Self::Audio,
             _ if mat_variable(path).is_some() => Self::Mat,
+            Some("wav" | "wave") => Self::Wav,
             _ if coding == Coding::Wav => Self::Wav,
             _ => Self::Raw,
         }
     }
 }
 
-/// True for inputs that state their own format and channels whatever the [`Coding`] is: SigMF recordings and
-/// archives, tables, arrays, and recordings that are decoded.
+/// True for inputs that state their own format and channels whatever the [`Coding`] is: names that end in
+/// `.wav`, SigMF recordings and archives, tables, arrays, and recordings that are decoded.
 pub fn is_self_describing(path: &Path) -> bool {
-    !matches!(Kind::of(path, Coding::Wav), Kind::Wav | Kind::Raw)
+    Kind::of(path, Coding::Raw(PcmFormat::U8)) != Kind::Raw
 }

@@ -19,6 +19,7 @@ mod live_lost;
 mod lost;
 mod mat;
 mod multi_reader;
+mod not_wav;
 mod notes;
 mod npy;
 mod pipe;

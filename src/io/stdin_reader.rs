@@ -5,6 +5,7 @@
 //! a timeout.
 
 use super::input_thread::{InputSource, Message, cut_frame};
+use super::not_wav::NotWav;
 use super::pipe::stdin_file;
 use super::stall::Wait;
 use super::{FrameReader, IoError, StreamHeader};
@@ -21,7 +22,7 @@ pub(super) struct StdinReader {
     name: String,
     source: InputSource,
     pipe: File,
-    frames: FrameReader<File>,
+    frames: FrameReader<NotWav<File>>,
     /// As the samples come.
     raw: StreamHeader,
     /// As the consumer sees them.
@@ -40,7 +41,8 @@ impl StdinReader {
         let pipe = stdin_file().map_err(refused())?;
         let raw = source.raw_header();
         let header = if source.only.is_some() { source.chosen(raw)? } else { raw };
-        let frames = FrameReader::new(pipe.try_clone().map_err(refused())?, raw.frame_bytes(), None);
+        let bytes = NotWav::new(pipe.try_clone().map_err(refused())?, &name);
+        let frames = FrameReader::new(bytes, raw.frame_bytes(), None);
         Ok(Self { pipe, frames, raw, header, source: source.clone(), spare: Vec::new(), name })
     }
 
@@ -61,11 +63,11 @@ impl StdinReader {
                 return Ok(None);
             }
             if !self.is_readable()? {
-                wait.passed(PATIENCE);
+                wait.go_on();
                 continue;
             }
             let got = self.frames.read_whole(&mut bytes);
-            let filled = got.map_err(self.refused())?;
+            let filled = got.map_err(IoError::reading(&self.name))?;
             if filled > 0 {
                 let filled = self.source.arrange(&mut bytes[..filled], &self.raw);
                 return Ok(Some(Message::Frames { bytes, filled }));

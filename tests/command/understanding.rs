@@ -106,8 +106,53 @@ fn files_of_the_wrong_kind_are_named_for_what_they_are() {
     for command in [&["analyze", "spec.toml"][..], &["verify", "spec.toml"]] {
         desk.refused(1, command, &["spec.toml", "this is a spec", "hybank design spec.toml"]);
     }
-    desk.refused(2, &["fuse", "b.json", "a.wav", "-o", "out.flac"], &["out.flac", "sox -t wav - out.flac"]);
-    desk.refused(2, &["stream", "b.json", "-o", "out.MP3"], &["out.MP3", "not mp3"]);
+    desk.write("a.wav", b"RIFF\x24\0\0\0WAVEfmt ");
+    desk.write("x.wav", b"\x93NUMPY\x01\0v\0{}");
+    desk.write("page.html", "<!DOCTYPE html>\nratio");
+    for (args, found) in [
+        (&["design", "a.wav", "-o", "c.json"][..], "a.wav: this is a WAV recording, and a spec is needed"),
+        (&["verify", "a.wav"], "a.wav: this is a WAV recording, and a bank is needed"),
+        (&["analyze", "page.html"], "page.html: this is a page"),
+        (&["fuse", "b.json", "b.json", "-o", "y.wav"], "b.json: this is a bank, and a recording is needed"),
+        (&["calibrate", "spec.toml", "spec.toml", "spec.toml", "-o", "m.toml"], "spec.toml: this is a spec"),
+        (&["measure", "x.wav"], "x.wav: this is a NumPy array"),
+    ] {
+        desk.refused(1, args, &[found]);
+    }
+}
+
+/// A name that promises another format is refused before anything is read.
+#[test]
+fn names_of_outputs_say_what_is_in_them() {
+    let desk = Desk::with_spec(AUDIO);
+    for (name, part) in [
+        ("out.flac", "sox -t wav - out.flac"),
+        ("out.MP3", "not mp3"),
+        ("out.npy", "name it out.wav"),
+        ("out.raw", "hybank stream"),
+        ("out.sigmf", "name it out.sigmf-meta"),
+        ("out.sigmf-data", "name it out.sigmf-meta"),
+    ] {
+        desk.refused(2, &["fuse", "b.json", "a.wav", "-o", name], &[name, part]);
+    }
+    for (name, part) in
+        [("out.wav", "--output-format wav"), ("out.npy", "name it out.raw"), ("out.ogg", "sox")]
+    {
+        desk.refused(2, &["stream", "b.json", "-o", name], &[name, part]);
+    }
+    let wav = ["stream", "b.json", "--format", "wav", "-o", "out.raw"];
+    desk.refused(2, &wav, &["out.raw: the output is WAV, not raw"]);
+}
+
+#[test]
+fn tones_without_a_unit_are_warned_of() {
+    let desk = Desk::with_spec(AUDIO);
+    let warned = |source: &str, folder: &str| {
+        let output = desk.run(&["simulate", "spec.toml", "--source", source, "-o", folder], &[]);
+        assert!(output.status.success(), "{output:?}");
+        text(&output.stderr).contains("rad/s; write tones:440Hz")
+    };
+    assert!(warned("tones:440", "a") && !warned("tones:440 Hz", "b"));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::bank_file::{is_dash, load, refuse_overlap};
 use super::design::report::{against, frequency};
 use crate::bank::Bank;
 use crate::design::{self, Analysis, Certified, DesignError, GammaScale, MeanAnalysis};
-use crate::overview::{decibels, understood};
+use crate::overview::{decibels, six_digits, understood};
 use crate::quantity;
 use crate::units::Seconds;
 use std::path::PathBuf;
@@ -182,13 +182,14 @@ impl Report {
              noncausal    {noncausal}\n\
              rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
              SNR          {} for a signal with the target's spectrum\n\
-             noise gain   {noise_gain:.6}      for independent noise on the slow samples\n\
+             noise gain   {:<11}   for independent noise on the slow samples\n\
              output noise {}\n{}",
             self.understood,
             against(gamma, self.scale.zero_output, "zero output"),
             against(gamma, self.scale.interleaving, "plain interleaving"),
             frequency(peak_hertz, self.is_normalised),
             decibels(self.scale.rms_reference, rms_error),
+            six_digits(noise_gain),
             if output_noise == 0.0 {
                 "none: the spec gives the converters no noise".to_owned()
             } else {

@@ -194,11 +194,11 @@ impl Sensitivity {
 fn of_box(errors: &ErrorBox) -> String {
     let mut parts = Vec::new();
     if errors.delays.iter().any(|x| x.0 > 0.0) {
-        parts.push(format!("delays +-({})", list(&errors.delays, |x| time(x.0))));
+        parts.push(format!("delays ±({})", list(&errors.delays, |x| time(x.0))));
     }
     for (what, shares) in [("gains", &errors.gains), ("cut-offs", &errors.cutoffs)] {
         if shares.iter().any(|x| *x > 0.0) {
-            parts.push(format!("{what} +-({})", list(shares, |x| percent(*x))));
+            parts.push(format!("{what} ±({})", list(shares, |x| percent(*x))));
         }
     }
     if parts.is_empty() { "no errors".to_owned() } else { parts.join(", ") }

@@ -3,6 +3,7 @@
 use super::super::Failure;
 use super::super::capture_args::CaptureArgs;
 use super::super::capture_file::Whole;
+use super::super::file_kind::unreadable;
 use super::super::interrupt::interrupts;
 use crate::calibrate::Record;
 use crate::io::{MultiReader, PcmFormat, ReadOptions, Turns};
@@ -31,7 +32,7 @@ pub(super) fn read(
 ) -> Result<(Vec<Record>, Vec<String>), Failure> {
     let captures = reading.captures.options(paths.len(), spec.channels.len());
     let options = ReadOptions { turns: reading.turns, ..captures };
-    let reader = MultiReader::start(paths, options, interrupts()).map_err(Failure::input)?;
+    let reader = MultiReader::start(paths, options, interrupts()).map_err(unreadable)?;
     let mut reader = reader.ok_or_else(|| Failure::input("interrupted; nothing was written"))?;
     check_channels(spec, &reader)?;
     check_rate(spec, &reader)?;

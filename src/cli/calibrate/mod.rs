@@ -4,9 +4,10 @@ mod captures;
 mod report;
 
 use super::Failure;
-use super::bank_file::{is_dash, parse_spec, read_text, write_text};
+use super::bank_file::{is_dash, parse_spec, read_kind, write_text};
 use super::capture_args::CaptureArgs;
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading as FileReading};
+use super::file_kind::FileKind;
 use super::say::name_leftovers;
 use super::say::say_understood;
 use super::turns::TurnArgs;
@@ -111,7 +112,7 @@ enum Signal {
 /// [`Failure`] with the one message for the user.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check_usage()?;
-    let text = read_text(&args.spec)?;
+    let text = read_kind(&args.spec, FileKind::Spec)?;
     let spec = parse(&args.spec, &text)?;
     say_understood(Some(&spec));
     let settings = args.settings(&spec)?;

@@ -5,7 +5,8 @@ use crate::design::quantise::WordStudy;
 use crate::design::{
     Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy,
 };
-use crate::overview::{counted, decibels, understood};
+use crate::overview::{counted, decibels, six_digits, understood};
+use crate::quantity::readable;
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -247,7 +248,7 @@ impl Report<'_> {
              noise gain {} ({})\n",
             number(Some(rms_error)),
             decibels(self.scale.rms_reference, rms_error),
-            number(Some(noise_gain)),
+            six_digits(noise_gain),
             if output_noise == 0.0 {
                 "the spec gives the converters no noise".to_owned()
             } else {
@@ -270,12 +271,12 @@ pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
     if other == 0.0 {
         return format!("{what} makes no error at all");
     }
-    format!("{} against {what} ({})", decibels(gamma, other), number(Some(other)))
+    format!("{} against {what} ({})", decibels(gamma, other), six_digits(other))
 }
 
 /// A frequency with its unit; in normalised time it is a share of the output rate.
 pub(in crate::cli) fn frequency(hertz: Hertz, is_normalised: bool) -> String {
-    if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { format!("{hertz:.4}") }
+    if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { readable(hertz.0, "Hz") }
 }
 
 /// A robust bank pays if it lowers the worst case by this share.

@@ -50,7 +50,8 @@ impl From<&Stall> for Event {
         let wait = Wait {
             input: stall.input.clone(),
             channels: [*stall.channels.start(), *stall.channels.end()],
-            seconds: stall.waited.as_secs_f64(),
+            // Rounded to milliseconds.
+            seconds: stall.waited.as_millis() as f64 / 1e3,
         };
         if stall.is_over { Self::StallOver(wait) } else { Self::Stall(wait) }
     }

@@ -233,7 +233,7 @@ impl Args {
             converters: self.interleaved.into(),
             harmonics: self.harmonics.into(),
             full_scale: self.full_scale,
-            rails: capture.rails.unwrap_or((-self.full_scale, self.full_scale)),
+            rails: capture.rails.unwrap_or_else(|| float_rails(capture, self.full_scale)),
             window: self.window.window(),
         })
     }
@@ -260,4 +260,11 @@ impl Args {
     fn named(&self, error: &dyn std::fmt::Display) -> Failure {
         Failure::Input(format!("{}: {error}", name(&self.file)))
     }
+}
+
+/// The rails of floats: full scale, unless some sample lies beyond it and so nothing clipped there.
+fn float_rails(capture: &CaptureFile, full_scale: f64) -> (f64, f64) {
+    let mut all = capture.samples.iter().chain(capture.imaginary.iter().flatten());
+    let top = if all.any(|x| x.abs() > full_scale) { f64::INFINITY } else { full_scale };
+    (-top, top)
 }

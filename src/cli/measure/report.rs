@@ -2,6 +2,7 @@
 
 use super::Report;
 use crate::measure::{Comparison, Imbalance, Measurement, Quadrature, Spur};
+use crate::quantity::readable;
 use std::fmt::Write as _;
 
 /// Spurs that the text lists.
@@ -102,14 +103,14 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
     for tone in &measured.tones {
         let _ = writeln!(
             text,
-            "tone             {:.6} +- {:.2e} Hz, amplitude {:.6} ({:.2} dBFS)",
+            "tone             {:.6} ± {:.2e} Hz, amplitude {:.6} ({:.2} dBFS)",
             tone.frequency.value.0, tone.frequency.sigma.0, tone.amplitude.value, tone.level.0
         );
         if (tone.alias - tone.frequency.value).0.abs() > 0.5 * measured.rate.0 / measured.samples as f64 {
             let _ = writeln!(text, "                 seen at {:.6}", tone.alias);
         }
     }
-    let _ = writeln!(text, "offset           {:.6} +- {:.2e}", measured.offset.value, measured.offset.sigma);
+    let _ = writeln!(text, "offset           {:.6} ± {:.2e}", measured.offset.value, measured.offset.sigma);
     if let Some(quadrature) = &measured.quadrature {
         write_quadrature(text, quadrature);
     }
@@ -122,11 +123,11 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
 /// Of complex recordings.
 fn write_quadrature(text: &mut String, quadrature: &Quadrature) {
     let Quadrature { offset, imbalances } = quadrature;
-    let _ = writeln!(text, "offset, imag.    {:.6} +- {:.2e}", offset.value, offset.sigma);
+    let _ = writeln!(text, "offset, imag.    {:.6} ± {:.2e}", offset.value, offset.sigma);
     for Imbalance { gain, phase, image_rejection } in imbalances {
         let _ = writeln!(
             text,
-            "I/Q imbalance    gain {:.6} +- {:.1e}, phase {:.4} +- {:.1e} degrees, image rejection {:.2} dB",
+            "I/Q imbalance    gain {:.6} ± {:.1e}, phase {:.4} ± {:.1e} degrees, image rejection {:.2} dB",
             gain.value,
             gain.sigma,
             phase.value.0.to_degrees(),
@@ -160,11 +161,13 @@ fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
     );
     let _ = writeln!(
         text,
-        "lag              {:.6} +- {:.1e} samples ({:.6e})",
-        found.lag_samples.value, found.lag_samples.sigma, found.lag
+        "lag              {:.6} ± {:.1e} samples ({})",
+        found.lag_samples.value,
+        found.lag_samples.sigma,
+        readable(found.lag.0, "s")
     );
-    let _ = writeln!(text, "gain             {:.8} +- {:.1e}", found.gain.value, found.gain.sigma);
-    let _ = writeln!(text, "offset           {:.3e} +- {:.1e}", found.offset.value, found.offset.sigma);
+    let _ = writeln!(text, "gain             {:.8} ± {:.1e}", found.gain.value, found.gain.sigma);
+    let _ = writeln!(text, "offset           {:.3e} ± {:.1e}", found.offset.value, found.offset.sigma);
     let _ = writeln!(
         text,
         "SNR              {:.2} dB   reference over error, lag, gain and offset taken out",

@@ -13,7 +13,7 @@ table { border-collapse: collapse; width: 100%; }
 th, td { text-align: left; vertical-align: top; padding: 0.3rem 1rem 0.3rem 0; border-bottom: 1px solid #ddd; }
 td.value { font-variant-numeric: tabular-nums; white-space: nowrap; }
 figure { margin: 1.5rem 0; } figure div { overflow-x: auto; }
-figure svg { display: block; width: 100%; min-width: 36rem; height: auto; }
+figure svg { display: block; width: 100%; min-width: 42rem; height: auto; }
 figcaption { color: #555; }
 pre { background: #f5f5f5; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem; }
 @media (max-width: 40rem) { .facts td, .facts th { display: block; border: 0; padding-right: 0; }

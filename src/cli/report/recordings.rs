@@ -2,6 +2,7 @@
 
 use super::super::bank_file::name;
 use super::super::capture_file::Whole;
+use super::super::file_kind::unreadable;
 use super::super::fused::fused;
 use super::super::match_bank::{check_channels, output_rate};
 use super::super::say::warn;
@@ -34,7 +35,7 @@ impl Spectra {
     /// Reads the captures and fuses them.
     pub(super) fn read(bank: &Bank, path: &Path, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let stop = crossbeam_channel::never();
-        let reader = MultiReader::start(inputs, ReadOptions::files(), stop).map_err(Failure::input)?;
+        let reader = MultiReader::start(inputs, ReadOptions::files(), stop).map_err(unreadable)?;
         let mut reader = reader.ok_or_else(|| Failure::input("interrupted; nothing was written"))?;
         check_channels(bank, path, &reader)?;
         let rate = Hertz(output_rate(bank, &reader)?);

@@ -15,7 +15,8 @@ use super::say::name_leftovers;
 use crate::design::{self, Problem};
 use crate::files::refuse_overlaps;
 use crate::io::{Container, SampleWriter};
-use crate::overview::understood;
+use crate::overview::{counted, understood};
+use crate::quantity::readable;
 use crate::simulate::{Converter, target};
 use crate::spec::Spec;
 use std::path::PathBuf;
@@ -110,6 +111,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if spec.latency.is_none() {
         warnings.push(format!("the spec gives no latency; {latency} fast samples are used"));
     }
+    warnings.extend(signal.warning(&spec));
     let Converters { common, each } = args.converters.converters(&spec, signal.parts())?;
     let jittered = args.converters.is_jittered();
     let frames = signal.frames(&problem, args.samples, jittered)?;
@@ -137,6 +139,19 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         warnings,
     }
     .print(args.json)
+}
+
+/// A rate with its unit.
+fn rate(hertz: &serde_json::Value) -> String {
+    hertz.as_f64().map_or_else(|| hertz.to_string(), |hertz| readable(hertz, "S/s"))
+}
+
+/// With which output of the bank the target lines up.
+fn lateness(latency: usize) -> String {
+    match latency {
+        0 => "in line with the output of fuse".to_owned(),
+        _ => format!("{} later than the output of fuse without --keep-latency", counted(latency, "sample")),
+    }
 }
 
 /// Warnings of converters that clipped.
@@ -238,13 +253,13 @@ impl Report {
         let each = self.converters.iter().zip(1..).map(|(converter, channel)| converter.text(channel));
         let each: String = each.collect();
         super::print(&format!(
-            "{}\nsource: {}\n{} frames at {} Hz, target at {} Hz with a latency of {} samples:\n  {}\n{}{each}",
+            "{}\nsource: {}\n{} at {}, target at {}, {}:\n  {}\n{}{each}",
             self.understood,
             self.source,
-            self.frames,
-            self.slow_rate,
-            self.fast_rate,
-            self.latency,
+            counted(self.frames, "frame"),
+            rate(&self.slow_rate),
+            rate(&self.fast_rate),
+            lateness(self.latency),
             self.files.join("\n  "),
             self.common.text()
         ))

@@ -63,6 +63,13 @@ impl Signal {
         Ok(Self { real, imaginary: Some(imaginary), text, given, ratio })
     }
 
+    /// Warns of tones without a unit in a spec whose time is in seconds.
+    pub(super) fn warning(&self, spec: &Spec) -> Option<String> {
+        let is_doubtful = !spec.is_normalised() && has_bare_tones(&self.given);
+        is_doubtful
+            .then(|| "a frequency of a tone without a unit is in rad/s; write tones:440Hz for hertz".into())
+    }
+
     pub(super) fn is_complex(&self) -> bool {
         self.imaginary.is_some()
     }
@@ -143,6 +150,31 @@ impl Reader<'_> {
     }
 }
 
+/// Whether a tone of a source such as `step@1+tones:440,1kHz` has a number without a unit.
+fn has_bare_tones(source: &str) -> bool {
+    let tones = source.split('+').filter_map(|part| part.split_once("tones:"));
+    tones.flat_map(|(_, list)| list.split(',')).any(|tone| tone.trim().parse::<f64>().is_ok())
+}
+
 fn is_recording(source: &str) -> bool {
     Path::new(source).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("wav"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::has_bare_tones;
+
+    #[test]
+    fn tones_without_a_unit_are_found() {
+        for (source, is_bare) in [
+            ("tones:440", true),
+            ("tones:440Hz,1e3", true),
+            ("step@1+ctones:-2", true),
+            ("tones:440Hz,1 kHz", false),
+            ("step@1", false),
+            ("speech.wav", false),
+        ] {
+            assert_eq!(has_bare_tones(source), is_bare, "{source}");
+        }
+    }
 }
