@@ -1,5 +1,6 @@
 //! Warnings about a bank.
 
+use super::text::six_digits;
 use crate::bank::{Bank, FixedPoint};
 use crate::design::{GammaScale, MeanAnalysis};
 use crate::spec::Method;
@@ -28,8 +29,9 @@ fn large_noise_gain(method: Method, noise_gain: f64) -> String {
         _ => "",
     };
     format!(
-        "noise gain {noise_gain:.1e}: the bank amplifies the converters' noise that much{rounding}{weighed}; \
-         look for nearly equal delays and for front ends of little gain"
+        "noise gain {}: the bank amplifies the converters' noise that much{rounding}{weighed}; \
+         look for nearly equal delays and for front ends of little gain",
+        six_digits(noise_gain)
     )
 }
 

@@ -1,6 +1,6 @@
 //! The figures of a bank.
 
-use super::text::decibels;
+use super::text::{decibels, six_digits};
 use super::understood::understood;
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::uncertainty::{DelayDerivatives, delay_derivatives};
@@ -54,30 +54,19 @@ fn fact(name: &'static str, value: impl Into<String>, meaning: impl Into<String>
     Fact { name, value: value.into(), meaning: meaning.into() }
 }
 
-/// At most six significant digits.
-fn number(value: f64) -> String {
-    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
-        let decimals = (5.0 - value.abs().max(1e-4).log10().floor()).clamp(1.0, 9.0) as usize;
-        let text = format!("{value:.decimals$}");
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        format!("{value:.5e}")
-    }
-}
-
 /// A proven interval. Its ends are rounded outwards, so that what is printed is proven too.
 fn interval(lower: f64, upper: f64) -> String {
     format!("{} to {}", beyond(lower, -1.0), beyond(upper, 1.0))
 }
 
-/// The [`number`] next to the value in `direction`, 1 or -1.
+/// The number of six digits next to the value in `direction`, 1 or -1.
 fn beyond(value: f64, direction: f64) -> String {
-    let text = number(value);
+    let text = six_digits(value);
     if text.parse().is_ok_and(|rounded: f64| direction * (rounded - value) >= 0.0) {
         return text;
     }
     let last_digit = 10f64.powi(value.abs().log10().floor() as i32 - 5);
-    number(value + direction * last_digit)
+    six_digits(value + direction * last_digit)
 }
 
 impl Facts {
@@ -103,7 +92,7 @@ fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact
         let below = |other: f64| decibels(gamma, other);
         facts.push(fact(
             "gamma",
-            number(gamma),
+            six_digits(gamma),
             format!(
                 "worst-case gain from the analog input to the error (h = 1, computed): {} against zero output, {} \
                  against plain interleaving",
@@ -128,14 +117,14 @@ fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact
         Err(error) => fact("proven", "nothing", format!("the bounds of the file were not proven: {error}")),
     });
     if let Some(noncausal) = bank.gamma.noncausal {
-        facts.push(fact("noncausal", number(noncausal), "no latency makes gamma smaller"));
+        facts.push(fact("noncausal", six_digits(noncausal), "no latency makes gamma smaller"));
     }
     facts.push(fact(
         "SNR",
         decibels(scale.rms_reference, mean.rms_error),
         "of a signal with the spectrum of the target, against the ideal fast converter",
     ));
-    facts.push(fact("noise gain", number(mean.noise_gain), noise(mean)));
+    facts.push(fact("noise gain", six_digits(mean.noise_gain), noise(mean)));
     facts
 }
 
@@ -162,7 +151,7 @@ fn cost_facts(bank: &Bank) -> Vec<Fact> {
         let operations = summary.multiply_adds.unwrap_or_else(|| recursion(bank));
         facts.push(fact(
             "cost",
-            number(operations),
+            six_digits(operations),
             format!("multiply-adds per output sample ({}, {})", summary.algorithm, summary.numbers),
         ));
     }
@@ -200,10 +189,10 @@ fn channel_facts(bank: &Bank, spec: &Spec, derivatives: &DelayDerivatives) -> Ve
     channels
         .map(|((channel, delay), slope)| {
             let time = readable(channel.delay.0, "s");
-            let samples = format!("{} samples", number(delay.0));
+            let samples = format!("{} samples", six_digits(delay.0));
             ChannelFact {
                 delay: if spec.is_normalised() { samples } else { format!("{samples} = {time}") },
-                gain: number(channel.gain),
+                gain: six_digits(channel.gain),
                 sensitivity: gamma.map(|gamma| slope * SMALL_ERROR / gamma).filter(|share| share.is_finite()),
             }
         })
@@ -212,21 +201,7 @@ fn channel_facts(bank: &Bank, spec: &Spec, derivatives: &DelayDerivatives) -> Ve
 
 #[cfg(test)]
 mod tests {
-    use super::{interval, number};
-
-    #[test]
-    fn numbers_have_six_digits_at_most() {
-        for (value, text) in [
-            (0.0, "0"),
-            (24.0, "24"),
-            (0.031_293_64, "0.0312936"),
-            (-1.5, "-1.5"),
-            (123_456.78, "123456.8"),
-            (1e-9, "1.00000e-9"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-    }
+    use super::interval;
 
     #[test]
     fn proven_ends_are_rounded_outwards() {

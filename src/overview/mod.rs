@@ -12,5 +12,5 @@ pub use doubts::doubts;
 pub use facts::{ChannelFact, Fact, Facts};
 pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
-pub use text::{counted, decibels};
+pub use text::{counted, decibels, six_digits};
 pub use understood::understood;

@@ -95,11 +95,15 @@ fn nyquist(bank: &Bank) -> Hertz {
 }
 
 fn front_ends(bank: &Bank) -> Result<Chart, DesignError> {
-    Ok(of_target_and_channels(bank, "Front ends", &front_end_gains(bank, POINTS)?))
+    Ok(of_target_and_channels(bank, "Gain of the front ends", &front_end_gains(bank, POINTS)?))
 }
 
 fn analysis(bank: &Bank) -> Result<Chart, DesignError> {
-    Ok(of_target_and_channels(bank, "Equivalent analysis filters", &analysis_gains(bank, POINTS)?))
+    Ok(of_target_and_channels(
+        bank,
+        "Gain of the equivalent analysis filters",
+        &analysis_gains(bank, POINTS)?,
+    ))
 }
 
 /// Gains of the target and of each channel.
@@ -138,7 +142,7 @@ fn by_frequency(
 
 fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let (x_label, series) = by_frequency(bank, responses, |response, _| decibels(response.norm()));
-    Chart { title: "Synthesis filters".into(), x_label, y_label: "gain, dB".into(), series }
+    Chart { title: "Gain of the synthesis filters".into(), x_label, y_label: "gain, dB".into(), series }
 }
 
 fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
@@ -146,7 +150,7 @@ fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let delay = |response: Complex<f64>, delay: f64| if response.norm() >= least { delay } else { f64::NAN };
     let (x_label, series) = by_frequency(bank, responses, delay);
     let y_label = "group delay, fast samples".to_owned();
-    Chart { title: "Synthesis filters, where they pass".into(), x_label, y_label, series }
+    Chart { title: "Group delay of the synthesis filters, where they pass".into(), x_label, y_label, series }
 }
 
 /// The phases without jumps of whole turns; where a filter does not pass they have no meaning.
@@ -212,7 +216,9 @@ fn error(bank: &Bank) -> Result<Chart, DesignError> {
 fn delay_error(bank: &Bank) -> Result<Chart, DesignError> {
     let slopes = delay_derivatives(bank)?.per_fast_period;
     let gamma = |step: i32| -> Result<(f64, f64), DesignError> {
-        let size = DELAY_ERROR * (f64::from(step) / f64::from(DELAY_ERRORS));
+        // Closer together where the errors are small: there gamma has a corner.
+        let share = f64::from(step) / f64::from(DELAY_ERRORS);
+        let size = DELAY_ERROR * (share * share.abs());
         // Without a derivative all delays move the same way.
         let moved = |slope: &f64| (size * if *slope < 0.0 { -1.0 } else { 1.0 }).in_seconds(bank.fast_period);
         let delays = slopes.iter().map(moved).collect();

@@ -25,9 +25,9 @@ pub fn spectra(rate: Hertz, recordings: &[(&str, &[f64])]) -> Chart {
         points: spectrum.columns(COLUMNS).into_iter().map(point).collect(),
     };
     Chart {
-        title: "The captures".into(),
+        title: "Spectra of the captures".into(),
         x_label: format!("frequency, {unit}"),
-        y_label: "amplitude, dB of full scale".into(),
+        y_label: "amplitude, dBFS".into(),
         series: spectra.into_iter().map(series).collect(),
     }
 }

@@ -2,6 +2,17 @@
 
 use std::fmt::Display;
 
+/// A number in at most six significant digits.
+pub fn six_digits(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
+        let decimals = (5.0 - value.abs().max(1e-4).log10().floor()).clamp(1.0, 9.0) as usize;
+        let text = format!("{value:.decimals$}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.5e}")
+    }
+}
+
 /// A ratio of amplitudes in decibels, with one digit after the point.
 pub fn decibels(value: f64, reference: f64) -> String {
     if reference == 0.0 {
@@ -17,4 +28,23 @@ pub fn counted(count: impl Display, name: &str) -> String {
     let count = count.to_string();
     let ending = if count == "1" { "" } else { "s" };
     format!("{count} {name}{ending}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::six_digits;
+
+    #[test]
+    fn numbers_have_six_digits_at_most() {
+        for (value, text) in [
+            (0.0, "0"),
+            (24.0, "24"),
+            (0.031_293_64, "0.0312936"),
+            (-1.5, "-1.5"),
+            (123_456.78, "123456.8"),
+            (1e-9, "1.00000e-9"),
+        ] {
+            assert_eq!(six_digits(value), text);
+        }
+    }
 }

@@ -71,7 +71,7 @@ impl fmt::Display for Warning {
                 write!(f, "{inputs}: no samples to fuse (the length is zero), so the output has none")
             }
             Self::Replaced(count) => {
-                write!(f, "{count} input samples were NaN or infinite and were replaced by 0")
+                write!(f, "{count} input samples were missing, NaN or infinite and were replaced by 0")
             }
             Self::Clipped(count) => write!(f, "{count} output samples were clipped"),
             Self::StateReset(count) => {

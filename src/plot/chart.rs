@@ -12,6 +12,10 @@ const HEIGHT: u32 = 450;
 pub(super) const ENLARGED: (u32, u32) = (WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
 /// Pixels left and right of all.
 const SIDE: u32 = 10;
+/// Curves that differ by less than this share of their values are drawn as level.
+const LEAST_SHARE: f64 = 1e-3;
+/// Share of an axis by which it goes on after its last point.
+const END: f64 = 1e-9;
 /// Curves nearer to each other than this share of the height look like one.
 const SAME_PLACE: f64 = 0.005;
 const COLOURS: [RGBColor; 6] = [
@@ -107,7 +111,8 @@ impl Chart {
         if points().next().is_none() {
             return Err(PlotError::Empty { title: self.title.clone() });
         }
-        Ok((widened(points().map(|p| p.0), 0.0), widened(points().map(|p| p.1), 0.06)))
+        let (across, up) = (extent(points().map(|p| p.0)), extent(points().map(|p| p.1)));
+        Ok((widened(&across, 0.0, 0.0), widened(&up, 0.06, LEAST_SHARE)))
     }
 
     fn looks(&self, height: f64) -> Vec<Look> {
@@ -132,14 +137,16 @@ impl Chart {
         let looks = self.looks(y.end - y.start);
         let legend = Legend::new(self.entries(&looks, marks), (WIDTH - 2 * SIDE) as i32);
         let below = root.margin(8 * OVERSIZE, 8 * OVERSIZE, SIDE * OVERSIZE, SIDE * OVERSIZE);
-        let below = below.titled(&self.title, text(16))?;
+        let (title, below) = below.split_vertically(28 * OVERSIZE);
+        // At the left, where a narrow screen begins.
+        title.draw(&Text::new(self.title.as_str(), (8 * OVERSIZE as i32, 3 * OVERSIZE as i32), text(18)))?;
         let (above, below) = below.split_vertically(legend.height());
         legend.draw(&above)?;
         let mut chart = ChartBuilder::on(&below)
             .margin_top(4 * OVERSIZE)
             .margin_right(14 * OVERSIZE)
-            .x_label_area_size(38 * OVERSIZE)
-            .y_label_area_size(64 * OVERSIZE)
+            .x_label_area_size(44 * OVERSIZE)
+            .y_label_area_size(72 * OVERSIZE)
             .build_cartesian_2d(x, y)?;
         self.draw_axes(&mut chart)?;
         self.draw_lines(&mut chart, &looks)?;
@@ -156,8 +163,8 @@ impl Chart {
             .y_desc(&self.y_label)
             .x_label_formatter(&|value| across.text(*value))
             .y_label_formatter(&|value| up.text(*value))
-            .label_style(text(12))
-            .axis_desc_style(text(13))
+            .label_style(text(15))
+            .axis_desc_style(text(15))
             .light_line_style(RGBColor(238, 238, 238))
             .draw()?;
         Ok(())
@@ -179,7 +186,7 @@ impl Chart {
 
     /// Circles with their texts above them.
     fn draw_marks<B: DrawingBackend>(&self, chart: &mut Axes<'_, B>, marks: &[Marks]) -> Drawn<B> {
-        let text_style = TextStyle::from(text(10)).color(&RGBColor(60, 60, 60));
+        let text_style = TextStyle::from(text(12)).color(&RGBColor(60, 60, 60));
         for (marks, colour) in marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())) {
             let points = || marks.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
             let radius = 3 * OVERSIZE as i32;
@@ -242,11 +249,20 @@ impl Labels {
     }
 }
 
-fn widened(values: impl Iterator<Item = f64>, share: f64) -> Range<f64> {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    let span = if high > low { high - low } else { high.abs().max(1.0) };
-    let margin = if high > low { share * span } else { 0.5 * span };
-    low - margin..high + margin
+fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
+    values.fold(f64::INFINITY..f64::NEG_INFINITY, |range, v| range.start.min(v)..range.end.max(v))
+}
+
+/// With `share` of the length on both sides; at least `least` of the size of the numbers long.
+fn widened(range: &Range<f64>, share: f64, least: f64) -> Range<f64> {
+    let (low, high, size) = (range.start, range.end, range.start.abs().max(range.end.abs()));
+    let margin = match high - low {
+        0.0 => 0.5 * size.max(1.0),
+        span => (share * span).max(0.5 * (least * size - span)),
+    };
+    // A tick at the end must not be lost by rounding.
+    let slack = END * (high - low);
+    low - margin - slack..high + margin + slack
 }
 
 fn scale_by_view_box(svg: &str) -> String {
@@ -293,6 +309,17 @@ mod tests {
         // A line of the chart and one of the legend.
         assert_eq!(lines(2.0), 2);
         assert!(lines(0.0) > 10 && lines(0.05) > 10);
+    }
+
+    /// Rounding errors are not blown up to the height of the picture; real differences are.
+    #[test]
+    fn a_level_curve_is_drawn_level() {
+        let height = |apart: f64| {
+            let (_, up) = chart(vec![(0.0, -30.0), (1.0, -30.0 + apart)]).ranges(&[]).unwrap();
+            up.end - up.start
+        };
+        assert!((0.02..0.04).contains(&height(1e-7)), "{}", height(1e-7));
+        assert!((1.0..1.2).contains(&height(1.0)), "{}", height(1.0));
     }
 
     #[test]

@@ -10,10 +10,10 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 pub(super) const OVERSIZE: u32 = 4;
 
 /// Pixels of a row, a sample of a line, and what separates things; all before enlargement.
-const ROW: i32 = 20;
-const SAMPLE: i32 = 22;
+const ROW: i32 = 23;
+const SAMPLE: i32 = 26;
 const GAP: i32 = 8;
-const FONT: u32 = 12;
+const FONT: u32 = 15;
 /// Mean width of a letter over its height.
 const LETTER: f64 = 0.56;
 

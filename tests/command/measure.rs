@@ -161,6 +161,11 @@ fn clipping_and_hidden_spurs_are_said() {
     wav::write(&desk, "loud.wav", 1, 48_000, &loud);
     let output = desk.run(&["measure", "loud.wav"], b"");
     assert!(text(&output.stderr).contains("limits of the range"), "{}", text(&output.stderr));
+    // Floats beyond full scale did not clip there.
+    let tall: Vec<f32> = capture(6000, 4321.0).iter().map(|x| 3.0 * x).collect();
+    wav::write(&desk, "tall.wav", 1, 48_000, &tall);
+    let output = desk.run(&["measure", "tall.wav"], b"");
+    assert!(!text(&output.stderr).contains("limits of the range"), "{}", text(&output.stderr));
     // A quarter of the rate: the image of two converters is the tone itself.
     wav::write(&desk, "quarter.wav", 1, 48_000, &capture(6000, 12_000.0));
     let output = desk.run(&["measure", "quarter.wav", "--interleaved", "2"], b"");

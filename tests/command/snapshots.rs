@@ -8,6 +8,22 @@ use crate::support::{Desk, THESIS, text};
 use std::fs;
 use std::path::Path;
 
+/// Two audio converters.
+const AUDIO: &str = "\
+fast_rate = \"48 kS/s\"
+ratio = 2
+latency = 12
+[target]
+filter = { family = \"butterworth\", order = 4, cutoff = \"9 kHz\" }
+[[channel]]
+delay = \"25 us\"
+[[channel]]
+delay = \"12.5 us\"
+[design]
+method = \"fir\"
+taps = 24
+";
+
 const COMMANDS: [&str; 18] = [
     "init",
     "design",
@@ -109,6 +125,9 @@ fn reports_are_what_they_were() {
         THESIS.replace("latency = 10", "latency = 4").replace("\"fir\"\ntaps = 22", "\"iir\""),
     );
     desk.write("robust.toml", format!("{THESIS}\n[uncertainty]\ndelay_samples = 0.1\nreference = 0\n"));
+    desk.write("audio.toml", AUDIO);
+    desk.write("taps.csv", "ch1,ch2\n0.1,0.2\n0.5,0.9\n0.4,-0.2\n");
+    desk.write("lost.jsonl", "{\"channel\": 2, \"first\": 40, \"length\": 3}\n");
     desk.write("drift.toml", format!("{THESIS}\n[uncertainty]\ndelay_samples = 0.1\n"));
     for (name, args) in [
         ("design-fir", &["design", "spec.toml", "-o", "fir.json"][..]),
@@ -140,6 +159,64 @@ fn reports_are_what_they_were() {
         ("simulate", &["simulate", "spec.toml", "--source", "step@0.3", "-o", "cap"]),
         ("fuse", &["fuse", "fir.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav"]),
         ("demo", &["demo", "-o", "shown"]),
+        ("import", &["import", "spec.toml", "taps.csv", "-o", "imported.json"]),
+        (
+            "stream",
+            &[
+                "stream",
+                "fir.json",
+                "--input",
+                "cap/ch1.wav",
+                "--input",
+                "cap/ch2.wav",
+                "-o",
+                "fast.raw",
+                "--gaps",
+                "hold",
+                "--lost",
+                "lost.jsonl",
+            ],
+        ),
+        (
+            "simulate-tones",
+            &[
+                "simulate",
+                "audio.toml",
+                "--source",
+                "tones:3.1kHz,5.3kHz",
+                "--samples",
+                "8192",
+                "--gain",
+                "0.4",
+                "--bits",
+                "12",
+                "--noise",
+                "1e-4",
+                "--delay-error",
+                "300ns,0",
+                "--offset",
+                "0.01",
+                "-o",
+                "tones",
+            ],
+        ),
+        (
+            "calibrate",
+            &[
+                "calibrate",
+                "audio.toml",
+                "tones/ch1.wav",
+                "tones/ch2.wav",
+                "-o",
+                "measured.toml",
+                "--tone",
+                "3.1kHz,5.3kHz",
+                "--reference",
+                "2",
+            ],
+        ),
+        ("measure", &["measure", "tones/ch1.wav", "--tone", "3.1kHz,5.3kHz"]),
+        ("measure-ref", &["measure", "tones/ch1.wav", "--ref", "tones/ch2.wav"]),
     ] {
         check(name, &printed(&desk, args));
     }

@@ -69,7 +69,10 @@ fn what_is_not_finite_is_counted_and_replaced() {
     wav::write_pair(&desk, &[1.0, f32::NAN, 2.0], &[0.0, f32::INFINITY, 0.0]);
     let args = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"];
     let output = desk.run(&args, &[]);
-    assert!(output.status.success() && text(&output.stderr).contains("2 input samples were NaN or infinite"));
+    assert!(
+        output.status.success()
+            && text(&output.stderr).contains("2 input samples were missing, NaN or infinite")
+    );
     assert_eq!(wav::samples(&desk, "out.wav"), fused(&interleaved(&[1.0, 0.0, 2.0], &[0.0; 3])));
     refused(&desk, &[&args[..], &["--strict", "--force"]].concat(), &["NaN"]);
 }
