@@ -1,5 +1,8 @@
 //! Figures on photographs: skipped, with a note, where the data are not there.
 
+#[path = "support/noise.rs"]
+mod noise;
+
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, quality, read_image, read_map};
 use hybank_ibr::partial::{Densify, densify};
@@ -7,11 +10,12 @@ use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedSettings};
 use hybank_ibr::pipeline::{Agreement, Method, RenderSettings, rectified, uncalibrated};
 use hybank_ibr::propagate::RectifiedView;
 use hybank_ibr::uncalibrated::Point;
+use noise::noisy;
 use std::path::{Path, PathBuf};
 
 /// The data folder, or `None` with a printed note.
 fn data(folder: &str) -> Option<PathBuf> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let root = std::env::var_os("HYBANK_DATA").map_or(beside, PathBuf::from);
     let path = root.join("ibr").join(folder);
     if !path.is_dir() {
@@ -60,8 +64,8 @@ fn psnr(pair: &Pair, settings: &RenderSettings) -> f64 {
 fn cones_full_depth() {
     let Some(pair) = pair("cones") else { return };
     let settings = RenderSettings::default();
-    assert!(psnr(&pair, &settings) >= 29.1);
-    assert!(psnr(&pair, &RenderSettings { offset: 0.25, ..settings }) >= 30.1);
+    assert!(psnr(&pair, &settings) >= 29.2);
+    assert!(psnr(&pair, &RenderSettings { offset: 0.25, ..settings }) >= 30.3);
     assert!(psnr(&pair, &RenderSettings { method: Method::Plane, ..settings }) >= 28.8);
 }
 
@@ -74,8 +78,21 @@ fn at_a_photographs_own_place() {
             let got = rectified::render(&views(&pair), place as f64, &RenderSettings::default()).unwrap();
             let psnr = quality::compare(&got.image, own, None).unwrap().unwrap().psnr;
             println!("{folder} at view {place}: {psnr:.2} dB");
-            assert!(psnr >= 36.5, "{folder} {place}: {psnr}");
+            assert!(psnr >= 40.7, "{folder} {place}: {psnr}");
         }
+    }
+}
+
+/// White noise of 24 grey levels: lambda = 0.1 gave 24.3 dB where both photographs have it, and equal
+/// weights 26.0 dB where one has it.
+#[test]
+fn noise_is_smoothed_and_counts_less() {
+    for (noise, least) in [([24.0, 24.0], 25.2), ([0.0, 24.0], 28.2)] {
+        let Some(mut pair) = pair("cones") else { return };
+        for (seed, (image, noise)) in (1..).zip(pair.images.iter_mut().zip(noise)) {
+            *image = noisy(image, noise, seed);
+        }
+        assert!(psnr(&pair, &RenderSettings { offset: 0.25, ..RenderSettings::default() }) >= least);
     }
 }
 
@@ -117,8 +134,7 @@ fn wrong_inputs_show() {
 }
 
 /// Each view from the other one alone. Filling the plane's border holes with the farthest of four neighbours
-/// gave
-/// 22.7 dB where rows gave 25.7.
+/// gave 22.7 dB where rows gave 25.7.
 #[test]
 fn single_views() {
     let Some(pair) = pair("teddy") else { return };

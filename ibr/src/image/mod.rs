@@ -6,11 +6,13 @@ mod dynamic;
 pub mod pfm;
 pub mod quality;
 mod read;
+mod texture;
 mod write;
 pub mod y4m;
 
 pub(crate) use read::unavailable_memory;
 pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
+pub use texture::Texture;
 pub use write::{Levels, begin, begin_bytes, encode, encode_levels, encode_to, encode_with_alpha, save};
 
 use std::path::PathBuf;

@@ -2,7 +2,7 @@
 //! lie at the same depth and have the same colour in another view.
 
 use crate::depth::{DepthMap, Measure};
-use crate::image::Image;
+use crate::image::{Image, Texture};
 use crate::propagate::{CalibratedView, RectifiedView};
 use rayon::prelude::*;
 
@@ -37,6 +37,9 @@ pub struct PairAgreement {
     pub share: f64,
     /// Brightness of the second view divided by that of the first, at points of the same depth.
     pub gain: f64,
+    /// Root mean square difference of the brightness at points of the same depth, with equal exposure, grey
+    /// levels.
+    pub difference: f64,
 }
 
 impl PairAgreement {
@@ -53,6 +56,8 @@ pub struct Agreement {
     pub pairs: Vec<PairAgreement>,
     /// Factor for each view that gives it the exposure of the first one; 1 where the difference is small.
     pub gains: Vec<f64>,
+    /// Noise and slopes of each photograph, where it shows them.
+    pub textures: Vec<Option<Texture>>,
 }
 
 impl Agreement {
@@ -82,7 +87,8 @@ impl Agreement {
         distance: impl Fn(usize, usize) -> f64,
         map: impl Fn(usize, usize) -> M,
     ) -> Self {
-        let mut agreement = Self { pairs: Vec::new(), gains: vec![1.0; inputs.len()] };
+        let textures = inputs.par_iter().map(|(image, _)| Texture::of(image)).collect();
+        let mut agreement = Self { pairs: Vec::new(), gains: vec![1.0; inputs.len()], textures };
         for j in 1..inputs.len() {
             let Some(i) = (0..j).min_by(|a, b| distance(*a, j).total_cmp(&distance(*b, j))) else { continue };
             let found = Comparison::new(inputs[i], inputs[j], map(i, j)).verdict([i, j]);
@@ -94,6 +100,21 @@ impl Agreement {
         }
         agreement.gains.iter_mut().filter(|g| g.ln().abs() < SMALLEST_GAIN).for_each(|g| *g = 1.0);
         agreement
+    }
+
+    /// Variance of the noise of a view, with its exposure; 0 if its photograph does not show it.
+    pub(super) fn noise(&self, view: usize) -> f64 {
+        let texture = self.textures.get(view).copied().flatten();
+        texture.map_or(0.0, |texture| (texture.noise * self.gains[view]).powi(2))
+    }
+
+    /// Variance of what views show differently for other reasons than noise: depth that is not exact, and
+    /// surfaces that shine. `None` without pairs.
+    pub(super) fn variance(&self) -> Option<f64> {
+        // The brightness is the mean of three colours.
+        let noise = |pair: &PairAgreement| pair.views.map(|view| self.noise(view)).iter().sum::<f64>() / 3.0;
+        let all: f64 = self.pairs.iter().map(|pair| (pair.difference.powi(2) - noise(pair)).max(0.0)).sum();
+        (!self.pairs.is_empty()).then(|| all / self.pairs.len() as f64)
     }
 
     /// The pair that agrees least.
@@ -152,7 +173,12 @@ impl Comparison {
         let gain = self.gain();
         let alike = |[a, b]: &&[f32; 2]| (b - a * gain as f32).abs() <= GREY_LEVELS;
         let share = self.matched.iter().filter(alike).count() as f64 / self.points as f64;
-        Some(PairAgreement { views, points: self.points, share, gain })
+        Some(PairAgreement { views, points: self.points, share, gain, difference: self.difference(gain) })
+    }
+
+    fn difference(&self, gain: f64) -> f64 {
+        let square = |[a, b]: &[f32; 2]| (f64::from(*b) / gain - f64::from(*a)).powi(2);
+        (self.matched.iter().map(square).sum::<f64>() / self.matched.len().max(1) as f64).sqrt()
     }
 
     /// The median ratio of the brightness of points that are neither dark nor overexposed; 1 of too few.

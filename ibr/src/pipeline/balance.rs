@@ -1,5 +1,6 @@
 //! The share of each view in the virtual one, and its exposure.
 
+use super::Agreement;
 use crate::camera::Camera;
 use crate::propagate::{CalibratedView, RectifiedView};
 use crate::sample::Sample;
@@ -7,6 +8,10 @@ use crate::sample::Sample;
 /// Keeps the weights finite at the place of a view, where that view then weighs this much more than its
 /// counterpart at the other end: (1 + SOFTENING) / SOFTENING to its inverse.
 const SOFTENING: f64 = 0.2;
+
+/// The least variance of the differences between views: that of rounding to whole grey levels, with a
+/// margin.
+const LEAST_VARIANCE: f64 = 1.0;
 
 /// Weights of the views: near ones count more.
 ///
@@ -102,10 +107,36 @@ impl Balance {
         Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>())
     }
 
+    /// The same for photographs of unequal noise.
+    ///
+    /// The inverse of a weight is a variance: that of the difference between the view and the virtual one,
+    /// in units of v, the variance of the differences between views. Noise adds to it,
+    ///
+    /// ```text
+    /// 1 / w_i + (sigma_i^2 - sigma_min^2) / v
+    /// ```
+    ///
+    /// Noise that all views have is left out: it is also in the photographs that a view is compared with.
+    pub fn with_noise(mut self, agreement: &Agreement) -> Self {
+        let Some(variance) = agreement.variance() else { return self };
+        let noise = |view: usize| agreement.noise(view);
+        let least = self.views().into_iter().map(noise).fold(f64::INFINITY, f64::min);
+        for (view, weight) in self.weights.iter_mut().enumerate() {
+            let excess = (noise(view) - least) / variance.max(LEAST_VARIANCE);
+            *weight = (1.0 / (1.0 / f64::from(*weight) + excess.max(0.0))) as f32;
+        }
+        self
+    }
+
     /// The same with factors for the brightness of the views.
     pub fn with_gains(self, gains: &[f64]) -> Self {
         let needed = gains.iter().any(|g| *g != 1.0);
         Self { gains: if needed { gains.iter().map(|g| *g as f32).collect() } else { Vec::new() }, ..self }
+    }
+
+    /// The sum of the weights.
+    pub(super) fn total(&self) -> f64 {
+        self.weights.iter().copied().map(f64::from).sum()
     }
 
     /// The weight of a view.
@@ -140,6 +171,24 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Texture;
+    use crate::pipeline::PairAgreement;
+
+    #[test]
+    fn a_photograph_with_more_noise_counts_less() {
+        let texture = |noise| Some(Texture { noise, slope: 10.0 });
+        let pair = PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: 1.0, difference: 10.0 };
+        let weights = |noise: [f64; 2], pairs: Vec<PairAgreement>| {
+            let agreement = Agreement { pairs, gains: vec![1.0, 1.0], textures: noise.map(texture).to_vec() };
+            Balance::by_distance(&[0.5, 0.5]).with_noise(&agreement).weights
+        };
+        assert_eq!(weights([5.0, 5.0], vec![pair]), [1.0, 1.0]);
+        assert_eq!(weights([5.0, 9.0], Vec::new()), [1.0, 1.0]);
+        // Of the differences' variance 100 the noise explains (3^2 + 9^2) / 3.
+        let unequal = weights([3.0, 9.0], vec![pair]);
+        assert_eq!(unequal[0], 1.0);
+        assert!((f64::from(unequal[1]) - 1.0 / (1.0 + 72.0 / 70.0)).abs() < 1e-6, "{unequal:?}");
+    }
 
     #[test]
     fn half_way_all_is_equal_and_at_a_view_that_view_decides() {

@@ -82,12 +82,14 @@ fn render_with<const C: usize>(
         Some(_) => Balance::by_angle(views, camera).nearest(settings.nearest),
         None => Balance::calibrated(views, camera),
     };
+    let agreement = Agreement::calibrated(views);
+    let balance = balance.with_noise(&agreement);
+    let settings = &settings.suited_to(&agreement, &balance);
     let chosen = balance.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
     let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
     let whole = Frame::whole(width, height, 0.5, settings.offset);
     let survey = Survey::of(views, &chosen, camera, &whole);
-    let agreement = Agreement::calibrated(views);
     let balance = if settings.keep_exposure { balance } else { balance.with_gains(&agreement.gains) };
     let count = survey.most_samples().div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1);
     let bands: Vec<Range<usize>> =

@@ -4,6 +4,7 @@ mod agreement;
 mod balance;
 pub mod calibrated;
 pub mod rectified;
+mod smoothing;
 pub mod uncalibrated;
 
 pub use agreement::{Agreement, PairAgreement};
@@ -41,6 +42,9 @@ pub struct RenderSettings {
     /// Use the brightness of every view as it is. Otherwise views that are brighter or darker than the first
     /// one are given its exposure.
     pub keep_exposure: bool,
+    /// Use lambda and stiffness as they are. Otherwise they follow from the noise and the slopes of the
+    /// photographs, where cameras are known.
+    pub keep_smoothing: bool,
     /// Use only so many views, those that [`Balance`] finds nearest to the virtual camera; all without it.
     pub nearest: Option<usize>,
 }

@@ -87,8 +87,9 @@ fn render_with<const ORDER: usize, const C: usize>(
 ) -> Result<Rendering, RenderError> {
     let (width, height) = views[0].image.size();
     let agreement = Agreement::rectified(views);
-    let mut balance = Balance::rectified(views, position).nearest(settings.nearest);
+    let mut balance = Balance::rectified(views, position).nearest(settings.nearest).with_noise(&agreement);
     let chosen = balance.views();
+    let settings = &settings.suited_to(&agreement, &balance);
     if !settings.keep_exposure {
         balance = balance.with_gains(&agreement.gains);
     }
@@ -301,7 +302,7 @@ mod tests {
     fn the_position_of_a_camera_gives_nearly_its_image() {
         let mut parts = [scene(48, 6, 1)];
         parts[0].1 = DepthMap::new((48, 6), vec![4.0; 288], 1.0, Measure::Disparity).unwrap();
-        let mut settings = RenderSettings::default();
+        let mut settings = RenderSettings { keep_smoothing: true, ..RenderSettings::default() };
         settings.interpolation.fit.lambda = 0.0;
         settings.interpolation.fit.tau = 1e-9;
         let got = render(&views(&parts), 0.0, &settings).unwrap();

@@ -156,7 +156,7 @@ fn predict(name: &str, rig: &Rig, which: &[usize], position: f64, truth: &Image,
 }
 
 fn photographs(folder: &str) -> Option<(Rig, Option<Image>)> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let path = std::env::var_os("HYBANK_DATA").map_or(beside, PathBuf::from).join("ibr").join(folder);
     if !path.is_dir() {
         println!("skipped: {} is not there", path.display());

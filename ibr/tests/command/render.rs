@@ -86,7 +86,7 @@ fn converged_rigs_have_negative_disparities() {
     let psnr = |figures: &serde_json::Value| figures["psnr"].as_f64().unwrap();
     let (with, without) = (render("placed.toml"), render("scene.toml"));
     // The columns that the shift pushed out of the right image are missing at the border.
-    assert!(psnr(&with) > psnr(&plain) - 4.0, "{plain} {with}");
+    assert!(psnr(&with) > psnr(&plain) - 5.0, "{plain} {with}");
     assert!(psnr(&without) > psnr(&with) - 1.0, "{with} {without}");
     assert_eq!(without["samples"]["dropped"]["unknown"], 0, "{without}");
 }

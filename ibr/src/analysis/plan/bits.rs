@@ -21,7 +21,7 @@ use crate::analysis::random::{seeded, within};
 use crate::analysis::view::with_noise;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::{RenderError, RenderSettings, rectified};
+use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, rectified};
 use crate::propagate::RectifiedView;
 
 /// Errors of intensity that are tried, in grey levels.
@@ -39,6 +39,14 @@ pub struct Sensitivity {
     pub depth: f64,
 }
 
+/// The settings with exposures as they are and with the smoothing that suits the views, so that renderings
+/// from changed views are comparable.
+fn settled(views: &[RectifiedView<'_>], position: f64, settings: &RenderSettings) -> RenderSettings {
+    let agreement = Agreement::rectified(views);
+    let balance = Balance::rectified(views, position).with_noise(&agreement);
+    RenderSettings { keep_exposure: true, ..settings.suited_to(&agreement, &balance) }
+}
+
 /// The sensitivities of a view of a rectified rig: it is rendered from intensities and from disparities with
 /// small independent errors.
 ///
@@ -49,7 +57,7 @@ pub fn sensitivity(
     position: f64,
     settings: &RenderSettings,
 ) -> Result<Sensitivity, RenderError> {
-    let settings = RenderSettings { keep_exposure: true, ..*settings };
+    let settings = settled(views, position, settings);
     let plain = rectified::render(views, position, &settings)?.image;
     let change = |views: &[RectifiedView<'_>]| {
         let image = rectified::render(views, position, &settings)?.image;
@@ -110,7 +118,7 @@ impl RoundingCosts {
         ranges: (f64, f64),
         most: u32,
     ) -> Result<Self, RenderError> {
-        let settings = RenderSettings { keep_exposure: true, ..*settings };
+        let settings = settled(views, position, settings);
         let render = |views: &[RectifiedView<'_>]| {
             Ok::<Image, RenderError>(rectified::render(views, position, &settings)?.image)
         };

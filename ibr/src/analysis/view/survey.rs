@@ -5,7 +5,7 @@ use crate::image::Image;
 use crate::interpolate::rows::RowWork;
 use crate::interpolate::{Cover, Degree, InterpolationError};
 use crate::occlusion::{self, RowScratch};
-use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, rectified};
+use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, rectified};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
@@ -68,13 +68,16 @@ pub fn survey(
     position: f64,
     settings: &RenderSettings,
 ) -> Result<Survey, RenderError> {
+    let agreement = Agreement::rectified(views);
+    let balance = Balance::rectified(views, position).with_noise(&agreement);
+    let settings = &settings.suited_to(&agreement, &balance);
     let rendering = rectified::render(views, position, settings)?;
     let colour = rendering.image.channels() == 3;
     let (evidence, edges) = match (settings.interpolation.fit.degree, colour) {
-        (Degree::Linear, false) => collect::<2, 1>(views, position, settings, &rendering)?,
-        (Degree::Linear, true) => collect::<2, 3>(views, position, settings, &rendering)?,
-        (Degree::Cubic, false) => collect::<4, 1>(views, position, settings, &rendering)?,
-        (Degree::Cubic, true) => collect::<4, 3>(views, position, settings, &rendering)?,
+        (Degree::Linear, false) => collect::<2, 1>(views, position, settings, balance, &rendering)?,
+        (Degree::Linear, true) => collect::<2, 3>(views, position, settings, balance, &rendering)?,
+        (Degree::Cubic, false) => collect::<4, 1>(views, position, settings, balance, &rendering)?,
+        (Degree::Cubic, true) => collect::<4, 3>(views, position, settings, balance, &rendering)?,
     };
     Ok(Survey { rendering, evidence, edges })
 }
@@ -93,6 +96,7 @@ fn collect<const ORDER: usize, const C: usize>(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,
+    balance: Balance,
     rendering: &Rendering,
 ) -> Result<(Vec<Evidence>, Vec<f32>), RenderError> {
     let (width, height) = rendering.image.size();
@@ -100,7 +104,7 @@ fn collect<const ORDER: usize, const C: usize>(
         views,
         camera: RigCamera::new(views, position),
         frame: Frame::whole(width, height, RowWork::<ORDER, C>::MARGIN, settings.offset),
-        balance: Balance::rectified(views, position).with_gains(&rendering.agreement.gains),
+        balance: balance.with_gains(&rendering.agreement.gains),
         settings,
         image: &rendering.image,
     };

@@ -91,7 +91,7 @@ pub(in crate::cli) struct RenderArguments {
     /// Degree of the row splines.
     #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
     pub(in crate::cli) degree: DegreeName,
-    /// Weight of the slope penalty of the row fit, px^2.
+    /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs].
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     pub(in crate::cli) lambda: Option<f64>,
     /// Weight of the differences of neighbouring coefficients of the row fit.
@@ -160,7 +160,9 @@ pub(in crate::cli) enum DegreeName {
 impl RenderArguments {
     /// The settings that were typed over the defaults; `offset` is that of the scene.
     pub(in crate::cli) fn settings(&self, offset: f64) -> RenderSettings {
-        let mut settings = RenderSettings { nearest: self.nearest, ..self.scene.settings(offset) };
+        let keep_smoothing = self.lambda.is_some();
+        let nearest = self.nearest;
+        let mut settings = RenderSettings { nearest, keep_smoothing, ..self.scene.settings(offset) };
         settings.method = match self.method {
             MethodName::Auto => Method::Auto,
             MethodName::Rows => Method::Rows,

@@ -1,0 +1,78 @@
+//! Smoothing that suits the noise of the photographs.
+
+use super::{Agreement, Balance, RenderSettings};
+
+/// Range of the smoothing: with less the fit is undetermined between samples, and with more the noise is
+/// not that of a photograph.
+const LEAST: f64 = 0.01;
+const MOST: f64 = 4.0;
+
+impl RenderSettings {
+    /// The settings with the lambda and the stiffness that suit the photographs; as they are with
+    /// `keep_smoothing` or if no photograph shows its noise. The result keeps its smoothing.
+    ///
+    /// Take the noise of the samples as white with the variance sigma^2 and the texture along a row as a
+    /// random walk with the mean square slope s^2. The most probable row minimises
+    ///
+    /// ```text
+    /// sum_k w_k (I_k - J(x_k))^2 / sigma^2  +  integral J'(x)^2 dx / s^2
+    /// ```
+    ///
+    /// With W = sum of the weights of the samples per pixel, about that of the views, the second term is
+    /// sum_k w_k J'(x_k)^2 / (W s^2). So lambda = sigma^2 / (W s^2) in the row fit. The plane fit counts
+    /// edges of pixels instead of samples, so its stiffness is sigma^2 / s^2; it is never less than that of
+    /// the settings, because samples of general cameras are also displaced.
+    pub(crate) fn suited_to(&self, agreement: &Agreement, balance: &Balance) -> Self {
+        let mut settings = Self { keep_smoothing: true, ..*self };
+        if self.keep_smoothing {
+            return settings;
+        }
+        let (mut noise, mut slope) = (0.0, 0.0);
+        for (view, texture) in agreement.textures.iter().enumerate() {
+            let Some(texture) = texture else { continue };
+            let weight = f64::from(balance.weight(view as u16));
+            noise += weight * texture.noise * texture.noise;
+            slope += weight * texture.slope * texture.slope;
+        }
+        if slope > 0.0 {
+            let (fit, plane) = (&mut settings.interpolation.fit, &mut settings.interpolation.plane);
+            fit.lambda = (noise / slope / balance.total()).clamp(LEAST, MOST);
+            plane.stiffness = (noise / slope).min(MOST).max(plane.stiffness);
+        }
+        settings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Texture;
+
+    fn suited(textures: &[Option<Texture>], settings: &RenderSettings) -> RenderSettings {
+        let agreement = Agreement { textures: textures.to_vec(), ..Agreement::default() };
+        settings.suited_to(&agreement, &Balance::by_distance(&vec![1.0; textures.len()]))
+    }
+
+    #[test]
+    fn more_noise_is_smoothed_more_and_more_samples_less() {
+        let of = |noise| Some(Texture { noise, slope: 10.0 });
+        let lambda = |textures: &[Option<Texture>]| {
+            suited(textures, &RenderSettings::default()).interpolation.fit.lambda
+        };
+        assert!((lambda(&[of(5.0)]) - 0.25).abs() < 1e-12);
+        assert!((lambda(&[of(5.0), of(5.0)]) - 0.125).abs() < 1e-7);
+        assert_eq!(lambda(&[of(0.1)]), LEAST);
+        assert_eq!(lambda(&[of(100.0)]), MOST);
+    }
+
+    #[test]
+    fn photographs_without_texture_and_settings_that_are_kept_change_nothing() {
+        let default = RenderSettings::default();
+        assert_eq!(suited(&[None, None], &default).interpolation, default.interpolation);
+        let noisy = Some(Texture { noise: 9.0, slope: 10.0 });
+        let kept = RenderSettings { keep_smoothing: true, ..default };
+        assert_eq!(suited(&[noisy], &kept).interpolation, default.interpolation);
+        let suited = suited(&[noisy], &default);
+        assert!(suited.interpolation.plane.stiffness > default.interpolation.plane.stiffness);
+    }
+}
