@@ -1,4 +1,5 @@
-"""CPU and bits of `hybank.dask.fuse` over two processes against one run, and the load of a scheduler by empty tasks.
+"""CPU and bits of `hybank.dask.fuse` over two processes against one process, and the load of a scheduler by empty tasks.
+Every figure is the least of three runs.
 
     python python/bench/dask_fuse.py [FRAMES [TAPS]]      100 million unless given; needs dask and distributed
 
@@ -37,18 +38,30 @@ def archive(path, channels, frames):
     x.flush()
 
 
-def fused(client, bank, folder, algorithm, frames):
-    x = np.load(folder / "in.npy", mmap_mode="r")
+def seconds(client, run):
+    """CPU seconds of everybody while something runs, and its result."""
     begin = cpu(client)
-    want = bank.fuse(x, algorithm=algorithm)
-    one = cpu(client) - begin
-    begin, clock = cpu(client), time.perf_counter()
-    report = hb.dask.fuse(bank, folder / "in.npy", folder / "out.npy", client=client, algorithm=algorithm)
-    many, clock = cpu(client) - begin, time.perf_counter() - clock
-    same = bool((np.load(folder / "out.npy", mmap_mode="r") == want).all())
+    result = run()
+    return cpu(client) - begin, result
+
+
+def fused(client, bank, folder, algorithm, frames):
+    """From a file into a file: as a whole, span by span in this process, and by tasks."""
+    x = np.load(folder / "in.npy", mmap_mode="r")
+    whole, spans, tasks = (folder / f"{name}.npy" for name in ("whole", "spans", "tasks"))
+    by_spans = lambda sink, client: hb.dask.fuse(bank, folder / "in.npy", sink, client=client, algorithm=algorithm)  # noqa: E731
+    runs = {
+        "whole": lambda: np.save(whole, bank.fuse(x, algorithm=algorithm)),
+        "spans": lambda: by_spans(spans, None),
+        "tasks": lambda: by_spans(tasks, client),
+    }
+    used = {name: min(seconds(client, run)[0] for _ in range(3)) for name, run in runs.items()}
+    want = whole.read_bytes()
+    same = all(path.read_bytes() == want for path in (spans, tasks))
+    one = min(used["whole"], used["spans"])
     print(
-        f"{algorithm}: {frames} frames, {report.spans} spans, equal {same}, CPU {one:.2f} s alone,"
-        f" {many:.2f} s by tasks (ratio {many / one:.3f}), {clock:.2f} s"
+        f"{algorithm}: {frames} frames, equal {same}, CPU {used['whole']:.2f} s as a whole, {used['spans']:.2f} s in"
+        f" spans, {used['tasks']:.2f} s by tasks; tasks over the less of one process: {used['tasks'] / one:.3f}"
     )
 
 

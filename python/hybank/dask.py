@@ -21,7 +21,11 @@ from hybank._hybank import Bank, HybankError, Recording, encode
 from hybank._spec import design as _design
 
 SPAN = 1 << 20
-_BLOCK = 1 << 16
+_LONGEST_SPAN = 1 << 24
+_SPANS_PER_THREAD = 8
+# Arrays of a block are so small that the allocator keeps their memory: the allocators of workers give larger ones
+# back to the system, and the faults of their pages would cost more than the filters.
+_BLOCK_BYTES = 120 << 10
 
 
 @dataclass
@@ -37,14 +41,14 @@ class Report:
     reruns: list = field(default_factory=list)
 
 
-def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="auto", span=SPAN, progress=None):
+def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="auto", span=None, progress=None):
     """Fuse an archive into a new one; the output has the bits of ``bank.fuse`` over all of it.
 
     ``source`` is the path of a zarr array or of an ``.npy`` file, ``("file.h5", "dataset")``, or a list of WAV or SigMF
     files with a channel or more each. ``axis`` is the axis of time of arrays. ``sink`` is the path of an ``.npy`` file
     or of a zarr array, which is made anew; a source or another kind of file is refused. ``client`` is a
     ``dask.distributed.Client``; without one this process does one span after another. ``span`` is the least number of
-    frames of a task. ``progress(done, spans)`` is called after every span.
+    frames of a task; unless given, each thread has eight tasks, of 2^20 to 2^24 frames. ``progress(done, spans)`` is called after every span.
     """
     source, sink = _located(source), _location(sink)
     _check_sink(sink, source)
@@ -52,6 +56,7 @@ def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="aut
     if reader.channels != bank.channels:
         raise HybankError(f"the source has {reader.channels} channels, the bank has {bank.channels}")
     plan = _plan(bank, reader.dtype, dtype, algorithm)
+    span = _usual_span(reader.frames, client) if span is None else span
     job = _job(bank, source, sink, axis, plan, reader.frames, span)
     _create(sink, reader.frames * bank.ratio, plan.output, job.span * bank.ratio)
     report = Report(plan.algorithm, reader.frames, len(job.spans), job.warm_up)
@@ -145,6 +150,16 @@ def _job(bank, source, sink, axis, plan, frames, span):
     return _Job(bank.to_json(), source, sink, axis, plan, warm, span, spans)
 
 
+def _usual_span(frames, client):
+    """Few tasks cost the scheduler little; eight per thread end at about the same time."""
+    threads = 1 if client is None else _threads(client)
+    return min(max(frames // (_SPANS_PER_THREAD * threads), SPAN), _LONGEST_SPAN)
+
+
+def _threads(client):
+    return max(sum(client.nthreads().values()), 1)
+
+
 def warm_up(bank):
     """Frames after which two states of a recursion hardly differ: W = 2 ln eps / ln rho, rho its largest pole."""
     poles = np.linalg.eigvals(bank.ss[0])
@@ -178,8 +193,10 @@ def _run(job, k, state=None):
 
 
 def _through(s, reader, first, last):
-    for start in range(first, last, _BLOCK):
-        yield s.process(reader.read(start, min(_BLOCK, last - start)))
+    samples = max(s.channels, s.ratio)
+    block = max(_BLOCK_BYTES // (samples * reader.dtype.itemsize), 1 << 10)
+    for start in range(first, last, block):
+        yield s.process(reader.read(start, min(block, last - start)))
 
 
 class _Region:
@@ -237,7 +254,7 @@ def _distributed(client, job, progress):
     todo = deque(range(len(job.spans)))
     shared = client.scatter(job, broadcast=True) if len(job.bank) > 1 << 16 else job
     submit = lambda k: client.submit(_numbered, shared, k, pure=False, retries=3)  # noqa: E731
-    under_way = 4 * max(sum(client.nthreads().values()), 1)
+    under_way = 4 * _threads(client)
     futures = as_completed([submit(todo.popleft()) for _ in range(min(under_way, len(todo)))])
     ends = {}
     for future in _counted(futures, progress, len(job.spans)):

@@ -33,7 +33,7 @@ def fuse(
     axis: int = -1,
     dtype: DTypeLike | None = None,
     algorithm: _Algorithm = "auto",
-    span: int = ...,
+    span: int | None = None,
     progress: _Progress | None = None,
 ) -> Report: ...
 def sweep(

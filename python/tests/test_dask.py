@@ -250,6 +250,24 @@ def test_a_sweep_designs_every_plant_with_any_executor():
     assert len({bank.gamma.norm for bank in results}) == 3 and threads == {threading.main_thread()}
 
 
+class Threads:
+    """What a fusion asks of a client: the threads of each worker."""
+
+    def __init__(self, *threads):
+        self.threads = threads
+
+    def nthreads(self):
+        return dict(enumerate(self.threads))
+
+
+@pytest.mark.parametrize(
+    "frames, client, span",
+    [(0, None, 2**20), (10**8, None, 12_500_000), (10**8, Threads(1, 1), 6_250_000), (10**12, Threads(4, 4), 2**24)],
+)
+def test_each_thread_has_eight_spans_of_a_million_frames_or_more(frames, client, span):
+    assert hb.dask._usual_span(frames, client) == span
+
+
 def test_a_single_spec_is_no_sweep():
     for specs in ("spec.toml", SPEC):
         with pytest.raises(TypeError, match="hybank.design"):
