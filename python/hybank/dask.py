@@ -83,7 +83,7 @@ def sweep(specs, *, map=map, client=None, progress=None, **keywords):  # noqa: A
     specs = [spec if isinstance(spec, (str, os.PathLike)) else dict(spec) for spec in specs]
     tasks = [(spec, keywords) for spec in specs]
     if client is not None:
-        results = client.gather(client.map(_designed, tasks, pure=False))
+        results = (future.result() for future in client.map(_designed, tasks, pure=False))
     else:
         results = map(_designed, tasks)
     return [_loaded(result) for result in _counted(results, progress, len(specs))]

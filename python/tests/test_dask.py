@@ -274,11 +274,29 @@ def test_a_single_spec_is_no_sweep():
             hb.dask.sweep(specs)
 
 
-def test_a_sweep_runs_on_a_cluster():
+def test_a_sweep_runs_on_a_cluster_and_reports_every_design():
     distributed = pytest.importorskip("distributed")
     specs = [{**SPEC, "latency": latency} for latency in (4, 5)] + [{**SPEC, "ratio": -1}]
     settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    last, gate = distributed.Event("last"), {**SPEC, "name": Gate()}
+    reported = []
+
+    def progress(done, count):
+        reported.append((done, count))
+        if done == 3:
+            last.set()
+
     with distributed.LocalCluster(**settings) as cluster, distributed.Client(cluster) as client:
-        results = hb.dask.sweep(specs, client=client, proof=False)
+        results = hb.dask.sweep([*specs, gate], client=client, proof=False, progress=progress)
+    assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert results[:2] == [hb.design(spec, proof=False) for spec in specs[:2]]
-    assert isinstance(results[2], hb.SpecError)
+    assert isinstance(results[2], hb.SpecError) and results[3].spec.count("opened") == 1
+
+
+class Gate:
+    """A name that is known when the progress of the designs before it was reported."""
+
+    def tolist(self):
+        import distributed
+
+        return "opened" if distributed.Event("last").wait(timeout=60) else "closed"

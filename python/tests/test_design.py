@@ -156,10 +156,22 @@ def test_ctrl_c_interrupts_a_long_design_at_once():
     assert time.monotonic() - begin < 2
 
 
-def test_a_design_lets_other_threads_run():
+def _stream(bank, x):
+    s = bank.stream()
+    s.process(x)
+    s.flush()
+
+
+@pytest.mark.parametrize(
+    "run",
+    [lambda bank, _: hb.design(TEXT.replace("taps = 16", "taps = 64"), proof=False), lambda bank, x: bank.fuse(x), _stream],
+    ids=["design", "fuse", "stream"],
+)
+def test_other_threads_run_meanwhile(bank, run):
     """While it runs, another thread of Python counts."""
     counted = 0
     done = threading.Event()
+    x = np.zeros((2, 20_000_000), "f4")
 
     def count():
         nonlocal counted
@@ -169,7 +181,7 @@ def test_a_design_lets_other_threads_run():
 
     thread = threading.Thread(target=count)
     thread.start()
-    hb.design(TEXT.replace("taps = 16", "taps = 64"), proof=False)
+    run(bank, x)
     done.set()
     thread.join()
     assert counted > 3
