@@ -20,3 +20,9 @@ def aligned(taps, ratio, latency, x):
     flush = -(-latency // ratio)
     padded = np.concatenate([x, np.zeros((x.shape[0], flush), dtype=x.dtype)], axis=1)
     return polyphase_sum(taps, ratio, padded)[latency : latency + x.shape[1] * ratio]
+
+
+def assert_identical(y, want):
+    """The same values, number type and shape. (``strict`` of NumPy's own function needs NumPy 1.24.)"""
+    assert (y.dtype, y.shape) == (want.dtype, want.shape)
+    np.testing.assert_array_equal(y, want)
