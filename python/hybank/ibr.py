@@ -45,8 +45,8 @@ def render(
       two views. A ``UserWarning`` says that the order of depth is undecided; ``reverse_order=True`` takes the other one.
 
     ``size`` (H, W) is that of the first image unless given; a rectified rig has that of its images. NaN and 0 are
-    unknown depth; ``fill=False`` leaves such pixels out. ``method`` is ``"rows"`` or ``"plane"`` for rectified rigs,
-    which take rows unless told otherwise.
+    unknown depth; ``fill=False`` leaves such pixels out. ``method`` is ``"rows"`` or ``"plane"`` for rectified rigs;
+    ``"auto"`` takes rows for them.
     """
     images = [_image(image) for image in images]
     rectified = disparity is not None and positions is not None and at is not None
