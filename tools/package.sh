@@ -65,5 +65,5 @@ ${libc:+Depends: libc6 (>= $libc), libgcc-s1
  Designs and runs filter banks that make several slow converters with
  fractional delays work as one fast converter, with proven error bounds.
 CONTROL
-dpkg-deb --quiet --root-owner-group --build "$tree" "$out/hybank_${version}_$architecture.deb"
+dpkg-deb --root-owner-group --build "$tree" "$out/hybank_${version}_$architecture.deb" >/dev/null
 echo "$out/hybank_${version}_$architecture.deb"
