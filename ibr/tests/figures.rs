@@ -6,7 +6,7 @@ mod noise;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, quality, read_image, read_map};
 use hybank_ibr::partial::{Densify, densify};
-use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedSettings};
+use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
 use hybank_ibr::pipeline::{Agreement, Method, RenderSettings, rectified, uncalibrated};
 use hybank_ibr::propagate::RectifiedView;
 use hybank_ibr::uncalibrated::Point;
@@ -192,47 +192,56 @@ fn house_tracks(path: &Path, views: &[usize]) -> Vec<Vec<Option<Point>>> {
     text("house.nview-corners".into()).lines().map(row).collect()
 }
 
-fn house(from: &[usize], wanted: usize) -> Option<(f64, usize, usize)> {
+/// A view of the Model House and its photograph.
+struct House {
+    done: UncalibratedRendering,
+    truth: Image,
+}
+
+impl House {
+    fn psnr(&self, region: &[bool]) -> f64 {
+        quality::compare(&self.done.rendering.image, &self.truth, Some(region)).unwrap().unwrap().psnr
+    }
+}
+
+fn house(from: &[usize], wanted: usize) -> Option<House> {
     let path = data("model_house")?;
     let image = |v: &usize| read_image(&path.join(format!("house.{v:03}.png"))).unwrap();
     let (images, truth) = (from.iter().map(image).collect::<Vec<_>>(), image(&wanted));
     let tracks = house_tracks(&path, from);
     let target = Target::Tracks(house_tracks(&path, &[wanted]).into_iter().map(|t| t[0]).collect());
-    let settings = RenderSettings::default();
-    let start = std::time::Instant::now();
-    let got = uncalibrated::render(
-        &images.iter().collect::<Vec<_>>(),
-        &tracks,
-        &target,
-        truth.size(),
-        &settings,
-        &UncalibratedSettings::default(),
-    )
-    .unwrap();
-    let seconds = start.elapsed().as_secs_f64();
-    let image = &got.rendering.image;
-    let q = quality::compare(image, &truth, Some(&got.region)).unwrap().unwrap();
-    let share = q.pixels as f64 / got.region.len() as f64;
-    println!("{from:?} -> {wanted}: {q:?} {share:.4} {seconds:.2} s");
-    println!("{:?} {:?}", got.geometry, got.rendering.report);
-    Some((q.psnr, got.geometry.inliers, got.geometry.matches))
+    let images: Vec<&Image> = images.iter().collect();
+    let (settings, special) = (RenderSettings::default(), UncalibratedSettings::default());
+    let done = uncalibrated::render(&images, &tracks, &target, truth.size(), &settings, &special).unwrap();
+    let house = House { done, truth };
+    let region = &house.done.region;
+    let share = region.iter().filter(|inside| **inside).count() as f64 / region.len() as f64;
+    println!("{from:?} -> {wanted}: {:.2} dB on {share:.4} of the image", house.psnr(region));
+    println!("{:?} {:?}", house.done.geometry, house.done.rendering.report);
+    Some(house)
 }
 
-/// A third view beside the two shows 5 % more of the hull, which is harder to render, and its mesh bridges
-/// edges in another way: on the pixels of both it is still 0.6 dB below two views. It is 29.9 dB if
-/// triangles that no other view confirms hide others, and Delaunay's edges are kept.
+/// More views beside two show more of the hull. On the pixels of the two they cost 0.05 to 0.39 dB, because
+/// their surfaces are displaced. Where the two nearest views had meshes of different points they cost up to
+/// 0.84 dB.
 #[test]
-fn model_house_from_three_views() {
-    let Some((three, ..)) = house(&[2, 4, 1], 3) else { return };
-    assert!(three >= 30.4, "{three}");
+fn model_house_from_more_views() {
+    for (from, wanted) in [(&[2, 4, 1][..], 3), (&[1, 3, 4], 2), (&[1, 3, 0], 2), (&[2, 4, 1, 0], 3)] {
+        let Some(more) = house(from, wanted) else { return };
+        let two = house(&from[..2], wanted).unwrap();
+        let both: Vec<bool> = two.done.region.iter().zip(&more.done.region).map(|(a, b)| *a && *b).collect();
+        let [two, more] = [&two, &more].map(|house| house.psnr(&both));
+        println!("{from:?} -> {wanted}, on the pixels of both: {two:.2} dB from two, {more:.2} dB from all");
+        assert!(more >= two - 0.45, "{from:?}: {two} {more}");
+    }
 }
 
 #[test]
 fn model_house() {
-    let Some((psnr, inliers, matches)) = house(&[2, 4], 3) else { return };
-    let (second, all, of) = house(&[1, 3], 2).unwrap();
-    assert_eq!((inliers, matches), (340, 344));
-    assert_eq!((all, of), (182, 182));
-    assert!(psnr >= 31.0, "{psnr}");
-    assert!(second >= 31.7, "{second}");
+    let Some(first) = house(&[2, 4], 3) else { return };
+    let second = house(&[1, 3], 2).unwrap();
+    let matches = |house: &House| (house.done.geometry.inliers, house.done.geometry.matches);
+    assert_eq!((matches(&first), matches(&second)), ((340, 344), (182, 182)));
+    let [first, second] = [&first, &second].map(|house| house.psnr(&house.done.region));
+    assert!(first >= 31.0 && second >= 31.7, "{first} {second}");
 }

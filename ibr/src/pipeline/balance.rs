@@ -54,6 +54,13 @@ impl Balance {
         Self { weights, distances: distances.to_vec(), gains: Vec::new() }
     }
 
+    /// The two views that weigh most, of at least two.
+    pub(super) fn first_two(&self) -> [usize; 2] {
+        let mut order: Vec<usize> = (0..self.weights.len()).collect();
+        order.sort_by(|a, b| self.weights[*b].total_cmp(&self.weights[*a]));
+        [order[0], order[1]]
+    }
+
     /// The same with the `count` nearest views only; all if there is no number.
     pub fn nearest(mut self, count: Option<usize>) -> Self {
         let mut order: Vec<usize> = (0..self.distances.len()).collect();

@@ -29,7 +29,15 @@ impl<F: Fn(&[usize]) -> f64> Search<F> {
     /// The best of the choices that grow greedily from each candidate as the first and are then improved by
     /// exchanges. As many errors as there are candidates times those of [`Search::exchanged`].
     pub fn from_each(&self, count: usize) -> Vec<usize> {
-        let choices = (0..self.candidates).map(|first| self.improved(self.grown(vec![first], count)));
+        self.from_several(self.candidates, count)
+    }
+
+    /// The same from the `starts` candidates that are best alone.
+    pub fn from_several(&self, starts: usize, count: usize) -> Vec<usize> {
+        let mut firsts: Vec<(f64, usize)> = (0..self.candidates).map(|i| ((self.error)(&[i]), i)).collect();
+        firsts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let grown = firsts.into_iter().take(starts).map(|(_, first)| self.grown(vec![first], count));
+        let choices = grown.map(|chosen| self.improved(chosen));
         let scored = choices.map(|chosen| ((self.error)(&chosen), chosen));
         let best = scored.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Vec::new(), |(_, chosen)| chosen);
         best.into_iter().take(count).collect()
@@ -91,6 +99,8 @@ mod tests {
         assert!((search.error)(&search.greedy(2)) > 0.0);
         assert_eq!(sorted(search.exchanged(2)), [2, 17]);
         assert_eq!(sorted(search.from_each(2)), [2, 17]);
+        assert_eq!(sorted(search.from_several(3, 2)), [2, 17]);
+        assert!(search.from_several(0, 2).is_empty());
         assert_eq!(search.greedy(30).len(), 20);
         assert!(search.greedy(0).is_empty() && search.from_each(0).is_empty());
     }

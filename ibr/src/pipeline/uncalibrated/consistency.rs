@@ -7,7 +7,7 @@ use crate::image::Image;
 use crate::pipeline::RenderError;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::flips;
-use crate::uncalibrated::mesh::Mesh;
+use crate::uncalibrated::mesh::{self, Feature, Mesh};
 use rayon::prelude::*;
 
 /// Difference of colours that counts at most, in grey levels: where another surface hides the point in the
@@ -44,16 +44,32 @@ impl Surface {
     }
 }
 
-/// The surfaces of each view.
-pub(super) fn surfaces(images: &[&Image], scene: &Reconstruction) -> Result<Vec<Surface>, RenderError> {
+/// The surfaces of each view. Where the `nearest` two share points their surfaces have no others: a point
+/// that only one of them has bends its surface, and the two would show double images.
+pub(super) fn surfaces(
+    images: &[&Image],
+    scene: &Reconstruction,
+    nearest: [usize; 2],
+) -> Result<Vec<Surface>, RenderError> {
     let grey: Vec<Image> = images.par_iter().map(|image| image.to_grey()).collect();
-    let all: Vec<_> = (0..images.len()).into_par_iter().map(|view| surface(&grey, scene, view)).collect();
+    let partner = |view: usize| match nearest {
+        [a, b] if a == view => Some(b),
+        [a, b] if b == view => Some(a),
+        _ => None,
+    };
+    let surface = |view: usize| surface(&grey, scene, view, partner(view));
+    let all: Vec<_> = (0..images.len()).into_par_iter().map(surface).collect();
     // Of several errors the first, for any number of threads.
     all.into_iter().collect()
 }
 
-fn surface(grey: &[Image], scene: &Reconstruction, view: usize) -> Result<Surface, RenderError> {
-    let mut mesh = Mesh::delaunay(&scene.features(view));
+fn surface(
+    grey: &[Image],
+    scene: &Reconstruction,
+    view: usize,
+    partner: Option<usize>,
+) -> Result<Surface, RenderError> {
+    let mut mesh = Mesh::delaunay(&features(scene, view, partner, grey[view].size()));
     let others = others(grey, scene, view)?;
     // A surface is right if one other view shows it: nearer ones may hide it in the rest.
     let miss = |p: &Point, chi: f64| {
@@ -67,6 +83,25 @@ fn surface(grey: &[Image], scene: &Reconstruction, view: usize) -> Result<Surfac
     flips::exchange(&mut mesh, miss);
     let doubtful = unusual(&mean_misses(&mesh, grey[view].size(), miss));
     Ok(Surface { mesh, doubtful })
+}
+
+/// The features of a view, inside of the hull of those that it shares with its partner only these.
+fn features(
+    scene: &Reconstruction,
+    view: usize,
+    partner: Option<usize>,
+    size: (usize, usize),
+) -> Vec<Feature> {
+    let all = scene.features(view);
+    let Some(partner) = partner else { return all };
+    let shared = scene.features_with(view, partner);
+    let inside = mesh::dense_chi(&shared, size);
+    let is_outside = |feature: &&Feature| {
+        let (x, y) = (feature.position.x.round() as usize, feature.position.y.round() as usize);
+        inside.get(y * size.0 + x).is_none_or(|chi| chi.is_nan())
+    };
+    let own: Vec<Feature> = all.iter().filter(is_outside).filter(|f| !shared.contains(f)).copied().collect();
+    shared.into_iter().chain(own).collect()
 }
 
 /// The mean of `miss` over the pixels of each triangle, NaN for triangles without any.

@@ -158,13 +158,14 @@ pub fn render(
     let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
     let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated)?;
     scene.numbers = numbers;
-    let surfaces = consistency::surfaces(images, &scene)?;
+    let balance = synthesis::balance(&scene, images.len());
+    let surfaces = consistency::surfaces(images, &scene, balance.first_two())?;
     if uncalibrated.handedness.is_none() {
         decide(images, &surfaces, &mut scene)?;
     }
     let colour = images.iter().any(|i| i.channels() == 3);
     let render = if colour { synthesis::render::<3> } else { synthesis::render::<1> };
-    Ok(render(images, &surfaces, &scene, size, settings, uncalibrated)?)
+    Ok(render(images, &surfaces, &scene, &balance, size, (settings, uncalibrated))?)
 }
 
 /// Decides the order of depth from the photographs, which show what is in front, and the guessed

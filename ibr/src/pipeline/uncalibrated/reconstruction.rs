@@ -49,9 +49,15 @@ impl Reconstruction {
 
     /// The features of one view with their chi, without points behind it.
     pub(super) fn features(&self, view: usize) -> Vec<Feature> {
+        self.features_with(view, view)
+    }
+
+    /// Those of a view that another one has too.
+    pub(super) fn features_with(&self, view: usize, other: usize) -> Vec<Feature> {
         let matrix = &self.cameras[view];
         let feature = |(point, seen): (&Vector4<f64>, &Vec<Option<Point>>)| {
             let position = seen[view]?;
+            seen[other]?;
             let front = chirality::depth(matrix, point) > 0.0;
             front.then(|| Feature { position, chi: chirality::chi(matrix, point) })
         };

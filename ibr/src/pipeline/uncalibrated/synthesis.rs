@@ -22,12 +22,13 @@ pub(super) fn render<const C: usize>(
     images: &[&Image],
     surfaces: &[Surface],
     scene: &Reconstruction,
+    balance: &Balance,
     size: (usize, usize),
-    settings: &RenderSettings,
-    special: &UncalibratedSettings,
+    (settings, special): (&RenderSettings, &UncalibratedSettings),
 ) -> Result<UncalibratedRendering, RenderError> {
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
     let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame)?;
+    balance.apply(&mut samples);
     let mut report = Report { dropped, propagated: samples.len(), ..Report::default() };
     let hull = hull_features(scene, images.len());
     let absolute = special.sigma_share * chi_range(&hull);
@@ -52,7 +53,7 @@ pub(super) fn render<const C: usize>(
     Ok(UncalibratedRendering { rendering, region, geometry: scene.geometry.clone(), hand: scene.hand })
 }
 
-/// The samples of all views in the virtual one, with their weights, and what was dropped.
+/// The samples of all views in the virtual one, and what was dropped.
 fn propagated<const C: usize>(
     images: &[&Image],
     surfaces: &[Surface],
@@ -74,9 +75,6 @@ fn propagated<const C: usize>(
         let pixels = images.iter().map(|i| i.width() * i.height()).sum();
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
-    if images.len() > 2 {
-        balance(scene, images.len()).apply(&mut samples);
-    }
     Ok((samples, dropped))
 }
 
@@ -95,9 +93,12 @@ fn remove_occluded<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTes
     before - samples.len()
 }
 
-/// Weights of the views: near ones count more. The distance of a view is the parallax between it and the
-/// virtual one, in pixels.
-fn balance(scene: &Reconstruction, target: usize) -> Balance {
+/// Weights of the views: near ones count more, all alike of two. The distance of a view is the parallax
+/// between it and the virtual one, in pixels.
+pub(super) fn balance(scene: &Reconstruction, target: usize) -> Balance {
+    if target == 2 {
+        return Balance::by_distance(&[1.0, 1.0]);
+    }
     let positions: Vec<Vec<Option<Point>>> = scene
         .points
         .iter()

@@ -68,7 +68,7 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
     let settings = UncalibratedSettings::default();
     let target = Target::Tracks(tracks.iter().map(|t| t[1]).collect());
     let mut found = reconstruction::reconstruct(&images, &tracks, &target, &settings).ok()?;
-    let surfaces = consistency::surfaces(&images, &found).ok()?;
+    let surfaces = consistency::surfaces(&images, &found, [0, 1]).ok()?;
     let (by_calibrations, advantage) = (found.hand, Advantage::of(&images, &surfaces, &found).ok()?);
     decide(&images, &surfaces, &mut found).ok()?;
     // The truth: chi of the first camera against the true 1 / d.
