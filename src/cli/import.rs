@@ -6,6 +6,7 @@ use super::design::report::Report;
 use crate::design::{self, DesignError, GammaScale, ProofSearch};
 use crate::files::{Bound, read_bytes};
 use crate::interchange::{TapsError, taps_of_csv, taps_of_npy};
+use crate::overview::doubts;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -51,12 +52,19 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     refuse_overlap(&args.output, &args.taps)?;
     let mut spec = load_spec_or_bank(&args.spec)?;
     spec.latency = args.latency.or(spec.latency);
+    if spec.latency.is_none() {
+        return Err(Failure::Input(format!(
+            "{}: it gives no latency, which taps from elsewhere have; give --latency, the delay of their output in fast samples",
+            args.spec.display()
+        )));
+    }
     let taps = read(&args.taps)?;
     let named = |error: DesignError| Failure::Input(format!("{}: {error}", args.taps.display()));
     let begin = Instant::now();
     let found = design::judge_taps(&spec, taps, ProofSearch::Run).map_err(named)?;
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
     let scale = GammaScale::new(&found.bank).map_err(named)?;
+    doubts(&found.bank, &mean, &scale).iter().for_each(|doubt| super::warn(doubt));
     write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let report = Report::new(args.output.display().to_string(), &found, mean, scale, seconds);

@@ -159,8 +159,8 @@ fn fir(parts: &Fir<'_>) -> String {
          /* {comment}.\n   taps[channel][phase][lag]: tap phase + lag * {m} of the channel's filter. */\n\
          static const {tap} {name}_taps[{count}] = {taps};\n\n{offsets}\
          typedef struct {{\n    {sample} history[{lags}][{n}]; /* a ring of slow periods */\n    int newest;\n}} {name}_state;\n\n\
-         static void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n}}\n\n{helper}\
-         static void {name}_process({name}_state *state, const {sample} input[{n}], {sample} output[{m}]) {{\n    \
+         static inline void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n}}\n\n{helper}\
+         static inline void {name}_process({name}_state *state, const {sample} input[{n}], {sample} output[{m}]) {{\n    \
          state->newest = state->newest == 0 ? {last} : state->newest - 1;\n    \
          for (int i = 0; i < {n}; i++) state->history[state->newest][i] = {centred};\n    \
          for (int p = 0; p < {m}; p++) {{\n        {number} sum = 0;\n        \
@@ -194,11 +194,11 @@ fn recursive(bank: &Bank, block: &SparseBlock, name: &str) -> String {
          static const int {name}_starts[{boundaries}] = {starts};\n\
          static const double {name}_offsets[{inputs}] = {offsets};\n\n\
          typedef struct {{\n    double x[{width}];\n}} {name}_state;\n\n\
-         static void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n}}\n\n\
+         static inline void {name}_reset({name}_state *state) {{\n    memset(state, 0, sizeof *state);\n}}\n\n\
          static double {name}_row(const double *z, int row) {{\n    double sum = 0;\n    \
          for (int k = {name}_starts[row]; k < {name}_starts[row + 1]; k++) sum += {name}_values[k] * z[{name}_columns[k]];\n    \
          return sum;\n}}\n\n\
-         static void {name}_process({name}_state *state, const double input[{inputs}], double output[{outputs}]) {{\n    \
+         static inline void {name}_process({name}_state *state, const double input[{inputs}], double output[{outputs}]) {{\n    \
          double z[{all}];\n    \
          for (int i = 0; i < {states}; i++) z[i] = state->x[i];\n    \
          for (int i = 0; i < {inputs}; i++) z[{states} + i] = input[i] - {name}_offsets[i];\n    \

@@ -5,6 +5,7 @@ use super::lines::{Found, Lines, fit_lines};
 use super::quadrature::Quadrature;
 use super::record::Record;
 use super::{Cause, MeasureError, Settings, Spectrum, UnsettledEnds, Window};
+use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
 use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate};
 use crate::units::{Decibels, Hertz, Radians};
 
@@ -150,6 +151,18 @@ pub fn measure_complex(
 
 fn measured(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     settings.check()?;
+    match figures(record, rate, settings) {
+        // A peak that is searched for may be a trend, which no sine fits.
+        Err(MeasureError::Fit(TonesCoincide { .. } | AtEdge { .. } | NoTone { .. }))
+            if settings.tones.is_empty() =>
+        {
+            Err(MeasureError::Fit(NoTone { near: None }))
+        }
+        result => result,
+    }
+}
+
+fn figures(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     let tones = fit_tones(record, rate, settings)?;
     let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
     let pattern = Pattern {

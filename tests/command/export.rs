@@ -1,7 +1,7 @@
 //! Exported banks as their users take them: C compiled by the system's compiler, arrays read by NumPy and
 //! SciPy.
 
-use crate::support::{Desk, THESIS, number};
+use crate::support::{Desk, THESIS, number, text};
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::interchange::{PolyphaseTaps, SparseBlock};
 use std::process::Command;
@@ -243,6 +243,12 @@ fn taps_of_other_tools_are_judged() {
     let plain = desk.json(&[&["import", "spec.toml", "plain.csv"][..], &late].concat());
     assert!((gamma(&plain) / number(&plain, "/scale/interleaving") - 1.0).abs() < 1e-9, "{plain}");
     desk.refused(1, &["import", "spec.toml", "none.csv", "-o", "x.json"], &["none.csv", "cannot read"]);
+    desk.write("wrong.csv", "-9,-9\n9,9\n");
+    let output = desk.run(&["import", "spec.toml", "wrong.csv", "-o", "wrong.json"], &[]);
+    let warning = text(&output.stderr);
+    assert!(output.status.success() && warning.contains("no better than that of zero output"), "{warning}");
+    desk.write("open.toml", THESIS.replace("latency = 10\n", ""));
+    desk.refused(1, &["import", "open.toml", "taps.csv", "-o", "x.json"], &["open.toml", "give --latency"]);
     desk.write("three.csv", "1,2,3\n");
     desk.refused(1, &["import", "spec.toml", "three.csv", "-o", "x.json"], &["3 filters", "2 channels"]);
     desk.refused(2, &["import", "spec.toml", "taps.txt", "-o", "x.json"], &["taps.txt", ".csv and .npy"]);

@@ -180,6 +180,12 @@ fn what_cannot_be_measured_is_refused() {
     wav::write(&desk, "empty.wav", 1, 48_000, &[]);
     wav::write(&desk, "short.wav", 1, 48_000, &capture(100, 4321.0));
     desk.refused(1, &["measure", "flat.wav"], &["flat.wav", "no tone found"]);
+    let decay: Vec<f32> = (0..4000u16).map(|n| (-f32::from(n) / 500.0).exp()).collect();
+    let ramp: Vec<f32> = (0..4000u16).map(|n| f32::from(n) / 4000.0).collect();
+    for trend in [decay, ramp] {
+        wav::write(&desk, "trend.wav", 1, 48_000, &trend);
+        desk.refused(1, &["measure", "trend.wav"], &["trend.wav", "no tone found: "]);
+    }
     desk.refused(1, &["measure", "empty.wav"], &["empty.wav", "no samples"]);
     desk.refused(1, &["measure", "short.wav", "--interleaved", "16"], &["short.wav", "too few", "harmonics"]);
     desk.refused(1, &["measure", "x.wav", "--tone", "9kHz"], &["x.wav", "no tone found near 9000 Hz"]);
