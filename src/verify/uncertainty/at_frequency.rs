@@ -6,14 +6,19 @@
 //! box
 //!
 //! ```text
-//! sigma(K) <= max over the vertices of sigma(K_v) + sum_i |F_i| c_i.
+//! sigma(K) <= max over the vertices of sigma(K_v) + rho,
+//! rho^2 = the largest eigenvalue of sum_i (c_i^2 / w_i) F_i F_i*,   w_i = |F_i| c_i / sum_j |F_j| c_j.
 //! ```
+//!
+//! rho bounds sum_i F_i r_i for all rows of norms c_i, by Cauchy and Schwarz for u* F_i r_i with the weights
+//! w_i. It is at most sum_i |F_i| c_i, and for columns F_i that are far from parallel much smaller.
 //!
 //! Gains enter h_i as factors, so their box adds vertices and no remainder. Where the bound is too large,
 //! the box is halved along the channel with the largest remainder.
 //!
 //! The vertices form a tree, channel by channel. With channel i still free, h_i lies within r_i of the mean
-//! of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch.
+//! of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch. Where a branch has many
+//! vertices, multipliers bound them all at once and far better (`multipliers`).
 //!
 //! Most gains are compared in double precision (`quick`). Balls decide where that does not suffice, and give
 //! the gains that are reported.
@@ -22,6 +27,7 @@ use super::super::ball::{self, Ball, Matrix};
 use super::super::positive;
 use super::super::spectrum::ComplexMatrix;
 use super::grid::ChannelGrid;
+use super::multipliers::{self, Vertices};
 use super::quick::{Compared, Quick, Terms};
 use crate::linalg;
 use std::collections::HashMap;
@@ -30,6 +36,10 @@ use std::collections::HashMap;
 const HALVED: usize = 2;
 /// Relative margins over a computed eigenvalue at which a proof that it is an upper bound is tried.
 const MARGINS: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
+/// Least vertices of a branch for which multipliers are sought.
+const MANY_VERTICES: usize = 512;
+/// Above this many vertices, and on grids that are finer than the box, nothing else is tried.
+const MOST_VERTICES: usize = 4096;
 /// Maximum number of boxes at one frequency.
 pub(super) const MAX_BOXES: usize = 4096;
 
@@ -103,6 +113,14 @@ impl Work {
         self.operations += self.per_gain;
     }
 
+    /// Counts a search for multipliers and its proof, for matrices of some order from `rows` rows of a Gram
+    /// matrix.
+    fn count_multipliers(&mut self, order: usize, rows: usize) {
+        self.gains += 1;
+        let (order, rows) = (order as f64, rows as f64);
+        self.operations += 4.0 * order * rows * (rows + order) + 6.0 * order.powi(3);
+    }
+
     /// Counts a gain in doubles.
     pub(super) fn count_quick(&mut self) {
         self.gains += 1;
@@ -133,13 +151,16 @@ impl AtFrequency<'_> {
     /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
     pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
         let quick = Quick::new(&self.gram, &self.filters);
+        let mut remainders: HashMap<Vec<usize>, f64> = HashMap::new();
         let mut sets = Sets { at: self, known: HashMap::new() };
         let mut boxes = vec![self.whole()];
         for _ in 0..MAX_BOXES {
             let Some(parts) = boxes.pop() else { return Verdict::Below };
             let halves = self.halved(&parts, HALVED);
+            let levels = parts.iter().map(|part| part.level).collect();
+            let remainder = *remainders.entry(levels).or_insert_with(|| self.joint_remainder(&parts));
             let limits = Limits {
-                gain: threshold - self.remainder(&parts),
+                gain: threshold - remainder,
                 // Where the box can be halved, gains below the threshold need no digits.
                 reported: if halves.is_some() { threshold } else { 0.0 },
             };
@@ -162,6 +183,11 @@ impl AtFrequency<'_> {
         self.channels.iter().map(part).collect()
     }
 
+    /// Whether the grid has points between the ends of the box.
+    fn is_divided(&self) -> bool {
+        self.channels.iter().any(|channel| channel.errors.len() > 2)
+    }
+
     /// A bound of what channel `i` adds to the gains at the vertices.
     fn term(&self, i: usize, part: &Part) -> f64 {
         self.columns[i] * self.remainders[i][part.level]
@@ -170,6 +196,25 @@ impl AtFrequency<'_> {
     /// A bound of what all channels add to them.
     pub(super) fn remainder(&self, parts: &[Part]) -> f64 {
         super::angle::outward(parts.iter().enumerate().map(|(i, part)| self.term(i, part)).sum())
+    }
+
+    /// A smaller bound of the same for taps that stay: rho of the module's page.
+    fn joint_remainder(&self, parts: &[Part]) -> f64 {
+        let sum = self.remainder(parts);
+        let outputs = self.filters.re.nrows();
+        if parts.len() < 2 || sum == 0.0 || !sum.is_finite() {
+            return sum;
+        }
+        // c_i^2 / w_i = c_i sum / |F_i|; channels without taps add nothing.
+        let weight = |(i, part): (usize, &Part)| {
+            let column = self.columns[i];
+            let square = Ball::from(self.remainders[i][part.level]) * Ball::from(sum);
+            if column > 0.0 { square / Ball::from(column) } else { Ball::ZERO }
+        };
+        let weights: Vec<Ball> = parts.iter().enumerate().map(weight).collect();
+        let scaled = |m: &Matrix| Matrix::from_fn(outputs, weights.len(), |p, i| m[(p, i)] * weights[i]);
+        let scaled = ComplexMatrix { re: scaled(&self.filters.re), im: scaled(&self.filters.im) };
+        upper_gain(&scaled.product(&self.filters.adjoint()), 0.0).min(sum)
     }
 
     /// The halves along the channel with the largest remainder that has at least `steps` steps of the grid.
@@ -315,7 +360,7 @@ enum Found {
     /// One is not, but is not to be reported.
     Between,
     Gain(Attained),
-    /// The work ended.
+    /// The work ended, or there are too many vertices.
     UsedUp,
 }
 
@@ -348,6 +393,11 @@ impl Tree<'_, '_> {
         if let Some(found) = self.judge(spread[channel], mixes, chosen) {
             return found;
         }
+        match self.are_bounded(chosen) {
+            Some(true) => return Found::Nothing,
+            Some(false) => return Found::UsedUp,
+            None => {}
+        }
         let sets = self.sets;
         for vertex in &sets[channel].vertices {
             mixes[channel] = self.at.mix(channel, vertex);
@@ -360,6 +410,26 @@ impl Tree<'_, '_> {
         }
         mixes[channel].clone_from(&sets[channel].mean);
         Found::Nothing
+    }
+
+    /// Whether multipliers prove that all vertices of a branch are within the limit; `None` if there are few
+    /// enough to look at them.
+    fn are_bounded(&mut self, chosen: &[Vertex]) -> Option<bool> {
+        let sets = self.sets;
+        let chosen_sets = chosen.iter().map(std::slice::from_ref);
+        let others = sets[chosen.len()..].iter().map(|set| set.vertices.as_slice());
+        let channels: Vec<Vertices<'_>> = chosen_sets.chain(others).collect();
+        let count = channels.iter().fold(1usize, |all, vertices| all.saturating_mul(vertices.len()));
+        if count < MANY_VERTICES {
+            return None;
+        }
+        if count > MOST_VERTICES && self.at.is_divided() {
+            return Some(false);
+        }
+        let order = multipliers::order(self.at.filters.re.nrows(), &channels);
+        self.work.count_multipliers(order, self.at.gram.re.nrows());
+        let is_proven = multipliers::proves(self.at, &channels, self.limits.gain);
+        (is_proven || count > MOST_VERTICES).then_some(is_proven)
     }
 
     /// The verdict on a branch, or `None` if its parts must be looked at.

@@ -18,6 +18,8 @@ use std::f64::consts::PI;
 const MAX_LEVEL: u32 = 5;
 /// Most rows of a Gram matrix.
 const MAX_ROWS: usize = 160;
+/// From this many channels on, the worst point so far is tried at each frequency before all others.
+const MANY_CHANNELS: usize = 5;
 /// Factors by which the accuracy is relaxed until the work allows it.
 const RELAXED: [f64; 6] = [1.0, 2.0, 5.0, 20.0, 100.0, 1e4];
 /// Limit on the cells of one attempt.
@@ -51,6 +53,8 @@ pub(super) struct Cover<'a> {
     /// Size of the reference samples.
     scale: f64,
     best: Option<Best>,
+    /// The grid of the point of `best`, where it was needed.
+    at_best: Option<(ErrorPoint, Grid)>,
     /// The upper end that is to be proven; without it one relative to the best lower end.
     goal: Option<f64>,
     /// Gains computed so far.
@@ -110,6 +114,7 @@ impl<'a> Cover<'a> {
             lags,
             scale,
             best: None,
+            at_best: None,
             goal: None,
             gains_computed: 0,
             operations: 0.0,
@@ -252,6 +257,9 @@ impl<'a> Cover<'a> {
     /// Judges one frequency on coarse grids first.
     fn judge(&mut self, centre: f64, threshold: f64) -> Result<Verdict, VerifyError> {
         let near = Frequency::near(centre);
+        if let Some(above) = self.gain_of_best(centre, &near, threshold)? {
+            return Ok(Verdict::Above(above));
+        }
         let rows = self.remainders(&near)?;
         let mut verdict = Verdict::Below;
         for level in 0..=MAX_LEVEL {
@@ -271,6 +279,35 @@ impl<'a> Cover<'a> {
             }
         }
         Ok(verdict)
+    }
+
+    /// The gain of the worst point so far at another frequency, if it is above the threshold. With many
+    /// vertices a search would take long to meet one that is.
+    fn gain_of_best(
+        &mut self,
+        centre: f64,
+        near: &Frequency,
+        threshold: f64,
+    ) -> Result<Option<Attained>, VerifyError> {
+        if self.taps == Taps::Following || self.channels.len() < MANY_CHANNELS {
+            return Ok(None);
+        }
+        let Some(point) = self.best.as_ref().map(|best| best.point.clone()) else { return Ok(None) };
+        let grid = match self.at_best.take() {
+            Some((known, grid)) if known == point => grid,
+            _ => Grid::at(self.bank, &point)?,
+        };
+        let at = self.plain(&grid, near);
+        let mixes: Vec<Mix> = (0..self.channels.len())
+            .map(|i| vec![(grid.channels[i].rows[0][0], 1.0 + point.gains[i])])
+            .collect();
+        let lower = lower_gain(&at.square(&mixes));
+        self.operations += self.cost_of_gain() + self.cost_of_gram(&grid);
+        self.gains_computed += 1;
+        self.at_best = Some((point.clone(), grid));
+        self.offer(Best { lower, point, frequency: centre.min(PI) });
+        let attained = Attained { lower, upper: f64::INFINITY, vertices: Vec::new() };
+        Ok((lower > threshold).then_some(attained))
     }
 
     /// Bounds of the remainders of each channel, by halvings.
@@ -337,7 +374,9 @@ impl<'a> Cover<'a> {
         if known || rows > MAX_ROWS {
             return Ok(known);
         }
-        self.grids.push(Grid::new(self.bank, self.errors, level_of_grid)?);
+        // A grid that is too large is as good as none.
+        let Ok(grid) = Grid::new(self.bank, self.errors, level_of_grid) else { return Ok(false) };
+        self.grids.push(grid);
         Ok(true)
     }
 

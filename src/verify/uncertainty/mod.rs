@@ -12,7 +12,8 @@
 //!
 //! *Over the errors, at a fixed frequency* (`at_frequency`): each channel's row is a convex mix of its
 //! rows at the ends of the box plus a remainder that falls with the square of the width, so the gain is at
-//! most the largest gain at a vertex plus the remainders. Where that is too much, the box is halved.
+//! most the largest gain at a vertex plus the remainders. Where that is too much, the box is halved. Many
+//! vertices are bounded at once (`multipliers`).
 //!
 //! *Between frequencies, for fixed errors*: with its memory cut off after J slow periods (`memory`) K is a
 //! polynomial in z^-1, and |a* K|^2 is a nonnegative trigonometric polynomial p of some degree d for every
@@ -37,6 +38,7 @@ mod cover;
 mod following;
 mod grid;
 mod memory;
+mod multipliers;
 mod quick;
 mod slopes;
 #[cfg(test)]
