@@ -38,8 +38,10 @@ const HALVED: usize = 2;
 const MARGINS: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
 /// Least vertices of a branch for which multipliers are sought.
 const MANY_VERTICES: usize = 512;
-/// Above this many vertices, and on grids that are finer than the box, nothing else is tried.
-const MOST_VERTICES: usize = 4096;
+/// Above this many vertices nothing else is tried.
+const MOST_VERTICES: usize = 1 << 16;
+/// Above this many they are not sought on grids that are finer than the box.
+const MOST_DIVIDED: usize = 4096;
 /// Maximum number of boxes at one frequency.
 pub(super) const MAX_BOXES: usize = 4096;
 
@@ -423,7 +425,7 @@ impl Tree<'_, '_> {
         if count < MANY_VERTICES {
             return None;
         }
-        if count > MOST_VERTICES && self.at.is_divided() {
+        if count > MOST_DIVIDED && self.at.is_divided() {
             return Some(false);
         }
         let order = multipliers::order(self.at.filters.re.nrows(), &channels);
