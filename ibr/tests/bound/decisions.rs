@@ -143,8 +143,8 @@ fn a_searched_placement_is_close_to_the_best() {
 const STARTS: usize = 5;
 
 /// The same choice against the best of all subsets by rendering: 3 of 9 places, or 4 of 20 with
-/// `HYBANK_SWEEP=1`. The criterion knows surfaces and no textures, so it loses up to 0.9 dB. With the
-/// rendered views themselves as the criterion, exchanges after a greedy choice lose less than 0.3 dB.
+/// `HYBANK_SWEEP=1`. The criterion knows surfaces and no textures, so it loses up to 2.4 dB. With the
+/// rendered views themselves as the criterion, exchanges from several starts lose less than 0.3 dB.
 #[test]
 fn placement_gives_good_views() {
     let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 9, 3) };
@@ -183,5 +183,5 @@ fn placement_gives_good_views() {
         assert!(best - exchanged < 0.3, "scene {seed}: {exchanged} {best}");
         losses.push(best - surfaces);
     }
-    assert!(mean(losses.iter().copied()) < 1.0, "{losses:.2?}");
+    assert!(mean(losses.iter().copied()) < 1.5, "{losses:.2?}");
 }

@@ -14,34 +14,16 @@
 //! w_i. It is at most sum_i |F_i| c_i, and for columns F_i that are far from parallel much smaller.
 //!
 //! Gains enter h_i as factors, so their box adds vertices and no remainder. Where the bound is too large,
-//! the box is halved along the channel with the largest remainder.
-//!
-//! The vertices form a tree, channel by channel. With channel i still free, h_i lies within r_i of the mean
-//! of its vertices, so sigma of the mean plus sum |F_i| r_i bounds the whole branch. Where a branch has many
-//! vertices, multipliers bound them all at once and far better (`multipliers`).
-//!
-//! Most gains are compared in double precision (`quick`). Balls decide where that does not suffice, and give
-//! the gains that are reported.
+//! the box is halved along the channel with the largest remainder ([`super::vertex_tree`]).
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::positive;
 use super::super::spectrum::ComplexMatrix;
 use super::grid::ChannelGrid;
-use super::multipliers::{self, Vertices};
-use super::quick::{Compared, Quick, Terms};
 use crate::linalg;
-use std::collections::HashMap;
 
-/// Steps of the grid that a part needs to be halved.
-const HALVED: usize = 2;
 /// Relative margins over a computed eigenvalue at which a proof that it is an upper bound is tried.
 const MARGINS: [f64; 4] = [1e-9, 1e-6, 1e-3, 1.0];
-/// Least vertices of a branch for which multipliers are sought.
-const MANY_VERTICES: usize = 512;
-/// Above this many vertices nothing else is tried.
-const MOST_VERTICES: usize = 1 << 16;
-/// Above this many they are not sought on grids that are finer than the box.
-const MOST_DIVIDED: usize = 4096;
 /// Maximum number of boxes at one frequency.
 pub(super) const MAX_BOXES: usize = 4096;
 
@@ -115,14 +97,6 @@ impl Work {
         self.operations += self.per_gain;
     }
 
-    /// Counts a search for multipliers and its proof, for matrices of some order from `rows` rows of a Gram
-    /// matrix.
-    fn count_multipliers(&mut self, order: usize, rows: usize) {
-        self.gains += 1;
-        let (order, rows) = (order as f64, rows as f64);
-        self.operations += 4.0 * order * rows * (rows + order) + 6.0 * order.powi(3);
-    }
-
     /// Counts a gain in doubles.
     pub(super) fn count_quick(&mut self) {
         self.gains += 1;
@@ -150,35 +124,6 @@ pub(super) struct Part {
 }
 
 impl AtFrequency<'_> {
-    /// Compares the largest gain over the whole box with `threshold`, within the limit of `work`.
-    pub(super) fn compare(&self, threshold: f64, work: &mut Work) -> Verdict {
-        let quick = Quick::new(&self.gram, &self.filters);
-        let mut remainders: HashMap<Vec<usize>, f64> = HashMap::new();
-        let mut sets = Sets { at: self, known: HashMap::new() };
-        let mut boxes = vec![self.whole()];
-        for _ in 0..MAX_BOXES {
-            let Some(parts) = boxes.pop() else { return Verdict::Below };
-            let halves = self.halved(&parts, HALVED);
-            let levels = parts.iter().map(|part| part.level).collect();
-            let remainder = *remainders.entry(levels).or_insert_with(|| self.joint_remainder(&parts));
-            let limits = Limits {
-                gain: threshold - remainder,
-                // Where the box can be halved, gains below the threshold need no digits.
-                reported: if halves.is_some() { threshold } else { 0.0 },
-            };
-            let sets = sets.of(&parts);
-            match (Tree { at: self, quick: &quick, sets: &sets, limits, work }.search(), halves) {
-                (Found::Nothing, _) => continue,
-                (Found::UsedUp, _) => break,
-                (Found::Gain(found), _) if found.lower > threshold => return Verdict::Above(found),
-                (Found::Gain(found), None) => return Verdict::Open(found),
-                (Found::Between | Found::Gain(_), Some(halves)) => boxes.extend(halves),
-                (Found::Between, None) => break,
-            }
-        }
-        Verdict::Open(Attained::unknown())
-    }
-
     /// The whole box.
     pub(super) fn whole(&self) -> Vec<Part> {
         let part = |channel: &ChannelGrid| Part { first: 0, last: channel.errors.len() - 1, level: 0 };
@@ -186,7 +131,7 @@ impl AtFrequency<'_> {
     }
 
     /// Whether the grid has points between the ends of the box.
-    fn is_divided(&self) -> bool {
+    pub(super) fn is_divided(&self) -> bool {
         self.channels.iter().any(|channel| channel.errors.len() > 2)
     }
 
@@ -201,7 +146,7 @@ impl AtFrequency<'_> {
     }
 
     /// A smaller bound of the same for taps that stay: rho of the module's page.
-    fn joint_remainder(&self, parts: &[Part]) -> f64 {
+    pub(super) fn joint_remainder(&self, parts: &[Part]) -> f64 {
         let sum = self.remainder(parts);
         let outputs = self.filters.re.nrows();
         if parts.len() < 2 || sum == 0.0 || !sum.is_finite() {
@@ -244,12 +189,12 @@ impl AtFrequency<'_> {
         all.flat_map(|(error, speed)| gains.iter().map(move |&gain| Vertex { error, speed, gain })).collect()
     }
 
-    fn mix(&self, i: usize, vertex: &Vertex) -> Mix {
+    pub(super) fn mix(&self, i: usize, vertex: &Vertex) -> Mix {
         vec![(self.channels[i].rows[vertex.error][vertex.speed], vertex.gain)]
     }
 
     /// The mean of the rows of a set of vertices.
-    fn mean(&self, i: usize, set: &[Vertex]) -> Mix {
+    pub(super) fn mean(&self, i: usize, set: &[Vertex]) -> Mix {
         let mut mean: Mix = Vec::new();
         for (row, gain) in set.iter().flat_map(|vertex| self.mix(i, vertex)) {
             let share = gain / set.len() as f64;
@@ -262,7 +207,7 @@ impl AtFrequency<'_> {
     }
 
     /// A bound of the distance of the rows of a set from their mean.
-    fn radius(&self, i: usize, set: &[Vertex], mean: &Mix) -> f64 {
+    pub(super) fn radius(&self, i: usize, set: &[Vertex], mean: &Mix) -> f64 {
         if set.len() == 1 {
             return 0.0;
         }
@@ -312,157 +257,6 @@ impl AtFrequency<'_> {
         };
         let map = ComplexMatrix { re: part(&self.filters.re, 1.0), im: part(&self.filters.im, 0.0) };
         map.product(&self.gram.select(&rows, &rows)).product(&map.adjoint())
-    }
-}
-
-/// The vertices of a channel over a part of its delays.
-#[derive(Debug, Clone)]
-struct Set {
-    vertices: Vec<Vertex>,
-    mean: Mix,
-    /// Bounds |F_i| times the distance of the rows from their mean.
-    radius: f64,
-}
-
-/// The sets of all parts so far, by channel and ends.
-struct Sets<'a, 'b> {
-    at: &'a AtFrequency<'b>,
-    known: HashMap<(usize, usize, usize), Set>,
-}
-
-impl Sets<'_, '_> {
-    fn of(&mut self, parts: &[Part]) -> Vec<Set> {
-        let at = self.at;
-        let set = |(i, part): (usize, &Part)| {
-            let make = || {
-                let vertices = at.vertices(i, part);
-                let mean = at.mean(i, &vertices);
-                let radius = at.columns[i] * at.radius(i, &vertices, &mean);
-                Set { vertices, mean, radius }
-            };
-            self.known.entry((i, part.first, part.last)).or_insert_with(make).clone()
-        };
-        parts.iter().enumerate().map(set).collect()
-    }
-}
-
-/// What the gains of one box are compared with.
-#[derive(Debug, Clone, Copy)]
-struct Limits {
-    /// Gains up to this are small enough.
-    gain: f64,
-    /// Gains up to this are not computed to all digits.
-    reported: f64,
-}
-
-/// What a search found.
-enum Found {
-    /// All gains are within the limit.
-    Nothing,
-    /// One is not, but is not to be reported.
-    Between,
-    Gain(Attained),
-    /// The work ended, or there are too many vertices.
-    UsedUp,
-}
-
-/// The search among the vertices of one box.
-struct Tree<'a, 'b> {
-    at: &'a AtFrequency<'b>,
-    quick: &'a Quick,
-    sets: &'a [Set],
-    limits: Limits,
-    work: &'a mut Work,
-}
-
-impl Tree<'_, '_> {
-    fn search(&mut self) -> Found {
-        // spread[i] bounds what the channels from i on may add to their means.
-        let mut spread = vec![0.0; self.sets.len() + 1];
-        for (i, set) in self.sets.iter().enumerate().rev() {
-            spread[i] = super::angle::outward(spread[i + 1] + set.radius);
-        }
-        let mut mixes: Vec<Mix> = self.sets.iter().map(|set| set.mean.clone()).collect();
-        self.branch(&spread, &mut mixes, &mut Vec::new())
-    }
-
-    /// `mixes` are the chosen vertices of the first channels and the means of the others.
-    fn branch(&mut self, spread: &[f64], mixes: &mut [Mix], chosen: &mut Vec<Vertex>) -> Found {
-        let channel = chosen.len();
-        if self.work.is_used_up() {
-            return Found::UsedUp;
-        }
-        if let Some(found) = self.judge(spread[channel], mixes, chosen) {
-            return found;
-        }
-        match self.are_bounded(chosen) {
-            Some(true) => return Found::Nothing,
-            Some(false) => return Found::UsedUp,
-            None => {}
-        }
-        let sets = self.sets;
-        for vertex in &sets[channel].vertices {
-            mixes[channel] = self.at.mix(channel, vertex);
-            chosen.push(*vertex);
-            let found = self.branch(spread, mixes, chosen);
-            chosen.pop();
-            if !matches!(found, Found::Nothing) {
-                return found;
-            }
-        }
-        mixes[channel].clone_from(&sets[channel].mean);
-        Found::Nothing
-    }
-
-    /// Whether multipliers prove that all vertices of a branch are within the limit; `None` if there are few
-    /// enough to look at them.
-    fn are_bounded(&mut self, chosen: &[Vertex]) -> Option<bool> {
-        let sets = self.sets;
-        let chosen_sets = chosen.iter().map(std::slice::from_ref);
-        let others = sets[chosen.len()..].iter().map(|set| set.vertices.as_slice());
-        let channels: Vec<Vertices<'_>> = chosen_sets.chain(others).collect();
-        let count = channels.iter().fold(1usize, |all, vertices| all.saturating_mul(vertices.len()));
-        if count < MANY_VERTICES {
-            return None;
-        }
-        if count > MOST_DIVIDED && self.at.is_divided() {
-            return Some(false);
-        }
-        let order = multipliers::order(self.at.filters.re.nrows(), &channels);
-        self.work.count_multipliers(order, self.at.gram.re.nrows());
-        let is_proven = multipliers::proves(self.at, &channels, self.limits.gain);
-        (is_proven || count > MOST_VERTICES).then_some(is_proven)
-    }
-
-    /// The verdict on a branch, or `None` if its parts must be looked at.
-    fn judge(&mut self, spread: f64, mixes: &[Mix], chosen: &[Vertex]) -> Option<Found> {
-        let (limit, is_leaf) = (self.limits.gain - spread, chosen.len() == self.sets.len());
-        self.work.count_quick();
-        let terms = self.terms(mixes);
-        match self.quick.compare(&terms, limit) {
-            Compared::Below => return Some(Found::Nothing),
-            Compared::NotBelow if !is_leaf => return None,
-            Compared::NotBelow if self.quick.compare(&terms, self.limits.reported) == Compared::Below => {
-                return Some(Found::Between);
-            }
-            _ => {}
-        }
-        self.work.count();
-        let square = self.at.square(mixes);
-        let upper = upper_gain(&square, limit);
-        if upper <= limit {
-            return Some(Found::Nothing);
-        }
-        let attained = || Attained { lower: lower_gain(&square), upper, vertices: chosen.to_vec() };
-        is_leaf.then(|| Found::Gain(attained()))
-    }
-
-    fn terms(&self, mixes: &[Mix]) -> Terms {
-        let mut terms = Terms::default();
-        for (i, mix) in mixes.iter().enumerate() {
-            mix.iter().for_each(|&(row, weight)| self.quick.subtract(&mut terms, i, row, weight));
-        }
-        terms
     }
 }
 

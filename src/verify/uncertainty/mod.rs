@@ -44,6 +44,7 @@ mod slopes;
 #[cfg(test)]
 mod tests;
 mod transfer;
+mod vertex_tree;
 
 pub use slopes::{Slopes, slopes};
 
