@@ -12,7 +12,8 @@ pub use holes::{Cover, HoleCount, HoleFill, HoleSettings};
 
 use crate::occlusion::DepthTest;
 
-/// Hears which share of a piece of work is done, 0 to 1, from any thread and not necessarily in order.
+/// Called with the share of a piece of work that is done, 0 to 1, from any thread and not necessarily in
+/// order.
 pub type Watch<'a> = &'a (dyn Fn(f64) + Sync);
 
 /// Degree of the splines of the row fit.

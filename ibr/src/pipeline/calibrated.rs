@@ -34,7 +34,7 @@ pub fn render(
     render_watched(views, camera, size, settings, &|_| ())
 }
 
-/// As [`render`]; `watch` hears which share of the work is done.
+/// As [`render`]; `watch` is called with the share of the work that is done.
 ///
 /// # Errors
 /// As [`render`].

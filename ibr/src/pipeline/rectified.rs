@@ -29,7 +29,7 @@ pub fn render(
     render_watched(views, position, settings, &|_| ())
 }
 
-/// As [`render`]; `watch` hears which share of the work is done.
+/// As [`render`]; `watch` is called with the share of the work that is done.
 ///
 /// # Errors
 /// As [`render`].

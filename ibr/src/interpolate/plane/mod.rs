@@ -134,7 +134,7 @@ impl<const C: usize> PlaneProblem<C> {
         self.solve_watched(region, &|_| ())
     }
 
-    /// As [`PlaneProblem::solve`]; `watch` hears which share of the fit is done.
+    /// As [`PlaneProblem::solve`]; `watch` is called with the share of the fit that is done.
     ///
     /// # Errors
     /// As [`PlaneProblem::solve`].
