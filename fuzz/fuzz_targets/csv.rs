@@ -9,7 +9,9 @@ fn frames(bytes: &[u8], most: usize) -> Option<Vec<u64>> {
     let (mut all, mut some) = (Vec::new(), Vec::new());
     loop {
         if let Err(error) = reader.fill(&mut some, most) {
-            assert!(error.to_string().starts_with("fuzz.csv: not a table of samples that can be read: line "));
+            assert!(
+                error.to_string().starts_with("fuzz.csv: not a table of samples that can be read: line ")
+            );
             return None;
         }
         assert!(some.len() % reader.channels() == 0 && some.len() <= most * reader.channels());

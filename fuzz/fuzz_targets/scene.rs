@@ -10,7 +10,9 @@ fuzz_target!(|text: &str| {
     let path = Path::new("/nonexistent-folder-of-the-fuzzer/fuzz.toml");
     match parse(text, path) {
         Ok(spec) if text.contains("..") || text.contains('/') => drop(spec),
-        Ok(spec) => assert!(!load(&spec, path, &LoadOptions::default()).expect_err("no file").to_string().is_empty()),
+        Ok(spec) => {
+            assert!(!load(&spec, path, &LoadOptions::default()).expect_err("no file").to_string().is_empty())
+        }
         Err(error) => assert!(error.to_string().contains("fuzz.toml")),
     }
 });

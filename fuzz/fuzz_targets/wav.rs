@@ -14,7 +14,9 @@ fn frames(bytes: &[u8], buffer: usize) -> Option<Vec<u8>> {
         }
     };
     let header = reader.header().clone();
-    assert!(header.channels > 0 && header.rate > 0 && header.layout.container >= header.layout.format.bytes());
+    assert!(
+        header.channels > 0 && header.rate > 0 && header.layout.container >= header.layout.format.bytes()
+    );
     let frame = header.frame_bytes();
     let mut all = Vec::new();
     let mut block = vec![0; frame * buffer];

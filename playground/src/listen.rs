@@ -141,7 +141,8 @@ fn sweep(spec: &Spec) -> Result<Signal, Refusal> {
     let [start, end] = SWEEP.map(|share| Hertz(share * band.0));
     let length = Seconds(spec.fast_period.0 * samples as f64);
     let source = Source::Chirp { start, end, length, amplitude: 1.0 };
-    let text = with_rate(spec, format!("A sweep from {} to {}", readable(start.0, "Hz"), readable(end.0, "Hz")));
+    let text =
+        with_rate(spec, format!("A sweep from {} to {}", readable(start.0, "Hz"), readable(end.0, "Hz")));
     Ok(Signal { analog: Analog::Known(source.normalised(spec.fast_period)), samples, text })
 }
 
