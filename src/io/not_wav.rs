@@ -3,7 +3,8 @@
 use super::IoError;
 use std::io::{self, Read};
 
-/// Raw bytes that do not begin with a WAV header, as 64 bits of chance tell.
+/// Raw bytes. A WAV header at the beginning is an error: raw samples look like one by chance in one of 2^64
+/// cases.
 #[derive(Debug)]
 pub(super) struct NotWav<R> {
     inner: R,
@@ -20,7 +21,7 @@ impl<R> NotWav<R> {
 }
 
 impl<R: Read> Read for NotWav<R> {
-    /// As the bytes come: a header that comes in pieces is not found.
+    /// Looks at the first bytes that come: a header in pieces is not found.
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(bytes)?;
         if std::mem::take(&mut self.is_first) && is_wav(&bytes[..count]) {

@@ -171,7 +171,7 @@ impl Tuning {
         Ok(Some(stream))
     }
 
-    /// Leaves the frames behind that [`Tuning::next`] gave, and returns the stream that goes on from here,
+    /// Moves past the frames that [`Tuning::next`] gave, and returns the stream that goes on from here,
     /// with the history of the running one, if the filters change.
     ///
     /// # Errors

@@ -8,7 +8,7 @@
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use std::collections::VecDeque;
 
-/// Samples that are kept behind those that the next frame needs, for shifts that become smaller.
+/// Samples that are kept before those that the next frame needs, for shifts that become smaller.
 const KEPT: i64 = 1 << 14;
 
 /// The samples of all channels, and the frames that are made of them.
@@ -129,7 +129,7 @@ impl ShiftedFrames {
         self.channels.iter().zip(shifts).map(of).collect()
     }
 
-    /// Leaves frames behind; those from number `kept` on are still needed.
+    /// Moves on by `count` frames; frames from number `kept` on are still needed.
     pub(super) fn advance(&mut self, count: usize, kept: u64) {
         self.position += count as i64;
         for channel in &mut self.channels {

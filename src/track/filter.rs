@@ -245,7 +245,7 @@ mod tests {
         assert!((sum / count - 1.0).abs() < 0.03 && (product / count).abs() < 0.02);
     }
 
-    /// A clock whose rate changes by 10 ppm in each second, measured at 60 dB: the lag of the filter behind
+    /// A clock whose rate changes by 10 ppm in each second, measured at 60 dB: the lag of the filter at
     /// the acceleration a is a T^2 (1 - alpha) / beta, and with a matching model the error is that of the
     /// prediction.
     #[test]

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 /// gamma below which a computed norm has few digits.
 const TINY: f64 = 1e-9;
 
-/// The noncausal bound of two channels behind Butterworth filters, M = 2, for a cutoff in multiples of the
+/// The noncausal bound of two channels after Butterworth filters, M = 2, for a cutoff in multiples of the
 /// fast rate.
 fn noncausal(order: usize, cutoff: f64) -> f64 {
     let spec = alike(&butterworth(order, TAU * cutoff), 2, 10, &[1.2, 0.6]);

@@ -105,7 +105,8 @@ impl Agreement {
     /// Variance of the noise of a view, with its exposure; 0 if its photograph does not show it.
     pub(super) fn noise(&self, view: usize) -> f64 {
         let texture = self.textures.get(view).copied().flatten();
-        texture.map_or(0.0, |texture| (texture.noise * self.gains[view]).powi(2))
+        let gain = self.gains.get(view).copied().unwrap_or(1.0);
+        texture.map_or(0.0, |texture| (texture.noise * gain).powi(2))
     }
 
     /// Variance of what views show differently for other reasons than noise: depth that is not exact, and

@@ -118,7 +118,8 @@ fn examine(
 ) -> Result<(Rendering, Vec<Regressors>), RenderError> {
     let rendering = pipeline::render(views, camera, size, settings)?;
     let jitter = jitter(views, camera, settings, &rendering.image, known.noise)?;
-    let (shares, lever) = shares(views, camera);
+    let balance = Balance::calibrated(views, camera).with_noise(&rendering.agreement);
+    let (shares, lever) = shares(views, camera, &balance);
     let lever = lever / (known.spacing * known.spacing);
     let image = &rendering.image;
     let (slopes, bends) = (slopes(image), bends(image));
@@ -148,8 +149,7 @@ fn examine(
 
 /// Sum of the squared shares of the views in a pixel that all of them see, and the same times their squared
 /// distances.
-fn shares(views: &[CalibratedView<'_>], camera: &Camera) -> (f64, f64) {
-    let balance = Balance::calibrated(views, camera);
+fn shares(views: &[CalibratedView<'_>], camera: &Camera, balance: &Balance) -> (f64, f64) {
     let weight = |i: usize| f64::from(balance.weight(i as u16));
     let total: f64 = (0..views.len()).map(weight).sum();
     let square = |i: usize| (weight(i) / total).powi(2);

@@ -5,7 +5,7 @@ use crate::image::Image;
 use crate::interpolate::rows::RowWork;
 use crate::interpolate::{Cover, Degree, InterpolationError};
 use crate::occlusion::{self, RowScratch};
-use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, rectified};
+use crate::pipeline::{Balance, RenderError, RenderSettings, Rendering, rectified};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::Sample;
 use hybank::sampling::fit::Response;
@@ -68,10 +68,9 @@ pub fn survey(
     position: f64,
     settings: &RenderSettings,
 ) -> Result<Survey, RenderError> {
-    let agreement = Agreement::rectified(views);
-    let balance = Balance::rectified(views, position).with_noise(&agreement);
-    let settings = &settings.suited_to(&agreement, &balance);
     let rendering = rectified::render(views, position, settings)?;
+    let balance = Balance::rectified(views, position).with_noise(&rendering.agreement);
+    let settings = &settings.suited_to(&rendering.agreement, &balance);
     let colour = rendering.image.channels() == 3;
     let (evidence, edges) = match (settings.interpolation.fit.degree, colour) {
         (Degree::Linear, false) => collect::<2, 1>(views, position, settings, balance, &rendering)?,
