@@ -254,7 +254,11 @@ mod tests {
             let mut slow = fast.clone();
             let clipped = encode(Isa::detect(), format, &samples, &mut fast);
             assert_eq!(clipped, encode_each(format, &samples, &mut slow), "{format}");
-            assert_eq!(fast, slow, "{format}");
+            for (fast, slow) in fast.chunks_exact(format.bytes()).zip(slow.chunks_exact(format.bytes())) {
+                // Rust leaves the sign of a NaN open, and Miri draws it.
+                let nan = format.decode(fast).is_nan() && format.decode(slow).is_nan();
+                assert!(fast == slow || nan, "{format}: {fast:?} instead of {slow:?}");
+            }
         }
     }
 }
