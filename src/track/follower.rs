@@ -93,6 +93,17 @@ pub struct Follower {
     warnings: Vec<TrackWarning>,
 }
 
+/// One filter per followed channel, which begins with the delay of the spec and its interval.
+fn tracker(spec: &Spec, followed: &[usize], halves: &[Seconds], settings: &FollowSettings) -> DelayTracker {
+    let state = |(&j, half): (&usize, &Seconds)| {
+        DelayState::known(spec.channels[j].delay, half.0 / HALF_WIDTH, settings.rate_deviation)
+    };
+    let states: Vec<DelayState> = followed.iter().zip(halves).map(state).collect();
+    let smallest = halves.iter().map(|half| half.0).fold(f64::INFINITY, f64::min);
+    let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
+    DelayTracker::new(&states, settings.model, wanted)
+}
+
 impl Follower {
     /// Begins with the delays of the bank and the intervals of its spec.
     ///
@@ -116,13 +127,7 @@ impl Follower {
             check_pilot(&Model::new(&spec)?, pilot, settings.block_frames)?;
         }
         let halves: Vec<Seconds> = followed.iter().map(|&j| of_all[j]).collect();
-        let state = |(&j, half): (&usize, &Seconds)| {
-            DelayState::known(spec.channels[j].delay, half.0 / HALF_WIDTH, settings.rate_deviation)
-        };
-        let states: Vec<DelayState> = followed.iter().zip(&halves).map(state).collect();
-        let smallest = halves.iter().map(|half| half.0).fold(f64::INFINITY, f64::min);
-        let wanted = Seconds((KNOWN * spec.fast_period.0).max(KNOWN_SHARE * smallest) / HALF_WIDTH);
-        let tracker = DelayTracker::new(&states, settings.model, wanted);
+        let tracker = tracker(&spec, &followed, &halves, &settings);
         let no_shifts = vec![0; spec.channels.len()];
         Ok(Self {
             spec,

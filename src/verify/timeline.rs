@@ -64,6 +64,26 @@ impl Instant {
         sign([difference, BigFloat::from(other.delay.0), -BigFloat::from(self.delay.0)])
     }
 
+    /// The most slow periods of `ratio` fast periods from this instant on that do not pass `latest`.
+    fn periods_before(self, latest: Self, fast_period: Seconds, ratio: usize) -> Result<f64, VerifyError> {
+        let age = latest.since::<BigFloat>(self, fast_period).nearest();
+        let mut periods = (age / ratio as f64).floor();
+        let is_supported = periods < MAX_PERIODS_LATE;
+        if !is_supported {
+            return Err(VerifyError::TooLarge { states: usize::MAX });
+        }
+        let passes =
+            |periods: f64| self.later_by_periods(periods, ratio).compare(latest, fast_period).is_gt();
+        // The quotient may have been rounded across a whole number.
+        while passes(periods) {
+            periods -= 1.0;
+        }
+        while !passes(periods + 1.0) {
+            periods += 1.0;
+        }
+        Ok(periods)
+    }
+
     /// Encloses the time from `earlier` to this instant in fast periods; exactly zero if they are one.
     fn since<F: Number>(self, earlier: Self, fast_period: Seconds) -> Ball<F> {
         if self.compare(earlier, fast_period) == Ordering::Equal {
@@ -91,23 +111,7 @@ impl Timeline {
             .clone()
             .max_by(|&a, &b| compare(a, b))
             .unwrap_or(Instant { whole: 0.0, delay: Seconds(0.0) });
-        let periods = |time: Instant| -> Result<f64, VerifyError> {
-            let age = latest.since::<BigFloat>(time, fast_period).nearest();
-            let mut periods = (age / ratio as f64).floor();
-            let is_supported = periods < MAX_PERIODS_LATE;
-            if !is_supported {
-                return Err(VerifyError::TooLarge { states: usize::MAX });
-            }
-            let after = |periods: f64| compare(time.later_by_periods(periods, ratio), latest).is_gt();
-            // The quotient may have been rounded across a whole number.
-            while after(periods) {
-                periods -= 1.0;
-            }
-            while !after(periods + 1.0) {
-                periods += 1.0;
-            }
-            Ok(periods)
-        };
+        let periods = |time: Instant| time.periods_before(latest, fast_period, ratio);
         let late = times.clone().map(periods).collect::<Result<Vec<f64>, _>>()?;
         let folded: Vec<Instant> =
             times.zip(&late).map(|(time, &periods)| time.later_by_periods(periods, ratio)).collect();

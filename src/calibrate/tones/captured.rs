@@ -29,6 +29,11 @@ impl<'a> Captures<'a> {
         self.records.iter().map(|record| record.samples.len()).min().unwrap_or(0)
     }
 
+    /// Number of records.
+    pub(super) fn records(&self) -> usize {
+        self.records.len()
+    }
+
     pub(super) fn record(&self, i: usize) -> &'a Record {
         &self.records[i]
     }

@@ -82,13 +82,8 @@ pub(super) fn fit(
     check_order(model, &measured, settings.reference)?;
     let modulus = branch::modulus(&measured);
     let mut fitted = solve(model, &measured, &modulus, settings, &mut remarks)?;
-    if settings.fit.offset && captures.is_complex {
-        let values = |i| captures.constants(&sines, i).map(|constant| constant.value);
-        let offsets = (0..model.channels()).map(|i| values(i).collect()).collect();
-        fitted.remarks.push(Remark::ComplexOffsets { offsets });
-    } else if settings.fit.offset {
-        let constants = sines.channels.iter().map(|c| (c.constant.value, c.constant.sigma));
-        fitted.offsets = Some(constants.collect());
+    if settings.fit.offset {
+        add_offsets(&mut fitted, &captures, &sines);
     }
     fitted.frames = frames;
     fitted.remarks.extend(remarks);
@@ -98,6 +93,18 @@ pub(super) fn fit(
         amplitude: captures.tone(&sines, settings.reference, t, Direction::Forward).amplitude,
     };
     Ok((fitted, Found { tones: used.iter().map(tone).collect(), modulus }))
+}
+
+/// Adds the offsets of real samples; those of complex ones are only reported.
+fn add_offsets(fitted: &mut Fitted, captures: &Captures<'_>, sines: &SineFit) {
+    if captures.is_complex {
+        let values = |i| captures.constants(sines, i).map(|constant| constant.value).collect();
+        let offsets = (0..captures.records()).map(values).collect();
+        fitted.remarks.push(Remark::ComplexOffsets { offsets });
+    } else {
+        let constants = sines.channels.iter().map(|c| (c.constant.value, c.constant.sigma));
+        fitted.offsets = Some(constants.collect());
+    }
 }
 
 /// Starts of a fit near given frequencies.
