@@ -128,3 +128,26 @@ fn poles_come_back_in_rad_per_fast_period() {
         assert!((found - Complex::new(expected.0, expected.1)).norm() < 1e-14);
     }
 }
+
+#[test]
+fn a_scaled_cutoff_is_the_same_in_every_form() {
+    let forms = [
+        tf(&[0.25], &[1.0, 1.0, 0.25]),
+        zpk(&[[0.0, 3.0], [0.0, -3.0]], &[[-0.5, 0.0], [-0.5, 1.0], [-0.5, -1.0]], 0.25),
+        FilterSpec::StateSpace {
+            a: vec![vec![-1.0, 0.5], vec![0.0, -2.0]],
+            b: vec![vec![1.0], vec![1.0]],
+            c: vec![vec![1.0, 1.0]],
+        },
+        family(Family::Elliptic, 3, 0.1),
+        FilterSpec::Cascade { cascade: vec![family(Family::Rc, 1, 0.2), tf(&[1.0, 2.0], &[1.0, 1.0])] },
+    ];
+    for form in &forms {
+        let (filter, faster) =
+            (realise(form, 1.0).unwrap(), realise(&form.with_cutoff_scaled(1.3), 1.0).unwrap());
+        for w in [0.0, 0.3, 1.7] {
+            let (scaled, same) = (response(&faster, 1.3 * w), response(&filter, w));
+            assert!((scaled - same).norm() < 1e-12 * same.norm(), "{form:?}: {scaled} {same}");
+        }
+    }
+}
