@@ -21,7 +21,7 @@
 //! exchange methods.
 
 use super::DesignError;
-use crate::linalg::CMat;
+use crate::linalg::{self, CMat};
 use crate::lmi::Settings;
 use crate::lmi::sampled::{self, MeanSquareObjective, Point, Problem, Taps};
 use crate::lti::peak::Peak;
@@ -39,10 +39,48 @@ const PEAK_EXCESS: f64 = 0.2;
 /// Fraction of the margin that the secondary objective may use at the points. The rest is left to the peaks
 /// between them.
 const MARGIN_AT_POINTS: f64 = 0.75;
-/// Limit on the rounds of each objective; five are rarely needed.
-const ROUND_LIMIT: usize = 16;
+/// Share of the distance between the largest peak and the bound to which the next problem is solved.
+const SHARE_OF_WIDTH: f64 = 0.3;
 /// Frequencies closer than this are one point, in radians.
 const LEAST_DISTANCE: f64 = 1e-7;
+
+/// How closely the problems of the rounds are solved.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pace {
+    /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
+    accuracy: f64,
+    /// Largest tolerance of the optimum on the points.
+    loosest: f64,
+    /// Tolerance of the secondary objective.
+    mean_square: f64,
+    /// Added points whose gain is below this share of gamma are left out of the secondary objective.
+    active: f64,
+    /// Limit on the rounds of each objective.
+    rounds: usize,
+}
+
+impl Pace {
+    /// Every problem as closely as the last one, for few rounds: five are rarely needed.
+    fn steady(accuracy: f64) -> Self {
+        let loosest = POINTS_ACCURACY * accuracy;
+        Self { accuracy, loosest, mean_square: Settings::SAMPLED.tol_gap_rel, active: 0.0, rounds: 16 }
+    }
+
+    /// For many rounds, each only as close as the peaks between its points are. An iterate in the middle of
+    /// the unknowns that are nearly optimal has lower peaks there than one at their edge.
+    pub(super) fn gradual(accuracy: f64) -> Self {
+        Self { accuracy, loosest: 0.1, mean_square: 1e-4, active: 0.95, rounds: 32 }
+    }
+
+    fn finest(&self) -> f64 {
+        POINTS_ACCURACY * self.accuracy
+    }
+
+    /// Of a problem whose predecessor left an interval of this relative width.
+    fn tolerance(&self, width: f64) -> f64 {
+        (SHARE_OF_WIDTH * width).min(self.loosest).max(self.finest())
+    }
+}
 
 /// An error `K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega)`, affine in the unknowns `F_j`.
 pub(super) trait AffineError {
@@ -139,16 +177,17 @@ impl<E: AffineError> Exchange<E> {
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
     pub(super) fn optimise(&mut self) -> Result<Candidate, DesignError> {
-        self.optimise_to(GAMMA_ACCURACY)
+        self.optimise_at(Pace::steady(GAMMA_ACCURACY))
     }
 
-    /// As [`Exchange::optimise`], with gamma within `accuracy` of the optimum before the margin is spent.
+    /// As [`Exchange::optimise`], with gamma within the accuracy of `pace` before the margin is spent.
     ///
     /// # Errors
     /// As [`Exchange::optimise`].
-    pub(super) fn optimise_to(&mut self, accuracy: f64) -> Result<Candidate, DesignError> {
-        let least = self.minimise_gamma(accuracy, f64::INFINITY)?;
-        self.minimise_mean_square(least)
+    pub(super) fn optimise_at(&mut self, pace: Pace) -> Result<Candidate, DesignError> {
+        let least = self.minimise_gamma(pace, f64::INFINITY)?;
+        self.leave_out_inactive(&least, pace.active)?;
+        self.minimise_mean_square(least, pace)
     }
 
     /// Unknowns with gamma within `accuracy` of the optimum, without the secondary objective. Ends early
@@ -157,7 +196,7 @@ impl<E: AffineError> Exchange<E> {
     /// # Errors
     /// As [`Exchange::optimise`].
     pub(super) fn compare(&mut self, accuracy: f64, hopeless: f64) -> Result<Candidate, DesignError> {
-        self.minimise_gamma(accuracy, hopeless)
+        self.minimise_gamma(Pace::steady(accuracy), hopeless)
     }
 
     /// Adds points at the given frequencies, except where there is one. Returns whether any was added.
@@ -175,40 +214,78 @@ impl<E: AffineError> Exchange<E> {
         Ok(!added.is_empty())
     }
 
-    fn minimise_gamma(&mut self, accuracy: f64, hopeless: f64) -> Result<Candidate, DesignError> {
-        let settings = Settings { tol_gap_rel: POINTS_ACCURACY * accuracy, ..Settings::SAMPLED };
+    fn minimise_gamma(&mut self, pace: Pace, hopeless: f64) -> Result<Candidate, DesignError> {
         let mut best: Option<Candidate> = None;
-        for _ in 0..ROUND_LIMIT {
-            let solution = sampled::minimise(&self.problem, &settings)?;
-            self.count_round(solution.steps.len());
-            let level = solution.gamma * (1.0 + PEAK_EXCESS * accuracy);
-            self.raise_lower_bound(solution.lower.value, solution.dual);
-            let candidate = self.judge(solution.taps, solution.gamma, level)?;
-            let above = candidate.peaks.above(level);
+        let mut width = f64::INFINITY;
+        for _ in 0..pace.rounds {
+            let tolerance = pace.tolerance(width);
+            let (candidate, above) = self.round(pace, tolerance)?;
             if best.as_ref().is_none_or(|best| candidate.peaks.estimate < best.peaks.estimate) {
                 best = Some(candidate);
             }
             let gamma = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
-            let decided = gamma <= self.lower * (1.0 + accuracy) || self.lower > hopeless;
-            if decided || !self.add(&above)? {
+            if gamma <= self.lower * (1.0 + pace.accuracy) || self.lower > hopeless {
                 break;
             }
+            // Without a peak to add it is the problem on the points that is not solved closely enough.
+            let added = self.add(&above)?;
+            if !added && tolerance <= pace.finest() {
+                break;
+            }
+            width = if added { gamma / self.lower - 1.0 } else { 0.0 };
         }
         best.ok_or(DesignError::NoTaps)
     }
 
+    /// Solves the problem on the points. Returns the unknowns and the frequencies of the peaks that belong
+    /// among the points.
+    fn round(&mut self, pace: Pace, tolerance: f64) -> Result<(Candidate, Vec<f64>), DesignError> {
+        let settings = Settings { tol_gap_rel: tolerance, ..Settings::SAMPLED };
+        let solution = sampled::minimise(&self.problem, &settings)?;
+        self.count_round(solution.steps.len());
+        self.raise_lower_bound(solution.lower.value, solution.dual);
+        // The optimum lies anywhere between the two.
+        let optimum = if tolerance > pace.finest() { self.lower } else { solution.gamma };
+        let level = optimum * (1.0 + PEAK_EXCESS * pace.accuracy);
+        let candidate = self.judge(solution.taps, solution.gamma, level)?;
+        let above = candidate.peaks.above(level);
+        Ok((candidate, above))
+    }
+
+    /// Leaves out the added points where the gain of `start` is below a share of its gamma. If the secondary
+    /// objective raises the gain there, it is a peak and becomes a point again.
+    fn leave_out_inactive(&mut self, start: &Candidate, share: f64) -> Result<(), DesignError> {
+        if share == 0.0 {
+            return Ok(());
+        }
+        let least = share * start.peaks.estimate;
+        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        for (l, point) in self.problem.points().iter().enumerate() {
+            let weight = self.objective.weights[l];
+            let gain = linalg::largest_singular_value_c(&self.problem.error_at(l, &start.taps))?;
+            if weight > 0.0 || gain >= least {
+                points.push(point.clone());
+                weights.push(weight);
+            }
+        }
+        self.objective.weights = weights;
+        self.problem = Problem::new(points, self.problem.lags().to_vec())?;
+        Ok(())
+    }
+
     /// The least secondary objective with gamma at most `(1 + gamma_margin)` times that of `start`. Returns
     /// `start` if the interior-point method makes no progress from there.
-    fn minimise_mean_square(&mut self, start: Candidate) -> Result<Candidate, DesignError> {
+    fn minimise_mean_square(&mut self, start: Candidate, pace: Pace) -> Result<Candidate, DesignError> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
-        for _ in 0..ROUND_LIMIT {
+        let settings = Settings { tol_gap_rel: pace.mean_square, ..Settings::SAMPLED };
+        for _ in 0..pace.rounds {
             let found = sampled::mean_square_under_cap(
                 &self.problem,
                 &self.objective,
                 cap_at_points,
                 &start.taps,
-                &Settings::SAMPLED,
+                &settings,
             );
             // There is nothing to gain if gamma is zero or the iteration stalls.
             let Ok(found) = found else { break };

@@ -13,6 +13,7 @@ use crate::linalg::Mat;
 use crate::linalg::blocks::Blocks;
 use crate::lmi::Settings;
 use crate::lmi::factor::RegularisedCholesky;
+use std::cell::OnceCell;
 
 /// The objective.
 #[derive(Debug, Clone)]
@@ -50,6 +51,17 @@ pub(super) struct Engine<'a> {
     projected_z: ChannelProjection,
     dz: Blocks,
     corrector: Blocks,
+    /// At the present iterate, once it is known.
+    equality: OnceCell<Equality>,
+}
+
+/// The dual equality.
+#[derive(Debug)]
+struct Equality {
+    /// c.
+    cost: Vec<f64>,
+    /// `c - A*(Z)`.
+    residual: Vec<f64>,
 }
 
 /// A direction: taps, slack and dual matrices.
@@ -86,6 +98,7 @@ impl<'a> Engine<'a> {
             projected_z: ChannelProjection::new(count, m, n, k1),
             dz: Blocks::zeros(count, order, order),
             corrector: Blocks::zeros(count, order, order),
+            equality: OnceCell::new(),
         })
     }
 
@@ -130,8 +143,16 @@ impl<'a> Engine<'a> {
     }
 
     /// `c - A*(Z)`.
-    pub(super) fn dual_residual(&self) -> Vec<f64> {
-        self.cost().iter().zip(self.adjoint(&self.cone.z)).map(|(c, a)| c - a).collect()
+    pub(super) fn dual_residual(&self) -> &[f64] {
+        &self.equality().residual
+    }
+
+    fn equality(&self) -> &Equality {
+        self.equality.get_or_init(|| {
+            let cost = self.cost();
+            let residual = cost.iter().zip(self.adjoint(&self.cone.z)).map(|(c, a)| c - a).collect();
+            Equality { cost, residual }
+        })
     }
 
     fn newton(&mut self) -> Option<RegularisedCholesky> {
@@ -175,9 +196,9 @@ impl<'a> Engine<'a> {
         let order = self.cone.order() as f64;
         let gap = self.cone.gap();
         let mu = gap / order;
-        let dual_residual = norm(&self.dual_residual());
+        let dual_residual = norm(self.dual_residual());
         let newton = self.newton().ok_or(Stall::Newton)?;
-        let cost = self.cost();
+        let cost = self.equality().cost.clone();
         let mut dz = std::mem::replace(&mut self.dz, Blocks::zeros(0, 0, 0));
         let mut corrector = std::mem::replace(&mut self.corrector, Blocks::zeros(0, 0, 0));
 
@@ -238,6 +259,7 @@ impl<'a> Engine<'a> {
         // From the unknowns, not from the step, so that rounding errors do not accumulate.
         self.cone.k = self.reduced.error(&self.x);
         self.cone.z.add_scaled(dual, dz);
+        self.equality = OnceCell::new();
         true
     }
 }

@@ -194,6 +194,6 @@ impl Run<'_> {
 /// the objective, whether or not the dual equality holds.
 fn duality_gap(engine: &Engine<'_>, curvature: &RegularisedCholesky) -> f64 {
     let r = engine.dual_residual();
-    let correction: f64 = curvature.solve(&r).iter().zip(&r).map(|(a, b)| a * b).sum();
+    let correction: f64 = curvature.solve(r).iter().zip(r).map(|(a, b)| a * b).sum();
     engine.cone.gap() + 0.5 * correction.max(0.0)
 }

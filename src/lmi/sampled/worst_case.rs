@@ -141,7 +141,7 @@ impl Run<'_> {
         };
         let (mut least, mut waited) = (f64::INFINITY, 0);
         while steps.len() < self.settings.max_iterations {
-            let merit = engine.cone.gap() / engine.cone.t + norm(&engine.dual_residual());
+            let merit = engine.cone.gap() / engine.cone.t + norm(engine.dual_residual());
             if merit <= 4.0 * self.settings.tol_gap_rel {
                 self.judge(&engine, best)?;
                 if best.solved(self.settings.tol_gap_rel) {

@@ -25,7 +25,7 @@ use super::scenarios::{RobustProblem, moved_plant, scenarios};
 use super::sheets::{Sheet, Sheets};
 use crate::bank::TapSlopes;
 use crate::design::DesignError;
-use crate::design::exchange::Exchange;
+use crate::design::exchange::{Exchange, Pace};
 use crate::design::filters::impulse_responses;
 use crate::design::methods::{Filters, Settings, Synthesis, fir};
 use crate::design::plant::LiftedPlant;
@@ -92,7 +92,7 @@ pub(crate) fn synthesise(
     let sides = Sides::new(problem);
     let scenarios = Scenarios { plants: &plants, points: &points, within_reach: &within_reach };
     let mut exchange = sides.exchange((plant, nominal), scenarios, settings)?;
-    let found = exchange.optimise_to(ACCURACY)?;
+    let found = exchange.optimise_at(Pace::gradual(ACCURACY))?;
     let (taps, slopes) = sides.split(&found.taps, settings.taps);
     let norm = |(plant, point): (&LiftedPlant, &ErrorPoint)| {
         Ok(plant.fir_norm(&slopes.moved(&taps, &sides.errors(point)))?.gain)

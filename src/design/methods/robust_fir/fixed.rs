@@ -1,11 +1,12 @@
 //! Taps that stay as they are.
 
+use super::grid_filters::GridFilters;
 use super::norms::{ACCURACY, MARGIN, RobustNorms, lags, largest};
 use super::scenario_grid::ScenarioGrid;
 use super::scenarios::{RobustProblem, moved_plant, scenarios};
 use super::sheets::{Sheet, Sheets};
 use crate::design::DesignError;
-use crate::design::exchange::Exchange;
+use crate::design::exchange::{Exchange, Pace};
 use crate::design::filters::{impulse_responses, polyphase};
 use crate::design::methods::{Filters, Settings, Synthesis, fir};
 use crate::design::plant::LiftedPlant;
@@ -121,9 +122,11 @@ struct Scenario<'a> {
 
 /// The norms of the taps over the scenarios, estimated.
 fn estimates<'a>(sheets: &Sheets<'a>, taps: &[Vec<f64>]) -> Result<Vec<Scenario<'a>>, DesignError> {
+    let lags = polyphase(taps, sheets.sheets[0].grid.plant().ratio());
+    let response = sheets.response(&lags);
     let of = |sheet: &Sheet<'a>| {
-        let lags = polyphase(taps, sheet.grid.plant().ratio());
-        Ok(Scenario { plant: sheet.grid.plant(), estimate: sheet.grid.estimate(&lags)? })
+        let filters = GridFilters { response: &response, factors: &sheet.factors };
+        Ok(Scenario { plant: sheet.grid.plant(), estimate: sheet.grid.estimate(&filters)? })
     };
     // The first sheet has no errors.
     sheets.sheets[1..].iter().map(of).collect()
@@ -153,7 +156,7 @@ fn least_worst_norm(
     settings: &Settings,
 ) -> Result<RobustTaps, DesignError> {
     let mut exchange = exchange(plant, sheets, settings)?;
-    let found = exchange.optimise_to(ACCURACY)?;
+    let found = exchange.optimise_at(Pace::gradual(ACCURACY))?;
     let taps = impulse_responses(&found.taps, settings.taps);
     let peak = plant.fir_norm(&taps)?;
     let worst = worst_of(&estimates(exchange.error(), &taps)?, &taps)?;

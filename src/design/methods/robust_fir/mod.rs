@@ -11,6 +11,7 @@
 
 mod affine;
 mod fixed;
+mod grid_filters;
 mod norms;
 mod scenario_grid;
 mod scenarios;

@@ -1,11 +1,13 @@
 //! The error of one scenario on a fine grid of frequencies, of which only the part near its peaks is
 //! computed: at most of the scenarios the error is far below that of the worst one.
 
+use super::grid_filters::GridFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{FINE, error_at, gain, intervals, peaks_between, trapezoidal_weights};
+use crate::design::error_grid::{FINE, intervals, peaks_between, trapezoidal_weights};
 use crate::design::exchange::Peaks;
 use crate::design::plant::LiftedPlant;
-use crate::lmi::sampled::{Point, Taps};
+use crate::linalg::{self, CMat};
+use crate::lmi::sampled::Point;
 use std::cell::OnceCell;
 use std::f64::consts::PI;
 
@@ -47,21 +49,36 @@ impl<'a> ScenarioGrid<'a> {
         (points, weights)
     }
 
+    /// The number of points.
+    pub(super) fn count(&self) -> usize {
+        self.points.len()
+    }
+
     /// The largest gain at every fourth point.
-    pub(super) fn estimate(&self, taps: &Taps) -> Result<f64, DesignError> {
-        let mut gains = (0..self.points.len()).step_by(STRIDE).map(|k| gain(self.point(k), taps));
+    pub(super) fn estimate(&self, filters: &GridFilters<'_>) -> Result<f64, DesignError> {
+        let mut gains = (0..self.count()).step_by(STRIDE).map(|k| gain(&self.error(k, filters)));
         gains.try_fold(0.0, |most, gain| Ok(f64::max(most, gain?)))
     }
 
-    /// The peaks of the error with `taps` that are above `level`. The estimate is that of gamma if gamma is
-    /// above the level; else it is at most the level.
-    pub(super) fn peaks(&self, taps: &Taps, level: f64) -> Result<Peaks, DesignError> {
-        let count = self.points.len();
+    /// The peaks of the error with these filters that are above `level`. The estimate is that of gamma if
+    /// gamma is above the level; else it is at most the level.
+    pub(super) fn peaks(&self, filters: &GridFilters<'_>, level: f64) -> Result<Peaks, DesignError> {
+        let gains = self.gains(filters, level)?;
+        let most = gains.iter().copied().fold(0.0, f64::max);
+        let between = |omega| gain(&error(&self.at(omega), &filters.between(omega)));
+        let found = peaks_between(&gains, self.frequency(1), NEAR * level, between)?;
+        Ok(Peaks { estimate: found.estimate.max(most), ..found })
+    }
+
+    /// The gains near points with gains about `level` or more; elsewhere smaller numbers.
+    fn gains(&self, filters: &GridFilters<'_>, level: f64) -> Result<Vec<f64>, DesignError> {
+        let count = self.count();
         let mut gains = vec![0.0; count];
         for k in (0..count).step_by(STRIDE) {
+            let error = self.error(k, filters);
             // The Frobenius norm is no smaller than the gain and costs less.
-            let bound = error_at(self.point(k), taps).norm();
-            gains[k] = if bound < NEAR * level { bound } else { gain(self.point(k), taps)? };
+            let bound = error.norm();
+            gains[k] = if bound < NEAR * level { bound } else { gain(&error)? };
         }
         let is_near = |k: usize| gains[k] >= NEAR * level;
         let near: Vec<usize> = (0..count).step_by(STRIDE).filter(|&k| is_near(k)).collect();
@@ -69,13 +86,14 @@ impl<'a> ScenarioGrid<'a> {
             let first = centre.saturating_sub(STRIDE - 1);
             let around = &mut gains[first..(centre + STRIDE).min(count)];
             for (k, known) in around.iter_mut().enumerate().filter(|(_, known)| **known == 0.0) {
-                *known = gain(self.point(first + k), taps)?;
+                *known = gain(&self.error(first + k, filters))?;
             }
         }
-        let most = gains.iter().copied().fold(0.0, f64::max);
-        let found =
-            peaks_between(&gains, self.frequency(1), NEAR * level, |omega| gain(&self.at(omega), taps))?;
-        Ok(Peaks { estimate: found.estimate.max(most), ..found })
+        Ok(gains)
+    }
+
+    fn error(&self, k: usize, filters: &GridFilters<'_>) -> CMat {
+        error(self.point(k), &filters.at(k))
     }
 
     fn point(&self, k: usize) -> &Point {
@@ -83,16 +101,32 @@ impl<'a> ScenarioGrid<'a> {
     }
 
     fn frequency(&self, k: usize) -> f64 {
-        PI * k as f64 / (self.points.len() - 1) as f64
+        grid_frequency(k, self.count())
     }
+}
+
+/// The frequencies of a grid of `count` points.
+pub(super) fn grid_frequency(k: usize, count: usize) -> f64 {
+    PI * k as f64 / (count - 1) as f64
+}
+
+/// K = W - F H for the filters' response F.
+fn error(point: &Point, filters: &CMat) -> CMat {
+    &point.w - filters * &point.h
+}
+
+fn gain(error: &CMat) -> Result<f64, DesignError> {
+    Ok(linalg::largest_singular_value_c(error)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::design::error_grid::ErrorGrid;
+    use crate::design::methods::robust_fir::grid_filters::GridResponse;
     use crate::design::problem::Problem;
     use crate::linalg::Mat;
+    use crate::lmi::sampled::Taps;
     use crate::random::Random;
     use crate::spec::Spec;
 
@@ -111,16 +145,18 @@ mod tests {
                     peaks.peaks.iter().copied().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap()
                 };
                 let all = whole.peaks(&taps).unwrap();
+                let response = GridResponse::new(&taps, part.count());
+                let filters = GridFilters { response: &response, factors: &[1.0] };
                 for level in [0.0, 0.5, 0.9, 0.999].map(|share| share * all.estimate) {
-                    let some = part.peaks(&taps, level).unwrap();
+                    let some = part.peaks(&filters, level).unwrap();
                     assert_eq!(
                         (highest(&some), some.estimate),
                         (highest(&all), all.estimate),
                         "{lags} {level}"
                     );
                 }
-                assert!(part.peaks(&taps, 1.01 * all.estimate).unwrap().estimate <= 1.01 * all.estimate);
-                let estimate = part.estimate(&taps).unwrap();
+                assert!(part.peaks(&filters, 1.01 * all.estimate).unwrap().estimate <= 1.01 * all.estimate);
+                let estimate = part.estimate(&filters).unwrap();
                 assert!(estimate <= all.estimate && estimate > 0.97 * all.estimate, "{estimate}");
             }
         }

@@ -1,9 +1,10 @@
 //! The errors of all scenarios as one error on one long stretch of frequencies.
 
+use super::grid_filters::{GridFilters, GridResponse};
 use super::scenario_grid::ScenarioGrid;
 use crate::design::DesignError;
 use crate::design::exchange::{AffineError, Peaks};
-use crate::linalg::{CMat, Complex, Mat};
+use crate::linalg::{CMat, Complex};
 use crate::lmi::sampled::{Point, Taps};
 use crate::lti::peak::Peak;
 use std::f64::consts::{PI, TAU};
@@ -25,17 +26,6 @@ pub(super) struct Sheet<'a> {
 }
 
 impl Sheet<'_> {
-    /// The filters of this scenario.
-    fn filters(&self, taps: &Taps) -> Taps {
-        let mixed = |lag: &Mat| {
-            let channels = lag.ncols() / self.factors.len();
-            let part = |k: usize| lag.columns(k * channels, channels);
-            let sum = part(0) * self.factors[0];
-            (1..self.factors.len()).fold(sum, |sum, k| sum + part(k) * self.factors[k])
-        };
-        taps.iter().map(mixed).collect()
-    }
-
     fn stacked(&self, h: &CMat) -> CMat {
         let n = h.nrows();
         CMat::from_fn(n * self.factors.len(), h.ncols(), |row, column| {
@@ -45,6 +35,11 @@ impl Sheet<'_> {
 }
 
 impl Sheets<'_> {
+    /// The response of some taps on the grid of all sheets.
+    pub(super) fn response<'t>(&self, taps: &'t Taps) -> GridResponse<'t> {
+        GridResponse::new(taps, self.sheets[0].grid.count())
+    }
+
     /// A point of a sheet's grid among those of all, with columns of zeros where a scenario with coinciding
     /// instants has fewer.
     pub(super) fn point(&self, sheet: usize, point: &Point) -> Point {
@@ -66,16 +61,16 @@ impl AffineError for Sheets<'_> {
 
     fn peaks(&self, taps: &Taps, _gamma: f64, level: f64) -> Result<Peaks, DesignError> {
         let mut all = Peaks { estimate: 0.0, peaks: Vec::new() };
+        let response = self.response(taps);
         for (number, sheet) in self.sheets.iter().enumerate() {
-            let Peaks { estimate, peaks } = sheet.grid.peaks(&sheet.filters(taps), level / sheet.weight)?;
+            let filters = GridFilters { response: &response, factors: &sheet.factors };
+            let Peaks { estimate, peaks } = sheet.grid.peaks(&filters, level / sheet.weight)?;
             all.estimate = all.estimate.max(sheet.weight * estimate);
             let shifted = |peak: Peak| Peak {
                 frequency: peak.frequency + TAU * number as f64,
                 gain: sheet.weight * peak.gain,
             };
-            // Of each scenario the highest peak: the others mostly fall with it.
-            let peaks = peaks.into_iter().map(shifted).filter(|peak| peak.gain > level);
-            all.peaks.extend(peaks.max_by(|a, b| a.gain.total_cmp(&b.gain)));
+            all.peaks.extend(peaks.into_iter().map(shifted).filter(|peak| peak.gain > level));
         }
         Ok(all)
     }
