@@ -3,6 +3,7 @@
 use super::scenarios::{MAX_SCENARIOS, scenarios};
 use crate::design::uncertainty::norm_of;
 use crate::design::{ProofSearch, design_with};
+use crate::random::Random;
 use crate::spec::Spec;
 use crate::units::Seconds;
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint, Taps};
@@ -32,6 +33,30 @@ fn robust_optima_are_those_of_a_semidefinite_program() {
         );
         assert_eq!(designed.bank.gamma.norm, Some(study.robust.nominal));
         assert!(study.robust.nominal < 1.04 * 0.039932 && study.pairs < 400, "{study:?}");
+    }
+}
+
+/// With one delay of the two off, the optimum is flat: many banks are nearly as good. The taps are within
+/// 1e-3 of the lower bound, and at no point of the box that was drawn are they worse than stated.
+#[test]
+fn flat_optima_are_reached_and_random_points_are_no_worse() {
+    let mut random = Random(11);
+    for half in [0.1, 0.2, 0.3] {
+        let mut spec = thesis(half);
+        spec.uncertainty.as_mut().unwrap().reference = Some(1);
+        let designed = design_with(&spec, ProofSearch::Skip).unwrap();
+        let study = designed.robust.unwrap();
+        assert!(
+            study.lower <= study.robust.worst && study.lower > study.robust.worst * (1.0 - 1e-3),
+            "{study:?}"
+        );
+        assert!(study.robust.worst < 0.99 * study.nominal.worst, "{study:?}");
+        for _ in 0..8 {
+            let delays = vec![Seconds(0.0), Seconds(half * random.sample())];
+            let point = ErrorPoint { delays, ..ErrorPoint::none(2) };
+            let (norm, _) = norm_of(&designed.bank, &point, Taps::Fixed).unwrap();
+            assert!(norm <= study.robust.worst * (1.0 + 1e-3), "{point:?}: {norm} {study:?}");
+        }
     }
 }
 
