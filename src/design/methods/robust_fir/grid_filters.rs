@@ -1,11 +1,16 @@
 //! The filters of all scenarios on the grid of frequencies that the scenarios share: the response of the
 //! taps is computed once and not for each scenario.
 
-use super::scenario_grid::grid_frequency;
 use crate::design::filters;
 use crate::linalg::{CMat, Complex};
 use crate::lmi::sampled::Taps;
 use std::cell::OnceCell;
+use std::f64::consts::PI;
+
+/// The frequencies of a grid of `count` points.
+pub(super) fn grid_frequency(k: usize, count: usize) -> f64 {
+    PI * k as f64 / (count - 1) as f64
+}
 
 /// The responses of some taps at the points of a grid, computed when they are needed.
 pub(super) struct GridResponse<'a> {

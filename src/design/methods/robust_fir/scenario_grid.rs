@@ -1,7 +1,7 @@
 //! The error of one scenario on a fine grid of frequencies, of which only the part near its peaks is
 //! computed: at most of the scenarios the error is far below that of the worst one.
 
-use super::grid_filters::GridFilters;
+use super::grid_filters::{GridFilters, grid_frequency};
 use crate::design::DesignError;
 use crate::design::error_grid::{FINE, intervals, peaks_between, trapezoidal_weights};
 use crate::design::exchange::Peaks;
@@ -9,7 +9,6 @@ use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::Point;
 use std::cell::OnceCell;
-use std::f64::consts::PI;
 
 /// Every so many points are looked at first: six for each slow lag. Between two of them, pi / (6 lags)
 /// apart, the gain falls from a maximum by 1 % at most (M. Riesz: cos(lags t / 2) with t = pi / (12 lags)),
@@ -103,11 +102,6 @@ impl<'a> ScenarioGrid<'a> {
     fn frequency(&self, k: usize) -> f64 {
         grid_frequency(k, self.count())
     }
-}
-
-/// The frequencies of a grid of `count` points.
-pub(super) fn grid_frequency(k: usize, count: usize) -> f64 {
-    PI * k as f64 / (count - 1) as f64
 }
 
 /// K = W - F H for the filters' response F.
