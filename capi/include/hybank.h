@@ -9,6 +9,9 @@
  *     hybank_close(bank);
  *
  * One thread at a time may use a bank; different banks are independent. Only open and close allocate.
+ *
+ * Plain C of 1989 with the types of stdint.h, so that MATLAB's loadlibrary and cffi can read it. pycparser does, in a test;
+ * it was not tried in MATLAB itself.
  */
 #ifndef HYBANK_H
 #define HYBANK_H

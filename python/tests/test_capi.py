@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,11 @@ from conftest import ROOT
 
 @pytest.fixture(scope="module")
 def library():
-    folders = [Path(os.environ.get("CARGO_TARGET_DIR", "none")), ROOT / "capi" / "target"]
-    paths = [folder / profile / "libhybank.so" for folder in folders for profile in ("release", "debug")]
+    folder = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    paths = [folder / profile / "libhybank.so" for profile in ("release", "debug")]
     found = next((path for path in paths if path.exists()), None)
     if found is None:
-        pytest.skip("no libhybank.so: cargo build in capi/")
+        pytest.skip("no libhybank.so: cargo build -p hybank-capi")
     library = ctypes.CDLL(str(found))
     library.hybank_open.restype = ctypes.c_void_p
     library.hybank_error.restype = ctypes.c_char_p
@@ -54,3 +55,37 @@ def test_c_has_the_bits_of_python(library, filters, random, name, dtype, suffix)
 def test_failures_have_a_text(library):
     assert not library.hybank_open(b"none.json", b"auto", 0)
     assert b"none.json" in library.hybank_error()
+
+
+NUMBERS = {"float", "double", "int16_t"}
+PASSED = {"int", "size_t", "ptrdiff_t", "void", "const char *", "hybank *", "const hybank *"} | {
+    f"{const}{number} *" for number in NUMBERS for const in ("", "const ")
+}
+
+
+def test_tools_with_a_parser_of_their_own_read_the_header():
+    """MATLAB's loadlibrary takes prototypes of numbers, texts, pointers to numbers and to structures without bit fields,
+    unions, functions as arguments and pointers to pointers. pycparser is another parser of old C."""
+    pycparser = pytest.importorskip("pycparser")
+    from pycparser import c_ast, c_generator
+
+    header = ROOT / "capi" / "include" / "hybank.h"
+    command = ["cc", "-x", "c", "-std=c89", "-E", "-P", "-D__attribute__(x)=", "-D__extension__=", header]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    written, functions = c_generator.CGenerator(), {}
+    for declared in pycparser.CParser().parse(text).ext:
+        if isinstance(declared, c_ast.Decl) and isinstance(declared.type, c_ast.FuncDecl):
+            result, arguments = declared.type.type, declared.type.args.params
+            functions[declared.name] = [kind(written, part) for part in [result, *(a.type for a in arguments)]]
+    assert len(functions) == 14
+    assert {part for parts in functions.values() for part in parts} <= PASSED, functions
+    assert functions["hybank_process"] == ["ptrdiff_t", "hybank *", "const float *", "size_t", "float *"]
+
+
+def kind(written, declared):
+    """A type without the name of what has it."""
+    part = declared
+    while not hasattr(part, "declname"):
+        part = part.type
+    part.declname = None
+    return " ".join(written.visit(declared).split())

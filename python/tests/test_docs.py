@@ -1,5 +1,6 @@
 """The snippets of docs/python.md run, one after another, in one folder."""
 
+import importlib.util
 import re
 from pathlib import Path
 
@@ -20,11 +21,12 @@ def test_the_snippets_run_and_say_what_is_true(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("spec.toml").write_text(SPEC)
     text = (ROOT / "docs" / "python.md").read_text()
-    names = {}
+    names, missing = {}, set()
     for snippet in re.findall(r"```python\n(.*?)```", text, re.S):
-        for package in ("scipy", "soundfile", "control"):
-            if package in snippet:
-                pytest.importorskip(package)
+        absent = {p for p in ("scipy", "soundfile", "control") if p in snippet and importlib.util.find_spec(p) is None}
+        missing |= absent
+        if absent:
+            continue
         exec(compile(snippet, "docs/python.md", "exec"), names)
         if "same =" in snippet:
             np.testing.assert_allclose(names["same"], names["bank"].fuse(names["x"]), atol=1e-12)
@@ -33,3 +35,5 @@ def test_the_snippets_run_and_say_what_is_true(tmp_path, monkeypatch):
             np.testing.assert_allclose(names["causal"], want, atol=1e-10)
         if "full_output" in snippet:
             assert names["report"].gaps == [(2, 100, 4)] and names["report"].mask.any()
+    if missing:
+        pytest.skip(f"all snippets hold, except those of {', '.join(sorted(missing))}, which is not installed")
