@@ -1,5 +1,5 @@
-"""CPU and bits of `hybank.dask.fuse` over two processes against one process, and the load of a scheduler by empty tasks.
-Every figure is the least of three runs.
+"""CPU and bits of `hybank.dask.fuse` over two processes against one process; what a cluster needs to start and while it
+has nothing to do; and the load of a scheduler by empty tasks. Every figure is the least of three runs.
 
     python python/bench/dask_fuse.py [FRAMES [TAPS]]      100 million unless given; needs dask and distributed
 
@@ -23,9 +23,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def cpu(client):
-    """CPU seconds of this process and of the workers."""
+    """CPU seconds of this process, and of the workers if there is a client."""
     used = lambda: sum(os.times()[:2])  # noqa: E731
-    return used() + sum(client.run(used).values())
+    return used() + (sum(client.run(used).values()) if client else 0)
 
 
 def archive(path, channels, frames):
@@ -55,7 +55,9 @@ def fused(client, bank, folder, algorithm, frames):
         "spans": lambda: by_spans(spans, None),
         "tasks": lambda: by_spans(tasks, client),
     }
-    used = {name: min(seconds(client, run)[0] for _ in range(3)) for name, run in runs.items()}
+    # What the workers need while one process works alone is not its own.
+    counted = lambda name: client if name == "tasks" else None  # noqa: E731
+    used = {name: min(seconds(counted(name), run)[0] for _ in range(3)) for name, run in runs.items()}
     want = whole.read_bytes()
     same = all(path.read_bytes() == want for path in (spans, tasks))
     one = min(used["whole"], used["spans"])
@@ -63,6 +65,13 @@ def fused(client, bank, folder, algorithm, frames):
         f"{algorithm}: {frames} frames, equal {same}, CPU {used['whole']:.2f} s as a whole, {used['spans']:.2f} s in"
         f" spans, {used['tasks']:.2f} s by tasks; tasks over the less of one process: {used['tasks'] / one:.3f}"
     )
+
+
+def overhead(client, before):
+    """What is paid without any samples."""
+    start = cpu(client) - before
+    idle = min(seconds(client, lambda: time.sleep(1))[0] for _ in range(3))
+    print(f"cluster: {start:.2f} s of CPU to start, {idle:.2f} s in each second without tasks")
 
 
 def empty(client, count=20_000):
@@ -84,8 +93,10 @@ def noise_bank(taps):
 def main():
     frames = int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000
     bank = noise_bank(int(sys.argv[2])) if len(sys.argv) > 2 else hb.load(ROOT / "filters" / "thesis-fir.json")
-    settings = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    settings = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": ":0"}
+    before = sum(os.times()[:2])
     with tempfile.TemporaryDirectory() as name, LocalCluster(**settings) as cluster, Client(cluster) as client:
+        overhead(client, before)
         archive(Path(name) / "in.npy", bank.channels, frames)
         for algorithm in ("direct", "fast-fir", "overlap-save"):
             fused(client, bank, Path(name), algorithm, frames)

@@ -20,7 +20,8 @@ import numpy as np
 from hybank._hybank import Bank, HybankError, Recording, encode
 from hybank._spec import design as _design
 
-SPAN = 1 << 20
+# Shorter tasks would cost the scheduler more than the workers.
+SPAN = 1 << 23
 _LONGEST_SPAN = 1 << 24
 _SPANS_PER_THREAD = 8
 # Arrays of a block are so small that the allocator keeps their memory: the allocators of workers give larger ones
@@ -48,7 +49,8 @@ def fuse(bank, source, sink, *, client=None, axis=-1, dtype=None, algorithm="aut
     files with a channel or more each. ``axis`` is the axis of time of arrays. ``sink`` is the path of an ``.npy`` file
     or of a zarr array, which is made anew; a source or another kind of file is refused. ``client`` is a
     ``dask.distributed.Client``; without one this process does one span after another. ``span`` is the least number of
-    frames of a task; unless given, each thread has eight tasks, of 2^20 to 2^24 frames. ``progress(done, spans)`` is called after every span.
+    frames of a task; unless given, each thread has eight tasks, of 2^23 to 2^24 frames. ``progress(done, spans)`` is
+    called after every span.
     """
     source, sink = _located(source), _location(sink)
     _check_sink(sink, source)
@@ -255,10 +257,9 @@ def _distributed(client, job, progress):
     shared = client.scatter(job, broadcast=True) if len(job.bank) > 1 << 16 else job
     submit = lambda k: client.submit(_numbered, shared, k, pure=False, retries=3)  # noqa: E731
     under_way = 4 * _threads(client)
-    futures = as_completed([submit(todo.popleft()) for _ in range(min(under_way, len(todo)))])
+    futures = as_completed([submit(todo.popleft()) for _ in range(min(under_way, len(todo)))], with_results=True)
     ends = {}
-    for future in _counted(futures, progress, len(job.spans)):
-        k, end = future.result()
+    for _, (k, end) in _counted(futures, progress, len(job.spans)):
         ends[k] = end
         if todo:
             futures.add(submit(todo.popleft()))
@@ -322,7 +323,7 @@ class _Array:
             return np.asarray(self.array[first : first + count])
         if self.by_frames:
             return np.asarray(self.array[first : first + count])
-        return np.ascontiguousarray(self.array[:, first : first + count])
+        return np.asarray(self.array[:, first : first + count])
 
 
 class _Recordings:
@@ -353,7 +354,7 @@ def _open(source, axis):
     if isinstance(source, list):
         return _Recordings(source)
     if _is_npy(source):
-        return _Array(np.load(source, mmap_mode="r"), axis)
+        return _Array(np.asarray(np.load(source, mmap_mode="r")), axis)
     import zarr
 
     return _Array(zarr.open_array(source, mode="r"), axis)

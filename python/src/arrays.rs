@@ -3,11 +3,13 @@
 use crate::errors::{HybankError, refused};
 use crate::formats::{Format, Number};
 use crate::samples::{Part, Samples};
+use bytemuck::NoUninit;
 use hybank::memory::available_memory;
-use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, SampleLayout};
+use hybank::runtime::{Input, Interleaved, Isa, PcmFrames, Sample, SampleLayout};
+use numpy::ndarray::Axis;
 use numpy::{
-    Complex32, Complex64, Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Complex32, Complex64, Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
+    PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
@@ -31,8 +33,18 @@ pub(crate) struct Shape {
 struct Layout {
     channels: usize,
     frames: usize,
-    /// Frame after frame; otherwise channel after channel.
-    by_frames: bool,
+    order: Order,
+}
+
+/// The order of samples in memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Order {
+    /// Frame after frame.
+    Frames,
+    /// Channel after channel.
+    Channels,
+    /// Each channel without gaps, but gaps between them: a slice along time. The axis of channels.
+    Slices { axis: usize },
 }
 
 /// An array that is read while the interpreter lock is released.
@@ -53,18 +65,22 @@ enum Numbers<'py> {
 
 impl<'py> Held<'py> {
     /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it
-    /// is. Others (slices with steps, foreign byte orders, float16, lists) are copied first.
+    /// is, also a slice along time of the latter. Others (slices with steps, foreign byte orders, float16,
+    /// lists) are copied first.
     pub(crate) fn new(x: &Bound<'py, PyAny>, shape: Shape) -> PyResult<Self> {
         let Ok(array) = x.cast_exact::<PyUntypedArray>() else {
             return Self::new(&plain(x)?, shape);
         };
         let [channels, frames] = shape.of(array)?;
         let (by_rows, by_columns) = (array.is_c_contiguous(), array.is_fortran_contiguous());
-        if !(by_rows || by_columns) || !array.is_aligned() {
+        if !array.is_aligned() {
             return Self::new(&x.call_method0("copy")?, shape);
         }
-        let time_first = shape.time_first();
-        let layout = Layout { channels, frames, by_frames: if by_rows { time_first } else { !time_first } };
+        if !(by_rows || by_columns) {
+            return Self::slice(array, shape);
+        }
+        let order = if by_rows == shape.time_first() { Order::Frames } else { Order::Channels };
+        let layout = Layout { channels, frames, order };
         // Complex numbers as pairs of floats: a view along the axis that varies fastest.
         let pairs = |name: &str| {
             let rows = if by_rows { x.clone() } else { x.getattr("T")? };
@@ -85,6 +101,22 @@ impl<'py> Held<'py> {
             return Ok(complex(Numbers::F64(readonly(pairs("f8")?.cast()?)?)));
         }
         Self::converted(array, shape)
+    }
+
+    /// An array with gaps.
+    fn slice(array: &Bound<'py, PyUntypedArray>, shape: Shape) -> PyResult<Self> {
+        let [channels, frames] = shape.of(array)?;
+        let axis = usize::from(shape.time_first());
+        let is_slice = array.ndim() == 2 && array.strides()[1 - axis] == array.dtype().itemsize() as isize;
+        if let (true, Some(numbers)) = (is_slice, Numbers::of(array)?) {
+            let format = Format { number: numbers.number(), complex: false };
+            return Ok(Self {
+                numbers,
+                layout: Layout { channels, frames, order: Order::Slices { axis } },
+                format,
+            });
+        }
+        Self::new(&array.call_method0("copy")?, shape)
     }
 
     /// From another byte order, or from floats of half precision.
@@ -111,26 +143,18 @@ impl<'py> Held<'py> {
     /// The samples; of complex ones the real parts.
     pub(crate) fn samples(&self) -> PyResult<Samples<'_>> {
         let layout = self.layout;
-        let integers = |bytes| Samples::Pcm(layout.pcm(bytes, self.format.number));
+        let is_interleaved = layout.order == Order::Frames;
         Ok(match &self.numbers {
-            Numbers::F32(array) => match array.as_slice().map_err(refused)? {
-                numbers if self.format.complex => Samples::Part32(layout.parts(numbers)),
-                numbers if layout.by_frames => {
-                    Samples::Interleaved32(Interleaved::new(numbers, layout.channels).map_err(refused)?)
-                }
-                numbers => Samples::Planar32(layout.rows(numbers)),
-            },
-            Numbers::F64(array) => match array.as_slice().map_err(refused)? {
-                numbers if self.format.complex => Samples::Part64(layout.parts(numbers)),
-                numbers if layout.by_frames => {
-                    Samples::Interleaved64(Interleaved::new(numbers, layout.channels).map_err(refused)?)
-                }
-                numbers => Samples::Planar64(layout.rows(numbers)),
-            },
-            Numbers::I8(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
-            Numbers::U8(array) => integers(array.as_slice().map_err(refused)?),
-            Numbers::I16(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
-            Numbers::I32(array) => integers(bytemuck::cast_slice(array.as_slice().map_err(refused)?)),
+            Numbers::F32(array) if self.format.complex => Samples::Part32(layout.parts(slice(array)?)),
+            Numbers::F64(array) if self.format.complex => Samples::Part64(layout.parts(slice(array)?)),
+            Numbers::F32(array) if is_interleaved => Samples::Interleaved32(layout.interleaved(array)?),
+            Numbers::F64(array) if is_interleaved => Samples::Interleaved64(layout.interleaved(array)?),
+            Numbers::F32(array) => Samples::Planar32(layout.rows(array)?),
+            Numbers::F64(array) => Samples::Planar64(layout.rows(array)?),
+            Numbers::I8(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
+            Numbers::U8(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
+            Numbers::I16(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
+            Numbers::I32(array) => Samples::Pcm(layout.pcm(array, self.format.number)?),
         })
     }
 
@@ -203,25 +227,45 @@ impl Shape {
 }
 
 impl Layout {
-    fn rows<'a, S>(&self, numbers: &'a [S]) -> Vec<&'a [S]> {
-        (0..self.channels).map(|i| &numbers[i * self.frames..(i + 1) * self.frames]).collect()
+    /// Each channel.
+    fn rows<'a, S: Element>(&self, array: &'a PyReadonlyArrayDyn<'_, S>) -> PyResult<Vec<&'a [S]>> {
+        let Self { channels, frames, order } = *self;
+        let Order::Slices { axis } = order else {
+            let numbers = slice(array)?;
+            return Ok((0..channels).map(|i| &numbers[i * frames..(i + 1) * frames]).collect());
+        };
+        let row = |i| array.as_array().index_axis_move(Axis(axis), i).to_slice();
+        (0..channels).map(|i| row(i).ok_or_else(|| refused("a channel has gaps"))).collect()
+    }
+
+    fn interleaved<'a, S: Element + Sample>(
+        &self,
+        array: &'a PyReadonlyArrayDyn<'_, S>,
+    ) -> PyResult<Interleaved<'a, S>> {
+        Interleaved::new(slice(array)?, self.channels).map_err(refused)
     }
 
     fn parts<'a, S>(&self, numbers: &'a [S]) -> Part<'a, S> {
-        let &Self { channels, frames, by_frames } = self;
-        let (frame_step, channel_step) = if by_frames { (channels, 1) } else { (1, frames) };
+        let &Self { channels, frames, order } = self;
+        let (frame_step, channel_step) = if order == Order::Frames { (channels, 1) } else { (1, frames) };
         Part { numbers, part: 0, frame_step, channel_step, channels, frames }
     }
 
-    fn pcm<'a>(&self, bytes: &'a [u8], number: Number) -> Vec<PcmFrames<'a>> {
-        let Some(format) = number.pcm() else { return Vec::new() };
-        let layout = SampleLayout::packed(format);
-        if self.by_frames {
-            return vec![PcmFrames { layout, channels: self.channels, bytes }];
+    fn pcm<'a, S: Element + NoUninit>(
+        &self,
+        array: &'a PyReadonlyArrayDyn<'_, S>,
+        number: Number,
+    ) -> PyResult<Vec<PcmFrames<'a>>> {
+        let Some(format) = number.pcm() else { return Ok(Vec::new()) };
+        let frames = |numbers, channels| PcmFrames {
+            layout: SampleLayout::packed(format),
+            channels,
+            bytes: bytemuck::cast_slice(numbers),
+        };
+        if self.order == Order::Frames {
+            return Ok(vec![frames(slice(array)?, self.channels)]);
         }
-        let row = |bytes| PcmFrames { layout, channels: 1, bytes };
-        let size = self.frames * format.bytes();
-        (0..self.channels).map(|i| row(&bytes[i * size..(i + 1) * size])).collect()
+        Ok(self.rows(array)?.into_iter().map(|row| frames(row, 1)).collect())
     }
 }
 
@@ -280,4 +324,8 @@ fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
 
 fn readonly<'py, T: Element>(array: &Bound<'py, PyArrayDyn<T>>) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     array.try_readonly().map_err(refused)
+}
+
+fn slice<'a, S: Element>(array: &'a PyReadonlyArrayDyn<'_, S>) -> PyResult<&'a [S]> {
+    array.as_slice().map_err(refused)
 }

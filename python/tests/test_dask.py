@@ -217,7 +217,7 @@ def test_a_killed_worker_loses_nothing(tmp_path):
             killed.extend([client.run(os.getpid)])
             os.kill(next(iter(killed[0].values())), signal.SIGKILL)
 
-    settings = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    settings = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": ":0"}
     with distributed.LocalCluster(**settings) as cluster, distributed.Client(cluster) as client:
         report = hb.dask.fuse(
             bank, tmp_path / "in.npy", tmp_path / "out.npy", client=client, span=4096, progress=kill
@@ -262,9 +262,9 @@ class Threads:
 
 @pytest.mark.parametrize(
     "frames, client, span",
-    [(0, None, 2**20), (10**8, None, 12_500_000), (10**8, Threads(1, 1), 6_250_000), (10**12, Threads(4, 4), 2**24)],
+    [(0, None, 2**23), (10**8, None, 12_500_000), (10**8, Threads(1, 1), 2**23), (10**12, Threads(4, 4), 2**24)],
 )
-def test_each_thread_has_eight_spans_of_a_million_frames_or_more(frames, client, span):
+def test_each_thread_has_eight_spans_of_eight_million_frames_or_more(frames, client, span):
     assert hb.dask._usual_span(frames, client) == span
 
 
@@ -277,7 +277,7 @@ def test_a_single_spec_is_no_sweep():
 def test_a_sweep_runs_on_a_cluster_and_reports_every_design():
     distributed = pytest.importorskip("distributed")
     specs = [{**SPEC, "latency": latency} for latency in (4, 5)] + [{**SPEC, "ratio": -1}]
-    settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": ":0"}
     last, gate = distributed.Event("last"), {**SPEC, "name": Gate()}
     reported = []
 
