@@ -5,6 +5,7 @@ use crate::errors::{HybankError, refused};
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::FuseReport;
+use crate::signals::Signals;
 use hybank::bank::Bank;
 use hybank::pipeline::{self, GapPolicy, Whole, WholeSettings};
 use hybank::runtime::{Algorithm, Options, Plan, ThreadPool};
@@ -104,8 +105,10 @@ pub(crate) fn fuse<'py>(
     for part in 0..=usize::from(format.complex) {
         input.select(part);
         room.select(part);
-        let whole = py.detach(|| pipeline::fuse(bank, &plan, &input, &mut room, settings));
-        report.add(whole.map_err(refused)?);
+        let signals = Signals::new();
+        let stop = || signals.raised();
+        let whole = py.detach(|| pipeline::fuse_until(bank, &plan, &input, &mut room, settings, &stop));
+        report.add(whole.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?);
     }
     report.clipped = room.clipped();
     let y = array.finish()?;

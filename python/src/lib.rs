@@ -22,6 +22,7 @@ mod proofs;
 mod recordings;
 mod results;
 mod samples;
+mod signals;
 mod simulate;
 mod sources;
 mod stream;

@@ -25,6 +25,9 @@ pub enum PipelineError {
     /// The thread that prepares changes of the filters cannot be started.
     #[error("no thread for the changes of the filters: {0}")]
     Thread(std::io::Error),
+    /// The caller of [`fuse_until`](super::fuse_until) stopped it.
+    #[error("the fusion was stopped")]
+    Stopped,
 }
 
 impl PipelineError {

@@ -34,4 +34,4 @@ pub use outputs::{Block, FileOutputs, Output};
 pub use retune::{Retuned, Retuner, Retuning};
 pub use run::{Ending, run};
 pub use streams::{Pipeline, Settings};
-pub use whole::{Whole, WholeSettings, fuse};
+pub use whole::{Whole, WholeSettings, fuse, fuse_until};

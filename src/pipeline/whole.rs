@@ -1,12 +1,19 @@
 //! Fuses a signal that is in memory as a whole, lined up with the time axis of the input.
 
 use super::{GapFiller, GapPolicy, GapSummary, PipelineError};
-use crate::bank::Bank;
+use crate::bank::{Bank, SynthesisFilters};
 use crate::runtime::{Frames, Input, Interleaved, Isa, Plan, ProcessError, SplitOutput, Stream, ThreadPool};
 use std::ops::Range;
 
 /// Samples of a step in which gaps are filled.
 const STEP_SAMPLES: usize = 1 << 17;
+
+/// Multiply-adds of a segment on one thread: from 2 ms with AVX-512 to 100 ms with double sums on a slow
+/// processor.
+const SEGMENT_MULTIPLY_ADDS: usize = 1 << 27;
+
+/// Reading, converting and storing an output sample cost about as much as so many multiply-adds.
+const MULTIPLY_ADDS_PER_STORE: usize = 8;
 
 /// Settings of [`fuse`].
 #[derive(Debug, Clone, Copy, Default)]
@@ -48,13 +55,31 @@ pub fn fuse(
     output: &mut (impl SplitOutput + ?Sized),
     settings: WholeSettings<'_>,
 ) -> Result<Whole, PipelineError> {
+    fuse_until(bank, plan, input, output, settings, &|| false)
+}
+
+/// As [`fuse`], until `stop` says true. It is asked every few milliseconds of work, on the calling thread.
+///
+/// # Errors
+/// As [`fuse`], and [`PipelineError::Stopped`]; what the output then holds is of no use.
+pub fn fuse_until(
+    bank: &Bank,
+    plan: &Plan,
+    input: &(impl Input + Sync + ?Sized),
+    output: &mut (impl SplitOutput + ?Sized),
+    settings: WholeSettings<'_>,
+    stop: &dyn Fn() -> bool,
+) -> Result<Whole, PipelineError> {
     let (frames, ratio) = (input.frames(), plan.ratio());
+    if input.channels() != plan.channels() {
+        return Err(ProcessError::Channels { given: input.channels(), wanted: plan.channels() }.into());
+    }
     let wanted = frames * ratio;
     if output.capacity() < wanted {
         return Err(ProcessError::OutputTooShort { given: output.capacity(), wanted }.into());
     }
     let skip = if settings.keep_latency { plan.extra_latency() } else { plan.latency() };
-    let mut run = Run::new(bank, plan, skip, settings)?;
+    let mut run = Run::new(bank, plan, skip, settings, stop)?;
     // All outputs of these frames are dropped, except a few of the last one.
     let head = skip.div_ceil(ratio).min(frames);
     let mut edge = vec![0.0; head.max(plan.flush_frames()) * ratio];
@@ -80,6 +105,9 @@ struct Run<'a> {
     /// Outputs y\[n\] that are dropped.
     dropped: usize,
     workers: Option<&'a ThreadPool>,
+    /// Frames between two questions of `stop`.
+    segment: usize,
+    stop: &'a dyn Fn() -> bool,
 }
 
 impl<'a> Run<'a> {
@@ -88,6 +116,7 @@ impl<'a> Run<'a> {
         plan: &Plan,
         skip: usize,
         settings: WholeSettings<'a>,
+        stop: &'a dyn Fn() -> bool,
     ) -> Result<Self, PipelineError> {
         Ok(Self {
             stream: Stream::new(plan),
@@ -95,6 +124,8 @@ impl<'a> Run<'a> {
             marks: Vec::new(),
             dropped: skip - plan.extra_latency(),
             workers: settings.workers,
+            segment: segment(bank, plan, settings.workers.map_or(1, ThreadPool::threads)),
+            stop,
         })
     }
 
@@ -104,11 +135,19 @@ impl<'a> Run<'a> {
         input: &(impl Input + Sync + ?Sized),
         frames: Range<usize>,
         output: &mut (impl SplitOutput + ?Sized),
-    ) -> Result<(), ProcessError> {
+    ) -> Result<(), PipelineError> {
         if self.filler.is_some() {
             return self.filled(input, frames, output);
         }
-        self.run(&Frames::new(input, frames), output)
+        let (mut first, ratio) = (frames.start, self.stream.ratio());
+        while first < frames.end {
+            // Segments end at multiples of their length, where no algorithm has to wait for more frames.
+            let end = frames.end.min((first / self.segment + 1) * self.segment);
+            let segment = Frames::new(input, first..end);
+            output.halves((first - frames.start) * ratio, |_, rest| self.run(&segment, rest))?;
+            first = end;
+        }
+        Ok(())
     }
 
     /// Some of the frames, gaps filled.
@@ -117,12 +156,9 @@ impl<'a> Run<'a> {
         input: &(impl Input + Sync + ?Sized),
         frames: Range<usize>,
         output: &mut (impl SplitOutput + ?Sized),
-    ) -> Result<(), ProcessError> {
+    ) -> Result<(), PipelineError> {
         let (channels, ratio) = (input.channels(), self.stream.ratio());
-        if channels != self.stream.channels() {
-            return Err(ProcessError::Channels { given: channels, wanted: self.stream.channels() });
-        }
-        let step = (STEP_SAMPLES / channels).max(1);
+        let step = (STEP_SAMPLES / channels).clamp(1, self.segment);
         let mut numbers = Vec::new();
         for first in frames.clone().step_by(step) {
             let count = step.min(frames.end - first);
@@ -147,7 +183,10 @@ impl<'a> Run<'a> {
         &mut self,
         input: &(impl Input + Sync + ?Sized),
         output: &mut (impl SplitOutput + ?Sized),
-    ) -> Result<(), ProcessError> {
+    ) -> Result<(), PipelineError> {
+        if (self.stop)() {
+            return Err(PipelineError::Stopped);
+        }
         match self.workers {
             Some(workers) => self.stream.run_parallel(input, output, workers),
             None => self.stream.run(input, output),
@@ -175,6 +214,23 @@ impl<'a> Run<'a> {
         });
         let (replaced, state_resets) = (self.stream.replaced(), self.stream.state_resets());
         Whole { replaced, state_resets, gaps, mask }
+    }
+}
+
+/// Frames of a segment, a multiple of the plan's alignment.
+fn segment(bank: &Bank, plan: &Plan, threads: usize) -> usize {
+    let each = multiply_adds_per_frame(bank, plan) + plan.ratio() * MULTIPLY_ADDS_PER_STORE;
+    (threads * SEGMENT_MULTIPLY_ADDS / each).max(1).next_multiple_of(plan.alignment())
+}
+
+/// Multiply-adds of a frame, at most.
+fn multiply_adds_per_frame(bank: &Bank, plan: &Plan) -> usize {
+    let (channels, ratio) = (plan.channels(), plan.ratio());
+    match (&bank.filters, plan.summary().multiply_adds) {
+        (SynthesisFilters::StateSpace(system), None) => {
+            (system.a.len() + ratio) * (system.a.len() + channels)
+        }
+        (_, each) => each.unwrap_or_default().ceil() as usize * ratio,
     }
 }
 

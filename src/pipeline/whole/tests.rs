@@ -5,6 +5,7 @@ use crate::pipeline::{Block, Output, Pipeline, Settings};
 use crate::random::Random;
 use crate::runtime::{Algorithm, Options, PcmOutput, Planar};
 use crate::units::Seconds;
+use std::cell::Cell;
 
 /// What the command writes: samples and marks.
 #[derive(Default)]
@@ -112,5 +113,36 @@ fn an_output_that_is_too_short_and_channels_that_do_not_match_are_refused() {
             refused,
             Err(PipelineError::Process(ProcessError::Channels { given: 1, wanted: 2 }))
         ));
+    }
+}
+
+/// Long filters make short segments, so that a fusion that is stopped ends soon.
+#[test]
+fn segments_change_no_bit_and_a_fusion_ends_between_them() {
+    let (bank, both) = (bank(2001, 2, 7), channels(140_001, false));
+    let planes = both.each_ref().map(Vec::as_slice);
+    let input = Planar::new(&planes).unwrap();
+    for algorithm in [Algorithm::Direct, Algorithm::FastFir, Algorithm::OverlapSave { transform: None }] {
+        let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
+        let mut at_once = vec![0.0f32; both[0].len() * 2];
+        Stream::new(&plan).run(&input, &mut at_once[..]).unwrap();
+        let asked = Cell::new(0);
+        let run = |most: usize| {
+            let (mut output, stop) = (vec![0.0f32; at_once.len()], || asked.replace(asked.get() + 1) == most);
+            asked.set(0);
+            let settings = WholeSettings { keep_latency: true, ..WholeSettings::default() };
+            fuse_until(&bank, &plan, &input, &mut output[..], settings, &stop).map(|_| output)
+        };
+        let segments = run(usize::MAX).unwrap();
+        let delay = plan.extra_latency();
+        assert!(segments[..segments.len() - delay] == at_once[delay..], "{algorithm:?}");
+        let questions = asked.get();
+        assert!(questions >= both[0].len().div_ceil(segment(&bank, &plan, 1)), "{algorithm:?}");
+        assert!(
+            questions > 2 || plan.algorithm() == "overlap-save",
+            "{algorithm:?}: asked {questions} times"
+        );
+        assert!(matches!(run(questions - 1), Err(PipelineError::Stopped)), "{algorithm:?}");
+        assert_eq!(asked.get(), questions, "{algorithm:?}");
     }
 }
