@@ -1,6 +1,9 @@
 //! How long a view takes: rows and plane, two sizes, two views and eight, mean shift.
 //!
-//! The views are those of the synthetic scene, so that the inputs repeat exactly.
+//! The views are those of the synthetic scene, so that the inputs repeat exactly. Only renderings are timed:
+//! the photographs and their depths are in memory. An argument chooses the lines that contain it
+//! (`cargo bench -p hybank-ibr --bench view_time -- "2 views, full depth, rows 450x375"`), and
+//! `RAYON_NUM_THREADS=1` measures one thread.
 
 #[path = "../../benches/stopwatch/mod.rs"]
 mod stopwatch;
@@ -32,22 +35,37 @@ fn views(size: (usize, usize), positions: &[f64]) -> Vec<View> {
     positions.iter().copied().map(view).collect()
 }
 
+/// Whether the arguments choose a line.
+fn chosen(name: &str) -> bool {
+    let mut wanted = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
+    wanted.next().is_none_or(|part| name.contains(&part))
+}
+
+/// Times a task if its line is chosen.
+fn time_chosen<T>(name: &str, task: impl FnMut() -> T) {
+    if chosen(name) {
+        time(name, task);
+    }
+}
+
 fn full_depth(size: (usize, usize), positions: &[f64]) {
+    let count = positions.len();
+    let name = |method: &str| format!("{count} views, full depth, {method} {}x{}", size.0, size.1);
+    if !chosen(&name("rows")) && !chosen(&name("plane")) {
+        return;
+    }
     let views = views(size, positions);
-    let count = views.len();
     let rows: Vec<RectifiedView<'_>> = views
         .iter()
         .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
         .collect();
     let settings = RenderSettings { method: Method::Rows, ..RenderSettings::default() };
-    time(&format!("{count} views, full depth, rows {}x{}", size.0, size.1), || {
-        rectified::render(&rows, 0.5, &settings).expect("the views overlap")
-    });
+    time_chosen(&name("rows"), || rectified::render(&rows, 0.5, &settings).expect("the views overlap"));
     let free: Vec<CalibratedView<'_>> =
         views.iter().map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera }).collect();
     let target = Camera::metric(rig_camera(0.5, size), false).expect("a rig camera is regular");
     let settings = RenderSettings::default();
-    time(&format!("{count} views, full depth, plane {}x{}", size.0, size.1), || {
+    time_chosen(&name("plane"), || {
         calibrated::render(&free, &target, size, &settings).expect("they overlap")
     });
 }
@@ -58,5 +76,5 @@ fn main() {
         full_depth(size, &[-1.0, -0.7, -0.3, 0.0, 1.0, 1.3, 1.7, 2.0]);
     }
     let image = &views((450, 375), &[0.0])[0].image;
-    time("mean shift, 450x375", || MeanShift::default().segment(image).expect("default settings"));
+    time_chosen("mean shift, 450x375", || MeanShift::default().segment(image).expect("default settings"));
 }

@@ -24,8 +24,8 @@ const SMALLEST_PIVOT: f64 = 1e-14;
 /// Beyond this position doubles are too coarse for a knot index.
 const LARGEST_POSITION: f64 = 1e15;
 
-/// Samples whose weights are computed together.
-const BATCH: usize = 8;
+/// Samples whose weights are computed together; with more, the numbers do not fit the vector registers.
+const BATCH: usize = 4;
 
 /// A sample of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,14 +110,19 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         let mut samples = samples.into_iter();
         let mut added = 0;
         loop {
-            let mut count = 0;
-            let batch: [FitSample<C>; BATCH] =
-                std::array::from_fn(|_| samples.next().inspect(|_| count += 1).unwrap_or(padding));
-            let positions: [f64; BATCH] = std::array::from_fn(|i| batch[i].x);
-            let (knots, w, d) = BSpline::<ORDER>::weights_and_slopes_of(&positions);
-            for (i, sample) in batch.iter().take(count).enumerate() {
-                let of_sample = |all: &[[f64; BATCH]; ORDER]| std::array::from_fn(|j| all[j][i]);
-                added += usize::from(self.accumulate(sample, knots[i], &of_sample(&w), &of_sample(&d)));
+            let (mut batch, mut positions, mut count) = ([padding; BATCH], [f64::NAN; BATCH], 0);
+            while count < BATCH {
+                let Some(sample) = samples.next() else { break };
+                (batch[count], positions[count]) = (sample, sample.x);
+                count += 1;
+            }
+            let (knots, all_w, all_d) = BSpline::<ORDER>::weights_and_slopes_of(&positions);
+            for (i, sample) in batch[..count].iter().enumerate() {
+                let (mut w, mut d) = ([0.0; ORDER], [0.0; ORDER]);
+                for j in 0..ORDER {
+                    (w[j], d[j]) = (all_w[j][i], all_d[j][i]);
+                }
+                added += usize::from(self.accumulate(sample, knots[i], &w, &d));
             }
             if count < BATCH {
                 return added;
@@ -139,14 +144,18 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         let Some(band) = self.band[row..].first_chunk_mut::<ORDER>() else { return false };
         for k in 0..ORDER {
             let (wk, dk) = (s.weight * w[k], penalty * d[k]);
-            for l in k..ORDER {
-                band[k][l - k] += wk * w[l] + dk * d[l];
+            // An even number of entries, as vector registers hold; the last one may get a product with 0.
+            for j in 0..(ORDER - k).next_multiple_of(2).min(ORDER) {
+                let (wl, dl) = if k + j < ORDER { (w[k + j], d[k + j]) } else { (0.0, 0.0) };
+                band[k][j] += wk * wl + dk * dl;
             }
         }
         let Some(rhs) = self.rhs[row..].first_chunk_mut::<ORDER>() else { return false };
         for k in 0..ORDER {
             let wk = s.weight * w[k];
-            rhs[k].iter_mut().zip(&s.values).for_each(|(r, v)| *r += wk * v);
+            for c in 0..C {
+                rhs[k][c] += wk * s.values[c];
+            }
         }
         true
     }
@@ -218,13 +227,17 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         self.rhs[self.knots..].fill([0.0; C]);
         for m in (0..self.knots).rev() {
             let column = self.band[m];
-            let mut c = self.rhs[m].map(|r| r * column[0]);
-            for (factor, later) in column[1..].iter().zip(&self.rhs[m + 1..]) {
-                for (c, later) in c.iter_mut().zip(later) {
-                    *c -= factor * later;
+            let Some(rows) = self.rhs[m..].first_chunk_mut::<ORDER>() else { return };
+            let mut here = rows[0];
+            for c in 0..C {
+                here[c] *= column[0];
+            }
+            for i in 1..ORDER {
+                for c in 0..C {
+                    here[c] -= column[i] * rows[i][c];
                 }
             }
-            self.rhs[m] = c;
+            rows[0] = here;
         }
     }
 

@@ -33,6 +33,12 @@ fn floor(x: f64) -> i64 {
     toward_zero - i64::from(toward_zero as f64 > x)
 }
 
+/// Added to a smaller number, it leaves no bits for a fraction: the sum is rounded to an integer.
+const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
+
+/// Positions below it are rounded so; a quarter of what the sum can hold.
+const LARGEST_ROUNDED: f64 = (1_u64 << 50) as f64;
+
 /// The centred B-spline of degree ORDER - 1, as the weights at x of the ORDER splines that are nonzero
 /// there.
 ///
@@ -52,6 +58,30 @@ impl<const ORDER: usize> BSpline<ORDER> {
         let shifted = x + if ORDER % 2 == 1 { 0.5 } else { 0.0 };
         let floor = floor(shifted);
         (floor - (Self::DEGREE / 2) as i64, shifted - floor as f64)
+    }
+
+    /// [`BSpline::locate`] at N positions at once. Positions of usual size are rounded by a sum: casts to
+    /// integers test for their range and go one by one.
+    #[inline(always)]
+    fn locate_all<const N: usize>(x: &[f64; N]) -> ([i64; N], [f64; N]) {
+        let (mut knots, mut t) = ([0; N], [0.0; N]);
+        let half = if ORDER % 2 == 1 { 0.5 } else { 0.0 };
+        let usual = x.iter().fold(true, |all, x| all & (x.abs() < LARGEST_ROUNDED));
+        for i in 0..N {
+            let sum = x[i] + half + ROUNDING;
+            let (nearest, shifted) = (sum - ROUNDING, x[i] + half);
+            // The nearest integer may lie above.
+            let above = nearest > shifted;
+            let floor = nearest - if above { 1.0 } else { 0.0 };
+            let integer = (sum.to_bits() as i64).wrapping_sub(ROUNDING.to_bits() as i64) - i64::from(above);
+            (knots[i], t[i]) = (integer - (Self::DEGREE / 2) as i64, shifted - floor);
+        }
+        if !usual {
+            for i in 0..N {
+                (knots[i], t[i]) = Self::locate(x[i]);
+            }
+        }
+        (knots, t)
     }
 
     /// First knot k0 and beta(x - k0 - j), j = 0..ORDER; the weights are >= 0 and sum to one.
@@ -84,10 +114,9 @@ impl<const ORDER: usize> BSpline<ORDER> {
     pub fn weights_and_slopes_of<const N: usize>(
         x: &[f64; N],
     ) -> ([i64; N], [[f64; N]; ORDER], [[f64; N]; ORDER]) {
-        let located = x.map(Self::locate);
-        let t = located.map(|l| l.1);
+        let (knots, t) = Self::locate_all(x);
         let lower = raise::<ORDER, N>(&t, Self::DEGREE);
-        (located.map(|l| l.0), raise_once(&lower, &t, ORDER), differences(&lower))
+        (knots, raise_once(&lower, &t, ORDER), differences(&lower))
     }
 }
 
@@ -226,6 +255,27 @@ mod tests {
     fn floors_are_floors() {
         for x in [-2.0, -1.5, -1e-300, 0.0, 0.5, 1.0, 1e15 + 0.5, -1e15 - 0.5] {
             assert_eq!(floor(x) as f64, x.floor());
+        }
+    }
+
+    /// Positions are located together as they are alone, also beside one that is too large or not a number.
+    #[test]
+    fn many_positions_are_located_as_one() {
+        let usual = [-2.5, -2.0, -1e-300, -0.0, 0.0, 0.5, 0.999_999_999, 7.0, 1e15 + 0.5, -1e15 - 0.5];
+        let mut strange = usual;
+        (strange[3], strange[4], strange[5], strange[6]) = (f64::NAN, 1e300, f64::INFINITY, -3e18);
+        for x in [usual, strange] {
+            let bits = |(knot, t): (i64, f64)| (knot, t.to_bits());
+            let (knots, t) = BSpline::<4>::locate_all(&x);
+            assert!(
+                (0..x.len()).all(|i| bits((knots[i], t[i])) == bits(BSpline::<4>::locate(x[i]))),
+                "{x:?}"
+            );
+            let (knots, t) = BSpline::<3>::locate_all(&x);
+            assert!(
+                (0..x.len()).all(|i| bits((knots[i], t[i])) == bits(BSpline::<3>::locate(x[i]))),
+                "{x:?}"
+            );
         }
     }
 

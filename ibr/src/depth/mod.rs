@@ -5,6 +5,7 @@ mod relief;
 
 pub use fill::fill_unknown;
 pub use relief::Relief;
+pub(crate) use relief::{Reliefs, TILE};
 
 /// The quantity that a map holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -277,9 +278,25 @@ fn has_negatives(stored: &[f32]) -> bool {
 /// 0 if all disparities are positive; else what lifts the least to a quarter of their range, and to one
 /// pixel at least: depths in the order of the disparities, in a ratio that real scenes have.
 fn guessed_offset(data: &[f32]) -> f64 {
-    let known = data.iter().copied().filter(|v| !v.is_nan());
-    let (low, high) = known.fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
+    let (low, high) = range(data);
     if low > 0.0 { 0.0 } else { f64::from((high - low) / 4.0).max(1.0) - f64::from(low) }
+}
+
+/// The least and the largest known value. In lanes, and with comparisons that are false for unknown ones, so
+/// that the compiler compares several at a time.
+fn range(data: &[f32]) -> (f32, f32) {
+    const LANES: usize = 8;
+    let (mut low, mut high) = ([f32::MAX; LANES], [f32::MIN; LANES]);
+    let mut compare = |lane: usize, v: f32| {
+        low[lane] = if v < low[lane] { v } else { low[lane] };
+        high[lane] = if v > high[lane] { v } else { high[lane] };
+    };
+    let (whole, rest) = data.as_chunks::<LANES>();
+    for values in whole {
+        (0..LANES).for_each(|lane| compare(lane, values[lane]));
+    }
+    rest.iter().for_each(|v| compare(0, *v));
+    (low.into_iter().fold(f32::MAX, f32::min), high.into_iter().fold(f32::MIN, f32::max))
 }
 
 #[cfg(test)]

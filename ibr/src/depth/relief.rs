@@ -19,58 +19,143 @@ pub struct Relief {
     pub outline: bool,
 }
 
+/// Pixels of a row whose surroundings are found together.
+pub(crate) const TILE: usize = 64;
+
+/// Which is nearer, and what separates two surfaces: the part of a map that comparisons need.
+#[derive(Clone, Copy)]
+struct Scale {
+    /// 1 if larger values are nearer, else -1.
+    nearer: f32,
+    /// Added to a value, it gives a positive number in proportion or inverse proportion to depth.
+    offset: f32,
+}
+
+/// The surroundings of some neighbouring pixels, in the order of their columns: arrays of a fixed length,
+/// whose loops the compiler turns into vector instructions. Unknown pixels have any.
+pub(crate) struct Reliefs {
+    pub(crate) across: [f32; TILE],
+    pub(crate) down: [f32; TILE],
+    pub(crate) behind_edge: [bool; TILE],
+    pub(crate) outline: [bool; TILE],
+}
+
+impl Reliefs {
+    /// The surroundings of the pixel with this number in the tile.
+    #[inline]
+    pub(crate) fn at(&self, i: usize) -> Relief {
+        Relief {
+            across: f64::from(self.across[i]),
+            down: f64::from(self.down[i]),
+            behind_edge: self.behind_edge[i],
+            outline: self.outline[i],
+        }
+    }
+}
+
+/// A tile and its neighbours, NaN outside the map.
+struct Surroundings {
+    left: [f32; TILE],
+    here: [f32; TILE],
+    right: [f32; TILE],
+    above: [f32; TILE],
+    below: [f32; TILE],
+}
+
 impl DepthMap {
     /// The surroundings of a pixel. Slopes are means over the neighbours on the same surface, and 0 without
     /// any.
-    #[inline]
     pub fn relief(&self, x: usize, y: usize) -> Relief {
-        let row = self.row(y);
-        let here = row[x];
-        let side = |at: Option<usize>| at.and_then(|i| row.get(i)).copied().unwrap_or(f32::NAN);
-        let beyond = |at: Option<usize>| at.and_then(|i| self.data.get(i)).copied().unwrap_or(f32::NAN);
-        let p = y * self.width + x;
-        let (left, right) = (side(x.checked_sub(1)), side(Some(x + 1)));
-        let (above, below) = (beyond(p.checked_sub(self.width)), beyond(Some(p + self.width)));
-        let around = [left, right, above, below];
-        Relief {
-            across: self.slope(left, here, right),
-            down: self.slope(above, here, below),
-            behind_edge: around.into_iter().any(|n| self.is_behind(here, n)),
-            outline: around.into_iter().any(|n| self.is_behind(n, here)),
+        let at = |x: Option<usize>, y: Option<usize>| {
+            let place = x.zip(y).filter(|(x, y)| *x < self.width && *y < self.height);
+            place.map_or(f32::NAN, |(x, y)| self.data[y * self.width + x])
+        };
+        let (left, right) = (at(x.checked_sub(1), Some(y)), at(Some(x + 1), Some(y)));
+        let (above, below) = (at(Some(x), y.checked_sub(1)), at(Some(x), Some(y + 1)));
+        let (slopes, [behind_edge, outline]) =
+            Scale::of(self).relief(at(Some(x), Some(y)), [left, right, above, below]);
+        let [across, down] = slopes.map(f64::from);
+        Relief { across, down, behind_edge, outline }
+    }
+
+    /// The surroundings of the pixels of a row from this column on, up to the end of the row or a tile.
+    pub(crate) fn reliefs(&self, start: usize, y: usize) -> Reliefs {
+        let around = self.surroundings(start, y);
+        let Surroundings { left, here, right, above, below } = &around;
+        let (across, down) = ([0.0; TILE], [0.0; TILE]);
+        let mut reliefs = Reliefs { across, down, behind_edge: [false; TILE], outline: [false; TILE] };
+        let scale = Scale::of(self);
+        for i in 0..TILE {
+            let (slopes, edges) = scale.relief(here[i], [left[i], right[i], above[i], below[i]]);
+            [reliefs.across[i], reliefs.down[i]] = slopes;
+            [reliefs.behind_edge[i], reliefs.outline[i]] = edges;
         }
+        reliefs
+    }
+
+    fn surroundings(&self, start: usize, y: usize) -> Surroundings {
+        let tile = |row: Option<usize>, start: usize| {
+            let mut values = [f32::NAN; TILE];
+            let row = row.filter(|y| *y < self.height).map_or(&[][..], |y| self.row(y));
+            let rest = row.get(start..).unwrap_or_default();
+            let count = rest.len().min(TILE);
+            values[..count].copy_from_slice(&rest[..count]);
+            values
+        };
+        let here = tile(Some(y), start);
+        let mut left = [f32::NAN; TILE];
+        left[1..].copy_from_slice(&here[..TILE - 1]);
+        if let Some(before) = start.checked_sub(1) {
+            left[0] = self.row(y)[before];
+        }
+        let (above, below) = (tile(y.checked_sub(1), start), tile(Some(y + 1), start));
+        Surroundings { left, here, right: tile(Some(y), start + 1), above, below }
+    }
+}
+
+impl Scale {
+    fn of(map: &DepthMap) -> Self {
+        let nearer = if map.measure == Measure::Disparity { 1.0 } else { -1.0 };
+        Self { nearer, offset: map.offset as f32 }
+    }
+
+    /// Slopes across and down, and whether the pixel lies behind an edge and on an outline, from its
+    /// neighbours to the left, right, above and below.
+    #[inline(always)]
+    fn relief(self, here: f32, around: [f32; 4]) -> ([f32; 2], [bool; 2]) {
+        let [left, right, above, below] = around;
+        let slopes = [self.slope(left, here, right), self.slope(above, here, below)];
+        let steps = around.map(|neighbour| self.step(here, neighbour));
+        let behind_edge = steps.iter().fold(false, |any, (step, jump)| any | (*step >= *jump));
+        let outline = steps.iter().fold(false, |any, (step, jump)| any | (-*step >= *jump));
+        (slopes, [behind_edge, outline])
+    }
+
+    /// The least difference of two values that separates their surfaces.
+    ///
+    /// Depth is proportional to 1 / D, so a difference of a share of the nearer depth is the same share of
+    /// the smaller disparity.
+    #[inline(always)]
+    fn jump(self, a: f32, b: f32) -> f32 {
+        JUMP * ((if a < b { a } else { b }) + self.offset)
     }
 
     /// Mean of the differences to the neighbours on the surface of `here`; unknown neighbours have none.
-    #[inline]
-    fn slope(&self, before: f32, here: f32, after: f32) -> f64 {
+    #[inline(always)]
+    fn slope(self, before: f32, here: f32, after: f32) -> f32 {
         let one_surface = |a: f32, b: f32| (a - b).abs() < self.jump(a, b);
         match (one_surface(before, here), one_surface(here, after)) {
-            (true, true) => f64::from(after - before) / 2.0,
-            (true, false) => f64::from(here - before),
-            (false, true) => f64::from(after - here),
+            (true, true) => (after - before) / 2.0,
+            (true, false) => here - before,
+            (false, true) => after - here,
             (false, false) => 0.0,
         }
     }
 
-    /// Whether `here` lies behind the surface of a neighbour.
-    #[inline]
-    fn is_behind(&self, here: f32, neighbour: f32) -> bool {
-        let closer = match self.measure {
-            Measure::Disparity => neighbour - here,
-            Measure::Depth => here - neighbour,
-        };
-        closer >= self.jump(here, neighbour)
-    }
-
-    /// The least difference of two values that separates their surfaces.
-    #[inline]
-    fn jump(&self, a: f32, b: f32) -> f32 {
-        match self.measure {
-            // Depth is proportional to 1 / D, so a difference of a share of the nearer depth is the same
-            // share of the smaller disparity.
-            Measure::Disparity => JUMP * (a.min(b) + self.offset as f32),
-            Measure::Depth => JUMP * a.min(b),
-        }
+    /// How much nearer a neighbour is, and from which difference on it lies on another surface.
+    #[inline(always)]
+    fn step(self, here: f32, neighbour: f32) -> (f32, f32) {
+        (self.nearer * (neighbour - here), self.jump(here, neighbour))
     }
 }
 
@@ -101,6 +186,26 @@ mod tests {
         let far = map.relief(3, 0);
         assert!(far.across == 0.0 && far.behind_edge && !far.outline && edge.outline, "{far:?}");
         assert!(!map.relief(4, 1).behind_edge);
+    }
+
+    /// A tile has what its pixels have one by one, at the borders of map and tile too.
+    #[test]
+    fn tiles_have_the_bits_of_single_pixels() {
+        let (width, height) = (2 * TILE + 9, 3);
+        let value = |i: usize| match i % 11 {
+            3 => f32::NAN,
+            k => 5.0 + if k > 7 { 4.0 } else { 0.01 * (i % 17) as f32 },
+        };
+        let data: Vec<f32> = (0..width * height).map(value).collect();
+        for measure in [Measure::Depth, Measure::Disparity] {
+            let map = DepthMap::new((width, height), data.clone(), 1.0, measure).unwrap();
+            for (x, y) in (0..width * height).map(|p| (p % width, p / width)) {
+                if !map.row(y)[x].is_nan() {
+                    let start = x - x % TILE;
+                    assert_eq!(map.reliefs(start, y).at(x - start), map.relief(x, y), "{measure:?} {x} {y}");
+                }
+            }
+        }
     }
 
     #[test]

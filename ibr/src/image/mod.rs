@@ -205,6 +205,12 @@ impl Image {
     #[inline]
     pub fn pixel<const C: usize>(&self, index: usize) -> [f32; C] {
         let start = index * self.channels;
+        if self.channels == C {
+            // The usual case in one piece, without a test for each channel.
+            if let Some(pixel) = self.data[start..].first_chunk::<C>() {
+                return *pixel;
+            }
+        }
         std::array::from_fn(|c| self.data[start + c.min(self.channels - 1)])
     }
 

@@ -59,20 +59,19 @@ const ROWS: usize = 4;
 /// Replaces every disoccluded pixel by the mean over the disoccluded pixels near it in its column. Each row
 /// fills its holes for itself, and without this the fillings form a comb of teeth one row high.
 pub(crate) fn join_rows<const C: usize>(mask: &[Cover], width: usize, values: &mut [f32]) {
-    let before: Vec<[f32; C]> = values.as_chunks::<C>().0.to_vec();
-    for (p, out) in values.as_chunks_mut::<C>().0.iter_mut().enumerate() {
-        if mask[p] != Cover::Disocclusion {
-            continue;
-        }
+    let pixels = values.as_chunks_mut::<C>().0;
+    let uncovered = |p: &usize| mask.get(*p) == Some(&Cover::Disocclusion);
+    let mean = |p: usize| {
         let rows = (p / width).saturating_sub(ROWS)..p / width + ROWS + 1;
-        let column = rows.map(|y| y * width + p % width);
         let (mut sum, mut count) = ([0.0; C], 0.0);
-        for q in column.filter(|q| mask.get(*q) == Some(&Cover::Disocclusion)) {
-            sum.iter_mut().zip(before[q]).for_each(|(s, v)| *s += v);
+        for q in rows.map(|y| y * width + p % width).filter(uncovered) {
+            sum.iter_mut().zip(pixels[q]).for_each(|(s, v)| *s += v);
             count += 1.0;
         }
-        *out = sum.map(|s| s / count);
-    }
+        (p, sum.map(|s| s / count))
+    };
+    let joined: Vec<(usize, [f32; C])> = (0..pixels.len()).filter(uncovered).map(mean).collect();
+    joined.into_iter().for_each(|(p, value)| pixels[p] = value);
 }
 
 /// Pixels in holes, by kind.
@@ -87,7 +86,9 @@ pub struct HoleCount {
 impl HoleCount {
     /// Counts the holes of a mask.
     pub fn of(mask: &[Cover]) -> Self {
-        let count = |kind: Cover| mask.iter().filter(|c| **c == kind).count();
+        // A byte counts a short piece, so that the compiler compares many pixels at a time.
+        let piece = |kind: Cover, piece: &[Cover]| piece.iter().map(|c| u8::from(*c == kind)).sum::<u8>();
+        let count = |kind: Cover| mask.chunks(128).map(|part| usize::from(piece(kind, part))).sum();
         Self { crack: count(Cover::Crack), disocclusion: count(Cover::Disocclusion) }
     }
 

@@ -117,11 +117,11 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
             while to < samples.len() && samples[to].x <= s.x + radius {
                 to += 1;
             }
-            let (a, b, n) = (self.sums[from], self.sums[to], (to - from) as f64);
-            let (sum, squares) = (b.0 - a.0, b.1 - a.1);
+            let (a, b, n) = (self.sums[from], self.sums[to], (to - from) as i32);
+            let (sum, squares, n) = (b.0 - a.0, b.1 - a.1, f64::from(n));
             // V = 1 / (1 + var / s0^2) with n^2 var = n sum z^2 - (sum z)^2, in a single division.
-            let (floor, spread) = (n * n * s0 * s0, (n * squares - sum * sum).max(0.0));
-            floor / (floor + spread)
+            let (floor, spread) = (n * n * s0 * s0, n * squares - sum * sum);
+            floor / (floor + if spread > 0.0 { spread } else { 0.0 })
         }));
     }
 

@@ -2,6 +2,10 @@
 
 use super::DepthTest;
 use crate::sample::Sample;
+use std::ops::Range;
+
+/// Added to a number below it, it rounds to a whole one, which is the lower part of the bits of the sum.
+const WHOLE: f64 = (1_u64 << 52) as f64;
 
 /// The part of a sample that sorting and the depth test need: 16 bytes to move instead of 40.
 #[derive(Debug, Clone, Copy, Default)]
@@ -12,12 +16,40 @@ struct Key {
     index: u32,
 }
 
+/// Keys whose depths are compared as a whole.
+const CHUNK: usize = 8;
+
+/// The least and the largest depth of some keys.
+#[derive(Debug, Clone, Copy)]
+struct Depths {
+    near: f32,
+    far: f32,
+}
+
+impl Depths {
+    const NONE: Self = Self { near: f32::INFINITY, far: f32::NEG_INFINITY };
+
+    /// Comparisons instead of `min` and `max`: a depth that is not a number hides nothing and is not hidden.
+    #[inline]
+    fn and(self, other: Self) -> Self {
+        let near = if other.near < self.near { other.near } else { self.near };
+        let far = if other.far > self.far { other.far } else { self.far };
+        Self { near, far }
+    }
+
+    fn of(keys: &[Key]) -> Self {
+        keys.iter().fold(Self::NONE, |all, k| all.and(Self { near: k.depth, far: k.depth }))
+    }
+}
+
 /// Work memory of the row routines, reused from row to row.
 #[derive(Debug, Clone)]
 pub struct RowScratch<const C: usize> {
     keys: Vec<Key>,
     sorted: Vec<Key>,
     starts: Vec<u32>,
+    /// The depths of each chunk of keys.
+    chunks: Vec<Depths>,
     /// Indices of the window whose depths increase; the front is the nearest.
     window: Vec<u32>,
     /// Keys that a sample of enlarged radius hides.
@@ -27,31 +59,38 @@ pub struct RowScratch<const C: usize> {
 
 impl<const C: usize> Default for RowScratch<C> {
     fn default() -> Self {
-        let (keys, sorted, survivors) = (Vec::new(), Vec::new(), Vec::new());
-        Self { keys, sorted, starts: Vec::new(), window: Vec::new(), hidden: Vec::new(), survivors }
+        let (keys, sorted, starts, chunks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (window, hidden, survivors) = (Vec::new(), Vec::new(), Vec::new());
+        Self { keys, sorted, starts, chunks, window, hidden, survivors }
     }
 }
 
 impl<const C: usize> RowScratch<C> {
-    /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into
-    /// pixels, then insertion, which meets few samples per pixel.
+    /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into as
+    /// many cells as there are keys, then insertion, which meets few keys per cell.
     fn sort(&mut self) {
         let n = self.keys.len();
-        let (low, high) = self.keys.iter().fold((f64::MAX, f64::MIN), |(a, b), k| (a.min(k.x), b.max(k.x)));
-        let cells = ((high - low).floor() as usize).saturating_add(1);
         if n < 2 {
             return;
         }
-        if cells > 8 * n + 64 {
+        let (low, high) = self.keys.iter().fold((f64::MAX, f64::MIN), |(low, high), k| {
+            (if k.x < low { k.x } else { low }, if k.x > high { k.x } else { high })
+        });
+        let scale = (n - 1) as f64 / (high - low + 1.0);
+        if !(scale.is_finite() && scale > 0.0) {
             self.keys.sort_by(|a, b| a.x.total_cmp(&b.x));
             return;
         }
-        let cell = |k: &Key| (k.x - low) as usize;
+        // The cast of a sum that has no fraction left: a cast of the number itself tests for its range. The
+        // limit is for positions that are not numbers.
+        let cell = |k: &Key| (((k.x - low) * scale + WHOLE).to_bits() as u32 as usize).min(n - 1);
         self.starts.clear();
-        self.starts.resize(cells + 1, 0);
+        self.starts.resize(n + 1, 0);
         self.keys.iter().for_each(|k| self.starts[cell(k) + 1] += 1);
-        for i in 0..cells {
-            self.starts[i + 1] += self.starts[i];
+        let mut sum = 0;
+        for start in &mut self.starts {
+            sum += *start;
+            *start = sum;
         }
         // All n elements are written below.
         self.sorted.resize(n, Key::default());
@@ -62,7 +101,7 @@ impl<const C: usize> RowScratch<C> {
         }
         // After the scatter starts[i] is the end of cell i.
         let mut begin = 0;
-        for end in &self.starts[..cells] {
+        for end in &self.starts[..n] {
             let end = *end as usize;
             sort_cell(&mut self.sorted[begin..end]);
             begin = end;
@@ -70,11 +109,68 @@ impl<const C: usize> RowScratch<C> {
         std::mem::swap(&mut self.sorted, &mut self.keys);
     }
 
+    /// Collects the survivors in the order of the keys.
+    ///
+    /// Within a surface no depths of neighbours are far enough apart for one sample to hide another: then
+    /// the least and the largest depth around a chunk of keys show that all of it is visible. Other chunks
+    /// are searched.
+    fn collect(&mut self, samples: &[Sample<C>], test: &DepthTest) {
+        let n = self.keys.len();
+        let largest =
+            samples.iter().fold(0.0, |most: f32, s| if s.spacing > most { s.spacing } else { most });
+        let radius = test.radius(largest);
+        self.chunks.clear();
+        self.chunks.extend(self.keys.chunks(CHUNK).map(Depths::of));
+        self.hidden.clear();
+        self.hidden.resize(n, false);
+        self.survivors.clear();
+        self.survivors.reserve(n);
+        let (mut chunk, count) = (0, self.chunks.len());
+        while chunk < count {
+            let start = chunk;
+            while chunk < count && self.is_flat(chunk, radius, test) {
+                chunk += 1;
+            }
+            let visible = &self.keys[start * CHUNK..(chunk * CHUNK).min(n)];
+            self.survivors.extend(visible.iter().map(|k| samples[k.index as usize]));
+            let start = chunk;
+            while chunk < count && !self.is_flat(chunk, radius, test) {
+                chunk += 1;
+            }
+            if start < chunk {
+                let around = self.around(start..chunk, radius);
+                let around = around.start * CHUNK..(around.end * CHUNK).min(n);
+                self.mark_hidden(around.clone(), samples, test);
+                self.sweep(around, start * CHUNK..(chunk * CHUNK).min(n), samples, test);
+            }
+        }
+    }
+
+    /// Whether no sample near a chunk can hide another.
+    fn is_flat(&self, chunk: usize, radius: f64, test: &DepthTest) -> bool {
+        let around = self.around(chunk..chunk + 1, radius);
+        let Depths { near, far } = self.chunks[around].iter().fold(Depths::NONE, |all, d| all.and(*d));
+        !test.hides(f64::from(near), f64::from(far))
+    }
+
+    /// Some chunks and all that have keys within a radius of theirs.
+    #[inline]
+    fn around(&self, chunks: Range<usize>, radius: f64) -> Range<usize> {
+        let (mut start, mut end) = (chunks.start, chunks.end);
+        let close = |a: usize, b: usize| DepthTest::close(self.keys[b].x - self.keys[a].x, 0.0, radius);
+        let last = (end * CHUNK).min(self.keys.len()) - 1;
+        while start > 0 && close(start * CHUNK - 1, chunks.start * CHUNK) {
+            start -= 1;
+        }
+        while end < self.chunks.len() && close(last, end * CHUNK) {
+            end += 1;
+        }
+        start..end
+    }
+
     /// Marks what samples of a larger radius than epsilon hide; the sweep covers the radius epsilon.
-    fn mark_hidden(&mut self, samples: &[Sample<C>], test: &DepthTest) {
-        let Self { keys, hidden, .. } = self;
-        hidden.clear();
-        hidden.resize(keys.len(), false);
+    fn mark_hidden(&mut self, around: Range<usize>, samples: &[Sample<C>], test: &DepthTest) {
+        let (keys, hidden) = (&self.keys[around.clone()], &mut self.hidden[around]);
         for (i, k) in keys.iter().enumerate() {
             let radius = test.radius(samples[k.index as usize].spacing);
             if radius > test.epsilon {
@@ -87,16 +183,17 @@ impl<const C: usize> RowScratch<C> {
         }
     }
 
-    /// Collects the survivors in the order of the keys, with a window of the nearest keys within epsilon.
-    fn sweep(&mut self, samples: &[Sample<C>], test: &DepthTest) {
+    /// Collects the survivors among the keys `own`, with a window of the nearest keys within epsilon, all of
+    /// which lie in `around`.
+    fn sweep(&mut self, around: Range<usize>, own: Range<usize>, samples: &[Sample<C>], test: &DepthTest) {
         let Self { keys, window, hidden, survivors, .. } = self;
         let test_close = |dx: f64| DepthTest::close(dx, 0.0, test.epsilon);
-        survivors.clear();
-        survivors.reserve(samples.len());
         window.clear();
-        let (mut head, mut next) = (0, 0);
-        for (k, hidden) in keys.iter().zip(hidden.iter()) {
-            while let Some(entering) = keys.get(next).filter(|e| e.x <= k.x || test_close(e.x - k.x)) {
+        let (mut head, mut next) = (0, around.start);
+        for (k, hidden) in keys[own.clone()].iter().zip(&hidden[own]) {
+            while let Some(entering) =
+                keys[..around.end].get(next).filter(|e| e.x <= k.x || test_close(e.x - k.x))
+            {
                 while window.len() > head && keys[window[window.len() - 1] as usize].depth >= entering.depth {
                     window.pop();
                 }
@@ -143,8 +240,7 @@ pub fn remove_in_row<const C: usize>(
     scratch.keys.clear();
     scratch.keys.extend(samples.iter().enumerate().map(key));
     scratch.sort();
-    scratch.mark_hidden(samples, test);
-    scratch.sweep(samples, test);
+    scratch.collect(samples, test);
     std::mem::swap(&mut scratch.survivors, samples);
     before - samples.len()
 }

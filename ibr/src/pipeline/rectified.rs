@@ -129,6 +129,7 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
             *count = strip.survivors_of_row(job, row);
             rows::count(&strip.samples, samples);
             nearest_depths(&strip.samples, &job.settings.interpolation, keys);
+            job.disparities(keys);
             (job.watch)((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / height as f64);
             fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
                 .map(|_| ())
@@ -145,7 +146,7 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
         join_rows::<C>(&mask, width, &mut values);
     }
     let image = Image::from_values((width, height), C, values);
-    let depth = job.disparities(keys);
+    let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
     let (views, agreement) = (Vec::new(), Agreement::default());
     Ok(Rendering { image, mask, depth, counts: samples, views, report, agreement })
 }
@@ -166,17 +167,18 @@ fn render_plane<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError>
     report.holes = HoleCount::of(&fit.mask);
     report.convergence = Some(fit.convergence);
     let image = Image::from_values((width, height), C, fit.values);
-    let depth = job.disparities(fit.depth.data().to_vec());
+    let mut keys = fit.depth.data().to_vec();
+    job.disparities(&mut keys);
+    let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
     let (mask, counts, views) = (fit.mask, fit.counts, Vec::new());
     Ok(Rendering { image, mask, depth, counts, views, report, agreement: Agreement::default() })
 }
 
 impl Job<'_> {
-    /// Disparities from the depth keys of the pixels.
-    fn disparities(&self, mut keys: Vec<f32>) -> DepthMap {
+    /// Turns depth keys of pixels into disparities.
+    fn disparities(&self, keys: &mut [f32]) {
         let offset = self.camera.disparity_offset;
         keys.iter_mut().for_each(|k| *k = (1.0 / f64::from(*k) - offset) as f32);
-        DepthMap::from_known((self.frame.width, self.frame.height), keys, Measure::Disparity)
     }
 }
 

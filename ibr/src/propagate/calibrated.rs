@@ -2,11 +2,9 @@
 
 use super::{CalibratedView, Frame, spacing, weight};
 use crate::camera::{Camera, Relative};
+use crate::depth::TILE;
 use crate::sample::{Dropped, Sample};
 use rayon::prelude::*;
-
-/// Pixels of a tile: part of one row of a view.
-const TILE: usize = 64;
 
 /// Least depth at the virtual camera for which the corners of a tile say where its pixels fall, as a share
 /// of the largest one.
@@ -290,12 +288,13 @@ fn tile_samples<const C: usize>(
 ) {
     let (y, start) = (tile.row as usize, tile.column as usize);
     let (row, width) = (RowMap::new(map, y), view.image.width());
+    let reliefs = view.depth.reliefs(start, y);
     for (x, &depth) in view.depth.row(y).iter().enumerate().skip(start).take(TILE) {
         if depth.is_nan() {
             continue;
         }
         let Fate::Sample(landing) = row.fate(x as f64, depth, frame) else { continue };
-        let relief = view.depth.relief(x, y);
+        let relief = reliefs.at(x - start);
         let [a, b] = row.steps(&landing, f64::from(depth), [relief.across, relief.down]);
         let pixel = y * width + x;
         let doubtful = relief.behind_edge || view.depth.is_guessed(pixel);
@@ -305,7 +304,7 @@ fn tile_samples<const C: usize>(
             y: landing.at.1,
             depth: landing.at.2 as f32,
             value: view.image.pixel::<C>(pixel),
-            spacing: spacing(distance, &relief),
+            spacing: spacing(distance, relief.outline),
             weight: weight((a[0] * b[1] - a[1] * b[0]).abs(), doubtful),
             pixel: pixel as u32,
             view: tile.view,

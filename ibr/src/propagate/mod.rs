@@ -5,7 +5,7 @@ mod calibrated;
 pub use calibrated::{Survey, calibrated};
 
 use crate::camera::Camera;
-use crate::depth::{DepthMap, Relief};
+use crate::depth::{DepthMap, Reliefs, TILE};
 use crate::image::Image;
 use crate::occlusion::LARGEST_SPACING;
 use crate::sample::{Dropped, Sample};
@@ -119,8 +119,8 @@ const OUTLINE_SHARE: f64 = 0.85;
 
 /// Spacing of a sample, from the distance to its neighbours.
 #[inline]
-fn spacing(distance: f64, relief: &Relief) -> f32 {
-    (if relief.outline { OUTLINE_SHARE * distance } else { distance }) as f32
+fn spacing(distance: f64, outline: bool) -> f32 {
+    (distance * if outline { OUTLINE_SHARE } else { 1.0 }) as f32
 }
 
 /// Appends the samples of row `y` of a rectified view, seen by a camera on the line.
@@ -136,35 +136,82 @@ pub fn rectified_row<const C: usize>(
     samples: &mut Vec<Sample<C>>,
 ) -> Dropped {
     let mut dropped = Dropped::default();
-    let shift = view.position - camera.position;
-    let width = view.image.width();
-    for (column, &disparity) in view.disparity.row(y).iter().enumerate() {
-        if disparity.is_nan() {
-            dropped.unknown += 1;
-            continue;
-        }
-        let x = column as f64 + shift * f64::from(disparity) + frame.offset;
-        if !frame.holds_column(x) {
-            dropped.outside += 1;
-            continue;
-        }
-        let pixel = y * width + column;
-        let relief = view.disparity.relief(column, y);
-        let stretch = (1.0 + shift * relief.across).abs();
-        let doubtful = relief.behind_edge || view.disparity.is_guessed(pixel);
-        samples.push(Sample {
-            x,
-            y: y as f64,
-            depth: (1.0 / (f64::from(disparity) + camera.disparity_offset)) as f32,
-            value: view.image.pixel::<C>(pixel),
-            spacing: spacing(((stretch * stretch + 1.0) / 2.0).sqrt(), &relief),
-            weight: weight(stretch, doubtful),
-            pixel: pixel as u32,
-            view: index,
-            doubtful,
-        });
+    for start in (0..view.image.width()).step_by(TILE) {
+        let shifted = ShiftedTile::new(view, (start, y), camera, frame);
+        dropped += shifted.append(view, index, frame, samples);
     }
     dropped
+}
+
+/// Some neighbouring pixels of a rectified view, moved to the virtual camera.
+struct ShiftedTile {
+    /// Column and row of the first pixel.
+    start: (usize, usize),
+    columns: [f64; TILE],
+    depths: [f32; TILE],
+    stretches: [f64; TILE],
+    spacings: [f32; TILE],
+    reliefs: Reliefs,
+}
+
+impl ShiftedTile {
+    /// Computes the tile in loops over arrays; what belongs to unknown pixels is not used.
+    fn new(view: &RectifiedView<'_>, start: (usize, usize), camera: &RigCamera, frame: &Frame) -> Self {
+        let shift = view.position - camera.position;
+        let reliefs = view.disparity.reliefs(start.0, start.1);
+        let (mut columns, mut depths) = ([0.0; TILE], [0.0; TILE]);
+        let known = &view.disparity.row(start.1)[start.0..];
+        let placed = columns.iter_mut().zip(&mut depths).zip(known);
+        for (i, ((column, depth), disparity)) in placed.enumerate() {
+            let disparity = f64::from(*disparity);
+            *column = (start.0 + i) as f64 + shift * disparity + frame.offset;
+            *depth = (1.0 / (disparity + camera.disparity_offset)) as f32;
+        }
+        let (mut stretches, mut spacings) = ([0.0; TILE], [0.0; TILE]);
+        for i in 0..TILE {
+            let stretch = (1.0 + shift * f64::from(reliefs.across[i])).abs();
+            stretches[i] = stretch;
+            spacings[i] = spacing(((stretch * stretch + 1.0) / 2.0).sqrt(), reliefs.outline[i]);
+        }
+        Self { start, columns, depths, stretches, spacings, reliefs }
+    }
+
+    /// Appends the samples that lie in the frame.
+    fn append<const C: usize>(
+        &self,
+        view: &RectifiedView<'_>,
+        index: u16,
+        frame: &Frame,
+        samples: &mut Vec<Sample<C>>,
+    ) -> Dropped {
+        let (mut dropped, (start, y)) = (Dropped::default(), self.start);
+        let first = y * view.image.width() + start;
+        samples.reserve(TILE);
+        for (i, disparity) in view.disparity.row(y)[start..].iter().take(TILE).enumerate() {
+            let (x, pixel) = (self.columns[i], first + i);
+            if disparity.is_nan() {
+                dropped.unknown += 1;
+                continue;
+            }
+            if !frame.holds_column(x) {
+                dropped.outside += 1;
+                continue;
+            }
+            let doubtful = self.reliefs.behind_edge[i] || view.disparity.is_guessed(pixel);
+            samples.push(Sample {
+                x,
+                y: y as f64,
+                depth: self.depths[i],
+                value: view.image.pixel::<C>(pixel),
+                spacing: self.spacings[i],
+                weight: weight(self.stretches[i], doubtful),
+                pixel: pixel as u32,
+                view: index,
+                doubtful,
+            });
+        }
+        dropped
+    }
 }
 
 /// All samples of a rectified rig, row by row and view by view within a row.
