@@ -153,9 +153,7 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         let Some(rhs) = self.rhs[row..].first_chunk_mut::<ORDER>() else { return false };
         for k in 0..ORDER {
             let wk = s.weight * w[k];
-            for c in 0..C {
-                rhs[k][c] += wk * s.values[c];
-            }
+            rhs[k].iter_mut().zip(&s.values).for_each(|(r, v)| *r += wk * v);
         }
         true
     }
@@ -228,10 +226,7 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
         for m in (0..self.knots).rev() {
             let column = self.band[m];
             let Some(rows) = self.rhs[m..].first_chunk_mut::<ORDER>() else { return };
-            let mut here = rows[0];
-            for c in 0..C {
-                here[c] *= column[0];
-            }
+            let mut here = rows[0].map(|r| r * column[0]);
             for i in 1..ORDER {
                 for c in 0..C {
                     here[c] -= column[i] * rows[i][c];
