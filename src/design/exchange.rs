@@ -69,7 +69,7 @@ impl Pace {
     /// For many rounds, each only as close as the peaks between its points are. An iterate in the middle of
     /// the unknowns that are nearly optimal has lower peaks there than one at their edge.
     pub(super) fn gradual(accuracy: f64) -> Self {
-        Self { accuracy, loosest: 0.1, mean_square: 1e-4, active: 0.95, rounds: 32 }
+        Self { accuracy, loosest: 0.1, mean_square: 1e-3, active: 0.95, rounds: 32 }
     }
 
     fn finest(&self) -> f64 {

@@ -18,7 +18,7 @@ use crate::verify::uncertainty::ErrorBox;
 const NO_GAIN: f64 = 1e-3;
 /// The norm is computed where its estimate is at least this share of the largest estimate: estimates are off
 /// by a per cent or two.
-const NEAR_WORST: f64 = 0.95;
+const NEAR_WORST: f64 = 0.97;
 
 /// The comparison of a robust design with one that takes the errors for zero.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
