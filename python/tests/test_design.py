@@ -145,7 +145,16 @@ def test_progress_is_reported():
 LONG = TEXT.replace("taps = 16", "taps = 1200").replace("latency = 4", "latency = 600")
 
 
+@pytest.fixture
+def keyboard_interrupts():
+    # Shells start jobs in the background with SIGINT ignored, and Python leaves that so.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="needs signals")
+@pytest.mark.usefixtures("keyboard_interrupts")
 def test_ctrl_c_interrupts_a_long_design_at_once():
     main = threading.main_thread().ident
     timer = threading.Timer(0.5, lambda: signal.pthread_kill(main, signal.SIGINT))
