@@ -66,8 +66,8 @@ impl Pace {
         Self { accuracy, loosest, mean_square: Settings::SAMPLED.tol_gap_rel, active: 0.0, rounds: 16 }
     }
 
-    /// For many rounds, each only as close as the peaks between its points are. An iterate in the middle of
-    /// the unknowns that are nearly optimal has lower peaks there than one at their edge.
+    /// For many rounds. Each problem is solved only as closely as the peaks between its points require: an
+    /// iterate in the middle of the set of nearly optimal unknowns has lower peaks than one at its boundary.
     pub(super) fn gradual(accuracy: f64) -> Self {
         Self { accuracy, loosest: 0.1, mean_square: 1e-3, active: 0.95, rounds: 32 }
     }

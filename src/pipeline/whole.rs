@@ -58,10 +58,11 @@ pub fn fuse(
     fuse_until(bank, plan, input, output, settings, &|| false)
 }
 
-/// As [`fuse`], until `stop` says true. It is asked every few milliseconds of work, on the calling thread.
+/// As [`fuse`], until `stop` returns true. It is called every few milliseconds of work, on the thread of
+/// the caller.
 ///
 /// # Errors
-/// As [`fuse`], and [`PipelineError::Stopped`]; what the output then holds is of no use.
+/// As [`fuse`], and [`PipelineError::Stopped`]; the output is incomplete then.
 pub fn fuse_until(
     bank: &Bank,
     plan: &Plan,
@@ -105,7 +106,7 @@ struct Run<'a> {
     /// Outputs y\[n\] that are dropped.
     dropped: usize,
     workers: Option<&'a ThreadPool>,
-    /// Frames between two questions of `stop`.
+    /// Frames between two calls of `stop`.
     segment: usize,
     stop: &'a dyn Fn() -> bool,
 }

@@ -22,7 +22,7 @@ pub struct Relief {
 /// Pixels of a row whose surroundings are found together.
 pub(crate) const TILE: usize = 64;
 
-/// Which is nearer, and what separates two surfaces: the part of a map that comparisons need.
+/// What decides which of two values of a map is nearer, and whether they lie on one surface.
 #[derive(Clone, Copy)]
 struct Scale {
     /// 1 if larger values are nearer, else -1.
@@ -32,7 +32,7 @@ struct Scale {
 }
 
 /// The surroundings of some neighbouring pixels, in the order of their columns: arrays of a fixed length,
-/// whose loops the compiler turns into vector instructions. Unknown pixels have any.
+/// whose loops the compiler turns into vector instructions. The entries of unknown pixels mean nothing.
 pub(crate) struct Reliefs {
     pub(crate) across: [f32; TILE],
     pub(crate) down: [f32; TILE],
