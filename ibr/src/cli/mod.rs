@@ -6,6 +6,7 @@ mod contact;
 mod demo;
 mod failure;
 mod heat;
+mod inputs;
 mod memory;
 mod output;
 mod progress;

@@ -5,6 +5,7 @@ mod path;
 
 use super::arguments::RenderArguments;
 use super::failure::{self, Failure};
+use super::inputs;
 use super::memory::{self, Work};
 use super::output;
 use super::progress::Progress;
@@ -184,33 +185,20 @@ fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -
 
 /// Warnings on stderr about what the figures of merit alone do not show.
 fn warn(done: &Rendered, kind: &Kind) {
-    let warn = |text: String| failure::say(&format!("hybank-ibr: warning: {text}\n"));
     let coverage = done.rendering.coverage();
     if coverage < 0.5 && done.hull.is_none() {
-        warn(format!("only {:.1} % of the image is covered by samples", 100.0 * coverage));
+        inputs::warn(&format!("only {:.1} % of the image is covered by samples", 100.0 * coverage));
     }
-    for pair in done.rendering.agreement.pairs.iter().filter(|p| p.is_poor()) {
-        let suspects = match kind {
-            Kind::Rectified { .. } => "positions (swapped?), disparity_scale and disparity_offset",
-            _ => "cameras and depth_scale",
-        };
-        warn(format!(
-            "views {} and {} agree in depth and colour at only {:.0} % of {} points; check their {suspects}",
-            pair.views[0] + 1,
-            pair.views[1] + 1,
-            100.0 * pair.share,
-            pair.points
-        ));
-    }
+    inputs::warn_of_contradictions(&done.rendering.agreement, kind);
     if let Some(c) = done.rendering.report.convergence.filter(|c| !c.reached) {
-        warn(format!(
+        inputs::warn(&format!(
             "the plane fit stopped after {} steps at a relative residual of {:.1e}",
             c.steps, c.residual
         ));
     }
     if done.geometry.as_ref().is_some_and(|g| g.order_by == uncalibrated::OrderBy::Nothing) {
-        warn(
-            "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; if far objects hide near ones, use --reverse-order".into(),
+        inputs::warn(
+            "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; if far objects hide near ones, use --reverse-order",
         );
     }
 }

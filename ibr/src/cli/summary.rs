@@ -1,5 +1,6 @@
 //! The summary of a rendering as text and as JSON.
 
+use super::inputs;
 use crate::image::quality::Quality;
 use crate::interpolate::HoleCount;
 use crate::interpolate::plane::Convergence;
@@ -109,7 +110,7 @@ impl Summary {
         }
         lines.push(format!("coverage  {:.2} %", 100.0 * self.coverage));
         lines.extend(self.counts());
-        lines.extend(self.agreement_line());
+        lines.extend(inputs::line(&self.agreement));
         lines.extend(self.geometry_line());
         lines.push(format!(
             "time      {:.3} s, after {:.3} s of reading and making depth dense",
@@ -136,16 +137,6 @@ impl Summary {
             ));
         }
         lines
-    }
-
-    fn agreement_line(&self) -> Option<String> {
-        let worst = self.agreement.worst()?;
-        let exposures = self.agreement.gains.iter().any(|g| *g != 1.0);
-        Some(format!(
-            "inputs    views agree in depth and colour at {:.0} % of the points{}",
-            100.0 * worst.share,
-            if exposures { "; exposures differ and are matched" } else { "" }
-        ))
     }
 
     fn geometry_line(&self) -> Option<String> {

@@ -270,3 +270,14 @@ fn middlebury_folders_are_scenes() {
     refused(dir.path(), &["render", "m.toml", "-o", "x.png"], 1, &["calib.txt", "`cam0` is missing"]);
     refused(dir.path(), &["render", "m.toml", "-o", "calib.txt.png", "--count", "-"], 2, &["--count -"]);
 }
+
+/// A view alone cannot contradict another: the report says that its inputs are unchecked.
+#[test]
+fn the_inputs_of_a_single_view_are_reported_as_unchecked() {
+    let dir = rig();
+    let text = |arguments: &[&str]| String::from_utf8(good(dir.path(), arguments).stdout).unwrap();
+    let both = text(&["render", "scene.toml", "-o", "both.png"]);
+    assert!(both.contains("inputs    views agree in depth and colour at "), "{both}");
+    let alone = text(&["render", "scene.toml", "--view", "right", "-o", "alone.png"]);
+    assert!(alone.contains("inputs    unchecked: a single view"), "{alone}");
+}

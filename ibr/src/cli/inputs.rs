@@ -1,0 +1,69 @@
+//! What a command says of inputs that contradict each other, or that nothing was compared with.
+
+use super::failure;
+use crate::pipeline::Agreement;
+use crate::scene::Kind;
+
+/// Prints a warning on standard error.
+pub(super) fn warn(text: &str) {
+    failure::say(&format!("hybank-ibr: warning: {text}\n"));
+}
+
+/// Warns of every pair of views that agrees in too few points, and names the keys to check.
+pub(super) fn warn_of_contradictions(agreement: &Agreement, kind: &Kind) {
+    let suspects = match kind {
+        Kind::Rectified { .. } => "positions (swapped?), disparity_scale and disparity_offset",
+        _ => "cameras and depth_scale",
+    };
+    for pair in agreement.pairs.iter().filter(|p| p.is_poor()) {
+        warn(&format!(
+            "views {} and {} agree in depth and colour at only {:.0} % of {} points; check their {suspects}",
+            pair.views[0] + 1,
+            pair.views[1] + 1,
+            100.0 * pair.share,
+            pair.points
+        ));
+    }
+}
+
+/// The line of a report about the inputs; none for views without depth.
+pub(super) fn line(agreement: &Agreement) -> Option<String> {
+    let Some(worst) = agreement.worst() else { return unchecked(agreement) };
+    let exposures = agreement.gains.iter().any(|g| *g != 1.0);
+    Some(format!(
+        "inputs    views agree in depth and colour at {:.0} % of the points{}",
+        100.0 * worst.share,
+        if exposures { "; exposures differ and are matched" } else { "" }
+    ))
+}
+
+/// Why no two views were compared.
+fn unchecked(agreement: &Agreement) -> Option<String> {
+    match agreement.gains.len() {
+        0 => None,
+        1 => Some(
+            "inputs    unchecked: a single view has no other to compare with, so a wrong depth scale or \
+             position would not show"
+                .into(),
+        ),
+        views => Some(format!("inputs    unchecked: the {views} views share too few points to compare")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::PairAgreement;
+
+    #[test]
+    fn the_line_says_what_was_checked() {
+        let of = |views: usize, pairs: Vec<PairAgreement>| {
+            line(&Agreement { pairs, gains: vec![1.0; views], textures: Vec::new() })
+        };
+        let pair = PairAgreement { views: [0, 1], points: 500, share: 0.876, gain: 1.0, difference: 2.0 };
+        assert_eq!(of(0, Vec::new()), None);
+        assert!(of(1, Vec::new()).is_some_and(|l| l.contains("unchecked: a single view")));
+        assert!(of(3, Vec::new()).is_some_and(|l| l.contains("unchecked: the 3 views share too few points")));
+        assert!(of(2, vec![pair]).is_some_and(|l| l.ends_with("at 88 % of the points")));
+    }
+}
