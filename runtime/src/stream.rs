@@ -23,9 +23,9 @@ use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, StateError, SwapEr
 /// | | NaN or infinity in the input | sums that overflow |
 /// |---|---|---|
 /// | direct | seen in the outputs; filtered again with zeros | filtered again at most once |
-/// | fast FIR | replaced first; filtered once | each such output by the definition in f64: N K multiply-adds |
+/// | fast FIR | replaced first; filtered once | each such output by definition in f64: N K multiply-adds |
 /// | overlap-save | replaced first; filtered once | the batch once more, from smaller numbers |
-/// | recursive | replaced first; filtered once | filtered once; the state becomes 0, [counted](Stream::state_resets) |
+/// | recursive | replaced first; filtered once | filtered once; state 0, [counted](Self::state_resets) |
 ///
 /// Only the repair of fast FIR may cost more than filtering twice, because it is not vectorised. The search
 /// for what is not finite passes over the input at most three times.
