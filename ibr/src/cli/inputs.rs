@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn the_line_says_what_was_checked() {
         let of = |views: usize, pairs: Vec<PairAgreement>| {
-            line(&Agreement { pairs, gains: vec![1.0; views], textures: Vec::new() })
+            line(&Agreement { pairs, gains: vec![1.0; views], ..Agreement::default() })
         };
         let pair = PairAgreement { views: [0, 1], points: 500, share: 0.876, gain: 1.0, difference: 2.0 };
         assert_eq!(of(0, Vec::new()), None);

@@ -1,6 +1,7 @@
 //! Whether the inputs fit each other, from the inputs alone: points that one view gives by its depth must
 //! lie at the same depth and have the same colour in another view.
 
+use super::depth_errors::{self, Lookups};
 use crate::depth::{DepthMap, Measure};
 use crate::image::{Image, Texture};
 use crate::propagate::{CalibratedView, RectifiedView};
@@ -58,6 +59,9 @@ pub struct Agreement {
     pub gains: Vec<f64>,
     /// Noise and slopes of each photograph, where it shows them.
     pub textures: Vec<Option<Texture>>,
+    /// Standard deviation of the independent errors of each map: pixels of disparity for a baseline of one,
+    /// or shares of the depth. Empty where a view shares too few points with another.
+    pub depth_errors: Vec<f64>,
 }
 
 impl Agreement {
@@ -88,7 +92,8 @@ impl Agreement {
         map: impl Fn(usize, usize) -> M,
     ) -> Self {
         let textures = inputs.par_iter().map(|(image, _)| Texture::of(image)).collect();
-        let mut agreement = Self { pairs: Vec::new(), gains: vec![1.0; inputs.len()], textures };
+        let mut agreement = Self { gains: vec![1.0; inputs.len()], textures, ..Self::default() };
+        let mut errors = vec![Vec::new(); inputs.len()];
         for j in 1..inputs.len() {
             let Some(i) = (0..j).min_by(|a, b| distance(*a, j).total_cmp(&distance(*b, j))) else { continue };
             let found = Comparison::new(inputs[i], inputs[j], map(i, j)).verdict([i, j]);
@@ -97,8 +102,13 @@ impl Agreement {
             let gain = if pair.is_poor() { 1.0 } else { pair.gain };
             agreement.gains[j] = agreement.gains[i] / gain;
             agreement.pairs.push(pair);
+            let look = |a: usize, b: usize| Lookups::of(inputs[a].1, inputs[b].1, map(a, b));
+            if let Some(found) = depth_errors::of_each(look(i, j), look(j, i)) {
+                [i, j].iter().zip(found).for_each(|(view, variance)| errors[*view].push(variance));
+            }
         }
         agreement.gains.iter_mut().filter(|g| g.ln().abs() < SMALLEST_GAIN).for_each(|g| *g = 1.0);
+        agreement.depth_errors = deviations(&errors).unwrap_or_default();
         agreement
     }
 
@@ -107,6 +117,11 @@ impl Agreement {
         let texture = self.textures.get(view).copied().flatten();
         let gain = self.gains.get(view).copied().unwrap_or(1.0);
         texture.map_or(0.0, |texture| (texture.noise * gain).powi(2))
+    }
+
+    /// Standard deviation of the errors of a map; 0 if it is not known.
+    pub(super) fn depth_error(&self, view: usize) -> f64 {
+        self.depth_errors.get(view).copied().unwrap_or(0.0)
     }
 
     /// Variance of what views show differently for other reasons than noise: depth that is not exact, and
@@ -122,6 +137,14 @@ impl Agreement {
     pub fn worst(&self) -> Option<&PairAgreement> {
         self.pairs.iter().min_by(|a, b| a.share.total_cmp(&b.share))
     }
+}
+
+/// Roots of the mean variances found for each map; `None` if one has none.
+fn deviations(variances: &[Vec<f64>]) -> Option<Vec<f64>> {
+    let mean = |found: &Vec<f64>| {
+        (!found.is_empty()).then(|| (found.iter().sum::<f64>() / found.len() as f64).sqrt())
+    };
+    variances.iter().map(mean).collect()
 }
 
 /// Points of one view found in another one.

@@ -97,7 +97,7 @@ fn render_with<const C: usize>(
     let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
     problem.add_bands(&bands, |rows| {
         let (mut samples, all) = visible_in(rows.clone(), height, &survey, views, settings.depth_test());
-        balance.apply(&mut samples);
+        balance.apply(&mut samples, |view| views[view].image);
         propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         samples
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
-        Balance::calibrated(&views, &target).apply(&mut samples);
+        Balance::calibrated(&views, &target).apply(&mut samples, |view| views[view].image);
         let fit = plane::interpolate(&samples, (40, 30), &settings.interpolation).unwrap();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
@@ -186,7 +186,7 @@ mod tests {
         let mut problem = PlaneProblem::<1>::new((40, 30), &settings.interpolation).unwrap();
         for rows in [0..7, 7..8, 8..30] {
             let (mut band, _) = visible_in(rows, 30, &survey, &views, settings.depth_test());
-            Balance::calibrated(&views, &target).apply(&mut band);
+            Balance::calibrated(&views, &target).apply(&mut band, |view| views[view].image);
             problem.add(&band).unwrap();
         }
         assert_eq!(problem.samples(), samples.len());

@@ -3,6 +3,7 @@
 mod agreement;
 mod balance;
 pub mod calibrated;
+pub(crate) mod depth_errors;
 pub mod rectified;
 mod smoothing;
 pub mod uncalibrated;

@@ -234,7 +234,7 @@ impl<const C: usize> Strip<C> {
         count.propagated = self.samples.len();
         occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
         count.used = self.samples.len();
-        job.balance.apply(&mut self.samples);
+        job.balance.apply(&mut self.samples, |view| job.views[view].image);
         count
     }
 }
@@ -275,7 +275,7 @@ mod tests {
         let (mut samples, dropped) = propagate::rectified::<3>(&views(&parts), 0.4, &frame);
         let propagated = samples.len();
         let occluded = occlusion::remove(&mut samples, settings.depth_test());
-        Balance::rectified(&views(&parts), 0.4).apply(&mut samples);
+        Balance::rectified(&views(&parts), 0.4).apply(&mut samples, |view| &parts[view].0);
         let (values, mask) = rows::interpolate(&samples, (40, 9), &settings.interpolation).unwrap();
         assert_eq!(got.image.data(), values);
         assert_eq!(got.mask, mask);

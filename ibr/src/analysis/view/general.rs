@@ -9,14 +9,12 @@ use crate::analysis::random::{part, seeded};
 use crate::camera::Camera;
 use crate::depth::DepthMap;
 use crate::image::Image;
+use crate::pipeline::depth_errors::Lookups;
 use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, calibrated as pipeline};
 use crate::propagate::CalibratedView;
 
 /// Errors of depth below this share change nothing that can be seen.
 const LEAST: f64 = 1e-4;
-
-/// Largest relative difference of two depths of one surface.
-const SAME_SURFACE: f64 = 0.05;
 
 /// Largest share of its depth by which a noisy depth is wrong, in standard deviations.
 const TAIL: f64 = 3.0;
@@ -72,40 +70,13 @@ fn spacing(views: &[CalibratedView<'_>], camera: &Camera) -> f64 {
 /// s^2 (1 + 4/9). The median makes hidden points harmless.
 pub fn depth_noise(views: &[CalibratedView<'_>]) -> f64 {
     let distance = |i: usize, j: usize| (views[i].camera.centre() - views[j].camera.centre()).norm();
-    let mut differences: Vec<f64> = (1..views.len())
-        .filter_map(|j| Some(((0..j).min_by(|a, b| distance(*a, j).total_cmp(&distance(*b, j)))?, j)))
-        .flat_map(|(i, j)| lookups(&views[i], &views[j]))
-        .collect();
-    if differences.is_empty() {
-        return 0.0;
-    }
-    let middle = differences.len() / 2;
-    let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
-    1.4826 * median / (13.0_f64 / 9.0).sqrt()
-}
-
-/// Relative differences of the depths of a point in two maps, for every seventh pixel of the first.
-fn lookups(a: &CalibratedView<'_>, b: &CalibratedView<'_>) -> Vec<f64> {
-    let map = a.camera.relative_to(&b.camera);
-    let ((width, height), (columns, rows)) = (a.depth.size(), b.depth.size());
-    let lookup = |p: usize| {
-        if a.depth.is_guessed(p) {
-            return None;
-        }
-        let (u, v, d) = map.map((p % width) as f64, (p / width) as f64, f64::from(a.depth.data()[p]));
-        // Also false for unknown depths.
-        if !(u >= 0.0 && v >= 0.0 && u < columns as f64 - 1.0 && v < rows as f64 - 1.0) {
-            return None;
-        }
-        let (x, y, s, t) = (u as usize, v as usize, u.fract(), v.fract());
-        let at = |i: usize, j: usize| f64::from(b.depth.row(y + j)[x + i]);
-        let upper = at(0, 0) * (1.0 - s) + at(1, 0) * s;
-        let lower = at(0, 1) * (1.0 - s) + at(1, 1) * s;
-        let difference = ((upper * (1.0 - t) + lower * t) / d - 1.0).abs();
-        // Points that another surface hides say nothing. NaN beside unknown depths.
-        (difference <= SAME_SURFACE).then_some(difference)
+    let nearest = |j| (0..j).min_by(|a: &usize, b: &usize| distance(*a, j).total_cmp(&distance(*b, j)));
+    let lookups = |j: usize| {
+        let (a, b) = (&views[nearest(j)?], &views[j]);
+        let map = a.camera.relative_to(&b.camera);
+        Some(Lookups::of(a.depth, b.depth, |x, y, d| map.map(x, y, d)))
     };
-    (0..width * height).step_by(7).filter_map(lookup).collect()
+    (1..views.len()).filter_map(lookups).fold(Lookups::default(), Lookups::and).common()
 }
 
 /// A rendering and the regressors of its pixels.

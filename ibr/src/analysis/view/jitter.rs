@@ -3,6 +3,7 @@
 use crate::analysis::random::{part, seeded};
 use crate::depth::DepthMap;
 use crate::image::Image;
+use crate::pipeline::depth_errors::Lookups;
 use crate::pipeline::{RenderError, RenderSettings, rectified};
 use crate::propagate::RectifiedView;
 
@@ -19,33 +20,11 @@ const WINDOW: usize = 2;
 /// interpolated between two neighbours. The median makes hidden points harmless. Errors that both maps
 /// share, and offsets between the cameras, do not show.
 pub fn disparity_noise(views: &[RectifiedView<'_>]) -> f64 {
-    let mut differences: Vec<f64> = views.windows(2).flat_map(|pair| lookups(&pair[0], &pair[1])).collect();
-    if differences.is_empty() {
-        return 0.0;
-    }
-    let middle = differences.len() / 2;
-    let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
-    1.4826 * median / (5.0_f64 / 3.0).sqrt()
-}
-
-/// |difference| of the disparities of a point in two maps, for every fourth pixel of the first.
-fn lookups(a: &RectifiedView<'_>, b: &RectifiedView<'_>) -> Vec<f64> {
-    let (width, height) = a.disparity.size();
-    let lookup = |p: usize| {
-        let (x, y) = (p % width, p / width);
-        let d = f64::from(a.disparity.data()[p]);
-        let there = x as f64 + (a.position - b.position) * d;
-        // Also false for unknown disparities.
-        if a.disparity.is_guessed(p) || !(there >= 0.0 && there < width as f64 - 1.0) {
-            return None;
-        }
-        let (column, part) = (there as usize, there.fract());
-        let q = y * width + column;
-        let known = |q: usize| (!b.disparity.is_guessed(q)).then(|| f64::from(b.disparity.data()[q]));
-        let other = known(q)? * (1.0 - part) + known(q + 1)? * part;
-        (!other.is_nan()).then_some((other - d).abs())
+    let lookups = |pair: &[RectifiedView<'_>]| {
+        let shift = pair[0].position - pair[1].position;
+        Lookups::of(pair[0].disparity, pair[1].disparity, |x, y, d| (x + shift * d, y, d))
     };
-    (0..width * height).step_by(4).filter_map(lookup).collect()
+    views.windows(2).map(lookups).fold(Lookups::default(), Lookups::and).common()
 }
 
 /// The views' disparity maps with independent errors of this standard deviation, from a fixed seed.

@@ -165,7 +165,7 @@ impl<const ORDER: usize, const C: usize> RowSurvey<ORDER, C> {
             propagate::rectified_row(view, index, y, &job.camera, &job.frame, &mut self.samples);
         }
         occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
-        job.balance.apply(&mut self.samples);
+        job.balance.apply(&mut self.samples, |view| job.views[view].image);
         let fitted = self.fit.interpolate(&self.samples, settings, &mut self.values, &mut self.mask);
         if !fitted.map_err(failed)? {
             return Ok(());

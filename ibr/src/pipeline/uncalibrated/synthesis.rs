@@ -28,7 +28,7 @@ pub(super) fn render<const C: usize>(
 ) -> Result<UncalibratedRendering, RenderError> {
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
     let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame)?;
-    balance.apply(&mut samples);
+    balance.apply(&mut samples, |view| images[view]);
     let mut report = Report { dropped, propagated: samples.len(), ..Report::default() };
     let hull = hull_features(scene, images.len());
     let absolute = special.sigma_share * chi_range(&hull);

@@ -1,0 +1,276 @@
+//! Independent errors of the depth maps, from the maps alone: points that one map gives are looked up in
+//! another.
+
+use crate::depth::{DepthMap, Measure};
+
+/// Every so many pixels of a map are looked up.
+const STEP: usize = 7;
+
+/// Fewest points for a verdict.
+const FEWEST: usize = 100;
+
+/// Largest relative difference of two depths of one surface.
+const SAME_SURFACE: f64 = 0.05;
+
+/// The median of |x| of a normal variable of deviation one, to its inverse.
+const MEDIAN: f64 = 1.4826;
+
+/// Differences beyond this many deviations belong to points that another surface hides.
+const HIDDEN: f64 = 3.0;
+
+/// Least value of 1 - k1 k2, see [`of_each`]; 5/9 at random places in a row.
+const LEAST_AVERAGED: f64 = 0.3;
+
+/// Rounds in which hidden points are left out.
+const ROUNDS: usize = 4;
+
+/// What the lookups of one map in another found.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Lookups {
+    /// |difference| of each point: pixels of disparity for a baseline of one, or shares of the depth.
+    differences: Vec<f64>,
+    /// Sum over the points of the share of the variance that interpolation leaves: the squared weights.
+    kept: f64,
+}
+
+impl Lookups {
+    /// Depths of points of one map against those of another at the same points. `map` takes a pixel and its
+    /// depth to the other view.
+    pub(crate) fn of(from: &DepthMap, to: &DepthMap, map: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
+        let (width, height) = from.size();
+        let mut all = Self::default();
+        for p in (0..width * height).step_by(STEP).filter(|p| !from.is_guessed(*p)) {
+            let depth = f64::from(from.data()[p]);
+            let (u, v, d) = map((p % width) as f64, (p / width) as f64, depth);
+            let Some((there, kept)) = interpolated(to, u, v) else { continue };
+            let (difference, is_hidden) = match from.measure() {
+                Measure::Disparity => ((there - d).abs(), false),
+                Measure::Depth => ((there / d - 1.0).abs(), (there / d - 1.0).abs() > SAME_SURFACE),
+            };
+            if difference.is_finite() && !is_hidden {
+                all.differences.push(difference);
+                all.kept += kept;
+            }
+        }
+        all
+    }
+
+    /// With those of other maps.
+    pub(crate) fn and(mut self, other: Self) -> Self {
+        self.differences.extend(other.differences);
+        self.kept += other.kept;
+        self
+    }
+
+    /// Mean share of the variance of the second depth that interpolation leaves: 2/3 between two neighbours,
+    /// 4/9 between four, at random places.
+    fn share(&self) -> f64 {
+        self.kept / self.differences.len().max(1) as f64
+    }
+
+    /// Standard deviation of the independent errors of each map, if both have the same: the difference has
+    /// s^2 (1 + k), with the share k that interpolation leaves. The median makes hidden points harmless. 0
+    /// without points.
+    pub(crate) fn common(mut self) -> f64 {
+        let share = self.share();
+        median(&mut self.differences).map_or(0.0, |median| MEDIAN * median / (1.0 + share).sqrt())
+    }
+
+    /// Variance of the differences without hidden points: the median, again without what lies far beyond it.
+    fn variance(&mut self) -> Option<f64> {
+        for _ in 0..ROUNDS {
+            let limit = HIDDEN * MEDIAN * median(&mut self.differences)?;
+            self.differences.retain(|difference| *difference <= limit);
+        }
+        Some((MEDIAN * median(&mut self.differences)?).powi(2))
+    }
+}
+
+/// The value between pixels of a map, whose neighbours must be measured, and the sum of the squared weights.
+fn interpolated(map: &DepthMap, u: f64, v: f64) -> Option<(f64, f64)> {
+    let (width, height) = map.size();
+    // Also false for positions of pixels without depth.
+    if !(u >= 0.0 && v >= 0.0 && u < width as f64 - 1.0 && v <= height as f64 - 1.0) {
+        return None;
+    }
+    let (x, y, s, t) = (u as usize, v as usize, u.fract(), v.fract());
+    let known = |p: usize| (!map.is_guessed(p)).then(|| f64::from(map.data()[p]));
+    let along = |y: usize| Some(known(y * width + x)? * (1.0 - s) + known(y * width + x + 1)? * s);
+    let value = if t == 0.0 { along(y)? } else { along(y)? * (1.0 - t) + along(y + 1)? * t };
+    let kept = |part: f64| (1.0 - part).powi(2) + part * part;
+    Some((value, kept(s) * kept(t)))
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Variances of the independent errors of two maps, from the lookups of the first in the second and of the
+/// second in the first; `None` with too few of them.
+///
+/// The lookups of the first have the variance D1 = s1^2 + k1 s2^2, because the second depth is interpolated,
+/// and those of the second D2 = s2^2 + k2 s1^2. So s1^2 = (D1 - k1 D2) / (1 - k1 k2). Errors that do not
+/// change from pixel to pixel are not averaged by interpolation; they have D1 = D2 and are shared equally.
+/// `None` too where most points fall on pixels, and nothing is averaged.
+pub(super) fn of_each(mut first: Lookups, mut second: Lookups) -> Option<[f64; 2]> {
+    if first.differences.len().min(second.differences.len()) < FEWEST {
+        return None;
+    }
+    let (k1, k2) = (first.share(), second.share());
+    let (d1, d2) = (first.variance()?, second.variance()?);
+    let both = 1.0 - k1 * k2;
+    (both >= LEAST_AVERAGED).then(|| [(d1 - k1 * d2) / both, (d2 - k2 * d1) / both].map(|s| s.max(0.0)))
+}
+
+/// By how much errors of depth displace the samples of a view, as positions in the view itself: the mean of
+/// d d' over the pixels, d the displacement in pixels per pixel of disparity or per share of the depth.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Lever {
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl Lever {
+    /// Of errors of disparity, at this distance along the rows.
+    pub(super) fn along_rows(distance: f64) -> Self {
+        Self { xx: distance * distance, ..Self::default() }
+    }
+
+    /// From the map of pixels and their depths to the other view. The pixels that move farthest, a tenth,
+    /// are left out: points close to a camera move without limit.
+    pub(super) fn of(map: &DepthMap, to: impl Fn(f64, f64, f64) -> (f64, f64, f64)) -> Self {
+        const STEPS: usize = 16;
+        let (width, height) = map.size();
+        let columns = (0..width).step_by(width.div_ceil(STEPS).max(1));
+        let rows = (0..height).step_by(height.div_ceil(STEPS).max(1));
+        let pixels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+        let mut all: Vec<[f64; 2]> = pixels
+            .filter_map(|(x, y)| displacement([x as f64, y as f64, f64::from(map.row(y)[x])], map, &to))
+            .collect();
+        all.sort_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
+        all.truncate(all.len() - all.len() / 10);
+        let mean = |product: &dyn Fn(&[f64; 2]) -> f64| {
+            all.iter().map(product).sum::<f64>() / all.len().max(1) as f64
+        };
+        Self { xx: mean(&|d| d[0] * d[0]), xy: mean(&|d| d[0] * d[1]), yy: mean(&|d| d[1] * d[1]) }
+    }
+
+    /// Mean square change of the value for an error of one in the depth, with the gradient of the view.
+    pub(super) fn square(&self, [x, y]: [f64; 2]) -> f64 {
+        self.xx * x * x + 2.0 * self.xy * x * y + self.yy * y * y
+    }
+
+    /// The same for a gradient in every direction, with a mean square of one for each component.
+    pub(super) fn trace(&self) -> f64 {
+        self.xx + self.yy
+    }
+}
+
+/// The displacement of one pixel within its own view that has the effect of a change of its depth.
+fn displacement(
+    [x, y, depth]: [f64; 3],
+    map: &DepthMap,
+    to: impl Fn(f64, f64, f64) -> (f64, f64, f64),
+) -> Option<[f64; 2]> {
+    const CHANGE: f64 = 1e-3;
+    let moved = match map.measure() {
+        Measure::Disparity => depth + CHANGE,
+        Measure::Depth => depth * (1.0 + CHANGE),
+    };
+    let here = to(x, y, depth);
+    let by = |(u, v, _): (f64, f64, f64)| ((u - here.0) / CHANGE, (v - here.1) / CHANGE);
+    let (right, below) = (by(to(x + CHANGE, y, depth)), by(to(x, y + CHANGE, depth)));
+    let (u, v) = by(to(x, y, moved));
+    let area = right.0 * below.1 - right.1 * below.0;
+    let found = [(u * below.1 - v * below.0) / area, (v * right.0 - u * right.1) / area];
+    found.iter().all(|d| d.is_finite()).then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
+    use crate::uncalibrated::random::Dice;
+
+    const SIZE: (usize, usize) = (240, 180);
+
+    fn disturbed(map: &DepthMap, deviation: f64, seed: u64) -> DepthMap {
+        let dice = &mut Dice::new(seed);
+        let error = |v: f32, e: f64| match map.measure() {
+            Measure::Disparity => v + e as f32,
+            Measure::Depth => v * (1.0 + e as f32),
+        };
+        map.changed(|v| error(v, deviation * dice.normal()))
+    }
+
+    fn shots() -> [(Camera, DepthMap); 2] {
+        [0.0, 1.0].map(|position| {
+            let camera = Camera::metric(rig_camera(position, SIZE), false).unwrap();
+            (camera, SyntheticScene::default().view(&camera, SIZE).1)
+        })
+    }
+
+    /// Errors that differ by a factor of eight, and errors in one map alone.
+    #[test]
+    fn the_errors_of_each_map_are_told_apart() {
+        let maps = shots().map(|(_, depth)| rig_disparity(&depth, SIZE.0));
+        for deviations in [[0.1, 0.8], [0.5, 0.5], [0.4, 0.0]] {
+            let noisy = [0, 1].map(|i| disturbed(&maps[i], deviations[i], 3 + i as u64));
+            let look = |a: usize, b: usize| {
+                let shift = a as f64 - b as f64;
+                Lookups::of(&noisy[a], &noisy[b], move |x, y, d| (x + shift * d, y, d))
+            };
+            let found = of_each(look(0, 1), look(1, 0)).unwrap();
+            let largest = deviations[0].max(deviations[1]).powi(2);
+            for (found, deviation) in found.iter().zip(deviations) {
+                assert!((found - deviation * deviation).abs() < 0.2 * largest, "{deviations:?}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn relative_errors_of_depths_are_told_apart() {
+        let shots = shots();
+        let noisy = [(0, 0.002), (1, 0.008)].map(|(i, s)| disturbed(&shots[i].1, s, 7 + i as u64));
+        let look = |a: usize, b: usize| {
+            let map = shots[a].0.relative_to(&shots[b].0);
+            Lookups::of(&noisy[a], &noisy[b], move |x, y, d| map.map(x, y, d))
+        };
+        let [first, second] = of_each(look(0, 1), look(1, 0)).unwrap().map(f64::sqrt);
+        assert!((0.0..0.004).contains(&first) && (0.007..0.009).contains(&second), "{first} {second}");
+    }
+
+    /// An error of a disparity displaces a point by as much, times the distance of the cameras; a relative
+    /// error of a depth by its disparity, in the pixels of a view of half the size and turned by a right
+    /// angle too.
+    #[test]
+    fn levers_are_displacements() {
+        let shots = shots();
+        let disparity = rig_disparity(&shots[0].1, SIZE.0);
+        let found = Lever::of(&disparity, |x, y, d| (x - 0.4 * d, y, d));
+        assert!((found.xx - 0.16).abs() < 1e-9 && found.yy < 1e-9 && found.xy.abs() < 1e-9, "{found:?}");
+        assert!((found.xx - Lever::along_rows(0.4).xx).abs() < 1e-9);
+        let map = shots[0].0.relative_to(&shots[1].0);
+        let middle = f64::from(disparity.middle().unwrap()).powi(2);
+        let found = Lever::of(&shots[0].1, |x, y, d| map.map(x, y, d));
+        assert!((0.8..1.6).contains(&(found.xx / middle)) && found.yy < 1e-6 * middle, "{found:?} {middle}");
+        let turned = |x: f64, y: f64, d: f64| {
+            let (u, v, d) = map.map(x, y, d);
+            (-0.5 * v, 0.5 * u, d)
+        };
+        let again = Lever::of(&shots[0].1, turned);
+        assert!((again.xx / found.xx - 1.0).abs() < 1e-6 && again.yy < 1e-6 * middle, "{again:?}");
+        assert!((found.square([3.0, 1.0]) / found.xx / 9.0 - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn few_points_have_no_verdict() {
+        let few = |count| Lookups { differences: vec![1.0; count], kept: 0.6 * count as f64 };
+        assert_eq!(of_each(few(99), few(500)), None);
+        assert!(of_each(few(100), few(500)).is_some());
+        assert_eq!(Lookups::default().common(), 0.0);
+    }
+}
