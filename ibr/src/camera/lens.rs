@@ -33,6 +33,14 @@ impl Lens {
         Self { focal, centre, radial, tangential, reach: reach(radial) }
     }
 
+    /// The lens of the same photograph, resized by factors of columns and rows.
+    pub(super) fn resized(self, factors: [f64; 2]) -> Self {
+        let factors = Vector2::from(factors);
+        let half = Vector2::new(0.5, 0.5);
+        let centre = (self.centre + half).component_mul(&factors) - half;
+        Self { focal: self.focal.component_mul(&factors), centre, ..self }
+    }
+
     /// The distorted position of an undistorted one, in pixels; `None` beyond the radius where the image
     /// folds back.
     pub fn record(&self, ideal: Vector2<f64>) -> Option<Vector2<f64>> {

@@ -4,7 +4,9 @@ pub mod colmap;
 mod file_error;
 mod lens;
 pub mod middlebury;
+pub mod names;
 mod path;
+pub mod resize;
 pub mod transforms;
 
 pub use file_error::CameraFileError;

@@ -6,6 +6,7 @@
 
 use super::colmap::ModelCamera;
 use super::file_error::CHECK_THE_PATH;
+use super::names::{self, Found, NameError};
 use super::{Camera, CameraFileError, Lens};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::Deserialize;
@@ -206,13 +207,15 @@ impl Inner {
 }
 
 impl Transforms {
-    /// The frame of an image: the one whose path `image` ends with, or else the only one of that name, with
-    /// or without extension.
-    pub fn find(&self, image: &Path) -> Option<&Frame> {
-        let image = plain(image);
-        let mut whole = self.frames.iter().filter(|frame| image.ends_with(plain(&frame.image)));
-        let mut alike = self.frames.iter().filter(|frame| frame.image.file_stem() == image.file_stem());
-        whole.next().or_else(|| alike.next().filter(|_| alike.next().is_none()))
+    /// The frame of an image, by the rule of [`names::find`].
+    ///
+    /// # Errors
+    /// [`NameError`].
+    pub fn find(&self, image: &str) -> Result<(&Frame, Found), NameError> {
+        let images: Vec<_> = self.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
+        let images: Vec<&str> = images.iter().map(AsRef::as_ref).collect();
+        let found = names::find(&images, image)?;
+        Ok((&self.frames[found.index], found))
     }
 
     /// The camera of a frame. `fallback` is the size of its image if the file does not give it.
@@ -255,11 +258,6 @@ impl Transforms {
     }
 }
 
-/// A path without the `./` at its beginning.
-fn plain(path: &Path) -> PathBuf {
-    path.components().filter(|part| *part != std::path::Component::CurDir).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -283,14 +281,14 @@ mod tests {
     #[test]
     fn open_gl_axes_become_pixels() {
         let file = read(FILE).unwrap();
-        let frame = file.find(Path::new("train/r_0.png")).unwrap();
+        let frame = file.find("train/r_0.png").unwrap().0;
         let found = file.camera(frame, (7, 7)).unwrap();
         assert_eq!(found.size, (200, 100));
         let (x, y, depth) = found.camera.project(&Vector3::new(3.0, 3.5, 2.0));
         assert!((depth - 2.0).abs() < 1e-12 && (x - (99.5 + 50.0)).abs() < 1e-9, "{x} {depth}");
         assert!((y - (49.5 - 25.0)).abs() < 1e-9, "{y}");
         // The second looks along -x of the world: its z axis, which points backwards, is +x.
-        let second = file.find(Path::new("images/b.png")).unwrap();
+        let second = file.find("images/b.png").unwrap().0;
         assert_eq!(second.depth.as_deref(), Some(Path::new("b.png")));
         let camera = file.camera(second, (7, 7)).unwrap().camera;
         let (x, y, depth) = camera.project(&Vector3::new(-5.0, 1.0, -1.0));

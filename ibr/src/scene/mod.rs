@@ -7,6 +7,7 @@ pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
 use crate::camera::CameraFileError;
+use crate::camera::middlebury::Calibration;
 use crate::camera::{Camera, CameraError};
 use crate::depth::{DepthError, DepthMap};
 use crate::image::{Image, ImageError};
@@ -25,6 +26,10 @@ pub struct Scene {
     pub offset: f64,
     /// Unknown depths that were filled from their neighbours.
     pub filled: usize,
+    /// The calibration file of a rectified rig, which gives its disparities a unit.
+    pub calibration: Option<Calibration>,
+    /// What was decided on reading and is worth a sentence to the user.
+    pub notes: Vec<String>,
 }
 
 /// The three situations of the thesis.
@@ -60,6 +65,15 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Views to render from.
+    pub fn views(&self) -> usize {
+        match self {
+            Self::Rectified { views, .. } => views.len(),
+            Self::Calibrated { views, .. } => views.len(),
+            Self::Uncalibrated { images, .. } => images.len(),
+        }
+    }
+
     /// Virtual views to render.
     pub fn frames(&self) -> usize {
         match self {

@@ -30,6 +30,13 @@ pub struct SceneSpec {
     /// Whether the world frame of the cameras is left-handed.
     #[serde(default)]
     pub mirrored: bool,
+    /// Stored value / scale = disparity, in views that do not say it themselves.
+    pub disparity_scale: Option<f64>,
+    /// Stored value / scale = depth, in views that do not say it themselves.
+    pub depth_scale: Option<f64>,
+    /// What [`complete`](super::complete) decided and is worth a sentence to the user.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
 /// A view.

@@ -4,6 +4,7 @@
 
 mod binary;
 
+use super::file_error::CHECK_THE_PATH;
 use super::{Camera, CameraFileError, Lens};
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -11,6 +12,9 @@ use std::path::Path;
 
 /// What to do if a file of a model cannot be opened.
 const FILES: &str = "a COLMAP model has cameras.txt and images.txt, or cameras.bin and images.bin";
+
+/// Where COLMAP puts models in its folders.
+const PLACES: [&str; 6] = ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
 
 /// A camera of the model with the size of its image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +37,9 @@ pub type Model = BTreeMap<String, ModelCamera>;
 /// # Errors
 /// [`CameraFileError`], with file and line or record.
 pub fn read_model(folder: &Path) -> Result<Model, CameraFileError> {
+    if !is_model(folder) {
+        return Err(no_model(folder));
+    }
     let named = |name: &str, source| CameraFileError::Read { path: folder.join(name), source, remedy: FILES };
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
         let load = |name: &str| crate::files::read(&folder.join(name)).map_err(|e| named(name, e));
@@ -40,6 +47,27 @@ pub fn read_model(folder: &Path) -> Result<Model, CameraFileError> {
     }
     let load = |name: &str| crate::files::read_text(&folder.join(name)).map_err(|e| named(name, e));
     parse_model(&load("cameras.txt")?, &load("images.txt")?, folder)
+}
+
+/// Whether a folder has the file of cameras, in one of the formats.
+fn is_model(folder: &Path) -> bool {
+    ["cameras.txt", "cameras.bin"].iter().any(|name| folder.join(name).is_file())
+}
+
+/// That there is no model in a folder, with those that are in folders below it.
+fn no_model(folder: &Path) -> CameraFileError {
+    let below = PLACES.iter().map(|place| folder.join(place)).filter(|place| is_model(place));
+    let below: Vec<String> = below.map(|place| place.display().to_string()).collect();
+    let remedy = match (below.is_empty(), folder.is_file(), folder.exists()) {
+        (false, ..) => format!("name the folder with the model: {}", below.join(" or ")),
+        (_, true, _) => "it is a file; name the folder that holds it".into(),
+        (_, _, true) => FILES.into(),
+        _ => format!("there is no such folder; {CHECK_THE_PATH}"),
+    };
+    CameraFileError::Content {
+        path: folder.into(),
+        reason: format!("there is neither cameras.txt nor cameras.bin: {remedy}"),
+    }
 }
 
 fn parse_binary(cameras: &[u8], images: &[u8], folder: &Path) -> Result<Model, CameraFileError> {

@@ -1,7 +1,11 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
-use super::{Goal, Loaded, Loader, in_order};
+use super::left_out::LeftOut;
+use super::models::Source;
+use super::{Goal, Inputs, Loaded, Loader, in_order};
 use crate::camera::Camera;
+use crate::camera::colmap::ModelCamera;
+use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
 use crate::scene::{CalibratedSource, Kind, SceneError, ViewSpec};
 use nalgebra::Matrix3x4;
@@ -9,56 +13,103 @@ use rayon::prelude::*;
 
 type Matrix = [[f64; 4]; 3];
 
+/// A camera whose calibration was for images of another size than the one at hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Resized {
+    from: Size,
+    to: Size,
+}
+
+impl Resized {
+    /// The size of another image of the same collection, resized alike.
+    fn applied(self, (w, h): Size) -> Size {
+        let side = |from: usize, to: usize, side: usize| {
+            ((side as f64 * to as f64 / from as f64).round() as usize).max(1)
+        };
+        (side(self.from.0, self.to.0, w), side(self.from.1, self.to.1, h))
+    }
+}
+
+/// The images at hand that a camera from a file is compared with: the first, and how it was resized.
+#[derive(Clone, Copy)]
+struct First {
+    size: Size,
+    resized: Option<Resized>,
+}
+
 impl Loader<'_> {
     pub(super) fn calibrated(
         &self,
         views: &[&ViewSpec],
-        left_out: Option<&ViewSpec>,
+        left_out: Option<&LeftOut>,
         goals: &[Goal],
-    ) -> Loaded<(Kind, usize)> {
-        let one = |view: &&ViewSpec| {
-            let others = [
-                ("disparity", view.disparity.is_some()),
-                ("disparity_scale", view.disparity_scale.is_some()),
-                ("disparity_offset", view.disparity_offset.is_some()),
-            ];
-            self.no_other_kind(view, "calibrated", &others)?;
-            let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
-            let (image, depth, filled) =
-                self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;
-            let camera = self.camera_of(view, image.size())?;
-            Ok((CalibratedSource { image, depth, camera }, filled))
-        };
-        let sources = in_order(views.par_iter().map(one).collect())?;
-        let first = sources[0].0.image.size();
-        let (cameras, own) = match left_out {
-            Some(view) => {
-                let own = self.image(&view.image)?.size();
-                (vec![self.camera_of(view, own)?], own)
-            }
+    ) -> Loaded<Inputs> {
+        self.a_camera_each(views)?;
+        let sources = in_order(views.par_iter().map(|view| self.source(view)).collect())?;
+        let first = First { size: sources[0].0.image.size(), resized: sources[0].2 };
+        let (cameras, size) = match left_out {
+            Some(place) => self.at_place(place, first, goals)?,
             None => self.cameras(goals, first)?,
         };
-        let size = self.size(goals, own)?;
+        let notes = notes(sources.iter().filter_map(|s| s.2));
         let filled = sources.iter().map(|s| s.1).sum();
         let views = sources.into_iter().map(|s| s.0).collect();
-        Ok((Kind::Calibrated { views, cameras, size }, filled))
+        Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, filled, calibration: None, notes })
     }
 
-    /// The virtual cameras, and the size of the image whose camera the first is.
-    fn cameras(&self, goals: &[Goal], first: (usize, usize)) -> Loaded<(Vec<Camera>, (usize, usize))> {
-        let start = |goal: &Goal| {
-            let target = &goal.target;
-            self.target_camera(target.camera.as_ref(), target.colmap_image.as_deref(), goal, first)
+    /// A view, the number of its depths that were filled, and how its camera was resized.
+    fn source(&self, view: &ViewSpec) -> Loaded<(CalibratedSource, usize, Option<Resized>)> {
+        let others = [
+            ("disparity", view.disparity.is_some()),
+            ("disparity_scale", view.disparity_scale.is_some()),
+            ("disparity_offset", view.disparity_offset.is_some()),
+        ];
+        self.no_other_kind(view, "calibrated", &others)?;
+        let map = self.need(view.depth.as_deref(), view, "depth", "calibrated")?;
+        let (image, depth, filled) =
+            self.image_with_map(view, map, view.depth_scale.unwrap_or(1.0), Measure::Depth)?;
+        let (camera, resized) = self.camera_of(view, image.size())?;
+        Ok((CalibratedSource { image, depth, camera }, filled, resized))
+    }
+
+    /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size
+    /// of the virtual view.
+    fn at_place(&self, place: &LeftOut, first: First, goals: &[Goal]) -> Loaded<(Vec<Camera>, Size)> {
+        let (camera, own) = match place {
+            LeftOut::View(index) => {
+                let view = &self.spec.view[*index];
+                let own = self.image(&view.image)?.size();
+                (self.camera_of(view, own)?.0, own)
+            }
+            LeftOut::Listed(image) => {
+                let source = self.common_source();
+                let source = source.ok_or_else(|| self.no_such_view(image))?;
+                let found = self.listed_camera(&source, image, first.size, "--view")?;
+                let own = first.resized.map_or(found.size, |resized| resized.applied(found.size));
+                (self.scaled(found, own, "--view")?, own)
+            }
         };
-        let own = match goals.first().map(start).transpose()? {
-            Some((_, Some(size))) => size,
-            _ => first,
+        Ok((vec![camera], self.size(goals, own)?))
+    }
+
+    /// The virtual cameras and their size.
+    fn cameras(&self, goals: &[Goal], first: First) -> Loaded<(Vec<Camera>, Size)> {
+        let own = match goals.first().map(|goal| self.start_of(goal, first)).transpose()? {
+            Some(Wanted::Listed(found)) => {
+                first.resized.map_or(found.size, |resized| resized.applied(found.size))
+            }
+            _ => first.size,
+        };
+        let size = self.size(goals, own)?;
+        let camera = |wanted: Wanted, goal: &Goal| match wanted {
+            Wanted::Given(camera) => Ok(camera),
+            Wanted::Listed(found) => self.scaled(found, size, &goal.name),
         };
         let cameras = self.along(
             goals,
-            |goal| Ok(start(goal)?.0),
+            |goal| camera(self.start_of(goal, first)?, goal),
             |goal, from, share| {
-                let to = self.end_of_path(goal, first)?;
+                let to = camera(self.end_of_path(goal, first)?, goal)?;
                 from.towards(&to, share).map_err(|source| SceneError::Camera {
                     path: self.path.into(),
                     which: format!("the path of {}", goal.name),
@@ -66,58 +117,136 @@ impl Loader<'_> {
                 })
             },
         )?;
-        Ok((cameras, own))
+        Ok((cameras, size))
     }
 
-    fn end_of_path(&self, goal: &Goal, first: (usize, usize)) -> Loaded<Camera> {
+    fn start_of(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
+        self.wanted(goal.target.camera.as_ref(), goal.target.colmap_image.as_deref(), goal, first)
+    }
+
+    fn end_of_path(&self, goal: &Goal, first: First) -> Loaded<Wanted> {
         let (rows, image) = (goal.target.to_camera.as_ref(), goal.target.to_colmap_image.as_deref());
         if rows.is_none() && image.is_none() {
             let name = &goal.name;
-            return Err(self
-                .incomplete(format!("{name} needs `to_camera` or `to_colmap_image` for a path of cameras")));
+            return Err(
+                self.incomplete(format!("{name} needs `to_camera` or `to_camera_of` for a path of cameras"))
+            );
         }
-        Ok(self.target_camera(rows, image, goal, first)?.0)
+        self.wanted(rows, image, goal, first)
     }
 
     fn matrix(&self, rows: &Matrix, which: &str) -> Loaded<Camera> {
         let matrix = Matrix3x4::from_fn(|i, j| rows[i][j]);
-        Camera::metric(matrix, self.spec.mirrored).map_err(|source| SceneError::Camera {
-            path: self.path.into(),
-            which: which.into(),
-            source,
-        })
+        Camera::metric(matrix, self.spec.mirrored).map_err(|source| self.bad_camera(which, source))
     }
 
-    fn camera_of(&self, view: &ViewSpec, size: (usize, usize)) -> Loaded<Camera> {
+    fn bad_camera(&self, which: &str, source: crate::camera::CameraError) -> SceneError {
+        SceneError::Camera { path: self.path.into(), which: which.into(), source }
+    }
+
+    /// The camera of a view whose image has this size.
+    fn camera_of(&self, view: &ViewSpec, size: Size) -> Loaded<(Camera, Option<Resized>)> {
+        let which = format!("view {:?}", view.label());
         match (&view.camera, self.source_of(view)) {
-            (Some(rows), _) => self.matrix(rows, &format!("view {:?}", view.label())),
+            (Some(rows), _) => Ok((self.matrix(rows, &which)?, None)),
             (None, Some(source)) => {
-                Ok(self.listed_camera(&source, &view.image.to_string_lossy(), size)?.camera)
+                let found = self.listed_camera(&source, &view.image.to_string_lossy(), size, &which)?;
+                self.fitted(found, size, &source, &which)
             }
             (None, None) => self.need(None, view, "camera", "calibrated"),
         }
     }
 
-    /// The camera of a matrix or of a listed image, and the size of that image.
-    fn target_camera(
+    /// A camera from a file for an image of another size than the file says: resized with it, or refused.
+    fn fitted(
+        &self,
+        found: ModelCamera,
+        size: Size,
+        source: &Source,
+        which: &str,
+    ) -> Loaded<(Camera, Option<Resized>)> {
+        if found.size == size {
+            return Ok((found.camera, None));
+        }
+        if factors(found.size, size).is_some() {
+            let resized = Resized { from: found.size, to: size };
+            return Ok((self.scaled(found, size, which)?, Some(resized)));
+        }
+        let (Source::Colmap(file) | Source::Transforms(file)) = source;
+        Err(self.incomplete(format!(
+            "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions",
+            size.0,
+            size.1,
+            file.display(),
+            found.size.0,
+            found.size.1
+        )))
+    }
+
+    /// A camera from a file, scaled with its image; as it is, for a window of another shape.
+    fn scaled(&self, found: ModelCamera, size: Size, which: &str) -> Loaded<Camera> {
+        match factors(found.size, size) {
+            Some(factors) if found.size != size => {
+                found.camera.resized(factors).map_err(|source| self.bad_camera(which, source))
+            }
+            _ => Ok(found.camera),
+        }
+    }
+
+    /// A virtual camera: a matrix, or the camera of a listed image.
+    fn wanted(
         &self,
         rows: Option<&Matrix>,
         image: Option<&str>,
         goal: &Goal,
-        first: (usize, usize),
-    ) -> Loaded<(Camera, Option<(usize, usize)>)> {
+        first: First,
+    ) -> Loaded<Wanted> {
         if let Some(rows) = rows {
-            return Ok((self.matrix(rows, &goal.name)?, None));
+            return Ok(Wanted::Given(self.matrix(rows, &goal.name)?));
         }
         match (image, self.common_source()) {
             (Some(image), Some(source)) => {
-                let found = self.listed_camera(&source, image, first)?;
-                Ok((found.camera, Some(found.size)))
+                Ok(Wanted::Listed(self.listed_camera(&source, image, first.size, &goal.name)?))
             }
-            _ => Err(self.incomplete(format!(
-                "{} needs a `camera` (3 x 4), or `colmap_image` with a `colmap` folder or a `transforms` file at the top",
+            (Some(_), None) => Err(self.incomplete(format!(
+                "{} has `camera_of`, which needs a `colmap` folder or a `transforms` file at the top; give it a `camera` (3 x 4), or name that file",
                 goal.name
             ))),
+            (None, Some(source)) => Err(self.incomplete(format!(
+                "{} needs `camera_of`, an image whose camera it takes, or a `camera` (3 x 4); {}",
+                goal.name,
+                self.some_names(&source)?
+            ))),
+            (None, None) => Err(self.incomplete(format!("{} needs a `camera` (3 x 4)", goal.name))),
         }
     }
+}
+
+/// A virtual camera that a table asks for.
+enum Wanted {
+    Given(Camera),
+    Listed(ModelCamera),
+}
+
+/// What to say of cameras that were resized, each change once.
+fn notes(all: impl Iterator<Item = Resized>) -> Vec<String> {
+    let mut counts: Vec<(Resized, usize)> = Vec::new();
+    for resized in all {
+        match counts.iter_mut().find(|(known, _)| *known == resized) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((resized, 1)),
+        }
+    }
+    let note = |(Resized { from, to }, count): (Resized, usize)| {
+        let views = if count == 1 {
+            "the camera of 1 view is".into()
+        } else {
+            format!("the cameras of {count} views are")
+        };
+        format!(
+            "{views} scaled from images of {} x {} to {} x {} pixels, the size of the photographs",
+            from.0, from.1, to.0, to.1
+        )
+    };
+    counts.into_iter().map(note).collect()
 }

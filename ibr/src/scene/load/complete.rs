@@ -19,11 +19,11 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
     let mut whole = spec.clone();
     let folder = path.parent().unwrap_or(Path::new(""));
     if let (Some(file), true) = (&spec.transforms, spec.view.is_empty()) {
-        whole.view = transforms_views(file, folder)?;
+        whole.view = transforms_views(file, folder, spec.depth_scale)?;
     }
     if let Some(file) = &spec.calib {
         if spec.view.is_empty() {
-            whole.view = pair_views(file, folder);
+            (whole.view, whole.notes) = pair_views(file, folder);
         }
         let calibration = read_calibration(&folder.join(file))?;
         for view in &mut whole.view {
@@ -41,11 +41,15 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
             }
         }
     }
+    for view in &mut whole.view {
+        view.disparity_scale = view.disparity_scale.or(spec.disparity_scale);
+        view.depth_scale = view.depth_scale.or(spec.depth_scale);
+    }
     Ok(whole)
 }
 
 /// The frames with depth; paths in the file are relative to it.
-fn transforms_views(file: &Path, folder: &Path) -> Loaded<Vec<ViewSpec>> {
+fn transforms_views(file: &Path, folder: &Path, scale: Option<f64>) -> Loaded<Vec<ViewSpec>> {
     let all = read_transforms(&folder.join(file))?;
     let beside = file.parent().unwrap_or(Path::new(""));
     let view = |frame: &crate::camera::transforms::Frame| {
@@ -55,7 +59,7 @@ fn transforms_views(file: &Path, folder: &Path) -> Loaded<Vec<ViewSpec>> {
             name: Some(frame.image.display().to_string()),
             image: beside.join(&frame.image),
             depth: Some(beside.join(depth)),
-            depth_scale: whole_numbers.then_some(STORED_PER_UNIT),
+            depth_scale: scale.or(whole_numbers.then_some(STORED_PER_UNIT)),
             ..ViewSpec::default()
         })
     };
@@ -66,8 +70,8 @@ fn transforms_views(file: &Path, folder: &Path) -> Loaded<Vec<ViewSpec>> {
     }
 }
 
-/// im0.png and im1.png with disp0.pfm and, if it is there, disp1.pfm.
-fn pair_views(file: &Path, folder: &Path) -> Vec<ViewSpec> {
+/// The views of a pair whose disparity maps are there, and what is to be said of a missing one.
+fn pair_views(file: &Path, folder: &Path) -> (Vec<ViewSpec>, Vec<String>) {
     let beside = file.parent().unwrap_or(Path::new(""));
     let view = |k: usize| ViewSpec {
         image: beside.join(format!("im{k}.png")),
@@ -75,6 +79,19 @@ fn pair_views(file: &Path, folder: &Path) -> Vec<ViewSpec> {
         disparity: Some(beside.join(format!("disp{k}.pfm"))),
         ..ViewSpec::default()
     };
-    let both = folder.join(beside).join("disp1.pfm").exists();
-    (0..if both { 2 } else { 1 }).map(view).collect()
+    let has_map = |k: &usize| folder.join(beside).join(format!("disp{k}.pfm")).exists();
+    let found: Vec<usize> = (0..2).filter(has_map).collect();
+    match found[..] {
+        // The message about the file that cannot be opened names the first map.
+        [] => (vec![view(0)], Vec::new()),
+        [only] => {
+            let note = format!(
+                "there is no disp{}.pfm beside {}: the view is rendered from im{only}.png alone",
+                1 - only,
+                file.display()
+            );
+            (vec![view(only)], vec![note])
+        }
+        _ => ((0..2).map(view).collect(), Vec::new()),
+    }
 }

@@ -72,7 +72,7 @@ impl Loader<'_> {
                 Err(self.incomplete(format!("{name} frames = {frames}: a path has 2 to {MOST_FRAMES} views")))
             }
             (Some(_), false) => Err(self.incomplete(format!(
-                "{name} has `frames` but no end of the path: `to_position`, `to_camera`, `to_colmap_image` or `to_between`"
+                "{name} has `frames` but no end of the path: `to_position`, `to_camera`, `to_camera_of` or `to_between`"
             ))),
             (None, true) => Err(
                 self.incomplete(format!("{name} has the end of a path; say with `frames` how many views it has"))

@@ -2,10 +2,12 @@
 
 use super::{Loaded, Loader};
 use crate::camera::colmap::{Model, ModelCamera, read_model};
+use crate::camera::names::{self, NameError};
+use crate::camera::resize::Size;
 use crate::camera::transforms::{Transforms, read_transforms};
 use crate::scene::ViewSpec;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Where the camera of a view is written.
@@ -57,31 +59,88 @@ impl Loader<'_> {
         colmap.or_else(|| self.spec.transforms.as_ref().map(|file| Source::Transforms(self.file(file))))
     }
 
-    /// The camera of an image: by its path, or by the path's last part. `fallback` is the size of the image
-    /// if the file does not give it.
+    /// The camera of an image, as the file lists it. `fallback` is the size of the image if the file does
+    /// not give it; `which` names the view in messages.
     pub(super) fn listed_camera(
         &self,
         source: &Source,
         image: &str,
-        fallback: (usize, usize),
+        fallback: Size,
+        which: &str,
     ) -> Loaded<ModelCamera> {
-        let missing = |file: &Path, what: &str| {
-            self.incomplete(format!("{}: {what} has no image {image:?}", file.display()))
-        };
-        match (self.models.get(source)?, source) {
-            (Read::Colmap(model), Source::Colmap(file) | Source::Transforms(file)) => {
-                in_model(&model, image).ok_or_else(|| missing(file, "the model"))
+        let (Source::Colmap(file) | Source::Transforms(file)) = source;
+        let refused = |e: NameError| self.incomplete(format!("{which}: {}: {e}", file.display()));
+        match self.models.get(source)? {
+            Read::Colmap(model) => {
+                let names = names_of(&model);
+                let found = names::find(&names, image).map_err(refused)?;
+                Ok(model[names[found.index]])
             }
-            (Read::Transforms(all), Source::Colmap(file) | Source::Transforms(file)) => {
-                let frame = all.find(Path::new(image)).ok_or_else(|| missing(file, "the file"))?;
+            Read::Transforms(all) => {
+                let (frame, _) = all.find(image).map_err(refused)?;
                 Ok(all.camera(frame, fallback)?)
             }
         }
     }
+
+    /// The name of an image in a file of cameras, and whether its folders agree with it.
+    fn listed_name(&self, source: &Source, image: &str) -> Loaded<Option<(String, bool)>> {
+        Ok(match self.models.get(source)? {
+            Read::Colmap(model) => {
+                let names = names_of(&model);
+                names::find(&names, image).ok().map(|found| (names[found.index].to_string(), found.whole))
+            }
+            Read::Transforms(all) => {
+                let frame = all.find(image).ok();
+                frame.map(|(frame, found)| (frame.image.display().to_string(), found.whole))
+            }
+        })
+    }
+
+    /// Some of the images that a file lists, for messages.
+    pub(super) fn some_names(&self, source: &Source) -> Loaded<String> {
+        let (Source::Colmap(file) | Source::Transforms(file)) = source;
+        let listed = match self.models.get(source)? {
+            Read::Colmap(model) => names::list(&names_of(&model), ", "),
+            Read::Transforms(all) => {
+                let images: Vec<_> = all.frames.iter().map(|frame| frame.image.to_string_lossy()).collect();
+                names::list(&images.iter().map(AsRef::as_ref).collect::<Vec<_>>(), ", ")
+            }
+        };
+        Ok(format!("{} lists {listed}", file.display()))
+    }
+
+    /// Whether the scene's file of cameras lists an image.
+    pub(super) fn is_listed(&self, image: &str) -> Loaded<bool> {
+        let Some(source) = self.common_source() else { return Ok(false) };
+        Ok(self.listed_name(&source, image)?.is_some_and(|(_, whole)| whole))
+    }
+
+    /// Refuses two photographs with the camera of one image, where a folder says that it is not theirs.
+    pub(super) fn a_camera_each(&self, views: &[&ViewSpec]) -> Loaded<()> {
+        let mut seen: BTreeMap<(PathBuf, String), (&ViewSpec, bool)> = BTreeMap::new();
+        for view in views.iter().filter(|view| view.camera.is_none()) {
+            let Some(source) = self.source_of(view) else { continue };
+            let Some((name, whole)) = self.listed_name(&source, &view.image.to_string_lossy())? else {
+                continue;
+            };
+            let (Source::Colmap(file) | Source::Transforms(file)) = source;
+            if let Some((other, sure)) = seen.insert((file.clone(), name.clone()), (view, whole))
+                && other.image != view.image
+                && !(sure && whole)
+            {
+                return Err(self.incomplete(format!(
+                    "{}: views {:?} and {:?} would both have the camera of image {name:?}, the only one of that file name; give the other one a `camera`, or remove its [[view]]",
+                    file.display(),
+                    other.label(),
+                    view.label()
+                )));
+            }
+        }
+        Ok(())
+    }
 }
 
-fn in_model(model: &Model, image: &str) -> Option<ModelCamera> {
-    let last = |name: &str| name.rsplit('/').next().unwrap_or(name).to_string();
-    let by_last_part = || model.iter().find(|(name, _)| last(name) == last(image)).map(|(_, camera)| camera);
-    model.get(image).or_else(by_last_part).copied()
+fn names_of(model: &Model) -> Vec<&str> {
+    model.keys().map(String::as_str).collect()
 }

@@ -1,7 +1,7 @@
 //! Scenes of a rectified rig: positions and disparities.
 
-use super::{Goal, Loaded, Loader, in_order};
-use crate::camera::middlebury::read_calibration;
+use super::{Goal, Inputs, Loaded, Loader, in_order};
+use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
 use crate::scene::{Kind, RectifiedSource, ViewSpec};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ impl Loader<'_> {
         views: &[&ViewSpec],
         left_out: Option<&ViewSpec>,
         goals: &[Goal],
-    ) -> Loaded<(Kind, usize)> {
+    ) -> Loaded<Inputs> {
         let positions = match left_out {
             Some(view) => vec![self.virtual_position(view.position, "[virtual]")?],
             None => self.positions(goals)?,
@@ -39,9 +39,10 @@ impl Loader<'_> {
                 (format!("view {:?}", view.label()), format!("view {:?}", views[0].label()));
             source.image.same_size(&name, first, &first_name)?;
         }
-        self.fits_calibration(first)?;
+        let calibration = self.calibration(first)?;
         let filled = sources.iter().map(|s| s.1).sum();
-        Ok((Kind::Rectified { views: sources.into_iter().map(|s| s.0).collect(), positions }, filled))
+        let views = sources.into_iter().map(|s| s.0).collect();
+        Ok(Inputs { kind: Kind::Rectified { views, positions }, filled, calibration, notes: Vec::new() })
     }
 
     fn virtual_position(&self, position: Option<f64>, goal: &str) -> Loaded<f64> {
@@ -65,12 +66,13 @@ impl Loader<'_> {
         })
     }
 
-    /// Refuses images of another size than the calibration file is for: its offset is in their pixels.
-    fn fits_calibration(&self, size: (usize, usize)) -> Loaded<()> {
-        let Some(file) = &self.spec.calib else { return Ok(()) };
-        let (width, height) = read_calibration(&self.file(file))?.size;
+    /// The calibration file, refused for images of another size: its offset is in their pixels.
+    fn calibration(&self, size: (usize, usize)) -> Loaded<Option<Calibration>> {
+        let Some(file) = &self.spec.calib else { return Ok(None) };
+        let calibration = read_calibration(&self.file(file))?;
+        let (width, height) = calibration.size;
         if (width, height) == size {
-            return Ok(());
+            return Ok(Some(calibration));
         }
         Err(self.incomplete(format!(
             "{} is for images of {width} x {height} pixels, but the views have {} x {}; use the calibration of that size, or give `disparity_offset` (in pixels of these images) in the views instead of `calib`",

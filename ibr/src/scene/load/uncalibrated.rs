@@ -1,6 +1,6 @@
 //! Scenes without cameras: images and tracks.
 
-use super::{Goal, Loaded, Loader, in_order};
+use super::{Goal, Inputs, Loaded, Loader, in_order};
 use crate::pipeline::uncalibrated::Target;
 use crate::scene::{Kind, ViewSpec};
 use crate::uncalibrated::Point;
@@ -14,7 +14,7 @@ impl Loader<'_> {
         views: &[&ViewSpec],
         left_out: Option<&ViewSpec>,
         goals: &[Goal],
-    ) -> Loaded<Kind> {
+    ) -> Loaded<Inputs> {
         let file = self.matches_file(views, goals)?;
         let tracks = Tracks::read(&self.file(file))?;
         let virtual_columns = match left_out {
@@ -36,7 +36,8 @@ impl Loader<'_> {
         };
         let size = self.size(goals, own)?;
         let tracks = tracks.rows().iter().map(pick).collect();
-        Ok(Kind::Uncalibrated { images, tracks, targets, size })
+        let kind = Kind::Uncalibrated { images, tracks, targets, size };
+        Ok(Inputs { kind, filled: 0, calibration: None, notes: Vec::new() })
     }
 
     /// What the goals ask for; `in_column` gives the positions in a column of the tracks.

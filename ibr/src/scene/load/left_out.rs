@@ -1,0 +1,58 @@
+//! The place that `--view` names: a view that is left out, or an image that only has a camera.
+
+use super::{Loaded, Loader};
+use crate::camera::names::{self, NameError};
+use crate::scene::{SceneError, ViewSpec};
+
+/// What `--view` names.
+pub(super) enum LeftOut {
+    /// A view, by its number.
+    View(usize),
+    /// An image of the file of cameras that is no view.
+    Listed(String),
+}
+
+impl Loader<'_> {
+    /// The view that is left out: the one of this name, or the one whose name or image ends like it; else an
+    /// image that the file of cameras lists.
+    pub(super) fn left_out(&self) -> Loaded<Option<LeftOut>> {
+        let Some(name) = &self.options.view else { return Ok(None) };
+        let views = &self.spec.view;
+        if let Some(index) = views.iter().position(|view| view.label() == *name) {
+            return Ok(Some(LeftOut::View(index)));
+        }
+        let labels: Vec<String> = views.iter().map(ViewSpec::label).collect();
+        let images: Vec<String> = views.iter().map(|view| view.image.display().to_string()).collect();
+        for list in [labels, images] {
+            let list: Vec<&str> = list.iter().map(String::as_str).collect();
+            match names::find(&list, name) {
+                Ok(found) if found.whole => return Ok(Some(LeftOut::View(found.index))),
+                Err(e @ NameError::Ambiguous { .. }) => return Err(self.incomplete(format!("--view: {e}"))),
+                _ => (),
+            }
+        }
+        let general = views.iter().all(|view| view.position.is_none());
+        match general && self.is_listed(name)? {
+            true => Ok(Some(LeftOut::Listed(name.clone()))),
+            false => Err(self.no_such_view(name)),
+        }
+    }
+
+    pub(super) fn no_such_view(&self, name: &str) -> SceneError {
+        SceneError::NoSuchView {
+            path: self.path.into(),
+            name: name.into(),
+            known: self.spec.view.iter().map(ViewSpec::label).collect::<Vec<_>>().join(", "),
+        }
+    }
+}
+
+impl LeftOut {
+    /// The number of the view.
+    pub(super) fn index(&self) -> Option<usize> {
+        match self {
+            Self::View(index) => Some(*index),
+            Self::Listed(_) => None,
+        }
+    }
+}
