@@ -28,6 +28,16 @@ impl Failure {
         }
     }
 
+    /// The same failure, said of a virtual view, from 0, of several.
+    pub(super) fn of_view(self, view: usize, all: usize) -> Self {
+        match self {
+            Self::Input(message) if all > 1 => {
+                Self::Input(format!("virtual view {} of {all}: {message}", view + 1))
+            }
+            other => other,
+        }
+    }
+
     /// A failure to print.
     pub(super) fn printing(error: &std::io::Error) -> Self {
         match error.kind() {

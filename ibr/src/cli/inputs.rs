@@ -2,11 +2,16 @@
 
 use super::failure;
 use crate::pipeline::Agreement;
-use crate::scene::Kind;
+use crate::scene::{Kind, Scene};
 
 /// Prints a warning on standard error.
 pub(super) fn warn(text: &str) {
     failure::say(&format!("hybank-ibr: warning: {text}\n"));
+}
+
+/// Prints what was decided on reading a scene and the user may not expect.
+pub(super) fn notes(scene: &Scene) {
+    scene.notes.iter().for_each(|note| failure::say(&format!("hybank-ibr: note: {note}\n")));
 }
 
 /// Warns of every pair of views that agrees in too few points, and names the keys to check.

@@ -35,9 +35,12 @@ pub(super) fn name_leftovers(outputs: &[&Path]) {
     }
 }
 
-/// Refuses a file name whose extension is not an image format, before any work is done.
+/// Refuses a file name whose extension is not an image format, before any work is done: wrong usage.
 pub(super) fn refuse_format(path: &Path, levels: Levels) -> Result<(), Failure> {
-    encoded(&Image::filled(1, 1, 1, 0.0), path, levels).map(|_| ())
+    match encoded(&Image::filled(1, 1, 1, 0.0), path, levels) {
+        Err(Failure::Input(message)) => Err(Failure::Usage(message)),
+        other => other.map(|_| ()),
+    }
 }
 
 /// A file to be written, or the PNG for standard output.

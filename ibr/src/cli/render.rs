@@ -1,5 +1,7 @@
 //! `hybank-ibr render`: a scene file in, images and their figures out.
 
+mod concerns;
+mod metric;
 mod outputs;
 mod path;
 
@@ -16,6 +18,7 @@ use crate::pipeline::{RenderSettings, Rendering, Watch, calibrated, rectified, u
 use crate::propagate::{CalibratedView, RectifiedView};
 use crate::scene::{self, Kind, Scene};
 use crate::uncalibrated::chirality::Handedness;
+use concerns::Concerns;
 use outputs::Outputs;
 use std::path::Path;
 use std::time::Instant;
@@ -34,6 +37,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let start = Instant::now();
     let scene = read(arguments)?;
     let preparation = start.elapsed().as_secs_f64();
+    check_nearest(&scene.kind, arguments)?;
     let method = arguments.settings(scene.offset).method;
     memory::check(&scene, Work::Render(method)).map_err(|e| e.in_file(&arguments.scene.file))?;
     if scene.kind.frames() > 1 {
@@ -53,7 +57,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     summary.error_white = white;
     output::write(&encoded, arguments.scene.force)?;
     drop(progress);
-    warn(&done, &scene.kind);
+    inputs::notes(&scene);
+    let mut concerns = Concerns::default();
+    concerns.add(&done);
+    concerns.warn(&scene.kind);
     report(&summary, arguments)
 }
 
@@ -66,10 +73,12 @@ fn timed(
     watch: Watch<'_>,
 ) -> Result<(Rendered, Summary), Failure> {
     let start = Instant::now();
-    let done = render(scene, frame, arguments, watch).map_err(|e| e.in_file(&arguments.scene.file))?;
+    let named = |e: Failure| e.of_view(frame, scene.kind.frames()).in_file(&arguments.scene.file);
+    let done = render(scene, frame, arguments, watch).map_err(named)?;
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
+    summary.depths = metric::depths(scene, arguments.depth.is_some());
     Ok((done, summary))
 }
 
@@ -90,6 +99,22 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     output::refuse_overlaps(&files, &arguments.scene.inputs())?;
     output::name_leftovers(&files);
     files.iter().try_for_each(|path| output::refuse_existing(path, arguments.scene.force))
+}
+
+/// Refuses a choice of the nearest views where no camera is known, and warns of one that is none.
+fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
+    let Some(count) = arguments.nearest else { return Ok(()) };
+    if let Kind::Uncalibrated { .. } = kind {
+        return Err(Failure::Usage(format!(
+            "--nearest {count}: the cameras of this scene are unknown, so no view is known to be nearer; name \
+             fewer views in the scene instead"
+        )));
+    }
+    let views = kind.views();
+    if count > views {
+        inputs::warn(&format!("--nearest {count}: there are {views} views to render from, and all are used"));
+    }
+    Ok(())
 }
 
 fn read(arguments: &RenderArguments) -> Result<Scene, Failure> {
@@ -124,7 +149,7 @@ fn render(
                 .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
                 .collect();
             let done = rectified::render_watched(&views, positions[frame], &settings, watch);
-            done.map(whole).map_err(Failure::input)
+            done.map(|rendering| whole(metric::in_millimetres(rendering, scene))).map_err(Failure::input)
         }
         Kind::Calibrated { views, cameras, size } => {
             let views: Vec<CalibratedView<'_>> = views
@@ -181,26 +206,6 @@ fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -
     within.iter().for_each(|q| summary.compare(q));
     summary.whole_image = whole.map(|q| Figures { psnr: q.psnr, ssim: q.ssim, mae: q.mae });
     Ok(())
-}
-
-/// Warnings on stderr about what the figures of merit alone do not show.
-fn warn(done: &Rendered, kind: &Kind) {
-    let coverage = done.rendering.coverage();
-    if coverage < 0.5 && done.hull.is_none() {
-        inputs::warn(&format!("only {:.1} % of the image is covered by samples", 100.0 * coverage));
-    }
-    inputs::warn_of_contradictions(&done.rendering.agreement, kind);
-    if let Some(c) = done.rendering.report.convergence.filter(|c| !c.reached) {
-        inputs::warn(&format!(
-            "the plane fit stopped after {} steps at a relative residual of {:.1e}",
-            c.steps, c.residual
-        ));
-    }
-    if done.geometry.as_ref().is_some_and(|g| g.order_by == uncalibrated::OrderBy::Nothing) {
-        inputs::warn(
-            "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; if far objects hide near ones, use --reverse-order",
-        );
-    }
 }
 
 fn report(summary: &Summary, arguments: &RenderArguments) -> Result<(), Failure> {

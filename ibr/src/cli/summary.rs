@@ -41,6 +41,8 @@ pub(super) struct Summary {
     /// How well the views agree in depth and colour, from the inputs alone.
     pub(super) agreement: Agreement,
     pub(super) geometry: Option<GeometryReport>,
+    /// What the numbers in the file of --depth are.
+    pub(super) depths: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -87,6 +89,7 @@ impl Summary {
             convergence: r.convergence,
             agreement: rendering.agreement.clone(),
             geometry: None,
+            depths: None,
         }
     }
 
@@ -111,6 +114,7 @@ impl Summary {
         lines.push(format!("coverage  {:.2} %", 100.0 * self.coverage));
         lines.extend(self.counts());
         lines.extend(inputs::line(&self.agreement));
+        lines.extend(self.depths_line());
         lines.extend(self.geometry_line());
         lines.push(format!(
             "time      {:.3} s, after {:.3} s of reading and making depth dense",
@@ -137,6 +141,16 @@ impl Summary {
             ));
         }
         lines
+    }
+
+    fn depths_line(&self) -> Option<String> {
+        self.depths.as_ref().map(|depths| format!("depths    written {depths}"))
+    }
+
+    /// What all views of a path have in common.
+    pub(super) fn common_lines(&self) -> String {
+        let lines = inputs::line(&self.agreement).into_iter().chain(self.depths_line());
+        lines.map(|line| line + "\n").collect()
     }
 
     fn geometry_line(&self) -> Option<String> {

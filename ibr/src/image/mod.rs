@@ -3,6 +3,7 @@
 mod colmap_map;
 pub mod colour;
 mod dynamic;
+mod frame_rate;
 pub mod pfm;
 pub mod quality;
 mod read;
@@ -10,6 +11,7 @@ mod texture;
 mod write;
 pub mod y4m;
 
+pub use frame_rate::FrameRate;
 pub(crate) use read::unavailable_memory;
 pub use read::{MOST_PIXELS, read_image, read_image_within, read_map, read_map_within};
 pub use texture::Texture;

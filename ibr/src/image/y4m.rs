@@ -3,12 +3,14 @@
 //! Colour is written as Y'CbCr of ITU-R BT.601 with full chroma resolution (C444), 16 to 235 and 16 to 240;
 //! grey as Y' alone (Cmono).
 
-use super::Image;
+use super::{FrameRate, Image};
 
 /// The header of a film of frames of this size; 3 channels are RGB, all else is grey.
-pub fn header((width, height): (usize, usize), channels: usize, fps: u32) -> Vec<u8> {
+pub fn header((width, height): (usize, usize), channels: usize, rate: FrameRate) -> Vec<u8> {
     let colours = if channels == 3 { "C444" } else { "Cmono" };
-    format!("YUV4MPEG2 W{width} H{height} F{fps}:1 Ip A1:1 {colours} XCOLORRANGE=LIMITED\n").into_bytes()
+    let FrameRate { frames, seconds } = rate;
+    format!("YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 {colours} XCOLORRANGE=LIMITED\n")
+        .into_bytes()
 }
 
 /// Appends a frame: its planes one after the other.
@@ -58,8 +60,8 @@ mod tests {
     #[test]
     fn grey_has_one_plane() {
         let image = Image::new(2, 1, 1, vec![0.0, 255.0]).unwrap();
-        let mut bytes = header(image.size(), 1, 30);
+        let mut bytes = header(image.size(), 1, FrameRate { frames: 30000, seconds: 1001 });
         append_frame(&image, &mut bytes);
-        assert_eq!(bytes, b"YUV4MPEG2 W2 H1 F30:1 Ip A1:1 Cmono XCOLORRANGE=LIMITED\nFRAME\n\x10\xeb");
+        assert_eq!(bytes, b"YUV4MPEG2 W2 H1 F30000:1001 Ip A1:1 Cmono XCOLORRANGE=LIMITED\nFRAME\n\x10\xeb");
     }
 }

@@ -5,20 +5,6 @@ use hybank_ibr::image::read_image;
 use image::DynamicImage;
 use nalgebra::{Matrix3x4, Rotation3, Vector3};
 
-fn refused(dir: &Path, arguments: &[&str], exit: i32, words: &[&str]) {
-    let output = run(dir, arguments);
-    let message = stderr(&output);
-    assert_eq!(code(&output), exit, "{arguments:?}: {message}");
-    assert!(words.iter().all(|word| message.contains(word)), "{arguments:?}: {message}");
-    assert!(!message.contains("panicked") && output.stdout.is_empty(), "{arguments:?}: {message}");
-}
-
-fn good(dir: &Path, arguments: &[&str]) -> Output {
-    let output = run(dir, arguments);
-    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
-    output
-}
-
 /// Frames of a film as their planes, read by the rules of the format.
 fn frames(bytes: &[u8], header: &str, planes: usize) -> Vec<Vec<u8>> {
     let rest = bytes.strip_prefix(header.as_bytes()).unwrap();

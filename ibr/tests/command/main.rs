@@ -8,9 +8,11 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 mod bound;
+mod colmap;
 #[cfg(unix)]
 mod disturbed;
 mod doors;
+mod mistakes;
 mod refuse;
 mod render;
 #[cfg(unix)]
@@ -28,6 +30,21 @@ fn code(output: &Output) -> i32 {
 
 fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// A run that ends with this exit code and one message with all the words.
+fn refused(dir: &Path, arguments: &[&str], exit: i32, words: &[&str]) {
+    let output = run(dir, arguments);
+    let message = stderr(&output);
+    assert_eq!(code(&output), exit, "{arguments:?}: {message}");
+    assert!(words.iter().all(|word| message.contains(word)), "{arguments:?}: {message}");
+    assert!(!message.contains("panicked") && output.stdout.is_empty(), "{arguments:?}: {message}");
+}
+
+fn good(dir: &Path, arguments: &[&str]) -> Output {
+    let output = run(dir, arguments);
+    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
+    output
 }
 
 fn json(output: &Output) -> serde_json::Value {

@@ -107,7 +107,7 @@ fn hostile_arguments_are_refused_by_name() {
         (&["-o", "nowhere/o.png"], 1, "nowhere/o.png"),
         (&["-o", "o.png", "--view", "middle"], 1, "the views are left, right"),
         (&["-o", "o.png", "--truth", "nowhere.png"], 1, "nowhere.png"),
-        (&["-o", "o"], 1, "use .png"),
+        (&["-o", "o"], 2, "use .png"),
     ] {
         let refused = render(arguments);
         let message = stderr(&refused);
@@ -143,6 +143,6 @@ fn wrong_usage_is_two() {
     assert_eq!(code(&missing), 1);
     assert!(stderr(&missing).contains("s.toml"));
     let format = run(dir.path(), &["render", "s.toml", "-o", "o.gif"]);
-    assert_eq!(code(&format), 1);
+    assert_eq!(code(&format), 2);
     assert!(stderr(&format).contains(".png"));
 }

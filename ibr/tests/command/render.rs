@@ -131,7 +131,7 @@ fn depth_and_sixteen_bits_are_written() {
         assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
     }
     let refused = run(dir.path(), &["render", "scene.toml", "-o", "x.jpg", "--bits", "16"]);
-    assert!(code(&refused) == 1 && stderr(&refused).contains(".png files only"), "{}", stderr(&refused));
+    assert!(code(&refused) == 2 && stderr(&refused).contains(".png files only"), "{}", stderr(&refused));
 }
 
 /// The views of a path are those that are rendered one by one, in numbered files.

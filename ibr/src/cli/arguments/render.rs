@@ -1,7 +1,7 @@
 //! Arguments of `hybank-ibr render`.
 
 use super::SceneArguments;
-use crate::image::Levels;
+use crate::image::{FrameRate, Levels};
 use crate::interpolate::{Degree, HoleFill};
 use crate::partial::{Densify, Segmentwise};
 use crate::pipeline::{Method, RenderSettings};
@@ -53,8 +53,9 @@ pub(in crate::cli) struct RenderArguments {
     /// Also write a mask: white for seen pixels, grey for cracks, black for disocclusions.
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) mask: Option<PathBuf>,
-    /// Also write the depth of the virtual view (.pfm): disparities for a baseline of one of a rectified
-    /// rig, else depths; NaN in holes.
+    /// Also write the depth of the virtual view (.pfm), NaN in holes: millimetres of a rig with calib.txt,
+    /// disparities in pixels for a baseline of one of other rectified rigs, depths in the unit of general
+    /// cameras, and an order without a unit of scenes without cameras.
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) depth: Option<PathBuf>,
     /// Also write how many visible samples fall on each pixel (.png of 16 bits or .pfm).
@@ -67,10 +68,11 @@ pub(in crate::cli) struct RenderArguments {
     /// Write a PNG with an alpha channel: transparent where no view shows what is there.
     #[arg(long)]
     pub(in crate::cli) alpha: bool,
-    /// Frames per second that a film says it has.
-    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(in crate::cli) fps: u32,
-    /// Use only the K views nearest to the virtual camera, by angle and distance.
+    /// Frames per second that a film says it has: 25, 29.97 or 30000/1001.
+    #[arg(long, value_name = "RATE", default_value = "25")]
+    pub(in crate::cli) fps: FrameRate,
+    /// Use only the K views nearest to the virtual camera, by angle and distance; not in scenes without
+    /// cameras.
     #[arg(long, value_name = "K")]
     pub(in crate::cli) nearest: Option<usize>,
     /// Bits per value of a PNG, 8 or 16.

@@ -4,7 +4,7 @@ use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::Failure;
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded};
-use crate::image::{Image, Levels, encode_levels, encode_with_alpha, pfm, y4m};
+use crate::image::{FrameRate, Image, Levels, encode_levels, encode_with_alpha, pfm, y4m};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use std::path::{Path, PathBuf};
@@ -37,6 +37,7 @@ impl Part {
             Self::Depth => &["pfm"],
             Self::Count => &["png", "pfm"],
             Self::View if is_film(path) => return Ok(()),
+            Self::View if is_packed_film(path) => return Err(packed_film(path)),
             Self::View => return output::refuse_format(path, levels),
             Self::Mask | Self::Error => return output::refuse_format(path, Levels::Eight),
         };
@@ -52,6 +53,21 @@ impl Part {
 /// Whether a path is a film of several views.
 pub(super) fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending == "y4m")
+}
+
+/// Whether a path is a film of a format that only encoders write.
+fn is_packed_film(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    ["mp4", "m4v", "mov", "mkv", "webm", "avi", "mpg", "mpeg", "ogv", "wmv"].contains(&ending.as_str())
+}
+
+fn packed_film(path: &Path) -> Failure {
+    let (shown, film) = (path.display(), path.with_extension("y4m"));
+    Failure::Usage(format!(
+        "-o {shown}: films are written uncompressed, as .y4m; write `-o {}`, or give an encoder the frames: \
+         `-o - | ffmpeg -i - {shown}`",
+        film.display()
+    ))
 }
 
 /// The files of one view.
@@ -125,7 +141,7 @@ impl Outputs {
         &self,
         rendering: &Rendering,
         truth: Option<&Image>,
-        fps: u32,
+        fps: FrameRate,
     ) -> Result<(Vec<Encoded<'_>>, Option<f32>), Failure> {
         let (mut all, mut white) = (Vec::new(), None);
         for (part, path) in &self.parts {
@@ -145,7 +161,12 @@ impl Outputs {
         Ok((all, white))
     }
 
-    fn view<'a>(&self, rendering: &Rendering, path: &'a Path, fps: u32) -> Result<Encoded<'a>, Failure> {
+    fn view<'a>(
+        &self,
+        rendering: &Rendering,
+        path: &'a Path,
+        fps: FrameRate,
+    ) -> Result<Encoded<'a>, Failure> {
         let image = &rendering.image;
         if is_film(path) {
             let mut bytes = y4m::header(image.size(), image.channels(), fps);

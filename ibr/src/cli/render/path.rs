@@ -1,11 +1,13 @@
 //! Rendering a list of virtual views or those on a path: numbered files, which appear together, or one film.
 
-use super::{Outputs, Summary, outputs, timed, warn};
+use super::concerns::Concerns;
+use super::{Outputs, Summary, outputs, timed};
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::{self, Failure};
+use crate::cli::inputs;
 use crate::cli::output;
 use crate::cli::progress::Progress;
-use crate::image::{Image, Levels, y4m};
+use crate::image::{FrameRate, Image, Levels, y4m};
 use crate::scene::Scene;
 use hybank::files::AtomicFile;
 use serde::Serialize;
@@ -29,13 +31,12 @@ pub(super) fn run(scene: &Scene, preparation: f64, arguments: &RenderArguments) 
     let mut film = is_film(&arguments.output).then(|| Film::new(arguments)).transpose()?;
     let progress = Progress::new(frames as u64 + 1);
     let (mut summary, mut written) = (PathSummary { frames: Vec::new() }, Vec::new());
+    let mut concerns = Concerns::default();
     for (frame, files) in files.iter().enumerate() {
         progress.step("rendering");
         let watch = |share| progress.within(share);
         let (done, figures) = timed(scene, frame, preparation, arguments, &watch)?;
-        if frame == 0 {
-            warn(&done, &scene.kind);
-        }
+        concerns.add(&done);
         film.as_mut().map_or(Ok(()), |film| film.append(&done.rendering.image))?;
         let (encoded, _) = files.encoded(&done.rendering, None, arguments.fps)?;
         let mut files = output::begin(&encoded, arguments.scene.force)?;
@@ -48,6 +49,8 @@ pub(super) fn run(scene: &Scene, preparation: f64, arguments: &RenderArguments) 
     written.extend(film.and_then(|film| film.file));
     output::commit(written)?;
     drop(progress);
+    inputs::notes(scene);
+    concerns.warn(&scene.kind);
     report(&summary, &files, arguments)
 }
 
@@ -100,7 +103,7 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
 /// A film that grows frame by frame: a file that appears when it is whole, or standard output.
 struct Film {
     file: Option<AtomicFile>,
-    fps: u32,
+    fps: FrameRate,
     begun: bool,
 }
 
@@ -142,5 +145,6 @@ fn text(summary: &PathSummary, files: &[Outputs], arguments: &RenderArguments) -
         };
         format!("{name}  coverage {coverage:.2} %, {:.3} s\n", figures.seconds)
     };
-    summary.frames.iter().zip(files).enumerate().map(line).collect()
+    let common = summary.frames.first().map_or(String::new(), Summary::common_lines);
+    summary.frames.iter().zip(files).enumerate().map(line).collect::<String>() + &common
 }
