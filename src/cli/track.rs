@@ -135,6 +135,7 @@ impl TrackArgs {
             block_frames: self.track_frames,
             model: DriftModel { delay_walk: 0.0, rate_walk: wander * wander * unit },
             rate_deviation: FIRST_RATE * wander,
+            rate_change: wander * unit,
         };
         let follower = Follower::new(bank, guide, settings);
         let follower = follower.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;

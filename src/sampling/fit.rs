@@ -11,8 +11,10 @@
 //! an addition). The normal equations have half bandwidth n = ORDER - 1 and are solved by an LDL^T
 //! factorisation without fill-in: O(M n^2) for any number of right-hand sides.
 
+mod bend;
 mod influence;
 
+pub use bend::Knowledge;
 pub use influence::Response;
 
 use super::error::SamplingError;

@@ -4,6 +4,7 @@
 //! * [`fit`]: regularised, weighted least squares in a shift-invariant spline space, solved in O(M n^2);
 //! * [`recurrent`]: perfect reconstruction from M interleaved sample sets (Yen's formula);
 //! * [`nonuniform`]: samples with value errors and jitter, and sure bounds of the error between them;
+//! * [`smoothing`]: smoothing splines through such samples, with what is known between them;
 //! * [`periodic`]: superposed periodic sets, as several cameras or converters take them, and the moments of
 //!   the intervals between their samples;
 //! * [`jump`]: the error of linear interpolation across a jump;
@@ -20,9 +21,11 @@ pub mod nonuniform;
 pub mod periodic;
 mod quadrature;
 pub mod recurrent;
+pub mod smoothing;
 
 pub use error::SamplingError;
 pub use fit::{Fit, FitSample};
 pub use kernel::{BSpline, sinc, sinc_slope};
 pub use periodic::PeriodicSets;
 pub use recurrent::Recurrent;
+pub use smoothing::SmoothingSpline;

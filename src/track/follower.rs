@@ -5,6 +5,7 @@ use super::frame_shift::{least_half, shift_for};
 use super::guide::Guide;
 use super::log::{Logged, TrackWarning};
 use super::readings::{HALF_WIDTH, Reading};
+use super::timeline::Timeline;
 use super::tracker::{DelayTracker, Lock};
 use super::{Coincidence, TrackError};
 use crate::bank::{Bank, SynthesisFilters};
@@ -37,6 +38,9 @@ pub struct FollowSettings {
     pub model: DriftModel,
     /// Standard deviation of the rates at the beginning, seconds per second.
     pub rate_deviation: f64,
+    /// By how much a rate changes in a second at most, for the bound of the error between readings; it
+    /// changes nothing else.
+    pub rate_change: f64,
 }
 
 /// Delays at which the taps are to be from some frame on.
@@ -67,7 +71,9 @@ pub struct Followed {
 ///
 /// Delays are relative to the reference channel of the spec's `[uncertainty]`. After each block the Kalman
 /// filters take its measurement; without one, or with one that contradicts them, they go on as they are. The
-/// delays for the block after the next one are those expected there.
+/// delays for the block after the next one are those expected there. Readings that are known beforehand need
+/// no filter: what the readings before and after an instant say of it together is used, as soon as a channel
+/// has readings of two frames.
 #[derive(Debug, Clone)]
 pub struct Follower {
     spec: Spec,
@@ -79,6 +85,8 @@ pub struct Follower {
     /// How far their delays may be off.
     halves: Vec<Seconds>,
     tracker: DelayTracker,
+    /// One for each followed channel that has readings enough.
+    timelines: Vec<Option<Timeline>>,
     /// The frame for which the filters' states hold.
     time: f64,
     /// Something was measured.
@@ -129,6 +137,12 @@ impl Follower {
         let halves: Vec<Seconds> = followed.iter().map(|&j| of_all[j]).collect();
         let tracker = tracker(&spec, &followed, &halves, &settings);
         let no_shifts = vec![0; spec.channels.len()];
+        let frame = spec.fast_period * spec.ratio as f64;
+        let timeline = |&j: &usize| match &guide {
+            Guide::Readings(readings) => Timeline::new(readings, j, frame, settings.model),
+            Guide::Pilot(_) | Guide::AnySignal => None,
+        };
+        let timelines = followed.iter().map(timeline).collect();
         Ok(Self {
             spec,
             guide,
@@ -137,6 +151,7 @@ impl Follower {
             followed,
             halves,
             tracker,
+            timelines,
             time: 0.0,
             is_started: false,
             blocks: 0,
@@ -161,6 +176,7 @@ impl Follower {
         let centre = first as f64 + 0.5 * (frames as f64 - 1.0);
         let measured = self.measure(samples, first, centre);
         self.advance_to(centre);
+        self.look_up(centre);
         let (measured, reason) = match measured {
             Ok(measured) => (measured, None),
             Err(reason) => (vec![None; self.spec.channels.len()], Some(reason)),
@@ -190,7 +206,7 @@ impl Follower {
                 };
                 let measured: Vec<_> = reading.delays.iter().map(of).collect();
                 self.advance_to(reading.frame as f64);
-                latest = Ok(self.take(measured));
+                latest = Ok(self.take(reading.frame, measured));
             }
             return latest;
         }
@@ -207,7 +223,7 @@ impl Follower {
                 measurement.variance += walked;
             }
         }
-        Ok(self.take(measured))
+        Ok(self.take(first, measured))
     }
 
     /// By how much the samples of this block have a smaller delay than the channel.
@@ -229,11 +245,19 @@ impl Follower {
     }
 
     /// Updates the filters; a measurement that was refused is none.
-    fn take(&mut self, mut measured: Vec<Option<DelayMeasurement>>) -> Vec<Option<DelayMeasurement>> {
+    fn take(
+        &mut self,
+        frame: u64,
+        mut measured: Vec<Option<DelayMeasurement>>,
+    ) -> Vec<Option<DelayMeasurement>> {
         for k in 0..self.followed.len() {
             let j = self.followed[k];
             let Some(measurement) = measured[j] else { continue };
             self.is_started = true;
+            if let Some(timeline) = &self.timelines[k] {
+                measured[j] = Some(measurement).filter(|_| !timeline.refuses(frame));
+                continue;
+            }
             let (_, is_taken) = self.tracker.update(k, measurement);
             let is_lost = self.tracker.locks().nth(k) == Some(Lock::Lost);
             if is_lost {
@@ -262,8 +286,40 @@ impl Follower {
         }
     }
 
+    /// Lets the filters of channels with a timeline know what it says.
+    fn look_up(&mut self, frame: f64) {
+        let time = self.frame_time() * frame;
+        for (k, timeline) in self.timelines.iter().enumerate() {
+            if let Some(timeline) = timeline {
+                self.tracker.restart(k, timeline.at(time));
+            }
+        }
+    }
+
+    /// What is expected at a frame of the stream, for each followed channel.
+    fn expected(&self, frame: f64) -> Vec<DelayState> {
+        let (time, elapsed) = (self.frame_time() * frame, self.frame_time() * (frame - self.time));
+        let ahead = |state: DelayState| DelayState { delay: state.delay + elapsed * state.rate, ..state };
+        let of = |(timeline, state): (&Option<Timeline>, DelayState)| match timeline {
+            Some(timeline) => timeline.at(time),
+            None => ahead(state),
+        };
+        self.timelines.iter().zip(self.tracker.states()).map(of).collect()
+    }
+
+    /// Bounds of the delays of all channels at a frame; `None` without timelines.
+    fn bounds(&self, frame: f64) -> Option<Vec<Option<Seconds>>> {
+        let mut bounds = vec![None; self.spec.channels.len()];
+        let (time, change) = (self.frame_time() * frame, self.settings.rate_change);
+        for (&j, timeline) in self.followed.iter().zip(&self.timelines) {
+            bounds[j] = timeline.as_ref().and_then(|timeline| timeline.bound(time, change));
+        }
+        self.timelines.iter().any(Option::is_some).then_some(bounds)
+    }
+
     fn logged(&self, centre: f64, measured: Vec<Option<DelayMeasurement>>, reason: Option<String>) -> Logged {
         let mut log = Logged::of_reference(&self.spec, centre, self.frame_time(), reason);
+        log.bound = self.bounds(centre);
         let states = self.tracker.states().zip(self.tracker.locks());
         for (&j, (state, lock)) in self.followed.iter().zip(states) {
             log.put(j, state, lock, measured[j]);
@@ -276,9 +332,9 @@ impl Follower {
     fn change(&mut self, frame: usize, at: f64) -> Change {
         let mut errors = vec![FastPeriods(0.0); self.spec.channels.len()];
         let (h, period) = (self.spec.fast_period, self.frame_time());
-        let elapsed = period * (at - self.time);
-        for ((&j, &half), state) in self.followed.iter().zip(&self.halves).zip(self.tracker.states()) {
-            let error = state.delay + elapsed * state.rate - self.spec.channels[j].delay;
+        let states = self.expected(at);
+        for ((&j, &half), state) in self.followed.iter().zip(&self.halves).zip(states) {
+            let error = state.delay - self.spec.channels[j].delay;
             let shift = &mut self.last_shifts[j];
             *shift = shift_for(error, half, period, *shift);
             let rest = error - period * *shift as f64;
@@ -290,7 +346,8 @@ impl Follower {
     /// Changes within the block that begins at frame `first`, often enough for its drift.
     fn changes(&mut self, first: u64) -> Vec<Change> {
         let frames = self.settings.block_frames;
-        let fastest = self.tracker.states().map(|state| state.rate.abs()).fold(0.0, f64::max);
+        let middle = first as f64 + 0.5 * frames as f64;
+        let fastest = self.expected(middle).iter().map(|state| state.rate.abs()).fold(0.0, f64::max);
         let drift = fastest * (frames * self.spec.ratio) as f64;
         let most = (frames / LEAST_FRAMES).max(1);
         // NaN and infinity become the limits.

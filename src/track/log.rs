@@ -21,6 +21,11 @@ pub struct Logged {
     pub shift: Vec<i64>,
     /// Half-widths of their 95 % intervals; zero where a delay counts as exact.
     pub half_width: Vec<Seconds>,
+    /// By how much the delays err at most between readings that are known beforehand: if each reading is
+    /// within its half-width and no rate changes by more than [`super::FollowSettings::rate_change`]. None
+    /// outside the readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bound: Option<Vec<Option<Seconds>>>,
     /// Changes of the delays in parts per million.
     pub rate_ppm: Vec<f64>,
     /// Whether each delay is known.
@@ -42,6 +47,7 @@ impl Logged {
             delay: spec.channels.iter().map(|channel| channel.delay).collect(),
             shift: vec![0; count],
             half_width: vec![Seconds(0.0); count],
+            bound: None,
             rate_ppm: vec![0.0; count],
             lock: vec![Lock::Locked; count],
             measured: vec![None; count],

@@ -6,7 +6,8 @@
 //! [`DelayTracker`] holds the filters of all channels, refuses measurements that contradict them, and says
 //! whether it is locked. [`Coincidence`] warns ahead of delays that come together, where no bank recovers
 //! the signal. A [`Follower`] measures the delays of a bank's channels block by block, by a pilot tone or by
-//! any signal, and says how taps that are affine in the delays are to change.
+//! any signal, and says how taps that are affine in the delays are to change. Delays measured before
+//! are known on both sides of every instant: a smoothing spline of [`crate::sampling`] goes through them.
 //!
 //! ```
 //! use hybank::track::{DelayFilter, DelayMeasurement, DriftModel, DelayState};
@@ -33,6 +34,7 @@ mod log;
 mod readings;
 #[cfg(test)]
 mod tests;
+mod timeline;
 mod tracker;
 
 pub use coincidence::Coincidence;

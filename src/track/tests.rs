@@ -31,7 +31,7 @@ fn bank(half: f64) -> Bank {
 
 fn settings(wander: f64) -> FollowSettings {
     let model = DriftModel { delay_walk: 0.0, rate_walk: wander * wander };
-    FollowSettings { block_frames: 4096, model, rate_deviation: 1e-4 }
+    FollowSettings { block_frames: 4096, model, rate_deviation: 1e-4, rate_change: wander }
 }
 
 /// A normal number by the sum of twelve uniform ones.
@@ -215,6 +215,37 @@ fn a_log_is_read_again() {
         assert_eq!(log.held.is_some(), number == 5, "{log:?}");
         assert!((log.delay[1].0 - delay(0.0)).abs() < 1e-8, "{log:?}");
     }
+}
+
+/// A table of the drift of a clock whose rate changes by 10 ppm in each second, a line in four blocks. A
+/// filter of the lines goes on straight for up to six blocks after one, which is 0.1 fast periods off.
+#[test]
+fn a_known_drift_is_followed_between_its_readings() {
+    let bank = bank(0.9);
+    let nominal = bank.delays[1].0;
+    let delay = |t: f64| nominal - 5e-6 + 0.5 * 1e-5 * (t - 0.8) * (t - 0.8);
+    let line = |k: u64| {
+        let (frame, delay) = (k * 16_384, delay(k as f64 * 16_384.0 * PERIOD));
+        format!("{{\"frame\": {frame}, \"delay\": [0, {delay}], \"half_width\": 2e-11}}\n")
+    };
+    let lines: String = (0..8).map(line).collect();
+    let readings = Reading::parse(&lines, "d.jsonl", 2).unwrap();
+    let mut follower = Follower::new(&bank, Guide::Readings(readings), settings(1e-5)).unwrap();
+    let mut worst = 0.0_f64;
+    for number in 0..26 {
+        let found = follower.follow(&vec![vec![0.0; 4096]; 2]);
+        let at = (number as f64 + 0.5) * 4096.0 * PERIOD - 0.5 * PERIOD;
+        let error = (found.log.delay[1].0 - delay(at)).abs();
+        let bound = found.log.bound.unwrap()[1].unwrap().0;
+        assert!(error < bound && bound < 8e-7, "{number}: {error:e} {bound:e}");
+        for pair in found.changes.windows(2) {
+            // Each change suits the middle of the frames until the next one.
+            let then = 0.5 * (pair[0].frame + pair[1].frame) as f64 - 0.5;
+            let then = ((number + 2) as f64 * 4096.0 + then) * PERIOD;
+            worst = worst.max((pair[0].errors[1].0 / 96_000.0 + nominal - delay(then)).abs());
+        }
+    }
+    assert!(worst < 0.01 / 96_000.0, "{:.4} fast periods", worst * 96_000.0);
 }
 
 #[test]

@@ -34,9 +34,14 @@ impl<const ORDER: usize, const C: usize> Fit<ORDER, C> {
     /// The response of J(x) to the right-hand sides; meaningful after [`Fit::solve`]. It solves A z = b(x)
     /// with the factors that `solve` left, within 24 knots of x: O(ORDER) per knot.
     pub fn respond(&self, x: f64, response: &mut Response) {
+        self.respond_within(x, REACH, response);
+    }
+
+    /// The same within `reach` knots of x.
+    pub fn respond_within(&self, x: f64, reach: usize, response: &mut Response) {
         let (knot, w) = BSpline::<ORDER>::weights(x);
         let center = (knot - self.first).clamp(0, self.knots as i64) as usize;
-        let (start, end) = (center.saturating_sub(REACH), (center + ORDER + REACH).min(self.knots));
+        let (start, end) = (center.saturating_sub(reach), (center + ORDER + reach).min(self.knots));
         response.first = self.first + start as i64;
         response.z.clear();
         response.z.resize(end.saturating_sub(start), 0.0);
