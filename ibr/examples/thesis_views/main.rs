@@ -2,7 +2,7 @@
 //! and 4.6 to 4.8 as charts, tables 3.1 and 4.1, and a page that sets them beside what the thesis claims.
 //!
 //! ```text
-//! cargo run --release --example thesis_views -- [FOLDER] [--few]
+//! cargo run --release -p hybank-ibr --example thesis_views -- [FOLDER] [--few]
 //! ```
 //!
 //! writes `index.html` and the charts to FOLDER (`thesis_views`). Figure 3.9 takes the photographs "Cones"

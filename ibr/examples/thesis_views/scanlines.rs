@@ -36,12 +36,12 @@ pub(crate) fn rows(effort: Effort) -> Outcome<Figure> {
         .collect();
     let rows = predicted.rows();
     let estimates: Vec<f64> = rows.iter().map(|r| r.estimate).collect();
-    let bounds: Vec<f64> = rows.iter().filter_map(|r| r.local_bound).collect();
+    let bounds: Vec<f64> = rows.iter().map(|r| r.local_limit).collect();
     let above = bounds.iter().zip(&measured).filter(|(bound, error)| bound >= error).count();
     let related = correlation(&estimates, &measured);
     let verdicts = vec![
         Verdict::new(
-            "the bound lies above the error of every row",
+            "the local limit lies above the error of every row",
             format!("in {above} of {} rows", rows.len()),
             above as f64 >= 0.99 * rows.len() as f64,
         ),
@@ -58,7 +58,7 @@ pub(crate) fn rows(effort: Effort) -> Outcome<Figure> {
         vec![
             ("measured", by_row(&measured)),
             ("estimate", by_row(&estimates)),
-            ("local bound", by_row(&bounds)),
+            ("local limit", by_row(&bounds)),
         ],
     );
     Ok(Figure { file: "figure-3.9.svg", chart, verdicts })

@@ -74,25 +74,59 @@ pub(super) struct SceneArguments {
 
 const BOUND_EXAMPLES: &str = "Examples:
   hybank-ibr bound scene.toml
-      prints how large the error of the virtual view will be, and its causes
-  hybank-ibr bound scene.toml --map error.png --truth photo.png
-      also writes where the error is, and compares the prediction with a photograph
+      prints how large the error of the virtual view will be, its causes, and what would make it smaller
+  hybank-ibr bound scene.toml --map error.png --plot rows.svg --truth photo.png
+      also writes where the error is, plots it by rows, and compares the prediction with a photograph
+  hybank-ibr bound scene.toml --map error.pfm
+      writes numbers in grey levels, three channels: limit (or sure bound), expected, estimate
+  hybank-ibr bound scene.toml --curvature 4 --intensity-error 1 --disparity-error 0.25
+      also gives a sure bound
 
-Three figures, in grey levels:
-  bound      not exceeded where slopes and residuals are at most those of the samples nearby
-  expected   root mean square error, a bound of the expected mean error
+Figures, in grey levels:
   estimate   mean absolute error, calibrated by leaving out each view in turn
-The view of a rectified rig is the one that `render --method rows` gives. Of general cameras, estimate and
-expected are given, and no bound; scenes without cameras are refused.";
+  expected   root mean square error, a bound of the expected mean error
+  limit      not exceeded where slopes, second differences and residuals are at most those of the samples
+             nearby; not sure, as photographs break that
+  sure       with --curvature: not exceeded, whatever the scene, within the limits that are given; of
+             rectified rigs
+The view of a rectified rig is the one that `render --method rows` gives. Of several virtual views each is
+predicted, and files are numbered. Scenes without cameras are refused.";
 
 #[derive(Debug, Args)]
 #[command(after_help = BOUND_EXAMPLES)]
 pub(super) struct BoundArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
-    /// Write the estimate of every pixel as an image: black is no error, white the largest.
+    /// Write the error of every pixel: as a picture of the estimate, where black is no error and white the
+    /// largest, or as numbers (.pfm): limit or sure bound, expected error and estimate in grey levels.
     #[arg(long, value_name = "FILE")]
     pub(super) map: Option<PathBuf>,
+    /// Plot the figures of every image row, with the measured error of --truth, and below them the part of
+    /// each cause (.svg or .png).
+    #[arg(long, value_name = "FILE")]
+    pub(super) plot: Option<PathBuf>,
+    /// Largest second derivative of the rows of the virtual view within one surface, grey levels per pixel
+    /// squared: gives a sure bound (rectified rigs).
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    pub(super) curvature: Option<f64>,
+    /// Largest error of an intensity, for the sure bound: noise, rounding, reflections.
+    #[arg(
+        long,
+        value_name = "E",
+        default_value_t = 0.5,
+        requires = "curvature",
+        allow_negative_numbers = true
+    )]
+    pub(super) intensity_error: f64,
+    /// Largest error of a disparity for a baseline of one, in pixels, for the sure bound.
+    #[arg(
+        long,
+        value_name = "PX",
+        default_value_t = 0.0,
+        requires = "curvature",
+        allow_negative_numbers = true
+    )]
+    pub(super) disparity_error: f64,
 }
 
 #[derive(Debug, Args)]

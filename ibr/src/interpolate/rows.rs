@@ -19,6 +19,8 @@ pub struct RowWork<const ORDER: usize, const C: usize> {
     fit: Fit<ORDER, C>,
     smoothing: Vec<f64>,
     sums: Vec<(f64, f64)>,
+    /// Columns of the copies that fill holes.
+    fillers: Vec<f64>,
     width: usize,
 }
 
@@ -26,7 +28,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
     /// For rows of `width` >= 1 pixels.
     pub fn new(width: usize) -> Self {
         let fit = Fit::covering(width.max(1) - 1);
-        Self { fit, smoothing: Vec::new(), sums: Vec::new(), width }
+        Self { fit, smoothing: Vec::new(), sums: Vec::new(), fillers: Vec::new(), width }
     }
 
     /// Distance outside the image up to which samples are used, in pixels.
@@ -49,6 +51,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         mask.fill(Cover::Disocclusion);
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Ok(false) };
         self.fit.clear();
+        self.fillers.clear();
         self.weigh(samples, settings);
         self.fit.add_all(samples.iter().zip(&self.smoothing).map(|(s, v)| FitSample {
             x: s.x,
@@ -88,6 +91,11 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
     /// [`RowWork::interpolate`] solved.
     pub fn respond(&self, x: f64, response: &mut Response) {
         self.fit.respond(x, response);
+    }
+
+    /// Columns of the samples of weight one that the last call of [`RowWork::interpolate`] put into holes.
+    pub fn fillers(&self) -> &[f64] {
+        &self.fillers
     }
 
     /// V_s of every sample, from the variance of the depth within max(epsilon, 1 px).
@@ -148,6 +156,7 @@ impl<const ORDER: usize, const C: usize> RowWork<ORDER, C> {
         for k in 1..parts as usize {
             let x = from + (to - from) * k as f64 / parts;
             self.fit.add(x, &value, 1.0, settings.fit.lambda);
+            self.fillers.push(x);
         }
     }
 }

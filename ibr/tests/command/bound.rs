@@ -10,7 +10,7 @@ fn an_error_is_predicted_mapped_and_compared() {
     let figures = json(&run(dir.path(), &arguments));
     let number = |path: &str| figures.pointer(path).and_then(serde_json::Value::as_f64).unwrap();
     let (bound, expected, estimate) =
-        (number("/totals/local_bound"), number("/totals/expected"), number("/totals/estimate"));
+        (number("/totals/local_limit"), number("/totals/expected"), number("/totals/estimate"));
     assert!(estimate > 0.0 && estimate <= expected && number("/measured/mae") < bound, "{figures}");
     let parts: f64 = (0..5).map(|k| number(&format!("/causes/{k}/error"))).sum();
     assert!((parts / estimate - 1.0).abs() < 1e-4, "{figures}");
@@ -53,4 +53,114 @@ fn what_cannot_be_predicted_is_refused() {
     assert_eq!(code(&usage), 2);
     let over = run(dir.path(), &["bound", "scene.toml", "--map", "left.png", "--force"]);
     assert!(code(&over) == 1 && dir.path().join("left.png").is_file(), "{}", stderr(&over));
+}
+
+/// Float maps hold grey levels: limit, expected error and estimate, whose means are the totals.
+#[test]
+fn a_float_map_holds_the_numbers() {
+    let dir = rig();
+    let figures = json(&run(dir.path(), &["bound", "scene.toml", "--map", "map.pfm", "--json"]));
+    let map = pfm::decode(&std::fs::read(dir.path().join("map.pfm")).unwrap()).unwrap();
+    assert_eq!((map.width, map.height, map.channels), (SIZE.0, SIZE.1, 3));
+    let pixels = (SIZE.0 * SIZE.1) as f64;
+    let mean = |channel: usize, power: i32| {
+        let values = map.data.iter().skip(channel).step_by(3);
+        values.map(|v| f64::from(*v).powi(power)).sum::<f64>() / pixels
+    };
+    let total = |name: &str| figures["totals"][name].as_f64().unwrap();
+    assert!((mean(0, 1) / total("local_limit") - 1.0).abs() < 1e-4, "{figures}");
+    assert!((mean(1, 2).sqrt() / total("expected") - 1.0).abs() < 1e-4, "{figures}");
+    assert!((mean(2, 1) / total("estimate") - 1.0).abs() < 1e-4, "{figures}");
+    assert!(figures["white"].is_null() && figures["totals"]["sure_bound"].is_null(), "{figures}");
+}
+
+/// With limits the sure bound is in the totals, in the first channel of the map, and holds.
+#[test]
+fn a_sure_bound_is_given_within_limits() {
+    let dir = rig();
+    let limits = ["--curvature", "80", "--intensity-error", "1", "--disparity-error", "0.01"];
+    let asked = ["bound", "scene.toml", "--truth", "middle.png", "--map", "map.pfm", "--json"];
+    let figures = json(&run(dir.path(), &[&asked[..], &limits].concat()));
+    let map = pfm::decode(&std::fs::read(dir.path().join("map.pfm")).unwrap()).unwrap();
+    let mean = map.data.iter().step_by(3).map(|v| f64::from(*v)).sum::<f64>() / (SIZE.0 * SIZE.1) as f64;
+    assert!((mean / figures["totals"]["sure_bound"].as_f64().unwrap() - 1.0).abs() < 1e-4, "{figures}");
+    assert_eq!(figures["measured"]["within_sure_bound"], 1.0, "{figures}");
+    let refused = run(dir.path(), &["bound", "scene.toml", "--curvature", "-3"]);
+    assert!(code(&refused) == 2 && stderr(&refused).contains("--curvature -3"), "{}", stderr(&refused));
+    assert_eq!(code(&run(dir.path(), &["bound", "scene.toml", "--disparity-error", "0.1"])), 2);
+}
+
+/// The plot has the figures of every row, with and without a photograph, and the causes below them.
+#[test]
+fn the_rows_are_plotted() {
+    let dir = rig();
+    let arguments = ["bound", "scene.toml", "--plot", "rows.svg", "--truth", "middle.png"];
+    assert_eq!(code(&run(dir.path(), &arguments)), 0);
+    let svg = std::fs::read_to_string(dir.path().join("rows.svg")).unwrap();
+    for text in
+        ["estimate, mean", "expected,", "local limit, mean", "measured, mean", "density", "edges", "%"]
+    {
+        assert!(svg.contains(text), "{text}");
+    }
+    // One picture that holds two, the second below the first.
+    assert_eq!((svg.matches("<svg").count(), svg.matches("</svg>").count()), (3, 3));
+    assert!(
+        svg.starts_with("<svg width=\"960\" height=\"900\"") && svg.contains("<svg y=\"450\""),
+        "{}",
+        &svg[..200]
+    );
+    assert_eq!(code(&run(dir.path(), &["bound", "scene.toml", "--plot", "rows.png"])), 0);
+    assert_eq!(read_image(&dir.path().join("rows.png")).unwrap().size(), (1920, 1800));
+    for (path, said) in [("-", "standard output"), ("rows.pdf", ".svg or .png")] {
+        let refused = run(dir.path(), &["bound", "scene.toml", "--plot", path]);
+        assert!(code(&refused) == 2 && stderr(&refused).contains(said), "{}", stderr(&refused));
+    }
+    let both = run(dir.path(), &["bound", "scene.toml", "--plot", "a.png", "--map", "a.png"]);
+    assert!(code(&both) != 0 && !dir.path().join("a.png").exists(), "{}", stderr(&both));
+}
+
+/// Every view of a path is predicted, with numbered files; a photograph fits one view only.
+#[test]
+fn the_views_of_a_path_are_predicted() {
+    let dir = rig();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    let path = scene
+        .replace("[virtual]\nposition = 0.5\n", "[virtual]\nposition = 0.5\nto_position = 1.5\nframes = 3\n");
+    std::fs::write(dir.path().join("path.toml"), path).unwrap();
+    let figures = json(&run(dir.path(), &["bound", "path.toml", "--map", "map.png", "--json"]));
+    let frames = figures["frames"].as_array().unwrap();
+    let estimate = |k: usize| frames[k]["totals"]["estimate"].as_f64().unwrap();
+    assert!(frames.len() == 3 && estimate(2) > estimate(0) && estimate(0) > 0.0, "{figures}");
+    let alone = json(&run(dir.path(), &["bound", "scene.toml", "--json"]));
+    assert!((alone["totals"]["estimate"].as_f64().unwrap() / estimate(0) - 1.0).abs() < 1e-9);
+    // Advice is given for the largest.
+    let advised: Vec<bool> = frames.iter().map(|f| !f["advice"].is_null()).collect();
+    assert_eq!((advised, figures["worst"].as_u64()), (vec![false, false, true], Some(2)));
+    assert!((1..=3).all(|k| dir.path().join(format!("map-000{k}.png")).is_file()));
+    let text = run(dir.path(), &["bound", "path.toml"]);
+    let text = String::from_utf8(text.stdout).unwrap();
+    assert!(text.contains("view    1") && text.contains("The largest, view 3:"), "{text}");
+    let refused = run(dir.path(), &["bound", "path.toml", "--truth", "middle.png"]);
+    assert!(code(&refused) == 2 && stderr(&refused).contains("--view"), "{}", stderr(&refused));
+    let exists = run(dir.path(), &["bound", "path.toml", "--map", "map.png"]);
+    assert!(code(&exists) == 1 && stderr(&exists).contains("map-0001.png"), "{}", stderr(&exists));
+}
+
+/// Swapped positions are warned of, and the advice is to check them, not to spend.
+#[test]
+fn contradicting_inputs_are_to_be_checked_first() {
+    let dir = rig();
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
+    let swapped =
+        scene.replace("position = 1.0", "position = 9.0").replace("position = 0.0", "position = 1.0");
+    std::fs::write(dir.path().join("swapped.toml"), swapped.replace("position = 9.0", "position = 0.0"))
+        .unwrap();
+    let done = run(dir.path(), &["bound", "swapped.toml"]);
+    let text = String::from_utf8(done.stdout.clone()).unwrap();
+    assert!(stderr(&done).contains("positions (swapped?)"), "{}", stderr(&done));
+    assert!(text.contains("next      check the inputs first") && !text.contains("gains"), "{text}");
+    let right = run(dir.path(), &["bound", "scene.toml"]);
+    let text = String::from_utf8(right.stdout.clone()).unwrap();
+    assert!(right.stderr.is_empty() && text.contains("inputs    views agree"), "{text}{}", stderr(&right));
+    assert!(text.contains("gains     the estimate falls by:") && text.contains("one more view at"), "{text}");
 }

@@ -1,14 +1,13 @@
 //! The three numbers of every pixel, from the survey and the calibrated weights.
 
+use super::Cause;
 use super::calibrate::LeastSquares;
-use super::jitter::{depth_jitter, difference, disparity_noise};
-use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, regressors};
-use super::survey::{Survey, survey};
+use super::jitter::difference;
+use super::regressors::{CAUSE_OF, REGRESSORS, Regressors};
 use super::variogram::Variogram;
-use super::{Cause, Evidence};
 use crate::image::Image;
-use crate::pipeline::{Agreement, RenderError, RenderSettings, Rendering};
-use crate::propagate::RectifiedView;
+use crate::pipeline::{RenderError, Rendering};
+use std::ops::Range;
 
 /// Weights of the mean absolute error for photographs, from "Cones": bias, noise, slope, jitter, edge,
 /// doubt, hole.
@@ -23,9 +22,6 @@ const LEFT_OUT: usize = 4;
 
 /// A prior as strong as this many grey levels squared per pixel.
 const PRIOR: f64 = 1e-3;
-
-/// Errors of disparity reach this many standard deviations.
-const REACH: f64 = 3.0;
 
 /// Error of two values that are both rounded.
 const ROUNDING: f32 = 1.0;
@@ -47,14 +43,18 @@ pub struct Calibration {
 pub struct ViewError {
     /// The rendering.
     pub rendering: Rendering,
-    /// Local bound of each pixel, in grey levels, row by row; empty for general cameras.
-    pub local_bound: Vec<f32>,
+    /// Sure bound of each pixel, in grey levels, row by row; empty without [`Limits`](super::Limits).
+    pub sure_bound: Vec<f32>,
+    /// Local limit of each pixel: not sure, see [the module](super).
+    pub local_limit: Vec<f32>,
     /// Expected bound: the root mean square.
     pub expected: Vec<f32>,
     /// Expected absolute error.
     pub estimate: Vec<f32>,
     /// Mean over the view of the part of the estimate that each cause has, in the order of [`Cause::ALL`].
     pub causes: [f64; 5],
+    /// The same of each row.
+    pub causes_of_rows: Vec<[f64; 5]>,
     /// The weights.
     pub calibration: Calibration,
 }
@@ -62,8 +62,10 @@ pub struct ViewError {
 /// Figures of a whole view, in grey levels unless named.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Totals {
-    /// Mean of the local bounds; none for general cameras.
-    pub local_bound: Option<f64>,
+    /// Mean of the sure bounds; none without limits that are known for sure.
+    pub sure_bound: Option<f64>,
+    /// Mean of the local limits.
+    pub local_limit: f64,
     /// Root mean square: the expected bound of the mean absolute error.
     pub expected: f64,
     /// Mean absolute error.
@@ -75,25 +77,51 @@ pub struct Totals {
 impl ViewError {
     /// Figures of the whole view.
     pub fn totals(&self) -> Totals {
-        Totals::over(&self.local_bound, &self.expected, &self.estimate)
+        self.over(0..self.estimate.len())
     }
 
     /// Figures of each row.
     pub fn rows(&self) -> Vec<Totals> {
-        let width = self.rendering.image.width();
-        let bounds = self.local_bound.chunks(width).chain(std::iter::repeat(&[][..]));
-        let rows = self.expected.chunks(width).zip(self.estimate.chunks(width)).zip(bounds);
-        rows.map(|((expected, estimate), bound)| Totals::over(bound, expected, estimate)).collect()
+        let (width, height) = self.rendering.image.size();
+        (0..height).map(|y| self.over(y * width..(y + 1) * width)).collect()
     }
 
-    /// Share of the pixels whose error against a photograph of the same size is within the local bound,
-    /// after rounding to 8 bits; none if there is no local bound.
-    pub fn within_local_bound(&self, truth: &Image) -> Option<f64> {
+    fn over(&self, pixels: Range<usize>) -> Totals {
+        let mean = |values: &[f32], power: i32| {
+            values.iter().map(|v| f64::from(*v).powi(power)).sum::<f64>() / values.len() as f64
+        };
+        let square = mean(&self.expected[pixels.clone()], 2);
+        Totals {
+            sure_bound: self.sure_bound.get(pixels.clone()).filter(|b| !b.is_empty()).map(|b| mean(b, 1)),
+            local_limit: mean(&self.local_limit[pixels.clone()], 1),
+            expected: square.sqrt(),
+            estimate: mean(&self.estimate[pixels], 1),
+            psnr: 10.0 * (255.0 * 255.0 / square).log10(),
+        }
+    }
+
+    /// Share of the pixels whose error against a photograph of the same size is within the local limit,
+    /// after rounding to 8 bits.
+    pub fn within_local_limit(&self, truth: &Image) -> f64 {
+        self.share_within(&self.local_limit, truth)
+    }
+
+    /// The same of the sure bound, if there is one.
+    pub fn within_sure_bound(&self, truth: &Image) -> Option<f64> {
+        (!self.sure_bound.is_empty()).then(|| self.share_within(&self.sure_bound, truth))
+    }
+
+    fn share_within(&self, limits: &[f32], truth: &Image) -> f64 {
         let errors = difference(&self.rendering.image.quantised(), truth);
-        let within =
-            errors.iter().zip(&self.local_bound).filter(|(error, bound)| **error <= **bound + ROUNDING);
-        let all = self.local_bound.len();
-        (all > 0).then(|| within.count() as f64 / all as f64)
+        let within = errors.iter().zip(limits).filter(|(error, limit)| **error <= **limit + ROUNDING);
+        within.count() as f64 / limits.len() as f64
+    }
+
+    /// Mean absolute error of each row against a photograph of the same size, after rounding to 8 bits.
+    pub fn measured_rows(&self, truth: &Image) -> Vec<f64> {
+        let errors = difference(&self.rendering.image.quantised(), truth);
+        let mean = |row: &[f32]| row.iter().map(|e| f64::from(*e)).sum::<f64>() / row.len() as f64;
+        errors.chunks(truth.width()).map(mean).collect()
     }
 
     /// The cause of the largest part of the estimate.
@@ -103,84 +131,12 @@ impl ViewError {
     }
 }
 
-impl Totals {
-    fn over(bound: &[f32], expected: &[f32], estimate: &[f32]) -> Self {
-        let mean = |values: &[f32], power: i32| {
-            values.iter().map(|v| f64::from(*v).powi(power)).sum::<f64>() / values.len() as f64
-        };
-        let square = mean(expected, 2);
-        Self {
-            local_bound: (!bound.is_empty()).then(|| mean(bound, 1)),
-            expected: square.sqrt(),
-            estimate: mean(estimate, 1),
-            psnr: 10.0 * (255.0 * 255.0 / square).log10(),
-        }
-    }
-}
-
-/// The error of the view from `position` on the line of the cameras of a rectified rig, rendered by rows.
-///
-/// # Errors
-/// Those of [`crate::pipeline::rectified::render`].
-pub fn rectified(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    settings: &RenderSettings,
-) -> Result<ViewError, RenderError> {
-    let gains = if settings.keep_exposure { Vec::new() } else { Agreement::rectified(views).gains };
-    let images = equalised(views.iter().map(|v| v.image), &gains);
-    let views: Vec<RectifiedView<'_>> =
-        views.iter().zip(&images).map(|(v, image)| RectifiedView { image, ..*v }).collect();
-    let settings = RenderSettings { keep_exposure: true, ..*settings };
-    let variogram = Variogram::of(images.iter());
-    let noise = disparity_noise(&views);
-    let known = Known { variogram, noise, spacing: spacing(&views, position) };
-    let calibration = calibrate(&views, &known, |others, truth| {
-        // A registration offset belongs to the virtual view only.
-        let settings = RenderSettings { offset: 0.0, ..settings };
-        let examined = examine(others, truth.position, &settings, &known)?;
-        Ok((examined.regressors, difference(&examined.survey.rendering.image.quantised(), truth.image)))
-    })?;
-    let Examined { survey, regressors } = examine(&views, position, &settings, &known)?;
-    let reach = (REACH * calibration.disparity_noise) as f32;
-    let bounds = survey.evidence.iter().map(|e| local_bound(e, reach)).collect();
-    Ok(judge(survey.rendering, &regressors, calibration, bounds))
-}
-
 /// What is known of the views together.
+#[derive(Clone)]
 pub(super) struct Known {
     pub(super) variogram: Variogram,
     /// Standard deviation of the errors of disparity, or of the relative errors of depth.
     pub(super) noise: f64,
-    /// Distance between neighbouring views.
-    pub(super) spacing: f64,
-}
-
-/// Mean distance between neighbouring views; for views at one place that of the virtual camera, or one.
-fn spacing(views: &[RectifiedView<'_>], position: f64) -> f64 {
-    let positions = || views.iter().map(|v| v.position);
-    let (low, high) = positions().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p), b.max(p)));
-    let away = positions().map(|p| (p - position).abs()).fold(f64::MAX, f64::min);
-    let candidates = [(high - low) / (views.len() as f64 - 1.0).max(1.0), away];
-    candidates.into_iter().find(|s| *s > 0.0).unwrap_or(1.0)
-}
-
-/// A survey with its regressors.
-struct Examined {
-    survey: Survey,
-    regressors: Vec<Regressors>,
-}
-
-fn examine(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    settings: &RenderSettings,
-    known: &Known,
-) -> Result<Examined, RenderError> {
-    let survey = survey(views, position, settings)?;
-    let jitter = depth_jitter(views, position, settings, &survey.rendering.image, known.noise)?;
-    let regressors = regressors(&survey, &jitter, &known.variogram, known.spacing);
-    Ok(Examined { survey, regressors })
 }
 
 /// Photographs with one exposure.
@@ -219,32 +175,44 @@ pub(super) fn calibrate<View: Copy>(
     })
 }
 
+/// What is found of a rendering before its causes are weighed.
+pub(super) struct Examined {
+    pub(super) rendering: Rendering,
+    pub(super) regressors: Vec<Regressors>,
+    pub(super) sure_bound: Vec<f32>,
+    pub(super) local_limit: Vec<f32>,
+}
+
 /// Expected error, estimate and causes from the regressors and their weights.
-pub(super) fn judge(
-    rendering: Rendering,
-    regressors: &[Regressors],
-    calibration: Calibration,
-    local_bound: Vec<f32>,
-) -> ViewError {
-    let mut causes = [0.0; 5];
+pub(super) fn judge(examined: Examined, calibration: Calibration) -> ViewError {
+    let Examined { rendering, regressors, sure_bound, local_limit } = examined;
+    let (width, height) = rendering.image.size();
+    let mut causes_of_rows = vec![[0.0; 5]; height];
     let (mut expected, mut estimate) = (Vec::new(), Vec::new());
-    for x in regressors {
-        let parts: Regressors = std::array::from_fn(|k| calibration.absolute[k] * x[k]);
+    for (p, x) in regressors.iter().enumerate() {
+        let parts = calibration.parts(x);
         let squares: f64 = (0..REGRESSORS).map(|k| calibration.square[k] * x[k] * x[k]).sum();
         for (part, cause) in parts.iter().zip(CAUSE_OF) {
-            causes[cause as usize] += part / regressors.len() as f64;
+            causes_of_rows[p / width][cause as usize] += part / width as f64;
         }
         let mean: f64 = parts.iter().sum();
         estimate.push(mean as f32);
         expected.push(squares.sqrt().max(mean) as f32);
     }
-    ViewError { rendering, local_bound, expected, estimate, causes, calibration }
+    let cause = |k: usize| causes_of_rows.iter().map(|row| row[k]).sum::<f64>() / height as f64;
+    let causes = std::array::from_fn(cause);
+    ViewError { rendering, sure_bound, local_limit, expected, estimate, causes, causes_of_rows, calibration }
 }
 
-/// The local bound of one pixel; `depth_error` bounds the error of disparities for a baseline of one.
-fn local_bound(e: &Evidence, depth_error: f32) -> f32 {
-    let geometry = e.steepest * (e.shift.abs() + depth_error * e.distance * e.reach);
-    let curvature = e.sharpest / 2.0 * e.spread;
-    let unseen = 255.0 * (1.0 - e.held).max(0.0);
-    (geometry + curvature + e.residual * e.reach + unseen).min(255.0)
+impl Calibration {
+    /// What each regressor adds to the estimate of a pixel.
+    fn parts(&self, x: &Regressors) -> Regressors {
+        std::array::from_fn(|k| self.absolute[k] * x[k])
+    }
+
+    /// The mean estimate over the pixels with these regressors.
+    pub(super) fn mean(&self, regressors: &[Regressors]) -> f64 {
+        let of_pixel = |x: &Regressors| self.parts(x).iter().sum::<f64>();
+        regressors.iter().map(of_pixel).sum::<f64>() / regressors.len() as f64
+    }
 }

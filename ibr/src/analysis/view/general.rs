@@ -1,8 +1,9 @@
 //! The error of a view of general cameras, from its rendering by the plane fit: the same causes as for
 //! rectified rigs, their sizes taken from the rendered view, its depths and its sample counts.
 
-use super::estimate::{Calibration, Known, ViewError, calibrate, equalised, judge};
+use super::estimate::{Calibration, Examined, Known, ViewError, calibrate, equalised, judge};
 use super::jitter::{difference, local_mean};
+use super::lookup::local_limits;
 use super::regressors::{Regressors, hole_distances, slopes};
 use super::variogram::Variogram;
 use crate::analysis::random::{part, seeded};
@@ -19,8 +20,7 @@ const LEAST: f64 = 1e-4;
 /// Largest share of its depth by which a noisy depth is wrong, in standard deviations.
 const TAIL: f64 = 3.0;
 
-/// The error of the view of `camera` with `size` pixels. It has no local bound: the influence of each sample
-/// on a pixel of the plane fit is not computed.
+/// The error of the view of `camera` with `size` pixels. [`CameraPredictor`] predicts several views.
 ///
 /// # Errors
 /// Those of [`crate::pipeline::calibrated::render`].
@@ -30,24 +30,121 @@ pub fn calibrated(
     size: (usize, usize),
     settings: &RenderSettings,
 ) -> Result<ViewError, RenderError> {
-    let gains = if settings.keep_exposure { Vec::new() } else { Agreement::calibrated(views).gains };
-    let images = equalised(views.iter().map(|v| v.image), &gains);
-    let views: Vec<CalibratedView<'_>> =
-        views.iter().zip(&images).map(|(v, image)| CalibratedView { image, ..*v }).collect();
-    let settings = RenderSettings { keep_exposure: true, ..*settings };
-    let known = Known {
-        variogram: Variogram::of(images.iter()),
-        noise: depth_noise(&views),
-        spacing: spacing(&views, camera),
+    CameraPredictor::new(views, settings)?.at(camera, size)
+}
+
+/// Views of general cameras with the weights that are calibrated on them, for any number of predictions.
+pub struct CameraPredictor<'a> {
+    /// Photographs with one exposure.
+    images: Vec<Image>,
+    maps: Vec<(&'a DepthMap, Camera)>,
+    settings: RenderSettings,
+    known: Known,
+    calibration: Calibration,
+    agreement: Agreement,
+}
+
+impl<'a> CameraPredictor<'a> {
+    /// Leaves each view out in turn and calibrates.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline::calibrated::render`].
+    pub fn new(views: &[CalibratedView<'a>], settings: &RenderSettings) -> Result<Self, RenderError> {
+        let agreement = Agreement::calibrated(views);
+        let gains = if settings.keep_exposure { &[][..] } else { &agreement.gains };
+        let images = equalised(views.iter().map(|v| v.image), gains);
+        let maps: Vec<_> = views.iter().map(|v| (v.depth, v.camera)).collect();
+        let views = joined(&images, &maps);
+        let settings = RenderSettings { keep_exposure: true, ..*settings };
+        let known = Known { variogram: Variogram::of(images.iter()), noise: depth_noise(&views) };
+        let calibration: Calibration = calibrate(&views, &known, |others, truth| {
+            // A registration offset belongs to the virtual view only.
+            let settings = RenderSettings { offset: 0.0, ..settings };
+            let goal = Goal { camera: &truth.camera, size: truth.image.size() };
+            let (rendering, x) = examine(others, &goal, &settings, &known, spacing(&views, &truth.camera))?;
+            Ok((x, difference(&rendering.image.quantised(), truth.image)))
+        })?;
+        Ok(Self { images, maps, settings, known, calibration, agreement })
+    }
+
+    /// How well the views agree, as they were given.
+    pub fn agreement(&self) -> &Agreement {
+        &self.agreement
+    }
+
+    /// The views, with one exposure.
+    pub fn views(&self) -> Vec<CalibratedView<'_>> {
+        joined(&self.images, &self.maps)
+    }
+
+    /// The error of the view of `camera`.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline::calibrated::render`].
+    pub fn at(&self, camera: &Camera, size: (usize, usize)) -> Result<ViewError, RenderError> {
+        let (views, goal) = (self.views(), Goal { camera, size });
+        let spacing = spacing(&views, camera);
+        let (rendering, regressors) = examine(&views, &goal, &self.settings, &self.known, spacing)?;
+        let local_limit = local_limits(&views, camera, &rendering, TAIL * self.known.noise);
+        Ok(judge(Examined { rendering, regressors, sure_bound: Vec::new(), local_limit }, self.calibration))
+    }
+
+    /// The view of `camera`, as it is rendered from the views.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline::calibrated::render`].
+    pub fn render(&self, camera: &Camera, size: (usize, usize)) -> Result<Rendering, RenderError> {
+        pipeline::render(&self.views(), camera, size, &RenderSettings { offset: 0.0, ..self.settings })
+    }
+
+    /// The local mean of the change of a rendered view if its depths were `changed`, in grey levels.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline::calibrated::render`].
+    pub fn change(
+        &self,
+        camera: &Camera,
+        rendered: &Image,
+        changed: impl Fn(&DepthMap) -> DepthMap,
+    ) -> Result<Vec<f32>, RenderError> {
+        let maps: Vec<DepthMap> = self.maps.iter().map(|(map, _)| changed(map)).collect();
+        let with = |(v, depth)| CalibratedView { depth, ..v };
+        let views: Vec<CalibratedView<'_>> = self.views().into_iter().zip(&maps).map(with).collect();
+        let image = pipeline::render(&views, camera, rendered.size(), &self.settings)?.image;
+        Ok(local_mean(&difference(&image, rendered), image.size()))
+    }
+
+    /// The mean estimate of the view of `camera` if `another` view were there too, with the weights as they
+    /// are.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline::calibrated::render`].
+    pub fn with_view(
+        &self,
+        camera: &Camera,
+        size: (usize, usize),
+        another: &CalibratedView<'_>,
+    ) -> Result<f64, RenderError> {
+        let views = [self.views(), vec![*another]].concat();
+        let (goal, spacing) = (Goal { camera, size }, spacing(&self.views(), camera));
+        let (_, regressors) = examine(&views, &goal, &self.settings, &self.known, spacing)?;
+        Ok(self.calibration.mean(&regressors))
+    }
+}
+
+fn joined<'a>(images: &'a [Image], maps: &[(&'a DepthMap, Camera)]) -> Vec<CalibratedView<'a>> {
+    let view = |(image, (depth, camera)): (&'a Image, &(&'a DepthMap, Camera))| CalibratedView {
+        image,
+        depth,
+        camera: *camera,
     };
-    let calibration: Calibration = calibrate(&views, &known, |others, truth| {
-        // A registration offset belongs to the virtual view only.
-        let settings = RenderSettings { offset: 0.0, ..settings };
-        let (rendering, x) = examine(others, &truth.camera, truth.image.size(), &settings, &known)?;
-        Ok((x, difference(&rendering.image.quantised(), truth.image)))
-    })?;
-    let (rendering, regressors) = examine(&views, camera, size, &settings, &known)?;
-    Ok(judge(rendering, &regressors, calibration, Vec::new()))
+    images.iter().zip(maps).map(view).collect()
+}
+
+/// A virtual camera and its size in pixels.
+struct Goal<'a> {
+    camera: &'a Camera,
+    size: (usize, usize),
 }
 
 /// Mean distance between a view and the one nearest to it; for views at one place that of the virtual
@@ -82,16 +179,17 @@ pub fn depth_noise(views: &[CalibratedView<'_>]) -> f64 {
 /// A rendering and the regressors of its pixels.
 fn examine(
     views: &[CalibratedView<'_>],
-    camera: &Camera,
-    size: (usize, usize),
+    goal: &Goal<'_>,
     settings: &RenderSettings,
     known: &Known,
+    spacing: f64,
 ) -> Result<(Rendering, Vec<Regressors>), RenderError> {
+    let Goal { camera, size } = *goal;
     let rendering = pipeline::render(views, camera, size, settings)?;
     let jitter = jitter(views, camera, settings, &rendering.image, known.noise)?;
     let balance = Balance::calibrated(views, camera).with_noise(&rendering.agreement);
     let (shares, lever) = shares(views, camera, &balance);
-    let lever = lever / (known.spacing * known.spacing);
+    let lever = lever / (spacing * spacing);
     let image = &rendering.image;
     let (slopes, bends) = (slopes(image), bends(image));
     let edges = edges(image, &rendering.depth, settings);

@@ -58,8 +58,11 @@ pub fn depth_jitter(
     Ok(local_mean(&difference(&changed, view), (width, height)))
 }
 
-/// |a - b| of each pixel, mean over the channels.
+/// |a - b| of each pixel, mean over the channels; of the brightness, if only one image has colours.
 pub(super) fn difference(a: &Image, b: &Image) -> Vec<f32> {
+    if a.channels() != b.channels() {
+        return difference(&a.to_grey(), &b.to_grey());
+    }
     let channels = a.channels();
     let pairs = a.data().chunks_exact(channels).zip(b.data().chunks_exact(channels));
     pairs.map(|(p, q)| p.iter().zip(q).map(|(p, q)| (p - q).abs()).sum::<f32>() / channels as f32).collect()

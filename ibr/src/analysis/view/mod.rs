@@ -1,15 +1,18 @@
 //! The error of one rendered view, pixel by pixel, without a photograph to compare it with.
 //!
-//! Three numbers for each pixel, in grey levels:
+//! Numbers for each pixel, in grey levels:
 //!
-//! * **local bound**: what the error does not exceed if slopes, second differences and residuals nearby are
-//!   at most those of the samples, by Prop. 3.1 for the smoothing spline that is really used (below).
-//!   Photographs break the condition where surfaces reflect or depth is wrong in all views;
+//! * **sure bound**: what the error does not exceed, for given [`Limits`] of the second derivative of the
+//!   virtual rows, of the errors of intensities and of those of disparities; for rectified rigs, rendered by
+//!   rows, and nothing where no limits are known (`sure.rs`);
+//! * **local limit**: the same with slopes, second differences and residuals of the samples nearby in the
+//!   place of such limits (below). It is not sure: photographs break it where surfaces reflect, where depth
+//!   is wrong in all views, and where something lies between the samples;
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!
-//! With h_s the influence of sample s on the pixel at x (the fit is linear in the samples) the local bound
-//! is
+//! With h_s the influence of sample s on the pixel at x (the fit is linear in the samples) the local limit
+//! of a rectified rig is
 //!
 //! ```text
 //! |f'| |sum h_s (x_s - x)| + (1/2) |f''| sum |h_s| (x_s - x)^2
@@ -17,7 +20,8 @@
 //! ```
 //!
 //! and the whole range of values for the part of the pixel that fills a hole. For linear interpolation it is
-//! (1/8) |f''| D^2 + E_T + E_D B |f'|.
+//! (1/8) |f''| D^2 + E_T + E_D B |f'|. That of general cameras has the same form for influences that are
+//! assumed (`lookup.rs`).
 //!
 //! The other two are sums over causes. The size of each cause is computed ([`survey()`]): the bias of the
 //! fit, by fitting the fit once more; the views that share in a pixel; the slope; the change under errors of
@@ -30,13 +34,18 @@ mod calibrate;
 mod estimate;
 mod general;
 mod jitter;
+mod lookup;
 mod regressors;
+mod rows;
+mod sure;
 mod survey;
 mod variogram;
 
-pub use estimate::{Calibration, Totals, ViewError, rectified};
-pub use general::{calibrated, depth_noise};
+pub use estimate::{Calibration, Totals, ViewError};
+pub use general::{CameraPredictor, calibrated, depth_noise};
 pub use jitter::{depth_jitter, disparity_noise, with_noise};
+pub use rows::{RigPredictor, rectified};
+pub use sure::Limits;
 pub use survey::{Evidence, Survey, survey};
 
 /// What an error comes from.

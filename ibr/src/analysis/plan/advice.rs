@@ -1,0 +1,229 @@
+//! What to spend on next: by how much the estimate of a view falls if one thing gets better.
+
+use crate::analysis::random::{part, seeded};
+use crate::analysis::view::{CameraPredictor, Cause, RigPredictor, ViewError};
+use crate::camera::Camera;
+use crate::depth::{DepthMap, fill_unknown};
+use crate::image::Image;
+use crate::pipeline::{RenderError, Rendering};
+use crate::propagate::{CalibratedView, RectifiedView};
+use nalgebra::{Matrix3x4, Vector3};
+
+/// Values beyond this number are not taken for rounded ones.
+const MOST_LEVELS: usize = 4096;
+
+/// What three improvements would gain, in grey levels of the mean absolute error.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Advice {
+    /// The largest cause.
+    pub cause: Cause,
+    /// Fall of the estimate if that cause were halved.
+    pub halved: f64,
+    /// Fall if the depth maps had one more bit; none if their values are not rounded.
+    pub depth_bit: Option<f64>,
+    /// One more view; none if it would not help.
+    pub view: Option<AnotherView>,
+}
+
+/// One more view, at the best of the places that were tried.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct AnotherView {
+    /// Position on the line of the cameras, or the three coordinates of a camera centre.
+    pub place: Vec<f64>,
+    /// Fall of the estimate.
+    pub falls: f64,
+}
+
+impl Advice {
+    fn new(now: &ViewError) -> Self {
+        let cause = now.dominant();
+        Self { cause, halved: now.causes[cause as usize] / 2.0, depth_bit: None, view: None }
+    }
+
+    /// For the view from `position` of a rectified rig, whose prediction is `now`.
+    ///
+    /// The further view stands half-way between the virtual camera and its neighbour, or on the side without
+    /// one as far away as the nearest view. Its photograph and depth are rendered from the others, with the
+    /// noise of the photographs. Where no view sees, its depth is that of the background. The weights of
+    /// the causes stay as they are.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline::rectified::render`].
+    pub fn on_rig(predictor: &RigPredictor<'_>, position: f64, now: &ViewError) -> Result<Self, RenderError> {
+        let (views, before) = (predictor.views(), now.totals().estimate);
+        let mut advice = Self::new(now);
+        let step = views.iter().map(|v| rounding_step(v.disparity)).fold(0.0, f64::max);
+        if step > 0.0 {
+            let change = predictor.change(position, &now.rendering.image, with_a_bit_less)?;
+            advice.depth_bit = Some(gain_of_a_bit(&now.estimate, &change));
+        }
+        let positions: Vec<f64> = views.iter().map(|v| v.position).collect();
+        for place in places_on_line(&positions, position, predictor.spacing(position)) {
+            let (image, disparity) = imagined(predictor.render(place)?);
+            let another = RectifiedView { image: &image, disparity: &disparity, position: place };
+            advice.consider(vec![place], before - predictor.with_view(position, &another)?);
+        }
+        Ok(advice)
+    }
+
+    /// The same for the view of a general camera of `size` pixels. The further view stands half-way between
+    /// the virtual camera and its nearest view, or as far away on the other side, and looks like the virtual
+    /// camera.
+    ///
+    /// # Errors
+    /// Those of [`crate::pipeline::calibrated::render`].
+    pub fn on_cameras(
+        predictor: &CameraPredictor<'_>,
+        camera: &Camera,
+        size: (usize, usize),
+        now: &ViewError,
+    ) -> Result<Self, RenderError> {
+        let (views, before) = (predictor.views(), now.totals().estimate);
+        let mut advice = Self::new(now);
+        let step = views.iter().map(|v| rounding_step(v.depth)).fold(0.0, f64::max);
+        if step > 0.0 {
+            let change = predictor.change(camera, &now.rendering.image, with_a_bit_less)?;
+            advice.depth_bit = Some(gain_of_a_bit(&now.estimate, &change));
+        }
+        for place in places_around(&views, camera) {
+            let Some(moved) = at(camera, place) else { continue };
+            let (image, depth) = imagined(predictor.render(&moved, size)?);
+            let another = CalibratedView { image: &image, depth: &depth, camera: moved };
+            let falls = before - predictor.with_view(camera, size, &another)?;
+            advice.consider(place.as_slice().to_vec(), falls);
+        }
+        Ok(advice)
+    }
+
+    fn consider(&mut self, place: Vec<f64>, falls: f64) {
+        if falls > self.view.as_ref().map_or(0.0, |best| best.falls) {
+            self.view = Some(AnotherView { place, falls });
+        }
+    }
+}
+
+/// The places on each side of `position` at which a further view is tried.
+fn places_on_line(positions: &[f64], position: f64, spacing: f64) -> Vec<f64> {
+    let nearest = |side: f64| {
+        let away = positions.iter().map(|p| side * (p - position)).filter(|away| *away > 0.0);
+        Some(away.fold(f64::INFINITY, f64::min)).filter(|away| away.is_finite())
+    };
+    let (below, above) = (nearest(-1.0), nearest(1.0));
+    let place = |own: Option<f64>, other: Option<f64>| own.map(|d| d / 2.0).or(other).unwrap_or(spacing);
+    vec![position - place(below, above), position + place(above, below)]
+}
+
+fn places_around(views: &[CalibratedView<'_>], camera: &Camera) -> Vec<Vector3<f64>> {
+    let centre = camera.centre();
+    let away = views.iter().map(|v| v.camera.centre() - centre).filter(|d| d.norm() > 0.0);
+    let nearest = away.min_by(|a, b| a.norm().total_cmp(&b.norm()));
+    nearest.map_or(Vec::new(), |d| vec![centre + d / 2.0, centre - d])
+}
+
+/// The camera at another place, without its lens.
+fn at(camera: &Camera, centre: Vector3<f64>) -> Option<Camera> {
+    let m = camera.m();
+    let mut matrix = Matrix3x4::zeros();
+    matrix.fixed_columns_mut::<3>(0).copy_from(&m);
+    matrix.set_column(3, &(-m * centre));
+    Camera::metric(matrix, camera.determinant() < 0.0).ok()
+}
+
+/// Photograph and depth of a place where no camera stands, from a rendering.
+fn imagined(rendering: Rendering) -> (Image, DepthMap) {
+    let noises = rendering.agreement.textures.iter().flatten().map(|texture| texture.noise);
+    let (sum, count) = noises.fold((0.0, 0.0), |(sum, count), noise| (sum + noise, count + 1.0));
+    let deviation = if count > 0.0 { sum / count } else { 0.0 };
+    let random = &mut seeded(2);
+    // The sum of three uniform numbers in [-1, 1) has the variance one.
+    let mut noise = || deviation * (2.0 * (part(random) + part(random) + part(random)) - 3.0);
+    let (mut image, mut depth) = (rendering.image, rendering.depth);
+    image.data_mut().iter_mut().for_each(|v| *v = (f64::from(*v) + noise()).clamp(0.0, 255.0) as f32);
+    fill_unknown(&mut depth);
+    (image, depth)
+}
+
+/// The step to which the values of a map are rounded: the least difference of two of them. Maps of more than
+/// 4096 different values are not taken for rounded; their step is 0.
+fn rounding_step(map: &DepthMap) -> f64 {
+    let measured = map.data().iter().enumerate().filter(|(p, v)| !v.is_nan() && !map.is_guessed(*p));
+    let mut levels = std::collections::BTreeSet::new();
+    for (_, value) in measured {
+        // Values are not negative zero; their bits are in their order for values of one sign.
+        levels.insert(value.to_bits());
+        if levels.len() > MOST_LEVELS {
+            return 0.0;
+        }
+    }
+    let mut values: Vec<f64> = levels.into_iter().map(|bits| f64::from(f32::from_bits(bits))).collect();
+    values.sort_by(f64::total_cmp);
+    values.windows(2).map(|pair| pair[1] - pair[0]).min_by(f64::total_cmp).unwrap_or(0.0)
+}
+
+/// A rounded map with one bit less.
+fn with_a_bit_less(map: &DepthMap) -> DepthMap {
+    let step = rounding_step(map);
+    map.changed(|v| paired(v, step))
+}
+
+/// The middle of a multiple of `step` and its partner: values as they were with one bit less. 0 leaves them.
+fn paired(value: f32, step: f64) -> f32 {
+    if step == 0.0 {
+        return value;
+    }
+    let pair = ((f64::from(value) / step).round() / 2.0).floor();
+    ((2.0 * pair + 0.5) * step) as f32
+}
+
+/// Fall of the mean estimate if rounded maps had one more bit, from the change c of each pixel if they had
+/// one less.
+///
+/// With the step s their errors have the variance s^2 / 12, those of a bit more s^2 / 48, and a bit less
+/// adds s^2 / 4. So s^2 / 12 - s^2 / 48 costs c^2 / 4 of the square of each pixel.
+fn gain_of_a_bit(estimate: &[f32], change: &[f32]) -> f64 {
+    let of_pixel = |(e, c): (&f32, &f32)| {
+        let (e, c) = (f64::from(*e), f64::from(*c));
+        e - (e * e - c * c / 4.0).max(e * e / 4.0).sqrt()
+    };
+    estimate.iter().zip(change).map(of_pixel).sum::<f64>() / estimate.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth::Measure;
+
+    #[test]
+    fn places_lie_between_neighbours_or_opposite_of_them() {
+        assert_eq!(places_on_line(&[0.0, 1.0, 4.0], 0.5, 2.0), [0.25, 0.75]);
+        assert_eq!(places_on_line(&[0.0, 1.0], 3.0, 1.0), [2.0, 5.0]);
+        assert_eq!(places_on_line(&[2.0], 2.0, 1.0), [1.0, 3.0]);
+    }
+
+    #[test]
+    fn steps_of_rounded_maps_are_found() {
+        let map =
+            |values: Vec<f32>| DepthMap::new((values.len(), 1), values, 1.0, Measure::Disparity).unwrap();
+        let rounded = (0..500).map(|k| 3.0 + 0.25 * (k % 40) as f32).collect();
+        assert_eq!(rounding_step(&map(rounded)), 0.25);
+        let fine = (0..9000).map(|k| 3.0 + 1e-3 * k as f32).collect();
+        assert_eq!(rounding_step(&map(fine)), 0.0);
+    }
+
+    /// A bit less adds three times the variance of the rounding, without a shift; what it costs says what a
+    /// bit more gains.
+    #[test]
+    fn a_bit_less_tells_of_a_bit_more() {
+        let (step, count) = (0.5, 1000);
+        let errors: Vec<f64> =
+            (0..count).map(|k| f64::from(paired(k as f32 * 0.5, step)) - 0.5 * k as f64).collect();
+        let mean = errors.iter().sum::<f64>() / count as f64;
+        let square = errors.iter().map(|e| e * e).sum::<f64>() / count as f64;
+        assert!(mean.abs() < 1e-6 && (square - step * step / 4.0).abs() < 1e-6, "{mean} {square}");
+        assert_eq!(paired(3.7, 0.0), 3.7);
+        // Rounding alone, e^2 = c^2 / 3: half of it goes.
+        let c = 3.0_f32.sqrt();
+        assert!((gain_of_a_bit(&[1.0, 1.0], &[c, c]) - 0.5).abs() < 1e-6);
+        assert_eq!(gain_of_a_bit(&[1.0], &[0.0]), 0.0);
+    }
+}

@@ -1,0 +1,156 @@
+//! The local limit of a view of general cameras: what the photographs show at the places of its pixels.
+//!
+//! The influences h_s of the samples on a pixel of the plane fit are not computed. They are taken to be
+//! positive with the sum one, to balance, and to have a second moment of half a square pixel along each
+//! axis. Then the limit of the row fit is
+//!
+//! ```text
+//! |J - f| <= E + |f'| m + (1/4) (|f_xx| + |f_yy|)
+//! ```
+//!
+//! E is the largest residual |J - v_s| nearby, which is found by looking pixels up in every photograph that
+//! shows their depth. m is the displacement of the sample under an error of depth of three standard
+//! deviations. Slopes and second differences are those of the photographs nearby, per pixel of the virtual
+//! view.
+
+use crate::camera::Camera;
+use crate::image::Image;
+use crate::interpolate::Cover;
+use crate::pipeline::Rendering;
+use crate::propagate::CalibratedView;
+use rayon::prelude::*;
+
+/// Depths of one point differ by at most this share.
+const SAME_POINT: f64 = 0.05;
+
+/// Pixels to each side over which local suprema are taken.
+const NEAR: usize = 3;
+
+/// The limit of a pixel that no view shows.
+const UNSEEN: f32 = 255.0;
+
+/// What the photographs show at a pixel: the largest over views and channels, in grey levels per virtual
+/// pixel.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shown {
+    residual: f32,
+    slope: f32,
+    curvature: f32,
+    /// Largest displacement by errors of depth, in pixels; not a number where no view shows the pixel.
+    moved: f32,
+}
+
+impl Shown {
+    const NOTHING: Self = Self { residual: 0.0, slope: 0.0, curvature: 0.0, moved: f32::NAN };
+
+    fn largest(self, other: Self) -> Self {
+        Self {
+            residual: self.residual.max(other.residual),
+            slope: self.slope.max(other.slope),
+            curvature: self.curvature.max(other.curvature),
+            moved: self.moved.max(other.moved),
+        }
+    }
+}
+
+/// The local limit of every pixel, in grey levels; `deviation` is the largest relative error of depth.
+pub(super) fn local_limits(
+    views: &[CalibratedView<'_>],
+    camera: &Camera,
+    rendering: &Rendering,
+    deviation: f64,
+) -> Vec<f32> {
+    let (width, height) = rendering.image.size();
+    let at = |p: usize| {
+        let all = views.iter().filter_map(|view| Lookup { view, camera, rendering, deviation }.at(p));
+        all.fold(Shown::NOTHING, Shown::largest)
+    };
+    let shown: Vec<Shown> = (0..width * height).into_par_iter().map(at).collect();
+    let nearby = largest_nearby(&shown, (width, height));
+    let limit = |p: usize| {
+        if rendering.mask[p] != Cover::Seen || shown[p].moved.is_nan() {
+            return UNSEEN;
+        }
+        let Shown { residual, slope, curvature, .. } = nearby[p];
+        (residual + slope * shown[p].moved + curvature / 4.0).min(UNSEEN)
+    };
+    (0..width * height).map(limit).collect()
+}
+
+/// The largest over windows of 7 x 7 pixels, smaller at the border.
+fn largest_nearby(shown: &[Shown], (width, height): (usize, usize)) -> Vec<Shown> {
+    let range = |at: usize, side: usize| at.saturating_sub(NEAR)..(at + NEAR + 1).min(side);
+    let largest = |all: &mut dyn Iterator<Item = Shown>| all.fold(Shown::default(), Shown::largest);
+    let of_rows: Vec<Shown> = (0..width * height)
+        .map(|p| largest(&mut range(p % width, width).map(|x| shown[p / width * width + x])))
+        .collect();
+    let of_columns =
+        |p: usize| largest(&mut range(p / width, height).map(|y| of_rows[y * width + p % width]));
+    (0..width * height).map(of_columns).collect()
+}
+
+/// A view in which the pixels of a rendering are looked up.
+struct Lookup<'a> {
+    view: &'a CalibratedView<'a>,
+    camera: &'a Camera,
+    rendering: &'a Rendering,
+    deviation: f64,
+}
+
+impl Lookup<'_> {
+    /// What the view shows at a pixel; nothing if it does not see its point.
+    fn at(&self, p: usize) -> Option<Shown> {
+        let width = self.rendering.image.width();
+        let (x, y) = ((p % width) as f64, (p / width) as f64);
+        let depth = f64::from(self.rendering.depth.data()[p]);
+        let (u, v, d) = self.view.camera.project(&self.camera.unproject(x, y, depth));
+        self.shows(u, v, d)?;
+        let beside = |dx: f64, dy: f64| {
+            let (u, v, _) = self.view.camera.project(&self.camera.unproject(x + dx, y + dy, depth));
+            (u, v)
+        };
+        let moved = self.view.camera.unproject(u, v, d * (1.0 + self.deviation));
+        let (a, b, _) = self.camera.project(&moved);
+        let mut shown = Shown { moved: (a - x).hypot(b - y) as f32, ..Shown::default() };
+        let image = self.view.image;
+        let sides = [beside(-1.0, 0.0), beside(1.0, 0.0), beside(0.0, -1.0), beside(0.0, 1.0)];
+        for channel in 0..image.channels() {
+            let value = |(u, v): (f64, f64)| bilinear(image, u, v, channel);
+            let here = value((u, v))?;
+            let [left, right, up, down] =
+                [value(sides[0])?, value(sides[1])?, value(sides[2])?, value(sides[3])?];
+            let rendered = self.rendering.image.data()[p * image.channels() + channel];
+            let steps = [here - left, right - here, here - up, down - here].map(f32::abs);
+            let bends = (left - 2.0 * here + right).abs() + (up - 2.0 * here + down).abs();
+            let slope = steps[0].max(steps[1]).hypot(steps[2].max(steps[3]));
+            let found = Shown { residual: (rendered - here).abs(), slope, curvature: bends, moved: 0.0 };
+            shown = shown.largest(found);
+        }
+        Some(shown)
+    }
+
+    /// Whether the map has this depth around a place.
+    fn shows(&self, u: f64, v: f64, d: f64) -> Option<()> {
+        let (width, height) = self.view.depth.size();
+        let inside = u >= 0.0 && v >= 0.0 && u <= width as f64 - 1.0 && v <= height as f64 - 1.0;
+        // Also false for unknown depths.
+        let same = |seen: f32| (f64::from(seen) / d - 1.0).abs() <= SAME_POINT;
+        (inside && d > 0.0 && same(self.view.depth.row(v.round() as usize)[u.round() as usize])).then_some(())
+    }
+}
+
+/// An image between its pixels; none outside.
+fn bilinear(image: &Image, u: f64, v: f64, channel: usize) -> Option<f32> {
+    let ((width, height), channels) = (image.size(), image.channels());
+    // Also false for numbers that are not finite.
+    if !(u >= 0.0 && v >= 0.0 && u <= width as f64 - 1.0 && v <= height as f64 - 1.0) {
+        return None;
+    }
+    let (x, y) = ((u as usize).min(width.max(2) - 2), (v as usize).min(height.max(2) - 2));
+    let (s, t) = ((u - x as f64) as f32, (v - y as f64) as f32);
+    let at = |x: usize, y: usize| {
+        image.data()[(y.min(height - 1) * width + x.min(width - 1)) * channels + channel]
+    };
+    let row = |y: usize| at(x, y) * (1.0 - s) + at(x + 1, y) * s;
+    Some(row(y) * (1.0 - t) + row(y + 1) * t)
+}

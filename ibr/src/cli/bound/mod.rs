@@ -1,0 +1,121 @@
+//! `hybank-ibr bound`: the error of the virtual views, predicted from the inputs alone.
+
+mod chart;
+mod files;
+mod predictor;
+mod report;
+
+use super::arguments::BoundArguments;
+use super::failure::Failure;
+use super::inputs;
+use super::memory::{self, Work};
+use super::output::{self, Encoded};
+use super::progress::Progress;
+use crate::analysis::view::{Limits, ViewError};
+use crate::image::Image;
+use crate::partial::{Densify, Segmentwise};
+use crate::pipeline::RenderError;
+use crate::scene::{self, Kind, Scene};
+use files::Outputs;
+use hybank::files::AtomicFile;
+use predictor::Predictor;
+use report::{Frames, Summary};
+use std::path::Path;
+
+pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
+    let limits = check(arguments)?;
+    let progress = Progress::new(3);
+    progress.step("reading");
+    let (scene, truth) = read(arguments)?;
+    progress.step("calibrating");
+    let settings = arguments.scene.settings(scene.offset);
+    let predictor = Predictor::new(&scene.kind, &settings, limits).map_err(Failure::input)?;
+    progress.step("predicting");
+    let frames = scene.kind.frames();
+    let (mut summaries, mut written) = (Vec::new(), Vec::new());
+    let mut worst: Option<(usize, f64, ViewError)> = None;
+    for frame in 0..frames {
+        let predicted = predictor.at(frame).map_err(Failure::input)?;
+        let mut summary = Summary::new(&predicted, predictor.agreement());
+        summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
+        let outputs = Outputs::of(arguments, (frames > 1).then_some(frame));
+        let (encoded, white) = outputs.encoded(&predicted, truth.as_ref())?;
+        summary.white = white;
+        written.extend(begun(&encoded, arguments.scene.force)?);
+        summaries.push(summary);
+        let estimate = predicted.totals().estimate;
+        if worst.as_ref().is_none_or(|(_, largest, _)| estimate > *largest) {
+            worst = Some((frame, estimate, predicted));
+        }
+        progress.within((frame + 1) as f64 / (frames + 1) as f64);
+    }
+    let Some((worst, _, now)) = worst else { return Err(Failure::input(RenderError::NoViews)) };
+    summaries[worst].advice = Some(predictor.advice(worst, &now).map_err(Failure::input)?);
+    output::commit(written)?;
+    drop(progress);
+    inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
+    Frames { summaries, worst }.print(predictor.agreement(), arguments.scene.json)
+}
+
+/// Files that are written but not named yet, and closed: a long path has more than a process may have open.
+fn begun(encoded: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFile>, Failure> {
+    let mut files = output::begin(encoded, force)?;
+    files.iter_mut().try_for_each(AtomicFile::seal).map_err(Failure::input)?;
+    Ok(files)
+}
+
+/// Checks that need no file, and the limits for a sure bound.
+fn check(arguments: &BoundArguments) -> Result<Option<Limits>, Failure> {
+    arguments.scene.check()?;
+    let outputs = Outputs::of(arguments, None);
+    outputs.check()?;
+    output::refuse_overlaps(&outputs.files(), &arguments.scene.inputs())?;
+    output::name_leftovers(&outputs.files());
+    outputs.refuse_existing(arguments.scene.force)?;
+    let limit = |name: &str, value: f64| match value.is_finite() && value >= 0.0 {
+        true => Ok(value),
+        false => Err(Failure::Usage(format!("{name} {value}: it must be a number that is not negative"))),
+    };
+    let Some(curvature) = arguments.curvature else { return Ok(None) };
+    Ok(Some(Limits {
+        curvature: limit("--curvature", curvature)?,
+        intensity: limit("--intensity-error", arguments.intensity_error)?,
+        disparity: limit("--disparity-error", arguments.disparity_error)?,
+    }))
+}
+
+fn read(arguments: &BoundArguments) -> Result<(Scene, Option<Image>), Failure> {
+    let file = &arguments.scene.file;
+    let source = arguments.scene.source()?;
+    let scene = arguments.scene.load(&source, Densify::Segmentwise(Segmentwise::default()), true)?;
+    refuse_what_has_no_prediction(&scene, arguments)?;
+    let frames = scene.kind.frames();
+    let numbers = (0..frames.min(scene::MOST_FRAMES)).map(|frame| (frames > 1).then_some(frame));
+    let all: Vec<Outputs> = numbers.map(|frame| Outputs::of(arguments, frame)).collect();
+    source.refuse_overlaps(&all.iter().flat_map(Outputs::files).collect::<Vec<_>>())?;
+    all.iter().try_for_each(|outputs| outputs.refuse_existing(arguments.scene.force))?;
+    memory::check(&scene, Work::Bound).map_err(|e| e.in_file(file))?;
+    Ok((scene, arguments.scene.truth()?))
+}
+
+fn refuse_what_has_no_prediction(scene: &Scene, arguments: &BoundArguments) -> Result<(), Failure> {
+    let named = |path: &Path, reason: &str| Failure::Input(format!("{}: {reason}", path.display()));
+    let file = &arguments.scene.file;
+    match &scene.kind {
+        Kind::Uncalibrated { .. } => Err(named(
+            file,
+            "bound predicts the errors of views with depth; the cameras of this scene are unknown",
+        )),
+        Kind::Calibrated { .. } if arguments.curvature.is_some() => Err(Failure::Usage(
+            "--curvature: the sure bound is that of the fit by rows, for rectified rigs; leave it out for \
+             general cameras"
+                .into(),
+        )),
+        kind if kind.frames() > 1 && arguments.scene.truth.is_some() => Err(Failure::Usage(
+            "--truth: there is one photograph, but the scene has several virtual views; give it with --view \
+             NAME, which predicts the place of one view"
+                .into(),
+        )),
+        _ => Ok(()),
+    }
+}

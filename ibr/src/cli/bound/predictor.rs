@@ -1,0 +1,66 @@
+//! The prediction for either kind of scene.
+
+use crate::analysis::plan::Advice;
+use crate::analysis::view::{CameraPredictor, Limits, RigPredictor, ViewError};
+use crate::camera::Camera;
+use crate::pipeline::{Agreement, RenderError, RenderSettings};
+use crate::propagate::{CalibratedView, RectifiedView};
+use crate::scene::Kind;
+
+/// Calibrated weights, and the virtual views to predict.
+pub(super) enum Predictor<'a> {
+    Rig { predictor: RigPredictor<'a>, positions: &'a [f64], limits: Option<Limits> },
+    Cameras { predictor: CameraPredictor<'a>, cameras: &'a [Camera], size: (usize, usize) },
+}
+
+impl<'a> Predictor<'a> {
+    pub(super) fn new(
+        kind: &'a Kind,
+        settings: &RenderSettings,
+        limits: Option<Limits>,
+    ) -> Result<Self, RenderError> {
+        match kind {
+            Kind::Rectified { views, positions } => {
+                let views: Vec<RectifiedView<'_>> = views
+                    .iter()
+                    .map(|v| RectifiedView { image: &v.image, disparity: &v.disparity, position: v.position })
+                    .collect();
+                Ok(Self::Rig { predictor: RigPredictor::new(&views, settings)?, positions, limits })
+            }
+            Kind::Calibrated { views, cameras, size } => {
+                let views: Vec<CalibratedView<'_>> = views
+                    .iter()
+                    .map(|v| CalibratedView { image: &v.image, depth: &v.depth, camera: v.camera })
+                    .collect();
+                Ok(Self::Cameras { predictor: CameraPredictor::new(&views, settings)?, cameras, size: *size })
+            }
+            Kind::Uncalibrated { .. } => Err(RenderError::NoViews),
+        }
+    }
+
+    /// How well the views agree.
+    pub(super) fn agreement(&self) -> &Agreement {
+        match self {
+            Self::Rig { predictor, .. } => predictor.agreement(),
+            Self::Cameras { predictor, .. } => predictor.agreement(),
+        }
+    }
+
+    /// The error of a virtual view.
+    pub(super) fn at(&self, frame: usize) -> Result<ViewError, RenderError> {
+        match self {
+            Self::Rig { predictor, positions, limits } => predictor.at(positions[frame], limits.as_ref()),
+            Self::Cameras { predictor, cameras, size } => predictor.at(&cameras[frame], *size),
+        }
+    }
+
+    /// What would make the error of a virtual view smaller.
+    pub(super) fn advice(&self, frame: usize, now: &ViewError) -> Result<Advice, RenderError> {
+        match self {
+            Self::Rig { predictor, positions, .. } => Advice::on_rig(predictor, positions[frame], now),
+            Self::Cameras { predictor, cameras, size } => {
+                Advice::on_cameras(predictor, &cameras[frame], *size, now)
+            }
+        }
+    }
+}

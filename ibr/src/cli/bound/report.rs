@@ -1,0 +1,179 @@
+//! What `bound` prints.
+
+use crate::analysis::plan::{Advice, AnotherView};
+use crate::analysis::view::{Cause, Totals, ViewError};
+use crate::cli::failure::Failure;
+use crate::cli::{inputs, output};
+use crate::image::{Image, quality};
+use crate::pipeline::Agreement;
+use serde::Serialize;
+use std::path::Path;
+
+/// The prediction for one virtual view, in grey levels unless named.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    totals: Totals,
+    causes: Vec<CauseShare>,
+    dominant: Cause,
+    /// What makes the largest part smaller; to check the inputs, if they contradict each other.
+    remedy: &'static str,
+    /// Whether the views fit each other; null if there is nothing to compare.
+    inputs_agree: Option<bool>,
+    /// Views that were left out in turn to calibrate the estimate; 0 if typical weights were used.
+    calibrated_on: usize,
+    /// Standard deviation of the disparities' errors for a baseline of one, in pixels; of general cameras
+    /// that of the relative errors of depth.
+    disparity_noise: f64,
+    /// Estimate that is white in the picture of --map.
+    pub(super) white: Option<f32>,
+    measured: Option<Measured>,
+    /// What would make the estimate smaller; of several views that of the largest estimate has it.
+    pub(super) advice: Option<Advice>,
+    rows: Vec<Totals>,
+}
+
+#[derive(Debug, Serialize)]
+struct CauseShare {
+    cause: Cause,
+    /// Mean over the view.
+    error: f64,
+}
+
+/// The comparison with a photograph.
+#[derive(Debug, Serialize)]
+struct Measured {
+    mae: f64,
+    psnr: f64,
+    /// Estimate divided by the measured mean absolute error.
+    ratio: f64,
+    /// Share of the pixels whose error is within the local limit.
+    within_local_limit: f64,
+    /// Share of the pixels whose error is within the sure bound, if there is one.
+    within_sure_bound: Option<f64>,
+}
+
+/// What to do first where the inputs contradict each other.
+const CHECK_FIRST: &str =
+    "check the inputs first: the views contradict each other, and the prediction is that of these inputs";
+
+impl Summary {
+    pub(super) fn new(predicted: &ViewError, agreement: &Agreement) -> Self {
+        let share = |(cause, error)| CauseShare { cause, error };
+        let dominant = predicted.dominant();
+        let inputs_agree = agreement.worst().map(|pair| !pair.is_poor());
+        Self {
+            totals: predicted.totals(),
+            causes: Cause::ALL.into_iter().zip(predicted.causes).map(share).collect(),
+            dominant,
+            remedy: if inputs_agree == Some(false) { CHECK_FIRST } else { dominant.remedy() },
+            inputs_agree,
+            calibrated_on: predicted.calibration.views,
+            disparity_noise: predicted.calibration.disparity_noise,
+            white: None,
+            measured: None,
+            advice: None,
+            rows: predicted.rows(),
+        }
+    }
+
+    /// Compares the prediction with a photograph, if there is one.
+    pub(super) fn measure(
+        &mut self,
+        predicted: &ViewError,
+        truth: Option<&Image>,
+        path: Option<&Path>,
+    ) -> Result<(), Failure> {
+        let (Some(truth), Some(path)) = (truth, path) else { return Ok(()) };
+        let named = |e| Failure::Input(format!("{}: {e}", path.display()));
+        let image = &predicted.rendering.image;
+        let Some(found) = quality::compare(image, truth, None).map_err(named)? else { return Ok(()) };
+        self.measured = Some(Measured {
+            mae: found.mae,
+            psnr: found.psnr,
+            ratio: self.totals.estimate / found.mae,
+            within_local_limit: predicted.within_local_limit(truth),
+            within_sure_bound: predicted.within_sure_bound(truth),
+        });
+        Ok(())
+    }
+
+    fn text(&self, agreement: &Agreement) -> String {
+        let t = &self.totals;
+        let mut lines = vec![
+            format!("estimate  {:.2} grey levels of mean absolute error", t.estimate),
+            format!("expected  {:.2} root mean square, a PSNR of {:.1} dB", t.expected, t.psnr),
+            format!(
+                "limit     {:.2} in the mean, if slopes and residuals are nowhere larger than at the samples",
+                t.local_limit
+            ),
+        ];
+        lines.extend(t.sure_bound.map(|b| format!("sure      {b:.2} in the mean, within the limits given")));
+        let part = |c: &CauseShare| format!("{:?} {:.2}", c.cause, c.error).to_lowercase();
+        lines.push(format!("causes    {}", self.causes.iter().map(part).collect::<Vec<_>>().join(", ")));
+        lines.push(format!("next      {}", self.remedy));
+        lines.extend(self.advice.as_ref().filter(|_| self.inputs_agree != Some(false)).map(advice));
+        lines.push(match self.calibrated_on {
+            0 => "weights   those of typical photographs: a single view cannot be left out".into(),
+            views => format!("weights   calibrated on {views} views, each left out in turn"),
+        });
+        lines.extend(inputs::line(agreement));
+        lines.extend(self.measured.as_ref().map(measured));
+        lines.join("\n") + "\n"
+    }
+}
+
+/// How much the estimate falls.
+fn advice(advice: &Advice) -> String {
+    let mut parts = vec![format!("{:?} errors halved {:.2}", advice.cause, advice.halved).to_lowercase()];
+    parts.extend(advice.depth_bit.map(|falls| format!("one more bit of depth {falls:.2}")));
+    parts.push(match &advice.view {
+        Some(AnotherView { place, falls }) => {
+            let place: Vec<String> = place.iter().map(|x| format!("{x:.3}")).collect();
+            format!("one more view at {} {falls:.2}", place.join(", "))
+        }
+        None => "one more view 0".into(),
+    });
+    format!("gains     the estimate falls by: {}", parts.join("; "))
+}
+
+fn measured(m: &Measured) -> String {
+    let sure = m.within_sure_bound.map(|share| format!(", {:.1} % within the sure bound", 100.0 * share));
+    format!(
+        "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the limit{}",
+        m.mae,
+        m.ratio,
+        m.psnr,
+        100.0 * m.within_local_limit,
+        sure.unwrap_or_default()
+    )
+}
+
+/// The predictions for all virtual views of a scene.
+#[derive(Debug, Serialize)]
+pub(super) struct Frames {
+    #[serde(rename = "frames")]
+    pub(super) summaries: Vec<Summary>,
+    /// The view with the largest estimate, by number from 0.
+    pub(super) worst: usize,
+}
+
+impl Frames {
+    /// Prints one view, or a line for each of several and the worst of them.
+    pub(super) fn print(&self, agreement: &Agreement, json: bool) -> Result<(), Failure> {
+        if json {
+            let text = match self.summaries.as_slice() {
+                [one] => serde_json::to_string(one),
+                _ => serde_json::to_string(self),
+            };
+            return output::print(&(text.map_err(Failure::input)? + "\n"));
+        }
+        let mut text = String::new();
+        if self.summaries.len() > 1 {
+            let line =
+                |(k, s): (usize, &Summary)| format!("view {:4}  estimate {:.2}\n", k + 1, s.totals.estimate);
+            text.extend(self.summaries.iter().enumerate().map(line));
+            text += &format!("The largest, view {}:\n", self.worst + 1);
+        }
+        output::print(&(text + &self.summaries[self.worst].text(agreement)))
+    }
+}
