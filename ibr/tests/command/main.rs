@@ -13,6 +13,7 @@ mod colmap;
 mod disturbed;
 mod doors;
 mod mistakes;
+mod path;
 mod refuse;
 mod render;
 #[cfg(unix)]
