@@ -4,11 +4,13 @@ use hybank_ibr::camera::Camera;
 use hybank_ibr::image::{Image, quality};
 use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::pipeline::uncalibrated::{
-    OrderBy, Target, UncalibratedRendering, UncalibratedSettings, render,
+    OrderBy, Target, UncalibratedRendering, UncalibratedSettings, render, render_watched,
 };
 use hybank_ibr::uncalibrated::Point;
 use hybank_ibr::uncalibrated::chirality::Handedness;
 use nalgebra::{Matrix3x4, Rotation3, Vector3};
+use std::sync::Mutex;
+use std::time::Instant;
 
 const SIZE: (usize, usize) = (160, 120);
 const NEAR: f64 = 4.0;
@@ -123,4 +125,24 @@ fn colours_decide_where_calibrations_mislead() {
         assert_eq!(found.geometry.order_by, OrderBy::Colours, "{shift}");
         assert!(psnr > wrong + 1.0, "{shift}: {psnr} dB, the other order {wrong} dB");
     }
+}
+
+/// The share of the work that is done grows from the reconstruction to the end of the fit.
+#[test]
+fn progress_is_reported_in_every_stage() {
+    let cameras = [camera(-0.5, 0.02), camera(0.5, -0.03), camera(0.05, 0.0)];
+    let images = [view(&cameras[0]), view(&cameras[1])];
+    let pairs: Vec<Vec<Option<Point>>> = tracks(&cameras[..2]);
+    let (start, shares) = (Instant::now(), Mutex::new(Vec::new()));
+    let watch = |share: f64| shares.lock().unwrap().push((share, start.elapsed().as_secs_f64()));
+    let (settings, special) = (RenderSettings::default(), UncalibratedSettings::default());
+    let views = [&images[0], &images[1]];
+    let got =
+        render_watched(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special, &watch).unwrap();
+    let shares = shares.into_inner().unwrap();
+    println!("shares and seconds {shares:.3?}, all {:.3} s", start.elapsed().as_secs_f64());
+    assert!(shares.windows(2).all(|pair| pair[0].0 <= pair[1].0), "{shares:?}");
+    let within = |low: f64, high: f64| shares.iter().any(|(share, _)| *share > low && *share < high);
+    assert!(within(0.0, 0.45) && within(0.45, 0.6) && within(0.6, 0.9) && within(0.9, 1.01), "{shares:?}");
+    assert_eq!(got, render(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special).unwrap());
 }

@@ -160,7 +160,7 @@ fn render(
             done.map(whole).map_err(Failure::input)
         }
         Kind::Uncalibrated { targets, .. } => {
-            render_uncalibrated(&scene.kind, &targets[frame], &settings, arguments)
+            render_uncalibrated(&scene.kind, &targets[frame], &settings, (arguments, watch))
         }
     }
 }
@@ -169,7 +169,7 @@ fn render_uncalibrated(
     kind: &Kind,
     target: &Target,
     settings: &RenderSettings,
-    arguments: &RenderArguments,
+    (arguments, watch): (&RenderArguments, Watch<'_>),
 ) -> Result<Rendered, Failure> {
     let Kind::Uncalibrated { images, tracks, size, .. } = kind else {
         return Err(Failure::input("the scene has calibrated views"));
@@ -177,16 +177,20 @@ fn render_uncalibrated(
     let images: Vec<&Image> = images.iter().collect();
     let mut special = UncalibratedSettings::default();
     special.robust.seed = arguments.seed;
-    let run = |special: &UncalibratedSettings| {
-        uncalibrated::render(&images, tracks, target, *size, settings, special).map_err(Failure::input)
+    // The other order needs a second rendering, after the first has said which order that is.
+    let parts = if arguments.reverse_order { 2.0 } else { 1.0 };
+    let run = |special: &UncalibratedSettings, before: f64| {
+        let watch = |share| watch((before + share) / parts);
+        uncalibrated::render_watched(&images, tracks, target, *size, settings, special, &watch)
+            .map_err(Failure::input)
     };
-    let mut done: UncalibratedRendering = run(&special)?;
+    let mut done: UncalibratedRendering = run(&special, 0.0)?;
     if arguments.reverse_order {
         special.handedness = Some(match done.hand {
             Handedness::Kept => Handedness::Reversed,
             Handedness::Reversed => Handedness::Kept,
         });
-        done = run(&special)?;
+        done = run(&special, 1.0)?;
     }
     let geometry = Some(done.geometry);
     Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })

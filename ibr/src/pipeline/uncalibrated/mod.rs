@@ -7,7 +7,7 @@ mod consistency;
 mod reconstruction;
 mod synthesis;
 
-use super::{RenderError, RenderSettings, Rendering};
+use super::{RenderError, RenderSettings, Rendering, Watch};
 use crate::image::Image;
 use crate::interpolate::plane::PlaneSettings;
 use crate::uncalibrated::chirality::Handedness;
@@ -16,6 +16,12 @@ use crate::uncalibrated::{GeometryError, Point, RobustSettings};
 use colours::Advantage;
 use consistency::Surface;
 use reconstruction::Reconstruction;
+
+/// Shares of the work, about, that are done when the scene is reconstructed, when its surfaces are meshed,
+/// and when the order of depth is decided.
+const RECONSTRUCTED: f64 = 0.4;
+const SURFACES: f64 = 0.5;
+const DECIDED: f64 = 0.55;
 
 /// The virtual camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,6 +149,22 @@ pub fn render(
     settings: &RenderSettings,
     uncalibrated: &UncalibratedSettings,
 ) -> Result<UncalibratedRendering, UncalibratedError> {
+    render_watched(images, tracks, target, size, settings, uncalibrated, &|_| ())
+}
+
+/// As [`render`]; `watch` is called with the share of the work that is done.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_watched(
+    images: &[&Image],
+    tracks: &[Vec<Option<Point>>],
+    target: &Target,
+    size: (usize, usize),
+    settings: &RenderSettings,
+    uncalibrated: &UncalibratedSettings,
+    watch: Watch<'_>,
+) -> Result<UncalibratedRendering, UncalibratedError> {
     let columns = tracks.first().map_or(images.len(), Vec::len);
     if images.len() < 2 || columns != images.len() {
         return Err(UncalibratedError::Views { images: images.len(), columns });
@@ -158,14 +180,18 @@ pub fn render(
     let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
     let mut scene = reconstruction::reconstruct(images, &tracks, target, uncalibrated)?;
     scene.numbers = numbers;
+    watch(RECONSTRUCTED);
     let balance = synthesis::balance(&scene, images.len());
     let surfaces = consistency::surfaces(images, &scene, balance.first_two())?;
+    watch(SURFACES);
     if uncalibrated.handedness.is_none() {
         decide(images, &surfaces, &mut scene)?;
     }
+    watch(DECIDED);
+    let rest = |share| watch(DECIDED + (1.0 - DECIDED) * share);
     let colour = images.iter().any(|i| i.channels() == 3);
     let render = if colour { synthesis::render::<3> } else { synthesis::render::<1> };
-    Ok(render(images, &surfaces, &scene, &balance, size, (settings, uncalibrated))?)
+    Ok(render(images, &surfaces, &scene, &balance, size, (settings, uncalibrated, &rest))?)
 }
 
 /// Decides the order of depth from the photographs, which show what is in front, and the guessed

@@ -9,13 +9,16 @@ use crate::image::Image;
 use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::{self, HoleCount};
 use crate::occlusion::{self, DepthTest};
-use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, Report};
+use crate::pipeline::{Agreement, Balance, RenderError, RenderSettings, Rendering, Report, Watch};
 use crate::propagate::Frame;
 use crate::sample::{Dropped, Sample};
 use crate::uncalibrated::Point;
 use crate::uncalibrated::chirality;
 use crate::uncalibrated::mesh::{self, Feature};
 use nalgebra::Vector4;
+
+/// Share of the rendering, about, that is done when the visible samples are known.
+const GATHERED: f64 = 0.4;
 
 /// Renders the virtual view from the reconstructed scene.
 pub(super) fn render<const C: usize>(
@@ -24,7 +27,7 @@ pub(super) fn render<const C: usize>(
     scene: &Reconstruction,
     balance: &Balance,
     size: (usize, usize),
-    (settings, special): (&RenderSettings, &UncalibratedSettings),
+    (settings, special, watch): (&RenderSettings, &UncalibratedSettings, Watch<'_>),
 ) -> Result<UncalibratedRendering, RenderError> {
     let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
     let (mut samples, dropped) = propagated::<C>(images, surfaces, scene, &frame)?;
@@ -39,10 +42,11 @@ pub(super) fn render<const C: usize>(
     let mut region: Vec<bool> = mesh::dense_chi(&hull, size).iter().map(|c| !c.is_nan()).collect();
     let interpolation =
         interpolate::Settings { depth_test: test, plane: special.plane, ..settings.interpolation };
+    watch(GATHERED);
     let mut problem = PlaneProblem::<C>::new(size, &interpolation)?;
     problem.add(&samples)?;
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
-    let fit = problem.solve(Some(&region))?;
+    let fit = problem.solve_watched(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
     report.convergence = Some(fit.convergence);
     report.holes = HoleCount::of(&fit.mask);
     let image = Image::from_values(size, C, fit.values);
