@@ -57,7 +57,6 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     summary.error_white = white;
     output::write(&encoded, arguments.scene.force)?;
     drop(progress);
-    inputs::notes(&scene);
     let mut concerns = Concerns::default();
     concerns.add(&done);
     concerns.warn(&scene.kind);

@@ -2,6 +2,7 @@
 
 use super::arguments::SceneArguments;
 use super::failure::Failure;
+use super::inputs;
 use super::output;
 use crate::files;
 use crate::image::{Image, read_image_within};
@@ -50,7 +51,7 @@ impl SceneArguments {
         Ok(Source { path, spec })
     }
 
-    /// Loads the scene.
+    /// Loads the scene, and prints what was decided on the way.
     pub(super) fn load(&self, source: &Source, densify: Densify, fill: bool) -> Result<Scene, Failure> {
         let options = LoadOptions {
             view: self.view.clone(),
@@ -59,7 +60,9 @@ impl SceneArguments {
             fill,
             max_pixels: self.max_pixels,
         };
-        scene::load(&source.spec, &source.path, &options).map_err(Failure::input)
+        let scene = scene::load(&source.spec, &source.path, &options).map_err(Failure::input)?;
+        inputs::notes(&scene);
+        Ok(scene)
     }
 }
 

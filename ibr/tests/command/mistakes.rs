@@ -27,6 +27,8 @@ fn half_of_a_pair_is_named() {
     write(dir.path(), "calib.txt", &calib);
     let left = good(dir.path(), &["render", "m.toml", "-o", "left.out.png"]);
     assert!(stderr(&left).contains("no disp1.pfm") && stderr(&left).contains("im0.png alone"));
+    let predicted = good(dir.path(), &["bound", "m.toml"]);
+    assert!(stderr(&predicted).contains("note: there is no disp1.pfm"), "{}", stderr(&predicted));
     std::fs::remove_file(at("disp0.pfm")).unwrap();
     refused(dir.path(), &["render", "m.toml", "-o", "x.png"], 1, &["disp0.pfm"]);
     std::fs::copy(at("right.pfm"), at("disp1.pfm")).unwrap();

@@ -4,7 +4,6 @@ use super::concerns::Concerns;
 use super::{Outputs, Summary, outputs, timed};
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::{self, Failure};
-use crate::cli::inputs;
 use crate::cli::output;
 use crate::cli::progress::Progress;
 use crate::image::{FrameRate, Image, Levels, y4m};
@@ -49,7 +48,6 @@ pub(super) fn run(scene: &Scene, preparation: f64, arguments: &RenderArguments) 
     written.extend(film.and_then(|film| film.file));
     output::commit(written)?;
     drop(progress);
-    inputs::notes(scene);
     concerns.warn(&scene.kind);
     report(&summary, &files, arguments)
 }
