@@ -119,6 +119,7 @@ pub(crate) fn list(names: &[&str], between: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn index(names: &[&str], wanted: &str) -> Option<usize> {
         find(names, wanted).ok().map(|found| found.index)
@@ -143,6 +144,20 @@ mod tests {
             (&both, "", None),
         ] {
             assert_eq!(index(names, wanted), want, "{names:?} {wanted}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
+        /// Names find themselves, and those that are in no folder of another one also below a folder.
+        #[test]
+        fn every_name_of_a_list_is_found(list in prop::collection::btree_set("([ab]/){0,3}[ab]\\.(png|jpg)", 1..12)) {
+            let names: Vec<&str> = list.iter().map(String::as_str).collect();
+            for (i, name) in names.iter().enumerate() {
+                let want = Found { index: i, whole: true };
+                prop_assert_eq!(find(&names, name), Ok(want));
+                prop_assert_eq!(find(&names, &format!("photos/./{name}")), Ok(want));
+            }
         }
     }
 

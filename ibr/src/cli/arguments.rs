@@ -42,7 +42,8 @@ pub(super) struct SceneArguments {
     /// Scene file (TOML); `-` is standard input.
     #[arg(value_name = "SCENE")]
     pub(super) file: PathBuf,
-    /// Leave this view out; the virtual view is its place.
+    /// Leave this view out; the virtual view is its place. Its name, or the end of the path of its image;
+    /// also an image that only has a camera in a COLMAP model or transforms file.
     #[arg(long, value_name = "NAME")]
     pub(super) view: Option<String>,
     /// Use only every K-th value of full depth maps, in rows and columns.

@@ -175,6 +175,34 @@ fn cameras_are_scaled_to_their_photographs() {
     refused(dir.path(), &render, 1, &["view \"photos/a.png\"", "60 x 45", "45 x 60", "same factor"]);
 }
 
+/// A virtual view of another size but of the shape of its camera's image shows the same scene; one of
+/// another shape is a window of it.
+#[test]
+fn a_size_of_the_same_shape_scales_the_virtual_camera() {
+    let dir = folder(FLAT);
+    let at = |name: &str| dir.path().join(name);
+    let small = photographs((60, 45), INNER.map(|v| v / 2.0));
+    save(&small[2].0, &at("small.png")).unwrap();
+    let whole = std::fs::read_to_string(at("s.toml")).unwrap();
+    let two = whole.split("[[view]]").take(3).collect::<Vec<_>>().join("[[view]]");
+    let target = |size: &str| {
+        let text = format!("{two}[virtual]\ncamera_of = \"c.png\"\n{size}");
+        std::fs::write(at("s.toml"), text).unwrap();
+    };
+    target("size = [60, 45]\n");
+    let found = psnr(dir.path(), &["--truth", "small.png"]);
+    assert!(found > 28.0, "{found}");
+    let picture = |name: &str| hybank_ibr::image::read_image(&at(name)).unwrap();
+    target("");
+    good(dir.path(), &["render", "s.toml", "-o", "whole.png"]);
+    target("size = [120, 50]\n");
+    good(dir.path(), &["render", "s.toml", "-o", "window.png"]);
+    let (whole, window) = (picture("whole.png"), picture("window.png"));
+    let difference = |i: usize| (whole.data()[i] - window.data()[i]).abs();
+    // The fit at the lower border of the window knows nothing of what is below.
+    assert!((0..3 * 120 * 45).all(|i| difference(i) <= 2.0));
+}
+
 /// Folders around the model, names that it does not have, and formats that were changed.
 #[test]
 fn messages_lead_to_the_model_and_its_names() {
