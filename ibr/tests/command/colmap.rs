@@ -134,7 +134,9 @@ fn folders_tell_images_of_one_name_apart() {
     replace(dir.path(), "\"0001.png\"", "\"photos/right/0001.png\"");
     let one = images(["left/0001.png", "other.png", "mid.png"]);
     std::fs::write(dir.path().join("model/images.txt"), one).unwrap();
-    refused(dir.path(), &render, 1, &["photos/left/0001.png", "photos/right/0001.png", "both"]);
+    let both = ["photos/left/0001.png", "photos/right/0001.png", "both"];
+    refused(dir.path(), &render, 1, &both);
+    refused(dir.path(), &["render", "s.toml", "--view", "right/0001.png", "-o", "x.png"], 1, &both);
 }
 
 /// Photographs of half the size that the model is for: the cameras are scaled with them.

@@ -44,7 +44,7 @@ impl Loader<'_> {
         left_out: Option<&LeftOut>,
         goals: &[Goal],
     ) -> Loaded<Inputs> {
-        self.a_camera_each(views)?;
+        self.a_camera_each()?;
         let sources = in_order(views.par_iter().map(|view| self.source(view)).collect())?;
         let first = First { size: sources[0].0.image.size(), resized: sources[0].2 };
         let (cameras, size) = match left_out {

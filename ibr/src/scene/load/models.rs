@@ -116,10 +116,11 @@ impl Loader<'_> {
         Ok(self.listed_name(&source, image)?.is_some_and(|(_, whole)| whole))
     }
 
-    /// Refuses two photographs with the camera of one image, where a folder says that it is not theirs.
-    pub(super) fn a_camera_each(&self, views: &[&ViewSpec]) -> Loaded<()> {
+    /// Refuses two photographs with the camera of one image, where a folder says that it is not theirs; the
+    /// view that is left out has a camera too.
+    pub(super) fn a_camera_each(&self) -> Loaded<()> {
         let mut seen: BTreeMap<(PathBuf, String), (&ViewSpec, bool)> = BTreeMap::new();
-        for view in views.iter().filter(|view| view.camera.is_none()) {
+        for view in self.spec.view.iter().filter(|view| view.camera.is_none()) {
             let Some(source) = self.source_of(view) else { continue };
             let Some((name, whole)) = self.listed_name(&source, &view.image.to_string_lossy())? else {
                 continue;
