@@ -5,7 +5,7 @@ mod relief;
 
 pub use fill::fill_unknown;
 pub use relief::Relief;
-pub(crate) use relief::{Reliefs, TILE};
+pub(crate) use relief::{JUMP, Reliefs, TILE};
 
 /// The quantity that a map holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,6 +153,12 @@ impl DepthMap {
     #[inline]
     pub fn is_guessed(&self, pixel: usize) -> bool {
         self.guessed.get(pixel).copied().unwrap_or(false)
+    }
+
+    /// Which values from this pixel on were filled from their neighbours; empty if none of the map was.
+    #[inline]
+    pub(crate) fn guessed_from(&self, pixel: usize) -> &[bool] {
+        self.guessed.get(pixel..).unwrap_or_default()
     }
 
     /// Width in values.

@@ -3,7 +3,7 @@
 use super::{DepthMap, Measure};
 
 /// A difference of this share of the nearer depth separates two surfaces: the depth test's default sigma.
-const JUMP: f32 = 0.05;
+pub(crate) const JUMP: f32 = 0.05;
 
 /// The surroundings of a pixel of known depth.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -42,8 +42,8 @@ pub(crate) struct Reliefs {
 
 impl Reliefs {
     /// The surroundings of the pixel with this number in the tile.
-    #[inline]
-    pub(crate) fn at(&self, i: usize) -> Relief {
+    #[cfg(test)]
+    fn at(&self, i: usize) -> Relief {
         Relief {
             across: f64::from(self.across[i]),
             down: f64::from(self.down[i]),

@@ -1,7 +1,10 @@
-//! Occlusion removal in the plane: a grid of cells of the size of the radius, with the least depth around
-//! each cell. Samples whose radii differ by a factor of two or more lie in different grids.
+//! Occlusion removal in the plane. A coarse grid finds the samples near depth edges; these are compared with
+//! those in the cells around them, of the size of the radius. Samples whose radii differ by a factor of two
+//! or more lie in different grids.
 
 use super::DepthTest;
+use super::cells::Cells;
+use super::points::{Extent, Points};
 use crate::sample::Sample;
 use rayon::prelude::*;
 
@@ -10,10 +13,10 @@ const CELLS_A_SAMPLE: usize = 4;
 
 /// Removes the hidden samples and keeps the order of the others; returns how many were removed.
 ///
-/// The ball of a sample meets at most nine cells. Most samples are visible, and one comparison with the
-/// least depth in these cells shows it; only the others are compared with the members. O(n) for the grid,
-/// and O(k) for samples near nearer ones, k the number of samples in nine cells. Parallel, with the same
-/// bits for any number of threads.
+/// The ball of a sample meets at most nine cells. Most samples are visible, and the least depth around some
+/// of them shows it; only the others are compared with the members. O(n) for the depths, and O(k) for
+/// samples near nearer ones, k the number of samples in nine cells. Parallel, with the same bits for any
+/// number of threads.
 pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) -> usize {
     let hidden = hidden(samples, test);
     let before = samples.len();
@@ -24,22 +27,71 @@ pub fn remove<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTest) ->
 
 /// Which samples are hidden.
 pub(crate) fn hidden<const C: usize>(samples: &[Sample<C>], test: &DepthTest) -> Vec<bool> {
-    if samples.is_empty() {
-        return Vec::new();
+    let points = Points::of(samples);
+    let mut search = PlaneSearch::default();
+    search.clear(&points.extent(), points.len());
+    search.enter(&points, test);
+    let mut flags = vec![false; samples.len()];
+    search.hidden(&points, test).iter().for_each(|i| flags[*i as usize] = true);
+    flags
+}
+
+/// Finds hidden samples; work memory that is used again.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PlaneSearch {
+    extent: Extent,
+    cells: Cells,
+    suspects: Vec<u32>,
+    grids: [Grid; LEVELS],
+    members: Vec<Member>,
+    hidden: Vec<u32>,
+}
+
+impl PlaneSearch {
+    /// Begins a search among at most `count` samples in a rectangle.
+    pub(crate) fn clear(&mut self, extent: &Extent, count: usize) {
+        self.extent = *extent;
+        self.cells.clear(extent, count);
     }
-    let extent = Extent::of(samples);
-    let mut next = vec![NONE; samples.len()];
-    let mut grids: [Option<Grid>; LEVELS] = [const { None }; LEVELS];
-    for (i, s) in samples.iter().enumerate() {
-        let level = level(s.spacing);
-        let radius = || test.radius((1 << level) as f32);
-        let grid = grids[level].get_or_insert_with(|| Grid::new(samples.len(), &extent, radius()));
-        next[i] = grid.insert(i as u32, s);
+
+    /// Looks at the samples that have been appended since the last call.
+    pub(crate) fn enter(&mut self, points: &Points, test: &DepthTest) {
+        self.cells.enter(points, test);
     }
-    let grids: Vec<Grid> = grids.into_iter().flatten().map(Grid::with_neighbours).collect();
-    let members = Members { samples, next: &next, test };
-    let hidden = |s: &Sample<C>| grids.iter().any(|grid| grid.hides(s, &members));
-    samples.par_iter().with_min_len(16_384).map(hidden).collect()
+
+    /// The places of the hidden ones among the samples that have been entered, in increasing order.
+    pub(crate) fn hidden(&mut self, points: &Points, test: &DepthTest) -> &[u32] {
+        self.cells.suspects(points, test, &mut self.suspects);
+        self.hidden.clear();
+        if !self.suspects.is_empty() {
+            self.gather(points, test);
+            let Self { suspects, grids, members, hidden, .. } = self;
+            let is_hidden = |i: &u32| {
+                let (i, members) = (*i as usize, &members[..]);
+                let [x, y] = [points.x[i], points.y[i]];
+                grids.iter().any(|grid| grid.hides((x, y, points.depth[i]), members, test))
+            };
+            hidden.par_extend(suspects.par_iter().with_min_len(4096).copied().filter(is_hidden));
+        }
+        &self.hidden
+    }
+
+    /// Fills the grids with the samples that may hide others.
+    fn gather(&mut self, points: &Points, test: &DepthTest) {
+        let Self { extent, cells, grids, members, .. } = self;
+        members.clear();
+        grids.iter_mut().for_each(|grid| grid.heads.clear());
+        cells.hiders(points, test, |i| {
+            let (x, y, depth, spacing) = (points.x[i], points.y[i], points.depth[i], points.spacing[i]);
+            let level = level(spacing);
+            let grid = &mut grids[level];
+            if grid.heads.is_empty() {
+                grid.place(extent, test.radius((1 << level) as f32), CELLS_A_SAMPLE * points.len() + 16);
+            }
+            let next = grid.insert(members.len() as u32, x, y);
+            members.push(Member { x, y, radius: test.radius(spacing), depth, next });
+        });
+    }
 }
 
 /// Grids for samples of spacing up to 1, 2, 4 and 8.
@@ -54,28 +106,9 @@ fn level(spacing: f32) -> usize {
     [1.0, 2.0, 4.0].iter().map(|limit| usize::from(spacing > *limit)).sum()
 }
 
-/// The rectangle that holds all samples.
-struct Extent {
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
-}
-
-impl Extent {
-    fn of<const C: usize>(samples: &[Sample<C>]) -> Self {
-        let none = Self { left: f64::MAX, right: f64::MIN, top: f64::MAX, bottom: f64::MIN };
-        samples.iter().fold(none, |e, s| Self {
-            left: e.left.min(s.x),
-            right: e.right.max(s.x),
-            top: e.top.min(s.y),
-            bottom: e.bottom.max(s.y),
-        })
-    }
-}
-
 /// Samples of similar radius in square cells, those of a cell as a linked list: neighbouring samples of a
 /// view come one after the other, so building it touches one cell after the other.
+#[derive(Debug, Clone, Default)]
 struct Grid {
     left: f64,
     top: f64,
@@ -83,108 +116,71 @@ struct Grid {
     scale: f64,
     columns: usize,
     rows: usize,
-    /// The last member of each cell.
+    /// The last member of each cell; empty without members.
     heads: Vec<u32>,
-    /// Least depth of the members in each cell, and later in it and its eight neighbours.
-    least: Vec<f32>,
 }
 
-/// All samples, and the one before each in its cell.
-struct Members<'a, const C: usize> {
-    samples: &'a [Sample<C>],
-    next: &'a [u32],
-    test: &'a DepthTest,
+/// A sample that may hide others.
+#[derive(Debug, Clone, Copy)]
+struct Member {
+    x: f64,
+    y: f64,
+    radius: f64,
+    depth: f32,
+    /// The one before it in its cell.
+    next: u32,
 }
 
 impl Grid {
-    /// An empty grid over the extent of all samples, with cells no smaller than `radius`.
-    fn new(samples: usize, extent: &Extent, radius: f64) -> Self {
-        let Extent { left, right, top, bottom } = *extent;
+    /// Places an empty grid over the extent of all samples, with cells no smaller than `radius`.
+    fn place(&mut self, extent: &Extent, radius: f64, most: usize) {
         // Members within the radius lie in neighbouring cells, even if the positions in the grid round.
-        let mut edge = 1.0001 * radius;
-        let limit = (CELLS_A_SAMPLE * samples + 16) as f64;
-        // The doubling ends at the latest when one cell holds all samples.
-        while ((right - left) / edge + 1.0) * ((bottom - top) / edge + 1.0) > limit {
-            edge *= 2.0;
-        }
-        let scale = 1.0 / edge;
-        let columns = ((right - left) * scale) as usize + 1;
-        let rows = ((bottom - top) * scale) as usize + 1;
-        let (heads, least) = (vec![NONE; columns * rows], vec![f32::INFINITY; columns * rows]);
-        Self { left, top, scale, columns, rows, heads, least }
+        let scale = extent.scale(1.0001 * radius, most);
+        let ((columns, rows), mut heads) = (extent.cells(scale), std::mem::take(&mut self.heads));
+        heads.resize(columns * rows, NONE);
+        *self = Self { left: extent.left, top: extent.top, scale, columns, rows, heads };
     }
 
     /// Adds a member; returns the one before it in its cell.
     #[inline]
-    fn insert<const C: usize>(&mut self, index: u32, s: &Sample<C>) -> u32 {
-        let (column, row) = self.cell(s);
-        let cell = row * self.columns + column;
-        self.least[cell] = least(self.least[cell], s.depth);
-        std::mem::replace(&mut self.heads[cell], index)
+    fn insert(&mut self, index: u32, x: f64, y: f64) -> u32 {
+        let (column, row) = self.cell(x, y);
+        std::mem::replace(&mut self.heads[row * self.columns + column], index)
     }
 
-    /// Spreads the least depths over the nine cells around each: first along the rows, then down the
-    /// columns.
-    fn with_neighbours(mut self) -> Self {
-        let columns = self.columns;
-        let mut along = self.least.clone();
-        for (wide, row) in along.chunks_exact_mut(columns).zip(self.least.chunks_exact(columns)) {
-            wide.iter_mut().skip(1).zip(row).for_each(|(w, before)| *w = least(*w, *before));
-            wide.iter_mut().zip(&row[1..]).for_each(|(w, after)| *w = least(*w, *after));
+    /// Column and row of the cell of a position.
+    #[inline]
+    fn cell(&self, x: f64, y: f64) -> (usize, usize) {
+        (((x - self.left) * self.scale) as usize, ((y - self.top) * self.scale) as usize)
+    }
+
+    /// Whether any member hides a sample with this position and depth: comparison with those in the nine
+    /// cells around.
+    fn hides(&self, (x, y, depth): (f64, f64, f32), members: &[Member], test: &DepthTest) -> bool {
+        if self.heads.is_empty() {
+            return false;
         }
-        self.least.copy_from_slice(&along);
-        self.least.iter_mut().skip(columns).zip(&along).for_each(|(l, above)| *l = least(*l, *above));
-        self.least.iter_mut().zip(&along[columns..]).for_each(|(l, below)| *l = least(*l, *below));
-        self
-    }
-
-    /// Column and row of the cell of a sample.
-    #[inline]
-    fn cell<const C: usize>(&self, s: &Sample<C>) -> (usize, usize) {
-        (((s.x - self.left) * self.scale) as usize, ((s.y - self.top) * self.scale) as usize)
-    }
-
-    /// Whether any member hides `s`.
-    #[inline]
-    fn hides<const C: usize>(&self, s: &Sample<C>, members: &Members<'_, C>) -> bool {
-        let (column, row) = self.cell(s);
-        let least = self.least[row * self.columns + column];
-        members.test.hides(f64::from(least), f64::from(s.depth)) && self.search(s, (column, row), members)
-    }
-
-    /// The same by comparison with the members of the nine cells around.
-    fn search<const C: usize>(
-        &self,
-        s: &Sample<C>,
-        (column, row): (usize, usize),
-        members: &Members<'_, C>,
-    ) -> bool {
+        let (column, row) = self.cell(x, y);
         let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
-        (row.saturating_sub(1)..(row + 2).min(self.rows))
-            .any(|r| columns.clone().any(|c| members.hide(self.heads[r * self.columns + c], s)))
-    }
-}
-
-impl<const C: usize> Members<'_, C> {
-    /// Whether a sample of the list that begins with `head` hides `s`.
-    fn hide(&self, head: u32, s: &Sample<C>) -> bool {
-        let member = |i: u32| (i != NONE).then_some(i);
-        std::iter::successors(member(head), |i| member(self.next[*i as usize])).any(|i| {
-            let y = &self.samples[i as usize];
-            self.test.hides(f64::from(y.depth), f64::from(s.depth))
-                && DepthTest::close(s.x - y.x, s.y - y.y, self.test.radius(y.spacing))
+        let hides = |m: &Member| {
+            test.hides(f64::from(m.depth), f64::from(depth)) && DepthTest::close(x - m.x, y - m.y, m.radius)
+        };
+        (row.saturating_sub(1)..(row + 2).min(self.rows)).any(|r| {
+            let cells = &self.heads[r * self.columns..][columns.clone()];
+            cells.iter().any(|head| list(members, *head).any(hides))
         })
     }
 }
 
-/// The lesser of two numbers, the first if the second is not a number.
+/// The members of the list that begins with `head`.
 #[inline]
-fn least(a: f32, b: f32) -> f32 {
-    if b < a { b } else { a }
+fn list(members: &[Member], head: u32) -> impl Iterator<Item = &Member> {
+    std::iter::successors(members.get(head as usize), |m| members.get(m.next as usize))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::points::RUN;
     use super::*;
     use proptest::prelude::*;
 
@@ -203,6 +199,9 @@ mod tests {
         check(&[sample(1.0, 1.0, 1.0)], &test);
         check(&[sample(1.0, 1.0, 1.0); 5], &test);
         check(&[sample(1.0, 1.0, 1.0), sample(1.0, 1.0, 2.0), sample(1e9, -1e9, 2.0)], &test);
+        check(&[sample(f64::NAN, 1.0, 1.0), sample(1.0, 1.0, 1.0), sample(1.0, f64::NAN, 2.0)], &test);
+        check(&[sample(f64::NAN, f64::NAN, 1.0); 2], &test);
+        check(&[sample(1.0, 1.0, f32::NAN), sample(1.0, 1.0, 2.0), sample(1.0, 1.2, 1.0)], &test);
     }
 
     #[test]
@@ -233,6 +232,37 @@ mod tests {
             let signed: Vec<Sample<1>> =
                 samples.iter().map(|s| Sample { depth: s.depth + lift, ..*s }).collect();
             check(&signed, &DepthTest { epsilon, relative: 0.0, absolute: 0.5 });
+        }
+
+        /// Samples that only hide others, places without a sample, several calls, and memory used before.
+        #[test]
+        fn a_search_in_parts_decides_on_its_own_samples(
+            raw in prop::collection::vec((0.0..30.0_f64, 0.0..9.0_f64, 0.5..9.0_f32, 0.2..12.0_f32, 0..4), 1..300),
+            cut in 0..300_usize, epsilon in 0.1..4.0_f64, relative in 0.0..0.3_f64
+        ) {
+            let samples: Vec<Sample<1>> = raw
+                .iter()
+                .map(|(x, y, d, spacing, kind)| match kind {
+                    0 => Sample { spacing: f32::NAN, ..sample(f64::NAN, f64::NAN, f32::NAN) },
+                    _ => Sample { spacing: *spacing, ..sample(*x, *y, *d) },
+                })
+                .collect();
+            let test = DepthTest { epsilon, relative, absolute: 0.1 };
+            let mut points = Points::of(&samples);
+            raw.iter().enumerate().for_each(|(i, s)| points.own[i] = s.4 > 1);
+            let own = |i: &usize| points.own[*i];
+            let hidden = test.hidden_by_definition(&samples);
+            let want: Vec<u32> = (0..raw.len()).filter(|i| hidden[*i]).filter(own).map(|i| i as u32).collect();
+            let mut part = points.clone();
+            part.resize((cut.min(raw.len()) / RUN) * RUN);
+            let extent = Extent { left: -1.0, right: 31.0, top: 0.0, bottom: 9.0 };
+            let mut search = PlaneSearch::default();
+            for _ in 0..2 {
+                search.clear(&extent, points.len());
+                search.enter(&part, &test);
+                search.enter(&points, &test);
+                prop_assert_eq!(search.hidden(&points, &test), &want);
+            }
         }
     }
 }

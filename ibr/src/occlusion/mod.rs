@@ -16,11 +16,14 @@
 //! one of that radius does, and comparing with the least depth suffices; this also holds in floating point,
 //! since both sides are monotone.
 
+mod cells;
 mod grid;
+mod points;
 mod row;
 
-pub(crate) use grid::hidden;
 pub use grid::remove;
+pub(crate) use grid::{PlaneSearch, hidden};
+pub(crate) use points::{Extent, Points, RUN};
 pub use row::{RowScratch, remove_in_row};
 
 use crate::sample::Sample;

@@ -7,10 +7,11 @@ use crate::camera::Camera;
 use crate::image::Image;
 use crate::interpolate::HoleCount;
 use crate::interpolate::plane::PlaneProblem;
-use crate::occlusion::{self, DepthTest, LARGEST_SPACING};
-use crate::propagate::{CalibratedView, Frame, Survey};
+use crate::occlusion::{DepthTest, PlaneSearch};
+use crate::propagate::{CalibratedView, Frame, Landed, Survey};
 use crate::sample::Sample;
 use std::ops::Range;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Samples held in memory at a time; larger scenes are rendered in bands of rows.
@@ -95,8 +96,14 @@ fn render_with<const C: usize>(
     let bands: Vec<Range<usize>> =
         (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
     let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let pool: Mutex<Vec<Work>> = Mutex::default();
     problem.add_bands(&bands, |rows| {
-        let (mut samples, all) = visible_in(rows.clone(), height, &survey, views, settings.depth_test());
+        let mut work = pool.lock().ok().and_then(|mut pool| pool.pop()).unwrap_or_default();
+        let test = settings.depth_test();
+        let (mut samples, all) = visible_in(rows.clone(), height, &survey, views, test, &mut work);
+        if let Ok(mut pool) = pool.lock() {
+            pool.push(work);
+        }
         balance.apply(&mut samples, |view| views[view].image);
         propagated.fetch_add(all, Ordering::Relaxed);
         watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
@@ -116,6 +123,13 @@ fn render_with<const C: usize>(
     Ok(Rendering { image, mask, depth, counts, views: chosen, report, agreement })
 }
 
+/// Work memory of the first two stages.
+#[derive(Default)]
+struct Work {
+    landed: Landed,
+    search: PlaneSearch,
+}
+
 /// The first two stages for some rows of the virtual image: the visible samples of these rows, and the
 /// number of all of their samples. The band is widened by the largest radius of the depth test on both
 /// sides, so that it contains every sample that can hide one of the band.
@@ -125,21 +139,17 @@ fn visible_in<const C: usize>(
     survey: &Survey,
     views: &[CalibratedView<'_>],
     test: &DepthTest,
+    work: &mut Work,
 ) -> (Vec<Sample<C>>, usize) {
     let last = rows.end == height;
     let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
     let bottom = if last { f64::MAX } else { rows.end as f64 };
-    // A little more than the radius: the distance test rounds.
-    let reach = 1.01 * test.radius(LARGEST_SPACING);
-    let mut samples = survey.samples_between::<C>(views, top - reach, bottom + reach);
-    let hidden = occlusion::hidden(&samples, test);
-    let (mut flags, mut all) = (hidden.iter(), 0);
-    samples.retain(|s| {
-        let own = s.y >= top && (s.y < bottom || last);
-        all += usize::from(own);
-        own & !flags.next().copied().unwrap_or(false)
-    });
-    (samples, all)
+    let (own, Work { landed, search }) = ((top, bottom), work);
+    search.clear(&survey.band_around(own, test).extent(), survey.most_between(own, test));
+    survey.land_between(views, own, test, landed, |points| search.enter(points, test));
+    let all = landed.count();
+    landed.remove(search.hidden(landed.points(), test));
+    (landed.samples(views), all)
 }
 
 #[cfg(test)]
@@ -147,6 +157,7 @@ mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
     use crate::interpolate::plane;
+    use crate::occlusion;
     use crate::propagate;
     use nalgebra::Matrix3x4;
 
@@ -184,8 +195,9 @@ mod tests {
         // In bands only the order of summation differs.
         let survey = Survey::new(&views, &target, &frame);
         let mut problem = PlaneProblem::<1>::new((40, 30), &settings.interpolation).unwrap();
+        let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
-            let (mut band, _) = visible_in(rows, 30, &survey, &views, settings.depth_test());
+            let (mut band, _) = visible_in(rows, 30, &survey, &views, settings.depth_test(), &mut work);
             Balance::calibrated(&views, &target).apply(&mut band, |view| views[view].image);
             problem.add(&band).unwrap();
         }

@@ -1,14 +1,20 @@
 //! Propagation from general cameras.
 
-use super::{CalibratedView, Frame, spacing, weight};
+mod landed;
+mod row_map;
+
+pub(crate) use landed::Landed;
+
+use super::{CalibratedView, Frame};
 use crate::camera::{Camera, Relative};
 use crate::depth::TILE;
+use crate::occlusion::{DepthTest, LARGEST_SPACING, Points};
 use crate::sample::{Dropped, Sample};
 use rayon::prelude::*;
+use row_map::RowMap;
 
-/// Least depth at the virtual camera for which the corners of a tile say where its pixels fall, as a share
-/// of the largest one.
-const IN_FRONT: f64 = 1e-6;
+/// Factor of the radius of the depth test: its distances round.
+const REACH: f64 = 1.01;
 
 /// Where the pixels of all views fall in the virtual image, tile by tile, so that the samples of any band of
 /// rows are found without looking at the pixels that miss it.
@@ -34,6 +40,8 @@ struct Tile {
     column: u32,
     /// Bounds of the virtual rows of its samples.
     rows: (f64, f64),
+    /// Bound of their spacing.
+    spacing: f32,
 }
 
 impl Survey {
@@ -79,19 +87,66 @@ impl Survey {
         top: f64,
         bottom: f64,
     ) -> Vec<Sample<C>> {
+        let mut landed = Landed::default();
         let band = self.frame.band(top, bottom);
-        let mut samples = Vec::with_capacity(self.reaching(&band).count() * TILE);
-        for tile in self.reaching(&band) {
-            let view = usize::from(tile.view);
-            tile_samples(&views[view], &self.maps[view], tile, &band, &mut samples);
+        for tile in self.reaching(band.rows, |_| 0.0) {
+            self.land(views, tile, &band, (f64::MIN, f64::MAX), &mut landed);
         }
-        samples
+        landed.samples(views)
     }
 
-    /// The tiles that may have samples in a band.
-    fn reaching<'a>(&'a self, band: &Frame) -> impl Iterator<Item = &'a Tile> + use<'a> {
-        let (top, bottom) = band.rows;
-        self.tiles.iter().filter(move |t| t.rows.0 <= bottom && t.rows.1 >= top)
+    /// The samples between two rows of the frame, the second excluded, and those that may hide them. Calls
+    /// `with` after each tile.
+    pub(crate) fn land_between(
+        &self,
+        views: &[CalibratedView<'_>],
+        own: (f64, f64),
+        test: &DepthTest,
+        landed: &mut Landed,
+        mut with: impl FnMut(&Points),
+    ) {
+        landed.clear();
+        let band = self.band_around(own, test);
+        for tile in self.reaching(own, |spacing| REACH * test.radius(spacing)) {
+            self.land(views, tile, &band, own, landed);
+            with(landed.points());
+        }
+    }
+
+    fn land(
+        &self,
+        views: &[CalibratedView<'_>],
+        tile: &Tile,
+        band: &Frame,
+        own: (f64, f64),
+        landed: &mut Landed,
+    ) {
+        let view = usize::from(tile.view);
+        landed.push(&views[view], &self.maps[view], tile, band, own);
+    }
+
+    /// The part of the frame that holds all samples between two rows and those that may hide them.
+    pub(crate) fn band_around(&self, (top, bottom): (f64, f64), test: &DepthTest) -> Frame {
+        let reach = REACH * test.radius(LARGEST_SPACING);
+        self.frame.band(top - reach, bottom + reach)
+    }
+
+    /// Places that [`Survey::land_between`] takes, at most.
+    pub(crate) fn most_between(&self, own: (f64, f64), test: &DepthTest) -> usize {
+        self.reaching(own, |spacing| REACH * test.radius(spacing)).count() * TILE
+    }
+
+    /// The tiles that may have samples between two rows, or as far from these as `reach` says of their
+    /// spacing.
+    fn reaching<'a>(
+        &'a self,
+        (top, bottom): (f64, f64),
+        reach: impl Fn(f32) -> f64 + 'a,
+    ) -> impl Iterator<Item = &'a Tile> {
+        self.tiles.iter().filter(move |t| {
+            let reach = reach(t.spacing);
+            t.rows.0 - reach <= bottom && t.rows.1 + reach >= top
+        })
     }
 }
 
@@ -132,184 +187,13 @@ impl RowSurvey {
             });
             if reach.meets(frame) {
                 let (row, column) = (y as u32, column as u32);
-                survey.tiles.push(Tile { view: index, row, column, rows: reach.rows });
+                // Slopes are known as shares of depths, not of disparities with an offset.
+                let known = view.depth.offset() == 0.0;
+                let spacing = if known { reach.spacing.min(LARGEST_SPACING) } else { LARGEST_SPACING };
+                survey.tiles.push(Tile { view: index, row, column, rows: reach.rows, spacing });
             }
         }
         survey
-    }
-}
-
-/// Bounds of the positions of some samples in the virtual image.
-struct Reach {
-    columns: (f64, f64),
-    rows: (f64, f64),
-}
-
-impl Reach {
-    fn meets(&self, frame: &Frame) -> bool {
-        let right = frame.width as f64 - 1.0 + frame.margin;
-        let (left, end) = (self.columns.0 + frame.offset, self.columns.1 + frame.offset);
-        left <= right && end >= -frame.margin && self.rows.0 <= frame.rows.1 && self.rows.1 >= frame.rows.0
-    }
-}
-
-/// The map of the pixels of one row: A x~ is affine in the column.
-struct RowMap<'a> {
-    map: &'a Relative,
-    y: f64,
-    start: [f64; 3],
-    /// Change of A x~ for a step to the right, and for one down.
-    step: [f64; 3],
-    down: [f64; 3],
-    shift: [f64; 3],
-    linear: bool,
-}
-
-/// A pixel with depth at the virtual camera.
-struct Landing {
-    /// Position and depth.
-    at: (f64, f64, f64),
-    /// A x~.
-    ray: [f64; 3],
-    /// Position without lenses.
-    ideal: [f64; 2],
-    /// 1 / depth.
-    inverse: f64,
-}
-
-impl<'a> RowMap<'a> {
-    fn new(map: &'a Relative, y: usize) -> Self {
-        let (a, b, y) = (&map.a, &map.b, y as f64);
-        let start = std::array::from_fn(|k| a[(k, 1)] * y + a[(k, 2)]);
-        let [step, down] = [0, 1].map(|column| std::array::from_fn(|k| a[(k, column)]));
-        Self { map, y, start, step, down, shift: [b.x, b.y, b.z], linear: map.is_linear() }
-    }
-
-    #[inline]
-    fn land(&self, x: f64, depth: f64) -> Landing {
-        // Written out: closures over the three coordinates are calls in this innermost loop.
-        let ray = [
-            self.start[0] + self.step[0] * x,
-            self.start[1] + self.step[1] * x,
-            self.start[2] + self.step[2] * x,
-        ];
-        let p =
-            [ray[0] * depth + self.shift[0], ray[1] * depth + self.shift[1], ray[2] * depth + self.shift[2]];
-        let inverse = 1.0 / p[2];
-        let ideal = [p[0] * inverse, p[1] * inverse];
-        let at = if self.linear { (ideal[0], ideal[1], p[2]) } else { self.map.map(x, self.y, depth) };
-        Landing { at, ray, ideal, inverse }
-    }
-
-    /// What one pixel of known depth becomes.
-    #[inline]
-    fn fate(&self, x: f64, depth: f32, frame: &Frame) -> Fate {
-        let landing = self.land(x, f64::from(depth));
-        let (u, v, d) = landing.at;
-        let u = u + frame.offset;
-        // NaN: outside the domain of the lens model.
-        if d <= 0.0 || u.is_infinite() || v.is_infinite() {
-            Fate::Behind
-        } else if frame.holds_column(u) && frame.holds_row(v) {
-            Fate::Sample(landing)
-        } else {
-            Fate::Outside
-        }
-    }
-
-    /// The displacements of a landing, in virtual pixels, for a step of one pixel to the right and for one
-    /// down, on a surface whose depth changes by `slopes` per pixel in these directions.
-    ///
-    /// With q = A x~ and p = d q + b, dp = d A e + q d' and d(p.x / p.z) = (dp.x - p.x / p.z dp.z) / p.z.
-    /// Lenses are left out: they change distances between neighbours by a few per cent.
-    #[inline]
-    fn steps(&self, landing: &Landing, depth: f64, slopes: [f64; 2]) -> [[f64; 2]; 2] {
-        [self.moved(landing, depth, self.step, slopes[0]), self.moved(landing, depth, self.down, slopes[1])]
-    }
-
-    /// The displacement for the change `a` of A x~ and a change of the depth by `slope`.
-    #[inline]
-    fn moved(&self, landing: &Landing, depth: f64, a: [f64; 3], slope: f64) -> [f64; 2] {
-        let Landing { ray, ideal, inverse, .. } = landing;
-        let away = a[2] * depth + ray[2] * slope;
-        let across = a[0] * depth + ray[0] * slope - ideal[0] * away;
-        let along = a[1] * depth + ray[1] * slope - ideal[1] * away;
-        [across * inverse, along * inverse]
-    }
-
-    /// Bounds of the samples of a tile, if all of it lies in front of the virtual camera and no lens bends
-    /// the map.
-    fn corners(&self, column: usize, depths: &[f32]) -> Option<Reach> {
-        let (near, far) =
-            depths.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), d| (a.min(*d), b.max(*d)));
-        let ends = [column as f64, (column + depths.len() - 1) as f64];
-        let corners = ends.map(|x| [near, far].map(|d| self.land(x, f64::from(d)).at));
-        let all = || corners.iter().flatten();
-        let bounds = |of: fn(&(f64, f64, f64)) -> f64| {
-            all().map(of).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
-        };
-        let (least, largest) = bounds(|p| p.2);
-        // The computed positions round: a millionth of a pixel is more than enough.
-        let wide =
-            |(low, high): (f64, f64)| (low - 1e-6 * (1.0 + low.abs()), high + 1e-6 * (1.0 + high.abs()));
-        (self.linear && largest > 0.0 && least > IN_FRONT * largest)
-            .then(|| Reach { columns: wide(bounds(|p| p.0)), rows: wide(bounds(|p| p.1)) })
-    }
-
-    /// The same from every pixel, and the number of pixels behind the virtual camera.
-    fn each(&self, column: usize, depths: &[f32], frame: &Frame) -> (Reach, usize) {
-        let mut behind = 0;
-        let mut rows = (f64::INFINITY, f64::NEG_INFINITY);
-        for (x, depth) in depths.iter().enumerate().filter(|(_, d)| !d.is_nan()) {
-            match self.fate((column + x) as f64, *depth, frame) {
-                Fate::Sample(landing) => rows = (rows.0.min(landing.at.1), rows.1.max(landing.at.1)),
-                Fate::Behind => behind += 1,
-                Fate::Outside => {}
-            }
-        }
-        (Reach { columns: (f64::MIN, f64::MAX), rows }, behind)
-    }
-}
-
-/// The outcome for one pixel of known depth.
-enum Fate {
-    Sample(Landing),
-    Behind,
-    Outside,
-}
-
-/// Appends the samples of a tile that lie in the frame.
-fn tile_samples<const C: usize>(
-    view: &CalibratedView<'_>,
-    map: &Relative,
-    tile: &Tile,
-    frame: &Frame,
-    samples: &mut Vec<Sample<C>>,
-) {
-    let (y, start) = (tile.row as usize, tile.column as usize);
-    let (row, width) = (RowMap::new(map, y), view.image.width());
-    let reliefs = view.depth.reliefs(start, y);
-    for (x, &depth) in view.depth.row(y).iter().enumerate().skip(start).take(TILE) {
-        if depth.is_nan() {
-            continue;
-        }
-        let Fate::Sample(landing) = row.fate(x as f64, depth, frame) else { continue };
-        let relief = reliefs.at(x - start);
-        let [a, b] = row.steps(&landing, f64::from(depth), [relief.across, relief.down]);
-        let pixel = y * width + x;
-        let doubtful = relief.behind_edge || view.depth.is_guessed(pixel);
-        let distance = ((a[0] * a[0] + a[1] * a[1] + b[0] * b[0] + b[1] * b[1]) / 2.0).sqrt();
-        samples.push(Sample {
-            x: landing.at.0 + frame.offset,
-            y: landing.at.1,
-            depth: landing.at.2 as f32,
-            value: view.image.pixel::<C>(pixel),
-            spacing: spacing(distance, relief.outline),
-            weight: weight((a[0] * b[1] - a[1] * b[0]).abs(), doubtful),
-            pixel: pixel as u32,
-            view: tile.view,
-            doubtful,
-        });
     }
 }
 

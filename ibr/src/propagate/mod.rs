@@ -2,12 +2,13 @@
 
 mod calibrated;
 
+pub(crate) use calibrated::Landed;
 pub use calibrated::{Survey, calibrated};
 
 use crate::camera::Camera;
 use crate::depth::{DepthMap, Reliefs, TILE};
 use crate::image::Image;
-use crate::occlusion::LARGEST_SPACING;
+use crate::occlusion::{Extent, LARGEST_SPACING};
 use crate::sample::{Dropped, Sample};
 
 /// One view of a rectified rig: the camera centres lie on a line parallel to the image rows.
@@ -59,20 +60,26 @@ impl Frame {
         Self { rows: (top.max(self.rows.0), bottom.min(self.rows.1)), ..*self }
     }
 
+    /// The rectangle in which samples are kept.
+    pub(crate) fn extent(&self) -> Extent {
+        let (left, right) = (-self.margin, self.width as f64 - 1.0 + self.margin);
+        Extent { left, right, top: self.rows.0, bottom: self.rows.1 }
+    }
+
     /// Whether a position lies in the frame.
     #[inline]
     pub fn holds(&self, x: f64, y: f64) -> bool {
-        self.holds_column(x) && self.holds_row(y)
+        self.holds_column(x) & self.holds_row(y)
     }
 
     #[inline]
     fn holds_column(&self, x: f64) -> bool {
-        x >= -self.margin && x <= self.width as f64 - 1.0 + self.margin
+        (x >= -self.margin) & (x <= self.width as f64 - 1.0 + self.margin)
     }
 
     #[inline]
     fn holds_row(&self, y: f64) -> bool {
-        y >= self.rows.0 && y <= self.rows.1
+        (y >= self.rows.0) & (y <= self.rows.1)
     }
 }
 

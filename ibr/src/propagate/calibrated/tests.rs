@@ -3,6 +3,7 @@
 use super::*;
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
+use crate::occlusion::PlaneSearch;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
 
 const SIZE: (usize, usize) = (150, 90);
@@ -47,6 +48,56 @@ fn bands_together_are_the_whole() {
     }
 }
 
+/// No sample of a tile has a larger spacing than its bound says. Within a surface the bound is near, at
+/// depth edges it is not.
+#[test]
+fn the_spacing_of_a_tile_is_bounded() {
+    let (image, depth) = scene();
+    let target = camera([0.0, 0.1, 0.9], 0.2);
+    let views = [camera([0.2, 0.0, 0.0], 0.05), camera([-0.3, 0.1, -0.2], -0.3), target]
+        .map(|camera| CalibratedView { image: &image, depth: &depth, camera });
+    let frame = Frame::whole(SIZE.0, SIZE.1, 20.0, 0.0);
+    let survey = Survey::new(&views, &target, &frame);
+    let (mut found, mut near) = (0, 0);
+    for tile in &survey.tiles {
+        let mut landed = Landed::default();
+        survey.land(&views, tile, &frame, (f64::MIN, f64::MAX), &mut landed);
+        for s in landed.samples::<1>(&views) {
+            assert!(s.spacing <= tile.spacing, "{s:?} in {tile:?}");
+            near += usize::from(tile.spacing < 2.0 * s.spacing);
+            found += 1;
+        }
+    }
+    assert!(found > 20_000 && near > found / 2, "{near} of {found}");
+}
+
+/// Bands find the hidden samples of the whole image, also where their spacing is far above a pixel.
+#[test]
+fn bands_hide_what_the_whole_hides() {
+    let (image, depth) = scene();
+    let views = [camera([0.2, 0.0, 0.0], 0.05), camera([-0.3, 0.1, -0.2], -0.3)]
+        .map(|camera| CalibratedView { image: &image, depth: &depth, camera });
+    for (forward, epsilon) in [(0.0, 0.7), (1.6, 0.7), (0.5, 3.0)] {
+        let target = camera([0.0, 0.0, forward], 0.0);
+        let frame = Frame::whole(SIZE.0, SIZE.1, 0.5, 0.0);
+        let test = DepthTest { epsilon, ..DepthTest::default() };
+        let (mut want, _) = calibrated::<1>(&views, &target, &frame);
+        assert!(crate::occlusion::remove(&mut want, &test) > 100);
+        let survey = Survey::new(&views, &target, &frame);
+        let (mut landed, mut search, mut got) = (Landed::default(), PlaneSearch::default(), Vec::new());
+        for own in [(f64::MIN, 1.0), (1.0, 23.5), (23.5, 24.0), (24.0, 70.0), (70.0, f64::MAX)] {
+            search.clear(&survey.band_around(own, &test).extent(), survey.most_between(own, &test));
+            survey.land_between(&views, own, &test, &mut landed, |points| search.enter(points, &test));
+            landed.remove(search.hidden(landed.points(), &test));
+            assert!(landed.points().len() <= survey.most_between(own, &test));
+            got.extend(landed.samples::<1>(&views));
+        }
+        let order = |s: &Sample<1>| (s.view, s.pixel);
+        got.sort_by_key(order);
+        assert_eq!(got, want, "{forward}");
+    }
+}
+
 /// Eight bands look at hardly more pixels than one: the cost does not grow with the number of bands.
 #[test]
 fn every_pixel_is_looked_at_about_once() {
@@ -60,7 +111,7 @@ fn every_pixel_is_looked_at_about_once() {
     let survey = Survey::new(&views, &camera([0.0, 0.0, 0.0], 0.0), &frame);
     let looked_at: usize = (0..8)
         .map(|k| frame.band(k as f64 * 11.25, (k + 1) as f64 * 11.25))
-        .map(|band| survey.reaching(&band).count())
+        .map(|band| survey.reaching(band.rows, |_| 0.0).count())
         .sum();
     assert!(looked_at as f64 <= 1.3 * survey.tiles.len() as f64, "{looked_at} of {}", survey.tiles.len());
 }

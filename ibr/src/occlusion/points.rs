@@ -1,0 +1,111 @@
+//! What the depth test needs of samples, as arrays.
+
+use crate::sample::Sample;
+
+/// Points whose bounds are found together.
+pub(crate) const RUN: usize = 8;
+
+/// Positions, depths and spacings of samples, in arrays of one length, a multiple of [`RUN`]: its loops
+/// become vector instructions. Neighbours in the arrays should be neighbours in the image.
+///
+/// A place without a sample has NaN in all numbers.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Points {
+    pub(crate) x: Vec<f64>,
+    pub(crate) y: Vec<f64>,
+    pub(crate) depth: Vec<f32>,
+    pub(crate) spacing: Vec<f32>,
+    /// Whether the depth test decides on the sample. The others may hide it and are not looked at.
+    pub(crate) own: Vec<bool>,
+}
+
+impl Points {
+    pub(crate) fn of<const C: usize>(samples: &[Sample<C>]) -> Self {
+        let mut points = Self::default();
+        points.resize(samples.len().next_multiple_of(RUN));
+        for (i, s) in samples.iter().enumerate() {
+            (points.x[i], points.y[i]) = (s.x, s.y);
+            (points.depth[i], points.spacing[i], points.own[i]) = (s.depth, s.spacing, true);
+        }
+        points
+    }
+
+    /// Number of places.
+    pub(crate) fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// Changes the number of places. New ones have no sample.
+    pub(crate) fn resize(&mut self, count: usize) {
+        self.x.resize(count, f64::NAN);
+        self.y.resize(count, f64::NAN);
+        self.depth.resize(count, f32::NAN);
+        self.spacing.resize(count, f32::NAN);
+        self.own.resize(count, false);
+    }
+
+    /// The rectangle that holds all samples.
+    pub(crate) fn extent(&self) -> Extent {
+        let none = (f64::MAX, f64::MIN);
+        let ((left, right), (top, bottom)) = (bounds::<_, 2>(&self.x, none), bounds::<_, 2>(&self.y, none));
+        Extent { left, right, top, bottom }
+    }
+}
+
+/// A rectangle of the virtual image.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Extent {
+    pub(crate) left: f64,
+    pub(crate) right: f64,
+    pub(crate) top: f64,
+    pub(crate) bottom: f64,
+}
+
+impl Extent {
+    /// Cells per pixel, of square cells no smaller than `edge`: the edge is doubled until there are at most
+    /// `most` cells.
+    pub(super) fn scale(&self, edge: f64, most: usize) -> f64 {
+        let cells =
+            |edge: f64| ((self.right - self.left) / edge + 1.0) * ((self.bottom - self.top) / edge + 1.0);
+        let mut edge = edge;
+        // The doubling ends at the latest when one cell holds all samples.
+        while cells(edge) > most as f64 {
+            edge *= 2.0;
+        }
+        1.0 / edge
+    }
+
+    /// Columns and rows of cells.
+    pub(super) fn cells(&self, scale: f64) -> (usize, usize) {
+        let count = |low: f64, high: f64| ((high - low) * scale) as usize + 1;
+        (count(self.left, self.right), count(self.top, self.bottom))
+    }
+}
+
+/// The least and the largest number; those that are not numbers do not count. In lanes, so that the compiler
+/// compares several at a time.
+#[inline]
+pub(super) fn bounds<T: Copy + PartialOrd, const LANES: usize>(numbers: &[T], none: (T, T)) -> (T, T) {
+    let (mut low, mut high) = ([none.0; LANES], [none.1; LANES]);
+    let (whole, rest) = numbers.as_chunks::<LANES>();
+    for values in whole {
+        for lane in 0..LANES {
+            low[lane] = least(low[lane], values[lane]);
+            high[lane] = largest(high[lane], values[lane]);
+        }
+    }
+    let low = low.iter().chain(rest).fold(none.0, |low, v| least(low, *v));
+    (low, high.iter().chain(rest).fold(none.1, |high, v| largest(high, *v)))
+}
+
+/// The lesser of two numbers, the first if the second is not a number.
+#[inline]
+pub(super) fn least<T: PartialOrd>(a: T, b: T) -> T {
+    if b < a { b } else { a }
+}
+
+/// The larger of two numbers, the first if the second is not a number.
+#[inline]
+pub(super) fn largest<T: PartialOrd>(a: T, b: T) -> T {
+    if b > a { b } else { a }
+}

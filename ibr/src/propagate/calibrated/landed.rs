@@ -1,0 +1,219 @@
+//! The samples of a band of rows, as arrays.
+
+use super::row_map::RowMap;
+use super::{CalibratedView, Frame, Tile};
+use crate::camera::Relative;
+use crate::depth::{Reliefs, TILE};
+use crate::image::Image;
+use crate::occlusion::{Points, RUN};
+use crate::propagate::{spacing, weight};
+use crate::sample::Sample;
+
+/// The pixels of some tiles at their places in the virtual image, view by view and row by row. Its arrays
+/// are used again from band to band.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Landed {
+    points: Points,
+    weights: Vec<f32>,
+    doubtful: Vec<bool>,
+    tiles: Vec<LandedTile>,
+}
+
+/// Where the pixels of a tile lie in the arrays.
+#[derive(Debug, Clone, Copy)]
+struct LandedTile {
+    view: u16,
+    first_pixel: u32,
+    first_place: usize,
+}
+
+impl Landed {
+    /// Removes all samples.
+    pub(super) fn clear(&mut self) {
+        self.points.resize(0);
+        self.weights.clear();
+        self.doubtful.clear();
+        self.tiles.clear();
+    }
+
+    /// Appends the pixels of a tile; those between the rows `own` are the band's own.
+    pub(super) fn push(
+        &mut self,
+        view: &CalibratedView<'_>,
+        map: &Relative,
+        tile: &Tile,
+        frame: &Frame,
+        own: (f64, f64),
+    ) {
+        let (row, column) = (tile.row as usize, tile.column as usize);
+        let first_pixel = row * view.image.width() + column;
+        let known = &view.depth.row(row)[column..];
+        let known = &known[..known.len().min(TILE)];
+        let mut depths = [f32::NAN; TILE];
+        depths[..known.len()].copy_from_slice(known);
+        let count = known.len().next_multiple_of(RUN);
+        let reliefs = view.depth.reliefs(column, row);
+        let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
+        places.keep(frame, own, count);
+        self.append(&places, count);
+        let mut doubtful = reliefs.behind_edge;
+        for (doubtful, guessed) in doubtful.iter_mut().zip(view.depth.guessed_from(first_pixel)) {
+            *doubtful |= *guessed;
+        }
+        self.append_trust(&places, &reliefs, &doubtful, count);
+        let first_place = self.doubtful.len() - count;
+        self.tiles.push(LandedTile { view: tile.view, first_pixel: first_pixel as u32, first_place });
+    }
+
+    fn append(&mut self, places: &Places, count: usize) {
+        let points = &mut self.points;
+        points.x.extend_from_slice(&places.x[..count]);
+        points.y.extend_from_slice(&places.y[..count]);
+        points.depth.extend(places.depth[..count].iter().map(|d| *d as f32));
+        points.own.extend_from_slice(&places.own[..count]);
+    }
+
+    fn append_trust(&mut self, places: &Places, reliefs: &Reliefs, doubtful: &[bool; TILE], count: usize) {
+        let spacings: [f32; TILE] = std::array::from_fn(|i| spacing(places.distance[i], reliefs.outline[i]));
+        let weights: [f32; TILE] = std::array::from_fn(|i| weight(places.area[i], doubtful[i]));
+        self.points.spacing.extend_from_slice(&spacings[..count]);
+        self.weights.extend_from_slice(&weights[..count]);
+        self.doubtful.extend_from_slice(&doubtful[..count]);
+    }
+
+    /// What the depth test needs.
+    pub(crate) fn points(&self) -> &Points {
+        &self.points
+    }
+
+    /// Own samples of the band.
+    pub(crate) fn count(&self) -> usize {
+        self.points.own.iter().filter(|own| **own).count()
+    }
+
+    /// Takes the samples at these places out of the band's own ones.
+    pub(crate) fn remove(&mut self, places: &[u32]) {
+        places.iter().for_each(|i| self.points.own[*i as usize] = false);
+    }
+
+    /// The band's own samples.
+    pub(crate) fn samples<const C: usize>(&self, views: &[CalibratedView<'_>]) -> Vec<Sample<C>> {
+        let mut samples = Vec::with_capacity(self.count());
+        let ends = self.tiles.iter().skip(1).map(|next| next.first_place).chain([self.points.len()]);
+        for (tile, end) in self.tiles.iter().zip(ends) {
+            let image = views[usize::from(tile.view)].image;
+            for (k, run) in (tile.first_place / RUN..end / RUN).enumerate() {
+                let run = self.run(run);
+                let sample = |i: usize| run.sample(image, tile, k * RUN, i);
+                match run.own {
+                    [true, true, true, true, true, true, true, true] => samples.extend((0..RUN).map(sample)),
+                    own => samples.extend((0..RUN).filter(|i| own[*i]).map(sample)),
+                }
+            }
+        }
+        samples
+    }
+
+    #[inline]
+    fn run(&self, number: usize) -> Run<'_> {
+        let points = &self.points;
+        Run {
+            x: &points.x.as_chunks().0[number],
+            y: &points.y.as_chunks().0[number],
+            depth: &points.depth.as_chunks().0[number],
+            spacing: &points.spacing.as_chunks().0[number],
+            own: &points.own.as_chunks().0[number],
+            weights: &self.weights.as_chunks().0[number],
+            doubtful: &self.doubtful.as_chunks().0[number],
+        }
+    }
+}
+
+/// Some neighbouring pixels of a tile.
+struct Run<'a> {
+    x: &'a [f64; RUN],
+    y: &'a [f64; RUN],
+    depth: &'a [f32; RUN],
+    spacing: &'a [f32; RUN],
+    own: &'a [bool; RUN],
+    weights: &'a [f32; RUN],
+    doubtful: &'a [bool; RUN],
+}
+
+impl Run<'_> {
+    /// The sample of pixel i of the run that begins `start` pixels after the tile.
+    #[inline]
+    fn sample<const C: usize>(&self, image: &Image, tile: &LandedTile, start: usize, i: usize) -> Sample<C> {
+        let pixel = tile.first_pixel + (start + i) as u32;
+        Sample {
+            x: self.x[i],
+            y: self.y[i],
+            depth: self.depth[i],
+            value: image.pixel::<C>(pixel as usize),
+            spacing: self.spacing[i],
+            weight: self.weights[i],
+            pixel,
+            view: tile.view,
+            doubtful: self.doubtful[i],
+        }
+    }
+}
+
+/// The pixels of a tile in the virtual image: arrays of a fixed length, whose loops the compiler turns into
+/// vector instructions. What belongs to unknown pixels is not a number.
+struct Places {
+    x: [f64; TILE],
+    y: [f64; TILE],
+    depth: [f64; TILE],
+    /// Distance of neighbouring pixels, root mean square over the two directions.
+    distance: [f64; TILE],
+    /// Area of a pixel.
+    area: [f64; TILE],
+    own: [bool; TILE],
+}
+
+/// Columns from the first one of a tile.
+const STEPS: [f64; TILE] = {
+    let mut steps = [0.0; TILE];
+    let mut i = 1;
+    while i < TILE {
+        steps[i] = steps[i - 1] + 1.0;
+        i += 1;
+    }
+    steps
+};
+
+impl Places {
+    fn new(row: &RowMap<'_>, column: usize, depths: &[f32; TILE], reliefs: &Reliefs, count: usize) -> Self {
+        let [x, y, depth, distance, area] = [[f64::NAN; TILE]; 5];
+        let mut places = Self { x, y, depth, distance, area, own: [false; TILE] };
+        let column = column as f64;
+        for i in 0..count.min(TILE) {
+            let depth = f64::from(depths[i]);
+            let landing = row.land(column + STEPS[i], depth);
+            let slopes = [f64::from(reliefs.across[i]), f64::from(reliefs.down[i])];
+            let [a, b] = row.steps(&landing, depth, slopes);
+            (places.x[i], places.y[i], places.depth[i]) = landing.at;
+            places.distance[i] = ((a[0] * a[0] + a[1] * a[1] + b[0] * b[0] + b[1] * b[1]) / 2.0).sqrt();
+            places.area[i] = (a[0] * b[1] - a[1] * b[0]).abs();
+        }
+        if row.is_bent() {
+            for i in 0..count.min(TILE) {
+                (places.x[i], places.y[i], places.depth[i]) = row.bend(column + STEPS[i], depths[i]);
+            }
+        }
+        places
+    }
+
+    /// Marks what lies between the rows `own`, and removes what lies outside the frame.
+    fn keep(&mut self, frame: &Frame, own: (f64, f64), count: usize) {
+        for i in 0..count.min(TILE) {
+            let (x, y, depth) = (self.x[i] + frame.offset, self.y[i], self.depth[i]);
+            let kept = (depth > 0.0) & frame.holds(x, y);
+            self.x[i] = if kept { x } else { f64::NAN };
+            self.y[i] = if kept { y } else { f64::NAN };
+            self.depth[i] = if kept { depth } else { f64::NAN };
+            self.own[i] = kept & (y >= own.0) & (y < own.1);
+        }
+    }
+}
