@@ -68,6 +68,20 @@ pub(crate) fn normal_step<const N: usize>(
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 
+/// The solution of a positive definite system, its matrix row by row; `None` if it is not positive definite
+/// or not finite.
+pub(crate) fn positive_solution(matrix: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
+    let side = rhs.len();
+    if matrix.iter().chain(rhs).any(|v| !v.is_finite()) {
+        return None;
+    }
+    let factor =
+        Mat::from_fn(side, side, |i, j| matrix[i * side + j]).as_ref().llt(faer::Side::Lower).ok()?;
+    let x = faer::linalg::solvers::Solve::solve(&factor, &Mat::from_fn(side, 1, |i, _| rhs[i]));
+    let found: Vec<f64> = (0..side).map(|i| x[(i, 0)]).collect();
+    found.iter().all(|v| v.is_finite()).then_some(found)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,6 +119,14 @@ mod tests {
             assert!(dot.abs() < 1e-13);
         }
         assert!(least_squares(&[[1.0, 1.0], [2.0, 2.0]], &[1.0, 2.0]).is_none());
+    }
+
+    #[test]
+    fn positive_systems_are_solved_and_others_refused() {
+        let x = positive_solution(&[4.0, 1.0, 1.0, 3.0], &[6.0, 7.0]).unwrap();
+        assert!((x[0] - 1.0).abs() < 1e-14 && (x[1] - 2.0).abs() < 1e-14, "{x:?}");
+        assert_eq!(positive_solution(&[1.0, 2.0, 2.0, 1.0], &[1.0, 1.0]), None);
+        assert_eq!(positive_solution(&[f64::NAN], &[1.0]), None);
     }
 
     #[test]

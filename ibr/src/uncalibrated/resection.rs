@@ -121,7 +121,7 @@ fn direct(sightings: &[Sighting]) -> Result<Matrix3x4<f64>, GeometryError> {
 }
 
 /// Levenberg-Marquardt on the reprojection error in normalised images; never worse than the start.
-pub(crate) fn refined(start: &Matrix3x4<f64>, sightings: &[Sighting]) -> Matrix3x4<f64> {
+fn refined(start: &Matrix3x4<f64>, sightings: &[Sighting]) -> Matrix3x4<f64> {
     let t = Normalisation::of(sightings.iter().map(|s| &s.image));
     let normal: Vec<Sighting> = sightings
         .iter()

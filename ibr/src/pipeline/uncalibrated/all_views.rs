@@ -1,26 +1,31 @@
-//! Cameras and points from all views together: points are triangulated from every view that shows them,
-//! cameras are refined on all points, in turn (resection and intersection, a bundle adjustment by blocks).
+//! Cameras and points from all views together: points are triangulated from every view that shows them, and
+//! a bundle adjustment fits cameras and points to all positions.
 
 use crate::uncalibrated::Point;
+use crate::uncalibrated::bundle::{Bundle, Observation};
 use crate::uncalibrated::normalise::Normalisation;
-use crate::uncalibrated::resection::{Sighting, refined};
 use crate::uncalibrated::triangulate::triangulate;
 use nalgebra::{Matrix3x4, Vector4};
 
-/// Rounds of points and cameras. The first brings most of the gain.
-const ROUNDS: usize = 4;
+/// Adjustments, at most: after each the positions that fit are chosen anew.
+const ROUNDS: usize = 8;
 
 /// Photographs that must show a point.
 const NEEDED: usize = 2;
 
+/// Fewest positions of a camera that is adjusted.
+const FEWEST: usize = 12;
+
 /// Points of tracks with their positions in each image, those that do not fit left out.
+#[derive(PartialEq)]
 pub(super) struct Cloud {
     pub(super) points: Vec<Vector4<f64>>,
     pub(super) seen: Vec<Vec<Option<Point>>>,
 }
 
-/// Triangulates all tracks and refines the cameras; the last column is the virtual view. Positions farther
-/// than `threshold` pixels from their point are taken as mistakes of the tracker.
+/// Triangulates all tracks and adjusts cameras and points until the same positions fit; the last column is
+/// the virtual view. Positions farther than `threshold` pixels from their point are taken as mistakes of the
+/// tracker.
 pub(super) fn adjust(cameras: &mut [Matrix3x4<f64>], tracks: &[Vec<Option<Point>>], threshold: f64) -> Cloud {
     let scales: Vec<Normalisation> = (0..cameras.len())
         .map(|i| {
@@ -28,26 +33,35 @@ pub(super) fn adjust(cameras: &mut [Matrix3x4<f64>], tracks: &[Vec<Option<Point>
         })
         .collect();
     let mut cloud = intersect(cameras, &scales, tracks, threshold);
-    for _ in 1..ROUNDS {
-        for (i, camera) in cameras.iter_mut().enumerate() {
-            let sighting = |(point, seen): (&Vector4<f64>, &Vec<Option<Point>>)| {
-                Some(Sighting { point: *point, image: seen[i]? })
-            };
-            let sightings: Vec<Sighting> =
-                cloud.points.iter().zip(&cloud.seen).filter_map(sighting).collect();
-            if sightings.len() >= 2 * NEEDED_FOR_A_CAMERA {
-                // Of the sign and scale of before: the order of depth depends on the sign.
-                let next = refined(camera, &sightings);
-                *camera = next * next.dot(camera).signum() * camera.norm() / next.norm();
-            }
+    for _ in 0..ROUNDS {
+        let is_seen = |i: usize| cloud.seen.iter().filter(|seen| seen[i].is_some()).count() >= FEWEST;
+        if !(0..cameras.len()).all(is_seen) {
+            return cloud;
         }
-        cloud = intersect(cameras, &scales, tracks, threshold);
+        let mut bundle = bundle(cameras, &cloud);
+        if bundle.adjust(threshold).is_none() {
+            return cloud;
+        }
+        cameras.copy_from_slice(&bundle.cameras);
+        let next = intersect(cameras, &scales, tracks, threshold);
+        let is_same = next.seen == cloud.seen;
+        cloud = next;
+        if is_same {
+            break;
+        }
     }
     cloud
 }
 
-/// Points that determine a camera.
-const NEEDED_FOR_A_CAMERA: usize = 6;
+fn bundle(cameras: &[Matrix3x4<f64>], cloud: &Cloud) -> Bundle {
+    let of_point = |(point, seen): (usize, &Vec<Option<Point>>)| {
+        let sight =
+            |(camera, image): (usize, &Option<Point>)| Some(Observation { camera, point, image: (*image)? });
+        seen.iter().enumerate().filter_map(sight).collect::<Vec<_>>()
+    };
+    let observations = cloud.seen.iter().enumerate().flat_map(of_point).collect();
+    Bundle { cameras: cameras.to_vec(), points: cloud.points.clone(), observations }
+}
 
 /// The points of all tracks that at least two photographs show.
 fn intersect(

@@ -97,8 +97,8 @@ fn remove_occluded<const C: usize>(samples: &mut Vec<Sample<C>>, test: &DepthTes
     before - samples.len()
 }
 
-/// Weights of the views: near ones count more, all alike of two. The distance of a view is the parallax
-/// between it and the virtual one, in pixels.
+/// Weights of the views: near ones count more, those beyond the two nearest far less, all alike of two. The
+/// distance of a view is the parallax between it and the virtual one, in pixels.
 pub(super) fn balance(scene: &Reconstruction, target: usize) -> Balance {
     if target == 2 {
         return Balance::by_distance(&[1.0, 1.0]);
@@ -116,7 +116,7 @@ pub(super) fn balance(scene: &Reconstruction, target: usize) -> Balance {
     let distance = |view| parallax(&matches(&positions, view, target));
     let distances: Option<Vec<f64>> = (0..target).map(distance).collect();
     // Too few points for a distance: all views count alike.
-    Balance::by_distance(&distances.unwrap_or_else(|| vec![1.0; target]))
+    Balance::by_distance(&distances.unwrap_or_else(|| vec![1.0; target])).faded()
 }
 
 /// All points in front of the virtual camera, projected into its image.
