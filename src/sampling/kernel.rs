@@ -107,6 +107,14 @@ impl<const ORDER: usize> BSpline<ORDER> {
         (first, w.map(|[w]| w), d.map(|[d]| d))
     }
 
+    /// Weights and slopes at a position t of a knot span, 0 <= t <= 1.
+    #[cfg(feature = "fit2")]
+    #[inline(always)]
+    pub(super) fn in_span(t: f64) -> ([f64; ORDER], [f64; ORDER]) {
+        let lower = raise::<ORDER, 1>(&[t], Self::DEGREE);
+        (raise_once(&lower, &[t], ORDER).map(|[w]| w), differences(&lower).map(|[d]| d))
+    }
+
     /// The same at N positions at once, with the positions innermost. They are independent of each other,
     /// so the processor need not wait for each step of the recursion. The bits are those of single calls.
     // Not inlined, the arrays would pass through memory, which takes half of a fit's time.

@@ -1,0 +1,198 @@
+//! Regularised least squares with tensor products of B-splines: [`Fit`](super::Fit) in two dimensions.
+//!
+//! Given samples (x_s, y_s, f_s) anywhere in an image, minimise over the coefficients c_mn of
+//! J(x, y) = sum_mn c_mn beta(x - m) beta(y - n)
+//!
+//! ```text
+//! sum_s w_s (f_s - J(x_s, y_s))^2 + sum_s w_s mu_s |grad J(x_s, y_s)|^2
+//!     + sum_pq g_pq (c_p - c_q)^2 + sum_pqr h_pqr (c_p - 2 c_q + c_r)^2
+//! ```
+//!
+//! over neighbours pq and triples pqr in a row or column. The springs g and h differ from place to place:
+//! across the edge of an object they are weak. For ORDER 2 the coefficients are the pixels.
+//!
+//! Each equation has (2 ORDER - 1)^2 unknowns (and four more for h if ORDER is 2). A direct solution would
+//! fill in, so conjugate gradients solve all channels together, from the mean of the samples around each
+//! coefficient; a multigrid preconditioner takes over where holes are large.
+
+mod conjugate;
+mod multigrid;
+mod planes;
+mod rows;
+mod springs;
+mod stencil;
+
+pub use rows::{Fit2Rows, Fit2Sample};
+pub use springs::Springs;
+
+use super::kernel::BSpline;
+use planes::{Grid, Planes, ROWS_AT_ONCE};
+use rayon::prelude::*;
+use stencil::{Offset, Stencil, half_square};
+
+/// When the conjugate gradients stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Iteration {
+    /// Relative residual, in the norm of the inverse diagonal.
+    pub tolerance: f64,
+    /// Most steps.
+    pub steps: usize,
+}
+
+/// How the conjugate gradients ended.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Convergence {
+    /// Steps taken, the most over the channels.
+    pub steps: usize,
+    /// Relative residual reached, the largest over the channels.
+    pub residual: f64,
+    /// Whether every channel reached the tolerance within the allowed steps.
+    pub reached: bool,
+}
+
+/// Direction of neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// Along a row.
+    Across,
+    /// Along a column.
+    Down,
+}
+
+/// Accumulates samples into the normal equations of one image and solves them.
+///
+/// ORDER = degree + 1, 2 (bilinear) or 4 (bicubic); C values per sample.
+#[derive(Debug, Clone)]
+pub struct Fit2<const ORDER: usize, const C: usize> {
+    size: (usize, usize),
+    grid: Grid,
+    /// For each coefficient the couplings that samples cause, then the right-hand sides.
+    records: Vec<f32>,
+}
+
+/// The normal equations with their springs.
+#[derive(Debug, Clone)]
+pub struct Connected<const ORDER: usize, const C: usize> {
+    size: (usize, usize),
+    matrix: Stencil,
+    rhs: Planes,
+}
+
+impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
+    /// Couplings of a coefficient that samples cause, its own included.
+    const COUPLINGS: usize = ORDER + (ORDER - 1) * (2 * ORDER - 1);
+    /// Numbers of a record.
+    const RECORD: usize = Self::COUPLINGS + C;
+
+    /// An empty problem for an image of `width` x `height` pixels.
+    pub fn new(width: usize, height: usize) -> Self {
+        const { assert!(ORDER == 2 || ORDER == 4, "the fit of an image is bilinear or bicubic") }
+        let grid = Grid { width: width + ORDER - 2, height: height + ORDER - 2 };
+        // Samples on the last row or column have weights of 0 beyond it.
+        let records = vec![0.0; (grid.len() + (grid.width + 1) * (ORDER - 1)) * Self::RECORD];
+        Self { size: (width, height), grid, records }
+    }
+
+    /// Width and height of the grid of coefficients. It has ORDER / 2 - 1 coefficients more than pixels on
+    /// each side.
+    pub fn coefficients(&self) -> (usize, usize) {
+        (self.grid.width, self.grid.height)
+    }
+
+    /// All rows, to add samples.
+    pub fn rows(&mut self) -> Fit2Rows<'_, ORDER, C> {
+        Fit2Rows::new(self.size, self.grid.width, &mut self.records)
+    }
+
+    fn record(&self, coefficient: usize) -> &[f32] {
+        &self.records[coefficient * Self::RECORD..(coefficient + 1) * Self::RECORD]
+    }
+
+    /// Weight of the samples at a coefficient, the sum of its row in the normal equations without
+    /// regularisation, and their weighted values; their ratio is the mean of the samples around it.
+    pub fn local_sums(&self, coefficient: usize) -> (f32, [f32; C]) {
+        let record = self.record(coefficient);
+        let later: f32 = record[..Self::COUPLINGS].iter().sum();
+        let earlier = half_square(ORDER - 1).enumerate().skip(1).map(|(k, (columns, rows))| {
+            let at = coefficient.checked_sub(rows * self.grid.width);
+            let at = at.and_then(|at| at.checked_add_signed(-columns));
+            at.map_or(0.0, |at| self.record(at)[k])
+        });
+        let values = std::array::from_fn(|c| record[Self::COUPLINGS + c]);
+        (later + earlier.sum::<f32>(), values)
+    }
+
+    /// Adds springs to the equations. `springs` gives those of one direction, for the grid of coefficients.
+    /// Coefficients that are `alone`, with neither samples nor springs, are held at 0.
+    pub fn connect(
+        self,
+        springs: impl Fn(Direction) -> Springs,
+        alone: impl Fn(usize) -> bool + Sync,
+    ) -> Connected<ORDER, C> {
+        let (size, (mut matrix, rhs)) = (self.size, self.assembled());
+        drop(self);
+        for direction in [Direction::Across, Direction::Down] {
+            springs::add(&mut matrix, &springs(direction), direction);
+        }
+        springs::hold(&mut matrix, alone);
+        Connected { size, matrix, rhs }
+    }
+
+    /// The equations without springs: planes instead of records.
+    fn assembled(&self) -> (Stencil, Planes) {
+        let mut matrix = Stencil::new(self.grid, offsets::<ORDER>());
+        let mut rhs = Planes::zeros(self.grid, C);
+        let (width, stride) = (self.grid.width, self.grid.stride());
+        let rows = matrix.planes_mut().par_rows_mut().zip(rhs.par_rows_mut());
+        let records = self.records.par_chunks(width * Self::RECORD);
+        rows.zip(records).with_min_len(ROWS_AT_ONCE).for_each(|((matrix, rhs), records)| {
+            for (x, record) in records.chunks_exact(Self::RECORD).enumerate() {
+                let (couplings, values) = record.split_at(Self::COUPLINGS);
+                couplings.iter().enumerate().for_each(|(k, a)| matrix[k * stride + x] = *a);
+                values.iter().enumerate().for_each(|(c, v)| rhs[c * stride + x] = *v);
+            }
+        });
+        (matrix, rhs)
+    }
+}
+
+/// Couplings of a matrix: those of samples first, as [`half_square`] has them, then those of triples.
+fn offsets<const ORDER: usize>() -> Vec<Offset> {
+    let mut offsets: Vec<Offset> = half_square(ORDER - 1).collect();
+    let triples: Vec<Offset> = [(2, 0), (0, 2)].into_iter().filter(|o| !offsets.contains(o)).collect();
+    offsets.extend(triples);
+    offsets
+}
+
+impl<const ORDER: usize, const C: usize> Connected<ORDER, C> {
+    /// Solves the equations: J at the pixels, C values each, row by row. `watch` is called with the share of
+    /// the way that is done, 0 to 1.
+    pub fn solve(&self, iteration: &Iteration, watch: &(dyn Fn(f64) + Sync)) -> (Vec<f32>, Convergence) {
+        let (solution, convergence) = conjugate::solve::<C>(&self.matrix, &self.rhs, iteration, watch);
+        (self.at_pixels(&solution), convergence)
+    }
+
+    /// J at the pixels.
+    fn at_pixels(&self, coefficients: &Planes) -> Vec<f32> {
+        let (width, height) = self.size;
+        let mut values = vec![0.0; width * height * C];
+        // The last of the weights at a knot is 0.
+        let weights = BSpline::<ORDER>::weights(0.0).1.map(|w| w as f32);
+        let rows = values.par_chunks_mut(width.max(1) * C).enumerate().with_min_len(ROWS_AT_ONCE);
+        rows.for_each(|(y, values)| {
+            for c in 0..C {
+                for (j, down) in weights[..ORDER - 1].iter().enumerate() {
+                    let row = coefficients.row(y + j, c);
+                    for (x, value) in values.iter_mut().skip(c).step_by(C).enumerate() {
+                        let sum: f32 = weights[..ORDER - 1].iter().zip(&row[x..]).map(|(w, u)| w * u).sum();
+                        *value += down * sum;
+                    }
+                }
+            }
+        });
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests;
