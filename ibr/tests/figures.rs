@@ -5,6 +5,7 @@ mod noise;
 
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, quality, read_image, read_map};
+use hybank_ibr::interpolate::plane::PlaneSettings;
 use hybank_ibr::partial::{Densify, densify};
 use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
 use hybank_ibr::pipeline::{Agreement, Method, RenderSettings, rectified, uncalibrated};
@@ -67,6 +68,20 @@ fn cones_full_depth() {
     assert!(psnr(&pair, &settings) >= 29.2);
     assert!(psnr(&pair, &RenderSettings { offset: 0.25, ..settings }) >= 30.3);
     assert!(psnr(&pair, &RenderSettings { method: Method::Plane, ..settings }) >= 28.8);
+}
+
+/// The plane against itself with bicubic splines, between the photographs and at one of their places.
+#[test]
+fn a_bicubic_plane_is_sharper() {
+    let Some(pair) = pair("cones") else { return };
+    let mut settings = RenderSettings { method: Method::Plane, offset: 0.25, ..RenderSettings::default() };
+    let linear = psnr(&pair, &settings);
+    settings.interpolation.plane = PlaneSettings::CUBIC;
+    let cubic = psnr(&pair, &settings);
+    assert!(cubic >= linear + 0.25 && cubic >= 30.2, "{linear} {cubic}");
+    let own = rectified::render(&views(&pair), 0.0, &RenderSettings { offset: 0.0, ..settings }).unwrap();
+    let own = quality::compare(&own.image, &pair.images[0], None).unwrap().unwrap().psnr;
+    assert!(own >= 41.0, "{own}");
 }
 
 /// At the place of a photograph that photograph counts most; equal weights gave 33.4 dB.

@@ -176,6 +176,7 @@ fn render_uncalibrated(
     let images: Vec<&Image> = images.iter().collect();
     let mut special = UncalibratedSettings::default();
     special.robust.seed = arguments.seed;
+    special.plane.degree = settings.interpolation.plane.degree;
     // The other order needs a second rendering, after the first has said which order that is.
     let parts = if arguments.reverse_order { 2.0 } else { 1.0 };
     let run = |special: &UncalibratedSettings, before: f64| {

@@ -5,8 +5,8 @@ use super::{
 };
 use crate::camera::Camera;
 use crate::image::Image;
-use crate::interpolate::HoleCount;
 use crate::interpolate::plane::PlaneProblem;
+use crate::interpolate::{Degree, HoleCount};
 use crate::occlusion::{DepthTest, PlaneSearch};
 use crate::propagate::{CalibratedView, Frame, Landed, Survey};
 use crate::sample::Sample;
@@ -47,10 +47,12 @@ pub fn render_watched(
     watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
     check(views, settings)?;
-    if views.iter().any(|v| v.image.channels() == 3) {
-        render_with::<3>(views, camera, size, settings, watch)
-    } else {
-        render_with::<1>(views, camera, size, settings, watch)
+    let colour = views.iter().any(|v| v.image.channels() == 3);
+    match (settings.interpolation.plane.degree, colour) {
+        (Degree::Linear, false) => render_with::<2, 1>(views, camera, size, settings, watch),
+        (Degree::Linear, true) => render_with::<2, 3>(views, camera, size, settings, watch),
+        (Degree::Cubic, false) => render_with::<4, 1>(views, camera, size, settings, watch),
+        (Degree::Cubic, true) => render_with::<4, 3>(views, camera, size, settings, watch),
     }
 }
 
@@ -72,7 +74,7 @@ fn check(views: &[CalibratedView<'_>], settings: &RenderSettings) -> Result<(), 
     Ok(())
 }
 
-fn render_with<const C: usize>(
+fn render_with<const ORDER: usize, const C: usize>(
     views: &[CalibratedView<'_>],
     camera: &Camera,
     (width, height): (usize, usize),
@@ -88,7 +90,7 @@ fn render_with<const C: usize>(
     let settings = &settings.suited_to(&agreement, &balance);
     let chosen = balance.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
-    let mut problem = PlaneProblem::<C>::new((width, height), &settings.interpolation)?;
+    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation)?;
     let whole = Frame::whole(width, height, 0.5, settings.offset);
     let survey = Survey::of(views, &chosen, camera, &whole);
     let balance = if settings.keep_exposure { balance } else { balance.with_gains(&agreement.gains) };
@@ -194,7 +196,7 @@ mod tests {
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
         let survey = Survey::new(&views, &target, &frame);
-        let mut problem = PlaneProblem::<1>::new((40, 30), &settings.interpolation).unwrap();
+        let mut problem = PlaneProblem::<2, 1>::new((40, 30), &settings.interpolation).unwrap();
         let mut work = Work::default();
         for rows in [0..7, 7..8, 8..30] {
             let (mut band, _) = visible_in(rows, 30, &survey, &views, settings.depth_test(), &mut work);

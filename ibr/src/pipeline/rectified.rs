@@ -99,7 +99,10 @@ fn render_with<const ORDER: usize, const C: usize>(
         Job { views, camera, balance, frame, settings, watch }
     };
     let rendering = match settings.method {
-        Method::Plane => render_plane::<C>(&whole(0.5)),
+        Method::Plane => match settings.interpolation.plane.degree {
+            Degree::Linear => render_plane::<2, C>(&whole(0.5)),
+            Degree::Cubic => render_plane::<4, C>(&whole(0.5)),
+        },
         Method::Auto | Method::Rows => render_rows::<ORDER, C>(&whole(RowWork::<ORDER, C>::MARGIN)),
     }?;
     Ok(Rendering { agreement, views: chosen, ..rendering })
@@ -152,9 +155,9 @@ fn render_rows<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rend
 }
 
 /// The same with the plane fit as third stage; the second stage still runs row by row.
-fn render_plane<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
+fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
     let Frame { width, height, .. } = job.frame;
-    let mut problem = PlaneProblem::<C>::new((width, height), &job.settings.interpolation)?;
+    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &job.settings.interpolation)?;
     let mut strip = Strip::<C>::new(job);
     let mut counts = Vec::with_capacity(height);
     for row in 0..height {

@@ -4,6 +4,7 @@ mod scene;
 
 use hybank_ibr::depth::{DepthMap, Measure};
 use hybank_ibr::image::{Image, quality};
+use hybank_ibr::interpolate::plane::PlaneSettings;
 use hybank_ibr::pipeline::{Method, RenderSettings, Rendering, calibrated, rectified};
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
 use scene::{Eye, SIZE, eye, shoot};
@@ -22,16 +23,20 @@ fn shots(eyes: &[Eye]) -> Vec<Shot> {
     eyes.iter().map(shot).collect()
 }
 
-fn render(shots: &[Shot], target: &Eye) -> Rendering {
+fn render(shots: &[Shot], target: &Eye, settings: &RenderSettings) -> Rendering {
     let views: Vec<CalibratedView<'_>> = shots
         .iter()
         .map(|s| CalibratedView { image: &s.image, depth: &s.depth, camera: s.eye.camera() })
         .collect();
-    calibrated::render(&views, &target.camera(), SIZE, &RenderSettings::default()).unwrap()
+    calibrated::render(&views, &target.camera(), SIZE, settings).unwrap()
 }
 
 fn psnr(shots: &[Shot], target: &Eye, what: &str) -> f64 {
-    let rendering = render(shots, target);
+    psnr_with(shots, target, &RenderSettings::default(), what)
+}
+
+fn psnr_with(shots: &[Shot], target: &Eye, settings: &RenderSettings, what: &str) -> f64 {
+    let rendering = render(shots, target, settings);
     let quality = quality::compare(&rendering.image, &shoot(target).0, None).unwrap().unwrap();
     println!("{what}: {:.2} dB, coverage {:.4} {:?}", quality.psnr, rendering.coverage(), rendering.report);
     quality.psnr
@@ -67,6 +72,29 @@ fn a_zoom_by_two_from_one_view() {
     assert!(got >= 37.0, "{got}");
 }
 
+fn bicubic() -> RenderSettings {
+    let mut settings = RenderSettings::default();
+    settings.interpolation.plane = PlaneSettings::CUBIC;
+    settings
+}
+
+/// Bicubic splines reach across the edges of objects, and are sharper all the same.
+#[test]
+fn a_bicubic_plane_is_sharper() {
+    let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
+    let target = |zoom, forward| Eye { zoom, ..eye(0.0, 0.0, forward) };
+    for (what, shots, target, gain) in [
+        ("stereo", &pair[..], target(1.0, 0.0), 2.5),
+        ("forward", &pair, target(1.0, 1.5), 2.0),
+        ("zoom", &pair, target(2.0, 0.0), 0.8),
+        ("zoom, one view", &pair[..1], target(2.0, 0.0), -0.05),
+    ] {
+        let linear = psnr(shots, &target, what);
+        let cubic = psnr_with(shots, &target, &bicubic(), &format!("{what}, bicubic"));
+        assert!(cubic >= linear + gain, "{what}: {linear} {cubic}");
+    }
+}
+
 /// Camera positions along a path through a photograph, and with `HYBANK_SWEEP=1` on through the other
 /// one: the error changes smoothly, so a film does not pulse. A photograph's own place is one of the
 /// positions.
@@ -99,8 +127,11 @@ fn a_stretched_surface_is_bridged() {
     let disparity = DepthMap::new((width, height), disparities, 1.0, Measure::Disparity).unwrap();
     let image = picture(1.0);
     let view = RectifiedView { image: &image, disparity: &disparity, position: 1.0 };
-    for (method, least) in [(Method::Rows, 60.0), (Method::Plane, 55.0)] {
-        let settings = RenderSettings { method, offset: -40.0, ..RenderSettings::default() };
+    let linear = RenderSettings::default();
+    for (method, settings, least) in
+        [(Method::Rows, linear, 60.0), (Method::Plane, linear, 55.0), (Method::Plane, bicubic(), 56.2)]
+    {
+        let settings = RenderSettings { method, offset: -40.0, ..settings };
         let got = rectified::render(&[view], 0.0, &settings).unwrap();
         let psnr = quality::compare(&got.image, &picture(2.0), None).unwrap().unwrap().psnr;
         println!("stretched by two, {method:?}: {psnr:.2} dB");

@@ -2,6 +2,7 @@
 
 use super::SceneArguments;
 use crate::image::{FrameRate, Levels};
+use crate::interpolate::plane::PlaneSettings;
 use crate::interpolate::{Degree, HoleFill};
 use crate::partial::{Densify, Segmentwise};
 use crate::pipeline::{Method, RenderSettings};
@@ -90,9 +91,10 @@ pub(in crate::cli) struct RenderArguments {
     /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
     #[arg(long)]
     pub(in crate::cli) drop_unknown: bool,
-    /// Degree of the row splines.
-    #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
-    pub(in crate::cli) degree: DegreeName,
+    /// Degree of the splines [default: cubic in rows, linear in the plane]. A cubic plane is sharper and
+    /// takes three times as long.
+    #[arg(long, value_enum)]
+    pub(in crate::cli) degree: Option<DegreeName>,
     /// Weight of the slope penalty of the row fit, px^2 [default: from the noise of the photographs].
     #[arg(long, value_name = "L", allow_negative_numbers = true)]
     pub(in crate::cli) lambda: Option<f64>,
@@ -176,10 +178,11 @@ impl RenderArguments {
             FillName::Bridge => HoleFill::Bridge,
             FillName::Leave => HoleFill::Leave,
         };
-        stage.fit.degree = match self.degree {
-            DegreeName::Linear => Degree::Linear,
-            DegreeName::Cubic => Degree::Cubic,
-        };
+        match self.degree {
+            Some(DegreeName::Linear) => stage.fit.degree = Degree::Linear,
+            Some(DegreeName::Cubic) => stage.plane = PlaneSettings::CUBIC,
+            None => {}
+        }
         let mut typed = |slot: fn(&mut crate::interpolate::Settings) -> &mut f64, value: Option<f64>| {
             if let Some(value) = value {
                 *slot(stage) = value;

@@ -1,47 +1,37 @@
 //! Samples enter the normal equations: into the whole image, or into several parts of it at a time.
 
-use super::PlaneProblem;
-use super::stencil::{Couplings, add_sample, bilinear, corners};
+use super::{Fit2Sample, PlaneProblem};
 use crate::interpolate::{HoleSettings, InterpolationError, check_samples};
 use crate::occlusion::LARGEST_SPACING;
 use crate::sample::Sample;
+use hybank::sampling::fit2::Fit2Rows;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Some rows of the image with all that samples change there.
-struct Part<'a, const C: usize> {
+struct Part<'a, const ORDER: usize, const C: usize> {
     size: (usize, usize),
     holes: HoleSettings,
     /// Index of the first pixel.
     first: usize,
-    entries: &'a mut [Couplings],
-    rhs: &'a mut [[f32; C]],
+    fit: Fit2Rows<'a, ORDER, C>,
     depth: &'a mut [f32],
     distance: &'a mut [f32],
     counts: &'a mut [u16],
 }
 
-impl<'a, const C: usize> Part<'a, C> {
-    /// The part before a pixel of the image, and the rest.
-    fn split(self, pixel: usize) -> (Self, Self) {
-        let at = pixel - self.first;
-        let (entries, rhs) = (self.entries.split_at_mut(at), self.rhs.split_at_mut(at));
+impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
+    /// The part before a row of the image, and the rest.
+    fn split(self, row: usize) -> (Self, Self) {
+        let (size, holes, pixel) = (self.size, self.holes, row * self.size.0);
+        let (fit, at) = (self.fit.split_at(row), pixel - self.first);
         let (depth, distance) = (self.depth.split_at_mut(at), self.distance.split_at_mut(at));
         let counts = self.counts.split_at_mut(at);
-        let (size, holes) = (self.size, self.holes);
-        let part = |first, entries, rhs, depth, distance, counts| Self {
-            size,
-            holes,
-            first,
-            entries,
-            rhs,
-            depth,
-            distance,
-            counts,
-        };
+        let part =
+            |first, fit, depth, distance, counts| Self { size, holes, first, fit, depth, distance, counts };
         (
-            part(self.first, entries.0, rhs.0, depth.0, distance.0, counts.0),
-            part(pixel, entries.1, rhs.1, depth.1, distance.1, counts.1),
+            part(self.first, fit.0, depth.0, distance.0, counts.0),
+            part(pixel, fit.1, depth.1, distance.1, counts.1),
         )
     }
 
@@ -53,22 +43,17 @@ impl<'a, const C: usize> Part<'a, C> {
             let inside = s.x >= -0.5 && s.x <= right + 0.5 && s.y >= -0.5 && s.y <= bottom + 0.5;
             if inside {
                 self.register(s);
-                self.splat(s.x.clamp(0.0, right), s.y.clamp(0.0, bottom), s.weight, &s.value);
+                self.fit.add(&Fit2Sample {
+                    x: s.x,
+                    y: s.y,
+                    values: s.value,
+                    weight: s.weight,
+                    slope_weight: 0.0,
+                });
                 added += 1;
             }
         }
         added
-    }
-
-    /// Adds a sample to both sides of the normal equations.
-    fn splat(&mut self, x: f64, y: f64, weight: f32, value: &[f32; C]) {
-        let (pixel, weights) = bilinear(self.size, x, y);
-        let pixel = pixel - self.first;
-        add_sample(self.entries, self.size.0, pixel, &weights, weight);
-        for (q, w) in corners(self.size, pixel, &weights) {
-            let w = weight * w;
-            self.rhs[q].iter_mut().zip(value).for_each(|(r, v)| *r += w * v);
-        }
     }
 
     /// Records the depth of the sample at the pixels within its reach, half a gap, unless another sample is
@@ -99,14 +84,13 @@ impl<'a, const C: usize> Part<'a, C> {
     }
 }
 
-impl<const C: usize> PlaneProblem<C> {
-    fn whole(&mut self) -> Part<'_, C> {
+impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
+    fn whole(&mut self) -> Part<'_, ORDER, C> {
         Part {
             size: (self.width, self.height),
             holes: self.settings.holes,
             first: 0,
-            entries: self.stencil.entries(),
-            rhs: &mut self.rhs,
+            fit: self.fit.rows(),
             depth: &mut self.depth,
             distance: &mut self.distance,
             counts: &mut self.counts,
@@ -135,22 +119,22 @@ impl<const C: usize> PlaneProblem<C> {
         bands: &[Range<usize>],
         make: impl Fn(&Range<usize>) -> Vec<Sample<C>> + Sync,
     ) -> Result<(), InterpolationError> {
-        // A sample changes the row below it and the rows within its reach.
-        let margin = self.settings.holes.reach(LARGEST_SPACING).ceil() as usize + 1;
+        // A sample changes the rows of its splines and those within its reach.
+        let margin = self.settings.holes.reach(LARGEST_SPACING).ceil() as usize + ORDER - 1;
         if bands.iter().any(|band| band.len() < 2 * margin) {
             return bands.iter().try_for_each(|band| self.add(&make(band)));
         }
         for parity in 0..2 {
-            let (height, width) = (self.height, self.width);
-            let mut parts: Vec<(&Range<usize>, Part<'_, C>)> = Vec::new();
+            let height = self.height;
+            let mut parts: Vec<(&Range<usize>, Part<'_, ORDER, C>)> = Vec::new();
             let mut rest = self.whole();
             for band in bands.iter().skip(parity).step_by(2) {
-                let (_, after) = rest.split(band.start.saturating_sub(margin) * width);
-                let (part, after) = after.split((band.end + margin).min(height) * width);
+                let (_, after) = rest.split(band.start.saturating_sub(margin));
+                let (part, after) = after.split((band.end + margin).min(height));
                 parts.push((band, part));
                 rest = after;
             }
-            let add = |(band, mut part): (&Range<usize>, Part<'_, C>)| {
+            let add = |(band, mut part): (&Range<usize>, Part<'_, ORDER, C>)| {
                 let samples = make(band);
                 check_samples(&samples).map(|()| part.add(&samples))
             };
@@ -161,8 +145,8 @@ impl<const C: usize> PlaneProblem<C> {
     }
 
     /// Adds a sample of weight one on a pixel.
-    pub(super) fn add_on_pixel(&mut self, pixel: usize, value: &[f32; C]) {
+    pub(super) fn add_on_pixel(&mut self, pixel: usize, values: [f32; C]) {
         let (x, y) = ((pixel % self.width) as f64, (pixel / self.width) as f64);
-        self.whole().splat(x, y, 1.0, value);
+        self.fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0, slope_weight: 0.0 });
     }
 }

@@ -1,8 +1,8 @@
 //! The plane fit: the whole virtual image at once, for samples at any position (the row fit in two
 //! dimensions).
 //!
-//! With u the pixels, B_s the bilinear weights of sample s and g_pq the stiffness of the edge between
-//! neighbouring pixels p and q, minimise
+//! With u the coefficients of a bilinear or bicubic spline, B_s its weights at sample s and g_pq the
+//! stiffness of the edge between neighbouring coefficients p and q, minimise
 //!
 //! ```text
 //! sum_s w_s (I_s - sum_p B_sp u_p)^2 + sum_pq g_pq (u_p - u_q)^2 + sum_pqr h_pqr (u_p - 2 u_q + u_r)^2,
@@ -10,26 +10,27 @@
 //! ```
 //!
 //! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in
-//! units of the depth test's sigma. The bending term smooths like a cubic spline: it removes noise and keeps
-//! slopes. Each equation has thirteen unknowns; conjugate gradients solve them for all channels together,
-//! with a multigrid preconditioner where holes are large.
+//! units of the depth test's sigma. The coefficients of the bilinear spline are the pixels. Its bending term
+//! smooths like a cubic spline: it removes noise and keeps slopes. [`hybank::sampling::fit2`] holds and
+//! solves the equations.
 
 mod background;
-mod conjugate;
 mod gather;
-mod multigrid;
+mod grid;
 mod springs;
-mod stencil;
 
-use super::{Cover, HoleFill, InterpolationError, Settings, Watch};
+use super::{Cover, Degree, HoleFill, InterpolationError, Settings, Watch};
 use crate::depth::{DepthMap, Measure};
 use crate::sample::Sample;
-use springs::Springs;
-use stencil::Stencil;
+use grid::Grid;
+use hybank::sampling::Fit2;
+use hybank::sampling::fit2::{Fit2Sample, Iteration};
 
 /// Settings of the plane fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneSettings {
+    /// Degree of the splines.
+    pub degree: Degree,
     /// Weight of the squared difference of neighbouring pixels on one surface.
     pub stiffness: f64,
     /// Weight of the squared second difference within one surface.
@@ -42,9 +43,25 @@ pub struct PlaneSettings {
     pub iterations: usize,
 }
 
+impl PlaneSettings {
+    /// Bilinear splines.
+    pub const LINEAR: Self = Self {
+        degree: Degree::Linear,
+        stiffness: 0.12,
+        bending: 0.02,
+        edge_stiffness: 1e-3,
+        tolerance: 3e-5,
+        iterations: 500,
+    };
+
+    /// Bicubic splines: the sharper image in three times the time. They are smooth without bending, and need
+    /// less stiffness, as they follow what bilinear splines take for noise.
+    pub const CUBIC: Self = Self { degree: Degree::Cubic, stiffness: 0.02, bending: 0.0, ..Self::LINEAR };
+}
+
 impl Default for PlaneSettings {
     fn default() -> Self {
-        Self { stiffness: 0.12, bending: 0.02, edge_stiffness: 1e-3, tolerance: 3e-5, iterations: 500 }
+        Self::LINEAR
     }
 }
 
@@ -80,11 +97,10 @@ const LEAST_SOURCE_WEIGHT: f32 = 0.3;
 
 /// Collects visible samples, all at once or band by band, and then fits the image.
 #[derive(Debug, Clone)]
-pub struct PlaneProblem<const C: usize> {
+pub struct PlaneProblem<const ORDER: usize, const C: usize> {
     width: usize,
     height: usize,
-    stencil: Stencil,
-    rhs: Vec<[f32; C]>,
+    fit: Fit2<ORDER, C>,
     /// Depth of the sample nearest to each pixel centre, NaN where none lies within half a gap.
     depth: Vec<f32>,
     /// Squared distance of that sample.
@@ -94,7 +110,7 @@ pub struct PlaneProblem<const C: usize> {
     added: usize,
 }
 
-impl<const C: usize> PlaneProblem<C> {
+impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     /// An empty problem.
     ///
     /// # Errors
@@ -105,8 +121,7 @@ impl<const C: usize> PlaneProblem<C> {
         Ok(Self {
             width,
             height,
-            stencil: Stencil::new(width, height),
-            rhs: vec![[0.0; C]; pixels],
+            fit: Fit2::new(width, height),
             depth: vec![f32::NAN; pixels],
             distance: vec![f32::INFINITY; pixels],
             counts: vec![0; pixels],
@@ -157,46 +172,57 @@ impl<const C: usize> PlaneProblem<C> {
         }
         let left_out = self.settings.holes.fill == HoleFill::Leave;
         let fitted = |p: usize| inside(p) && !(left_out && mask[p] != Cover::Seen);
-        self.connect(&(0..width * height).map(fitted).collect::<Vec<_>>());
-        self.depth = Vec::new();
-        let (mut values, convergence) =
-            conjugate::solve(&self.stencil, self.rhs, &self.settings.plane, watch);
+        let counts = std::mem::take(&mut self.counts);
+        let (mut values, convergence) = self.fitted(&fitted, watch);
         (0..width * height).filter(|p| !inside(*p)).for_each(|p| {
             mask[p] = Cover::Disocclusion;
             values[p * C..(p + 1) * C].fill(0.0);
         });
-        if self.settings.holes.fill == HoleFill::Leave {
+        if left_out {
             super::rows::blacken(&mask, &mut values, C);
         }
         values.iter_mut().for_each(|v| *v = v.clamp(0.0, 255.0));
-        Ok(PlaneFit { values, mask, depth, counts: self.counts, convergence })
+        Ok(PlaneFit { values, mask, depth, counts, convergence })
     }
 
     /// Gives every disoccluded pixel a sample with value and depth of the surface that continues into it.
     fn fill_background(&mut self, mask: &[Cover], inside: &dyn Fn(usize) -> bool) {
+        let grid = self.grid();
         let sound = |(p, depth): (usize, &f32)| {
-            if self.stencil.sample_weight(p) < LEAST_SOURCE_WEIGHT { f32::NAN } else { *depth }
+            let weight = self.fit.local_sums(grid.coefficient(p)).0;
+            if weight < LEAST_SOURCE_WEIGHT { f32::NAN } else { *depth }
         };
         let sound: Vec<f32> = self.depth.iter().enumerate().map(sound).collect();
         let sources = background::sources(&sound, self.width, &self.settings.depth_test);
-        for p in (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && inside(*p)) {
-            let Some(source) = sources[p].map(|s| s as usize) else { continue };
+        let holes = (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && inside(*p));
+        let found = holes.filter_map(|p| Some((p, sources[p]? as usize)));
+        // The value of a seen pixel before the fit: its share of the right-hand side. The new samples must
+        // not count in it.
+        let continued: Vec<(usize, usize, [f32; C])> = found
+            .map(|(p, source)| {
+                let (weight, values) = self.fit.local_sums(grid.coefficient(source));
+                (p, source, values.map(|v| v / weight))
+            })
+            .collect();
+        for (p, source, values) in continued {
             self.depth[p] = self.depth[source];
-            // The value of a seen pixel before the fit: its share of the right-hand side. A sample on a
-            // pixel centre affects that pixel only, so no source changes in this loop.
-            let weight = self.stencil.sample_weight(source);
-            let value = self.rhs[source].map(|r| r / weight);
-            self.add_on_pixel(p, &value);
+            self.add_on_pixel(p, values);
         }
     }
 
-    /// Adds the edges between neighbouring pixels and the bends of triples.
-    fn connect(&mut self, inside: &[bool]) {
-        for down in [false, true] {
-            let springs = Springs::new(&self.depth, self.width, inside, &self.settings, down);
-            self.stencil.add_springs(&springs.edge, &springs.bend, down);
-        }
-        inside.iter().enumerate().filter(|(_, i)| !**i).for_each(|(p, _)| self.stencil.isolate(p));
+    fn grid(&self) -> Grid {
+        Grid { image: (self.width, self.height), coefficients: self.fit.coefficients() }
+    }
+
+    /// The values of the pixels where `inside` is true, all fitted together.
+    fn fitted(self, inside: &(impl Fn(usize) -> bool + Sync), watch: Watch<'_>) -> (Vec<f32>, Convergence) {
+        let (plane, grid) = (&self.settings.plane, self.grid());
+        let springs = |direction| springs::between(&self.depth, grid, inside, &self.settings, direction);
+        let connected = self.fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient)));
+        let iteration = Iteration { tolerance: plane.tolerance, steps: plane.iterations };
+        let (values, ended) = connected.solve(&iteration, watch);
+        let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
+        (values, Convergence { steps, residual, reached })
     }
 }
 
@@ -209,7 +235,18 @@ pub fn interpolate<const C: usize>(
     size: (usize, usize),
     settings: &Settings,
 ) -> Result<PlaneFit, InterpolationError> {
-    let mut problem = PlaneProblem::new(size, settings)?;
+    match settings.plane.degree {
+        Degree::Linear => interpolate_with::<2, C>(samples, size, settings),
+        Degree::Cubic => interpolate_with::<4, C>(samples, size, settings),
+    }
+}
+
+fn interpolate_with<const ORDER: usize, const C: usize>(
+    samples: &[Sample<C>],
+    size: (usize, usize),
+    settings: &Settings,
+) -> Result<PlaneFit, InterpolationError> {
+    let mut problem = PlaneProblem::<ORDER, C>::new(size, settings)?;
     problem.add(samples)?;
     problem.solve(None)
 }

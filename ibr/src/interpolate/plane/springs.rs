@@ -1,44 +1,48 @@
 //! The stiffness between neighbouring pixels, which falls with the difference of their depths.
 
+use super::grid::Grid;
 use crate::interpolate::Settings;
 use crate::occlusion::DepthTest;
+use hybank::sampling::fit2::{Direction, Springs};
 use rayon::prelude::*;
 
-/// g of the edge from each pixel to the next one in a direction, and h of the triple that begins there; 0
-/// where there is none.
-pub(super) struct Springs {
-    pub(super) edge: Vec<f32>,
-    pub(super) bend: Vec<f32>,
+/// The springs of one direction, from the depths of the pixels, NaN where unknown: bridged holes count as
+/// lying on the surface of the others. Only what lies `inside` is connected.
+pub(super) fn between(
+    depth: &[f32],
+    grid: Grid,
+    inside: &(impl Fn(usize) -> bool + Sync),
+    settings: &Settings,
+    direction: Direction,
+) -> Springs {
+    let (width, height) = grid.coefficients;
+    let (mut edge, mut bend) = (vec![0.0; width * height], vec![0.0; width * height]);
+    let rows = edge.par_chunks_mut(width).zip(bend.par_chunks_mut(width));
+    rows.enumerate().with_min_len(8).for_each(|(y, (edge, bend))| {
+        for x in 0..width {
+            // The next ones, as far as they lie in the grid and inside.
+            let (room, step) = match direction {
+                Direction::Across => (width - 1 - x, (1, 0)),
+                Direction::Down => (height - 1 - y, (0, 1)),
+            };
+            let pixel = |k: usize| grid.pixel_at(x + k * step.0, y + k * step.1);
+            let joined = (0..=room.min(2)).take_while(|k| inside(pixel(*k))).count();
+            let depths = [0, 1, 2].map(|k| if k < joined { depth[pixel(k)] } else { f32::NAN });
+            (edge[x], bend[x]) = spring(&depths, joined, settings);
+        }
+    });
+    Springs { edge, bend }
 }
 
-impl Springs {
-    /// From the depths of the pixels, NaN where unknown: bridged holes count as lying on the surface of the
-    /// others. Only pixels `inside` are connected.
-    pub(super) fn new(depth: &[f32], width: usize, inside: &[bool], settings: &Settings, down: bool) -> Self {
-        let (mut edge, mut bend) = (vec![0.0; depth.len()], vec![0.0; depth.len()]);
-        let (stride, plane) = (if down { width } else { 1 }, &settings.plane);
-        let (stiffness, bending) = (plane.stiffness as f32, plane.bending as f32);
-        let rows = edge.par_chunks_mut(width).zip(bend.par_chunks_mut(width));
-        rows.enumerate().with_min_len(8).for_each(|(y, (edge, bend))| {
-            for x in 0..width {
-                let p = y * width + x;
-                // The next pixels, as far as they lie in the image and inside.
-                let room = if down { depth.len().saturating_sub(p + 1) / width } else { width - 1 - x };
-                let joined = (0..=room.min(2)).take_while(|k| inside[p + k * stride]).count();
-                let at = |k: usize| depth[p + k * stride];
-                if joined > 1 {
-                    let pair = near_and_far(at(0), at(1));
-                    edge[x] = stiffness * share(pair, &settings.depth_test) + plane.edge_stiffness as f32;
-                    if joined > 2 {
-                        let pairs = (pair, near_and_far(at(1), at(2)));
-                        let all = (pairs.0.0.min(pairs.1.0), pairs.0.1.max(pairs.1.1));
-                        bend[x] = bending * share(all, &settings.depth_test);
-                    }
-                }
-            }
-        });
-        Self { edge, bend }
-    }
+/// Edge and bend of `joined` neighbours, at most three, with these depths.
+#[inline]
+fn spring(depths: &[f32; 3], joined: usize, settings: &Settings) -> (f32, f32) {
+    let (plane, test) = (&settings.plane, &settings.depth_test);
+    let pair = near_and_far(depths[0], depths[1]);
+    let edge = || plane.stiffness as f32 * share(pair, test) + plane.edge_stiffness as f32;
+    let next = near_and_far(depths[1], depths[2]);
+    let bend = || plane.bending as f32 * share((pair.0.min(next.0), pair.1.max(next.1)), test);
+    (if joined > 1 { edge() } else { 0.0 }, if joined > 2 { bend() } else { 0.0 })
 }
 
 /// The lesser and the greater of two depths; an unknown one equals the other.

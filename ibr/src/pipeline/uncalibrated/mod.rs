@@ -9,6 +9,7 @@ mod synthesis;
 
 use super::{RenderError, RenderSettings, Rendering, Watch};
 use crate::image::Image;
+use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneSettings;
 use crate::uncalibrated::chirality::Handedness;
 use crate::uncalibrated::order::Order;
@@ -190,7 +191,12 @@ pub fn render_watched(
     watch(DECIDED);
     let rest = |share| watch(DECIDED + (1.0 - DECIDED) * share);
     let colour = images.iter().any(|i| i.channels() == 3);
-    let render = if colour { synthesis::render::<3> } else { synthesis::render::<1> };
+    let render = match (uncalibrated.plane.degree, colour) {
+        (Degree::Linear, false) => synthesis::render::<2, 1>,
+        (Degree::Linear, true) => synthesis::render::<2, 3>,
+        (Degree::Cubic, false) => synthesis::render::<4, 1>,
+        (Degree::Cubic, true) => synthesis::render::<4, 3>,
+    };
     Ok(render(images, &surfaces, &scene, &balance, size, (settings, uncalibrated, &rest))?)
 }
 

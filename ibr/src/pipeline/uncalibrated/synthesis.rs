@@ -21,7 +21,7 @@ use nalgebra::Vector4;
 const GATHERED: f64 = 0.4;
 
 /// Renders the virtual view from the reconstructed scene.
-pub(super) fn render<const C: usize>(
+pub(super) fn render<const ORDER: usize, const C: usize>(
     images: &[&Image],
     surfaces: &[Surface],
     scene: &Reconstruction,
@@ -43,7 +43,7 @@ pub(super) fn render<const C: usize>(
     let interpolation =
         interpolate::Settings { depth_test: test, plane: special.plane, ..settings.interpolation };
     watch(GATHERED);
-    let mut problem = PlaneProblem::<C>::new(size, &interpolation)?;
+    let mut problem = PlaneProblem::<ORDER, C>::new(size, &interpolation)?;
     problem.add(&samples)?;
     problem.seen().zip(&mut region).for_each(|(seen, inside)| *inside |= seen);
     let fit = problem.solve_watched(Some(&region), &|share| watch(GATHERED + (1.0 - GATHERED) * share))?;
