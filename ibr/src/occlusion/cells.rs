@@ -11,7 +11,10 @@ use std::ops::Range;
 /// Edge of a cell in pixels. On the synthetic scene 4 is the fastest of 2, 4 and 8.
 const EDGE: f64 = 4.0;
 
-/// Added to the radius: the distance test rounds.
+/// Columns of cells that a run usually meets, where samples lie a pixel apart.
+const USUAL_COLUMNS: usize = 4;
+
+/// Factor of the radius: the distance test rounds.
 const ROUNDING: f64 = 1.0001;
 
 /// Some neighbouring samples.
@@ -66,9 +69,9 @@ impl Cells {
             let run = self.run(points, start..start + RUN, test);
             self.runs.push(run);
             if run.near < f32::INFINITY {
-                for row in self.rows_of(&run) {
-                    self.near[row].iter_mut().for_each(|near| *near = least(*near, run.near));
-                }
+                let mut cells = std::mem::take(&mut self.near);
+                self.each_cell(&run, |cell| cells[cell] = least(cells[cell], run.near));
+                self.near = cells;
             }
         }
     }
@@ -82,9 +85,12 @@ impl Cells {
         }
         let none = (f32::INFINITY, f32::NEG_INFINITY);
         let depths: &[f32] = &points.depth[places.clone()];
-        let near = bounds::<_, 4>(depths, none).0;
-        let own = depths.iter().zip(&points.own[places.clone()]);
-        let far = own.fold(none.1, |far, (d, own)| if *own { largest(far, *d) } else { far });
+        let (near, mut far) = bounds::<_, 4>(depths, none);
+        let own = &points.own[places.clone()];
+        if own != [true; RUN] {
+            let own = depths.iter().zip(own).filter(|(_, own)| **own);
+            far = own.fold(none.1, |far, (d, _)| largest(far, *d));
+        }
         let spacing = bounds::<_, 4>(&points.spacing[places], (0.0, 0.0)).1;
         let reach = ROUNDING * test.radius(spacing);
         let last = |count: usize| count as u32 - 1;
@@ -96,12 +102,20 @@ impl Cells {
         Run { columns, rows, near, far }
     }
 
-    /// The cells of a run, as ranges of the arrays.
-    #[inline]
-    fn rows_of(&self, run: &Run) -> impl Iterator<Item = Range<usize>> + use<> {
-        let ([left, right], columns) = (run.columns.map(|c| c as usize), self.columns);
-        (run.rows[0] as usize..=run.rows[1] as usize)
-            .map(move |row| row * columns + left..row * columns + right + 1)
+    /// Calls `with` for each cell of a run, for some of them repeatedly.
+    #[inline(always)]
+    fn each_cell(&self, run: &Run, mut with: impl FnMut(usize)) {
+        let ([left, right], [top, bottom]) = (run.columns.map(|c| c as usize), run.rows.map(|r| r as usize));
+        if right < left + USUAL_COLUMNS && bottom < top + 2 {
+            // Always as many cells: the processor cannot foresee how often a loop would run.
+            for row in [top * self.columns, bottom * self.columns] {
+                (0..USUAL_COLUMNS).for_each(|k| with(row + (left + k).min(right)));
+            }
+        } else {
+            for row in top..=bottom {
+                (left..=right).for_each(|column| with(row * self.columns + column));
+            }
+        }
     }
 
     /// Finds the samples that may be hidden: those far enough behind the nearest one in their cell.
@@ -109,8 +123,9 @@ impl Cells {
         suspects.clear();
         let hides = |near: f32, far: f32| test.hides(f64::from(near), f64::from(far));
         for (k, run) in self.runs.iter().enumerate().filter(|(_, run)| run.far > f32::NEG_INFINITY) {
-            let around = self.rows_of(run).flat_map(|row| &self.near[row]);
-            if !hides(around.fold(f32::INFINITY, |near, n| least(near, *n)), run.far) {
+            let mut near = f32::INFINITY;
+            self.each_cell(run, |cell| near = least(near, self.near[cell]));
+            if !hides(near, run.far) {
                 continue;
             }
             for i in (k * RUN..(k + 1) * RUN).filter(|i| points.own[*i]) {
@@ -128,8 +143,8 @@ impl Cells {
     pub(super) fn hiders(&self, points: &Points, test: &DepthTest, mut with: impl FnMut(usize)) {
         let hides = |near: f32, far: f32| test.hides(f64::from(near), f64::from(far));
         for (k, run) in self.runs.iter().enumerate() {
-            let around = self.rows_of(run).flat_map(|row| &self.far[row]);
-            let far = around.fold(f32::NEG_INFINITY, |far, f| largest(far, *f));
+            let mut far = f32::NEG_INFINITY;
+            self.each_cell(run, |cell| far = largest(far, self.far[cell]));
             if hides(run.near, far) {
                 (k * RUN..(k + 1) * RUN).filter(|i| hides(points.depth[*i], far)).for_each(&mut with);
             }

@@ -2,9 +2,9 @@
 //! those in the cells around them, of the size of the radius. Samples whose radii differ by a factor of two
 //! or more lie in different grids.
 
-use super::DepthTest;
 use super::cells::Cells;
 use super::points::{Extent, Points};
+use super::{DepthTest, LARGEST_SPACING};
 use crate::sample::Sample;
 use rayon::prelude::*;
 
@@ -86,7 +86,7 @@ impl PlaneSearch {
             let level = level(spacing);
             let grid = &mut grids[level];
             if grid.heads.is_empty() {
-                grid.place(extent, test.radius((1 << level) as f32), CELLS_A_SAMPLE * points.len() + 16);
+                grid.place(extent, test.radius(LIMITS[level]), CELLS_A_SAMPLE * points.len() + 16);
             }
             let next = grid.insert(members.len() as u32, x, y);
             members.push(Member { x, y, radius: test.radius(spacing), depth, next });
@@ -94,7 +94,9 @@ impl PlaneSearch {
     }
 }
 
-/// Grids for samples of spacing up to 1, 2, 4 and 8.
+/// Largest spacing of the samples in each grid. The spacing on a surface seen from two sides is a little
+/// above and below 1, and most samples are in the grid with the smallest cells.
+const LIMITS: [f32; LEVELS] = [1.2, 2.4, 4.8, LARGEST_SPACING];
 const LEVELS: usize = 4;
 
 /// No sample.
@@ -103,7 +105,7 @@ const NONE: u32 = u32::MAX;
 /// The grid of a sample.
 #[inline]
 fn level(spacing: f32) -> usize {
-    [1.0, 2.0, 4.0].iter().map(|limit| usize::from(spacing > *limit)).sum()
+    LIMITS[..LEVELS - 1].iter().map(|limit| usize::from(spacing > *limit)).sum()
 }
 
 /// Samples of similar radius in square cells, those of a cell as a linked list: neighbouring samples of a

@@ -250,22 +250,27 @@ impl SampleErrors {
     /// Root mean square change of the value for an error of one in the depth, by central differences, which
     /// have half the variance of the noise in each direction.
     fn slope(&self, image: &Image, pixel: usize, gain: f64) -> f64 {
+        let square = match image.channels() {
+            3 => self.square::<3>(image, pixel, gain) / 3.0,
+            _ => self.square::<1>(image, pixel, gain),
+        };
+        (square - 0.5 * self.noise * self.lever.trace()).max(0.0).sqrt()
+    }
+
+    /// The sum of the mean square changes of the channels, with the noise.
+    fn square<const N: usize>(&self, image: &Image, pixel: usize, gain: f64) -> f64 {
         let (width, height) = image.size();
-        let (x, y) = (pixel % width, pixel / width);
-        let columns = (pixel - usize::from(x > 0), pixel + usize::from(x + 1 < width));
-        let rows =
-            (if y > 0 { pixel - width } else { pixel }, if y + 1 < height { pixel + width } else { pixel });
-        let channels = image.channels();
-        let square: f64 = (0..channels)
-            .map(|c| {
-                let value = |p: usize| f64::from(image.data()[p * channels + c]);
-                let along = |(a, b): (usize, usize), step: usize| {
-                    gain * (value(b) - value(a)) / ((b - a) / step).max(1) as f64
-                };
-                self.lever.square([along(columns, 1), along(rows, width)])
-            })
-            .sum();
-        (square / channels as f64 - 0.5 * self.noise * self.lever.trace()).max(0.0).sqrt()
+        // Pixels are counted in 32 bits, which divide faster.
+        let (x, y) = ((pixel as u32 % width as u32) as usize, (pixel as u32 / width as u32) as usize);
+        let [left, right] = [x > 0, x + 1 < width].map(usize::from);
+        let [above, below] = [y > 0, y + 1 < height].map(usize::from);
+        let value = |p: usize| image.pixel::<N>(p).map(f64::from);
+        let columns = [value(pixel - left), value(pixel + right)];
+        let rows = [value(pixel - above * width), value(pixel + below * width)];
+        let share = |steps: usize| if steps == 2 { 0.5 } else { 1.0 };
+        let (across, down) = (share(left + right), share(above + below));
+        let along = |[a, b]: &[[f64; N]; 2], c: usize, share: f64| gain * (b[c] - a[c]) * share;
+        (0..N).map(|c| self.lever.square([along(&columns, c, across), along(&rows, c, down)])).sum()
     }
 }
 
