@@ -2,8 +2,9 @@
 
 use super::*;
 use hybank_ibr::analysis::plan::{
-    Candidate, Costs, Placement, RoundingCosts, Search, Wanted, price_of_depth_errors,
+    Candidate, Costs, Placement, RoundingCosts, Search, Wanted, price_of_depth_errors, rounded_map,
 };
+use hybank_ibr::partial::{Densify, densify};
 use hybank_ibr::pipeline::rectified;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -12,11 +13,19 @@ fn mean_square(image: &Image, truth: &Image) -> f64 {
     mean(image.data().iter().zip(truth.data()).map(|(a, b)| f64::from(a - b).powi(2)))
 }
 
-/// Independent errors of the disparities with standard deviations up to two pixels: the mean absolute error
-/// that is predicted from the exact inputs, and the one that is measured with other errors of the same size.
+/// Independent errors of the disparities with standard deviations up to two pixels, in two scenes: the mean
+/// absolute error that is predicted from the exact inputs, and the one that is measured with other errors of
+/// the same size.
 #[test]
 fn the_price_of_errors_of_depth() {
-    let exact = degraded(&synthetic(&[0.0, 1.0, 0.5]), 1.5, 1e-3);
+    for (name, rig) in
+        [("synthetic", synthetic(&[0.0, 1.0, 0.5])), ("ray-traced", ray_traced(&[0.0, 1.0, 0.5]))]
+    {
+        price_of_errors_in(name, &degraded(&rig, 1.5, 1e-3));
+    }
+}
+
+fn price_of_errors_in(name: &str, exact: &Rig) {
     let (views, settings) = (exact.views(&[0, 1]), RenderSettings::default());
     let now = view::rectified(&views, 0.5, &settings).unwrap();
     for deviation in [0.0, 0.5, 1.0, 2.0] {
@@ -31,8 +40,8 @@ fn the_price_of_errors_of_depth() {
         let image = rectified::render(&rig.views(&[0, 1]), 0.5, &settings).unwrap().image;
         let measured = mean(errors(&image, &exact.images[2]));
         let price = price_of_depth_errors(&views, 0.5, &settings, &now, f64::from(deviation)).unwrap();
-        println!("depth errors of {deviation} px: measured {measured:.3}, predicted {price:.3}");
-        assert!((price / measured - 1.0).abs() < 0.15, "{deviation}: {measured} {price}");
+        println!("{name}, depth errors of {deviation} px: measured {measured:.3}, predicted {price:.3}");
+        assert!((price / measured - 1.0).abs() < 0.15, "{name} {deviation}: {measured} {price}");
     }
 }
 
@@ -68,6 +77,48 @@ fn the_split_of_bits() {
     let measured = r + 0.25 * (a - c) / (a - 2.0 * b + c);
     println!("predicted {predicted:?}, measured R_T = {measured:.2}; {tried:.2?}");
     assert!((predicted.texture - measured).abs() < 0.5, "{predicted:?} {measured}");
+}
+
+/// Depth for one pixel in 6 x 6: the split that is predicted, and the bits of depth of least mean square
+/// error. One more bit of every depth takes 1/36 bit from every intensity.
+#[test]
+fn the_split_of_bits_with_partial_depth() {
+    let rig = synthetic(&[0.0, 1.0, 0.5]);
+    let settings = RenderSettings::default();
+    let range = f64::from(rig.maps[..2].iter().flat_map(|m| m.data()).fold(0.0_f32, |a, b| a.max(*b)));
+    let dense = |step: Option<f64>| {
+        let of_view = |k: usize| {
+            let coarse = rig.maps[k].decimated(6).unwrap();
+            let coarse = step.map_or(coarse.clone(), |step| rounded_map(&coarse, step));
+            densify(&coarse, 6, &rig.images[k], &Densify::Bilinear).unwrap()
+        };
+        (0..2).map(of_view).collect::<Vec<_>>()
+    };
+    let (total, views) = (6.0, rig.views(&[0, 1]));
+    let costs = RoundingCosts::with_depths(&views, 0.5, &settings, (255.0, range), 12, dense).unwrap();
+    let predicted = costs.best(total, 6);
+    let reference = {
+        let maps = dense(None);
+        let views: Vec<_> =
+            views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect();
+        rectified::render(&views, 0.5, &settings).unwrap().image
+    };
+    let cost = |depth: f64| {
+        let grey = 255.0 * (depth / 36.0 - total).exp2() as f32;
+        let maps = dense(Some(range * (-depth).exp2()));
+        let mut images = rig.images[..2].to_vec();
+        images
+            .iter_mut()
+            .for_each(|i| i.data_mut().iter_mut().for_each(|v| *v = ((*v / grey).floor() + 0.5) * grey));
+        let view =
+            |k: usize| RectifiedView { image: &images[k], disparity: &maps[k], position: rig.positions[k] };
+        mean_square(&rectified::render(&[view(0), view(1)], 0.5, &settings).unwrap().image, &reference)
+    };
+    let tried: Vec<(f64, f64)> = (4..=24).map(|i| f64::from(i) / 2.0).map(|r| (r, cost(r).ln())).collect();
+    let measured = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap().0;
+    println!("predicted {predicted:?}, measured R_D = {measured:.2}; {tried:.2?}");
+    assert!((predicted.texture - (total - measured / 36.0)).abs() < 0.1, "{predicted:?} {measured}");
+    assert!((predicted.depth - measured).abs() < 2.0, "{predicted:?} {measured}");
 }
 
 /// All subsets of `count` out of `all`.

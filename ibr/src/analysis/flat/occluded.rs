@@ -21,6 +21,12 @@ use hybank::sampling::nonuniform::{Measured, PiecewiseLinear};
 /// Pixels at which means over the view are taken.
 const NODES: usize = 1500;
 
+/// Mean intervals to each side of a jump within which a view is compared closely.
+const BESIDE: f64 = 4.0;
+
+/// Positions there.
+const FINE: usize = 200;
+
 /// Curves, the cameras that see them, and the virtual camera.
 #[derive(Clone, Copy)]
 pub struct OccludedRig<'a> {
@@ -185,14 +191,35 @@ impl OccludedRig<'_> {
             }
         }
         let line = PiecewiseLinear::new(samples).ok()?;
-        let (a, b) = self.window;
-        let at = |k: usize| a + (b - a) * (k as f64 + 0.5) / (4 * NODES) as f64;
         let miss = |x: f64| {
             let seen = self.look(&self.view, x, None)?;
             Some((line.value(x) - self.curves[seen.curve].at(seen.u).texture[0]).abs())
         };
-        let misses: Vec<f64> = (0..4 * NODES).filter_map(|k| miss(at(k))).collect();
-        Some(misses.iter().sum::<f64>() / misses.len() as f64)
+        let places = self.places().into_iter();
+        let misses = places.filter_map(|(x, width)| Some((miss(x)? * width, width)));
+        let (sum, width) = misses.fold((0.0, 0.0), |(sum, all), (miss, width)| (sum + miss, all + width));
+        Some(sum / width)
+    }
+
+    /// Pixels at which a view is compared with the width that each stands for. They lie close together
+    /// beside jumps: an even grid would meet the few intervals there at one fixed distance from the jump.
+    fn places(&self) -> Vec<(f64, f64)> {
+        let (a, b) = self.window;
+        let mut cuts = vec![(a, false), (b, false)];
+        for jump in self.jumps() {
+            let interval = 1.0 / jump.front.iter().sum::<f64>() + 1.0 / jump.back.iter().sum::<f64>();
+            let low = (jump.x - BESIDE * interval).max(a);
+            cuts.extend([(low, true), ((jump.x + BESIDE * interval).min(b), false)]);
+        }
+        cuts.sort_by(|p, q| p.0.total_cmp(&q.0));
+        let piece = |pair: &[(f64, bool)]| {
+            let (from, to) = (pair[0].0, pair[1].0);
+            let fine = if pair[0].1 { FINE } else { 0 };
+            let count = fine.max((4.0 * NODES as f64 * (to - from) / (b - a)).ceil() as usize);
+            let width = (to - from) / count.max(1) as f64;
+            (0..count).map(move |k| (from + width * (k as f64 + 0.5), width))
+        };
+        cuts.windows(2).flat_map(piece).collect()
     }
 
     /// The pixel centres of a camera that see any curve.

@@ -1,4 +1,5 @@
-//! Virtual experiments against the theorems. `HYBANK_SWEEP=1` runs all sizes of the thesis's figures.
+//! Virtual experiments against the theorems, at all sizes of the thesis's figures. `HYBANK_SWEEP=1` makes
+//! more draws.
 
 use super::scenes::{Board, Wave, board_before_wall, cameras, virtual_camera};
 use super::{Errors, FlatCamera, FlatRig, PaintedCurve, occluded::OccludedRig, trial};
@@ -13,10 +14,15 @@ fn mean(draws: u64, trial: impl Fn(u64) -> Option<f64>) -> f64 {
     (0..draws).map(|seed| trial(seed).unwrap()).sum::<f64>() / draws as f64
 }
 
-/// Exponents of two up to `few`, or up to `all` if asked for.
-fn focals(first: i32, few: i32, all: i32) -> impl Iterator<Item = f64> {
-    let last = if std::env::var_os("HYBANK_SWEEP").is_some() { all } else { few };
+/// Powers of two.
+fn focals(first: i32, last: i32) -> impl Iterator<Item = f64> {
     (first..=last).map(|k| 2.0_f64.powi(k))
+}
+
+/// So many draws, or eight times as many if asked for.
+fn draws(few: f64) -> u64 {
+    let many = std::env::var_os("HYBANK_SWEEP").is_some();
+    (if many { 8.0 * few } else { few }).ceil() as u64
 }
 
 /// Slope of the least-squares line through the logarithms.
@@ -34,12 +40,12 @@ pub(crate) fn log_slope(points: &[(f64, f64)]) -> f64 {
 #[test]
 fn errors_decay_with_the_square_of_the_pixels() {
     let (mut measured, mut object) = (Vec::new(), Vec::new());
-    for focal in focals(5, 7, 10) {
+    for focal in focals(5, 10) {
         let cameras = cameras(10, focal);
         let rig = rig(&Wave, &cameras, focal);
         let (bound, estimate) = (rig.image_space(Errors::default()).total(), rig.estimate());
         // The error of one view scatters more where its pixels are few.
-        let draws = (2000.0 / focal).ceil().max(12.0) as u64;
+        let draws = draws((4000.0 / focal).max(6.0));
         let mae = mean(draws, |seed| trial::image_space(&rig, Errors::default(), seed));
         println!("focal {focal}: MAE {mae:.3e}, estimate {estimate:.3e}, bound {bound:.3e}");
         assert!(bound / mae > 4.0 && bound / mae < 7.0, "{focal}: {bound} {mae}");
@@ -51,7 +57,8 @@ fn errors_decay_with_the_square_of_the_pixels() {
         object.push((focal, mae));
     }
     let slopes = [log_slope(&measured), log_slope(&object)];
-    assert!(slopes.iter().all(|s| (s + 2.0).abs() < 0.06), "{slopes:?}");
+    println!("slopes {slopes:.3?}");
+    assert!(slopes.iter().all(|s| (s + 2.0).abs() < 0.05), "{slopes:?}");
 }
 
 /// The exact moments of few cameras: a Poisson process would be wrong by a factor of two at N = 4.
@@ -170,7 +177,7 @@ fn occluded_scenes_decay_with_the_pixels() {
     let boards = board_before_wall();
     let curves: Vec<&dyn PaintedCurve> = boards.iter().map(|b| b as &dyn PaintedCurve).collect();
     let mut measured = Vec::new();
-    for focal in focals(5, 7, 11) {
+    for focal in focals(5, 11) {
         let cameras: Vec<FlatCamera> = (0..10)
             .map(|i| FlatCamera::looking([-1.0 + 0.2 * (f64::from(i) + 0.5), 0.0], 0.0, focal))
             .collect();
@@ -179,7 +186,7 @@ fn occluded_scenes_decay_with_the_pixels() {
         let jumps = rig.jumps();
         assert_eq!(jumps.len(), 2);
         assert!(jumps.iter().all(|j| j.front.len() == 10 && (3..=7).contains(&j.back.len())), "{jumps:?}");
-        let mae = mean(30, |seed| rig.trial(seed));
+        let mae = mean(draws(30.0), |seed| rig.trial(seed));
         let (smooth, edges) = rig.estimate();
         let bound = rig.bound(Errors::default()).total();
         println!("focal {focal}: MAE {mae:.3e}, smooth {smooth:.2e} + jumps {edges:.3e}, bound {bound:.3e}");
@@ -188,5 +195,6 @@ fn occluded_scenes_decay_with_the_pixels() {
         measured.push((focal, mae));
     }
     let slope = log_slope(&measured);
-    assert!((slope + 1.0).abs() < 0.06, "{slope}");
+    println!("slope {slope:.3}");
+    assert!((slope + 1.0).abs() < 0.05, "{slope}");
 }

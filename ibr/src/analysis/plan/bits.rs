@@ -118,11 +118,36 @@ impl RoundingCosts {
         ranges: (f64, f64),
         most: u32,
     ) -> Result<Self, RenderError> {
-        let settings = settled(views, position, settings);
+        let depths = |step: Option<f64>| {
+            let of_view = |v: &RectifiedView<'_>| match step {
+                Some(step) => rounded_map(v.disparity, step),
+                None => v.disparity.clone(),
+            };
+            views.iter().map(of_view).collect()
+        };
+        Self::with_depths(views, position, settings, ranges, most, depths)
+    }
+
+    /// The same with depth that is not given for every pixel: `depths` makes the dense maps of all views
+    /// from disparities that are rounded to a step ([`rounded_map`]), or as they are.
+    ///
+    /// # Errors
+    /// Those of [`rectified::render`].
+    pub fn with_depths(
+        views: &[RectifiedView<'_>],
+        position: f64,
+        settings: &RenderSettings,
+        ranges: (f64, f64),
+        most: u32,
+        depths: impl Fn(Option<f64>) -> Vec<DepthMap>,
+    ) -> Result<Self, RenderError> {
+        let exact = depths(None);
+        let views = with_maps(views, &exact);
+        let settings = settled(&views, position, settings);
         let render = |views: &[RectifiedView<'_>]| {
             Ok::<Image, RenderError>(rectified::render(views, position, &settings)?.image)
         };
-        let plain = render(views)?;
+        let plain = render(&views)?;
         let (mut texture, mut depth) = (Vec::new(), Vec::new());
         for bits in 1..=most {
             let step = |range: f64| range * (-f64::from(bits)).exp2();
@@ -130,11 +155,8 @@ impl RoundingCosts {
             let coarse: Vec<_> =
                 views.iter().zip(&images).map(|(v, image)| RectifiedView { image, ..*v }).collect();
             texture.push(mean_square(&render(&coarse)?, &plain));
-            let maps: Vec<DepthMap> =
-                views.iter().map(|v| rounded_map(v.disparity, step(ranges.1))).collect();
-            let coarse: Vec<_> =
-                views.iter().zip(&maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect();
-            depth.push(mean_square(&render(&coarse)?, &plain));
+            let maps = depths(Some(step(ranges.1)));
+            depth.push(mean_square(&render(&with_maps(&views, &maps))?, &plain));
         }
         Ok(Self { texture, depth })
     }
@@ -148,6 +170,10 @@ impl RoundingCosts {
         let tried = (0..=(100.0 * total.max(0.0)) as usize).map(|i| split(i as f64 / 100.0));
         tried.min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(split(0.0))
     }
+}
+
+fn with_maps<'a>(views: &[RectifiedView<'a>], maps: &'a [DepthMap]) -> Vec<RectifiedView<'a>> {
+    views.iter().zip(maps).map(|(v, disparity)| RectifiedView { disparity, ..*v }).collect()
 }
 
 /// The mean square for any number of bits; its logarithm is linear between whole numbers and beyond them.
@@ -174,7 +200,8 @@ fn rounded_image(image: &Image, step: f64) -> Image {
     rounded
 }
 
-fn rounded_map(map: &DepthMap, step: f64) -> DepthMap {
+/// A map whose values are the middles of steps.
+pub fn rounded_map(map: &DepthMap, step: f64) -> DepthMap {
     map.changed(|v| middle(v, step))
 }
 

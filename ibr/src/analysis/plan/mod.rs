@@ -8,7 +8,7 @@ mod placement;
 mod search;
 
 pub use advice::{Advice, AnotherView};
-pub use bits::{BitSplit, RoundingCosts, Sensitivity, sensitivity};
+pub use bits::{BitSplit, RoundingCosts, Sensitivity, rounded_map, sensitivity};
 pub use depth::price_of_depth_errors;
 pub use placement::{Candidate, Costs, Placement, Wanted};
 pub use search::Search;

@@ -8,7 +8,7 @@ use crate::analysis::flat::tests::log_slope;
 use crate::analysis::random::{part, seeded, within};
 use crate::camera::Camera;
 use hybank::sampling::delaunay::{PoissonDelaunay, superposed_grids};
-use nalgebra::Vector2;
+use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector2, Vector3};
 
 fn sweep() -> bool {
     std::env::var_os("HYBANK_SWEEP").is_some()
@@ -45,7 +45,7 @@ fn mean(draws: u64, trial: impl Fn(u64) -> Option<f64>) -> f64 {
 /// samples as in the plane; the bound lies above, and so does the estimate, a little.
 #[test]
 fn errors_decay_with_the_pixels() {
-    let sizes: &[f64] = if sweep() { &[0.04, 0.03, 0.02, 0.014, 0.01, 0.007] } else { &[0.04, 0.028, 0.02] };
+    let sizes: &[f64] = if sweep() { &[0.04, 0.03, 0.02, 0.014, 0.01, 0.007] } else { &[0.04, 0.02, 0.01] };
     let mut measured = Vec::new();
     for pixel in sizes {
         let setup = setup(*pixel);
@@ -60,21 +60,83 @@ fn errors_decay_with_the_pixels() {
     assert!((slope + 1.0).abs() < 0.06, "{slope}");
 }
 
-/// Figures 4.7 and 4.8. The mean of |sum b_k e_k| over a triangle for uniform e_k is 0.340 of their limit.
+/// Figure 4.7: the mean of |sum b_k e_k| over a triangle for uniform e_k is 0.340 of their limit.
 #[test]
-fn errors_of_intensity_and_depth_enter_linearly() {
-    let setup = setup(0.014);
+fn errors_of_intensity_enter_linearly() {
+    let setup = setup(0.01);
     let rig = setup.rig();
-    for texture in [0.05, 0.1] {
+    for texture in [0.02, 0.05, 0.1] {
         let errors = Errors { texture, depth: 0.0 };
         let mae = mean(1, |seed| trial::image_space(&rig, errors, seed));
-        assert!((mae / texture - 0.340).abs() < 0.012 && mae < rig.bound(errors).total(), "{texture}: {mae}");
+        println!("E_T {texture}: MAE / E_T {:.4}", mae / texture);
+        assert!((mae / texture - 0.340).abs() < 0.006 && mae < rig.bound(errors).total(), "{texture}: {mae}");
     }
-    for depth in [0.1, 0.2] {
+}
+
+/// Figure 4.8: the error is about a fifteenth of the bound, and linear where E_D outweighs the sampling.
+#[test]
+fn errors_of_depth_enter_linearly() {
+    let setup = setup(0.01);
+    let rig = setup.rig();
+    let mut shares = Vec::new();
+    for depth in [0.05, 0.1, 0.2] {
         let errors = Errors { texture: 0.0, depth };
-        let mae = mean(1, |seed| trial::image_space(&rig, errors, seed));
+        let mae = mean(2, |seed| trial::image_space(&rig, errors, seed));
         let bound = rig.bound(errors).total();
-        assert!(mae < bound && mae > bound / 30.0, "{depth}: {mae} {bound}");
+        println!("E_D {depth}: MAE {mae:.3e}, bound / MAE {:.1}", bound / mae);
+        assert!((10.0..20.0).contains(&(bound / mae)), "{depth}: {mae} {bound}");
+        shares.push(mae / depth);
+    }
+    assert!(shares.iter().all(|s| (s / shares[1] - 1.0).abs() < 0.15), "{shares:?}");
+}
+
+/// Theorem 4.3 is an expectation too: N cameras at one place with one phase have the samples of one, and
+/// break it. The sure bound of the triangles holds, and so does the theorem with phases of their own.
+#[test]
+fn coincident_cameras_break_the_expectation_and_not_the_sure_bound() {
+    let (focal, mut ratios) = (50.0, Vec::new());
+    for count in [1, 8, 32] {
+        let cameras = vec![camera_at(0.3, 0.1, focal).unwrap(); count];
+        let setup = Setup { cameras, ..setup(1.0 / focal) };
+        let rig = setup.rig();
+        let (mae, sure) = trial::with_phases(&rig, &vec![Vector2::new(0.3, 0.6); count]).unwrap();
+        assert!(mae <= sure, "{count}: {mae} {sure}");
+        ratios.push(mae / rig.bound(Errors::default()).total());
+    }
+    println!("measured / Theorem 4.3 for 1, 8, 32 coincident cameras: {ratios:.2?}");
+    assert!(ratios[0] < 1.0 && ratios[2] > 1.0 && (ratios[1] / ratios[0] / 8.0 - 1.0).abs() < 0.01);
+    let setup = Setup { cameras: vec![camera_at(0.3, 0.1, focal).unwrap(); 8], ..setup(1.0 / focal) };
+    let rig = setup.rig();
+    let mae = mean(8, |seed| trial::image_space(&rig, Errors::default(), seed));
+    assert!(mae < rig.bound(Errors::default()).total());
+    assert!((mae / rig.estimate() - 1.0).abs() < 0.15, "{mae} {}", rig.estimate());
+}
+
+/// A camera like [`camera_at`] that is turned about its axis and looks a little aside.
+fn turned(x: f64, y: f64, focal: f64, turns: [f64; 3]) -> Camera {
+    let r = Rotation3::from_euler_angles(turns[0], turns[1], turns[2]);
+    let m = Matrix3::new(focal, 0.0, 0.0, 0.0, focal, 0.0, 0.0, 0.0, 1.0) * r.matrix();
+    let mut matrix = Matrix3x4::zeros();
+    matrix.fixed_columns_mut::<3>(0).copy_from(&m);
+    matrix.set_column(3, &(-m * Vector3::new(x, y, 0.0)));
+    Camera::metric(matrix, false).unwrap()
+}
+
+#[test]
+fn unequal_and_rotated_cameras_obey_the_theorem() {
+    let random = &mut seeded(31);
+    let mut place = || (within(0.6, random), within(0.6, random), within(1.0, random));
+    let places: Vec<(f64, f64, f64)> = (0..10).map(|_| place()).collect();
+    let unequal = places.iter().map(|(x, y, s)| camera_at(*x, *y, 50.0 * (0.7 * s).exp()).unwrap()).collect();
+    let rotated =
+        places.iter().map(|(x, y, s)| turned(*x, *y, 50.0, [0.05 * s, -0.04 * s, 3.0 * s])).collect();
+    for (name, cameras) in [("unequal", unequal), ("rotated", rotated)] {
+        let setup = Setup { cameras, ..setup(0.02) };
+        let rig = setup.rig();
+        let mae = mean(8, |seed| trial::image_space(&rig, Errors::default(), seed));
+        let (bound, estimate) = (rig.bound(Errors::default()).total(), rig.estimate());
+        println!("{name}: MAE {mae:.3e}, estimate {estimate:.3e}, bound {bound:.3e}");
+        assert!(mae < bound && (estimate / mae - 1.0).abs() < 0.12, "{name}: {mae} {estimate} {bound}");
     }
 }
 
@@ -139,27 +201,33 @@ fn points(grids: Option<usize>, density: f64, seed: u64) -> Vec<Vector2<f64>> {
     all
 }
 
+/// R^2, S, S^2, S R^2 and S sum l^2 of the triangles of one draw that belong to the unit square by a corner,
+/// which does not depend on their shape: sums and the number of triangles.
+fn sums(grids: Option<usize>, density: f64, seed: u64) -> ([f64; 5], f64) {
+    let mesh = Triangles::new(points(grids, density, seed).into_iter().map(|p| (p, 0.0))).unwrap();
+    let inside = |p: Vector2<f64>| p.x > 0.0 && p.x < 1.0 && p.y > 0.0 && p.y < 1.0;
+    let (mut sums, mut count) = ([0.0; 5], 0.0);
+    for t in mesh.all().filter(|t| inside(t.points[0])) {
+        let (s, r2) = (t.area(), t.radius().powi(2));
+        let [a, b, c] = t.points;
+        let edges = (a - b).norm_squared() + (b - c).norm_squared() + (c - a).norm_squared();
+        let terms = [r2, s, s * s, s * r2, s * edges];
+        sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        count += 1.0;
+    }
+    (sums, count)
+}
+
 /// Table 4.1, counted on triangulations: E[R^2], E[S], E[S^2], E[S R^2] and the mean error of a parabola.
+/// They are those of the theory within four standard errors, which are estimated from the scatter of the
+/// draws, and within 0.3 % beyond that (for ten grids the theory neglects circles wider than a cell).
 #[test]
 fn triangles_have_the_moments_of_the_table() {
-    // Grids repeat one pattern, so the view is small and the draws are many.
-    let (density, draws) = (200.0, if sweep() { 600 } else { 80 });
-    let tolerance = if sweep() { 0.025 } else { 0.06 };
-    for grids in [None, Some(10)] {
-        let (mut sums, mut count) = ([0.0; 5], 0.0);
-        for seed in 0..draws {
-            let mesh = Triangles::new(points(grids, density, seed).into_iter().map(|p| (p, 0.0))).unwrap();
-            let inside = |p: Vector2<f64>| p.x > 0.0 && p.x < 1.0 && p.y > 0.0 && p.y < 1.0;
-            // A triangle belongs to the square by a point that does not depend on its shape: a corner.
-            for t in mesh.all().filter(|t| inside(t.points[0])) {
-                let (s, r2) = (t.area(), t.radius().powi(2));
-                let [a, b, c] = t.points;
-                let edges = (a - b).norm_squared() + (b - c).norm_squared() + (c - a).norm_squared();
-                let terms = [r2, s, s * s, s * r2, s * edges];
-                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-                count += 1.0;
-            }
-        }
+    // Ten grids repeat one pattern: the square is one cell of them.
+    let many = if sweep() { 10 } else { 1 };
+    for (grids, density, draws) in [(None, 1000.0, 30 * many), (Some(10), 10.0, 2000 * many)] {
+        let all: Vec<([f64; 5], f64)> = (0..draws).map(|seed| sums(grids, density, seed)).collect();
+        let count: f64 = all.iter().map(|draw| draw.1).sum();
         let law = PoissonDelaunay { density };
         let factor = |order| grids.map_or(1.0, |n| superposed_grids(n, order));
         let theory = [
@@ -169,10 +237,14 @@ fn triangles_have_the_moments_of_the_table() {
             law.moment(1, 1) * factor(2),
             law.area_times_squared_edges() * factor(2),
         ];
-        for (k, (sum, want)) in sums.iter().zip(theory).enumerate() {
-            let ratio = sum / count / want;
-            println!("{grids:?}, moment {k}: simulated / theory {ratio:.4}");
-            assert!((ratio - 1.0).abs() < tolerance, "{grids:?} {k}: {ratio}");
+        for (k, want) in theory.into_iter().enumerate() {
+            let ratio = all.iter().map(|draw| draw.0[k]).sum::<f64>() / count / want;
+            // Of a ratio of sums: the scatter of what is left of each draw.
+            let scatter: f64 = all.iter().map(|draw| (draw.0[k] / want - ratio * draw.1).powi(2)).sum();
+            let error = scatter.sqrt() / count;
+            println!("{grids:?}, moment {k}: simulated / theory {ratio:.4} +- {error:.4}");
+            assert!(error < if sweep() { 0.004 } else { 0.012 }, "{grids:?} {k}: {error}");
+            assert!((ratio - 1.0).abs() < 4.0 * error + 0.003, "{grids:?} {k}: {ratio} {error}");
         }
     }
 }

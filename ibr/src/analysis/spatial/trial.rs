@@ -7,6 +7,7 @@ use crate::analysis::flat::Errors;
 use crate::analysis::random::{part, seeded, within};
 use crate::camera::Camera;
 use nalgebra::Vector2;
+use rand_pcg::Pcg64;
 
 /// Positions per side at which a view is compared.
 const SIDE: usize = 100;
@@ -21,10 +22,31 @@ pub fn image_space(rig: &SpatialRig<'_>, errors: Errors, seed: u64) -> Option<f6
     let random = &mut seeded(seed);
     let phases: Vec<Vector2<f64>> =
         rig.cameras.iter().map(|_| Vector2::new(part(random), part(random))).collect();
+    mean_error(&Triangles::new(capture(rig, errors, &phases, random))?, rig)
+}
+
+/// The same with given phases of the cameras' pixels and no errors, with the sure bound of the triangles at
+/// hand beside it: the mean of (1/2) K sum b_k |p_k - x|^2.
+pub fn with_phases(rig: &SpatialRig<'_>, phases: &[Vector2<f64>]) -> Option<(f64, f64)> {
+    let mesh = Triangles::new(capture(rig, Errors::default(), phases, &mut seeded(0)))?;
+    let (limits, mut sure) = (rig.smoothness(), 0.0);
+    for pixel in rig.grid(SIDE) {
+        sure += mesh.around(pixel)?.error_bound(pixel, limits, 0.0, 0.0);
+    }
+    Some((mean_error(&mesh, rig)?, sure / (SIDE * SIDE) as f64))
+}
+
+/// The samples of all cameras in the virtual image, with their values.
+fn capture(
+    rig: &SpatialRig<'_>,
+    errors: Errors,
+    phases: &[Vector2<f64>],
+    random: &mut Pcg64,
+) -> Vec<(Vector2<f64>, f64)> {
     let mut samples = Vec::new();
     for (camera, phase) in rig.cameras.iter().zip(phases) {
         let mut near = Vector2::zeros();
-        for pixel in pixels(rig, camera, phase) {
+        for pixel in pixels(rig, camera, *phase) {
             let Some(at) = parameters_at(rig.scene, camera, pixel, near) else { continue };
             near = at;
             let s = rig.scene.at(at);
@@ -33,7 +55,7 @@ pub fn image_space(rig: &SpatialRig<'_>, errors: Errors, seed: u64) -> Option<f6
             samples.push((Vector2::new(x, y), s.texture + within(errors.texture, random)));
         }
     }
-    mean_error(&Triangles::new(samples)?, rig)
+    samples
 }
 
 /// The pixel centres of a camera that see the window with its margin.
