@@ -4,7 +4,7 @@ use crate::page::{Table, Verdict};
 use crate::{Effort, Outcome};
 use hybank::sampling::PeriodicSets;
 use hybank::sampling::delaunay::{PoissonDelaunay, superposed_grids};
-use hybank_ibr::analysis::spatial::triangles::Triangles;
+use hybank_ibr::analysis::spatial::triangles::{Corners, Triangles};
 use nalgebra::Vector2;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -68,8 +68,10 @@ pub(crate) fn triangles(effort: Effort) -> Outcome<Table> {
     for seed in 0..effort.of(400, 25) {
         let mesh = Triangles::new(grids(density, seed).into_iter().map(|p| (p, 0.0)));
         let inside = |p: Vector2<f64>| p.x > 0.0 && p.x < 1.0 && p.y > 0.0 && p.y < 1.0;
-        // A triangle belongs to the square by a point that does not depend on its shape: a corner.
-        for t in mesh.ok_or("a triangulation failed")?.all().filter(|t| inside(t.points[0])) {
+        // A triangle belongs to the square by its leftmost corner.
+        let leftmost =
+            |t: &Corners| t.points.into_iter().min_by(|a, b| a.x.total_cmp(&b.x)).is_some_and(inside);
+        for t in mesh.ok_or("a triangulation failed")?.all().filter(leftmost) {
             let (area, radius) = (t.area(), t.radius().powi(2));
             let terms = [radius, area, area * area, area * radius];
             sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);

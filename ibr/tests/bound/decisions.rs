@@ -193,9 +193,13 @@ fn a_searched_placement_is_close_to_the_best() {
 /// Choices from which exchanges start.
 const STARTS: usize = 5;
 
+/// First candidates of greedy choices without exchanges.
+const FIRSTS: usize = 10;
+
 /// The same choice against the best of all subsets by rendering: 3 of 9 places, or 4 of 20 with
 /// `HYBANK_SWEEP=1`. The criterion knows surfaces and no textures, so it loses up to 2.4 dB. With the
-/// rendered views themselves as the criterion, exchanges from several starts lose less than 0.3 dB.
+/// rendered views themselves as the criterion, a single greedy choice loses up to 0.7 dB. The best of ten
+/// with other first candidates loses less than 0.3 dB, and so do exchanges from several starts.
 #[test]
 fn placement_gives_good_views() {
     let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 9, 3) };
@@ -220,18 +224,21 @@ fn placement_gives_good_views() {
         let psnr = |chosen: &[usize]| 10.0 * (255.0 * 255.0 / error(chosen)).log10();
         let surfaces = psnr(&placement(&rig, &targets).greedy(count));
         let search = Search { candidates: places, error: &error };
-        let [greedy, exchanged] =
-            [search.greedy(count), search.from_several(STARTS, count)].map(|c| psnr(&c));
+        let greedy = psnr(&search.greedy(count));
+        let repeated = psnr(&search.greedy_from_several(FIRSTS, count));
+        let without = known.borrow().len();
+        let exchanged = psnr(&search.from_several(STARTS, count));
         let rendered = known.borrow().len();
         let mut all: Vec<f64> = subsets(places, count).iter().map(|s| psnr(s)).collect();
         all.sort_by(f64::total_cmp);
         let (best, median) = (all[all.len() - 1], all[all.len() / 2]);
         println!(
-            "scene {seed}: by surfaces {surfaces:.2} dB, by views greedy {greedy:.2}, exchanged {exchanged:.2} \
-             ({rendered} sets), best {best:.2}, median {median:.2}"
+            "scene {seed}: by surfaces {surfaces:.2} dB, by views greedy {greedy:.2}, from {FIRSTS} firsts {repeated:.2} \
+             ({without} sets), exchanged {exchanged:.2} ({rendered} with those), best {best:.2}, median {median:.2}"
         );
         assert!(best - surfaces < 2.5, "scene {seed}: {surfaces} {best} {median}");
         assert!(best - exchanged < 0.3, "scene {seed}: {exchanged} {best}");
+        assert!(best - repeated < 0.3, "scene {seed}: {repeated} {best}");
         losses.push(best - surfaces);
     }
     assert!(mean(losses.iter().copied()) < 1.5, "{losses:.2?}");

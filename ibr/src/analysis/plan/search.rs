@@ -18,10 +18,16 @@ impl<F: Fn(&[usize]) -> f64> Search<F> {
         self.grown(Vec::new(), count)
     }
 
-    /// The greedy choice after exchanges of single candidates as long as they help: a few times as many
-    /// errors as [`Search::greedy`].
+    /// The best of the greedy choices whose first candidates are the `starts` that are best alone: at most
+    /// `starts` times as many errors as [`Search::greedy`].
     ///
     /// The first candidate of a greedy choice is best alone, which often is wrong for several.
+    pub fn greedy_from_several(&self, starts: usize, count: usize) -> Vec<usize> {
+        self.best_of(self.grown_from(starts, count), count)
+    }
+
+    /// The greedy choice after exchanges of single candidates as long as they help: a few times as many
+    /// errors as [`Search::greedy`].
     pub fn exchanged(&self, count: usize) -> Vec<usize> {
         self.improved(self.greedy(count))
     }
@@ -34,11 +40,19 @@ impl<F: Fn(&[usize]) -> f64> Search<F> {
 
     /// The same from the `starts` candidates that are best alone.
     pub fn from_several(&self, starts: usize, count: usize) -> Vec<usize> {
+        let choices = self.grown_from(starts, count);
+        self.best_of(choices.into_iter().map(|chosen| self.improved(chosen)).collect(), count)
+    }
+
+    /// Greedy choices, each with another first candidate.
+    fn grown_from(&self, starts: usize, count: usize) -> Vec<Vec<usize>> {
         let mut firsts: Vec<(f64, usize)> = (0..self.candidates).map(|i| ((self.error)(&[i]), i)).collect();
         firsts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let grown = firsts.into_iter().take(starts).map(|(_, first)| self.grown(vec![first], count));
-        let choices = grown.map(|chosen| self.improved(chosen));
-        let scored = choices.map(|chosen| ((self.error)(&chosen), chosen));
+        firsts.into_iter().take(starts).map(|(_, first)| self.grown(vec![first], count)).collect()
+    }
+
+    fn best_of(&self, choices: Vec<Vec<usize>>, count: usize) -> Vec<usize> {
+        let scored = choices.into_iter().map(|chosen| ((self.error)(&chosen), chosen));
         let best = scored.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Vec::new(), |(_, chosen)| chosen);
         best.into_iter().take(count).collect()
     }
@@ -100,7 +114,11 @@ mod tests {
         assert_eq!(sorted(search.exchanged(2)), [2, 17]);
         assert_eq!(sorted(search.from_each(2)), [2, 17]);
         assert_eq!(sorted(search.from_several(3, 2)), [2, 17]);
-        assert!(search.from_several(0, 2).is_empty());
+        assert!(search.from_several(0, 2).is_empty() && search.greedy_from_several(0, 2).is_empty());
+        // Without exchanges 2 or 17 must be a first; by itself each is worse than the middle.
+        assert_eq!(sorted(search.greedy_from_several(20, 2)), [2, 17]);
+        assert_eq!(search.greedy_from_several(1, 2), search.greedy(2));
+        assert_eq!(search.greedy_from_several(20, 0), Vec::<usize>::new());
         assert_eq!(search.greedy(30).len(), 20);
         assert!(search.greedy(0).is_empty() && search.from_each(0).is_empty());
     }

@@ -1,7 +1,7 @@
 //! Virtual experiments against the theorem. `HYBANK_SWEEP=1` runs all sizes of the thesis's figures.
 
 use super::scenes::{Hill, camera_at};
-use super::triangles::Triangles;
+use super::triangles::{Corners, Triangles};
 use super::{EdgeModel, SpatialRig, trial};
 use crate::analysis::flat::Errors;
 use crate::analysis::flat::tests::log_slope;
@@ -201,13 +201,15 @@ fn points(grids: Option<usize>, density: f64, seed: u64) -> Vec<Vector2<f64>> {
     all
 }
 
-/// R^2, S, S^2, S R^2 and S sum l^2 of the triangles of one draw that belong to the unit square by a corner,
-/// which does not depend on their shape: sums and the number of triangles.
+/// R^2, S, S^2, S R^2 and S sum l^2 of the triangles of one draw whose leftmost corner lies in the unit
+/// square: sums and the number of triangles. (Which corner the triangulation names first depends on the
+/// distance from the centre, so that corner would favour large triangles.)
 fn sums(grids: Option<usize>, density: f64, seed: u64) -> ([f64; 5], f64) {
     let mesh = Triangles::new(points(grids, density, seed).into_iter().map(|p| (p, 0.0))).unwrap();
     let inside = |p: Vector2<f64>| p.x > 0.0 && p.x < 1.0 && p.y > 0.0 && p.y < 1.0;
     let (mut sums, mut count) = ([0.0; 5], 0.0);
-    for t in mesh.all().filter(|t| inside(t.points[0])) {
+    let leftmost = |t: &Corners| t.points.into_iter().min_by(|a, b| a.x.total_cmp(&b.x)).is_some_and(inside);
+    for t in mesh.all().filter(leftmost) {
         let (s, r2) = (t.area(), t.radius().powi(2));
         let [a, b, c] = t.points;
         let edges = (a - b).norm_squared() + (b - c).norm_squared() + (c - a).norm_squared();
@@ -220,7 +222,7 @@ fn sums(grids: Option<usize>, density: f64, seed: u64) -> ([f64; 5], f64) {
 
 /// Table 4.1, counted on triangulations: E[R^2], E[S], E[S^2], E[S R^2] and the mean error of a parabola.
 /// They are those of the theory within four standard errors, which are estimated from the scatter of the
-/// draws, and within 0.3 % beyond that (for ten grids the theory neglects circles wider than a cell).
+/// draws, and 0.1 % more (for ten grids the theory neglects circles wider than a cell).
 #[test]
 fn triangles_have_the_moments_of_the_table() {
     // Ten grids repeat one pattern: the square is one cell of them.
@@ -244,7 +246,7 @@ fn triangles_have_the_moments_of_the_table() {
             let error = scatter.sqrt() / count;
             println!("{grids:?}, moment {k}: simulated / theory {ratio:.4} +- {error:.4}");
             assert!(error < if sweep() { 0.004 } else { 0.012 }, "{grids:?} {k}: {error}");
-            assert!((ratio - 1.0).abs() < 4.0 * error + 0.003, "{grids:?} {k}: {ratio} {error}");
+            assert!((ratio - 1.0).abs() < 4.0 * error + 0.001, "{grids:?} {k}: {ratio} {error}");
         }
     }
 }
