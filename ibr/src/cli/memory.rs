@@ -28,7 +28,7 @@ const ROWS: Rates = Rates { view: 4.0, pixel: 12.0, colour: 10.0 };
 const PLANE: Rates = Rates { view: 8.0, pixel: 100.0, colour: 12.0 };
 /// All samples are in memory at once, 40 bytes each, or 48 with colours.
 const UNCALIBRATED: Rates = Rates { view: 80.0, pixel: 100.0, colour: 12.0 };
-const BOUND: Rates = Rates { view: 24.0, pixel: 110.0, colour: 20.0 };
+const BOUND: Rates = Rates { view: 40.0, pixel: 150.0, colour: 20.0 };
 /// Threads, and bands of samples whose size does not depend on the views.
 const BASE: f64 = 5e7;
 
