@@ -216,15 +216,26 @@ impl Balance {
     /// Multiplies the weight and the brightness of every sample by those of its view, and the weight by what
     /// the slope of its photograph makes of the errors of its depth.
     pub fn apply<'a, const C: usize>(&self, samples: &mut [Sample<C>], image: impl Fn(usize) -> &'a Image) {
-        for s in samples {
-            let view = usize::from(s.view);
-            let gain = self.gain(s.view);
-            let displaced = |errors: &SampleErrors| errors.share(image(view), s.pixel as usize, gain);
-            s.weight *= self.weight(s.view) * self.errors.get(view).map_or(1.0, displaced);
-            s.value.iter_mut().for_each(|v| *v *= gain);
+        for samples in samples.chunk_by_mut(|a, b| a.view == b.view) {
+            let number = samples[0].view;
+            let (view, weight, gain) = (usize::from(number), self.weight(number), self.gain(number));
+            for part in samples.chunks_mut(PART) {
+                let shares = match self.errors.get(view) {
+                    Some(errors) => errors.shares(image(view), part, gain),
+                    None => [1.0; PART],
+                };
+                for (s, share) in part.iter_mut().zip(shares) {
+                    s.weight *= weight * share;
+                    s.value.iter_mut().for_each(|v| *v *= gain);
+                }
+            }
         }
     }
 }
+
+/// Samples whose weights are computed together: the compiler turns loops of a fixed length into vector
+/// instructions.
+const PART: usize = 64;
 
 /// Errors of the samples of a view.
 #[derive(Debug, Clone, PartialEq)]
@@ -237,23 +248,32 @@ struct SampleErrors {
 }
 
 impl SampleErrors {
-    /// Weight of the sample of a pixel over that of a sample without slope.
-    #[inline]
-    fn share(&self, image: &Image, pixel: usize, gain: f32) -> f32 {
+    /// Weights of samples over that of a sample without slope.
+    fn shares<const C: usize>(&self, image: &Image, samples: &[Sample<C>], gain: f32) -> [f32; PART] {
+        let mut shares = [1.0; PART];
         if self.typical.jitter == 0.0 {
-            return 1.0;
+            return shares;
         }
-        let slope = self.slope(image, pixel, f64::from(gain));
-        (self.typical.weight(slope, 0.0) * self.typical.error.powi(2)) as f32
+        let mut squares = [0.0; PART];
+        for (square, s) in squares.iter_mut().zip(samples) {
+            let (pixel, gain) = (s.pixel as usize, f64::from(gain));
+            *square = match image.channels() {
+                3 => self.square::<3>(image, pixel, gain),
+                _ => self.square::<1>(image, pixel, gain),
+            };
+        }
+        let channels = image.channels() as f64;
+        for (share, square) in shares.iter_mut().zip(squares) {
+            let slope = self.slope(square / channels);
+            *share = (self.typical.weight(slope, 0.0) * self.typical.error.powi(2)) as f32;
+        }
+        shares
     }
 
-    /// Root mean square change of the value for an error of one in the depth, by central differences, which
-    /// have half the variance of the noise in each direction.
-    fn slope(&self, image: &Image, pixel: usize, gain: f64) -> f64 {
-        let square = match image.channels() {
-            3 => self.square::<3>(image, pixel, gain) / 3.0,
-            _ => self.square::<1>(image, pixel, gain),
-        };
+    /// Root mean square change of the value for an error of one in the depth, from the mean square of
+    /// central differences, which have half the variance of the noise in each direction.
+    #[inline]
+    fn slope(&self, square: f64) -> f64 {
         (square - 0.5 * self.noise * self.lever.trace()).max(0.0).sqrt()
     }
 
