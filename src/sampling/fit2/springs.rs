@@ -38,8 +38,8 @@ pub(super) fn add(matrix: &mut Stencil, springs: &Springs, direction: Direction)
         let (one, two) = others.split_at_mut((after - 1) * stride);
         let one = &mut one[(next - 1) * stride..];
         let before = |springs: &[f32], back: usize| shifted(springs, width, y, back, direction);
-        let [g, g1] = [0, 1].map(|back| before(&springs.edge, back));
-        let [h, h1, h2] = [0, 1, 2].map(|back| before(&springs.bend, back));
+        let (g, g1) = (before(&springs.edge, 0), before(&springs.edge, 1));
+        let (h, h1, h2) = (before(&springs.bend, 0), before(&springs.bend, 1), before(&springs.bend, 2));
         for x in 0..width {
             diagonal[x] += g[x] + g1[x] + h[x] + 4.0 * h1[x] + h2[x];
             one[x] -= g[x] + 2.0 * (h[x] + h1[x]);

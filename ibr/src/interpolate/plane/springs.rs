@@ -27,8 +27,8 @@ pub(super) fn between(
             };
             let pixel = |k: usize| grid.pixel_at(x + k * step.0, y + k * step.1);
             let joined = (0..=room.min(2)).take_while(|k| inside(pixel(*k))).count();
-            let depths = [0, 1, 2].map(|k| if k < joined { depth[pixel(k)] } else { f32::NAN });
-            (edge[x], bend[x]) = spring(&depths, joined, settings);
+            let depth = |k: usize| if k < joined { depth[pixel(k)] } else { f32::NAN };
+            (edge[x], bend[x]) = spring(&[depth(0), depth(1), depth(2)], joined, settings);
         }
     });
     Springs { edge, bend }
