@@ -4,6 +4,8 @@
 
 #[path = "support/noise.rs"]
 mod noise;
+#[path = "support/normal.rs"]
+mod normal;
 
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, quality, read_image, read_map};

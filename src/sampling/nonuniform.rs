@@ -41,12 +41,17 @@ pub struct Measured {
 }
 
 impl Measured {
+    /// error^2 + slope^2 jitter^2: a displacement of the position has the effect of a value error of |f'|
+    /// times the displacement.
+    pub fn variance(&self, square_slope: f64) -> f64 {
+        self.error * self.error + square_slope * self.jitter * self.jitter
+    }
+
     /// Weight for a least-squares fit: 1 / (error^2 + (slope jitter)^2), `slope` a typical |f'|.
     ///
-    /// A displacement of the position has the effect of a value error of |f'| times the displacement. The
-    /// floor keeps the weight of a perfect sample finite: 1 / floor^2.
+    /// The floor keeps the weight of a perfect sample finite: 1 / floor^2.
     pub fn weight(&self, slope: f64, floor: f64) -> f64 {
-        1.0 / (self.error.powi(2) + (slope * self.jitter).powi(2) + floor.powi(2))
+        1.0 / (self.variance(slope * slope) + floor.powi(2))
     }
 }
 

@@ -16,6 +16,10 @@ const SOFTENING: f64 = 0.2;
 /// margin.
 const LEAST_VARIANCE: f64 = 1.0;
 
+/// Variance of a position within a pixel, in square pixels. Errors of depth that displace samples by less
+/// say little: between samples the fit is no better.
+const APERTURE: f64 = 1.0 / 12.0;
+
 /// Weights of the views: near ones count more.
 ///
 /// With x_i the distance of view i from the virtual camera, in units of the sum of the two least distances,
@@ -159,21 +163,20 @@ impl Balance {
 
     /// The same for photographs of unequal noise, and depths with errors.
     ///
-    /// Weights of least variance are inverse variances ([`Measured::weight`]): that of the difference
+    /// Weights of least variance are inverse variances ([`Measured::variance`]): that of the difference
     /// between the view and the virtual one, v / w_i with v the variance of the differences between views.
     /// Noise of the photograph adds to it, and so do errors of the depths. They displace a sample by its
     /// lever b times the error delta_i, which is a value error of the slope f' of the photograph there times
     /// the displacement:
     ///
     /// ```text
-    /// v / w_i + (sigma_i^2 - sigma_min^2) + (f' b)^2 delta_i^2
+    /// v / w_i + (sigma_i^2 - sigma_min^2) + f'^2 (1 / 12 + b^2 delta_i^2)
     /// ```
     ///
-    /// Noise that all views have is left out: it is also in the photographs that a view is compared with.
-    /// Levers are those of a typical pixel of the view. The last term belongs to single samples: with the
-    /// mean square slope for a whole view, Cones with errors of 1 px in one map lost 0.4 dB. v keeps the
-    /// part that errors of depth have in it: without their mean it tends to zero where both maps have
-    /// errors, and the same with both lost 1.6 dB.
+    /// with the variance 1 / 12 of a position within a pixel. Noise that all views have is left out: it is
+    /// also in the photographs that a view is compared with. The last term belongs to single samples, and of
+    /// it only the ratio between views counts, so that slopes are not smoothed more. Levers are those of a
+    /// typical pixel of the view.
     pub fn with_noise(mut self, agreement: &Agreement) -> Self {
         let Some(variance) = agreement.variance() else { return self };
         let variance = variance.max(LEAST_VARIANCE);
@@ -214,14 +217,15 @@ impl Balance {
     }
 
     /// Multiplies the weight and the brightness of every sample by those of its view, and the weight by what
-    /// the slope of its photograph makes of the errors of its depth.
+    /// the slope of its photograph makes of the errors of the depths.
     pub fn apply<'a, const C: usize>(&self, samples: &mut [Sample<C>], image: impl Fn(usize) -> &'a Image) {
+        let is_exact = self.errors.iter().all(|errors| errors.typical.jitter == 0.0);
         for samples in samples.chunk_by_mut(|a, b| a.view == b.view) {
             let number = samples[0].view;
             let (view, weight, gain) = (usize::from(number), self.weight(number), self.gain(number));
             for part in samples.chunks_mut(PART) {
-                let shares = match self.errors.get(view) {
-                    Some(errors) => errors.shares(image(view), part, gain),
+                let shares = match self.errors.get(view).filter(|_| !is_exact) {
+                    Some(errors) => self.shares(errors, image(view), part, gain),
                     None => [1.0; PART],
                 };
                 for (s, share) in part.iter_mut().zip(shares) {
@@ -230,6 +234,28 @@ impl Balance {
                 }
             }
         }
+    }
+
+    /// Weights of samples of one view over those without slope, where the weights of all views have the same
+    /// sum as without slope: the smoothing of the fit does not grow with the errors of depth.
+    fn shares<const C: usize>(
+        &self,
+        own: &SampleErrors,
+        image: &Image,
+        samples: &[Sample<C>],
+        gain: f32,
+    ) -> [f32; PART] {
+        let mut gradients = [Gradient([0.0; 3]); PART];
+        for (gradient, s) in gradients.iter_mut().zip(samples) {
+            *gradient = Gradient::of(image, s.pixel as usize, gain, own.noise);
+        }
+        let mut sums = [0.0; PART];
+        for (errors, weight) in self.errors.iter().zip(&self.weights) {
+            let weight = f64::from(*weight);
+            sums.iter_mut().zip(&gradients).for_each(|(sum, g)| *sum += weight * errors.share(g));
+        }
+        let total = self.total();
+        std::array::from_fn(|k| (own.share(&gradients[k]) * total / sums[k]) as f32)
     }
 }
 
@@ -248,37 +274,34 @@ struct SampleErrors {
 }
 
 impl SampleErrors {
-    /// Weights of samples over that of a sample without slope.
-    fn shares<const C: usize>(&self, image: &Image, samples: &[Sample<C>], gain: f32) -> [f32; PART] {
-        let mut shares = [1.0; PART];
-        if self.typical.jitter == 0.0 {
-            return shares;
+    /// Weight of a sample over that of one whose depth is exact.
+    fn share(&self, gradient: &Gradient) -> f64 {
+        if self.typical.jitter == 0.0 || !self.typical.error.is_finite() {
+            return 1.0;
         }
-        let mut squares = [0.0; PART];
-        for (square, s) in squares.iter_mut().zip(samples) {
-            let (pixel, gain) = (s.pixel as usize, f64::from(gain));
-            *square = match image.channels() {
-                3 => self.square::<3>(image, pixel, gain),
-                _ => self.square::<1>(image, pixel, gain),
-            };
-        }
-        let channels = image.channels() as f64;
-        for (share, square) in shares.iter_mut().zip(squares) {
-            let slope = self.slope(square / channels);
-            *share = (self.typical.weight(slope, 0.0) * self.typical.error.powi(2)) as f32;
-        }
-        shares
+        let floor = APERTURE * (gradient.0[0] + gradient.0[2]).max(0.0);
+        let variance = |square_slope| self.typical.variance(square_slope) + floor;
+        variance(0.0) / variance(self.lever.product(gradient.0).max(0.0))
+    }
+}
+
+/// Mean over the channels of the products of the slopes of a photograph: x x, x y and y y.
+#[derive(Clone, Copy)]
+struct Gradient([f64; 3]);
+
+impl Gradient {
+    /// By central differences, which have half the variance of the noise in each direction.
+    fn of(image: &Image, pixel: usize, gain: f32, noise: f64) -> Self {
+        let gain = f64::from(gain);
+        let [xx, xy, yy] = match image.channels() {
+            3 => Self::sums::<3>(image, pixel).map(|sum| gain * gain * sum / 3.0),
+            _ => Self::sums::<1>(image, pixel).map(|sum| gain * gain * sum),
+        };
+        Self([xx - 0.5 * noise, xy, yy - 0.5 * noise])
     }
 
-    /// Root mean square change of the value for an error of one in the depth, from the mean square of
-    /// central differences, which have half the variance of the noise in each direction.
-    #[inline]
-    fn slope(&self, square: f64) -> f64 {
-        (square - 0.5 * self.noise * self.lever.trace()).max(0.0).sqrt()
-    }
-
-    /// The sum of the mean square changes of the channels, with the noise.
-    fn square<const N: usize>(&self, image: &Image, pixel: usize, gain: f64) -> f64 {
+    /// The sums of the products over the channels, with the noise.
+    fn sums<const N: usize>(image: &Image, pixel: usize) -> [f64; 3] {
         let (width, height) = image.size();
         // Pixels are counted in 32 bits, which divide faster.
         let (x, y) = ((pixel as u32 % width as u32) as usize, (pixel as u32 / width as u32) as usize);
@@ -289,8 +312,12 @@ impl SampleErrors {
         let rows = [value(pixel - above * width), value(pixel + below * width)];
         let share = |steps: usize| if steps == 2 { 0.5 } else { 1.0 };
         let (across, down) = (share(left + right), share(above + below));
-        let along = |[a, b]: &[[f64; N]; 2], c: usize, share: f64| gain * (b[c] - a[c]) * share;
-        (0..N).map(|c| self.lever.square([along(&columns, c, across), along(&rows, c, down)])).sum()
+        let mut sums = [0.0; 3];
+        for c in 0..N {
+            let (u, v) = ((columns[1][c] - columns[0][c]) * across, (rows[1][c] - rows[0][c]) * down);
+            sums.iter_mut().zip([u * u, u * v, v * v]).for_each(|(sum, product)| *sum += product);
+        }
+        sums
     }
 }
 
@@ -322,6 +349,28 @@ mod tests {
         let unequal = weights([3.0, 9.0], vec![pair]);
         assert_eq!(unequal[0], 1.0);
         assert!((f64::from(unequal[1]) - 1.0 / (1.0 + 72.0 / 70.0)).abs() < 1e-6, "{unequal:?}");
+    }
+
+    /// On a slope the view with errors of depth counts less by the ratio of the variances, and the other one
+    /// more; on a flat photograph both are alike.
+    #[test]
+    fn samples_with_errors_of_depth_count_less_on_slopes() {
+        let pair = PairAgreement { views: [0, 1], points: 1000, share: 0.9, gain: 1.0, difference: 10.0 };
+        let depth_errors = vec![0.0, 2.0];
+        let agreement = Agreement { pairs: vec![pair], depth_errors, ..Agreement::default() };
+        let levers = vec![Lever::along_rows(0.5); 2];
+        let balance = Balance { levers, ..Balance::by_distance(&[0.5, 0.5]) }.with_noise(&agreement);
+        let weights = |slope: f32| {
+            let image = Image::new(5, 5, 1, (0..25).map(|p| slope * (p % 5) as f32).collect()).unwrap();
+            let mut samples = [0, 1].map(|view| Sample::<1> { view, pixel: 12, ..Sample::BLANK });
+            balance.apply(&mut samples, |_| &image);
+            samples.map(|s| s.weight)
+        };
+        assert_eq!(weights(0.0), [1.0, 1.0]);
+        let [exact, erring] = weights(20.0);
+        let ratio = (100.0 + 400.0 / 12.0) / (100.0 + 400.0 * (1.0 / 12.0 + 1.0));
+        assert!((erring / exact - ratio).abs() < 1e-6, "{exact} {erring} {ratio}");
+        assert!((exact + erring - 2.0).abs() < 1e-6, "{exact} {erring}");
     }
 
     #[test]

@@ -157,14 +157,10 @@ impl Lever {
         Self { xx: mean(&|d| d[0] * d[0]), xy: mean(&|d| d[0] * d[1]), yy: mean(&|d| d[1] * d[1]) }
     }
 
-    /// Mean square change of the value for an error of one in the depth, with the gradient of the view.
-    pub(super) fn square(&self, [x, y]: [f64; 2]) -> f64 {
-        self.xx * x * x + 2.0 * self.xy * x * y + self.yy * y * y
-    }
-
-    /// The same for a gradient in every direction, with a mean square of one for each component.
-    pub(super) fn trace(&self) -> f64 {
-        self.xx + self.yy
+    /// Mean square change of the value for an error of one in the depth, from the products x x, x y and y y
+    /// of the slopes of the view.
+    pub(super) fn product(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
+        self.xx * xx + 2.0 * self.xy * xy + self.yy * yy
     }
 }
 
@@ -263,7 +259,7 @@ mod tests {
         };
         let again = Lever::of(&shots[0].1, turned);
         assert!((again.xx / found.xx - 1.0).abs() < 1e-6 && again.yy < 1e-6 * middle, "{again:?}");
-        assert!((found.square([3.0, 1.0]) / found.xx / 9.0 - 1.0).abs() < 1e-3);
+        assert!((found.product([9.0, 3.0, 1.0]) / found.xx / 9.0 - 1.0).abs() < 1e-3);
     }
 
     #[test]
