@@ -20,6 +20,10 @@ const LEAST_VARIANCE: f64 = 1.0;
 /// say little: between samples the fit is no better.
 const APERTURE: f64 = 1.0 / 12.0;
 
+/// Errors of depth that change the weight of no sample by more than this share are left out: the slopes of
+/// all samples take a fifth of the time of a view.
+const NEGLIGIBLE: f64 = 0.02;
+
 /// Weights of the views: near ones count more.
 ///
 /// With x_i the distance of view i from the virtual camera, in units of the sum of the two least distances,
@@ -185,10 +189,13 @@ impl Balance {
         for (view, weight) in self.weights.iter_mut().enumerate() {
             let excess = (noise(view) - least).max(0.0);
             let error = (variance / f64::from(*weight) + excess).sqrt();
-            let jitter = agreement.depth_error(view);
-            let typical = Measured { x: 0.0, value: 0.0, error, jitter };
+            let mut typical = Measured { x: 0.0, value: 0.0, error, jitter: agreement.depth_error(view) };
             *weight = (variance * typical.weight(0.0, 0.0)) as f32;
             if let Some(lever) = self.levers.get(view) {
+                let displacement = lever.product([1.0, 0.0, 1.0]) * typical.jitter.powi(2);
+                if displacement < NEGLIGIBLE * APERTURE {
+                    typical.jitter = 0.0;
+                }
                 self.errors.push(SampleErrors { typical, lever: *lever, noise: noise(view) });
             }
         }
