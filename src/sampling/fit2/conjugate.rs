@@ -28,23 +28,24 @@ type PerChannel<const C: usize> = [f64; C];
 /// Solves A u = rhs for every channel.
 pub(super) fn solve<const C: usize>(
     a: &Stencil,
-    rhs: &Planes,
+    rhs: Planes,
     iteration: &Iteration,
     watch: Watch<'_>,
 ) -> (Planes, Convergence) {
-    let mut work = Work::<C>::new(a);
+    let mut work = Work::<C>::new(a, rhs);
     let first = Iteration { steps: iteration.steps.min(DIAGONAL_STEPS), ..*iteration };
-    let mut ended = work.solve(a, rhs, &first, watch);
-    if !ended.reached {
+    let (mut progress, mut steps) = work.solve(a, &first, watch);
+    if progress.any_open() && steps < iteration.steps {
         let mut multigrid = Multigrid::new(a);
-        ended = work.continue_with(a, &mut multigrid, rhs, iteration, ended.steps, watch);
+        steps = work.continue_with(a, &mut multigrid, &mut progress, iteration.steps, steps, watch);
     }
-    (work.u, ended)
+    (work.u, progress.ended(steps))
 }
 
 /// The vectors of the iteration.
 struct Work<const C: usize> {
     u: Planes,
+    /// The right-hand sides at first.
     residual: Planes,
     direction: Planes,
     image: Planes,
@@ -99,20 +100,20 @@ impl<const C: usize> Progress<C> {
 }
 
 impl<const C: usize> Work<C> {
-    fn new(a: &Stencil) -> Self {
+    fn new(a: &Stencil, rhs: Planes) -> Self {
         let zeros = || Planes::zeros(a.grid(), C);
         let mut inverse = Planes::zeros(a.grid(), 1);
         inverse.par_rows_mut().enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(y, inverse)| {
             let pairs = inverse.iter_mut().zip(a.diagonal_row(y));
             pairs.for_each(|(i, d)| *i = if *d > 0.0 { 1.0 / d } else { 0.0 });
         });
-        Self { u: zeros(), residual: zeros(), direction: zeros(), image: zeros(), inverse }
+        Self { u: zeros(), residual: rhs, direction: zeros(), image: zeros(), inverse }
     }
 
-    /// Conjugate gradients with diagonal preconditioner.
-    fn solve(&mut self, a: &Stencil, rhs: &Planes, end: &Iteration, watch: Watch<'_>) -> Convergence {
-        self.start(a, rhs);
-        let mut progress = self.residuals(a, rhs, end);
+    /// Conjugate gradients with diagonal preconditioner; the steps taken.
+    fn solve(&mut self, a: &Stencil, end: &Iteration, watch: Watch<'_>) -> (Progress<C>, usize) {
+        self.start(a);
+        let mut progress = self.residuals(a, end.tolerance);
         self.turn([0.0; C]);
         let mut steps = 0;
         while steps < end.steps && progress.any_open() {
@@ -124,24 +125,23 @@ impl<const C: usize> Work<C> {
             steps += 1;
             watch(progress.done());
         }
-        progress.ended(steps)
+        (progress, steps)
     }
 
-    /// Goes on from u with the multigrid preconditioner.
+    /// Goes on from u with the multigrid preconditioner, up to `most` steps; all steps taken.
     fn continue_with(
         &mut self,
         a: &Stencil,
         multigrid: &mut Multigrid<C>,
-        rhs: &Planes,
-        end: &Iteration,
+        progress: &mut Progress<C>,
+        most: usize,
         mut steps: usize,
         watch: Watch<'_>,
-    ) -> Convergence {
-        let mut progress = self.residuals(a, rhs, end);
+    ) -> usize {
         multigrid.apply(a, &self.residual, &mut self.direction);
         let mut preconditioned = Planes::zeros(a.grid(), C);
         let mut product = dot(&self.residual, &self.direction);
-        while steps < end.steps && progress.any_open() {
+        while steps < most && progress.any_open() {
             let curvature = a.multiply(&self.direction, &mut self.image);
             let Some(lengths) = progress.lengths(product, curvature) else { break };
             progress.energy = self.step(lengths);
@@ -152,13 +152,13 @@ impl<const C: usize> Work<C> {
             steps += 1;
             watch(progress.done());
         }
-        progress.ended(steps)
+        steps
     }
 
     /// The mean of the samples around each coefficient: rhs / A 1, the solution for constant values.
-    fn start(&mut self, a: &Stencil, rhs: &Planes) {
+    fn start(&mut self, a: &Stencil) {
         let stride = a.grid().stride();
-        let rows = self.u.par_rows_mut().zip(rhs.par_rows()).enumerate().with_min_len(ROWS_AT_ONCE);
+        let rows = self.u.par_rows_mut().zip(self.residual.par_rows()).enumerate().with_min_len(ROWS_AT_ONCE);
         rows.for_each_init(
             || vec![0.0; stride],
             |sums, (y, (u, rhs))| {
@@ -173,26 +173,25 @@ impl<const C: usize> Work<C> {
         );
     }
 
-    /// residual = rhs - A u, and the norms.
-    fn residuals(&mut self, a: &Stencil, rhs: &Planes, end: &Iteration) -> Progress<C> {
+    /// residual = rhs - A u in place of rhs, and the norms of both.
+    fn residuals(&mut self, a: &Stencil, tolerance: f64) -> Progress<C> {
         a.multiply::<C>(&self.u, &mut self.image);
         let stride = a.grid().stride();
         let mut sums = vec![([0.0; C], [0.0; C]); a.grid().height];
-        let inputs = rhs.par_rows().zip(self.image.par_rows()).zip(self.inverse.par_rows());
+        let inputs = self.image.par_rows().zip(self.inverse.par_rows());
         let rows = self.residual.par_rows_mut().zip(inputs).zip(&mut sums).with_min_len(ROWS_AT_ONCE);
-        rows.for_each(|((residual, ((rhs, image), inverse)), (scale, energy))| {
+        rows.for_each(|((residual, (image, inverse)), (scale, energy))| {
             for c in 0..C {
                 let row = c * stride..(c + 1) * stride;
-                let (rhs, r) = (blocks(&rhs[row.clone()]), blocks_mut(&mut residual[row.clone()]));
-                let inputs = rhs.iter().zip(blocks(&image[row]));
-                r.iter_mut().zip(inputs).for_each(|(r, (f, q))| (0..LANES).for_each(|l| r[l] = f[l] - q[l]));
-                scale[c] = energy_of(rhs, blocks(inverse));
+                let (r, image) = (blocks_mut(&mut residual[row.clone()]), blocks(&image[row]));
+                scale[c] = energy_of(r, blocks(inverse));
+                r.iter_mut().zip(image).for_each(|(r, q)| (0..LANES).for_each(|l| r[l] -= q[l]));
                 energy[c] = energy_of(r, blocks(inverse));
             }
         });
         let (scale, energy): (Vec<_>, Vec<_>) = sums.into_iter().unzip();
         let scale = total(&scale).map(|s| s.max(f64::MIN_POSITIVE));
-        Progress { scale, energy: total(&energy), tolerance: end.tolerance }
+        Progress { scale, energy: total(&energy), tolerance }
     }
 
     /// Steps by `lengths` along the direction; returns r . D^{-1} r of the new residual.

@@ -65,9 +65,8 @@ pub enum Direction {
 #[derive(Debug, Clone)]
 pub struct Fit2<const ORDER: usize, const C: usize> {
     size: (usize, usize),
-    grid: Grid,
-    /// For each coefficient the couplings that samples cause, then the right-hand sides.
-    records: Vec<f32>,
+    matrix: Stencil,
+    rhs: Planes,
 }
 
 /// The normal equations with their springs.
@@ -81,45 +80,35 @@ pub struct Connected<const ORDER: usize, const C: usize> {
 impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
     /// Couplings of a coefficient that samples cause, its own included.
     const COUPLINGS: usize = ORDER + (ORDER - 1) * (2 * ORDER - 1);
-    /// Numbers of a record.
-    const RECORD: usize = Self::COUPLINGS + C;
 
     /// An empty problem for an image of `width` x `height` pixels.
     pub fn new(width: usize, height: usize) -> Self {
         const { assert!(ORDER == 2 || ORDER == 4, "the fit of an image is bilinear or bicubic") }
         let grid = Grid { width: width + ORDER - 2, height: height + ORDER - 2 };
-        // Samples on the last row or column have weights of 0 beyond it.
-        let records = vec![0.0; (grid.len() + (grid.width + 1) * (ORDER - 1)) * Self::RECORD];
-        Self { size: (width, height), grid, records }
+        let (matrix, rhs) = (Stencil::new(grid, offsets::<ORDER>()), Planes::zeros(grid, C));
+        Self { size: (width, height), matrix, rhs }
     }
 
     /// Width and height of the grid of coefficients. It has ORDER / 2 - 1 coefficients more than pixels on
     /// each side.
     pub fn coefficients(&self) -> (usize, usize) {
-        (self.grid.width, self.grid.height)
+        (self.matrix.grid().width, self.matrix.grid().height)
     }
 
     /// All rows, to add samples.
     pub fn rows(&mut self) -> Fit2Rows<'_, ORDER, C> {
-        Fit2Rows::new(self.size, self.grid.width, &mut self.records)
-    }
-
-    fn record(&self, coefficient: usize) -> &[f32] {
-        &self.records[coefficient * Self::RECORD..(coefficient + 1) * Self::RECORD]
+        // Samples on the last row have weights of 0 below it.
+        let rows = self.matrix.grid().height + ORDER - 1;
+        Fit2Rows::new(self.size, self.matrix.planes_mut().first_rows(rows), self.rhs.first_rows(rows))
     }
 
     /// Weight of the samples at a coefficient, the sum of its row in the normal equations without
     /// regularisation, and their weighted values; their ratio is the mean of the samples around it.
     pub fn local_sums(&self, coefficient: usize) -> (f32, [f32; C]) {
-        let record = self.record(coefficient);
-        let later: f32 = record[..Self::COUPLINGS].iter().sum();
-        let earlier = half_square(ORDER - 1).enumerate().skip(1).map(|(k, (columns, rows))| {
-            let at = coefficient.checked_sub(rows * self.grid.width);
-            let at = at.and_then(|at| at.checked_add_signed(-columns));
-            at.map_or(0.0, |at| self.record(at)[k])
-        });
-        let values = std::array::from_fn(|c| record[Self::COUPLINGS + c]);
-        (later + earlier.sum::<f32>(), values)
+        let width = self.matrix.grid().width;
+        let (x, y) = (coefficient % width, coefficient / width);
+        let weight = self.matrix.row_sum(x, y, Self::COUPLINGS);
+        (weight, std::array::from_fn(|c| self.rhs.row(y, c)[x]))
     }
 
     /// Adds springs to the equations. `springs` gives those of one direction, for the grid of coefficients.
@@ -129,30 +118,12 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
         springs: impl Fn(Direction) -> Springs,
         alone: impl Fn(usize) -> bool + Sync,
     ) -> Connected<ORDER, C> {
-        let (size, (mut matrix, rhs)) = (self.size, self.assembled());
-        drop(self);
+        let Self { size, mut matrix, rhs } = self;
         for direction in [Direction::Across, Direction::Down] {
             springs::add(&mut matrix, &springs(direction), direction);
         }
         springs::hold(&mut matrix, alone);
         Connected { size, matrix, rhs }
-    }
-
-    /// The equations without springs: planes instead of records.
-    fn assembled(&self) -> (Stencil, Planes) {
-        let mut matrix = Stencil::new(self.grid, offsets::<ORDER>());
-        let mut rhs = Planes::zeros(self.grid, C);
-        let (width, stride) = (self.grid.width, self.grid.stride());
-        let rows = matrix.planes_mut().par_rows_mut().zip(rhs.par_rows_mut());
-        let records = self.records.par_chunks(width * Self::RECORD);
-        rows.zip(records).with_min_len(ROWS_AT_ONCE).for_each(|((matrix, rhs), records)| {
-            for (x, record) in records.chunks_exact(Self::RECORD).enumerate() {
-                let (couplings, values) = record.split_at(Self::COUPLINGS);
-                couplings.iter().enumerate().for_each(|(k, a)| matrix[k * stride + x] = *a);
-                values.iter().enumerate().for_each(|(c, v)| rhs[c * stride + x] = *v);
-            }
-        });
-        (matrix, rhs)
     }
 }
 
@@ -167,31 +138,38 @@ fn offsets<const ORDER: usize>() -> Vec<Offset> {
 impl<const ORDER: usize, const C: usize> Connected<ORDER, C> {
     /// Solves the equations: J at the pixels, C values each, row by row. `watch` is called with the share of
     /// the way that is done, 0 to 1.
-    pub fn solve(&self, iteration: &Iteration, watch: &(dyn Fn(f64) + Sync)) -> (Vec<f32>, Convergence) {
-        let (solution, convergence) = conjugate::solve::<C>(&self.matrix, &self.rhs, iteration, watch);
-        (self.at_pixels(&solution), convergence)
+    pub fn solve(self, iteration: &Iteration, watch: &(dyn Fn(f64) + Sync)) -> (Vec<f32>, Convergence) {
+        let (solution, convergence) = conjugate::solve::<C>(&self.matrix, self.rhs, iteration, watch);
+        (at_pixels::<ORDER, C>(&solution, self.size), convergence)
     }
+}
 
-    /// J at the pixels.
-    fn at_pixels(&self, coefficients: &Planes) -> Vec<f32> {
-        let (width, height) = self.size;
-        let mut values = vec![0.0; width * height * C];
-        // The last of the weights at a knot is 0.
-        let weights = BSpline::<ORDER>::weights(0.0).1.map(|w| w as f32);
-        let rows = values.par_chunks_mut(width.max(1) * C).enumerate().with_min_len(ROWS_AT_ONCE);
-        rows.for_each(|(y, values)| {
-            for c in 0..C {
-                for (j, down) in weights[..ORDER - 1].iter().enumerate() {
-                    let row = coefficients.row(y + j, c);
-                    for (x, value) in values.iter_mut().skip(c).step_by(C).enumerate() {
-                        let sum: f32 = weights[..ORDER - 1].iter().zip(&row[x..]).map(|(w, u)| w * u).sum();
-                        *value += down * sum;
+/// J at the pixels.
+fn at_pixels<const ORDER: usize, const C: usize>(
+    coefficients: &Planes,
+    (width, height): (usize, usize),
+) -> Vec<f32> {
+    let mut values = vec![0.0; width * height * C];
+    let last = coefficients.grid().height - 1;
+    // The last of the weights at a knot is 0.
+    let weights = BSpline::<ORDER>::weights(0.0).1.map(|w| w as f32);
+    let rows = values.par_chunks_mut(width.max(1) * C).enumerate().with_min_len(ROWS_AT_ONCE);
+    rows.for_each(|(y, values)| {
+        let values = values.as_chunks_mut::<C>().0;
+        for c in 0..C {
+            let rows: [&[f32]; ORDER] = std::array::from_fn(|j| coefficients.row((y + j).min(last), c));
+            for (x, value) in values.iter_mut().enumerate() {
+                let mut sum = 0.0;
+                for (row, down) in rows.iter().zip(&weights[..ORDER - 1]) {
+                    for (j, across) in weights[..ORDER - 1].iter().enumerate() {
+                        sum += down * across * row[x + j];
                     }
                 }
+                value[c] = sum;
             }
-        });
-        values
-    }
+        }
+    });
+    values
 }
 
 #[cfg(test)]

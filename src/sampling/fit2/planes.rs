@@ -12,6 +12,9 @@ pub(super) const BORDER: usize = 3;
 /// Rows that are treated without asking for another thread.
 pub(super) const ROWS_AT_ONCE: usize = 8;
 
+/// Numbers of some pages of memory.
+const PAGES: usize = 1 << 14;
+
 /// Width and height of a grid of coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Grid {
@@ -43,7 +46,11 @@ impl Planes {
     pub(super) fn zeros(grid: Grid, count: usize) -> Self {
         let rows = grid.height + 2 * BORDER;
         // A block before and after, for neighbours of the first and of the last numbers.
-        Self { grid, count, data: vec![0.0; rows * count * grid.stride() + 2 * LANES] }
+        let mut data = vec![0.0; rows * count * grid.stride() + 2 * LANES];
+        // The system gives memory page by page, at the first access. A page that is read first and written
+        // later costs it two turns and interrupts the other threads, so all are written now, in parallel.
+        data.par_chunks_mut(PAGES).for_each(|part| part.fill(0.0));
+        Self { grid, count, data }
     }
 
     pub(super) fn grid(&self) -> Grid {
@@ -89,6 +96,13 @@ impl Planes {
         &mut self.data[range]
     }
 
+    /// The first rows of all images, and below them rows of zeros, as many as [`BORDER`] at most.
+    pub(super) fn first_rows(&mut self, rows: usize) -> RowsMut<'_> {
+        let (stride, count) = (self.grid.stride(), self.count);
+        let range = self.start(0, 0)..self.start(rows, 0);
+        RowsMut { stride, count, data: &mut self.data[range] }
+    }
+
     /// Numbers of one row of all images in memory.
     pub(super) fn row_len(&self) -> usize {
         self.count * self.grid.stride()
@@ -102,6 +116,31 @@ impl Planes {
     pub(super) fn par_rows_mut(&mut self) -> rayon::slice::ChunksMut<'_, f32> {
         let len = self.row_len();
         self.rows_mut().par_chunks_mut(len)
+    }
+}
+
+/// Some rows of all images.
+#[derive(Debug)]
+pub(super) struct RowsMut<'a> {
+    stride: usize,
+    count: usize,
+    data: &'a mut [f32],
+}
+
+impl<'a> RowsMut<'a> {
+    /// The first `rows` rows, and the rest.
+    pub(super) fn split_at(self, rows: usize) -> (Self, Self) {
+        let (stride, count) = (self.stride, self.count);
+        let middle = rows.saturating_mul(count * stride).min(self.data.len());
+        let (before, after) = self.data.split_at_mut(middle);
+        (Self { stride, count, data: before }, Self { stride, count, data: after })
+    }
+
+    /// N numbers of a row of image k from column x on.
+    #[inline(always)]
+    pub(super) fn at<const N: usize>(&mut self, k: usize, x: usize, row: usize) -> &mut [f32] {
+        let start = (row * self.count + k) * self.stride + x;
+        &mut self.data[start..start + N]
     }
 }
 

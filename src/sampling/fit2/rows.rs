@@ -1,7 +1,7 @@
 //! Samples enter the normal equations, into some rows of an image.
 
 use super::super::kernel::BSpline;
-use super::Fit2;
+use super::planes::RowsMut;
 
 /// A sample of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,31 +18,32 @@ pub struct Fit2Sample<const C: usize> {
     pub slope_weight: f32,
 }
 
-/// Some rows of the equations of a [`Fit2`]. Rows that do not overlap take samples at the same time.
+/// Some rows of the equations of a [`Fit2`](super::Fit2). Rows that do not overlap take samples at the same
+/// time.
 #[derive(Debug)]
 pub struct Fit2Rows<'a, const ORDER: usize, const C: usize> {
     size: (usize, usize),
-    /// Coefficients of a row.
-    stride: usize,
     /// The first row.
     first: usize,
-    records: &'a mut [f32],
+    matrix: RowsMut<'a>,
+    rhs: RowsMut<'a>,
 }
 
 impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
-    pub(super) fn new(size: (usize, usize), stride: usize, records: &'a mut [f32]) -> Self {
-        Self { size, stride, first: 0, records }
+    pub(super) fn new(size: (usize, usize), matrix: RowsMut<'a>, rhs: RowsMut<'a>) -> Self {
+        Self { size, first: 0, matrix, rhs }
     }
 
     /// The rows before row `row` of the image, and the rest.
     pub fn split_at(self, row: usize) -> (Self, Self) {
-        let (size, stride, first) = (self.size, self.stride, self.first);
+        let (size, first) = (self.size, self.first);
         // Below the image there are more coefficients.
-        let end = if row < size.1 { row } else { usize::MAX };
-        let middle = (end - first).saturating_mul(stride * Fit2::<ORDER, C>::RECORD);
-        let (before, after) = self.records.split_at_mut(middle.min(self.records.len()));
-        let part = |first, records| Self { size, stride, first, records };
-        (part(first, before), part(row, after))
+        let rows = if row < size.1 { row - first } else { usize::MAX };
+        let (matrix, rhs) = (self.matrix.split_at(rows), self.rhs.split_at(rows));
+        (
+            Self { size, first, matrix: matrix.0, rhs: rhs.0 },
+            Self { size, first: row, matrix: matrix.1, rhs: rhs.1 },
+        )
     }
 
     /// Adds a sample, whose position is moved into the image. It changes its own row and the ORDER - 1 rows
@@ -55,16 +56,56 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
     pub fn add(&mut self, sample: &Fit2Sample<C>) {
         let (column, across) = span::<ORDER>(sample.x, self.size.0);
         let (row, down) = span::<ORDER>(sample.y, self.size.1);
-        let start = ((row - self.first) * self.stride + column) * Fit2::<ORDER, C>::RECORD;
-        let records = &mut self.records[start..];
-        let (w, v) = (&across.weights, &down.weights);
-        add_product(records, self.stride, (v, w), sample.weight, Some(&sample.values));
+        let at = (column, row - self.first);
+        let weighted = self.add_couplings(at, &product(&down.weights, &across.weights), sample.weight);
+        for (i, own) in weighted.iter().enumerate() {
+            for (c, value) in sample.values.iter().enumerate() {
+                let sums = self.rhs.at::<ORDER>(c, at.0, at.1 + i);
+                (0..ORDER).for_each(|j| sums[j] += own[j] * value);
+            }
+        }
         if sample.slope_weight > 0.0 {
             let weight = sample.weight * sample.slope_weight;
-            add_product::<ORDER, C>(records, self.stride, (v, &across.slopes), weight, None);
-            add_product::<ORDER, C>(records, self.stride, (&down.slopes, w), weight, None);
+            self.add_couplings(at, &product(&down.weights, &across.slopes), weight);
+            self.add_couplings(at, &product(&down.slopes, &across.weights), weight);
         }
     }
+
+    /// Adds weight b b', b the values of the splines from a coefficient on; returns weight b.
+    #[inline(always)]
+    fn add_couplings(
+        &mut self,
+        (column, row): (usize, usize),
+        b: &Tensor<ORDER>,
+        weight: f32,
+    ) -> Tensor<ORDER> {
+        let weighted = b.map(|row| row.map(|b| weight * b));
+        for (i, own) in weighted.iter().enumerate() {
+            let mut plane = 0;
+            for other in &b[i..] {
+                // Along the row to the right only, in rows below to both sides.
+                let left = if plane == 0 { 0 } else { ORDER - 1 };
+                for shift in 0..ORDER + left {
+                    let couplings = self.matrix.at::<ORDER>(plane, column, row + i);
+                    for j in 0..ORDER {
+                        if (left..left + ORDER).contains(&(j + shift)) {
+                            couplings[j] += own[j] * other[j + shift - left];
+                        }
+                    }
+                    plane += 1;
+                }
+            }
+        }
+        weighted
+    }
+}
+
+/// A number for each of the splines around a position, row by row.
+type Tensor<const ORDER: usize> = [[f32; ORDER]; ORDER];
+
+#[inline(always)]
+fn product<const ORDER: usize>(down: &[f32; ORDER], across: &[f32; ORDER]) -> Tensor<ORDER> {
+    down.map(|d| across.map(|a| d * a))
 }
 
 /// Weights and slopes of the splines around a position.
@@ -82,38 +123,4 @@ fn span<const ORDER: usize>(position: f64, length: usize) -> (usize, Span<ORDER>
     let first = (position as u32).min(length.saturating_sub(2) as u32);
     let (weights, slopes) = BSpline::<ORDER>::in_span(position - f64::from(first));
     (first as usize, Span { weights: weights.map(|w| w as f32), slopes: slopes.map(|d| d as f32) })
-}
-
-/// Adds weight (b b'), b the products of the weights down and across, and weight b f.
-#[inline(always)]
-fn add_product<const ORDER: usize, const C: usize>(
-    records: &mut [f32],
-    stride: usize,
-    (down, across): (&[f32; ORDER], &[f32; ORDER]),
-    weight: f32,
-    values: Option<&[f32; C]>,
-) {
-    let length = Fit2::<ORDER, C>::RECORD;
-    for (i, d) in down.iter().enumerate() {
-        // Images narrower than a spline: what is beyond the last record has the weight 0.
-        let end = ((i * stride + ORDER) * length).min(records.len());
-        let records = &mut records[i * stride * length..end];
-        for (j, record) in records.chunks_exact_mut(length).enumerate() {
-            let own = weight * d * across[j];
-            let (couplings, sums) = record.split_at_mut(Fit2::<ORDER, C>::COUPLINGS);
-            // Along the row, then the rows below.
-            for k in j..ORDER {
-                couplings[k - j] += own * d * across[k];
-            }
-            for (below, d) in down[i + 1..].iter().enumerate() {
-                let middle = ORDER + below * (2 * ORDER - 1) + ORDER - 1;
-                for (k, w) in across.iter().enumerate() {
-                    couplings[middle + k - j] += own * d * w;
-                }
-            }
-            if let Some(values) = values {
-                sums.iter_mut().zip(values).for_each(|(s, v)| *s += own * v);
-            }
-        }
-    }
 }

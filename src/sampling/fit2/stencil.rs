@@ -108,6 +108,17 @@ impl Stencil {
         }
     }
 
+    /// The same for one coefficient, with the first couplings only.
+    pub(super) fn row_sum(&self, x: usize, y: usize, couplings: usize) -> f32 {
+        let at = |start: usize| self.planes.data()[start + x];
+        let sum = |(k, offset): (usize, &Offset)| {
+            let entry = self.planes.start(y, k);
+            let earlier = entry.wrapping_add_signed(-self.planes.distance(*offset));
+            at(entry) + if k > 0 { at(earlier) } else { 0.0 }
+        };
+        self.offsets[..couplings].iter().enumerate().map(sum).sum()
+    }
+
     /// The matrix of blocks of 2 x 2 coefficients that move together: the sums of the entries between the
     /// blocks.
     pub(super) fn coarsened(&self) -> Self {

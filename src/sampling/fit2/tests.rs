@@ -199,7 +199,7 @@ fn sums_of_rows() {
     let mut fit = Fit2::<4, 2>::new(size.0, size.1);
     samples(60, size, 0.0).iter().for_each(|s| fit.rows().add(s));
     let (width, height) = fit.coefficients();
-    let (matrix, _) = fit.assembled();
+    let matrix = fit.matrix.clone();
     let mut ones = Planes::zeros(matrix.grid(), 1);
     (0..height).for_each(|y| ones.row_mut(y, 0).fill(1.0));
     let mut image = Planes::zeros(matrix.grid(), 1);

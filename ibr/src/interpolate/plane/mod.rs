@@ -25,6 +25,7 @@ use crate::sample::Sample;
 use grid::Grid;
 use hybank::sampling::Fit2;
 use hybank::sampling::fit2::{Fit2Sample, Iteration};
+use rayon::prelude::*;
 
 /// Settings of the plane fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,13 +119,16 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     pub fn new((width, height): (usize, usize), settings: &Settings) -> Result<Self, InterpolationError> {
         settings.check()?;
         let pixels = width * height;
+        // Written at once: pages that are read first and written later take the system twice the time.
+        let mut counts = vec![0; pixels];
+        counts.par_chunks_mut(width.max(1)).for_each(|row| row.fill(0));
         Ok(Self {
             width,
             height,
             fit: Fit2::new(width, height),
             depth: vec![f32::NAN; pixels],
             distance: vec![f32::INFINITY; pixels],
-            counts: vec![0; pixels],
+            counts,
             settings: *settings,
             added: 0,
         })
@@ -189,10 +193,10 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
     fn fill_background(&mut self, mask: &[Cover], inside: &dyn Fn(usize) -> bool) {
         let grid = self.grid();
         let sound = |(p, depth): (usize, &f32)| {
-            let weight = self.fit.local_sums(grid.coefficient(p)).0;
+            let weight = if depth.is_nan() { 0.0 } else { self.fit.local_sums(grid.coefficient(p)).0 };
             if weight < LEAST_SOURCE_WEIGHT { f32::NAN } else { *depth }
         };
-        let sound: Vec<f32> = self.depth.iter().enumerate().map(sound).collect();
+        let sound: Vec<f32> = self.depth.par_iter().enumerate().map(sound).collect();
         let sources = background::sources(&sound, self.width, &self.settings.depth_test);
         let holes = (0..mask.len()).filter(|p| mask[*p] == Cover::Disocclusion && inside(*p));
         let found = holes.filter_map(|p| Some((p, sources[p]? as usize)));
