@@ -111,16 +111,17 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
         (weight, std::array::from_fn(|c| self.rhs.row(y, c)[x]))
     }
 
-    /// Adds springs to the equations. `springs` gives those of one direction, for the grid of coefficients.
-    /// Coefficients that are `alone`, with neither samples nor springs, are held at 0.
+    /// Adds springs to the equations. `springs` gives those of one direction that begin in one row of the
+    /// grid of coefficients, and may be asked for a row more than once. Coefficients that are `alone`, with
+    /// neither samples nor springs, are held at 0.
     pub fn connect(
         self,
-        springs: impl Fn(Direction) -> Springs,
+        springs: impl Fn(Direction, usize) -> Springs + Sync,
         alone: impl Fn(usize) -> bool + Sync,
     ) -> Connected<ORDER, C> {
         let Self { size, mut matrix, rhs } = self;
         for direction in [Direction::Across, Direction::Down] {
-            springs::add(&mut matrix, &springs(direction), direction);
+            springs::add(&mut matrix, &springs, direction);
         }
         springs::hold(&mut matrix, alone);
         Connected { size, matrix, rhs }

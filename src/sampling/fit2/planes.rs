@@ -113,6 +113,15 @@ impl Planes {
         self.rows().par_chunks(self.row_len())
     }
 
+    /// Bands of so many rows, each row as in [`Planes::par_rows_mut`].
+    pub(super) fn par_bands_mut(
+        &mut self,
+        rows: usize,
+    ) -> impl IndexedParallelIterator<Item = std::slice::ChunksMut<'_, f32>> {
+        let len = self.row_len();
+        self.rows_mut().par_chunks_mut(rows * len).map(move |band| band.chunks_mut(len))
+    }
+
     pub(super) fn par_rows_mut(&mut self) -> rayon::slice::ChunksMut<'_, f32> {
         let len = self.row_len();
         self.rows_mut().par_chunks_mut(len)

@@ -8,14 +8,24 @@ use rayon::prelude::*;
 /// Added to the diagonal of a coefficient without samples and springs.
 const HELD: f32 = 1e-6;
 
-/// Springs in one direction, one of each kind for each coefficient p: edge (c_p - c_q)^2 to the next one,
-/// and bend (c_p - 2 c_q + c_r)^2 with the next two. They are 0 where the next ones are not there.
-#[derive(Debug, Clone, PartialEq)]
+/// Rows whose springs a thread makes in turn; those down from the two rows before are made again.
+const BAND: usize = 32;
+
+/// Springs that begin in one row, one of each kind for each coefficient p: edge (c_p - c_q)^2 to the next
+/// one, and bend (c_p - 2 c_q + c_r)^2 with the next two. They are 0 where the next ones are not there.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Springs {
     /// Weights of the first differences.
     pub edge: Vec<f32>,
     /// Weights of the second differences.
     pub bend: Vec<f32>,
+}
+
+impl Springs {
+    /// None, in a row of this width.
+    pub fn none(width: usize) -> Self {
+        Self { edge: vec![0.0; width], bend: vec![0.0; width] }
+    }
 }
 
 /// The planes of the next coefficient and of the one after it.
@@ -27,34 +37,66 @@ fn neighbours(matrix: &Stencil, direction: Direction) -> [Option<usize>; 2] {
     offsets.map(|o| matrix.plane_of(o))
 }
 
-/// Adds the springs of a direction.
-pub(super) fn add(matrix: &mut Stencil, springs: &Springs, direction: Direction) {
+/// Adds the springs of a direction, which `springs` gives row by row.
+pub(super) fn add(
+    matrix: &mut Stencil,
+    springs: &(impl Fn(Direction, usize) -> Springs + Sync),
+    direction: Direction,
+) {
     let [Some(next), Some(after)] = neighbours(matrix, direction) else { return };
     let grid = matrix.grid();
-    let (width, stride) = (grid.width, grid.stride());
-    let rows = matrix.planes_mut().par_rows_mut().enumerate().with_min_len(ROWS_AT_ONCE);
-    rows.for_each(|(y, row)| {
-        let (diagonal, others) = row.split_at_mut(stride);
-        let (one, two) = others.split_at_mut((after - 1) * stride);
-        let one = &mut one[(next - 1) * stride..];
-        let before = |springs: &[f32], back: usize| shifted(springs, width, y, back, direction);
-        let (g, g1) = (before(&springs.edge, 0), before(&springs.edge, 1));
-        let (h, h1, h2) = (before(&springs.bend, 0), before(&springs.bend, 1), before(&springs.bend, 2));
-        for x in 0..width {
-            diagonal[x] += g[x] + g1[x] + h[x] + 4.0 * h1[x] + h2[x];
-            one[x] -= g[x] + 2.0 * (h[x] + h1[x]);
-            two[x] += h[x];
+    let bands = matrix.planes_mut().par_bands_mut(BAND).enumerate();
+    bands.for_each(|(band, rows)| {
+        let first = band * BAND;
+        let above = |back: usize| match first.checked_sub(back) {
+            Some(y) if direction == Direction::Down => springs(direction, y),
+            _ => Springs::none(grid.width),
+        };
+        let (mut two_above, mut one_above) = (above(2), above(1));
+        for (y, row) in (first..).zip(rows) {
+            let here = springs(direction, y);
+            let mut row = Row { numbers: row, stride: grid.stride(), next, after };
+            match direction {
+                Direction::Across => row.add([0, 1, 2].map(|back| shifted(&here, back))),
+                Direction::Down => {
+                    let three = [here, one_above, two_above];
+                    row.add(three.each_ref().map(|s| (&s.edge[..], &s.bend[..])));
+                    [one_above, two_above, _] = three;
+                }
+            }
         }
     });
 }
 
-/// Springs of row y that begin `back` coefficients earlier; 0 where none does.
-fn shifted(springs: &[f32], width: usize, y: usize, back: usize, direction: Direction) -> Vec<f32> {
-    let row = |y: usize| &springs[y * width..(y + 1) * width];
-    match direction {
-        Direction::Across => std::iter::repeat_n(&0.0, back).chain(row(y)).take(width).copied().collect(),
-        Direction::Down if y >= back => row(y - back).to_vec(),
-        Direction::Down => vec![0.0; width],
+/// Springs that begin `back` coefficients earlier in the same row, in a row with zeros before it.
+fn shifted(springs: &Springs, back: usize) -> (Vec<f32>, Vec<f32>) {
+    let shift = |numbers: &[f32]| -> Vec<f32> {
+        std::iter::repeat_n(&0.0, back).chain(numbers).take(numbers.len()).copied().collect()
+    };
+    (shift(&springs.edge), shift(&springs.bend))
+}
+
+/// A row of all planes of a matrix, and the planes of a direction.
+struct Row<'a> {
+    numbers: &'a mut [f32],
+    stride: usize,
+    next: usize,
+    after: usize,
+}
+
+impl Row<'_> {
+    /// Adds the edges and bends that begin at each coefficient, one before it and two before it.
+    fn add<T: AsRef<[f32]>>(&mut self, [here, one, two]: [(T, T); 3]) {
+        let (diagonal, others) = self.numbers.split_at_mut(self.stride);
+        let (nearer, farther) = others.split_at_mut((self.after - 1) * self.stride);
+        let nearer = &mut nearer[(self.next - 1) * self.stride..];
+        let (g, g1) = (here.0.as_ref(), one.0.as_ref());
+        let (h, h1, h2) = (here.1.as_ref(), one.1.as_ref(), two.1.as_ref());
+        for x in 0..g.len() {
+            diagonal[x] += g[x] + g1[x] + h[x] + 4.0 * h1[x] + h2[x];
+            nearer[x] -= g[x] + 2.0 * (h[x] + h1[x]);
+            farther[x] += h[x];
+        }
     }
 }
 

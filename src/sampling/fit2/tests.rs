@@ -41,6 +41,12 @@ fn uneven(direction: Direction, (width, height): (usize, usize)) -> Springs {
     Springs { edge: of(1, 211), bend: of(2, 577) }
 }
 
+/// Row y of springs of a whole grid.
+fn row_of(springs: &Springs, width: usize, y: usize) -> Springs {
+    let row = y * width..(y + 1) * width;
+    Springs { edge: springs.edge[row.clone()].to_vec(), bend: springs.bend[row].to_vec() }
+}
+
 /// Solves A u = b by elimination; the rows of `a` end with the right-hand sides.
 fn eliminate(mut a: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let n = a.len();
@@ -126,7 +132,7 @@ fn fitted<const ORDER: usize>(samples: &[Fit2Sample<2>], size: (usize, usize)) -
         }
     }
     rest.iter().for_each(|s| fit.rows().add(s));
-    let connected = fit.connect(|direction| uneven(direction, grid), |_| false);
+    let connected = fit.connect(|direction, y| row_of(&uneven(direction, grid), grid.0, y), |_| false);
     connected.solve(&Iteration { tolerance: 1e-7, steps: 400 }, &|_| ())
 }
 
@@ -170,10 +176,10 @@ fn without_springs_down_rows_are_fits() {
     let mut fit = Fit2::<2, 2>::new(size.0, size.1);
     samples.iter().for_each(|s| fit.rows().add(s));
     let connected = fit.connect(
-        |direction| {
-            let edge = |p: usize| p % size.0 + 1 < size.0 && direction == Direction::Across;
-            let edge = (0..size.0 * size.1).map(|p| if edge(p) { tau } else { 0.0 }).collect();
-            Springs { edge, bend: vec![0.0; size.0 * size.1] }
+        |direction, _| {
+            let edge = |x: usize| x + 1 < size.0 && direction == Direction::Across;
+            let edge = (0..size.0).map(|x| if edge(x) { tau } else { 0.0 }).collect();
+            Springs { edge, ..Springs::none(size.0) }
         },
         |_| false,
     );
@@ -222,7 +228,7 @@ fn blocks_move_as_one() {
         let mut fit = Fit2::<ORDER, 2>::new(size.0, size.1);
         samples(60, size, 0.1).iter().for_each(|s| fit.rows().add(s));
         let grid = fit.coefficients();
-        let fine = fit.connect(|direction| uneven(direction, grid), |_| false).matrix;
+        let fine = fit.connect(|direction, y| row_of(&uneven(direction, grid), grid.0, y), |_| false).matrix;
         let coarse = fine.coarsened();
         let product = |a: &Stencil, one: &dyn Fn(usize, usize) -> bool| {
             let Grid { width, height } = a.grid();
@@ -268,13 +274,13 @@ fn large_holes_converge() {
             fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0, slope_weight: 0.0 });
         }
         let (width, height) = fit.coefficients();
-        let springs = |direction| {
-            let room = |p: usize| match direction {
-                Direction::Across => width - 1 - p % width,
-                Direction::Down => height - 1 - p / width,
+        let springs = |direction, y: usize| {
+            let room = |x: usize| match direction {
+                Direction::Across => width - 1 - x,
+                Direction::Down => height - 1 - y,
             };
             let of = |reach: usize, weight: f32| {
-                (0..width * height).map(|p| if room(p) >= reach { weight } else { 0.0 }).collect()
+                (0..width).map(|x| if room(x) >= reach { weight } else { 0.0 }).collect()
             };
             Springs { edge: of(1, 0.12), bend: of(2, 0.02) }
         };
@@ -293,7 +299,7 @@ fn large_holes_converge() {
 fn what_is_alone_is_held() {
     let mut fit = Fit2::<2, 1>::new(4, 3);
     fit.rows().add(&Fit2Sample { x: 1.0, y: 1.0, values: [50.0], weight: 2.0, slope_weight: 0.0 });
-    let none = |_| Springs { edge: vec![0.0; 12], bend: vec![0.0; 12] };
+    let none = |_, _| Springs::none(4);
     let (values, convergence) =
         fit.connect(none, |p| p != 5).solve(&Iteration { tolerance: 1e-6, steps: 9 }, &|_| ());
     assert!(convergence.reached);

@@ -4,34 +4,31 @@ use super::grid::Grid;
 use crate::interpolate::Settings;
 use crate::occlusion::DepthTest;
 use hybank::sampling::fit2::{Direction, Springs};
-use rayon::prelude::*;
 
-/// The springs of one direction, from the depths of the pixels, NaN where unknown: bridged holes count as
-/// lying on the surface of the others. Only what lies `inside` is connected.
-pub(super) fn between(
+/// The springs of one direction that begin in row y of the coefficients, from the depths of the pixels, NaN
+/// where unknown: bridged holes count as lying on the surface of the others. Only what lies `inside` is
+/// connected.
+pub(super) fn of_row(
     depth: &[f32],
     grid: Grid,
     inside: &(impl Fn(usize) -> bool + Sync),
     settings: &Settings,
-    direction: Direction,
+    (direction, y): (Direction, usize),
 ) -> Springs {
     let (width, height) = grid.coefficients;
-    let (mut edge, mut bend) = (vec![0.0; width * height], vec![0.0; width * height]);
-    let rows = edge.par_chunks_mut(width).zip(bend.par_chunks_mut(width));
-    rows.enumerate().with_min_len(8).for_each(|(y, (edge, bend))| {
-        for x in 0..width {
-            // The next ones, as far as they lie in the grid and inside.
-            let (room, step) = match direction {
-                Direction::Across => (width - 1 - x, (1, 0)),
-                Direction::Down => (height - 1 - y, (0, 1)),
-            };
-            let pixel = |k: usize| grid.pixel_at(x + k * step.0, y + k * step.1);
-            let joined = (0..=room.min(2)).take_while(|k| inside(pixel(*k))).count();
-            let depth = |k: usize| if k < joined { depth[pixel(k)] } else { f32::NAN };
-            (edge[x], bend[x]) = spring(&[depth(0), depth(1), depth(2)], joined, settings);
-        }
-    });
-    Springs { edge, bend }
+    let mut springs = Springs::none(width);
+    for (x, (edge, bend)) in springs.edge.iter_mut().zip(&mut springs.bend).enumerate() {
+        // The next ones, as far as they lie in the grid and inside.
+        let (room, step) = match direction {
+            Direction::Across => (width - 1 - x, (1, 0)),
+            Direction::Down => (height - 1 - y, (0, 1)),
+        };
+        let pixel = |k: usize| grid.pixel_at(x + k * step.0, y + k * step.1);
+        let joined = (0..=room.min(2)).take_while(|k| inside(pixel(*k))).count();
+        let depth = |k: usize| if k < joined { depth[pixel(k)] } else { f32::NAN };
+        (*edge, *bend) = spring(&[depth(0), depth(1), depth(2)], joined, settings);
+    }
+    springs
 }
 
 /// Edge and bend of `joined` neighbours, at most three, with these depths.
