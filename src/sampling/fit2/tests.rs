@@ -213,10 +213,9 @@ fn sums_of_rows() {
     let mut sums = vec![0.0; matrix.grid().stride()];
     for y in 0..height {
         matrix.row_sums(y, &mut sums);
-        for x in 0..width {
-            let want = image.row(y, 0)[x];
+        for (x, (want, sum)) in image.row(y, 0).iter().zip(&sums).enumerate() {
             let local = fit.local_sums(y * width + x).0;
-            assert!((sums[x] - want).abs() < 1e-4 && (local - want).abs() < 1e-4, "{x} {y}: {local} {want}");
+            assert!((sum - want).abs() < 1e-4 && (local - want).abs() < 1e-4, "{x} {y}: {local} {want}");
         }
     }
 }
