@@ -8,7 +8,7 @@
 //! camera.
 //!
 //! Crates for such problems (apex-solver, tiny-solver, factrs) know rotations and poses, and residuals of
-//! one's own. A projective camera would be such a residual; what they would add is the file [`normal`].
+//! one's own. A projective camera would be such a residual; what they would add is the file `normal.rs`.
 
 mod normal;
 #[cfg(test)]
