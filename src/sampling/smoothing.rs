@@ -138,7 +138,7 @@ impl SmoothingSpline {
     ///     + sum |h_s| (E_s + (|f'| + |f''| |d_s|) B_s + (1/2) |f''| B_s^2)
     /// ```
     ///
-    /// The first term is zero but for rounding. It holds for the samples at hand, however they lie.
+    /// The first term is zero up to rounding. It holds for the samples at hand, however they lie.
     pub fn error_bound(&self, x: f64, f: Smoothness, factor: f64) -> f64 {
         let first = self.samples[0].x;
         let mut response = Response::default();

@@ -28,7 +28,7 @@ pub struct Scene {
     pub filled: usize,
     /// The calibration file of a rectified rig, which gives its disparities a unit.
     pub calibration: Option<Calibration>,
-    /// What was decided on reading and is worth a sentence to the user.
+    /// What was decided on reading; it is reported to the user.
     pub notes: Vec<String>,
 }
 

@@ -34,7 +34,7 @@ pub struct SceneSpec {
     pub disparity_scale: Option<f64>,
     /// Stored value / scale = depth, in views that do not say it themselves.
     pub depth_scale: Option<f64>,
-    /// What [`complete`](super::complete) decided and is worth a sentence to the user.
+    /// What [`complete`](super::complete) decided; it is reported to the user.
     #[serde(skip)]
     pub notes: Vec<String>,
 }

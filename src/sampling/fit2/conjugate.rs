@@ -5,7 +5,7 @@
 //! once. The vectors are in single precision, whose rounding is a hundredth of a usual tolerance; scalar
 //! products are summed row by row in double precision, so their bits do not depend on the threads.
 
-use super::multigrid::{Multigrid, add_multiple};
+use super::multigrid::Multigrid;
 use super::planes::{Blocks, BlocksMut, LANES, Planes, ROWS_AT_ONCE, blocks, blocks_mut};
 use super::stencil::{self, Stencil, sum, total};
 use super::{Convergence, Iteration};
@@ -256,6 +256,18 @@ fn energy_of(r: Blocks<'_>, inverse: Blocks<'_>) -> f64 {
         (0..LANES).for_each(|l| sums[l] += r[l] * r[l] * i[l]);
     }
     sum(sums)
+}
+
+/// d = z + factor d in all channels: the next direction.
+fn add_multiple<const C: usize>(z: &Planes, factor: [f32; C], d: &mut Planes) {
+    let stride = z.grid().stride();
+    d.par_rows_mut().zip(z.par_rows()).with_min_len(ROWS_AT_ONCE).for_each(|(d, z)| {
+        for ((d, z), factor) in d.chunks_mut(stride).zip(z.chunks(stride)).zip(factor) {
+            for (d, z) in blocks_mut(d).iter_mut().zip(blocks(z)) {
+                d.iter_mut().zip(z).for_each(|(d, z)| *d = z + factor * *d);
+            }
+        }
+    });
 }
 
 /// u . v in every channel.

@@ -151,7 +151,7 @@ fn at_pixels<const ORDER: usize, const C: usize>(
     (width, height): (usize, usize),
 ) -> Vec<f32> {
     let mut values = vec![0.0; width * height * C];
-    let last = coefficients.grid().height - 1;
+    let last = coefficients.grid().height.saturating_sub(1);
     // The last of the weights at a knot is 0.
     let weights = BSpline::<ORDER>::weights(0.0).1.map(|w| w as f32);
     let rows = values.par_chunks_mut(width.max(1) * C).enumerate().with_min_len(ROWS_AT_ONCE);

@@ -4,7 +4,7 @@
 //! Coarse unknowns stand for blocks of 2 x 2 (unsmoothed aggregation, Galerkin matrices). A block that moves
 //! as a whole is too stiff, so the coarse correction is multiplied by a factor (Braess 1995).
 
-use super::planes::{Planes, ROWS_AT_ONCE, blocks, blocks_mut};
+use super::planes::{Planes, ROWS_AT_ONCE};
 use super::stencil::Stencil;
 use rayon::prelude::*;
 
@@ -136,16 +136,4 @@ impl<const C: usize> Work<C> {
             }
         });
     }
-}
-
-/// z = z + factor d: the next direction, in all channels.
-pub(super) fn add_multiple<const C: usize>(z: &Planes, factor: [f32; C], d: &mut Planes) {
-    let stride = z.grid().stride();
-    d.par_rows_mut().zip(z.par_rows()).with_min_len(ROWS_AT_ONCE).for_each(|(d, z)| {
-        for ((d, z), factor) in d.chunks_mut(stride).zip(z.chunks(stride)).zip(factor) {
-            for (d, z) in blocks_mut(d).iter_mut().zip(blocks(z)) {
-                d.iter_mut().zip(z).for_each(|(d, z)| *d = z + factor * *d);
-            }
-        }
-    });
 }

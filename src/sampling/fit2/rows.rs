@@ -35,6 +35,9 @@ impl<'a, const ORDER: usize, const C: usize> Fit2Rows<'a, ORDER, C> {
     }
 
     /// The rows before row `row` of the image, and the rest.
+    ///
+    /// # Panics
+    /// If the row lies above the first of these.
     pub fn split_at(self, row: usize) -> (Self, Self) {
         let (size, first) = (self.size, self.first);
         // Below the image there are more coefficients.

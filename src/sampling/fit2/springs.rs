@@ -13,7 +13,7 @@ const BAND: usize = 32;
 
 /// Springs that begin in one row, one of each kind for each coefficient p: edge (c_p - c_q)^2 to the next
 /// one, and bend (c_p - 2 c_q + c_r)^2 with the next two. They are 0 where the next ones are not there.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Springs {
     /// Weights of the first differences.
     pub edge: Vec<f32>,

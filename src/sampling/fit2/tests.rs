@@ -306,3 +306,13 @@ fn what_is_alone_is_held() {
         assert_eq!(*value, if p == 5 { 50.0 } else { 0.0 });
     }
 }
+
+/// An image without pixels has no values.
+#[test]
+fn empty_images_are_solved() {
+    for (width, height) in [(0, 0), (3, 0), (0, 3)] {
+        let connected = Fit2::<2, 1>::new(width, height).connect(|_, _| Springs::none(width), |_| false);
+        let (values, convergence) = connected.solve(&Iteration { tolerance: 1e-6, steps: 9 }, &|_| ());
+        assert!(values.is_empty() && convergence.reached);
+    }
+}

@@ -32,7 +32,7 @@ use rayon::prelude::*;
 pub struct PlaneSettings {
     /// Degree of the splines.
     pub degree: Degree,
-    /// Weight of the squared difference of neighbouring pixels on one surface.
+    /// Weight of the squared difference of neighbouring coefficients on one surface.
     pub stiffness: f64,
     /// Weight of the squared second difference within one surface.
     pub bending: f64,

@@ -7,7 +7,7 @@ use crate::uncalibrated::normalise::Normalisation;
 use crate::uncalibrated::triangulate::triangulate;
 use nalgebra::{Matrix3x4, Vector4};
 
-/// Adjustments, at most: after each the positions that fit are chosen anew.
+/// Adjustments, at most: after each the positions that fit are chosen again.
 const ROUNDS: usize = 8;
 
 /// Photographs that must show a point.
