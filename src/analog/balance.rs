@@ -4,14 +4,15 @@ use crate::linalg::{Mat, inverse, power_of_two};
 
 use super::section::Realisation;
 
-/// Doublings of [`input_energy`]: covers pole spreads up to 2^60.
+/// Doublings of [`gramian`]: covers pole spreads up to 2^60.
 const MAX_DOUBLINGS: usize = 60;
 
-/// Scales every state by a power of two to unit input energy: the diagonal of the controllability
-/// Gramian lies between 0.37 and 1.6 afterwards. States that the input does not drive keep their scale.
-pub(super) fn with_unit_states(system: &Realisation) -> Realisation {
+/// Scales every state by a power of two to unit input energy: the diagonal of the controllability Gramian
+/// lies between 0.37 and 1.6 afterwards. States that the input does not drive keep their scale. The input is
+/// white, or white noise through `signal`.
+pub(super) fn with_unit_states(signal: Option<&Realisation>, system: &Realisation) -> Realisation {
     let mut scaled = system.clone();
-    for (i, energy) in input_energy(system).into_iter().enumerate() {
+    for (i, energy) in own_energy(signal, system).into_iter().enumerate() {
         let factor = power_of_two(energy.sqrt());
         scaled.a.row_mut(i).scale_mut(1.0 / factor);
         scaled.b.row_mut(i).scale_mut(1.0 / factor);
@@ -21,12 +22,27 @@ pub(super) fn with_unit_states(system: &Realisation) -> Realisation {
     scaled
 }
 
-/// Diagonal of the controllability Gramian P, a P + P a' + b b' = 0, for a stable `a`.
+/// The energy of each state of `system`.
+fn own_energy(signal: Option<&Realisation>, system: &Realisation) -> Vec<f64> {
+    let (whole, first) = match signal {
+        Some(signal) => (signal.then(system), signal.a.nrows()),
+        None => (system.clone(), 0),
+    };
+    let gramian = gramian(&whole);
+    (first..whole.a.nrows()).map(|i| gramian[(i, i)]).collect()
+}
+
+/// ||c (s - a)^-1 b||_2^2.
+pub(super) fn output_energy(system: &Realisation) -> f64 {
+    (&system.c * gramian(system) * system.c.transpose())[(0, 0)]
+}
+
+/// Controllability Gramian P, a P + P a' + b b' = 0, for a stable `a`.
 ///
 /// The bilinear map e = (alpha + a)(alpha - a)^-1 turns it into P = e P e' + 2 alpha g g' with
 /// g = (alpha - a)^-1 b, whose series is summed by doubling. Every term is positive, so the
 /// diagonal is accurate enough for scaling even if P is nearly singular.
-fn input_energy(system: &Realisation) -> Vec<f64> {
+fn gramian(system: &Realisation) -> Mat {
     let n = system.a.nrows();
     let alpha = typical_rate(&system.a);
     let resolvent = inverse(&(Mat::identity(n, n) * alpha - &system.a));
@@ -40,7 +56,7 @@ fn input_energy(system: &Realisation) -> Vec<f64> {
             break;
         }
     }
-    (0..n).map(|i| p[(i, i)]).collect()
+    p
 }
 
 /// Geometric mean of the diagonal's moduli: between the fast and the slow poles.

@@ -5,6 +5,7 @@
 //! they are realised.
 //!
 //! - [`StrictlyProper`] is the type that the designer works with: stable, strictly proper, real, normalised.
+//! - [`StableFilter`] is the same with a direct term: the filter W of a [`signal`].
 //! - [`families`] are the classical low-passes as [`Zpk`].
 //! - [`fit`] makes filters of measured responses.
 //!
@@ -31,11 +32,13 @@ mod rational;
 mod realise;
 mod roots;
 mod section;
+mod signal;
 mod strictly_proper;
 mod zpk;
 
 pub use error::AnalogError;
-pub use strictly_proper::StrictlyProper;
+pub use signal::{SignalFilter, resolved_band, signal};
+pub use strictly_proper::{StableFilter, StrictlyProper};
 pub use zpk::{Cutoffs, Zpk};
 
 /// Least -Re(p)/|p| of a pole: a quality factor of 5e8. Eigenvalues of a realisation are not known to

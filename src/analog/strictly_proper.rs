@@ -1,49 +1,50 @@
-//! The checked filter.
+//! The checked filters.
 
 use crate::linalg::{Complex, Mat};
 use crate::spec::FilterSpec;
 use crate::units::{RadiansPerFastPeriod, Seconds};
+use std::ops::Deref;
 
-use super::balance::with_unit_states;
+use super::balance::{output_energy, with_unit_states};
 use super::realise::Chain;
 use super::section::Realisation;
 use super::{AnalogError, MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_GAIN, MIN_NORMALISED_POLE};
 
-/// A stable, strictly proper, real filter Phi in normalised time t' = t/h.
+/// A stable, proper, real filter in normalised time t' = t/h.
 ///
-/// State equations dx/dt' = a x + b f, out = c x with a: n x n, b: n x 1, c: 1 x n, all dimensionless. The
-/// gain is that of the written filter: Phi'(s') = Phi(s'/h). Two filters are equal when their normalised
-/// poles, zeros and gains are (for state-space forms: their matrices), in whatever form they were written;
-/// channels with equal filters can share one state.
-///
-/// Source: thesis section 5.2 asks for exactly these properties (rational, stable, strictly proper).
+/// State equations dx/dt' = a x + b f, out = c x + d f with a: n x n, b: n x 1, c: 1 x n, all dimensionless.
+/// The gain is that of the written filter: Phi'(s') = Phi(s'/h). Two filters are equal when their normalised
+/// poles, zeros and gains are (for state-space forms: their matrices), in whatever form they were written.
 #[derive(Debug, Clone)]
-pub struct StrictlyProper {
+pub struct StableFilter {
     chain: Chain,
     poles: Vec<Complex<f64>>,
     realisation: Realisation,
 }
 
-impl PartialEq for StrictlyProper {
+impl PartialEq for StableFilter {
     fn eq(&self, other: &Self) -> bool {
         self.chain == other.chain
     }
 }
 
-impl StrictlyProper {
-    /// Checks `filter` and realises it in normalised time t' = t / h, with h = `fast_period`.
+impl StableFilter {
+    /// Checks `filter`, which may have a direct term, and realises it in normalised time t' = t / h, with
+    /// h = `fast_period`.
     ///
     /// # Errors
-    /// [`AnalogError`]: a fast period that is not positive and finite; a written form that violates a rule;
-    /// poles that are unstable, without conjugate or outside
-    /// [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a response that is zero at all frequencies or
-    /// beyond double precision.
+    /// As [`StrictlyProper::new`].
     pub fn new(filter: &FilterSpec, fast_period: Seconds) -> Result<Self, AnalogError> {
-        let h = fast_period;
+        filter.check_proper()?;
+        Self::driven_by(None, filter, fast_period)
+    }
+
+    /// Of a filter whose written form has been checked; the states have unit energy for white noise through
+    /// `signal`.
+    fn driven_by(signal: Option<&Self>, filter: &FilterSpec, h: Seconds) -> Result<Self, AnalogError> {
         if !(h.0.is_finite() && h.0 > 0.0) {
             return Err(AnalogError::FastPeriod { value: h });
         }
-        filter.check()?;
         let chain = Chain::new(filter, h)?;
         let mut poles = Vec::new();
         for block in &chain.blocks {
@@ -53,7 +54,7 @@ impl StrictlyProper {
         if !chain.gain.is_normal() {
             return Err(AnalogError::GainOutOfRange { value: chain.gain });
         }
-        let realisation = with_unit_states(&realise(&chain));
+        let realisation = with_unit_states(signal.map(|signal| &signal.realisation), &realise(&chain));
         Self { chain, poles, realisation }.transmitting()
     }
 
@@ -96,6 +97,11 @@ impl StrictlyProper {
         &self.realisation.c
     }
 
+    /// d, the direct term; 0 for a [`StrictlyProper`] filter.
+    pub fn d(&self) -> f64 {
+        self.realisation.d
+    }
+
     /// n, the number of states and of poles.
     pub fn order(&self) -> usize {
         self.realisation.a.nrows()
@@ -114,6 +120,52 @@ impl StrictlyProper {
     pub fn poles(&self) -> &[Complex<f64>] {
         &self.poles
     }
+
+    /// The power of the output of `front_end` for white noise of unit density through this filter:
+    /// ||Phi W||_2^2 in normalised time.
+    pub fn power_through(&self, front_end: &StrictlyProper) -> f64 {
+        output_energy(&self.realisation.then(&front_end.realisation))
+    }
+}
+
+/// A front end Phi: a [`StableFilter`] without direct term. Channels with equal filters can share one state.
+///
+/// Source: thesis section 5.2 asks for exactly these properties (rational, stable, strictly proper).
+#[derive(Debug, Clone, PartialEq)]
+pub struct StrictlyProper(StableFilter);
+
+impl Deref for StrictlyProper {
+    type Target = StableFilter;
+
+    fn deref(&self) -> &StableFilter {
+        &self.0
+    }
+}
+
+impl StrictlyProper {
+    /// Checks `filter` and realises it in normalised time t' = t / h, with h = `fast_period`.
+    ///
+    /// # Errors
+    /// [`AnalogError`]: a fast period that is not positive and finite; a written form that violates a rule;
+    /// poles that are unstable, without conjugate or outside
+    /// [`MIN_NORMALISED_POLE`]`..=`[`MAX_NORMALISED_POLE`]; a response that is zero at all frequencies or
+    /// beyond double precision.
+    pub fn new(filter: &FilterSpec, fast_period: Seconds) -> Result<Self, AnalogError> {
+        Self::driven_by(None, filter, fast_period)
+    }
+
+    /// As [`StrictlyProper::new`]; the states are scaled for the input `signal` in place of white noise.
+    ///
+    /// # Errors
+    /// As [`StrictlyProper::new`].
+    pub fn driven_by(
+        signal: Option<&StableFilter>,
+        filter: &FilterSpec,
+        fast_period: Seconds,
+    ) -> Result<Self, AnalogError> {
+        filter.check()?;
+        StableFilter::driven_by(signal, filter, fast_period).map(Self)
+    }
 }
 
 /// The blocks in series. The gain is applied at the output, so that states keep their size.
@@ -121,6 +173,7 @@ fn realise(chain: &Chain) -> Realisation {
     let mut whole =
         chain.blocks.iter().fold(Realisation::wire(), |whole, block| whole.then(&block.realise()));
     whole.c *= chain.gain;
+    whole.d *= chain.gain;
     whole
 }
 

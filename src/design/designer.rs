@@ -246,4 +246,6 @@ fn proven_worst_case(bank: &Bank, errors: &ErrorBox, taps: Taps) -> Option<f64> 
 }
 
 #[cfg(test)]
+mod signal_tests;
+#[cfg(test)]
 mod tests;

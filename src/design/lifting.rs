@@ -15,7 +15,6 @@
 
 use super::DesignError;
 use super::problem::Problem;
-use crate::analog::StrictlyProper;
 use crate::linalg::{self, Mat};
 use crate::lti::StateSpace;
 use crate::lti::exponential::{StateTransition, gramian_root};
@@ -105,7 +104,7 @@ fn before_the_end((front_end, gain): (usize, f64), age: f64, period: f64) -> Sam
 /// Propagates the joint analog state through one period. The outputs of the returned system are the
 /// samples, without their delays by whole periods.
 fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<StateSpace, DesignError> {
-    let joint = JointState::new(&problem.front_ends)?;
+    let joint = JointState::new(problem)?;
     let mut order: Vec<usize> = (0..instants.len()).collect();
     order.sort_by(|&i, &j| instants[i].time.total_cmp(&instants[j].time));
     let mut rows = vec![(Mat::zeros(1, 0), Mat::zeros(1, 0)); instants.len()];
@@ -130,27 +129,43 @@ fn follow_state(problem: &Problem, instants: &[SamplingInstant]) -> Result<State
     Ok(StateSpace::new(state, input, stacked(&c)?, stacked(&d)?)?)
 }
 
-/// All distinct front ends side by side, driven by the same input: dx/dt = diag(A_i) x + B f, row i of C
-/// reads filter i.
+/// The filter W of the signal and all distinct front ends, which it drives: dx/dt = A x + B f, row i of C
+/// reads front end i. The states of W come first:
+///
+/// ```text
+/// A = [ A_W                ]   B = [ B_W     ]   C = [ 0  C_1     ]
+///     [ B_1 C_W  A_1       ]       [ B_1 D_W ]       [ 0      C_2 ]
+///     [ B_2 C_W       A_2  ]       [ B_2 D_W ]
+/// ```
+///
+/// Without a signal the front ends stand side by side, driven by the same input.
 pub(super) struct JointState {
     transition: StateTransition,
     b: Mat,
     c: Mat,
-    /// C_i A_i: the derivatives of the outputs, as far as the state determines them.
+    /// C A: the derivatives of the outputs, as far as the state determines them.
     slopes: Mat,
 }
 
 impl JointState {
-    pub(super) fn new(front_ends: &[StrictlyProper]) -> Result<Self, DesignError> {
-        let b: Vec<&Mat> = front_ends.iter().map(StrictlyProper::b).collect();
-        let c: Vec<&Mat> = front_ends.iter().map(StrictlyProper::c).collect();
-        let slopes: Vec<Mat> = front_ends.iter().map(|filter| filter.c() * filter.a()).collect();
-        Ok(Self {
-            transition: StateTransition::new(front_ends.iter().map(|filter| filter.a().clone()).collect()),
-            b: linalg::vstack(&b)?,
-            c: linalg::block_diagonal(&c),
-            slopes: linalg::block_diagonal(&slopes.iter().collect::<Vec<_>>()),
-        })
+    pub(super) fn new(problem: &Problem) -> Result<Self, DesignError> {
+        let front_ends = &problem.front_ends;
+        let b: Vec<&Mat> = front_ends.iter().map(|filter| filter.b()).collect();
+        let c: Vec<&Mat> = front_ends.iter().map(|filter| filter.c()).collect();
+        let (b, c) = (linalg::vstack(&b)?, linalg::block_diagonal(&c));
+        let Some(signal) = &problem.signal else {
+            let slopes: Vec<Mat> = front_ends.iter().map(|filter| filter.c() * filter.a()).collect();
+            let blocks = front_ends.iter().map(|filter| filter.a().clone()).collect();
+            let slopes = linalg::block_diagonal(&slopes.iter().collect::<Vec<_>>());
+            return Ok(Self { transition: StateTransition::new(blocks), b, c, slopes });
+        };
+        let blocks: Vec<&Mat> = std::iter::once(signal.a()).chain(front_ends.iter().map(|f| f.a())).collect();
+        let mut a = linalg::block_diagonal(&blocks);
+        let own = signal.order();
+        a.view_mut((own, 0), (b.nrows(), own)).copy_from(&(&b * signal.c()));
+        let b = linalg::vstack(&[signal.b(), &(b * signal.d())])?;
+        let c = linalg::hstack(&[&Mat::zeros(c.nrows(), own), &c])?;
+        Ok(Self { slopes: &c * &a, transition: StateTransition::new(vec![a]), b, c })
     }
 
     pub(super) fn order(&self) -> usize {

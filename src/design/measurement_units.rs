@@ -22,7 +22,7 @@ impl Problem {
     /// # Errors
     /// [`DesignError::Lti`] if a decomposition does not converge.
     pub(super) fn measurement_units(&self) -> Result<Vec<f64>, DesignError> {
-        let joint = JointState::new(&self.front_ends)?;
+        let joint = JointState::new(self)?;
         let (transition, input) = joint.over(self.ratio as f64)?;
         let outputs = joint.c() * controllability_root(&transition, &input)?;
         let size = |channel: &Channel| channel.gain.abs() * outputs.row(channel.front_end).norm();

@@ -1,9 +1,10 @@
 //! The design problem in normalised time: a spec without its units.
 
 use super::DesignError;
-use crate::analog::StrictlyProper;
+use crate::analog::{StableFilter, StrictlyProper, signal};
+use crate::linalg::Complex;
 use crate::spec::{FilterSpec, Spec};
-use crate::units::FastPeriods;
+use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use crate::verify::uncertainty::ErrorPoint;
 
 /// Maximum number of states of the delay chains of the lifted system. Its matrices are dense: at this size
@@ -20,13 +21,16 @@ pub struct Problem {
     pub ratio: usize,
     /// The latency m0 in fast samples.
     pub latency: usize,
-    /// The distinct analog filters. Channels whose filters are proportional share one filter and its state.
+    /// W, the filter of the signal: the front ends see white noise, or an input of bounded energy, through it.
+    /// `None` stands for W = 1.
+    pub signal: Option<StableFilter>,
+    /// The distinct analog filters Phi. Channels whose filters are proportional share one filter and its state.
     pub front_ends: Vec<StrictlyProper>,
     /// Index of Phi_0 in `front_ends`.
     pub target: usize,
     /// The slow channels.
     pub channels: Vec<Channel>,
-    /// Power sigma_i^2 of the noise that each channel adds to its samples.
+    /// Power s_i^2 of the noise that each channel adds to its samples, relative to an input of unit density.
     pub noise: Vec<f64>,
 }
 
@@ -47,9 +51,13 @@ impl Problem {
     /// Normalises `spec` with the given latency (fast samples).
     pub fn new(spec: &Spec, latency: usize) -> Result<Self, DesignError> {
         let mut front_ends = Vec::new();
+        let refused = |place: &dyn Fn() -> String| {
+            let place = place();
+            |source| DesignError::Analog { place, source }
+        };
+        let signal = signal(spec).map_err(refused(&|| "signal.filter".to_owned()))?;
         let realise = |filter: &FilterSpec, place: &dyn Fn() -> String| {
-            StrictlyProper::new(filter, spec.fast_period)
-                .map_err(|source| DesignError::Analog { place: place(), source })
+            StrictlyProper::driven_by(signal.as_ref(), filter, spec.fast_period).map_err(refused(place))
         };
         let (target, _) = intern(&mut front_ends, realise(&spec.target, &|| "target.filter".to_owned())?);
         let mut channels = Vec::with_capacity(spec.channels.len());
@@ -59,8 +67,9 @@ impl Problem {
             let converter_gain = channel.gain;
             channels.push(Channel { front_end, gain: proportion * converter_gain, converter_gain, delay });
         }
-        let noise = spec.channels.iter().map(|channel| channel.noise * channel.noise).collect();
-        let problem = Self { ratio: spec.ratio, latency, front_ends, target, channels, noise };
+        let scale = input_scale(spec, signal.as_ref(), &front_ends[target]);
+        let noise = spec.channels.iter().map(|channel| channel.noise * channel.noise * scale).collect();
+        let problem = Self { ratio: spec.ratio, latency, signal, front_ends, target, channels, noise };
         problem.check_size()?;
         Ok(problem)
     }
@@ -73,6 +82,18 @@ impl Problem {
         }
         self.latency -= fast_periods;
         self
+    }
+
+    /// States of the front ends and of the signal's filter.
+    pub fn analog_states(&self) -> usize {
+        let own = self.signal.as_ref().map_or(0, StableFilter::order);
+        own + self.front_ends.iter().map(|front_end| front_end.order()).sum::<usize>()
+    }
+
+    /// The response Phi W of the front end of this index, behind the signal's filter.
+    pub fn response(&self, front_end: usize, w: RadiansPerFastPeriod) -> Complex<f64> {
+        let response = self.front_ends[front_end].response(w);
+        self.signal.as_ref().map_or(response, |signal| response * signal.response(w))
     }
 
     /// The delays of the channels.
@@ -133,6 +154,13 @@ impl Problem {
     pub fn longest_delay(&self) -> FastPeriods {
         FastPeriods(self.channels.iter().map(|channel| channel.delay.0).fold(0.0, f64::max))
     }
+}
+
+/// The power of an input of unit density at the target, over that of the signal in full scale: with it the
+/// noise of the converters and the signal have one scale.
+fn input_scale(spec: &Spec, signal: Option<&StableFilter>, target: &StrictlyProper) -> f64 {
+    let Some((signal, table)) = signal.zip(spec.signal.as_ref()) else { return 1.0 };
+    signal.power_through(target) / (table.rms * table.rms)
 }
 
 /// The delay in whole slow periods that all channels have, in fast periods, beyond [`KEPT_PERIODS`] of them.

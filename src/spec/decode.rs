@@ -14,12 +14,22 @@ use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{
     ChannelSpec, Family, FilterSpec, Method, PerChannel, Reduction, Solver, Spec, SpecProblem, Tracking,
-    UncertaintySpec,
+    UncertaintySpec, signal,
 };
 use crate::quantity::Time;
 
-const TOP_KEYS: [&str; 9] =
-    ["name", "fast_period", "fast_rate", "ratio", "latency", "target", "channel", "uncertainty", "design"];
+const TOP_KEYS: [&str; 10] = [
+    "name",
+    "fast_period",
+    "fast_rate",
+    "ratio",
+    "latency",
+    "target",
+    "channel",
+    "signal",
+    "uncertainty",
+    "design",
+];
 const CHANNEL_KEYS: [&str; 6] = ["delay", "delay_samples", "filter", "noise", "gain", "offset"];
 const DESIGN_KEYS: [&str; 10] = [
     "method",
@@ -74,6 +84,7 @@ pub(crate) fn spec_with(
         .fields(&["filter"])?;
     let target = target.required("filter", "give the target's analog filter")?;
     let target = front_end(&target, fast_period, models)?;
+    let signal = top.optional("signal").map(|v| signal::read(&v)).transpose()?;
     let table = top.optional("design").map(|table| table.fields(&DESIGN_KEYS)).transpose()?;
     let noise = noise(table.as_ref())?.unwrap_or(0.0);
     let (channels, errors): (Vec<_>, Vec<_>) =
@@ -90,7 +101,17 @@ pub(crate) fn spec_with(
             table.as_ref().unwrap_or(&top).fault_at(Some(key), problem)
         }
     })?;
-    Ok(Spec { name, fast_period, ratio, latency, target: target.filter, channels, uncertainty, design })
+    Ok(Spec {
+        name,
+        fast_period,
+        ratio,
+        latency,
+        target: target.filter,
+        channels,
+        signal,
+        uncertainty,
+        design,
+    })
 }
 
 /// The errors of the channels' models as further half-widths of their gains. Without a table each channel
@@ -373,6 +394,14 @@ pub(super) fn filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
     let fields = value.fields(&FILTER_FORMS.concat())?;
     let filter = unchecked_filter(&fields)?;
     filter.check().map_err(|problem| fields.fault_at(problem.key(), problem))?;
+    Ok(filter)
+}
+
+/// Reads a filter that may have a direct term.
+pub(super) fn proper_filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
+    let fields = value.fields(&FILTER_FORMS.concat())?;
+    let filter = unchecked_filter(&fields)?;
+    filter.check_proper().map_err(|problem| fields.fault_at(problem.key(), problem))?;
     Ok(filter)
 }
 

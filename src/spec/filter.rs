@@ -45,24 +45,41 @@ impl FilterSpec {
     /// # Errors
     /// The first [`FilterProblem`] found.
     pub fn check(&self) -> Result<(), FilterProblem> {
-        self.check_parts()?;
-        if let Self::Cascade { cascade } = self {
-            for (index, stage) in cascade.iter().enumerate() {
-                check_stage(stage).map_err(|p| FilterProblem::Stage { index, problem: Box::new(p) })?;
-            }
-        }
+        self.check_size()?;
         let (zeros, poles) = self.degrees();
-        let key = self.order_key();
-        if poles == 0 {
-            return Err(FilterProblem::NoPoles { key });
-        }
-        if poles > MAX_ORDER {
-            return Err(FilterProblem::OrderTooHigh { key, order: poles });
-        }
         if zeros >= poles {
             return Err(FilterProblem::NotStrictlyProper { zeros, poles, remedy: self.direct_term_remedy() });
         }
         Ok(())
+    }
+
+    /// As [`FilterSpec::check`], for a filter that may have a direct term.
+    ///
+    /// # Errors
+    /// The first [`FilterProblem`] found.
+    pub fn check_proper(&self) -> Result<(), FilterProblem> {
+        self.check_size()?;
+        let (zeros, poles) = self.degrees();
+        if zeros > poles { Err(FilterProblem::Improper { zeros, poles }) } else { Ok(()) }
+    }
+
+    /// The entries, and the number of poles.
+    fn check_size(&self) -> Result<(), FilterProblem> {
+        self.check_parts()?;
+        self.check_stages()?;
+        let (key, (_, poles)) = (self.order_key(), self.degrees());
+        match poles {
+            0 => Err(FilterProblem::NoPoles { key }),
+            1..=MAX_ORDER => Ok(()),
+            order => Err(FilterProblem::OrderTooHigh { key, order }),
+        }
+    }
+
+    fn check_stages(&self) -> Result<(), FilterProblem> {
+        let Self::Cascade { cascade } = self else { return Ok(()) };
+        cascade.iter().enumerate().try_for_each(|(index, stage)| {
+            check_stage(stage).map_err(|p| FilterProblem::Stage { index, problem: Box::new(p) })
+        })
     }
 
     /// Degrees of numerator and denominator as written (leading zeros of polynomials do not count; a

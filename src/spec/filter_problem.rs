@@ -64,6 +64,16 @@ pub enum FilterProblem {
         /// What to do about it.
         remedy: String,
     },
+    /// More zeros than poles.
+    #[error(
+        "the filter has {zeros} zeros and {poles} poles, so it grows with frequency; give it at least as many poles as zeros"
+    )]
+    Improper {
+        /// Degree of the numerator.
+        zeros: usize,
+        /// Degree of the denominator.
+        poles: usize,
+    },
     /// A matrix of a state-space form that does not fit the others.
     #[error(
         "{key} is {rows} x {cols}, but a filter with one input, one output and {states} states needs {expected}"
@@ -139,7 +149,7 @@ impl FilterProblem {
             | Self::ParameterRange { key, .. } => Some(key),
             Self::ZeroDenominator { .. } => Some("den"),
             Self::NestedCascade | Self::Stage { .. } => Some("cascade"),
-            Self::NotStrictlyProper { .. } | Self::MissingParameter { .. } => None,
+            Self::NotStrictlyProper { .. } | Self::Improper { .. } | Self::MissingParameter { .. } => None,
         }
     }
 }

@@ -14,6 +14,7 @@ mod limits;
 mod measured;
 mod nearest;
 pub(crate) mod reader;
+mod signal;
 mod uncertainty;
 mod word_lengths;
 mod write;
@@ -29,6 +30,7 @@ pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_T
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub(crate) use limits::{check_gain, check_offset};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
+pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
 pub use uncertainty::{PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
@@ -54,6 +56,8 @@ pub struct Spec {
     pub target: FilterSpec,
     /// The real channels, in the order of the recordings.
     pub channels: Vec<ChannelSpec>,
+    /// What the analog signal is; `None` weighs every frequency alike.
+    pub signal: Option<SignalSpec>,
     /// How well the values of the channels are known, if the spec says so.
     pub uncertainty: Option<UncertaintySpec>,
     /// The design settings.
@@ -323,6 +327,7 @@ impl Spec {
             limits::check_gain(channel.gain)?;
             limits::check_offset(channel.offset)?;
         }
+        self.signal.as_ref().map_or(Ok(()), SignalSpec::check)?;
         if let Some(uncertainty) = &self.uncertainty {
             uncertainty.check(self.channels.len(), self.fast_period)?;
         }

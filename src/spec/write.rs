@@ -5,7 +5,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::Fault;
 use super::document::Node;
 use super::reader::Value;
-use super::{ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, Spec, UncertaintySpec, decode};
+use super::{
+    ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, SignalSpec, Spec, UncertaintySpec, decode,
+};
 use crate::units::Seconds;
 
 /// The written form of a [`Spec`], with all times in seconds and all defaults filled in.
@@ -19,6 +21,8 @@ struct Document<'a> {
     latency: Option<usize>,
     target: Target<'a>,
     channel: &'a [ChannelSpec],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    signal: Option<&'a SignalSpec>,
     #[serde(skip_serializing_if = "Option::is_none")]
     uncertainty: Option<&'a UncertaintySpec>,
     design: &'a DesignSpec,
@@ -38,6 +42,7 @@ impl Serialize for Spec {
             latency: self.latency,
             target: Target { filter: &self.target },
             channel: &self.channels,
+            signal: self.signal.as_ref(),
             uncertainty: self.uncertainty.as_ref(),
             design: &self.design,
         }

@@ -4,15 +4,17 @@
 use super::ball::{self, Ball, Matrix};
 use super::timeline::{Instant, SamplingInstant};
 use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
-use crate::analog::StrictlyProper;
+use crate::analog::{StableFilter, StrictlyProper, signal};
 use crate::arithmetic::Number;
 use crate::bank::Bank;
 use crate::spec::FilterSpec;
 use crate::units::Seconds;
 
-/// The distinct filters side by side, driven by the same input: dx/dt = a x + b f.
+/// The filter W of the signal and the distinct front ends, which it drives, the states of W first:
+/// dx/dt = a x + b f. Without a signal the front ends stand side by side, driven by the same input.
 #[derive(Debug, Clone)]
 pub(super) struct FrontEnds {
+    signal: Option<StableFilter>,
     /// Each filter with the index of its first state. Proportional filters count once.
     filters: Vec<(usize, StrictlyProper)>,
     /// The factor of each filter's cut-off, and the filter whose cut-off that is: Phi(s / x) has the state
@@ -28,15 +30,18 @@ impl FrontEnds {
     /// [`VerifyError::NoSpec`], [`VerifyError::FrontEnd`].
     pub(super) fn new(bank: &Bank) -> Result<(Self, Vec<SamplingInstant>), VerifyError> {
         let spec = bank.spec.as_ref().ok_or(VerifyError::NoSpec)?;
+        let signal = signal(spec)
+            .map_err(|source| VerifyError::FrontEnd { place: "spec.signal.filter".to_owned(), source })?;
+        let own = signal.as_ref().map_or(0, StableFilter::order);
         let mut filters: Vec<(usize, StrictlyProper)> = Vec::new();
         let mut index = |filter: &FilterSpec, name: String| {
-            let made = StrictlyProper::new(filter, spec.fast_period)
+            let made = StrictlyProper::driven_by(signal.as_ref(), filter, spec.fast_period)
                 .map_err(|source| VerifyError::FrontEnd { place: name, source })?;
             let known = filters.iter().enumerate().find_map(|(i, (_, seen))| Some((i, made.ratio_to(seen)?)));
             if let Some(known) = known {
                 return Ok(known);
             }
-            let start = filters.last().map_or(0, |(start, last)| start + last.order());
+            let start = filters.last().map_or(own, |(start, last)| start + last.order());
             filters.push((start, made));
             Ok((filters.len() - 1, 1.0))
         };
@@ -51,12 +56,17 @@ impl FrontEnds {
             samples.push(SamplingInstant { filter, gain, converter_gain: channel.gain, time });
         }
         let speeds = (0..filters.len()).map(|filter| (filter, 1.0)).collect();
-        Ok((Self { speeds, filters }, samples))
+        Ok((Self { signal, speeds, filters }, samples))
     }
 
     /// Number of states.
     pub(super) fn order(&self) -> usize {
         self.filters.last().map_or(0, |(start, last)| start + last.order())
+    }
+
+    /// W, if the spec has a signal.
+    pub(super) fn signal(&self) -> Option<&StableFilter> {
+        self.signal.as_ref()
     }
 
     /// The filter with this index; see [`FrontEnds::with_speed`] for the factor of its cut-off.
@@ -98,12 +108,25 @@ impl FrontEnds {
     pub(super) fn dynamics<F: Number>(&self) -> (Matrix<F>, Matrix<F>) {
         let order = self.order();
         let (mut a, mut b) = (ball::zeros(order, order), ball::zeros(order, 1));
+        if let Some(signal) = &self.signal {
+            a.view_mut((0, 0), signal.a().shape()).copy_from(&ball::exact(signal.a()));
+            b.rows_mut(0, signal.order()).copy_from(&ball::exact(signal.b()));
+        }
         for ((start, filter), &(_, speed)) in self.filters.iter().zip(&self.speeds) {
             let fast = |m| {
                 if speed == 1.0 { ball::exact(m) } else { ball::scaled(&ball::exact(m), Ball::from(speed)) }
             };
+            let input = fast(filter.b());
             a.view_mut((*start, *start), filter.a().shape()).copy_from(&fast(filter.a()));
-            b.rows_mut(*start, filter.order()).copy_from(&fast(filter.b()));
+            match &self.signal {
+                None => b.rows_mut(*start, filter.order()).copy_from(&input),
+                Some(signal) => {
+                    let (row, direct) = (ball::exact(signal.c()), Ball::from(signal.d()));
+                    let shape = (filter.order(), signal.order());
+                    a.view_mut((*start, 0), shape).copy_from(&ball::product(&input, &row));
+                    b.rows_mut(*start, filter.order()).copy_from(&ball::scaled(&input, direct));
+                }
+            }
         }
         (a, b)
     }

@@ -43,6 +43,7 @@ fn bank(
         latency: Some(latency),
         target,
         channels: filters.into_iter().zip(delays).map(channel).collect(),
+        signal: None,
         uncertainty: None,
         design: DesignSpec::new(Method::Fir, Some(taps)),
     };

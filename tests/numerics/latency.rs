@@ -38,6 +38,7 @@ fn plant(seed: u64, method: Method) -> Spec {
         latency: None,
         target: filter,
         channels,
+        signal: None,
         uncertainty: None,
         design: DesignSpec::new(method, method.has_taps().then_some(taps)),
     }
@@ -139,6 +140,7 @@ fn four_at_48_khz(taps: usize) -> Spec {
         latency: None,
         target: filter.clone(),
         channels: [3.1, 1.9, 1.05, 0.0].iter().map(channel).collect(),
+        signal: None,
         uncertainty: None,
         design: DesignSpec::new(Method::Fir, Some(taps)),
     }
@@ -206,6 +208,7 @@ fn a_common_delay_adds_to_the_latency() {
             latency: None,
             target: filter.clone(),
             channels: vec![channel(1.25), channel(0.5)],
+            signal: None,
             uncertainty: None,
             design: DesignSpec::new(method, method.has_taps().then_some(14)),
         }

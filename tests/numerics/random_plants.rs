@@ -66,6 +66,7 @@ fn unreduced(seed: u64) -> Spec {
         latency: Some(dice.count(0, 3 * ratio)),
         target,
         channels,
+        signal: None,
         uncertainty: None,
         design,
     }

@@ -43,6 +43,7 @@ pub(crate) fn alike(filter: &FilterSpec, ratio: usize, latency: usize, delays: &
         latency: Some(latency),
         target: filter.clone(),
         channels: delays.iter().map(channel).collect(),
+        signal: None,
         uncertainty: None,
         design: DesignSpec::new(Method::Iir, None),
     }

@@ -43,3 +43,34 @@ pub fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Zpk<Cutoff
     let gain = dc * product_of_negatives(&poles) / product_of_negatives(&zeros);
     Zpk::new(zeros, poles, gain)
 }
+
+/// The shape of elliptic filters: the ripple up to the cutoff, and the stop-band edge over the cutoff.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Selectivity {
+    /// Ripple in the pass band, decibels.
+    pub ripple_db: f64,
+    /// Stop-band edge over the cutoff, above 1.
+    pub transition: f64,
+}
+
+impl Selectivity {
+    /// The least order with an attenuation of at least `attenuation_db` from the stop-band edge on: the
+    /// degree equation n = K'(k1) K(k) / (K(k1) K'(k)), k = 1 / `transition`,
+    /// k1^2 = (10^(ripple/10) - 1) / (10^(attenuation/10) - 1).
+    pub fn order_for(self, attenuation_db: f64) -> usize {
+        let selectivity = Modulus::new((excess_power(self.ripple_db) / excess_power(attenuation_db)).sqrt());
+        let degree = selectivity.ln_nome() / self.modulus().ln_nome();
+        // The attenuation of a whole order has that order, whatever the rounding.
+        (degree - 1e-9).ceil().max(1.0) as usize
+    }
+
+    /// The attenuation in decibels from the stop-band edge on of the filter of this `order`.
+    pub fn attenuation_of(self, order: usize) -> f64 {
+        let selectivity = self.modulus().with_nome_power(order).k;
+        10.0 * (excess_power(self.ripple_db) / (selectivity * selectivity)).ln_1p() / std::f64::consts::LN_10
+    }
+
+    fn modulus(self) -> Modulus {
+        Modulus::new(1.0 / self.transition)
+    }
+}

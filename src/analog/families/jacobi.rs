@@ -57,8 +57,21 @@ impl Modulus {
     /// The modulus whose nome is the `n`-th root of this one's: the degree equation of elliptic filters,
     /// n K'(k1)/K(k1) = ... solved by theta series.
     pub(super) fn with_nome_root(self, n: usize) -> Self {
-        // ln q1 = -pi K'/K; its n-th root, and the complementary nome with ln q ln q' = pi^2.
-        let ln_q = -PI * self.swapped().quarter_period() / self.quarter_period() / n as f64;
+        Self::of_nome(self.ln_nome() / n as f64)
+    }
+
+    /// The modulus whose nome is the `n`-th power of this one's.
+    pub(super) fn with_nome_power(self, n: usize) -> Self {
+        Self::of_nome(self.ln_nome() * n as f64)
+    }
+
+    /// ln q = -pi K'/K.
+    pub(super) fn ln_nome(self) -> f64 {
+        -PI * self.swapped().quarter_period() / self.quarter_period()
+    }
+
+    /// The complementary nome has ln q ln q' = pi^2.
+    fn of_nome(ln_q: f64) -> Self {
         if ln_q < -PI { theta_modulus(ln_q) } else { theta_modulus(PI * PI / ln_q).swapped() }
     }
 

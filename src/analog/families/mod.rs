@@ -15,7 +15,7 @@ mod jacobi;
 
 pub use bessel::bessel;
 pub use chebyshev::{chebyshev1, chebyshev2};
-pub use elliptic::elliptic;
+pub use elliptic::{Selectivity, elliptic};
 
 use std::f64::consts::FRAC_PI_2;
 

@@ -113,7 +113,7 @@ impl Timetable {
         }
         slots.sort_by(|a, b| a.phase.total_cmp(&b.phase));
         let phases: Vec<f64> = slots.iter().map(|slot| slot.phase).chain([ratio as f64]).collect();
-        let joint = JointState::new(&problem.front_ends)?;
+        let joint = JointState::new(problem)?;
         for (slot, pair) in slots.iter_mut().zip(phases.windows(2)) {
             let length = pair[1] - pair[0];
             slot.segment = (length >= SAME_INSTANT).then(|| joint.over(length)).transpose()?;
@@ -175,7 +175,7 @@ struct Smoother {
 impl Smoother {
     /// The steady state without any sample, at the beginning of a slow period.
     fn new(problem: &Problem, timetable: &Timetable) -> Result<Self, DesignError> {
-        let joint = JointState::new(&problem.front_ends)?;
+        let joint = JointState::new(problem)?;
         let (transition, input) = joint.over(problem.ratio as f64)?;
         let prior = controllability_root(&transition, &input)?;
         let order = joint.order();

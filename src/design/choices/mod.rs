@@ -17,6 +17,7 @@ use super::methods::robust_fir::RobustProblem;
 use super::methods::{self, Settings, fir, iir};
 use super::plant::LiftedPlant;
 use super::problem::{Channel, Problem, common_delay};
+use crate::analog::SignalFilter;
 use crate::spec::{Method, Spec};
 use crate::units::FastPeriods;
 use reach::Reach;
@@ -53,7 +54,10 @@ pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
 /// As [`latency`].
 pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, DesignError> {
     let latency = spec.latency.map_or_else(|| choose_latency(spec, compared), Ok)?;
-    let complete = Spec { latency: Some(latency), ..spec.clone() };
+    let mut complete = Spec { latency: Some(latency), ..spec.clone() };
+    if let Some((signal, filter)) = complete.signal.as_mut().zip(SignalFilter::of(spec)) {
+        signal.floor_db = filter.floor_db;
+    }
     // The delays may ask for more than the longest latency.
     complete.check()?;
     Ok(complete)
@@ -90,7 +94,8 @@ pub(super) fn settings(spec: &Spec) -> Result<Settings, DesignError> {
 /// The settings with all delays shorter by so many fast periods, a multiple of the slow period.
 fn settings_earlier(spec: &Spec, fast_periods: usize) -> Result<Settings, DesignError> {
     let at_slow_rate = || {
-        let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, ..spec.clone() };
+        let signal = SignalFilter::written_out(spec);
+        let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, signal, ..spec.clone() };
         // The method replaces the latency. With this one no delay chain is long.
         let latency = common_delay(&slow);
         let problem = Problem::new(&slow, latency.max(fast_periods / spec.ratio))?;

@@ -91,8 +91,7 @@ impl Reach {
 
 /// The problem with few analog states, and whether it is the same problem.
 fn manageable(problem: &Problem) -> (Problem, bool) {
-    let states: usize = problem.front_ends.iter().map(|front_end| front_end.order()).sum();
-    if states <= MOST_STATES {
+    if problem.analog_states() <= MOST_STATES {
         return (problem.clone(), true);
     }
     let mut alike = problem.clone();

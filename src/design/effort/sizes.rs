@@ -10,9 +10,9 @@ pub(super) struct Sizes {
     pub(super) channels: f64,
     /// M.
     pub(super) ratio: f64,
-    /// States of the lifted plant: of the front ends and of the delay chains.
+    /// States of the lifted plant: of the analog side and of the delay chains.
     pub(super) states: f64,
-    /// States of the front ends alone.
+    /// States of the front ends and of the signal's filter alone.
     pub(super) front_end_states: f64,
     /// Taps per channel at the fast rate.
     pub(super) taps: f64,
@@ -27,7 +27,7 @@ pub(super) struct Sizes {
 impl Sizes {
     /// Of a problem without identical channels.
     pub(super) fn new(problem: &Problem, taps: usize) -> Self {
-        let front_end_states: usize = problem.front_ends.iter().map(|front_end| front_end.order()).sum();
+        let front_end_states = problem.analog_states();
         Self {
             channels: problem.channels.len() as f64,
             ratio: problem.ratio as f64,

@@ -2,6 +2,7 @@
 //! e^{-a |t|}, so all covariances of samples are known from their times alone.
 
 use super::*;
+use crate::analog::StrictlyProper;
 use crate::design::problem::Channel;
 use crate::lti::gramian::controllability_root;
 use crate::spec::FilterSpec;
@@ -15,6 +16,7 @@ fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64
     Problem {
         ratio,
         latency,
+        signal: None,
         front_ends: poles.iter().map(filter).collect(),
         target: 0,
         channels: channels

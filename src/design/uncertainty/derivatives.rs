@@ -62,8 +62,9 @@ pub fn delay_derivatives(bank: &Bank) -> Result<DelayDerivatives, DesignError> {
     let (u, v) = (svd.u.column(0), svd.v.column(0));
     let derivative = |i: usize| {
         let front_end = &problem.front_ends[problem.channels[i].front_end];
+        let feedthrough = problem.signal.as_ref().map_or(1.0, |signal| signal.d());
         let direct = (front_end.c() * front_end.b())[(0, 0)].abs();
-        if direct > DIRECT * front_end.c().norm() * front_end.b().norm() {
+        if feedthrough != 0.0 && direct > DIRECT * front_end.c().norm() * front_end.b().norm() {
             return f64::NAN;
         }
         let from_error: Complex<f64> = u.iter().zip(f.column(i).iter()).map(|(u, f)| u.conj() * f).sum();

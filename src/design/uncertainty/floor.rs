@@ -18,7 +18,6 @@ use super::super::plant::LiftedPlant;
 use super::super::resolution::resolves_delays;
 use super::super::{DesignError, problem::Problem};
 use super::search::moved;
-use crate::analog::StrictlyProper;
 use crate::bank::Bank;
 use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use crate::verify::uncertainty::{ErrorBox, ErrorPoint};
@@ -66,8 +65,7 @@ fn common_shift(problem: &Problem, half: FastPeriods) -> f64 {
     if half.0 == 0.0 || !half.0.is_finite() {
         return 0.0;
     }
-    let target = &problem.front_ends[problem.target];
-    let value = |theta: f64| shifted(target, theta, half.0);
+    let value = |theta: f64| shifted(problem, theta, half.0);
     let step = PI / FREQUENCIES as f64;
     let best = (0..=FREQUENCIES).max_by(|&a, &b| value(a as f64 * step).total_cmp(&value(b as f64 * step)));
     let centre = best.unwrap_or(0) as f64 * step;
@@ -82,10 +80,10 @@ fn common_shift(problem: &Problem, half: FastPeriods) -> f64 {
     most
 }
 
-fn shifted(target: &StrictlyProper, theta: f64, half: f64) -> f64 {
+fn shifted(problem: &Problem, theta: f64, half: f64) -> f64 {
     let term = |k: i32| {
         let nu = theta + 2.0 * PI * f64::from(k);
-        target.response(RadiansPerFastPeriod(nu)).norm_sqr() * (nu * half).sin().powi(2)
+        problem.response(problem.target, RadiansPerFastPeriod(nu)).norm_sqr() * (nu * half).sin().powi(2)
     };
     (-ALIASES..=ALIASES).map(term).sum::<f64>().sqrt()
 }

@@ -27,6 +27,7 @@ fn the_thesis_example_is_read() {
         latency: Some(10),
         target: thesis.clone(),
         channels: vec![ChannelSpec::new(Seconds(1.2), thesis), ChannelSpec::new(Seconds(0.6), zpk)],
+        signal: None,
         uncertainty: None,
         design: DesignSpec::new(Method::Fir, Some(22)),
     };
@@ -153,4 +154,21 @@ fn half_widths_have_units() {
     assert_eq!(uncertainty.delay, Some(PerChannel::Each(vec![Seconds(0.0), Seconds(0.01)])));
     assert_eq!(uncertainty.jitter, Some(PerChannel::Same(Seconds(0.5))));
     assert_eq!(uncertainty.cutoff, Some(PerChannel::Same(0.02)));
+}
+
+#[test]
+fn the_signal_is_a_band_or_a_filter() {
+    let signal =
+        |table: &str| read(&THESIS.replace("[design]", &format!("[signal]\n{table}\n[design]"))).signal;
+    let band = |low, high| Band { low: Hertz(low), high: Hertz(high) };
+    assert_eq!(read(THESIS).signal, None);
+    assert_eq!(signal("band = \"0.2 Hz\""), Some(SignalSpec::in_band(band(0.0, 0.2))));
+    let told = SignalSpec { floor_db: Some(60.0), rms: 0.1, ..SignalSpec::in_band(band(0.6, 0.9)) };
+    assert_eq!(signal("band = [0.6, \"900 mHz\"]\nfloor_db = 60\nrms = 0.1"), Some(told));
+    let filter = FilterSpec::TransferFunction { num: vec![0.01, 1.0], den: vec![1.0, 1.0] };
+    let spectrum = SignalSpectrum::Filter(filter);
+    assert_eq!(
+        signal("filter = { num = [0.01, 1.0], den = [1.0, 1.0] }"),
+        Some(SignalSpec { spectrum, floor_db: None, rms: USUAL_RMS })
+    );
 }

@@ -256,3 +256,28 @@ fn serde_reads_a_filter_with_a_message_about_keys() {
         serde_json::from_str::<FilterSpec>(r#"{ "num": [1], "num": [2], "den": [1, 2] }"#).unwrap_err();
     assert!(twice.to_string().contains("given twice"), "{twice}");
 }
+
+#[test]
+fn a_signal_that_cannot_be_is_refused() {
+    for (table, words) in [
+        ("rms = 0.1", "the key band is missing; say which frequencies"),
+        ("band = 0.2\nfilter = { family = \"rc\", cutoff = 1 }", "both band and filter are given"),
+        ("band = 0", "must end at a positive, finite frequency"),
+        ("band = -1", "must end at a positive, finite frequency"),
+        ("band = [0.3, 0.2]", "must begin at 0 or above, and below its end"),
+        ("band = [0.2, 0.2]", "must begin at 0 or above, and below its end"),
+        ("band = [-0.1, 0.2]", "must begin at 0 or above, and below its end"),
+        ("band = [0.1, 0.2, 0.3]", "expected a frequency, or a list of two"),
+        ("band = \"8 s\"", "not known here; write a frequency"),
+        ("band = 0.2\nfloor_db = 2", "floor_db says how far the signal is down"),
+        ("band = 0.2\nfloor_db = 201", "floor_db says how far the signal is down"),
+        ("band = 0.2\nrms = 0", "rms of the signal at the target"),
+        ("band = 0.2\nrms = 1.5", "rms of the signal at the target"),
+        ("filter = { family = \"rc\", cutoff = 1 }\nfloor_db = 60", "both filter and floor_db are given"),
+        ("filter = { num = [1, 0, 0], den = [1, 1] }", "it grows with frequency"),
+        ("bnad = 0.2", "did you mean \"band\"?"),
+    ] {
+        let text = message(&THESIS.replace("[design]", &format!("[signal]\n{table}\n[design]")));
+        assert!(text.contains(words), "{table}: expected {words:?} in\n{text}");
+    }
+}

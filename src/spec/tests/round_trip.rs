@@ -62,7 +62,17 @@ prop_compose! {
             (0usize..99).prop_map(Reduction::Order), (0.0..9.0f64).prop_map(Reduction::Loss)
         ]),
         uncertainty in prop::option::of((0.0..1.0f64, 0usize..2, prop::bool::ANY)),
+        signal in prop::option::of((written_filter(), 0.1..9.0f64, 0usize..3, 0.01..1.0f64)),
     ) -> Spec {
+        let signal = signal.map(|(filter, edge, kind, rms)| SignalSpec {
+            spectrum: match kind {
+                0 => SignalSpectrum::Filter(filter),
+                1 => SignalSpectrum::Band(Band::up_to(Hertz(edge))),
+                _ => SignalSpectrum::Band(Band { low: Hertz(0.5 * edge), high: Hertz(edge) }),
+            },
+            floor_db: (kind > 0 && edge > 4.0).then_some(10.0 * edge),
+            rms,
+        });
         let uncertainty = uncertainty.map(|(x, reference, each)| UncertaintySpec {
             delay: Some(if each { PerChannel::Each(vec![fast_period * x; channels.len()]) } else { PerChannel::Same(fast_period * x) }),
             cutoff: (x < 0.5).then_some(PerChannel::Same(x)),
@@ -76,6 +86,7 @@ prop_compose! {
         Spec {
             name, fast_period, ratio, latency, target,
             channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
+            signal,
             uncertainty,
             design: DesignSpec {
                 method,

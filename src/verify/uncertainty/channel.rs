@@ -4,17 +4,19 @@ use super::super::VerifyError;
 use super::super::ball::{self, Ball, Matrix};
 use super::super::covariance::Covariance;
 use super::super::front_ends::FrontEnds;
-use super::Taps;
-use super::aliases::{Aliases, Weight};
+use super::aliases::{Aliases, FrontEnd, Weight};
 use super::angle::{Frequency, outward};
 use super::grid::Grid;
 use super::memory::{Memory, growth};
 use super::transfer::Transfer;
+use super::{ErrorBox, Taps};
 use crate::units::Seconds;
 
 /// A channel with the range of its errors.
 pub(super) struct Channel {
     transfer: Transfer,
+    /// Of the signal's filter, if the spec has a signal.
+    signal: Option<Transfer>,
     /// Second derivative in the cut-off, if that is uncertain.
     curvature: Option<Transfer>,
     memory: Memory,
@@ -47,8 +49,14 @@ pub(super) struct Memories<'a> {
 
 impl<'a> Memories<'a> {
     /// # Errors
-    /// [`VerifyError::LongMemory`].
-    pub(super) fn new(grid: &'a Grid) -> Result<Self, VerifyError> {
+    /// [`VerifyError::LongMemory`]; [`VerifyError::ErrorBox`] for uncertain cut-offs beside a signal: a
+    /// kernel of Phi(s / x) W is not that of another x in another time.
+    pub(super) fn new(grid: &'a Grid, errors: &ErrorBox) -> Result<Self, VerifyError> {
+        if grid.front_ends.signal().is_some() && errors.cutoffs.iter().any(|cutoff| *cutoff > 0.0) {
+            let rule = "uncertain cut-offs are not covered for a spec with a [signal]; leave the cut-offs out of the \
+                        box, or the table out of the spec";
+            return Err(VerifyError::ErrorBox { rule: rule.into() });
+        }
         let covariance = Covariance::new(&grid.period).ok_or(VerifyError::LongMemory)?;
         let growth = growth(&grid.period.transition).ok_or(VerifyError::LongMemory)?;
         Ok(Self { grid, covariance, growth })
@@ -82,6 +90,11 @@ pub(super) fn transfer(grid: &Grid, i: usize) -> Transfer {
     Transfer::new(grid.front_ends.filter(sample.filter), FrontEnds::gain(sample))
 }
 
+/// The transfer function of the signal's filter.
+pub(super) fn signal_transfer(grid: &Grid) -> Option<Transfer> {
+    grid.front_ends.signal().map(|signal| Transfer::new(signal, 1.0))
+}
+
 impl Channel {
     /// Channel `i` of `grid`, with the largest errors of its delay, gain and cut-off.
     pub(super) fn new(
@@ -97,6 +110,7 @@ impl Channel {
         Self {
             curvature: (cutoff > 0.0).then(|| transfer.curvature()),
             transfer,
+            signal: signal_transfer(grid),
             memory: memories.of_sample(first),
             cutoff,
             gain,
@@ -128,7 +142,8 @@ impl Channel {
     pub(super) fn response(&self, near: &Frequency, ratio: usize) -> Result<Response, VerifyError> {
         let range = [1.0 - self.cutoff, 1.0 + self.cutoff];
         let sum = |transfer: &Transfer| {
-            Aliases::new(transfer, near.angle, ratio, range).ok_or(VerifyError::LongMemory)
+            let front_end = FrontEnd { transfer, signal: self.signal.as_ref() };
+            Aliases::new(&front_end, near.angle, ratio, range).ok_or(VerifyError::LongMemory)
         };
         let aliases = sum(&self.transfer)?;
         // The chord over 2 x of a function with second derivative at most curvature / (1 - x)^2.

@@ -75,7 +75,7 @@ impl<'a> Cover<'a> {
     /// See [`super::worst_case`].
     pub(super) fn new(bank: &'a Bank, errors: &'a ErrorBox, taps: Taps) -> Result<Self, VerifyError> {
         let grid = Grid::new(bank, errors, level_of_grid(0, taps))?;
-        let memories = Memories::new(&grid)?;
+        let memories = Memories::new(&grid, errors)?;
         let fast_period = bank.spec.as_ref().map_or(bank.fast_period, |spec| spec.fast_period);
         let channel = |i: usize| {
             let largest = (errors.delays[i], errors.gains[i], errors.cutoffs[i]);

@@ -4,9 +4,9 @@ use super::super::VerifyError;
 use super::super::ball;
 use super::super::spectrum;
 use super::ErrorBox;
-use super::aliases::{Aliases, Weight};
+use super::aliases::{Aliases, FrontEnd, Weight};
 use super::angle::{Frequency, cosine_below, outward};
-use super::channel::{Memories, column_norm, transfer};
+use super::channel::{Memories, column_norm, signal_transfer, transfer};
 use super::grid::Grid;
 use super::memory::Lags;
 use crate::bank::Bank;
@@ -59,7 +59,7 @@ pub fn slopes(bank: &Bank, errors: &ErrorBox) -> Result<Slopes, VerifyError> {
     errors.check(bank.channel_count())?;
     let certain = ErrorBox { delays: vec![Seconds(0.0); bank.channel_count()], ..errors.clone() };
     let grid = Grid::new(bank, &certain, 0)?;
-    let memories = Memories::new(&grid)?;
+    let memories = Memories::new(&grid, errors)?;
     let lags = Lags::new(&bank.filters, bank.ratio, FILTER_TAIL).ok_or(VerifyError::LongMemory)?;
     let mut found = Slopes { lipschitz: Vec::new(), columns: Vec::new(), steepness: Vec::new() };
     for i in 0..bank.channel_count() {
@@ -80,7 +80,8 @@ fn of_channel(
     i: usize,
     cutoff: f64,
 ) -> Result<[f64; 3], VerifyError> {
-    let transfer = transfer(memories.grid(), i);
+    let (transfer, signal) = (transfer(memories.grid(), i), signal_transfer(memories.grid()));
+    let front_end = FrontEnd { transfer: &transfer, signal: signal.as_ref() };
     let memory = memories.of_slope(memories.grid().channels[i].rows[0][0]);
     let range = [1.0 - cutoff, 1.0 + cutoff];
     // The slope of a kernel that is x times faster is x^2 phi'(x t).
@@ -93,7 +94,7 @@ fn of_channel(
     let values = |near: &Frequency| {
         let filters = spectrum::filter_response(&bank.filters, bank.ratio, &near.z);
         let column = column_norm(&filters, i);
-        let steep = Aliases::new(&transfer, near.angle, bank.ratio, range)?.norm(Weight::Slope);
+        let steep = Aliases::new(&front_end, near.angle, bank.ratio, range)?.norm(Weight::Slope);
         Some([column * steep, column, steep])
     };
     largest(degrees, cut, values).ok_or(VerifyError::LongMemory)

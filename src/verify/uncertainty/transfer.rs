@@ -2,7 +2,7 @@
 //! the imaginary axis.
 
 use super::super::ball::{self, Ball, Matrix};
-use crate::analog::StrictlyProper;
+use crate::analog::StableFilter;
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 
 /// N(s) / D(s), coefficients in ascending powers of s, s in rad per fast period; D is monic.
@@ -13,10 +13,10 @@ pub(super) struct Transfer {
 }
 
 impl Transfer {
-    /// `gain` c (s I - a)^-1 b, by the recursion of Faddeev and Le Verrier: M_0 = I,
+    /// `gain` (c (s I - a)^-1 b + d), by the recursion of Faddeev and Le Verrier: M_0 = I,
     /// M_k = a M_{k-1} + d_k I, d_k = -tr(a M_{k-1}) / k; then D = s^n + sum_k d_k s^(n-k) and
-    /// N = sum_k c M_k b s^(n-1-k). It loses many digits, so it runs with 512 bits.
-    pub(super) fn new(filter: &StrictlyProper, gain: f64) -> Self {
+    /// N = sum_k c M_k b s^(n-1-k) + d D. It loses many digits, so it runs with 512 bits.
+    pub(super) fn new(filter: &StableFilter, gain: f64) -> Self {
         let (a, b): (Matrix<BigFloat>, Matrix<BigFloat>) = (ball::exact(filter.a()), ball::exact(filter.b()));
         let c: Matrix<BigFloat> = ball::scaled(&ball::exact(filter.c()), Ball::from(gain));
         let n = a.nrows();
@@ -29,6 +29,10 @@ impl Transfer {
             let d = -(trace / Ball::from(k as f64));
             den[n - k] = narrowed(d);
             power = ball::add(&next, &ball::scaled(&ball::identity(n), d));
+        }
+        if filter.d() != 0.0 {
+            let direct = Ball::from(filter.d()) * Ball::from(gain);
+            num = plus(&num, &den.iter().map(|&x| x * direct).collect::<Vec<_>>());
         }
         Self { num, den }
     }
@@ -50,7 +54,7 @@ impl Transfer {
         (square(&self.num, u) / square(&self.den, u)).upper()
     }
 
-    /// a_1, a_2, .. with |Phi(j u)| <= sum_p a_p |u|^-p for all |u| >= `from`; `None` where that is too
+    /// a_0, a_1, .. with |Phi(j u)| <= sum_p a_p |u|^-p for all |u| >= `from`; `None` where that is too
     /// close to the poles.
     pub(super) fn decay(&self, from: f64) -> Option<Vec<f64>> {
         let n = self.den.len() - 1;
@@ -63,7 +67,7 @@ impl Transfer {
         }
         let coefficient =
             |p: usize| self.num.get(n - p).map_or(0.0, |x| x.magnitude() / share * (1.0 + 1e-10));
-        Some((1..=n).map(coefficient).collect())
+        Some((0..=n).map(coefficient).collect())
     }
 }
 
@@ -102,6 +106,17 @@ fn minus(p: &[Ball], q: &[Ball]) -> Vec<Ball> {
     plus(p, &q.iter().map(|&x| -x).collect::<Vec<_>>())
 }
 
+/// The product of two polynomials with bounds as coefficients, rounded up.
+pub(super) fn product(p: &[f64], q: &[f64]) -> Vec<f64> {
+    let mut product = vec![0.0; (p.len() + q.len()).saturating_sub(1)];
+    for (i, x) in p.iter().enumerate() {
+        for (j, y) in q.iter().enumerate() {
+            product[i + j] += x * y;
+        }
+    }
+    product.iter().map(|x| x * (1.0 + 1e-12)).collect()
+}
+
 /// |p(j u)|^2: the even coefficients make the real part, the odd ones the imaginary part.
 fn square(p: &[Ball], u: Ball) -> Ball {
     let v = -(u * u);
@@ -115,6 +130,7 @@ fn square(p: &[Ball], u: Ball) -> Ball {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analog::StrictlyProper;
     use crate::spec::FilterSpec;
     use crate::units::{RadiansPerFastPeriod, Seconds};
 
@@ -134,12 +150,12 @@ mod tests {
         }
         let decay = transfer.decay(30.0).unwrap();
         for u in [30.0, 100.0, 1e4] {
-            let bound: f64 = decay.iter().enumerate().map(|(p, a)| a * f64::powi(u, -(p as i32) - 1)).sum();
+            let bound: f64 = decay.iter().enumerate().map(|(p, a)| a * f64::powi(u, -(p as i32))).sum();
             let modulus = 1.5 * filter.response(RadiansPerFastPeriod(u)).norm();
             assert!(modulus <= bound && bound <= 1.3 * modulus, "{u}: {modulus} {bound}");
         }
         // Relative degree 3: the terms of slower decay are exactly zero.
-        assert!(decay[0] == 0.0 && decay[1] == 0.0 && decay[2] > 0.0);
+        assert!(decay[..3].iter().all(|a| *a == 0.0) && decay[3] > 0.0);
         assert!(transfer.decay(0.5).is_none());
     }
 
