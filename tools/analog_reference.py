@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes src/analog/families/reference.txt: low-pass prototypes by scipy.signal and by mpmath.
+"""Writes src/analog/families/reference.txt: low-pass prototypes and band-passes by scipy.signal and by mpmath.
 
 Run from the repository root: python3 tools/analog_reference.py
-Made with scipy 1.17.1 and mpmath 1.3.0.
+Made with scipy 1.17.1 and mpmath 1.4.1.
 
 One line a filter: source family order ripple_db attenuation_db gain, then `z re im` and `p re im` for
-the roots of the closed upper half plane. scipy designs elliptic filters iteratively; the mpmath lines are
+the roots of the closed upper half plane. A band-pass has `e low high` before them, its edges in Hz. scipy designs elliptic filters iteratively; the mpmath lines are
 the closed formulas at 60 digits.
 """
 
@@ -20,12 +20,13 @@ OUT = "src/analog/families/reference.txt"
 def upper(roots):
     roots = np.array([complex(r) for r in np.atleast_1d(roots)])
     noise = 1e-12 * np.abs(roots)
-    upper_half = [(float(r.real), float(r.imag) if r.imag > e else 0.0) for r, e in zip(roots, noise) if r.imag > -e]
+    upper_half = [(float(r.real), float(r.imag) if r.imag > e else 0.0) for r, e in zip(roots, noise) if r.imag >= -e]
     return sorted(upper_half, key=lambda r: r[1])
 
 
-def line(source, family, order, ripple, attenuation, zeros, poles, gain):
-    roots = [f"z {re!r} {im!r}" for re, im in upper(zeros)] + [f"p {re!r} {im!r}" for re, im in upper(poles)]
+def line(source, family, order, ripple, attenuation, zeros, poles, gain, edges=None):
+    roots = [] if edges is None else [f"e {edges[0]!r} {edges[1]!r}"]
+    roots += [f"z {re!r} {im!r}" for re, im in upper(zeros)] + [f"p {re!r} {im!r}" for re, im in upper(poles)]
     return " ".join([source, family, str(order), repr(ripple), repr(attenuation), repr(float(gain))] + roots)
 
 
@@ -73,6 +74,64 @@ def elliptic(n, ripple, attenuation):
     return zeros, poles, gain if n % 2 else gain / mp.sqrt(1 + e1)
 
 
+BANDS = [(0.1, 0.4), (0.2, 0.25), (0.2, 0.202), (1e-3, 10.0), (0.2, 0.2 + 1e-6)]
+MEMBERS = [(family, n) for family in ("butterworth", "chebyshev1", "chebyshev2", "elliptic", "bessel") for n in (1, 2, 3, 6, 7)]
+RIPPLE, ATTENUATION = 0.5, 60.0
+
+
+def scipy_band_lines():
+    designs = {
+        "butterworth": lambda n, w: ss.butter(n, w, "bandpass", True, "zpk"),
+        "chebyshev1": lambda n, w: ss.cheby1(n, RIPPLE, w, "bandpass", True, "zpk"),
+        "chebyshev2": lambda n, w: ss.cheby2(n, ATTENUATION, w, "bandpass", True, "zpk"),
+        "elliptic": lambda n, w: ss.ellip(n, RIPPLE, ATTENUATION, w, "bandpass", True, "zpk"),
+        "bessel": lambda n, w: ss.bessel(n, w, "bandpass", True, "zpk", "phase"),
+    }
+    for family, n in MEMBERS:
+        for edges in BANDS:
+            filter = designs[family](n, 2 * np.pi * np.array(edges))
+            yield line("scipy", family, n, *ripples(family), *filter, edges)
+
+
+def ripples(family):
+    return (RIPPLE if family in ("chebyshev1", "elliptic") else 0.0,
+            ATTENUATION if family in ("chebyshev2", "elliptic") else 0.0)
+
+
+def prototype(family, n):
+    if family == "bessel":
+        return bessel(n)
+    if family == "elliptic":
+        return elliptic(n, RIPPLE, ATTENUATION)
+    angles = [mp.pi * (2 * i - n + 1) / (2 * n) for i in range(n)]
+    if family == "butterworth":
+        return [], [-mp.exp(mp.j * a) for a in angles], mp.mpf(1)
+    db = RIPPLE if family == "chebyshev1" else ATTENUATION
+    eps = mp.sqrt(mp.mpf(10) ** (mp.mpf(db) / 10) - 1)
+    mu = mp.asinh(1 / eps if family == "chebyshev1" else eps) / n
+    poles = [-mp.sinh(mu + mp.j * a) for a in angles]
+    if family == "chebyshev1":
+        gain = mp.re(mp.fprod(-p for p in poles))
+        return [], poles, gain if n % 2 else gain / mp.sqrt(1 + eps * eps)
+    zeros = [mp.mpc(0, 1 / mp.sin(a)) for a in angles if abs(a) > 1e-9]
+    poles = [1 / p for p in poles]
+    return zeros, poles, mp.re(mp.fprod(-p for p in poles) / mp.fprod(-z for z in zeros))
+
+
+def band_pass(zeros, poles, gain, edges):
+    w1, w2 = (2 * mp.pi * mp.mpf(f) for f in edges)
+    width = w2 - w1
+    moved = lambda roots: [r * width / 2 + sign * mp.sqrt((r * width / 2) ** 2 - w1 * w2) for r in roots for sign in (1, -1)]
+    excess = len(poles) - len(zeros)
+    return moved(zeros) + [mp.mpf(0)] * excess, moved(poles), gain * width ** excess
+
+
+def mpmath_band_lines():
+    for family, n in MEMBERS:
+        for edges in BANDS:
+            yield line("mpmath", family, n, *ripples(family), *band_pass(*prototype(family, n), edges), edges)
+
+
 def mpmath_lines():
     for n in range(1, 33):
         yield line("mpmath", "bessel", n, 0.0, 0.0, *bessel(n))
@@ -82,5 +141,5 @@ def mpmath_lines():
 
 
 with open(OUT, "w") as out:
-    for text in [*scipy_lines(), *mpmath_lines()]:
+    for text in [*scipy_lines(), *mpmath_lines(), *scipy_band_lines(), *mpmath_band_lines()]:
         out.write(text + "\n")

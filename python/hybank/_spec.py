@@ -48,36 +48,42 @@ class Channel(dict):
         )
 
 
+def _passband(cutoff):
+    """One frequency is the cutoff of a low-pass, two are the edges of a band-pass, as in scipy.signal."""
+    is_band = isinstance(cutoff, (list, tuple)) or getattr(cutoff, "ndim", 0) == 1
+    return {"band": list(cutoff)} if is_band else {"cutoff": cutoff}
+
+
 def butterworth(order, cutoff):
-    """Low-pass with the flattest magnitude; -3 dB at ``cutoff`` hertz."""
-    return _given(family="butterworth", order=order, cutoff=cutoff)
+    """Low-pass with the flattest magnitude; -3 dB at ``cutoff`` hertz. Two frequencies make a band-pass."""
+    return _given(family="butterworth", order=order, **_passband(cutoff))
 
 
 def chebyshev1(order, cutoff, ripple_db):
-    """Low-pass with equal ripples up to ``cutoff`` hertz."""
-    return _given(family="chebyshev1", order=order, cutoff=cutoff, ripple_db=ripple_db)
+    """Low-pass with equal ripples up to ``cutoff`` hertz. Two frequencies make a band-pass."""
+    return _given(family="chebyshev1", order=order, ripple_db=ripple_db, **_passband(cutoff))
 
 
 def chebyshev2(order, cutoff, attenuation_db):
-    """Low-pass with equal ripples from ``cutoff`` hertz on."""
-    return _given(family="chebyshev2", order=order, cutoff=cutoff, attenuation_db=attenuation_db)
+    """Low-pass with equal ripples from ``cutoff`` hertz on. Two frequencies make a band-pass."""
+    return _given(family="chebyshev2", order=order, attenuation_db=attenuation_db, **_passband(cutoff))
 
 
 def elliptic(order, cutoff, ripple_db, attenuation_db):
-    """Low-pass with equal ripples in both bands."""
+    """Low-pass with equal ripples in both bands. Two frequencies make a band-pass."""
     return _given(
-        family="elliptic", order=order, cutoff=cutoff, ripple_db=ripple_db, attenuation_db=attenuation_db
+        family="elliptic", order=order, ripple_db=ripple_db, attenuation_db=attenuation_db, **_passband(cutoff)
     )
 
 
 def bessel(order, cutoff):
-    """Low-pass with the flattest group delay."""
-    return _given(family="bessel", order=order, cutoff=cutoff)
+    """Low-pass with the flattest group delay. Two frequencies make a band-pass."""
+    return _given(family="bessel", order=order, **_passband(cutoff))
 
 
 def rc(cutoff):
-    """One pole at ``cutoff`` hertz."""
-    return _given(family="rc", cutoff=cutoff)
+    """One pole at ``cutoff`` hertz. Two frequencies make the resonator with -3 dB there."""
+    return _given(family="rc", **_passband(cutoff))
 
 
 def tf(num, den):

@@ -1,30 +1,46 @@
-//! The edge of a front end's band.
+//! The edges of a front end's band.
 
 use super::StrictlyProper;
 use crate::units::RadiansPerFastPeriod;
 
-/// Frequencies per decade on which the edge is searched.
+/// Frequencies per decade on which the edges are searched.
 const PER_DECADE: f64 = 100.0;
-/// Halvings of the interval around the edge.
+/// Halvings of the interval around an edge.
 const HALVINGS: usize = 50;
 
+/// Where |Phi'| is within 3 dB of its largest value, from the lowest such frequency to the highest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfPowerBand {
+    /// 0 for a low-pass.
+    pub low: RadiansPerFastPeriod,
+    /// The -3 dB frequency of a low-pass, the upper one of a band-pass.
+    pub high: RadiansPerFastPeriod,
+}
+
 impl StrictlyProper {
-    /// The highest frequency at which |Phi'| is 3 dB below its largest value: the -3 dB frequency of a
-    /// low-pass, the upper one of a band-pass.
+    /// The upper edge of [`Self::half_power_band`].
     pub fn half_power_frequency(&self) -> RadiansPerFastPeriod {
+        self.half_power_band().high
+    }
+
+    /// The band within 3 dB of the largest gain.
+    pub fn half_power_band(&self) -> HalfPowerBand {
         let gain = |w: f64| self.response(RadiansPerFastPeriod(w)).norm();
         let frequencies = self.searched();
         let level = frequencies.iter().map(|&w| gain(w)).fold(gain(0.0), f64::max) * 0.5_f64.sqrt();
-        let last = frequencies.iter().rposition(|&w| gain(w) >= level).unwrap_or(0);
-        let Some(&above) = frequencies.get(last + 1) else {
-            return RadiansPerFastPeriod(frequencies[last]);
+        let passes = |w: f64| gain(w) >= level;
+        let first = frequencies.iter().position(|&w| passes(w)).unwrap_or(0);
+        let last = frequencies.iter().rposition(|&w| passes(w)).unwrap_or(0);
+        let below = if passes(0.0) { None } else { first.checked_sub(1) };
+        let low = match below {
+            Some(below) => edge(passes, frequencies[first], frequencies[below]),
+            None => 0.0,
         };
-        let (mut low, mut high) = (frequencies[last], above);
-        for _ in 0..HALVINGS {
-            let middle = (low * high).sqrt();
-            if gain(middle) >= level { low = middle } else { high = middle }
-        }
-        RadiansPerFastPeriod(high)
+        let high = match frequencies.get(last + 1) {
+            Some(&above) => edge(passes, frequencies[last], above),
+            None => frequencies[last],
+        };
+        HalfPowerBand { low: RadiansPerFastPeriod(low), high: RadiansPerFastPeriod(high) }
     }
 
     /// Frequencies from far below the slowest pole to far above the fastest, and those of the poles.
@@ -40,14 +56,23 @@ impl StrictlyProper {
     }
 }
 
+/// Where `passes` ends between a frequency `inside` the band and one `outside` it.
+fn edge(passes: impl Fn(f64) -> bool, mut inside: f64, mut outside: f64) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle = (inside * outside).sqrt();
+        *if passes(middle) { &mut inside } else { &mut outside } = middle;
+    }
+    outside
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{Family, FilterSpec};
+    use crate::spec::{Family, FilterSpec, Passband};
     use crate::units::{Hertz, Seconds};
     use std::f64::consts::TAU;
 
-    fn edge(filter: &FilterSpec) -> f64 {
+    fn upper_edge(filter: &FilterSpec) -> f64 {
         StrictlyProper::new(filter, Seconds(1.0)).unwrap().half_power_frequency().0
     }
 
@@ -58,22 +83,25 @@ mod tests {
                 let filter = FilterSpec::Family {
                     family: Family::Butterworth,
                     order: Some(order),
-                    cutoff: Hertz(cutoff),
+                    passband: Passband::LowPass { cutoff: Hertz(cutoff) },
                     ripple_db: None,
                     attenuation_db: None,
                 };
-                assert!((edge(&filter) / (TAU * cutoff) - 1.0).abs() < 1e-9, "{order} {cutoff}");
+                assert!((upper_edge(&filter) / (TAU * cutoff) - 1.0).abs() < 1e-9, "{order} {cutoff}");
             }
         }
     }
 
     /// s / (s^2 + s/q + 1) has its edges at w = (sqrt(1 + 4 q^2) +- 1) / (2 q).
     #[test]
-    fn band_passes_have_the_upper_edge() {
+    fn band_passes_have_both_edges() {
         for q in [0.5, 3.0, 1e4] {
             let filter = FilterSpec::TransferFunction { num: vec![1.0, 0.0], den: vec![1.0, 1.0 / q, 1.0] };
-            let want = ((1.0 + 4.0 * q * q).sqrt() + 1.0) / (2.0 * q);
-            assert!((edge(&filter) / want - 1.0).abs() < 1e-9, "{q}: {} {want}", edge(&filter));
+            let band = StrictlyProper::new(&filter, Seconds(1.0)).unwrap().half_power_band();
+            let want = [-1.0, 1.0].map(|sign| ((1.0 + 4.0 * q * q).sqrt() + sign) / (2.0 * q));
+            for (found, want) in [band.low.0, band.high.0].into_iter().zip(want) {
+                assert!((found / want - 1.0).abs() < 1e-9, "{q}: {found} {want}");
+            }
         }
     }
 }

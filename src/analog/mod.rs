@@ -37,6 +37,7 @@ mod strictly_proper;
 mod zpk;
 
 pub use error::AnalogError;
+pub use half_power::HalfPowerBand;
 pub use signal::{SignalFilter, resolved_band, signal};
 pub use strictly_proper::{StableFilter, StrictlyProper};
 pub use zpk::{Cutoffs, Zpk};

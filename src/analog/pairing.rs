@@ -3,7 +3,8 @@
 use super::roots::{RootSet, Roots};
 use super::section::Section;
 
-/// Pairs zeros with poles and orders the sections, low quality first. Needs no more zeros than poles.
+/// Pairs zeros with poles and orders the sections, low quality first, and those of one quality as they were
+/// paired. Needs no more zeros than poles.
 ///
 /// In each step the pair with the least ratio of frequencies is joined. If the zeros of a section were far
 /// from its poles, its gain on one side of the spectrum would be tiny, and no later section could restore
@@ -20,9 +21,14 @@ pub(super) fn pair_sections(poles: &RootSet, zeros: &RootSet) -> Vec<Section> {
     while let Some((zero, section)) = closest_section(&real_zeros, &sections) {
         attach(&mut sections[section], real_zeros.remove(zero));
     }
-    sections.sort_by(|a, b| a.poles.quality().total_cmp(&b.poles.quality()));
+    let rank = |section: &Section| (section.poles.quality().ln() / SAME_QUALITY).round();
+    sections.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     sections
 }
+
+/// Qualities that differ by less than this share are one. The pairs of poles of a band-pass come in twos of
+/// one quality, and rounding must not decide about their order.
+const SAME_QUALITY: f64 = 1e-6;
 
 /// Poles not yet in a section.
 struct UnpairedPoles {
@@ -74,6 +80,11 @@ impl UnpairedPoles {
 /// frequencies.
 const SLOW_ZERO_PENALTY: f64 = 4.0;
 
+/// Added to the distance of a zero at the origin to a section that has a zero: more than any other distance.
+/// A band-pass has one for each pair of poles; as resonators all sections have their gain in the band, while
+/// high-passes followed by low-passes would differ by large factors there.
+const SECOND_AT_ORIGIN: f64 = 1e3;
+
 /// Distance of two frequencies on a logarithmic scale. A zero at the origin counts as very slow, so that it
 /// is paired with the slowest pole.
 fn distance(zero: f64, pole: f64) -> f64 {
@@ -99,7 +110,10 @@ fn closest_pair(pairs: &[Roots], unpaired: &UnpairedPoles) -> Option<(usize, Gro
 fn closest_section(zeros: &[f64], sections: &[Section]) -> Option<(usize, usize)> {
     let open = (0..sections.len()).filter(|&k| sections[k].zeros.count() < sections[k].poles.count());
     let candidates = open.flat_map(|k| (0..zeros.len()).map(move |i| (i, k)));
-    let cost = |&(i, k): &(usize, usize)| distance(zeros[i], sections[k].poles.natural_frequency());
+    let cost = |&(i, k): &(usize, usize)| {
+        let second = if zeros[i] == 0.0 && sections[k].zeros.count() > 0 { SECOND_AT_ORIGIN } else { 0.0 };
+        distance(zeros[i], sections[k].poles.natural_frequency()) + second
+    };
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 

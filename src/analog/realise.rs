@@ -1,7 +1,7 @@
 //! From a written filter to a gain and blocks in series, in normalised time.
 
 use crate::linalg::{Complex, Mat, eigenvalues, solve_c, to_complex};
-use crate::spec::{Family, FilterProblem, FilterSpec};
+use crate::spec::{Family, FilterProblem, FilterSpec, Passband};
 use crate::units::{RadiansPerFastPeriod, Seconds};
 
 use super::pairing::pair_sections;
@@ -73,11 +73,11 @@ impl Chain {
                 Self::from_zpk(&Zpk::new(complex(zeros), complex(poles), *gain).normalised(h), h)
             }
             FilterSpec::StateSpace { a, b, c } => Ok(Self::from_matrices(a, b, c, h)),
-            FilterSpec::Family { family, order, cutoff, ripple_db, attenuation_db } => {
+            FilterSpec::Family { family, order, passband, ripple_db, attenuation_db } => {
                 let order = order.unwrap_or(1);
                 let prototype =
                     prototype(*family, order, ripple_db.unwrap_or(0.0), attenuation_db.unwrap_or(0.0))?;
-                Self::from_zpk(&prototype.low_pass(*cutoff, h), h)
+                Self::from_zpk(&moved(&prototype, *passband, h)?, h)
             }
             FilterSpec::Cascade { cascade } => {
                 let mut whole = Self { gain: 1.0, blocks: Vec::new() };
@@ -116,6 +116,27 @@ impl Chain {
             d: 0.0,
         };
         Self { gain: 1.0, blocks: vec![Block::State(state)] }
+    }
+}
+
+/// The prototype at its place, refused where the band is too narrow for its poles.
+fn moved(
+    prototype: &Zpk<Cutoffs>,
+    passband: Passband,
+    h: Seconds,
+) -> Result<Zpk<RadiansPerFastPeriod>, AnalogError> {
+    let filter = prototype.moved(passband, h);
+    let is_damped = |pole: &Complex<f64>| -pole.re >= MIN_DAMPING_RATIO * pole.norm();
+    match passband {
+        Passband::BandPass { low, high } if !filter.poles.iter().all(is_damped) => {
+            let rule =
+                "a band this narrow puts poles within 1e-9 of the imaginary axis, beyond double precision; \
+                        widen the band or lower the order"
+                    .into();
+            let width = (high - low).0;
+            Err(FilterProblem::ParameterRange { key: "band", value: width, unit: " Hz wide", rule }.into())
+        }
+        _ => Ok(filter),
     }
 }
 

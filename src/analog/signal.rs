@@ -7,7 +7,7 @@
 
 use super::families::Selectivity;
 use super::{AnalogError, StableFilter};
-use crate::spec::{Band, Family, FilterSpec, SignalSpec, SignalSpectrum, Spec};
+use crate::spec::{Band, Family, FilterSpec, Passband, SignalSpec, SignalSpectrum, Spec};
 use crate::units::Hertz;
 
 /// Ripple of W over the band.
@@ -72,7 +72,7 @@ impl SignalFilter {
         let filter = FilterSpec::Family {
             family: Family::Elliptic,
             order: Some(order),
-            cutoff: band.high,
+            passband: passband(band),
             ripple_db: Some(RIPPLE_DB),
             attenuation_db: Some(floor_db),
         };
@@ -123,6 +123,10 @@ fn band_pass_transitions(band: Band, resolved: Hertz) -> [f64; 2] {
     let [first, last] = [zone, zone + 1.0].map(|edge| edge * resolved.0);
     let clipped = if first <= low && high <= last { nearer(below.max(first), above.min(last)) } else { 0.0 };
     [clipped, nearer(below, above)]
+}
+
+fn passband(Band { low, high }: Band) -> Passband {
+    if low.0 == 0.0 { Passband::LowPass { cutoff: high } } else { Passband::BandPass { low, high } }
 }
 
 /// The first of `transitions` that leaves a floor.
@@ -188,6 +192,33 @@ mod tests {
                 assert!(outside <= -reached + 1e-6, "{edge}: {outside} above {reached} at {x}");
             }
             assert!(reached == floor || filter.order() == 12, "{edge}: {reached}");
+        }
+    }
+
+    /// The same for bands above 0, in whatever zone, and for one that would reach below 0.
+    #[test]
+    fn a_band_pass_keeps_band_and_floor() {
+        for ([low, high], resolved, floor) in [
+            ([0.79, 0.96], 0.5, 80.0),
+            ([0.12, 0.2], 0.5, 60.0),
+            ([0.01, 0.4], 0.5, 80.0),
+            ([3.1, 3.2], 0.5, 70.0),
+        ] {
+            let w =
+                SignalFilter::of_band(Band { low: Hertz(low), high: Hertz(high) }, Hertz(resolved), floor);
+            let reached = w.floor_db.unwrap();
+            let filter = StableFilter::new(&w.filter, Seconds(1.0)).unwrap();
+            let gain_db = |f: f64| 20.0 * filter.response(RadiansPerFastPeriod(TAU * f)).norm().log10();
+            let skirt = 0.175 * (high - low);
+            for k in 0..=1000 {
+                let x = f64::from(k) / 1000.0;
+                let inside = gain_db(low + x * (high - low));
+                assert!((-1.0 - 1e-6..=1e-6).contains(&inside), "{low}: {inside}");
+                let outside =
+                    gain_db((high + skirt) * (1.0 + 20.0 * x * x)).max(gain_db((low - skirt).max(0.0) * x));
+                assert!(outside <= -reached + 1e-6, "{low}: {outside} above {reached} at {x}");
+            }
+            assert!(reached == floor || filter.order() == 16, "{low}: {reached}");
         }
     }
 

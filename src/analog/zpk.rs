@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::marker::PhantomData;
 
 use crate::linalg::Complex;
+use crate::spec::Passband;
 use crate::units::{Hertz, RadiansPerFastPeriod, RadiansPerSecond, Seconds};
 
 /// The unit of s of a prototype: multiples of its cutoff, which lies at |s| = 1.
@@ -27,9 +28,31 @@ pub struct Zpk<U> {
 }
 
 impl Zpk<Cutoffs> {
+    /// The prototype moved to `passband`, in normalised time.
+    pub fn moved(&self, passband: Passband, fast_period: Seconds) -> Zpk<RadiansPerFastPeriod> {
+        match passband {
+            Passband::LowPass { cutoff } => self.low_pass(cutoff, fast_period),
+            Passband::BandPass { low, high } => self.band_pass(low, high, fast_period),
+        }
+    }
+
     /// The low-pass H(s' / w') in normalised time, with w' = 2 pi f h for the cutoff f.
     pub fn low_pass(&self, cutoff: Hertz, fast_period: Seconds) -> Zpk<RadiansPerFastPeriod> {
         self.stretched(TAU * cutoff.0 * fast_period.0)
+    }
+
+    /// The band-pass H((s'^2 + w1 w2) / (s' (w2 - w1))) in normalised time, with w = 2 pi f h for the edges
+    /// f: two roots for every root of the prototype, and a zero at 0 for every pole without a zero.
+    pub fn band_pass(&self, low: Hertz, high: Hertz, fast_period: Seconds) -> Zpk<RadiansPerFastPeriod> {
+        let center = TAU * (low.0.sqrt() * high.0.sqrt()) * fast_period.0;
+        let width = TAU * (high.0 - low.0) * fast_period.0;
+        let moved = |roots: &[Complex<f64>]| -> Vec<Complex<f64>> {
+            roots.iter().flat_map(|root| band_pass_roots(root * (0.5 * width), center)).collect()
+        };
+        let excess = self.poles.len().saturating_sub(self.zeros.len());
+        let mut zeros = moved(&self.zeros);
+        zeros.resize(zeros.len() + excess, Complex::default());
+        Zpk::new(zeros, moved(&self.poles), times_power(self.gain, width, excess as i64))
     }
 }
 
@@ -68,6 +91,21 @@ impl<U> Zpk<U> {
             times_power(self.gain, scale, relative_degree),
         )
     }
+}
+
+/// The roots u +- j sqrt(w^2 - u^2) of s^2 - 2 u s + w^2, where both parts of each keep their relative
+/// accuracy, however near a narrow band puts them to j w: the discriminant is a product of differences, the
+/// larger root a sum without cancellation, and the smaller one follows from the product w^2.
+fn band_pass_roots(u: Complex<f64>, w: f64) -> [Complex<f64>; 2] {
+    let q = u / w;
+    let square = Complex::new((1.0 - q.re) * (1.0 + q.re) + q.im * q.im, -2.0 * q.re * q.im);
+    let root = square.sqrt() * w;
+    let turned = Complex::new(-root.im, root.re);
+    let is_opposed = u.re * turned.re + u.im * turned.im < 0.0;
+    let larger = if is_opposed { u - turned } else { u + turned };
+    // A real u within the circle gives a pair of equal size, which has to be conjugate to the last bit.
+    let smaller = if u.im == 0.0 && square.re > 0.0 { larger.conj() } else { w / larger * w };
+    [larger, smaller]
 }
 
 /// `x * base^exponent` by repeated multiplication, so that no intermediate value overflows or underflows

@@ -2,8 +2,9 @@
 
 use super::DesignError;
 use super::problem::{Problem, common_delay};
+use crate::analog::HalfPowerBand;
 use crate::quantity::readable;
-use crate::spec::{FilterSpec, Spec};
+use crate::spec::{FilterSpec, Passband, Spec};
 use crate::units::Hertz;
 use std::f64::consts::{PI, TAU};
 
@@ -13,6 +14,8 @@ const NARROW: f64 = 0.01;
 const NEAR: f64 = 1e-3;
 /// Samples nearer to each other than this are at one instant up to rounding.
 const TOGETHER: f64 = 1e-12;
+/// An edge is on a multiple of half the fast rate within this share of it: the edges are found by bisection.
+const ON_A_MULTIPLE: f64 = 1e-9;
 /// Bandwidths in rad/s between these look as if one sample were the unit of time.
 const NORMALISED: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 
@@ -45,6 +48,25 @@ pub enum Implausible {
         place: String,
         /// Its -3 dB frequency.
         edge: Hertz,
+        /// Half the fast rate.
+        nyquist: Hertz,
+    },
+    /// A target whose band reaches over a multiple of half the fast rate.
+    #[error(
+        "{place}: -3 dB at {} and {}, with {multiple} times the output's Nyquist frequency {} between them; there the \
+         band folds onto itself, also in the ideal converter. Move the band or the fast rate until it lies between two \
+         multiples",
+        readable(.low.0, "Hz"), readable(.high.0, "Hz"), readable(.nyquist.0, "Hz")
+    )]
+    Straddling {
+        /// `the target`.
+        place: String,
+        /// Its lower -3 dB frequency.
+        low: Hertz,
+        /// Its upper one.
+        high: Hertz,
+        /// The lowest multiple of half the fast rate between them.
+        multiple: u64,
         /// Half the fast rate.
         nyquist: Hertz,
     },
@@ -96,14 +118,26 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<Implau
         None => (&spec.target, problem.target),
     };
     let place = channel.map_or_else(|| "the target".to_owned(), |i| format!("channel {}", i + 1));
-    let normalised = problem.front_ends[front_end].half_power_frequency().0;
-    let edge = Hertz(normalised / TAU / spec.fast_period.0);
+    let band = problem.front_ends[front_end].half_power_band();
+    let [low, edge] = [band.low.0, band.high.0].map(|w| Hertz(w / TAU / spec.fast_period.0));
     let nyquist = Hertz(0.5 / spec.fast_period.0);
-    if normalised < NARROW * PI {
+    if band.high.0 < NARROW * PI {
         return Some(Implausible::Narrow { place, edge, nyquist, remedy: remedy(filter, edge) });
     }
     // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not.
-    (normalised > PI && channel.is_none()).then_some(Implausible::Wide { place, edge, nyquist })
+    let multiple = folding_multiple(&band).filter(|_| channel.is_none())?;
+    Some(if band.low.0 == 0.0 {
+        Implausible::Wide { place, edge, nyquist }
+    } else {
+        Implausible::Straddling { place, low, high: edge, multiple, nyquist }
+    })
+}
+
+/// The lowest multiple of half the fast rate within `band`. A band between two multiples is undersampled
+/// without loss.
+fn folding_multiple(band: &HalfPowerBand) -> Option<u64> {
+    let multiple = (band.low.0 / PI * (1.0 + ON_A_MULTIPLE)).floor() + 1.0;
+    (band.high.0 > multiple * PI * (1.0 + ON_A_MULTIPLE)).then_some(multiple as u64)
 }
 
 fn distance(apart: f64) -> String {
@@ -112,6 +146,9 @@ fn distance(apart: f64) -> String {
 
 fn remedy(filter: &FilterSpec, edge: Hertz) -> &'static str {
     match filter {
+        FilterSpec::Family { passband: Passband::BandPass { .. }, .. } => {
+            "bare numbers are in Hz; write the unit, as in band = [\"60 MHz\", \"80 MHz\"]"
+        }
         FilterSpec::Family { .. } => "a bare number is in Hz; write the unit, as in cutoff = \"9 kHz\"",
         _ if NORMALISED.contains(&(edge.0 * TAU)) => {
             "coefficients are in rad/s, and these look normalised to one sample; scale them to seconds, or give \
@@ -183,6 +220,26 @@ mod tests {
         assert!(text.ends_with("cutoff = \"9 kHz\""), "{text}");
         let wide = audio("9e6", [1.2, 0.6]);
         assert!(matches!(&wide[..], [Implausible::Wide { place, .. }] if place == "the target"), "{wide:?}");
+    }
+
+    #[test]
+    fn a_band_is_undersampled_between_two_multiples_of_half_the_rate_and_nowhere_else() {
+        let band = |edges: &str| {
+            found(&format!(
+                "fast_rate = 80e6\nratio = 2\nlatency = 12\n\
+                 target = {{ filter = {{ family = \"butterworth\", order = 3, band = [{edges}] }} }}\n\
+                 channel = [{{ delay_samples = 1.2 }}, {{ delay_samples = 0.6 }}]\ndesign = {{ method = \"iir\" }}"
+            ))
+        };
+        for edges in ["62e6, 78e6", "41e6, 79e6", "40e6, 80e6", "3e6, 39e6", "4.01e9, 4.03e9"] {
+            assert_eq!(band(edges), [], "{edges}");
+        }
+        let text = band("70e6, 90e6")[0].to_string();
+        let words =
+            "the target: -3 dB at 70 MHz and 90 MHz, with 2 times the output's Nyquist frequency 40 MHz";
+        assert!(text.starts_with(words), "{text}");
+        let narrow = band("6, 8")[0].to_string();
+        assert!(narrow.ends_with("band = [\"60 MHz\", \"80 MHz\"]"), "{narrow}");
     }
 
     #[test]

@@ -4,7 +4,6 @@ use super::text::counted;
 use crate::analog::StrictlyProper;
 use crate::quantity::readable;
 use crate::spec::Spec;
-use crate::units::Hertz;
 use std::f64::consts::{PI, TAU};
 
 /// Delays that a line holds.
@@ -34,13 +33,18 @@ fn rates(spec: &Spec) -> String {
 }
 
 fn target(spec: &Spec) -> Option<String> {
-    let edge = StrictlyProper::new(&spec.target, spec.fast_period).ok()?.half_power_frequency().0;
-    let share = format!("{} of Nyquist", two_digits(edge / PI));
+    let band = StrictlyProper::new(&spec.target, spec.fast_period).ok()?.half_power_band();
+    let edges = [band.low.0, band.high.0].map(|w| two_digits(w / PI));
+    let hertz = [band.low.0, band.high.0].map(|w| readable(w / TAU / spec.fast_period.0, "Hz"));
+    let (share, hertz) = if band.low.0 == 0.0 {
+        (format!("{} of Nyquist", edges[1]), hertz[1].clone())
+    } else {
+        (format!("{} and {} of Nyquist", edges[0], edges[1]), hertz.join(" and "))
+    };
     if spec.is_normalised() {
         return Some(format!("target -3 dB at {share}"));
     }
-    let hertz = Hertz(edge / TAU / spec.fast_period.0);
-    Some(format!("target -3 dB at {} ({share})", readable(hertz.0, "Hz")))
+    Some(format!("target -3 dB at {hertz} ({share})"))
 }
 
 fn delays(spec: &Spec) -> String {

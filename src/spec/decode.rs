@@ -13,8 +13,8 @@ use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no
 use super::reader::{Fields, Value};
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{
-    ChannelSpec, Family, FilterSpec, Method, PerChannel, Reduction, Solver, Spec, SpecProblem, Tracking,
-    UncertaintySpec, signal,
+    ChannelSpec, Family, FilterSpec, Method, Passband, PerChannel, Reduction, Solver, Spec, SpecProblem,
+    Tracking, UncertaintySpec, signal,
 };
 use crate::quantity::Time;
 
@@ -51,7 +51,7 @@ const FILTER_FORMS: [&[&str]; 5] = [
     &["num", "den"],
     &["poles", "zeros", "gain"],
     &["a", "b", "c"],
-    &["family", "order", "cutoff", "ripple_db", "attenuation_db"],
+    &["family", "order", "cutoff", "band", "ripple_db", "attenuation_db"],
     &["cascade"],
 ];
 
@@ -446,10 +446,31 @@ fn family(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
     Ok(FilterSpec::Family {
         family: named.name("filter family", &Family::ALL.map(|f| (f.name(), f)))?,
         order: fields.optional("order").map(|v| v.count("poles")).transpose()?,
-        cutoff: fields.required("cutoff", "give the cutoff in hertz")?.frequency()?,
+        passband: passband(fields)?,
         ripple_db: number("ripple_db")?,
         attenuation_db: number("attenuation_db")?,
     })
+}
+
+/// The cutoff, or the edges of the band.
+fn passband(fields: &Fields<'_>) -> Result<Passband, Fault> {
+    let missing = "give the cutoff in hertz, or band = [low, high] for a band-pass";
+    match (fields.optional("cutoff"), fields.optional("band")) {
+        (Some(_), Some(band)) => {
+            let remedy = "a low-pass has a cutoff and a band-pass has a band, keep one of them";
+            Err(band.fault(SpecProblem::Conflict { first: "cutoff", second: "band", remedy }))
+        }
+        (_, None) => Ok(Passband::LowPass { cutoff: fields.required("cutoff", missing)?.frequency()? }),
+        (None, Some(band)) => {
+            const EDGES: &str = "a list of two frequencies, as in [\"60 MHz\", \"80 MHz\"]";
+            let edges = band.items(EDGES)?;
+            let [low, high] = &edges[..] else {
+                let found = "a list of another length";
+                return Err(band.fault(SpecProblem::WrongType { expected: EDGES, found }));
+            };
+            Ok(Passband::BandPass { low: low.frequency()?, high: high.frequency()? })
+        }
+    }
 }
 
 /// Complex numbers as `[re, im]`; a bare number is real.

@@ -2,8 +2,7 @@
 //! degrees. [`crate::analog`] checks the poles.
 
 use super::filter_problem::MAX_ORDER;
-use super::{Family, FilterProblem, FilterSpec};
-use crate::units::Hertz;
+use super::{Family, FilterProblem, FilterSpec, Passband};
 
 /// Least ripple or attenuation in decibels; less is numerically none.
 pub const MIN_RIPPLE_DB: f64 = 1e-6;
@@ -89,15 +88,17 @@ impl FilterSpec {
             Self::TransferFunction { num, den } => (degree(num), degree(den)),
             Self::ZeroPoleGain { zeros, poles, .. } => (zeros.len(), poles.len()),
             Self::StateSpace { a, .. } => (a.len().saturating_sub(1), a.len()),
-            Self::Family { family, order, .. } => family_degrees(*family, order.unwrap_or(1)),
+            Self::Family { family, order, passband, .. } => {
+                passband.degrees(family_degrees(*family, order.unwrap_or(1)))
+            }
             Self::Cascade { cascade } => {
                 cascade.iter().map(Self::degrees).fold((0, 0), |sum, d| (sum.0 + d.0, sum.1 + d.1))
             }
         }
     }
 
-    /// Phi(s / `factor`): every frequency of the filter, the cut-off among them, is multiplied by `factor`,
-    /// and the gain at 0 stays. The written form stays too.
+    /// Phi(s / `factor`): every frequency of the filter, its cutoff or both edges of its band among them, is
+    /// multiplied by `factor`, and the gain stays. The written form stays too.
     #[must_use]
     pub fn with_cutoff_scaled(&self, factor: f64) -> Self {
         let scaled = |list: &[[f64; 2]]| list.iter().map(|x| x.map(|part| part * factor)).collect();
@@ -117,10 +118,10 @@ impl FilterSpec {
                 gain: gain * factor.powi(poles.len() as i32 - zeros.len() as i32),
             },
             Self::StateSpace { a, b, c } => Self::StateSpace { a: rows(a), b: rows(b), c: c.clone() },
-            Self::Family { family, order, cutoff, ripple_db, attenuation_db } => Self::Family {
+            Self::Family { family, order, passband, ripple_db, attenuation_db } => Self::Family {
                 family: *family,
                 order: *order,
-                cutoff: *cutoff * factor,
+                passband: passband.scaled(factor),
                 ripple_db: *ripple_db,
                 attenuation_db: *attenuation_db,
             },
@@ -136,9 +137,9 @@ impl FilterSpec {
             Self::TransferFunction { num, den } => check_polynomials(num, den),
             Self::ZeroPoleGain { zeros, poles, gain } => check_zpk(zeros, poles, *gain),
             Self::StateSpace { a, b, c } => check_matrices(a, b, c),
-            Self::Family { family, order, cutoff, ripple_db, attenuation_db } => {
-                check_order(*family, *order)?;
-                check_cutoff(*cutoff)?;
+            Self::Family { family, order, passband, ripple_db, attenuation_db } => {
+                check_order(*family, *order, *passband)?;
+                passband.check()?;
                 check_ripples(*family, *ripple_db, *attenuation_db)
             }
             Self::Cascade { cascade } if cascade.is_empty() => {
@@ -250,8 +251,9 @@ fn check_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>]) -> Result<(), 
     Ok(())
 }
 
-fn check_order(family: Family, order: Option<usize>) -> Result<(), FilterProblem> {
+fn check_order(family: Family, order: Option<usize>, passband: Passband) -> Result<(), FilterProblem> {
     let name = family.name();
+    let poles = |order: usize| order.saturating_mul(passband.poles_per_order());
     match (family, order) {
         (Family::Rc, None | Some(1)) => Ok(()),
         (Family::Rc, Some(order)) => {
@@ -264,18 +266,11 @@ fn check_order(family: Family, order: Option<usize>) -> Result<(), FilterProblem
             meaning: "the number of poles",
         }),
         (_, Some(0)) => Err(FilterProblem::NoPoles { key: "order" }),
-        (_, Some(order)) if order > MAX_ORDER => Err(FilterProblem::OrderTooHigh { key: "order", order }),
+        (_, Some(order)) if poles(order) > MAX_ORDER => {
+            Err(FilterProblem::OrderTooHigh { key: "order", order: poles(order) })
+        }
         _ => Ok(()),
     }
-}
-
-fn check_cutoff(cutoff: Hertz) -> Result<(), FilterProblem> {
-    check_finite("cutoff", [cutoff.0])?;
-    if cutoff.0 > 0.0 {
-        return Ok(());
-    }
-    let rule = "the cutoff must be a positive frequency in hertz".into();
-    Err(FilterProblem::ParameterRange { key: "cutoff", value: cutoff.0, unit: " Hz", rule })
 }
 
 fn check_ripples(family: Family, ripple: Option<f64>, attenuation: Option<f64>) -> Result<(), FilterProblem> {
@@ -319,6 +314,7 @@ fn check_decibels(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Hertz;
     use proptest::prelude::*;
 
     fn tf(num: &[f64], den: &[f64]) -> FilterSpec {
@@ -331,13 +327,22 @@ mod tests {
         let family = |family, order| FilterSpec::Family {
             family,
             order: Some(order),
-            cutoff: Hertz(1.0),
+            passband: Passband::LowPass { cutoff: Hertz(1.0) },
             ripple_db: None,
             attenuation_db: None,
         };
         assert_eq!(family(Family::Elliptic, 4).degrees(), (4, 4));
         assert_eq!(family(Family::Elliptic, 5).degrees(), (4, 5));
         assert_eq!(family(Family::Bessel, 4).degrees(), (0, 4));
+        let band = |family| FilterSpec::Family {
+            family,
+            order: Some(3),
+            passband: Passband::BandPass { low: Hertz(1.0), high: Hertz(2.0) },
+            ripple_db: None,
+            attenuation_db: None,
+        };
+        assert_eq!(band(Family::Elliptic).degrees(), (5, 6));
+        assert_eq!(band(Family::Bessel).degrees(), (3, 6));
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod filter_problem;
 mod limits;
 mod measured;
 mod nearest;
+mod passband;
 pub(crate) mod reader;
 mod signal;
 mod uncertainty;
@@ -30,12 +31,13 @@ pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_T
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
 pub(crate) use limits::{check_gain, check_offset};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
+pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
 pub use uncertainty::{PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
-use crate::units::{FastPeriods, Hertz, Seconds};
+use crate::units::{FastPeriods, Seconds};
 use design::KeyProblem;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -127,15 +129,16 @@ pub enum FilterSpec {
         /// 1 x n.
         c: Vec<Vec<f64>>,
     },
-    /// A classical low-pass by name.
+    /// A classical low-pass or band-pass by name.
     Family {
         /// Which one.
         family: Family,
-        /// Number of poles.
+        /// Number of poles of the low-pass; a band-pass has twice as many.
         #[serde(skip_serializing_if = "Option::is_none")]
         order: Option<usize>,
-        /// Cutoff, with scipy.signal's meaning for the family.
-        cutoff: Hertz,
+        /// The cutoff, or the edges of the band.
+        #[serde(flatten)]
+        passband: Passband,
         /// Pass-band ripple in decibels (Chebyshev 1, elliptic).
         #[serde(skip_serializing_if = "Option::is_none")]
         ripple_db: Option<f64>,
@@ -151,7 +154,7 @@ pub enum FilterSpec {
     },
 }
 
-/// The classical low-pass families.
+/// The classical families.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
@@ -165,7 +168,7 @@ pub enum Family {
     Elliptic,
     /// Maximally flat group delay, normalised by phase.
     Bessel,
-    /// One pole.
+    /// One pole; with a band, the resonator of two poles.
     Rc,
 }
 

@@ -7,7 +7,7 @@ use crate::bank::{BlockFilter, Certificate, Gamma, LowerProof, SynthesisFilters}
 use crate::design::{LiftedPlant, Problem, filters};
 use crate::linalg::{CMat, symmetric_eigenvalues};
 use crate::lti::FrequencyResponse;
-use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
 use crate::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
 
@@ -15,7 +15,7 @@ fn family(family: Family, order: usize, omega: f64) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: Some(order),
-        cutoff: Hertz(omega / TAU),
+        passband: Passband::LowPass { cutoff: Hertz(omega / TAU) },
         ripple_db: family.has_ripple().then_some(0.5),
         attenuation_db: family.has_attenuation().then_some(55.0),
     }

@@ -7,7 +7,7 @@
 use crate::support::specs::{alike, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::{ProofSearch, design, design_with};
-use hybank::spec::{Family, FilterSpec, Spec};
+use hybank::spec::{Family, FilterSpec, Passband, Spec};
 use hybank::units::Hertz;
 use hybank::verify::{EnclosedErrorSystem, Precision, Recursion, verify};
 
@@ -34,7 +34,7 @@ fn case(
     let filter = FilterSpec::Family {
         family,
         order: Some(order),
-        cutoff: Hertz(cutoff),
+        passband: Passband::LowPass { cutoff: Hertz(cutoff) },
         ripple_db: family.has_ripple().then_some(0.5),
         attenuation_db: family.has_attenuation().then_some(60.0),
     };

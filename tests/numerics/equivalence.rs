@@ -12,7 +12,7 @@ use hybank::design::filters::lifted;
 use hybank::design::problem::{Channel, Problem};
 use hybank::linalg::{Mat, singular_values};
 use hybank::simulate::{Instants, Source, sample};
-use hybank::spec::{Family, FilterSpec};
+use hybank::spec::{Family, FilterSpec, Passband};
 use hybank::units::{FastPeriods, Hertz, Seconds};
 
 struct Case {
@@ -144,7 +144,7 @@ fn a_steep_front_end() {
     let elliptic = FilterSpec::Family {
         family: Family::Elliptic,
         order: Some(5),
-        cutoff: Hertz(0.25),
+        passband: Passband::LowPass { cutoff: Hertz(0.25) },
         ripple_db: Some(0.5),
         attenuation_db: Some(40.0),
     };

@@ -6,7 +6,7 @@ use crate::support::random::Random;
 use crate::support::sweep::{each, wanted};
 use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, analyze, design};
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Reduction, Spec};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Reduction, Spec};
 use hybank::units::{RadiansPerSecond, Seconds};
 
 /// A low-pass of order 1 to 6 with its cutoff between 0.03 and 3 radians a fast sample.
@@ -15,7 +15,7 @@ fn front_end(dice: &mut Random) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: Some(dice.count(1, 6)),
-        cutoff: RadiansPerSecond(0.03 * 100f64.powf(dice.part())).in_hertz(),
+        passband: Passband::LowPass { cutoff: RadiansPerSecond(0.03 * 100f64.powf(dice.part())).in_hertz() },
         ripple_db: None,
         attenuation_db: None,
     }

@@ -2,7 +2,7 @@
 // Each program uses a part of it.
 #![allow(dead_code)]
 
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
 use hybank::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
 
@@ -22,7 +22,7 @@ pub(crate) fn low_pass(family: Family, order: usize, omega: f64) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: Some(order),
-        cutoff: Hertz(omega / TAU),
+        passband: Passband::LowPass { cutoff: Hertz(omega / TAU) },
         ripple_db: family.has_ripple().then_some(0.5),
         attenuation_db: family.has_attenuation().then_some(55.0),
     }

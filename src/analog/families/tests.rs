@@ -1,6 +1,7 @@
 //! Prototypes against stored digits and against the properties that define them.
 
 use super::*;
+use crate::units::{Hertz, Seconds};
 
 /// One line of `reference.txt` (made by `tools/analog_reference.py`).
 struct Reference {
@@ -10,6 +11,8 @@ struct Reference {
     order: usize,
     ripple_db: f64,
     attenuation_db: f64,
+    /// The edges of a band-pass in Hz.
+    band: Option<[f64; 2]>,
     expected: Zpk<Cutoffs>,
 }
 
@@ -32,6 +35,7 @@ fn reference(line: &'static str) -> Reference {
         order: words[2].parse().unwrap(),
         ripple_db: number(3),
         attenuation_db: number(4),
+        band: (words.get(6) == Some(&"e")).then(|| [number(7), number(8)]),
         expected: Zpk::new(roots("z"), roots("p"), number(5)),
     }
 }
@@ -56,7 +60,7 @@ fn distance(found: &[Complex<f64>], expected: &[Complex<f64>]) -> f64 {
 
 #[test]
 fn zeros_poles_and_gains_agree_with_scipy_and_with_sixty_digits() {
-    let references = references();
+    let references: Vec<Reference> = references().into_iter().filter(|r| r.band.is_none()).collect();
     assert_eq!(references.len(), 217);
     for r in &references {
         // scipy's own elliptic iteration stops near 1e-12; mpmath's digits are all good.
@@ -71,6 +75,43 @@ fn zeros_poles_and_gains_agree_with_scipy_and_with_sixty_digits() {
         assert!(zeros <= tolerance, "{}: zeros off by {zeros:e}", r.label);
         assert!(gain <= 20.0 * tolerance, "{}: gain off by {gain:e}", r.label);
     }
+}
+
+/// Largest distance of a pole's real part to that of the nearest pole, relative to it: the bandwidth of a
+/// resonance, which is a small part of a pole's size in a narrow band.
+fn damping_error(found: &[Complex<f64>], expected: &[Complex<f64>]) -> f64 {
+    let error = |x: &Complex<f64>| {
+        let nearest = found.iter().min_by(|a, b| (*a - x).norm().total_cmp(&(*b - x).norm())).unwrap();
+        (nearest.re / x.re - 1.0).abs()
+    };
+    expected.iter().map(error).fold(0.0, f64::max)
+}
+
+#[test]
+fn band_passes_agree_with_scipy_and_with_sixty_digits() {
+    let references: Vec<Reference> = references().into_iter().filter(|r| r.band.is_some()).collect();
+    assert_eq!(references.len(), 250);
+    for r in &references {
+        let [low, high] = r.band.unwrap();
+        let found = designed(r).band_pass(Hertz(low), Hertz(high), Seconds(1.0));
+        let label = format!("{} {low}..{high}", r.label);
+        assert_eq!(found.poles.len(), 2 * r.order, "{label}");
+        assert_eq!(found.zeros.len(), r.expected.zeros.len(), "{label}");
+        // scipy's roots lose what cancels in a narrow or a wide band.
+        let (tolerance, damping) = if r.source == "scipy" { (1e-9, 1e-3) } else { (1e-14, 1e-12) };
+        let poles = distance(&found.poles, &r.expected.poles);
+        let zeros = distance(&nonzero(&found.zeros), &nonzero(&r.expected.zeros));
+        let gain = (found.gain / r.expected.gain - 1.0).abs();
+        let damped = damping_error(&found.poles, &r.expected.poles);
+        assert!(poles <= tolerance, "{label}: poles off by {poles:e}");
+        assert!(zeros <= tolerance, "{label}: zeros off by {zeros:e}");
+        assert!(damped <= damping, "{label}: damping off by {damped:e}");
+        assert!(gain <= 100.0 * tolerance, "{label}: gain off by {gain:e}");
+    }
+}
+
+fn nonzero(roots: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    roots.iter().copied().filter(|root| root.norm() > 0.0).collect()
 }
 
 fn decibels(zpk: &Zpk<Cutoffs>, w: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::analog::StrictlyProper;
-use crate::spec::{Family, FilterSpec};
+use crate::spec::{Family, FilterSpec, Passband};
 use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -13,7 +13,8 @@ const PERIOD: Seconds = Seconds(1e-9);
 fn family(family: Family, order: usize) -> FilterSpec {
     let ripple_db = family.has_ripple().then_some(0.5);
     let attenuation_db = family.has_attenuation().then_some(50.0);
-    FilterSpec::Family { family, order: Some(order), cutoff: Hertz(CUTOFF), ripple_db, attenuation_db }
+    let passband = Passband::LowPass { cutoff: Hertz(CUTOFF) };
+    FilterSpec::Family { family, order: Some(order), passband, ripple_db, attenuation_db }
 }
 
 fn response(filter: &FilterSpec, f: f64) -> crate::linalg::Complex<f64> {

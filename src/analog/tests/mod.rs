@@ -3,7 +3,7 @@
 use super::section::Realisation;
 use super::*;
 use crate::linalg::Complex;
-use crate::spec::{Family, FilterSpec};
+use crate::spec::{Family, FilterSpec, Passband};
 use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
 
 mod realisation;
@@ -22,10 +22,22 @@ fn family(family: Family, order: usize, cutoff: f64) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: (family != Family::Rc).then_some(order),
-        cutoff: Hertz(cutoff),
+        passband: Passband::LowPass { cutoff: Hertz(cutoff) },
         ripple_db: family.has_ripple().then_some(0.5),
         attenuation_db: family.has_attenuation().then_some(60.0),
     }
+}
+
+/// The band-pass of the family, after its low-pass where it needs more poles.
+fn band_pass(kind: Family, order: usize, [low, high]: [f64; 2]) -> FilterSpec {
+    let mut filter = family(kind, order, high);
+    if let FilterSpec::Family { passband, .. } = &mut filter {
+        *passband = Passband::BandPass { low: Hertz(low), high: Hertz(high) };
+    }
+    if filter.check().is_ok() {
+        return filter;
+    }
+    FilterSpec::Cascade { cascade: vec![filter, family(Family::Rc, 1, 30.0 * high)] }
 }
 
 /// The family member, followed by the pole of a switch where it needs one.

@@ -29,6 +29,26 @@ fn families_realise_to_the_last_digits() {
 }
 
 #[test]
+fn band_passes_realise_narrow_and_wide() {
+    for kind in Family::ALL {
+        for order in 1..=(if kind == Family::Rc { 1 } else { 8 }) {
+            for band in [[0.2, 0.25], [0.2, 0.202], [20.0, 20.2], [1e-3, 10.0], [0.775, 0.975]] {
+                let phi = realise(&band_pass(kind, order, band), 1.0).unwrap();
+                let error = realisation_error(&phi);
+                assert!(error < 1e-11, "{kind:?} {order} at {band:?}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_band_too_narrow_for_double_precision_is_refused_by_its_width() {
+    let refused =
+        realise(&band_pass(Family::Butterworth, 4, [1.0, 1.0 + 1e-9]), 1.0).unwrap_err().to_string();
+    assert!(refused.contains("Hz wide: a band this narrow"), "{refused}");
+}
+
+#[test]
 fn high_orders_realise() {
     for (kind, order) in
         [(Family::Butterworth, 32), (Family::Bessel, 32), (Family::Chebyshev1, 21), (Family::Elliptic, 15)]

@@ -76,7 +76,7 @@ fn an_edge_sharper_than_a_double_is_refused_by_its_order() {
     let filter = FilterSpec::Family {
         family: Family::Elliptic,
         order: Some(17),
-        cutoff: Hertz(1.0),
+        passband: Passband::LowPass { cutoff: Hertz(1.0) },
         ripple_db: Some(11.0),
         attenuation_db: Some(11.05),
     };

@@ -81,10 +81,20 @@ fn every_filter_form_is_read() {
     let family = |family, order, ripple_db, attenuation_db| FilterSpec::Family {
         family,
         order,
-        cutoff: Hertz(2e4),
+        passband: Passband::LowPass { cutoff: Hertz(2e4) },
         ripple_db,
         attenuation_db,
     };
+    assert_eq!(
+        target("{ family = 'bessel', order = 3, band = ['60 MHz', 80e6] }"),
+        FilterSpec::Family {
+            family: Family::Bessel,
+            order: Some(3),
+            passband: Passband::BandPass { low: Hertz(60e6), high: Hertz(80e6) },
+            ripple_db: None,
+            attenuation_db: None,
+        }
+    );
     assert_eq!(
         target(r#"{ a = [[-1, 2.5], [0, -3]], b = [[0], [1]], c = [[1, 0]] }"#),
         FilterSpec::StateSpace {

@@ -183,6 +183,23 @@ fn every_mistake_in_a_filter_has_its_message() {
         ("{ family = 'butterworth', order = 0, cutoff = 1 }", "no pole"),
         ("{ family = 'butterworth', order = 33, cutoff = 1 }", "33 poles, but at most 32"),
         ("{ family = 'butterworth', order = 3, cutoff = -1 }", "cutoff = -1 Hz"),
+        ("{ family = 'butterworth', order = 3, cutoff = 1, band = [1, 2] }", "keep one of them"),
+        ("{ family = 'butterworth', order = 17, band = [1, 2] }", "34 poles, but at most 32"),
+        (
+            "{ family = 'butterworth', order = 3, band = [0, 2] }",
+            "band = 0 Hz: a band-pass begins above 0 Hz",
+        ),
+        ("{ family = 'butterworth', order = 3, band = [2, 1] }", "write band = [1, 2]"),
+        (
+            "{ family = 'butterworth', order = 3, band = [2, 2] }",
+            "both edges of the band are at this frequency",
+        ),
+        ("{ family = 'butterworth', order = 3, band = [1] }", "a list of two frequencies, as in [\"60 MHz\""),
+        ("{ family = 'butterworth', order = 3, band = 7 }", "a list of two frequencies"),
+        (
+            "{ family = 'elliptic', order = 4, band = [1, 2], ripple_db = 1, attenuation_db = 60 }",
+            "or choose the odd order 5",
+        ),
         (
             "{ family = 'butterworth', order = 3, cutoff = 1, ripple_db = 1 }",
             "ripple_db = 1 has no meaning for a butterworth",

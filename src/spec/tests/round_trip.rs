@@ -33,7 +33,11 @@ fn written_filter() -> impl Strategy<Value = FilterSpec> {
             FilterSpec::Family {
                 family,
                 order: (family != Family::Rc).then_some(2 * k + 1),
-                cutoff: Hertz(cutoff),
+                passband: if k % 2 == 0 || cutoff < f64::MIN_POSITIVE {
+                    Passband::LowPass { cutoff: Hertz(cutoff) }
+                } else {
+                    Passband::BandPass { low: Hertz(cutoff / 3.0), high: Hertz(cutoff) }
+                },
                 ripple_db: family.has_ripple().then_some(0.1),
                 attenuation_db: family.has_attenuation().then_some(51.7),
             }

@@ -1,0 +1,109 @@
+//! Where a filter family passes: a cutoff, or the two edges of a band.
+
+use serde::{Serialize, Serializer};
+
+use super::FilterProblem;
+use crate::units::Hertz;
+
+/// The edges of a family member, with scipy.signal's meaning for the family. Written as the key `cutoff` or
+/// as the key `band`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum Passband {
+    /// From 0 to the cutoff: one pole per order.
+    #[serde(rename = "cutoff", serialize_with = "as_number")]
+    LowPass {
+        /// The cutoff.
+        cutoff: Hertz,
+    },
+    /// From edge to edge: two poles per order. An edge means for the band-pass what the cutoff means for the
+    /// low-pass.
+    #[serde(rename = "band", serialize_with = "as_pair")]
+    BandPass {
+        /// f_1, above 0.
+        low: Hertz,
+        /// f_2, above f_1.
+        high: Hertz,
+    },
+}
+
+fn as_number<S: Serializer>(cutoff: &Hertz, serializer: S) -> Result<S::Ok, S::Error> {
+    cutoff.serialize(serializer)
+}
+
+fn as_pair<S: Serializer>(low: &Hertz, high: &Hertz, serializer: S) -> Result<S::Ok, S::Error> {
+    [low, high].serialize(serializer)
+}
+
+impl Passband {
+    /// Poles of the filter for each pole of its low-pass prototype.
+    pub const fn poles_per_order(self) -> usize {
+        match self {
+            Self::LowPass { .. } => 1,
+            Self::BandPass { .. } => 2,
+        }
+    }
+
+    /// The degrees of numerator and denominator that those of a prototype become. In a band-pass each pole
+    /// of the prototype without a zero gets a zero at s = 0, so the excess of poles stays.
+    pub(super) const fn degrees(self, (zeros, poles): (usize, usize)) -> (usize, usize) {
+        match self {
+            Self::LowPass { .. } => (zeros, poles),
+            Self::BandPass { .. } => (zeros + poles, 2 * poles),
+        }
+    }
+
+    /// All edges times `factor`.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        match self {
+            Self::LowPass { cutoff } => Self::LowPass { cutoff: cutoff * factor },
+            Self::BandPass { low, high } => Self::BandPass { low: low * factor, high: high * factor },
+        }
+    }
+
+    /// Checks the order of the edges.
+    pub(super) fn check(self) -> Result<(), FilterProblem> {
+        match self {
+            Self::LowPass { cutoff } if !cutoff.0.is_finite() => Err(not_finite("cutoff", cutoff)),
+            Self::LowPass { cutoff } if cutoff.0 <= 0.0 => {
+                Err(refused("cutoff", cutoff, "the cutoff must be a positive frequency in hertz".into()))
+            }
+            Self::LowPass { .. } => Ok(()),
+            Self::BandPass { low, high } => check_band(low, high),
+        }
+    }
+}
+
+fn check_band(low: Hertz, high: Hertz) -> Result<(), FilterProblem> {
+    if let Some(edge) = [low, high].into_iter().find(|edge| !edge.0.is_finite()) {
+        return Err(not_finite("band", edge));
+    }
+    if low.0 <= 0.0 {
+        let rule = format!(
+            "a band-pass begins above 0 Hz; for the low-pass from 0 to {high} Hz write cutoff = {high}",
+            high = high.0
+        );
+        return Err(refused("band", low, rule));
+    }
+    if low == high {
+        let rule = "both edges of the band are at this frequency; give two, as in band = [60e6, 80e6]".into();
+        return Err(refused("band", high, rule));
+    }
+    if high < low {
+        let rule = format!(
+            "the upper edge is below the lower one, {low} Hz; write band = [{high}, {low}]",
+            low = low.0,
+            high = high.0
+        );
+        return Err(refused("band", high, rule));
+    }
+    Ok(())
+}
+
+fn not_finite(key: &'static str, value: Hertz) -> FilterProblem {
+    FilterProblem::NotFinite { key, value: value.0 }
+}
+
+fn refused(key: &'static str, value: Hertz, rule: String) -> FilterProblem {
+    FilterProblem::ParameterRange { key, value: value.0, unit: " Hz", rule }
+}
