@@ -2,10 +2,10 @@
 
 use super::DesignError;
 use super::problem::{Problem, common_delay};
-use crate::analog::HalfPowerBand;
+use crate::analog::resolved_band;
 use crate::quantity::readable;
-use crate::spec::{FilterSpec, Passband, Spec};
-use crate::units::Hertz;
+use crate::spec::{Band, FilterSpec, Passband, Spec};
+use crate::units::{Hertz, RadiansPerFastPeriod};
 use std::f64::consts::{PI, TAU};
 
 /// Bandwidths below this share of the output's Nyquist frequency are implausible.
@@ -70,6 +70,34 @@ pub enum Implausible {
         /// Half the fast rate.
         nyquist: Hertz,
     },
+    /// A signal whose band reaches over a multiple of half the fast rate.
+    #[error(
+        "the band of the signal, {} to {}, reaches over {}, {multiple} times the output's Nyquist frequency; there it \
+         folds onto itself, also in an ideal converter. State the band that matters, or choose another fast rate",
+        readable(.low.0, "Hz"), readable(.high.0, "Hz"), readable(.nyquist.0 * *.multiple as f64, "Hz")
+    )]
+    FoldedSignal {
+        /// Where the band begins.
+        low: Hertz,
+        /// Where it ends.
+        high: Hertz,
+        /// The lowest multiple of half the fast rate between them.
+        multiple: u64,
+        /// Half the fast rate.
+        nyquist: Hertz,
+    },
+    /// A signal with more bandwidth than the samples resolve.
+    #[error(
+        "the band of the signal is {} wide, and the samples of all converters together resolve {}; part of it aliases, \
+         whatever the filters do. Use more converters, or state a narrower band",
+        readable(.width.0, "Hz"), readable(.resolved.0, "Hz")
+    )]
+    WideSignal {
+        /// Its width.
+        width: Hertz,
+        /// Half the mean rate of all samples, at most half the fast rate.
+        resolved: Hertz,
+    },
     /// Two channels that sample almost at one instant.
     #[error(
         "channels {first} and {second} sample {} modulo the slow period; channels that sample at one instant lower \
@@ -104,6 +132,7 @@ pub enum Implausible {
 pub fn implausible(spec: &Spec) -> Result<Vec<Implausible>, DesignError> {
     let problem = Problem::new(spec, spec.latency.unwrap_or_else(|| common_delay(spec)))?;
     let mut found: Vec<Implausible> = band(spec, &problem, None).into_iter().collect();
+    found.extend(signal_band(spec));
     let other = |i: &usize| spec.channels[*i].filter != spec.target;
     found.extend((0..spec.channels.len()).filter(other).filter_map(|i| band(spec, &problem, Some(i))));
     found.extend(same_instants(&problem));
@@ -124,8 +153,10 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<Implau
     if band.high.0 < NARROW * PI {
         return Some(Implausible::Narrow { place, edge, nyquist, remedy: remedy(filter, edge) });
     }
-    // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not.
-    let multiple = folding_multiple(&band).filter(|_| channel.is_none())?;
+    // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not, unless
+    // the signal is narrower.
+    let may_be_wide = channel.is_some() || spec.signal.is_some();
+    let multiple = folding_multiple([band.low, band.high]).filter(|_| !may_be_wide)?;
     Some(if band.low.0 == 0.0 {
         Implausible::Wide { place, edge, nyquist }
     } else {
@@ -133,11 +164,24 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<Implau
     })
 }
 
-/// The lowest multiple of half the fast rate within `band`. A band between two multiples is undersampled
+/// The band of the signal, where the spec states one.
+fn signal_band(spec: &Spec) -> Option<Implausible> {
+    let Band { low, high } = spec.signal.as_ref()?.band()?;
+    let (width, resolved) = (high - low, resolved_band(spec));
+    if let Some(multiple) =
+        folding_multiple([low, high].map(|f| f.angular().per_fast_period(spec.fast_period)))
+    {
+        let nyquist = Hertz(0.5 / spec.fast_period.0);
+        return Some(Implausible::FoldedSignal { low, high, multiple, nyquist });
+    }
+    (width > resolved).then_some(Implausible::WideSignal { width, resolved })
+}
+
+/// The lowest multiple of half the fast rate between two edges. A band between two multiples is undersampled
 /// without loss.
-fn folding_multiple(band: &HalfPowerBand) -> Option<u64> {
-    let multiple = (band.low.0 / PI * (1.0 + ON_A_MULTIPLE)).floor() + 1.0;
-    (band.high.0 > multiple * PI * (1.0 + ON_A_MULTIPLE)).then_some(multiple as u64)
+fn folding_multiple([low, high]: [RadiansPerFastPeriod; 2]) -> Option<u64> {
+    let multiple = (low.0 / PI * (1.0 + ON_A_MULTIPLE)).floor() + 1.0;
+    (high.0 > multiple * PI * (1.0 + ON_A_MULTIPLE)).then_some(multiple as u64)
 }
 
 fn distance(apart: f64) -> String {
@@ -265,5 +309,27 @@ mod tests {
         let text = audio("9000.0", [2.6, 0.6])[0].to_string();
         assert!(text.starts_with("channels 1 and 2 sample at one instant modulo the slow period"), "{text}");
         assert_eq!(audio("9000.0", [2.5, 0.3]), [Implausible::LongSpan { span: 2.2, ratio: 2 }]);
+    }
+
+    /// A band says what matters, so a wide target draws no warning beside it.
+    #[test]
+    fn a_band_of_the_signal_may_be_undersampled_but_not_folded() {
+        let signal = |band: &str| {
+            found(&format!(
+                "fast_rate = 80e6\nratio = 4\nlatency = 12\nsignal = {{ band = {band} }}\n\
+                 target = {{ filter = {{ family = \"butterworth\", order = 1, cutoff = 100e6 }} }}\n\
+                 channel = [{{ delay_samples = 2.2 }}, {{ delay_samples = 0.6 }}]"
+            ))
+        };
+        for band in ["19e6", "20e6", "[62e6, 78e6]", "[80e6, 99e6]"] {
+            assert_eq!(signal(band), [], "{band}");
+        }
+        let [folded, wide] = ["[70e6, 90e6]", "30e6"].map(|band| signal(band)[0].to_string());
+        assert!(
+            folded.starts_with("the band of the signal, 70 MHz to 90 MHz, reaches over 80 MHz"),
+            "{folded}"
+        );
+        let words = "the band of the signal is 30 MHz wide, and the samples of all converters together resolve 20 MHz";
+        assert!(wide.starts_with(words), "{wide}");
     }
 }
