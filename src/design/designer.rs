@@ -101,7 +101,7 @@ pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, Des
     let (complete, problem, watch) = normalise(spec, options)?;
     watch.begins(Stage::Filters);
     let settings = settings(&complete)?;
-    let repeats = Repeats::of(spec.design.method);
+    let repeats = Repeats::of(&spec.design);
     let merged = if settings.robust.is_some() {
         problem.keep_channels()
     } else {

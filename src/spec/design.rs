@@ -43,9 +43,14 @@ impl Method {
         }
     }
 
-    /// Whether the method makes FIR filters and therefore reads `taps`.
+    /// Whether the method makes FIR filters whether `taps` is given or not.
     pub const fn has_taps(self) -> bool {
         matches!(self, Self::Fir | Self::Sinc | Self::Separation)
+    }
+
+    /// Whether the method reads `taps`; `h2` makes FIR filters with it and recursive ones without.
+    pub const fn reads_taps(self) -> bool {
+        self.has_taps() || matches!(self, Self::H2)
     }
 
     /// Whether the method minimises gamma and therefore reads `gamma_margin`.
@@ -68,7 +73,7 @@ impl Method {
         matches!(self, Self::Fir)
     }
 
-    /// Whether the method makes recursive filters and therefore reads `order` and `reduction_loss_db`.
+    /// Whether the method may make recursive filters, for which it reads `order` and `reduction_loss_db`.
     pub const fn has_states(self) -> bool {
         matches!(self, Self::Iir | Self::H2)
     }
@@ -117,6 +122,11 @@ impl Reduction {
 }
 
 impl DesignSpec {
+    /// Whether the filters are FIR, not recursive.
+    pub const fn is_fir(&self) -> bool {
+        self.method.has_taps() || (self.method.reads_taps() && self.taps.is_some())
+    }
+
     /// A method, with taps if it makes FIR filters, and no other keys.
     pub const fn new(method: Method, taps: Option<usize>) -> Self {
         Self {
@@ -247,7 +257,7 @@ impl DesignSpec {
 
     fn check_keys(&self) -> Result<(), KeyProblem> {
         let keys = [
-            ("taps", self.taps.is_some(), self.method.has_taps(), "fir"),
+            ("taps", self.taps.is_some(), self.method.reads_taps(), "fir or h2"),
             ("gamma_margin", self.gamma_margin.is_some(), self.method.has_gamma_margin(), "fir or iir"),
             ("solver", self.solver.is_some(), self.method.has_solver(), "fir"),
             ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
@@ -276,6 +286,13 @@ impl DesignSpec {
             return blame(
                 "tracking",
                 Err(SpecProblem::Conflict { first: "bits", second: "tracking", remedy }),
+            );
+        }
+        if let (Some(reduction), true, Method::H2) = (self.reduction, self.is_fir(), self.method) {
+            let (method, remedy) = ("h2 with taps", "h2 without taps");
+            return blame(
+                reduction.key(),
+                Err(SpecProblem::NeedlessKey { key: reduction.key(), method, remedy }),
             );
         }
         match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
@@ -314,9 +331,9 @@ impl DesignOverrides {
     }
 
     /// Values of the command line take precedence. Keys of the file that a new method does not read are
-    /// dropped.
+    /// dropped; taps too if the new method is recursive without them.
     pub(super) fn over(self, file: Self) -> Self {
-        let replaced = self.method;
+        let replaced = self.method.filter(|method| file.method != Some(*method));
         let kept = |has: fn(Method) -> bool| replaced.is_none_or(has);
         Self {
             method: self.method.or(file.method),

@@ -5,7 +5,6 @@
 //! taps, without regard to noise) and `iir`, the rms for `h2`; for `sinc` and `separation` it is their
 //! gamma.
 
-mod history_errors;
 mod reach;
 mod recursive;
 mod search;
@@ -38,7 +37,7 @@ type Compared<'a> = &'a dyn Fn(usize);
 /// [`Problem`].
 pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
     let mut complete = spec.clone();
-    if spec.design.method.has_taps() {
+    if spec.design.is_fir() {
         complete.design.taps = Some(taps(spec));
         if let Some(latency) = spec.latency {
             reach::check(&Problem::new(spec, latency)?, taps(spec))?;
@@ -64,9 +63,10 @@ pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, Des
 }
 
 /// Taps per channel: the number in the spec, or 12 M - 1 for the comparison methods (23 for M = 2, as in
-/// the thesis). The method `fir` has no default; [`Spec::check`] asks for the number.
+/// the thesis); 0 for recursive filters. The method `fir` has no default; [`Spec::check`] asks for the number.
 fn taps(spec: &Spec) -> usize {
-    spec.design.taps.unwrap_or(12 * spec.ratio - 1)
+    let usual = if spec.design.is_fir() { 12 * spec.ratio - 1 } else { 0 };
+    spec.design.taps.unwrap_or(usual)
 }
 
 /// The latency m0 of a spec in fast samples: the number in the spec, or the designer's choice.
@@ -113,7 +113,7 @@ fn settings_earlier(spec: &Spec, fast_periods: usize) -> Result<Settings, Design
 }
 
 fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignError> {
-    let repeats = Repeats::of(spec.design.method);
+    let repeats = Repeats::of(&spec.design);
     // Delays that all channels have only add to the latency.
     let common = common_delay(spec);
     let problem = Problem::new(spec, common)?.earlier(common).merge_channels(repeats).of_unit_size()?.problem;

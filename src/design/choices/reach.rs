@@ -9,8 +9,8 @@
 //! the mean over frequency of a square that is nowhere above gamma^2, so gamma^2 is at least the largest of
 //! them.
 
-use super::history_errors::HistoryErrors;
 use crate::design::DesignError;
+use crate::design::history_errors::HistoryErrors;
 use crate::design::merging::Repeats;
 use crate::design::problem::Problem;
 use crate::spec::MAX_LATENCY;

@@ -1,9 +1,9 @@
 //! The latency of recursive banks. They see all past samples, and a bank that delays its output by one fast
 //! sample is a bank of one more sample of latency, so neither error grows with the latency.
 
-use super::history_errors::HistoryErrors;
 use super::search::WORTHWHILE;
 use crate::design::DesignError;
+use crate::design::history_errors::HistoryErrors;
 use crate::design::problem::Problem;
 use std::collections::BTreeMap;
 

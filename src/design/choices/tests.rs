@@ -1,5 +1,5 @@
-use super::history_errors::HistoryErrors;
 use super::*;
+use crate::design::history_errors::HistoryErrors;
 use crate::lmi::sampled;
 
 /// The problem of a spec in normalised time with the same filter everywhere.

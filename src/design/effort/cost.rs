@@ -69,6 +69,13 @@ pub(super) fn proof(states: f64) -> Effort {
     Effort { seconds: (CERTIFICATE + long) * states.powi(3), bytes: 30.0 * REAL * states * states }
 }
 
+/// The fixed-point smoother over so many frames, with so many samples of the target at a time.
+pub(super) fn smoother(sizes: &Sizes, frames: f64, targets: f64) -> Effort {
+    let s = sizes.front_end_states;
+    let steps = frames * sizes.outputs();
+    Effort { seconds: SMALL * steps * 8.0 * s * s * (s + targets), bytes: COMPLEX * (s * s + steps * s) }
+}
+
 /// Whether the noncausal bound explains the optimum, so that no other bound is searched.
 pub(super) fn is_noncausal(sizes: &Sizes) -> bool {
     sizes.latency - sizes.longest_delay > NONCAUSAL_LATENCY

@@ -2,6 +2,7 @@
 
 use super::amount::Effort;
 use super::cost::{
+    smoother,
     COMPLEX, PRODUCT, REAL, SMALL, causal_bound, complex_cube, is_noncausal, peak, proof, response,
 };
 use super::sizes::Sizes;
@@ -137,6 +138,12 @@ pub(super) fn judged(sizes: &Sizes) -> Effort {
 /// taps reach back over the latency that the delays leave.
 pub(super) fn scale(sizes: &Sizes) -> Effort {
     judged(&Sizes { taps: sizes.look_back + sizes.ratio, ..*sizes })
+}
+
+/// The bank of least mean square: the smoother passes through the history once for the phases with most lags
+/// and once for the others.
+pub(super) fn mean_square(sizes: &Sizes) -> Effort {
+    smoother(sizes, sizes.lags() + 1.0, sizes.ratio).times(2.0).then(judged(sizes))
 }
 
 /// A bank for whole delays and a fractional delay for each channel.

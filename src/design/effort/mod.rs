@@ -51,7 +51,7 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     let taps = spec.design.taps.unwrap_or_default();
     let common = if spec.latency.is_none() { common_delay(spec) } else { 0 };
     let problem = Problem::new(spec, spec.latency.unwrap_or(common))?.earlier(common);
-    let problem = problem.merge_channels(Repeats::of(spec.design.method)).problem;
+    let problem = problem.merge_channels(Repeats::of(&spec.design)).problem;
     let guess = || problem.longest_delay().0.ceil() as usize + taps / 4;
     let latency = if spec.latency.is_none() { guess() } else { problem.latency };
     let sizes = Sizes::new(&Problem { latency, ..problem }, taps);
@@ -71,6 +71,7 @@ fn synthesis(spec: &Spec, sizes: &Sizes) -> Effort {
         Method::Fir if spec.design.solver == Some(Solver::Kyp) => fir::by_lmi(sizes),
         Method::Fir => fir::design(sizes).then(robust(spec, sizes)),
         Method::Iir => recursive::design(sizes),
+        Method::H2 if spec.design.is_fir() => fir::mean_square(sizes),
         Method::H2 => recursive::mean_square(sizes),
         Method::Sinc => fir::judged(sizes),
         Method::Separation => fir::separation(sizes),
@@ -88,15 +89,15 @@ fn robust(spec: &Spec, sizes: &Sizes) -> Effort {
 
 /// The search for a proof.
 fn proven(spec: &Spec, sizes: &Sizes) -> Effort {
-    if spec.design.method.has_taps() { fir::proven(sizes) } else { recursive::proven(sizes) }
+    if spec.design.is_fir() { fir::proven(sizes) } else { recursive::proven(sizes) }
 }
 
 /// The choice of the latency, for a method of which one design takes `design`.
 fn chosen(spec: &Spec, sizes: &Sizes, design: Effort) -> Effort {
     match spec.design.method {
         Method::Fir => fir::comparison(sizes).times(COMPARISONS),
-        Method::Iir => design.times(COMPARISONS).then(recursive::smoother(sizes)),
-        Method::H2 => recursive::smoother(sizes),
+        Method::Iir => design.times(COMPARISONS).then(recursive::causal_errors(sizes)),
+        Method::H2 => recursive::causal_errors(sizes),
         Method::Sinc | Method::Separation => {
             design.times((sizes.taps + sizes.longest_delay).min(MOST_COMPARISONS))
         }
