@@ -5,7 +5,7 @@
 //! sample of the other, which a filter with memory has seen. Kept apart, they would make the plant singular.
 
 use super::lifting::SAME_INSTANT;
-use super::problem::{Channel, Problem};
+use super::problem::Problem;
 use crate::linalg::Mat;
 use crate::spec::{DesignSpec, Method};
 

@@ -78,11 +78,24 @@ impl LiftedPlant {
     /// # Errors
     /// [`DesignError::Shapes`] never: the sizes fit.
     pub(super) fn with_noise(&self) -> Result<Self, DesignError> {
+        self.with_noise_scaled(1.0)
+    }
+
+    /// Whether a converter has noise.
+    pub(super) fn has_noise(&self) -> bool {
+        self.problem.noise.iter().any(|power| *power > 0.0)
+    }
+
+    /// As [`Self::with_noise`], with `share` of the rms of the noise.
+    ///
+    /// # Errors
+    /// As [`Self::with_noise`].
+    pub(super) fn with_noise_scaled(&self, share: f64) -> Result<Self, DesignError> {
         let noise = &self.problem.noise;
         let noisy: Vec<usize> = (0..noise.len()).filter(|&i| noise[i] > 0.0).collect();
         let chains = self.chains.iter().zip(noise);
         let chains = chains.map(|(chain, power)| if *power > 0.0 { 0..0 } else { chain.clone() });
-        let rms = |i: usize, k: usize| if noisy[k] == i { noise[i].sqrt() } else { 0.0 };
+        let rms = |i: usize, k: usize| if noisy[k] == i { share * noise[i].sqrt() } else { 0.0 };
         let added = |system: &StateSpace| {
             let d = Mat::from_fn(system.outputs(), noisy.len(), rms);
             let b = linalg::hstack(&[system.b(), &Mat::zeros(system.order(), noisy.len())])?;

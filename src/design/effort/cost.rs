@@ -27,6 +27,8 @@ const LONG_CERTIFICATE: f64 = 1.3e-5;
 /// Seconds per n^2 and per row, a sample or a front end's state, of a period of the causal recursion in 512
 /// bits.
 const RECURSION: f64 = 1e-7;
+/// Samples of the target whose errors may still fall, at an instant of a survey of all latencies.
+pub(super) const SURVEYED: f64 = 64.0;
 /// Fast periods of latency beyond the longest delay with which the noncausal bound explains nearly any
 /// optimum.
 const NONCAUSAL_LATENCY: f64 = 32.0;

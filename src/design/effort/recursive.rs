@@ -1,7 +1,7 @@
 //! The effort of recursive designs.
 
 use super::amount::Effort;
-use super::cost::{REAL, SMALL, causal_bound, peak, proof, response, smoother};
+use super::cost::{REAL, SMALL, causal_bound, peak, proof, response, smoother, SURVEYED};
 use super::sizes::Sizes;
 
 /// Riccati equations of an H-infinity design of many states, where the noncausal bound is nearly always
@@ -10,8 +10,6 @@ const TRIALS: f64 = 1.5;
 const RICCATI: f64 = 150.0;
 /// Frames of history on which the errors of all causal banks are computed, beyond the latency.
 const HISTORY: f64 = 128.0;
-/// Samples of the target whose errors may still fall, at an instant of a survey.
-const SURVEYED: f64 = 64.0;
 
 /// The bank of least gamma. Not counted are the trials in extended precision where the optimum lies above
 /// every bound: up to half a minute for up to 96 states, nothing beyond.
