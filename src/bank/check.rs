@@ -157,7 +157,8 @@ impl Bank {
 
     fn check_method(&self) -> Checked {
         let fir = matches!(self.filters, SynthesisFilters::Fir(_));
-        if fir == self.method.has_taps() {
+        let fits = if fir { self.method.reads_taps() } else { !self.method.has_taps() };
+        if fits {
             return Ok(());
         }
         let (found, expected) = if fir { ("taps", "state_space") } else { ("state_space", "taps") };

@@ -79,7 +79,8 @@ pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) ->
 
 /// A value of the command line that was given in place of the spec's `key`.
 pub(super) fn bad_flag(key: &str, problem: &SpecProblem) -> Failure {
-    Failure::Input(format!("--{}: {problem}", key.replace('_', "-")))
+    let flag = if key == "target_snr_db" { "snr".to_owned() } else { key.replace('_', "-") };
+    Failure::Input(format!("--{flag}: {problem}"))
 }
 
 /// The spec of a spec file, or the one that a bank file carries (with the bank's latency).

@@ -101,7 +101,7 @@ pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, Des
     let (complete, problem, watch) = normalise(spec, options)?;
     watch.begins(Stage::Filters);
     let settings = settings(&complete)?;
-    let repeats = Repeats::of(spec.design.method);
+    let repeats = Repeats::of(&spec.design);
     let merged = if settings.robust.is_some() {
         problem.keep_channels()
     } else {
@@ -164,7 +164,7 @@ fn normalise<'a>(spec: &Spec, options: &Options<'a>) -> Result<(Spec, Problem, W
     let open = with_taps(spec)?;
     let mut watch = Watch { observer: options.observer, effort: checked(&open)? };
     let complete = completed(&open, &|designs| watch.begins(Stage::Latency { designs }))?;
-    if spec.latency.is_none() {
+    if complete != open {
         watch.effort = checked(&complete)?;
     }
     let problem = Problem::new(&complete, complete.latency.unwrap_or_default())?;
@@ -193,7 +193,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
     };
     Design {
         latency_chosen: spec.latency.is_none(),
-        taps_chosen: spec.design.method.has_taps() && spec.design.taps.is_none(),
+        taps_chosen: spec.design.is_fir() && spec.design.taps.is_none(),
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
         iterations: synthesis.iterations,
         words,

@@ -146,6 +146,19 @@ pub enum DesignError {
         /// Most states.
         limit: usize,
     },
+    /// No number of taps reaches the SNR that was asked for.
+    #[error(
+        "an SNR of {wanted:.1} dB is out of reach: no bank of latency {latency} has more than {best:.1} dB; ask for less, \
+         allow a longer latency, or state less noise"
+    )]
+    SnrOutOfReach {
+        /// Decibels.
+        wanted: f64,
+        /// The most that any number of taps reaches, in decibels.
+        best: f64,
+        /// m0, fast samples.
+        latency: usize,
+    },
     /// The design would take longer than ten minutes.
     #[error(
         "this design would take about {effort}, and ten minutes are allowed: {remedy}; --no-limit runs it all the same"

@@ -185,18 +185,17 @@ impl<E: AffineError> Exchange<E> {
     /// # Errors
     /// As [`Exchange::optimise`].
     pub(super) fn optimise_at(&mut self, pace: Pace) -> Result<Candidate, DesignError> {
-        let least = self.minimise_gamma(pace, f64::INFINITY)?;
+        let least = self.minimise_gamma(pace)?;
         self.leave_out_inactive(&least, pace.active)?;
         self.minimise_mean_square(least, pace)
     }
 
-    /// Unknowns with gamma within `accuracy` of the optimum, without the secondary objective. Ends early
-    /// when the lower bound exceeds `hopeless`.
+    /// Unknowns with gamma within `accuracy` of the optimum, without the secondary objective.
     ///
     /// # Errors
     /// As [`Exchange::optimise`].
-    pub(super) fn compare(&mut self, accuracy: f64, hopeless: f64) -> Result<Candidate, DesignError> {
-        self.minimise_gamma(Pace::steady(accuracy), hopeless)
+    pub(super) fn compare(&mut self, accuracy: f64) -> Result<Candidate, DesignError> {
+        self.minimise_gamma(Pace::steady(accuracy))
     }
 
     /// Adds points at the given frequencies, except where there is one. Returns whether any was added.
@@ -214,7 +213,7 @@ impl<E: AffineError> Exchange<E> {
         Ok(!added.is_empty())
     }
 
-    fn minimise_gamma(&mut self, pace: Pace, hopeless: f64) -> Result<Candidate, DesignError> {
+    fn minimise_gamma(&mut self, pace: Pace) -> Result<Candidate, DesignError> {
         let mut best: Option<Candidate> = None;
         let mut width = f64::INFINITY;
         for _ in 0..pace.rounds {
@@ -224,7 +223,7 @@ impl<E: AffineError> Exchange<E> {
                 best = Some(candidate);
             }
             let gamma = best.as_ref().map_or(0.0, |best| best.peaks.estimate);
-            if gamma <= self.lower * (1.0 + pace.accuracy) || self.lower > hopeless {
+            if gamma <= self.lower * (1.0 + pace.accuracy) {
                 break;
             }
             // Without a peak to add it is the problem on the points that is not solved closely enough.

@@ -16,17 +16,24 @@ const USUAL: f64 = 16.0;
 
 impl Problem {
     /// For each channel the unit u_i in which it is designed: u_i times the measurement has about unit size.
-    /// The size is the root mean square of the samples for white noise of unit density at the analog input,
-    /// without the noise of the converter.
     ///
     /// # Errors
     /// [`DesignError::Lti`] if a decomposition does not converge.
     pub(super) fn measurement_units(&self) -> Result<Vec<f64>, DesignError> {
+        Ok(self.measurement_sizes()?.into_iter().map(unit).collect())
+    }
+
+    /// The root mean square of the samples of each channel for white noise of unit density at the analog
+    /// input, without the noise of the converter.
+    ///
+    /// # Errors
+    /// As [`Problem::measurement_units`].
+    pub(super) fn measurement_sizes(&self) -> Result<Vec<f64>, DesignError> {
         let joint = JointState::new(self)?;
         let (transition, input) = joint.over(self.ratio as f64)?;
         let outputs = joint.c() * controllability_root(&transition, &input)?;
         let size = |channel: &Channel| channel.gain.abs() * outputs.row(channel.front_end).norm();
-        Ok(self.channels.iter().map(|channel| unit(size(channel))).collect())
+        Ok(self.channels.iter().map(size).collect())
     }
 }
 

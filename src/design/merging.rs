@@ -5,9 +5,9 @@
 //! sample of the other, which a filter with memory has seen. Kept apart, they would make the plant singular.
 
 use super::lifting::SAME_INSTANT;
-use super::problem::{Channel, Problem};
+use super::problem::Problem;
 use crate::linalg::Mat;
-use crate::spec::Method;
+use crate::spec::{DesignSpec, Method};
 
 /// Which channels count as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,12 +17,19 @@ pub(super) enum Repeats {
     /// Proportional filters that sample at the same instant or whole slow periods apart. The newest sample
     /// stands for all.
     AtWholePeriods,
+    /// The same among channels without noise. With noise an older sample says more of its instant, and the
+    /// noise keeps the plant regular.
+    AtWholePeriodsUnlessNoisy,
 }
 
 impl Repeats {
-    /// The repeats that carry no information for banks of `method`.
-    pub(super) fn of(method: Method) -> Self {
-        if method.has_taps() { Self::AtOneInstant } else { Self::AtWholePeriods }
+    /// The repeats that carry no information for the bank that `design` asks for.
+    pub(super) fn of(design: &DesignSpec) -> Self {
+        match design.method {
+            _ if design.is_fir() => Self::AtOneInstant,
+            Method::H2 => Self::AtWholePeriodsUnlessNoisy,
+            _ => Self::AtWholePeriods,
+        }
     }
 }
 
@@ -81,9 +88,8 @@ impl Problem {
     /// The channels in groups that carry one measurement, in the order of their first channels.
     fn groups(&self, repeats: Repeats) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();
-        for (i, channel) in self.channels.iter().enumerate() {
-            let known =
-                groups.iter_mut().find(|group| self.repeats(channel, &self.channels[group[0]], repeats));
+        for i in 0..self.channels.len() {
+            let known = groups.iter_mut().find(|group| self.repeats(i, group[0], repeats));
             match known {
                 Some(group) => group.push(i),
                 None => groups.push(vec![i]),
@@ -92,12 +98,16 @@ impl Problem {
         groups
     }
 
-    fn repeats(&self, a: &Channel, b: &Channel, repeats: Repeats) -> bool {
+    fn repeats(&self, i: usize, j: usize, repeats: Repeats) -> bool {
+        let (a, b) = (&self.channels[i], &self.channels[j]);
         let apart = a.delay.0 - b.delay.0;
         let period = self.ratio as f64;
+        let at_whole_periods = (apart - period * (apart / period).round()).abs() < SAME_INSTANT;
+        let noisy = self.noise[i] > 0.0 || self.noise[j] > 0.0;
         let alike = match repeats {
+            Repeats::AtWholePeriodsUnlessNoisy if noisy => apart.abs() < SAME_INSTANT,
+            Repeats::AtWholePeriodsUnlessNoisy | Repeats::AtWholePeriods => at_whole_periods,
             Repeats::AtOneInstant => apart == 0.0,
-            Repeats::AtWholePeriods => (apart - period * (apart / period).round()).abs() < SAME_INSTANT,
         };
         a.front_end == b.front_end && alike
     }

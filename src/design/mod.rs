@@ -11,6 +11,7 @@ mod error_grid;
 mod error_response;
 mod exchange;
 pub mod filters;
+mod history_errors;
 pub mod interleaving;
 mod lifting;
 mod measurement_units;
@@ -26,6 +27,8 @@ pub mod reduction;
 mod resolution;
 pub mod responses;
 mod scale;
+mod smoother;
+mod timetable;
 pub mod uncertainty;
 
 pub use analysis::{Analysis, MeanAnalysis, analyze, analyze_mean};

@@ -70,6 +70,50 @@ impl LiftedPlant {
         })
     }
 
+    /// The same plant with the noise of the converters: each channel that has noise gets an input of unit
+    /// power that adds to its samples alone, D_y = `[D_y, diag(s_i)]`. A channel with noise is no state of its
+    /// delay chain any more, so its [`chain`](Self::chain) is empty. The norm of the error system of this
+    /// plant is that of signal and noise, and so is its mean square.
+    ///
+    /// # Errors
+    /// [`DesignError::Shapes`] never: the sizes fit.
+    pub(super) fn with_noise(&self) -> Result<Self, DesignError> {
+        self.with_noise_scaled(1.0)
+    }
+
+    /// Whether a converter has noise.
+    pub(super) fn has_noise(&self) -> bool {
+        self.problem.noise.iter().any(|power| *power > 0.0)
+    }
+
+    /// As [`Self::with_noise`], with `share` of the rms of the noise.
+    ///
+    /// # Errors
+    /// As [`Self::with_noise`].
+    pub(super) fn with_noise_scaled(&self, share: f64) -> Result<Self, DesignError> {
+        let noise = &self.problem.noise;
+        let noisy: Vec<usize> = (0..noise.len()).filter(|&i| noise[i] > 0.0).collect();
+        let chains = self.chains.iter().zip(noise);
+        let chains = chains.map(|(chain, power)| if *power > 0.0 { 0..0 } else { chain.clone() });
+        let rms = |i: usize, k: usize| if noisy[k] == i { share * noise[i].sqrt() } else { 0.0 };
+        let added = |system: &StateSpace| {
+            let d = Mat::from_fn(system.outputs(), noisy.len(), rms);
+            let b = linalg::hstack(&[system.b(), &Mat::zeros(system.order(), noisy.len())])?;
+            let d = linalg::hstack(&[system.d(), &d])?;
+            Ok::<_, DesignError>(StateSpace::new(system.a().clone(), b, system.c().clone(), d)?)
+        };
+        Ok(Self {
+            problem: self.problem.clone(),
+            system: added(&self.system)?,
+            chains: chains.collect(),
+            prompt: added(&self.prompt)?,
+            delays: self.delays.clone(),
+            response: OnceLock::new(),
+            resonances: OnceLock::new(),
+            measurement_size: OnceLock::new(),
+        })
+    }
+
     /// The problem in normalised time from which the plant was made.
     pub fn problem(&self) -> &Problem {
         &self.problem

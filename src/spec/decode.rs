@@ -8,6 +8,7 @@ use super::design::KeyProblem;
 use super::limits::{
     check_channel_count, check_delay, check_fast_period, check_fast_rate, check_gain, check_gamma_margin,
     check_latency, check_noise, check_offset, check_order, check_ratio, check_reduction_loss, check_taps,
+    check_target_snr,
 };
 use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
 use super::reader::{Fields, Value};
@@ -31,9 +32,10 @@ const TOP_KEYS: [&str; 10] = [
     "design",
 ];
 const CHANNEL_KEYS: [&str; 6] = ["delay", "delay_samples", "filter", "noise", "gain", "offset"];
-const DESIGN_KEYS: [&str; 10] = [
+const DESIGN_KEYS: [&str; 11] = [
     "method",
     "taps",
+    "target_snr_db",
     "gamma_margin",
     "solver",
     "bits",
@@ -293,6 +295,9 @@ fn design(
     let written = DesignOverrides {
         method: get("method").map(|v| v.name("method", &Method::ALL.map(|m| (m.name(), m)))).transpose()?,
         taps: get("taps").map(|v| checked_count(&v, "taps", check_taps)).transpose()?,
+        target_snr_db: get("target_snr_db")
+            .map(|v| checked_number(&v, check_target_snr).map(|db| db + 0.0))
+            .transpose()?,
         gamma_margin: get("gamma_margin").map(|v| checked_number(&v, check_gamma_margin)).transpose()?,
         solver: get("solver").map(|v| v.name("solver", &Solver::ALL.map(|s| (s.name(), s)))).transpose()?,
         bits: get("bits").map(|v| word_lengths(&v)).transpose()?,

@@ -1,7 +1,7 @@
 //! The `[design]` table: defaults, overrides from the command line, and the keys of each method.
 
 use super::limits::{
-    check_gamma_margin, check_optimised_taps, check_order, check_reduction_loss, check_taps,
+    check_gamma_margin, check_optimised_taps, check_order, check_reduction_loss, check_taps, check_target_snr,
 };
 use super::word_lengths::{WordLengths, check_fraction_bits};
 use super::{DesignSpec, Method, Reduction, Solver, SpecProblem, Tracking, UncertaintySpec};
@@ -14,6 +14,8 @@ pub struct DesignOverrides {
     pub method: Option<Method>,
     /// Taps per channel.
     pub taps: Option<usize>,
+    /// The SNR in decibels for which the taps are chosen.
+    pub target_snr_db: Option<f64>,
     /// Relative excess over the optimal gamma.
     pub gamma_margin: Option<f64>,
     /// The optimisation method of FIR designs.
@@ -43,9 +45,19 @@ impl Method {
         }
     }
 
-    /// Whether the method makes FIR filters and therefore reads `taps`.
+    /// Whether the method makes FIR filters whether `taps` is given or not.
     pub const fn has_taps(self) -> bool {
         matches!(self, Self::Fir | Self::Sinc | Self::Separation)
+    }
+
+    /// Whether the method reads `taps`; `h2` makes FIR filters with it and recursive ones without.
+    pub const fn reads_taps(self) -> bool {
+        self.has_taps() || matches!(self, Self::H2)
+    }
+
+    /// Whether the number of taps may be chosen for an SNR, so that the method reads `target_snr_db`.
+    pub const fn has_target_snr(self) -> bool {
+        matches!(self, Self::Fir | Self::H2)
     }
 
     /// Whether the method minimises gamma and therefore reads `gamma_margin`.
@@ -68,7 +80,7 @@ impl Method {
         matches!(self, Self::Fir)
     }
 
-    /// Whether the method makes recursive filters and therefore reads `order` and `reduction_loss_db`.
+    /// Whether the method may make recursive filters, for which it reads `order` and `reduction_loss_db`.
     pub const fn has_states(self) -> bool {
         matches!(self, Self::Iir | Self::H2)
     }
@@ -117,11 +129,18 @@ impl Reduction {
 }
 
 impl DesignSpec {
+    /// Whether the filters are FIR, not recursive.
+    pub const fn is_fir(&self) -> bool {
+        let asks_for_taps = self.taps.is_some() || self.target_snr_db.is_some();
+        self.method.has_taps() || (self.method.reads_taps() && asks_for_taps)
+    }
+
     /// A method, with taps if it makes FIR filters, and no other keys.
     pub const fn new(method: Method, taps: Option<usize>) -> Self {
         Self {
             method,
             taps,
+            target_snr_db: None,
             gamma_margin: None,
             solver: None,
             bits: None,
@@ -139,7 +158,7 @@ impl DesignSpec {
         self.overridden(DesignOverrides { method: Some(method), ..Default::default() }, channels)
     }
 
-    /// The same design with another number of taps per channel.
+    /// The same design with another number of taps per channel, in place of a wanted SNR too.
     ///
     /// # Errors
     /// [`SpecProblem`] if the method makes no FIR filters, or the number is out of range.
@@ -148,11 +167,21 @@ impl DesignSpec {
     }
 
     fn overridden(&self, overrides: DesignOverrides, channels: usize) -> Result<Self, SpecProblem> {
-        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, tracking, reduction } =
-            self.clone();
+        let Self {
+            method,
+            taps,
+            target_snr_db,
+            gamma_margin,
+            solver,
+            bits,
+            fraction_bits,
+            tracking,
+            reduction,
+        } = self.clone();
         let written = DesignOverrides {
             method: Some(method),
             taps,
+            target_snr_db,
             gamma_margin,
             solver,
             bits,
@@ -184,11 +213,8 @@ impl DesignSpec {
             let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
             return blame("fraction_bits", Err(SpecProblem::MissingKey { key: "bits", remedy }));
         }
+        blame("target_snr_db", self.target_snr_db.map_or(Ok(()), check_target_snr))?;
         match (self.method, self.taps) {
-            (Method::Fir, None) => {
-                let remedy = "the method fir needs the number of taps per channel at the fast rate, for example taps = 22";
-                blame("method", Err(SpecProblem::MissingKey { key: "taps", remedy }))
-            }
             (Method::Fir, Some(taps)) => blame("taps", self.check_unknowns(taps, channels)),
             _ => Ok(()),
         }
@@ -247,7 +273,8 @@ impl DesignSpec {
 
     fn check_keys(&self) -> Result<(), KeyProblem> {
         let keys = [
-            ("taps", self.taps.is_some(), self.method.has_taps(), "fir"),
+            ("taps", self.taps.is_some(), self.method.reads_taps(), "fir or h2"),
+            ("target_snr_db", self.target_snr_db.is_some(), self.method.has_target_snr(), "fir or h2"),
             ("gamma_margin", self.gamma_margin.is_some(), self.method.has_gamma_margin(), "fir or iir"),
             ("solver", self.solver.is_some(), self.method.has_solver(), "fir"),
             ("bits", self.bits.is_some(), self.method.has_bits(), "fir"),
@@ -278,6 +305,20 @@ impl DesignSpec {
                 Err(SpecProblem::Conflict { first: "bits", second: "tracking", remedy }),
             );
         }
+        if let (Some(_), Some(_)) = (self.taps, self.target_snr_db) {
+            let remedy = "the SNR decides how many taps there are, keep one of them";
+            return blame(
+                "target_snr_db",
+                Err(SpecProblem::Conflict { first: "taps", second: "target_snr_db", remedy }),
+            );
+        }
+        if let (Some(reduction), true, Method::H2) = (self.reduction, self.is_fir(), self.method) {
+            let (method, remedy) = ("h2 with taps", "h2 without taps");
+            return blame(
+                reduction.key(),
+                Err(SpecProblem::NeedlessKey { key: reduction.key(), method, remedy }),
+            );
+        }
         match keys.into_iter().find(|&(_, given, read, _)| given && !read) {
             Some((key, _, _, remedy)) => {
                 blame(key, Err(SpecProblem::NeedlessKey { key, method: self.method.name(), remedy }))
@@ -304,6 +345,7 @@ impl DesignOverrides {
         match key {
             "method" => self.method.is_some(),
             "taps" => self.taps.is_some(),
+            "target_snr_db" => self.target_snr_db.is_some(),
             "gamma_margin" => self.gamma_margin.is_some(),
             "solver" => self.solver.is_some(),
             "bits" => self.bits.is_some(),
@@ -314,13 +356,17 @@ impl DesignOverrides {
     }
 
     /// Values of the command line take precedence. Keys of the file that a new method does not read are
-    /// dropped.
+    /// dropped; taps too if the new method is recursive without them.
     pub(super) fn over(self, file: Self) -> Self {
-        let replaced = self.method;
+        let replaced = self.method.filter(|method| file.method != Some(*method));
         let kept = |has: fn(Method) -> bool| replaced.is_none_or(has);
         Self {
             method: self.method.or(file.method),
-            taps: self.taps.or(file.taps.filter(|_| kept(Method::has_taps))),
+            // Each stands in place of the other.
+            taps: self.taps.or(file.taps.filter(|_| kept(Method::has_taps) && self.target_snr_db.is_none())),
+            target_snr_db: self
+                .target_snr_db
+                .or(file.target_snr_db.filter(|_| kept(Method::has_target_snr) && self.taps.is_none())),
             gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| kept(Method::has_gamma_margin))),
             solver: self.solver.or(file.solver.filter(|_| kept(Method::has_solver))),
             bits: self.bits.or(file.bits.filter(|_| kept(Method::has_bits))),
@@ -330,13 +376,24 @@ impl DesignOverrides {
         }
     }
 
-    /// The default method is FIR if taps are given, else IIR, which needs no size.
+    /// The default method is FIR if taps or an SNR are given, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let Self { method, taps, gamma_margin, solver, bits, fraction_bits, tracking, reduction } = self;
-        let default = if taps.is_some() { Method::Fir } else { Method::Iir };
-        DesignSpec {
-            method: method.unwrap_or(default),
+        let Self {
+            method,
             taps,
+            target_snr_db,
+            gamma_margin,
+            solver,
+            bits,
+            fraction_bits,
+            tracking,
+            reduction,
+        } = self;
+        let is_sized = taps.is_some() || target_snr_db.is_some();
+        DesignSpec {
+            method: method.unwrap_or(if is_sized { Method::Fir } else { Method::Iir }),
+            taps,
+            target_snr_db,
             gamma_margin,
             solver,
             bits,

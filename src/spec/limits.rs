@@ -23,6 +23,9 @@ pub const MAX_LATENCY: usize = 65_536;
 /// Largest order of a spec; banks of the designer have fewer states.
 pub const MAX_STATES: usize = 65_536;
 
+/// Largest SNR that can be asked for: doubles have no more.
+pub const MAX_TARGET_SNR_DB: f64 = 300.0;
+
 /// Largest loss by order reduction of a spec; a larger one would leave no state.
 pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
 
@@ -177,6 +180,18 @@ pub(crate) fn check_order(order: usize) -> Result<(), SpecProblem> {
         "order is the largest number of states of the bank, 0 to {MAX_STATES}; leave it out for no limit"
     );
     Err(range(order as f64, "states", rule))
+}
+
+/// The SNR for which taps are chosen.
+pub(super) fn check_target_snr(db: f64) -> Result<(), SpecProblem> {
+    if (0.0..=MAX_TARGET_SNR_DB).contains(&db) {
+        return Ok(());
+    }
+    let rule = format!(
+        "target_snr_db is the ratio of the signal to error and noise together, 0 to {MAX_TARGET_SNR_DB} dB; 90 is that of \
+         15 bits"
+    );
+    Err(range(db, "dB", rule))
 }
 
 /// Decibels that order reduction may lose.

@@ -28,7 +28,7 @@ pub use filter_problem::{FilterProblem, MAX_ORDER};
 #[cfg(feature = "cli")]
 pub(crate) use limits::check_noise;
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS, delay_in_fast_periods};
-pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES};
+pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
 pub(crate) use limits::{check_gain, check_offset};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
@@ -213,9 +213,13 @@ pub enum Tracking {
 pub struct DesignSpec {
     /// The method.
     pub method: Method,
-    /// Taps per channel at the fast rate, for FIR methods.
+    /// Taps per channel at the fast rate, for FIR methods; `None` lets the designer choose. The method `h2`
+    /// makes FIR filters with them and recursive ones without.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub taps: Option<usize>,
+    /// The SNR in decibels for which the fewest taps are chosen, in place of `taps`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_snr_db: Option<f64>,
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma_margin: Option<f64>,

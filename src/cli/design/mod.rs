@@ -28,6 +28,7 @@ use std::time::Instant;
 Examples:
   hybank design spec.toml -o bank.json
   hybank design spec.toml -o iir.json --method iir
+  hybank design spec.toml -o bank.json --method h2 --snr 90
   hybank design spec.toml -o fixed.json --taps 64 --bits 14
   hybank design spec.toml -o small.json --method iir --order 6
   hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
@@ -44,6 +45,10 @@ pub(super) struct Args {
     /// Taps per channel, in place of those of the spec
     #[arg(long)]
     taps: Option<usize>,
+    /// The fewest taps whose SNR is at least this many decibels, signal against error and noise (methods fir
+    /// and h2)
+    #[arg(long, value_name = "DB", conflicts_with = "taps")]
+    snr: Option<f64>,
     /// Latency in fast samples, in place of that of the spec
     #[arg(long)]
     latency: Option<usize>,
@@ -110,6 +115,7 @@ fn overrides(args: &Args) -> DesignOverrides {
     DesignOverrides {
         method: args.method,
         taps: args.taps,
+        target_snr_db: args.snr,
         gamma_margin: args.gamma_margin,
         solver: args.solver,
         bits: args.bits.clone(),

@@ -1,72 +1,78 @@
-//! What a spec leaves open: the latency, and the number of taps of the comparison methods.
+//! What a spec leaves open: the latency, and the number of taps.
 //!
-//! The latency is the shortest one whose error is within 0.1 % of the least over all latencies, by the
-//! method and with the length of the spec. The error is what the method minimises: gamma for `fir` (of real
-//! taps, without regard to noise) and `iir`, the rms for `h2`; for `sinc` and `separation` it is their
-//! gamma.
+//! What counts is the whole error: the mean square of the error for the signal plus the noise of the
+//! converters at the output. The latency is the shortest one whose whole error is within 0.1 dB of the least
+//! over all latencies, with the length of the spec. Where the spec states no noise, the samples are rounded to
+//! 16 bits: beyond that no latency is worth its while. For `fir`, `iir` and `h2` the error is the least that
+//! banks of that length can reach, which a smoother finds without a design; for `sinc` and `separation`,
+//! which minimise nothing, it is that of their banks.
 
-mod history_errors;
+mod causal;
+mod length;
 mod reach;
-mod recursive;
 mod search;
 
 use super::DesignError;
 use super::effort::{self, Limits};
+use super::filters;
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustProblem;
-use super::methods::{self, Settings, fir, iir};
+use super::methods::{self, Filters, Settings};
 use super::plant::LiftedPlant;
-use super::problem::{Channel, Problem, common_delay};
+use super::problem::{Problem, common_delay};
 use crate::analog::SignalFilter;
+use crate::lti::StateSpace;
+use crate::lti::gramian::h2_norm;
 use crate::spec::{Method, Spec};
-use crate::units::FastPeriods;
+use causal::CausalErrors;
 use reach::Reach;
-use recursive::{CausalErrors, NEGLIGIBLE};
 use search::Search;
 
-/// Relative accuracy of the gammas of `fir` that are compared.
-const ACCURACY: f64 = 1e-4;
+/// A longer latency is chosen only if it lowers the whole error by more than 0.1 dB: less than the error of a
+/// measured SNR, while the last tenth of a decibel may take many times the latency.
+const WORTHWHILE_DB: f64 = 0.1;
+/// Bits of a converter of which nothing is said.
+const USUAL_BITS: i32 = 16;
 
 /// Called with the number of designs that were compared.
 type Compared<'a> = &'a dyn Fn(usize);
 
-/// The spec with the number of taps that the methods which make FIR filters use, and with a latency that
-/// these taps reach or none.
+/// The spec with the number of taps that the comparison methods use, and with a latency that these taps reach
+/// or none. The taps of `fir` and `h2` may still be open.
 ///
 /// # Errors
 /// [`DesignError::OutOfReach`] for a latency that the taps do not reach; [`DesignError`] if the spec has no
 /// [`Problem`].
 pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
     let mut complete = spec.clone();
-    if spec.design.method.has_taps() {
-        complete.design.taps = Some(taps(spec));
-        if let Some(latency) = spec.latency {
-            reach::check(&Problem::new(spec, latency)?, taps(spec))?;
-        }
+    if matches!(spec.design.method, Method::Sinc | Method::Separation) {
+        // 23 for M = 2, as in the thesis.
+        complete.design.taps = Some(spec.design.taps.unwrap_or(12 * spec.ratio - 1));
+    }
+    if let (Some(taps), Some(latency)) = (complete.design.taps, spec.latency) {
+        reach::check(&Problem::new(spec, latency)?, taps)?;
     }
     Ok(complete)
 }
 
-/// The spec of [`with_taps`] with nothing left open: a latency as well. `compared` receives the number of
-/// designs that were compared.
+/// The spec of [`with_taps`] with nothing left open: a latency and a number of taps as well. `compared`
+/// receives the number of designs that were compared.
 ///
 /// # Errors
-/// As [`latency`].
+/// As [`latency`]; [`DesignError::SnrOutOfReach`] if no number of taps reaches the SNR that the spec asks for.
 pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, DesignError> {
     let latency = spec.latency.map_or_else(|| choose_latency(spec, compared), Ok)?;
     let mut complete = Spec { latency: Some(latency), ..spec.clone() };
     if let Some((signal, filter)) = complete.signal.as_mut().zip(SignalFilter::of(spec)) {
         signal.floor_db = filter.floor_db;
     }
+    if spec.design.is_fir() && spec.design.taps.is_none() {
+        complete.design.taps = Some(length::fewest_taps(&complete)?);
+        complete.design.target_snr_db = None;
+    }
     // The delays may ask for more than the longest latency.
     complete.check()?;
     Ok(complete)
-}
-
-/// Taps per channel: the number in the spec, or 12 M - 1 for the comparison methods (23 for M = 2, as in
-/// the thesis). The method `fir` has no default; [`Spec::check`] asks for the number.
-fn taps(spec: &Spec) -> usize {
-    spec.design.taps.unwrap_or(12 * spec.ratio - 1)
 }
 
 /// The latency m0 of a spec in fast samples: the number in the spec, or the designer's choice.
@@ -83,7 +89,7 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     choose_latency(&open, &|_| ())
 }
 
-/// The settings of the method, from a spec with taps.
+/// The settings of the method, from a spec with nothing left open.
 ///
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`] at the slow rate.
@@ -104,7 +110,7 @@ fn settings_earlier(spec: &Spec, fast_periods: usize) -> Result<Settings, Design
     };
     let separate = spec.design.method == Method::Separation;
     Ok(Settings {
-        taps: taps(spec),
+        taps: spec.design.taps.unwrap_or_default(),
         robust: RobustProblem::of(spec),
         gamma_margin: spec.design.gamma_margin,
         solver: spec.design.solver,
@@ -113,50 +119,54 @@ fn settings_earlier(spec: &Spec, fast_periods: usize) -> Result<Settings, Design
 }
 
 fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignError> {
-    let repeats = Repeats::of(spec.design.method);
     // Delays that all channels have only add to the latency.
     let common = common_delay(spec);
-    let problem = Problem::new(spec, common)?.earlier(common).merge_channels(repeats).of_unit_size()?.problem;
+    let problem = Problem::new(&with_usual_noise(spec), common)?.earlier(common);
+    let problem = problem.merge_channels(Repeats::of(&spec.design)).of_unit_size()?.problem;
     compared(0);
-    let latency = match spec.design.method {
-        Method::Fir => for_fir(&problem, taps(spec), compared),
-        Method::Iir => for_iir(&problem, compared),
-        Method::H2 => Ok(CausalErrors::new(&problem)?.shortest()),
-        Method::Sinc | Method::Separation => {
+    let latency = match (spec.design.method, spec.design.taps) {
+        (Method::Sinc | Method::Separation, _) => {
             for_comparison(spec.design.method, &problem, &settings_earlier(spec, common)?, compared)
         }
+        (_, Some(taps)) => {
+            let latencies = reach::candidates(&problem, taps);
+            let reach = Reach::new(&problem, taps, &latencies)?;
+            Ok(shortest(&latencies.map(|latency| reach.rms(latency)).collect::<Vec<_>>()))
+        }
+        (_, None) => Ok(shortest(CausalErrors::new(&problem)?.rms())),
     };
     Ok(common + latency?)
 }
 
-/// The shortest latency whose least gamma with `taps` taps per channel is almost the best.
-fn for_fir(problem: &Problem, taps: usize, compared: Compared<'_>) -> Result<usize, DesignError> {
-    let latencies = reach::candidates(problem, taps);
-    let reach = Reach::new(problem, taps, &latencies)?;
-    let floor = floor(problem, reach.zero_output())?;
-    let search = Search::new(latencies.map(|latency| reach.bound_of_choice(latency)), floor);
-    search.shortest(compared, |latency, hopeless| {
-        fir::bracket(&plant(problem, latency)?, taps, ACCURACY, hopeless)
-    })
+/// The spec with the rounding of so many bits as noise, if no channel has any noise.
+fn with_usual_noise(spec: &Spec) -> Spec {
+    let mut noisy = spec.clone();
+    if spec.channels.iter().all(|channel| channel.noise == 0.0) {
+        let step = 2f64.powi(1 - assumed_bits(spec));
+        noisy.channels.iter_mut().for_each(|channel| channel.noise = step / 12f64.sqrt());
+    }
+    noisy
 }
 
-/// The shortest latency whose least gamma is almost the best. Where the designer fails, other latencies
-/// are tried.
-fn for_iir(problem: &Problem, compared: Compared<'_>) -> Result<usize, DesignError> {
-    let errors = CausalErrors::new(problem)?;
-    let floor = floor(problem, errors.zero_output())?;
-    let mut designs = 0;
-    let gamma = |latency: usize| {
-        designs += 1;
-        compared(designs);
-        let designed =
-            plant(problem, latency).and_then(|plant| iir::synthesise(&plant, &Settings::default()));
-        designed.map_or(f64::INFINITY, |synthesis| synthesis.peak.gain)
-    };
-    Ok(recursive::shortest(&errors, problem.ratio, floor, gamma))
+/// [`USUAL_BITS`], or as many as leave the rounding well below the error of the wanted SNR.
+fn assumed_bits(spec: &Spec) -> i32 {
+    let decibels_a_bit = 20.0 * 2f64.log10();
+    let wanted = spec.design.target_snr_db.map_or(0.0, |snr| (snr / decibels_a_bit).ceil());
+    USUAL_BITS.max(wanted as i32 + 4)
 }
 
-/// The shortest latency whose gamma is almost the best of a method that does not minimise it.
+/// The index of the first error that is within [`WORTHWHILE_DB`] of the least.
+fn shortest(rms: &[f64]) -> usize {
+    let least = rms.iter().copied().fold(f64::INFINITY, f64::min);
+    rms.iter().position(|rms| *rms <= least * worthwhile()).unwrap_or(0)
+}
+
+/// [`WORTHWHILE_DB`] as a factor.
+fn worthwhile() -> f64 {
+    10f64.powf(WORTHWHILE_DB / 20.0)
+}
+
+/// The shortest latency whose whole error is almost the best of a method that does not minimise it.
 fn for_comparison(
     method: Method,
     problem: &Problem,
@@ -165,32 +175,22 @@ fn for_comparison(
 ) -> Result<usize, DesignError> {
     let latencies = reach::candidates(problem, settings.taps);
     let reach = Reach::new(problem, settings.taps, &latencies)?;
-    let search = Search::new(latencies.map(|latency| reach.bound_of_choice(latency)), 0.0);
-    search.shortest(compared, |latency, _| {
-        let synthesis = methods::synthesise(method, &plant(problem, latency)?, settings)?;
-        Ok((synthesis.peak.gain, synthesis.peak.gain))
+    Search::new(latencies.map(|latency| reach.lower_bound(latency))).shortest(compared, |latency| {
+        let problem = Problem { latency, ..problem.clone() };
+        problem.check_size()?;
+        let plant = LiftedPlant::new(&problem)?;
+        whole_error(&plant, &methods::synthesise(method, &plant, settings)?.filters)
     })
 }
 
-/// The plant with another latency.
-fn plant(problem: &Problem, latency: usize) -> Result<LiftedPlant, DesignError> {
-    let problem = Problem { latency, ..problem.clone() };
-    problem.check_size()?;
-    LiftedPlant::new(&problem)
-}
-
-/// A lower bound of gamma for all filters of any latency: the noncausal bound. Delays by whole slow periods
-/// do not change it, so it is computed without them. Gammas that are [`NEGLIGIBLE`] relative to
-/// `zero_output` count as equal.
-fn floor(problem: &Problem, zero_output: f64) -> Result<f64, DesignError> {
-    let within_a_period = |channel: &Channel| Channel {
-        delay: FastPeriods(channel.delay.0.rem_euclid(problem.ratio as f64)),
-        ..*channel
+/// The root of the mean square of error and noise together, per fast sample.
+fn whole_error(plant: &LiftedPlant, filters: &Filters) -> Result<f64, DesignError> {
+    let system = match filters {
+        Filters::Fir(taps) => StateSpace::fir(&filters::polyphase(taps, plant.ratio()))?,
+        Filters::StateSpace(system) => system.clone(),
     };
-    let channels = problem.channels.iter().map(within_a_period).collect();
-    let prompt = Problem { latency: problem.ratio - 1, channels, ..problem.clone() };
-    let noncausal = LiftedPlant::new(&prompt)?.noncausal_bound()?.gain;
-    Ok(noncausal.max(NEGLIGIBLE * zero_output))
+    let error = plant.with_noise()?.error_system(&system)?;
+    Ok(h2_norm(&error)? / (plant.ratio() as f64).sqrt())
 }
 
 #[cfg(test)]

@@ -4,24 +4,20 @@
 //! Phase p of the output has `J_p = ceil((taps - p) / M)` lags, so it sees the newest `J_p` frames. Its
 //! least mean-square error depends only on the instant `p - m0` of the target relative to these frames:
 //! see [`HistoryErrors`].
-//!
-//! The errors bound gamma from below. White noise of unit density has the error `||K_p||_2^2` at phase p,
-//! the mean over frequency of a square that is nowhere above gamma^2, so gamma^2 is at least the largest of
-//! them.
 
-use super::history_errors::HistoryErrors;
 use crate::design::DesignError;
+use crate::design::history_errors::HistoryErrors;
 use crate::design::merging::Repeats;
 use crate::design::problem::Problem;
 use crate::spec::MAX_LATENCY;
 use crate::units::FastPeriods;
 use std::ops::RangeInclusive;
 
-/// Share of the target's power that some phase must be able to remove. Below it gamma is that of zero
+/// Share of the target's power that some phase must be able to remove. Below it the error is that of zero
 /// output.
 const LEAST_REMOVED: f64 = 1e-3;
 /// Front ends with more states in all are replaced by the target's, so that the errors cost little.
-const MOST_STATES: usize = 64;
+const MOST_STATES: usize = 128;
 /// Factor on the lower bound where front ends were replaced: the errors are then only a guess.
 const GUESS: f64 = 0.5;
 
@@ -56,11 +52,6 @@ impl Reach {
         Ok(Self { ratio, taps, long, short, exact })
     }
 
-    /// The rms of the target, the error of a bank that outputs zeros.
-    pub(super) fn zero_output(&self) -> f64 {
-        self.long.power.sqrt()
-    }
-
     /// The least mean-square error of each phase of the output.
     fn errors(&self, latency: usize) -> impl Iterator<Item = f64> {
         let most = self.taps.div_ceil(self.ratio);
@@ -71,15 +62,14 @@ impl Reach {
         })
     }
 
-    /// A lower bound of gamma; infinite for a latency out of reach, which would be refused.
-    pub(super) fn bound_of_choice(&self, latency: usize) -> f64 {
-        if self.is_reached(latency) { self.lower_bound(latency) } else { f64::INFINITY }
+    /// The least root mean square over all phases, of error and noise together.
+    pub(super) fn rms(&self, latency: usize) -> f64 {
+        (self.errors(latency).sum::<f64>() / self.ratio as f64).sqrt()
     }
 
-    /// A lower bound of gamma.
+    /// A lower bound of the same.
     pub(super) fn lower_bound(&self, latency: usize) -> f64 {
-        let least = self.errors(latency).fold(0.0, f64::max).sqrt();
-        if self.exact { least } else { GUESS * least }
+        if self.exact { self.rms(latency) } else { GUESS * self.rms(latency) }
     }
 
     /// Whether the filters can remove a noticeable part of the target at any phase.
@@ -109,6 +99,8 @@ fn manageable(problem: &Problem) -> (Problem, bool) {
 /// [`DesignError::OutOfReach`] with the latencies that the taps reach.
 pub(super) fn check(problem: &Problem, taps: usize) -> Result<(), DesignError> {
     let latency = problem.latency;
+    // Where there is much noise no tap removes anything, however near its sample is.
+    let problem = &Problem { noise: vec![0.0; problem.noise.len()], ..problem.clone() };
     if is_covered(problem, taps) || Reach::new(problem, taps, &(latency..=latency))?.is_reached(latency) {
         return Ok(());
     }

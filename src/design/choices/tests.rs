@@ -1,6 +1,7 @@
-use super::history_errors::HistoryErrors;
 use super::*;
+use crate::design::history_errors::HistoryErrors;
 use crate::lmi::sampled;
+use crate::spec::DesignSpec;
 
 /// The problem of a spec in normalised time with the same filter everywhere.
 fn problem(filter: &str, ratio: usize, delays: &[f64]) -> Problem {
@@ -51,20 +52,24 @@ fn the_errors_are_those_of_the_least_squares_taps() {
         (STEEP, 3, vec![4.4, 0.3], 7),
     ];
     for (filter, ratio, delays, taps) in cases {
-        let problem = problem(filter, ratio, &delays);
-        let reach = Reach::new(&problem, taps, &(0..=taps + 6)).unwrap();
-        for latency in 0..=taps + 6 {
-            let expected = least_square_errors(&problem, latency, taps);
-            let worst = expected.iter().copied().fold(0.0, f64::max).sqrt();
-            let found = reach.lower_bound(latency);
-            assert!((found - worst).abs() < 1e-5 * worst + 1e-9, "latency {latency}: {found} {worst}");
+        for noise in [0.0, 1e-4, 0.03] {
+            let mut problem = problem(filter, ratio, &delays);
+            problem.noise = (0..delays.len()).map(|i| (noise * (1.0 + i as f64)).powi(2)).collect();
+            problem.channels[0].gain = -1.5;
+            let reach = Reach::new(&problem, taps, &(0..=taps + 6)).unwrap();
+            for latency in 0..=taps + 6 {
+                let expected = least_mean_square(&problem, latency, taps).sqrt();
+                let found = reach.rms(latency);
+                let close = (found - expected).abs() < 1e-5 * expected + 1e-9;
+                assert!(close, "noise {noise}, latency {latency}: {found} {expected}");
+            }
         }
     }
 }
 
 /// By QR on a grid of frequencies that is exact for the periodic part of the error.
-fn least_square_errors(problem: &Problem, latency: usize, taps: usize) -> Vec<f64> {
-    let plant = plant(problem, latency).unwrap();
+fn least_mean_square(problem: &Problem, latency: usize, taps: usize) -> f64 {
+    let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() }).unwrap();
     let ratio = problem.ratio;
     let lags: Vec<usize> = (0..ratio).map(|p| taps.saturating_sub(p).div_ceil(ratio)).collect();
     let count = 256;
@@ -76,36 +81,81 @@ fn least_square_errors(problem: &Problem, latency: usize, taps: usize) -> Vec<f6
     let grid = sampled::Problem::new(points.collect(), lags).unwrap();
     let weight = |k: usize| if k == 0 || k == count { 0.5 } else { 1.0 } / count as f64;
     let weights: Vec<f64> = (0..=count).map(weight).collect();
-    let square = sampled::MeanSquareObjective::noiseless(weights.clone(), problem.channels.len());
+    let square = sampled::MeanSquareObjective { weights, noise: problem.noise.clone() };
     let taps = sampled::least_squares(&grid, &square, 1e-13).unwrap();
-    let errors: Vec<_> = (0..=count).map(|l| grid.error_at(l, &taps)).collect();
-    let square =
-        |p: usize| errors.iter().zip(&weights).map(|(k, weight)| weight * k.row(p).norm_squared()).sum();
-    (0..ratio).map(square).collect()
+    grid.mean_square(&taps, &square) / ratio as f64
+}
+
+/// A spec without latency of two converters, with the `[design]` of a method.
+fn spec(design: &str) -> Spec {
+    let text = format!(
+        "fast_period = 1.0\nratio = 2\ntarget = {{ filter = {STEEP} }}\n\
+         channel = [{{ delay = 1.2 }}, {{ delay = 0.6 }}]\ndesign = {{ {design} }}\n"
+    );
+    Spec::from_toml(&text, "spec.toml").unwrap()
+}
+
+/// The whole error of the mean-square optimum of a spec, in double precision and without a smoother.
+fn whole(spec: &Spec, latency: usize, taps: usize) -> f64 {
+    least_mean_square(&Problem::new(&with_usual_noise(spec), latency).unwrap(), latency, taps).sqrt()
 }
 
 #[test]
-fn the_bound_is_below_gamma_and_the_check_agrees_with_the_search() {
-    for (filter, ratio, delays, taps) in [(THESIS, 2, vec![1.2, 0.6], 8), (STEEP, 4, vec![3.1, 1.9], 11)] {
-        let problem = problem(filter, ratio, &delays);
-        let latencies = reach::candidates(&problem, taps);
-        let reach = Reach::new(&problem, taps, &latencies).unwrap();
-        for latency in latencies {
-            let (lower, upper) =
-                fir::bracket(&plant(&problem, latency).unwrap(), taps, ACCURACY, f64::INFINITY).unwrap();
-            assert!(lower <= upper && upper <= lower * (1.0 + ACCURACY), "{latency}: {lower} {upper}");
-            assert!(reach.lower_bound(latency) <= upper, "{latency}");
-        }
+fn the_latency_is_the_shortest_within_a_tenth_of_a_decibel() {
+    for design in ["method = \"fir\", taps = 16", "method = \"h2\", taps = 16", "taps = 16, noise = 1e-2"] {
+        let spec = spec(design);
+        let errors: Vec<f64> = (0..20).map(|latency| whole(&spec, latency, 16)).collect();
+        let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+        let chosen = latency(&spec).unwrap();
+        assert!(errors[chosen] < 1.0117 * least, "{design}: {chosen} {errors:?}");
+        assert!(errors[..chosen].iter().all(|error| *error > 1.0115 * least), "{design}: {chosen} {errors:?}");
+    }
+}
+
+/// With much noise waiting for later samples brings little.
+#[test]
+fn recursive_banks_wait_less_where_there_is_noise() {
+    let chosen = |design: &str| latency(&spec(design)).unwrap();
+    let (quiet, noisy) = (chosen("method = \"h2\""), chosen("method = \"h2\", noise = 0.03"));
+    assert!(quiet > noisy && noisy > 0, "{quiet} {noisy}");
+    assert_eq!(chosen("method = \"iir\""), quiet);
+}
+
+#[test]
+fn as_many_taps_are_chosen_as_the_snr_needs() {
+    for (design, snr) in [("method = \"fir\", target_snr_db = 50", 50.0), ("target_snr_db = 65, method = \"h2\"", 65.0)] {
+        let mut open = spec(design);
+        open.latency = Some(9);
+        let complete = completed(&with_taps(&open).unwrap(), &|_| ()).unwrap();
+        let taps = complete.design.taps.unwrap();
+        assert_eq!(complete.design.target_snr_db, None);
+        let found = |taps: usize| {
+            let problem = Problem::new(&open, 9).unwrap();
+            let power = HistoryErrors::new(&problem, 1, 0..=0).unwrap().power;
+            10.0 * (power / least_mean_square(&problem, 9, taps)).log10()
+        };
+        assert!(found(taps) >= snr && found(taps - 1) < snr, "{taps} taps: {} {}", found(taps), found(taps - 1));
     }
 }
 
 #[test]
-fn the_floor_does_not_depend_on_whole_periods() {
-    let near = floor(&problem(THESIS, 2, &[1.25, 0.5]), 1.0).unwrap();
-    let far = floor(&problem(THESIS, 2, &[801.25, 0.5]), 1.0).unwrap();
-    assert!((near / far - 1.0).abs() < 1e-12, "{near} {far}");
-    // Channels a whole period apart are one measurement.
-    let twice = floor(&problem(THESIS, 2, &[1.25, 3.25]), 1.0).unwrap();
-    let once = floor(&problem(THESIS, 2, &[1.25]), 1.0).unwrap();
-    assert!((twice / once - 1.0).abs() < 1e-12, "{twice} {once}");
+fn an_snr_that_is_out_of_reach_is_refused_with_the_best_one() {
+    let open = Spec { latency: Some(9), ..spec("target_snr_db = 200, method = \"h2\", noise = 1e-3") };
+    let refused = completed(&open, &|_| ()).unwrap_err();
+    let DesignError::SnrOutOfReach { wanted, best, latency } = refused else { panic!("{refused}") };
+    assert!(wanted == 200.0 && latency == 9 && (30.0..70.0).contains(&best), "{refused}");
+}
+
+#[test]
+fn taps_that_are_left_open_are_almost_as_good_as_any() {
+    for (design, channels) in [("method = \"fir\"", 1), ("method = \"fir\", noise = 1e-3", 2)] {
+        let mut open = spec(design);
+        open.channels.truncate(channels);
+        let complete = completed(&with_taps(&open).unwrap(), &|_| ()).unwrap();
+        let (latency, taps) = (complete.latency.unwrap(), complete.design.taps.unwrap());
+        let best = whole(&open, latency, 120);
+        let (enough, fewer) = (whole(&open, latency, taps), whole(&open, latency, taps - 1));
+        assert!(enough <= 1.0101 * best && fewer > 1.0099 * best, "{taps} taps: {enough} {fewer} {best}");
+        assert_eq!(complete.design, DesignSpec { taps: Some(taps), ..open.design.clone() });
+    }
 }

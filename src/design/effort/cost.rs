@@ -27,6 +27,8 @@ const LONG_CERTIFICATE: f64 = 1.3e-5;
 /// Seconds per n^2 and per row, a sample or a front end's state, of a period of the causal recursion in 512
 /// bits.
 const RECURSION: f64 = 1e-7;
+/// Samples of the target whose errors may still fall, at an instant of a survey of all latencies.
+pub(super) const SURVEYED: f64 = 64.0;
 /// Fast periods of latency beyond the longest delay with which the noncausal bound explains nearly any
 /// optimum.
 const NONCAUSAL_LATENCY: f64 = 32.0;
@@ -67,6 +69,13 @@ pub(super) fn proof(states: f64) -> Effort {
     }
     let long = if states > MAX_LONG_STATES as f64 { 0.0 } else { LONG_CERTIFICATE };
     Effort { seconds: (CERTIFICATE + long) * states.powi(3), bytes: 30.0 * REAL * states * states }
+}
+
+/// The fixed-point smoother over so many frames, with so many samples of the target at a time.
+pub(super) fn smoother(sizes: &Sizes, frames: f64, targets: f64) -> Effort {
+    let s = sizes.front_end_states;
+    let steps = frames * sizes.outputs();
+    Effort { seconds: SMALL * steps * 8.0 * s * s * (s + targets), bytes: COMPLEX * (s * s + steps * s) }
 }
 
 /// Whether the noncausal bound explains the optimum, so that no other bound is searched.

@@ -3,6 +3,7 @@
 use super::amount::Effort;
 use super::cost::{
     COMPLEX, PRODUCT, REAL, SMALL, causal_bound, complex_cube, is_noncausal, peak, proof, response,
+    smoother, SURVEYED,
 };
 use super::sizes::Sizes;
 use crate::design::error_grid::FINE;
@@ -12,8 +13,6 @@ use crate::design::prove::MOST_LONG_TAPS;
 /// Interior-point iterations and rounds of the exchange of one design.
 const ITERATIONS: f64 = 25.0;
 const ROUNDS: f64 = 4.0;
-/// Share of them that a comparison of latencies needs.
-const COARSE: f64 = 0.4;
 /// Norms of one design: of the taps, and of those after a peak that the grid missed.
 const NORMS: f64 = 2.0;
 
@@ -51,9 +50,9 @@ pub(super) fn affine(sizes: &Sizes) -> Effort {
     exchange.then(norm(sizes).times(2.0 * SCENARIOS))
 }
 
-/// A design that is only exact enough to be compared, without norms.
-pub(super) fn comparison(sizes: &Sizes) -> Effort {
-    grid(sizes).with(iteration(sizes).times(COARSE * ITERATIONS)).with(errors(sizes).times(COARSE * ROUNDS))
+/// The least errors of these taps at all latencies, for the phases with most lags and for the others.
+pub(super) fn reachable(sizes: &Sizes) -> Effort {
+    smoother(sizes, sizes.lags() + sizes.longest_delay / sizes.ratio, SURVEYED).times(2.0)
 }
 
 /// The plant at all frequencies of the fine grid, with a copy of the coarse one.
@@ -137,6 +136,12 @@ pub(super) fn judged(sizes: &Sizes) -> Effort {
 /// taps reach back over the latency that the delays leave.
 pub(super) fn scale(sizes: &Sizes) -> Effort {
     judged(&Sizes { taps: sizes.look_back + sizes.ratio, ..*sizes })
+}
+
+/// The bank of least mean square: the smoother passes through the history once for the phases with most lags
+/// and once for the others.
+pub(super) fn mean_square(sizes: &Sizes) -> Effort {
+    smoother(sizes, sizes.lags(), sizes.ratio).times(2.0).then(judged(sizes))
 }
 
 /// A bank for whole delays and a fractional delay for each channel.

@@ -28,9 +28,13 @@ pub const MOST_SECONDS: f64 = 600.0;
 /// Memory of the program itself and of everything that does not grow with the sizes, in bytes.
 const BASE_BYTES: f64 = 10e6;
 
-/// Designs that the choice of a latency compares, usually and at most.
-const COMPARISONS: f64 = 12.0;
+/// Designs of a comparison method that the choice of a latency compares at most.
 const MOST_COMPARISONS: f64 = 40.0;
+/// Surveys that the choice of a number of taps takes: lengths are doubled, then halved.
+const LENGTHS: f64 = 12.0;
+
+/// Frames that a bank sees whose number of taps is still open, before it is chosen.
+const USUAL_LAGS: usize = 24;
 
 /// Whether a design is refused when its estimate exceeds ten minutes or the free memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,16 +46,17 @@ pub enum Limits {
     Off,
 }
 
-/// The effort of the design of a spec with taps and, unless it is still to be chosen, a latency; with the
+/// The effort of the design of a spec, whose latency and taps may still be to be chosen; with the
 /// search for a proof if `proving`, and with the scale of gamma that is reported.
 ///
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`].
 pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
-    let taps = spec.design.taps.unwrap_or_default();
+    let usual = if spec.design.is_fir() { USUAL_LAGS * spec.ratio } else { 0 };
+    let taps = spec.design.taps.unwrap_or(usual);
     let common = if spec.latency.is_none() { common_delay(spec) } else { 0 };
     let problem = Problem::new(spec, spec.latency.unwrap_or(common))?.earlier(common);
-    let problem = problem.merge_channels(Repeats::of(spec.design.method)).problem;
+    let problem = problem.merge_channels(Repeats::of(&spec.design)).problem;
     let guess = || problem.longest_delay().0.ceil() as usize + taps / 4;
     let latency = if spec.latency.is_none() { guess() } else { problem.latency };
     let sizes = Sizes::new(&Problem { latency, ..problem }, taps);
@@ -61,7 +66,10 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     } else {
         Effort::default()
     });
-    let total = if spec.latency.is_none() { finished.then(chosen(spec, &sizes, design)) } else { finished };
+    let chosen = if spec.latency.is_none() { latency_choice(spec, &sizes, design) } else { Effort::default() };
+    let open = spec.design.is_fir() && spec.design.taps.is_none();
+    let length = if open { fir::reachable(&sizes).times(LENGTHS) } else { Effort::default() };
+    let total = finished.then(chosen).then(length);
     Ok(Effort { bytes: total.bytes + BASE_BYTES, ..total })
 }
 
@@ -71,6 +79,7 @@ fn synthesis(spec: &Spec, sizes: &Sizes) -> Effort {
         Method::Fir if spec.design.solver == Some(Solver::Kyp) => fir::by_lmi(sizes),
         Method::Fir => fir::design(sizes).then(robust(spec, sizes)),
         Method::Iir => recursive::design(sizes),
+        Method::H2 if spec.design.is_fir() => fir::mean_square(sizes),
         Method::H2 => recursive::mean_square(sizes),
         Method::Sinc => fir::judged(sizes),
         Method::Separation => fir::separation(sizes),
@@ -88,18 +97,17 @@ fn robust(spec: &Spec, sizes: &Sizes) -> Effort {
 
 /// The search for a proof.
 fn proven(spec: &Spec, sizes: &Sizes) -> Effort {
-    if spec.design.method.has_taps() { fir::proven(sizes) } else { recursive::proven(sizes) }
+    if spec.design.is_fir() { fir::proven(sizes) } else { recursive::proven(sizes) }
 }
 
 /// The choice of the latency, for a method of which one design takes `design`.
-fn chosen(spec: &Spec, sizes: &Sizes, design: Effort) -> Effort {
-    match spec.design.method {
-        Method::Fir => fir::comparison(sizes).times(COMPARISONS),
-        Method::Iir => design.times(COMPARISONS).then(recursive::smoother(sizes)),
-        Method::H2 => recursive::smoother(sizes),
-        Method::Sinc | Method::Separation => {
+fn latency_choice(spec: &Spec, sizes: &Sizes, design: Effort) -> Effort {
+    match (spec.design.method, spec.design.taps) {
+        (Method::Sinc | Method::Separation, _) => {
             design.times((sizes.taps + sizes.longest_delay).min(MOST_COMPARISONS))
         }
+        (_, Some(_)) => fir::reachable(sizes),
+        (_, None) => recursive::causal_errors(sizes),
     }
 }
 

@@ -21,6 +21,7 @@ pub enum Stage {
 impl fmt::Display for Stage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Latency { designs: 0 } => write!(f, "choosing the latency"),
             Self::Latency { designs } => write!(f, "choosing the latency ({designs} designs compared)"),
             Self::Filters => write!(f, "designing the filters"),
             Self::Realisation => write!(f, "realising the filters"),

@@ -1,7 +1,7 @@
 //! The effort of recursive designs.
 
 use super::amount::Effort;
-use super::cost::{COMPLEX, REAL, SMALL, causal_bound, peak, proof, response};
+use super::cost::{REAL, SMALL, causal_bound, peak, proof, response, smoother, SURVEYED};
 use super::sizes::Sizes;
 
 /// Riccati equations of an H-infinity design of many states, where the noncausal bound is nearly always
@@ -49,9 +49,7 @@ pub(super) fn reduction(sizes: &Sizes) -> Effort {
 }
 
 /// The errors of all causal banks at all latencies, by the smoother.
-pub(super) fn smoother(sizes: &Sizes) -> Effort {
+pub(super) fn causal_errors(sizes: &Sizes) -> Effort {
     let frames = 2.0 * HISTORY + (sizes.longest_delay / sizes.ratio).ceil();
-    let s = sizes.front_end_states;
-    let steps = frames * sizes.outputs();
-    Effort { seconds: SMALL * steps * 8.0 * s * s * (s + 64.0), bytes: COMPLEX * s * s }
+    smoother(sizes, frames, SURVEYED)
 }

@@ -46,18 +46,13 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
 }
 
 /// Bounds of the least gamma of `taps` taps per channel, at most `accuracy` (relative) apart, on the grid of
-/// the exchange. Ends early, with bounds farther apart, when the lower one exceeds `hopeless`.
+/// the exchange.
 ///
 /// # Errors
 /// As [`synthesise`].
-pub(crate) fn bracket(
-    plant: &LiftedPlant,
-    taps: usize,
-    accuracy: f64,
-    hopeless: f64,
-) -> Result<(f64, f64), DesignError> {
+pub(crate) fn bracket(plant: &LiftedPlant, taps: usize, accuracy: f64) -> Result<(f64, f64), DesignError> {
     let mut exchange = exchange(plant, &Settings { taps, ..Settings::default() })?;
-    let upper = exchange.compare(accuracy, hopeless)?.peaks.estimate;
+    let upper = exchange.compare(accuracy)?.peaks.estimate;
     Ok((exchange.lower.min(upper), upper))
 }
 

@@ -1,14 +1,15 @@
-//! The bank with the least mean-square error of all causal banks: the Kalman filter, which is `iir` at
-//! gamma = infinity.
+//! The bank with the least mean-square error of all causal banks, for white noise at the analog input and
+//! the noise of the converters: the Kalman filter, which is `iir` at gamma = infinity.
 
 use super::filtering::{Filter, Innovations};
 use super::gamma_iteration::GammaIteration;
 use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
-use super::{Settings, Synthesis};
+use super::Synthesis;
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::lti::gramian::h2_norm;
+use std::rc::Rc;
 
 /// Feedthrough of a measurement, relative to its size, below which 106 bits may lose the digits of its
 /// noise.
@@ -16,23 +17,25 @@ const FAINT_FEEDTHROUGH: f64 = 1e-4;
 /// Errors up to this multiple of the least one count as the least.
 const SAME_ERROR: f64 = 1.0 + 1e-6;
 
-/// The filters of least mean-square error for white noise at the analog input. The method has no settings.
+/// The filters with the least `||K||_2^2 + sum_i noise_i ||f_i||^2`. The method has no settings.
 ///
 /// # Errors
 /// [`DesignError::RiccatiFailed`] if the Riccati equation could not be solved, [`DesignError::Lti`] if the
 /// plant is not stable.
-pub(crate) fn synthesise(plant: &LiftedPlant, _: &Settings) -> Result<Synthesis, DesignError> {
-    let innovations = Innovations::in_all_coordinates(plant)?;
-    let mut iteration = GammaIteration::new(plant, &innovations)?;
+pub(crate) fn synthesise(plant: &LiftedPlant) -> Result<Synthesis, DesignError> {
+    let noisy = plant.with_noise()?;
+    let innovations = Innovations::in_all_coordinates(&noisy)?;
+    // gamma is that of the signal alone, so the noise counts in the filters and not in the bounds.
+    let mut iteration = GammaIteration::new(plant, &[Rc::new(Innovations::new(plant)?)])?;
     let mut candidates: Vec<Filter> = innovations.iter().filter_map(|form| form.h2()).collect();
     // Double precision loses up to a fifth of the mean square after smooth front ends, and nothing shows it.
-    let precise_filter = precise::<DoubleDouble>(plant, MOST_STATES_AT_106_BITS)?;
+    let precise_filter = precise::<DoubleDouble>(&noisy, MOST_STATES_AT_106_BITS)?;
     let faint = innovations.iter().any(|form| form.least_feedthrough() < FAINT_FEEDTHROUGH);
     if faint || precise_filter.is_none() {
-        candidates.extend(precise::<BigFloat>(plant, MOST_STATES_AT_512_BITS)?);
+        candidates.extend(precise::<BigFloat>(&noisy, MOST_STATES_AT_512_BITS)?);
     }
     candidates.extend(precise_filter);
-    let rms: Vec<f64> = candidates.iter().map(|filter| rms_error(plant, filter)).collect();
+    let rms: Vec<f64> = candidates.iter().map(|filter| rms_error(&noisy, filter)).collect();
     let enough = SAME_ERROR * rms.iter().copied().fold(f64::INFINITY, f64::min);
     // Those of double precision come first: they keep the delay lines of the plant.
     let good = candidates.into_iter().zip(rms).filter(|(_, rms)| *rms <= enough);
@@ -49,7 +52,7 @@ fn precise<F: Number>(plant: &LiftedPlant, limit: usize) -> Result<Option<Filter
     Ok(PreciseFiltering::<F>::new(plant)?.h2())
 }
 
-/// ||K||_2; infinite for a filter that rounding made unstable.
+/// ||K||_2 with the noise; infinite for a filter that rounding made unstable.
 fn rms_error(plant: &LiftedPlant, filter: &Filter) -> f64 {
     let error = plant.error_system(filter).ok();
     error.and_then(|error| h2_norm(&error).ok()).unwrap_or(f64::INFINITY)

@@ -5,6 +5,7 @@
 //! | [`fir`] | the norm of the error, for given length (thesis 5.4) | FIR | dual of the sampled problem |
 //! | [`iir`] | the norm of the error (thesis 5.3) | state space | unsolvable Riccati equation |
 //! | [`h2`] | the mean-square error: `iir` at gamma = infinity | state space | noncausal bound |
+//! | [`mean_square_fir`] | the same, for given length: `h2` with taps | FIR | noncausal bound |
 //! | [`sinc`] | nothing: Yen's interpolation, truncated (thesis 5.6.3) | FIR | noncausal bound |
 //! | [`separation`] | delays and bank one after the other (thesis 5.6.3) | FIR | noncausal bound |
 
@@ -14,6 +15,7 @@ pub(crate) mod fir_kyp;
 mod gamma_iteration;
 pub(crate) mod h2;
 pub(crate) mod iir;
+mod mean_square_fir;
 mod precise_filtering;
 pub(crate) mod robust_fir;
 pub(crate) mod separation;
@@ -30,7 +32,7 @@ use crate::spec::{Method, Solver, Tracking};
 /// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Settings {
-    /// Taps per channel at the fast rate, for the methods that make FIR filters.
+    /// Taps per channel at the fast rate; 0 for recursive filters.
     pub(crate) taps: usize,
     /// Relative excess over the least gamma that may be spent on a smaller mean square; `None` is the
     /// method's default.
@@ -103,7 +105,8 @@ pub(crate) fn synthesise(
         Method::Fir if settings.solver == Some(Solver::Kyp) => fir_kyp::synthesise(plant, settings),
         Method::Fir => fir::synthesise(plant, settings),
         Method::Iir => iir::synthesise(plant, settings),
-        Method::H2 => h2::synthesise(plant, settings),
+        Method::H2 if settings.taps > 0 => mean_square_fir::synthesise(plant, settings),
+        Method::H2 => h2::synthesise(plant),
         Method::Sinc => sinc::synthesise(plant, settings),
         Method::Separation => separation::synthesise(plant, settings),
     }

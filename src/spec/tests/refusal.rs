@@ -107,7 +107,10 @@ fn every_mistake_has_its_line_and_its_message() {
         // Design.
         ("method = \"fir\"", "method = \"fri\"", 17, "did you mean \"fir\""),
         ("method = \"fir\"", "method = \"kalman\"", 17, "choose one of fir, iir, h2, sinc, separation"),
-        ("taps = 22", "", 16, "the method fir needs the number of taps"),
+        ("taps = 22", "taps = 22\ntarget_snr_db = 90", 19, "the SNR decides how many taps there are"),
+        ("taps = 22", "target_snr_db = -1", 18, "target_snr_db is the ratio of the signal"),
+        ("\"fir\"\ntaps = 22", "\"iir\"\ntarget_snr_db = 90", 18, "fir or h2"),
+        ("\"fir\"\ntaps = 22", "\"h2\"\ntaps = 22\norder = 4", 19, "h2 with taps"),
         ("taps = 22", "taps = 0", 18, "1 to 65536 taps"),
         ("taps = 22", "taps = 65537", 18, "1 to 65536 taps"),
         ("taps = 22", "taps = 10_000", 18, "taps times channels is at most 16384"),
@@ -255,7 +258,7 @@ fn specs_in_memory_are_checked_too() {
         Spec { ratio: 0, ..good.clone() },
         Spec { channels: vec![], ..good.clone() },
         Spec { target: FilterSpec::Cascade { cascade: vec![] }, ..good.clone() },
-        Spec { design: DesignSpec { taps: None, ..good.design.clone() }, ..good.clone() },
+        Spec { design: DesignSpec { target_snr_db: Some(90.0), ..good.design.clone() }, ..good.clone() },
     ];
     for spec in bad {
         assert!(spec.check().is_err() && spec.to_toml().is_err(), "{spec:?}");

@@ -104,7 +104,7 @@ pub(crate) fn synthesise(
     let of_fixed = largest(plants.iter().map(|plant| Ok(plant.fir_norm(fixed_taps)?.gain)))?;
     let ratios = norms.iter().zip(&within_reach).map(|(norm, reach)| norm / reach);
     let ratio = ratios.fold(peak.gain / nominal, f64::max);
-    let (_, redesigned) = fir::bracket(&plants[worst], settings.taps, ACCURACY, f64::INFINITY)?;
+    let (_, redesigned) = fir::bracket(&plants[worst], settings.taps, ACCURACY)?;
     let study = TrackingStudy {
         errors: problem.errors.clone(),
         tracked,

@@ -1,0 +1,53 @@
+//! The FIR bank with the least mean-square error of all banks of its length, for white noise at the analog
+//! input and the noise of the converters.
+//!
+//! The phases of the output do not depend on one another: phase p estimates the target at the instant p - m0
+//! from the newest `J_p = ceil((taps - p) / M)` frames.
+
+use super::{Settings, Synthesis};
+use crate::design::DesignError;
+use crate::design::history_errors::best_taps;
+use crate::design::plant::LiftedPlant;
+use crate::design::problem::Problem;
+
+/// Noise of a sample relative to its size, below which the noise of a converter counts as this: samples that
+/// determine one another up to rounding are weighed alike, and not as huge differences.
+const ROUNDING: f64 = 1e-13;
+
+/// The `settings.taps` taps per channel with the least `||K||_2^2 + sum_i noise_i ||f_i||^2`.
+///
+/// # Errors
+/// [`DesignError::Lti`] for unstable plants.
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+    let problem = with_rounding(plant)?;
+    let (ratio, length) = (problem.ratio, settings.taps);
+    let mut taps = vec![vec![0.0; length]; problem.channels.len()];
+    // The first phases have a lag more than the others, unless all have equally many.
+    let longer = length - length / ratio * ratio;
+    for (phases, frames) in [(0..longer, length / ratio + 1), (longer..ratio, length / ratio)] {
+        if phases.is_empty() || frames == 0 {
+            continue;
+        }
+        let instant = |p: usize| p as i64 - problem.latency as i64;
+        let best = best_taps(&problem, frames, instant(phases.start)..=instant(phases.end - 1))?;
+        for (p, filters) in phases.zip(best) {
+            for (tap, lags) in taps.iter_mut().zip(filters) {
+                lags.iter().enumerate().for_each(|(j, weight)| tap[p + j * ratio] = *weight);
+            }
+        }
+    }
+    Synthesis::of_taps(plant, taps)
+}
+
+/// The problem with at least the noise of rounding.
+fn with_rounding(plant: &LiftedPlant) -> Result<Problem, DesignError> {
+    let mut problem = plant.problem().clone();
+    let sizes = problem.measurement_sizes()?;
+    for (power, size) in problem.noise.iter_mut().zip(sizes) {
+        *power = power.max((ROUNDING * size).powi(2));
+    }
+    Ok(problem)
+}
+
+#[cfg(test)]
+mod tests;

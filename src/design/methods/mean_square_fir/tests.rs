@@ -1,0 +1,207 @@
+//! Golden values of the mean-square optimum.
+//!
+//! Origin: computed apart from this code, from covariances alone: for each phase the normal equations of the
+//! samples that the taps reach, with covariances by the matrix exponential. They are the rms of the error per
+//! fast sample, signal and noise together, for white noise of unit density at the analog input.
+
+use crate::design::{Design, ProofSearch, analyze_mean, design_with};
+use crate::linalg::Complex;
+use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use crate::units::{Hertz, Seconds};
+use std::f64::consts::PI;
+
+/// A channel of [`spec`]: delay in fast periods, noise, filter.
+struct Converter {
+    delay: f64,
+    noise: f64,
+    filter: FilterSpec,
+}
+
+struct Case {
+    ratio: usize,
+    latency: usize,
+    taps: Option<usize>,
+    target: FilterSpec,
+    converters: Vec<Converter>,
+}
+
+impl Case {
+    fn spec(&self) -> Spec {
+        let channel = |converter: &Converter| ChannelSpec {
+            noise: converter.noise,
+            ..ChannelSpec::new(Seconds(converter.delay), converter.filter.clone())
+        };
+        Spec {
+            latency: Some(self.latency),
+            channels: self.converters.iter().map(channel).collect(),
+            design: DesignSpec::new(Method::H2, self.taps),
+            target: self.target.clone(),
+            ..Spec::from_toml(THESIS, "spec.toml").unwrap()
+        }
+        .with_ratio(self.ratio)
+    }
+
+    /// Rms of the error and of the noise together.
+    fn rms(&self) -> f64 {
+        total(&design_with(&self.spec(), ProofSearch::Skip).unwrap())
+    }
+}
+
+impl Spec {
+    fn with_ratio(self, ratio: usize) -> Self {
+        Self { ratio, ..self }
+    }
+}
+
+fn total(design: &Design) -> f64 {
+    let mean = analyze_mean(&design.bank).unwrap();
+    mean.rms_error.hypot(mean.output_noise)
+}
+
+const THESIS: &str = "fast_period = 1.0\nratio = 2\nlatency = 10\n\
+    target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
+    channel = [{ delay = 1.2 }, { delay = 0.6 }]\n";
+
+fn thesis(noise: f64, taps: Option<usize>) -> Case {
+    let filter = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
+    let converter = |delay| Converter { delay, noise, filter: filter.clone() };
+    Case { ratio: 2, latency: 10, taps, target: filter.clone(), converters: vec![converter(1.2), converter(0.6)] }
+}
+
+fn butterworth(order: usize, cutoff: f64) -> FilterSpec {
+    FilterSpec::Family {
+        family: Family::Butterworth,
+        order: Some(order),
+        cutoff: Hertz(cutoff),
+        ripple_db: None,
+        attenuation_db: None,
+    }
+}
+
+/// A converter that samples every `period` fast periods, as virtual channels of the frame of `frame`.
+fn virtual_channels(frame: f64, period: f64, converter: &Converter) -> Vec<Converter> {
+    let count = (frame / period).round() as usize;
+    let of = |j: usize| Converter {
+        delay: converter.delay - j as f64 * period,
+        filter: converter.filter.clone(),
+        ..*converter
+    };
+    (0..count).map(of).collect()
+}
+
+/// All delays and the latency later by the least whole number that makes every delay positive.
+fn shifted(mut case: Case) -> Case {
+    let least = case.converters.iter().map(|converter| converter.delay).fold(0.0, f64::min);
+    let shift = (-least).ceil();
+    case.converters.iter_mut().for_each(|converter| converter.delay += shift);
+    case.latency += shift as usize;
+    case
+}
+
+fn check(case: &Case, golden: f64) {
+    let found = case.rms();
+    // Ten decimals are printed.
+    assert!((found - golden).abs() < 1e-10, "{found:.12} instead of {golden}");
+}
+
+#[test]
+fn the_thesis_example_with_noise() {
+    for (noise, golden) in
+        [(0.0, 0.0271078137), (1e-3, 0.0271259258), (1e-2, 0.0288178494), (1e-1, 0.0751746502)]
+    {
+        check(&thesis(noise, Some(22)), golden);
+        // The recursive bank sees all of the past, and 11 frames nearly are all of it.
+        let recursive = thesis(noise, None).rms();
+        assert!(recursive < golden + 1e-10 && recursive > golden * 0.999, "{noise}: {recursive} {golden}");
+    }
+}
+
+/// 24 kHz and 16 kHz into 48 kHz.
+#[test]
+fn two_rates_as_virtual_channels() {
+    let goldens = [
+        (0.0, [0.0528751882, 0.0470057306, 0.0469987756]),
+        (1e-2, [0.0595395837, 0.0550370025, 0.0550324897]),
+    ];
+    for (noise, row) in goldens {
+        for (latency, golden) in [5, 12, 20].into_iter().zip(row) {
+            let (a, b) = (butterworth(4, 9.0 / 48.0), butterworth(4, 7.0 / 48.0));
+            let first = Converter { delay: 4.3, noise, filter: a.clone() };
+            let second = Converter { delay: 4.1, noise, filter: b };
+            let converters =
+                virtual_channels(6.0, 2.0, &first).into_iter().chain(virtual_channels(6.0, 3.0, &second));
+            let case =
+                Case { ratio: 6, latency, taps: Some(48), target: a, converters: converters.collect() };
+            check(&shifted(case), golden);
+        }
+    }
+}
+
+/// 100 Hz and 60 Hz into 300 Hz; then one of 120 Hz with other noise.
+#[test]
+fn many_virtual_channels() {
+    let filter = butterworth(2, 20.0 / 300.0);
+    let case = |periods: [f64; 2], noise: [f64; 2]| {
+        let converter = |k: usize| Converter { delay: [0.4, 1.7][k], noise: noise[k], filter: filter.clone() };
+        let channels = (0..2).flat_map(|k| virtual_channels(15.0, periods[k], &converter(k)));
+        let (target, converters) = (filter.clone(), channels.collect());
+        shifted(Case { ratio: 15, latency: 20, taps: Some(90), target, converters })
+    };
+    check(&case([3.0, 5.0], [1e-3; 2]), 0.0460010907);
+    check(&case([3.0, 5.0], [1e-2; 2]), 0.0482508302);
+    check(&case([2.5, 3.0], [1e-2, 1e-3]), 0.0314942102);
+}
+
+/// A Butterworth band-pass from the poles of its low-pass, both cut-offs in hertz.
+fn band_pass(order: usize, low: f64, high: f64) -> FilterSpec {
+    let (width, square) = (2.0 * PI * (high - low), 4.0 * PI * PI * low * high);
+    let pole = |k: usize| Complex::from_polar(1.0, PI * (0.5 + (k as f64 + 0.5) / order as f64));
+    let pair = |k: usize| {
+        let half = pole(k) * (0.5 * width);
+        let root = (half * half - square).sqrt();
+        [half + root, half - root]
+    };
+    FilterSpec::ZeroPoleGain {
+        zeros: vec![[0.0, 0.0]; order],
+        poles: (0..order).flat_map(pair).map(|p| [p.re, p.im]).collect(),
+        gain: width.powi(order as i32),
+    }
+}
+
+#[test]
+fn undersampling_of_an_intermediate_frequency() {
+    let filter = band_pass(3, 62.0 / 80.0, 78.0 / 80.0);
+    for (noise, golden) in [(0.0, 0.0141802688), (1e-3, 0.0142127481)] {
+        let converter = |delay| Converter { delay, noise, filter: filter.clone() };
+        let converters = vec![converter(1.03), converter(0.0)];
+        check(&Case { ratio: 2, latency: 24, taps: Some(64), target: filter.clone(), converters }, golden);
+    }
+}
+
+/// No change of a tap lowers the error: with gains, noise of one channel only, a repeated channel, fewer taps
+/// than phases, and channels that are older by whole periods.
+#[test]
+fn no_other_taps_are_better() {
+    let filter = butterworth(3, 0.2);
+    let converter = |delay, noise| Converter { delay, noise, filter: filter.clone() };
+    for taps in [1, 2, 5, 9] {
+        let converters = vec![converter(0.3, 0.0), converter(0.3, 0.02), converter(7.3, 0.01), converter(1.9, 0.0)];
+        let case = Case { ratio: 3, latency: 4, taps: Some(taps), target: filter.clone(), converters };
+        let mut spec = case.spec();
+        (spec.channels[1].gain, spec.channels[3].gain) = (-1.7, 1e-3);
+        let designed = design_with(&spec, ProofSearch::Skip).unwrap();
+        let least = total(&designed);
+        let crate::bank::SynthesisFilters::Fir(best) = &designed.bank.filters else { panic!("taps") };
+        for (i, n) in (0..4).flat_map(|i| (0..taps).map(move |n| (i, n))) {
+            for change in [-1e-3, 1e-3] {
+                let mut bank = designed.bank.clone();
+                let mut changed = best.clone();
+                changed[i][n] += change / spec.channels[i].gain;
+                bank.filters = crate::bank::SynthesisFilters::Fir(changed);
+                let mean = analyze_mean(&bank).unwrap();
+                let other = mean.rms_error.hypot(mean.output_noise);
+                assert!(other >= least * (1.0 - 1e-13), "{taps} taps, {i} {n}: {other} {least}");
+            }
+        }
+    }
+}
