@@ -1,6 +1,6 @@
 //! The band in which figures hold.
 
-use crate::analog::StrictlyProper;
+use crate::analog::{StrictlyProper, resolved_band};
 use crate::design::Problem;
 use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Hertz, RadiansPerFastPeriod};
@@ -39,11 +39,11 @@ impl FigureBand {
             return Self { low_hertz: low, high_hertz: high, source: BandSource::Signal };
         }
         let target = &problem.front_ends[problem.target];
-        let (low, high) = (lower_edge(target), target.half_power_frequency().0 / TAU);
-        let effective = 0.5 * (problem.channels.len() as f64 / problem.ratio as f64).min(1.0);
-        let high = if low < effective { high.min(effective) } else { high };
-        let hertz = |cycles: f64| Hertz(cycles / spec.fast_period.0);
-        Self { low_hertz: hertz(low), high_hertz: hertz(high), source: BandSource::Target }
+        let hertz = |w: f64| Hertz(w / TAU / spec.fast_period.0);
+        let (low, high) = (hertz(lower_edge(target)), hertz(target.half_power_frequency().0));
+        let resolved = resolved_band(spec);
+        let high = if low < resolved && high > resolved { resolved } else { high };
+        Self { low_hertz: low, high_hertz: high, source: BandSource::Target }
     }
 
     /// The ends in cycles per fast period.
@@ -52,7 +52,7 @@ impl FigureBand {
     }
 }
 
-/// The lowest frequency from which on a filter passes half its largest power, in cycles per fast period: 0
+/// The lowest frequency from which on a filter passes half its largest power, in radians per fast period: 0
 /// for a low-pass.
 fn lower_edge(filter: &StrictlyProper) -> f64 {
     let gain = |w: f64| filter.response(RadiansPerFastPeriod(w)).norm();
@@ -68,5 +68,5 @@ fn lower_edge(filter: &StrictlyProper) -> f64 {
         let middle = 0.5 * (low + high);
         if gain(middle) >= level { high = middle } else { low = middle }
     }
-    high / TAU
+    high
 }

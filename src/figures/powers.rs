@@ -7,8 +7,8 @@ use super::signal::{Columns, Signal};
 use crate::linalg::{CMat, Complex};
 use crate::units::FastPeriods;
 
-/// Multiply-adds that an integral may take, about: some seconds.
-const MOST_WORK: f64 = 4e9;
+/// Multiply-adds that an integral may take, about: a second or two.
+const MOST_WORK: f64 = 1e9;
 /// Fewest and most angles of an integral.
 const ANGLES: std::ops::RangeInclusive<f64> = 120.0..=40_000.0;
 

@@ -92,7 +92,8 @@ impl Signal {
         match &self.band {
             Some(band) => vec![folded(*band.start()), folded(*band.end())],
             None => {
-                let poles = self.problem.front_ends.iter().flat_map(|filter| filter.poles());
+                let own = self.problem.signal.iter().flat_map(|filter| filter.poles());
+                let poles = self.problem.front_ends.iter().flat_map(|filter| filter.poles()).chain(own);
                 poles.filter(|pole| pole.im > 0.0).map(|pole| folded(pole.im)).collect()
             }
         }
@@ -101,6 +102,7 @@ impl Signal {
     /// The columns at theta, radians per slow period.
     pub(super) fn at(&self, theta: f64) -> Columns {
         let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
+        let filters = 0..front_ends.len();
         let period = *ratio as f64;
         let aliases: Vec<Alias> = match &self.band {
             Some(band) => aliases_in(band, theta, period),
@@ -112,7 +114,7 @@ impl Signal {
         for (k, (&w, alias)) in frequencies.iter().zip(&aliases).enumerate() {
             let size = (alias.count / period).sqrt();
             let passed: Vec<Complex<f64>> =
-                front_ends.iter().map(|filter| filter.response(RadiansPerFastPeriod(w)) * size).collect();
+                filters.clone().map(|i| self.problem.response(i, RadiansPerFastPeriod(w)) * size).collect();
             for (i, channel) in channels.iter().enumerate() {
                 let delayed = Complex::from_polar(channel.gain, -w * channel.delay.0);
                 measurement[(i, k)] = passed[channel.front_end] * delayed;
