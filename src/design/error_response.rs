@@ -1,9 +1,9 @@
 //! The error of a bank by frequency.
 
-use super::analysis::bank_problem;
-use super::plant::LiftedPlant;
 use super::DesignError;
+use super::analysis::bank_problem;
 use super::filters::FilterResponse;
+use super::plant::LiftedPlant;
 use crate::bank::Bank;
 use crate::linalg;
 use crate::units::{Hertz, RadiansPerSlowPeriod};

@@ -82,19 +82,17 @@ impl Panel {
 ///
 /// `breaks` are angles at which the functions may jump or have narrow peaks; those outside 0 to pi are left
 /// out.
-pub(super) fn mean_over_circle(
-    breaks: &[f64],
-    most: usize,
-    of: &mut dyn FnMut(f64) -> Vec<f64>,
-) -> Vec<f64> {
-    let mut ends: Vec<f64> = breaks.iter().copied().filter(|x| *x > 0.0 && *x < PI).chain([0.0, PI]).collect();
+pub(super) fn mean_over_circle(breaks: &[f64], most: usize, of: &mut dyn FnMut(f64) -> Vec<f64>) -> Vec<f64> {
+    let mut ends: Vec<f64> =
+        breaks.iter().copied().filter(|x| *x > 0.0 && *x < PI).chain([0.0, PI]).collect();
     ends.sort_by(f64::total_cmp);
     ends.dedup_by(|b, a| *b - *a < 1e-12);
     let mut panels: Vec<Panel> = ends.windows(2).map(|end| Panel::new(end[0], end[1], of)).collect();
     let mut evaluations = 15 * panels.len();
     loop {
         let totals = sums(&panels);
-        let (rough, mut fine): (Vec<_>, Vec<_>) = panels.into_iter().partition(|panel| panel.is_rough(&totals));
+        let (rough, mut fine): (Vec<_>, Vec<_>) =
+            panels.into_iter().partition(|panel| panel.is_rough(&totals));
         if rough.is_empty() || evaluations >= most {
             return totals.into_iter().map(|total| total / PI).collect();
         }

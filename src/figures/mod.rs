@@ -26,9 +26,9 @@ mod signal;
 mod simple;
 mod snr;
 mod spline;
-mod tones;
 #[cfg(test)]
 mod tests;
+mod tones;
 
 pub use band::{BandSource, FigureBand};
 pub use simple::{SimpleFigure, SimpleWay};

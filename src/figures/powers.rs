@@ -39,7 +39,8 @@ pub(super) struct Powers {
 pub(super) fn target_power(signal: &Signal) -> f64 {
     let work = signal.columns() * signal.problem().ratio;
     let breaks = even_and(signal.breaks());
-    let power = mean_over_circle(&breaks, angles(work), &mut |theta| vec![signal.at(theta).reference.norm_squared()]);
+    let power =
+        mean_over_circle(&breaks, angles(work), &mut |theta| vec![signal.at(theta).reference.norm_squared()]);
     power.first().copied().unwrap_or(0.0) / signal.problem().ratio as f64
 }
 
@@ -48,9 +49,11 @@ impl Conditions<'_> {
     pub(super) fn powers(&self, ways: &[Reconstruction]) -> Vec<Powers> {
         let problem = self.signal.problem();
         let size = problem.ratio * problem.channels.len();
-        let lags = |way: &Reconstruction| if let Reconstruction::Bank(filters) = way { filters.lags() } else { 1 };
+        let lags =
+            |way: &Reconstruction| if let Reconstruction::Bank(filters) = way { filters.lags() } else { 1 };
         let work: usize = ways.iter().map(|way| size * (lags(way) + self.signal.columns())).sum();
-        let breaks = even_and(self.signal.breaks().into_iter().chain(ways.iter().flat_map(Reconstruction::breaks)));
+        let breaks =
+            even_and(self.signal.breaks().into_iter().chain(ways.iter().flat_map(Reconstruction::breaks)));
         let means = mean_over_circle(&breaks, angles(work), &mut |theta| {
             let columns = self.signal.at(theta);
             let late = self.is_uncertain().then(|| self.late(&columns));

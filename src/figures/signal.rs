@@ -108,7 +108,8 @@ impl Signal {
             Some(band) => aliases_in(band, theta, period),
             None => self.aliases.clone(),
         };
-        let frequencies: Vec<f64> = aliases.iter().map(|alias| (theta + TAU * alias.number) / period).collect();
+        let frequencies: Vec<f64> =
+            aliases.iter().map(|alias| (theta + TAU * alias.number) / period).collect();
         let mut measurement = CMat::zeros(channels.len(), aliases.len());
         let mut reference = CMat::zeros(*ratio, aliases.len());
         for (k, (&w, alias)) in frequencies.iter().zip(&aliases).enumerate() {

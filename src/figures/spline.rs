@@ -38,10 +38,15 @@ struct Output {
 impl Spline {
     pub(super) fn new(problem: &Problem) -> Self {
         let period = problem.ratio as f64;
-        let mut taken: Vec<(f64, Sample)> = problem.channels.iter().enumerate().map(|(channel, of)| {
-            let frames = (-of.delay.0 / period).floor();
-            (-of.delay.0 - frames * period, Sample { channel, lag: frames })
-        }).collect();
+        let mut taken: Vec<(f64, Sample)> = problem
+            .channels
+            .iter()
+            .enumerate()
+            .map(|(channel, of)| {
+                let frames = (-of.delay.0 / period).floor();
+                (-of.delay.0 - frames * period, Sample { channel, lag: frames })
+            })
+            .collect();
         taken.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut knots: Vec<Knot> = Vec::new();
         for (time, sample) in taken {
@@ -122,7 +127,13 @@ impl Spline {
     }
 
     /// The cubic at `time` as a row over the channels.
-    fn piece(&self, time: f64, theta: f64, values: &CMat, moments: &CMat) -> nalgebra::RowDVector<Complex<f64>> {
+    fn piece(
+        &self,
+        time: f64,
+        theta: f64,
+        values: &CMat,
+        moments: &CMat,
+    ) -> nalgebra::RowDVector<Complex<f64>> {
         let last = self.knots.len() - 1;
         let (i, turn, start) = match self.knots.iter().rposition(|knot| knot.time <= time) {
             Some(i) => (i, Complex::ONE, self.knots[i].time),

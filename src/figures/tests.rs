@@ -77,7 +77,8 @@ fn simple_ways_have_the_digits_of_another_program() {
         let zero = SynthesisFilters::Fir(vec![vec![0.0]; system.delays.len()]);
         let bank = Bank { spec: Some(system.spec(SINC)), latency: 24, ..Bank::bare(zero, system.ratio) };
         let figures = Figures::new(&bank).unwrap();
-        let found = |way| figures.simple.iter().find(|figure| figure.way == way).map(|figure| figure.snr.total_db.0);
+        let found =
+            |way| figures.simple.iter().find(|figure| figure.way == way).map(|figure| figure.snr.total_db.0);
         let ways = [SimpleWay::CubicSpline, SimpleWay::Interleaving, SimpleWay::OneChannel];
         for (way, want) in ways.into_iter().zip(want) {
             let got = found(way);
@@ -170,7 +171,10 @@ fn perfect_interleaving_is_exact() {
         let mut spec = system.spec(SINC);
         spec.channels = delays
             .iter()
-            .map(|delay| crate::spec::ChannelSpec { delay: crate::units::Seconds(*delay), ..spec.channels[0].clone() })
+            .map(|delay| crate::spec::ChannelSpec {
+                delay: crate::units::Seconds(*delay),
+                ..spec.channels[0].clone()
+            })
             .collect();
         let bank = Bank { spec: Some(spec), latency: ratio - 1, ..unity(ratio) };
         let figures = Figures::new(&bank).unwrap();
@@ -180,7 +184,10 @@ fn perfect_interleaving_is_exact() {
         assert_eq!(figures.gain_over_simple(), None);
         assert!(!figures.is_worthwhile() && figures.best_simple().unwrap().snr.is_exact(), "{figures:?}");
         // Noise of 16 bits at a quarter of full scale: -98.09 dB of full scale plus 12.04, and gain 1.
-        assert!((figures.snr_16_bits_db.unwrap().0 - (101.105 - 12.041 - 3.0103 + 3.0103)).abs() < 0.01 , "{figures:?}");
+        assert!(
+            (figures.snr_16_bits_db.unwrap().0 - (101.105 - 12.041 - 3.0103 + 3.0103)).abs() < 0.01,
+            "{figures:?}"
+        );
     }
 }
 

@@ -59,7 +59,8 @@ impl ToneResponse {
         let samples = channels.iter().map(|channel| {
             passed[channel.front_end] * Complex::from_polar(channel.gain, -w * channel.delay.0)
         });
-        let phases = self.filters.at(w * *ratio as f64) * nalgebra::DVector::from_iterator(channels.len(), samples);
+        let phases =
+            self.filters.at(w * *ratio as f64) * nalgebra::DVector::from_iterator(channels.len(), samples);
         let turned = phases.iter().enumerate().map(|(p, y)| y * Complex::from_polar(1.0, -w * p as f64));
         let outputs = fourier::spectrum(turned.collect());
         let image = outputs.iter().skip(1).map(|y| y.norm()).fold(0.0, f64::max) / outputs[0].norm();
@@ -115,7 +116,8 @@ impl ToneResponse {
             return None;
         }
         let at = |i: usize| value(&grid[i]);
-        let is_peak = |i: &usize| (*i == 0 || at(*i) >= at(i - 1)) && (i + 1 == grid.len() || at(*i) >= at(i + 1));
+        let is_peak =
+            |i: &usize| (*i == 0 || at(*i) >= at(i - 1)) && (i + 1 == grid.len() || at(*i) >= at(i + 1));
         let mut peaks: Vec<usize> = (0..grid.len()).filter(is_peak).collect();
         peaks.sort_by(|&i, &j| at(j).total_cmp(&at(i)));
         let refined = peaks.into_iter().take(REFINED).map(|i| {

@@ -95,7 +95,10 @@ fn tones(bank: &Bank) -> Result<Chart, DesignError> {
         title: "Images and error of gain".into(),
         x_label: format!("input {x_label}"),
         y_label: "relative to the tone, dB".into(),
-        series: vec![curve("largest image", |tone| tone.image), curve("error of gain and phase", |tone| tone.gain_error)],
+        series: vec![
+            curve("largest image", |tone| tone.image),
+            curve("error of gain and phase", |tone| tone.gain_error),
+        ],
     })
 }
 

@@ -79,7 +79,8 @@ impl Words<'_> {
         .filter_map(|(part, db)| db.map(|db| format!("{part} {}", ratio(db))))
         .collect();
         let parts = if parts.is_empty() { String::new() } else { format!("; from {}", parts.join(", ")) };
-        let bits = snr_16_bits_db.map_or_else(String::new, |db| format!("; {} with 16-bit converters", rounded(db)));
+        let bits =
+            snr_16_bits_db.map_or_else(String::new, |db| format!("; {} with 16-bit converters", rounded(db)));
         format!("{input}{parts}{bits}")
     }
 
@@ -109,10 +110,15 @@ impl Words<'_> {
             format!("over {}{rest}", with_ratio(best))
         } else {
             let remedy = match self.figures.band.source {
-                BandSource::Target if self.figures.any_input.is_none() => "say in [signal] where the signal lies",
+                BandSource::Target if self.figures.any_input.is_none() => {
+                    "say in [signal] where the signal lies"
+                }
                 _ => "give the bank more latency and taps",
             };
-            format!("this bank does not pay: {} is as good or better{rest}; use that, or {remedy}", with_ratio(best))
+            format!(
+                "this bank does not pay: {} is as good or better{rest}; use that, or {remedy}",
+                with_ratio(best)
+            )
         };
         fact("compared", value, meaning)
     }
@@ -127,8 +133,7 @@ mod tests {
     }
 
     fn figures(total: f64, spline: f64) -> Figures {
-        let simple =
-            |way, channel, total| SimpleFigure { way, channel, snr: snr(total) };
+        let simple = |way, channel, total| SimpleFigure { way, channel, snr: snr(total) };
         Figures {
             band: FigureBand { low_hertz: Hertz(0.0), high_hertz: Hertz(9e3), source: BandSource::Signal },
             snr: snr(total),
@@ -145,7 +150,9 @@ mod tests {
     }
 
     fn lines(figures: &Figures) -> Vec<String> {
-        figure_facts(figures, false).map(|Fact { name, value, meaning }| format!("{name}: {value}, {meaning}")).into()
+        figure_facts(figures, false)
+            .map(|Fact { name, value, meaning }| format!("{name}: {value}, {meaning}"))
+            .into()
     }
 
     #[test]
@@ -164,9 +171,14 @@ mod tests {
 
     #[test]
     fn a_bank_that_does_not_pay_says_so() {
-        for (own, best, value) in [(42.7, 48.0, "-5.3 dB"), (48.9, 48.0, "+0.9 dB"), (90.0, f64::INFINITY, "worse")] {
+        for (own, best, value) in
+            [(42.7, 48.0, "-5.3 dB"), (48.9, 48.0, "+0.9 dB"), (90.0, f64::INFINITY, "worse")]
+        {
             let line = lines(&figures(own, best)).pop().unwrap();
-            assert!(line.starts_with(&format!("compared: {value}, this bank does not pay: a cubic spline")), "{line}");
+            assert!(
+                line.starts_with(&format!("compared: {value}, this bank does not pay: a cubic spline")),
+                "{line}"
+            );
             assert!(line.ends_with("; use that, or give the bank more latency and taps"), "{line}");
         }
         let line = lines(&figures(f64::INFINITY, f64::INFINITY)).pop().unwrap();

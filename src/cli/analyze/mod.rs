@@ -192,7 +192,9 @@ impl Report {
              noise gain   {:<11}   for independent noise on the slow samples\n\
              output noise {}\n{}",
             self.understood,
-            self.figures.as_ref().map_or_else(String::new, |figures| figure_text(figures, self.is_normalised)),
+            self.figures
+                .as_ref()
+                .map_or_else(String::new, |figures| figure_text(figures, self.is_normalised)),
             against(gamma, self.scale.zero_output, "zero output"),
             against(gamma, self.scale.interleaving, "plain interleaving"),
             frequency(peak_hertz, self.is_normalised),

@@ -156,7 +156,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     warn_or_refuse(&doubts(&found.bank, &mean, &scale), args.strict)?;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    let report = Report::new(args.output.display().to_string(), &found, Judged { mean, scale, figures }, seconds);
+    let report =
+        Report::new(args.output.display().to_string(), &found, Judged { mean, scale, figures }, seconds);
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {

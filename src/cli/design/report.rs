@@ -6,7 +6,7 @@ use crate::design::{
     Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy,
 };
 use crate::figures::Figures;
-use crate::overview::{counted, decibels, Fact, figure_facts, frequency, six_digits, understood};
+use crate::overview::{Fact, counted, decibels, figure_facts, frequency, six_digits, understood};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -137,12 +137,7 @@ impl ProofReport {
 
 impl<'a> Report<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(in crate::cli) fn new(
-        output: String,
-        design: &'a Design,
-        judged: Judged,
-        seconds: f64,
-    ) -> Self {
+    pub(in crate::cli) fn new(output: String, design: &'a Design, judged: Judged, seconds: f64) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
@@ -217,8 +212,15 @@ impl Report<'_> {
             (_, Some(reason)) => format!("computed, not proven: {reason}"),
             _ => "computed".to_owned(),
         };
-        let any = self.judged.figures.any_input.map_or_else(String::new, |gamma| format!("; any input: {}", six_digits(gamma)));
-        format!("gamma      {} (worst-case gain from the input to the error; {proof}{any})\n", number(self.gamma.norm))
+        let any = self
+            .judged
+            .figures
+            .any_input
+            .map_or_else(String::new, |gamma| format!("; any input: {}", six_digits(gamma)));
+        format!(
+            "gamma      {} (worst-case gain from the input to the error; {proof}{any})\n",
+            number(self.gamma.norm)
+        )
     }
 
     fn size(&self) -> String {
