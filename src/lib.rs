@@ -38,6 +38,8 @@ pub mod calibrate;
 #[cfg(feature = "design")]
 pub mod design;
 #[cfg(feature = "design")]
+pub mod figures;
+#[cfg(feature = "design")]
 pub mod lmi;
 #[cfg(feature = "design")]
 pub mod lti;

@@ -17,6 +17,12 @@ pub fn real_spectrum(samples: &[f64]) -> Vec<Complex<f64>> {
     spectrum
 }
 
+/// X_k = sum_n x_n e^{-2 pi j k n / L} for k = 0 .. L - 1, of L complex samples.
+pub fn spectrum(mut samples: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
+    FftPlanner::new().plan_fft_forward(samples.len()).process(&mut samples);
+    samples
+}
+
 /// z_n = L sum_k x_k y_{n - k}, indices modulo the length L of both.
 ///
 /// # Panics

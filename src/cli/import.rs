@@ -2,8 +2,9 @@
 
 use super::Failure;
 use super::bank_file::{load_spec_or_bank, refuse_overlap, write_text};
-use super::design::report::Report;
+use super::design::report::{Judged, Report};
 use crate::design::{self, DesignError, GammaScale, ProofSearch};
+use crate::figures::Figures;
 use crate::files::{Bound, read_bytes};
 use crate::interchange::{TapsError, taps_of_csv, taps_of_npy};
 use crate::overview::doubts;
@@ -38,6 +39,9 @@ pub(super) struct Args {
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
+    /// Print all figures: gamma with its scale and its bounds, the mean errors, the proof
+    #[arg(long, short, conflicts_with = "json")]
+    verbose: bool,
     /// Print a report as one JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -64,11 +68,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let found = design::judge_taps(&spec, taps, ProofSearch::Run).map_err(named)?;
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
     let scale = GammaScale::new(&found.bank).map_err(named)?;
+    let figures = Figures::new(&found.bank).map_err(named)?;
     doubts(&found.bank, &mean, &scale).iter().for_each(|doubt| super::warn(doubt));
     write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
-    let report = Report::new(args.output.display().to_string(), &found, mean, scale, seconds);
-    if args.json { super::print_json(&report) } else { super::print(&report.text()) }
+    let report =
+        Report::new(args.output.display().to_string(), &found, Judged { mean, scale, figures }, seconds);
+    if args.json { super::print_json(&report) } else { super::print(&report.text(args.verbose)) }
 }
 
 /// Reads taps from the bytes of a file.

@@ -1,11 +1,11 @@
 //! The error of a bank by frequency.
 
+use super::DesignError;
 use super::analysis::bank_problem;
+use super::filters::FilterResponse;
 use super::plant::LiftedPlant;
-use super::{DesignError, filters};
-use crate::bank::{Bank, SynthesisFilters};
+use crate::bank::Bank;
 use crate::linalg;
-use crate::lti::FrequencyResponse;
 use crate::units::{Hertz, RadiansPerSlowPeriod};
 use std::f64::consts::PI;
 
@@ -22,45 +22,22 @@ pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, D
     let problem = bank_problem(bank)?;
     problem.check_size()?;
     let plant = LiftedPlant::new(&problem)?;
-    let filters = Filters::new(bank)?;
+    let filters = FilterResponse::new(bank)?;
     let step = PI / points.saturating_sub(1).max(1) as f64;
     let at = |k: usize| {
         let omega = step * k as f64;
         let (h, w) = plant.response(omega);
-        let gain = linalg::largest_singular_value_c(&(w - filters.response(omega) * h))?;
+        let gain = linalg::largest_singular_value_c(&(w - filters.at(omega) * h))?;
         Ok((RadiansPerSlowPeriod(omega).in_hertz(bank.slow_period()), gain))
     };
     (0..points).map(at).collect()
 }
 
-/// F, prepared for many frequencies.
-enum Filters {
-    /// The lags F_0, F_1, ..
-    Polynomial(Vec<linalg::Mat>),
-    Recursive(FrequencyResponse),
-}
-
-impl Filters {
-    fn new(bank: &Bank) -> Result<Self, DesignError> {
-        Ok(match &bank.filters {
-            SynthesisFilters::Fir(taps) => Self::Polynomial(filters::polyphase(taps, bank.ratio)),
-            block @ SynthesisFilters::StateSpace(_) => {
-                Self::Recursive(FrequencyResponse::new(&filters::lifted(block, bank.ratio)?))
-            }
-        })
-    }
-
-    fn response(&self, omega: f64) -> linalg::CMat {
-        match self {
-            Self::Polynomial(lags) => filters::response(lags, omega),
-            Self::Recursive(filters) => filters.at_frequency(omega),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bank::SynthesisFilters;
+    use crate::design::filters;
     use crate::linalg::Complex;
 
     /// The definition: the whole error system, evaluated by a solve at each frequency.

@@ -3,7 +3,9 @@
 use super::DesignError;
 use crate::bank::{Bank, BlockFilter, SynthesisFilters};
 use crate::linalg::{CMat, Complex, Mat};
-use crate::lti::StateSpace;
+use crate::lti::peak::{resonances, stable_poles};
+use crate::lti::{FrequencyResponse, StateSpace};
+use std::f64::consts::PI;
 
 /// The taps F_0, F_1, .. of F(z), M x N each, for filters `taps[i][n] = f_i[n]`; at least one.
 pub fn polyphase(taps: &[Vec<f64>], ratio: usize) -> Vec<Mat> {
@@ -27,6 +29,63 @@ pub fn response(lags: &[Mat], w: f64) -> CMat {
         filter.zip_apply(lag, |sum, tap| *sum += rotation * tap);
     }
     filter
+}
+
+/// F of a bank, prepared for many frequencies.
+pub(crate) enum FilterResponse {
+    /// The lags F_0, F_1, ..
+    Polynomial(Vec<Mat>),
+    /// A recursion, and the angles of its resonances.
+    Recursive {
+        /// F(z).
+        response: FrequencyResponse,
+        /// Radians per slow period.
+        resonances: Vec<f64>,
+    },
+}
+
+impl FilterResponse {
+    /// Angles per lag of FIR filters between which their response is smooth.
+    const BREAKS_PER_LAG: f64 = 0.25;
+    /// Fewest and most of these angles.
+    const BREAKS: std::ops::RangeInclusive<f64> = 4.0..=512.0;
+
+    /// Of the filters of `bank`.
+    ///
+    /// # Errors
+    /// As [`lifted`]; [`DesignError::Lti`] for unstable filters.
+    pub(crate) fn new(bank: &Bank) -> Result<Self, DesignError> {
+        Ok(match &bank.filters {
+            SynthesisFilters::Fir(taps) => Self::Polynomial(polyphase(taps, bank.ratio)),
+            block @ SynthesisFilters::StateSpace(_) => {
+                let system = lifted(block, bank.ratio)?;
+                let resonances = resonances(&stable_poles(&system)?);
+                Self::Recursive { response: FrequencyResponse::new(&system), resonances }
+            }
+        })
+    }
+
+    /// F at e^{jw}, w in radians per slow period.
+    pub(crate) fn at(&self, w: f64) -> CMat {
+        match self {
+            Self::Polynomial(lags) => response(lags, w),
+            Self::Recursive { response, .. } => response.at_frequency(w),
+        }
+    }
+
+    /// Slow periods after which the response to a sample is over, for FIR filters; 1 for a recursion.
+    pub(crate) fn lags(&self) -> usize {
+        if let Self::Polynomial(lags) = self { lags.len() } else { 1 }
+    }
+
+    /// Angles from 0 to pi that part the response into smooth pieces.
+    pub(crate) fn breaks(&self) -> Vec<f64> {
+        let pieces =
+            (Self::BREAKS_PER_LAG * self.lags() as f64).clamp(*Self::BREAKS.start(), *Self::BREAKS.end());
+        let even = (1..pieces as usize).map(|k| PI * k as f64 / pieces.floor());
+        let narrow = if let Self::Recursive { resonances, .. } = self { resonances.as_slice() } else { &[] };
+        even.chain(narrow.iter().copied()).collect()
+    }
 }
 
 /// F(z) of a bank as one system: N slow samples in and M fast samples out per slow period.

@@ -1,10 +1,12 @@
 //! The figures of a bank.
 
+use super::terms::figure_facts;
 use super::text::{decibels, six_digits};
 use super::understood::understood;
 use crate::bank::{Bank, SynthesisFilters};
 use crate::design::uncertainty::{DelayDerivatives, delay_derivatives};
 use crate::design::{DesignError, GammaScale, MeanAnalysis, analyze_mean};
+use crate::figures::Figures;
 use crate::quantity::readable;
 use crate::runtime::Options;
 use crate::spec::Spec;
@@ -42,7 +44,8 @@ pub struct Facts {
     pub title: String,
     /// The spec in units of the user.
     pub understood: String,
-    /// gamma, its bounds, the signal-to-noise ratio and the noise gain.
+    /// In the user's terms: signal-to-noise ratio, images, error of gain, and the simple ways. Then gamma, its bounds and
+    /// the noise gain.
     pub error: Vec<Fact>,
     /// Method, latency, size and operations.
     pub cost: Vec<Fact>,
@@ -50,7 +53,7 @@ pub struct Facts {
     pub channels: Vec<ChannelFact>,
 }
 
-fn fact(name: &'static str, value: impl Into<String>, meaning: impl Into<String>) -> Fact {
+pub(super) fn fact(name: &'static str, value: impl Into<String>, meaning: impl Into<String>) -> Fact {
     Fact { name, value: value.into(), meaning: meaning.into() }
 }
 
@@ -79,7 +82,10 @@ impl Facts {
         Ok(Self {
             title: name.to_owned(),
             understood: understood(&Spec { latency: Some(bank.latency), ..spec.clone() }),
-            error: error_facts(bank, &GammaScale::new(bank)?, &analyze_mean(bank)?),
+            error: figure_facts(&Figures::new(bank)?, bank.is_normalised())
+                .into_iter()
+                .chain(error_facts(bank, &GammaScale::new(bank)?, &analyze_mean(bank)?))
+                .collect(),
             cost: cost_facts(bank),
             channels: channel_facts(bank, spec, &delay_derivatives(bank)?),
         })
@@ -119,11 +125,6 @@ fn error_facts(bank: &Bank, scale: &GammaScale, mean: &MeanAnalysis) -> Vec<Fact
     if let Some(noncausal) = bank.gamma.noncausal {
         facts.push(fact("noncausal", six_digits(noncausal), "no latency makes gamma smaller"));
     }
-    facts.push(fact(
-        "SNR",
-        decibels(scale.rms_reference, mean.rms_error),
-        "of a signal with the spectrum of the target, against the ideal fast converter",
-    ));
     facts.push(fact("noise gain", six_digits(mean.noise_gain), noise(mean)));
     facts
 }

@@ -5,6 +5,7 @@ mod doubts;
 mod facts;
 mod pictures;
 mod spectra;
+mod terms;
 mod text;
 mod understood;
 
@@ -12,5 +13,6 @@ pub use doubts::doubts;
 pub use facts::{ChannelFact, Fact, Facts};
 pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
-pub use text::{counted, decibels, six_digits};
+pub use terms::figure_facts;
+pub use text::{counted, decibels, frequency, six_digits};
 pub use understood::understood;

@@ -4,6 +4,7 @@ use crate::bank::Bank;
 use crate::design::responses::{analysis_gains, fir_response, front_end_gains, impulse_responses};
 use crate::design::uncertainty::{delay_derivatives, norm_at};
 use crate::design::{self, DesignError};
+use crate::figures::{Tone, tone_curve};
 use crate::linalg::Complex;
 use crate::plot::{Chart, Series};
 use crate::quantity::scale_of;
@@ -42,6 +43,12 @@ pub fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
     let responses = impulse_responses(bank)?;
     let picture = |name, caption, chart| Picture { name, caption, chart };
     Ok(vec![
+        picture(
+            "tones",
+            "What the bank makes of a tone, by its frequency at the analog input: the largest image, and the error of gain \
+             and phase, both relative to the tone.",
+            tones(bank)?,
+        ),
         picture("front-ends", "What the target and the converters pass.", front_ends(bank)?),
         picture(
             "analysis",
@@ -74,6 +81,25 @@ pub fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
             delay_error(bank)?,
         ),
     ])
+}
+
+/// Images and errors of gain over the band of the figures.
+fn tones(bank: &Bank) -> Result<Chart, DesignError> {
+    let tones = tone_curve(bank, POINTS)?;
+    let (factor, x_label) = axis(tones.last().map_or(Hertz(1.0), |(hertz, _)| *hertz));
+    let curve = |label: &str, of: fn(&Tone) -> f64| Series {
+        label: label.into(),
+        points: tones.iter().map(|(hertz, tone)| (hertz.0 * factor, decibels(of(tone)))).collect(),
+    };
+    Ok(Chart {
+        title: "Images and error of gain".into(),
+        x_label: format!("input {x_label}"),
+        y_label: "relative to the tone, dB".into(),
+        series: vec![
+            curve("largest image", |tone| tone.image),
+            curve("error of gain and phase", |tone| tone.gain_error),
+        ],
+    })
 }
 
 fn decibels(gain: f64) -> f64 {

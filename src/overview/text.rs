@@ -1,5 +1,7 @@
 //! Numbers in sentences.
 
+use crate::quantity::readable;
+use crate::units::Hertz;
 use std::fmt::Display;
 
 /// A number in at most six significant digits.
@@ -21,6 +23,11 @@ pub fn decibels(value: f64, reference: f64) -> String {
         // Adding zero takes the sign from a zero.
         format!("{:.1} dB", (200.0 * (value / reference).log10()).round() / 10.0 + 0.0)
     }
+}
+
+/// A frequency with its unit; in normalised time it is a share of the output rate.
+pub fn frequency(hertz: Hertz, is_normalised: bool) -> String {
+    if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { readable(hertz.0, "Hz") }
 }
 
 /// A number of things, with a plural where it is not 1.

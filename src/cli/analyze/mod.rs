@@ -6,10 +6,11 @@ mod worst_case;
 
 use super::Failure;
 use super::bank_file::{is_dash, load, refuse_overlap};
-use super::design::report::{against, frequency};
+use super::design::report::{against, figure_text};
 use crate::bank::Bank;
 use crate::design::{self, Analysis, Certified, DesignError, GammaScale, MeanAnalysis};
-use crate::overview::{decibels, six_digits, understood};
+use crate::figures::Figures;
+use crate::overview::{decibels, frequency, six_digits, understood};
 use crate::quantity;
 use crate::units::Seconds;
 use std::path::PathBuf;
@@ -100,12 +101,15 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             return Ok(());
         }
     }
+    let own_delays = args.delay_error.is_empty();
+    let figures = own_delays.then(|| Figures::new(&bank)).transpose().map_err(named)?;
     let report = Report {
         understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
         is_normalised: bank.is_normalised(),
         scale: GammaScale::new(&bank).map_err(named)?,
         analysis,
         certified,
+        figures,
         errors,
     };
     if args.json { super::print_json(&report) } else { super::print(&report.text()) }
@@ -156,6 +160,9 @@ struct Report {
     analysis: Analysis,
     #[serde(skip_serializing_if = "Option::is_none")]
     certified: Option<Certified>,
+    /// With the delays of the bank; none where others are given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    figures: Option<Figures>,
     #[serde(flatten)]
     errors: worst_case::Report,
 }
@@ -175,16 +182,19 @@ impl Report {
         );
         let MeanAnalysis { rms_error, noise_gain, output_noise } = mean;
         format!(
-            "{}\n\
+            "{}\n{}\
              gamma        {gamma:.9}   worst-case gain from the analog input to the error (h = 1)\n\
              scale        {}, {}\n{proof}\
              worst at     {} modulo the slow rate\n\
              noncausal    {noncausal}\n\
              rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
-             SNR          {} for a signal with the target's spectrum\n\
+             white SNR    {} for white noise at the analog input\n\
              noise gain   {:<11}   for independent noise on the slow samples\n\
              output noise {}\n{}",
             self.understood,
+            self.figures
+                .as_ref()
+                .map_or_else(String::new, |figures| figure_text(figures, self.is_normalised)),
             against(gamma, self.scale.zero_output, "zero output"),
             against(gamma, self.scale.interleaving, "plain interleaving"),
             frequency(peak_hertz, self.is_normalised),

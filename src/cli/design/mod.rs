@@ -8,11 +8,12 @@ use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text}
 use super::interrupt::end_at_interrupt;
 use super::say::say_understood;
 use crate::design::{self, DesignError, GammaScale, Limits, Options};
+use crate::figures::Figures;
 use crate::overview::doubts;
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use progress::Progress;
-use report::Report;
+use report::{Judged, Report};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -85,6 +86,10 @@ pub(super) struct Args {
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
+    /// Print all figures: gamma with its scale and its bounds, the mean errors, word lengths, order, robustness
+    /// and the proof
+    #[arg(long, short, conflicts_with = "json")]
+    verbose: bool,
     /// Print a report as one JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -153,17 +158,19 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mean = design::analyze_mean(&found.bank).map_err(named)?;
     let scale = GammaScale::new(&found.bank).map_err(named)?;
+    let figures = Figures::new(&found.bank).map_err(named)?;
     warn_or_refuse(&doubts(&found.bank, &mean, &scale), args.strict)?;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    let report = Report::new(args.output.display().to_string(), &found, mean, scale, seconds);
+    let report =
+        Report::new(args.output.display().to_string(), &found, Judged { mean, scale, figures }, seconds);
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {
-        super::say(&report.text());
+        super::say(&report.text(args.verbose));
         Ok(())
     } else {
-        super::print(&report.text())
+        super::print(&report.text(args.verbose))
     }
 }
 

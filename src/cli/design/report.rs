@@ -5,8 +5,8 @@ use crate::design::quantise::WordStudy;
 use crate::design::{
     Design, GammaScale, MeanAnalysis, OrderErrorPoint, OrderReduction, RobustStudy, TrackingStudy,
 };
-use crate::overview::{counted, decibels, six_digits, understood};
-use crate::quantity::readable;
+use crate::figures::Figures;
+use crate::overview::{Fact, counted, decibels, figure_facts, frequency, six_digits, understood};
 use crate::spec::Method;
 use crate::units::Hertz;
 use crate::verify::{BoundedBanks, Verified};
@@ -38,8 +38,7 @@ pub(in crate::cli) struct Report<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     tracking: Option<&'a TrackingStudy>,
     #[serde(flatten)]
-    mean: MeanAnalysis,
-    scale: GammaScale,
+    judged: Judged,
     /// Hertz, at the slow rate to which all frequencies alias.
     peak_hertz: Hertz,
     #[serde(skip)]
@@ -48,6 +47,15 @@ pub(in crate::cli) struct Report<'a> {
     seconds: f64,
     #[serde(flatten)]
     proof: ProofReport,
+}
+
+/// What is computed of a finished bank for its report.
+#[derive(Debug, serde::Serialize)]
+pub(in crate::cli) struct Judged {
+    #[serde(flatten)]
+    pub(in crate::cli) mean: MeanAnalysis,
+    pub(in crate::cli) scale: GammaScale,
+    pub(in crate::cli) figures: Figures,
 }
 
 /// The increase of the error by integer taps.
@@ -129,13 +137,7 @@ impl ProofReport {
 
 impl<'a> Report<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(in crate::cli) fn new(
-        output: String,
-        design: &'a Design,
-        mean: MeanAnalysis,
-        scale: GammaScale,
-        seconds: f64,
-    ) -> Self {
+    pub(in crate::cli) fn new(output: String, design: &'a Design, judged: Judged, seconds: f64) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
@@ -157,8 +159,7 @@ impl<'a> Report<'a> {
             words: Words::of(design),
             robust: design.robust.as_ref(),
             tracking: design.tracking.as_ref(),
-            mean,
-            scale,
+            judged,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             is_normalised: bank.is_normalised(),
             iterations: design.iterations,
@@ -167,9 +168,15 @@ impl<'a> Report<'a> {
         }
     }
 
-    pub(in crate::cli) fn text(&self) -> String {
+    /// Six lines; all that is known with `verbose`.
+    pub(in crate::cli) fn text(&self, verbose: bool) -> String {
+        let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
+        if !verbose {
+            return terms + &self.gamma_line();
+        }
         let parts = [
-            self.heading(),
+            format!("{}\n", self.understood),
+            terms,
             self.gamma_text(),
             self.mean_text(),
             self.words.as_ref().map(Words::text).unwrap_or_default(),
@@ -184,18 +191,35 @@ impl<'a> Report<'a> {
 }
 
 impl Report<'_> {
-    /// The spec as it was understood, and the sizes of the bank.
+    /// The sizes of the bank.
     fn heading(&self) -> String {
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
         format!(
-            "{}\n{}: {}, {}, ratio {}, {}, latency {}{chosen}\n",
-            self.understood,
+            "{}: {}, {}, ratio {}, {}, latency {}{chosen}\n",
             self.bank,
             self.method.name(),
             counted(self.channels, "channel"),
             self.ratio,
             self.size(),
             self.latency,
+        )
+    }
+
+    /// The worst case in one line, proven or not.
+    fn gamma_line(&self) -> String {
+        let proof = match (&self.proof.proven, &self.proof.unproven) {
+            (Some(proven), _) => format!("proven: at most {}", number(Some(proven.upper))),
+            (_, Some(reason)) => format!("computed, not proven: {reason}"),
+            _ => "computed".to_owned(),
+        };
+        let any = self
+            .judged
+            .figures
+            .any_input
+            .map_or_else(String::new, |gamma| format!("; any input: {}", six_digits(gamma)));
+        format!(
+            "gamma      {} (worst-case gain from the input to the error; {proof}{any})\n",
+            number(self.gamma.norm)
         )
     }
 
@@ -241,13 +265,13 @@ impl Report<'_> {
 
     /// What is to be expected of signals and noise that are not the worst ones.
     fn mean_text(&self) -> String {
-        let MeanAnalysis { rms_error, noise_gain, output_noise, .. } = self.mean;
+        let MeanAnalysis { rms_error, noise_gain, output_noise, .. } = self.judged.mean;
         format!(
             "H2 error   {} (rms, for white noise of unit density at the analog input)\n\
              SNR        {} for a signal with the target's spectrum\n\
              noise gain {} ({})\n",
             number(Some(rms_error)),
-            decibels(self.scale.rms_reference, rms_error),
+            decibels(self.judged.scale.rms_reference, rms_error),
             six_digits(noise_gain),
             if output_noise == 0.0 {
                 "the spec gives the converters no noise".to_owned()
@@ -260,7 +284,7 @@ impl Report<'_> {
     /// gamma beside that of the simplest banks.
     fn scale_text(&self) -> String {
         let Some(gamma) = self.gamma.norm else { return String::new() };
-        let GammaScale { zero_output, interleaving, .. } = self.scale;
+        let GammaScale { zero_output, interleaving, .. } = self.judged.scale;
         let zero = against(gamma, zero_output, "zero output");
         format!("           {zero}, {}\n", against(gamma, interleaving, "plain interleaving"))
     }
@@ -274,9 +298,10 @@ pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
     format!("{} against {what} ({})", decibels(gamma, other), six_digits(other))
 }
 
-/// A frequency with its unit; in normalised time it is a share of the output rate.
-pub(in crate::cli) fn frequency(hertz: Hertz, is_normalised: bool) -> String {
-    if is_normalised { format!("{:.4} of the output rate", hertz.0) } else { readable(hertz.0, "Hz") }
+/// The figures in the user's terms, one line each.
+pub(in crate::cli) fn figure_text(figures: &Figures, is_normalised: bool) -> String {
+    let line = |Fact { name, value, meaning }: Fact| format!("{name:<10} {value} {meaning}\n");
+    figure_facts(figures, is_normalised).map(line).concat()
 }
 
 /// A robust bank pays if it lowers the worst case by this share.

@@ -1,0 +1,158 @@
+//! Figures of a bank in the user's terms: the signal-to-noise ratio of the spec's signal, the largest image
+//! and the largest error of gain of a tone, and what the simple ways would give.
+//!
+//! # Tones
+//! A tone at the analog frequency w gives the samples `g_i Phi_i(j w) e^{-j w D_i} e^{j w k M}` (h = 1), and
+//! the bank answers with tones at w + 2 pi k / M ([`Tone`]). The one for k = 0 against the target's is the
+//! error of gain and phase; the others are images. The largest image over a band predicts the spurious-free
+//! dynamic range.
+//!
+//! # Signal-to-noise ratio
+//! Variance of the target over the variance of the error, averaged over time, in decibels. For white noise
+//! in the band of the spec's `[signal]`; for the spectrum |W|^2 where that is a filter; without the table for
+//! white noise at all frequencies, as in the thesis. The front ends stand before the samples in any case.
+//! The parts are the error from the signal, the noise of the converters, and what delays that are off add
+//! ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are resolved.
+//!
+//! # Simple ways
+//! One channel alone with its Wiener filter, plain interleaving, and the cubic spline through all samples, for
+//! the same signal, noise and uncertainty, from their exact periodically time-varying responses.
+
+mod band;
+mod integral;
+mod powers;
+mod reconstruction;
+mod signal;
+mod simple;
+mod snr;
+mod spline;
+#[cfg(test)]
+mod tests;
+mod tones;
+
+pub use band::{BandSource, FigureBand};
+pub use simple::{SimpleFigure, SimpleWay};
+pub use snr::Snr;
+pub use tones::Tone;
+
+use crate::bank::Bank;
+use crate::design::filters::FilterResponse;
+use crate::design::{DesignError, LiftedPlant, Problem};
+use crate::spec::Spec;
+use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
+use reconstruction::Reconstruction;
+use snr::Setting;
+use tones::ToneResponse;
+
+/// By how many decibels a bank must beat the simple ways to be worth its trouble.
+pub const WORTHWHILE: Decibels = Decibels(1.0);
+
+/// The figures of a bank.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Figures {
+    /// The band of the tones, and of the signal where the spec has one.
+    pub band: FigureBand,
+    /// The signal-to-noise ratio of the bank.
+    pub snr: Snr,
+    /// The same with converters of 16 bits and a signal of the spec's rms; `None` where the spec states the
+    /// noise of the converters.
+    pub snr_16_bits_db: Option<Decibels>,
+    /// The largest image relative to its tone; `None` where the bank loses a tone of the band altogether.
+    pub image: Option<ToneFigure>,
+    /// The largest relative error of gain and phase; `None` as for `image`.
+    pub gain_error: Option<ToneFigure>,
+    /// Whether the target is zero somewhere in the band; the tones there are left out.
+    pub target_vanishes: bool,
+    /// The simple ways, the best one first.
+    pub simple: Vec<SimpleFigure>,
+    /// gamma for inputs of any spectrum; `None` without `[signal]`, where gamma says it.
+    pub any_input: Option<f64>,
+}
+
+/// A figure of a tone.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct ToneFigure {
+    /// The figure, relative to the tone.
+    pub db: Decibels,
+    /// The frequency of the tone at the analog input.
+    pub hertz: Hertz,
+}
+
+impl Figures {
+    /// Of a bank with its spec.
+    ///
+    /// # Errors
+    /// [`DesignError::NoSpec`] for a bank without front ends, [`DesignError::Lti`] for unstable filters,
+    /// [`DesignError::Analog`] as for a design.
+    pub fn new(bank: &Bank) -> Result<Self, DesignError> {
+        let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
+        let plain = without_signal(spec, bank.latency)?;
+        let band = FigureBand::new(spec, &plain);
+        let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?);
+        let worst = tones.worst(band.cycles(spec));
+        let setting = Setting::new(bank, spec, &band)?;
+        let mut ways = simple::ways(setting.problem());
+        ways.push(Reconstruction::Bank(FilterResponse::new(bank)?));
+        let mut ratios = setting.ratios(&ways);
+        let own = ratios.pop().unwrap_or_default();
+        let figure = |tone: Option<Tone>, of: fn(&Tone) -> f64| {
+            tone.map(|tone| ToneFigure {
+                db: Decibels::of_amplitude(of(&tone)),
+                hertz: Hertz(tone.frequency.0 / spec.fast_period.0),
+            })
+        };
+        Ok(Self {
+            band,
+            snr: own.snr,
+            snr_16_bits_db: own.with_16_bits,
+            image: figure(worst.image, |tone| tone.image),
+            gain_error: figure(worst.gain_error, |tone| tone.gain_error),
+            target_vanishes: worst.vanishes,
+            simple: simple::figures(&ways, ratios.iter().map(|ratio| ratio.snr)),
+            any_input: any_input(bank, spec, &plain)?,
+        })
+    }
+
+    /// The best of the simple ways.
+    pub fn best_simple(&self) -> Option<&SimpleFigure> {
+        self.simple.first()
+    }
+
+    /// By how much the bank beats the best of the simple ways; `None` where both make no error that is
+    /// more than rounding.
+    pub fn gain_over_simple(&self) -> Option<Decibels> {
+        let best = self.best_simple()?.snr;
+        let are_exact = self.snr.is_exact() && best.is_exact();
+        (!are_exact).then(|| self.snr.total_db - best.total_db)
+    }
+
+    /// Whether the bank beats the simple ways by [`WORTHWHILE`].
+    pub fn is_worthwhile(&self) -> bool {
+        self.gain_over_simple().is_some_and(|gain| gain >= WORTHWHILE)
+    }
+}
+
+/// The tones of `bank` at `points` frequencies of the band of its [`Figures`], with the fast period of the spec.
+///
+/// # Errors
+/// As [`Figures::new`].
+pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Tone)>, DesignError> {
+    let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
+    let plain = without_signal(spec, bank.latency)?;
+    let band = FigureBand::new(spec, &plain).cycles(spec);
+    let tones = ToneResponse::new(plain, FilterResponse::new(bank)?).curve(band, points);
+    let hertz = |CyclesPerFastPeriod(f): CyclesPerFastPeriod| Hertz(f / spec.fast_period.0);
+    Ok(tones.into_iter().map(|tone| (hertz(tone.frequency), tone)).collect())
+}
+
+/// The front ends themselves, without the spectrum of the signal.
+fn without_signal(spec: &Spec, latency: usize) -> Result<Problem, DesignError> {
+    Problem::new(&Spec { signal: None, ..spec.clone() }, latency)
+}
+
+fn any_input(bank: &Bank, spec: &Spec, plain: &Problem) -> Result<Option<f64>, DesignError> {
+    match spec.signal {
+        Some(_) => Ok(Some(LiftedPlant::new(plain)?.bank_norm(&bank.filters)?.gain)),
+        None => Ok(None),
+    }
+}

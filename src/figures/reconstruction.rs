@@ -1,0 +1,70 @@
+//! Ways from slow samples to fast ones as the matrix F(theta) of their polyphase components: the filters of a
+//! bank, and the simple ways.
+
+use super::signal::Columns;
+use super::spline::Spline;
+use crate::design::Problem;
+use crate::design::filters::FilterResponse;
+use crate::design::interleaving::{NearestSample, nearest_samples};
+use crate::linalg::{CMat, Complex};
+
+/// A way from the N slow samples of a period to its M fast samples, linear and periodic.
+pub(super) enum Reconstruction {
+    /// The filters of a bank.
+    Bank(FilterResponse),
+    /// Each output sample is the slow sample nearest to its instant.
+    Interleaving(Vec<NearestSample>),
+    /// The cubic spline through all slow samples.
+    Spline(Spline),
+    /// The Wiener filter of one channel: the least mean-square error with samples of all time.
+    OneChannel(usize),
+}
+
+impl Reconstruction {
+    /// Plain interleaving with samples of all time; `None` unless each output sample has one slow sample of
+    /// its own (N = M).
+    pub(super) fn interleaving(problem: &Problem) -> Option<Self> {
+        let Problem { ratio, latency, channels, .. } = problem;
+        let nearest = || nearest_samples(&problem.delays(), *ratio, *latency, i64::MIN);
+        (channels.len() == *ratio).then(|| Self::Interleaving(nearest()))
+    }
+
+    /// F at the angle theta, M x N, for a signal with `columns` there and the noise powers `noise`.
+    pub(super) fn at(&self, theta: f64, columns: &Columns, noise: &[f64]) -> CMat {
+        match self {
+            Self::Bank(filters) => filters.at(theta),
+            Self::Interleaving(nearest) => interleaved(nearest, noise.len(), theta),
+            Self::Spline(spline) => spline.at(theta),
+            Self::OneChannel(channel) => wiener(columns, noise, *channel),
+        }
+    }
+
+    /// Angles between which F is smooth, or where it has narrow peaks.
+    pub(super) fn breaks(&self) -> Vec<f64> {
+        if let Self::Bank(filters) = self { filters.breaks() } else { Vec::new() }
+    }
+
+    /// Whether an error of a delay counts: a channel alone has nothing to be late against.
+    pub(super) fn knows_delays(&self) -> bool {
+        !matches!(self, Self::OneChannel(_))
+    }
+}
+
+fn interleaved(nearest: &[NearestSample], channels: usize, theta: f64) -> CMat {
+    let mut filters = CMat::zeros(nearest.len(), channels);
+    for (p, sample) in nearest.iter().enumerate() {
+        filters[(p, sample.channel)] = Complex::from_polar(1.0, -theta * sample.lag as f64);
+    }
+    filters
+}
+
+/// W H_i* / (H_i H_i* + s_i^2) in the column of channel i.
+fn wiener(columns: &Columns, noise: &[f64], channel: usize) -> CMat {
+    let row = columns.measurement.row(channel);
+    let mut filters = CMat::zeros(columns.reference.nrows(), noise.len());
+    let power = row.norm_squared() + noise[channel];
+    if power > 0.0 {
+        filters.set_column(channel, &(&columns.reference * row.adjoint() / Complex::new(power, 0.0)));
+    }
+    filters
+}

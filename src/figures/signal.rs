@@ -1,0 +1,158 @@
+//! The analog signal for which figures hold: white noise in a band, or through the front ends at all
+//! frequencies.
+
+use crate::design::Problem;
+use crate::linalg::{CMat, Complex};
+use crate::units::RadiansPerFastPeriod;
+use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
+
+/// Fast rates up to which every alias of an unbounded signal counts by itself.
+const ALL_UP_TO: f64 = 8.0;
+/// The same for ratios above [`LARGE_RATIO`].
+const ALL_UP_TO_LARGE: f64 = 2.0;
+const LARGE_RATIO: usize = 16;
+/// Beyond, one alias stands for a block of this share of its number: front ends are smooth there.
+const BLOCK: f64 = 0.1;
+/// Aliases are counted up to this multiple of the largest pole. A front end of one pole passes 6e-5 of its
+/// power above, 0.0003 dB.
+const BEYOND_POLES: f64 = 1e4;
+/// Where in its block an alias lies: the fractional parts of multiples of the golden ratio, so that products
+/// of channels with different delays average out.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// A signal that reaches the samples of a problem.
+#[derive(Debug, Clone)]
+pub(super) struct Signal {
+    problem: Problem,
+    /// The frequencies that it occupies with unit density, radians per fast period. `None`: all.
+    band: Option<RangeInclusive<f64>>,
+    /// For an unbounded signal: numbers k of aliases and how many each stands for.
+    aliases: Vec<Alias>,
+}
+
+/// One or more multiples of the slow rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Alias {
+    number: f64,
+    count: f64,
+}
+
+/// What a signal gives at one angle theta of the slow samples: a column for each analog frequency
+/// w = (theta + 2 pi k) / M that aliases there. With the spectrum S of the signal,
+///
+/// ```text
+/// measurement[i, k] = sqrt(S / M) g_i Phi_i(j w) e^{-j w D_i}
+/// reference[p, k]   = sqrt(S / M) Phi_0(j w) e^{j w (p - m0)}
+/// ```
+///
+/// The mean over theta of `|reference - F measurement|^2 / M` (Frobenius) is the mean square of the error of
+/// the filters F per fast sample.
+pub(super) struct Columns {
+    /// w of each column, radians per fast period.
+    pub(super) frequencies: Vec<f64>,
+    /// N rows.
+    pub(super) measurement: CMat,
+    /// M rows.
+    pub(super) reference: CMat,
+}
+
+impl Signal {
+    /// White noise of unit density in a band, before the front ends of `problem`.
+    pub(super) fn in_band(problem: Problem, band: RangeInclusive<f64>) -> Self {
+        Self { problem, band: Some(band), aliases: Vec::new() }
+    }
+
+    /// White noise of unit density at all frequencies, before the front ends of `problem`.
+    pub(super) fn everywhere(problem: Problem) -> Self {
+        let aliases = aliases(&problem);
+        Self { problem, band: None, aliases }
+    }
+
+    /// The front ends, delays and rates.
+    pub(super) fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Number of columns at an angle, about.
+    pub(super) fn columns(&self) -> usize {
+        let in_band = |band: &RangeInclusive<f64>| {
+            2 + (self.problem.ratio as f64 * (band.end() - band.start()) / PI) as usize
+        };
+        self.band.as_ref().map_or(self.aliases.len(), in_band)
+    }
+
+    /// Angles at which the columns change abruptly or much: the folded ends of the band, or the folded
+    /// resonances of the front ends.
+    pub(super) fn breaks(&self) -> Vec<f64> {
+        let folded = |w: f64| {
+            let turn = (self.problem.ratio as f64 * w).rem_euclid(TAU);
+            turn.min(TAU - turn)
+        };
+        match &self.band {
+            Some(band) => vec![folded(*band.start()), folded(*band.end())],
+            None => {
+                let own = self.problem.signal.iter().flat_map(|filter| filter.poles());
+                let poles = self.problem.front_ends.iter().flat_map(|filter| filter.poles()).chain(own);
+                poles.filter(|pole| pole.im > 0.0).map(|pole| folded(pole.im)).collect()
+            }
+        }
+    }
+
+    /// The columns at theta, radians per slow period.
+    pub(super) fn at(&self, theta: f64) -> Columns {
+        let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
+        let filters = 0..front_ends.len();
+        let period = *ratio as f64;
+        let aliases: Vec<Alias> = match &self.band {
+            Some(band) => aliases_in(band, theta, period),
+            None => self.aliases.clone(),
+        };
+        let frequencies: Vec<f64> =
+            aliases.iter().map(|alias| (theta + TAU * alias.number) / period).collect();
+        let mut measurement = CMat::zeros(channels.len(), aliases.len());
+        let mut reference = CMat::zeros(*ratio, aliases.len());
+        for (k, (&w, alias)) in frequencies.iter().zip(&aliases).enumerate() {
+            let size = (alias.count / period).sqrt();
+            let passed: Vec<Complex<f64>> =
+                filters.clone().map(|i| self.problem.response(i, RadiansPerFastPeriod(w)) * size).collect();
+            for (i, channel) in channels.iter().enumerate() {
+                let delayed = Complex::from_polar(channel.gain, -w * channel.delay.0);
+                measurement[(i, k)] = passed[channel.front_end] * delayed;
+            }
+            for p in 0..*ratio {
+                let advance = w * (p as f64 - *latency as f64);
+                reference[(p, k)] = passed[*target] * Complex::from_polar(1.0, advance);
+            }
+        }
+        Columns { frequencies, measurement, reference }
+    }
+}
+
+/// The aliases of theta within a band and its mirror.
+fn aliases_in(band: &RangeInclusive<f64>, theta: f64, period: f64) -> Vec<Alias> {
+    let number = |w: f64| (w * period - theta) / TAU;
+    let (first, last) = (number(-band.end()).ceil() as i64, number(*band.end()).floor() as i64);
+    let all = (first..=last).map(|k| Alias { number: k as f64, count: 1.0 });
+    all.filter(|alias| band.contains(&((theta + TAU * alias.number) / period).abs())).collect()
+}
+
+/// All aliases of an unbounded signal that count.
+fn aliases(problem: &Problem) -> Vec<Alias> {
+    let rates = if problem.ratio > LARGE_RATIO { ALL_UP_TO_LARGE } else { ALL_UP_TO };
+    let direct = (rates * problem.ratio as f64).ceil();
+    let poles = problem.front_ends.iter().flat_map(|filter| filter.poles());
+    let fastest = poles.map(|pole| pole.norm()).fold(0.0, f64::max);
+    let last = (BEYOND_POLES * fastest / TAU * problem.ratio as f64).max(direct);
+    let mut found: Vec<Alias> =
+        (0..=2 * direct as i64).map(|k| Alias { number: k as f64 - direct, count: 1.0 }).collect();
+    let (mut start, mut place) = (direct + 1.0, 0.0_f64);
+    while start <= last {
+        let count = (BLOCK * start).ceil();
+        place = (place + GOLDEN).fract();
+        let number = start + (place * count).floor();
+        found.extend([Alias { number, count }, Alias { number: -number, count }]);
+        start += count;
+    }
+    found
+}

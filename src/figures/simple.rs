@@ -1,0 +1,77 @@
+//! The simple ways that a bank must beat.
+
+use super::reconstruction::Reconstruction;
+use super::snr::Snr;
+use super::spline::Spline;
+use crate::design::Problem;
+
+/// Channels that are tried alone, at most: one of each kind of front end, gain and noise.
+const MOST_ALONE: usize = 8;
+
+/// A way to use the slow samples without a bank.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SimpleWay {
+    /// One channel through its best filter: least mean-square error, with samples of all time.
+    OneChannel,
+    /// Each output sample is the slow sample nearest to its instant; with as many channels as the ratio only.
+    Interleaving,
+    /// The cubic spline through all slow samples at their instants.
+    CubicSpline,
+}
+
+/// What a simple way gives.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct SimpleFigure {
+    /// The way.
+    pub way: SimpleWay,
+    /// The channel that is used alone, from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<usize>,
+    /// Its signal-to-noise ratio.
+    #[serde(flatten)]
+    pub snr: Snr,
+}
+
+/// All simple ways for a problem.
+pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
+    let spline = Reconstruction::Spline(Spline::new(problem));
+    let alone = kinds(problem).into_iter().map(Reconstruction::OneChannel);
+    Reconstruction::interleaving(problem).into_iter().chain([spline]).chain(alone).collect()
+}
+
+/// The first channel of each kind: a delay does not change what a channel gives alone.
+fn kinds(problem: &Problem) -> Vec<usize> {
+    let mut kinds: Vec<usize> = Vec::new();
+    let alike = |i: usize, j: usize| {
+        let (a, b) = (problem.channels[i], problem.channels[j]);
+        (a.front_end, a.gain, problem.noise[i]) == (b.front_end, b.gain, problem.noise[j])
+    };
+    for i in 0..problem.channels.len() {
+        if kinds.len() < MOST_ALONE && !kinds.iter().any(|&j| alike(i, j)) {
+            kinds.push(i);
+        }
+    }
+    kinds
+}
+
+/// The figures of the simple ways among `ways`, the best one first, and of single channels only the best.
+pub(super) fn figures(ways: &[Reconstruction], ratios: impl Iterator<Item = Snr>) -> Vec<SimpleFigure> {
+    let named = |(way, snr): (&Reconstruction, Snr)| {
+        let (way, channel) = match way {
+            Reconstruction::Bank(_) => return None,
+            Reconstruction::Interleaving(_) => (SimpleWay::Interleaving, None),
+            Reconstruction::Spline(_) => (SimpleWay::CubicSpline, None),
+            Reconstruction::OneChannel(channel) => (SimpleWay::OneChannel, Some(channel + 1)),
+        };
+        Some(SimpleFigure { way, channel, snr })
+    };
+    let mut found: Vec<SimpleFigure> = ways.iter().zip(ratios).filter_map(named).collect();
+    found.sort_by(|a, b| b.snr.total_db.0.total_cmp(&a.snr.total_db.0));
+    let mut alone = 0;
+    found.retain(|figure| {
+        alone += usize::from(figure.way == SimpleWay::OneChannel);
+        figure.way != SimpleWay::OneChannel || alone == 1
+    });
+    found
+}

@@ -1,0 +1,130 @@
+//! The signal-to-noise ratio with its parts.
+
+use super::band::FigureBand;
+use super::powers::{Conditions, Powers, target_power};
+use super::reconstruction::Reconstruction;
+use super::signal::Signal;
+use super::without_signal;
+use crate::bank::Bank;
+use crate::design::{DesignError, Problem};
+use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
+use crate::units::{Decibels, FastPeriods};
+use std::f64::consts::TAU;
+
+/// Half-width of a 95 % interval over the deviation of a Gaussian error.
+const HALF_WIDTHS: f64 = 1.959_963_984_540_054;
+/// Variance of the rounding to 16 bits of a full scale from -1 to 1: step^2 / 12.
+const ROUNDING_16_BITS: f64 = 1.0 / (12.0 * (1u64 << 30) as f64);
+/// Above this an error is rounding of double precision.
+const EXACT: Decibels = Decibels(270.0);
+
+/// Variance of the target over the variance of the error and of its parts, averaged over time.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Snr {
+    /// All parts together.
+    pub total_db: Decibels,
+    /// The error from the signal, with the delays of the spec.
+    pub signal_db: Decibels,
+    /// The noise of the converters; `None` without any.
+    pub noise_db: Option<Decibels>,
+    /// What delays within the spec's `[uncertainty]` add to the error from the signal: the mean over Gaussian
+    /// errors whose 95 % intervals are the stated ones, constant for each converter. `None` where all delays
+    /// are exact, or where the taps follow them.
+    pub delays_db: Option<Decibels>,
+}
+
+impl Snr {
+    /// Whether the error is no more than the rounding of double precision.
+    pub fn is_exact(&self) -> bool {
+        self.total_db > EXACT
+    }
+}
+
+/// The ratios of one way.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Ratios {
+    pub(super) snr: Snr,
+    /// The total with converters of 16 bits, where the spec states no noise.
+    pub(super) with_16_bits: Option<Decibels>,
+}
+
+/// The signal, the noise and the uncertainty for which ratios are computed.
+pub(super) struct Setting {
+    signal: Signal,
+    target: f64,
+    noise: Vec<f64>,
+    spread: Vec<FastPeriods>,
+    /// Variance of the signal at the target, in full scale.
+    rms: f64,
+}
+
+impl Setting {
+    /// Of a bank with its spec.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub(super) fn new(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
+        let plain = without_signal(spec, bank.latency)?;
+        let in_full_scale = plain.noise.clone();
+        let signal = match spec.signal.as_ref().map(|signal| &signal.spectrum) {
+            Some(SignalSpectrum::Band(_)) => {
+                let [low, high] = band.cycles(spec).map(|f| TAU * f.0);
+                Signal::in_band(plain, low..=high)
+            }
+            Some(SignalSpectrum::Filter(_)) => Signal::everywhere(Problem::new(spec, bank.latency)?),
+            None => Signal::everywhere(plain),
+        };
+        let target = target_power(&signal);
+        let rms = spec.signal.as_ref().map(|signal| signal.rms);
+        // Without a signal the noise counts relative to unit density, as in the design.
+        let scale = rms.map_or(1.0, |rms| target / (rms * rms));
+        Ok(Self {
+            signal,
+            target,
+            noise: in_full_scale.into_iter().map(|power| power * scale).collect(),
+            spread: spread(bank, spec),
+            rms: rms.unwrap_or(USUAL_RMS),
+        })
+    }
+
+    /// The front ends, with the spectrum of the signal where it is a filter.
+    pub(super) fn problem(&self) -> &Problem {
+        self.signal.problem()
+    }
+
+    /// The ratios of each way.
+    pub(super) fn ratios(&self, ways: &[Reconstruction]) -> Vec<Ratios> {
+        let conditions =
+            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: self.spread.clone() };
+        let uncertain = conditions.is_uncertain();
+        conditions.powers(ways).into_iter().map(|powers| self.ratio(&powers, uncertain)).collect()
+    }
+
+    fn ratio(&self, powers: &Powers, uncertain: bool) -> Ratios {
+        let Powers { signal, uncertain: all_delays, noise, unit_noise } = *powers;
+        let is_noisy = self.noise.iter().any(|power| *power > 0.0);
+        let db = |power: f64| Decibels::of_power(self.target / power);
+        let rounding = unit_noise * ROUNDING_16_BITS * self.target / (self.rms * self.rms);
+        Ratios {
+            snr: Snr {
+                total_db: db(all_delays + noise),
+                signal_db: db(signal),
+                noise_db: is_noisy.then(|| db(noise)),
+                delays_db: uncertain.then(|| db((all_delays - signal).max(0.0))),
+            },
+            with_16_bits: (!is_noisy).then(|| db(all_delays + rounding)),
+        }
+    }
+}
+
+/// Deviations of the delays. Taps that follow a delay know it.
+fn spread(bank: &Bank, spec: &Spec) -> Vec<FastPeriods> {
+    let channels = spec.channels.len();
+    let Some(table) = &spec.uncertainty else { return vec![FastPeriods(0.0); channels] };
+    let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
+    let deviation = |(i, half): (usize, crate::units::Seconds)| {
+        let known = if follows(i) { 0.0 } else { 1.0 / HALF_WIDTHS };
+        half.in_fast_periods(spec.fast_period) * known
+    };
+    table.delays(channels).into_iter().enumerate().map(deviation).collect()
+}

@@ -1,0 +1,156 @@
+//! What a bank makes of a tone: its images and its error of gain and phase.
+
+use crate::design::Problem;
+use crate::design::filters::FilterResponse;
+use crate::linalg::{Complex, fourier};
+use crate::units::{CyclesPerFastPeriod, RadiansPerFastPeriod};
+use std::f64::consts::TAU;
+
+/// Grid points for each peak that filters of a given length may have in a band.
+const PER_PEAK: f64 = 8.0;
+/// Fewest and most points of the grid.
+const POINTS: std::ops::RangeInclusive<f64> = 400.0..=20_000.0;
+/// Multiply-adds that the grid may take, about: a second.
+const MOST_WORK: f64 = 1e9;
+/// Local peaks of the grid that are refined, the largest ones.
+const REFINED: usize = 8;
+/// Steps of the golden section: the interval shrinks by 1e-8.
+const STEPS: usize = 40;
+/// The target counts as zero below this share of its largest gain in the band: 120 dB.
+const VANISHING: f64 = 1e-6;
+
+/// The output of a bank for the tone e^{j w t}. With the responses F_i of the filters at the fast rate
+///
+/// ```text
+/// Y_k = (1 / M) sum_i F_i(e^{j (w + 2 pi k / M)}) g_i Phi_i(j w) e^{-j w D_i}
+/// ```
+///
+/// is the amplitude at w + 2 pi k / M: the tone for k = 0, an image for k = 1 .. M - 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tone {
+    /// w / (2 pi).
+    pub frequency: CyclesPerFastPeriod,
+    /// |Phi_0(j w)|, the gain of the target.
+    pub target: f64,
+    /// The largest |Y_k| / |Y_0|, k = 1 .. M - 1; 0 for M = 1.
+    pub image: f64,
+    /// |Y_0 / (Phi_0 e^{-j w m0}) - 1|: the relative error of gain and phase together.
+    pub gain_error: f64,
+}
+
+/// A bank that answers tones.
+pub(super) struct ToneResponse {
+    problem: Problem,
+    filters: FilterResponse,
+}
+
+impl ToneResponse {
+    /// Of the `filters` of a bank behind the front ends of `problem`, without the spectrum of a signal.
+    pub(super) fn new(problem: Problem, filters: FilterResponse) -> Self {
+        Self { problem, filters }
+    }
+
+    /// The output at w / (2 pi) = `frequency`.
+    pub(super) fn at(&self, frequency: f64) -> Tone {
+        let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
+        let w = TAU * frequency;
+        let passed: Vec<Complex<f64>> =
+            front_ends.iter().map(|filter| filter.response(RadiansPerFastPeriod(w))).collect();
+        let samples = channels.iter().map(|channel| {
+            passed[channel.front_end] * Complex::from_polar(channel.gain, -w * channel.delay.0)
+        });
+        let phases =
+            self.filters.at(w * *ratio as f64) * nalgebra::DVector::from_iterator(channels.len(), samples);
+        let turned = phases.iter().enumerate().map(|(p, y)| y * Complex::from_polar(1.0, -w * p as f64));
+        let outputs = fourier::spectrum(turned.collect());
+        let image = outputs.iter().skip(1).map(|y| y.norm()).fold(0.0, f64::max) / outputs[0].norm();
+        let wanted = passed[*target] * Complex::from_polar(1.0, -w * *latency as f64);
+        let gain_error = (outputs[0] / *ratio as f64 / wanted - 1.0).norm();
+        Tone { frequency: CyclesPerFastPeriod(frequency), target: wanted.norm(), image, gain_error }
+    }
+
+    /// Tones at `count` equidistant frequencies of a band, ends included.
+    pub(super) fn curve(&self, [low, high]: [CyclesPerFastPeriod; 2], count: usize) -> Vec<Tone> {
+        let step = (high.0 - low.0) / count.saturating_sub(1).max(1) as f64;
+        (0..count).map(|k| self.at(low.0 + step * k as f64)).collect()
+    }
+
+    /// The tones of the largest image and of the largest error of gain in a band, searched between the points
+    /// of a grid too. Frequencies at which the target is zero are left out.
+    pub(super) fn worst(&self, band: [CyclesPerFastPeriod; 2]) -> Worst {
+        let grid = self.grid(band);
+        let largest = grid.iter().map(|tone| tone.target).fold(0.0, f64::max);
+        let counts = |tone: &Tone| tone.target > VANISHING * largest;
+        let value = |of: fn(&Tone) -> f64| move |tone: &Tone| if counts(tone) { of(tone) } else { 0.0 };
+        Worst {
+            image: self.peak(&grid, &value(|tone| tone.image)),
+            gain_error: self.peak(&grid, &value(|tone| tone.gain_error)),
+            vanishes: !grid.iter().all(counts),
+        }
+    }
+
+    /// Points dense enough for every peak of the filters, and those at the resonances of a recursion.
+    fn grid(&self, [low, high]: [CyclesPerFastPeriod; 2]) -> Vec<Tone> {
+        let period = self.problem.ratio as f64;
+        let work = self.filters.lags() * self.problem.ratio * self.problem.channels.len();
+        let peaks = (high.0 - low.0) * self.filters.lags() as f64 * period;
+        let wanted = (PER_PEAK * peaks).clamp(*POINTS.start(), *POINTS.end());
+        let step = (high.0 - low.0) / wanted.min(MOST_WORK / work as f64).max(100.0).floor();
+        let even = (0..=((high.0 - low.0) / step).round() as usize).map(|k| low.0 + step * k as f64);
+        let turns = (low.0 * period).floor() as i64..=(high.0 * period).ceil() as i64;
+        let breaks = self.filters.breaks();
+        let folded = turns.flat_map(|turn| {
+            breaks.iter().flat_map(move |b| [b / TAU, -b / TAU].map(|x| (turn as f64 + x) / period))
+        });
+        let inside = folded.filter(|f| (low.0..=high.0).contains(f));
+        let mut all: Vec<f64> = even.map(|f| f.min(high.0)).chain(inside).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all.into_iter().map(|f| self.at(f)).collect()
+    }
+
+    /// The largest value near the largest local peaks of the grid; `None` where a value is not a number or
+    /// infinite: then the bank gives no tone at all.
+    fn peak(&self, grid: &[Tone], value: &dyn Fn(&Tone) -> f64) -> Option<Tone> {
+        if !grid.iter().all(|tone| value(tone).is_finite()) {
+            return None;
+        }
+        let at = |i: usize| value(&grid[i]);
+        let is_peak =
+            |i: &usize| (*i == 0 || at(*i) >= at(i - 1)) && (i + 1 == grid.len() || at(*i) >= at(i + 1));
+        let mut peaks: Vec<usize> = (0..grid.len()).filter(is_peak).collect();
+        peaks.sort_by(|&i, &j| at(j).total_cmp(&at(i)));
+        let refined = peaks.into_iter().take(REFINED).map(|i| {
+            let ends = [&grid[i.saturating_sub(1)], &grid[(i + 1).min(grid.len() - 1)]];
+            self.refined(ends.map(|tone| tone.frequency.0), grid[i], value)
+        });
+        refined.max_by(|a, b| value(a).total_cmp(&value(b)))
+    }
+
+    /// Golden section between two frequencies, or `best` where nothing is larger.
+    fn refined(&self, [mut low, mut high]: [f64; 2], mut best: Tone, value: &dyn Fn(&Tone) -> f64) -> Tone {
+        let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
+        for _ in 0..STEPS {
+            let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
+            let [left, right] = [a, b].map(|f| self.at(f));
+            for tone in [left, right] {
+                if value(&tone) > value(&best) {
+                    best = tone;
+                }
+            }
+            if value(&left) > value(&right) { high = b } else { low = a }
+        }
+        best
+    }
+}
+
+/// The worst tones of a band.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Worst {
+    /// Largest image; `None` where the bank passes some tone not at all.
+    pub(super) image: Option<Tone>,
+    /// Largest error of gain.
+    pub(super) gain_error: Option<Tone>,
+    /// Whether the target is zero somewhere in the band.
+    pub(super) vanishes: bool,
+}
