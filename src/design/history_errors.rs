@@ -120,7 +120,9 @@ impl Record<'_> {
                 lambda.copy_from_slice(row.as_slice());
             }
             match event {
-                Some(Event::Target(begun)) if begun == index => self.add(&mut lambda, self.problem.target, 1.0),
+                Some(Event::Target(begun)) if begun == index => {
+                    self.add(&mut lambda, self.problem.target, 1.0)
+                }
                 Some(Event::Sample { channel, frame }) => {
                     let Some(Some(innovation)) = innovations.next() else { continue };
                     let of = &self.problem.channels[channel];

@@ -1,13 +1,10 @@
 //! The band in which figures hold.
 
-use crate::analog::{StrictlyProper, resolved_band};
+use crate::analog::resolved_band;
 use crate::design::Problem;
 use crate::spec::{Band, Spec};
-use crate::units::{CyclesPerFastPeriod, Hertz, RadiansPerFastPeriod};
+use crate::units::{CyclesPerFastPeriod, Hertz};
 use std::f64::consts::TAU;
-
-/// Halvings of the interval around the lower edge of a band-pass.
-const HALVINGS: usize = 50;
 
 /// Where a band comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -38,9 +35,8 @@ impl FigureBand {
         if let Some(Band { low, high }) = spec.signal.as_ref().and_then(|signal| signal.band()) {
             return Self { low_hertz: low, high_hertz: high, source: BandSource::Signal };
         }
-        let target = &problem.front_ends[problem.target];
-        let hertz = |w: f64| Hertz(w / TAU / spec.fast_period.0);
-        let (low, high) = (hertz(lower_edge(target)), hertz(target.half_power_frequency().0));
+        let band = problem.front_ends[problem.target].half_power_band();
+        let [low, high] = [band.low, band.high].map(|w| Hertz(w.0 / TAU / spec.fast_period.0));
         let resolved = resolved_band(spec);
         let high = if low < resolved && high > resolved { resolved } else { high };
         Self { low_hertz: low, high_hertz: high, source: BandSource::Target }
@@ -50,23 +46,4 @@ impl FigureBand {
     pub(super) fn cycles(&self, spec: &Spec) -> [CyclesPerFastPeriod; 2] {
         [self.low_hertz, self.high_hertz].map(|end| end.per_fast_period(spec.fast_period))
     }
-}
-
-/// The lowest frequency from which on a filter passes half its largest power, in radians per fast period: 0
-/// for a low-pass.
-fn lower_edge(filter: &StrictlyProper) -> f64 {
-    let gain = |w: f64| filter.response(RadiansPerFastPeriod(w)).norm();
-    let peaks = filter.poles().iter().map(|pole| pole.norm());
-    let largest = peaks.clone().map(gain).fold(gain(0.0), f64::max);
-    let level = largest * 0.5_f64.sqrt();
-    if gain(0.0) >= level {
-        return 0.0;
-    }
-    let passed = peaks.filter(|&w| gain(w) >= level).fold(f64::INFINITY, f64::min);
-    let (mut low, mut high) = (0.0, passed);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if gain(middle) >= level { high = middle } else { low = middle }
-    }
-    high
 }

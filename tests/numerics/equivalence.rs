@@ -32,6 +32,7 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
     let problem = Problem {
         ratio,
         latency,
+        signal: None,
         front_ends: front_ends.iter().map(filter).collect(),
         target: 0,
         channels: channels

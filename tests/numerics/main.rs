@@ -4,6 +4,7 @@
 mod support;
 
 mod adc_tools;
+mod bands;
 mod causal_optima;
 mod equivalence;
 mod filters;

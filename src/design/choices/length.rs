@@ -25,7 +25,8 @@ pub(super) fn fewest_taps(spec: &Spec) -> Result<usize, DesignError> {
     // A wanted SNR is that of the noise which the spec states; without one the usual rounding limits it.
     let noisy = if wanted.is_some() { spec.clone() } else { super::with_usual_noise(spec) };
     let latency = spec.latency.unwrap_or_default();
-    let problem = Problem::new(&noisy, latency)?.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem;
+    let problem =
+        Problem::new(&noisy, latency)?.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem;
     let most = match spec.design.method {
         Method::Fir => MAX_OPTIMISED_TAPS / (spec.channels.len() * spec.ratio),
         _ => MOST_FRAMES,
@@ -38,7 +39,11 @@ pub(super) fn fewest_taps(spec: &Spec) -> Result<usize, DesignError> {
     };
     if best.square > enough {
         let best_db = 10.0 * (best.power / best.square).log10();
-        return Err(DesignError::SnrOutOfReach { wanted: wanted.unwrap_or_default(), best: best_db, latency });
+        return Err(DesignError::SnrOutOfReach {
+            wanted: wanted.unwrap_or_default(),
+            best: best_db,
+            latency,
+        });
     }
     lengths.fewest(enough, best.frames)
 }
@@ -60,7 +65,8 @@ struct Best {
 
 impl Lengths<'_> {
     fn best(&self) -> Result<Best, DesignError> {
-        let oldest = (self.problem.latency + self.problem.longest_delay().0.ceil() as usize) / self.problem.ratio;
+        let oldest =
+            (self.problem.latency + self.problem.longest_delay().0.ceil() as usize) / self.problem.ratio;
         let mut frames = (oldest + FIRST_FRAMES).min(self.most);
         let mut best = self.of(frames)?;
         while frames < self.most {

@@ -108,7 +108,10 @@ fn the_latency_is_the_shortest_within_a_tenth_of_a_decibel() {
         let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
         let chosen = latency(&spec).unwrap();
         assert!(errors[chosen] < 1.0117 * least, "{design}: {chosen} {errors:?}");
-        assert!(errors[..chosen].iter().all(|error| *error > 1.0115 * least), "{design}: {chosen} {errors:?}");
+        assert!(
+            errors[..chosen].iter().all(|error| *error > 1.0115 * least),
+            "{design}: {chosen} {errors:?}"
+        );
     }
 }
 
@@ -123,7 +126,9 @@ fn recursive_banks_wait_less_where_there_is_noise() {
 
 #[test]
 fn as_many_taps_are_chosen_as_the_snr_needs() {
-    for (design, snr) in [("method = \"fir\", target_snr_db = 50", 50.0), ("target_snr_db = 65, method = \"h2\"", 65.0)] {
+    for (design, snr) in
+        [("method = \"fir\", target_snr_db = 50", 50.0), ("target_snr_db = 65, method = \"h2\"", 65.0)]
+    {
         let mut open = spec(design);
         open.latency = Some(9);
         let complete = completed(&with_taps(&open).unwrap(), &|_| ()).unwrap();
@@ -134,7 +139,12 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
             let power = HistoryErrors::new(&problem, 1, 0..=0).unwrap().power;
             10.0 * (power / least_mean_square(&problem, 9, taps)).log10()
         };
-        assert!(found(taps) >= snr && found(taps - 1) < snr, "{taps} taps: {} {}", found(taps), found(taps - 1));
+        assert!(
+            found(taps) >= snr && found(taps - 1) < snr,
+            "{taps} taps: {} {}",
+            found(taps),
+            found(taps - 1)
+        );
     }
 }
 

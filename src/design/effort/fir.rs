@@ -2,8 +2,8 @@
 
 use super::amount::Effort;
 use super::cost::{
-    COMPLEX, PRODUCT, REAL, SMALL, causal_bound, complex_cube, is_noncausal, peak, proof, response,
-    smoother, SURVEYED,
+    COMPLEX, PRODUCT, REAL, SMALL, SURVEYED, causal_bound, complex_cube, is_noncausal, peak, proof, response,
+    smoother,
 };
 use super::sizes::Sizes;
 use crate::design::error_grid::FINE;

@@ -66,7 +66,8 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     } else {
         Effort::default()
     });
-    let chosen = if spec.latency.is_none() { latency_choice(spec, &sizes, design) } else { Effort::default() };
+    let chosen =
+        if spec.latency.is_none() { latency_choice(spec, &sizes, design) } else { Effort::default() };
     let open = spec.design.is_fir() && spec.design.taps.is_none();
     let length = if open { fir::reachable(&sizes).times(LENGTHS) } else { Effort::default() };
     let total = finished.then(chosen).then(length);

@@ -1,7 +1,7 @@
 //! The effort of recursive designs.
 
 use super::amount::Effort;
-use super::cost::{REAL, SMALL, causal_bound, peak, proof, response, smoother, SURVEYED};
+use super::cost::{REAL, SMALL, SURVEYED, causal_bound, peak, proof, response, smoother};
 use super::sizes::Sizes;
 
 /// Riccati equations of an H-infinity design of many states, where the noncausal bound is nearly always

@@ -1,10 +1,10 @@
 //! The bank with the least mean-square error of all causal banks, for white noise at the analog input and
 //! the noise of the converters: the Kalman filter, which is `iir` at gamma = infinity.
 
+use super::Synthesis;
 use super::filtering::{Filter, Innovations};
 use super::gamma_iteration::GammaIteration;
 use super::precise_filtering::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, PreciseFiltering};
-use super::Synthesis;
 use crate::arithmetic::{BigFloat, DoubleDouble, Number};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;

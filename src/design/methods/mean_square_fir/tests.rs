@@ -6,7 +6,7 @@
 
 use crate::design::{Design, ProofSearch, analyze_mean, design_with};
 use crate::linalg::Complex;
-use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Spec};
+use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
 use crate::units::{Hertz, Seconds};
 use std::f64::consts::PI;
 
@@ -65,14 +65,20 @@ const THESIS: &str = "fast_period = 1.0\nratio = 2\nlatency = 10\n\
 fn thesis(noise: f64, taps: Option<usize>) -> Case {
     let filter = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
     let converter = |delay| Converter { delay, noise, filter: filter.clone() };
-    Case { ratio: 2, latency: 10, taps, target: filter.clone(), converters: vec![converter(1.2), converter(0.6)] }
+    Case {
+        ratio: 2,
+        latency: 10,
+        taps,
+        target: filter.clone(),
+        converters: vec![converter(1.2), converter(0.6)],
+    }
 }
 
 fn butterworth(order: usize, cutoff: f64) -> FilterSpec {
     FilterSpec::Family {
         family: Family::Butterworth,
         order: Some(order),
-        cutoff: Hertz(cutoff),
+        passband: Passband::LowPass { cutoff: Hertz(cutoff) },
         ripple_db: None,
         attenuation_db: None,
     }
@@ -142,7 +148,8 @@ fn two_rates_as_virtual_channels() {
 fn many_virtual_channels() {
     let filter = butterworth(2, 20.0 / 300.0);
     let case = |periods: [f64; 2], noise: [f64; 2]| {
-        let converter = |k: usize| Converter { delay: [0.4, 1.7][k], noise: noise[k], filter: filter.clone() };
+        let converter =
+            |k: usize| Converter { delay: [0.4, 1.7][k], noise: noise[k], filter: filter.clone() };
         let channels = (0..2).flat_map(|k| virtual_channels(15.0, periods[k], &converter(k)));
         let (target, converters) = (filter.clone(), channels.collect());
         shifted(Case { ratio: 15, latency: 20, taps: Some(90), target, converters })
@@ -185,7 +192,8 @@ fn no_other_taps_are_better() {
     let filter = butterworth(3, 0.2);
     let converter = |delay, noise| Converter { delay, noise, filter: filter.clone() };
     for taps in [1, 2, 5, 9] {
-        let converters = vec![converter(0.3, 0.0), converter(0.3, 0.02), converter(7.3, 0.01), converter(1.9, 0.0)];
+        let converters =
+            vec![converter(0.3, 0.0), converter(0.3, 0.02), converter(7.3, 0.01), converter(1.9, 0.0)];
         let case = Case { ratio: 3, latency: 4, taps: Some(taps), target: filter.clone(), converters };
         let mut spec = case.spec();
         (spec.channels[1].gain, spec.channels[3].gain) = (-1.7, 1e-3);
