@@ -1,5 +1,5 @@
 use super::*;
-use crate::design::history_errors::HistoryErrors;
+use crate::design::history_errors::{HistoryErrors, best_taps};
 use crate::lmi::sampled;
 use crate::spec::DesignSpec;
 
@@ -167,5 +167,49 @@ fn taps_that_are_left_open_are_almost_as_good_as_any() {
         let (enough, fewer) = (whole(&open, latency, taps), whole(&open, latency, taps - 1));
         assert!(enough <= 1.0101 * best && fewer > 1.0099 * best, "{taps} taps: {enough} {fewer} {best}");
         assert_eq!(complete.design, DesignSpec { taps: Some(taps), ..open.design.clone() });
+    }
+}
+
+/// The latencies of banks for a signal in a band, against the whole errors of banks of 48 taps at every latency
+/// as the lifted plant has them.
+#[test]
+fn signals_in_a_band_get_the_latency_that_their_samples_need() {
+    struct System {
+        latency: usize,
+        ratio: usize,
+        band: f64,
+        filter: &'static str,
+        delays: &'static [f64],
+    }
+    let (fourth, second) =
+        ("family = \"butterworth\", order = 4, cutoff = 0.1875", "family = \"butterworth\", order = 2, cutoff = 0.4167");
+    let systems = [
+        System { latency: 12, ratio: 2, band: 1.0 / 6.0, filter: fourth, delays: &[1.2, 0.6] },
+        System { latency: 22, ratio: 2, band: 0.4167, filter: second, delays: &[1.2, 0.6] },
+        System { latency: 19, ratio: 4, band: 0.375, filter: second, delays: &[2.7, 1.9, 1.1, 0.2] },
+        System { latency: 7, ratio: 2, band: 0.425, filter: "family = \"rc\", cutoff = 0.6", delays: &[1.3, 0.8, 0.1] },
+    ];
+    for System { latency: expected, ratio, band, filter, delays } in systems {
+        let channels: Vec<String> = delays.iter().map(|delay| format!("{{ delay = {delay} }}")).collect();
+        let text = format!(
+            "fast_period = 1.0\nratio = {ratio}\nsignal = {{ band = {band} }}\n\
+             target = {{ filter = {{ {filter} }} }}\nchannel = [{}]\ndesign = {{ method = \"h2\", taps = 48 }}\n",
+            channels.join(", ")
+        );
+        let spec = Spec::from_toml(&text, "spec.toml").unwrap();
+        let error = |latency: usize| {
+            let problem = Problem::new(&with_usual_noise(&spec), latency).unwrap();
+            let plant = LiftedPlant::new(&problem).unwrap();
+            let instants = -(latency as i64)..=ratio as i64 - 1 - latency as i64;
+            let best = best_taps(&problem, 48 / ratio, instants).unwrap();
+            let tap = |i: usize, n: usize| best[n % ratio][i][n / ratio];
+            let taps = (0..delays.len()).map(|i| (0..48).map(|n| tap(i, n)).collect()).collect();
+            whole_error(&plant, &Filters::Fir(taps)).unwrap()
+        };
+        let errors: Vec<f64> = (0..32).map(error).collect();
+        assert_eq!((shortest(&errors), latency(&spec)), (expected, Ok(expected)), "{band}: {errors:?}");
+        // A gamma method takes the same one.
+        let fir = Spec { design: DesignSpec::new(Method::Fir, Some(48)), ..spec };
+        assert_eq!(latency(&fir), Ok(expected));
     }
 }
