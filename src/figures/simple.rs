@@ -1,9 +1,10 @@
 //! The simple ways that a bank must beat.
 
 use super::reconstruction::Reconstruction;
-use super::snr::Snr;
+use super::snr::Ratios;
 use super::spline::Spline;
 use crate::design::Problem;
+use crate::units::Decibels;
 
 /// Channels that are tried alone, at most: one of each kind of front end, gain and noise.
 const MOST_ALONE: usize = 8;
@@ -28,9 +29,8 @@ pub struct SimpleFigure {
     /// The channel that is used alone, from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<usize>,
-    /// Its signal-to-noise ratio.
-    #[serde(flatten)]
-    pub snr: Snr,
+    /// Its signal-to-noise ratio, with all parts; with converters of 16 bits where the spec states no noise.
+    pub snr_db: Decibels,
 }
 
 /// All simple ways for a problem.
@@ -56,18 +56,18 @@ fn kinds(problem: &Problem) -> Vec<usize> {
 }
 
 /// The figures of the simple ways among `ways`, the best one first, and of single channels only the best.
-pub(super) fn figures(ways: &[Reconstruction], ratios: impl Iterator<Item = Snr>) -> Vec<SimpleFigure> {
-    let named = |(way, snr): (&Reconstruction, Snr)| {
+pub(super) fn figures(ways: &[Reconstruction], ratios: &[Ratios]) -> Vec<SimpleFigure> {
+    let named = |(way, ratios): (&Reconstruction, &Ratios)| {
         let (way, channel) = match way {
             Reconstruction::Bank(_) => return None,
             Reconstruction::Interleaving(_) => (SimpleWay::Interleaving, None),
             Reconstruction::Spline(_) => (SimpleWay::CubicSpline, None),
             Reconstruction::OneChannel(channel) => (SimpleWay::OneChannel, Some(channel + 1)),
         };
-        Some(SimpleFigure { way, channel, snr })
+        Some(SimpleFigure { way, channel, snr_db: ratios.with_noise() })
     };
     let mut found: Vec<SimpleFigure> = ways.iter().zip(ratios).filter_map(named).collect();
-    found.sort_by(|a, b| b.snr.total_db.0.total_cmp(&a.snr.total_db.0));
+    found.sort_by(|a, b| b.snr_db.0.total_cmp(&a.snr_db.0));
     let mut alone = 0;
     found.retain(|figure| {
         alone += usize::from(figure.way == SimpleWay::OneChannel);

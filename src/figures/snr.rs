@@ -48,14 +48,21 @@ pub(super) struct Ratios {
     pub(super) with_16_bits: Option<Decibels>,
 }
 
+impl Ratios {
+    /// The ratio by which ways are compared: with the noise of the converters, the stated or the assumed one.
+    pub(super) fn with_noise(&self) -> Decibels {
+        self.with_16_bits.unwrap_or(self.snr.total_db)
+    }
+}
+
 /// The signal, the noise and the uncertainty for which ratios are computed.
 pub(super) struct Setting {
     signal: Signal,
     target: f64,
+    /// Of the converters, in the scale of the signal: as the spec says, or that of 16 bits.
     noise: Vec<f64>,
+    noise_is_stated: bool,
     spread: Vec<FastPeriods>,
-    /// Variance of the signal at the target, in full scale.
-    rms: f64,
 }
 
 impl Setting {
@@ -65,7 +72,7 @@ impl Setting {
     /// As [`Problem::new`].
     pub(super) fn new(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
         let plain = without_signal(spec, bank.latency)?;
-        let in_full_scale = plain.noise.clone();
+        let stated = plain.noise.clone();
         let signal = match spec.signal.as_ref().map(|signal| &signal.spectrum) {
             Some(SignalSpectrum::Band(_)) => {
                 let [low, high] = band.cycles(spec).map(|f| TAU * f.0);
@@ -76,15 +83,15 @@ impl Setting {
         };
         let target = target_power(&signal);
         let rms = spec.signal.as_ref().map(|signal| signal.rms);
-        // Without a signal the noise counts relative to unit density, as in the design.
-        let scale = rms.map_or(1.0, |rms| target / (rms * rms));
-        Ok(Self {
-            signal,
-            target,
-            noise: in_full_scale.into_iter().map(|power| power * scale).collect(),
-            spread: spread(bank, spec),
-            rms: rms.unwrap_or(USUAL_RMS),
-        })
+        let noise_is_stated = stated.iter().any(|power| *power > 0.0);
+        let scale = |rms: f64| target / (rms * rms);
+        let noise = if noise_is_stated {
+            // Without a signal the noise counts relative to unit density, as in the design.
+            stated.into_iter().map(|power| power * rms.map_or(1.0, scale)).collect()
+        } else {
+            vec![ROUNDING_16_BITS * scale(rms.unwrap_or(USUAL_RMS)); stated.len()]
+        };
+        Ok(Self { signal, target, noise, noise_is_stated, spread: spread(bank, spec) })
     }
 
     /// The front ends, with the spectrum of the signal where it is a filter.
@@ -101,18 +108,17 @@ impl Setting {
     }
 
     fn ratio(&self, powers: &Powers, uncertain: bool) -> Ratios {
-        let Powers { signal, uncertain: all_delays, noise, unit_noise } = *powers;
-        let is_noisy = self.noise.iter().any(|power| *power > 0.0);
+        let Powers { signal, uncertain: all_delays, noise, .. } = *powers;
         let db = |power: f64| Decibels::of_power(self.target / power);
-        let rounding = unit_noise * ROUNDING_16_BITS * self.target / (self.rms * self.rms);
+        let stated = if self.noise_is_stated { noise } else { 0.0 };
         Ratios {
             snr: Snr {
-                total_db: db(all_delays + noise),
+                total_db: db(all_delays + stated),
                 signal_db: db(signal),
-                noise_db: is_noisy.then(|| db(noise)),
+                noise_db: self.noise_is_stated.then(|| db(noise)),
                 delays_db: uncertain.then(|| db((all_delays - signal).max(0.0))),
             },
-            with_16_bits: (!is_noisy).then(|| db(all_delays + rounding)),
+            with_16_bits: (!self.noise_is_stated).then(|| db(all_delays + noise)),
         }
     }
 }

@@ -41,7 +41,7 @@ fn named(figure: &SimpleFigure) -> String {
 }
 
 fn with_ratio(figure: &SimpleFigure) -> String {
-    format!("{} ({})", named(figure), ratio(figure.snr.total_db))
+    format!("{} ({})", named(figure), ratio(figure.snr_db))
 }
 
 struct Words<'a> {
@@ -99,28 +99,32 @@ impl Words<'_> {
 
     /// The bank beside the best simple way, and the other ways.
     fn comparison(&self) -> Fact {
-        let ways = &self.figures.simple;
-        let Some((best, others)) = ways.split_first() else { return fact("compared", "unknown", "") };
-        let rest: String = others.iter().map(|way| format!(", {}", with_ratio(way))).collect();
-        let Some(gain) = self.figures.gain_over_simple() else {
-            return fact("compared", "no gain", format!("{} is exact too", named(best)));
+        let Some((best, others)) = self.figures.simple.split_first() else {
+            return fact("compared", "unknown", "");
         };
-        let value = if best.snr.is_exact() { "worse".to_owned() } else { format!("{:+.1} dB", gain.0) };
-        let meaning = if self.figures.is_worthwhile() {
-            format!("over {}{rest}", with_ratio(best))
+        let Some(gain) = self.figures.gain_over_simple() else { return fact("compared", "unknown", "") };
+        let verdict = if self.figures.is_worthwhile() {
+            format!("over {}", with_ratio(best))
         } else {
-            let remedy = match self.figures.band.source {
-                BandSource::Target if self.figures.any_input.is_none() => {
-                    "say in [signal] where the signal lies"
-                }
-                _ => "give the bank more latency and taps",
-            };
             format!(
-                "this bank does not pay: {} is as good or better{rest}; use that, or {remedy}",
-                with_ratio(best)
+                "this bank does not pay beside {}; use that, or {}",
+                with_ratio(best),
+                self.remedy(best.way)
             )
         };
-        fact("compared", value, meaning)
+        let rest: Vec<String> = others.iter().map(with_ratio).collect();
+        let bits = self.figures.snr_16_bits_db.map_or("", |_| "; all with 16-bit converters");
+        fact("compared", format!("{:+.1} dB", gain.0), format!("{verdict}; {}{bits}", rest.join(", ")))
+    }
+
+    /// What may make the bank better than a simple way.
+    fn remedy(&self, best: SimpleWay) -> &'static str {
+        let knows_signal = self.figures.any_input.is_some();
+        match best {
+            _ if !knows_signal => "say in [signal] where the signal lies",
+            SimpleWay::OneChannel => "state the `noise` of the converters and design with the method h2",
+            SimpleWay::Interleaving | SimpleWay::CubicSpline => "give the bank more latency and taps",
+        }
     }
 }
 
@@ -133,11 +137,11 @@ mod tests {
     }
 
     fn figures(total: f64, spline: f64) -> Figures {
-        let simple = |way, channel, total| SimpleFigure { way, channel, snr: snr(total) };
+        let simple = |way, channel, total| SimpleFigure { way, channel, snr_db: Decibels(total) };
         Figures {
             band: FigureBand { low_hertz: Hertz(0.0), high_hertz: Hertz(9e3), source: BandSource::Signal },
             snr: snr(total),
-            snr_16_bits_db: Some(Decibels(89.04)),
+            snr_16_bits_db: Some(Decibels(total.min(89.04))),
             image: Some(ToneFigure { db: Decibels(-98.76), hertz: Hertz(8.5e3) }),
             gain_error: Some(ToneFigure { db: Decibels(f64::NEG_INFINITY), hertz: Hertz(0.0) }),
             target_vanishes: false,
@@ -150,9 +154,8 @@ mod tests {
     }
 
     fn lines(figures: &Figures) -> Vec<String> {
-        figure_facts(figures, false)
-            .map(|Fact { name, value, meaning }| format!("{name}: {value}, {meaning}"))
-            .into()
+        let line = |Fact { name, value, meaning }: Fact| format!("{name}: {value}, {meaning}");
+        figure_facts(figures, false).map(line).into()
     }
 
     #[test]
@@ -163,26 +166,24 @@ mod tests {
                 "SNR: 132.9 dB, for white noise in 0 to 9 kHz; 89.0 dB with 16-bit converters",
                 "image: -98.8 dB, largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
                 "gain error: none, largest error of gain and phase of a tone in 0 to 9 kHz, at 0 Hz",
-                "compared: +84.9 dB, over a cubic spline through all samples (48.0 dB), channel 2 alone with its best filter \
-                 (20.0 dB)",
+                "compared: +41.0 dB, over a cubic spline through all samples (48.0 dB); channel 2 alone with its best \
+                 filter (20.0 dB); all with 16-bit converters",
             ]
         );
     }
 
     #[test]
     fn a_bank_that_does_not_pay_says_so() {
-        for (own, best, value) in
-            [(42.7, 48.0, "-5.3 dB"), (48.9, 48.0, "+0.9 dB"), (90.0, f64::INFINITY, "worse")]
+        for (own, best, value) in [(42.7, 48.0, "-5.3 dB"), (48.9, 48.0, "+0.9 dB"), (80.0, 89.04, "-9.0 dB")]
         {
             let line = lines(&figures(own, best)).pop().unwrap();
-            assert!(
-                line.starts_with(&format!("compared: {value}, this bank does not pay: a cubic spline")),
-                "{line}"
-            );
-            assert!(line.ends_with("; use that, or give the bank more latency and taps"), "{line}");
+            let verdict = format!("compared: {value}, this bank does not pay beside a cubic spline");
+            assert!(line.starts_with(&verdict), "{line}");
+            assert!(line.contains("; use that, or give the bank more latency and taps;"), "{line}");
+            let unknown = Figures { any_input: None, ..figures(own, best) };
+            let line = lines(&unknown).pop().unwrap();
+            assert!(line.contains("; use that, or say in [signal] where the signal lies;"), "{line}");
         }
-        let line = lines(&figures(f64::INFINITY, f64::INFINITY)).pop().unwrap();
-        assert_eq!(line, "compared: no gain, a cubic spline through all samples is exact too");
     }
 
     #[test]
@@ -197,5 +198,6 @@ mod tests {
         assert!(lines[0].ends_with(parts), "{}", lines[0]);
         assert_eq!(lines[1], "image: none, some tone in 0 to 9 kHz does not come through at all");
         assert!(lines[2].ends_with("left out"), "{}", lines[2]);
+        assert!(lines[3].ends_with("filter (20.0 dB)"), "{}", lines[3]);
     }
 }

@@ -188,7 +188,7 @@ impl Report {
              worst at     {} modulo the slow rate\n\
              noncausal    {noncausal}\n\
              rms error    {rms_error:.9}   for white noise of unit density at the analog input\n\
-             white SNR    {} for white noise at the analog input\n\
+             SNR          {} for a signal with the spectrum of the target and of [signal]\n\
              noise gain   {:<11}   for independent noise on the slow samples\n\
              output noise {}\n{}",
             self.understood,

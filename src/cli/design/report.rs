@@ -268,10 +268,11 @@ impl Report<'_> {
         let MeanAnalysis { rms_error, noise_gain, output_noise, .. } = self.judged.mean;
         format!(
             "H2 error   {} (rms, for white noise of unit density at the analog input)\n\
-             SNR        {} for a signal with the target's spectrum\n\
+             SNR        {} for {}\n\
              noise gain {} ({})\n",
             number(Some(rms_error)),
             decibels(self.judged.scale.rms_reference, rms_error),
+            whole_spectrum(&self.judged.figures),
             six_digits(noise_gain),
             if output_noise == 0.0 {
                 "the spec gives the converters no noise".to_owned()
@@ -287,6 +288,14 @@ impl Report<'_> {
         let GammaScale { zero_output, interleaving, .. } = self.judged.scale;
         let zero = against(gamma, zero_output, "zero output");
         format!("           {zero}, {}\n", against(gamma, interleaving, "plain interleaving"))
+    }
+}
+
+/// The signal for which `rms_error` holds.
+pub(in crate::cli) fn whole_spectrum(figures: &Figures) -> &'static str {
+    match figures.any_input {
+        Some(_) => "the whole spectrum that the bank is designed for, the floor outside the band included",
+        None => "a signal with the target's spectrum",
     }
 }
 
