@@ -76,7 +76,7 @@ impl Pictures<'_> {
                 .collect(),
         };
         Chart {
-            title: "Error while the chirp rises from 50 Hz to 8 kHz, step at 1 s".into(),
+            title: "Error while the chirp rises from 50 Hz to 13 kHz, step at 1 s".into(),
             x_label: "time, s".into(),
             y_label: "RMS error in 20 ms, dB of full scale".into(),
             series: self.contenders.iter().map(curve).collect(),

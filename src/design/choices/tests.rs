@@ -181,13 +181,21 @@ fn signals_in_a_band_get_the_latency_that_their_samples_need() {
         filter: &'static str,
         delays: &'static [f64],
     }
-    let (fourth, second) =
-        ("family = \"butterworth\", order = 4, cutoff = 0.1875", "family = \"butterworth\", order = 2, cutoff = 0.4167");
+    let (fourth, second) = (
+        "family = \"butterworth\", order = 4, cutoff = 0.1875",
+        "family = \"butterworth\", order = 2, cutoff = 0.4167",
+    );
     let systems = [
         System { latency: 12, ratio: 2, band: 1.0 / 6.0, filter: fourth, delays: &[1.2, 0.6] },
         System { latency: 22, ratio: 2, band: 0.4167, filter: second, delays: &[1.2, 0.6] },
         System { latency: 19, ratio: 4, band: 0.375, filter: second, delays: &[2.7, 1.9, 1.1, 0.2] },
-        System { latency: 7, ratio: 2, band: 0.425, filter: "family = \"rc\", cutoff = 0.6", delays: &[1.3, 0.8, 0.1] },
+        System {
+            latency: 7,
+            ratio: 2,
+            band: 0.425,
+            filter: "family = \"rc\", cutoff = 0.6",
+            delays: &[1.3, 0.8, 0.1],
+        },
     ];
     for System { latency: expected, ratio, band, filter, delays } in systems {
         let channels: Vec<String> = delays.iter().map(|delay| format!("{{ delay = {delay} }}")).collect();

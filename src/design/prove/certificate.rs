@@ -34,7 +34,7 @@ const CORRECTION_DIGITS: [usize; 2] = [9, 17];
 const NOISE: f64 = 1e-3;
 /// Maximum number of states of an error system whose certificate is searched in 512 bits: some seconds per
 /// gamma that is tried.
-pub(in crate::design) const MAX_LONG_STATES: usize = 48;
+pub(in crate::design) const MAX_LONG_STATES: usize = 96;
 /// Maximum number of states of an error system for which the search tries to find a certificate. It needs
 /// eigenvalues of matrices twice as large.
 pub(in crate::design) const MAX_SEARCHED_STATES: usize = 512;
