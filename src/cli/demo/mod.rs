@@ -60,7 +60,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let captured = capture(&problem, &signal, frames);
     let contenders = contend(&spec, &problem, &captured)?;
     let step = Analog::Known(step().normalised(spec.fast_period));
-    let step = target(&problem, &step, frames);
+    let step = target(&problem, &step, frames, problem.latency);
     let pictures = Pictures { spec: &spec, captured: &captured, step: &step, contenders: &contenders };
     args.save(&folder, &pictures)?;
     if args.json {
