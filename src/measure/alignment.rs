@@ -3,6 +3,7 @@
 use super::MeasureError;
 use super::interpolate::{Interpolator, REACH};
 use crate::linalg::{Mat, PositiveFactor};
+use std::ops::Range;
 
 /// Most steps of the fractional lag.
 const MOST_STEPS: usize = 30;
@@ -20,8 +21,9 @@ pub(super) struct Alignment<'a> {
     pub(super) phase: f64,
     pub(super) gain: f64,
     pub(super) offset: f64,
-    /// Samples that are compared at most.
+    /// Samples that are compared at most, and where in the record.
     most: usize,
+    within: Range<usize>,
 }
 
 /// What the last step found.
@@ -58,7 +60,27 @@ pub(super) struct Point {
 
 impl<'a> Alignment<'a> {
     pub(super) fn new(samples: &'a [f64], reference: &'a [f64], whole: i64, most: usize) -> Self {
-        Self { samples, reference, whole, phase: 0.0, gain: 1.0, offset: 0.0, most }
+        let within = 0..samples.len();
+        Self { samples, reference, whole, phase: 0.0, gain: 1.0, offset: 0.0, most, within }
+    }
+
+    /// From now on only these samples of the record are compared.
+    pub(super) fn restrict(&mut self, within: Range<usize>) {
+        self.within = within;
+    }
+
+    /// The samples of the record that have a reference.
+    pub(super) fn known(&self) -> Range<usize> {
+        let (reach, within) = (REACH as i64, &self.within);
+        let first = (self.whole + reach).max(within.start as i64);
+        let last = (self.reference.len() as i64 - reach + self.whole).min(within.end as i64);
+        usize::try_from(first).unwrap_or(0)..usize::try_from(last.max(first)).unwrap_or(0)
+    }
+
+    /// Those among them that are compared.
+    pub(super) fn probed(&self) -> Range<usize> {
+        let Range { start, end } = self.known();
+        start..end.min(start.saturating_add(self.most))
     }
 
     /// Gauss-Newton in lag, gain and offset.
@@ -115,18 +137,14 @@ impl<'a> Alignment<'a> {
     pub(super) fn points(&self) -> impl Iterator<Item = Point> {
         let interpolator = Interpolator::new(self.phase);
         let reach = REACH as i64;
-        let first = (self.whole + reach).max(0);
-        let last = (self.reference.len() as i64 - reach + self.whole).min(self.samples.len() as i64);
-        let last = last.min(first.saturating_add(i64::try_from(self.most).unwrap_or(i64::MAX)));
-        let point = move |n: i64| {
-            let begin = (n - self.whole - reach) as usize;
+        let point = move |n: usize| {
+            let begin = (n as i64 - self.whole - reach) as usize;
             let near = &self.reference[begin..=begin + 2 * REACH];
             let sum = |weights: &[f64]| near.iter().zip(weights).map(|(x, c)| x * c).sum::<f64>();
             let (value, slope) = (sum(&interpolator.values), sum(&interpolator.slopes));
-            let n = n as usize;
             Point { n, value, slope, error: self.samples[n] - self.gain * value - self.offset }
         };
-        (first..last).map(point).filter(|point| point.error.is_finite())
+        self.probed().map(point).filter(|point| point.error.is_finite())
     }
 
     fn normal_equations(&self) -> Normal {

@@ -2,15 +2,17 @@
 
 use super::alignment::Alignment;
 use super::lag::likely_lags;
-use super::{MeasureError, Spectrum, Window};
+use super::{MeasureError, Spectrum, UnsettledEnds, Window};
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
 use crate::units::{Decibels, Hertz, Seconds};
 
 /// Samples with which a lag is tried.
 const PROBED: usize = 1 << 15;
-/// Mean squares of errors within this factor are the same.
+/// Mean squares of errors within this factor are the same, if they are those of the same samples.
 const EQUAL_ERRORS: f64 = 1.05;
+/// Fewest samples by which two lags are compared.
+const LEAST_SHARED: usize = 256;
 /// An error below this share of the signal is none.
 const NO_ERROR: f64 = 1e-10;
 /// Bands of the error spectrum.
@@ -18,7 +20,9 @@ const BANDS: usize = 16;
 
 /// A record y against a reference r: `y[n] = gain r(n - lag) + offset + error`, with the least mean square
 /// of the error. r is interpolated between its samples by a windowed sinc of 257 samples, which is exact for
-/// a lag of whole samples and else good to -118 dB up to 0.485 fs; 128 samples at each end are not compared.
+/// a lag of whole samples and else good to -118 dB up to 0.485 fs; 128 samples at each end are not compared,
+/// nor are [`UnsettledEnds`]. Of several lags that explain the record, as with the periods of a tone, it is the
+/// shortest.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Comparison {
     /// Samples by which the record comes later.
@@ -45,6 +49,10 @@ pub struct Comparison {
     pub largest_error_at: usize,
     /// Samples that were compared.
     pub compared: usize,
+    /// Samples at both ends whose error is far above that of the rest, such as those of a filter without
+    /// input before the first sample: they are left out of all figures.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unsettled_ends: Option<UnsettledEnds>,
     /// The error in equal bands from 0 to half the rate.
     pub error_bands: Vec<Band>,
     /// The spectrum of the error.
@@ -84,26 +92,51 @@ pub fn compare(
     }
     let whole = likeliest(samples, reference, &likely_lags(samples, reference))?;
     let mut alignment = Alignment::new(samples, reference, whole, usize::MAX);
-    let settled = alignment.settle()?;
-    Ok(compared(&alignment, rate, window, &settled.covariance))
+    let mut settled = alignment.settle()?;
+    let ends = unsettled_ends(&alignment);
+    if let Some(ends) = ends {
+        let known = alignment.known();
+        alignment.restrict(known.start + ends.samples..known.end.saturating_sub(ends.samples));
+        settled = alignment.settle()?;
+    }
+    let comparison = compared(&alignment, rate, window, &settled.covariance);
+    Ok(Comparison { unsettled_ends: ends, ..comparison })
 }
 
-/// Of likely lags the one with the smallest error; of several with the same error the one nearest to 0,
-/// since the recordings of a tone agree at every period.
+/// Both ends, if the error is far larger there.
+fn unsettled_ends(alignment: &Alignment<'_>) -> Option<UnsettledEnds> {
+    let errors: Vec<f64> = alignment.points().map(|point| point.error).collect();
+    UnsettledEnds::of(&errors)
+}
+
+/// Of likely lags, the shortest first, the one with the smallest error; a longer one must explain the samples
+/// better that both explain, since the recordings of a tone agree at every period.
 fn likeliest(samples: &[f64], reference: &[f64], lags: &[i64]) -> Result<i64, MeasureError> {
     let mut first_failure = None;
-    let mut settled: Vec<(i64, f64)> = Vec::new();
+    let mut best: Option<Alignment<'_>> = None;
     for &lag in lags {
         let mut alignment = Alignment::new(samples, reference, lag, PROBED);
         match alignment.settle() {
-            Ok(found) => settled.push((alignment.whole, found.error / found.signal)),
+            Ok(_) if best.as_ref().is_none_or(|best| is_better(&alignment, best)) => best = Some(alignment),
+            Ok(_) => {}
             Err(failure) => first_failure = first_failure.or(Some(failure)),
         }
     }
-    let least = settled.iter().fold(f64::INFINITY, |least, (_, error)| error.min(least));
-    let equal = settled.iter().filter(|(_, error)| *error <= EQUAL_ERRORS * least + NO_ERROR);
-    let nearest = equal.min_by_key(|(lag, _)| lag.abs()).map(|(lag, _)| *lag);
-    nearest.ok_or(first_failure.unwrap_or(MeasureError::NoLag { lag: 0 }))
+    best.map(|best| best.whole).ok_or(first_failure.unwrap_or(MeasureError::NoLag { lag: 0 }))
+}
+
+/// Whether `longer` explains the record better than `shorter` where both are known. Where they share too few
+/// samples each is judged by its own.
+fn is_better(longer: &Alignment<'_>, shorter: &Alignment<'_>) -> bool {
+    let (a, b) = (longer.probed(), shorter.probed());
+    let shared = a.start.max(b.start)..a.end.min(b.end);
+    let is_shared = shared.len() >= LEAST_SHARED;
+    let [own, other] = [longer, shorter].map(|alignment| {
+        let mut same = Alignment::new(alignment.samples, alignment.reference, alignment.whole, PROBED);
+        same.restrict(if is_shared { shared.clone() } else { alignment.probed() });
+        same.settle().map_or(f64::INFINITY, |found| found.error / found.signal)
+    });
+    EQUAL_ERRORS * own + NO_ERROR < other
 }
 
 /// The figures at the lag that was found.
@@ -124,19 +157,22 @@ fn compared(alignment: &Alignment<'_>, rate: Hertz, window: Window, covariance: 
         gain: Estimate { value: alignment.gain, sigma: sigma(0) },
         offset: Estimate { value: alignment.offset, sigma: sigma(1) },
         snr: Decibels::of_power(signal / squares),
-        snr_unaligned: unaligned(alignment.samples, alignment.reference),
+        snr_unaligned: unaligned(alignment),
         error_rms: (squares / count).sqrt(),
         largest_error: largest.map_or(0.0, |p| p.2.abs()),
         largest_error_at: largest.map_or(0, |p| p.0),
         compared: points.len(),
+        unsettled_ends: None,
         error_bands: bands(&error_spectrum, rate),
         error_spectrum,
     }
 }
 
-/// Energy of the reference over that of the difference.
-fn unaligned(samples: &[f64], reference: &[f64]) -> Decibels {
-    let pairs = samples.iter().zip(reference).filter(|(x, r)| x.is_finite() && r.is_finite());
+/// Energy of the reference over that of the difference, among the samples that are compared.
+fn unaligned(alignment: &Alignment<'_>) -> Decibels {
+    let pairs =
+        alignment.points().filter_map(|p| Some((alignment.samples[p.n], *alignment.reference.get(p.n)?)));
+    let pairs = pairs.filter(|(_, r)| r.is_finite());
     let (signal, error) = pairs.fold((0.0, 0.0), |(s, e), (x, r)| (s + r * r, e + (x - r) * (x - r)));
     Decibels::of_power(signal / error)
 }

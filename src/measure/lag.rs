@@ -9,10 +9,15 @@ const LEAST_PART: usize = 2;
 /// Lags whose correlation is this close to the largest are tried: the correlation at whole samples is below
 /// that at the lag itself.
 const LIKELY: f64 = 0.8;
-/// Lags that are tried, beside the one nearest to 0.
+/// Coefficients that differ by less than this share are one: the noise of the recordings makes such
+/// differences between periods of a signal.
+const ALIKE: f64 = 1e-3;
+/// Lags that are tried: so many of the largest correlation, and of those that exceed all nearer to 0.
 const MOST_LAGS: usize = 8;
 
-/// The lags of the largest correlation coefficients in absolute value, in whole samples, best first.
+/// The lags of the largest correlation coefficients in absolute value, in whole samples, and those with a
+/// larger coefficient than all that are nearer to 0: among the many lags that agree for a periodic signal they
+/// hold the shortest.
 pub(super) fn likely_lags(samples: &[f64], reference: &[f64]) -> Vec<i64> {
     let (x, r) = (deviations(samples), deviations(reference));
     let size = (x.len() + r.len()).next_power_of_two();
@@ -47,10 +52,20 @@ pub(super) fn likely_lags(samples: &[f64], reference: &[f64]) -> Vec<i64> {
     };
     let peaks = lags.enumerate().filter(|(i, _)| is_peak(*i));
     let mut peaks: Vec<(f64, i64)> = peaks.map(|(i, lag)| (all[i], lag)).collect();
-    let nearest = peaks.iter().map(|(_, lag)| *lag).min_by_key(|lag| lag.abs());
+    peaks.sort_by_key(|(_, lag)| lag.abs());
+    let mut rising: Vec<(f64, i64)> = Vec::new();
+    for peak in &peaks {
+        if rising.last().is_none_or(|last| peak.0 > last.0 * (1.0 + ALIKE)) {
+            rising.push(*peak);
+        }
+    }
+    let shortest = rising.into_iter().rev().take(MOST_LAGS).map(|(_, lag)| lag);
+    let mut lags: Vec<i64> = shortest.collect();
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    peaks.truncate(MOST_LAGS);
-    peaks.into_iter().map(|(_, lag)| lag).chain(nearest).collect()
+    lags.extend(peaks.into_iter().take(MOST_LAGS).map(|(_, lag)| lag));
+    lags.sort_by_key(|lag| lag.abs());
+    lags.dedup();
+    lags
 }
 
 /// Sums of the squares of the first 0, 1, 2, .. values.

@@ -102,6 +102,22 @@ fn the_spectrum_is_drawn_with_its_spurs() {
     desk.refused(1, &["measure", "x.wav", "--plot", "x.wav", "--force"], &["x.wav"]);
 }
 
+/// A bank's output against the target of `simulate`, as README says: no lag, and the SNR of the bank also sample
+/// by sample.
+#[test]
+fn a_fused_recording_lies_on_the_time_axis_of_its_target() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let chirp = "chirp:0.01Hz..0.05Hz@4000s";
+    desk.good(&["simulate", "spec.toml", "--source", chirp, "-o", "cap"]);
+    desk.good(&["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav"]);
+    let found = desk.json(&["measure", "y.wav", "--ref", "cap/target.wav", "--json"]);
+    let [aligned, plain] =
+        ["/reference/snr_db", "/reference/snr_unaligned_db"].map(|figure| number(&found, figure));
+    assert!(number(&found, "/reference/lag_samples/value").abs() < 0.01, "{found}");
+    assert!(aligned > 50.0 && (aligned - plain).abs() < 1.0, "{aligned} {plain}");
+}
+
 #[test]
 fn a_recording_is_compared_with_a_reference() {
     let desk = Desk::with_spec(THESIS);

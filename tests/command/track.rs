@@ -47,8 +47,7 @@ fn rms_error(desk: &Desk, fused: &str) -> f64 {
     };
     let (have, want) = (samples(fused), samples("cap/target.wav"));
     let last = have.len() - 200;
-    // The target has the latency of the bank.
-    let square = |k: usize| f64::from(have[k] - want[k + 12]).powi(2);
+    let square = |k: usize| f64::from(have[k] - want[k]).powi(2);
     // The last third: the delays are known by then.
     let range = 2 * last / 3..last;
     (range.clone().map(square).sum::<f64>() / range.len() as f64).sqrt()

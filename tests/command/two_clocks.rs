@@ -24,8 +24,8 @@ fn snr(desk: &Desk, fused: &str, beyond: usize) -> f64 {
     let (have, want) = (samples(desk, fused), samples(desk, "cap/target.wav"));
     let range = have.len() / 3..have.len() - LATENCY - 100 - beyond;
     let of = |x: &dyn Fn(usize) -> f64| range.clone().map(|k| x(k).powi(2)).sum::<f64>();
-    let signal = of(&|k| f64::from(want[k + LATENCY]));
-    10.0 * (signal / of(&|k| f64::from(have[k]) - f64::from(want[k + LATENCY]))).log10()
+    let signal = of(&|k| f64::from(want[k]));
+    10.0 * (signal / of(&|k| f64::from(have[k]) - f64::from(want[k]))).log10()
 }
 
 /// The delays as simulated, in the time of the first recorder.

@@ -159,6 +159,14 @@ fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
         if text.is_empty() { "" } else { "\n" },
         found.compared
     );
+    if let Some(ends) = &found.unsettled_ends {
+        let _ = writeln!(
+            text,
+            "ends             {} more samples at either end are left out: something has not settled there, and they \
+             raise the error by {:.1} dB",
+            ends.samples, ends.raise.0
+        );
+    }
     let _ = writeln!(
         text,
         "lag              {:.6} ± {:.1e} samples ({})",

@@ -12,7 +12,7 @@ use super::bank_file::load_spec_or_bank;
 use super::folder::write_together;
 use super::recordings::{Mono, begin_recording};
 use super::say::name_leftovers;
-use crate::design::{self, Problem};
+use crate::design::Problem;
 use crate::files::refuse_overlaps;
 use crate::io::{Container, SampleWriter};
 use crate::overview::{counted, understood};
@@ -24,7 +24,7 @@ use std::path::PathBuf;
 /// Simulates what the slow converters capture
 ///
 /// Writes ch1.wav, ch2.wav, .. at the slow rate, and target.wav: the samples of the ideal fast converter,
-/// delayed by the latency. The samples of a step, tone or chirp are exact to rounding. A WAV recording is
+/// in line with the output of `fuse`. The samples of a step, tone or chirp are exact to rounding. A WAV recording is
 /// treated as a periodic, band-limited analog signal. The converters have the gains and offsets of the spec,
 /// and the errors that are asked for; the target is ideal. Complex signals, as a quadrature receiver
 /// delivers them, are written as SigMF recordings or raw: both parts pass the same front ends and clocks.
@@ -86,7 +86,9 @@ struct Report {
     is_complex: bool,
     slow_rate: serde_json::Value,
     fast_rate: serde_json::Value,
-    latency: usize,
+    /// Of the bank, if the spec says it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    latency: Option<usize>,
     #[serde(flatten)]
     common: CommonReport,
     converters: Vec<ConverterReport>,
@@ -103,14 +105,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let spec = load_spec_or_bank(&args.spec)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", args.spec.display()));
-    let latency = design::latency(&spec).map_err(|error| named(&error))?;
-    let problem = Problem::new(&spec, latency).map_err(|error| named(&error))?;
+    // The converters do not know what the spec says of the signal, and the latency delays nothing here.
+    let unweighted = Spec { signal: None, ..spec.clone() };
+    let problem = Problem::new(&unweighted, 0).map_err(|error| named(&error))?;
     let signal = Signal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
     let (rates, mut warnings) = Rates::of(&spec, kind).map_err(|message| named(&message))?;
-    if spec.latency.is_none() {
-        warnings.push(format!("the spec gives no latency; {latency} fast samples are used"));
-    }
     warnings.extend(signal.warning(&spec));
     let Converters { common, each } = args.converters.converters(&spec, signal.parts())?;
     let jittered = args.converters.is_jittered();
@@ -126,14 +126,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let files: Vec<String> = outputs.iter().map(|output| output.path.display().to_string()).collect();
     warnings.extend(clipping(&files, &reports));
     Report {
-        understood: understood(&Spec { latency: Some(latency), ..spec }),
+        understood: understood(&spec),
         source: signal.text,
         files,
         frames,
         is_complex: signal.imaginary.is_some(),
         slow_rate: number(rates.slow),
         fast_rate: number(rates.fast),
-        latency,
+        latency: spec.latency,
         common,
         converters: reports,
         warnings,
@@ -144,14 +144,6 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 /// A rate with its unit.
 fn rate(hertz: &serde_json::Value) -> String {
     hertz.as_f64().map_or_else(|| hertz.to_string(), |hertz| readable(hertz, "S/s"))
-}
-
-/// With which output of the bank the target lines up.
-fn lateness(latency: usize) -> String {
-    match latency {
-        0 => "in line with the output of fuse".to_owned(),
-        _ => format!("{} later than the output of fuse without --keep-latency", counted(latency, "sample")),
-    }
 }
 
 /// Warnings of converters that clipped.
@@ -186,7 +178,7 @@ impl Run<'_> {
 
     fn target(&self) -> Parts {
         let amplified = |analog| {
-            let mut samples = target(self.problem, analog, self.frames);
+            let mut samples = target(self.problem, analog, self.frames, 0);
             samples.iter_mut().for_each(|x| *x *= self.args.gain);
             samples
         };
@@ -253,13 +245,12 @@ impl Report {
         let each = self.converters.iter().zip(1..).map(|(converter, channel)| converter.text(channel));
         let each: String = each.collect();
         super::print(&format!(
-            "{}\nsource: {}\n{} at {}, target at {}, {}:\n  {}\n{}{each}",
+            "{}\nsource: {}\n{} at {}, target at {} in line with the output of fuse:\n  {}\n{}{each}",
             self.understood,
             self.source,
             counted(self.frames, "frame"),
             rate(&self.slow_rate),
             rate(&self.fast_rate),
-            lateness(self.latency),
             self.files.join("\n  "),
             self.common.text()
         ))

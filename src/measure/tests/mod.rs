@@ -366,6 +366,41 @@ fn lag_gain_and_error_against_a_reference() {
     }
 }
 
+/// A signal of period 960 explains a record at every 960 samples, and the first third of the record is noisy:
+/// the longer lags leave out more of it, but the samples they share are explained no better.
+#[test]
+fn the_shortest_of_many_lags_is_taken() {
+    let mut random = Random(23);
+    let tones = [(17.0, 0.5), (53.0, 0.3), (211.0, 0.1)];
+    let at = |t: f64| tones.iter().map(|(k, a)| a * (TAU * k / 960.0 * t + k).cos()).sum::<f64>();
+    let clean: Vec<f64> = (0..24_000).map(|n| at(f64::from(n))).collect();
+    for late in [-12.0, 7.3] {
+        let noise = |n: i32| if n < 8000 { 1e-3 } else { 1e-5 };
+        let record: Vec<f64> =
+            (0..24_000).map(|n| at(f64::from(n) - late) + noise(n) * gaussian(&mut random)).collect();
+        let found = compare(&record, &clean, RATE, Window::Bh7).unwrap();
+        close(found.lag_samples.value, late, 1e-3);
+    }
+}
+
+#[test]
+fn unsettled_ends_are_left_out_of_the_figures_and_named() {
+    let clean = waveform(12_000, 0.0);
+    let mut record: Vec<f64> = clean.iter().enumerate().map(|(n, x)| x + 1e-5 * (n as f64).sin()).collect();
+    let settled = compare(&record, &clean, RATE, Window::Bh7).unwrap();
+    assert_eq!(settled.unsettled_ends, None);
+    record[..300].iter_mut().for_each(|x| *x = 0.0);
+    record[11_800..].iter_mut().for_each(|x| *x *= 0.9);
+    let found = compare(&record, &clean, RATE, Window::Bh7).unwrap();
+    // 128 samples are never compared; of what is left 172 are wrong at the beginning.
+    let ends = found.unsettled_ends.unwrap();
+    assert!((172..=344).contains(&ends.samples) && ends.raise.0 > 10.0, "{ends:?}");
+    assert_eq!(found.compared, 12_000 - 256 - 2 * ends.samples);
+    for (snr, settled) in [(found.snr, settled.snr), (found.snr_unaligned, settled.snr_unaligned)] {
+        close(snr.0, settled.0, 0.5);
+    }
+}
+
 #[test]
 fn equal_recordings_have_no_error_and_a_fault_is_located() {
     let clean = waveform(3000, 0.0);
