@@ -7,7 +7,8 @@ from types import SimpleNamespace
 from hybank import _hybank
 
 _RESULTS = (
-    "Analysis", "Calibration", "Capture", "FuseReport", "Gamma", "Geometry", "Measurement", "Verified", "View",
+    "Analysis", "Calibration", "Capture", "Figures", "FuseReport", "Gamma", "Geometry", "Measurement", "Verified",
+    "View",
 )
 
 

@@ -4,7 +4,7 @@ use crate::arrays::Shape;
 use crate::background;
 use crate::errors::{HybankError, file_error, refused};
 use crate::fuse::{self, Request};
-use crate::results::Gamma;
+use crate::results::{Figures, Gamma};
 use crate::sources;
 use crate::stream::Stream;
 use hybank::bank::{self, BlockFilter, SynthesisFilters};
@@ -187,6 +187,13 @@ impl Bank {
         let (hertz, gain): (Vec<f64>, Vec<f64>) =
             points.into_iter().map(|(hertz, gain)| (hertz.0, gain)).unzip();
         Ok((PyArray1::from_vec(py, hertz), PyArray1::from_vec(py, gain)))
+    }
+
+    /// Signal-to-noise ratio, largest image and error of gain, and what the simple ways would give.
+    fn figures(&self, py: Python<'_>) -> PyResult<Figures> {
+        let bank = Arc::clone(&self.bank);
+        let figures = background::run(py, None, move |_| hybank::figures::Figures::new(&bank))?;
+        figures.map(Figures::from).map_err(refused)
     }
 
     /// Draws the error by frequency with matplotlib.

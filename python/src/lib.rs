@@ -40,6 +40,7 @@ fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("SpecError", py.get_type::<errors::SpecError>())?;
     module.add_class::<bank::Bank>()?;
     module.add_class::<stream::Stream>()?;
+    module.add_class::<results::Figures>()?;
     module.add_class::<results::Gamma>()?;
     module.add_class::<results::FuseReport>()?;
     module.add_class::<results::Verified>()?;

@@ -16,6 +16,7 @@ pub(crate) fn restored<'py>(name: &str, attributes: &Bound<'py, PyAny>) -> PyRes
         "Gamma" => result::<results::Gamma>(attributes),
         "Geometry" => result::<ibr::Geometry>(attributes),
         "Measurement" => result::<measure::Measurement>(attributes),
+        "Figures" => result::<results::Figures>(attributes),
         "Verified" => result::<results::Verified>(attributes),
         "View" => result::<ibr::View>(attributes),
         _ => Err(HybankError::new_err(format!("a pickle of {name} is of another version of hybank"))),

@@ -1,6 +1,7 @@
 //! What calls give back: named numbers.
 
 use hybank::design;
+use hybank::figures;
 use hybank::verify::{self, BoundedBanks};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -34,6 +35,63 @@ impl Gamma {
 /// As Python writes it.
 fn known(bound: Option<f64>) -> String {
     bound.map_or_else(|| "None".to_owned(), |value| format!("{value:?}"))
+}
+
+/// A bank in the user's terms: ratios in decibels, frequencies in hertz.
+#[pyclass(frozen, get_all, module = "hybank")]
+#[derive(FromPyObject)]
+pub(crate) struct Figures {
+    /// The band of the figures: low and high end.
+    band: (f64, f64),
+    /// Signal-to-noise ratio with all parts that the spec states.
+    snr: f64,
+    /// Its parts: from the signal, from the converters' noise, from uncertain delays; None without.
+    snr_signal: f64,
+    snr_noise: Option<f64>,
+    snr_delays: Option<f64>,
+    /// With 16-bit converters; None where the spec states noise.
+    snr_16_bits: Option<f64>,
+    /// The largest image of a tone in the band and the frequency of the tone; None where a tone is lost.
+    image: Option<f64>,
+    image_frequency: Option<f64>,
+    /// The largest error of gain and phase of a tone, relative to it, and the frequency of the tone.
+    gain_error: Option<f64>,
+    gain_error_frequency: Option<f64>,
+    /// The simple ways, the best one first: name, channel (from 1) and signal-to-noise ratio.
+    simple: Vec<(String, Option<usize>, f64)>,
+    /// The gain over the best of them, for the same converters.
+    gain_over_simple: Option<f64>,
+    /// gamma for inputs of any spectrum; None for a spec without signal.
+    any_input: Option<f64>,
+}
+
+impl From<figures::Figures> for Figures {
+    fn from(figures: figures::Figures) -> Self {
+        let simple = |way: &figures::SimpleFigure| (way.way.name().to_owned(), way.channel, way.snr_db.0);
+        Self {
+            band: (figures.band.low_hertz.0, figures.band.high_hertz.0),
+            snr: figures.snr.total_db.0,
+            snr_signal: figures.snr.signal_db.0,
+            snr_noise: figures.snr.noise_db.map(|db| db.0),
+            snr_delays: figures.snr.delays_db.map(|db| db.0),
+            snr_16_bits: figures.snr_16_bits_db.map(|db| db.0),
+            image: figures.image.map(|image| image.db.0),
+            image_frequency: figures.image.map(|image| image.hertz.0),
+            gain_error: figures.gain_error.map(|error| error.db.0),
+            gain_error_frequency: figures.gain_error.map(|error| error.hertz.0),
+            simple: figures.simple.iter().map(simple).collect(),
+            gain_over_simple: figures.gain_over_simple().map(|db| db.0),
+            any_input: figures.any_input,
+        }
+    }
+}
+
+#[pymethods]
+impl Figures {
+    fn __repr__(&self) -> String {
+        let [image, gain_error] = [self.image, self.gain_error].map(known);
+        format!("Figures(snr={:?}, image={image}, gain_error={gain_error})", self.snr)
+    }
 }
 
 /// What happened while a bank was run on an array.

@@ -72,8 +72,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     doubts(&found.bank, &mean, &scale).iter().for_each(|doubt| super::warn(doubt));
     write_text(&args.output, &found.bank.to_json().map_err(Failure::input)?, args.force)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
-    let report =
-        Report::new(args.output.display().to_string(), &found, Judged { mean, scale, figures }, seconds);
+    let judged = Judged { mean, scale, figures, hint: None };
+    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
     if args.json { super::print_json(&report) } else { super::print(&report.text(args.verbose)) }
 }
 

@@ -37,10 +37,11 @@ pub use simple::{SimpleFigure, SimpleWay};
 pub use snr::Snr;
 pub use tones::Tone;
 
+use crate::analog::resolved_band;
 use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
 use crate::design::{DesignError, LiftedPlant, Problem};
-use crate::spec::Spec;
+use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
 use reconstruction::Reconstruction;
 use snr::Setting;
@@ -48,6 +49,9 @@ use tones::ToneResponse;
 
 /// By how many decibels a bank must beat the simple ways to be worth its trouble.
 pub const WORTHWHILE: Decibels = Decibels(1.0);
+
+/// Share of the resolved band that a signal may take, so that a filter can end it.
+const RESOLVED_SHARE: f64 = 0.9;
 
 /// The figures of a bank.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -135,6 +139,31 @@ impl Figures {
     pub fn is_worthwhile(&self) -> bool {
         self.gain_over_simple().is_some_and(|gain| gain >= WORTHWHILE)
     }
+}
+
+/// Only the signal-to-noise ratio of [`Figures`].
+///
+/// # Errors
+/// As [`Figures::new`].
+pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
+    let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
+    let band = FigureBand::new(spec, &without_signal(spec, bank.latency)?);
+    let own = [Reconstruction::Bank(FilterResponse::new(bank)?)];
+    Ok(Setting::new(bank, spec, &band)?.ratios(&own).pop().unwrap_or_default().snr)
+}
+
+/// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band to
+/// spare where the target passes more.
+///
+/// # Errors
+/// As [`Problem::new`].
+pub fn target_band(spec: &Spec) -> Result<Option<Band>, DesignError> {
+    let problem = without_signal(spec, spec.latency.unwrap_or(0))?;
+    let FigureBand { low_hertz, high_hertz, .. } =
+        FigureBand::new(&Spec { signal: None, ..spec.clone() }, &problem);
+    let roomy = resolved_band(spec) * RESOLVED_SHARE;
+    let high = if low_hertz < roomy { Hertz(high_hertz.0.min(roomy.0)) } else { high_hertz };
+    Ok((low_hertz < high).then_some(Band { low: low_hertz, high }))
 }
 
 /// The tones of `bank` at `points` frequencies of the band of its [`Figures`], with the fast period of the spec.

@@ -1,5 +1,6 @@
 //! The figures of a bank.
 
+use super::fact::{Fact, fact};
 use super::terms::figure_facts;
 use super::text::{decibels, six_digits};
 use super::understood::understood;
@@ -14,17 +15,6 @@ use crate::verify::{BoundedBanks, verify};
 
 /// The error of a delay, fast samples, for which the change of gamma is stated.
 const SMALL_ERROR: f64 = 1e-3;
-
-/// A figure with its name and its meaning.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fact {
-    /// Its name in tables.
-    pub name: &'static str,
-    /// With its unit.
-    pub value: String,
-    /// In a sentence.
-    pub meaning: String,
-}
 
 /// A channel and what an error of its delay does.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,10 +41,6 @@ pub struct Facts {
     pub cost: Vec<Fact>,
     /// In the order of the spec.
     pub channels: Vec<ChannelFact>,
-}
-
-pub(super) fn fact(name: &'static str, value: impl Into<String>, meaning: impl Into<String>) -> Fact {
-    Fact { name, value: value.into(), meaning: meaning.into() }
 }
 
 /// A proven interval. Its ends are rounded outwards, so that what is printed is proven too.

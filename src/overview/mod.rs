@@ -2,6 +2,7 @@
 //! The commands `design`, `plot` and `report` and the page of `playground/` show it.
 
 mod doubts;
+mod fact;
 mod facts;
 mod pictures;
 mod spectra;
@@ -10,9 +11,10 @@ mod text;
 mod understood;
 
 pub use doubts::doubts;
-pub use facts::{ChannelFact, Fact, Facts};
+pub use fact::Fact;
+pub use facts::{ChannelFact, Facts};
 pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
-pub use terms::figure_facts;
+pub use terms::{band, figure_facts, rounded as decibels_of};
 pub use text::{counted, decibels, frequency, six_digits};
 pub use understood::understood;

@@ -1,6 +1,6 @@
 //! The figures of a bank in the user's terms, in words.
 
-use super::facts::{Fact, fact};
+use super::fact::{Fact, fact};
 use super::text::frequency;
 use crate::figures::{BandSource, FigureBand, Figures, SimpleFigure, SimpleWay, Snr, ToneFigure};
 use crate::units::{Decibels, Hertz};
@@ -20,12 +20,19 @@ pub fn figure_facts(figures: &Figures, is_normalised: bool) -> [Fact; 4] {
     ]
 }
 
-/// Decibels with one digit after the point.
+/// Decibels with one digit after the point; "exact" where only rounding is left.
 fn ratio(db: Decibels) -> String {
     if db > EXACT { "exact".to_owned() } else { rounded(db) }
 }
 
-fn rounded(Decibels(db): Decibels) -> String {
+/// A band of frequencies; in normalised time shares of the output rate.
+pub fn band(low: Hertz, high: Hertz, is_normalised: bool) -> String {
+    let low = if low.0 == 0.0 { "0".to_owned() } else { frequency(low, is_normalised) };
+    format!("{low} to {}", frequency(high, is_normalised))
+}
+
+/// Decibels with one digit after the point.
+pub fn rounded(Decibels(db): Decibels) -> String {
     // Adding zero takes the sign from a zero.
     format!("{:.1} dB", (10.0 * db).round() / 10.0 + 0.0)
 }
@@ -33,10 +40,10 @@ fn rounded(Decibels(db): Decibels) -> String {
 /// The way in words.
 fn named(figure: &SimpleFigure) -> String {
     match (figure.way, figure.channel) {
-        (SimpleWay::OneChannel, Some(channel)) => format!("channel {channel} alone with its best filter"),
-        (SimpleWay::OneChannel, None) => "one channel alone with its best filter".to_owned(),
+        (SimpleWay::OneChannel, Some(channel)) => format!("channel {channel} alone"),
+        (SimpleWay::OneChannel, None) => "one channel alone".to_owned(),
         (SimpleWay::Interleaving, _) => "plain interleaving".to_owned(),
-        (SimpleWay::CubicSpline, _) => "a cubic spline through all samples".to_owned(),
+        (SimpleWay::CubicSpline, _) => "a cubic spline".to_owned(),
     }
 }
 
@@ -56,14 +63,13 @@ impl Words<'_> {
 
     fn band(&self) -> String {
         let FigureBand { low_hertz, high_hertz, .. } = self.figures.band;
-        let low = if low_hertz.0 == 0.0 { "0".to_owned() } else { self.hertz(low_hertz) };
-        format!("{low} to {}", self.hertz(high_hertz))
+        band(low_hertz, high_hertz, self.is_normalised)
     }
 
     fn snr(&self) -> String {
-        let Figures { snr, snr_16_bits_db, band, any_input, .. } = self.figures;
+        let Figures { snr, snr_16_bits_db, band: FigureBand { source, .. }, any_input, .. } = self.figures;
         let Snr { signal_db, noise_db, delays_db, .. } = *snr;
-        let input = match (band.source, any_input) {
+        let input = match (source, any_input) {
             (BandSource::Signal, _) => format!("for white noise in {}", self.band()),
             (BandSource::Target, Some(_)) => "for the spectrum of the spec's signal".to_owned(),
             (BandSource::Target, None) => {
@@ -166,8 +172,8 @@ mod tests {
                 "SNR: 132.9 dB, for white noise in 0 to 9 kHz; 89.0 dB with 16-bit converters",
                 "image: -98.8 dB, largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
                 "gain error: none, largest error of gain and phase of a tone in 0 to 9 kHz, at 0 Hz",
-                "compared: +41.0 dB, over a cubic spline through all samples (48.0 dB); channel 2 alone with its best \
-                 filter (20.0 dB); all with 16-bit converters",
+                "compared: +41.0 dB, over a cubic spline (48.0 dB); channel 2 alone \
+                 (20.0 dB); all with 16-bit converters",
             ]
         );
     }
@@ -198,6 +204,6 @@ mod tests {
         assert!(lines[0].ends_with(parts), "{}", lines[0]);
         assert_eq!(lines[1], "image: none, some tone in 0 to 9 kHz does not come through at all");
         assert!(lines[2].ends_with("left out"), "{}", lines[2]);
-        assert!(lines[3].ends_with("filter (20.0 dB)"), "{}", lines[3]);
+        assert!(lines[3].ends_with("alone (20.0 dB)"), "{}", lines[3]);
     }
 }

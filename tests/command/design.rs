@@ -11,11 +11,18 @@ use serde_json::Value;
 fn a_design_is_reported_and_analysed() {
     let desk = Desk::with_spec(THESIS);
     let out = desk.good(&["design", "spec.toml", "-o", "bank.json"]);
-    for part in
-        ["bank.json: fir, 2 channels, ratio 2, 22 taps per channel, latency 10", "gamma      0.039932"]
-    {
-        assert!(out.contains(part), "{out}");
-    }
+    let names: Vec<&str> = out.lines().map(|line| line.split("  ").next().unwrap_or_default()).collect();
+    let heading = "bank.json: fir, 2 channels, ratio 2, 22 taps per channel, latency 10";
+    assert_eq!(names[..2], [heading, "SNR"], "{out}");
+    // The spec has no band, which is the seventh line.
+    assert!(
+        out.lines().count() == 7
+            && out.contains("\nsignal     without [signal]")
+            && out.contains("\ngamma      0.039932"),
+        "{out}"
+    );
+    let all = desk.good(&["design", "spec.toml", "-o", "bank.json", "--force", "--verbose"]);
+    assert!(all.lines().count() > 11 && all.contains("\nnoncausal  "), "{all}");
     let bank = desk.read_json("bank.json");
     assert_eq!(bank["format"], "hybank-bank");
     assert_eq!(bank["channels"][0]["taps"].as_array().unwrap().len(), 22);
@@ -30,6 +37,40 @@ fn a_design_is_reported_and_analysed() {
     let moved = desk.json(&["analyze", "bank.json", "--delay-error", "0,0.1", "--json"]);
     assert!((number(&moved, "/gamma") / 0.043_978 - 1.0).abs() < 0.02, "{moved}");
     assert!(desk.good(&["analyze", "bank.json"]).contains("noise gain"));
+}
+
+/// The signal below 0.18 of the output rate is within reach of both converters together, and of neither
+/// alone.
+#[test]
+fn figures_in_the_terms_of_the_user_are_reported() {
+    let spec = |delay: &str, table: &str| {
+        format!(
+            "fast_rate = 48000.0\nratio = 2\nlatency = 24\n{table}\n\
+             target = {{ filter = {{ family = \"butterworth\", order = 2, cutoff = 20000.0 }} }}\n\
+             channel = [{{ delay_samples = {delay} }}, {{ delay_samples = 0.1 }}]\n\
+             design = {{ method = \"fir\", taps = 48 }}\n"
+        )
+    };
+    let desk = Desk::with_spec(&spec("1.2", "signal = { band = \"16 kHz\" }"));
+    let report = desk.json(&["design", "spec.toml", "-o", "b.json", "--json"]);
+    let figures = &report["figures"];
+    assert_eq!(figures["band"]["high_hertz"], 16000.0);
+    let snr = number(figures, "/snr/total_db");
+    assert!(snr > 90.0 && number(figures, "/image/db") < -80.0, "{figures}");
+    assert!(number(figures, "/image/hertz") <= 16000.0 && number(figures, "/gain_error/db") < -80.0);
+    assert!(number(figures, "/any_input") > 10.0 * number(&report, "/gamma/norm"), "{report}");
+    assert_eq!(desk.json(&["analyze", "b.json", "--json"])["figures"], *figures);
+    let out = desk.good(&["analyze", "b.json"]);
+    assert!(out.contains("for white noise in 0 to 16 kHz") && out.contains("over a cubic spline"), "{out}");
+    // Delays that are known to a third of a sample only.
+    desk.write(
+        "vague.toml",
+        spec("1.2", "signal = { band = \"6 kHz\" }\nuncertainty = { delay_samples = 0.3 }"),
+    );
+    let out = desk.good(&["design", "vague.toml", "-o", "vague.json"]);
+    let line = out.lines().find(|line| line.starts_with("compared")).unwrap();
+    assert!(line.contains("this bank does not pay beside channel 1 alone"), "{out}");
+    assert!(out.lines().count() == 6 && out.contains("uncertain delays"), "{out}");
 }
 
 #[test]
@@ -91,7 +132,7 @@ fn a_large_noise_gain_is_warned_of_and_unresolved_delays_have_no_bounds() {
     let apart = |by: f64| THESIS.replace("delay = 1.2", &format!("delay = {:?}", 0.6 + by));
     let designed = |by: f64| {
         desk.write("near.toml", apart(by));
-        let flags = ["--force", "--taps", "4", "--latency", "2"];
+        let flags = ["--force", "--verbose", "--taps", "4", "--latency", "2"];
         let output = desk.run(&[&["design", "near.toml", "-o", "near.json"][..], &flags].concat(), &[]);
         assert!(output.status.success(), "{output:?}");
         (text(&output.stdout), text(&output.stderr))

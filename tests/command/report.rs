@@ -26,9 +26,16 @@ fn a_page_shows_the_bank_and_loads_nothing() {
     assert!(LOADING.iter().all(|tag| !page.contains(tag)), "something is loaded");
     // Addresses occur as the names of XML only.
     assert_eq!(page.matches("http").count(), page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count());
-    assert_eq!((page.matches("<svg").count(), page.matches("</svg>").count()), (8, 8));
+    assert_eq!((page.matches("<svg").count(), page.matches("</svg>").count()), (9, 9));
     assert!(page.contains("a &lt; b &amp; c") && !page.contains("a < b"), "the name is not escaped");
-    for part in ["proven for this page", "this bank has at most", "multiply-adds", "hybank verify b.json"] {
+    for part in [
+        "largest image of a tone",
+        "plain interleaving",
+        "proven for this page",
+        "this bank has at most",
+        "multiply-adds",
+        "hybank verify b.json",
+    ] {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.contains("NaN") && !page.contains("Captures"));
@@ -53,7 +60,7 @@ fn captures_are_shown_before_and_after() {
     let desk = desk();
     desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "4000", "-o", "cap"]);
     let page = page(&desk, &["cap/ch1.wav", "cap/ch2.wav"]);
-    assert_eq!(page.matches("<svg").count(), 9);
+    assert_eq!(page.matches("<svg").count(), 10);
     for part in ["Captures", "plain interleaving", "fused", "hybank fuse b.json cap/ch1.wav cap/ch2.wav"] {
         assert!(page.contains(part), "{part}");
     }

@@ -131,9 +131,10 @@ fn reports_are_what_they_were() {
     desk.write("drift.toml", format!("{THESIS}\n[uncertainty]\ndelay_samples = 0.1\n"));
     for (name, args) in [
         ("design-fir", &["design", "spec.toml", "-o", "fir.json"][..]),
-        ("design-bits", &["design", "spec.toml", "-o", "bits.json", "--bits", "8"]),
+        ("design-fir-verbose", &["design", "spec.toml", "-o", "fir.json", "--verbose", "--force"]),
+        ("design-bits", &["design", "spec.toml", "-o", "bits.json", "--bits", "8", "--verbose"]),
         ("design-iir", &["design", "iir.toml", "-o", "iir.json"]),
-        ("design-reduced", &["design", "iir.toml", "-o", "two.json", "--order", "2"]),
+        ("design-reduced", &["design", "iir.toml", "-o", "two.json", "--order", "2", "--verbose"]),
         ("analyze", &["analyze", "fir.json"]),
         ("analyze-certify", &["analyze", "fir.json", "--certify"]),
         (
@@ -150,9 +151,12 @@ fn reports_are_what_they_were() {
                 "--sensitivity",
             ],
         ),
-        ("design-robust", &["design", "robust.toml", "-o", "robust.json"]),
+        ("design-robust", &["design", "robust.toml", "-o", "robust.json", "--verbose"]),
         ("verify-robust", &["verify", "robust.json"]),
-        ("design-tracking", &["design", "drift.toml", "-o", "drift.json", "--tracking", "affine"]),
+        (
+            "design-tracking",
+            &["design", "drift.toml", "-o", "drift.json", "--tracking", "affine", "--verbose"],
+        ),
         ("verify-tracking", &["verify", "drift.json"]),
         ("verify-fir", &["verify", "fir.json"]),
         ("verify-iir", &["verify", "iir.json"]),

@@ -18,7 +18,7 @@ delay_samples = 0.15
 /// With the bank, and captures of two tones by recorders whose clocks drift apart by 1.5 ppm.
 fn desk() -> Desk {
     let desk = Desk::with_spec(SPEC);
-    let out = desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let out = desk.good(&["design", "spec.toml", "-o", "bank.json", "--verbose"]);
     assert!(out.contains("tracked ") && out.contains("redesigned "), "{out}");
     desk.good(&[
         "simulate",

@@ -182,15 +182,17 @@ fn help_has_the_reference_of_specs() {
 
 /// The curve that must be in a picture is there, and no number is missing.
 #[test]
-fn a_bank_is_drawn_in_eight_pictures() {
+fn a_bank_is_drawn_in_nine_pictures() {
     let desk = Desk::with_spec(AUDIO);
     for flags in [&[][..], &["--method", "iir"]] {
         let spec = if flags.is_empty() { AUDIO.to_owned() } else { AUDIO.replace("taps = 24\n", "") };
         assert_eq!(designed(&desk, &spec, flags), (Some(0), String::new()));
         let files = desk.good(&["plot", "b.json", "-o", "pictures", "--force"]);
-        assert_eq!(files.lines().count(), 8);
+        assert_eq!(files.lines().count(), 9);
+        assert!(files.starts_with("pictures/tones.svg\n"), "{files}");
         for (name, words) in [
-            ("front-ends", &["target", "channel 2", "kHz"][..]),
+            ("tones", &["largest image", "error of gain and phase", "input frequency, kHz"][..]),
+            ("front-ends", &["target", "channel 2", "kHz"]),
             ("filters", &["channel 1", "channel 2", "dB"]),
             ("analysis", &["target", "channel 2", "kHz"]),
             ("phase", &["channel 1", "rad"]),
@@ -206,7 +208,7 @@ fn a_bank_is_drawn_in_eight_pictures() {
     }
     desk.refused(1, &["plot", "b.json", "-o", "pictures"], &["exists", "--force"]);
     let files = desk.good(&["plot", "b.json", "-o", "pixels", "--format", "png"]);
-    assert_eq!(files.lines().filter(|name| name.ends_with(".png")).count(), 8);
+    assert_eq!(files.lines().filter(|name| name.ends_with(".png")).count(), 9);
     // The size stands in the header (RFC 2083): 1920 by 900 pixels.
     assert_eq!(
         desk.read("pixels/error.png")[..24],
@@ -220,7 +222,7 @@ fn gamma_is_drawn_against_latency_and_taps() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json"]);
     let files = desk.good(&["plot", "b.json", "-o", "pictures", "--sweeps"]);
-    assert_eq!(files.lines().count(), 10);
+    assert_eq!(files.lines().count(), 11);
     for (name, x) in [("latency", "latency, fast samples"), ("taps", "taps per channel")] {
         let picture = String::from_utf8(desk.read(&format!("pictures/{name}.svg"))).unwrap();
         assert!([x, "this bank", "gamma, dB"].iter().all(|word| picture.contains(word)), "{name}");

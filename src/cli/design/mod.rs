@@ -1,5 +1,6 @@
 //! `hybank design`: from a spec file to a bank file.
 
+mod band_hint;
 mod progress;
 pub(super) mod report;
 
@@ -11,6 +12,7 @@ use crate::design::{self, DesignError, GammaScale, Limits, Options};
 use crate::figures::Figures;
 use crate::overview::doubts;
 use crate::spec::{DesignOverrides, Method, Reduction, Solver, Spec, Tracking, WordLengths};
+use band_hint::BandHint;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use progress::Progress;
 use report::{Judged, Report};
@@ -162,8 +164,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     warn_or_refuse(&doubts(&found.bank, &mean, &scale), args.strict)?;
     let text = found.bank.to_json().map_err(Failure::input)?;
     write_text(&args.output, &text, args.force)?;
-    let report =
-        Report::new(args.output.display().to_string(), &found, Judged { mean, scale, figures }, seconds);
+    let hint = BandHint::new(&found, seconds).map_err(named)?;
+    let judged = Judged { mean, scale, figures, hint };
+    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
     if args.json {
         super::print_json(&report)
     } else if is_dash(&args.output) {

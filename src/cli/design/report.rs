@@ -1,5 +1,6 @@
 //! The report of `hybank design` on a finished bank, as text and as JSON.
 
+use super::band_hint::BandHint;
 use crate::bank::{Gamma, SynthesisFilters};
 use crate::design::quantise::WordStudy;
 use crate::design::{
@@ -56,6 +57,9 @@ pub(in crate::cli) struct Judged {
     pub(in crate::cli) mean: MeanAnalysis,
     pub(in crate::cli) scale: GammaScale,
     pub(in crate::cli) figures: Figures,
+    /// For a spec without a signal.
+    #[serde(rename = "with_band", skip_serializing_if = "Option::is_none")]
+    pub(in crate::cli) hint: Option<BandHint>,
 }
 
 /// The increase of the error by integer taps.
@@ -172,13 +176,14 @@ impl<'a> Report<'a> {
     pub(in crate::cli) fn text(&self, verbose: bool) -> String {
         let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
         if !verbose {
-            return terms + &self.gamma_line();
+            return terms + &self.gamma_line() + &self.hint();
         }
         let parts = [
             format!("{}\n", self.understood),
             terms,
             self.gamma_text(),
             self.mean_text(),
+            self.hint(),
             self.words.as_ref().map(Words::text).unwrap_or_default(),
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.robust.map(|study| robust_text(study, self.gamma.worst_case)).unwrap_or_default(),
@@ -205,11 +210,15 @@ impl Report<'_> {
         )
     }
 
+    fn hint(&self) -> String {
+        self.judged.hint.map_or_else(String::new, |hint| hint.text(self.is_normalised))
+    }
+
     /// The worst case in one line, proven or not.
     fn gamma_line(&self) -> String {
         let proof = match (&self.proof.proven, &self.proof.unproven) {
             (Some(proven), _) => format!("proven: at most {}", number(Some(proven.upper))),
-            (_, Some(reason)) => format!("computed, not proven: {reason}"),
+            (_, Some(_)) => "computed, not proven; --verbose says why".to_owned(),
             _ => "computed".to_owned(),
         };
         let any = self

@@ -64,6 +64,7 @@ fn a_bank_without_any_error_loses_nothing_by_integers() {
     assert_eq!(number(&report, "/gamma/norm"), 0.0);
     assert_eq!(number(&report, "/words/loss_db"), 0.0);
     assert!(
-        desk.good(&["design", "exact.toml", "-o", "b.json", "--force"]).contains("gamma is 0.0000 dB above")
+        desk.good(&["design", "exact.toml", "-o", "b.json", "--force", "--verbose"])
+            .contains("gamma is 0.0000 dB above")
     );
 }

@@ -25,7 +25,7 @@ fn the_order_is_reduced_reported_and_proven() {
 
     // In the file, the loss; on the command line, something else in its place.
     desk.write("loss.toml", format!("{iir}reduction_loss_db = 6\n"));
-    let text = desk.good(&["design", "loss.toml", "-o", "loss.json"]);
+    let text = desk.good(&["design", "loss.toml", "-o", "loss.json", "--verbose"]);
     assert!(text.contains("dB of gamma lost") && text.contains("states          gamma"), "{text}");
     let report = desk.json(&["design", "loss.toml", "-o", "one.json", "--order", "1", "--json"]);
     assert_eq!(report["states"], 1);
