@@ -7,6 +7,7 @@ mod abuse;
 mod algorithms;
 mod analyze;
 #[cfg(target_os = "linux")]
+mod band;
 mod bit_true;
 mod calibrate;
 mod cuts;
