@@ -23,6 +23,27 @@ pub fn spectrum(mut samples: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
     samples
 }
 
+/// x_n = sum over all k modulo L of X_k e^{2 pi j k n / L}, real, for n = 0 .. L, from X_k of k = 0 ..= L/2: L
+/// times the inverse of [`real_spectrum`]. Zeros if the lengths do not fit.
+pub fn real_sequence(spectrum: &[Complex<f64>], length: usize) -> Vec<f64> {
+    let mut sequence = vec![0.0; length];
+    let mut spectrum = spectrum.to_vec();
+    // The constant and, of even lengths, the highest frequency are real.
+    let last = if length.is_multiple_of(2) { spectrum.len().checked_sub(1) } else { None };
+    for real in [Some(0), last].into_iter().flatten() {
+        if let Some(value) = spectrum.get_mut(real) {
+            value.im = 0.0;
+        }
+    }
+    if length > 0 {
+        let transform = RealFftPlanner::new().plan_fft_inverse(length);
+        if transform.process(&mut spectrum, &mut sequence).is_err() {
+            sequence.fill(0.0);
+        }
+    }
+    sequence
+}
+
 /// z_n = L sum_k x_k y_{n - k}, indices modulo the length L of both.
 ///
 /// # Panics

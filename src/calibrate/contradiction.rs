@@ -1,4 +1,4 @@
-//! Captures that contradict the spec: the same recording twice, another order, other delays.
+//! In what captures contradict a spec, and how another order and other delays are found.
 //!
 //! The blind estimator looks at the bands that hold one alias each. Something is reported only where the
 //! evidence is clear: with the delays found, the signal leaves at most a tenth of the power unexplained
@@ -8,19 +8,14 @@ use super::blind::Blind;
 use super::model::Model;
 use super::order::order_of_delays;
 use super::parameters::Fit;
-use super::record::{Record, repeated};
+use super::record::Record;
 use super::result::ChannelEstimate;
+use crate::quantity::readable;
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
-use crate::units::FastPeriods;
+use crate::units::{FastPeriods, Seconds};
 use std::fmt;
 
-/// Least frames of a record that is judged, and the number that suffices.
-pub const LEAST_FRAMES: usize = 1024;
-/// See [`LEAST_FRAMES`].
-pub const ENOUGH_FRAMES: usize = 16_384;
-/// Most channels: the work grows with their cube.
-const MOST_CHANNELS: usize = 32;
 /// Share of the unexplained power that other delays must take away to count: all but this.
 const LEFT: f64 = 0.1;
 /// Another order is looked for where the given one leaves more than this share of the power unexplained;
@@ -51,6 +46,36 @@ pub enum Contradiction {
         /// The channel that each capture belongs to, from 1.
         order: Vec<usize>,
     },
+    /// A capture holds next to nothing.
+    Silent {
+        /// From 1.
+        channel: usize,
+        /// Its rms over that of the loudest channel.
+        level: f64,
+    },
+    /// A capture has the other sign.
+    Inverted {
+        /// From 1.
+        channel: usize,
+    },
+    /// A capture is larger or smaller than the others.
+    Gain {
+        /// From 1.
+        channel: usize,
+        /// Its gain over that of the spec, relative to the first of two channels, or to the median of more.
+        ratio: f64,
+        /// What the gain of the spec would be.
+        gain: f64,
+    },
+    /// A capture began before the others, or after them.
+    Start {
+        /// From 1.
+        channel: usize,
+        /// Samples by which it began too early; below 0 if too late.
+        early: i64,
+        /// The same as a time, unless the spec is in normalised time.
+        seconds: Option<Seconds>,
+    },
     /// A delay is outside its interval.
     Delay {
         /// From 1.
@@ -79,6 +104,22 @@ impl fmt::Display for Contradiction {
                     order.join(", ")
                 )
             }
+            Self::Silent { channel, level } => write!(
+                f,
+                "channel {channel} is silent: its level is {level:.1e} of that of the loudest channel; check its cable, its \
+                 converter, and the order of the captures"
+            ),
+            Self::Inverted { channel } => write!(
+                f,
+                "channel {channel} is inverted; swap its leads, or give the channel the opposite sign of `gain` in the spec \
+                 and design the bank again"
+            ),
+            Self::Gain { channel, ratio, gain } => write!(
+                f,
+                "the gain of channel {channel} is {ratio:.4} times that of the spec, relative to the other channels; write \
+                 `gain = {gain:.4}` in the spec, or measure it with `hybank calibrate`, and design the bank again"
+            ),
+            Self::Start { channel, early, seconds } => start(f, *channel, *early, *seconds),
             Self::Delay { channel, reference, deviation, half_width } => write!(
                 f,
                 "the delay of channel {channel} relative to channel {reference} differs from that of the spec by {:.4} fast periods (± {:.1e}), \
@@ -91,25 +132,21 @@ impl fmt::Display for Contradiction {
     }
 }
 
-/// What clearly contradicts `spec` in the first frames of captures; nothing where they do not tell.
-pub fn contradictions(spec: &Spec, records: &[Record]) -> Vec<Contradiction> {
-    let channels = spec.channels.len();
-    if records.len() != channels || !(2..=MOST_CHANNELS).contains(&channels) {
-        return Vec::new();
-    }
-    let delays = spec.delays_in_fast_periods();
-    if let Some((i, j)) = repeated(records).filter(|&(i, j)| delays[i] != delays[j]) {
-        return vec![Contradiction::Repeated { first: i + 1, second: j + 1 }];
-    }
-    let shortest = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
-    if shortest < LEAST_FRAMES {
-        return Vec::new();
-    }
-    by_delays(spec, records).unwrap_or_default()
+fn start(f: &mut fmt::Formatter<'_>, channel: usize, early: i64, seconds: Option<Seconds>) -> fmt::Result {
+    let count = early.unsigned_abs();
+    let samples = if count == 1 { "sample" } else { "samples" };
+    let time = seconds.map_or_else(String::new, |time| format!(" ({})", readable(time.0, "s")));
+    let (when, whose) =
+        if early > 0 { ("before", "of this channel") } else { ("after", "of the other channels") };
+    write!(
+        f,
+        "the capture of channel {channel} began {count} {samples}{time} {when} the others; cut the first {count} {samples} \
+         {whose}"
+    )
 }
 
 /// `None` where the captures do not tell.
-fn by_delays(spec: &Spec, records: &[Record]) -> Option<Vec<Contradiction>> {
+pub(super) fn by_delays(spec: &Spec, records: &[Record]) -> Option<Vec<Contradiction>> {
     let uncertainty = spec.uncertainty.clone().unwrap_or_default();
     let reference = uncertainty.reference_channel().unwrap_or(0);
     let fit = Fit { delay: true, gain: true, offset: false, cutoff: false };
@@ -182,6 +219,7 @@ fn other_order(blind: &Blind<'_>, channels: usize) -> Option<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibrate::contradictions;
     use crate::calibrate::testbench::{gaussian, interleaved, tones, with_errors};
     use crate::random::Random;
     use crate::units::Hertz;

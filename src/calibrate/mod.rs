@@ -32,6 +32,7 @@
 //! What spoils an estimate and can be recognised is refused ([`CalibrateError`]) or noted ([`Remark`]);
 //! where the data contradict the model, the intervals are widened by the misfit.
 
+mod agreement;
 mod apply;
 mod blind;
 mod contradiction;
@@ -45,13 +46,17 @@ mod record;
 mod remark;
 mod result;
 mod settings;
+mod starts;
 #[cfg(test)]
 mod testbench;
 mod tones;
 mod waveform;
 
+pub use agreement::{
+    Agreement, ENOUGH_FRAMES, LEAST_FRAMES, Verdict, agreement, contradictions, frames_for_agreement,
+};
 pub use apply::applied;
-pub use contradiction::{Contradiction, ENOUGH_FRAMES, LEAST_FRAMES, contradictions};
+pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use measured::{Modulus, Tone};
 pub use model::Model;

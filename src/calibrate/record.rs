@@ -56,6 +56,14 @@ impl Record {
         std::iter::once(self.samples.as_slice()).chain(self.imaginary.as_deref())
     }
 
+    /// The first samples, at most `count`.
+    pub(super) fn beginning(&self, count: usize) -> Self {
+        let count = count.min(self.samples.len());
+        let imaginary = self.imaginary.as_ref().map(|part| part[..count.min(part.len())].to_vec());
+        let keep = self.keep[..count].to_vec();
+        Self { samples: self.samples[..count].to_vec(), imaginary, keep, clipped: self.clipped }
+    }
+
     /// Samples that are not clipped and finite.
     pub fn used(&self) -> usize {
         self.keep.iter().filter(|&&keep| keep).count()

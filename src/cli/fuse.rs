@@ -1,6 +1,7 @@
 //! `hybank fuse`: fuses slow recordings into one fast recording.
 
 use super::Failure;
+use super::bank_file::is_dash;
 use super::before_after::{BeforeAfter, BeforeAfterArgs};
 use super::bit_true::{BitTrueArgs, Job};
 use super::capture_args::CaptureArgs;
@@ -14,13 +15,15 @@ use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_r
 use super::say::say_understood;
 use super::track::TrackArgs;
 use super::turns::TurnArgs;
-use super::watch::Watch;
+use super::watch::{UNWATCHED, Watch};
 use super::{bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
     BLOCK_BYTES, Container, MultiReader, OutputHeader, PcmFrames, Placement, ReadOptions, SampleWriter,
 };
+use crate::overview::counted;
 use crate::pipeline::{Ending, FileOutputs, Pipeline, Settings, Warning, run as run_pipeline};
+use crate::quantity::readable;
 use crate::runtime::{Algorithm, Options, Plan};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -100,6 +103,10 @@ struct Report<'a> {
     /// Samples dropped at the beginning so that the output lines up with the inputs; with --keep-latency
     /// only those that the algorithm adds.
     latency_dropped: u64,
+    /// Largest magnitude of the output, of full scale.
+    peak: f64,
+    /// Whether the captures agree with the spec of the bank.
+    captures: &'a str,
     seconds: f64,
     /// The figures of plain interleaving and of the output, with --measure.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -132,7 +139,7 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     let mut pipeline = args.pipeline(bank, &plan, (skip, rate), is_complex)?;
     let mut outputs = args.outputs(rate, is_complex)?;
     let is_watched = !is_complex && !args.track.is_wanted();
-    let mut watch = if is_watched { Watch::new(bank) } else { Watch::idle() };
+    let mut watch = if is_watched { Watch::new(bank) } else { Watch::idle(UNWATCHED) };
     let mut follow = Follow::new(journal.clone());
     run_all(&mut pipeline, &mut reader, &mut outputs, |parts, pipeline| {
         watch.observe(parts);
@@ -144,19 +151,42 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     let frames = reader.consumed();
     pipeline.flush(frames * bank.ratio as u64, &mut outputs).map_err(Failure::running)?;
     let run = RunReport::new(pipeline.finish(), args.tolerated(&reader), "--bits 32f");
-    let run = run.with_warnings(watch.finish()).with_reported(reported);
+    let watched = watch.finish();
+    let run = run.with_warnings(watched.warnings).with_reported(reported);
     let seconds = begin.elapsed().as_secs_f64();
     let shift = plan.latency() as u64 - skip;
     let placement = Placement { ratio: bank.ratio as u64, shift, samples: run.samples };
     outputs.annotate(carried(&reader, run.gaps(), bank, &args.output, placement)?);
+    let peak = outputs.peak().unwrap_or(0.0);
     complete(outputs, &run, args.strict, journal)?;
     let (measure, rate) = (args.measured(bank)?, rate.round() as u64);
-    let report = Report { run: &run, rate, frames, latency_dropped: skip, seconds, measure };
+    let captures = &watched.verdict;
+    let report = Report { run: &run, rate, frames, latency_dropped: skip, peak, captures, seconds, measure };
     journal.end(&report)?;
-    match &report.measure {
-        _ if args.json => print_report(&report, &args.output),
-        Some(measured) => super::print(&measured.text()),
-        None => Ok(()),
+    if args.json {
+        return print_report(&report, &args.output);
+    }
+    // Where samples go to standard output nothing else does.
+    if is_dash(&args.output) { Ok(()) } else { super::print(&report.text(&args.output)) }
+}
+
+impl Report<'_> {
+    /// The figures of --measure; what was written, and whether the captures agree with the bank.
+    fn text(&self, output: &Path) -> String {
+        let figures = self.measure.as_ref().map_or_else(String::new, BeforeAfter::text);
+        let (samples, clipped) = (counted(self.run.samples, "sample"), self.run.clipped);
+        let rate = self.rate as f64;
+        let length = readable(self.run.samples as f64 / rate, "s");
+        let level =
+            if self.peak > 0.0 { format!(" ({:.1} dBFS)", 20.0 * self.peak.log10()) } else { String::new() };
+        let clipped = if clipped == 0 { "none".to_owned() } else { clipped.to_string() };
+        format!(
+            "{figures}{}: {samples} at {} = {length}, peak {:.4}{level}, {clipped} clipped\n{}\n",
+            output.display(),
+            readable(rate, "S/s"),
+            self.peak,
+            self.captures
+        )
     }
 }
 
@@ -249,7 +279,7 @@ impl Args {
         let header = OutputHeader { container, format, is_complex, rate };
         let samples = SampleWriter::create(&self.output, header, self.force);
         let log = self.track.begin_log(self.force)?;
-        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log))
+        Ok(FileOutputs::new(samples.map_err(Failure::running)?, mask).with_log(log).with_peak(format))
     }
 
     fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {

@@ -97,7 +97,7 @@ pub(super) struct RunReport {
     /// Output samples written.
     pub(super) samples: u64,
     /// Output samples that saturated.
-    clipped: u64,
+    pub(super) clipped: u64,
     /// Input samples that were NaN or infinite and became 0.
     replaced: u64,
     /// Times that a recursion's state was not finite and was set to zero.

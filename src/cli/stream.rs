@@ -12,7 +12,7 @@ use super::say::say_line;
 use super::say::say_understood;
 use super::track::TrackArgs;
 use super::turns::TurnArgs;
-use super::watch::Watch;
+use super::watch::{UNWATCHED, Watch};
 use super::{Failure, bank_file, match_bank};
 use crate::bank::Bank;
 use crate::io::{
@@ -122,7 +122,7 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     let mut pipeline = args.pipeline(bank, &plan, rate, is_complex)?;
     let mut outputs = args.outputs(rate, is_complex)?;
     let is_watched = !is_complex && !args.track.is_wanted();
-    let watch = if is_watched { Watch::new(bank) } else { Watch::idle() };
+    let watch = if is_watched { Watch::new(bank) } else { Watch::idle(UNWATCHED) };
     let mut watch = watch.live(journal.clone());
     let mut follow = Follow::new(journal.clone());
     let ending = run_pipeline(&mut reader, &mut pipeline, &mut outputs, |parts, pipeline| {
@@ -139,7 +139,7 @@ fn stream(args: &Args, inputs: &[PathBuf], bank: &Bank, journal: &Journal) -> Re
     }
     let tolerated = reader.warnings().into_iter().map(Warning::Input).collect();
     let run = RunReport::new(pipeline.finish(), tolerated, "--output-format f32le");
-    let run = run.with_reported([reported, watch.finish()].concat());
+    let run = run.with_reported([reported, watch.finish().warnings].concat());
     let (ratio, shift) = (bank.ratio as u64, plan.latency() as u64);
     let placement = Placement { ratio, shift, samples: run.samples };
     outputs.annotate(carried(&reader, run.gaps(), bank, &args.output, placement)?);

@@ -18,6 +18,7 @@ mod gaps;
 mod mask;
 mod outcome;
 mod outputs;
+mod peak;
 mod retune;
 mod run;
 mod shifted;

