@@ -29,7 +29,7 @@ const KRONROD: [f64; 8] = [
 ];
 /// Weights of the seven Gauss points.
 const GAUSS: [f64; 4] =
-    [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_93, 0.417_959_183_673_469_4];
+    [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
 /// Relative error of each mean at which refinement ends: 0.0004 dB of a power, far below what is printed.
 const ACCURACY: f64 = 1e-4;

@@ -45,7 +45,7 @@ use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
 use reconstruction::Reconstruction;
 use snr::Setting;
-use tones::ToneResponse;
+use tones::{ToneResponse, Worst};
 
 /// By how many decibels a bank must beat the simple ways to be worth its trouble.
 pub const WORTHWHILE: Decibels = Decibels(1.0);
@@ -84,6 +84,13 @@ pub struct ToneFigure {
     pub hertz: Hertz,
 }
 
+impl ToneFigure {
+    fn new(spec: &Spec, tone: &Tone, ratio: f64) -> Self {
+        let hertz = Hertz(tone.frequency.0 / spec.fast_period.0);
+        Self { db: Decibels::of_amplitude(ratio), hertz }
+    }
+}
+
 impl Figures {
     /// Of a bank with its spec.
     ///
@@ -95,25 +102,19 @@ impl Figures {
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain);
         let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?);
-        let worst = tones.worst(band.cycles(spec));
+        let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
         let setting = Setting::new(bank, spec, &band)?;
         let mut ways = simple::ways(setting.problem());
         ways.push(Reconstruction::Bank(FilterResponse::new(bank)?));
         let mut ratios = setting.ratios(&ways);
         let own = ratios.pop().unwrap_or_default();
-        let figure = |tone: Option<Tone>, of: fn(&Tone) -> f64| {
-            tone.map(|tone| ToneFigure {
-                db: Decibels::of_amplitude(of(&tone)),
-                hertz: Hertz(tone.frequency.0 / spec.fast_period.0),
-            })
-        };
         Ok(Self {
             band,
             snr: own.snr,
             snr_16_bits_db: own.with_16_bits,
-            image: figure(worst.image, |tone| tone.image),
-            gain_error: figure(worst.gain_error, |tone| tone.gain_error),
-            target_vanishes: worst.vanishes,
+            image: image.map(|tone| ToneFigure::new(spec, &tone, tone.image)),
+            gain_error: gain_error.map(|tone| ToneFigure::new(spec, &tone, tone.gain_error)),
+            target_vanishes: vanishes,
             simple: simple::figures(&ways, &ratios),
             any_input: any_input(bank, spec, &plain)?,
         })

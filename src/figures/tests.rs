@@ -7,7 +7,7 @@ use super::signal::Signal;
 use super::snr::Ratios;
 use super::*;
 use crate::bank::SynthesisFilters;
-use crate::design::{ProofSearch, analyze_mean, design_with};
+use crate::design::{ProofSearch, analyze_mean, design_with, filters};
 use crate::linalg::{self, Mat};
 use crate::random::Random;
 use crate::simulate::{Analog, Source, Tone as SourceTone, capture};
@@ -237,6 +237,22 @@ fn a_target_that_vanishes_in_the_band_gives_no_infinities() {
     assert!((figures.snr.total_db.0).abs() < 1e-9 && !figures.is_worthwhile(), "{figures:?}");
 }
 
+/// The same filters as taps and as matrices have the same figures.
+#[test]
+fn recursive_banks_have_the_figures_of_their_taps() {
+    let system =
+        System { ratio: 3, latency: 12, filter: BUTTERWORTH_2, delays: &[2.1, 0.9, 0.2], band: 0.35 };
+    let fir = system.bank(FIR_24);
+    let block = filters::to_block(&filters::lifted(&fir.filters, 3).unwrap());
+    let recursive = Bank { filters: SynthesisFilters::StateSpace(block), ..fir.clone() };
+    let [a, b] = [fir, recursive].map(|bank| Figures::new(&bank).unwrap());
+    assert!((a.snr.total_db - b.snr.total_db).0.abs() < 1e-3, "{a:?} {b:?}");
+    for (a, b) in [(a.image, b.image), (a.gain_error, b.gain_error)] {
+        let (a, b) = (a.unwrap(), b.unwrap());
+        assert!((a.db - b.db).0.abs() < 1e-5 && (a.hertz - b.hertz).0.abs() < 1e-3, "{a:?} {b:?}");
+    }
+}
+
 /// The output of an FIR bank by its definition.
 fn fused(taps: &[Vec<f64>], ratio: usize, captured: &[Vec<f64>]) -> Vec<f64> {
     let sample = |n: usize| {
@@ -313,6 +329,7 @@ fn check_prediction(seed: u64) {
     let error = power(output.iter().zip(&target).map(|(y, z)| y - z));
     let snr = Decibels::of_power(power(target.iter().copied()) / error).0;
     let predicted = figures.snr.signal_db.0;
+    println!("seed {seed}: SNR {snr:.2} dB, predicted {predicted:.2} dB");
     assert!((snr - predicted).abs() < 0.5, "seed {seed}: {snr} dB, predicted {predicted} dB\n{text}");
     check_image(&figures, &bank, (ratio, frames), |bin| simulated(&[bin], &mut Random(1)).0, seed);
 }
@@ -336,6 +353,7 @@ fn check_image(
     let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
     let there = ToneResponse::new(plain, FilterResponse::new(bank).unwrap()).at(bin as f64 / length as f64);
     let predicted = Decibels::of_amplitude(there.image).0;
+    println!("seed {seed}: image {measured:.3} dB, predicted {predicted:.3} dB");
     assert!((measured - predicted).abs() < 0.01, "seed {seed}: {measured} dB, predicted {predicted} dB");
     assert!(predicted <= image.db.0 + 1e-9, "seed {seed}: {predicted} dB above the largest, {image:?}");
 }
