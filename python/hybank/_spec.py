@@ -3,8 +3,8 @@
 from hybank._hybank import design as _design
 
 _DESIGN_KEYS = (
-    "method", "taps", "gamma_margin", "solver", "bits", "fraction_bits", "order", "reduction_loss_db", "noise",
-    "tracking",
+    "method", "taps", "target_snr_db", "gamma_margin", "solver", "bits", "fraction_bits", "order",
+    "reduction_loss_db", "noise", "tracking",
 )
 
 
@@ -40,10 +40,13 @@ def _of_keywords(keywords):
 class Channel(dict):
     """One slow converter: its delay in seconds (or as a text with a unit), and what differs from the default."""
 
-    def __init__(self, delay=None, filter=None, *, delay_samples=None, noise=None, gain=None, offset=None):
+    def __init__(
+        self, delay=None, filter=None, *, delay_samples=None, noise=None, bits=None, jitter=None, gain=None, offset=None
+    ):
         super().__init__(
             _given(
-                delay=delay, filter=filter, delay_samples=delay_samples, noise=noise, gain=gain, offset=offset
+                delay=delay, filter=filter, delay_samples=delay_samples, noise=noise, bits=bits, jitter=jitter,
+                gain=gain, offset=offset,
             )
         )
 

@@ -97,7 +97,7 @@ pub fn resolved_band(spec: &Spec) -> Hertz {
 /// The floor that the noise of the converters suggests: what lies below the noise needs no suppression.
 fn usual_floor(spec: &Spec) -> f64 {
     let [least, most] = FLOORS_DB;
-    let quietest = spec.channels.iter().map(|channel| channel.noise).fold(f64::INFINITY, f64::min);
+    let quietest = spec.channels.iter().map(|channel| channel.sample_noise()).fold(f64::INFINITY, f64::min);
     // A converter of b bits has the noise 2^(1 - b) / sqrt(12).
     let bits = 1.0 - (quietest * 12f64.sqrt()).log2();
     (least + FLOOR_PER_BIT_DB * (bits - BITS_OF_LEAST_FLOOR)).clamp(least, most)

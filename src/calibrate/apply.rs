@@ -2,15 +2,12 @@
 
 use super::remark::Remark;
 use super::result::{Calibration, ChannelEstimate};
-use crate::spec::{PerChannel, Spec, UncertaintySpec};
+use crate::spec::{HALF_WIDTH, PerChannel, Spec, UncertaintySpec};
 use crate::units::Seconds;
 
-/// The half-width of a 95 % interval in standard deviations.
-const HALF_WIDTH: f64 = 1.959_963_984_540_054;
-
 /// `spec` with the values of `calibration` and an `[uncertainty]` table with their half-widths. Values that
-/// were not fitted stay, and so do their half-widths and the jitter. Delays that would be negative raise
-/// all delays and the latency by whole fast periods.
+/// were not fitted stay, and so do their half-widths. Delays that would be negative raise all
+/// delays and the latency by whole fast periods.
 pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Remark>) {
     let mut new = spec.clone();
     let h = spec.fast_period;
@@ -66,6 +63,5 @@ fn uncertainty(spec: &Spec, calibration: &Calibration) -> UncertaintySpec {
             before.cutoff
         },
         reference: Some(calibration.reference + 1),
-        jitter: before.jitter,
     }
 }

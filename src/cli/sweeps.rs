@@ -4,7 +4,7 @@ use crate::bank::Bank;
 use crate::design::{DesignError, ProofSearch, design_with};
 use crate::overview::Picture;
 use crate::plot::{Chart, Series};
-use crate::spec::{DesignSpec, Method, Spec};
+use crate::spec::{DesignSpec, Spec};
 
 /// Points of a curve.
 const MOST_LATENCIES: usize = 17;
@@ -28,9 +28,7 @@ pub(super) fn sweeps(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
         caption: "gamma of the best bank of each latency. More latency lets the filters see later samples.",
         chart: chart("gamma and latency", "latency, fast samples", by_latency(bank, &plain), bank),
     }];
-    if let (Method::Fir | Method::Sinc | Method::Separation, Some(taps)) =
-        (spec.design.method, spec.design.taps)
-    {
+    if let Some(taps) = spec.design.taps {
         pictures.push(Picture {
             name: "taps",
             caption: "gamma of the best filters of each length, at the latency of the bank.",

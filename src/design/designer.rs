@@ -101,8 +101,8 @@ pub fn design_observed(spec: &Spec, options: &Options<'_>) -> Result<Design, Des
     let (complete, problem, watch) = normalise(spec, options)?;
     watch.begins(Stage::Filters);
     let settings = settings(&complete)?;
-    let repeats = Repeats::of(&spec.design);
-    let merged = if settings.robust.is_some() {
+    let repeats = Repeats::of(spec);
+    let merged = if settings.robust.is_some() || settings.deviations.is_some() {
         problem.keep_channels()
     } else {
         problem.merge_channels(repeats).of_unit_size()?
@@ -193,7 +193,7 @@ fn judge(spec: &Spec, complete: Spec, realised: Realised, synthesis: &Synthesis)
     };
     Design {
         latency_chosen: spec.latency.is_none(),
-        taps_chosen: spec.design.is_fir() && spec.design.taps.is_none(),
+        taps_chosen: spec.is_fir() && spec.design.taps.is_none(),
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
         iterations: synthesis.iterations,
         words,

@@ -177,6 +177,16 @@ impl JointState {
         &self.c
     }
 
+    /// e^{A l}.
+    pub(super) fn transition(&self, length: f64) -> Mat {
+        self.transition.over(length)
+    }
+
+    /// C A: the derivatives of the outputs, as far as the state determines them.
+    pub(super) fn slopes(&self) -> &Mat {
+        &self.slopes
+    }
+
     /// (e^{A l}, S) of a segment of length l: x <- e^{A l} x + S w with S S* = G(l).
     pub(super) fn over(&self, length: f64) -> Result<(Mat, Mat), DesignError> {
         Ok((self.transition.over(length), gramian_root(&self.transition, &self.b, length)?))

@@ -7,7 +7,7 @@
 use super::lifting::SAME_INSTANT;
 use super::problem::Problem;
 use crate::linalg::Mat;
-use crate::spec::{DesignSpec, Method};
+use crate::spec::{Method, Spec};
 
 /// Which channels count as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,10 +23,10 @@ pub(super) enum Repeats {
 }
 
 impl Repeats {
-    /// The repeats that carry no information for the bank that `design` asks for.
-    pub(super) fn of(design: &DesignSpec) -> Self {
-        match design.method {
-            _ if design.is_fir() => Self::AtOneInstant,
+    /// The repeats that carry no information for the bank that `spec` asks for.
+    pub(super) fn of(spec: &Spec) -> Self {
+        match spec.design.method {
+            _ if spec.is_fir() => Self::AtOneInstant,
             Method::H2 => Self::AtWholePeriodsUnlessNoisy,
             _ => Self::AtWholePeriods,
         }
@@ -172,7 +172,6 @@ fn least_noise_shares(noise: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::Spec;
 
     /// M = 2; each channel by its numerator, delay and noise, after num / (s + 1).
     fn problem(channels: &[(f64, f64, f64)]) -> Problem {

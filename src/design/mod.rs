@@ -3,6 +3,7 @@
 
 pub mod analysis;
 mod choices;
+pub(crate) mod covariances;
 mod designer;
 mod doubling;
 pub mod effort;

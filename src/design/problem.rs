@@ -1,9 +1,10 @@
 //! The design problem in normalised time: a spec without its units.
 
 use super::DesignError;
+use super::covariances::Covariances;
 use crate::analog::{StableFilter, StrictlyProper, signal};
 use crate::linalg::Complex;
-use crate::spec::{FilterSpec, Spec};
+use crate::spec::{ChannelSpec, FilterSpec, Spec};
 use crate::units::{FastPeriods, RadiansPerFastPeriod};
 use crate::verify::uncertainty::ErrorPoint;
 
@@ -68,10 +69,37 @@ impl Problem {
             channels.push(Channel { front_end, gain: proportion * converter_gain, converter_gain, delay });
         }
         let scale = input_scale(spec, signal.as_ref(), &front_ends[target]);
-        let noise = spec.channels.iter().map(|channel| channel.noise * channel.noise * scale).collect();
-        let problem = Self { ratio: spec.ratio, latency, signal, front_ends, target, channels, noise };
+        let noise = spec.channels.iter().map(|channel| channel.sample_noise().powi(2) * scale).collect();
+        let mut problem = Self { ratio: spec.ratio, latency, signal, front_ends, target, channels, noise };
         problem.check_size()?;
+        let jitter = problem.jitter_powers(spec)?;
+        problem.noise.iter_mut().zip(jitter).for_each(|(power, jitter)| *power += jitter);
         Ok(problem)
+    }
+
+    /// Power of the noise by which the jitter of each channel of `spec` shows, relative to an input of unit
+    /// density: the mean square of what the front end's output changes meanwhile. It grows with the signal, so
+    /// it needs no full scale.
+    fn jitter_powers(&self, spec: &Spec) -> Result<Vec<f64>, DesignError> {
+        if spec.channels.iter().all(|channel| channel.jitter.0 == 0.0) {
+            return Ok(vec![0.0; self.channels.len()]);
+        }
+        let covariances = Covariances::new(self)?;
+        let power = |(channel, written): (&Channel, &ChannelSpec)| {
+            let deviation = written.jitter.in_fast_periods(spec.fast_period);
+            channel.gain * channel.gain * covariances.change(channel.front_end, deviation)
+        };
+        Ok(self.channels.iter().zip(&spec.channels).map(power).collect())
+    }
+
+    /// The jitter's part of the noise of each channel of `spec`, over the power of the target.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub(crate) fn jitter_shares(spec: &Spec, latency: usize) -> Result<Vec<f64>, DesignError> {
+        let problem = Self::new(spec, latency)?;
+        let power = Covariances::new(&problem)?.power(problem.target);
+        Ok(problem.jitter_powers(spec)?.into_iter().map(|jitter| jitter / power).collect())
     }
 
     /// The same problem `fast_periods` earlier: a common shift of all delays and of the latency changes

@@ -7,12 +7,10 @@ use super::signal::Signal;
 use super::without_signal;
 use crate::bank::Bank;
 use crate::design::{DesignError, Problem};
-use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
+use crate::spec::{HALF_WIDTH, SignalSpectrum, Spec, USUAL_RMS};
 use crate::units::{Decibels, FastPeriods};
 use std::f64::consts::TAU;
 
-/// Half-width of a 95 % interval over the deviation of a Gaussian error.
-const HALF_WIDTHS: f64 = 1.959_963_984_540_054;
 /// Variance of the rounding to 16 bits of a full scale from -1 to 1: step^2 / 12.
 const ROUNDING_16_BITS: f64 = 1.0 / (12.0 * (1u64 << 30) as f64);
 /// Above this an error is rounding of double precision.
@@ -72,7 +70,8 @@ impl Setting {
     /// As [`Problem::new`].
     pub(super) fn new(bank: &Bank, spec: &Spec, band: &FigureBand) -> Result<Self, DesignError> {
         let plain = without_signal(spec, bank.latency)?;
-        let stated = plain.noise.clone();
+        let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
+        let jitter = Problem::jitter_shares(spec, bank.latency)?;
         let signal = match spec.signal.as_ref().map(|signal| &signal.spectrum) {
             Some(SignalSpectrum::Band(_)) => {
                 let [low, high] = band.cycles(spec).map(|f| TAU * f.0);
@@ -83,11 +82,12 @@ impl Setting {
         };
         let target = target_power(&signal);
         let rms = spec.signal.as_ref().map(|signal| signal.rms);
-        let noise_is_stated = stated.iter().any(|power| *power > 0.0);
+        let noise_is_stated = stated.iter().chain(&jitter).any(|power| *power > 0.0);
         let scale = |rms: f64| target / (rms * rms);
         let noise = if noise_is_stated {
             // Without a signal the noise counts relative to unit density, as in the design.
-            stated.into_iter().map(|power| power * rms.map_or(1.0, scale)).collect()
+            let own = stated.into_iter().map(|power| power * rms.map_or(1.0, scale));
+            own.zip(jitter).map(|(power, share)| power + share * target).collect()
         } else {
             vec![ROUNDING_16_BITS * scale(rms.unwrap_or(USUAL_RMS)); stated.len()]
         };
@@ -129,7 +129,7 @@ fn spread(bank: &Bank, spec: &Spec) -> Vec<FastPeriods> {
     let Some(table) = &spec.uncertainty else { return vec![FastPeriods(0.0); channels] };
     let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
     let deviation = |(i, half): (usize, crate::units::Seconds)| {
-        let known = if follows(i) { 0.0 } else { 1.0 / HALF_WIDTHS };
+        let known = if follows(i) { 0.0 } else { 1.0 / HALF_WIDTH };
         half.in_fast_periods(spec.fast_period) * known
     };
     table.delays(channels).into_iter().enumerate().map(deviation).collect()

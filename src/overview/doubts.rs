@@ -1,7 +1,7 @@
 //! Warnings about a bank.
 
 use super::text::six_digits;
-use crate::bank::{Bank, FixedPoint};
+use crate::bank::{Bank, FixedPoint, SynthesisFilters};
 use crate::design::{GammaScale, MeanAnalysis};
 use crate::spec::Method;
 
@@ -19,14 +19,17 @@ const LARGE_NOISE_GAIN: f64 = 10.0;
 const USELESS: f64 = 0.99;
 
 /// Warning for a bank with large coefficients.
-fn large_noise_gain(method: Method, noise_gain: f64) -> String {
-    let rounding = match method {
-        Method::Iir | Method::H2 => "",
-        _ => ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)",
+fn large_noise_gain(bank: &Bank, noise_gain: f64) -> String {
+    let rounding = match bank.filters {
+        SynthesisFilters::StateSpace(_) => "",
+        SynthesisFilters::Fir(_) => ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)",
     };
-    let weighed = match method {
-        Method::Fir => "; `noise` with a large `gamma_margin` trades gamma for less noise",
-        _ => "",
+    let weighed = match bank.method {
+        Method::Fir | Method::Iir => {
+            "; `noise` with the method h2, or with a large `gamma_margin`, trades gamma for less noise"
+        }
+        Method::H2 => "; with the `noise` of the converters h2 has less",
+        Method::Sinc | Method::Separation => "",
     };
     format!(
         "noise gain {}: the bank amplifies the converters' noise that much{rounding}{weighed}; \
@@ -41,7 +44,7 @@ pub fn doubts(bank: &Bank, mean: &MeanAnalysis, scale: &GammaScale) -> Vec<Strin
     let warnings = [
         bank.fixed_point.as_ref().is_some_and(FixedPoint::is_zero).then(|| ALL_ZERO.to_owned()),
         is_useless.then(|| USELESS_BANK.to_owned()),
-        (mean.noise_gain > LARGE_NOISE_GAIN).then(|| large_noise_gain(bank.method, mean.noise_gain)),
+        (mean.noise_gain > LARGE_NOISE_GAIN).then(|| large_noise_gain(bank, mean.noise_gain)),
     ];
     warnings.into_iter().flatten().collect()
 }

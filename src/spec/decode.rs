@@ -6,8 +6,8 @@ use super::Fault;
 use super::design::DesignOverrides;
 use super::design::KeyProblem;
 use super::limits::{
-    check_channel_count, check_delay, check_fast_period, check_fast_rate, check_gain, check_gamma_margin,
-    check_latency, check_noise, check_offset, check_order, check_ratio, check_reduction_loss, check_taps,
+    check_channel_count, check_converter_bits, check_delay, check_fast_period, check_fast_rate, check_gain, check_gamma_margin,
+    check_jitter, check_latency, check_noise, check_offset, check_order, check_ratio, check_reduction_loss, check_taps,
     check_target_snr,
 };
 use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
@@ -31,7 +31,8 @@ const TOP_KEYS: [&str; 10] = [
     "uncertainty",
     "design",
 ];
-const CHANNEL_KEYS: [&str; 6] = ["delay", "delay_samples", "filter", "noise", "gain", "offset"];
+const CHANNEL_KEYS: [&str; 8] =
+    ["delay", "delay_samples", "filter", "noise", "bits", "jitter", "gain", "offset"];
 const DESIGN_KEYS: [&str; 11] = [
     "method",
     "taps",
@@ -45,8 +46,7 @@ const DESIGN_KEYS: [&str; 11] = [
     "reduction_loss_db",
     "noise",
 ];
-const UNCERTAINTY_KEYS: [&str; 7] =
-    ["delay", "delay_samples", "gain", "cutoff", "offset", "reference", "jitter"];
+const UNCERTAINTY_KEYS: [&str; 6] = ["delay", "delay_samples", "gain", "cutoff", "offset", "reference"];
 
 /// The keys of each written form of a filter; the first one names the form.
 const FILTER_FORMS: [&[&str]; 5] = [
@@ -210,7 +210,25 @@ fn channel(item: &Value<'_>, common: &Common<'_>) -> Result<(ChannelSpec, Decibe
     let number = |key, check| fields.optional(key).map(|v| checked_number(&v, check)).transpose();
     let gain = number("gain", check_gain)?.unwrap_or(1.0);
     let offset = number("offset", check_offset)?.unwrap_or(0.0) + 0.0;
-    Ok((ChannelSpec { delay, filter, noise, gain, offset }, error))
+    let bits = fields.optional("bits").map(|v| converter_bits(&v)).transpose()?;
+    let jitter = fields.optional("jitter").map(|v| jitter(&v, common.fast_period)).transpose()?;
+    let jitter = jitter.unwrap_or(Seconds(0.0));
+    Ok((ChannelSpec { delay, filter, noise, bits, jitter, gain, offset }, error))
+}
+
+/// The resolution of a converter.
+fn converter_bits(value: &Value<'_>) -> Result<u32, Fault> {
+    // A number that does not fit u32 is out of range in any case.
+    let bits = u32::try_from(value.count("bits")?).unwrap_or(u32::MAX);
+    check_converter_bits(bits).map_err(|problem| value.fault(problem))?;
+    Ok(bits)
+}
+
+/// The rms jitter of a converter.
+fn jitter(value: &Value<'_>, h: Seconds) -> Result<Seconds, Fault> {
+    let jitter = value.time()?.in_seconds(h);
+    check_jitter(jitter.in_fast_periods(h), jitter.0).map_err(|problem| value.fault(problem))?;
+    Ok(jitter + Seconds(0.0))
 }
 
 /// D_i, from one of its two spellings.
@@ -262,7 +280,6 @@ fn uncertainty(item: &Value<'_>, channels: usize, h: Seconds) -> Result<Uncertai
         offset: shares("offset")?,
         cutoff: shares("cutoff")?,
         reference: fields.optional("reference").map(|v| v.count("(channel)")).transpose()?,
-        jitter: times("jitter")?,
     };
     table.check_by_key(channels, h).map_err(|(key, problem)| {
         let key = if key == "delay" && is_in_samples { "delay_samples" } else { key };

@@ -233,6 +233,7 @@ impl DesignSpec {
         channels: usize,
     ) -> Result<(), KeyProblem> {
         blame("solver", self.check_robust_solver(uncertainty, channels))?;
+        self.check_averaging(uncertainty, channels)?;
         blame("tracking", self.check_tracking(uncertainty, channels))
     }
 
@@ -249,6 +250,24 @@ impl DesignSpec {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Only filters of finite length average over errors exactly.
+    fn check_averaging(
+        &self,
+        uncertainty: Option<&UncertaintySpec>,
+        channels: usize,
+    ) -> Result<(), KeyProblem> {
+        let Some(reduction) = self.reduction.filter(|_| self.method == Method::H2) else { return Ok(()) };
+        let is_uncertain = |table: &UncertaintySpec| {
+            table.delays(channels).iter().any(|delay| *delay > Seconds(0.0))
+                || table.gains(channels).iter().any(|gain| *gain > 0.0)
+        };
+        if !uncertainty.is_some_and(is_uncertain) {
+            return Ok(());
+        }
+        let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
+        blame(reduction.key(), Err(SpecProblem::Conflict { first: reduction.key(), second: "[uncertainty]", remedy }))
     }
 
     /// Taps can only follow delays that are uncertain.

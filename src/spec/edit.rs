@@ -169,10 +169,9 @@ fn number(value: f64) -> String {
 fn lines(table: &UncertaintySpec, h: Option<Seconds>) -> Vec<String> {
     let line =
         |key: &str, value: Option<PerChannel<f64>>| value.map(|value| format!("{key} = {}", written(&value)));
-    let seconds = |list: &Option<PerChannel<Seconds>>| list.as_ref().map(|list| list.map(|time| time.0));
     let delay = match h {
         Some(h) => line("delay_samples", table.delay.as_ref().map(|list| list.map(|time| *time / h))),
-        None => line("delay", seconds(&table.delay)),
+        None => line("delay", table.delay.as_ref().map(|list| list.map(|time| time.0))),
     };
     let reference = table.reference.map(|reference| format!("reference = {reference}"));
     let all = [
@@ -181,7 +180,6 @@ fn lines(table: &UncertaintySpec, h: Option<Seconds>) -> Vec<String> {
         line("offset", table.offset.clone()),
         line("cutoff", table.cutoff.clone()),
         reference,
-        line("jitter", seconds(&table.jitter)),
     ];
     all.into_iter().flatten().collect()
 }

@@ -144,6 +144,30 @@ pub(crate) fn check_noise(noise: f64) -> Result<(), SpecProblem> {
     ))
 }
 
+/// Most bits of a converter; finer steps than these are lost in doubles beside full scale.
+const MAX_CONVERTER_BITS: u32 = 32;
+
+/// The resolution of a converter.
+pub(super) fn check_converter_bits(bits: u32) -> Result<(), SpecProblem> {
+    if (1..=MAX_CONVERTER_BITS).contains(&bits) {
+        return Ok(());
+    }
+    let rule = format!("a converter has 1 to {MAX_CONVERTER_BITS} bits, its sign among them; leave it out for no rounding");
+    Err(range(f64::from(bits), "bits", rule))
+}
+
+/// Largest jitter in fast periods: instants that are off by more say nothing of the signal.
+const MAX_JITTER: f64 = 1.0;
+
+/// The jitter of sampling instants.
+pub(super) fn check_jitter(periods: FastPeriods, seconds: f64) -> Result<(), SpecProblem> {
+    if (0.0..=MAX_JITTER).contains(&periods.0) {
+        return Ok(());
+    }
+    let rule = format!("jitter is the rms error of a sampling instant, 0 to {MAX_JITTER} fast periods; check its unit");
+    Err(range(seconds, "s", rule))
+}
+
 /// Largest and, inverted, smallest size of a converter's gain. 120 dB from nominal a 24-bit converter has
 /// four bits left or clips nearly always, so such a number is in the wrong unit.
 const MAX_GAIN: f64 = 1e6;

@@ -33,6 +33,7 @@ pub(crate) use limits::{check_gain, check_offset};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
+pub(crate) use uncertainty::HALF_WIDTH;
 pub use uncertainty::{PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
@@ -76,6 +77,12 @@ pub struct ChannelSpec {
     /// sigma_i: rms of the converter's own white noise, relative to full scale.
     #[serde(skip_serializing_if = "is_zero")]
     pub noise: f64,
+    /// Bits of the converter, whose rounding is noise too; `None` for no rounding.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bits: Option<u32>,
+    /// Rms of the distance of a sampling instant from its nominal one, other at each sample.
+    #[serde(skip_serializing_if = "is_exact")]
+    pub jitter: Seconds,
     /// g_i: the converter's gain relative to nominal. With y the output of Phi_i at the sampling instant,
     /// the converter delivers the sample g_i y + o_i.
     #[serde(skip_serializing_if = "is_one")]
@@ -88,8 +95,19 @@ pub struct ChannelSpec {
 impl ChannelSpec {
     /// A converter without noise, gain error and offset.
     pub fn new(delay: Seconds, filter: FilterSpec) -> Self {
-        Self { delay, filter, noise: 0.0, gain: 1.0, offset: 0.0 }
+        Self { delay, filter, noise: 0.0, bits: None, jitter: Seconds(0.0), gain: 1.0, offset: 0.0 }
     }
+
+    /// Rms of the noise and of the rounding together, relative to full scale: a step of 2^(1 - bits) is an
+    /// error of step / sqrt(12).
+    pub fn sample_noise(&self) -> f64 {
+        let rounding = self.bits.map_or(0.0, |bits| 2f64.powi(1 - bits as i32) / 12f64.sqrt());
+        self.noise.hypot(rounding)
+    }
+}
+
+fn is_exact(time: &Seconds) -> bool {
+    time.0 == 0.0
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -331,6 +349,8 @@ impl Spec {
             limits::check_delay(channel.delay.in_fast_periods(self.fast_period), channel.delay.0, "s")?;
             channel.filter.check()?;
             limits::check_noise(channel.noise)?;
+            channel.bits.map_or(Ok(()), limits::check_converter_bits)?;
+            limits::check_jitter(channel.jitter.in_fast_periods(self.fast_period), channel.jitter.0)?;
             limits::check_gain(channel.gain)?;
             limits::check_offset(channel.offset)?;
         }
@@ -341,6 +361,18 @@ impl Spec {
         self.design.check(self.channels.len())?;
         let beside = self.design.check_beside(self.uncertainty.as_ref(), self.channels.len());
         beside.map_err(|KeyProblem { problem, .. }| problem)
+    }
+
+    /// Whether the filters are FIR: by the method, by its taps, or because `h2` averages over uncertain delays
+    /// and gains, which no recursive filter does exactly.
+    pub fn is_fir(&self) -> bool {
+        let channels = self.channels.len();
+        let is_uncertain = |table: &UncertaintySpec| {
+            let delays = table.delays(channels).into_iter().map(|delay| delay.0);
+            delays.chain(table.gains(channels)).any(|half| half > 0.0)
+        };
+        let averages = self.design.method == Method::H2 && self.uncertainty.as_ref().is_some_and(is_uncertain);
+        self.design.is_fir() || averages
     }
 
     /// True in normalised time: times are in fast periods, and the rates of recordings are free.

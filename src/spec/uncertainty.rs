@@ -6,6 +6,8 @@ use super::SpecProblem;
 use super::limits::range;
 use crate::units::{FastPeriods, Seconds};
 
+/// Half-width of the 95 % interval of a normal law over its standard deviation.
+pub(crate) const HALF_WIDTH: f64 = 1.959_963_984_540_054;
 /// Largest half-width of a delay in fast periods; nothing is known of a delay that may be off by more.
 const MAX_DELAY: f64 = 1024.0;
 
@@ -33,9 +35,6 @@ pub struct UncertaintySpec {
     /// of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<usize>,
-    /// Largest distance of a sampling instant from its nominal one in seconds, other in each period.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub jitter: Option<PerChannel<Seconds>>,
 }
 
 /// One value for every channel, or one value each.
@@ -109,6 +108,17 @@ impl UncertaintySpec {
             || self.gains(channels).into_iter().chain(self.cutoffs(channels)).any(|share| share > 0.0)
     }
 
+    /// Standard deviations of all `channels` delays: a half-width of a 95 % interval of the normal law is 1.96
+    /// of them.
+    pub fn delay_deviations(&self, channels: usize) -> Vec<Seconds> {
+        self.delays(channels).into_iter().map(|half| half * (1.0 / HALF_WIDTH)).collect()
+    }
+
+    /// Standard deviations of all `channels` gains.
+    pub fn gain_deviations(&self, channels: usize) -> Vec<f64> {
+        self.gains(channels).into_iter().map(|half| half / HALF_WIDTH).collect()
+    }
+
     fn relative<T: Copy + Default>(&self, written: Option<&PerChannel<T>>, channels: usize) -> Vec<T> {
         let exact = self.reference_channel();
         let of = |i| written.filter(|_| exact != Some(i)).map_or_else(T::default, |value| value.of(i));
@@ -126,11 +136,8 @@ impl UncertaintySpec {
         channels: usize,
         h: Seconds,
     ) -> Result<(), (&'static str, SpecProblem)> {
-        let times = [("delay", &self.delay), ("jitter", &self.jitter)];
-        for (key, times) in times {
-            let time = |value: &Seconds| check_time(value.in_fast_periods(h), *value);
-            check_list(times.as_ref(), channels, time).map_err(|problem| (key, problem))?;
-        }
+        let time = |value: &Seconds| check_time(value.in_fast_periods(h), *value);
+        check_list(self.delay.as_ref(), channels, time).map_err(|problem| ("delay", problem))?;
         let shares =
             [("gain", &self.gain, 1e6), ("offset", &self.offset, 1.0), ("cutoff", &self.cutoff, 0.5)];
         for (key, shares, most) in shares {

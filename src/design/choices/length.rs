@@ -1,5 +1,6 @@
 //! The fewest taps that are enough: for a wanted SNR, or to be almost as good as any number.
 
+use super::{with_uncertain_instants, with_usual_noise};
 use crate::design::DesignError;
 use crate::design::history_errors::HistoryErrors;
 use crate::design::merging::Repeats;
@@ -23,7 +24,8 @@ const MOST_FRAMES: usize = 2048;
 pub(super) fn fewest_taps(spec: &Spec) -> Result<usize, DesignError> {
     let wanted = spec.design.target_snr_db;
     // A wanted SNR is that of the noise which the spec states; without one the usual rounding limits it.
-    let noisy = if wanted.is_some() { spec.clone() } else { super::with_usual_noise(spec) };
+    let noisy =
+        if wanted.is_some() { with_uncertain_instants(spec) } else { with_usual_noise(spec) };
     let latency = spec.latency.unwrap_or_default();
     let problem =
         Problem::new(&noisy, latency)?.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem;

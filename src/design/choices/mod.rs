@@ -17,13 +17,14 @@ use super::effort::{self, Limits};
 use super::filters;
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustProblem;
-use super::methods::{self, Filters, Settings};
+use super::methods::{self, Deviations, Filters, Settings};
 use super::plant::LiftedPlant;
 use super::problem::{Problem, common_delay};
 use crate::analog::SignalFilter;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
 use crate::spec::{Method, Spec};
+use crate::units::Seconds;
 use causal::CausalErrors;
 use reach::Reach;
 use search::Search;
@@ -32,7 +33,9 @@ use search::Search;
 /// measured SNR, while the last tenth of a decibel may take many times the latency.
 const WORTHWHILE_DB: f64 = 0.1;
 /// Bits of a converter of which nothing is said.
-const USUAL_BITS: i32 = 16;
+const USUAL_BITS: u32 = 16;
+/// Bits by which the rounding lies below a wanted SNR: 24 dB.
+const SPARE_BITS: f64 = 4.0;
 
 /// Called with the number of designs that were compared.
 type Compared<'a> = &'a dyn Fn(usize);
@@ -66,7 +69,7 @@ pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, Des
     if let Some((signal, filter)) = complete.signal.as_mut().zip(SignalFilter::of(spec)) {
         signal.floor_db = filter.floor_db;
     }
-    if spec.design.is_fir() && spec.design.taps.is_none() {
+    if spec.is_fir() && spec.design.taps.is_none() {
         complete.design.taps = Some(length::fewest_taps(&complete)?);
         complete.design.target_snr_db = None;
     }
@@ -112,6 +115,7 @@ fn settings_earlier(spec: &Spec, fast_periods: usize) -> Result<Settings, Design
     Ok(Settings {
         taps: spec.design.taps.unwrap_or_default(),
         robust: RobustProblem::of(spec),
+        deviations: Deviations::of(spec),
         gamma_margin: spec.design.gamma_margin,
         solver: spec.design.solver,
         at_slow_rate: separate.then(at_slow_rate).transpose()?,
@@ -122,7 +126,7 @@ fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignEr
     // Delays that all channels have only add to the latency.
     let common = common_delay(spec);
     let problem = Problem::new(&with_usual_noise(spec), common)?.earlier(common);
-    let problem = problem.merge_channels(Repeats::of(&spec.design)).of_unit_size()?.problem;
+    let problem = problem.merge_channels(Repeats::of(spec)).of_unit_size()?.problem;
     compared(0);
     let latency = match (spec.design.method, spec.design.taps) {
         (Method::Sinc | Method::Separation, _) => {
@@ -138,21 +142,31 @@ fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignEr
     Ok(common + latency?)
 }
 
-/// The spec with the rounding of so many bits as noise, if no channel has any noise.
+/// The spec with the usual resolution, if no channel has any noise; and where the method averages over delays
+/// that are uncertain, with these as jitter: about as bad, but other at each sample, which a smoother can weigh.
 fn with_usual_noise(spec: &Spec) -> Spec {
     let mut noisy = spec.clone();
-    if spec.channels.iter().all(|channel| channel.noise == 0.0) {
-        let step = 2f64.powi(1 - assumed_bits(spec));
-        noisy.channels.iter_mut().for_each(|channel| channel.noise = step / 12f64.sqrt());
+    if spec.channels.iter().all(|channel| channel.sample_noise() == 0.0 && channel.jitter.0 == 0.0) {
+        noisy.channels.iter_mut().for_each(|channel| channel.bits = Some(assumed_bits(spec)));
+    }
+    with_uncertain_instants(&noisy)
+}
+
+/// The spec with uncertain delays as jitter, for a method that averages over them.
+fn with_uncertain_instants(spec: &Spec) -> Spec {
+    let mut noisy = spec.clone();
+    for (channel, deviations) in noisy.channels.iter_mut().zip(Deviations::of(spec).unwrap_or_default()) {
+        let delay = spec.fast_period * deviations.delay.0;
+        channel.jitter = Seconds(channel.jitter.0.hypot(delay.0));
     }
     noisy
 }
 
 /// [`USUAL_BITS`], or as many as leave the rounding well below the error of the wanted SNR.
-fn assumed_bits(spec: &Spec) -> i32 {
-    let decibels_a_bit = 20.0 * 2f64.log10();
-    let wanted = spec.design.target_snr_db.map_or(0.0, |snr| (snr / decibels_a_bit).ceil());
-    USUAL_BITS.max(wanted as i32 + 4)
+fn assumed_bits(spec: &Spec) -> u32 {
+    let decibels_per_bit = 20.0 * 2f64.log10();
+    let wanted = spec.design.target_snr_db.map_or(0.0, |snr| (snr / decibels_per_bit).ceil() + SPARE_BITS);
+    USUAL_BITS.max(wanted as u32)
 }
 
 /// The index of the first error that is within [`WORTHWHILE_DB`] of the least.

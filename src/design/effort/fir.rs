@@ -16,6 +16,8 @@ const ROUNDS: f64 = 4.0;
 /// Norms of one design: of the taps, and of those after a peak that the grid missed.
 const NORMS: f64 = 2.0;
 
+/// Nodes of the average over a delay, usually.
+const AVERAGING_NODES: f64 = 400.0;
 /// Seconds per cube of the taps of a search for witnesses in 512 bits.
 const LONG_WITNESSES: f64 = 1.1e-7;
 
@@ -142,6 +144,18 @@ pub(super) fn scale(sizes: &Sizes) -> Effort {
 /// and once for the others.
 pub(super) fn mean_square(sizes: &Sizes) -> Effort {
     smoother(sizes, sizes.lags(), sizes.ratio).times(2.0).then(judged(sizes))
+}
+
+/// The bank of least mean square over uncertain delays: a covariance for each pair of channels and each lag,
+/// and two factorisations.
+pub(super) fn averaged(sizes: &Sizes) -> Effort {
+    let (s, pairs) = (sizes.front_end_states, sizes.channels * (sizes.channels + sizes.ratio));
+    let lags = 2.0 * sizes.lags();
+    let exponential = 40.0 * s.powi(3) + 8000.0;
+    let tables = pairs * AVERAGING_NODES * s * s;
+    let rows = sizes.channels * sizes.lags();
+    let seconds = SMALL * (pairs * lags * exponential + tables) + PRODUCT * rows.powi(3);
+    Effort { seconds, bytes: 3.0 * REAL * rows * rows }.then(judged(sizes))
 }
 
 /// A bank for whole delays and a fractional delay for each channel.

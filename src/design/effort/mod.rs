@@ -17,6 +17,7 @@ pub use progress::{Observer, Stage, unobserved};
 
 use super::DesignError;
 use super::merging::Repeats;
+use super::methods::Deviations;
 use super::methods::robust_fir::RobustProblem;
 use super::problem::{Problem, common_delay};
 use crate::memory::available_memory;
@@ -52,11 +53,11 @@ pub enum Limits {
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`].
 pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
-    let usual = if spec.design.is_fir() { USUAL_LAGS * spec.ratio } else { 0 };
+    let usual = if spec.is_fir() { USUAL_LAGS * spec.ratio } else { 0 };
     let taps = spec.design.taps.unwrap_or(usual);
     let common = if spec.latency.is_none() { common_delay(spec) } else { 0 };
     let problem = Problem::new(spec, spec.latency.unwrap_or(common))?.earlier(common);
-    let problem = problem.merge_channels(Repeats::of(&spec.design)).problem;
+    let problem = problem.merge_channels(Repeats::of(spec)).problem;
     let guess = || problem.longest_delay().0.ceil() as usize + taps / 4;
     let latency = if spec.latency.is_none() { guess() } else { problem.latency };
     let sizes = Sizes::new(&Problem { latency, ..problem }, taps);
@@ -68,7 +69,7 @@ pub fn estimate(spec: &Spec, proving: bool) -> Result<Effort, DesignError> {
     });
     let chosen =
         if spec.latency.is_none() { latency_choice(spec, &sizes, design) } else { Effort::default() };
-    let open = spec.design.is_fir() && spec.design.taps.is_none();
+    let open = spec.is_fir() && spec.design.taps.is_none();
     let length = if open { fir::reachable(&sizes).times(LENGTHS) } else { Effort::default() };
     let total = finished.then(chosen).then(length);
     Ok(Effort { bytes: total.bytes + BASE_BYTES, ..total })
@@ -80,7 +81,8 @@ fn synthesis(spec: &Spec, sizes: &Sizes) -> Effort {
         Method::Fir if spec.design.solver == Some(Solver::Kyp) => fir::by_lmi(sizes),
         Method::Fir => fir::design(sizes).then(robust(spec, sizes)),
         Method::Iir => recursive::design(sizes),
-        Method::H2 if spec.design.is_fir() => fir::mean_square(sizes),
+        Method::H2 if spec.is_fir() && Deviations::of(spec).is_some() => fir::averaged(sizes),
+        Method::H2 if spec.is_fir() => fir::mean_square(sizes),
         Method::H2 => recursive::mean_square(sizes),
         Method::Sinc => fir::judged(sizes),
         Method::Separation => fir::separation(sizes),
@@ -98,7 +100,7 @@ fn robust(spec: &Spec, sizes: &Sizes) -> Effort {
 
 /// The search for a proof.
 fn proven(spec: &Spec, sizes: &Sizes) -> Effort {
-    if spec.design.is_fir() { fir::proven(sizes) } else { recursive::proven(sizes) }
+    if spec.is_fir() { fir::proven(sizes) } else { recursive::proven(sizes) }
 }
 
 /// The choice of the latency, for a method of which one design takes `design`.

@@ -4,11 +4,12 @@
 //! The phases of the output do not depend on one another: phase p estimates the target at the instant p - m0
 //! from the newest `J_p = ceil((taps - p) / M)` frames.
 
-use super::{Settings, Synthesis};
+use super::{Settings, Synthesis, averaged_fir};
 use crate::design::DesignError;
 use crate::design::history_errors::best_taps;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
+use std::ops::RangeInclusive;
 
 /// Noise of a sample relative to its size, below which the noise of a converter counts as this: samples that
 /// determine one another up to rounding are weighed alike, and not as huge differences.
@@ -19,28 +20,45 @@ const ROUNDING: f64 = 1e-13;
 /// # Errors
 /// [`DesignError::Lti`] for unstable plants.
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+    if let Some(deviations) = &settings.deviations {
+        return averaged_fir::synthesise(plant, settings.taps, deviations);
+    }
     let problem = with_rounding(plant)?;
-    let (ratio, length) = (problem.ratio, settings.taps);
+    let best = |frames, instants| best_taps(&problem, frames, instants);
+    Synthesis::of_taps(plant, of_phases(&problem, settings.taps, best)?)
+}
+
+/// The taps `[i][n]` of so many per channel from those of each phase: `best(frames, instants)[k][i][j]` weighs
+/// sample j of channel i for the target at the k-th of the instants.
+///
+/// # Errors
+/// Those of `best`.
+pub(super) fn of_phases(
+    problem: &Problem,
+    length: usize,
+    best: impl Fn(usize, RangeInclusive<i64>) -> Result<Vec<Vec<Vec<f64>>>, DesignError>,
+) -> Result<Vec<Vec<f64>>, DesignError> {
+    let ratio = problem.ratio;
     let mut taps = vec![vec![0.0; length]; problem.channels.len()];
     // The first phases have a lag more than the others, unless all have equally many.
-    let longer = length - length / ratio * ratio;
+    let longer = length % ratio;
     for (phases, frames) in [(0..longer, length / ratio + 1), (longer..ratio, length / ratio)] {
         if phases.is_empty() || frames == 0 {
             continue;
         }
         let instant = |p: usize| p as i64 - problem.latency as i64;
-        let best = best_taps(&problem, frames, instant(phases.start)..=instant(phases.end - 1))?;
-        for (p, filters) in phases.zip(best) {
+        let found = best(frames, instant(phases.start)..=instant(phases.end - 1))?;
+        for (p, filters) in phases.zip(found) {
             for (tap, lags) in taps.iter_mut().zip(filters) {
                 lags.iter().enumerate().for_each(|(j, weight)| tap[p + j * ratio] = *weight);
             }
         }
     }
-    Synthesis::of_taps(plant, taps)
+    Ok(taps)
 }
 
 /// The problem with at least the noise of rounding.
-fn with_rounding(plant: &LiftedPlant) -> Result<Problem, DesignError> {
+pub(super) fn with_rounding(plant: &LiftedPlant) -> Result<Problem, DesignError> {
     let mut problem = plant.problem().clone();
     let sizes = problem.measurement_sizes()?;
     for (power, size) in problem.noise.iter_mut().zip(sizes) {

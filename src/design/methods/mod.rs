@@ -6,9 +6,11 @@
 //! | [`iir`] | the norm of the error (thesis 5.3) | state space | unsolvable Riccati equation |
 //! | [`h2`] | the mean-square error: `iir` at gamma = infinity | state space | noncausal bound |
 //! | [`mean_square_fir`] | the same, for given length: `h2` with taps | FIR | noncausal bound |
+//! | [`averaged_fir`] | the same on average over uncertain delays and gains | FIR | noncausal bound |
 //! | [`sinc`] | nothing: Yen's interpolation, truncated (thesis 5.6.3) | FIR | noncausal bound |
 //! | [`separation`] | delays and bank one after the other (thesis 5.6.3) | FIR | noncausal bound |
 
+mod averaged_fir;
 mod filtering;
 pub(crate) mod fir;
 pub(crate) mod fir_kyp;
@@ -27,7 +29,8 @@ use super::plant::LiftedPlant;
 use super::problem::Problem;
 use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
-use crate::spec::{Method, Solver, Tracking};
+use crate::spec::{Method, Solver, Spec, Tracking};
+use crate::units::FastPeriods;
 
 /// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]
@@ -41,8 +44,32 @@ pub(crate) struct Settings {
     pub(crate) solver: Option<Solver>,
     /// The errors that `fir` has to expect; `None` if there are none.
     pub(crate) robust: Option<robust_fir::RobustProblem>,
+    /// For mean-square designs, how well each channel is known; `None` if all are exact.
+    pub(crate) deviations: Option<Vec<Deviations>>,
     /// The channels of the plant in units of the slow period, for `separation`.
     pub(crate) at_slow_rate: Option<Problem>,
+}
+
+/// Standard deviations of the errors of a converter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Deviations {
+    /// Of the delay.
+    pub(crate) delay: FastPeriods,
+    /// Of the gain, relative to it.
+    pub(crate) gain: f64,
+}
+
+impl Deviations {
+    /// Of the channels of `spec`, for a method that averages over them; `None` if all are exact.
+    pub(crate) fn of(spec: &Spec) -> Option<Vec<Self>> {
+        let (table, channels) = (spec.uncertainty.as_ref()?, spec.channels.len());
+        let delays = table.delay_deviations(channels).into_iter();
+        let delays = delays.map(|delay| delay.in_fast_periods(spec.fast_period));
+        let pairs = delays.zip(table.gain_deviations(channels));
+        let all: Vec<Self> = pairs.map(|(delay, gain)| Self { delay, gain }).collect();
+        let uncertain = all.iter().any(|deviations| deviations.delay.0 > 0.0 || deviations.gain > 0.0);
+        (spec.design.method == Method::H2 && uncertain).then_some(all)
+    }
 }
 
 /// Synthesis filters, one per channel of the plant.

@@ -185,6 +185,82 @@ fn a_margin_is_spent_on_the_mean_square() {
     }
 }
 
+/// Of filters: the mean square of the error, that of the noise at the output, and the noise gain.
+fn squares(plant: &LiftedPlant, filters: &Filters) -> [f64; 3] {
+    let system = match filters {
+        Filters::StateSpace(system) => system.clone(),
+        Filters::Fir(taps) => {
+            lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), plant.ratio()).unwrap()
+        }
+    };
+    let square = |system: &crate::lti::StateSpace| crate::lti::gramian::h2_norm(system).unwrap().powi(2);
+    let rms: Vec<f64> = plant.problem().noise.iter().map(|power| power.sqrt()).collect();
+    let noise = square(&system.clone().scale_inputs(&rms).unwrap());
+    [square(&plant.error_system(&system).unwrap()), noise, square(&system).sqrt()]
+}
+
+/// The recursive optimum is at least as good as that of many taps, whatever the noise; and noise that is stated
+/// is not amplified beyond what zero output has.
+#[test]
+fn the_recursive_mean_square_optimum_counts_noise() {
+    let channels = [
+        ("smooth and nearly equal", "{ delay = 1.2 }, { delay = 1.2001 }", 2),
+        ("one exact", "{ delay = 0.6, noise = 0 }, { delay = 1.3 }", 2),
+        ("whole periods apart", "{ delay = 0.5 }, { delay = 6.5 }, { delay = 1.5 }", 2),
+        ("delayed and exact", "{ delay = 0.5 }, { delay = 7.0, noise = 0 }", 2),
+        ("many", "{ delay = 0 }, { delay = 1.01 }, { delay = 2.3 }, { delay = 2.31 }", 3),
+    ];
+    for (what, list, ratio) in channels {
+        for noise in [1e-9, 1e-6, 1e-3, 0.1, 1.0] {
+            let text = format!(
+                "fast_period = 1.0\nratio = {ratio}\nlatency = 6\nchannel = [{list}]\n\
+                 target = {{ filter = {{ family = \"butterworth\", order = 6, cutoff = 0.05 }} }}\n\
+                 design = {{ method = \"h2\", noise = {noise:e} }}"
+            );
+            let spec = Spec::from_toml(&text, "spec.toml").unwrap();
+            let problem = Problem::new(&spec, 6).unwrap().merge_channels(Repeats::of(&spec));
+            let plant = LiftedPlant::new(&problem.of_unit_size().unwrap().problem).unwrap();
+            let of = |taps: usize| {
+                let settings = Settings { taps, ..Settings::default() };
+                squares(&plant, &synthesise(Method::H2, &plant, &settings).unwrap().filters)
+            };
+            let (recursive, fir) = (of(0), of(60));
+            let zero = crate::lti::gramian::h2_norm(&plant.reference().unwrap()).unwrap().powi(2);
+            let total = |squares: [f64; 3]| squares[0] + squares[1];
+            assert!(total(recursive) <= total(fir) * (1.0 + 1e-4) + 1e-20 * zero, "{what}, {noise:e}: {recursive:?} {fir:?}");
+            assert!(total(recursive) <= zero, "{what}, {noise:e}: {recursive:?} {zero}");
+        }
+    }
+}
+
+/// With a margin `iir` spends gamma on error and noise together.
+#[test]
+fn iir_trades_gamma_for_less_noise() {
+    let case = Case {
+        name: "noise",
+        ratio: 2,
+        latency: 6,
+        channels: "{ delay = 1.2, noise = 0.02 }, { delay = 1.1, noise = 0.02 }",
+    };
+    let plant = plant(&case);
+    let of = |margin: Option<f64>| {
+        let settings = Settings { gamma_margin: margin, ..settings(&case, Method::Iir) };
+        let found = synthesise(Method::Iir, &plant, &settings).unwrap();
+        let [error, noise, _] = squares(&plant, &found.filters);
+        (found.peak.gain, error + noise)
+    };
+    let (least, all) = of(None);
+    let mut before = all;
+    for margin in [0.05, 0.5, 3.0] {
+        let (gamma, total) = of(Some(margin));
+        assert!(gamma <= least * (1.0 + margin) * (1.0 + 1e-9), "{margin}: {gamma} {least}");
+        assert!(total < before, "{margin}: {total} {before}");
+        before = total;
+    }
+    let best = squares(&plant, &synthesise(Method::H2, &plant, &settings(&case, Method::H2)).unwrap().filters);
+    assert!(best[0] + best[1] <= before * (1.0 + 1e-9), "{best:?} {before}");
+}
+
 #[test]
 fn sinc_names_both_numbers_it_needs_equal() {
     let error = synthesise(Method::Sinc, &plant(&CASES[3]), &settings(&CASES[3], Method::Sinc)).unwrap_err();

@@ -44,7 +44,7 @@ fn delays_keep_their_unit() {
 fn inline_channels_and_filters_are_edited() {
     let text = "fast_period = 1.0\nratio = 2\nlatency = 10 # samples\n\
                 target = { filter = { family = \"rc\", cutoff = 0.1 } }\n\
-                uncertainty = { jitter = 1e-3 }\nchannel = [{ delay = 1.2 }, { delay = 0.6, gain = 2 }]\n";
+                uncertainty = { cutoff = 1e-3 }\nchannel = [{ delay = 1.2 }, { delay = 0.6, gain = 2 }]\n";
     let mut spec = calibrated(text);
     spec.channels[0].filter = spec.channels[0].filter.with_cutoff_scaled(1.25);
     spec.latency = Some(12);
@@ -52,7 +52,7 @@ fn inline_channels_and_filters_are_edited() {
     assert_eq!(read(&edited), spec);
     assert!(edited.contains("latency = 12 # samples\n"), "{edited}");
     assert!(edited.contains("cutoff = 0.125") && edited.contains("gain = 1.01 }"), "{edited}");
-    assert!(edited.contains("jitter = 0.001"), "{edited}");
+    assert!(edited.contains("cutoff = 0.001"), "{edited}");
 }
 
 #[test]

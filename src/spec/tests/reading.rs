@@ -159,10 +159,9 @@ fn half_widths_are_numbers_or_lists_and_the_reference_is_exact() {
 #[test]
 fn half_widths_have_units() {
     let table =
-        "[uncertainty]\ndelay = [0.0, \"10 ms\"]\njitter = \"0.5 samples\"\ncutoff = \"2%\"\n[design]";
+        "[uncertainty]\ndelay = [0.0, \"10 ms\"]\ncutoff = \"2%\"\n[design]";
     let uncertainty = read(&THESIS.replace("[design]", table)).uncertainty.unwrap();
     assert_eq!(uncertainty.delay, Some(PerChannel::Each(vec![Seconds(0.0), Seconds(0.01)])));
-    assert_eq!(uncertainty.jitter, Some(PerChannel::Same(Seconds(0.5))));
     assert_eq!(uncertainty.cutoff, Some(PerChannel::Same(0.02)));
 }
 
@@ -181,4 +180,16 @@ fn the_signal_is_a_band_or_a_filter() {
         signal("filter = { num = [0.01, 1.0], den = [1.0, 1.0] }"),
         Some(SignalSpec { spectrum, floor_db: None, rms: USUAL_RMS })
     );
+}
+
+#[test]
+fn converters_have_bits_and_jitter() {
+    let text = THESIS.replacen("delay = 1.2", "delay = 1.2\nnoise = 1e-3\nbits = 12\njitter = \"10 ms\"", 1);
+    let spec = read(&text);
+    assert_eq!((spec.channels[0].bits, spec.channels[0].jitter), (Some(12), Seconds(0.01)));
+    // A step of full scale +-1 is 2^-11.
+    let rounding = 2f64.powi(-11) / 12f64.sqrt();
+    assert!((spec.channels[0].sample_noise() / 1e-3_f64.hypot(rounding) - 1.0).abs() < 1e-15);
+    assert_eq!((spec.channels[1].bits, spec.channels[1].jitter), (None, Seconds(0.0)));
+    assert_eq!(read(&spec.to_toml().unwrap()), spec);
 }

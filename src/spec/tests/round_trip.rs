@@ -81,7 +81,6 @@ prop_compose! {
             delay: Some(if each { PerChannel::Each(vec![fast_period * x; channels.len()]) } else { PerChannel::Same(fast_period * x) }),
             cutoff: (x < 0.5).then_some(PerChannel::Same(x)),
             reference: Some(reference),
-            jitter: each.then_some(PerChannel::Same(fast_period * x)),
             ..UncertaintySpec::default()
         });
         let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
@@ -91,7 +90,7 @@ prop_compose! {
         let by_snr = method.has_target_snr() && ratio % 3 == 0;
         Spec {
             name, fast_period, ratio, latency, target,
-            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
+            channels: channels.into_iter().map(|(d, filter)| ChannelSpec { noise: 1e-4 * d.fract(), bits: (d > 5.0).then_some(d as u32), jitter: fast_period * (0.1 * d.fract()), gain: 0.9 + d.floor() % 3.0 / 10.0, offset: (d % 2.0 - 1.0).min(0.0), ..ChannelSpec::new(fast_period * d, filter) }).collect(),
             signal,
             uncertainty,
             design: DesignSpec {
@@ -103,7 +102,7 @@ prop_compose! {
                 bits: bits.clone().filter(|_| method.has_bits()),
                 fraction_bits: fraction_bits.filter(|_| method.has_bits() && bits.is_some()),
                 tracking: follows.then_some(Tracking::Affine),
-                reduction: reduction.filter(|_| method.has_states()),
+                reduction: reduction.filter(|_| method.has_states() && !(method == Method::H2 && moves)),
             },
         }
     }

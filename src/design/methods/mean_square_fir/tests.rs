@@ -4,10 +4,13 @@
 //! samples that the taps reach, with covariances by the matrix exponential. They are the rms of the error per
 //! fast sample, signal and noise together, for white noise of unit density at the analog input.
 
-use crate::design::{Design, ProofSearch, analyze_mean, design_with};
+use crate::design::analysis::bank_problem;
+use crate::design::filters::lifted;
+use crate::design::{Design, LiftedPlant, ProofSearch, analyze_mean, design_with};
 use crate::linalg::Complex;
-use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
-use crate::units::{Hertz, Seconds};
+use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, PerChannel, Spec, UncertaintySpec};
+use crate::lti::gramian::h2_norm;
+use crate::units::{FastPeriods, Hertz, Seconds};
 use std::f64::consts::PI;
 
 /// A channel of [`spec`]: delay in fast periods, noise, filter.
@@ -212,4 +215,76 @@ fn no_other_taps_are_better() {
             }
         }
     }
+}
+
+/// The mean square of error and noise of a bank whose delays are off by so much, by its error system.
+fn square_at(design: &Design, errors: [f64; 2]) -> f64 {
+    let problem = bank_problem(&design.bank).unwrap().with_delay_errors(&errors.map(FastPeriods));
+    let plant = LiftedPlant::new(&problem).unwrap().with_noise().unwrap();
+    let filters = lifted(&design.bank.filters, 2).unwrap();
+    h2_norm(&plant.error_system(&filters).unwrap()).unwrap().powi(2) / 2.0
+}
+
+/// The mean over Gaussian errors of the second delay, by Gauss-Legendre rules of four points between the kinks:
+/// wherever a sample coincides with another instant, at multiples of 0.2.
+fn mean_over_second_delay(design: &Design, deviation: f64) -> f64 {
+    let (step, nodes) = (0.2, [(0.339981043584856, 0.652145154862546), (0.861136311594053, 0.347854845137454)]);
+    let count = (8.0 * deviation / step).ceil() as i32;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for k in -count..count {
+        for (node, weight) in nodes.iter().flat_map(|&(x, w)| [(x, w), (-x, w)]) {
+            let x = step * (f64::from(k) + 0.5 + 0.5 * node);
+            let weight = weight * (-0.5 * (x / deviation).powi(2)).exp();
+            sum += weight * square_at(design, [0.0, x]);
+            weights += weight;
+        }
+    }
+    (sum / weights).sqrt()
+}
+
+/// The thesis example with Gaussian errors of the delays, by half-widths of 95 % intervals.
+fn uncertain(noise: f64, deviations: [f64; 2]) -> Design {
+    let mut spec = thesis(noise, Some(22)).spec();
+    let halves = deviations.map(|deviation| Seconds(1.959963984540054 * deviation));
+    spec.uncertainty = Some(UncertaintySpec {
+        delay: Some(PerChannel::Each(halves.to_vec())),
+        reference: Some(0),
+        ..UncertaintySpec::default()
+    });
+    design_with(&spec, ProofSearch::Skip).unwrap()
+}
+
+/// Origin as above, with cross-spectra times the characteristic functions.
+#[test]
+fn uncertain_delays_are_averaged_over() {
+    for (deviation, golden) in [(0.5, 0.0432626514), (3.0, 0.0498582889)] {
+        let design = uncertain(1e-3, [0.0, deviation]);
+        let found = mean_over_second_delay(&design, deviation);
+        assert!((found - golden).abs() < 2e-10, "{deviation}: {found} {golden}");
+        // One channel alone leaves 0.04988204, and the bank for exact delays far more.
+        let nominal = design_with(&thesis(1e-3, Some(22)).spec(), ProofSearch::Skip).unwrap();
+        let careless = mean_over_second_delay(&nominal, deviation);
+        assert!(found < 0.04988204 && careless > 0.0574, "{found} {careless}");
+    }
+    // Both: the Gauss rule of five points in each delay.
+    let design = uncertain(1e-2, [0.05, 0.05]);
+    let nodes = [(0.0, 8.0 / 15.0), (1.355626179974266, 0.2220759220056126), (2.856970013872806, 0.01125741132772069)];
+    let signed = |(x, w): (f64, f64)| if x == 0.0 { vec![(x, w)] } else { vec![(x, w), (-x, w)] };
+    let nodes: Vec<(f64, f64)> = nodes.into_iter().flat_map(signed).collect();
+    let mut sum = 0.0;
+    for (first, second) in nodes.iter().flat_map(|a| nodes.iter().map(move |b| (a, b))) {
+        sum += first.1 * second.1 * square_at(&design, [0.05 * first.0, 0.05 * second.0]);
+    }
+    assert!((sum.sqrt() - 0.0297463283).abs() < 2e-10, "{}", sum.sqrt());
+}
+
+/// Without taps a mean-square design over uncertain delays is FIR all the same, and says so.
+#[test]
+fn uncertain_delays_make_h2_fir() {
+    let mut spec = thesis(1e-3, None).spec();
+    spec.uncertainty = Some(UncertaintySpec { delay: Some(PerChannel::Same(Seconds(0.1))), ..UncertaintySpec::default() });
+    let design = design_with(&spec, ProofSearch::Skip).unwrap();
+    assert!(design.taps_chosen && matches!(design.bank.filters, crate::bank::SynthesisFilters::Fir(_)));
+    spec.design.reduction = Some(crate::spec::Reduction::Order(3));
+    assert!(spec.check().is_err());
 }
