@@ -65,7 +65,7 @@ fn error(spec: &Spec, latency: usize) -> f64 {
 /// The errors of all latencies that can be the choice.
 fn errors(spec: &Spec) -> Vec<f64> {
     let longest = spec.channels.iter().map(|channel| channel.delay.0.ceil() as usize).max().unwrap_or(0);
-    let last = spec.design.taps.map_or(longest + 8 * spec.ratio, |taps| longest + taps);
+    let last = spec.design.taps.map_or(longest + 16 * spec.ratio, |taps| longest + taps);
     (0..=last).map(|latency| error(spec, latency)).collect()
 }
 
@@ -160,7 +160,7 @@ fn the_latency_is_not_the_middle_of_the_taps() {
     assert_eq!(latency(&short), Ok(5));
     let gamma = gamma(&short, 5);
     assert!((gamma - 0.0011).abs() < 5e-5, "{gamma}");
-    assert_eq!(latency(&four_at_48_khz(96)), Ok(6));
+    assert_eq!(latency(&four_at_48_khz(96)), Ok(10));
 }
 
 #[test]
