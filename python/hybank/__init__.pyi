@@ -368,6 +368,8 @@ class Channel(dict[str, Any]):
         *,
         delay_samples: float | np.number[Any] | None = None,
         noise: float | np.number[Any] | None = None,
+        bits: int | np.integer[Any] | None = None,
+        jitter: _Quantity | None = None,
         gain: float | np.number[Any] | None = None,
         offset: float | np.number[Any] | None = None,
     ) -> None: ...

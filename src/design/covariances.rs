@@ -105,8 +105,12 @@ impl Covariances {
 
     /// The averages over differences of this deviation; 0 for exact instants.
     pub(crate) fn averaged(&self, deviation: FastPeriods) -> Averaged<'_> {
-        let mut averaged =
-            Averaged { covariances: self, deviation: deviation.0, nodes: Vec::new(), far: self.inputs.clone() };
+        let mut averaged = Averaged {
+            covariances: self,
+            deviation: deviation.0,
+            nodes: Vec::new(),
+            far: self.inputs.clone(),
+        };
         if deviation.0 > 0.0 {
             averaged.tabulate();
         }
@@ -139,7 +143,12 @@ impl Averaged<'_> {
         for width in self.covariances.panels(self.deviation, 2.0 * REACH * self.deviation) {
             let transitions = match known.take() {
                 Some((same, transitions)) if same == width => transitions,
-                _ => NODES.iter().map(|node| node.0).chain([1.0]).map(|part| joint.transition(part * width)).collect(),
+                _ => NODES
+                    .iter()
+                    .map(|node| node.0)
+                    .chain([1.0])
+                    .map(|part| joint.transition(part * width))
+                    .collect(),
             };
             for ((part, share), transition) in NODES.into_iter().zip(&transitions) {
                 let (at, weight, moved) = (time + part * width, share * width, transition * &state);

@@ -19,7 +19,7 @@ pub(super) enum Repeats {
     AtWholePeriods,
     /// The same among channels without noise. With noise an older sample says more of its instant, and the
     /// noise keeps the plant regular.
-    AtWholePeriodsUnlessNoisy,
+    NoiselessAtWholePeriods,
 }
 
 impl Repeats {
@@ -27,7 +27,7 @@ impl Repeats {
     pub(super) fn of(spec: &Spec) -> Self {
         match spec.design.method {
             _ if spec.is_fir() => Self::AtOneInstant,
-            Method::H2 => Self::AtWholePeriodsUnlessNoisy,
+            Method::H2 => Self::NoiselessAtWholePeriods,
             _ => Self::AtWholePeriods,
         }
     }
@@ -105,8 +105,8 @@ impl Problem {
         let at_whole_periods = (apart - period * (apart / period).round()).abs() < SAME_INSTANT;
         let noisy = self.noise[i] > 0.0 || self.noise[j] > 0.0;
         let alike = match repeats {
-            Repeats::AtWholePeriodsUnlessNoisy if noisy => apart.abs() < SAME_INSTANT,
-            Repeats::AtWholePeriodsUnlessNoisy | Repeats::AtWholePeriods => at_whole_periods,
+            Repeats::NoiselessAtWholePeriods if noisy => apart.abs() < SAME_INSTANT,
+            Repeats::NoiselessAtWholePeriods | Repeats::AtWholePeriods => at_whole_periods,
             Repeats::AtOneInstant => apart == 0.0,
         };
         a.front_end == b.front_end && alike

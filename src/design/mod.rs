@@ -18,6 +18,7 @@ mod lifting;
 mod measurement_units;
 mod merging;
 mod methods;
+mod normalise;
 pub mod plant;
 mod plausibility;
 pub mod problem;

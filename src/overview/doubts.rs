@@ -22,7 +22,9 @@ const USELESS: f64 = 0.99;
 fn large_noise_gain(bank: &Bank, noise_gain: f64) -> String {
     let rounding = match bank.filters {
         SynthesisFilters::StateSpace(_) => "",
-        SynthesisFilters::Fir(_) => ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)",
+        SynthesisFilters::Fir(_) => {
+            ", and the rounding of f32 (fuse to 32-bit integers or 64-bit floats to avoid that)"
+        }
     };
     let weighed = match bank.method {
         Method::Fir | Method::Iir => {

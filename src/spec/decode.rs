@@ -6,9 +6,9 @@ use super::Fault;
 use super::design::DesignOverrides;
 use super::design::KeyProblem;
 use super::limits::{
-    check_channel_count, check_converter_bits, check_delay, check_fast_period, check_fast_rate, check_gain, check_gamma_margin,
-    check_jitter, check_latency, check_noise, check_offset, check_order, check_ratio, check_reduction_loss, check_taps,
-    check_target_snr,
+    check_channel_count, check_converter_bits, check_delay, check_fast_period, check_fast_rate, check_gain,
+    check_gamma_margin, check_jitter, check_latency, check_noise, check_offset, check_order, check_ratio,
+    check_reduction_loss, check_taps, check_target_snr,
 };
 use super::measured::{FilterModel, FilterModels, MeasuredFilter, Measurement, no_models};
 use super::reader::{Fields, Value};

@@ -267,7 +267,10 @@ impl DesignSpec {
             return Ok(());
         }
         let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
-        blame(reduction.key(), Err(SpecProblem::Conflict { first: reduction.key(), second: "[uncertainty]", remedy }))
+        blame(
+            reduction.key(),
+            Err(SpecProblem::Conflict { first: reduction.key(), second: "[uncertainty]", remedy }),
+        )
     }
 
     /// Taps can only follow delays that are uncertain.

@@ -152,7 +152,9 @@ pub(super) fn check_converter_bits(bits: u32) -> Result<(), SpecProblem> {
     if (1..=MAX_CONVERTER_BITS).contains(&bits) {
         return Ok(());
     }
-    let rule = format!("a converter has 1 to {MAX_CONVERTER_BITS} bits, its sign among them; leave it out for no rounding");
+    let rule = format!(
+        "a converter has 1 to {MAX_CONVERTER_BITS} bits, its sign among them; leave it out for no rounding"
+    );
     Err(range(f64::from(bits), "bits", rule))
 }
 
@@ -164,7 +166,9 @@ pub(super) fn check_jitter(periods: FastPeriods, seconds: f64) -> Result<(), Spe
     if (0.0..=MAX_JITTER).contains(&periods.0) {
         return Ok(());
     }
-    let rule = format!("jitter is the rms error of a sampling instant, 0 to {MAX_JITTER} fast periods; check its unit");
+    let rule = format!(
+        "jitter is the rms error of a sampling instant, 0 to {MAX_JITTER} fast periods; check its unit"
+    );
     Err(range(seconds, "s", rule))
 }
 

@@ -371,7 +371,8 @@ impl Spec {
             let delays = table.delays(channels).into_iter().map(|delay| delay.0);
             delays.chain(table.gains(channels)).any(|half| half > 0.0)
         };
-        let averages = self.design.method == Method::H2 && self.uncertainty.as_ref().is_some_and(is_uncertain);
+        let averages =
+            self.design.method == Method::H2 && self.uncertainty.as_ref().is_some_and(is_uncertain);
         self.design.is_fir() || averages
     }
 

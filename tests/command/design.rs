@@ -1,6 +1,7 @@
 //! The command `design`: what it reports, what it writes, and what overrides the spec.
 
 mod integer_taps;
+mod length;
 mod order;
 mod refusals;
 

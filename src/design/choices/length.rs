@@ -24,8 +24,7 @@ const MOST_FRAMES: usize = 2048;
 pub(super) fn fewest_taps(spec: &Spec) -> Result<usize, DesignError> {
     let wanted = spec.design.target_snr_db;
     // A wanted SNR is that of the noise which the spec states; without one the usual rounding limits it.
-    let noisy =
-        if wanted.is_some() { with_uncertain_instants(spec) } else { with_usual_noise(spec) };
+    let noisy = if wanted.is_some() { with_uncertain_instants(spec) } else { with_usual_noise(spec) };
     let latency = spec.latency.unwrap_or_default();
     let problem =
         Problem::new(&noisy, latency)?.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem;

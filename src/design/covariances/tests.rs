@@ -34,7 +34,10 @@ fn averages_multiply_the_spectrum_by_the_characteristic_function() {
                 let expected = (0..count).map(term).sum::<f64>() * step / std::f64::consts::PI;
                 let scale = (covariances.power(a) * covariances.power(b)).sqrt();
                 let found = averaged.at(a, b, t);
-                assert!((found - expected).abs() < 1e-10 * scale, "{deviation} {a} {b} {t}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 1e-10 * scale,
+                    "{deviation} {a} {b} {t}: {found} {expected}"
+                );
             }
         }
     }
@@ -49,7 +52,10 @@ fn jitter_is_the_slope_times_the_deviation_where_there_is_a_slope() {
     for deviation in [1e-3, 1e-4, 1e-6, 1e-9] {
         let found = covariances.change(1, FastPeriods(deviation)) / covariances.power(1);
         let expected = natural * deviation * deviation;
-        assert!((found / expected - 1.0).abs() < 3.0 * deviation.sqrt() + 1e-5, "{deviation}: {found} {expected}");
+        assert!(
+            (found / expected - 1.0).abs() < 3.0 * deviation.sqrt() + 1e-5,
+            "{deviation}: {found} {expected}"
+        );
     }
     // One pole p has no slope: the change is that of a random walk, 2 (1 - e^{-p |d|}) on average.
     let p = TAU * 0.1;

@@ -98,7 +98,8 @@ impl<'a> Samples<'a> {
             for j in 0..frames {
                 let sampled = -(j as f64) * self.problem.ratio as f64 - channel.delay.0;
                 let later = instant as f64 - sampled;
-                all[j * channels + i] = channel.gain * averaged.at(self.problem.target, channel.front_end, later);
+                all[j * channels + i] =
+                    channel.gain * averaged.at(self.problem.target, channel.front_end, later);
             }
         }
         all

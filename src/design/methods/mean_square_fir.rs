@@ -4,7 +4,7 @@
 //! The phases of the output do not depend on one another: phase p estimates the target at the instant p - m0
 //! from the newest `J_p = ceil((taps - p) / M)` frames.
 
-use super::{Settings, Synthesis, averaged_fir};
+use super::{Settings, Synthesis};
 use crate::design::DesignError;
 use crate::design::history_errors::best_taps;
 use crate::design::plant::LiftedPlant;
@@ -20,9 +20,6 @@ const ROUNDING: f64 = 1e-13;
 /// # Errors
 /// [`DesignError::Lti`] for unstable plants.
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
-    if let Some(deviations) = &settings.deviations {
-        return averaged_fir::synthesise(plant, settings.taps, deviations);
-    }
     let problem = with_rounding(plant)?;
     let best = |frames, instants| best_taps(&problem, frames, instants);
     Synthesis::of_taps(plant, of_phases(&problem, settings.taps, best)?)

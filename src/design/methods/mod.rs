@@ -132,7 +132,10 @@ pub(crate) fn synthesise(
         Method::Fir if settings.solver == Some(Solver::Kyp) => fir_kyp::synthesise(plant, settings),
         Method::Fir => fir::synthesise(plant, settings),
         Method::Iir => iir::synthesise(plant, settings),
-        Method::H2 if settings.taps > 0 => mean_square_fir::synthesise(plant, settings),
+        Method::H2 if settings.taps > 0 => match &settings.deviations {
+            Some(deviations) => averaged_fir::synthesise(plant, settings.taps, deviations),
+            None => mean_square_fir::synthesise(plant, settings),
+        },
         Method::H2 => h2::synthesise(plant),
         Method::Sinc => sinc::synthesise(plant, settings),
         Method::Separation => separation::synthesise(plant, settings),

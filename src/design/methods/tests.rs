@@ -227,7 +227,10 @@ fn the_recursive_mean_square_optimum_counts_noise() {
             let (recursive, fir) = (of(0), of(60));
             let zero = crate::lti::gramian::h2_norm(&plant.reference().unwrap()).unwrap().powi(2);
             let total = |squares: [f64; 3]| squares[0] + squares[1];
-            assert!(total(recursive) <= total(fir) * (1.0 + 1e-4) + 1e-20 * zero, "{what}, {noise:e}: {recursive:?} {fir:?}");
+            assert!(
+                total(recursive) <= total(fir) * (1.0 + 1e-4) + 1e-20 * zero,
+                "{what}, {noise:e}: {recursive:?} {fir:?}"
+            );
             assert!(total(recursive) <= zero, "{what}, {noise:e}: {recursive:?} {zero}");
         }
     }
@@ -257,7 +260,8 @@ fn iir_trades_gamma_for_less_noise() {
         assert!(total < before, "{margin}: {total} {before}");
         before = total;
     }
-    let best = squares(&plant, &synthesise(Method::H2, &plant, &settings(&case, Method::H2)).unwrap().filters);
+    let best =
+        squares(&plant, &synthesise(Method::H2, &plant, &settings(&case, Method::H2)).unwrap().filters);
     assert!(best[0] + best[1] <= before * (1.0 + 1e-9), "{best:?} {before}");
 }
 

@@ -158,8 +158,7 @@ fn half_widths_are_numbers_or_lists_and_the_reference_is_exact() {
 
 #[test]
 fn half_widths_have_units() {
-    let table =
-        "[uncertainty]\ndelay = [0.0, \"10 ms\"]\ncutoff = \"2%\"\n[design]";
+    let table = "[uncertainty]\ndelay = [0.0, \"10 ms\"]\ncutoff = \"2%\"\n[design]";
     let uncertainty = read(&THESIS.replace("[design]", table)).uncertainty.unwrap();
     assert_eq!(uncertainty.delay, Some(PerChannel::Each(vec![Seconds(0.0), Seconds(0.01)])));
     assert_eq!(uncertainty.cutoff, Some(PerChannel::Same(0.02)));

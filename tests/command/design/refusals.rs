@@ -24,7 +24,15 @@ fn a_wrong_spec_is_answered_with_place_reason_and_remedy() {
     bad_spec(&desk, "delay = 1.2", "delay = -1.2", &["bad.toml:7:", "-1.2 s", "cannot be negative"]);
     bad_spec(&desk, "ratio = 2", "ratio = 0", &["bad.toml:2:", "1 to 1024"]);
     bad_spec(&desk, "taps = 22", "taps = 0", &["bad.toml:12:", "1 to 65536"]);
-    bad_spec(&desk, "taps = 22\n", "", &["taps", "missing"]);
+    bad_spec(&desk, "taps = 22\n", "taps = 22\ntarget_snr_db = 60\n", &["bad.toml:13:", "keep one of them"]);
+    bad_spec(
+        &desk,
+        "taps = 22\n",
+        "target_snr_db = 300\n",
+        &["an SNR of 300.0 dB is out of reach", "latency 10"],
+    );
+    bad_spec(&desk, "delay = 1.2", "delay = 1.2\nbits = 40", &["bits", "1 to 32"]);
+    bad_spec(&desk, "delay = 1.2", "delay = 1.2\njitter = 3", &["jitter", "check its unit"]);
     bad_spec(&desk, "\"fir\"", "\"fri\"", &["bad.toml:11:", "did you mean \"fir\"?"]);
     bad_spec(&desk, "fast_period = 1.0", "fast_period = nan", &["bad.toml:1:"]);
     bad_spec(&desk, "fast_period = 1.0", "fast_period = 1.0\nfast_rate = 1.0", &["fast_period", "fast_rate"]);
@@ -53,7 +61,8 @@ fn what_is_wrong_with_a_flag_names_the_flag() {
             "--bits: bits has no meaning for the method h2",
             "fir",
         ),
-        ("iir.toml", &["--method", "fir"], "--method: the key taps is missing", "taps = 22"),
+        ("iir.toml", &["--snr", "90"], "--snr: target_snr_db has no meaning for the method iir", "fir or h2"),
+        ("spec.toml", &["--snr=-1"], "--snr: -1 dB", "0 to 300 dB"),
         ("iir.toml", &["--order", "100000"], "--order: 100000 states", "0 to 65536"),
         ("iir.toml", &["--reduction-loss-db=-1"], "--reduction-loss-db: -1 dB", "0 to 400 dB"),
         ("spec.toml", &["--latency", "100000"], "--latency: 100000 fast samples", "at most 65536"),

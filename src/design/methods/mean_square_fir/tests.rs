@@ -8,8 +8,10 @@ use crate::design::analysis::bank_problem;
 use crate::design::filters::lifted;
 use crate::design::{Design, LiftedPlant, ProofSearch, analyze_mean, design_with};
 use crate::linalg::Complex;
-use crate::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, PerChannel, Spec, UncertaintySpec};
 use crate::lti::gramian::h2_norm;
+use crate::spec::{
+    ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, PerChannel, Spec, UncertaintySpec,
+};
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::f64::consts::PI;
 
@@ -228,7 +230,8 @@ fn square_at(design: &Design, errors: [f64; 2]) -> f64 {
 /// The mean over Gaussian errors of the second delay, by Gauss-Legendre rules of four points between the kinks:
 /// wherever a sample coincides with another instant, at multiples of 0.2.
 fn mean_over_second_delay(design: &Design, deviation: f64) -> f64 {
-    let (step, nodes) = (0.2, [(0.339981043584856, 0.652145154862546), (0.861136311594053, 0.347854845137454)]);
+    let (step, nodes) =
+        (0.2, [(0.339981043584856, 0.652145154862546), (0.861136311594053, 0.347854845137454)]);
     let count = (8.0 * deviation / step).ceil() as i32;
     let (mut sum, mut weights) = (0.0, 0.0);
     for k in -count..count {
@@ -268,7 +271,11 @@ fn uncertain_delays_are_averaged_over() {
     }
     // Both: the Gauss rule of five points in each delay.
     let design = uncertain(1e-2, [0.05, 0.05]);
-    let nodes = [(0.0, 8.0 / 15.0), (1.355626179974266, 0.2220759220056126), (2.856970013872806, 0.01125741132772069)];
+    let nodes = [
+        (0.0, 8.0 / 15.0),
+        (1.355626179974266, 0.2220759220056126),
+        (2.856970013872806, 0.01125741132772069),
+    ];
     let signed = |(x, w): (f64, f64)| if x == 0.0 { vec![(x, w)] } else { vec![(x, w), (-x, w)] };
     let nodes: Vec<(f64, f64)> = nodes.into_iter().flat_map(signed).collect();
     let mut sum = 0.0;
@@ -282,7 +289,8 @@ fn uncertain_delays_are_averaged_over() {
 #[test]
 fn uncertain_delays_make_h2_fir() {
     let mut spec = thesis(1e-3, None).spec();
-    spec.uncertainty = Some(UncertaintySpec { delay: Some(PerChannel::Same(Seconds(0.1))), ..UncertaintySpec::default() });
+    spec.uncertainty =
+        Some(UncertaintySpec { delay: Some(PerChannel::Same(Seconds(0.1))), ..UncertaintySpec::default() });
     let design = design_with(&spec, ProofSearch::Skip).unwrap();
     assert!(design.taps_chosen && matches!(design.bank.filters, crate::bank::SynthesisFilters::Fir(_)));
     spec.design.reduction = Some(crate::spec::Reduction::Order(3));

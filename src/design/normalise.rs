@@ -1,0 +1,138 @@
+//! From a spec to its problem in normalised time.
+
+use super::DesignError;
+use super::covariances::Covariances;
+use super::problem::{Channel, Problem};
+use crate::analog::{StableFilter, StrictlyProper, signal};
+use crate::spec::{ChannelSpec, FilterSpec, Spec};
+use crate::verify::uncertainty::ErrorPoint;
+
+impl Problem {
+    /// Normalises `spec` with the given latency (fast samples).
+    pub fn new(spec: &Spec, latency: usize) -> Result<Self, DesignError> {
+        let mut front_ends = Vec::new();
+        let refused = |place: &dyn Fn() -> String| {
+            let place = place();
+            |source| DesignError::Analog { place, source }
+        };
+        let signal = signal(spec).map_err(refused(&|| "signal.filter".to_owned()))?;
+        let realise = |filter: &FilterSpec, place: &dyn Fn() -> String| {
+            StrictlyProper::driven_by(signal.as_ref(), filter, spec.fast_period).map_err(refused(place))
+        };
+        let (target, _) = intern(&mut front_ends, realise(&spec.target, &|| "target.filter".to_owned())?);
+        let mut channels = Vec::with_capacity(spec.channels.len());
+        for (i, (channel, delay)) in spec.channels.iter().zip(spec.delays_in_fast_periods()).enumerate() {
+            let filter = realise(&channel.filter, &|| format!("filter of channel {}", i + 1))?;
+            let (front_end, proportion) = intern(&mut front_ends, filter);
+            let converter_gain = channel.gain;
+            channels.push(Channel { front_end, gain: proportion * converter_gain, converter_gain, delay });
+        }
+        let scale = input_scale(spec, signal.as_ref(), &front_ends[target]);
+        let noise = spec.channels.iter().map(|channel| channel.sample_noise().powi(2) * scale).collect();
+        let mut problem = Self { ratio: spec.ratio, latency, signal, front_ends, target, channels, noise };
+        problem.check_size()?;
+        let jitter = problem.jitter_powers(spec)?;
+        problem.noise.iter_mut().zip(jitter).for_each(|(power, jitter)| *power += jitter);
+        Ok(problem)
+    }
+
+    /// Power of the noise by which the jitter of each channel of `spec` shows, relative to an input of unit
+    /// density: the mean square of what the front end's output changes meanwhile. It grows with the signal, so
+    /// it needs no full scale.
+    fn jitter_powers(&self, spec: &Spec) -> Result<Vec<f64>, DesignError> {
+        if spec.channels.iter().all(|channel| channel.jitter.0 == 0.0) {
+            return Ok(vec![0.0; self.channels.len()]);
+        }
+        let covariances = Covariances::new(self)?;
+        let power = |(channel, written): (&Channel, &ChannelSpec)| {
+            let deviation = written.jitter.in_fast_periods(spec.fast_period);
+            channel.gain * channel.gain * covariances.change(channel.front_end, deviation)
+        };
+        Ok(self.channels.iter().zip(&spec.channels).map(power).collect())
+    }
+
+    /// The jitter's part of the noise of each channel of `spec`, over the power of the target.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub(crate) fn jitter_shares(spec: &Spec, latency: usize) -> Result<Vec<f64>, DesignError> {
+        let problem = Self::new(spec, latency)?;
+        let power = Covariances::new(&problem)?.power(problem.target);
+        Ok(problem.jitter_powers(spec)?.into_iter().map(|jitter| jitter / power).collect())
+    }
+
+    /// The problem of `spec` with errors of its channels; the delays may become negative.
+    ///
+    /// # Errors
+    /// As [`Problem::new`].
+    pub fn with_errors(spec: &Spec, latency: usize, point: &ErrorPoint) -> Result<Self, DesignError> {
+        let mut moved = spec.clone();
+        for (channel, cutoff) in moved.channels.iter_mut().zip(&point.cutoffs) {
+            if *cutoff != 0.0 {
+                channel.filter = channel.filter.with_cutoff_scaled(1.0 + cutoff);
+            }
+        }
+        let mut problem = Self::new(&moved, latency)?;
+        for ((channel, delay), gain) in problem.channels.iter_mut().zip(&point.delays).zip(&point.gains) {
+            channel.delay += delay.in_fast_periods(spec.fast_period);
+            channel.gain *= 1.0 + gain;
+            channel.converter_gain *= 1.0 + gain;
+        }
+        problem.check_size()?;
+        Ok(problem)
+    }
+}
+
+/// The power of an input of unit density at the target, over that of the signal in full scale: with it the
+/// noise of the converters and the signal have one scale.
+fn input_scale(spec: &Spec, signal: Option<&StableFilter>, target: &StrictlyProper) -> f64 {
+    let Some((signal, table)) = signal.zip(spec.signal.as_ref()) else { return 1.0 };
+    signal.power_through(target) / (table.rms * table.rms)
+}
+
+/// The index of the filter to which `filter` is proportional, and the factor. A filter that is not
+/// proportional to any becomes the last one.
+fn intern(front_ends: &mut Vec<StrictlyProper>, filter: StrictlyProper) -> (usize, f64) {
+    let known = front_ends.iter().enumerate().find_map(|(i, seen)| Some((i, filter.ratio_to(seen)?)));
+    known.unwrap_or_else(|| {
+        front_ends.push(filter);
+        (front_ends.len() - 1, 1.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(signal: &str, channel: &str) -> Problem {
+        let text = format!(
+            "fast_period = 1e-3\nratio = 2\n{signal}\ntarget = {{ filter = {{ family = \"butterworth\", order = 3, cutoff = 200 }} }}\n\
+             channel = [{{ delay = 0, {channel} }}, {{ delay = 1e-3 }}]\n"
+        );
+        Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 0).unwrap()
+    }
+
+    /// The powers of noise and rounding are in units of full scale, that of jitter in units of the signal.
+    #[test]
+    fn the_causes_of_noise_add() {
+        for signal in ["", "signal = { band = 150, rms = 0.1 }"] {
+            let power = |channel: &str| problem(signal, channel).noise[0];
+            let [noise, bits, jitter] = ["noise = 1e-3", "bits = 10", "jitter = \"10 us\""].map(power);
+            let all = power("noise = 1e-3, bits = 10, jitter = \"10 us\"");
+            assert!((all / (noise + bits + jitter) - 1.0).abs() < 1e-14);
+            // The step of ten bits is 2^-9.
+            assert!((bits / noise - 2f64.powi(-18) / 12.0 / 1e-6).abs() < 1e-12 * bits / noise);
+            let plain = problem(signal, "noise = 0");
+            let power = Covariances::new(&plain).unwrap().power(plain.target);
+            let full_scale = if signal.is_empty() { 1.0 } else { power / 0.01 };
+            assert!((noise / (1e-6 * full_scale) - 1.0).abs() < 1e-9, "{noise} {full_scale}");
+            // 0.01 fast periods: (2 pi f 1e-5)^2 for some f of the band.
+            let share = (jitter / power).sqrt() / (std::f64::consts::TAU * 1e-5);
+            assert!((50.0..200.0).contains(&share), "{share} Hz");
+            assert_eq!((plain.noise[0], problem(signal, "bits = 10").noise[1]), (0.0, 0.0));
+            // The sample of twice the gain changes twice as much.
+            let twice = problem(signal, "gain = -2, jitter = \"10 us\"").noise[0];
+            assert!((twice / jitter - 4.0).abs() < 1e-12);
+        }
+    }
+}
