@@ -31,7 +31,10 @@ fn scale_bank(desk: &Desk, fast_period: f64, scale: f64) {
 /// standard output.
 fn quietly(desk: &Desk, args: &[&str]) {
     let said = desk.good(args);
-    assert!(said.is_empty() || said.lines().count() == 2 && said.contains(" samples at "), "{args:?}: {said}");
+    assert!(
+        said.is_empty() || said.lines().count() == 2 && said.contains(" samples at "),
+        "{args:?}: {said}"
+    );
 }
 
 /// Runs and wants exit code 1 with a message of one line.
