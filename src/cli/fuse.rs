@@ -166,8 +166,9 @@ fn fuse(args: &Args, bank: &Bank, journal: &Journal) -> Result<(), Failure> {
     if args.json {
         return print_report(&report, &args.output);
     }
-    // Where samples go to standard output nothing else does.
-    if is_dash(&args.output) { Ok(()) } else { super::print(&report.text(&args.output)) }
+    // Where samples or events go to standard output nothing else does.
+    let is_taken = [Some(args.output.as_path()), args.journal.report()].into_iter().flatten().any(is_dash);
+    if is_taken { Ok(()) } else { super::print(&report.text(&args.output)) }
 }
 
 impl Report<'_> {
