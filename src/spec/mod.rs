@@ -10,6 +10,7 @@ mod edit;
 mod error;
 mod filter;
 mod filter_problem;
+mod filter_reader;
 mod limits;
 mod measured;
 mod nearest;

@@ -1,8 +1,9 @@
 //! The `[signal]` table: what the analog signal is.
 
+use super::filter_reader::proper_filter;
 use super::limits::range;
 use super::reader::{Fields, Value};
-use super::{Fault, FilterSpec, SpecProblem, decode};
+use super::{Fault, FilterSpec, SpecProblem};
 use crate::units::Hertz;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -125,7 +126,7 @@ fn spectrum(fields: &Fields<'_>) -> Result<SignalSpectrum, Fault> {
             check_band(read).map_err(|problem| band.fault(problem))?;
             Ok(SignalSpectrum::Band(read))
         }
-        (None, Some(filter)) => decode::proper_filter(&filter).map(SignalSpectrum::Filter),
+        (None, Some(filter)) => proper_filter(&filter).map(SignalSpectrum::Filter),
         (None, None) => {
             let remedy = "say which frequencies the signal occupies, as in band = \"8 kHz\" or band = [\"60 MHz\", \"80 MHz\"]";
             Err(fields.whole().fault(SpecProblem::MissingKey { key: "band", remedy }))

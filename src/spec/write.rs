@@ -4,6 +4,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::Fault;
 use super::document::Node;
+use super::filter_reader::filter;
 use super::reader::Value;
 use super::{
     ChannelSpec, DesignOverrides, DesignSpec, FilterSpec, SignalSpec, Spec, UncertaintySpec, decode,
@@ -60,7 +61,7 @@ impl<'de> Deserialize<'de> for Spec {
 impl<'de> Deserialize<'de> for FilterSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let node = Node::deserialize(deserializer)?;
-        decode::filter(&Value::root(&node)).map_err(custom)
+        filter(&Value::root(&node)).map_err(custom)
     }
 }
 

@@ -1,0 +1,115 @@
+//! Reads an analog filter in whichever form it is written.
+
+use super::reader::{Fields, Value};
+use super::{Family, Fault, FilterSpec, Passband, SpecProblem};
+
+/// The keys of each written form of a filter; the first one names the form.
+pub(super) const FILTER_FORMS: [&[&str]; 5] = [
+    &["num", "den"],
+    &["poles", "zeros", "gain"],
+    &["a", "b", "c"],
+    &["family", "order", "cutoff", "band", "ripple_db", "attenuation_db"],
+    &["cascade"],
+];
+
+/// Reads one filter in whichever form it is written.
+pub(super) fn filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
+    let fields = value.fields(&FILTER_FORMS.concat())?;
+    let filter = unchecked_filter(&fields)?;
+    filter.check().map_err(|problem| fields.fault_at(problem.key(), problem))?;
+    Ok(filter)
+}
+
+/// Reads a filter that may have a direct term.
+pub(super) fn proper_filter(value: &Value<'_>) -> Result<FilterSpec, Fault> {
+    let fields = value.fields(&FILTER_FORMS.concat())?;
+    let filter = unchecked_filter(&fields)?;
+    filter.check_proper().map_err(|problem| fields.fault_at(problem.key(), problem))?;
+    Ok(filter)
+}
+
+fn unchecked_filter(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
+    let mut used = FILTER_FORMS.iter().filter_map(|form| form.iter().copied().find(|key| fields.has(key)));
+    let Some(first) = used.next() else { return Err(fields.whole().fault(SpecProblem::EmptyFilter)) };
+    if let Some(second) = used.next() {
+        let remedy = "they belong to different ways to write a filter, keep the keys of one way";
+        return Err(fields.fault_at(Some(second), SpecProblem::Conflict { first, second, remedy }));
+    }
+    match first {
+        "num" | "den" => Ok(FilterSpec::TransferFunction {
+            num: fields.required("num", "list the numerator in descending powers of s")?.numbers()?,
+            den: fields.required("den", "list the denominator in descending powers of s")?.numbers()?,
+        }),
+        "poles" | "zeros" | "gain" => Ok(FilterSpec::ZeroPoleGain {
+            zeros: fields.optional("zeros").map(|v| roots(&v)).transpose()?.unwrap_or_default(),
+            poles: roots(&fields.required("poles", "list the poles as [re, im] pairs in rad/s")?)?,
+            gain: fields
+                .required("gain", "give the factor before the product of zeros over poles")?
+                .number()?,
+        }),
+        "a" | "b" | "c" => Ok(FilterSpec::StateSpace {
+            a: fields.required("a", "give dx/dt = a x + b f, out = c x as lists of rows")?.matrix()?,
+            b: fields.required("b", "give the n x 1 input matrix, [[..], ..]")?.matrix()?,
+            c: fields.required("c", "give the 1 x n output matrix, [[..]]")?.matrix()?,
+        }),
+        "cascade" => {
+            let stages = fields
+                .required("cascade", "list the stages")?
+                .items("a list of filters, [{ .. }, { .. }]")?;
+            let read = |stage: &Value<'_>| unchecked_filter(&stage.fields(&FILTER_FORMS.concat())?);
+            Ok(FilterSpec::Cascade { cascade: stages.iter().map(read).collect::<Result<_, _>>()? })
+        }
+        _ => family(fields),
+    }
+}
+
+fn family(fields: &Fields<'_>) -> Result<FilterSpec, Fault> {
+    let named = fields.required("family", "name the family, for example family = \"butterworth\"")?;
+    let number = |key| fields.optional(key).map(|v: Value<'_>| v.number()).transpose();
+    Ok(FilterSpec::Family {
+        family: named.name("filter family", &Family::ALL.map(|f| (f.name(), f)))?,
+        order: fields.optional("order").map(|v| v.count("poles")).transpose()?,
+        passband: passband(fields)?,
+        ripple_db: number("ripple_db")?,
+        attenuation_db: number("attenuation_db")?,
+    })
+}
+
+/// The cutoff, or the edges of the band.
+fn passband(fields: &Fields<'_>) -> Result<Passband, Fault> {
+    let missing = "give the cutoff in hertz, or band = [low, high] for a band-pass";
+    match (fields.optional("cutoff"), fields.optional("band")) {
+        (Some(_), Some(band)) => {
+            let remedy = "a low-pass has a cutoff and a band-pass has a band, keep one of them";
+            Err(band.fault(SpecProblem::Conflict { first: "cutoff", second: "band", remedy }))
+        }
+        (_, None) => Ok(Passband::LowPass { cutoff: fields.required("cutoff", missing)?.frequency()? }),
+        (None, Some(band)) => {
+            const EDGES: &str = "a list of two frequencies, as in [\"60 MHz\", \"80 MHz\"]";
+            let edges = band.items(EDGES)?;
+            let [low, high] = &edges[..] else {
+                let found = "a list of another length";
+                return Err(band.fault(SpecProblem::WrongType { expected: EDGES, found }));
+            };
+            Ok(Passband::BandPass { low: low.frequency()?, high: high.frequency()? })
+        }
+    }
+}
+
+/// Complex numbers as `[re, im]`; a bare number is real.
+fn roots(value: &Value<'_>) -> Result<Vec<[f64; 2]>, Fault> {
+    value.items("a list of [re, im] pairs")?.iter().map(root).collect()
+}
+
+fn root(value: &Value<'_>) -> Result<[f64; 2], Fault> {
+    if let Ok(re) = value.number() {
+        return Ok([re, 0.0]);
+    }
+    let pair = value.numbers()?;
+    <[f64; 2]>::try_from(pair).map_err(|_| {
+        value.fault(SpecProblem::WrongType {
+            expected: "a pair [re, im] of numbers",
+            found: "a list of another length",
+        })
+    })
+}
