@@ -141,7 +141,7 @@ impl Search<'_> {
             let limit = (ALIKE * best.left).max(NEARLY_NOTHING * left);
             let alike = changes.iter().filter(|c| c.channel == best.channel && c.left <= limit);
             let nearest = nearest(alike, best.channel, &guess)?;
-            (guess, left) = self.refined(nearest);
+            (guess, left) = self.refined(nearest)?;
             if left <= SETTLED * before {
                 break;
             }
@@ -181,8 +181,9 @@ impl Search<'_> {
         judged.collect()
     }
 
-    /// The best start near that of a change, if it is clearly better.
-    fn refined(&self, change: &Change) -> (Guess, f64) {
+    /// The best start near that of a change, if it is clearly better. `None` if it lies farther away than peaks do
+    /// that the signal resolves.
+    fn refined(&self, change: &Change) -> Option<(Guess, f64)> {
         let (mut guess, mut left) = (change.guess.clone(), change.left);
         let mut step = FIRST_STEP;
         for _ in 0..MOST_STEPS {
@@ -199,7 +200,11 @@ impl Search<'_> {
                 _ => step /= 2,
             }
         }
-        if ALIKE * left < change.left { (guess, left) } else { (change.guess.clone(), change.left) }
+        if ALIKE * left >= change.left {
+            return Some((change.guess.clone(), change.left));
+        }
+        let moved = (guess.early[change.channel] - change.guess.early[change.channel]).abs();
+        (moved <= NEIGHBOURS).then_some((guess, left))
     }
 
     /// The spectral matrices of the captures from the assumed starts on.
