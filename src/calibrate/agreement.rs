@@ -53,10 +53,10 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Explained(share) => {
+                let least = (1e4 * share).floor().min(9999.0) / 100.0;
                 write!(
                     f,
-                    "the captures agree with the spec, which explains {:.4} % of their power",
-                    100.0 * share
+                    "the captures agree with the spec, which explains at least {least} % of their power"
                 )
             }
             Self::Untold => f.write_str("this signal does not tell whether the captures agree with the spec"),
@@ -125,8 +125,8 @@ fn judged(spec: &Spec, found: &Starts, by_delays: Vec<Contradiction>) -> Agreeme
         contradictions = by_delays;
     }
     contradictions.extend(gains(spec, found));
-    let is_explained = found.unexplained <= EXPLAINED;
-    let verdict = if is_explained { Verdict::Explained(1.0 - found.unexplained) } else { Verdict::Untold };
+    let is_explained = found.implausible <= EXPLAINED;
+    let verdict = if is_explained { Verdict::Explained(1.0 - found.implausible) } else { Verdict::Untold };
     Agreement { contradictions, verdict }
 }
 
@@ -244,7 +244,7 @@ mod tests {
     fn starts_are_told_from_one_sample_to_seconds() {
         let mut dice = Random(52);
         for early in [1_usize, 7, 300, 5000, 29_520] {
-            let mut records = recorded(early + 40_000, 0.03, &mut dice);
+            let mut records = recorded(2 * early + 40_000, 0.03, &mut dice);
             records[0].drain(..early);
             let late = found(&records);
             let start = Contradiction::Start {
@@ -254,7 +254,7 @@ mod tests {
             };
             assert_eq!(late.contradictions.first().map(ToString::to_string), Some(start.to_string()));
             assert_eq!(late.contradictions.len(), 1, "{late:?}");
-            let mut records = recorded(early + 40_000, 0.03, &mut dice);
+            let mut records = recorded(2 * early + 40_000, 0.03, &mut dice);
             records[1].drain(..early);
             let [Contradiction::Start { channel: 2, early: told, .. }] = found(&records).contradictions[..]
             else {

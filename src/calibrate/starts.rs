@@ -34,10 +34,17 @@ const NEARLY_NOTHING: f64 = 0.01;
 const DISTINCT: i64 = 8;
 /// Starts this near to each other are one, which a narrow band does not resolve.
 const NEIGHBOURS: i64 = 2;
+/// First step of the search for the best start near a peak, which is as wide as the band is narrow.
+const FIRST_STEP: i64 = 64;
+const MOST_STEPS: usize = 20;
+/// Share of the frames that must overlap: of short overlaps too many look alike.
+const OVERLAP: usize = 2;
 /// An alias is plausible if the front ends pass it with this share of the gain of the strongest one.
 const PLAUSIBLE: f64 = 0.05;
-/// With a signal in fewer bands any alias is plausible: it may be a tone in any Nyquist zone.
+/// With a signal in fewer bands any alias is possible: it may be a tone in any Nyquist zone.
 const BROAD: f64 = 8.0;
+/// A signal in fewer bands, one tone or two, tells nothing of starts.
+const LEAST_BANDS: f64 = 2.5;
 /// Farthest aliases that are looked at, and farthest zones whose correlations are searched.
 const FARTHEST_ALIAS: usize = 16;
 const FARTHEST_ZONE: usize = 4;
@@ -53,8 +60,10 @@ pub(super) struct Starts {
     pub(super) inverted: Vec<bool>,
     /// Gains relative to those of the spec, up to a common factor.
     pub(super) gains: Vec<f64>,
-    /// u, at these starts.
+    /// u at these starts, of any alias.
     pub(super) unexplained: f64,
+    /// The same of plausible aliases.
+    pub(super) implausible: f64,
 }
 
 /// Starts and signs of all channels.
@@ -67,7 +76,10 @@ struct Guess {
 /// How well a guess explains the captures.
 struct Judged {
     unexplained: f64,
+    implausible: f64,
     gains: Vec<f64>,
+    /// Bands that the signal occupies.
+    width: f64,
 }
 
 /// A guess that changes one channel.
@@ -92,7 +104,9 @@ pub(super) fn starts(model: &Model, records: &[Record]) -> Option<Starts> {
         return search.found(nominal);
     }
     let found = search.improved(&nominal, before)?;
-    let is_clear = search.left(&found)? <= LEFT * before;
+    let judged = search.judged(&found)?;
+    let is_resolved = judged.width >= LEAST_BANDS || found.early == nominal.early;
+    let is_clear = judged.unexplained <= LEFT * before && is_resolved;
     search.found(if is_clear { found } else { nominal })
 }
 
@@ -104,9 +118,9 @@ struct Search<'a> {
 
 impl Search<'_> {
     fn found(&self, guess: Guess) -> Option<Starts> {
-        let Judged { unexplained, gains } = self.judged(&guess)?;
+        let Judged { unexplained, implausible, gains, .. } = self.judged(&guess)?;
         let inverted = guess.signs.iter().map(|sign| *sign < 0.0).collect();
-        Some(Starts { early: guess.early, inverted, gains, unexplained })
+        Some(Starts { early: guess.early, inverted, gains, unexplained, implausible })
     }
 
     fn left(&self, guess: &Guess) -> Option<f64> {
@@ -167,14 +181,30 @@ impl Search<'_> {
         judged.collect()
     }
 
-    /// The best start beside that of a change.
+    /// The best start near that of a change, if it is clearly better. `None` if it lies farther away than peaks do
+    /// that the signal resolves.
     fn refined(&self, change: &Change) -> Option<(Guess, f64)> {
-        let beside = (-NEIGHBOURS..=NEIGHBOURS).filter_map(|step| {
-            let mut guess = change.guess.clone();
-            guess.early[change.channel] += step;
-            self.left(&guess).map(|left| (guess, left))
-        });
-        beside.min_by(|a, b| a.1.total_cmp(&b.1))
+        let (mut guess, mut left) = (change.guess.clone(), change.left);
+        let mut step = FIRST_STEP;
+        for _ in 0..MOST_STEPS {
+            if step == 0 {
+                break;
+            }
+            let beside = [-step, step].into_iter().filter_map(|step| {
+                let mut moved = guess.clone();
+                moved.early[change.channel] += step;
+                self.left(&moved).map(|left| (moved, left))
+            });
+            match beside.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some((moved, least)) if least < left => (guess, left) = (moved, least),
+                _ => step /= 2,
+            }
+        }
+        if ALIKE * left >= change.left {
+            return Some((change.guess.clone(), change.left));
+        }
+        let moved = (guess.early[change.channel] - change.guess.early[change.channel]).abs();
+        (moved <= NEIGHBOURS).then_some((guess, left))
     }
 
     /// The spectral matrices of the captures from the assumed starts on.
@@ -183,7 +213,7 @@ impl Search<'_> {
         let skipped: Vec<usize> =
             early.iter().map(|d| usize::try_from(d - least).unwrap_or(usize::MAX)).collect();
         let length = smooth(self.frames.saturating_sub(*skipped.iter().max()?));
-        if length < LEAST_FRAMES {
+        if length < LEAST_FRAMES || (OVERLAP + 1) * length < self.frames {
             return None;
         }
         let cut: Vec<&[f64]> = self
@@ -199,22 +229,26 @@ impl Search<'_> {
     fn judged(&self, guess: &Guess) -> Option<Judged> {
         let bands = self.bands(&guess.early)?;
         let powers: Vec<f64> = bands.iter().map(|band| band.count as f64 * band.matrix.trace().re).collect();
-        let total: f64 = powers.iter().sum();
-        let is_broad = total * total >= BROAD * powers.iter().map(|p| p * p).sum::<f64>();
-        let columns: Vec<Vec<CMat>> = bands.iter().map(|band| self.columns(band.w, is_broad)).collect();
+        let width = powers.iter().sum::<f64>().powi(2) / powers.iter().map(|p| p * p).sum::<f64>();
+        let columns: Vec<Vec<CMat>> = bands.iter().map(|band| self.columns(band.w)).collect();
         let gains = self.gains(&bands, &columns);
-        let (mut left, mut all) = (0.0, 0.0);
+        let (mut left, mut plausible, mut all) = (0.0, 0.0, 0.0);
         for (band, columns) in bands.iter().zip(&columns) {
             let scaled = |i: usize| guess.signs[i] / gains[i];
             let n = band.matrix.nrows();
             let matrix = CMat::from_fn(n, n, |i, j| band.matrix[(i, j)] * (scaled(i) * scaled(j)));
             let power = matrix.trace().re;
             let explained = |a: &CMat| (a.adjoint() * &matrix * a)[(0, 0)].re / a.norm_squared();
+            let strongest = columns.first().map_or(0.0, |a| PLAUSIBLE * a.norm());
+            let usual =
+                columns.iter().take_while(|a| a.norm() >= strongest).map(explained).fold(0.0, f64::max);
             left += band.count as f64 * (power - columns.iter().map(explained).fold(0.0, f64::max));
+            plausible += band.count as f64 * (power - usual);
             all += band.count as f64 * power;
         }
-        let unexplained = left / all;
-        unexplained.is_finite().then_some(Judged { unexplained, gains })
+        let implausible = plausible / all;
+        let unexplained = if width < BROAD { left / all } else { implausible };
+        unexplained.is_finite().then_some(Judged { unexplained, implausible, gains, width })
     }
 
     /// The power of each channel over that which the spec expects of the mean signal, as a factor of the gain.
@@ -232,14 +266,12 @@ impl Search<'_> {
         (0..self.captures.len()).map(gain).collect()
     }
 
-    /// The columns of the plausible aliases at W, that of the strongest first; without the phases that the
-    /// bands lack.
-    fn columns(&self, w: f64, is_broad: bool) -> Vec<CMat> {
+    /// The columns of the aliases at W, that of the strongest first; without the phases that the bands lack.
+    fn columns(&self, w: f64) -> Vec<CMat> {
         let reach = self.model.ratio.min(FARTHEST_ALIAS) as i32;
         let mut all: Vec<CMat> = (-reach..=reach).map(|k| self.column(w, k)).collect();
         all.sort_by(|a, b| b.norm_squared().total_cmp(&a.norm_squared()));
-        let least = all.first().map_or(0.0, |a| PLAUSIBLE * a.norm());
-        all.retain(|a| a.norm() > 0.0 && (!is_broad || a.norm() >= least));
+        all.retain(|a| a.norm() > 0.0);
         all
     }
 
@@ -273,7 +305,7 @@ impl Search<'_> {
             let turn = TAU * f64::from(zone);
             let phased = |b: usize| cross(b) * Complex::from_polar(1.0, (b as f64 * step + turn) * apart / m);
             let spectrum: Vec<Complex<f64>> = (0..x.len()).map(phased).collect();
-            peaks.extend(highest(&fourier::real_sequence(&spectrum, size), self.frames - LEAST_FRAMES));
+            peaks.extend(highest(&fourier::real_sequence(&spectrum, size), self.frames / OVERLAP));
         }
         peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut starts: Vec<i64> = Vec::new();
