@@ -3,6 +3,7 @@
 mod band_hint;
 mod progress;
 pub(super) mod report;
+mod studies;
 
 use super::Failure;
 use super::bank_file::{bad_flag, is_dash, load_spec, refuse_overlap, write_text};
@@ -166,9 +167,13 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     write_text(&args.output, &text, args.force)?;
     let hint = BandHint::new(&found, seconds).map_err(named)?;
     let judged = Judged { mean, scale, figures, hint };
-    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
+    show(args, &Report::new(args.output.display().to_string(), &found, judged, seconds))
+}
+
+/// Prints the report, beside the bank if that goes to standard output.
+fn show(args: &Args, report: &Report<'_>) -> Result<(), Failure> {
     if args.json {
-        super::print_json(&report)
+        super::print_json(report)
     } else if is_dash(&args.output) {
         super::say(&report.text(args.verbose));
         Ok(())
