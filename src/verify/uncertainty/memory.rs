@@ -6,7 +6,7 @@
 //! kernel maps one period of the input to one sample, and different samples read different periods. The
 //! bound does not depend on the instant of the sample within its period.
 
-use super::super::ball::{self, Matrix};
+use super::super::ball::{self, Ball, Matrix};
 use super::super::error_system::BlockForm;
 use super::angle::outward;
 use crate::bank::SynthesisFilters;
@@ -16,19 +16,74 @@ const MAX_PERIODS: usize = 20_000;
 /// Relative size of the energy at which the explicit sum ends.
 const NEGLIGIBLE: f64 = 1e-22;
 
-/// Bounds of sum_{j >= 0} ||E^j|| in row sums; `None` if the powers do not fall below 1/2 in time.
+/// A bound of sum_{j >= 0} ||E^j|| in row sums; `None` if the powers do not fall below 1/2 in time.
+///
+/// Balls would grow like the powers of |E|, which need not fall. So the powers are followed as exact numbers
+/// M_j: M_{j+1} = M_j E - D_j with the rounding errors D_j, whence E^j = M_j + sum_{i < j} D_i E^{j-1-i}. With
+/// ||D_i|| <= d the sum S of the first J norms is at most sum ||M_j|| + J d S.
 pub(super) fn growth(transition: &Matrix) -> Option<f64> {
-    let (mut power, mut sum) = (ball::identity(transition.nrows()), 0.0);
-    for _ in 0..MAX_PERIODS {
+    let (mut power, mut sum, mut rounding) = (ball::identity(transition.nrows()), 0.0, 0.0);
+    for periods in 1..=MAX_PERIODS {
         let size = if power.nrows() == 0 { 0.0 } else { ball::row_sum(&power) };
-        if size < 0.5 {
-            // The powers from here on: at most `size` times the whole.
-            return Some(outward(sum / (1.0 - size)));
+        let share = outward(periods as f64 * rounding);
+        let total = outward(sum / (1.0 - share));
+        let last = outward(size + rounding * total);
+        if share < 0.5 && last < 0.5 {
+            // The powers from here on: at most `last` times the whole.
+            return Some(outward(total / (1.0 - last)));
         }
         sum += size;
-        power = ball::product(transition, &power);
+        let next = ball::product(&power, transition);
+        rounding = ball::nan_max(rounding, ball::radius_sum(&next));
+        power = midpoint(&next);
     }
     None
+}
+
+fn midpoint(m: &Matrix) -> Matrix {
+    m.map(|x| Ball::exactly(x.mid()))
+}
+
+/// [`growth`] in column sums.
+fn growth_of_transposed(transition: &Matrix) -> Option<f64> {
+    growth(&transition.transpose())
+}
+
+/// A row v E^k for k = 0, 1, ..: an exact row, and a bound of the sum of the moduli of what it lacks. That is
+/// the sum of the rounding errors d_i E^{k-1-i}, so at most the largest of them times the growth.
+struct MovingRow<'a> {
+    row: Matrix,
+    transition: &'a Matrix,
+    growth: f64,
+    rounding: f64,
+}
+
+impl<'a> MovingRow<'a> {
+    fn new(row: &Matrix, transition: &'a Matrix, growth: f64) -> Self {
+        Self { rounding: ball::radius_sum(row), row: midpoint(row), transition, growth }
+    }
+
+    /// What the row lacks.
+    fn missing(&self) -> f64 {
+        outward(self.rounding * self.growth)
+    }
+
+    /// The row in balls.
+    fn enclosed(&self) -> Matrix {
+        let missing = self.missing();
+        self.row.map(|x| x.widened(missing))
+    }
+
+    /// A bound of the sum of its moduli.
+    fn size(&self) -> f64 {
+        outward(self.row.iter().fold(0.0, |sum, x| sum + x.magnitude()) + self.missing())
+    }
+
+    fn advance(&mut self) {
+        let next = ball::product(&self.row, self.transition);
+        self.rounding = ball::nan_max(self.rounding, ball::radius_sum(&next));
+        self.row = midpoint(&next);
+    }
 }
 
 /// The tails of a kernel.
@@ -44,19 +99,19 @@ impl Memory {
     /// Of the kernel read by `row` from states with the given `transition` over a slow period, stationary
     /// `covariance` and `growth` (see [`growth`]).
     pub(super) fn new(row: &Matrix, transition: &Matrix, covariance: &Matrix, growth: f64) -> Self {
-        let mut row = row.clone();
+        let mut moving = MovingRow::new(row, transition, growth);
         let mut energies: Vec<f64> = Vec::new();
         while energies.len() < MAX_PERIODS {
+            let row = moving.enclosed();
             let square = ball::product_transposed(&ball::product(&row, covariance), &row)[(0, 0)];
             energies.push(outward(square.magnitude().sqrt()));
-            row = ball::product(&row, transition);
+            moving.advance();
             if energies[energies.len() - 1] <= NEGLIGIBLE * energies[0] {
                 break;
             }
         }
         // sqrt(v X v') <= |v|_1 sqrt(||X||), and |v E^j|_1 <= |v|_1 ||E^j||.
-        let size = row.iter().fold(0.0, |sum, x| sum + x.magnitude());
-        let rest = outward(size * ball::row_sum(covariance).sqrt() * growth);
+        let rest = outward(moving.size() * ball::row_sum(covariance).sqrt() * growth);
         Self { energies, rest }
     }
 
@@ -117,9 +172,15 @@ impl Lags {
             m.column_iter().map(|column| column.iter().fold(0.0, |sum, x| sum + x.magnitude())).collect()
         };
         let output = ball::row_sum(&form.c) * form.c.nrows() as f64;
-        let (mut sizes, mut moved) = (columns(&form.d), form.b.clone());
+        // a^k b as an exact matrix; each column lacks at most the largest rounding error of a step times the
+        // growth of the transposed powers.
+        let growth_of_columns = outward(growth_of_transposed(&form.a)?);
+        let mut rounding = ball::radius_sum(&form.b.transpose());
+        let (mut sizes, mut moved) = (columns(&form.d), midpoint(&form.b));
         for last in 0..MAX_PERIODS {
-            let tails: Vec<f64> = columns(&moved).iter().map(|x| outward(x * output * growth)).collect();
+            let missing = outward(rounding * growth_of_columns);
+            let tails: Vec<f64> =
+                columns(&moved).iter().map(|x| outward((x + missing) * output * growth)).collect();
             let small =
                 tails.iter().zip(&sizes).all(|(tail, size)| *tail <= negligible * size.max(negligible));
             if small {
@@ -127,8 +188,10 @@ impl Lags {
                 return Some(Self { last, sizes, tails });
             }
             let lag = columns(&ball::product(&form.c, &moved));
-            sizes.iter_mut().zip(lag).for_each(|(size, lag)| *size += lag);
-            moved = ball::product(&form.a, &moved);
+            sizes.iter_mut().zip(lag).for_each(|(size, lag)| *size += outward(lag + output * missing));
+            let next = ball::product(&form.a, &moved);
+            rounding = ball::nan_max(rounding, ball::radius_sum(&next.transpose()));
+            moved = midpoint(&next);
         }
         None
     }

@@ -67,6 +67,32 @@ fn the_ends_are_those_of_the_table() {
     }
 }
 
+/// Front ends whose transition has entries with sum(|E|) above one: balls that follow its powers grow.
+#[test]
+fn boxes_are_proven_behind_resonant_front_ends_and_signals() {
+    for filters in [
+        "signal = { band = 0.2 }\ntarget = { filter = { family = \"butterworth\", order = 3, cutoff = 0.3 } }",
+        "target = { filter = { family = \"chebyshev1\", order = 5, cutoff = 0.1, ripple_db = 0.5 } }",
+        "target = { filter = { family = \"elliptic\", order = 5, cutoff = 0.1, ripple_db = 1, attenuation_db = 60 } }",
+    ] {
+        let text = format!(
+            "fast_period = 1.0\nratio = 2\nlatency = 8\n{filters}\n\
+             channel = [{{ delay = 1.2 }}, {{ delay = 0.6 }}]\ndesign = {{ method = \"fir\", taps = 24 }}"
+        );
+        let spec = crate::spec::Spec::from_toml(&text, "spec.toml").unwrap();
+        let bank = crate::design::design_with(&spec, crate::design::ProofSearch::Skip).unwrap().bank;
+        for half in [1e-9, 1e-3] {
+            let found = worst_case(&bank, &square_box(half), Taps::Fixed, 0.01, &[]).unwrap();
+            assert!(found.upper <= found.lower * 1.0101, "{filters}: {found:?}");
+            let norm = bank.gamma.norm.unwrap();
+            assert!(
+                found.upper >= norm && (half > 1e-6 || found.lower <= norm * 1.001),
+                "{filters}: {found:?} {norm}"
+            );
+        }
+    }
+}
+
 /// With a candidate at the peak the lower end is the norm there.
 #[test]
 fn a_candidate_is_proven() {
