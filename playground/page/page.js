@@ -6,7 +6,7 @@ const PATIENCE = 300;
 /** The loudest sample of the three recordings. */
 const LOUDEST = 0.7;
 /** Pictures that are always seen. */
-const SHOWN = ['error', 'filters'];
+const SHOWN = ['tones', 'error', 'filters'];
 
 const $ = id => document.getElementById(id);
 

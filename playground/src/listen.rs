@@ -10,7 +10,7 @@ use hybank::pipeline::{WholeSettings, fuse};
 use hybank::quantity::readable;
 use hybank::runtime::{Options, Planar, Precision};
 use hybank::simulate::{Analog, Captured, Recording, Source, Tone, capture, frames, interleaved};
-use hybank::spec::Spec;
+use hybank::spec::{SignalSpec, Spec};
 use hybank::units::{FastPeriods, Hertz, Seconds};
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
@@ -21,7 +21,7 @@ const USUAL_RATE: f64 = 48e3;
 /// Seconds of the signals that are made here, and of a recording at most.
 const LENGTH: f64 = 2.0;
 const MOST_SECONDS: f64 = 30.0;
-/// Tones of the chord, and where the sweep begins and ends, relative to the band of the target.
+/// Tones of the chord, and where the sweep begins and ends, relative to the band that is played.
 const CHORD: [f64; 5] = [0.04, 0.11, 0.27, 0.52, 0.83];
 const SWEEP: [f64; 2] = [0.01, 0.95];
 /// Output samples at either end that the signal-to-noise ratio leaves out, beside the latency.
@@ -120,11 +120,13 @@ fn usual_samples(spec: &Spec) -> usize {
     (LENGTH * played_at(spec)) as usize
 }
 
-/// The band of the target, at most to half of the fast rate.
+/// The end of the band that the target passes and the signal of the spec occupies, at most half of the fast rate.
 fn band(spec: &Spec) -> Result<Hertz, Refusal> {
     let target = StrictlyProper::new(&spec.target, spec.fast_period).map_err(Refusal::new)?;
     let edge = target.half_power_frequency().0.min(PI);
-    Ok(Hertz(edge / TAU / spec.fast_period.0))
+    let passed = edge / TAU / spec.fast_period.0;
+    let occupied = spec.signal.as_ref().and_then(SignalSpec::band).map_or(passed, |band| band.high.0);
+    Ok(Hertz(passed.min(occupied)))
 }
 
 /// The description of a signal that is made here, with the rate at which it is played.

@@ -62,7 +62,7 @@ async function designs() {
   await designed();
   assert.match(await text('interval'), /^0\.03\d+ ≤ gamma ≤ 0\.03\d+$/);
   assert.match(await text('proof'), /proven on this page/);
-  await chromium.until(`document.querySelectorAll('#pictures img').length === 2`);
+  await chromium.until(`document.querySelectorAll('#pictures img').length === 3`);
   await chromium.until(`document.querySelectorAll('#others img').length === 6`);
   await chromium.until(`[...document.querySelectorAll('#pictures img')].every(image => image.naturalWidth > 0)`);
   return text('interval');
@@ -181,7 +181,7 @@ async function sounds() {
 
 /** A design of minutes: the page goes on, and the design can be ended. */
 async function staysAwake() {
-  await type(example('interleaved-4x250M').replace('taps = 32', 'taps = 400'));
+  await type(example('interleaved-4x250M').replace('taps = 24', 'taps = 400'));
   await chromium.until(`!document.getElementById('stop').hidden`);
   const pause = await chromium.value(`new Promise(resolve => {
     let last = performance.now(), longest = 0, frames = 0;

@@ -31,6 +31,7 @@ from hybank._hybank import (
 )
 from hybank._spec import (
     Channel,
+    Signal,
     bessel,
     butterworth,
     cascade,
@@ -56,6 +57,7 @@ __all__ = [
     "HybankError",
     "Measurement",
     "Recording",
+    "Signal",
     "SpecError",
     "Stream",
     "Verified",

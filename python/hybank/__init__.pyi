@@ -12,11 +12,13 @@ __all__ = [
     "Calibration",
     "Capture",
     "Channel",
+    "Figures",
     "FuseReport",
     "Gamma",
     "HybankError",
     "Measurement",
     "Recording",
+    "Signal",
     "SpecError",
     "Stream",
     "Verified",
@@ -164,8 +166,6 @@ class Capture:
     def channels(self) -> NDArray[Any]: ...
     @property
     def target(self) -> NDArray[Any]: ...
-    @property
-    def latency(self) -> int: ...
 
 @final
 class Recording:
@@ -372,6 +372,16 @@ class Channel(dict[str, Any]):
         jitter: _Quantity | None = None,
         gain: float | np.number[Any] | None = None,
         offset: float | np.number[Any] | None = None,
+    ) -> None: ...
+
+class Signal(dict[str, Any]):
+    def __init__(
+        self,
+        band: _Cutoff | None = None,
+        filter: _Filter | None = None,
+        *,
+        floor_db: float | np.number[Any] | None = None,
+        rms: float | np.number[Any] | None = None,
     ) -> None: ...
 
 @overload

@@ -1,11 +1,15 @@
 """Specs as Python writes them: mappings with the keys of a spec file. Everything is checked by the Rust library."""
 
+from collections.abc import Mapping
+
 from hybank._hybank import design as _design
 
 _DESIGN_KEYS = (
     "method", "taps", "target_snr_db", "gamma_margin", "solver", "bits", "fraction_bits", "order",
     "reduction_loss_db", "noise", "tracking",
 )
+# Every form of a filter has one of these keys.
+_FILTER_KEYS = ("family", "num", "den", "zeros", "poles", "a", "cascade")
 
 
 def _given(**entries):
@@ -15,8 +19,8 @@ def _given(**entries):
 def design(source=None, /, *, proof=True, limits=True, progress=None, **keywords):
     """Design the bank of a spec: a path, a TOML text of several lines, a mapping, or keywords.
 
-    Keywords are those of a spec file, with ``channels`` for the list of channels, a filter for ``target``, and the
-    keys of the table ``[design]`` beside the others. ``progress(step, seconds)`` is called for every step, with the
+    Keywords are those of a spec file, with ``channels`` for the list of channels, a filter for ``target``, a band, a
+    filter or a ``Signal`` for ``signal``, and the keys of the table ``[design]`` beside the others. ``progress(step, seconds)`` is called for every step, with the
     estimated seconds of the whole design. Ctrl-C interrupts it.
     """
     if source is None:
@@ -33,8 +37,28 @@ def _of_keywords(keywords):
     target = spec.get("target")
     if target is not None and "filter" not in target:
         spec["target"] = {"filter": target}
+    if spec.get("signal") is not None:
+        spec["signal"] = _signal(spec["signal"])
     table = {key: keywords[key] for key in _DESIGN_KEYS if key in keywords}
     return {**spec, "design": {**spec.get("design", {}), **table}}
+
+
+def _signal(given):
+    """The table ``[signal]``: of a band, of a filter, or as it is."""
+    if not isinstance(given, Mapping):
+        return Signal(given)
+    # The filter of a band-pass has a key ``band``, too.
+    return Signal(filter=given) if any(key in given for key in _FILTER_KEYS) else given
+
+
+class Signal(dict):
+    """The analog signal: its band (the highest frequency, or two in hertz or with units), or its spectrum as a filter.
+
+    ``floor_db`` says how far the spectrum is down outside the band, ``rms`` how large the signal is, of full scale.
+    """
+
+    def __init__(self, band=None, filter=None, *, floor_db=None, rms=None):
+        super().__init__(_given(band=band, filter=filter, floor_db=floor_db, rms=rms))
 
 
 class Channel(dict):

@@ -221,8 +221,6 @@ impl Analysis {
 pub(crate) struct Capture {
     /// Slow samples, (N, T); complex for a complex signal.
     pub(crate) channels: Py<PyAny>,
-    /// Samples of the ideal fast converter, delayed by the latency: M T of them.
+    /// Samples of the ideal fast converter, M T of them, in line with the output of `Bank.fuse`.
     pub(crate) target: Py<PyAny>,
-    /// The latency in fast samples.
-    pub(crate) latency: usize,
 }

@@ -5,7 +5,7 @@ use crate::background;
 use crate::errors::{HybankError, refused};
 use crate::results::Capture;
 use crate::sources;
-use hybank::design::{self, Problem};
+use hybank::design::Problem;
 use hybank::simulate::{Analog, Captured, ComplexSource, Recording, Source, WorkloadError, capture, frames};
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -28,15 +28,17 @@ pub(crate) fn simulate(
         return Err(HybankError::new_err(format!("gain: {gain} is not a finite number")));
     }
     let spec = sources::spec(source)?;
-    let latency = design::latency(&spec).map_err(refused)?;
-    let problem = Problem::new(&spec, latency).map_err(refused)?;
+    // As the command does: the converters do not know what the spec says of the signal, and without latency the
+    // target lies on the time axis of the output of `Bank.fuse`.
+    let unweighted = Spec { signal: None, ..spec.clone() };
+    let problem = Problem::new(&unweighted, 0).map_err(refused)?;
     let signal = Signal::new(&spec, signal, rate)?;
     let frames = signal.frames(&problem, samples).map_err(refused)?;
     let captured = background::run(py, None, move |_| {
         let part = |analog| capture(&problem, analog, frames);
         (part(&signal.real), signal.imaginary.as_ref().map(part))
     })?;
-    delivered(py, &spec, captured, gain, latency)
+    delivered(py, &spec, captured, gain)
 }
 
 /// An analog signal in normalised time.
@@ -95,7 +97,6 @@ fn delivered(
     spec: &Spec,
     (real, imaginary): (Captured, Option<Captured>),
     gain: f64,
-    latency: usize,
 ) -> PyResult<Capture> {
     let real = amplified(real, spec, gain);
     let (channels, target) = match imaginary.map(|part| amplified(part, spec, gain)) {
@@ -112,7 +113,7 @@ fn delivered(
             )
         }
     };
-    Ok(Capture { channels: channels.unbind(), target: target.unbind(), latency })
+    Ok(Capture { channels: channels.unbind(), target: target.unbind() })
 }
 
 fn amplified(captured: Captured, spec: &Spec, gain: f64) -> Captured {

@@ -78,6 +78,57 @@ def test_every_form_of_a_filter_is_taken(bank):
         assert hb.design(**common, target=form, method="fir", taps=8, proof=False).gamma.norm < 1
 
 
+KEYWORDS = {
+    "fast_rate": 48e3, "ratio": 2, "latency": 4, "target": hb.butterworth(4, 9e3),
+    "channels": [hb.Channel(25e-6), hb.Channel(12.5e-6)], "method": "fir", "taps": 16, "proof": False,
+}
+
+
+def test_a_signal_is_a_band_a_filter_or_a_table():
+    want = hb.design(f"signal = {{ band = '8 kHz' }}\n{TEXT}", proof=False)
+    for signal in (8e3, np.float64(8e3), "8 kHz", (0, 8e3), np.array([0, 8e3]), hb.Signal(8e3), {"band": "8 kHz"}):
+        assert hb.design(**KEYWORDS, signal=signal).to_json() == want.to_json()
+    without = hb.design(**KEYWORDS, signal=None)
+    assert without.to_json() == hb.design(TEXT, proof=False).to_json() and "[signal]" not in without.spec
+    # A band-pass filter has a key "band", too.
+    for form in (hb.butterworth(3, 8e3), hb.butterworth(2, ("100 Hz", 8e3)), hb.tf([5e4], [1, 5e4])):
+        assert hb.design(**KEYWORDS, signal=form).spec == hb.design(**KEYWORDS, signal={"filter": form}).spec
+    full = hb.design(**KEYWORDS, signal=hb.Signal(("20 Hz", "8 kHz"), floor_db=60, rms=np.float32(0.125)))
+    for words in ("band = [20.0, 8000.0]", "floor_db = 60", "rms = 0.125"):
+        assert words in full.spec
+
+
+def test_figures_hold_what_a_wanted_snr_and_the_converters_say():
+    channels = [hb.Channel(delay, bits=12, jitter="1 ns") for delay in (25e-6, 12.5e-6)]
+    keywords = {**KEYWORDS, "channels": channels, "signal": "8 kHz", "latency": None}
+    noisy = hb.design(**keywords).figures()
+    assert noisy.snr_noise is not None and noisy.snr < noisy.snr_signal and noisy.snr_16_bits is None
+    wanted = hb.design(**{**keywords, "taps": None}, target_snr_db=60)
+    fewer = hb.design(**{**keywords, "taps": wanted.taps.shape[1] - 2})
+    assert wanted.figures().snr >= 60 > fewer.figures().snr
+
+
+@pytest.mark.parametrize(
+    "signal, path, words",
+    [
+        (-8e3, "signal.band", "positive"),
+        ("8 kg", "signal.band", "unit|frequency"),
+        ((9e3, 8e3), "signal.band", "below its end"),
+        ({"bend": 8e3}, "signal.bend", 'did you mean "band"'),
+        (hb.Signal(), "signal", "missing"),
+        (hb.Signal(8e3, rms=2), "signal.rms", "out of range"),
+        (hb.Signal(8e3, floor_db=-3), "signal.floor_db", "out of range"),
+        (hb.Signal(8e3, hb.rc(8e3)), "signal.filter", "keep one"),
+        (hb.Signal(filter=hb.rc(8e3), floor_db=60), "signal.floor_db", "leave floor_db out"),
+        ({**hb.rc(8e3), "cutof": 1}, "signal.filter.cutof", "did you mean"),
+    ],
+)
+def test_errors_of_a_signal_are_those_of_the_library(signal, path, words):
+    with pytest.raises(hb.SpecError, match=words) as caught:
+        hb.design(**KEYWORDS, signal=signal)
+    assert caught.value.path == path
+
+
 def test_errors_of_a_text_have_line_caret_and_remedy():
     with pytest.raises(hb.SpecError) as caught:
         hb.design(TEXT.replace("taps", "tabs"))

@@ -50,14 +50,14 @@ pub fn recordings<'a>(
         let samples = signal.filtered(&problem.front_ends[channel.front_end], instants);
         samples.into_iter().map(|sample| channel.gain * sample).collect()
     };
-    let target = move || target(problem, signal, periods, problem.latency);
+    let target = move || target(problem, signal, periods);
     problem.channels.iter().map(slow).chain(std::iter::once_with(target))
 }
 
-/// The reference samples (phi_0 * f)(n - `latency`), M per slow period. Those of [`capture`] have the latency
-/// of the problem; without any they lie on the time axis of the channels, as `fuse` gives its output.
-pub fn target(problem: &Problem, signal: &Analog, periods: usize, latency: usize) -> Vec<f64> {
-    let (first, step) = (FastPeriods(-(latency as f64)), FastPeriods(1.0));
+/// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem. A problem of
+/// latency 0 has them on the time axis of the channels, as `fuse` gives its output.
+pub fn target(problem: &Problem, signal: &Analog, periods: usize) -> Vec<f64> {
+    let (first, step) = (FastPeriods(-(problem.latency as f64)), FastPeriods(1.0));
     let instants = Instants { first, step, count: periods * problem.ratio };
     signal.filtered(&problem.front_ends[problem.target], instants)
 }

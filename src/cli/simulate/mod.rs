@@ -105,7 +105,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let spec = load_spec_or_bank(&args.spec)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", args.spec.display()));
-    // The converters do not know what the spec says of the signal, and the latency delays nothing here.
+    // The converters do not know what the spec says of the signal. Without latency the target lies on the time
+    // axis of the output of `fuse`.
     let unweighted = Spec { signal: None, ..spec.clone() };
     let problem = Problem::new(&unweighted, 0).map_err(|error| named(&error))?;
     let signal = Signal::read(&args.signal, &spec)?;
@@ -178,7 +179,7 @@ impl Run<'_> {
 
     fn target(&self) -> Parts {
         let amplified = |analog| {
-            let mut samples = target(self.problem, analog, self.frames, 0);
+            let mut samples = target(self.problem, analog, self.frames);
             samples.iter_mut().for_each(|x| *x *= self.args.gain);
             samples
         };
