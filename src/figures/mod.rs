@@ -43,7 +43,6 @@ use crate::design::filters::FilterResponse;
 use crate::design::{DesignError, LiftedPlant, Problem};
 use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
-use reconstruction::Reconstruction;
 use snr::Setting;
 use tones::{ToneResponse, Worst};
 
@@ -104,10 +103,9 @@ impl Figures {
         let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?);
         let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
         let setting = Setting::new(bank, spec, &band)?;
-        let mut ways = simple::ways(setting.problem());
-        ways.push(Reconstruction::Bank(FilterResponse::new(bank)?));
-        let mut ratios = setting.ratios(&ways);
-        let own = ratios.pop().unwrap_or_default();
+        let ways = simple::ways(setting.problem());
+        let ratios = setting.ratios(&ways);
+        let own = setting.ratio_of_bank(FilterResponse::new(bank)?);
         Ok(Self {
             band,
             snr: own.snr,
@@ -149,8 +147,7 @@ impl Figures {
 pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let band = FigureBand::new(spec, &without_signal(spec, bank.latency)?);
-    let own = [Reconstruction::Bank(FilterResponse::new(bank)?)];
-    Ok(Setting::new(bank, spec, &band)?.ratios(&own).pop().unwrap_or_default().snr)
+    Ok(Setting::new(bank, spec, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
 }
 
 /// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band to

@@ -6,9 +6,10 @@ use super::reconstruction::Reconstruction;
 use super::signal::Signal;
 use super::without_signal;
 use crate::bank::Bank;
+use crate::design::filters::FilterResponse;
 use crate::design::{DesignError, Problem};
-use crate::spec::{HALF_WIDTH, SignalSpectrum, Spec, USUAL_RMS};
-use crate::units::{Decibels, FastPeriods};
+use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
+use crate::units::{Decibels, FastPeriods, Seconds};
 use std::f64::consts::TAU;
 
 /// Variance of the rounding to 16 bits of a full scale from -1 to 1: step^2 / 12.
@@ -60,7 +61,10 @@ pub(super) struct Setting {
     /// Of the converters, in the scale of the signal: as the spec says, or that of 16 bits.
     noise: Vec<f64>,
     noise_is_stated: bool,
+    /// Deviations of the delays.
     spread: Vec<FastPeriods>,
+    /// Those that the bank does not follow.
+    not_followed: Vec<FastPeriods>,
 }
 
 impl Setting {
@@ -91,7 +95,16 @@ impl Setting {
         } else {
             vec![ROUNDING_16_BITS * scale(rms.unwrap_or(USUAL_RMS)); stated.len()]
         };
-        Ok(Self { signal, target, noise, noise_is_stated, spread: spread(bank, spec) })
+        let channels = spec.channels.len();
+        let deviations = spec.uncertainty.as_ref().map(|table| table.delay_deviations(channels));
+        let deviations = deviations.unwrap_or_else(|| vec![Seconds(0.0); channels]);
+        let spread: Vec<FastPeriods> =
+            deviations.into_iter().map(|time| time.in_fast_periods(spec.fast_period)).collect();
+        let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
+        let known =
+            |(i, deviation): (usize, &FastPeriods)| if follows(i) { FastPeriods(0.0) } else { *deviation };
+        let not_followed = spread.iter().enumerate().map(known).collect();
+        Ok(Self { signal, target, noise, noise_is_stated, spread, not_followed })
     }
 
     /// The front ends, with the spectrum of the signal where it is a filter.
@@ -99,10 +112,19 @@ impl Setting {
         self.signal.problem()
     }
 
-    /// The ratios of each way.
+    /// The ratios of ways with filters that stay as they are.
     pub(super) fn ratios(&self, ways: &[Reconstruction]) -> Vec<Ratios> {
+        self.ratios_for(ways, &self.spread)
+    }
+
+    /// The ratio of the bank itself, whose taps may follow the delays.
+    pub(super) fn ratio_of_bank(&self, bank: FilterResponse) -> Ratios {
+        self.ratios_for(&[Reconstruction::Bank(bank)], &self.not_followed).pop().unwrap_or_default()
+    }
+
+    fn ratios_for(&self, ways: &[Reconstruction], spread: &[FastPeriods]) -> Vec<Ratios> {
         let conditions =
-            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: self.spread.clone() };
+            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: spread.to_vec() };
         let uncertain = conditions.is_uncertain();
         conditions.powers(ways).into_iter().map(|powers| self.ratio(&powers, uncertain)).collect()
     }
@@ -121,16 +143,4 @@ impl Setting {
             with_16_bits: (!self.noise_is_stated).then(|| db(all_delays + noise)),
         }
     }
-}
-
-/// Deviations of the delays. Taps that follow a delay know it.
-fn spread(bank: &Bank, spec: &Spec) -> Vec<FastPeriods> {
-    let channels = spec.channels.len();
-    let Some(table) = &spec.uncertainty else { return vec![FastPeriods(0.0); channels] };
-    let follows = |i: usize| bank.tap_slopes.as_ref().is_some_and(|slopes| slopes.follows(i));
-    let deviation = |(i, half): (usize, crate::units::Seconds)| {
-        let known = if follows(i) { 0.0 } else { 1.0 / HALF_WIDTH };
-        half.in_fast_periods(spec.fast_period) * known
-    };
-    table.delays(channels).into_iter().enumerate().map(deviation).collect()
 }
