@@ -120,7 +120,7 @@ fn usual_samples(spec: &Spec) -> usize {
     (LENGTH * played_at(spec)) as usize
 }
 
-/// The end of the band that the target passes and the signal of the spec occupies, at most half of the fast rate.
+/// The end of the band that the target passes and the signal occupies, at most half of the fast rate.
 fn band(spec: &Spec) -> Result<Hertz, Refusal> {
     let target = StrictlyProper::new(&spec.target, spec.fast_period).map_err(Refusal::new)?;
     let edge = target.half_power_frequency().0.min(PI);

@@ -28,7 +28,7 @@ pub(crate) fn simulate(
         return Err(HybankError::new_err(format!("gain: {gain} is not a finite number")));
     }
     let spec = sources::spec(source)?;
-    // As the command does: the converters do not know what the spec says of the signal, and without latency the
+    // As the command does: the converters do not know what the spec says of the signal. Without latency the
     // target lies on the time axis of the output of `Bank.fuse`.
     let unweighted = Spec { signal: None, ..spec.clone() };
     let problem = Problem::new(&unweighted, 0).map_err(refused)?;

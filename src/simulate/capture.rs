@@ -54,8 +54,8 @@ pub fn recordings<'a>(
     problem.channels.iter().map(slow).chain(std::iter::once_with(target))
 }
 
-/// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem. A problem of
-/// latency 0 has them on the time axis of the channels, as `fuse` gives its output.
+/// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem. With
+/// m0 = 0 they lie on the time axis of the channels, as `fuse` gives its output.
 pub fn target(problem: &Problem, signal: &Analog, periods: usize) -> Vec<f64> {
     let (first, step) = (FastPeriods(-(problem.latency as f64)), FastPeriods(1.0));
     let instants = Instants { first, step, count: periods * problem.ratio };

@@ -105,8 +105,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let spec = load_spec_or_bank(&args.spec)?;
     let named = |error: &dyn std::fmt::Display| Failure::Input(format!("{}: {error}", args.spec.display()));
-    // The converters do not know what the spec says of the signal. Without latency the target lies on the time
-    // axis of the output of `fuse`.
+    // The converters do not know what the spec says of the signal. Without latency the target lies on the
+    // time axis of the output of `fuse`.
     let unweighted = Spec { signal: None, ..spec.clone() };
     let problem = Problem::new(&unweighted, 0).map_err(|error| named(&error))?;
     let signal = Signal::read(&args.signal, &spec)?;
