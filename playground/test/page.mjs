@@ -60,7 +60,7 @@ async function designs() {
   await chromium.send('Page.navigate', { url: `file://${page}` });
   await chromium.until(`document.readyState === 'complete' && !!document.getElementById('status')`);
   await designed();
-  assert.match(await text('interval'), /^0\.03\d+ ≤ gamma ≤ 0\.03\d+$/);
+  assert.match(await text('interval'), /^0\.0000026\d+ ≤ gamma ≤ 0\.0000026\d+$/);
   assert.match(await text('proof'), /proven on this page/);
   await chromium.until(`document.querySelectorAll('#pictures img').length === 3`);
   await chromium.until(`document.querySelectorAll('#others img').length === 6`);
