@@ -23,8 +23,8 @@ pub fn spectrum(mut samples: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
     samples
 }
 
-/// x_n = sum over all k modulo L of X_k e^{2 pi j k n / L}, real, for n = 0 .. L, from X_k of k = 0 ..= L/2: L
-/// times the inverse of [`real_spectrum`]. Zeros if the lengths do not fit.
+/// x_n = sum over all k modulo L of X_k e^{2 pi j k n / L}, real, for n = 0 .. L, from X_k of k = 0 ..=
+/// L/2: L times the inverse of [`real_spectrum`]. Zeros if the lengths do not fit.
 pub fn real_sequence(spectrum: &[Complex<f64>], length: usize) -> Vec<f64> {
     let mut sequence = vec![0.0; length];
     let mut spectrum = spectrum.to_vec();

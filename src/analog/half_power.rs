@@ -1,6 +1,6 @@
 //! The edges of a front end's band.
 
-use super::StrictlyProper;
+use super::StableFilter;
 use crate::units::RadiansPerFastPeriod;
 
 /// Frequencies per decade on which the edges are searched.
@@ -17,7 +17,7 @@ pub struct HalfPowerBand {
     pub high: RadiansPerFastPeriod,
 }
 
-impl StrictlyProper {
+impl StableFilter {
     /// The upper edge of [`Self::half_power_band`].
     pub fn half_power_frequency(&self) -> RadiansPerFastPeriod {
         self.half_power_band().high
@@ -67,7 +67,7 @@ fn edge(passes: impl Fn(f64) -> bool, mut inside: f64, mut outside: f64) -> f64 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::analog::StrictlyProper;
     use crate::spec::{Family, FilterSpec, Passband};
     use crate::units::{Hertz, Seconds};
     use std::f64::consts::TAU;

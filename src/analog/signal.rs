@@ -44,13 +44,21 @@ impl SignalFilter {
         Some(match &signal.spectrum {
             SignalSpectrum::Filter(filter) => Self { filter: filter.clone(), floor_db: None },
             SignalSpectrum::Band(band) => {
-                let floor = signal.floor_db.unwrap_or_else(|| usual_floor(spec));
+                let floor = Self::asked_floor(spec).unwrap_or(FLOORS_DB[1]);
                 Self::of_band(*band, resolved_band(spec), floor)
             }
         })
     }
 
-    /// The signal of `spec` with W in place of the band, so that it no longer depends on the rates of the spec.
+    /// The floor that the spec asks for, or that the noise of its converters suggests, in decibels; `None` without
+    /// a band.
+    pub fn asked_floor(spec: &Spec) -> Option<f64> {
+        let signal = spec.signal.as_ref()?;
+        signal.band().map(|_| signal.floor_db.unwrap_or_else(|| usual_floor(spec)))
+    }
+
+    /// The signal of `spec` with W in place of the band, so that it no longer depends on the rates of the
+    /// spec.
     pub fn written_out(spec: &Spec) -> Option<SignalSpec> {
         let (signal, own) = spec.signal.as_ref().zip(Self::of(spec))?;
         Some(SignalSpec { spectrum: SignalSpectrum::Filter(own.filter), floor_db: None, rms: signal.rms })

@@ -11,16 +11,16 @@ use std::fmt;
 pub const LEAST_FRAMES: usize = 1024;
 /// The number that suffices for the order and the delays.
 pub const ENOUGH_FRAMES: usize = 16_384;
-/// Samples of all channels that are looked at: starts that are seconds apart need long captures, and the work
-/// is bounded.
+/// Samples of all channels that are looked at: starts that are seconds apart need long captures, and the
+/// work is bounded.
 const MOST_SAMPLES: usize = 1 << 18;
 /// Most channels: the work grows with their cube.
 const MOST_CHANNELS: usize = 32;
 /// A channel is silent below this share of the rms of the loudest one; with a filter of its own below its
 /// square.
 const SILENT: f64 = 1e-3;
-/// A gain this far from that of the spec, beyond what the spec allows, contradicts it. Converters that are not
-/// calibrated differ by a few per cent.
+/// A gain this far from that of the spec, beyond what the spec allows, contradicts it. Converters that are
+/// not calibrated differ by a few per cent.
 const GAIN_ERROR: f64 = 0.05;
 /// The spec explains captures that leave this share of their power unexplained.
 const EXPLAINED: f64 = 0.1;
@@ -197,8 +197,8 @@ mod tests {
         Spec::from_toml(text, "spec.toml").unwrap()
     }
 
-    /// White noise after a low-pass of 3 kHz, at the instants of channel i: filtered noise on a grid of a tenth
-    /// of a fast period.
+    /// White noise after a low-pass of 3 kHz, at the instants of channel i: filtered noise on a grid of a
+    /// tenth of a fast period.
     fn recorded(frames: usize, noise: f64, dice: &mut Random) -> Vec<Vec<f64>> {
         let fine = 10;
         let (mut y, mut z) = (0.0, 0.0);

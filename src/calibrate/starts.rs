@@ -1,16 +1,17 @@
 //! Whether the captures of a spec's channels began together and have the polarities and gains of the spec.
 //!
-//! A capture that began d samples too early, with the sign s, holds s x_i[k - d]: at the slow frequency W it has
-//! the factor s e^{-jWd}, whichever alias it shows. With the column a_i = g_i Phi_i(j nu) e^{-j nu D_i} of the
-//! alias nu = (W + 2 pi k) / M and the spectral matrix R of a band,
+//! A capture that began d samples too early, with the sign s, holds s x_i[k - d]: at the slow frequency W
+//! it has the factor s e^{-jWd}, whichever alias it shows. With the column a_i = g_i Phi_i(j nu) e^{-j nu
+//! D_i} of the alias nu = (W + 2 pi k) / M and the spectral matrix R of a band,
 //!
 //! ```text
 //! u = sum over bands of min over k of (tr R - a* R a / |a|^2), over the sum of tr R
 //! ```
 //!
-//! is the share of the power that one alias per band leaves unexplained. It is near 0 for captures of the spec
-//! whose aliases do not overlap, and near 1 - 1/N for captures that do not belong together. Where it is large,
-//! other starts and signs are tried, one channel after another: the peaks of the cross-correlations.
+//! is the share of the power that one alias per band leaves unexplained. It is near 0 for captures of the
+//! spec whose aliases do not overlap, and near 1 - 1/N for captures that do not belong together. Where it
+//! is large, other starts and signs are tried, one channel after another: the peaks of the
+//! cross-correlations.
 
 use super::blind::{Band, Spectra};
 use super::model::Model;
@@ -181,8 +182,8 @@ impl Search<'_> {
         judged.collect()
     }
 
-    /// The best start near that of a change, if it is clearly better. `None` if it lies farther away than peaks do
-    /// that the signal resolves.
+    /// The best start near that of a change, if it is clearly better. `None` if it lies farther away than
+    /// peaks do that the signal resolves.
     fn refined(&self, change: &Change) -> Option<(Guess, f64)> {
         let (mut guess, mut left) = (change.guess.clone(), change.left);
         let mut step = FIRST_STEP;
@@ -251,7 +252,8 @@ impl Search<'_> {
         unexplained.is_finite().then_some(Judged { unexplained, implausible, gains, width })
     }
 
-    /// The power of each channel over that which the spec expects of the mean signal, as a factor of the gain.
+    /// The power of each channel over that which the spec expects of the mean signal, as a factor of the
+    /// gain.
     fn gains(&self, bands: &[Band], columns: &[Vec<CMat>]) -> Vec<f64> {
         let gain = |i: usize| {
             let (mut found, mut expected) = (0.0, 0.0);
@@ -283,8 +285,8 @@ impl Search<'_> {
         })
     }
 
-    /// Likely starts of channel `i` relative to the first one: the peaks of the cross-correlations, each with
-    /// the phases of a Nyquist zone removed.
+    /// Likely starts of channel `i` relative to the first one: the peaks of the cross-correlations, each
+    /// with the phases of a Nyquist zone removed.
     fn peaks(&self, i: usize) -> Vec<i64> {
         if i == 0 {
             return Vec::new();

@@ -1,9 +1,9 @@
 //! Covariances of the front ends' outputs for white noise of unit density at the analog input, exact or
 //! averaged over Gaussian errors of the instants.
 //!
-//! With x the joint analog state and X its covariance, `c(t) = E[y(s + t) y(s)'] = C e^{A t} X C'` for t >= 0,
-//! and c(-t) = c(t)'. Two instants that are off by independent Gaussian errors have the covariance
-//! `E c(t + d)`, d of the variance of their difference: the average multiplies the cross-spectrum by the
+//! With x the joint analog state and X its covariance, `c(t) = E[y(s + t) y(s)'] = C e^{A t} X C'` for t >=
+//! 0, and c(-t) = c(t)'. Two instants that are off by independent Gaussian errors have the covariance `E
+//! c(t + d)`, d of the variance of their difference: the average multiplies the cross-spectrum by the
 //! characteristic function. It is a sum over Gauss-Legendre panels that begin at the kink of c at t = 0.
 
 use super::DesignError;

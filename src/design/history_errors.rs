@@ -106,10 +106,10 @@ struct Record<'a> {
 impl Record<'_> {
     /// The taps of the target sample `index`.
     ///
-    /// The innovation of a sample y of front end c is e = (y - c x) / size, and it moves the estimates: x by
-    /// k e and z by l e. So the estimate of z is a linear form of all innovations, and going back in time the
-    /// form `lambda` on the state gives the weight of each: (l + lambda k) / size for the sample itself, and
-    /// minus c times that for the state before it.
+    /// The innovation of a sample y of front end c is e = (y - c x) / size, and it moves the estimates: x
+    /// by k e and z by l e. So the estimate of z is a linear form of all innovations, and going back in
+    /// time the form `lambda` on the state gives the weight of each: (l + lambda k) / size for the sample
+    /// itself, and minus c times that for the state before it.
     fn taps(&self, index: usize) -> Vec<Vec<f64>> {
         let mut taps = vec![vec![0.0; self.frames]; self.problem.channels.len()];
         let mut lambda = vec![0.0; self.outputs.ncols()];

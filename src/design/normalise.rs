@@ -37,8 +37,8 @@ impl Problem {
     }
 
     /// Power of the noise by which the jitter of each channel of `spec` shows, relative to an input of unit
-    /// density: the mean square of what the front end's output changes meanwhile. It grows with the signal, so
-    /// it needs no full scale.
+    /// density: the mean square of what the front end's output changes meanwhile. It grows with the signal,
+    /// so it needs no full scale.
     fn jitter_powers(&self, spec: &Spec) -> Result<Vec<f64>, DesignError> {
         if spec.channels.iter().all(|channel| channel.jitter.0 == 0.0) {
             return Ok(vec![0.0; self.channels.len()]);

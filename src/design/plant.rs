@@ -71,9 +71,9 @@ impl LiftedPlant {
     }
 
     /// The same plant with the noise of the converters: each channel that has noise gets an input of unit
-    /// power that adds to its samples alone, D_y = `[D_y, diag(s_i)]`. A channel with noise is no state of its
-    /// delay chain any more, so its [`chain`](Self::chain) is empty. The norm of the error system of this
-    /// plant is that of signal and noise, and so is its mean square.
+    /// power that adds to its samples alone, D_y = `[D_y, diag(s_i)]`. A channel with noise is no state of
+    /// its delay chain any more, so its [`chain`](Self::chain) is empty. The norm of the error system of
+    /// this plant is that of signal and noise, and so is its mean square.
     ///
     /// # Errors
     /// [`DesignError::Shapes`] never: the sizes fit.

@@ -2,7 +2,7 @@
 
 use super::DesignError;
 use super::problem::{Problem, common_delay};
-use crate::analog::resolved_band;
+use crate::analog::{SignalFilter, resolved_band};
 use crate::quantity::readable;
 use crate::spec::{Band, FilterSpec, Passband, Spec};
 use crate::units::{Hertz, RadiansPerFastPeriod};
@@ -16,6 +16,10 @@ const NEAR: f64 = 1e-3;
 const TOGETHER: f64 = 1e-12;
 /// An edge is on a multiple of half the fast rate within this share of it: the edges are found by bisection.
 const ON_A_MULTIPLE: f64 = 1e-9;
+/// A band that ends above this share of what the samples resolve has no room.
+const NO_ROOM: f64 = 0.98;
+/// Floors that differ by less serve as well.
+const SAME_FLOOR_DB: f64 = 10.0;
 /// Bandwidths in rad/s between these look as if one sample were the unit of time.
 const NORMALISED: std::ops::RangeInclusive<f64> = 1e-3..=10.0;
 
@@ -98,6 +102,23 @@ pub enum Implausible {
         /// Half the mean rate of all samples, at most half the fast rate.
         resolved: Hertz,
     },
+    /// A signal without room between the end of its band and the frequencies that alias onto it.
+    #[error(
+        "the band of the signal ends at {}, and the samples resolve {}: near its end tones and their images cannot be \
+         told apart, and its floor outside is {floor:.0} dB instead of {asked:.0} dB. Leave some per cent of room, or \
+         use more converters",
+        readable(.high.0, "Hz"), readable(.resolved.0, "Hz")
+    )]
+    NoRoom {
+        /// Where the band ends.
+        high: Hertz,
+        /// Half the mean rate of all samples, at most half the fast rate.
+        resolved: Hertz,
+        /// How far W is down outside the band, decibels.
+        floor: f64,
+        /// How far it should be.
+        asked: f64,
+    },
     /// Two channels that sample almost at one instant.
     #[error(
         "channels {first} and {second} sample {} modulo the slow period; channels that sample at one instant lower \
@@ -153,8 +174,8 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<Implau
     if band.high.0 < NARROW * PI {
         return Some(Implausible::Narrow { place, edge, nyquist, remedy: remedy(filter, edge) });
     }
-    // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not, unless
-    // the signal is narrower.
+    // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not,
+    // unless the signal is narrower.
     let may_be_wide = channel.is_some() || spec.signal.is_some();
     let multiple = folding_multiple([band.low, band.high]).filter(|_| !may_be_wide)?;
     Some(if band.low.0 == 0.0 {
@@ -174,7 +195,17 @@ fn signal_band(spec: &Spec) -> Option<Implausible> {
         let nyquist = Hertz(0.5 / spec.fast_period.0);
         return Some(Implausible::FoldedSignal { low, high, multiple, nyquist });
     }
-    (width > resolved).then_some(Implausible::WideSignal { width, resolved })
+    if width > resolved {
+        return Some(Implausible::WideSignal { width, resolved });
+    }
+    let (floor, asked) = (SignalFilter::of(spec)?.floor_db?, SignalFilter::asked_floor(spec)?);
+    let ends_with_the_samples = low.0 == 0.0 && high >= resolved * NO_ROOM;
+    (floor < asked - SAME_FLOOR_DB || ends_with_the_samples).then_some(Implausible::NoRoom {
+        high,
+        resolved,
+        floor,
+        asked,
+    })
 }
 
 /// The lowest multiple of half the fast rate between two edges. A band between two multiples is undersampled
@@ -321,9 +352,14 @@ mod tests {
                  channel = [{{ delay_samples = 2.2 }}, {{ delay_samples = 0.6 }}]"
             ))
         };
-        for band in ["19e6", "20e6", "[62e6, 78e6]", "[80e6, 99e6]"] {
+        for band in ["15e6", "19e6", "[62e6, 78e6]", "[82e6, 98e6]"] {
             assert_eq!(signal(band), [], "{band}");
         }
+        let text = signal("20e6")[0].to_string();
+        assert!(
+            text.starts_with("the band of the signal ends at 20 MHz, and the samples resolve 20 MHz"),
+            "{text}"
+        );
         let [folded, wide] = ["[70e6, 90e6]", "30e6"].map(|band| signal(band)[0].to_string());
         assert!(
             folded.starts_with("the band of the signal, 70 MHz to 90 MHz, reaches over 80 MHz"),

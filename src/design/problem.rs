@@ -20,10 +20,11 @@ pub struct Problem {
     pub ratio: usize,
     /// The latency m0 in fast samples.
     pub latency: usize,
-    /// W, the filter of the signal: the front ends see white noise, or an input of bounded energy, through it.
-    /// `None` stands for W = 1.
+    /// W, the filter of the signal: the front ends see white noise, or an input of bounded energy, through
+    /// it. `None` stands for W = 1.
     pub signal: Option<StableFilter>,
-    /// The distinct analog filters Phi. Channels whose filters are proportional share one filter and its state.
+    /// The distinct analog filters Phi. Channels whose filters are proportional share one filter and its
+    /// state.
     pub front_ends: Vec<StrictlyProper>,
     /// Index of Phi_0 in `front_ends`.
     pub target: usize,

@@ -4,9 +4,9 @@
 //! The error of the estimate of the joint analog state x is kept as a root X with cov(x) = X X*. A target
 //! sample `z = c x` is a further row of the root; once its instant has passed, z stays and x moves on. A
 //! measured sample `y = g c_i x + n` removes one direction: the columns, with one more for the noise n, are
-//! turned so that y depends on the first one only, which is then known. What x and z have there are the gains
-//! of their estimates on the normalised innovation. The error of z is the norm of what remains of its row.
-//! Nothing is subtracted, so small errors keep their digits.
+//! turned so that y depends on the first one only, which is then known. What x and z have there are the
+//! gains of their estimates on the normalised innovation. The error of z is the norm of what remains of its
+//! row. Nothing is subtracted, so small errors keep their digits.
 //!
 //! Source: Kailath, Sayed and Hassibi, *Linear Estimation* (2000), chapters 10 and 12 (array algorithms,
 //! fixed-point smoothing).
@@ -100,8 +100,8 @@ impl Smoother {
         self.open.push(Open { index, row, fixed: 0.0 });
     }
 
-    /// Turns the columns so that the sample depends on the first one only, and removes that one. `None` for a
-    /// sample that is known already.
+    /// Turns the columns so that the sample depends on the first one only, and removes that one. `None` for
+    /// a sample that is known already.
     pub(super) fn measure(&mut self, measurement: Measurement) -> Option<Innovation> {
         let c = self.c.row(measurement.front_end);
         let y: Vec<f64> = (c * &self.root).iter().copied().chain([measurement.noise]).collect();

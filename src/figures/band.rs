@@ -1,6 +1,6 @@
 //! The band in which figures hold.
 
-use crate::analog::resolved_band;
+use crate::analog::{StableFilter, resolved_band, signal};
 use crate::design::Problem;
 use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Hertz};
@@ -28,15 +28,22 @@ pub struct FigureBand {
 }
 
 impl FigureBand {
-    /// The band of the spec's `[signal]`. Without one, or where it is a filter, the half-power band of the
-    /// target, up to half the rate at which the channels sample together, f_N = min(1, N / M) / (2 h). A target
-    /// that lies above f_N keeps its band: it is undersampled.
+    /// The band of the spec's `[signal]`: the stated one, or the half-power band of its filter. Without a
+    /// signal the half-power band of the target, up to half the rate at which the channels sample together,
+    /// f_N = min(1, N / M) / (2 h). A target that lies above f_N keeps its band: it is undersampled.
     pub(super) fn new(spec: &Spec, problem: &Problem) -> Self {
         if let Some(Band { low, high }) = spec.signal.as_ref().and_then(|signal| signal.band()) {
             return Self { low_hertz: low, high_hertz: high, source: BandSource::Signal };
         }
-        let band = problem.front_ends[problem.target].half_power_band();
-        let [low, high] = [band.low, band.high].map(|w| Hertz(w.0 / TAU / spec.fast_period.0));
+        let edges = |filter: &StableFilter| {
+            let band = filter.half_power_band();
+            [band.low, band.high].map(|w| Hertz(w.0 / TAU / spec.fast_period.0))
+        };
+        if let Ok(Some(filter)) = signal(spec) {
+            let [low_hertz, high_hertz] = edges(&filter);
+            return Self { low_hertz, high_hertz, source: BandSource::Signal };
+        }
+        let [low, high] = edges(&problem.front_ends[problem.target]);
         let resolved = resolved_band(spec);
         let high = if low < resolved && high > resolved { resolved } else { high };
         Self { low_hertz: low, high_hertz: high, source: BandSource::Target }

@@ -1,6 +1,7 @@
 //! Means over the unit circle by adaptive Gauss-Kronrod quadrature.
 //!
-//! Source: R. Piessens et al., *QUADPACK*, Springer 1983, rule QK15 (seven Gauss and fifteen Kronrod points).
+//! Source: R. Piessens et al., *QUADPACK*, Springer 1983, rule QK15 (seven Gauss and fifteen Kronrod
+//! points).
 
 use std::f64::consts::PI;
 
@@ -115,8 +116,8 @@ fn sums(panels: &[Panel]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Poisson's kernel (1 - r^2) / (1 - 2 r cos t + r^2) has the mean 1 for every r: r = 0.9999 is a peak of
-    /// the width 1e-4. A jump needs its break.
+    /// Poisson's kernel (1 - r^2) / (1 - 2 r cos t + r^2) has the mean 1 for every r: r = 0.9999 is a peak
+    /// of the width 1e-4. A jump needs its break.
     #[test]
     fn narrow_peaks_and_jumps_are_integrated() {
         let poisson = |r: f64, t: f64| (1.0 - r * r) / (1.0 - 2.0 * r * t.cos() + r * r);

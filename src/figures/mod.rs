@@ -9,16 +9,16 @@
 //!
 //! # Signal-to-noise ratio
 //! Variance of the target over the variance of the error, averaged over time, in decibels. For white noise
-//! in the band of the spec's `[signal]`; for the spectrum |W|^2 where that is a filter; without the table for
-//! white noise at all frequencies, as in the thesis. The front ends stand before the samples in any case.
-//! The parts are the error from the signal, the noise of the converters, and what delays that are off add
-//! ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are resolved.
+//! in the band of the spec's `[signal]`; for the spectrum |W|^2 where that is a filter; without the table
+//! for white noise at all frequencies, as in the thesis. The front ends stand before the samples in any
+//! case. The parts are the error from the signal, the noise of the converters, and what delays that are off
+//! add ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are resolved.
 //!
 //! # Simple ways
-//! One channel alone with its Wiener filter, plain interleaving, and the cubic spline through all samples, for
-//! the same signal, noise and uncertainty, from their exact periodically time-varying responses. Where the spec
-//! states no noise, all are compared with converters of 16 bits: without any noise one channel alone would be
-//! exact wherever the signal fits into it.
+//! One channel alone with its Wiener filter, plain interleaving, and the cubic spline through all samples,
+//! for the same signal, noise and uncertainty, from their exact periodically time-varying responses. Where
+//! the spec states no noise, all are compared with converters of 16 bits: without any noise one channel
+//! alone would be exact wherever the signal fits into it.
 
 mod band;
 mod integral;
@@ -150,8 +150,8 @@ pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     Ok(Setting::new(bank, spec, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
 }
 
-/// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band to
-/// spare where the target passes more.
+/// A band for the signal of a spec that has none: what the target passes, with a tenth of the resolved band
+/// to spare where the target passes more.
 ///
 /// # Errors
 /// As [`Problem::new`].
@@ -164,7 +164,8 @@ pub fn target_band(spec: &Spec) -> Result<Option<Band>, DesignError> {
     Ok((low_hertz < high).then_some(Band { low: low_hertz, high }))
 }
 
-/// The tones of `bank` at `points` frequencies of the band of its [`Figures`], with the fast period of the spec.
+/// The tones of `bank` at `points` frequencies of the band of its [`Figures`], with the fast period of the
+/// spec.
 ///
 /// # Errors
 /// As [`Figures::new`].

@@ -1,5 +1,5 @@
-//! Mean squares of the errors of reconstructions: from the signal, from the noise of the converters, and from
-//! delays that are not known exactly.
+//! Mean squares of the errors of reconstructions: from the signal, from the noise of the converters, and
+//! from delays that are not known exactly.
 
 use super::integral::mean_over_circle;
 use super::reconstruction::Reconstruction;
@@ -90,9 +90,9 @@ impl Conditions<'_> {
         [signal, uncertain, noise, per_channel.iter().sum()]
     }
 
-    /// A delay that is late by a Gaussian error of deviation s turns a sample of the frequency w by a random
-    /// phase. Its mean is the sample times chi = e^{-(w s)^2 / 2}, and the rest has the power 1 - chi^2; it is
-    /// coherent in one channel, and independent between channels.
+    /// A delay that is late by a Gaussian error of deviation s turns a sample of the frequency w by a
+    /// random phase. Its mean is the sample times chi = e^{-(w s)^2 / 2}, and the rest has the power 1 -
+    /// chi^2; it is coherent in one channel, and independent between channels.
     fn late(&self, columns: &Columns) -> Late {
         let mut mean = columns.measurement.clone();
         let mut spread = vec![0.0; self.spread.len()];

@@ -1,5 +1,5 @@
-//! Ways from slow samples to fast ones as the matrix F(theta) of their polyphase components: the filters of a
-//! bank, and the simple ways.
+//! Ways from slow samples to fast ones as the matrix F(theta) of their polyphase components: the filters of
+//! a bank, and the simple ways.
 
 use super::signal::Columns;
 use super::spline::Spline;

@@ -15,7 +15,8 @@ const MOST_ALONE: usize = 8;
 pub enum SimpleWay {
     /// One channel through its best filter: least mean-square error, with samples of all time.
     OneChannel,
-    /// Each output sample is the slow sample nearest to its instant; with as many channels as the ratio only.
+    /// Each output sample is the slow sample nearest to its instant; with as many channels as the ratio
+    /// only.
     Interleaving,
     /// The cubic spline through all slow samples at their instants.
     CubicSpline,

@@ -26,9 +26,9 @@ pub struct Snr {
     pub signal_db: Decibels,
     /// The noise of the converters; `None` without any.
     pub noise_db: Option<Decibels>,
-    /// What delays within the spec's `[uncertainty]` add to the error from the signal: the mean over Gaussian
-    /// errors whose 95 % intervals are the stated ones, constant for each converter. `None` where all delays
-    /// are exact, or where the taps follow them.
+    /// What delays within the spec's `[uncertainty]` add to the error from the signal: the mean over
+    /// Gaussian errors whose 95 % intervals are the stated ones, constant for each converter. `None` where
+    /// all delays are exact, or where the taps follow them.
     pub delays_db: Option<Decibels>,
 }
 
@@ -48,7 +48,8 @@ pub(super) struct Ratios {
 }
 
 impl Ratios {
-    /// The ratio by which ways are compared: with the noise of the converters, the stated or the assumed one.
+    /// The ratio by which ways are compared: with the noise of the converters, the stated or the assumed
+    /// one.
     pub(super) fn with_noise(&self) -> Decibels {
         self.with_16_bits.unwrap_or(self.snr.total_db)
     }

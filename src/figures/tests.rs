@@ -59,8 +59,8 @@ const THESIS: System = System {
     band: 0.0,
 };
 
-/// Digits of theory by an independent program (white noise in the band, no converter noise): systems A, B, E,
-/// G and H of a set of twelve.
+/// Digits of theory by an independent program (white noise in the band, no converter noise): systems A, B,
+/// E, G and H of a set of twelve.
 #[test]
 fn simple_ways_have_the_digits_of_another_program() {
     let inf = f64::INFINITY;
@@ -128,9 +128,9 @@ fn mean_square_optimum(noise: f64) -> Bank {
     Bank { spec: Some(spec), latency: 10, ..Bank::bare(SynthesisFilters::Fir(taps), 2) }
 }
 
-/// Rms errors of that bank, without errors of the delays and with a second delay that is off by 0.5 and 3 fast
-/// periods (one deviation). By another route than frequencies: quadratic forms of the taps with covariances,
-/// which for the cross terms are means over a grid of 4,000 delays.
+/// Rms errors of that bank, without errors of the delays and with a second delay that is off by 0.5 and 3
+/// fast periods (one deviation). By another route than frequencies: quadratic forms of the taps with
+/// covariances, which for the cross terms are means over a grid of 4,000 delays.
 #[test]
 fn errors_of_noise_and_of_uncertain_delays_have_the_digits_of_covariances() {
     for (noise, spread, want) in [
@@ -265,8 +265,8 @@ fn fused(taps: &[Vec<f64>], ratio: usize, captured: &[Vec<f64>]) -> Vec<f64> {
     (0..captured[0].len() * ratio).map(sample).collect()
 }
 
-/// Tones at multiples of 1 / (M Q) that do not alias onto each other or onto their mirrors, spread evenly over
-/// a band: over one period of Q frames their errors are orthogonal.
+/// Tones at multiples of 1 / (M Q) that do not alias onto each other or onto their mirrors, spread evenly
+/// over a band: over one period of Q frames their errors are orthogonal.
 fn orthogonal_tones(random: &mut Random, [low, high]: [f64; 2], ratio: usize, frames: usize) -> Vec<usize> {
     let length = (ratio * frames) as f64;
     let wanted = frames / 5;

@@ -78,8 +78,8 @@ impl ToneResponse {
         (0..count).map(|k| self.at(low.0 + step * k as f64)).collect()
     }
 
-    /// The tones of the largest image and of the largest error of gain in a band, searched between the points
-    /// of a grid too. Frequencies at which the target is zero are left out.
+    /// The tones of the largest image and of the largest error of gain in a band, searched between the
+    /// points of a grid too. Frequencies at which the target is zero are left out.
     pub(super) fn worst(&self, band: [CyclesPerFastPeriod; 2]) -> Worst {
         let grid = self.grid(band);
         let largest = grid.iter().map(|tone| tone.target).fold(0.0, f64::max);

@@ -19,10 +19,10 @@ const NO_ERROR: f64 = 1e-10;
 const BANDS: usize = 16;
 
 /// A record y against a reference r: `y[n] = gain r(n - lag) + offset + error`, with the least mean square
-/// of the error. r is interpolated between its samples by a windowed sinc of 257 samples, which is exact for
-/// a lag of whole samples and else good to -118 dB up to 0.485 fs; 128 samples at each end are not compared,
-/// nor are [`UnsettledEnds`]. Of several lags that explain the record, as with the periods of a tone, it is the
-/// shortest.
+/// of the error. r is interpolated between its samples by a windowed sinc of 257 samples, which is exact
+/// for a lag of whole samples and else good to -118 dB up to 0.485 fs; 128 samples at each end are not
+/// compared, nor are [`UnsettledEnds`]. Of several lags that explain the record, as with the periods of a
+/// tone, it is the shortest.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Comparison {
     /// Samples by which the record comes later.
@@ -109,8 +109,8 @@ fn unsettled_ends(alignment: &Alignment<'_>) -> Option<UnsettledEnds> {
     UnsettledEnds::of(&errors)
 }
 
-/// Of likely lags, the shortest first, the one with the smallest error; a longer one must explain the samples
-/// better that both explain, since the recordings of a tone agree at every period.
+/// Of likely lags, the shortest first, the one with the smallest error; a longer one must explain the
+/// samples better that both explain, since the recordings of a tone agree at every period.
 fn likeliest(samples: &[f64], reference: &[f64], lags: &[i64]) -> Result<i64, MeasureError> {
     let mut first_failure = None;
     let mut best: Option<Alignment<'_>> = None;

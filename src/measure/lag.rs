@@ -16,8 +16,8 @@ const ALIKE: f64 = 1e-3;
 const MOST_LAGS: usize = 8;
 
 /// The lags of the largest correlation coefficients in absolute value, in whole samples, and those with a
-/// larger coefficient than all that are nearer to 0: among the many lags that agree for a periodic signal they
-/// hold the shortest.
+/// larger coefficient than all that are nearer to 0: among the many lags that agree for a periodic signal
+/// they hold the shortest.
 pub(super) fn likely_lags(samples: &[f64], reference: &[f64]) -> Vec<i64> {
     let (x, r) = (deviations(samples), deviations(reference));
     let size = (x.len() + r.len()).next_power_of_two();

@@ -34,8 +34,8 @@ pub struct Facts {
     pub title: String,
     /// The spec in units of the user.
     pub understood: String,
-    /// In the user's terms: signal-to-noise ratio, images, error of gain, and the simple ways. Then gamma, its bounds and
-    /// the noise gain.
+    /// In the user's terms: signal-to-noise ratio, images, error of gain, and the simple ways. Then gamma,
+    /// its bounds and the noise gain.
     pub error: Vec<Fact>,
     /// Method, latency, size and operations.
     pub cost: Vec<Fact>,

@@ -8,8 +8,8 @@ use crate::units::{Decibels, Hertz};
 /// Ratios above this are rounding errors of double precision.
 const EXACT: Decibels = Decibels(270.0);
 
-/// Signal-to-noise ratio, images, error of gain, and the simple ways. In normalised time frequencies are shares
-/// of the output rate.
+/// Signal-to-noise ratio, images, error of gain, and the simple ways. In normalised time frequencies are
+/// shares of the output rate.
 pub fn figure_facts(figures: &Figures, is_normalised: bool) -> [Fact; 4] {
     let words = Words { figures, is_normalised };
     [

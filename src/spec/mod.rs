@@ -364,8 +364,8 @@ impl Spec {
         beside.map_err(|KeyProblem { problem, .. }| problem)
     }
 
-    /// Whether the filters are FIR: by the method, by its taps, or because `h2` averages over uncertain delays
-    /// and gains, which no recursive filter does exactly.
+    /// Whether the filters are FIR: by the method, by its taps, or because `h2` averages over uncertain
+    /// delays and gains, which no recursive filter does exactly.
     pub fn is_fir(&self) -> bool {
         let channels = self.channels.len();
         let is_uncertain = |table: &UncertaintySpec| {

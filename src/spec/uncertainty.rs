@@ -108,8 +108,8 @@ impl UncertaintySpec {
             || self.gains(channels).into_iter().chain(self.cutoffs(channels)).any(|share| share > 0.0)
     }
 
-    /// Standard deviations of all `channels` delays: a half-width of a 95 % interval of the normal law is 1.96
-    /// of them.
+    /// Standard deviations of all `channels` delays: a half-width of a 95 % interval of the normal law is
+    /// 1.96 of them.
     pub fn delay_deviations(&self, channels: usize) -> Vec<Seconds> {
         self.delays(channels).into_iter().map(|half| half * (1.0 / HALF_WIDTH)).collect()
     }

@@ -102,8 +102,8 @@ fn the_spectrum_is_drawn_with_its_spurs() {
     desk.refused(1, &["measure", "x.wav", "--plot", "x.wav", "--force"], &["x.wav"]);
 }
 
-/// A bank's output against the target of `simulate`, as README says: no lag, and the SNR of the bank also sample
-/// by sample.
+/// A bank's output against the target of `simulate`, as README says: no lag, and the SNR of the bank also
+/// sample by sample.
 #[test]
 fn a_fused_recording_lies_on_the_time_axis_of_its_target() {
     let desk = Desk::with_spec(THESIS);

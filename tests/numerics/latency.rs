@@ -1,6 +1,6 @@
-//! A latency that the spec leaves open: the shortest whose whole error, that of the signal and the rounding to
-//! 16 bits, is within 0.1 dB of the best, against designs at every latency. `HYBANK_LATENCIES=300` tries that many random plants, `HYBANK_LATENCIES=17..18`
-//! that one.
+//! A latency that the spec leaves open: the shortest whose whole error, that of the signal and the rounding
+//! to 16 bits, is within 0.1 dB of the best, against designs at every latency. `HYBANK_LATENCIES=300` tries
+//! that many random plants, `HYBANK_LATENCIES=17..18` that one.
 
 use crate::support::random::Random;
 use crate::support::specs::{butterworth, low_pass, with_taps};
@@ -44,8 +44,8 @@ fn plant(seed: u64, method: Method) -> Spec {
     }
 }
 
-/// The least whole error of a bank of the same length, for a method that minimises something else too; infinite
-/// where there is no bank.
+/// The least whole error of a bank of the same length, for a method that minimises something else too;
+/// infinite where there is no bank.
 fn error(spec: &Spec, latency: usize) -> f64 {
     let mut spec = Spec { latency: Some(latency), ..spec.clone() };
     spec.channels.iter_mut().for_each(|channel| channel.noise = ROUNDING);

@@ -89,8 +89,8 @@ pub(super) struct Args {
     /// Replace an existing bank file
     #[arg(long)]
     force: bool,
-    /// Print all figures: gamma with its scale and its bounds, the mean errors, word lengths, order, robustness
-    /// and the proof
+    /// Print all figures: gamma with its scale and its bounds, the mean errors, word lengths, order,
+    /// robustness and the proof
     #[arg(long, short, conflicts_with = "json")]
     verbose: bool,
     /// Print a report as one JSON object on standard output

@@ -24,10 +24,11 @@ use std::path::PathBuf;
 /// Simulates what the slow converters capture
 ///
 /// Writes ch1.wav, ch2.wav, .. at the slow rate, and target.wav: the samples of the ideal fast converter,
-/// in line with the output of `fuse`. The samples of a step, tone or chirp are exact to rounding. A WAV recording is
-/// treated as a periodic, band-limited analog signal. The converters have the gains and offsets of the spec,
-/// and the errors that are asked for; the target is ideal. Complex signals, as a quadrature receiver
-/// delivers them, are written as SigMF recordings or raw: both parts pass the same front ends and clocks.
+/// in line with the output of `fuse`. The samples of a step, tone or chirp are exact to rounding. A WAV
+/// recording is treated as a periodic, band-limited analog signal. The converters have the gains and
+/// offsets of the spec, and the errors that are asked for; the target is ideal. Complex signals, as a
+/// quadrature receiver delivers them, are written as SigMF recordings or raw: both parts pass the same
+/// front ends and clocks.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Sources:

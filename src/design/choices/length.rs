@@ -1,10 +1,11 @@
 //! The fewest taps that are enough: for a wanted SNR, or to be almost as good as any number.
 
+use super::reach::{self, Reach};
 use super::{with_uncertain_instants, with_usual_noise};
 use crate::design::DesignError;
 use crate::design::history_errors::HistoryErrors;
 use crate::design::merging::Repeats;
-use crate::design::problem::Problem;
+use crate::design::problem::{Problem, common_delay};
 use crate::spec::{MAX_OPTIMISED_TAPS, Method, Spec};
 
 /// More taps are chosen only if they lower the whole error by more than this share.
@@ -28,11 +29,7 @@ pub(super) fn fewest_taps(spec: &Spec) -> Result<usize, DesignError> {
     let latency = spec.latency.unwrap_or_default();
     let problem =
         Problem::new(&noisy, latency)?.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem;
-    let most = match spec.design.method {
-        Method::Fir => MAX_OPTIMISED_TAPS / (spec.channels.len() * spec.ratio),
-        _ => MOST_FRAMES,
-    };
-    let lengths = Lengths { problem: &problem, most: most.clamp(1, MOST_FRAMES) };
+    let lengths = Lengths { problem: &problem, most: most_frames(spec) };
     let best = lengths.best()?;
     let enough = match wanted {
         Some(snr) => best.power * 10f64.powf(-snr / 10.0),
@@ -47,6 +44,93 @@ pub(super) fn fewest_taps(spec: &Spec) -> Result<usize, DesignError> {
         });
     }
     lengths.fewest(enough, best.frames)
+}
+
+/// What a spec that leaves both open gets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LengthAndLatency {
+    pub(super) taps: usize,
+    pub(super) latency: usize,
+}
+
+/// As [`fewest_taps`], over all latencies; then the shortest latency at which that many taps are enough, or
+/// almost the best of that length.
+///
+/// # Errors
+/// As [`fewest_taps`].
+pub(super) fn with_latency(spec: &Spec) -> Result<LengthAndLatency, DesignError> {
+    let wanted = spec.design.target_snr_db;
+    let common = common_delay(spec);
+    let noisy = if wanted.is_some() { with_uncertain_instants(spec) } else { with_usual_noise(spec) };
+    let problem = Problem::new(&noisy, common)?.earlier(common);
+    let problem = problem.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem;
+    let most = most_frames(spec) * spec.ratio;
+    let mut taps = FIRST_FRAMES * spec.ratio;
+    let mut best = OverLatencies::new(&problem, taps)?;
+    while taps < most {
+        taps = (2 * taps).min(most);
+        let more = OverLatencies::new(&problem, taps)?;
+        let done = best.least().powi(2) - more.least().powi(2) <= SAME_SQUARE * best.least().powi(2);
+        best = more;
+        if done {
+            break;
+        }
+    }
+    let enough =
+        wanted.map_or(best.least() * (1.0 + WORTHWHILE), |snr| best.zero_output * 10f64.powf(-snr / 20.0));
+    if best.least() > enough {
+        let best_db = 20.0 * (best.zero_output / best.least()).log10();
+        let latency = common + super::shortest(&best.rms);
+        return Err(DesignError::SnrOutOfReach {
+            wanted: wanted.unwrap_or_default(),
+            best: best_db,
+            latency,
+        });
+    }
+    let (mut too_few, mut taps) = (0, taps);
+    while taps - too_few > 1 {
+        let middle = too_few + (taps - too_few) / 2;
+        if OverLatencies::new(&problem, middle)?.least() <= enough { taps = middle } else { too_few = middle }
+    }
+    Ok(LengthAndLatency { taps, latency: common + super::shortest(&OverLatencies::new(&problem, taps)?.rms) })
+}
+
+/// The latency of a spec with taps: the shortest that is almost the best.
+///
+/// # Errors
+/// As [`HistoryErrors::new`].
+pub(super) fn latency_of(problem: &Problem, taps: usize) -> Result<usize, DesignError> {
+    Ok(super::shortest(&OverLatencies::new(problem, taps)?.rms))
+}
+
+/// The least errors of banks of one length at all latencies.
+struct OverLatencies {
+    rms: Vec<f64>,
+    zero_output: f64,
+}
+
+impl OverLatencies {
+    fn new(problem: &Problem, taps: usize) -> Result<Self, DesignError> {
+        let latencies = reach::candidates(problem, taps);
+        let reach = Reach::new(problem, taps, &latencies)?;
+        Ok(Self {
+            rms: latencies.map(|latency| reach.rms(latency)).collect(),
+            zero_output: reach.zero_output(),
+        })
+    }
+
+    fn least(&self) -> f64 {
+        self.rms.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Frames at most for the method of `spec`.
+fn most_frames(spec: &Spec) -> usize {
+    let most = match spec.design.method {
+        Method::Fir => MAX_OPTIMISED_TAPS / (spec.channels.len() * spec.ratio),
+        _ => MOST_FRAMES,
+    };
+    most.clamp(1, MOST_FRAMES)
 }
 
 /// The lengths of a problem with a latency.

@@ -1,11 +1,11 @@
 //! What a spec leaves open: the latency, and the number of taps.
 //!
 //! What counts is the whole error: the mean square of the error for the signal plus the noise of the
-//! converters at the output. The latency is the shortest one whose whole error is within 0.1 dB of the least
-//! over all latencies, with the length of the spec. Where the spec states no noise, the samples are rounded to
-//! 16 bits: beyond that no latency is worth its while. For `fir`, `iir` and `h2` the error is the least that
-//! banks of that length can reach, which a smoother finds without a design; for `sinc` and `separation`,
-//! which minimise nothing, it is that of their banks.
+//! converters at the output. The latency is the shortest one whose whole error is within 0.1 dB of the
+//! least over all latencies, with the length of the spec. Where the spec states no noise, the samples are
+//! rounded to 16 bits: beyond that no latency is worth its while. For `fir`, `iir` and `h2` the error is
+//! the least that banks of that length can reach, which a smoother finds without a design; for `sinc` and
+//! `separation`, which minimise nothing, it is that of their banks.
 
 mod causal;
 mod length;
@@ -23,25 +23,29 @@ use super::problem::{Problem, common_delay};
 use crate::analog::SignalFilter;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
-use crate::spec::{Method, Spec};
+use crate::spec::{MAX_OPTIMISED_TAPS, Method, Spec};
 use crate::units::Seconds;
 use causal::CausalErrors;
+use length::LengthAndLatency;
 use reach::Reach;
 use search::Search;
 
-/// A longer latency is chosen only if it lowers the whole error by more than 0.1 dB: less than the error of a
-/// measured SNR, while the last tenth of a decibel may take many times the latency.
+/// A longer latency is chosen only if it lowers the whole error by more than 0.1 dB: less than the error of
+/// a measured SNR, while the last tenth of a decibel may take many times the latency.
 const WORTHWHILE_DB: f64 = 0.1;
 /// Bits of a converter of which nothing is said.
 const USUAL_BITS: u32 = 16;
 /// Bits by which the rounding lies below a wanted SNR: 24 dB.
 const SPARE_BITS: f64 = 4.0;
 
+/// Lengths that are designed at most for a wanted SNR, each a tenth longer than the one before.
+const LENGTHENINGS: usize = 16;
+
 /// Called with the number of designs that were compared.
 type Compared<'a> = &'a dyn Fn(usize);
 
-/// The spec with the number of taps that the comparison methods use, and with a latency that these taps reach
-/// or none. The taps of `fir` and `h2` may still be open.
+/// The spec with the number of taps that the comparison methods use, and with a latency that these taps
+/// reach or none. The taps of `fir` and `h2` may still be open.
 ///
 /// # Errors
 /// [`DesignError::OutOfReach`] for a latency that the taps do not reach; [`DesignError`] if the spec has no
@@ -62,16 +66,19 @@ pub(super) fn with_taps(spec: &Spec) -> Result<Spec, DesignError> {
 /// receives the number of designs that were compared.
 ///
 /// # Errors
-/// As [`latency`]; [`DesignError::SnrOutOfReach`] if no number of taps reaches the SNR that the spec asks for.
+/// As [`latency`]; [`DesignError::SnrOutOfReach`] if no number of taps reaches the SNR that the spec asks
+/// for.
 pub(super) fn completed(spec: &Spec, compared: Compared<'_>) -> Result<Spec, DesignError> {
-    let latency = spec.latency.map_or_else(|| choose_latency(spec, compared), Ok)?;
-    let mut complete = Spec { latency: Some(latency), ..spec.clone() };
+    let mut complete = spec.clone();
+    if spec.is_fir() && spec.design.taps.is_none() {
+        let LengthAndLatency { taps, latency } = length(spec, compared)?;
+        complete.latency = Some(latency);
+        (complete.design.taps, complete.design.target_snr_db) = (Some(taps), None);
+    } else if spec.latency.is_none() {
+        complete.latency = Some(choose_latency(spec, compared)?);
+    }
     if let Some((signal, filter)) = complete.signal.as_mut().zip(SignalFilter::of(spec)) {
         signal.floor_db = filter.floor_db;
-    }
-    if spec.is_fir() && spec.design.taps.is_none() {
-        complete.design.taps = Some(length::fewest_taps(&complete)?);
-        complete.design.target_snr_db = None;
     }
     // The delays may ask for more than the longest latency.
     complete.check()?;
@@ -89,7 +96,54 @@ pub fn latency(spec: &Spec) -> Result<usize, DesignError> {
     }
     let open = with_taps(spec)?;
     effort::check(&open, false, Limits::Enforced)?;
+    if open.is_fir() && open.design.taps.is_none() {
+        return Ok(length(&open, &|_| ())?.latency);
+    }
     choose_latency(&open, &|_| ())
+}
+
+/// The taps of a FIR spec that leaves them open, and its latency.
+fn length(spec: &Spec, compared: Compared<'_>) -> Result<LengthAndLatency, DesignError> {
+    let found = match spec.latency {
+        Some(latency) => LengthAndLatency { taps: length::fewest_taps(spec)?, latency },
+        None => length::with_latency(spec)?,
+    };
+    let is_minimax = spec.design.method == Method::Fir && RobustProblem::of(spec).is_none();
+    match spec.design.target_snr_db.filter(|_| is_minimax) {
+        Some(wanted) => lengthened(spec, found, wanted, compared),
+        None => Ok(found),
+    }
+}
+
+/// At least `found`, and as long as it takes until the bank of least gamma has the `wanted` SNR: it does not
+/// aim at that. If no length of [`LENGTHENINGS`] has it, the last one.
+fn lengthened(
+    spec: &Spec,
+    found: LengthAndLatency,
+    wanted: f64,
+    compared: Compared<'_>,
+) -> Result<LengthAndLatency, DesignError> {
+    let LengthAndLatency { mut taps, mut latency } = found;
+    let noisy = with_uncertain_instants(spec);
+    let problem =
+        Problem::new(&noisy, latency)?.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem;
+    for designs in 0..LENGTHENINGS {
+        compared(designs);
+        let mut settings = settings(spec)?;
+        settings.taps = taps;
+        let plant = LiftedPlant::new(&Problem { latency, ..problem.clone() })?;
+        let error = whole_error(&plant, &methods::synthesise(Method::Fir, &plant, &settings)?.filters)?;
+        let target = h2_norm(&plant.reference()?)? / (plant.ratio() as f64).sqrt();
+        if error <= target * 10f64.powf(-wanted / 20.0) {
+            break;
+        }
+        taps = (taps + (taps / 10).max(1)).min(MAX_OPTIMISED_TAPS / spec.channels.len());
+        if spec.latency.is_none() {
+            let common = common_delay(spec);
+            latency = common + length::latency_of(&problem.clone().earlier(common.min(latency)), taps)?;
+        }
+    }
+    Ok(LengthAndLatency { taps, latency })
 }
 
 /// The settings of the method, from a spec with nothing left open.
@@ -132,18 +186,15 @@ fn choose_latency(spec: &Spec, compared: Compared<'_>) -> Result<usize, DesignEr
         (Method::Sinc | Method::Separation, _) => {
             for_comparison(spec.design.method, &problem, &settings_earlier(spec, common)?, compared)
         }
-        (_, Some(taps)) => {
-            let latencies = reach::candidates(&problem, taps);
-            let reach = Reach::new(&problem, taps, &latencies)?;
-            Ok(shortest(&latencies.map(|latency| reach.rms(latency)).collect::<Vec<_>>()))
-        }
+        (_, Some(taps)) => length::latency_of(&problem, taps),
         (_, None) => Ok(shortest(CausalErrors::new(&problem)?.rms())),
     };
     Ok(common + latency?)
 }
 
-/// The spec with the usual resolution, if no channel has any noise; and where the method averages over delays
-/// that are uncertain, with these as jitter: about as bad, but other at each sample, which a smoother can weigh.
+/// The spec with the usual resolution, if no channel has any noise; and where the method averages over
+/// delays that are uncertain, with these as jitter: about as bad, but other at each sample, which a
+/// smoother can weigh.
 fn with_usual_noise(spec: &Spec) -> Spec {
     let mut noisy = spec.clone();
     if spec.channels.iter().all(|channel| channel.sample_noise() == 0.0 && channel.jitter.0 == 0.0) {

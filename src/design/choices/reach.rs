@@ -52,6 +52,11 @@ impl Reach {
         Ok(Self { ratio, taps, long, short, exact })
     }
 
+    /// The rms of the target, the error of a bank that outputs zeros.
+    pub(super) fn zero_output(&self) -> f64 {
+        self.long.power.sqrt()
+    }
+
     /// The least mean-square error of each phase of the output.
     fn errors(&self, latency: usize) -> impl Iterator<Item = f64> {
         let most = self.taps.div_ceil(self.ratio);

@@ -170,8 +170,8 @@ fn taps_that_are_left_open_are_almost_as_good_as_any() {
     }
 }
 
-/// The latencies of banks for a signal in a band, against the whole errors of banks of 48 taps at every latency
-/// as the lifted plant has them.
+/// The latencies of banks for a signal in a band, against the whole errors of banks of 48 taps at every
+/// latency as the lifted plant has them.
 #[test]
 fn signals_in_a_band_get_the_latency_that_their_samples_need() {
     struct System {

@@ -8,9 +8,9 @@ fn problem(filters: &str) -> Problem {
     Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 0).unwrap()
 }
 
-/// One pole p: c(t) = (p / 2) e^{-p |t|}, whose Gaussian average is a sum of two error functions. Here by the
-/// frequency: (1 / pi) int_0^inf |Phi|^2 chi cos(w t) dw with the trapezoidal rule, which is exact for such a
-/// decaying smooth function up to its aliases.
+/// One pole p: c(t) = (p / 2) e^{-p |t|}, whose Gaussian average is a sum of two error functions. Here by
+/// the frequency: (1 / pi) int_0^inf |Phi|^2 chi cos(w t) dw with the trapezoidal rule, which is exact for
+/// such a decaying smooth function up to its aliases.
 #[test]
 fn averages_multiply_the_spectrum_by_the_characteristic_function() {
     let text = "{ delay = 0, filter = { family = \"butterworth\", order = 3, cutoff = 0.2 } }, \

@@ -1,11 +1,11 @@
-//! The FIR bank with the least mean-square error for channels whose delays and gains are uncertain: the error
-//! is averaged over Gaussian errors that each converter keeps.
+//! The FIR bank with the least mean-square error for channels whose delays and gains are uncertain: the
+//! error is averaged over Gaussian errors that each converter keeps.
 //!
 //! The samples of one converter share their error, so their covariances among one another stay as they are;
 //! the covariances of different converters are multiplied by the characteristic functions of both errors in
-//! the spectrum, and those with the target by that of one. That is the same as a channel of less gain at high
-//! frequencies with further noise. A channel of which little is known so gets little weight, and the bank is
-//! never worse than the best single channel.
+//! the spectrum, and those with the target by that of one. That is the same as a channel of less gain at
+//! high frequencies with further noise. A channel of which little is known so gets little weight, and the
+//! bank is never worse than the best single channel.
 
 use super::mean_square_fir::{of_phases, with_rounding};
 use super::{Deviations, Synthesis};

@@ -14,8 +14,8 @@ use std::rc::Rc;
 const NOISE_SHARES: [f64; 6] = [1.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 
 /// The least gamma within [`GAMMA_ACCURACY`](super::GAMMA_ACCURACY); with `settings.gamma_margin` > 0 a
-/// filter with at most (1 + margin) times the optimum instead, which has the smaller mean square of error and
-/// noise: the mean-square optimum if its gamma is that small, else a central filter.
+/// filter with at most (1 + margin) times the optimum instead, which has the smaller mean square of error
+/// and noise: the mean-square optimum if its gamma is that small, else a central filter.
 ///
 /// # Errors
 /// [`DesignError::RiccatiFailed`] if no Riccati equation could be solved, [`DesignError::Lti`] if the plant

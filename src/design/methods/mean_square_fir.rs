@@ -25,8 +25,8 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     Synthesis::of_taps(plant, of_phases(&problem, settings.taps, best)?)
 }
 
-/// The taps `[i][n]` of so many per channel from those of each phase: `best(frames, instants)[k][i][j]` weighs
-/// sample j of channel i for the target at the k-th of the instants.
+/// The taps `[i][n]` of so many per channel from those of each phase: `best(frames, instants)[k][i][j]`
+/// weighs sample j of channel i for the target at the k-th of the instants.
 ///
 /// # Errors
 /// Those of `best`.

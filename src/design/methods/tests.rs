@@ -199,8 +199,8 @@ fn squares(plant: &LiftedPlant, filters: &Filters) -> [f64; 3] {
     [square(&plant.error_system(&system).unwrap()), noise, square(&system).sqrt()]
 }
 
-/// The recursive optimum is at least as good as that of many taps, whatever the noise; and noise that is stated
-/// is not amplified beyond what zero output has.
+/// The recursive optimum is at least as good as that of many taps, whatever the noise; and noise that is
+/// stated is not amplified beyond what zero output has.
 #[test]
 fn the_recursive_mean_square_optimum_counts_noise() {
     let channels = [

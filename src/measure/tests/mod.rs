@@ -366,8 +366,8 @@ fn lag_gain_and_error_against_a_reference() {
     }
 }
 
-/// A signal of period 960 explains a record at every 960 samples, and the first third of the record is noisy:
-/// the longer lags leave out more of it, but the samples they share are explained no better.
+/// A signal of period 960 explains a record at every 960 samples, and the first third of the record is
+/// noisy: the longer lags leave out more of it, but the samples they share are explained no better.
 #[test]
 fn the_shortest_of_many_lags_is_taken() {
     let mut random = Random(23);

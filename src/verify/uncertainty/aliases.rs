@@ -65,8 +65,8 @@ pub(super) struct FrontEnd<'a> {
 }
 
 impl Aliases {
-    /// Of Phi(s / x) W(s) for all x in `speeds`, at the frequency `angle` in [0, pi]. `None` if the poles lie
-    /// beyond all aliases that are summed.
+    /// Of Phi(s / x) W(s) for all x in `speeds`, at the frequency `angle` in [0, pi]. `None` if the poles
+    /// lie beyond all aliases that are summed.
     pub(super) fn new(front_end: &FrontEnd<'_>, angle: Ball, ratio: usize, speeds: [f64; 2]) -> Option<Self> {
         let FrontEnd { transfer, signal } = front_end;
         let inverses = reciprocals(speeds);

@@ -18,8 +18,9 @@ const NEGLIGIBLE: f64 = 1e-22;
 
 /// A bound of sum_{j >= 0} ||E^j|| in row sums; `None` if the powers do not fall below 1/2 in time.
 ///
-/// Balls would grow like the powers of |E|, which need not fall. So the powers are followed as exact numbers
-/// M_j: M_{j+1} = M_j E - D_j with the rounding errors D_j, whence E^j = M_j + sum_{i < j} D_i E^{j-1-i}. With
+/// Balls would grow like the powers of |E|, which need not fall. So the powers are followed as exact
+/// numbers M_j: M_{j+1} = M_j E - D_j with the rounding errors D_j, whence E^j = M_j + sum_{i < j} D_i
+/// E^{j-1-i}. With
 /// ||D_i|| <= d the sum S of the first J norms is at most sum ||M_j|| + J d S.
 pub(super) fn growth(transition: &Matrix) -> Option<f64> {
     let (mut power, mut sum, mut rounding) = (ball::identity(transition.nrows()), 0.0, 0.0);
@@ -49,8 +50,8 @@ fn growth_of_transposed(transition: &Matrix) -> Option<f64> {
     growth(&transition.transpose())
 }
 
-/// A row v E^k for k = 0, 1, ..: an exact row, and a bound of the sum of the moduli of what it lacks. That is
-/// the sum of the rounding errors d_i E^{k-1-i}, so at most the largest of them times the growth.
+/// A row v E^k for k = 0, 1, ..: an exact row, and a bound of the sum of the moduli of what it lacks. That
+/// is the sum of the rounding errors d_i E^{k-1-i}, so at most the largest of them times the growth.
 struct MovingRow<'a> {
     row: Matrix,
     transition: &'a Matrix,

@@ -48,8 +48,8 @@ fn banks_for_a_band_reach_the_figures_of_the_table() {
     for System { spec, without, with_band } in systems() {
         let (name, found) = (&spec.name, reached(&spec));
         println!("{name}: {found:.1?} dB with the band, table {with_band:?} dB; without {without:?} dB");
-        // Beyond 160 dB the figure depends on the last digits of the solver: the mean-square optimum of A has
-        // 164.2 and 166.2 dB.
+        // Beyond 160 dB the figure depends on the last digits of the solver: the mean-square optimum of A
+        // has 164.2 and 166.2 dB.
         let margin = if with_band[0] > 160.0 { MARGIN + 1.0 } else { MARGIN };
         assert!((0..2).all(|k| found[k] >= with_band[k] - margin), "{name}: {found:?}, {with_band:?}");
     }

@@ -1,8 +1,8 @@
 //! Golden values of the mean-square optimum.
 //!
-//! Origin: computed apart from this code, from covariances alone: for each phase the normal equations of the
-//! samples that the taps reach, with covariances by the matrix exponential. They are the rms of the error per
-//! fast sample, signal and noise together, for white noise of unit density at the analog input.
+//! Origin: computed apart from this code, from covariances alone: for each phase the normal equations of
+//! the samples that the taps reach, with covariances by the matrix exponential. They are the rms of the
+//! error per fast sample, signal and noise together, for white noise of unit density at the analog input.
 
 use crate::design::analysis::bank_problem;
 use crate::design::filters::lifted;
@@ -190,8 +190,8 @@ fn undersampling_of_an_intermediate_frequency() {
     }
 }
 
-/// No change of a tap lowers the error: with gains, noise of one channel only, a repeated channel, fewer taps
-/// than phases, and channels that are older by whole periods.
+/// No change of a tap lowers the error: with gains, noise of one channel only, a repeated channel, fewer
+/// taps than phases, and channels that are older by whole periods.
 #[test]
 fn no_other_taps_are_better() {
     let filter = butterworth(3, 0.2);
@@ -227,8 +227,8 @@ fn square_at(design: &Design, errors: [f64; 2]) -> f64 {
     h2_norm(&plant.error_system(&filters).unwrap()).unwrap().powi(2) / 2.0
 }
 
-/// The mean over Gaussian errors of the second delay, by Gauss-Legendre rules of four points between the kinks:
-/// wherever a sample coincides with another instant, at multiples of 0.2.
+/// The mean over Gaussian errors of the second delay, by Gauss-Legendre rules of four points between the
+/// kinks: wherever a sample coincides with another instant, at multiples of 0.2.
 fn mean_over_second_delay(design: &Design, deviation: f64) -> f64 {
     let (step, nodes) =
         (0.2, [(0.339981043584856, 0.652145154862546), (0.861136311594053, 0.347854845137454)]);
