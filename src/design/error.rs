@@ -148,7 +148,8 @@ pub enum DesignError {
     },
     /// No number of taps reaches the SNR that was asked for.
     #[error(
-        "an SNR of {wanted:.1} dB is out of reach: no bank of latency {latency} has more than {best:.1} dB; ask for less, \
+        "an SNR of {wanted:.1} dB is out of reach: no bank of latency {latency} has more than {best:.1} dB over the whole \
+         spectrum of the signal, its floor outside the band included; ask for less, give taps instead, raise floor_db, \
          allow a longer latency, or state less noise"
     )]
     SnrOutOfReach {
