@@ -52,8 +52,8 @@ pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
     Reconstruction::interleaving(problem).into_iter().chain([spline]).chain(alone).collect()
 }
 
-/// The first channel of each kind: a delay does not change what a channel gives alone. None of a single channel:
-/// that is the bank.
+/// The first channel of each kind: a delay does not change what a channel gives alone. None where there is
+/// one channel only: that is the bank.
 fn kinds(problem: &Problem) -> Vec<usize> {
     let mut kinds: Vec<usize> = Vec::new();
     let alike = |i: usize, j: usize| {
