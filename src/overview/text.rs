@@ -37,8 +37,8 @@ pub fn counted(count: impl Display, name: &str) -> String {
     format!("{count} {name}{ending}")
 }
 
-/// A relative change: per cent, or a factor above 1000 %. What would be below zero is no number: a slope holds
-/// for small changes only.
+/// A relative change: per cent, or a factor above 1000 %. What would be below zero is no number: a slope
+/// holds for small changes only.
 pub fn change(share: f64) -> String {
     match share {
         _ if share > 10.0 => format!("{:.0} times", 1.0 + share),
