@@ -104,6 +104,11 @@ impl fmt::Display for Contradiction {
                     order.join(", ")
                 )
             }
+            Self::Silent { channel, level } if *level == 0.0 => write!(
+                f,
+                "channel {channel} is silent: it has no signal at all; check its cable, its converter, and the order of \
+                 the captures"
+            ),
             Self::Silent { channel, level } => write!(
                 f,
                 "channel {channel} is silent: its level is {level:.1e} of that of the loudest channel; check its cable, its \

@@ -16,14 +16,16 @@
 //!
 //! # Simple ways
 //! One channel alone with its Wiener filter, plain interleaving, and the cubic spline through all samples,
-//! for the same signal, noise and uncertainty, from their exact periodically time-varying responses. Where
-//! the spec states no noise, all are compared with converters of 16 bits: without any noise one channel
-//! alone would be exact wherever the signal fits into it.
+//! for the same signal, noise and uncertainty, from their exact periodically time-varying responses. A bank
+//! of one channel is not compared with one channel. Where the spec states no noise, all are compared with
+//! converters of 16 bits: without any noise one channel alone would be exact wherever the signal fits into
+//! it.
 
 mod band;
 mod integral;
 mod powers;
 mod reconstruction;
+mod setup;
 mod signal;
 mod simple;
 mod snr;
@@ -33,6 +35,7 @@ mod tests;
 mod tones;
 
 pub use band::{BandSource, FigureBand};
+pub use setup::Setup;
 pub use simple::{SimpleFigure, SimpleWay};
 pub use snr::Snr;
 pub use tones::Tone;
@@ -72,6 +75,9 @@ pub struct Figures {
     pub simple: Vec<SimpleFigure>,
     /// gamma for inputs of any spectrum; `None` without `[signal]`, where gamma says it.
     pub any_input: Option<f64>,
+    /// How the bank was designed.
+    #[serde(skip)]
+    pub setup: Setup,
 }
 
 /// A figure of a tone.
@@ -115,6 +121,7 @@ impl Figures {
             target_vanishes: vanishes,
             simple: simple::figures(&ways, &ratios),
             any_input: any_input(bank, spec, &plain)?,
+            setup: Setup::new(bank, spec),
         })
     }
 

@@ -52,14 +52,16 @@ pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
     Reconstruction::interleaving(problem).into_iter().chain([spline]).chain(alone).collect()
 }
 
-/// The first channel of each kind: a delay does not change what a channel gives alone.
+/// The first channel of each kind: a delay does not change what a channel gives alone. None where there is
+/// one channel only: that is the bank.
 fn kinds(problem: &Problem) -> Vec<usize> {
     let mut kinds: Vec<usize> = Vec::new();
     let alike = |i: usize, j: usize| {
         let (a, b) = (problem.channels[i], problem.channels[j]);
         (a.front_end, a.gain, problem.noise[i]) == (b.front_end, b.gain, problem.noise[j])
     };
-    for i in 0..problem.channels.len() {
+    let choices = if problem.channels.len() > 1 { problem.channels.len() } else { 0 };
+    for i in 0..choices {
         if kinds.len() < MOST_ALONE && !kinds.iter().any(|&j| alike(i, j)) {
             kinds.push(i);
         }

@@ -253,6 +253,24 @@ fn recursive_banks_have_the_figures_of_their_taps() {
     }
 }
 
+/// A bank of one channel is that channel alone.
+#[test]
+fn one_channel_is_not_compared_with_itself() {
+    for (ratio, delays, want) in [
+        (1, &[0.0][..], &[SimpleWay::Interleaving, SimpleWay::CubicSpline][..]),
+        (2, &[0.0], &[SimpleWay::CubicSpline]),
+        (2, &[1.0, 0.0], &[SimpleWay::Interleaving, SimpleWay::CubicSpline, SimpleWay::OneChannel]),
+    ] {
+        let system = System { ratio, latency: 6, filter: BUTTERWORTH_2, delays, band: 0.2 };
+        let figures = Figures::new(&system.bank(FIR_24)).unwrap();
+        let found: Vec<SimpleWay> = figures.simple.iter().map(|figure| figure.way).collect();
+        assert_eq!(found.len(), want.len(), "{found:?}");
+        assert!(want.iter().all(|way| found.contains(way)), "{found:?}");
+        let Setup { ratio: m, channels, .. } = figures.setup;
+        assert_eq!((m, channels), (ratio, delays.len()));
+    }
+}
+
 /// The output of an FIR bank by its definition.
 fn fused(taps: &[Vec<f64>], ratio: usize, captured: &[Vec<f64>]) -> Vec<f64> {
     let sample = |n: usize| {

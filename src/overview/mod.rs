@@ -16,5 +16,5 @@ pub use facts::{ChannelFact, Facts};
 pub use pictures::{Picture, pictures};
 pub use spectra::spectra;
 pub use terms::{band, figure_facts, rounded as decibels_of};
-pub use text::{counted, decibels, frequency, six_digits};
+pub use text::{change, counted, decibels, frequency, six_digits};
 pub use understood::understood;

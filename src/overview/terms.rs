@@ -2,7 +2,8 @@
 
 use super::fact::{Fact, fact};
 use super::text::frequency;
-use crate::figures::{BandSource, FigureBand, Figures, SimpleFigure, SimpleWay, Snr, ToneFigure};
+use crate::figures::{BandSource, FigureBand, Figures, Setup, SimpleFigure, SimpleWay, Snr, ToneFigure};
+use crate::spec::Method;
 use crate::units::{Decibels, Hertz};
 
 /// Ratios above this are rounding errors of double precision.
@@ -14,7 +15,7 @@ pub fn figure_facts(figures: &Figures, is_normalised: bool) -> [Fact; 4] {
     let words = Words { figures, is_normalised };
     [
         fact("SNR", ratio(figures.snr.total_db), words.snr()),
-        words.tone("image", figures.image, "largest image of a tone"),
+        words.image(),
         words.tone("gain error", figures.gain_error, "largest error of gain and phase of a tone"),
         words.comparison(),
     ]
@@ -37,11 +38,17 @@ pub fn rounded(Decibels(db): Decibels) -> String {
     format!("{:.1} dB", (10.0 * db).round() / 10.0 + 0.0)
 }
 
-/// The way in words.
+/// A difference in decibels with its sign; none of a zero.
+fn signed(db: Decibels) -> String {
+    let text = rounded(db);
+    if text.starts_with('-') || text == "0.0 dB" { text } else { format!("+{text}") }
+}
+
+/// The way in words. No filter of one channel, however long, is better than what stands for one channel.
 fn named(figure: &SimpleFigure) -> String {
     match (figure.way, figure.channel) {
-        (SimpleWay::OneChannel, Some(channel)) => format!("channel {channel} alone"),
-        (SimpleWay::OneChannel, None) => "one channel alone".to_owned(),
+        (SimpleWay::OneChannel, Some(channel)) => format!("channel {channel} alone at best"),
+        (SimpleWay::OneChannel, None) => "one channel alone at best".to_owned(),
         (SimpleWay::Interleaving, _) => "plain interleaving".to_owned(),
         (SimpleWay::CubicSpline, _) => "a cubic spline".to_owned(),
     }
@@ -67,7 +74,8 @@ impl Words<'_> {
     }
 
     fn snr(&self) -> String {
-        let Figures { snr, snr_16_bits_db, band: FigureBand { source, .. }, any_input, .. } = self.figures;
+        let Figures { snr, snr_16_bits_db, band: FigureBand { source, .. }, any_input, setup, .. } =
+            self.figures;
         let Snr { signal_db, noise_db, delays_db, .. } = *snr;
         let input = match (source, any_input) {
             (BandSource::Signal, _) => format!("for white noise in {}", self.band()),
@@ -87,20 +95,36 @@ impl Words<'_> {
         let parts = if parts.is_empty() { String::new() } else { format!("; from {}", parts.join(", ")) };
         let bits =
             snr_16_bits_db.map_or_else(String::new, |db| format!("; {} with 16-bit converters", rounded(db)));
-        format!("{input}{parts}{bits}")
+        let cutoffs = if setup.has_uncertain_cutoffs { "; uncertain cut-offs not counted" } else { "" };
+        format!("{input}{parts}{bits}{cutoffs}")
+    }
+
+    fn image(&self) -> Fact {
+        match (self.figures.image, self.figures.setup) {
+            (Some(_), Setup { ratio: 1, channels: 1, .. }) => {
+                fact("image", "none", "one channel at the output rate has no images")
+            }
+            (Some(_), Setup { ratio: 1, .. }) => {
+                fact("image", "none", "channels at the output rate have no images")
+            }
+            (figure, _) => self.tone("image", figure, "largest image of a tone"),
+        }
     }
 
     fn tone(&self, name: &'static str, figure: Option<ToneFigure>, what: &str) -> Fact {
         let Some(ToneFigure { db, hertz }) = figure else {
             return fact(name, "none", format!("some tone in {} does not come through at all", self.band()));
         };
-        let value = if -db.0 > EXACT.0 { "none".to_owned() } else { rounded(db) };
         let left_out = if self.figures.target_vanishes {
             "; the target is zero at some frequency there, which is left out"
         } else {
             ""
         };
-        fact(name, value, format!("{what} in {}, at {}{left_out}", self.band(), self.hertz(hertz)))
+        if -db.0 > EXACT.0 {
+            let meaning = format!("below the rounding of double precision in {}{left_out}", self.band());
+            return fact(name, "none", meaning);
+        }
+        fact(name, rounded(db), format!("{what} in {}, at {}{left_out}", self.band(), self.hertz(hertz)))
     }
 
     /// The bank beside the best simple way, and the other ways.
@@ -112,24 +136,43 @@ impl Words<'_> {
         let verdict = if self.figures.is_worthwhile() {
             format!("over {}", with_ratio(best))
         } else {
-            format!(
-                "this bank does not pay beside {}; use that, or {}",
-                with_ratio(best),
-                self.remedy(best.way)
-            )
+            format!("against {}: this bank does not pay; {}", with_ratio(best), self.advice(best))
         };
         let rest: Vec<String> = others.iter().map(with_ratio).collect();
+        let rest = if rest.is_empty() { String::new() } else { format!("; {}", rest.join(", ")) };
         let bits = self.figures.snr_16_bits_db.map_or("", |_| "; all with 16-bit converters");
-        fact("compared", format!("{:+.1} dB", gain.0), format!("{verdict}; {}{bits}", rest.join(", ")))
+        fact("compared", signed(gain), format!("{verdict}{rest}{bits}"))
     }
 
-    /// What may make the bank better than a simple way.
+    /// What to do where the bank does not pay.
+    fn advice(&self, best: &SimpleFigure) -> String {
+        let place = match self.figures.band.source {
+            BandSource::Signal => "band",
+            BandSource::Target => "signal",
+        };
+        let why = match (best.way, self.figures.snr_16_bits_db) {
+            (SimpleWay::OneChannel, Some(_)) => format!(
+                "with 16-bit converters (assumed) one channel with a filter of any length would do as well for this \
+                 {place}; "
+            ),
+            _ => String::new(),
+        };
+        format!("{why}use that, or {}", self.remedy(best.way))
+    }
+
+    /// What may make the bank better than a simple way, and is not done yet.
     fn remedy(&self, best: SimpleWay) -> &'static str {
-        let knows_signal = self.figures.any_input.is_some();
-        match best {
-            _ if !knows_signal => "say in [signal] where the signal lies",
-            SimpleWay::OneChannel => "state the `noise` of the converters and design with the method h2",
-            SimpleWay::Interleaving | SimpleWay::CubicSpline => "give the bank more latency and taps",
+        let Figures { any_input, snr_16_bits_db, setup, .. } = self.figures;
+        let noise_is_stated = snr_16_bits_db.is_none();
+        match (best, noise_is_stated, setup.method) {
+            _ if any_input.is_none() => "say in [signal] where the signal lies",
+            (SimpleWay::OneChannel, false, Method::H2) => "state the `noise` of the converters",
+            (SimpleWay::OneChannel, false, _) => {
+                "state the `noise` of the converters and design with the method h2"
+            }
+            (SimpleWay::OneChannel, true, method) if method != Method::H2 => "design with the method h2",
+            _ if setup.is_recursive => "give the bank more latency",
+            _ => "give the bank more latency and taps",
         }
     }
 }
@@ -156,6 +199,13 @@ mod tests {
                 simple(SimpleWay::OneChannel, Some(2), 20.0),
             ],
             any_input: Some(0.9),
+            setup: Setup {
+                method: Method::Fir,
+                is_recursive: false,
+                ratio: 2,
+                channels: 2,
+                has_uncertain_cutoffs: false,
+            },
         }
     }
 
@@ -171,8 +221,8 @@ mod tests {
             [
                 "SNR: 132.9 dB, for white noise in 0 to 9 kHz; 89.0 dB with 16-bit converters",
                 "image: -98.8 dB, largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
-                "gain error: none, largest error of gain and phase of a tone in 0 to 9 kHz, at 0 Hz",
-                "compared: +41.0 dB, over a cubic spline (48.0 dB); channel 2 alone \
+                "gain error: none, below the rounding of double precision in 0 to 9 kHz",
+                "compared: +41.0 dB, over a cubic spline (48.0 dB); channel 2 alone at best \
                  (20.0 dB); all with 16-bit converters",
             ]
         );
@@ -180,16 +230,68 @@ mod tests {
 
     #[test]
     fn a_bank_that_does_not_pay_says_so() {
-        for (own, best, value) in [(42.7, 48.0, "-5.3 dB"), (48.9, 48.0, "+0.9 dB"), (80.0, 89.04, "-9.0 dB")]
-        {
+        for (own, best, value) in [
+            (42.7, 48.0, "-5.3 dB"),
+            (48.9, 48.0, "+0.9 dB"),
+            (80.0, 89.04, "-9.0 dB"),
+            (47.98, 48.0, "0.0 dB"),
+        ] {
             let line = lines(&figures(own, best)).pop().unwrap();
-            let verdict = format!("compared: {value}, this bank does not pay beside a cubic spline");
+            let verdict =
+                format!("compared: {value}, against a cubic spline ({best:.1} dB): this bank does not pay;");
             assert!(line.starts_with(&verdict), "{line}");
-            assert!(line.contains("; use that, or give the bank more latency and taps;"), "{line}");
+            assert!(line.contains(" use that, or give the bank more latency and taps;"), "{line}");
             let unknown = Figures { any_input: None, ..figures(own, best) };
             let line = lines(&unknown).pop().unwrap();
-            assert!(line.contains("; use that, or say in [signal] where the signal lies;"), "{line}");
+            assert!(line.contains(" use that, or say in [signal] where the signal lies;"), "{line}");
         }
+    }
+
+    /// One channel is better by 2 dB: with every method, and noise that is stated or not.
+    #[test]
+    fn no_advice_is_what_was_done_already() {
+        let assumed = "with 16-bit converters (assumed) one channel with a filter of any length would do as well for \
+                       this band; use that, or state the `noise` of the converters";
+        for (method, is_recursive, noise_is_stated, advice) in [
+            (Method::Fir, false, false, format!("{assumed} and design with the method h2; ")),
+            (Method::H2, true, false, format!("{assumed}; ")),
+            (Method::Fir, false, true, "use that, or design with the method h2; ".to_owned()),
+            (Method::H2, true, true, "use that, or give the bank more latency; ".to_owned()),
+            (Method::H2, false, true, "use that, or give the bank more latency and taps; ".to_owned()),
+        ] {
+            let mut figures = figures(68.3, 40.0);
+            figures.simple.swap(0, 1);
+            figures.simple[0].snr_db = Decibels(70.3);
+            figures.setup = Setup { method, is_recursive, ..figures.setup };
+            figures.snr_16_bits_db = figures.snr_16_bits_db.filter(|_| !noise_is_stated);
+            let line = lines(&figures).pop().unwrap();
+            let start =
+                "compared: -2.0 dB, against channel 2 alone at best (70.3 dB): this bank does not pay; ";
+            assert!(line.starts_with(&format!("{start}{advice}a cubic spline (40.0 dB)")), "{line}");
+        }
+        let mut figures = figures(42.7, 48.0);
+        figures.setup.is_recursive = true;
+        let line = lines(&figures).pop().unwrap();
+        assert!(line.contains(" use that, or give the bank more latency;"), "{line}");
+    }
+
+    #[test]
+    fn what_is_none_is_one_sentence() {
+        let mut figures = figures(60.0, 48.0);
+        figures.image = figures.gain_error;
+        figures.setup.has_uncertain_cutoffs = true;
+        let words = lines(&figures);
+        assert!(words[0].ends_with("; uncertain cut-offs not counted"), "{}", words[0]);
+        assert_eq!(words[1], "image: none, below the rounding of double precision in 0 to 9 kHz");
+        figures.setup = Setup { ratio: 1, channels: 1, ..figures.setup };
+        figures.simple.pop();
+        let words = lines(&figures);
+        assert_eq!(words[1], "image: none, one channel at the output rate has no images");
+        assert!(
+            words[3].ends_with("over a cubic spline (48.0 dB); all with 16-bit converters"),
+            "{}",
+            words[3]
+        );
     }
 
     #[test]
@@ -204,6 +306,6 @@ mod tests {
         assert!(lines[0].ends_with(parts), "{}", lines[0]);
         assert_eq!(lines[1], "image: none, some tone in 0 to 9 kHz does not come through at all");
         assert!(lines[2].ends_with("left out"), "{}", lines[2]);
-        assert!(lines[3].ends_with("alone (20.0 dB)"), "{}", lines[3]);
+        assert!(lines[3].ends_with("alone at best (20.0 dB)"), "{}", lines[3]);
     }
 }

@@ -70,10 +70,15 @@ impl fmt::Display for Warning {
                 let inputs = inputs.join(", ");
                 write!(f, "{inputs}: no samples to fuse (the length is zero), so the output has none")
             }
+            Self::Replaced(1) => {
+                f.write_str("1 input sample was missing, NaN or infinite and was replaced by 0")
+            }
             Self::Replaced(count) => {
                 write!(f, "{count} input samples were missing, NaN or infinite and were replaced by 0")
             }
+            Self::Clipped(1) => f.write_str("1 output sample was clipped"),
             Self::Clipped(count) => write!(f, "{count} output samples were clipped"),
+            Self::StateReset(1) => f.write_str("once the filter state was not finite and was set to zero"),
             Self::StateReset(count) => {
                 write!(f, "{count} times the filter state was not finite and was set to zero")
             }

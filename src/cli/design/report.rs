@@ -278,7 +278,10 @@ pub(in crate::cli) fn against(gamma: f64, other: f64, what: &str) -> String {
 
 /// The figures in the user's terms, one line each.
 pub(in crate::cli) fn figure_text(figures: &Figures, is_normalised: bool) -> String {
-    let line = |Fact { name, value, meaning }: Fact| format!("{name:<10} {value} {meaning}\n");
+    let line = |Fact { name, value, meaning }: Fact| {
+        let colon = if value == "none" { ":" } else { "" };
+        format!("{name:<10} {value}{colon} {meaning}\n")
+    };
     figure_facts(figures, is_normalised).map(line).concat()
 }
 

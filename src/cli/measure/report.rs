@@ -110,7 +110,12 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
             let _ = writeln!(text, "                 seen at {:.6}", tone.alias);
         }
     }
-    let _ = writeln!(text, "offset           {:.6} ± {:.2e}", measured.offset.value, measured.offset.sigma);
+    let _ = writeln!(
+        text,
+        "offset           {} ± {:.2e}",
+        six_decimals(measured.offset.value),
+        measured.offset.sigma
+    );
     if let Some(quadrature) = &measured.quadrature {
         write_quadrature(text, quadrature);
     }
@@ -123,7 +128,7 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
 /// Of complex recordings.
 fn write_quadrature(text: &mut String, quadrature: &Quadrature) {
     let Quadrature { offset, imbalances } = quadrature;
-    let _ = writeln!(text, "offset, imag.    {:.6} ± {:.2e}", offset.value, offset.sigma);
+    let _ = writeln!(text, "offset, imag.    {} ± {:.2e}", six_decimals(offset.value), offset.sigma);
     for Imbalance { gain, phase, image_rejection } in imbalances {
         let _ = writeln!(
             text,
@@ -152,6 +157,12 @@ fn write_spurs(text: &mut String, measured: &Measurement) {
     }
 }
 
+/// Six digits after the point; a zero has no sign.
+fn six_decimals(value: f64) -> String {
+    let text = format!("{value:.6}");
+    if text == "-0.000000" { "0.000000".to_owned() } else { text }
+}
+
 fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
     let _ = writeln!(
         text,
@@ -169,10 +180,10 @@ fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
     }
     let _ = writeln!(
         text,
-        "lag              {:.6} ± {:.1e} samples ({})",
-        found.lag_samples.value,
+        "lag              {} ± {:.1e} samples ({})",
+        six_decimals(found.lag_samples.value),
         found.lag_samples.sigma,
-        readable(found.lag.0, "s")
+        readable(found.lag.0 + 0.0, "s")
     );
     let _ = writeln!(text, "gain             {:.8} ± {:.1e}", found.gain.value, found.gain.sigma);
     let _ = writeln!(text, "offset           {:.3e} ± {:.1e}", found.offset.value, found.offset.sigma);

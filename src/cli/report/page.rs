@@ -1,6 +1,6 @@
 //! The page as HTML.
 
-use crate::overview::{ChannelFact, Fact, Facts};
+use crate::overview::{ChannelFact, Fact, Facts, change};
 use crate::plot::{Chart, PlotError};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -114,7 +114,7 @@ fn channel_table(channels: &[ChannelFact]) -> Markup {
                     td class="value" { (channel.gain) }
                     td class="value" {
                         @match channel.sensitivity {
-                            Some(share) => { (format!("{:+.2} %", 100.0 * share)) }
+                            Some(share) => { (change(share)) }
                             None => "no derivative",
                         }
                     }
