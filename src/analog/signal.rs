@@ -50,8 +50,8 @@ impl SignalFilter {
         })
     }
 
-    /// The floor that the spec asks for, or that the noise of its converters suggests, in decibels; `None` without
-    /// a band.
+    /// The floor that the spec asks for, or that the noise of its converters suggests, in decibels; `None`
+    /// without a band.
     pub fn asked_floor(spec: &Spec) -> Option<f64> {
         let signal = spec.signal.as_ref()?;
         signal.band().map(|_| signal.floor_db.unwrap_or_else(|| usual_floor(spec)))

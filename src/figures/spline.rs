@@ -99,9 +99,14 @@ impl Spline {
         if i + 1 < self.knots.len() { (i + 1, Complex::ONE) } else { (0, Complex::from_polar(1.0, theta)) }
     }
 
-    /// A of A m = R v, the continuity of the first derivative at every knot: `h_{i-1}/6 m_{i-1} + (h_{i-1}
-    /// + h_i)/3 m_i + h_i/6 m_{i+1} = (v_{i+1} - v_i)/h_i - (v_i - v_{i-1})/h_{i-1}`. It is diagonally
-    /// dominant, so it has an inverse.
+    /// A of A m = R v, the continuity of the first derivative at every knot:
+    ///
+    /// ```text
+    /// h_{i-1}/6 m_{i-1} + (h_{i-1} + h_i)/3 m_i + h_i/6 m_{i+1}
+    ///     = (v_{i+1} - v_i)/h_i - (v_i - v_{i-1})/h_{i-1}
+    /// ```
+    ///
+    /// It is diagonally dominant, so it has an inverse.
     fn moment_matrix(&self, theta: f64) -> CMat {
         self.by_interval(theta, |h| (h / 3.0, h / 6.0))
     }

@@ -63,7 +63,8 @@ fn silence_polarity_gain_and_starts_are_told_with_their_remedy() {
             x
         }
     };
-    let cases: [(&dyn Fn(Vec<f32>) -> Vec<f32>, &[&str]); 5] = [
+    type Damage<'a> = &'a dyn Fn(Vec<f32>) -> Vec<f32>;
+    let cases: [(Damage<'_>, &[&str]); 5] = [
         (&|x| vec![0.0; x.len()], &["channel 2 is silent", "check its cable"]),
         (&|x| x.iter().map(|x| -x).collect(), &["channel 2 is inverted", "swap its leads"]),
         (&|x| x.iter().map(|x| 0.5 * x).collect(), &["the gain of channel 2 is 0.5", "write `gain = 0.5"]),

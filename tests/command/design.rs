@@ -70,7 +70,10 @@ fn figures_in_the_terms_of_the_user_are_reported() {
     );
     let out = desk.good(&["design", "vague.toml", "-o", "vague.json"]);
     let line = out.lines().find(|line| line.starts_with("compared")).unwrap();
-    assert!(line.contains("against channel 1 alone at best") && line.contains(": this bank does not pay;"), "{out}");
+    assert!(
+        line.contains("against channel 1 alone at best") && line.contains(": this bank does not pay;"),
+        "{out}"
+    );
     assert!(out.lines().count() == 6 && out.contains("uncertain delays"), "{out}");
 }
 
