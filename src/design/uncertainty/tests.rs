@@ -1,13 +1,22 @@
 use super::*;
+use crate::design::{ProofSearch, design_with};
+use crate::spec::Spec;
 use crate::units::Seconds;
 use crate::verify::uncertainty::ErrorPoint;
 
 fn bank(name: &str) -> Bank {
-    let text = match name {
-        "thesis" => include_str!("../../../filters/thesis-fir.json"),
-        _ => include_str!("../../../filters/interleaved-4x250M.json"),
-    };
-    Bank::from_json(text, name).unwrap()
+    match name {
+        "thesis" => Bank::from_json(include_str!("../../../filters/thesis-fir.json"), name).unwrap(),
+        _ => interleaved(),
+    }
+}
+
+/// The interleaved converters for inputs of any frequency, with 32 taps: the bank of the digits below.
+fn interleaved() -> Bank {
+    let text = include_str!("../../../filters/interleaved-4x250M.toml");
+    let mut spec = Spec::from_toml(text, "interleaved-4x250M.toml").unwrap();
+    (spec.signal, spec.latency, spec.design.taps) = (None, Some(16), Some(32));
+    design_with(&spec, ProofSearch::Skip).unwrap().bank
 }
 
 /// Against differences of fourth order; the thesis bank with three settings of its delays, where
