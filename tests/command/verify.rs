@@ -203,8 +203,14 @@ fn the_intervals_of_the_ready_banks_are_narrow_and_hold_their_gamma() {
             _ => BoundedBanks::Any,
         };
         assert_eq!(proven.lower_banks, banks, "{name}: {proven:?}");
-        // A reduced bank is no optimal one.
-        let slack = if name == "reduced" { 1.0 } else { 2e-5 };
+        // A reduced bank is no optimal one, and the bound of one length is not sharp to the last digits.
+        let slack = if name == "reduced" {
+            1.0
+        } else if is_short {
+            1e-3
+        } else {
+            1e-5
+        };
         assert!(proven.upper - proven.lower < slack * proven.upper, "{name}: {proven:?}");
     }
 }
