@@ -34,8 +34,7 @@ pub(crate) use limits::{check_gain, check_offset};
 pub use measured::{FilterModel, FilterModels, MeasuredFilter, Measurement};
 pub use passband::Passband;
 pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
-pub(crate) use uncertainty::HALF_WIDTH;
-pub use uncertainty::{PerChannel, UncertaintySpec};
+pub use uncertainty::{HALF_WIDTH, PerChannel, UncertaintySpec};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 

@@ -7,7 +7,7 @@ use super::limits::range;
 use crate::units::{FastPeriods, Seconds};
 
 /// Half-width of the 95 % interval of a normal law over its standard deviation.
-pub(crate) const HALF_WIDTH: f64 = 1.959_963_984_540_054;
+pub const HALF_WIDTH: f64 = 1.959_963_984_540_054;
 /// Largest half-width of a delay in fast periods; nothing is known of a delay that may be off by more.
 const MAX_DELAY: f64 = 1024.0;
 
