@@ -10,6 +10,7 @@ use super::DesignError;
 use super::lifting::JointState;
 use super::problem::Problem;
 use crate::linalg::{self, Complex, Mat};
+use crate::lti::exponential::NODES;
 use crate::lti::gramian::controllability_root;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
@@ -20,17 +21,6 @@ const REACH: f64 = 9.0;
 const GROWTH: f64 = 1.5;
 /// Least width of a panel over the deviation. Oscillations that are faster average out.
 const LEAST_PANEL: f64 = 1.0 / 256.0;
-/// Gauss-Legendre abscissae on [0, 1] and weights, eight points (Abramowitz & Stegun, table 25.4).
-const NODES: [(f64, f64); 8] = [
-    (0.019855071751231912, 0.05061426814518853),
-    (0.10166676129318664, 0.11119051722668721),
-    (0.2372337950418355, 0.15685332293894344),
-    (0.4082826787521751, 0.18134189168918083),
-    (0.5917173212478248, 0.18134189168918083),
-    (0.7627662049581645, 0.15685332293894344),
-    (0.8983332387068134, 0.11119051722668721),
-    (0.9801449282487681, 0.05061426814518853),
-];
 /// Share of the power of a sample below which the difference of two covariances loses the digits of jitter.
 const RESOLVED: f64 = 1e-9;
 
@@ -63,7 +53,7 @@ struct Node {
 }
 
 impl Covariances {
-    /// Of the front ends of `problem`, behind the signal's filter.
+    /// Of the front ends of `problem`, after the signal's filter.
     ///
     /// # Errors
     /// [`DesignError`] if a decomposition fails or a front end is not stable.

@@ -64,7 +64,7 @@ impl Problem {
         own + self.front_ends.iter().map(|front_end| front_end.order()).sum::<usize>()
     }
 
-    /// The response Phi W of the front end of this index, behind the signal's filter.
+    /// The response Phi W of the front end of this index, after the signal's filter.
     pub fn response(&self, front_end: usize, w: RadiansPerFastPeriod) -> Complex<f64> {
         let response = self.front_ends[front_end].response(w);
         self.signal.as_ref().map_or(response, |signal| response * signal.response(w))

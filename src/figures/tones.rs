@@ -48,7 +48,7 @@ pub(super) struct ToneResponse {
 }
 
 impl ToneResponse {
-    /// Of the `filters` of a bank behind the front ends of `problem`, without the spectrum of a signal.
+    /// Of the `filters` of a bank after the front ends of `problem`, without the spectrum of a signal.
     pub(super) fn new(problem: Problem, filters: FilterResponse) -> Self {
         Self { problem, filters }
     }

@@ -5,7 +5,7 @@ use crate::linalg::{self, LinalgError, Mat};
 /// Eight-point Gauss-Legendre abscissae on [0, 1] and weights (Abramowitz & Stegun, table 25.4).
 /// The integrand below is entire and, after halving, nearly constant: the rule's error
 /// (norm^16 / 16! with a norm of at most 1/2) is far below rounding.
-const NODES: [(f64, f64); 8] = [
+pub(crate) const NODES: [(f64, f64); 8] = [
     (0.019855071751231912, 0.05061426814518853),
     (0.10166676129318664, 0.11119051722668721),
     (0.2372337950418355, 0.15685332293894344),

@@ -27,7 +27,7 @@ fn desk(length: &str) -> Desk {
     desk
 }
 
-/// Writes the second capture anew, and fuses; gives standard output and standard error.
+/// Writes the second capture again, and fuses; gives standard output and standard error.
 fn fused(desk: &Desk, change: impl Fn(Vec<f32>) -> Vec<f32>) -> (String, String) {
     let (_, samples) = wav::read(&desk.path("cap/ch2.wav"));
     wav::write(desk, "other.wav", 1, 24_000, &change(samples));

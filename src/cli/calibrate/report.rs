@@ -3,13 +3,11 @@
 use super::super::{Failure, print, print_json, warn};
 use crate::calibrate::{Calibration, ChannelEstimate, Remark};
 use crate::sine_fit::Estimate;
-use crate::spec::Spec;
+use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::FastPeriods;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// The half-width of a 95 % interval in standard deviations.
-const HALF_WIDTH: f64 = 1.959_963_984_540_054;
 /// A held-out value contradicts the calibration if it is this many half-widths away: six standard
 /// deviations.
 const CONTRADICTION: f64 = 3.0;

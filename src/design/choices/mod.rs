@@ -3,7 +3,7 @@
 //! What counts is the whole error: the mean square of the error for the signal plus the noise of the
 //! converters at the output. The latency is the shortest one whose whole error is within 0.1 dB of the
 //! least over all latencies, with the length of the spec. Where the spec states no noise, the samples are
-//! rounded to 16 bits: beyond that no latency is worth its while. For `fir`, `iir` and `h2` the error is
+//! rounded to 16 bits: beyond that no latency pays. For `fir`, `iir` and `h2` the error is
 //! the least that banks of that length can reach, which a smoother finds without a design; for `sinc` and
 //! `separation`, which minimise nothing, it is that of their banks.
 

@@ -56,7 +56,7 @@ pub(super) struct Aliases {
     decay: Vec<f64>,
 }
 
-/// A front end Phi behind the signal's filter W.
+/// A front end Phi after the signal's filter W.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrontEnd<'a> {
     pub(super) transfer: &'a Transfer,
