@@ -1,134 +1,114 @@
 //! What may be wrong with the imports, one line each.
 
-use crate::circles::circles;
-use crate::house::{Arrow, House, Library};
-use crate::rules::Rules;
+use crate::imports::{File, Imports};
+use petgraph::{algo::tarjan_scc, graphmap::DiGraphMap};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Libraries of the workspace, each with its folder; `hybank` is divided into rooms, the others are rooms
-/// themselves.
-const LIBRARIES: [(&str, &str); 5] = [
+/// The crates that ARCHITECTURE.md names, each with its folder. `hybank` is divided into rooms, the modules
+/// at its top; the other crates are rooms themselves.
+const CRATES: [(&str, &str); 5] = [
     ("hybank", "src"),
     ("hybank_audio", "audio/src"),
     ("hybank_linalg", "linalg/src"),
     ("hybank_runtime", "runtime/src"),
     ("hybank_ibr", "ibr/src"),
 ];
-const DIVIDED: &str = "hybank";
 
-pub(crate) struct Survey {
-    root: PathBuf,
-    house: House,
-    arrows: BTreeSet<Arrow>,
-    rules: Rules,
+/// The arrows allowed from each room, read from the first block of code below "Who may import whom": one or
+/// more statements `rooms -> rooms` a line, two spaces apart. What stands in parentheses is left out.
+fn allowed(text: &str) -> Result<BTreeMap<String, BTreeSet<String>>, String> {
+    let section = text.split_once("## Who may import whom").ok_or("ARCHITECTURE.md has no rules")?.1;
+    let block = section.split("```").nth(1).unwrap_or_default().trim_start_matches("text");
+    let outside = |part: &str| part.split_once(')').map_or(part, |(_, after)| after).to_owned();
+    let block: String = block.split('(').map(outside).collect();
+    let rooms = |list: &str| -> BTreeSet<String> {
+        let names = list.split(',').map(|room| room.trim().trim_start_matches("hybank::").to_owned());
+        names.filter(|room| !matches!(room.as_str(), "nothing" | "")).collect()
+    };
+    let mut allowed = BTreeMap::<String, BTreeSet<String>>::new();
+    for statement in block.lines().flat_map(|line| line.split("  ")).filter(|text| !text.trim().is_empty()) {
+        let (from, to) = statement.split_once("->").ok_or(format!("no arrow in `{statement}`"))?;
+        rooms(from).into_iter().for_each(|from| allowed.entry(from).or_default().extend(rooms(to)));
+    }
+    Ok(allowed)
 }
 
-impl Survey {
-    pub(crate) fn new(root: &Path) -> Result<Self, String> {
-        let root = root.canonicalize().map_err(|error| format!("{}: {error}", root.display()))?;
-        let library = |(name, folder): &(&str, &str)| Library {
-            name: (*name).to_owned(),
-            root: root.join(folder).join("lib.rs"),
-        };
-        let libraries: Vec<Library> =
-            LIBRARIES.iter().map(library).filter(|library| library.root.is_file()).collect();
-        let house = House::read(&libraries)?;
-        let text = fs::read_to_string(root.join("ARCHITECTURE.md"));
-        let rules = text.map_err(|error| error.to_string()).and_then(|text| Rules::parse(&text));
-        let rules = rules.map_err(|error| format!("ARCHITECTURE.md: {error}"))?;
-        Ok(Self { arrows: house.arrows(), root, house, rules })
+/// Every fault of the workspace in this folder.
+pub(crate) fn faults(root: &Path) -> Result<Vec<String>, String> {
+    let rules = std::fs::read_to_string(root.join("ARCHITECTURE.md")).map_err(|error| error.to_string())?;
+    let mut imports = Imports::default();
+    for (name, folder) in CRATES {
+        let path = root.join(folder).join("lib.rs");
+        if path.is_file() {
+            imports.read(&path, vec![name.to_owned()])?;
+        }
     }
+    let checks = Checks { root, rules: allowed(&rules)?, arrows: imports.arrows(), files: imports.files };
+    Ok([checks.unnamed(), checks.forbidden(), checks.circles()].concat())
+}
 
-    pub(crate) fn faults(&self) -> Vec<String> {
-        [self.unnamed(), self.circles_of_rules(), self.forbidden(), self.circles_of_files()].concat()
-    }
+struct Checks<'a> {
+    root: &'a Path,
+    rules: BTreeMap<String, BTreeSet<String>>,
+    files: Vec<File>,
+    arrows: BTreeSet<(usize, usize)>,
+}
 
-    /// Every arrow between rooms with a file that draws it.
-    pub(crate) fn list(&self) -> Vec<String> {
-        let line = |((from, to), arrow): (&(String, String), &Arrow)| {
-            format!("{from} -> {to}    {} imports {}", self.name(arrow.from), self.name(arrow.to))
-        };
-        self.between_rooms().iter().map(line).collect()
-    }
-
+impl Checks<'_> {
     fn name(&self, file: usize) -> String {
-        let path = &self.house.files[file].path;
-        path.strip_prefix(&self.root).unwrap_or(path).display().to_string()
+        let path = &self.files[file].path;
+        path.strip_prefix(self.root).unwrap_or(path).display().to_string()
     }
 
-    /// A module at the top of `hybank`, or another crate; the root itself only passes on.
+    /// The root of `hybank` is in no room: it only passes on.
     fn room(&self, file: usize) -> Option<String> {
-        match self.house.files[file].module.as_slice() {
-            [name] if name == DIVIDED => None,
-            [name, room, ..] if name == DIVIDED => Some(room.clone()),
-            [name, ..] => Some(name.replace('_', "-")),
-            [] => None,
+        match self.files[file].module.as_slice() {
+            [name, rest @ ..] if name == CRATES[0].0 => rest.first().cloned(),
+            module => module.first().map(|name| name.replace('_', "-")),
         }
     }
 
-    fn between_rooms(&self) -> BTreeMap<(String, String), Arrow> {
-        let rooms = |arrow: &Arrow| Some((self.room(arrow.from)?, self.room(arrow.to)?));
-        let pairs = self.arrows.iter().rev().filter_map(|arrow| Some((rooms(arrow)?, *arrow)));
-        pairs.filter(|((from, to), _)| from != to).collect()
-    }
-
-    /// Rooms without a rule, and rules without a room.
     fn unnamed(&self) -> Vec<String> {
-        let rooms: BTreeSet<String> =
-            (0..self.house.files.len()).filter_map(|file| self.room(file)).collect();
-        let without = rooms.iter().filter(|room| !self.rules.knows(room));
-        let missing = without.map(|room| format!("ARCHITECTURE.md has no rule for {room}"));
-        let unknown = self.rules.rooms().into_iter().filter(|room| !rooms.contains(*room));
-        missing
-            .chain(unknown.map(|room| format!("ARCHITECTURE.md names {room}, which is not there")))
-            .collect()
-    }
-
-    fn circles_of_rules(&self) -> Vec<String> {
-        let rooms: Vec<&str> = self.rules.rooms().into_iter().collect();
-        let place = |room: &str| rooms.binary_search(&room).unwrap_or_default();
-        let arrows: Vec<_> =
-            self.rules.arrows().into_iter().map(|(from, to)| (place(from), place(to))).collect();
-        let name = |room: usize| rooms[room].to_owned();
-        circles(rooms.len(), &arrows)
-            .iter()
-            .map(|circle| format!("ARCHITECTURE.md allows a circle: {}", around(circle, name)))
-            .collect()
+        let rooms: BTreeSet<String> = (0..self.files.len()).filter_map(|file| self.room(file)).collect();
+        let named: BTreeSet<String> = self.rules.keys().cloned().collect();
+        let differ = rooms.symmetric_difference(&named);
+        differ.map(|room| format!("{room} is not both a room and a rule of ARCHITECTURE.md")).collect()
     }
 
     fn forbidden(&self) -> Vec<String> {
-        let all = self.between_rooms();
-        let forbidden = all.iter().filter(|((from, to), _)| !self.rules.allow(from, to));
-        forbidden
-            .map(|((from, to), arrow)| {
-                let (importer, imported) = (self.name(arrow.from), self.name(arrow.to));
-                format!("{importer} imports {imported}: ARCHITECTURE.md does not allow {from} -> {to}")
-            })
-            .collect()
+        let fault = |&(from, to): &(usize, usize)| {
+            let (importer, imported) = (self.room(from)?, self.room(to)?);
+            let may = |rooms: &BTreeSet<String>| rooms.contains(&imported) || rooms.contains("everything");
+            let is_allowed = importer == imported || self.rules.get(&importer).is_some_and(may);
+            let rule = format!("ARCHITECTURE.md does not allow {importer} -> {imported}");
+            (!is_allowed).then(|| format!("{} imports {}: {rule}", self.name(from), self.name(to)))
+        };
+        self.arrows.iter().filter_map(fault).collect()
     }
 
-    /// A module and the files below it are one: it may use them, and they its names. Any other circle is a
-    /// fault.
-    fn circles_of_files(&self) -> Vec<String> {
-        let closing: Vec<_> =
-            self.arrows.iter().filter(|arrow| !arrow.down).map(|arrow| (arrow.from, arrow.to)).collect();
-        circles(self.house.files.len(), &closing)
-            .iter()
-            .map(|circle| format!("a circle of files: {}", around(circle, |file| self.name(file))))
-            .collect()
+    fn circles(&self) -> Vec<String> {
+        let rules = self.rules.iter().flat_map(|(from, to)| to.iter().map(move |to| (&**from, &**to)));
+        let rules = circles(rules).into_iter().map(|rooms| rooms.join(", "));
+        // A module and the files below it are one: it may use them, and they its names.
+        let module = |file: usize| &self.files[file].module;
+        let arrows = self.arrows.iter().copied().filter(|&(from, to)| !module(to).starts_with(module(from)));
+        let files =
+            circles(arrows).into_iter().map(|files| files.into_iter().map(|file| self.name(file)).collect());
+        let files = files.map(|names: Vec<String>| names.join(", "));
+        rules.chain(files).map(|names| format!("these import each other in a circle: {names}")).collect()
     }
 }
 
-fn around(circle: &[usize], name: impl Fn(usize) -> String) -> String {
-    let names: Vec<String> = circle.iter().chain(circle.first()).map(|&node| name(node)).collect();
-    names.join(" -> ")
+/// Groups of nodes that reach each other.
+fn circles<T: Copy + Ord + std::hash::Hash>(arrows: impl IntoIterator<Item = (T, T)>) -> Vec<Vec<T>> {
+    let groups = tarjan_scc(&DiGraphMap::<T, ()>::from_edges(arrows));
+    groups.into_iter().filter(|group| group.len() > 1).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Survey;
+    use super::allowed;
     use std::fs;
     use std::path::Path;
 
@@ -145,7 +125,7 @@ mod tests {
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(path, text).unwrap();
         }
-        let faults = Survey::new(&folder).unwrap().faults();
+        let faults = super::faults(&folder).unwrap();
         fs::remove_dir_all(folder).unwrap();
         faults
     }
@@ -176,7 +156,7 @@ mod tests {
             ("src/a/y.rs", "use super::X; pub struct Y;"),
             ("src/b.rs", ""),
         ]);
-        assert_eq!(found, ["a circle of files: src/a/x.rs -> src/a/y.rs -> src/a/x.rs"]);
+        assert_eq!(found, ["these import each other in a circle: src/a/y.rs, src/a/x.rs"]);
     }
 
     #[test]
@@ -184,14 +164,25 @@ mod tests {
         let found = faults(&[("src/lib.rs", "pub mod a; pub mod c;"), ("src/a.rs", ""), ("src/c.rs", "")]);
         assert_eq!(
             found,
-            ["ARCHITECTURE.md has no rule for c", "ARCHITECTURE.md names b, which is not there"]
+            ["b", "c"].map(|room| format!("{room} is not both a room and a rule of ARCHITECTURE.md"))
         );
     }
 
     #[test]
     fn this_workspace_keeps_its_arrows() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let faults = Survey::new(&root).unwrap().faults();
+        let faults = super::faults(&root).unwrap();
         assert!(faults.is_empty(), "\n{}\n", faults.join("\n"));
+    }
+
+    #[test]
+    fn statements_are_read() {
+        let text = "## Who may import whom\n\n```text\na -> everything\nb, c -> d (as, such), e    \
+            d -> nothing\ne -> nothing  b-f -> hybank::d\n```\n";
+        let rules = allowed(text).unwrap();
+        let named: Vec<&str> = rules["b"].iter().map(String::as_str).collect();
+        assert_eq!((named, rules["b-f"].len(), rules.len()), (vec!["d", "e"], 1, 6));
+        assert!(allowed("nothing").is_err());
+        assert!(allowed("## Who may import whom\n```text\na b\n```").unwrap_err().contains("a b"));
     }
 }
