@@ -1,11 +1,10 @@
-//! From how many taps per phase on do fast FIR and overlap-save take less time than the direct algorithm?
+//! From how many taps per phase on does overlap-save take less time than the direct algorithm?
 //!
-//! `cargo bench --bench algorithm_crossover` measures all three along a ladder of K for several N and M,
+//! `cargo bench --bench algorithm_crossover` measures both along a ladder of K for several N and M,
 //! overlap-save with the four shortest transforms that hold a block of K frames, in nanoseconds per frame
-//! (best of many repeats), and sets beside them what the plan chooses, first among the algorithms that add
-//! no latency. The constants of the plan's cost model (`runtime/src/algorithms/choice.rs`) were fitted to
-//! this table. Words after `--`: `f64` for double precision, `prompt` without overlap-save, and the name of
-//! an instruction set (`portable`, `avx2`, `avx512`) for that set instead of the widest one.
+//! (best of many repeats), and sets beside them what the plan chooses. The constants of the plan's cost model (`runtime/src/algorithms/choice.rs`) were fitted to
+//! this table. Words after `--`: `f64` for double precision, and the name of an
+//! instruction set (`portable`, `avx2`, `avx512`) for that set instead of the widest one.
 
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::runtime::{Algorithm, Isa, Options, Precision, Stream};
@@ -53,21 +52,17 @@ fn measure(bank: &Bank, options: Options) -> f64 {
 
 fn main() {
     let asked = |wanted: &str| std::env::args().any(|word| word == wanted);
-    let (double, prompt) = (asked("f64"), asked("prompt"));
     let isa = Isa::available().find(|isa| asked(isa.name())).unwrap_or_else(Isa::detect);
-    let precision = if double { Precision::Double } else { Precision::Single };
-    println!(
-        "| N | M | K | direct, ns per frame | fast FIR | overlap-save, F: ns per frame | the plan, no added latency | the plan |"
-    );
-    println!("|---|---|---|---|---|---|---|---|");
+    let precision = if asked("f64") { Precision::Double } else { Precision::Single };
+    println!("| N | M | K | direct, ns per frame | overlap-save, F: ns per frame | the plan |");
+    println!("|---|---|---|---|---|---|");
     for (n, m) in SHAPES {
         for k in LAGS {
             let bank = fir(n, m, k * m);
             let options = |algorithm| Options { precision, algorithm, isa, ..Options::default() };
             let direct = measure(&bank, options(Algorithm::Direct));
-            let fast = measure(&bank, options(Algorithm::FastFir));
             let shortest = (2 * k).next_power_of_two().max(16);
-            let lengths = (0..if prompt { 0 } else { 4 }).map(|i| shortest << i);
+            let lengths = (0..4).map(|i| shortest << i);
             let others: Vec<_> = lengths
                 .map(|len| {
                     format!(
@@ -76,14 +71,10 @@ fn main() {
                     )
                 })
                 .collect();
-            let plan = |algorithm| Stream::new(&bank.plan(options(algorithm)).unwrap()).plan().summary();
-            let (prompt_plan, plan) = (
-                plan(Algorithm::Auto { added_latency: false }).algorithm,
-                plan(Algorithm::Auto { added_latency: true }),
-            );
+            let plan = bank.plan(options(Algorithm::Auto)).unwrap().summary();
             let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
             println!(
-                "| {n} | {m} | {k} | {direct:.2} | {fast:.2} | {} | {prompt_plan} | {}{length} |",
+                "| {n} | {m} | {k} | {direct:.2} | {} | {}{length} |",
                 others.join(", "),
                 plan.algorithm
             );

@@ -8,7 +8,7 @@
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{
-    Algorithm, Isa, Options, PcmOutput, Precision, Stream, ThreadPool, multiply_add_chains,
+    Algorithm, Interleaved, Isa, Options, PcmOutput, Precision, Stream, ThreadPool, multiply_add_chains,
 };
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -114,20 +114,9 @@ impl Table {
         for (name, n, m, taps) in CASES {
             self.fir(&format!("{name}: f32"), n, m, taps, Algorithm::Direct, FRAMES);
             self.fir(&format!("{name}: f32, 64 frames per call"), n, m, taps, Algorithm::Direct, 64);
-            self.fir(&format!("{name}: f32, fast FIR"), n, m, taps, Algorithm::FastFir, FRAMES);
-            self.fir(
-                &format!("{name}: f32, fast FIR, 64 frames per call"),
-                n,
-                m,
-                taps,
-                Algorithm::FastFir,
-                64,
-            );
             self.doubles(&format!("{name}: f64"), n, m, taps, Algorithm::Direct);
-            self.doubles(&format!("{name}: f64, fast FIR"), n, m, taps, Algorithm::FastFir);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
             self.threads(&format!("{name}: f32, two threads"), n, m, taps, Algorithm::Direct);
-            self.threads(&format!("{name}: f32, fast FIR, two threads"), n, m, taps, Algorithm::FastFir);
             self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
             self.worst(name, n, m, taps);
         }
@@ -186,8 +175,8 @@ impl Table {
         let layout = SampleLayout::packed(PcmFormat::S16Le);
         self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
             let frames = PcmFrames { layout, channels: n, bytes: black_box(&bytes) };
-            let mut output = PcmOutput { format: PcmFormat::S16Le, bytes: &mut out, clipped: 0 };
-            stream.process_pcm(&[frames], &mut output).unwrap();
+            let mut output = PcmOutput::packed(PcmFormat::S16Le, &mut out);
+            stream.run(&[frames][..], &mut output).unwrap();
         });
     }
 
@@ -210,7 +199,8 @@ impl Table {
             stream.process(black_box(&x), &mut y).unwrap();
             one = one.min(start.elapsed());
             let start = Instant::now();
-            stream.process_parallel(black_box(&x), &mut y, &pool).unwrap();
+            let frames = Interleaved::new(black_box(&x), n).unwrap();
+            stream.run_parallel(&frames, &mut y[..], &pool).unwrap();
             two = two.min(start.elapsed());
         }
         let (one, two) = (one.as_secs_f64(), two.as_secs_f64());
@@ -242,14 +232,6 @@ impl Table {
         }
         for taps in [256, 512, 1024] {
             self.fir(&format!("taps: N 8 M 8, {taps} taps"), 8, 8, taps, Algorithm::Direct, FRAMES);
-            self.fir(
-                &format!("taps: N 8 M 8, {taps} taps, fast FIR"),
-                8,
-                8,
-                taps,
-                Algorithm::FastFir,
-                FRAMES,
-            );
         }
     }
 

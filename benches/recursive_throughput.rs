@@ -7,7 +7,7 @@
 //! ("biquads"), and the share of the peak.
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
-use hybank::runtime::{Isa, Options, Precision, Stream, multiply_add_chains};
+use hybank::runtime::{Isa, Options, Stream, multiply_add_chains};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -131,9 +131,8 @@ fn peak() -> f64 {
         })
 }
 
-fn measure(case: &Case, recursion: Precision, call: usize) {
-    let options = Options { recursion, ..Options::default() };
-    let mut stream = Stream::new(&bank(case.filter.clone()).plan(options).expect("a sound bank"));
+fn measure(case: &Case, call: usize) {
+    let mut stream = Stream::new(&bank(case.filter.clone()).plan(Options::default()).expect("a sound bank"));
     let (n, m) = (stream.channels(), stream.ratio());
     let x: Vec<f32> = (0..n * FRAMES).map(|i| ((i * 7919) % 1000) as f32 / 1000.0 - 0.5).collect();
     let mut y = vec![0.0; m * FRAMES];
@@ -164,22 +163,20 @@ fn main() {
         "| bank | algorithm | frames per call | M frames/s | M outputs/s | G sections/s | G biquads/s | GMAC/s | of f32 peak |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    for recursion in [Precision::Double, Precision::Single] {
-        for case in [
-            parallel(16, 4, 4),
-            parallel(16, 2, 2),
-            parallel(4, 2, 2),
-            parallel(32, 8, 8),
-            apart(4, 4),
-            apart(8, 8),
-        ] {
-            measure(&case, recursion, FRAMES);
-        }
-        for case in [designed(1, 5, 2, 2), designed(2, 3, 4, 4), designed(3, 3, 8, 8)] {
-            measure(&case, recursion, FRAMES);
-        }
-        measure(&parallel(16, 4, 4), recursion, 64);
-        measure(&full(8, 2, 2), recursion, FRAMES);
-        measure(&full(32, 4, 4), recursion, FRAMES);
+    for case in [
+        parallel(16, 4, 4),
+        parallel(16, 2, 2),
+        parallel(4, 2, 2),
+        parallel(32, 8, 8),
+        apart(4, 4),
+        apart(8, 8),
+    ] {
+        measure(&case, FRAMES);
     }
+    for case in [designed(1, 5, 2, 2), designed(2, 3, 4, 4), designed(3, 3, 8, 8)] {
+        measure(&case, FRAMES);
+    }
+    measure(&parallel(16, 4, 4), 64);
+    measure(&full(8, 2, 2), FRAMES);
+    measure(&full(32, 4, 4), FRAMES);
 }

@@ -5,8 +5,7 @@ usage: algorithm_costs.py LANES < table      (LANES of 32 bytes: 8 for f32, 4 fo
 
 Prints nanoseconds for each term of a frame, and quantiles of measured / fitted. Divided by the time of a vector of
 products and rounded they are the constants of the model. Then prints how much longer the choices of the plan take
-than the fastest algorithm: run it for the table of each instruction set, because one model serves them all. Where
-overlap-save was not measured, its column is empty.
+than the fastest algorithm: run it for the table of each instruction set, because one model serves them all.
 """
 
 import sys
@@ -34,12 +33,6 @@ def direct(n, m, k):
     return [steps * depth * m / GROUP, depth * m / GROUP, m, 1]
 
 
-def halves(costs, n, m, k):
-    """Terms of fast FIR: half a frame of each of three direct filters at their costs, vectors of outputs, of inputs."""
-    filters = [direct(n, m, -(-k // 2))] * 2 + [direct(n, m, k // 2)]
-    return [np.sum(filters, axis=0) @ costs / 2, m / GROUP, n / GROUP]
-
-
 def fit(name, rows):
     """Non-negative least squares of the relative error; what a busy host delayed weighs less."""
     terms, times = (np.array(column, float) for column in zip(*rows))
@@ -52,29 +45,24 @@ def fit(name, rows):
     return costs
 
 
-def losses(name, rows, column):
-    """How much longer the plan's choice takes than the fastest measured algorithm; overlap-save only with `plan`."""
+def losses(rows):
+    """How much longer the plan's choice takes than the fastest measured algorithm."""
     ratios = []
     for row in rows:
-        times = {"direct": float(row[3]), "fast-fir": float(row[4])}
-        if column == "plan":
-            times |= {f"overlap-save {f}": float(t) for f, t in (part.split(":") for part in row[5].split(",") if part)}
-        chosen = row[7 if column == "plan" else 6]
-        if chosen in times:
-            ratios.append((times[chosen] / min(times.values()), "N {} M {} K {}".format(*row[:3]), chosen))
+        times = {"direct": float(row[3])}
+        times |= {f"overlap-save {f}": float(t) for f, t in (part.split(":") for part in row[4].split(","))}
+        if row[5] in times:
+            ratios.append((times[row[5]] / min(times.values()), "N {} M {} K {}".format(*row[:3]), row[5]))
     values = [ratio for ratio, *_ in ratios]
     wrong = sum(value > 1.1 for value in values)
-    print(f"{name}: {len(values)} sizes, {wrong} lose more than a tenth; median and 95 %:",
+    print(f"auto: {len(values)} sizes, {wrong} lose more than a tenth; median and 95 %:",
           np.round(np.percentile(values, [50, 95]), 2), "worst:", *max(ratios))
 
 
 rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in sys.stdin]
-rows = [row for row in rows if len(row) == 8 and row[0].isdigit()]
+rows = [row for row in rows if len(row) == 6 and row[0].isdigit()]
 sizes = [tuple(map(int, row[:3])) for row in rows]
-costs = fit("direct", [(direct(*size), float(row[3])) for size, row in zip(sizes, rows)])
-fit("fast FIR", [(halves(costs, *size), float(row[4])) for size, row in zip(sizes, rows)])
-pairs = [(size, part.split(":")) for size, row in zip(sizes, rows) for part in row[5].split(",") if part]
-if pairs:
-    fit("overlap-save", [(blocks(*size, int(length)), float(time)) for size, (length, time) in pairs])
-    losses("auto with added latency", rows, "plan")
-losses("auto without added latency", rows, "prompt")
+fit("direct", [(direct(*size), float(row[3])) for size, row in zip(sizes, rows)])
+pairs = [(size, part.split(":")) for size, row in zip(sizes, rows) for part in row[4].split(",")]
+fit("overlap-save", [(blocks(*size, int(length)), float(time)) for size, (length, time) in pairs])
+losses(rows)

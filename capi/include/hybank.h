@@ -26,7 +26,7 @@ extern "C" {
 /* A bank with the state of one stream. */
 typedef struct hybank hybank;
 
-/* Reads a bank file. algorithm: "auto" (no added latency), "direct", "fast-fir" or "overlap-save". Sums are in double
+/* Reads a bank file. algorithm: "auto" (direct: no added latency), "direct" or "overlap-save". Sums are in double
  * precision if double_sums is not 0; recursive banks always use double. NULL on failure. */
 hybank *hybank_open(const char *path, const char *algorithm, int double_sums);
 

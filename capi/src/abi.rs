@@ -196,7 +196,7 @@ pub unsafe extern "C" fn hybank_flush_int16(bank: *mut Handle, to: *mut i16) -> 
     let run = || {
         let handle = handle(bank)?;
         let bytes = output(to.cast::<u8>(), 2 * handle.tail())?;
-        handle.flush(&mut PcmOutput { format: INT16, bytes, clipped: 0 })
+        handle.flush(&mut PcmOutput::packed(INT16, bytes))
     };
     count(run())
 }

@@ -30,7 +30,9 @@ impl Handle {
         let text = read_text(Path::new(path), BANK_FILE).map_err(|error| error.to_string())?;
         let bank = Bank::from_json(&text, path).map_err(|error| error.to_string())?;
         let precision = if double_sums { Precision::Double } else { Precision::Single };
-        let options = Options { precision, algorithm: parse(algorithm)?, ..Options::default() };
+        let algorithm = algorithm.parse::<Algorithm>().map_err(|error| format!("algorithm: {error}"))?;
+        let options =
+            Options { precision, algorithm: algorithm.without_added_latency(), ..Options::default() };
         let plan = bank.plan(options).map_err(|error| format!("{path}: {error}"))?;
         Ok(Self { stream: Stream::new(&plan) })
     }
@@ -54,24 +56,12 @@ impl Handle {
     fn process_int16(&mut self, input: &[u8], output: &mut [u8]) -> Result<usize, String> {
         let layout = SampleLayout::packed(INT16);
         let input = [PcmFrames { layout, channels: self.channels(), bytes: input }];
-        let mut output = PcmOutput { format: INT16, bytes: output, clipped: 0 };
-        self.stream.process_pcm(&input, &mut output).map_err(|error| error.to_string())
+        let mut output = PcmOutput::packed(INT16, output);
+        self.stream.run(&input[..], &mut output).map_err(|error| error.to_string())
     }
 
     fn flush(&mut self, output: &mut (impl Output + ?Sized)) -> Result<usize, String> {
         self.stream.flush(output).map_err(|error| error.to_string())
-    }
-}
-
-fn parse(algorithm: &str) -> Result<Algorithm, String> {
-    match algorithm {
-        "auto" => Ok(Algorithm::Auto { added_latency: false }),
-        "direct" => Ok(Algorithm::Direct),
-        "fast-fir" => Ok(Algorithm::FastFir),
-        "overlap-save" => Ok(Algorithm::OverlapSave { transform: None }),
-        _ => Err(format!(
-            "algorithm: \"{algorithm}\" is unknown; choose auto, direct, fast-fir or overlap-save"
-        )),
     }
 }
 

@@ -49,7 +49,7 @@ _Spec: TypeAlias = _Path | Mapping[str, Any]
 _Filter: TypeAlias = dict[str, Any]
 _Quantity: TypeAlias = float | str | np.number[Any]
 _Cutoff: TypeAlias = _Quantity | Sequence[_Quantity] | NDArray[Any]
-_Algorithm: TypeAlias = Literal["auto", "direct", "fast-fir", "overlap-save"]
+_Algorithm: TypeAlias = Literal["auto", "direct", "overlap-save"]
 _Matrix: TypeAlias = NDArray[np.float64]
 
 class HybankError(ValueError): ...

@@ -9,7 +9,7 @@ from hybank import Bank
 
 _Path: TypeAlias = str | PathLike[str]
 _Source: TypeAlias = _Path | tuple[_Path, str] | Sequence[_Path]
-_Algorithm: TypeAlias = Literal["auto", "direct", "fast-fir", "overlap-save"]
+_Algorithm: TypeAlias = Literal["auto", "direct", "overlap-save"]
 _Progress: TypeAlias = Callable[[int, int], object]
 
 SPAN: int

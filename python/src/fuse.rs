@@ -19,7 +19,7 @@ const MOST_THREADS: i64 = 1024;
 pub(crate) struct Request {
     workers: Option<ThreadPool>,
     gaps: Option<GapPolicy>,
-    algorithm: Option<Algorithm>,
+    algorithm: Algorithm,
     keep_latency: bool,
 }
 
@@ -46,9 +46,7 @@ impl Request {
     /// As the command line chooses: the fastest, and direct where gaps are filled, so that outputs that no
     /// gap affects have the same bits as without gaps.
     fn algorithm(&self) -> Algorithm {
-        let auto =
-            if self.gaps.is_some() { Algorithm::Direct } else { Algorithm::Auto { added_latency: true } };
-        self.algorithm.unwrap_or(auto)
+        if self.gaps.is_some() { self.algorithm.without_added_latency() } else { self.algorithm }
     }
 }
 
@@ -63,17 +61,9 @@ fn workers(threads: i64) -> PyResult<Option<ThreadPool>> {
     }
 }
 
-/// The algorithm of a name; `None` for `auto`.
-pub(crate) fn parse_algorithm(name: &str) -> PyResult<Option<Algorithm>> {
-    match name {
-        "auto" => Ok(None),
-        "direct" => Ok(Some(Algorithm::Direct)),
-        "fast-fir" => Ok(Some(Algorithm::FastFir)),
-        "overlap-save" => Ok(Some(Algorithm::OverlapSave { transform: None })),
-        _ => Err(HybankError::new_err(format!(
-            "algorithm: \"{name}\" is unknown; choose auto, direct, fast-fir or overlap-save"
-        ))),
-    }
+/// The algorithm of a name.
+pub(crate) fn parse_algorithm(name: &str) -> PyResult<Algorithm> {
+    name.parse().map_err(|error| HybankError::new_err(format!("algorithm: {error}")))
 }
 
 /// The bank made ready for outputs of a format.

@@ -60,7 +60,7 @@ impl<'py> NewArray<'py> {
             Numbers::I32(array) => bytemuck::cast_slice_mut(array.as_slice_mut().map_err(refused)?),
         };
         let format = pcm.ok_or_else(|| refused("floats are not integers"))?;
-        Ok(Room::Pcm(PcmOutput { format, bytes, clipped: 0 }))
+        Ok(Room::Pcm(PcmOutput::packed(format, bytes)))
     }
 
     /// The array.

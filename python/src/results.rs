@@ -98,7 +98,7 @@ impl Figures {
 #[pyclass(frozen, get_all, module = "hybank")]
 #[derive(FromPyObject)]
 pub(crate) struct FuseReport {
-    /// `direct`, `fast-fir`, `overlap-save`, `parallel-form` or `dense`.
+    /// `direct`, `overlap-save`, `parallel-form` or `dense`.
     pub(crate) algorithm: String,
     /// Number type of the sums: `f32` or `f64`.
     pub(crate) numbers: String,

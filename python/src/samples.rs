@@ -192,9 +192,9 @@ fn pcm_halves<'h, R>(
     samples: usize,
     with: impl FnOnce(&mut Room<'h>, &mut Room<'h>) -> R,
 ) -> R {
-    let format = room.format;
+    let format = room.layout.format;
     let (earlier, later) = room.bytes.split_at_mut(samples * format.bytes());
-    let half = |bytes| Room::Pcm(PcmOutput { format, bytes, clipped: 0 });
+    let half = |bytes| Room::Pcm(PcmOutput::packed(format, bytes));
     let (mut earlier, mut later) = (half(earlier), half(later));
     let result = with(&mut earlier, &mut later);
     room.clipped += earlier.clipped() + later.clipped();

@@ -8,7 +8,7 @@ use crate::fuse::{parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::samples::{Room, Samples};
 use hybank::bank::Bank;
-use hybank::runtime::{self, Algorithm, Plan, ProcessError, STATE_COUNTS, StateError};
+use hybank::runtime::{self, Plan, ProcessError, STATE_COUNTS, StateError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 use std::fmt;
@@ -51,8 +51,7 @@ impl Stream {
         let format = dtype.map_or(Ok(default), Format::of_dtype)?;
         let shape = Shape { axis, channels: bank.channel_count() };
         shape.check()?;
-        let auto = Algorithm::Auto { added_latency: false };
-        let plan = plan(bank, format, parse_algorithm(algorithm)?.unwrap_or(auto))?;
+        let plan = plan(bank, format, parse_algorithm(algorithm)?.without_added_latency())?;
         let streams = vec![runtime::Stream::new(&plan); 1 + usize::from(format.complex)];
         let state = Mutex::new(State { streams, clipped: 0, closed: false });
         Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, state })

@@ -44,7 +44,7 @@ def fused(tmp_path, bank, x, **keywords):
 
 
 @pytest.mark.parametrize("kind", SIGNALS)
-@pytest.mark.parametrize("algorithm", ["direct", "fast-fir", "overlap-save"])
+@pytest.mark.parametrize("algorithm", ["direct", "overlap-save"])
 def test_spans_have_the_bits_of_one_run(filters, tmp_path, algorithm, kind):
     bank = hb.load(filters / "interleaved-4x250M.json")
     x = drawn(kind, 4).astype("f4")

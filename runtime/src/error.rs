@@ -87,14 +87,6 @@ pub enum BuildError {
         /// Its name.
         algorithm: &'static str,
     },
-    /// Fast FIR was asked for, but there are no pairs of taps.
-    #[error(
-        "fast-fir pairs the taps of each phase, at least 2, and these filters have {phase_taps} (taps / M); use `direct`"
-    )]
-    TooShort {
-        /// K.
-        phase_taps: usize,
-    },
     /// The filters together are too long for 32-bit offsets.
     #[error(
         "the filters look back {history} frames on {channels} channels, more than the runtime can address; shorten them"
@@ -138,6 +130,14 @@ pub enum ProcessError {
         /// N.
         wanted: usize,
     },
+    /// The input claims more frames than there can be output samples for.
+    #[error("the input has {frames} frames, whose {ratio} samples each are more than can be counted")]
+    TooManyFrames {
+        /// Frames of the input.
+        frames: usize,
+        /// M.
+        ratio: usize,
+    },
     /// The output slice is too short.
     #[error("the output has room for {given} samples, {wanted} are needed (M per frame)")]
     OutputTooShort {
@@ -163,7 +163,7 @@ pub enum SwapError {
     },
     /// The state of the stream does not tell the state of the new plan.
     #[error(
-        "a stream of `{from}` cannot go on by this plan of `{to}`: direct and fast-fir follow each other, overlap-save the same taps per phase, transform and precision, and a recursion only its own plan"
+        "a stream of `{from}` cannot go on by this plan of `{to}`: only the history of `direct` means the same to other filters, in the same number type"
     )]
     State {
         /// Algorithm of the stream.

@@ -2,6 +2,7 @@
 
 use crate::aligned::Aligned;
 use crate::sample::Sample;
+use crate::state::Numbers;
 
 /// The last samples before the next frame, then room for frames to come. Short calls move along in the room;
 /// only when it is used up are the last samples copied to the front.
@@ -47,11 +48,6 @@ impl<T: Sample> History<T> {
         &self.samples[self.next - self.len..]
     }
 
-    /// Samples of the view before the next frame.
-    pub(crate) fn len(&self) -> usize {
-        self.len
-    }
-
     /// The `frames` frames that were written into the room belong to the history now.
     pub(crate) fn advance(&mut self, frames: usize) {
         self.next += frames * self.channels;
@@ -80,10 +76,19 @@ impl<T: Sample> History<T> {
         if back > self.len { T::default() } else { self.samples[self.next - back] }
     }
 
-    /// The same samples as in another history of the same shape.
-    pub(crate) fn copy_from(&mut self, other: &Self) {
-        self.samples.copy_from_slice(&other.samples);
-        self.next = other.next;
+    /// Passes the samples of the last `frames` frames to `put`, the last frame first.
+    pub(crate) fn save(&self, frames: usize, put: &mut dyn FnMut(f64)) {
+        for age in 1..=frames {
+            (0..self.channels).for_each(|channel| put(self.sample(age, channel).to_f64()));
+        }
+    }
+
+    /// The history is what [`History::save`] gave as the first of `numbers`, and zeros before that.
+    pub(crate) fn resume(&mut self, frames: usize, numbers: Numbers<'_>) {
+        let n = self.channels;
+        let known =
+            |age: usize, channel| if age <= frames { numbers.get((age - 1) * n + channel) } else { 0.0 };
+        self.fill(|age, channel| T::from_f64(known(age, channel)));
     }
 }
 

@@ -31,14 +31,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Samples need not be interleaved f32: [`Stream::process_planar`] takes a slice per channel,
-//! [`Stream::process_pcm`] recordings as they lie in files, [`ComplexStream`] complex samples, and
-//! [`Stream::run`] any [`Input`] and [`Output`].
+//! Samples need not be interleaved: [`Stream::run`] takes any [`Input`] and gives to any [`Output`], such as
+//! a slice per channel ([`Planar`]) and recordings as they lie in files ([`PcmFrames`], [`PcmOutput`]).
+//! Complex samples (IQ) are two streams through one plan, one for the real parts and one for the imaginary
+//! ones, which [`PcmFrames::part`] and [`PcmOutput::part`] pick out by a stride.
 //!
 //! | [`Algorithm`] | latency | work per output sample | [`history`](Plan::history) |
 //! |---|---|---|---|
 //! | `direct` | none added | N K multiply-adds | K - 1 frames |
-//! | `fast-fir` | none added | 3/4 N K, and additions | K - 1, or K if odd |
 //! | `overlap-save` | a batch of frames | O(N log K) | K - 1 |
 //! | recursive (`parallel-form`, `dense`) | none added | by the order | for ever |
 //!
@@ -47,7 +47,6 @@
 mod adapters;
 mod algorithms;
 mod aligned;
-mod complex;
 mod engine;
 mod error;
 mod history;
@@ -67,14 +66,16 @@ mod tests;
 mod thread_pool;
 
 pub use adapters::{Frames, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
-pub use algorithms::choice::Algorithm;
-pub use complex::ComplexStream;
+pub use algorithms::choice::{Algorithm, ParseAlgorithmError};
 pub use error::{BuildError, ProcessError, StateError, SwapError};
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use plan::{Options, Plan, PlanSummary};
 pub use precision::Precision;
 pub use sample::Sample;
-pub use simd::{Isa, multiply_add_chains};
+pub use simd::Isa;
+#[doc(hidden)]
+pub use simd::multiply_add_chains;
+#[doc(hidden)]
 pub use state::STATE_COUNTS;
 pub use state_space::StateSpace;
 pub use stream::Stream;

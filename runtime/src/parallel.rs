@@ -5,9 +5,10 @@
 //! than threads: a thread that is done takes the next one, so that a thread that was held up does not hold
 //! up all.
 
-use crate::ThreadPool;
 use crate::adapters::{Frames, Input, SplitOutput};
 use crate::algorithms::Filter;
+use crate::algorithms::direct::{Direct, DirectState};
+use crate::{Sample, ThreadPool};
 use std::ops::Range;
 
 /// Multiply-adds that are worth a chunk: some tens of microseconds, many times what it costs to hand it
@@ -18,38 +19,23 @@ const CHUNK_MULTIPLY_ADDS: usize = 1 << 20;
 /// long against making its state.
 const CHUNKS_PER_THREAD: usize = 8;
 
-/// A filter whose calls can be cut into chunks.
-pub(crate) trait Chunked: Filter {
-    /// Frames from one where a chunk may begin to the next.
-    const ALIGNMENT: usize;
-    /// Multiply-adds of a frame.
-    fn frame_multiply_adds(&self) -> usize;
-    /// M.
-    fn ratio(&self) -> usize;
-    /// Frames that a state must know.
-    fn history_frames(&self) -> usize;
-    /// Frames since a chunk could have begun, for a stream in this state.
-    fn phase_offset(state: &Self::State) -> usize;
-    /// A state before frame `first`, which has so many frames before it and at which a chunk may begin.
-    fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> Self::State;
-}
-
 /// Runs a call on all threads and leaves the state after its last frame; returns how many samples were not
 /// finite.
-pub(crate) fn process<F: Chunked>(
-    filter: &F,
-    state: &mut F::State,
+pub(crate) fn process<T: Sample>(
+    filter: &Direct<T>,
+    state: &mut DirectState<T>,
     input: &(impl Input + Sync + ?Sized),
     output: &mut (impl SplitOutput + ?Sized),
     pool: &ThreadPool,
 ) -> u64 {
     let frames = input.frames();
-    let least = CHUNK_MULTIPLY_ADDS.div_ceil(filter.frame_multiply_adds()).max(4 * filter.history_frames());
+    let frame_multiply_adds = (filter.multiply_adds() * filter.ratio as f64) as usize;
+    let least = CHUNK_MULTIPLY_ADDS.div_ceil(frame_multiply_adds).max(4 * filter.history_frames());
     if pool.threads() == 1 || frames < 2 * least {
         return filter.process(state, input, output);
     }
     let chunk = least.max(frames / (CHUNKS_PER_THREAD * pool.threads()));
-    let call = Call { filter, input, phase_offset: F::phase_offset(state), chunk };
+    let call = Call { filter, input, chunk };
     let (replaced, last) = pool.install(|| call.chunks(0..frames, Some(state), output));
     if let Some(last) = last {
         *state = last;
@@ -58,31 +44,28 @@ pub(crate) fn process<F: Chunked>(
 }
 
 /// A call whose chunks are shared out.
-struct Call<'a, F, I: ?Sized> {
-    filter: &'a F,
+struct Call<'a, T: Sample, I: ?Sized> {
+    filter: &'a Direct<T>,
     input: &'a I,
-    /// Frames since a chunk could have begun, before the call.
-    phase_offset: usize,
     /// Least frames of a chunk.
     chunk: usize,
 }
 
-impl<F: Chunked, I: Input + Sync + ?Sized> Call<'_, F, I> {
+impl<T: Sample, I: Input + Sync + ?Sized> Call<'_, T, I> {
     /// The frames of a range to an output of their own. The first chunk has the stream's `state`, the others
     /// make theirs; returns how many samples were not finite, and the state after the last chunk if it is
     /// not the stream's.
     fn chunks(
         &self,
         frames: Range<usize>,
-        state: Option<&mut F::State>,
+        state: Option<&mut DirectState<T>>,
         output: &mut (impl SplitOutput + ?Sized),
-    ) -> (u64, Option<F::State>) {
+    ) -> (u64, Option<DirectState<T>>) {
         if frames.len() < 2 * self.chunk {
             return self.chunk(frames, state, output);
         }
         let middle = frames.start + frames.len() / 2;
-        let middle = middle - (self.phase_offset + middle) % F::ALIGNMENT;
-        output.halves((middle - frames.start) * self.filter.ratio(), |earlier, later| {
+        output.halves((middle - frames.start) * self.filter.ratio, |earlier, later| {
             let ((some, _), (more, last)) = rayon::join(
                 || self.chunks(frames.start..middle, state, earlier),
                 || self.chunks(middle..frames.end, None, later),
@@ -94,9 +77,9 @@ impl<F: Chunked, I: Input + Sync + ?Sized> Call<'_, F, I> {
     fn chunk(
         &self,
         frames: Range<usize>,
-        state: Option<&mut F::State>,
+        state: Option<&mut DirectState<T>>,
         output: &mut (impl SplitOutput + ?Sized),
-    ) -> (u64, Option<F::State>) {
+    ) -> (u64, Option<DirectState<T>>) {
         let chunk = Frames::new(self.input, frames.clone());
         match state {
             Some(state) => (self.filter.process(state, &chunk, output), None),

@@ -2,20 +2,17 @@
 
 use crate::adapters::Offsets;
 use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
-use crate::algorithms::{Direct, Facts, FastFir, OverlapSave, Recursive};
-use crate::engine::{Coefficients, Engine};
+use crate::algorithms::{Direct, Facts, OverlapSave, Recursive};
+use crate::engine::{Engine, Fir, Running};
 use crate::state::Digest;
-use crate::{Algorithm, BuildError, Isa, Precision, StateSpace};
+use crate::{Algorithm, BuildError, Isa, Precision, Sample, StateSpace};
 use std::sync::Arc;
 
 /// How a bank is made ready to run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Number type of the FIR kernels.
+    /// Number type of the FIR kernels. Recursions feed their rounding errors back and always run in f64.
     pub precision: Precision,
-    /// Number type of recursions, [`Precision::Double`] unless asked for otherwise: a recursion feeds its
-    /// rounding errors back, and in f32 the error is about 1e-7 of full scale divided by 1 - |pole|.
-    pub recursion: Precision,
     /// How FIR filters are computed, [`Algorithm::Direct`] unless asked for otherwise, because the others
     /// round otherwise or add latency.
     pub algorithm: Algorithm,
@@ -25,19 +22,14 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            precision: Precision::default(),
-            recursion: Precision::Double,
-            algorithm: Algorithm::default(),
-            isa: Isa::detect(),
-        }
+        Self { precision: Precision::default(), algorithm: Algorithm::default(), isa: Isa::detect() }
     }
 }
 
 /// How a bank runs, for reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanSummary {
-    /// `direct`, `fast-fir` or `overlap-save` (FIR), `parallel-form` (delay lines and second-order sections
+    /// `direct` or `overlap-save` (FIR), `parallel-form` (delay lines and second-order sections
     /// side by side) or `dense` (delay lines and any other states).
     pub algorithm: &'static str,
     /// Number type of the sums: `f32` or `f64`.
@@ -50,7 +42,7 @@ pub struct PlanSummary {
     pub block: Option<usize>,
     /// Output samples by which the algorithm is later than the bank's own latency.
     pub extra_latency: usize,
-    /// Multiply-adds for each output sample; additions of fast FIR and of transforms count as such. `None`
+    /// Multiply-adds for each output sample; additions of transforms count as such. `None`
     /// for recursions.
     pub multiply_adds: Option<f64>,
 }
@@ -59,7 +51,8 @@ pub struct PlanSummary {
 /// [streams](crate::Stream) on any threads may use it at the same time.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    coefficients: Coefficients,
+    /// With a state at its beginning.
+    start: Arc<Engine>,
     facts: Facts,
     channels: usize,
     ratio: usize,
@@ -98,27 +91,11 @@ impl Plan {
         check_counts(taps.len(), ratio)?;
         let isa = options.isa;
         let choice = options.algorithm.choose(taps, ratio, options.precision)?;
-        let coefficients = match (choice, options.precision) {
-            (ChosenAlgorithm::Direct, Precision::Single) => {
-                Coefficients::DirectF32(Arc::new(Direct::new(taps, ratio, isa)?))
-            }
-            (ChosenAlgorithm::Direct, Precision::Double) => {
-                Coefficients::DirectF64(Arc::new(Direct::new(taps, ratio, isa)?))
-            }
-            (ChosenAlgorithm::FastFir, Precision::Single) => {
-                Coefficients::FastFirF32(Arc::new(FastFir::new(taps, ratio, isa)?))
-            }
-            (ChosenAlgorithm::FastFir, Precision::Double) => {
-                Coefficients::FastFirF64(Arc::new(FastFir::new(taps, ratio, isa)?))
-            }
-            (ChosenAlgorithm::OverlapSave(len), Precision::Single) => {
-                Coefficients::OverlapSaveF32(Arc::new(OverlapSave::new(taps, ratio, len, isa)?))
-            }
-            (ChosenAlgorithm::OverlapSave(len), Precision::Double) => {
-                Coefficients::OverlapSaveF64(Arc::new(OverlapSave::new(taps, ratio, len, isa)?))
-            }
+        let start = match options.precision {
+            Precision::Single => Engine::F32(choice.filter(taps, ratio, isa)?),
+            Precision::Double => Engine::F64(choice.filter(taps, ratio, isa)?),
         };
-        let mut plan = Self::new(coefficients, [taps.len(), ratio], latency, isa);
+        let mut plan = Self::new(start, [taps.len(), ratio], latency, isa);
         plan.digest.add_lists(taps);
         Ok(plan)
     }
@@ -137,15 +114,8 @@ impl Plan {
         check_counts(channels, ratio)?;
         check_recursive(options.algorithm)?;
         let isa = options.isa;
-        let coefficients = match options.recursion {
-            Precision::Single => {
-                Coefficients::RecursiveF32(Arc::new(Recursive::new(filter, channels, ratio, isa)?))
-            }
-            Precision::Double => {
-                Coefficients::RecursiveF64(Arc::new(Recursive::new(filter, channels, ratio, isa)?))
-            }
-        };
-        let mut plan = Self::new(coefficients, [channels, ratio], latency, isa);
+        let start = Engine::Recursive(Running::new(Recursive::new(filter, channels, ratio, isa)?));
+        let mut plan = Self::new(start, [channels, ratio], latency, isa);
         let StateSpace { a, b, c, d } = filter;
         [a, b, c, d].into_iter().for_each(|rows| plan.digest.add_lists(rows));
         Ok(plan)
@@ -167,17 +137,17 @@ impl Plan {
         Ok(Self { offsets, digest, ..self })
     }
 
-    fn new(coefficients: Coefficients, [channels, ratio]: [usize; 2], latency: usize, isa: Isa) -> Self {
-        let facts = coefficients.facts();
-        let mut digest = Digest::new(facts.name, coefficients.numbers());
+    fn new(start: Engine, [channels, ratio]: [usize; 2], latency: usize, isa: Isa) -> Self {
+        let facts = start.facts();
+        let mut digest = Digest::new(facts.name, start.numbers());
         let (transform, _) = facts.transform.unwrap_or_default();
         [channels, ratio, latency, transform].into_iter().for_each(|size| digest.add(size as u64));
         Self {
-            coefficients,
+            start: Arc::new(start),
             facts,
             channels,
             ratio,
-            latency: latency + facts.delay * ratio,
+            latency: latency.saturating_add(facts.delay * ratio),
             offsets: None,
             isa,
             digest,
@@ -196,7 +166,7 @@ impl Plan {
 
     /// With a state at its beginning.
     pub(crate) fn start(&self) -> Engine {
-        self.coefficients.start()
+        Engine::clone(&self.start)
     }
 
     /// N, samples per frame of the input.
@@ -221,16 +191,14 @@ impl Plan {
         self.facts.delay * self.ratio
     }
 
-    /// Frames after which an input is forgotten: K - 1, and for fast FIR K if that is odd. `None` for a
-    /// recursion, which never forgets.
+    /// K - 1, frames after which an input is forgotten. `None` for a recursion, which never forgets.
     pub fn history(&self) -> Option<usize> {
         self.facts.history
     }
 
     /// Frames by which a stream is processed: two streams of the same input, one begun a multiple of so many
     /// frames after the other and with its [history](Plan::history) before that, have the same bits. 1 for
-    /// the direct algorithm, 2 for fast FIR, the 2 S B frames of a batch for overlap-save. For recursions
-    /// 64: denormals are flushed so often, and the bits are the same only if the state is. How a stream is
+    /// the direct algorithm, the 2 S B frames of a batch for overlap-save. For recursions 64: denormals are flushed so often, and the bits are the same only if the state is. How a stream is
     /// cut into calls never matters.
     pub fn alignment(&self) -> usize {
         self.facts.alignment
@@ -251,13 +219,24 @@ impl Plan {
         let Facts { name, transform, multiply_adds, .. } = self.facts;
         PlanSummary {
             algorithm: name,
-            numbers: self.coefficients.numbers(),
+            numbers: self.start.numbers(),
             isa: self.isa.to_string(),
             transform: transform.map(|(len, _)| len),
             block: transform.map(|(_, block)| block),
             extra_latency: self.extra_latency(),
             multiply_adds,
         }
+    }
+}
+
+impl ChosenAlgorithm {
+    fn filter<T: Sample>(self, taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Fir<T>, BuildError> {
+        Ok(match self {
+            Self::Direct => Fir::Direct(Running::new(Direct::new(taps, ratio, isa)?)),
+            Self::OverlapSave(len) => {
+                Fir::OverlapSave(Running::new(OverlapSave::new(taps, ratio, len, isa)?))
+            }
+        })
     }
 }
 

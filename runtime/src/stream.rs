@@ -2,10 +2,10 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{Input, Interleaved, Output, Planar, WithoutOffsets, Zeros};
+use crate::adapters::{Input, Interleaved, Output, WithoutOffsets, Zeros};
 use crate::engine::Engine;
 use crate::state::{Count, Header, Numbers};
-use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, StateError, SwapError};
+use crate::{Plan, ProcessError, Sample, StateError, SwapError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
 /// first frame, and x_i the samples without the [offsets](Plan::with_offsets) of their converters.
@@ -23,19 +23,16 @@ use crate::{PcmFrames, PcmOutput, Plan, ProcessError, Sample, StateError, SwapEr
 /// | | NaN or infinity in the input | sums that overflow |
 /// |---|---|---|
 /// | direct | seen in the outputs; filtered again with zeros | filtered again at most once |
-/// | fast FIR | replaced first; filtered once | each such output by definition in f64: N K multiply-adds |
 /// | overlap-save | replaced first; filtered once | the batch once more, from smaller numbers |
 /// | recursive | replaced first; filtered once | filtered once; state 0, [counted](Self::state_resets) |
 ///
-/// Only the repair of fast FIR may cost more than filtering twice, because it is not vectorised. The search
-/// for what is not finite passes over the input at most three times.
+/// The search for what is not finite passes over the input at most three times.
 ///
 /// Denormals change none of these counts. FIR filters flush nothing: a denormal is a number like any other,
 /// and the floating-point mode of the thread is neither changed nor asked for. Where the processor handles
 /// denormals in microcode, each instruction that meets one takes some hundred cycles more; a thread that
 /// cannot afford this sets its flush-to-zero mode. Recursions flush their states every 64 frames: those
-/// below 1e-30 (f32) or 1e-280 (f64) become 0, so that a state that fades away is denormal for less than 64
-/// frames.
+/// below 1e-280 become 0, so that a state that fades away is denormal for less than 64 frames.
 ///
 /// A clone is a second stream at the same place.
 #[derive(Debug, Clone)]
@@ -119,33 +116,6 @@ impl Stream {
         self.run(&Interleaved::new(input, self.channels())?, output)
     }
 
-    /// As [`Stream::process`], from a slice for each channel: sample of channel i in frame k at
-    /// `input[i][k]`.
-    ///
-    /// # Errors
-    /// As [`Stream::process`], and if the channels differ in length.
-    pub fn process_planar<S: Sample>(
-        &mut self,
-        input: &[&[S]],
-        output: &mut [S],
-    ) -> Result<usize, ProcessError> {
-        self.run(&Planar::new(input)?, output)
-    }
-
-    /// As [`Stream::process`], from and to samples as they lie in files and pipes: the channels are those of
-    /// all `input` recordings one after another, the frames those that all of them have. Outputs that do not
-    /// fit an integer format saturate and are counted.
-    ///
-    /// # Errors
-    /// As [`Stream::process`].
-    pub fn process_pcm(
-        &mut self,
-        input: &[PcmFrames<'_>],
-        output: &mut PcmOutput<'_>,
-    ) -> Result<usize, ProcessError> {
-        self.run(input, output)
-    }
-
     /// As [`Stream::process`], from any input and to any output.
     ///
     /// # Errors
@@ -187,34 +157,6 @@ impl Stream {
         Ok(samples)
     }
 
-    /// As [`Stream::process`], on all threads of `pool` at once; see [`Stream::run_parallel`].
-    ///
-    /// # Errors
-    /// As [`Stream::process`].
-    #[cfg(feature = "rayon")]
-    pub fn process_parallel<S: Sample>(
-        &mut self,
-        input: &[S],
-        output: &mut [S],
-        pool: &crate::ThreadPool,
-    ) -> Result<usize, ProcessError> {
-        self.run_parallel(&Interleaved::new(input, self.channels())?, output, pool)
-    }
-
-    /// As [`Stream::process_pcm`], on all threads of `pool` at once; see [`Stream::run_parallel`].
-    ///
-    /// # Errors
-    /// As [`Stream::process`].
-    #[cfg(feature = "rayon")]
-    pub fn process_pcm_parallel(
-        &mut self,
-        input: &[PcmFrames<'_>],
-        output: &mut PcmOutput<'_>,
-        pool: &crate::ThreadPool,
-    ) -> Result<usize, ProcessError> {
-        self.run_parallel(input, output, pool)
-    }
-
     /// Brings out the last samples by [`Plan::flush_frames`] frames of zeros, which are part of the stream
     /// like any others. Returns the samples written, that many frames times M; `output` needs room for them.
     ///
@@ -229,33 +171,16 @@ impl Stream {
         Ok(samples)
     }
 
-    /// Goes on by other coefficients of the same N and M, with the history kept: for a bank that was
-    /// redesigned while the stream runs. Allocates the new state; [`Stream::continue_from`] does not.
-    ///
-    /// # Errors
-    /// [`SwapError`]; the stream is as before then.
-    pub fn swap(&mut self, plan: &Plan) -> Result<(), SwapError> {
-        let mut next = Self::new(plan);
-        next.continue_from(self)?;
-        *self = next;
-        Ok(())
-    }
-
     /// Makes this stream, whatever it was, the continuation of `running` by its own plan, at the same frame
     /// and with the same counts. Does not allocate: make the new stream on another thread, and call this at
     /// a frame boundary on the thread that runs.
     ///
     /// Samples of the past stay as they are: the offsets of the new plan hold for the frames to come.
     ///
-    /// From one FIR plan without added latency (direct, fast FIR; any K, any precision) to another, the
-    /// outputs are those that the new plan would have given from the beginning, bit for bit: at once if the
-    /// [history](Plan::history) of the new plan is no longer than that of the old one, else as many frames
-    /// later as the new one looks back. What the old plan had forgotten counts as 0 in between.
-    ///
-    /// From one overlap-save plan to another of the same K, transform and precision, outputs of complete
-    /// batches are still those of the old plan; the new one makes all batches from the running one on, so
-    /// that it has taken over after one [alignment](Plan::alignment). A recursion can only go on by its own
-    /// plan: its state means nothing to other coefficients.
+    /// For direct plans of one number type only. The outputs are those that the new plan would have given from
+    /// the beginning, bit for bit: at once if the [history](Plan::history) of the new plan is no longer than
+    /// that of the old one, else as many frames later as the new one looks back. What the old plan had
+    /// forgotten counts as 0 in between.
     ///
     /// # Errors
     /// [`SwapError`]; the stream is as before then.
@@ -265,7 +190,7 @@ impl Stream {
             return Err(SwapError::Shape { from, to });
         }
         let [from, to] = [old, new].map(|plan| plan.algorithm());
-        if !self.engine.continue_from(&running.engine, running.position) {
+        if !self.engine.continue_from(&running.engine) {
             return Err(SwapError::State { from, to });
         }
         (self.position, self.replaced) = (running.position, running.replaced);
@@ -292,7 +217,7 @@ impl Stream {
         let header = Header { position, replaced, resets: self.state_resets(), digest: self.plan.digest() };
         header.write(self.alignment(), bytes);
         let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
-        self.engine.save(self.channels(), &mut put);
+        self.engine.save(&mut put);
     }
 
     /// Makes this stream, whatever it was, the continuation of the one that gave `state`: the same frames
@@ -303,25 +228,21 @@ impl Stream {
     /// algorithm, number type and latency; the stream is as before then.
     pub fn resume(&mut self, state: &[u8]) -> Result<(), StateError> {
         let (header, numbers) = self.read(state)?;
-        self.go_on(header, numbers);
+        let place = header.position % self.alignment() as u64;
+        self.engine.resume(place as usize, numbers, header.resets);
+        (self.position, self.replaced) = (header.position, header.replaced);
         Ok(())
     }
 
     /// The parts of a state of this plan.
-    pub(crate) fn read<'a>(&self, state: &'a [u8]) -> Result<(Header, Numbers<'a>), StateError> {
+    fn read<'a>(&self, state: &'a [u8]) -> Result<(Header, Numbers<'a>), StateError> {
         let count = |place: usize| self.count(place as u64);
         Header::read(state, self.plan.digest(), self.alignment(), count)
     }
 
-    pub(crate) fn go_on(&mut self, header: Header, numbers: Numbers<'_>) {
-        self.engine.resume(self.channels(), header.position, numbers);
-        self.engine.set_resets(header.resets);
-        (self.position, self.replaced) = (header.position, header.replaced);
-    }
-
     /// Numbers of the state at a frame.
     fn count(&self, position: u64) -> Count {
-        self.engine.count(self.channels(), (position % self.alignment() as u64) as usize)
+        self.engine.count((position % self.alignment() as u64) as usize)
     }
 
     /// The samples that will be written, if everything fits.
@@ -333,7 +254,10 @@ impl Stream {
         if input.channels() != self.channels() {
             return Err(ProcessError::Channels { given: input.channels(), wanted: self.channels() });
         }
-        let wanted = input.frames() * self.ratio();
+        let (frames, ratio) = (input.frames(), self.ratio());
+        let Some(wanted) = frames.checked_mul(ratio) else {
+            return Err(ProcessError::TooManyFrames { frames, ratio });
+        };
         if output.capacity() < wanted {
             return Err(ProcessError::OutputTooShort { given: output.capacity(), wanted });
         }

@@ -1,9 +1,7 @@
 //! States as bytes: a stream goes on from them with the bits of the one that never stopped, and refuses what
 //! is no state of its plan.
 
-use hybank_runtime::{
-    Algorithm, ComplexStream, Options, Plan, Precision, STATE_COUNTS, StateError, StateSpace, Stream,
-};
+use hybank_runtime::{Algorithm, Options, Plan, Precision, STATE_COUNTS, StateError, StateSpace, Stream};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
@@ -15,7 +13,7 @@ fn numbers(count: usize, seed: usize) -> Vec<f64> {
 }
 
 fn options(algorithm: Algorithm, precision: Precision) -> Options {
-    Options { algorithm, precision, recursion: precision, ..Options::default() }
+    Options { algorithm, precision, ..Options::default() }
 }
 
 /// Filters of so many taps per phase on so many channels.
@@ -26,7 +24,7 @@ fn fir(channels: usize, phase_taps: usize, algorithm: Algorithm, precision: Prec
 
 /// States in a row after a delay line of two frames of channel 1; all of them depend on the next one
 /// (`dense`), or two on each other (`parallel-form`).
-fn recursion(channels: usize, order: usize, precision: Precision) -> Plan {
+fn recursion(channels: usize, order: usize) -> Plan {
     let size = order + 2;
     let mut a = vec![vec![0.0; size]; size];
     for i in 0..order {
@@ -41,7 +39,7 @@ fn recursion(channels: usize, order: usize, precision: Precision) -> Plan {
     b[order + 1] = (0..channels).map(|i| if i == 0 { 1.0 } else { 0.0 }).collect();
     let (c, d) = ((0..M).map(|i| numbers(size, 11 + i)).collect(), vec![vec![0.5; channels]; M]);
     let system = StateSpace { a, b, c, d };
-    Plan::from_state_space(&system, [channels, M], 4, options(Algorithm::Direct, precision)).unwrap()
+    Plan::from_state_space(&system, [channels, M], 4, Options::default()).unwrap()
 }
 
 /// Every algorithm in both precisions, with K odd and even, with and without offsets.
@@ -49,11 +47,11 @@ fn plans() -> Vec<Plan> {
     let overlap_save = Algorithm::OverlapSave { transform: Some(32) };
     let mut plans = Vec::new();
     for precision in [Precision::Single, Precision::Double] {
-        for algorithm in [Algorithm::Direct, Algorithm::FastFir, overlap_save] {
+        for algorithm in [Algorithm::Direct, overlap_save] {
             plans.extend([(1, 2), (2, 9), (3, 10)].map(|(n, k)| fir(n, k, algorithm, precision)));
         }
-        plans.extend([(1, 2), (2, 2), (2, 5)].map(|(n, order)| recursion(n, order, precision)));
     }
+    plans.extend([(1, 2), (2, 2), (2, 5)].map(|(n, order)| recursion(n, order)));
     let offset = plans[3].clone().with_offsets(&[0.25]).unwrap();
     plans.push(offset);
     plans
@@ -80,7 +78,7 @@ fn counts(stream: &Stream) -> [u64; 3] {
 fn a_stream_goes_on_with_the_bits_of_the_one_that_never_stopped() {
     let all = plans();
     let names: std::collections::BTreeSet<_> = all.iter().map(Plan::algorithm).collect();
-    assert_eq!(Vec::from_iter(names), ["dense", "direct", "fast-fir", "overlap-save", "parallel-form"]);
+    assert_eq!(Vec::from_iter(names), ["dense", "direct", "overlap-save", "parallel-form"]);
     let case = (0..all.len(), 0..700usize, 1..300usize, 0..200usize);
     let config = Config { cases: 400, failure_persistence: None, ..Config::default() };
     let test = TestRunner::new(config).run(&case, |(plan, cut, more, dirt)| {
@@ -105,9 +103,9 @@ fn a_stream_goes_on_with_the_bits_of_the_one_that_never_stopped() {
 
 #[test]
 fn a_state_that_overflowed_is_reset_at_the_same_frame() {
-    let plan = recursion(2, 2, Precision::Single);
+    let plan = recursion(2, 2);
     let mut running = Stream::new(&plan);
-    process(&mut running, &[3e38; 2 * 10]);
+    process(&mut running, &[1.7e308; 2 * 10]);
     let mut other = Stream::new(&plan);
     other.resume(&running.state()).unwrap();
     let more = numbers(2 * 90, 1);
@@ -193,28 +191,6 @@ fn damaged_states_are_refused_and_change_nothing() {
             bytes[56..64].fill(0xff);
             refuse(&bytes, StateError::Damaged);
         }
-    }
-}
-
-#[test]
-fn the_state_of_complex_streams() {
-    for plan in &plans() {
-        let n = plan.channels();
-        let input: Vec<[f64; 2]> =
-            numbers(80 * n, 3).into_iter().zip(numbers(80 * n, 4)).map(|(re, im)| [re, im]).collect();
-        let mut out = vec![[0.0; 2]; 80 * M];
-        let (mut running, mut other) = (ComplexStream::new(plan), ComplexStream::new(plan));
-        running.process(&input[..33 * n], &mut out).unwrap();
-        let state = running.state();
-        assert_eq!(other.resume(&state), Ok(()));
-        let [one, two] = [&mut running, &mut other].map(|stream| {
-            let mut out = vec![[0.0; 2]; 47 * M];
-            stream.process(&input[33 * n..], &mut out).unwrap();
-            out
-        });
-        assert_eq!(one, two);
-        assert_eq!(other.resume(&state[..state.len() - 16]), Err(StateError::Damaged));
-        assert_eq!(other.state(), running.state());
     }
 }
 

@@ -11,7 +11,7 @@ use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
 use super::output::{Bits, check_files, precision};
-use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_report};
+use super::run::{RunReport, ThreadArgs, algorithms, carried, complete, print_report};
 use super::say::say_understood;
 use super::track::TrackArgs;
 use super::turns::TurnArgs;
@@ -59,8 +59,8 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = Bits::F32)]
     bits: Bits,
     /// Algorithm of FIR filters; auto: the fastest for the bank, and direct with --gaps
-    #[arg(long, value_enum, default_value_t = AlgorithmArg::Auto)]
-    algorithm: AlgorithmArg,
+    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
+    algorithm: Algorithm,
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long)]
     keep_latency: bool,
@@ -235,13 +235,10 @@ impl Args {
 
     fn options(&self) -> Options {
         // Outputs that no gap affects must have the same bits as without gaps.
-        let auto = if self.gaps.policy().is_some() {
-            Algorithm::Direct
-        } else {
-            Algorithm::Auto { added_latency: true }
-        };
+        // Filters that follow delays change at single frames.
+        let direct = self.gaps.policy().is_some() || self.track.is_wanted();
         let precision = precision(self.bits.format());
-        let algorithm = self.algorithm.resolve(self.track.algorithm(auto));
+        let algorithm = if direct { self.algorithm.without_added_latency() } else { self.algorithm };
         Options { precision, algorithm, ..Options::default() }
     }
 

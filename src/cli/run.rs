@@ -11,32 +11,21 @@ use super::say::{say, warn};
 use crate::pipeline::{FileOutputs, Gap, GapSummary, Outcome, Warning};
 use crate::runtime::{Algorithm, PlanSummary, ThreadPool};
 pub(super) use carried::carried;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::Path;
 
-/// How FIR filters are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum AlgorithmArg {
-    /// The fastest algorithm that suits the command
-    Auto,
-    /// Computes every product; adds no latency
-    Direct,
-    /// Two frames at a time with three products instead of four; up to a quarter faster for long filters,
-    /// adds no latency
-    FastFir,
-    /// Fourier transforms of blocks; faster for long filters, adds latency
-    OverlapSave,
-}
-
-impl AlgorithmArg {
-    /// The algorithm to run; `auto` replaces `Auto`.
-    pub(super) fn resolve(self, auto: Algorithm) -> Algorithm {
-        match self {
-            Self::Auto => auto,
-            Self::Direct => Algorithm::Direct,
-            Self::FastFir => Algorithm::FastFir,
-            Self::OverlapSave => Algorithm::OverlapSave { transform: None },
-        }
-    }
+/// Reads `--algorithm`.
+pub(super) fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
+    let names = Algorithm::ALL.map(|algorithm| {
+        PossibleValue::new(algorithm.name()).help(match algorithm {
+            Algorithm::Auto => "The fastest algorithm that suits the command",
+            Algorithm::Direct => "Computes every product; adds no latency",
+            Algorithm::OverlapSave { .. } => {
+                "Fourier transforms of blocks; faster for long filters, adds latency"
+            }
+        })
+    });
+    PossibleValuesParser::new(names).try_map(|name| name.parse())
 }
 
 /// Threads of the filters.

@@ -7,7 +7,7 @@ use super::gaps::GapArgs;
 use super::interrupt::interrupts;
 use super::journal::{Journal, JournalArgs};
 use super::output::{check_files, precision};
-use super::run::{AlgorithmArg, RunReport, ThreadArgs, carried, complete, print_report};
+use super::run::{RunReport, ThreadArgs, algorithms, carried, complete, print_report};
 use super::say::say_line;
 use super::say::say_understood;
 use super::track::TrackArgs;
@@ -59,10 +59,9 @@ pub(super) struct Args {
     /// sigmf-meta), or a FIFO; `-` is standard output
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
-    /// Algorithm of FIR filters; auto is the faster one of direct and fast-fir, because overlap-save adds
-    /// latency (--json says how much), and direct where gaps are filled
-    #[arg(long, value_enum, default_value_t = AlgorithmArg::Auto)]
-    algorithm: AlgorithmArg,
+    /// Algorithm of FIR filters; auto is direct, because overlap-save adds latency (--json says how much)
+    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
+    algorithm: Algorithm,
     /// Output the last samples at the end, as many as the latency, with zeros for input
     #[arg(long)]
     flush: bool,
@@ -232,14 +231,8 @@ impl Args {
     }
 
     fn options(&self) -> Options {
-        // Outputs that no gap affects must have the same bits as without gaps.
-        let auto = if self.gaps.policy().is_some() {
-            Algorithm::Direct
-        } else {
-            Algorithm::Auto { added_latency: false }
-        };
         let precision = precision(self.output_format());
-        let algorithm = self.algorithm.resolve(self.track.algorithm(auto));
+        let algorithm = self.algorithm.without_added_latency();
         Options { precision, algorithm, ..Options::default() }
     }
 

@@ -3,7 +3,6 @@
 
 use super::Failure;
 use super::bank_file::read_text;
-use super::run::AlgorithmArg;
 use crate::bank::Bank;
 use crate::files::AtomicFile;
 use crate::pipeline::{Pipeline, Retuned, Retuner, Retuning};
@@ -40,10 +39,10 @@ pub(super) struct TrackArgs {
 
 impl TrackArgs {
     /// Refuses impossible combinations of options, before any file is read.
-    pub(super) fn check(&self, algorithm: AlgorithmArg) -> Result<(), Failure> {
+    pub(super) fn check(&self, algorithm: Algorithm) -> Result<(), Failure> {
         let usage = |message: String| Err(Failure::Usage(message));
         let Some(text) = self.track.as_deref() else { return Ok(()) };
-        if algorithm == AlgorithmArg::OverlapSave {
+        if matches!(algorithm, Algorithm::OverlapSave { .. }) {
             let message = "--track changes the filters at single frames, and overlap-save filters in blocks; use direct";
             return usage(message.into());
         }
@@ -103,11 +102,6 @@ impl TrackArgs {
     pub(super) fn input(&self) -> Option<&Path> {
         let text = self.track.as_deref()?;
         matches!(self.kind(text), Ok(Kind::File(_))).then(|| Path::new(text))
-    }
-
-    /// The algorithm that suits changes at single frames.
-    pub(super) fn algorithm(&self, auto: Algorithm) -> Algorithm {
-        if self.is_wanted() { Algorithm::Direct } else { auto }
     }
 
     /// The pipeline with filters that follow the delays, if that is asked for; `rate` is that of the output.

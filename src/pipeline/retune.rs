@@ -166,8 +166,8 @@ impl Tuning {
         let count = stream.history().unwrap_or(0);
         let history = self.frames.history(count);
         let mut bytes = vec![0; count * stream.ratio() * size_of::<f64>()];
-        let mut output = PcmOutput { format: PcmFormat::F64Le, bytes: &mut bytes, clipped: 0 };
-        stream.process_pcm(&[self.frames.packed(&history)], &mut output)?;
+        let mut output = PcmOutput::packed(PcmFormat::F64Le, &mut bytes);
+        stream.run(&[self.frames.packed(&history)][..], &mut output)?;
         Ok(Some(stream))
     }
 

@@ -4,7 +4,7 @@ use crate::support::random::Random;
 use crate::support::{Desk, bytes, frames};
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
-use hybank::runtime::{Algorithm, Options, PcmOutput, Precision, Stream};
+use hybank::runtime::{Options, PcmOutput, Precision, Stream};
 use hybank::units::Seconds;
 use std::io::{Read, Write};
 
@@ -63,8 +63,8 @@ fn run(stream: &mut Stream, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u
             let coded: Vec<u8> = frames.iter().flat_map(|x| ((x * 32767.0) as i16).to_le_bytes()).collect();
             let layout = SampleLayout::packed(PcmFormat::S16Le);
             let mut fast = vec![0; piece * m * 3];
-            let mut output = PcmOutput { format: PcmFormat::S24Be, bytes: &mut fast, clipped: 0 };
-            stream.process_pcm(&[PcmFrames { layout, channels: n, bytes: &coded }], &mut output).unwrap();
+            let mut output = PcmOutput::packed(PcmFormat::S24Be, &mut fast);
+            stream.run(&[PcmFrames { layout, channels: n, bytes: &coded }][..], &mut output).unwrap();
             out.extend(fast);
         } else {
             let mut fast = vec![0.0; piece * m];
@@ -85,17 +85,8 @@ fn ten_thousand_random_cuts_give_the_same_bits() {
     let mut streams: Vec<_> = banks
         .iter()
         .flat_map(|bank| {
-            let forms = if matches!(bank.filters, SynthesisFilters::StateSpace(_)) {
-                &[Algorithm::Direct][..]
-            } else {
-                &[Algorithm::Direct, Algorithm::FastFir]
-            };
-            let each = forms
-                .iter()
-                .flat_map(|&algorithm| [(algorithm, Precision::Single), (algorithm, Precision::Double)]);
-            each.map(move |(algorithm, precision)| {
-                (bank, Options { algorithm, precision, ..Options::default() })
-            })
+            let precisions = [Precision::Single, Precision::Double];
+            precisions.map(|precision| (bank, Options { precision, ..Options::default() }))
         })
         .map(|(bank, options)| {
             let mut stream = Stream::new(&bank.plan(options).unwrap());

@@ -145,9 +145,13 @@ fn converters_without_a_signal_give_silence() {
     first[0] = f64::NAN;
     let lossy: Vec<f32> = first.iter().map(|&x| x as f32).collect();
     wav::write(&desk, "lossy.wav", 1, rate, &lossy);
-    for more in
-        [&[][..], &["--keep-latency"], &["--gaps", "hold"], &["--gaps", "zero"], &["--algorithm", "fast-fir"]]
-    {
+    for more in [
+        &[][..],
+        &["--keep-latency"],
+        &["--gaps", "hold"],
+        &["--gaps", "zero"],
+        &["--algorithm", "overlap-save"],
+    ] {
         let args =
             [&["fuse", "bank.json", "lossy.wav", "cap/ch2.wav", "-o", "y.wav", "--force"], more].concat();
         // The missing samples are reported.

@@ -3,7 +3,7 @@
 
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::design::{Design, DesignError, ProofSearch, analyze, design_with};
-use hybank::runtime::{Options, Precision, Stream};
+use hybank::runtime::{Options, Stream};
 use hybank::spec::Spec;
 
 /// Designs without a search for proofs, which other tests are about.
@@ -96,18 +96,4 @@ fn channels_that_cannot_be_told_apart_share_a_filter_in_sections_too() {
     stream.process(&three, &mut b).unwrap();
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst:e}");
-}
-
-#[test]
-fn single_precision_is_asked_for_and_stays_near() {
-    let bank = design(&spec("iir", &[1.2, 0.6], 10, BUTTERWORTH)).unwrap().bank;
-    let options = Options { recursion: Precision::Single, ..Options::default() };
-    let mut single = Stream::new(&bank.plan(options).unwrap());
-    assert_eq!(single.plan().summary().numbers, "f32");
-    let input = samples(2 * 2000);
-    let (mut a, mut b) = (vec![0.0; input.len()], vec![0.0; input.len()]);
-    single.process(&input, &mut a).unwrap();
-    Stream::new(&bank.plan(Options::default()).unwrap()).process(&input, &mut b).unwrap();
-    let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert!(worst > 0.0 && worst < 1e-5, "{worst:e}");
 }

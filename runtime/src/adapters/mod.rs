@@ -6,14 +6,12 @@
 //! of samples and [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one by one, so that no
 //! adapter needs memory of its own.
 
-mod complex;
 mod frames;
 mod interleaved;
 mod offsets;
 mod pcm;
 mod planar;
 
-pub(crate) use complex::{ComplexInput, ComplexOutput, Part};
 pub use frames::Frames;
 pub use interleaved::Interleaved;
 pub(crate) use offsets::{Offsets, WithoutOffsets};

@@ -1,6 +1,7 @@
 //! The offsets of the converters, subtracted from the samples on their way to the kernels.
 
 use super::Input;
+use crate::sample::SamplesMut;
 use crate::{BuildError, Isa, Sample};
 use std::ops::Sub;
 
@@ -24,7 +25,7 @@ impl Offsets {
         if offsets.len() != channels {
             return Err(BuildError::OffsetCount { offsets: offsets.len(), channels });
         }
-        if let Some(index) = offsets.iter().position(|&offset| !f32::from_f64(offset).finite()) {
+        if let Some(index) = offsets.iter().position(|&offset| !f32::from_f64(offset).is_finite()) {
             let location = "the offsets of the channels".to_owned();
             return Err(BuildError::NotFinite { location, index, value: offsets[index] });
         }
@@ -37,10 +38,9 @@ impl Offsets {
 
     /// Subtracts the offsets from whole frames.
     fn subtract_from<T: Sample>(&self, samples: &mut [T]) {
-        if let Some(samples) = T::as_f32_mut(samples) {
-            subtract(samples, &self.single);
-        } else if let Some(samples) = T::as_f64_mut(samples) {
-            subtract(samples, &self.double);
+        match T::typed_mut(samples) {
+            SamplesMut::F32(samples) => subtract(samples, &self.single),
+            SamplesMut::F64(samples) => subtract(samples, &self.double),
         }
     }
 }

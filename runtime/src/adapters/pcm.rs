@@ -2,19 +2,34 @@
 
 use super::{Input, MOST_ROWS, Output, SCRATCH, SplitOutput, convert, interleave_rows};
 use crate::pcm::for_pcm_format;
+use crate::sample::{Samples, SamplesMut};
 use crate::simd::{decode, encode};
-use crate::{Isa, PcmFormat, PcmFrames, Sample};
+use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
 
 /// Room for output samples as they lie in files and pipes. Those beyond the full scale of an integer format
 /// saturate.
 #[derive(Debug)]
 pub struct PcmOutput<'a> {
-    /// How samples are to be stored.
-    pub format: PcmFormat,
+    /// How samples are to be stored; bytes between samples stay as they are.
+    pub layout: SampleLayout,
     /// M samples per frame.
     pub bytes: &'a mut [u8],
     /// Samples that were clipped, added to by every call.
     pub clipped: u64,
+}
+
+impl<'a> PcmOutput<'a> {
+    /// Room for samples that lie close together, none of them clipped so far.
+    pub fn packed(format: PcmFormat, bytes: &'a mut [u8]) -> Self {
+        Self { layout: SampleLayout::packed(format), bytes, clipped: 0 }
+    }
+
+    /// Room for one part of complex samples, which are pairs of those of this output: the real parts if `part`
+    /// is 0, the imaginary ones if it is 1. What is clipped is counted apart.
+    pub fn part(&mut self, part: usize) -> PcmOutput<'_> {
+        let start = (part * self.layout.container).min(self.bytes.len());
+        PcmOutput { layout: self.layout.part(), bytes: &mut self.bytes[start..], clipped: 0 }
+    }
 }
 
 /// Several recordings side by side: their channels follow each other.
@@ -33,8 +48,8 @@ impl Input for [PcmFrames<'_>] {
         }
         let n = self.channels();
         let mono = self.iter().all(|recording| recording.channels == 1);
-        match T::as_f32_mut(samples) {
-            Some(samples) if mono && n <= MOST_ROWS => {
+        match T::typed_mut(samples) {
+            SamplesMut::F32(samples) if mono && n <= MOST_ROWS => {
                 interleave_rows(isa, n, samples, |i, start, row| {
                     load_recording(isa, &self[i], first + start, row);
                 });
@@ -46,9 +61,8 @@ impl Input for [PcmFrames<'_>] {
 
 /// All channels from one recording.
 fn load_recording<T: Sample>(isa: Isa, recording: &PcmFrames<'_>, first: usize, samples: &mut [T]) {
-    let packed = recording.layout.container == recording.layout.format.bytes();
-    let done = match T::as_f32_mut(samples) {
-        Some(samples) if packed => {
+    let done = match T::typed_mut(samples) {
+        SamplesMut::F32(samples) if recording.layout.is_packed() => {
             decode(isa, recording.layout.format, &recording.bytes[first * recording.frame_bytes()..], samples)
         }
         _ => 0,
@@ -72,11 +86,12 @@ fn load_each<T: Sample>(recordings: &[PcmFrames<'_>], first: usize, samples: &mu
 /// frame may end after them).
 fn load_columns<T: Sample>(recording: &PcmFrames<'_>, first: usize, n: usize, samples: &mut [T]) {
     let container = recording.layout.container;
-    let bytes = recording.bytes.chunks_exact(recording.frame_bytes()).skip(first);
+    // The last sample may end before its container does.
+    let bytes = recording.bytes.chunks(recording.frame_bytes()).skip(first);
     for_pcm_format!(recording.layout.format, FORMAT => {
         for (frame, bytes) in samples.chunks_mut(n).zip(bytes) {
-            for (slot, sample) in frame[..recording.channels].iter_mut().zip(bytes.chunks_exact(container)) {
-                *slot = T::from_f64(FORMAT.decode(sample));
+            for (i, slot) in frame[..recording.channels].iter_mut().enumerate() {
+                *slot = T::from_f64(FORMAT.decode(&bytes[i * container..]));
             }
         }
     });
@@ -84,17 +99,19 @@ fn load_columns<T: Sample>(recording: &PcmFrames<'_>, first: usize, n: usize, sa
 
 impl Output for PcmOutput<'_> {
     fn capacity(&self) -> usize {
-        self.bytes.len() / self.format.bytes()
+        self.layout.containers(self.bytes.len())
     }
 
     fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
-        let size = self.format.bytes();
-        let out = &mut self.bytes[first * size..(first + samples.len()) * size];
-        self.clipped += match T::as_f32(samples) {
-            Some(samples) => encode(isa, self.format, samples, out),
-            None if size < 4 => encode_by_scratch(isa, self.format, samples, out),
-            // Formats that hold more digits than f32.
-            None => encode_each(self.format, samples, out),
+        let SampleLayout { format, container } = self.layout;
+        let out = &mut self.bytes[first * container..];
+        self.clipped += match T::typed(samples) {
+            Samples::F32(samples) if self.layout.is_packed() => encode(isa, format, samples, out),
+            Samples::F64(samples) if self.layout.is_packed() && format.bytes() < 4 => {
+                encode_by_scratch(isa, format, samples, out)
+            }
+            // Formats that hold more digits than f32, and samples apart.
+            _ => encode_each(self.layout, samples, out),
         };
     }
 }
@@ -110,9 +127,9 @@ impl SplitOutput for PcmOutput<'_> {
         samples: usize,
         with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
     ) -> R {
-        let Self { format, bytes, clipped } = self;
-        let (earlier, later) = bytes.split_at_mut(samples * format.bytes());
-        let half = |bytes| PcmOutput { format: *format, bytes, clipped: 0 };
+        let Self { layout, bytes, clipped } = self;
+        let (earlier, later) = bytes.split_at_mut(samples * layout.container);
+        let half = |bytes| PcmOutput { layout: *layout, bytes, clipped: 0 };
         let (mut earlier, mut later) = (half(earlier), half(later));
         let result = with(&mut earlier, &mut later);
         *clipped += earlier.clipped + later.clipped;
@@ -134,11 +151,14 @@ fn encode_by_scratch<T: Sample>(isa: Isa, format: PcmFormat, samples: &[T], out:
 }
 
 /// Sample by sample; returns how many were clipped.
-fn encode_each<T: Sample>(format: PcmFormat, samples: &[T], out: &mut [u8]) -> u64 {
+fn encode_each<T: Sample>(layout: SampleLayout, samples: &[T], out: &mut [u8]) -> u64 {
     let mut clipped = 0;
-    for_pcm_format!(format, FORMAT => {
-        for (slot, value) in out.chunks_exact_mut(FORMAT.bytes()).zip(samples) {
-            clipped += u64::from(FORMAT.encode(value.to_f64(), slot));
+    for_pcm_format!(layout.format, FORMAT => {
+        let mut put = |(slot, value): (&mut [u8], &T)| clipped += u64::from(FORMAT.encode(value.to_f64(), slot));
+        if layout.is_packed() {
+            out.chunks_exact_mut(FORMAT.bytes()).zip(samples).for_each(&mut put);
+        } else {
+            out.chunks_mut(layout.container).zip(samples).for_each(&mut put);
         }
     });
     clipped

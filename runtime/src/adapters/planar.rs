@@ -1,6 +1,7 @@
 //! Samples in memory, channel after channel.
 
 use super::{Input, MOST_ROWS, convert, interleave_rows};
+use crate::sample::SamplesMut;
 use crate::{Isa, ProcessError, Sample};
 
 /// A slice for each channel: sample of channel i in frame k at `[i][k]`.
@@ -45,10 +46,12 @@ impl<S: Sample> Input for Planar<'_, S> {
 
     fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
         let n = self.channels.len();
-        match T::as_f32_mut(samples) {
-            Some(samples) if n <= MOST_ROWS => interleave_rows(isa, n, samples, |i, start, row| {
-                convert(&self.channels[i][first + start..][..row.len()], row);
-            }),
+        match T::typed_mut(samples) {
+            SamplesMut::F32(samples) if n <= MOST_ROWS => {
+                interleave_rows(isa, n, samples, |i, start, row| {
+                    convert(&self.channels[i][first + start..][..row.len()], row);
+                })
+            }
             _ => {
                 for (k, frame) in (first..).zip(samples.chunks_exact_mut(n)) {
                     for (slot, channel) in frame.iter_mut().zip(self.channels) {

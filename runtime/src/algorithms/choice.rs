@@ -10,19 +10,17 @@ use super::filter::phase_taps;
 use super::overlap_save::Shape;
 use crate::simd::{SHORTEST_TRANSFORM, group_lanes};
 use crate::{BuildError, Precision};
+use std::fmt;
+use std::str::FromStr;
 
 /// How FIR filters are computed. All give the same sums up to rounding.
+///
+/// The names are those of [`FromStr`] and [`Display`](fmt::Display): `auto`, `direct` and `overlap-save`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Algorithm {
     /// Every product is computed; no sample is later than the bank's latency.
     #[default]
     Direct,
-    /// Two-parallel fast FIR: pairs of frames through three filters of half the length in place of four
-    /// (Karatsuba), for filters of K >= 2 taps per phase. Up to a quarter less work for long ones, and no
-    /// sample is later. The error is relative to the norms of each channel's filter and of the inputs in its
-    /// history and not to each product: a few eps, for white noise up to 1.4 times that of the direct
-    /// algorithm.
-    FastFir,
     /// Fourier transforms of `transform` = F frames, a power of two from 16 on that is at least K, or of the
     /// best such length. For long filters a fraction of the work, but the output is later by
     /// [`extra_latency`](crate::Plan::extra_latency).
@@ -30,18 +28,34 @@ pub enum Algorithm {
         /// F; `None` for the best length.
         transform: Option<usize>,
     },
-    /// The fastest algorithm by the measured costs of all; overlap-save only if `added_latency` is true.
-    Auto {
-        /// May the output be later than the bank's latency?
-        added_latency: bool,
-    },
+    /// The faster one by the measured costs of both; the output may be later than the bank's latency.
+    Auto,
+}
+
+/// A name that is not one of [`Algorithm::ALL`].
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is unknown; choose auto, direct or overlap-save")]
+pub struct ParseAlgorithmError(pub String);
+
+impl fmt::Display for Algorithm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Algorithm {
+    type Err = ParseAlgorithmError;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        let known = Self::ALL.into_iter().find(|algorithm| algorithm.name() == name);
+        known.ok_or_else(|| ParseAlgorithmError(name.to_owned()))
+    }
 }
 
 /// The algorithm that a bank runs by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ChosenAlgorithm {
     Direct,
-    FastFir,
     /// By transforms of F frames.
     OverlapSave(usize),
 }
@@ -57,24 +71,38 @@ const DIRECT_OUTPUT: f64 = 0.3;
 const ROW_LEVEL: f64 = 4.2;
 /// Each output of overlap-save: from rows to frames.
 const BLOCK_OUTPUT: f64 = 0.8;
-/// Each vector of outputs of fast FIR: from products to frames; each vector of inputs: to halves and means.
-const PAIR_OUTPUTS: f64 = 12.0;
-const PAIR_INPUTS: f64 = 10.0;
 /// Each input of overlap-save, and each frame.
 const BLOCK_INPUT: f64 = 0.5;
 const BLOCK_FRAME: f64 = 1.0;
 
 /// A longer transform must be cheaper by this factor: it makes outputs later.
 const WORTH_LENGTH: f64 = 0.93;
-/// An algorithm must be cheaper by this factor than one that rounds less or adds no latency.
+/// Overlap-save must be cheaper by this factor than the direct algorithm, which rounds less and adds no
+/// latency.
 const WORTH_CHANGE: f64 = 0.9;
 
 impl Algorithm {
+    /// All algorithms; overlap-save with the best length.
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Direct, Self::OverlapSave { transform: None }];
+
+    /// The name, without the length of a transform.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::OverlapSave { .. } => "overlap-save",
+            Self::Auto => "auto",
+        }
+    }
+
+    /// The same with [`Algorithm::Direct`] for [`Algorithm::Auto`], where a later output is not wanted.
+    pub fn without_added_latency(self) -> Self {
+        if self == Self::Auto { Self::Direct } else { self }
+    }
+
     /// The algorithm that filters are to run by.
     ///
     /// # Errors
-    /// [`BuildError::Transform`] if no transform, or not the given one, can hold the filters;
-    /// [`BuildError::TooShort`] if there are no pairs of taps to halve.
+    /// [`BuildError::Transform`] if no transform, or not the given one, can hold the filters.
     pub(crate) fn choose(
         self,
         taps: &[Vec<f64>],
@@ -86,16 +114,13 @@ impl Algorithm {
             |len| BuildError::Transform { len, phase_taps: size.phase_taps, shortest: SHORTEST_TRANSFORM };
         match self {
             Self::Direct => Ok(ChosenAlgorithm::Direct),
-            Self::FastFir if size.phase_taps < 2 => Err(BuildError::TooShort { phase_taps: size.phase_taps }),
-            Self::FastFir => Ok(ChosenAlgorithm::FastFir),
             Self::OverlapSave { transform: Some(len) } if !size.holds(len) => Err(refused(len)),
             Self::OverlapSave { transform: Some(len) } => Ok(ChosenAlgorithm::OverlapSave(len)),
             Self::OverlapSave { transform: None } => match size.best_transform() {
                 Some((len, _)) => Ok(ChosenAlgorithm::OverlapSave(len)),
                 None => Err(refused(LONGEST_TRANSFORM)),
             },
-            Self::Auto { added_latency: true } => Ok(size.fastest()),
-            Self::Auto { added_latency: false } => Ok(size.fastest_without_latency().0),
+            Self::Auto => Ok(size.fastest()),
         }
     }
 }
@@ -107,9 +132,7 @@ impl ChosenAlgorithm {
         let numbers = match self {
             Self::OverlapSave(len) => size.shape(len).numbers(),
             // The filters of all phases and the history, both rounded up to whole vectors.
-            Self::Direct | Self::FastFir => {
-                2.0 * (size.phase_taps * size.channels) as f64 * (size.ratio + 2) as f64
-            }
+            Self::Direct => 2.0 * (size.phase_taps * size.channels) as f64 * (size.ratio + 2) as f64,
         };
         numbers * precision.bytes()
     }
@@ -119,9 +142,8 @@ impl ChosenAlgorithm {
 /// [`BuildError::Recursive`] if only FIR filters run by this algorithm.
 pub(crate) fn check_recursive(algorithm: Algorithm) -> Result<(), BuildError> {
     match algorithm {
-        Algorithm::Direct | Algorithm::Auto { .. } => Ok(()),
-        Algorithm::FastFir => Err(BuildError::Recursive { algorithm: "fast-fir" }),
-        Algorithm::OverlapSave { .. } => Err(BuildError::Recursive { algorithm: "overlap-save" }),
+        Algorithm::Direct | Algorithm::Auto => Ok(()),
+        Algorithm::OverlapSave { .. } => Err(BuildError::Recursive { algorithm: algorithm.name() }),
     }
 }
 
@@ -154,25 +176,12 @@ impl Size {
 
     /// A frame by the direct algorithm.
     fn direct(&self) -> f64 {
-        self.direct_with(self.phase_taps)
-    }
-
-    /// A frame by the direct algorithm with K = `phase_taps`.
-    fn direct_with(&self, phase_taps: usize) -> f64 {
         // Windows are cut into whole groups, or whole frames.
         let frame = self.channels;
         let depth = if frame < self.group && frame.is_power_of_two() { frame } else { self.group };
-        let steps = (phase_taps as f64 * frame as f64 / depth as f64).ceil();
+        let steps = (self.phase_taps as f64 * frame as f64 / depth as f64).ceil();
         let vectors = (self.ratio * depth) as f64 / self.group as f64;
         vectors * (steps + DIRECT_SUM) + DIRECT_OUTPUT * self.ratio as f64
-    }
-
-    /// A frame by fast FIR: half a frame of each of three filters.
-    fn fast(&self) -> f64 {
-        let (odd, even) = (self.phase_taps / 2, self.phase_taps.div_ceil(2));
-        let filters = 2.0 * self.direct_with(even) + self.direct_with(odd);
-        let pairs = PAIR_OUTPUTS * self.ratio as f64 + PAIR_INPUTS * self.channels as f64;
-        filters / 2.0 + pairs / self.group as f64
     }
 
     fn shape(&self, len: usize) -> Shape {
@@ -199,29 +208,16 @@ impl Size {
             .reduce(|best, next| if next.1 < WORTH_LENGTH * best.1 { next } else { best })
     }
 
-    /// The algorithm that adds no latency, and its cost.
-    fn fastest_without_latency(&self) -> (ChosenAlgorithm, f64) {
-        let (direct, fast) = (self.direct(), self.fast());
-        if self.phase_taps > 1 && fast < WORTH_CHANGE * direct {
-            (ChosenAlgorithm::FastFir, fast)
-        } else {
-            (ChosenAlgorithm::Direct, direct)
-        }
-    }
-
     fn fastest(&self) -> ChosenAlgorithm {
-        let (prompt, cost) = self.fastest_without_latency();
-        let pays = |&(_, transformed): &(usize, f64)| transformed < WORTH_CHANGE * cost;
-        self.best_transform().filter(pays).map_or(prompt, |(len, _)| ChosenAlgorithm::OverlapSave(len))
+        let pays = |&(_, transformed): &(usize, f64)| transformed < WORTH_CHANGE * self.direct();
+        let transform = self.best_transform().filter(pays);
+        transform.map_or(ChosenAlgorithm::Direct, |(len, _)| ChosenAlgorithm::OverlapSave(len))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const ANY: Algorithm = Algorithm::Auto { added_latency: true };
-    const PROMPT: Algorithm = Algorithm::Auto { added_latency: false };
 
     fn chosen(
         n: usize,
@@ -239,8 +235,12 @@ mod tests {
         for (n, m, short, long) in
             [(1, 1, 16, 512), (2, 2, 8, 128), (4, 4, 4, 64), (8, 8, 4, 16), (16, 16, 2, 8)]
         {
-            assert_eq!(chosen(n, m, short, ANY), Ok(ChosenAlgorithm::Direct), "N {n} M {m} K {short}");
-            let choice = chosen(n, m, long, ANY).unwrap();
+            assert_eq!(
+                chosen(n, m, short, Algorithm::Auto),
+                Ok(ChosenAlgorithm::Direct),
+                "N {n} M {m} K {short}"
+            );
+            let choice = chosen(n, m, long, Algorithm::Auto).unwrap();
             assert!(matches!(choice, ChosenAlgorithm::OverlapSave(_)), "N {n} M {m} K {long}: {choice:?}");
         }
         assert_eq!(
@@ -250,38 +250,26 @@ mod tests {
     }
 
     #[test]
-    fn without_added_latency_long_filters_run_by_fast_fir() {
-        // Measured: the direct algorithm wins at the first K, fast FIR at the second by a tenth at least.
-        for (n, m, short, long) in
-            [(1, 1, 64, 512), (2, 2, 32, 128), (4, 4, 16, 64), (8, 8, 8, 64), (16, 16, 4, 32)]
-        {
-            assert_eq!(chosen(n, m, short, PROMPT), Ok(ChosenAlgorithm::Direct), "N {n} M {m} K {short}");
-            assert_eq!(chosen(n, m, long, PROMPT), Ok(ChosenAlgorithm::FastFir), "N {n} M {m} K {long}");
-        }
-    }
-
-    #[test]
     fn a_choice_once_made_stays_for_longer_filters() {
         for (n, m) in (1..=17).flat_map(|n| (1..=17).map(move |m| (n, m))) {
-            let size = |phase_taps| Size { channels: n, ratio: m, phase_taps, group: 8 };
-            let transformed =
-                |phase_taps: usize| matches!(size(phase_taps).fastest(), ChosenAlgorithm::OverlapSave(_));
-            let fast =
-                |phase_taps: usize| size(phase_taps).fastest_without_latency().0 == ChosenAlgorithm::FastFir;
-            for wins in [&transformed as &dyn Fn(usize) -> bool, &fast] {
-                let first = (0..14).map(|i| 1usize << i).find(|&phase_taps| wins(phase_taps)).unwrap();
-                assert!((0..6).map(|i| first << i).all(wins), "N {n} M {m}: first at K = {first}");
-            }
+            let wins = |phase_taps: usize| {
+                let size = Size { channels: n, ratio: m, phase_taps, group: 8 };
+                matches!(size.fastest(), ChosenAlgorithm::OverlapSave(_))
+            };
+            let first = (0..14).map(|i| 1usize << i).find(|&phase_taps| wins(phase_taps)).unwrap();
+            assert!((0..6).map(|i| first << i).all(wins), "N {n} M {m}: first at K = {first}");
         }
     }
 
     #[test]
-    fn one_frame_is_never_halved() {
-        for (n, m) in (1..=17).flat_map(|n| (1..=17).map(move |m| (n, m))) {
-            assert_eq!(chosen(n, m, 1, PROMPT), Ok(ChosenAlgorithm::Direct));
-            assert_ne!(chosen(n, m, 1, ANY), Ok(ChosenAlgorithm::FastFir));
+    fn names_go_both_ways_and_a_wrong_one_is_named() {
+        for algorithm in Algorithm::ALL {
+            assert_eq!(algorithm.to_string().parse(), Ok(algorithm));
         }
-        assert_eq!(chosen(1, 1, 1, Algorithm::FastFir), Err(BuildError::TooShort { phase_taps: 1 }));
+        let refused = "fast-fir".parse::<Algorithm>().unwrap_err().to_string();
+        assert_eq!(refused, "\"fast-fir\" is unknown; choose auto, direct or overlap-save");
+        let [auto, direct, overlap_save] = Algorithm::ALL.map(Algorithm::without_added_latency);
+        assert_eq!([auto, direct, overlap_save], [Algorithm::Direct, Algorithm::Direct, Algorithm::ALL[2]]);
     }
 
     #[test]

@@ -10,11 +10,12 @@
 #[cfg(test)]
 mod tests;
 
-use super::filter::{Facts, Filter, RecentInput, check_finite, phase_taps, replace_not_finite};
+use super::filter::{Facts, Filter, check_finite, phase_taps, replace_not_finite};
 use crate::adapters::{Input, Output};
 use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Polyphase, Segment, Tiling};
+use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa, Sample};
 use std::ops::Range;
 
@@ -30,7 +31,8 @@ const SEGMENT_BLOCKS: usize = 8;
 /// Coefficients in the order of use.
 #[derive(Debug)]
 pub(crate) struct Direct<T: Sample> {
-    pub(crate) channels: usize,
+    channels: usize,
+    /// M.
     pub(crate) ratio: usize,
     /// K - 1: frames that the filters look back.
     history: usize,
@@ -72,20 +74,14 @@ impl<T: Sample> Direct<T> {
     }
 
     /// N K: multiply-adds for each output sample, without those by padding.
-    pub(super) fn multiply_adds(&self) -> f64 {
+    pub(crate) fn multiply_adds(&self) -> f64 {
         (self.channels * (self.history + 1)) as f64
     }
 
     /// Frames that a state must know.
     #[cfg(feature = "rayon")]
-    pub(super) fn history_frames(&self) -> usize {
+    pub(crate) fn history_frames(&self) -> usize {
         self.history_frames
-    }
-
-    /// Zeros, for blocks of at most `block` frames, and with `more` frames than the filters look back.
-    pub(super) fn history(&self, block: usize, more: usize) -> History<T> {
-        let (n, &Tiling { history, vector, .. }) = (self.channels, self.filters.tiling());
-        History::new(n, history + more * n, block * n, vector * n)
     }
 
     /// Frames at the beginning of a call that go through the state's history although the others need not:
@@ -122,13 +118,13 @@ impl<T: Sample> Direct<T> {
         let len = if self.filters.reads_once() { SEGMENT_BLOCKS * self.block } else { self.block };
         // Whole vectors, so that all segments after it are whole vectors too.
         let first = frames.min(head + ((len - head) & !(vector - 1)));
-        if !self.run(&[segment(head, first), begin], out) {
+        if !self.filters.run(&[segment(head, first), begin], out) {
             return 0;
         }
         let mut done = first;
         while done < frames {
             let next = frames.min(done + len);
-            if !self.run(&[segment(done, next)], out) {
+            if !self.filters.run(&[segment(done, next)], out) {
                 break;
             }
             done = next;
@@ -169,26 +165,20 @@ impl<T: Sample> Direct<T> {
     /// 0, if it is not known that there are none.
     fn filter_room(&self, history: &mut History<T>, frames: usize, out: &mut [T], known_finite: bool) -> u64 {
         // Filtered first: hardly ever is there anything to replace.
-        if self.run(&[Segment { x: history.view(), first: 0, frames }], out) || known_finite {
+        if self.filters.run(&[Segment { x: history.view(), first: 0, frames }], out) || known_finite {
             return 0;
         }
         let count = replace_not_finite(history.room(frames));
         if count > 0 {
-            self.run(&[Segment { x: history.view(), first: 0, frames }], out);
+            self.filters.run(&[Segment { x: history.view(), first: 0, frames }], out);
         }
         count
-    }
-
-    /// Filters segments; false if something may not be finite.
-    #[inline]
-    pub(super) fn run(&self, segments: &[Segment<'_, T>], out: &mut [T]) -> bool {
-        self.filters.run(segments, out)
     }
 
     /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
     /// [`Direct::history_frames`] of them.
     #[cfg(feature = "rayon")]
-    fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> DirectState<T> {
+    pub(crate) fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> DirectState<T> {
         let mut samples = vec![T::default(); self.history_frames * self.channels];
         input.load(self.isa, first - self.history_frames, &mut samples);
         // They are counted where they are processed.
@@ -214,7 +204,11 @@ impl<T: Sample> Filter for Direct<T> {
     }
 
     fn state(&self) -> DirectState<T> {
-        DirectState { history: self.history(self.block, 0), output: Aligned::new(self.ratio * self.block) }
+        let (n, &Tiling { history, vector, .. }) = (self.channels, self.filters.tiling());
+        DirectState {
+            history: History::new(n, history, self.block * n, vector * n),
+            output: Aligned::new(self.ratio * self.block),
+        }
     }
 
     fn reset(state: &mut DirectState<T>) {
@@ -241,55 +235,23 @@ impl<T: Sample> Filter for Direct<T> {
         replaced
     }
 
-    #[cfg(feature = "rayon")]
-    fn process_parallel(
-        &self,
-        state: &mut DirectState<T>,
-        input: &(impl Input + Sync + ?Sized),
-        output: &mut (impl crate::adapters::SplitOutput + ?Sized),
-        pool: &crate::ThreadPool,
-    ) -> u64 {
-        crate::parallel::process(self, state, input, output, pool)
+    fn count(&self, _place: usize) -> Count {
+        Count { inputs: self.history * self.channels, sums: 0 }
     }
 
-    fn recent_input(state: &DirectState<T>) -> Option<&dyn RecentInput> {
-        Some(state)
+    fn save(&self, state: &DirectState<T>, put: &mut dyn FnMut(f64)) {
+        state.history.save(self.history, put);
     }
 
-    fn load(&self, state: &mut DirectState<T>, recent: &dyn RecentInput, _position: u64) -> bool {
-        state.history.fill(|age, channel| T::from_f64(recent.sample(age, channel)));
-        true
+    fn resume(&self, state: &mut DirectState<T>, _place: usize, numbers: Numbers<'_>) {
+        state.history.resume(self.history, numbers);
     }
 }
 
-#[cfg(feature = "rayon")]
-impl<T: Sample> crate::parallel::Chunked for Direct<T> {
-    const ALIGNMENT: usize = 1;
-
-    fn frame_multiply_adds(&self) -> usize {
-        (self.multiply_adds() * self.ratio as f64) as usize
-    }
-
-    fn ratio(&self) -> usize {
-        self.ratio
-    }
-
-    fn history_frames(&self) -> usize {
-        self.history_frames
-    }
-
-    fn phase_offset(_: &DirectState<T>) -> usize {
-        0
-    }
-
-    fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> DirectState<T> {
-        self.state_at(input, first)
-    }
-}
-
-impl<T: Sample> RecentInput for DirectState<T> {
-    fn sample(&self, age: usize, channel: usize) -> f64 {
-        self.history.sample(age, channel).to_f64()
+impl<T: Sample> DirectState<T> {
+    /// The recent input becomes that of another stream, 0 where its filters do not look back so far.
+    pub(crate) fn copy_input(&mut self, other: &Self) {
+        self.history.fill(|age, channel| other.history.sample(age, channel));
     }
 }
 

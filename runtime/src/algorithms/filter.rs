@@ -1,7 +1,5 @@
 //! What all algorithms have in common.
 
-#[cfg(feature = "rayon")]
-use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Output};
 use crate::state::{Count, Numbers};
 use crate::{BuildError, Sample};
@@ -30,62 +28,15 @@ pub(crate) trait Filter: Debug + Send + Sync {
         output: &mut (impl Output + ?Sized),
     ) -> u64;
 
-    /// As [`Filter::process`] on several threads, where calls can be cut into chunks.
-    #[cfg(feature = "rayon")]
-    fn process_parallel(
-        &self,
-        state: &mut Self::State,
-        input: &(impl Input + Sync + ?Sized),
-        output: &mut (impl SplitOutput + ?Sized),
-        _pool: &crate::ThreadPool,
-    ) -> u64 {
-        self.process(state, input, output)
-    }
-
-    /// Times that the state was not finite and became 0.
-    fn resets(_state: &Self::State) -> u64 {
-        0
-    }
-
-    /// The recent input, if the state is nothing else.
-    fn recent_input(_state: &Self::State) -> Option<&dyn RecentInput> {
-        None
-    }
-
-    /// Makes the state what it would be after `position` frames, of which the last ones are `recent`. Does
-    /// not allocate; false, with the state as before, if recent input does not determine the state.
-    fn load(&self, _state: &mut Self::State, _recent: &dyn RecentInput, _position: u64) -> bool {
-        false
-    }
-
-    /// Takes over the state of another stream, if it means the same to these coefficients. Does not
-    /// allocate; false, with the state as before, if it does not. `same` if the coefficients are the other
-    /// stream's own.
-    fn take_over(&self, _state: &mut Self::State, _other: (&Self, &Self::State), _same: bool) -> bool {
-        false
-    }
-
-    /// How many numbers make up a state `place` frames after a multiple of the alignment; none if recent
-    /// input determines the state.
-    fn count(&self, _place: usize) -> Count {
-        Count { inputs: 0, sums: 0 }
-    }
+    /// How many numbers make up a state `place` frames after a multiple of the alignment.
+    fn count(&self, place: usize) -> Count;
 
     /// Passes the numbers that [`Filter::count`] counts to `put`, one after another.
-    fn save(&self, _state: &Self::State, _put: &mut dyn FnMut(f64)) {}
+    fn save(&self, state: &Self::State, put: &mut dyn FnMut(f64));
 
     /// Makes the state that [`Filter::save`] gave as `numbers`, as many as [`Filter::count`] says. Does not
     /// allocate.
-    fn resume(&self, _state: &mut Self::State, _place: usize, _numbers: Numbers<'_>) {}
-
-    /// The states of a recursion were reset so many times.
-    fn set_resets(_state: &mut Self::State, _resets: u64) {}
-}
-
-/// Recent input of a stream.
-pub(crate) trait RecentInput {
-    /// The sample of `channel` that came `age` >= 1 frames before the next one; 0 where it is not known.
-    fn sample(&self, age: usize, channel: usize) -> f64;
+    fn resume(&self, state: &mut Self::State, place: usize, numbers: Numbers<'_>);
 }
 
 /// What an algorithm says of itself.
@@ -112,7 +63,7 @@ pub(crate) fn phase_taps(taps: &[Vec<f64>], ratio: usize) -> usize {
 /// Refuses taps that are not finite in the kernels' precision.
 pub(super) fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildError> {
     for (i, f) in taps.iter().enumerate() {
-        if let Some(index) = f.iter().position(|&value| !T::from_f64(value).finite()) {
+        if let Some(index) = f.iter().position(|&value| !T::from_f64(value).is_finite()) {
             let location = format!("the filter of channel {}", i + 1);
             return Err(BuildError::NotFinite { location, index, value: f[index] });
         }
@@ -123,7 +74,7 @@ pub(super) fn check_finite<T: Sample>(taps: &[Vec<f64>]) -> Result<(), BuildErro
 /// Zeros in place of NaN and infinity, counted.
 pub(super) fn replace_not_finite<T: Sample>(samples: &mut [T]) -> u64 {
     let mut count = 0;
-    for slot in samples.iter_mut().filter(|value| !value.finite()) {
+    for slot in samples.iter_mut().filter(|value| !value.is_finite()) {
         *slot = T::default();
         count += 1;
     }

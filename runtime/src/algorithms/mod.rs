@@ -5,13 +5,11 @@
 
 pub(crate) mod choice;
 pub(crate) mod direct;
-pub(crate) mod fast_fir;
 pub(crate) mod filter;
 pub(crate) mod overlap_save;
 pub(crate) mod recursive;
 
 pub(crate) use direct::Direct;
-pub(crate) use fast_fir::FastFir;
-pub(crate) use filter::{Facts, Filter, RecentInput};
+pub(crate) use filter::{Facts, Filter};
 pub(crate) use overlap_save::OverlapSave;
 pub(crate) use recursive::Recursive;

@@ -8,7 +8,8 @@ use std::ops::Range;
 pub struct SampleLayout {
     /// How the significant bytes are coded.
     pub format: PcmFormat,
-    /// Bytes from one sample to the next in a frame, at least `format.bytes()`.
+    /// Bytes from one sample to the next, at least `format.bytes()`: more for samples in wider words, and for
+    /// one part of complex samples.
     pub container: usize,
 }
 
@@ -16,6 +17,21 @@ impl SampleLayout {
     /// Samples that lie close together.
     pub fn packed(format: PcmFormat) -> Self {
         Self { format, container: format.bytes() }
+    }
+
+    /// True if no bytes lie between samples.
+    pub(crate) fn is_packed(self) -> bool {
+        self.container == self.format.bytes()
+    }
+
+    /// How the real or the imaginary parts lie in pairs of samples of this layout.
+    pub(crate) fn part(self) -> Self {
+        Self { container: 2 * self.container, ..self }
+    }
+
+    /// Samples in so many bytes; the last one may end before its container does.
+    pub(crate) fn containers(self, bytes: usize) -> usize {
+        (bytes + self.container).saturating_sub(self.format.bytes()) / self.container.max(1)
     }
 }
 
@@ -38,7 +54,14 @@ impl<'a> PcmFrames<'a> {
 
     /// Whole frames in memory.
     pub fn frames(&self) -> usize {
-        self.bytes.len() / self.frame_bytes()
+        self.layout.containers(self.bytes.len()) / self.channels.max(1)
+    }
+
+    /// One part of complex samples, which are pairs of these samples, so that channels 2 i and 2 i + 1 are the
+    /// parts of one channel: the real parts if `part` is 0, the imaginary ones if it is 1.
+    pub fn part(&self, part: usize) -> PcmFrames<'a> {
+        let start = (part * self.layout.container).min(self.bytes.len());
+        PcmFrames { layout: self.layout.part(), channels: self.channels / 2, bytes: &self.bytes[start..] }
     }
 
     /// Some of the frames.
@@ -47,10 +70,11 @@ impl<'a> PcmFrames<'a> {
     /// If the range goes beyond them.
     pub fn range(&self, frames: Range<usize>) -> PcmFrames<'a> {
         let size = self.frame_bytes();
-        PcmFrames { bytes: &self.bytes[frames.start * size..frames.end * size], ..*self }
+        let end = (frames.end * size).min(self.bytes.len());
+        PcmFrames { bytes: &self.bytes[frames.start * size..end], ..*self }
     }
 
-    /// True if no sample is NaN or infinite; integers never are.
+    /// True if no sample is NaN or infinite, nor any that lies between them; integers never are.
     pub fn is_finite(&self) -> bool {
         match self.layout.format {
             PcmFormat::F32Le => all_finite(self.bytes, |b| u32::from_le_bytes(b) << 1 < 0xFF00_0000),

@@ -5,7 +5,7 @@
 //! dispatch   from an Isa to a function compiled for it
 //! vector     the vector trait, all that kernels know of an instruction set
 //! portable  avx2  avx512  neon      the trait for each set
-//! fir  recursion  transform  pairs  pcm  finite  peak      the kernels
+//! fir  recursion  transform  pcm  finite  peak      the kernels
 //! ```
 //!
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
@@ -34,7 +34,6 @@ mod fir;
 mod isa;
 #[cfg(target_arch = "aarch64")]
 mod neon;
-mod pairs;
 mod pcm;
 mod peak;
 mod portable;
@@ -48,7 +47,6 @@ pub(crate) use dispatch::Element;
 pub(crate) use finite::all_finite;
 pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
 pub use isa::Isa;
-pub(crate) use pairs::{Halves, Products, join, split};
 pub(crate) use pcm::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};

@@ -1,7 +1,7 @@
 //! Calls and banks that are refused.
 
 use super::support::{Bank, Filters, fir_bank, rotation_bank, start};
-use crate::{BuildError, Options, PcmFormat, PcmOutput, ProcessError};
+use crate::{BuildError, Options, PcmFormat, PcmOutput, ProcessError, Zeros};
 
 #[test]
 fn calls_and_banks_that_do_not_fit_are_refused() {
@@ -17,8 +17,15 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
         Err(ProcessError::OutputTooShort { given: 3, wanted: 4 })
     );
     assert_eq!(stream.process(&[], &mut out), Ok(0));
-    let mut output = PcmOutput { format: PcmFormat::S8, bytes: &mut [], clipped: 0 };
-    assert_eq!(stream.process_pcm(&[], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
+    let mut output = PcmOutput::packed(PcmFormat::S8, &mut []);
+    assert_eq!(stream.run(&[][..], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
+
+    // More samples than can be counted; the product once wrapped to 0.
+    let endless = Zeros { channels: 2, frames: usize::MAX / 2 + 1 };
+    assert_eq!(
+        stream.run(&endless, &mut out[..]),
+        Err(ProcessError::TooManyFrames { frames: endless.frames, ratio: 2 })
+    );
 
     let refused = |bank: Bank| start(&bank, Options::default()).unwrap_err();
     assert_eq!(refused(Bank { ratio: 0, ..bank.clone() }), BuildError::NoRatio);

@@ -36,13 +36,12 @@ proptest! {
         lost in prop::collection::vec(0usize..100_000, 0..4),
     ) {
         let mut noise = Noise(seed);
-        // Two taps per phase at least, which fast FIR needs.
         let taps = random_taps(n, m + count, &mut noise);
         let input = noise.samples(n * cuts.iter().sum::<usize>());
         let len = phase_taps(&taps, m).next_power_of_two().max(16) << more;
         let bank = fir_bank(taps, m);
         let precision = if double { Precision::Double } else { Precision::Single };
-        for algorithm in [Algorithm::Direct, Algorithm::FastFir, Algorithm::OverlapSave { transform: Some(len) }] {
+        for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(len) }] {
             check_cuts(&mut start(&bank, precise(algorithm, precision)).unwrap(), &input, &lost, &cuts);
         }
     }

@@ -3,7 +3,7 @@
 
 use super::support::{FIR_ALGORITHMS, Noise, fir_bank, precise, random_taps, recursive_bank};
 use crate::{
-    Algorithm, BuildError, ComplexStream, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Precision,
+    Algorithm, BuildError, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
     SampleLayout, StateSpace, Stream,
 };
 
@@ -93,7 +93,7 @@ fn offsets_are_subtracted_in_every_form_of_the_samples() {
         let channels: Vec<Vec<f32>> =
             (0..n).map(|i| with.iter().skip(i).step_by(n).copied().collect()).collect();
         let planar: Vec<&[f32]> = channels.iter().map(Vec::as_slice).collect();
-        Stream::new(&subtracting).process_planar(&planar, &mut got).unwrap();
+        Stream::new(&subtracting).run(&Planar::new(&planar).unwrap(), &mut got[..]).unwrap();
         assert!(got == want, "planar, {}", plain.algorithm());
         for (format, whole) in [PcmFormat::S16Le, PcmFormat::F32Be, PcmFormat::F64Le]
             .into_iter()
@@ -113,8 +113,8 @@ fn offsets_are_subtracted_in_every_form_of_the_samples() {
             let parts: Vec<_> =
                 stored.iter().map(|bytes| PcmFrames { layout, channels: count, bytes }).collect();
             let mut bytes = vec![0; 4 * FRAMES * m];
-            let mut output = PcmOutput { format: PcmFormat::F32Le, bytes: &mut bytes, clipped: 0 };
-            Stream::new(&subtracting).process_pcm(&parts, &mut output).unwrap();
+            let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);
+            Stream::new(&subtracting).run(&parts[..], &mut output).unwrap();
             let got = bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
             // Doubles are rounded once, where they are stored.
             let close = got.zip(&want).all(|(a, &b)| (a - b).abs() <= 1e-6);
@@ -130,14 +130,12 @@ fn offsets_are_subtracted_on_all_threads() {
     let bank = fir_bank(random_taps(2, 1024, &mut noise), 2);
     let x = noise.samples(2 * 40_000);
     let pool = crate::ThreadPool::new(3).unwrap();
-    for algorithm in [Algorithm::Direct, Algorithm::FastFir] {
-        let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
-        let plan = plan.with_offsets(&[0.3, -0.01]).unwrap();
-        let [mut alone, mut together] = [vec![0f32; 80_000], vec![0f32; 80_000]];
-        Stream::new(&plan).process(&x, &mut alone).unwrap();
-        Stream::new(&plan).process_parallel(&x, &mut together, &pool).unwrap();
-        assert!(alone == together, "{}", plan.algorithm());
-    }
+    let plan = bank.plan(Options::default()).unwrap().with_offsets(&[0.3, -0.01]).unwrap();
+    let [mut alone, mut together] = [vec![0f32; 80_000], vec![0f32; 80_000]];
+    Stream::new(&plan).process(&x, &mut alone).unwrap();
+    let frames = Interleaved::new(&x, 2).unwrap();
+    Stream::new(&plan).run_parallel(&frames, &mut together[..], &pool).unwrap();
+    assert!(alone == together);
 }
 
 #[test]
@@ -170,17 +168,10 @@ fn a_continued_stream_keeps_its_past_and_takes_the_new_offsets() {
     let mut stream = Stream::new(&plan.clone().with_offsets(&old).unwrap());
     let mut got = vec![0f32; FRAMES * 2];
     stream.process(&delivered(first, &old), &mut got).unwrap();
-    stream.swap(&plan.with_offsets(&new).unwrap()).unwrap();
-    stream.process(&delivered(second, &new), &mut got[200..]).unwrap();
+    let mut next = Stream::new(&plan.with_offsets(&new).unwrap());
+    next.continue_from(&stream).unwrap();
+    next.process(&delivered(second, &new), &mut got[200..]).unwrap();
     assert!(got == want);
-}
-
-#[test]
-fn complex_samples_lose_the_offset_in_both_parts() {
-    let plan = Plan::from_taps(&[vec![2.0]], 1, 0, Options::default()).unwrap().with_offsets(&[0.5]).unwrap();
-    let mut out = [[0f32; 2]];
-    ComplexStream::new(&plan).process(&[[1.0, 0.25]], &mut out).unwrap();
-    assert_eq!(out, [[1.0, -0.5]]);
 }
 
 #[test]

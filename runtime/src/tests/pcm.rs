@@ -42,8 +42,8 @@ fn check_bytes(bank: &Bank, options: Options, [from, to]: [PcmFormat; 2], bytes:
     for recordings in [&[PcmFrames { layout, channels: n, bytes }][..], &planar] {
         stream.reset();
         let mut out = vec![0; want.0.len()];
-        let mut output = PcmOutput { format: to, bytes: &mut out, clipped: 0 };
-        assert_eq!(stream.process_pcm(recordings, &mut output), Ok(samples.len()));
+        let mut output = PcmOutput::packed(to, &mut out);
+        assert_eq!(stream.run(recordings, &mut output), Ok(samples.len()));
         let clipped = output.clipped;
         assert!((out, clipped) == want, "{from} to {to}, {:?}", options.algorithm);
     }

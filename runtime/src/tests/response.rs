@@ -55,7 +55,6 @@ fn double_precision_is_double() {
     // all 500 taps of a phase and the inputs of 1024 frames for transforms.
     let algorithms = [
         (Algorithm::Direct, 3.0 * 500.0),
-        (Algorithm::FastFir, 6.0 * 500.0),
         (Algorithm::OverlapSave { transform: Some(512) }, 9.0 * 500f64.sqrt() * 4096f64.sqrt()),
     ];
     for (algorithm, bound) in algorithms {

@@ -76,17 +76,17 @@ pub(crate) fn rotation_bank() -> Bank {
     recursive_bank(filter)
 }
 
-/// The algorithms for filters of 2 to 64 taps per phase.
-pub(crate) const FIR_ALGORITHMS: [Algorithm; 3] =
-    [Algorithm::Direct, Algorithm::FastFir, Algorithm::OverlapSave { transform: Some(64) }];
+/// The algorithms for filters of up to 64 taps per phase.
+pub(crate) const FIR_ALGORITHMS: [Algorithm; 2] =
+    [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(64) }];
 
 pub(crate) fn by(algorithm: Algorithm) -> Options {
     Options { algorithm, ..Options::default() }
 }
 
-/// Both kinds of filters in the precision.
+/// FIR filters in the precision.
 pub(crate) fn precise(algorithm: Algorithm, precision: Precision) -> Options {
-    Options { precision, recursion: precision, ..by(algorithm) }
+    Options { precision, ..by(algorithm) }
 }
 
 /// All outputs of an input in one call, the first of them for its first frame.

@@ -385,23 +385,6 @@ impl<T: Sample> Filter for OverlapSave<T> {
         progress.replaced
     }
 
-    /// A batch means the same to all coefficients of one shape: outputs of complete batches are still those
-    /// of the other coefficients.
-    fn take_over(
-        &self,
-        state: &mut OverlapSaveState<T>,
-        (other, from): (&Self, &OverlapSaveState<T>),
-        _same: bool,
-    ) -> bool {
-        let fits = self.shape == other.shape;
-        if fits {
-            state.samples.copy_from_slice(&from.samples);
-            state.output.copy_from_slice(&from.output);
-            state.filled = from.filled;
-        }
-        fits
-    }
-
     /// The history and the frames of the batch, and the outputs of the batch before that are still to come.
     fn count(&self, filled: usize) -> Count {
         let shape = &self.shape;

@@ -246,7 +246,7 @@ fn recursive_banks_have_no_transforms() {
         refused(Algorithm::OverlapSave { transform: None }),
         Some(BuildError::Recursive { algorithm: "overlap-save" })
     );
-    assert_eq!(refused(Algorithm::Auto { added_latency: true }), None);
+    assert_eq!(refused(Algorithm::Auto), None);
 }
 
 #[test]

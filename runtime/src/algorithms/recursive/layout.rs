@@ -1,9 +1,9 @@
 //! Where things lie when a state-space bank runs, and its coefficients in that order.
 
 use super::delay_lines::{DelayLines, DelayedInput};
+use crate::BuildError;
 use crate::aligned::Aligned;
 use crate::simd::{ColumnTile, FirKernel, Form, Polyphase, Recursion, SectionVector, Tiling, group_lanes};
-use crate::{BuildError, Sample};
 
 /// Where things lie: in a history of frames of N inputs, and in rows of S states.
 pub(super) struct Layout {
@@ -21,11 +21,11 @@ pub(super) struct Layout {
 
 impl Layout {
     /// For N channels and M phases, and a recursion in vectors of `lanes`.
-    pub(super) fn new<T: Sample>(
+    pub(super) fn new(
         delay_lines: &DelayLines,
         (channels, ratio): (usize, usize),
         lanes: usize,
-        kernel: FirKernel<T>,
+        kernel: FirKernel<f64>,
     ) -> Result<Self, BuildError> {
         let order = delay_lines.a.len();
         let history = delay_lines.history();
@@ -41,9 +41,9 @@ impl Layout {
             .iter()
             .max()
             .map_or(0, |place| place + 1)
-            .next_multiple_of((2 * lanes).max(group_lanes::<T>()));
+            .next_multiple_of((2 * lanes).max(group_lanes::<f64>()));
         // Without states this output matrix is not used.
-        let state_rows = kernel.tiling(states.max(group_lanes::<T>()), states, ratio);
+        let state_rows = kernel.tiling(states.max(group_lanes::<f64>()), states, ratio);
         Ok(Self {
             lanes,
             channels,
@@ -66,31 +66,31 @@ impl Layout {
         occupants
     }
 
-    pub(super) fn feedthrough<T: Sample>(
+    pub(super) fn feedthrough(
         &self,
         delay_lines: &DelayLines,
         ratio: usize,
-        kernel: FirKernel<T>,
-    ) -> Polyphase<T> {
+        kernel: FirKernel<f64>,
+    ) -> Polyphase<f64> {
         let n = self.channels;
         let tap =
             |e: usize, p: usize| delay_lines.taps.get(&(n - 1 - e % n, e / n)).map_or(0.0, |taps| taps[p]);
-        Polyphase::new(kernel, self.inputs, ratio, |e, p| T::from_f64(tap(e, p)))
+        Polyphase::new(kernel, self.inputs, ratio, tap)
     }
 
-    pub(super) fn output_matrix<T: Sample>(
+    pub(super) fn output_matrix(
         &self,
         delay_lines: &DelayLines,
         ratio: usize,
-        kernel: FirKernel<T>,
-    ) -> Polyphase<T> {
+        kernel: FirKernel<f64>,
+    ) -> Polyphase<f64> {
         let occupants = self.occupants();
         let last = occupants.len() - 1;
         let factor = |e: usize, p: usize| occupants[last - e].map_or(0.0, |state| delay_lines.c[state][p]);
-        Polyphase::new(kernel, self.state_rows, ratio, |e, p| T::from_f64(factor(e, p)))
+        Polyphase::new(kernel, self.state_rows, ratio, factor)
     }
 
-    pub(super) fn recursion<T: Sample>(&self, delay_lines: &DelayLines) -> Recursion<T> {
+    pub(super) fn recursion(&self, delay_lines: &DelayLines) -> Recursion<f64> {
         let columns = Columns { layout: self, delay_lines, occupants: self.occupants() };
         let form = if self.parallel {
             let vectors = (0..self.states).step_by(2 * self.lanes);
@@ -111,24 +111,24 @@ struct Columns<'a> {
 
 impl Columns<'_> {
     /// Factors of `count` places from `first` on, taken from one factor for each state.
-    fn column<T: Sample>(&self, factor: impl Fn(usize) -> f64, first: usize, count: usize) -> Vec<T> {
+    fn column(&self, factor: impl Fn(usize) -> f64, first: usize, count: usize) -> Vec<f64> {
         let places = self.occupants[first..first + count].iter();
-        places.map(|state| T::from_f64(state.map_or(0.0, &factor))).collect()
+        places.map(|state| state.map_or(0.0, &factor)).collect()
     }
 
-    fn section_vector<T: Sample>(&self, first: usize) -> SectionVector<T> {
+    fn section_vector(&self, first: usize) -> SectionVector<f64> {
         let lanes = self.layout.lanes;
         // What the states from `to` on take from those from `from` on, lane by lane.
         let a = |to: usize, from: usize| {
             let pairs = self.occupants[to..to + lanes].iter().zip(&self.occupants[from..from + lanes]);
-            pairs.map(|(i, j)| i.zip(*j).map_or(0.0, |(i, j)| self.delay_lines.a[i][j])).map(T::from_f64)
+            pairs.map(|(i, j)| i.zip(*j).map_or(0.0, |(i, j)| self.delay_lines.a[i][j]))
         };
         let (p, q) = (first, first + lanes);
-        let mut coefficients: Vec<T> = a(p, p).chain(a(p, q)).chain(a(q, p)).chain(a(q, q)).collect();
+        let mut coefficients: Vec<f64> = a(p, p).chain(a(p, q)).chain(a(q, p)).chain(a(q, q)).collect();
         let mut inputs = Vec::new();
         for (&input, factors) in &self.delay_lines.b {
-            let column: Vec<T> = self.column(|state| factors[state], first, 2 * lanes);
-            if column.iter().any(|&factor| factor != T::default()) {
+            let column: Vec<f64> = self.column(|state| factors[state], first, 2 * lanes);
+            if column.iter().any(|&factor| factor != 0.0) {
                 inputs.push(self.layout.place(input));
                 coefficients.extend(column);
             }
@@ -136,12 +136,12 @@ impl Columns<'_> {
         SectionVector { inputs, coefficients: Aligned::from_slice(&coefficients) }
     }
 
-    fn tiles<T: Sample>(&self) -> Vec<ColumnTile<T>> {
+    fn tiles(&self) -> Vec<ColumnTile<f64>> {
         let mut tiles = Vec::new();
         let mut first = 0;
         while first < self.layout.states {
             let left = (self.layout.states - first) / self.layout.lanes;
-            let vectors = (1 << left.ilog2()).min(ColumnTile::<T>::WIDEST);
+            let vectors = (1 << left.ilog2()).min(ColumnTile::<f64>::WIDEST);
             tiles.push(self.tile(first, vectors));
             first += vectors * self.layout.lanes;
         }
@@ -149,10 +149,10 @@ impl Columns<'_> {
     }
 
     /// Columns of zeros are left out, so that triangles and blocks cost less than full matrices.
-    fn tile<T: Sample>(&self, first: usize, vectors: usize) -> ColumnTile<T> {
+    fn tile(&self, first: usize, vectors: usize) -> ColumnTile<f64> {
         let (mut inputs, mut columns, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
-        let mut keep = |list: &mut Vec<u32>, place: u32, column: Vec<T>| {
-            if column.iter().any(|&factor| factor != T::default()) {
+        let mut keep = |list: &mut Vec<u32>, place: u32, column: Vec<f64>| {
+            if column.iter().any(|&factor| factor != 0.0) {
                 list.push(place);
                 coefficients.extend(column);
             }

@@ -5,7 +5,7 @@
 //! filters, one over the inputs and one over the states.
 //!
 //! Every 64 frames from the beginning of the stream, and not of a call, denormals are flushed: states below
-//! 1e-30 (f32) or 1e-280 (f64) become zero, so that a recursion that fades out does not slow down. A state
+//! 1e-280 become zero, so that a recursion that fades out does not slow down. A state
 //! that is not finite (the recursion overflowed) becomes zero there too, and is counted. NaN and infinity in
 //! the input are replaced before filtering, so they never reach a state, and no frame is filtered twice.
 
@@ -22,44 +22,47 @@ use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, all_finite};
 use crate::state::{Count, Numbers};
-use crate::{BuildError, Isa, Sample, StateSpace};
+use crate::{BuildError, Isa, StateSpace};
 
 /// Frames per block. Blocks are counted from the beginning of the stream, so that cuts into calls do not
 /// change a bit.
 pub(crate) const BLOCK: usize = 64;
 
+/// States below this become zero: far below every signal, and far above the denormals, which begin at 2e-308.
+pub(crate) const NEGLIGIBLE_STATE: f64 = 1e-280;
+
 /// Coefficients in the order of use.
 #[derive(Debug)]
-pub(crate) struct Recursive<T: Sample> {
+pub(crate) struct Recursive {
     pub(crate) channels: usize,
     pub(crate) ratio: usize,
     /// Frames that the delay lines look back.
     history: usize,
-    recursion: Recursion<T>,
-    advance: RecursionKernel<T>,
-    feedthrough: Polyphase<T>,
-    output_matrix: Polyphase<T>,
+    recursion: Recursion<f64>,
+    advance: RecursionKernel<f64>,
+    feedthrough: Polyphase<f64>,
+    output_matrix: Polyphase<f64>,
     isa: Isa,
 }
 
 /// What a stream remembers.
 #[derive(Debug, Clone)]
-pub(crate) struct RecursiveState<T: Sample> {
-    history: History<T>,
+pub(crate) struct RecursiveState {
+    history: History<f64>,
     /// The state before each frame of a block, and after the last one; the first row is the state.
-    rows: Aligned<T>,
+    rows: Aligned<f64>,
     /// S.
     states: usize,
-    output: Aligned<T>,
+    output: Aligned<f64>,
     /// What the states add to the output.
-    state_output: Aligned<T>,
+    state_output: Aligned<f64>,
     /// Frames since denormals were flushed.
     phase_offset: usize,
     /// Times the state was not finite and became zero.
     pub(crate) resets: u64,
 }
 
-impl<T: Sample> Recursive<T> {
+impl Recursive {
     /// For N = `channels` and M = `ratio`.
     pub(crate) fn new(
         filter: &StateSpace,
@@ -68,7 +71,7 @@ impl<T: Sample> Recursive<T> {
         isa: Isa,
     ) -> Result<Self, BuildError> {
         let order = filter.a.len();
-        let check = |name, rows: &[Vec<f64>], wanted| check_matrix::<T>(name, rows, wanted, channels, ratio);
+        let check = |name, rows: &[Vec<f64>], wanted| check_matrix(name, rows, wanted, channels, ratio);
         check("a", &filter.a, (order, order))?;
         check("b", &filter.b, (order, channels))?;
         check("c", &filter.c, (ratio, order))?;
@@ -94,7 +97,7 @@ impl<T: Sample> Recursive<T> {
     }
 
     /// Filters the frames in the history's room.
-    fn filter(&self, state: &mut RecursiveState<T>, frames: usize) {
+    fn filter(&self, state: &mut RecursiveState, frames: usize) {
         let RecursiveState { history, rows, output, state_output, .. } = state;
         self.advance.run(&self.recursion, rows, history.view(), self.channels, frames);
         self.feedthrough.run(&[Segment { x: history.view(), first: 0, frames }], output);
@@ -105,8 +108,8 @@ impl<T: Sample> Recursive<T> {
     }
 }
 
-impl<T: Sample> Filter for Recursive<T> {
-    type State = RecursiveState<T>;
+impl Filter for Recursive {
+    type State = RecursiveState;
 
     fn facts(&self) -> Facts {
         Facts {
@@ -119,7 +122,7 @@ impl<T: Sample> Filter for Recursive<T> {
         }
     }
 
-    fn state(&self) -> RecursiveState<T> {
+    fn state(&self) -> RecursiveState {
         let tiling = self.feedthrough.tiling();
         let padding = tiling.vector * self.channels;
         let states = self.recursion.states;
@@ -136,8 +139,8 @@ impl<T: Sample> Filter for Recursive<T> {
         }
     }
 
-    fn reset(state: &mut RecursiveState<T>) {
-        state.rows.fill(T::default());
+    fn reset(state: &mut RecursiveState) {
+        state.rows.fill(0.0);
         state.history.reset();
         state.phase_offset = 0;
         state.resets = 0;
@@ -145,7 +148,7 @@ impl<T: Sample> Filter for Recursive<T> {
 
     fn process(
         &self,
-        state: &mut RecursiveState<T>,
+        state: &mut RecursiveState,
         input: &(impl Input + ?Sized),
         output: &mut (impl Output + ?Sized),
     ) -> u64 {
@@ -165,57 +168,26 @@ impl<T: Sample> Filter for Recursive<T> {
         replaced
     }
 
-    fn resets(state: &RecursiveState<T>) -> u64 {
-        state.resets
-    }
-
-    /// States mean something to their own coefficients only.
-    fn take_over(
-        &self,
-        state: &mut RecursiveState<T>,
-        (_, from): (&Self, &RecursiveState<T>),
-        same: bool,
-    ) -> bool {
-        if same {
-            state.rows.copy_from_slice(&from.rows);
-            state.history.copy_from(&from.history);
-            state.phase_offset = from.phase_offset;
-            state.resets = from.resets;
-        }
-        same
-    }
-
     fn count(&self, _place: usize) -> Count {
         Count { inputs: self.history * self.channels, sums: self.recursion.states }
     }
 
-    fn save(&self, state: &RecursiveState<T>, put: &mut dyn FnMut(f64)) {
-        for age in 1..=self.history {
-            (0..self.channels).for_each(|channel| put(state.history.sample(age, channel).to_f64()));
-        }
-        state.rows[..state.states].iter().for_each(|value| put(value.to_f64()));
+    fn save(&self, state: &RecursiveState, put: &mut dyn FnMut(f64)) {
+        state.history.save(self.history, put);
+        state.rows[..state.states].iter().for_each(|&value| put(value));
     }
 
-    fn resume(&self, state: &mut RecursiveState<T>, place: usize, numbers: Numbers<'_>) {
-        let n = self.channels;
-        let past = |age: usize, channel: usize| {
-            let known = age <= self.history;
-            T::from_f64(if known { numbers.get((age - 1) * n + channel) } else { 0.0 })
-        };
+    fn resume(&self, state: &mut RecursiveState, place: usize, numbers: Numbers<'_>) {
         Self::reset(state);
-        state.history.fill(past);
+        state.history.resume(self.history, numbers);
         for (i, slot) in state.rows[..state.states].iter_mut().enumerate() {
-            *slot = T::from_f64(numbers.get(self.history * n + i));
+            *slot = numbers.get(self.history * self.channels + i);
         }
         state.phase_offset = place;
     }
-
-    fn set_resets(state: &mut RecursiveState<T>, resets: u64) {
-        state.resets = resets;
-    }
 }
 
-impl<T: Sample> RecursiveState<T> {
+impl RecursiveState {
     /// The last row becomes the first; at the end of a block denormals are flushed.
     fn commit(&mut self, frames: usize) {
         self.history.advance(frames);
@@ -229,17 +201,16 @@ impl<T: Sample> RecursiveState<T> {
     fn flush_denormals(&mut self) {
         let x = &mut self.rows[..self.states];
         // A NaN never leaves a recursion by itself.
-        if !x.iter().all(|value| value.finite()) {
-            x.fill(T::default());
+        if !x.iter().all(|value| value.is_finite()) {
+            x.fill(0.0);
             self.resets += 1;
         }
         // Numbers that fade away become denormal in the end, and slow.
-        let tiny = |value: &T| *value < T::NEGLIGIBLE && T::from_f64(-value.to_f64()) < T::NEGLIGIBLE;
-        x.iter_mut().filter(|value| tiny(value)).for_each(|value| *value = T::default());
+        x.iter_mut().filter(|value| value.abs() < NEGLIGIBLE_STATE).for_each(|value| *value = 0.0);
     }
 }
 
-fn check_matrix<T: Sample>(
+fn check_matrix(
     name: &'static str,
     rows: &[Vec<f64>],
     (wanted_rows, wanted_cols): (usize, usize),
@@ -259,7 +230,7 @@ fn check_matrix<T: Sample>(
             ratio,
         });
     }
-    match rows.iter().flatten().enumerate().find(|(_, value)| !T::from_f64(**value).finite()) {
+    match rows.iter().flatten().enumerate().find(|(_, value)| !value.is_finite()) {
         Some((index, &value)) => Err(BuildError::NotFinite {
             location: format!("matrix {name} of the state-space filters"),
             index,

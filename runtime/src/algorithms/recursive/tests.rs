@@ -4,15 +4,8 @@ use super::*;
 use crate::adapters::Interleaved;
 use crate::tests::support::{Noise, state_space_definition, worst};
 
-fn run<T: Sample>(
-    filter: &StateSpace,
-    n: usize,
-    m: usize,
-    isa: Isa,
-    input: &[f64],
-    cut: usize,
-) -> (Vec<f64>, bool) {
-    let plan = Recursive::<T>::new(filter, n, m, isa).unwrap();
+fn run(filter: &StateSpace, n: usize, m: usize, isa: Isa, input: &[f64], cut: usize) -> (Vec<f64>, bool) {
+    let plan = Recursive::new(filter, n, m, isa).unwrap();
     let mut state = plan.state();
     let mut out = vec![0.0; input.len() / n * m];
     for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
@@ -47,15 +40,15 @@ fn every_shape_follows_its_definition_with_the_same_bits_for_every_cut() {
             let filter = random(order, n, m, blocks, &mut noise);
             let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
             let want = state_space_definition(&filter, &input);
-            let (whole, is_parallel) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+            let (whole, is_parallel) = run(&filter, n, m, Isa::detect(), &input, 300);
             // Small dense matrices are block-diagonal too.
             assert!(is_parallel || (blocks.is_none() && order > 2), "{order} {blocks:?}");
             let error = worst(&want, &whole);
             assert!(error < 1e-12, "order {order} N {n} M {m}: {error:e}");
             for cut in [1, 7, 63, 64, 65, 129] {
-                assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+                assert_eq!(run(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
             }
-            let portable = run::<f64>(&filter, n, m, Isa::portable(), &input, 300).0;
+            let portable = run(&filter, n, m, Isa::portable(), &input, 300).0;
             let apart = worst(&whole, &portable);
             assert!(apart < 1e-12, "{apart:e}");
         }
@@ -91,36 +84,13 @@ fn delay_lines_before_the_states_follow_the_definition() {
         for (n, m, frames) in [(1, 1, 3), (1, 3, 1), (2, 2, 5), (3, 2, 4), (4, 4, 17), (5, 9, 2)] {
             let filter = delayed(&random(order, n, m, blocks, &mut noise), frames, &mut noise);
             let input: Vec<f64> = (0..n * 300).map(|_| noise.next()).collect();
-            let (whole, is_parallel) = run::<f64>(&filter, n, m, Isa::detect(), &input, 300);
+            let (whole, is_parallel) = run(&filter, n, m, Isa::detect(), &input, 300);
             assert!(is_parallel || (blocks.is_none() && order > 2));
             let error = worst(&whole, &state_space_definition(&filter, &input));
             assert!(error < 1e-12, "order {order} N {n} M {m} delayed by {frames}: {error:e}");
             for cut in [1, 63, 65] {
-                assert_eq!(run::<f64>(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
+                assert_eq!(run(&filter, n, m, Isa::detect(), &input, cut).0, whole, "cut {cut}");
             }
-        }
-    }
-}
-
-#[test]
-fn in_single_precision_the_error_is_what_the_poles_make_of_rounding() {
-    let mut noise = Noise(23);
-    for radius in [0.5, 0.9, 0.99, 0.999] {
-        let mut filter = random(6, 2, 3, Some(&[2, 2, 2]), &mut noise);
-        for (k, pair) in filter.a.chunks_mut(2).enumerate() {
-            let (s, c) = (0.3 + k as f64).sin_cos();
-            (pair[0][2 * k], pair[0][2 * k + 1]) = (radius * c, radius * s);
-            (pair[1][2 * k], pair[1][2 * k + 1]) = (-radius * s, radius * c);
-        }
-        let input: Vec<f64> = (0..2 * 3000).map(|_| f64::from(noise.next() as f32)).collect();
-        let want = state_space_definition(&filter, &input);
-        let single = run::<f32>(&filter, 2, 3, Isa::detect(), &input, 3000).0;
-        let size = want.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-        let error = worst(&single, &want) / size;
-        assert!(error > 1e-9, "this is not single precision: {error:e}");
-        assert!(error < 8.0 * f64::from(f32::EPSILON) / (1.0 - radius), "radius {radius}: {error:e}");
-        for cut in [1, 63, 65] {
-            assert_eq!(run::<f32>(&filter, 2, 3, Isa::detect(), &input, cut).0, single, "cut {cut}");
         }
     }
 }
@@ -130,13 +100,13 @@ fn zero_columns_of_triangles_are_not_multiplied() {
     let mut noise = Noise(24);
     let mut filter = random(24, 1, 2, None, &mut noise);
     (0..24).for_each(|i| filter.a[i][..i].fill(0.0));
-    let plan = Recursive::<f64>::new(&filter, 1, 2, Isa::detect()).unwrap();
+    let plan = Recursive::new(&filter, 1, 2, Isa::detect()).unwrap();
     let Form::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
     let columns: Vec<usize> = tiles.iter().map(|tile| tile.columns.len()).collect();
     assert_eq!(columns[0], 24);
     assert!(columns[1..].iter().all(|&count| count < 24), "{columns:?}");
     let input: Vec<f64> = (0..300).map(|_| noise.next()).collect();
-    let got = run::<f64>(&filter, 1, 2, Isa::detect(), &input, 300).0;
+    let got = run(&filter, 1, 2, Isa::detect(), &input, 300).0;
     assert!(worst(&got, &state_space_definition(&filter, &input)) < 1e-12);
 }
 
@@ -144,7 +114,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
 fn a_state_that_fades_away_becomes_zero() {
     let filter =
         StateSpace { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
-    let plan = Recursive::<f64>::new(&filter, 1, 1, Isa::detect()).unwrap();
+    let plan = Recursive::new(&filter, 1, 1, Isa::detect()).unwrap();
     let mut state = plan.state();
     let mut input = vec![0.0; 1200];
     input[0] = 1.0;
