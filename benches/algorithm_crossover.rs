@@ -2,9 +2,10 @@
 //!
 //! `cargo bench --bench algorithm_crossover` measures both along a ladder of K for several N and M,
 //! overlap-save with the four shortest transforms that hold a block of K frames, in nanoseconds per frame
-//! (best of many repeats), and sets beside them what the plan chooses. The constants of the plan's cost model (`runtime/src/algorithms/choice.rs`) were fitted to
-//! this table. Words after `--`: `f64` for double precision, and the name of an
-//! instruction set (`portable`, `avx2`, `avx512`) for that set instead of the widest one.
+//! (best of many repeats), and sets beside them what the plan chooses. The constants of the plan's cost
+//! model (`runtime/src/algorithms/choice.rs`) were fitted to this table. Words after `--`: `f64` for double
+//! precision, and the name of an instruction set (`portable`, `avx2`, `avx512`) for that set instead of the
+//! widest one.
 
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::runtime::{Algorithm, Isa, Options, Precision, Stream};

@@ -198,8 +198,9 @@ impl Plan {
 
     /// Frames by which a stream is processed: two streams of the same input, one begun a multiple of so many
     /// frames after the other and with its [history](Plan::history) before that, have the same bits. 1 for
-    /// the direct algorithm, the 2 S B frames of a batch for overlap-save. For recursions 64: denormals are flushed so often, and the bits are the same only if the state is. How a stream is
-    /// cut into calls never matters.
+    /// the direct algorithm, the 2 S B frames of a batch for overlap-save. For recursions 64: denormals are
+    /// flushed so often, and the bits are the same only if the state is. How a stream is cut into calls
+    /// never matters.
     pub fn alignment(&self) -> usize {
         self.facts.alignment
     }

@@ -177,9 +177,9 @@ impl Stream {
     ///
     /// Samples of the past stay as they are: the offsets of the new plan hold for the frames to come.
     ///
-    /// For direct plans of one number type only. The outputs are those that the new plan would have given from
-    /// the beginning, bit for bit: at once if the [history](Plan::history) of the new plan is no longer than
-    /// that of the old one, else as many frames later as the new one looks back. What the old plan had
+    /// For direct plans of one number type only. The outputs are those that the new plan would have given
+    /// from the beginning, bit for bit: at once if the [history](Plan::history) of the new plan is no longer
+    /// than that of the old one, else as many frames later as the new one looks back. What the old plan had
     /// forgotten counts as 0 in between.
     ///
     /// # Errors

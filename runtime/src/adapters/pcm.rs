@@ -24,8 +24,8 @@ impl<'a> PcmOutput<'a> {
         Self { layout: SampleLayout::packed(format), bytes, clipped: 0 }
     }
 
-    /// Room for one part of complex samples, which are pairs of those of this output: the real parts if `part`
-    /// is 0, the imaginary ones if it is 1. What is clipped is counted apart.
+    /// Room for one part of complex samples, which are pairs of those of this output: the real parts if
+    /// `part` is 0, the imaginary ones if it is 1. What is clipped is counted apart.
     pub fn part(&mut self, part: usize) -> PcmOutput<'_> {
         let start = (part * self.layout.container).min(self.bytes.len());
         PcmOutput { layout: self.layout.part(), bytes: &mut self.bytes[start..], clipped: 0 }

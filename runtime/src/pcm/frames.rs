@@ -8,8 +8,8 @@ use std::ops::Range;
 pub struct SampleLayout {
     /// How the significant bytes are coded.
     pub format: PcmFormat,
-    /// Bytes from one sample to the next, at least `format.bytes()`: more for samples in wider words, and for
-    /// one part of complex samples.
+    /// Bytes from one sample to the next, at least `format.bytes()`: more for samples in wider words, and
+    /// for one part of complex samples.
     pub container: usize,
 }
 
@@ -57,8 +57,8 @@ impl<'a> PcmFrames<'a> {
         self.layout.containers(self.bytes.len()) / self.channels.max(1)
     }
 
-    /// One part of complex samples, which are pairs of these samples, so that channels 2 i and 2 i + 1 are the
-    /// parts of one channel: the real parts if `part` is 0, the imaginary ones if it is 1.
+    /// One part of complex samples, which are pairs of these samples, so that channels 2 i and 2 i + 1 are
+    /// the parts of one channel: the real parts if `part` is 0, the imaginary ones if it is 1.
     pub fn part(&self, part: usize) -> PcmFrames<'a> {
         let start = (part * self.layout.container).min(self.bytes.len());
         PcmFrames { layout: self.layout.part(), channels: self.channels / 2, bytes: &self.bytes[start..] }

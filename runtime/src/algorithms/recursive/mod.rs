@@ -28,7 +28,8 @@ use crate::{BuildError, Isa, StateSpace};
 /// change a bit.
 pub(crate) const BLOCK: usize = 64;
 
-/// States below this become zero: far below every signal, and far above the denormals, which begin at 2e-308.
+/// States below this become zero: far below every signal, and far above the denormals, which begin at
+/// 2e-308.
 pub(crate) const NEGLIGIBLE_STATE: f64 = 1e-280;
 
 /// Coefficients in the order of use.
