@@ -44,6 +44,19 @@ pub fn real_sequence(spectrum: &[Complex<f64>], length: usize) -> Vec<f64> {
     sequence
 }
 
+/// sum over n of x_{n + lag} y_n at the index lag modulo the length, which is a power of two and holds every
+/// lag of which there are products.
+pub fn cross_correlation(x: &[f64], y: &[f64]) -> Vec<f64> {
+    let size = (x.len() + y.len()).next_power_of_two();
+    let [x, y] = [x, y].map(|samples| {
+        let mut padded = samples.to_vec();
+        padded.resize(size, 0.0);
+        real_spectrum(&padded)
+    });
+    let product: Vec<Complex<f64>> = x.iter().zip(&y).map(|(x, y)| x * y.conj() / size as f64).collect();
+    real_sequence(&product, size)
+}
+
 /// z_n = L sum_k x_k y_{n - k}, indices modulo the length L of both.
 ///
 /// # Panics

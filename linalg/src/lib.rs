@@ -16,6 +16,7 @@ pub mod blocks;
 mod cholesky;
 mod eigen;
 pub mod fourier;
+pub mod least_squares;
 mod lq;
 mod solve;
 mod svd;

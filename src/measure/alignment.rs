@@ -1,16 +1,41 @@
 //! Lag, gain and offset between a record and a reference.
 
 use super::MeasureError;
-use super::interpolate::{Interpolator, REACH};
-use crate::linalg::{Mat, PositiveFactor};
+use crate::linalg::least_squares::{LeastSquares, Minimum, NoMinimum, NormalEquations, StepLimits, minimise};
+use crate::linalg::{Mat, fourier};
+use crate::sine_fit::Channel;
+use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Most steps of the fractional lag.
-const MOST_STEPS: usize = 30;
-/// The lag has settled when it moves by less than this (samples).
+/// The lag has settled when it moves by less than this (samples): the rounding of the interpolation.
 const SETTLED: f64 = 1e-11;
+/// A step of the lag is at most half a sample: beyond it the derivative at the start says nothing.
+const LARGEST_STEP: f64 = 0.5;
+/// The lag is lost when it is so many whole samples from its start.
+const FARTHEST: i64 = 2;
 /// Fewest samples at which record and reference are compared.
 const LEAST_OVERLAP: usize = 16;
+
+/// Samples of each recording from which the whole part of the lag is found.
+const SEARCHED: usize = 1 << 20;
+/// Least part of the shorter recording that overlaps at a lag.
+const LEAST_PART: usize = 2;
+/// Lags whose correlation is this close to the largest are tried: the correlation at whole samples is below
+/// that at the lag itself.
+const LIKELY: f64 = 0.8;
+/// Coefficients that differ by less than this share are one: the noise of the recordings makes such
+/// differences between periods of a signal.
+const ALIKE: f64 = 1e-3;
+/// Lags that are tried: so many of the largest correlation, and of those that exceed all nearer to 0.
+const MOST_LAGS: usize = 8;
+
+/// Samples on each side of an instant from which it is interpolated.
+const REACH: usize = 128;
+/// Shape of the Kaiser window: -118 dB outside a transition that begins at 0.485 fs.
+const BETA: f64 = 12.265;
+/// Step of the derivative by the lag, in samples: the square of it, the error, is the square root of the
+/// rounding error.
+const STEP: f64 = 1e-4;
 
 /// The present lag, gain and offset.
 pub(super) struct Alignment<'a> {
@@ -21,6 +46,8 @@ pub(super) struct Alignment<'a> {
     pub(super) phase: f64,
     pub(super) gain: f64,
     pub(super) offset: f64,
+    /// Where the iteration began.
+    start: i64,
     /// Samples that are compared at most, and where in the record.
     most: usize,
     within: Range<usize>,
@@ -30,20 +57,8 @@ pub(super) struct Alignment<'a> {
 pub(super) struct Settled {
     /// Of gain, offset and lag.
     pub(super) covariance: Mat,
-    /// Mean square of the error.
+    /// Mean square of the error over that of the scaled reference.
     pub(super) error: f64,
-    /// Mean square of the scaled reference.
-    pub(super) signal: f64,
-}
-
-/// J'J and J'e for gain, offset and lag.
-struct Normal {
-    matrix: Mat,
-    projection: Mat,
-    /// e'e.
-    squares: f64,
-    /// Samples that took part.
-    count: usize,
 }
 
 /// A sample at which record and reference are known.
@@ -58,10 +73,40 @@ pub(super) struct Point {
     pub(super) error: f64,
 }
 
+impl LeastSquares for Alignment<'_> {
+    type Error = MeasureError;
+    const MOST_STEPS: usize = 30;
+
+    fn equations(&mut self) -> Result<NormalEquations, MeasureError> {
+        self.equations_of(3)
+    }
+
+    fn advance(&mut self, step: &[f64]) -> bool {
+        self.gain += step[0];
+        self.offset += step[1];
+        let phase = self.phase + step[2];
+        self.whole += phase.round() as i64;
+        self.phase = phase - phase.round();
+        (self.whole - self.start).abs() <= FARTHEST
+    }
+
+    /// Gain and offset follow from the lag.
+    fn limits(&self, k: usize, _: f64) -> StepLimits {
+        match k {
+            2 => StepLimits { largest: LARGEST_STEP, negligible: SETTLED },
+            _ => StepLimits { largest: f64::INFINITY, negligible: f64::INFINITY },
+        }
+    }
+
+    fn error(&self, _: NoMinimum) -> MeasureError {
+        MeasureError::NoLag { lag: self.start }
+    }
+}
+
 impl<'a> Alignment<'a> {
     pub(super) fn new(samples: &'a [f64], reference: &'a [f64], whole: i64, most: usize) -> Self {
         let within = 0..samples.len();
-        Self { samples, reference, whole, phase: 0.0, gain: 1.0, offset: 0.0, most, within }
+        Self { samples, reference, whole, phase: 0.0, gain: 1.0, offset: 0.0, start: whole, most, within }
     }
 
     /// From now on only these samples of the record are compared.
@@ -83,85 +128,143 @@ impl<'a> Alignment<'a> {
         start..end.min(start.saturating_add(self.most))
     }
 
-    /// Gauss-Newton in lag, gain and offset.
+    /// The least squares of the error in lag, gain and offset.
     pub(super) fn settle(&mut self) -> Result<Settled, MeasureError> {
-        let start = self.whole;
-        for step in 0..MOST_STEPS {
-            let Normal { matrix, projection, squares, count } = self.normal_equations();
-            if count < LEAST_OVERLAP {
-                return Err(self.overlap(count));
-            }
-            let lost = |_| MeasureError::NoLag { lag: start };
-            // The first step finds gain and offset alone: with a wrong gain the derivative by the lag is
-            // wrong.
-            let size = if step == 0 { 2 } else { 3 };
-            let factor =
-                PositiveFactor::new(&matrix.view((0, 0), (size, size)).into_owned()).map_err(lost)?;
-            let change = factor.solve(&projection.rows(0, size).into_owned());
-            self.gain += change[0];
-            self.offset += change[1];
-            if step == 0 {
-                continue;
-            }
-            self.shift(change[2].clamp(-0.5, 0.5));
-            if change[2].abs() < SETTLED {
-                let variance = squares / (count as f64 - 3.0).max(1.0);
-                let covariance = factor.solve(&Mat::identity(3, 3)) * variance;
-                let signal = self.gain * self.gain * matrix[(0, 0)] / count as f64;
-                return Ok(Settled { covariance, error: squares / count as f64, signal });
-            }
-            if (self.whole - start).abs() > 2 {
-                break;
-            }
-        }
-        Err(MeasureError::NoLag { lag: start })
-    }
-
-    fn shift(&mut self, change: f64) {
-        let phase = self.phase + change;
-        self.whole += phase.round() as i64;
-        self.phase = phase - phase.round();
-    }
-
-    fn overlap(&self, overlap: usize) -> MeasureError {
-        MeasureError::Overlap {
-            samples: self.samples.len(),
-            reference: self.reference.len(),
-            overlap,
-            lag: self.whole,
-            needed: LEAST_OVERLAP + 2 * REACH,
-        }
+        self.start = self.whole;
+        // With a wrong gain the derivative by the lag is wrong, so gain and offset come first.
+        let first = self.equations_of(2)?;
+        let change = first.inverse(f64::INFINITY).map_err(|why| self.error(why))? * first.projection;
+        self.gain += change[0];
+        self.offset += change[1];
+        let Minimum { equations, inverse, .. } = minimise(self)?;
+        let signal = self.gain * self.gain * equations.gram[(0, 0)];
+        Ok(Settled { covariance: inverse * equations.variance(), error: equations.squares / signal })
     }
 
     /// The samples at which both are known.
     pub(super) fn points(&self) -> impl Iterator<Item = Point> {
-        let interpolator = Interpolator::new(self.phase);
+        let weights = kernel(self.phase);
+        let (before, after) = (kernel(self.phase - STEP), kernel(self.phase + STEP));
+        let slopes: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (b - a) / (2.0 * STEP)).collect();
         let reach = REACH as i64;
         let point = move |n: usize| {
             let begin = (n as i64 - self.whole - reach) as usize;
             let near = &self.reference[begin..=begin + 2 * REACH];
             let sum = |weights: &[f64]| near.iter().zip(weights).map(|(x, c)| x * c).sum::<f64>();
-            let (value, slope) = (sum(&interpolator.values), sum(&interpolator.slopes));
+            let (value, slope) = (sum(&weights), sum(&slopes));
             Point { n, value, slope, error: self.samples[n] - self.gain * value - self.offset }
         };
         self.probed().map(point).filter(|point| point.error.is_finite())
     }
 
-    fn normal_equations(&self) -> Normal {
-        let (mut matrix, mut projection) = (Mat::zeros(3, 3), Mat::zeros(3, 1));
-        let (mut squares, mut count) = (0.0, 0);
+    /// Of the first so many among gain, offset and lag.
+    fn equations_of(&self, parameters: usize) -> Result<NormalEquations, MeasureError> {
+        let mut equations = NormalEquations::new(parameters);
         for point in self.points() {
             let row = [point.value, 1.0, self.gain * point.slope];
-            for (i, a) in row.iter().enumerate() {
-                for (j, b) in row[..=i].iter().enumerate() {
-                    matrix[(i, j)] += a * b;
-                }
-                projection[i] += a * point.error;
-            }
-            squares += point.error * point.error;
-            count += 1;
+            equations.add(&row[..parameters], point.error);
         }
-        matrix.fill_upper_triangle_with_lower_triangle();
-        Normal { matrix, projection, squares, count }
+        let overlap = equations.rows;
+        if overlap >= LEAST_OVERLAP {
+            return Ok(equations);
+        }
+        let (samples, reference) = (self.samples.len(), self.reference.len());
+        let needed = LEAST_OVERLAP + 2 * REACH;
+        Err(MeasureError::Overlap { samples, reference, overlap, lag: self.whole, needed })
     }
+}
+
+/// Coefficients c_j, j = -REACH ..= REACH, of x(n - phase) = sum over j of x[n - j] c_j for -1 < phase < 1,
+/// stored for increasing sample index: sinc(t) kaiser(t) at t = j - phase, scaled to keep constants. A phase
+/// of 0 gives the samples themselves.
+fn kernel(phase: f64) -> Vec<f64> {
+    let reach = REACH as f64;
+    let at = |i: usize| {
+        let t = reach - i as f64 - phase;
+        let share = 1.0 - (t / (reach + 1.0)).powi(2);
+        if share <= 0.0 { 0.0 } else { sinc(t) * bessel_i0(BETA * share.sqrt()) }
+    };
+    let values: Vec<f64> = (0..=2 * REACH).map(at).collect();
+    let sum: f64 = values.iter().sum();
+    values.iter().map(|x| x / sum).collect()
+}
+
+fn sinc(t: f64) -> f64 {
+    // Exact zeros at the other samples, where sin(pi t) rounds to something.
+    if t == 0.0 {
+        1.0
+    } else if t.fract() == 0.0 {
+        0.0
+    } else {
+        (PI * t).sin() / (PI * t)
+    }
+}
+
+/// The modified Bessel function I_0 by its power series; BETA is small.
+fn bessel_i0(x: f64) -> f64 {
+    let quarter = 0.25 * x * x;
+    let (mut term, mut sum) = (1.0, 1.0);
+    for k in 1..=60 {
+        term *= quarter / (k * k) as f64;
+        sum += term;
+    }
+    sum
+}
+
+/// The lags of the largest correlation coefficients in absolute value, in whole samples, and those with a
+/// larger coefficient than all that are nearer to 0: among the many lags that agree for a periodic signal
+/// they hold the shortest.
+pub(super) fn likely_lags(samples: &[f64], reference: &[f64]) -> Vec<i64> {
+    let all = coefficients(samples, reference);
+    let largest = all.iter().fold(0.0, |most: f64, (_, c)| most.max(*c));
+    let is_peak = |i: usize| {
+        let below = |j: Option<usize>| j.and_then(|j| all.get(j)).is_none_or(|(_, c)| *c <= all[i].1);
+        all[i].1 >= LIKELY * largest && below(i.checked_sub(1)) && below(Some(i + 1))
+    };
+    let mut peaks: Vec<(i64, f64)> = (0..all.len()).filter(|&i| is_peak(i)).map(|i| all[i]).collect();
+    peaks.sort_by_key(|(lag, _)| lag.abs());
+    let mut rising: Vec<(i64, f64)> = Vec::new();
+    for peak in &peaks {
+        if rising.last().is_none_or(|last| peak.1 > last.1 * (1.0 + ALIKE)) {
+            rising.push(*peak);
+        }
+    }
+    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let shortest = rising.iter().rev().take(MOST_LAGS);
+    let mut lags: Vec<i64> = shortest.chain(peaks.iter().take(MOST_LAGS)).map(|(lag, _)| *lag).collect();
+    lags.sort_by_key(|lag| lag.abs());
+    lags.dedup();
+    lags
+}
+
+/// The absolute correlation coefficient at each lag; 0 where too little overlaps.
+fn coefficients(samples: &[f64], reference: &[f64]) -> Vec<(i64, f64)> {
+    let [x, r] =
+        [samples, reference].map(|part| Channel::new(&part[..part.len().min(SEARCHED)]).deviations());
+    let correlation = fourier::cross_correlation(&x, &r);
+    let (energies, others) = (sums_of_squares(&x), sums_of_squares(&r));
+    let least = (x.len().min(r.len()) / LEAST_PART).max(1);
+    let coefficient = |lag: i64| {
+        let first = lag.max(0) as usize;
+        let last = (r.len() as i64 + lag).clamp(0, x.len() as i64) as usize;
+        if last < first + least {
+            return (lag, 0.0);
+        }
+        let own = energies[last] - energies[first];
+        let other = others[(last as i64 - lag) as usize] - others[(first as i64 - lag) as usize];
+        let covariance = correlation[lag.rem_euclid(correlation.len() as i64) as usize];
+        // An overlap of zeros correlates with nothing.
+        (lag, if own > 0.0 && other > 0.0 { covariance.abs() / (own * other).sqrt() } else { 0.0 })
+    };
+    (1 - r.len() as i64..x.len() as i64).map(coefficient).collect()
+}
+
+/// Sums of the squares of the first 0, 1, 2, .. values.
+fn sums_of_squares(values: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let next = values.iter().map(|x| {
+        sum += x * x;
+        sum
+    });
+    std::iter::once(0.0).chain(next).collect()
 }

@@ -1,7 +1,6 @@
 //! A record against a reference: lag, gain, offset and error.
 
-use super::alignment::Alignment;
-use super::lag::likely_lags;
+use super::alignment::{Alignment, likely_lags};
 use super::{MeasureError, Spectrum, UnsettledEnds, Window};
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
@@ -134,7 +133,7 @@ fn is_better(longer: &Alignment<'_>, shorter: &Alignment<'_>) -> bool {
     let [own, other] = [longer, shorter].map(|alignment| {
         let mut same = Alignment::new(alignment.samples, alignment.reference, alignment.whole, PROBED);
         same.restrict(if is_shared { shared.clone() } else { alignment.probed() });
-        same.settle().map_or(f64::INFINITY, |found| found.error / found.signal)
+        same.settle().map_or(f64::INFINITY, |found| found.error)
     });
     EQUAL_ERRORS * own + NO_ERROR < other
 }

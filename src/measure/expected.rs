@@ -1,20 +1,121 @@
-//! The lines that theory expects: their frequencies, and which of them coincide.
+//! The lines that theory expects: their causes, their frequencies, and which of them coincide.
 
-use super::Cause;
+use crate::sine_fit::{Direction, alias};
+use std::fmt;
 
-/// The spurs at a frequency and, in complex records, at its negative.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Sides {
-    pub(super) forward: Vec<Cause>,
-    pub(super) backward: Vec<Cause>,
+/// The cause of a spur. Tones count from 1; 0 stands for the only tone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Cause {
+    /// Unequal offsets of `of` converters in turn: a line at k fs / of.
+    Offset {
+        /// k.
+        k: usize,
+        /// Converters in turn.
+        of: usize,
+    },
+    /// Unequal gains or sampling instants of `of` converters in turn: a line at |k fs / of + f| or
+    /// |k fs / of - f|, in complex records without the bars. One tone does not tell gain from skew.
+    GainOrSkew {
+        /// k.
+        k: usize,
+        /// Converters in turn.
+        of: usize,
+        /// True for the sum, false for the difference.
+        is_sum: bool,
+        /// The tone.
+        tone: usize,
+    },
+    /// A harmonic of a tone.
+    Harmonic {
+        /// Multiple of the tone's frequency.
+        order: usize,
+        /// True if the harmonic lies above half the rate and is seen at its alias.
+        folded: bool,
+        /// The tone.
+        tone: usize,
+    },
+    /// Unequal nonlinearity of `of` converters in turn: a line at a harmonic displaced by k fs / of.
+    HarmonicImage {
+        /// Multiple of the tone's frequency.
+        order: usize,
+        /// k.
+        k: usize,
+        /// Converters in turn.
+        of: usize,
+    },
+    /// Parts of a complex record that are not in quadrature or not of one gain: a line at minus the
+    /// frequency of a tone or of its harmonic.
+    Image {
+        /// Multiple of the tone's frequency; 1 for the tone.
+        order: usize,
+        /// The tone.
+        tone: usize,
+    },
+    /// A product of two tones, at |a f1 + b f2|; in complex records at a f1 + b f2.
+    Intermodulation {
+        /// a.
+        a: i32,
+        /// The first tone.
+        first: usize,
+        /// b.
+        b: i32,
+        /// The second tone.
+        second: usize,
+    },
+    /// None of the others.
+    Unknown,
+}
+
+impl Cause {
+    /// True for what would be absent if all converters were equal.
+    pub fn is_interleaving(self) -> bool {
+        matches!(self, Self::Offset { .. } | Self::GainOrSkew { .. } | Self::HarmonicImage { .. })
+    }
+
+    /// True for harmonics.
+    pub fn is_harmonic(self) -> bool {
+        matches!(self, Self::Harmonic { .. })
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = |tone: usize| if tone == 0 { "f".to_owned() } else { format!("f{tone}") };
+        match *self {
+            Self::Offset { k, of } => write!(f, "offset, {k}/{of} fs"),
+            Self::GainOrSkew { k, of, is_sum, tone } => {
+                write!(f, "gain or skew, {k}/{of} fs {} {}", if is_sum { '+' } else { '-' }, name(tone))
+            }
+            Self::Harmonic { order, folded, tone } => {
+                write!(f, "harmonic, {order} {}{}", name(tone), if folded { ", folded" } else { "" })
+            }
+            Self::HarmonicImage { order, k, of } => write!(f, "harmonic {order} displaced by {k}/{of} fs"),
+            Self::Image { order: 1, tone } => write!(f, "image, -{}", name(tone)),
+            Self::Image { order, tone } => write!(f, "image of a harmonic, -{order} {}", name(tone)),
+            Self::Intermodulation { a, first, b, second } => {
+                write!(f, "intermodulation, {a} {} {b:+} {}", name(first), name(second))
+            }
+            Self::Unknown => write!(f, "unknown"),
+        }
+    }
 }
 
 /// A line at which at least one spur is expected.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Line {
     /// Cycles per sample, 0 to 1/2.
     pub(super) cycles: f64,
-    pub(super) causes: Sides,
+    /// The spurs there.
+    forward: Vec<Cause>,
+    /// In complex records those at the negative frequency.
+    backward: Vec<Cause>,
+}
+
+impl Line {
+    pub(super) fn causes(&self, direction: Direction) -> &[Cause] {
+        if direction == Direction::Forward { &self.forward } else { &self.backward }
+    }
 }
 
 /// The expected lines of a record.
@@ -99,20 +200,17 @@ impl Expected {
 
     /// Adds a line at the alias of `cycles`, or to the one that is there: its cause, and that of its image.
     fn add(&mut self, pattern: &Pattern<'_>, cycles: f64, [cause, image]: [Cause; 2]) {
-        let place = folded(cycles);
-        let is_near = |other: f64| (place - other).abs() < pattern.resolution;
-        if is_near(0.0) || is_near(0.5) || pattern.tones.iter().any(|f| is_near(folded(*f))) {
+        let folded = alias(cycles);
+        let is_near = |other: f64| (folded - other).abs() < pattern.resolution;
+        if is_near(0.0) || is_near(0.5) || pattern.tones.iter().any(|f| is_near(alias(*f))) {
             return self.hidden.push(cause);
         }
-        let line = match self.lines.iter().position(|line| is_near(line.cycles)) {
-            Some(at) => &mut self.lines[at],
-            None => {
-                self.lines.push(Line { cycles: place, causes: Sides::default() });
-                self.lines.last_mut().expect("it was pushed")
-            }
-        };
+        let at = self.lines.iter().position(|line| is_near(line.cycles)).unwrap_or_else(|| {
+            self.lines.push(Line { cycles: folded, ..Line::default() });
+            self.lines.len() - 1
+        });
         let is_backward = pattern.is_complex && cycles - cycles.round() < 0.0;
-        let Sides { forward, backward } = &mut line.causes;
+        let Line { forward, backward, .. } = &mut self.lines[at];
         let (own, other) = if is_backward { (backward, forward) } else { (forward, backward) };
         own.push(cause);
         if pattern.is_complex {
@@ -122,7 +220,7 @@ impl Expected {
 
     /// True for a frequency within the resolution of a tone or of an expected line.
     pub(super) fn holds(&self, pattern: &Pattern<'_>, cycles: f64) -> bool {
-        let tones = pattern.tones.iter().map(|f| folded(*f));
+        let tones = pattern.tones.iter().map(|f| alias(*f));
         let mut all = self.lines.iter().map(|line| line.cycles).chain(tones);
         all.any(|other| (cycles - other).abs() < pattern.resolution)
     }
@@ -136,7 +234,7 @@ impl Pattern<'_> {
 
     /// Where the record shows a frequency, in cycles per sample.
     pub(super) fn seen(&self, cycles: f64) -> f64 {
-        if self.is_complex { cycles - cycles.round() } else { folded(cycles) }
+        if self.is_complex { cycles - cycles.round() } else { alias(cycles) }
     }
 
     /// The causes of the line at seen + k / of and of its image.
@@ -150,11 +248,6 @@ impl Pattern<'_> {
     }
 }
 
-/// The alias in 0 ..= 1/2.
-pub(super) fn folded(cycles: f64) -> f64 {
-    (cycles - cycles.round()).abs()
-}
-
 /// The name of the line at the alias of f + k / of, for f in 0 ..= 1/2: 0 < f + k / of < 3/2.
 fn image(f: f64, k: usize, of: usize, tone: usize) -> Cause {
     let is_sum = f + k as f64 / of as f64 <= 0.5;
@@ -166,7 +259,7 @@ fn image(f: f64, k: usize, of: usize, tone: usize) -> Cause {
 pub(super) fn unexpected(pattern: &Pattern<'_>, expected: &Expected, cycles: f64) -> Cause {
     let of = pattern.converters;
     let [f] = pattern.tones else { return Cause::Unknown };
-    if expected.holds(pattern, folded(cycles)) {
+    if expected.holds(pattern, alias(cycles)) {
         return Cause::Unknown;
     }
     for order in 2..=pattern.harmonics {

@@ -1,9 +1,9 @@
 //! The amplitudes of lines, and what is left without them.
 
-use super::expected::{Expected, Pattern, Sides, folded, unexpected};
+use super::expected::{Expected, Pattern, unexpected};
 use super::record::Record;
 use super::{Cause, MeasureError};
-use crate::sine_fit::{Direction, SineFit, find_tones, fit, fit_known};
+use crate::sine_fit::{Direction, SineFit, alias, find_tones, fit, fit_known};
 use crate::units::{Decibels, Hertz};
 use std::f64::consts::SQRT_2;
 
@@ -111,8 +111,8 @@ impl Together {
         let mut half_rate = vec![0.0; record.parts().len()];
         let mut rounds = ALTERNATIONS;
         loop {
-            let places = expected.lines.iter().map(|line| rate * line.cycles);
-            let all: Vec<Hertz> = found.iter().copied().chain(places).collect();
+            let beside = expected.lines.iter().map(|line| rate * line.cycles);
+            let all: Vec<Hertz> = found.iter().copied().chain(beside).collect();
             let whole = fit_known(&record.channels(), rate, &all)?;
             let mut rest = record.residual(&whole);
             if expected.half_rate.is_some() {
@@ -134,18 +134,17 @@ impl Together {
     /// The expected lines, and in complex records the images of the tones.
     fn found(&self, record: &Record<'_>, pattern: &Pattern<'_>, expected: &Expected) -> Vec<Found> {
         let (rate, tones) = (self.fit.rate, pattern.tones.len());
-        let images =
-            pattern.tones.iter().enumerate().filter(|_| pattern.is_complex).map(|(k, cycles)| Found {
-                frequency: rate * -pattern.seen(*cycles),
-                amplitude: self.fit.exponential([0, 1], k, Direction::Backward).amplitude.value,
-                causes: vec![Cause::Image { order: 1, tone: pattern.number(k) }],
-            });
+        let tones_of_images = (0..tones).filter(|_| pattern.is_complex);
+        let images = tones_of_images.map(|k| Found {
+            frequency: rate * -pattern.seen(pattern.tones[k]),
+            amplitude: record.amplitude(&self.fit, k, Direction::Backward),
+            causes: vec![Cause::Image { order: 1, tone: pattern.number(k) }],
+        });
         let lines = expected.lines.iter().enumerate().flat_map(|(k, line)| {
-            let of_line = record.lines_of(&self.fit, tones + k, &line.causes);
-            of_line.into_iter().map(move |(direction, amplitude, causes)| Found {
+            record.directions().iter().map(move |&direction| Found {
                 frequency: rate * (direction.sign() * line.cycles),
-                amplitude,
-                causes,
+                amplitude: record.amplitude(&self.fit, tones + k, direction),
+                causes: line.causes(direction).to_vec(),
             })
         });
         let size = self.half_rate.iter().fold(0.0, |size: f64, a| size.hypot(*a));
@@ -196,19 +195,28 @@ impl Unexpected {
             let Ok(start) = find_tones(&channels, rate, 1, RANGE) else { break };
             let Ok(line) = fit(&channels, rate, &start) else { break };
             let cycles = line.frequencies[0].value / rate;
-            let sides = all.rest.lines_of(&line, 0, &Sides::default());
-            let largest = sides.iter().fold(0.0, |largest: f64, side| largest.max(side.1));
+            let sides: Vec<Found> = all
+                .rest
+                .directions()
+                .iter()
+                .map(|&direction| {
+                    let cycles = direction.sign() * cycles;
+                    let causes = vec![unexpected(pattern, expected, cycles)];
+                    Found {
+                        frequency: rate * cycles,
+                        amplitude: all.rest.amplitude(&line, 0, direction),
+                        causes,
+                    }
+                })
+                .collect();
+            let largest = sides.iter().fold(0.0, |largest: f64, side| largest.max(side.amplitude));
             let faint = |first: &Found| largest < first.amplitude * (-RANGE).amplitude_ratio();
             if all.found.first().is_some_and(faint) {
                 break;
             }
-            all.found.extend(sides.into_iter().map(|(direction, amplitude, _)| {
-                let cycles = direction.sign() * cycles;
-                let causes = vec![unexpected(pattern, expected, cycles)];
-                Found { frequency: rate * cycles, amplitude, causes }
-            }));
+            all.found.extend(sides);
             let rest = all.rest.residual(&line);
-            if !expected.holds(pattern, folded(cycles)) {
+            if !expected.holds(pattern, alias(cycles)) {
                 all.waves = all.waves.plus(&all.rest.minus(&rest));
                 all.largest = all.largest.max(largest);
             }

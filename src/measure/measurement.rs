@@ -2,9 +2,8 @@
 
 use super::expected::{Expected, Pattern};
 use super::lines::{Found, Lines, fit_lines};
-use super::quadrature::Quadrature;
-use super::record::Record;
-use super::{Cause, MeasureError, Settings, Spectrum, UnsettledEnds, Window};
+use super::record::{Quadrature, Record, UnsettledEnds};
+use super::{Cause, MeasureError, Settings, Spectrum, Window};
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
 use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate};
 use crate::units::{Decibels, Hertz, Radians};
@@ -184,7 +183,7 @@ fn figures(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Meas
 fn fit_tones(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<SineFit, MeasureError> {
     let channels = record.channels();
     let found = fit(&channels, rate, &starts(record, rate, settings)?)?;
-    let size = |direction| found.exponential([0, 1], 0, direction).amplitude.value;
+    let size = |direction| record.amplitude(&found, 0, direction);
     let is_given = !settings.tones.is_empty() || !record.is_complex();
     if is_given || size(Direction::Forward) >= size(Direction::Backward) {
         return Ok(found);
@@ -271,10 +270,7 @@ impl Figures<'_> {
 
     /// The tone k: the sine, or the exponential of a complex record.
     fn tone(&self, k: usize) -> ToneFit {
-        match self.record.is_complex() {
-            true => self.tones.exponential([0, 1], k, Direction::Forward),
-            false => self.tones.channels[0].tones[k],
-        }
+        self.tones.phasor(self.record.wave(Direction::Forward), k)
     }
 
     fn amplitudes(&self) -> impl Iterator<Item = f64> {
@@ -285,7 +281,7 @@ impl Figures<'_> {
     fn other_power(&self) -> f64 {
         let parts = self.tones.channels.iter().map(|part| part.residual_rms.powi(2));
         let rest = parts.sum::<f64>() / self.tones.channels.len() as f64;
-        let image = |k| 0.5 * self.tones.exponential([0, 1], k, Direction::Backward).amplitude.value.powi(2);
+        let image = |k| 0.5 * self.record.amplitude(self.tones, k, Direction::Backward).powi(2);
         let images = (0..self.tones.tones()).filter(|_| self.record.is_complex()).map(image);
         rest + images.sum::<f64>()
     }

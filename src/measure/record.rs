@@ -1,10 +1,14 @@
-//! Real and complex records: one part or two.
+//! Real and complex records, their ends, and what the parts of complex ones lack of quadrature.
 
-use super::Cause;
-use super::expected::Sides;
-use crate::sine_fit::{Channel, Direction, SineFit};
+use crate::sine_fit::{Channel, Component, Direction, Estimate, Ratio, SineFit};
+use crate::units::{Decibels, Radians};
 use std::borrow::Cow;
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{FRAC_PI_2, SQRT_2};
+
+/// Fewest samples at either end that are looked at.
+const FEWEST: usize = 8;
+/// The power of a piece relative to the middle from which on it belongs to an end.
+const RAISED: f64 = 4.0;
 
 /// The samples of a record. Powers are means over its parts, so that those of a tone of the amplitude A are
 /// A^2 / 2 for both kinds.
@@ -93,20 +97,113 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// The lines at a frequency of a fit: the sine, or the exponentials at plus and minus the frequency.
-    pub(super) fn lines_of(
-        &self,
-        fit: &SineFit,
-        tone: usize,
-        causes: &Sides,
-    ) -> Vec<(Direction, f64, Vec<Cause>)> {
-        if !self.is_complex() {
-            let amplitude = fit.channels[0].tones[tone].amplitude.value;
-            return vec![(Direction::Forward, amplitude, causes.forward.clone())];
-        }
-        let line = |direction, causes: &Vec<Cause>| {
-            (direction, fit.exponential([0, 1], tone, direction).amplitude.value, causes.clone())
-        };
-        vec![line(Direction::Forward, &causes.forward), line(Direction::Backward, &causes.backward)]
+    /// The exponentials that a frequency may have.
+    pub(super) fn directions(&self) -> &'static [Direction] {
+        if self.is_complex() { &[Direction::Forward, Direction::Backward] } else { &[Direction::Forward] }
     }
+
+    /// The sine in a fit of this record, or the exponential.
+    pub(super) fn wave(&self, direction: Direction) -> Component {
+        if self.is_complex() { Component::Complex([0, 1], direction) } else { Component::Real(0) }
+    }
+
+    /// The amplitude at plus or minus the frequency of a tone.
+    pub(super) fn amplitude(&self, fit: &SineFit, tone: usize, direction: Direction) -> f64 {
+        match self.wave(direction) {
+            Component::Real(part) => fit.channels[part].tones[tone].amplitude.value,
+            wave => fit.phasor(wave, tone).amplitude.value,
+        }
+    }
+}
+
+/// What the parts of a complex record lack of equal gains, of quadrature and of offsets of 0 (I/Q
+/// imbalance).
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Quadrature {
+    /// The constant of the imaginary parts.
+    pub offset: Estimate<f64>,
+    /// One per tone, at its frequency.
+    pub imbalances: Vec<Imbalance>,
+}
+
+/// The imbalance of the parts at a tone. With the gain g and the phase error p the imaginary part of
+/// e^{j w t} is g sin(w t + p), and the image of the tone has the relative size
+///
+/// ```text
+/// abs(b / a) = sqrt( (1 - 2 g cos p + g^2) / (1 + 2 g cos p + g^2) )
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Imbalance {
+    /// g, the gain of the imaginary part relative to that of the real part.
+    pub gain: Estimate<f64>,
+    /// p, the error of the quadrature.
+    #[serde(rename = "phase_radians")]
+    pub phase: Estimate<Radians>,
+    /// Tone over image.
+    #[serde(rename = "image_rejection_db")]
+    pub image_rejection: Decibels,
+}
+
+impl Quadrature {
+    /// Of the fit of both parts.
+    pub(super) fn of(fit: &SineFit) -> Self {
+        let imbalances = (0..fit.tones()).map(|tone| Imbalance::of(fit, tone)).collect();
+        Self { offset: fit.channels[1].constant, imbalances }
+    }
+}
+
+impl Imbalance {
+    fn of(fit: &SineFit, tone: usize) -> Self {
+        let Ratio { gain, phase } = fit.ratio(Component::Real(1), Component::Real(0), tone);
+        let [tone, image] = [Direction::Forward, Direction::Backward]
+            .map(|direction| fit.phasor(Component::Complex([0, 1], direction), tone).amplitude.value);
+        // The difference of phases beyond minus a quarter of a cycle, in -pi ..= pi.
+        let (sine, cosine) = (phase.value.0 + FRAC_PI_2).sin_cos();
+        Self {
+            gain,
+            phase: Estimate { value: Radians(sine.atan2(cosine)), sigma: phase.sigma },
+            image_rejection: Decibels::of_amplitude(tone / image),
+        }
+    }
+}
+
+/// Samples at the ends of a record that hold most of what no line explains: a filter that had no input
+/// before the first sample, for example.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct UnsettledEnds {
+    /// Samples at either end.
+    pub samples: usize,
+    /// Power of the rest of the whole record over that without these samples. The gain of leaving them out
+    /// is larger, because they pull at the fit of the tones too.
+    #[serde(rename = "raise_db")]
+    pub raise: Decibels,
+}
+
+impl UnsettledEnds {
+    /// The ends of a rest whose power they at least double. Pieces of 8, 16, 32 .. samples are compared with
+    /// the middle half. `None` too if more than an eighth at either end is raised: such a record changes all
+    /// along.
+    pub(super) fn of(rest: &[f64]) -> Option<Self> {
+        let n = rest.len();
+        let (whole, middle) = (mean_square(rest), mean_square(&rest[n / 4..n - n / 4]));
+        if whole <= 2.0 * middle {
+            return None;
+        }
+        let is_raised = |k: usize| {
+            [k..2 * k, n - 2 * k..n - k].into_iter().any(|at| mean_square(&rest[at]) > RAISED * middle)
+        };
+        let mut samples = FEWEST;
+        while 8 * samples <= n && is_raised(samples) {
+            samples *= 2;
+        }
+        let is_an_end = 8 * samples <= n;
+        is_an_end.then(|| Self {
+            samples,
+            raise: Decibels::of_power(whole / mean_square(&rest[samples..n - samples])),
+        })
+    }
+}
+
+fn mean_square(samples: &[f64]) -> f64 {
+    samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64
 }

@@ -68,7 +68,7 @@ pub enum SineFitError {
     },
     /// Nothing stands out of the noise.
     #[error(
-        "no tone found{}: the largest peak of the spectrum is not above its noise; give a record with a sine wave", place(*near)
+        "no tone found{}: the largest peak of the spectrum is not above its noise; give a record with a sine wave", near_text(*near)
     )]
     NoTone {
         /// Where it was looked for; `None` for anywhere.
@@ -86,6 +86,6 @@ pub enum SineFitError {
     },
 }
 
-fn place(frequency: Option<Hertz>) -> String {
+fn near_text(frequency: Option<Hertz>) -> String {
     frequency.map_or_else(String::new, |frequency| format!(" near {frequency}"))
 }

@@ -1,15 +1,13 @@
-//! The iteration: linearise, solve, update.
+//! The fit: the coefficients of each channel are eliminated, the frequencies are iterated.
 
-use super::columns::Oscillator;
-use super::normal::{Normal, Point, centre, linear_count};
+use super::normal::{Oscillator, Point, accumulate, centre, linear_count};
 use super::result::{Covariance, SineFit};
 use super::{Channel, SineFitError, alias, distance_to_edge};
+use crate::linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::{LinalgError, Mat, PositiveFactor};
 use crate::units::Hertz;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
-/// Most Gauss-Newton steps; a start within half a cycle per record takes three to six.
-const MOST_STEPS: usize = 40;
 /// The iteration ends when the phase at the ends of the longest record moves by less than this (radians). A
 /// record of 1e9 samples at an SNR of 120 dB has a standard deviation of 4e-11.
 const PHASE_TOLERANCE: f64 = 1e-11;
@@ -44,33 +42,29 @@ pub fn fit_known(channels: &[Channel<'_>], rate: Hertz, tones: &[Hertz]) -> Resu
 pub fn fit(channels: &[Channel<'_>], rate: Hertz, tones: &[Hertz]) -> Result<SineFit, SineFitError> {
     let mut state = State::new(channels, rate, tones)?;
     state.solve_linear()?;
-    for step in 1..=MOST_STEPS {
-        let movement = state.solve()?;
-        state.check_movement(tones, step)?;
-        if movement < state.tolerance() {
-            state.solve_linear()?;
-            state.check_frequencies()?;
-            return state.finish(step);
-        }
-    }
-    Err(SineFitError::NoConvergence { frequency: tones[0], iterations: MOST_STEPS })
+    let steps = minimise(&mut state)?.steps;
+    state.solve_linear()?;
+    state.check_frequencies()?;
+    state.finish(steps)
 }
 
 /// The present parameters.
 struct State<'a> {
     channels: &'a [Channel<'a>],
     rate: Hertz,
+    tones: &'a [Hertz],
     /// Cycles per sample.
     frequencies: Vec<f64>,
     /// Coefficients of 1, cosines and sines of each channel, phases at the centre of its record.
     linear: Vec<Vec<f64>>,
     /// Half the length of the longest record, the unit of time of the derivatives.
     unit: f64,
-    is_known: bool,
+    /// The parts of the last equations.
+    parts: Vec<Eliminated>,
 }
 
-/// A channel's part of the solution: G = its Gram matrix without derivatives, with B = its Gram matrix with
-/// them.
+/// A channel's part of the solution, with its own coefficients eliminated: G = its Gram matrix without
+/// derivatives, B = that with derivatives, D = that of the derivatives; g and h = the projections.
 struct Eliminated {
     factor: PositiveFactor,
     /// G^-1 g.
@@ -84,8 +78,53 @@ struct Eliminated {
     used: usize,
 }
 
+impl LeastSquares for State<'_> {
+    type Error = SineFitError;
+    /// A start within half a cycle per record takes three to six.
+    const MOST_STEPS: usize = 40;
+
+    /// Of the frequencies, in radians at the ends of the longest record.
+    fn equations(&mut self) -> Result<NormalEquations, SineFitError> {
+        self.parts = self.eliminate(true)?;
+        let mut sum = NormalEquations::new(self.frequencies.len());
+        sum.gram = self.sum_of_schur(|_| 1.0);
+        self.parts.iter().for_each(|part| sum.projection += &part.rest);
+        Ok(sum)
+    }
+
+    fn advance(&mut self, step: &[f64]) -> bool {
+        let step = Mat::from_column_slice(step.len(), 1, step);
+        for (linear, part) in self.linear.iter_mut().zip(&self.parts) {
+            let change = &part.own - &part.coupling * &step;
+            linear.iter_mut().zip(change.iter()).for_each(|(x, dx)| *x += dx);
+        }
+        for (f, change) in self.frequencies.iter_mut().zip(step.iter()) {
+            *f += change / (TAU * self.unit);
+        }
+        let moved = |(f, tone): (&f64, &Hertz)| (TAU * self.unit * (f - *tone / self.rate)).abs();
+        self.frequencies.iter().zip(self.tones).map(moved).all(|moved| moved <= FARTHEST)
+    }
+
+    /// [`PHASE_TOLERANCE`], but no less than what the rounding of the frequencies moves.
+    fn limits(&self, _: usize, _: f64) -> StepLimits {
+        let largest = self.frequencies.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+        let rounding = 4.0 * f64::EPSILON * TAU * self.unit * largest;
+        StepLimits { largest: LARGEST_STEP, negligible: PHASE_TOLERANCE + rounding }
+    }
+
+    fn error(&self, why: NoMinimum) -> SineFitError {
+        match why {
+            NoMinimum::WithoutEffect(k) => SineFitError::NoTone { near: Some(self.tone(k)) },
+            NoMinimum::Dependent => self.dependent(self.frequencies.len() - 1),
+            NoMinimum::NoConvergence(iterations) => {
+                SineFitError::NoConvergence { frequency: self.tones[0], iterations }
+            }
+        }
+    }
+}
+
 impl<'a> State<'a> {
-    fn new(channels: &'a [Channel<'a>], rate: Hertz, tones: &[Hertz]) -> Result<Self, SineFitError> {
+    fn new(channels: &'a [Channel<'a>], rate: Hertz, tones: &'a [Hertz]) -> Result<Self, SineFitError> {
         if channels.is_empty() || tones.is_empty() || !(rate.0 > 0.0 && rate.0.is_finite()) {
             return Err(SineFitError::Nothing { channels: channels.len(), tones: tones.len(), rate });
         }
@@ -93,16 +132,10 @@ impl<'a> State<'a> {
         let linear = vec![vec![0.0; linear_count(tones.len())]; channels.len()];
         let frequencies = tones.iter().map(|tone| *tone / rate).collect();
         let unit = 0.5 * longest as f64;
-        let state = Self { channels, rate, frequencies, linear, unit, is_known: true };
+        let state = Self { channels, rate, tones, frequencies, linear, unit, parts: Vec::new() };
         state.check_samples()?;
         state.check_frequencies()?;
         Ok(state)
-    }
-
-    /// [`PHASE_TOLERANCE`], but no less than what the rounding of the frequencies moves.
-    fn tolerance(&self) -> f64 {
-        let largest = self.frequencies.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
-        PHASE_TOLERANCE + 4.0 * f64::EPSILON * 2.0 * PI * self.unit * largest
     }
 
     fn check_samples(&self) -> Result<(), SineFitError> {
@@ -154,12 +187,12 @@ impl<'a> State<'a> {
         }
     }
 
-    /// One pass over all samples.
-    fn eliminate(&self) -> Result<Vec<Eliminated>, SineFitError> {
+    /// One pass over all samples, with the derivatives by the frequencies or without.
+    fn eliminate(&self, is_searched: bool) -> Result<Vec<Eliminated>, SineFitError> {
         let oscillators: Vec<_> = self.frequencies.iter().map(|&f| Oscillator::new(f)).collect();
-        let unit = (!self.is_known).then_some(self.unit);
+        let unit = is_searched.then_some(self.unit);
         let channel = |(channel, linear): (&Channel<'_>, &Vec<f64>)| {
-            let normal = Normal::accumulate(channel, &Point { oscillators: &oscillators, linear, unit });
+            let normal = accumulate(channel, &Point { oscillators: &oscillators, linear, unit });
             Eliminated::new(&normal, linear.len()).map_err(|error| match error {
                 LinalgError::NotPositiveDefinite { pivot } => self.dependent(pivot / 2),
                 _ => self.dependent(0),
@@ -170,117 +203,63 @@ impl<'a> State<'a> {
 
     /// The least-squares coefficients at the present frequencies.
     fn solve_linear(&mut self) -> Result<(), SineFitError> {
-        self.is_known = true;
-        let parts = self.eliminate()?;
+        let parts = self.eliminate(false)?;
         for (linear, part) in self.linear.iter_mut().zip(&parts) {
             linear.iter_mut().zip(part.own.iter()).for_each(|(x, dx)| *x += dx);
         }
         Ok(())
     }
 
-    /// One Gauss-Newton step of all parameters; returns the largest movement of a frequency, in radians at
-    /// the ends of the longest record.
-    fn solve(&mut self) -> Result<f64, SineFitError> {
-        self.is_known = false;
-        let parts = self.eliminate()?;
-        let rest = parts.iter().fold(Mat::zeros(self.frequencies.len(), 1), |sum, part| sum + &part.rest);
-        let step = self.inverse_schur(&parts, None)? * rest;
-        let largest = step.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let factor = if largest > LARGEST_STEP { LARGEST_STEP / largest } else { 1.0 };
-        let step = step * factor;
-        for (linear, part) in self.linear.iter_mut().zip(&parts) {
-            let change = &part.own - &part.coupling * &step;
-            linear.iter_mut().zip(change.iter()).for_each(|(x, dx)| *x += dx);
-        }
-        for (f, change) in self.frequencies.iter_mut().zip(step.iter()) {
-            *f += change / (2.0 * PI * self.unit);
-        }
-        Ok(largest)
-    }
-
-    /// The inverse of the sum of the Schur complements, S; with `variances` of the channels' noise
-    /// S^-1 (sum of variance_i S_i) S^-1, the covariance of the frequencies.
-    ///
-    /// Rows and columns are scaled to a unit diagonal, since the amplitudes of tones may differ by decades.
-    fn inverse_schur(&self, parts: &[Eliminated], variances: Option<&[f64]>) -> Result<Mat, SineFitError> {
+    fn sum_of_schur(&self, weight: impl Fn(usize) -> f64) -> Mat {
         let tones = self.frequencies.len();
-        let sum = |weight: &dyn Fn(usize) -> f64| {
-            let terms = parts.iter().enumerate().map(|(i, part)| &part.schur * weight(i));
-            terms.fold(Mat::zeros(tones, tones), |sum, term| sum + term)
-        };
-        let whole = sum(&|_| 1.0);
-        let scale: Vec<f64> = (0..tones).map(|k| whole[(k, k)].sqrt().recip()).collect();
-        if let Some(k) = scale.iter().position(|s| !s.is_finite()) {
-            return Err(SineFitError::NoTone { near: Some(self.tone(k)) });
-        }
-        let scaled = Mat::from_fn(tones, tones, |i, j| whole[(i, j)] * scale[i] * scale[j]);
-        let factor = PositiveFactor::new(&scaled).map_err(|_| self.dependent(tones - 1))?;
-        let unit = factor.solve(&Mat::identity(tones, tones));
-        let inverse = Mat::from_fn(tones, tones, |i, j| unit[(i, j)] * scale[i] * scale[j]);
-        Ok(match variances {
-            None => inverse,
-            Some(variances) => &inverse * sum(&|i| variances[i]) * &inverse,
-        })
+        let terms = self.parts.iter().enumerate().map(|(i, part)| &part.schur * weight(i));
+        terms.fold(Mat::zeros(tones, tones), |sum, term| sum + term)
     }
 
-    fn check_movement(&self, tones: &[Hertz], iterations: usize) -> Result<(), SineFitError> {
-        for (f, tone) in self.frequencies.iter().zip(tones) {
-            let moved = 2.0 * PI * self.unit * (f - *tone / self.rate);
-            if moved.is_nan() || moved.abs() > FARTHEST {
-                return Err(SineFitError::NoConvergence { frequency: *tone, iterations });
-            }
-        }
-        Ok(())
-    }
-
-    /// A last pass for the residual and the covariance.
+    /// A last pass for the residual and the covariance; frequencies were fitted if there were `iterations`.
     fn finish(mut self, iterations: usize) -> Result<SineFit, SineFitError> {
         let is_fitted = iterations > 0;
-        self.is_known = !is_fitted;
-        let parts = self.eliminate()?;
         let tones = self.frequencies.len();
+        // With S_i the Schur complements and v_i the variances: S^-1 (sum of v_i S_i) S^-1.
+        let inverse = match is_fitted {
+            true => self.equations()?.inverse(Self::WORST_CONDITION).map_err(|why| self.error(why))?,
+            false => {
+                self.parts = self.eliminate(false)?;
+                Mat::zeros(tones, tones)
+            }
+        };
         // Each channel carries its share of the common frequencies.
         let shared = if is_fitted { tones as f64 / self.channels.len() as f64 } else { 0.0 };
-        let variance = |part: &Eliminated| {
-            part.squares / (part.used as f64 - linear_count(tones) as f64 - shared).max(1.0)
-        };
-        let variances: Vec<f64> = parts.iter().map(variance).collect();
-        let frequencies = match is_fitted {
-            true => self.inverse_schur(&parts, Some(&variances))?,
-            false => Mat::zeros(tones, tones),
-        };
-        let squares: Vec<(f64, usize)> = parts.iter().map(|part| (part.squares, part.used)).collect();
-        let coupling = |part: &Eliminated| match is_fitted {
-            true => part.coupling.clone(),
-            false => Mat::zeros(linear_count(tones), tones),
-        };
-        let covariance = Covariance {
-            couplings: parts.iter().map(coupling).collect(),
-            factors: parts.into_iter().map(|part| part.factor).collect(),
-            variances,
-            frequencies,
-            unit: self.unit,
-        };
-        let centres = self.channels.iter().map(|channel| centre(channel.samples.len())).collect();
-        let offsets = self.channels.iter().map(|channel| channel.offset).collect();
-        let lengths = self.channels.iter().map(|channel| channel.samples.len()).collect();
-        Ok(SineFit::assemble(super::result::Parts {
+        let freedom = |part: &Eliminated| part.used as f64 - linear_count(tones) as f64 - shared;
+        let variances: Vec<f64> =
+            self.parts.iter().map(|part| part.squares / freedom(part).max(1.0)).collect();
+        let frequencies =
+            if is_fitted { &inverse * self.sum_of_schur(|i| variances[i]) * &inverse } else { inverse };
+        let squares: Vec<(f64, usize)> = self.parts.iter().map(|part| (part.squares, part.used)).collect();
+        let (mut factors, mut couplings) = (Vec::new(), Vec::new());
+        for part in self.parts {
+            couplings.push(if is_fitted { part.coupling } else { Mat::zeros(linear_count(tones), tones) });
+            factors.push(part.factor);
+        }
+        let of_channels = |value: fn(&Channel<'_>) -> f64| self.channels.iter().map(value).collect();
+        let fit = SineFit {
             rate: self.rate,
+            frequencies: Vec::new(),
+            channels: Vec::new(),
+            iterations,
             cycles: self.frequencies,
             linear: self.linear,
-            squares,
-            lengths,
-            centres,
-            offsets,
-            covariance,
-            iterations,
-        }))
+            centres: of_channels(|channel| centre(channel.samples.len())),
+            starts: of_channels(|channel| channel.offset.0),
+            covariance: Covariance { factors, couplings, variances, frequencies, unit: self.unit },
+        };
+        Ok(fit.described(self.channels, &squares))
     }
 }
 
 impl Eliminated {
     /// Of the normal equations, whose first `linear` columns are the channel's own.
-    fn new(normal: &Normal, linear: usize) -> Result<Self, LinalgError> {
+    fn new(normal: &NormalEquations, linear: usize) -> Result<Self, LinalgError> {
         let shared = normal.gram.nrows() - linear;
         let part = |row: usize, column: usize, rows: usize, columns: usize| {
             normal.gram.view((row, column), (rows, columns)).into_owned()
@@ -291,6 +270,6 @@ impl Eliminated {
         let coupling = factor.solve(&b);
         let schur = d - b.transpose() * &coupling;
         let rest = normal.projection.rows(linear, shared) - b.transpose() * &own;
-        Ok(Self { factor, own, coupling, schur, rest, squares: normal.squares, used: normal.used })
+        Ok(Self { factor, own, coupling, schur, rest, squares: normal.squares, used: normal.rows })
     }
 }

@@ -24,8 +24,7 @@
 //! sigma(2 pi f T)^2 = 12 / (SNR N (N^2 - 1))
 //! ```
 //!
-//! A complex record is two channels, its real and its imaginary part, fitted jointly:
-//! [`SineFit::exponential`]. The frequency of C joint channels has 1/C of that variance. Noise that repeats
+//! A complex record is two channels, its real and its imaginary part, fitted jointly: [`Component::Complex`]. The frequency of C joint channels has 1/C of that variance. Noise that repeats
 //! with the tone, such as the quantisation of few distinct phases, is not independent, and sigma is then too
 //! small.
 //!
@@ -35,10 +34,9 @@
 //! samples times parameters is stored. Time counts from the centre of each record in units of half the
 //! longest one, which makes the columns nearly orthogonal.
 
-mod columns;
 mod error;
-mod estimate;
-mod exponential;
+#[cfg(test)]
+mod exponential_tests;
 mod gauss_newton;
 mod normal;
 mod result;
@@ -47,13 +45,20 @@ mod search;
 mod tests;
 
 pub use error::SineFitError;
-pub use estimate::Estimate;
-pub use exponential::{ComplexChannel, Direction};
 pub use gauss_newton::{fit, fit_known};
-pub use result::{ChannelFit, SineFit, ToneFit};
+pub use result::{ChannelFit, ComplexChannel, Component, Direction, Ratio, SineFit, ToneFit};
 pub use search::{find_tones, locate};
 
 use crate::units::Seconds;
+
+/// An estimate with its standard deviation, in one unit.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Estimate<Q> {
+    /// The value.
+    pub value: Q,
+    /// The standard deviation.
+    pub sigma: Q,
+}
 
 /// The record of one converter.
 #[derive(Debug, Clone, Copy)]
@@ -81,11 +86,14 @@ impl<'a> Channel<'a> {
     pub fn used(&self) -> usize {
         (0..self.samples.len()).filter(|&n| self.uses(n)).count()
     }
-}
 
-/// For [`Channel::keep`]: true where a sample is strictly between the rails of the converter.
-pub fn unclipped(samples: &[f64], lowest: f64, highest: f64) -> Vec<bool> {
-    samples.iter().map(|&x| lowest < x && x < highest).collect()
+    /// The samples that take part, minus their mean; 0 in place of the others.
+    pub(crate) fn deviations(&self) -> Vec<f64> {
+        let used = || (0..self.samples.len()).filter(|&n| self.uses(n));
+        let mean = used().map(|n| self.samples[n]).sum::<f64>() / used().count().max(1) as f64;
+        let deviation = |n: usize| if self.uses(n) { self.samples[n] - mean } else { 0.0 };
+        (0..self.samples.len()).map(deviation).collect()
+    }
 }
 
 /// Distance of a frequency in cycles per sample to the nearest multiple of 1/2, where sine and cosine
@@ -95,6 +103,6 @@ fn distance_to_edge(cycles: f64) -> f64 {
 }
 
 /// The frequency in 0 ..= 1/2 cycles per sample at which samples show `cycles`.
-fn alias(cycles: f64) -> f64 {
+pub(crate) fn alias(cycles: f64) -> f64 {
     (cycles - cycles.round()).abs()
 }

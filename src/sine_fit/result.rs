@@ -1,12 +1,27 @@
 //! What a fit found.
+//!
+//! A tone of a complex record z[n] = x_0[n] + j x_1[n], whose parts are two channels, is two exponentials: the
+//! tone and its image at the negative frequency. With the phasors P_i = A_i e^{j phi_i} of both parts
+//!
+//! ```text
+//! z = a e^{2 pi j f t} + b e^{-2 pi j f t},    a = (P_0 + j P_1) / 2,    b = conj(P_0 - j P_1) / 2
+//! ```
+//!
+//! A converter of equal parts in quadrature (A_1 = A_0, phi_1 = phi_0 - pi/2) has no image. N complex
+//! samples with noise of variance s^2 in each part, SNR = abs(a)^2 / (2 s^2), give (Rife and Boorstyn, 1974)
+//!
+//! ```text
+//! sigma(abs a) / abs a = 1 / sqrt(2 N SNR)        sigma(2 pi f T)^2 = 6 / (SNR N (N^2 - 1))
+//! ```
 
-use super::Estimate;
-use super::columns::{BLOCK, Oscillator, fraction_of_turn};
-use super::normal::linear_count;
-use crate::linalg::{Mat, PositiveFactor};
+use super::normal::{BLOCK, Oscillator, fractional_cycles, linear_count};
+use super::{Channel, Estimate};
+use crate::linalg::{Complex, Mat, PositiveFactor};
 use crate::units::{Hertz, Radians, Seconds};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
+
+const J: Complex<f64> = Complex::new(0.0, 1.0);
 
 /// Sines fitted to the records of one or several channels.
 #[derive(Debug, Clone)]
@@ -20,14 +35,14 @@ pub struct SineFit {
     /// Gauss-Newton steps; 0 for known frequencies.
     pub iterations: usize,
     /// Cycles per sample.
-    cycles: Vec<f64>,
+    pub(super) cycles: Vec<f64>,
     /// Coefficients of 1, cosines and sines of each channel, phases at the centre of its record.
-    linear: Vec<Vec<f64>>,
+    pub(super) linear: Vec<Vec<f64>>,
     /// Sample index at the centre of each record.
-    centres: Vec<f64>,
-    /// Instant of sample 0 of each channel.
-    offsets: Vec<Seconds>,
-    covariance: Covariance,
+    pub(super) centres: Vec<f64>,
+    /// Instant of sample 0 of each channel, seconds.
+    pub(super) starts: Vec<f64>,
+    pub(super) covariance: Covariance,
 }
 
 /// What was fitted to one channel. Amplitudes and constants have the unit of the samples.
@@ -47,29 +62,52 @@ pub struct ChannelFit {
     pub left_out: usize,
 }
 
-/// One tone in one channel.
+/// One tone in one channel, or an exponential of a complex record.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ToneFit {
     /// A_ik.
     pub amplitude: Estimate<f64>,
     /// phi_ik, the phase at the instant 0, in -pi ..= pi. Its error contains that of the frequency times the
     /// distance of the record from the instant 0; the difference of two channels does not, see
-    /// [`SineFit::lag_between`].
+    /// [`SineFit::ratio`].
     pub phase: Estimate<Radians>,
 }
 
-/// What the iteration hands over.
-pub(super) struct Parts {
-    pub(super) rate: Hertz,
-    pub(super) cycles: Vec<f64>,
-    pub(super) linear: Vec<Vec<f64>>,
-    /// Residual energy and number of samples of each channel.
-    pub(super) squares: Vec<(f64, usize)>,
-    pub(super) lengths: Vec<usize>,
-    pub(super) centres: Vec<f64>,
-    pub(super) offsets: Vec<Seconds>,
-    pub(super) covariance: Covariance,
-    pub(super) iterations: usize,
+/// One phasor over another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ratio {
+    /// Of the amplitudes.
+    pub gain: Estimate<f64>,
+    /// The difference of the phases, in -pi ..= pi.
+    pub phase: Estimate<Radians>,
+}
+
+/// One of the two exponentials of a tone in a complex record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// At +f.
+    Forward,
+    /// At -f.
+    Backward,
+}
+
+impl Direction {
+    /// The sign of the frequency.
+    pub(crate) fn sign(self) -> f64 {
+        if self == Self::Forward { 1.0 } else { -1.0 }
+    }
+}
+
+/// The channels that are the real and the imaginary part of a complex record.
+pub type ComplexChannel = [usize; 2];
+
+/// What carries a phasor of a tone; channels count from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Component {
+    /// The sine in a channel.
+    Real(usize),
+    /// An exponential in a complex record, whose parts are of one length.
+    Complex(ComplexChannel, Direction),
 }
 
 /// The covariance of all parameters. Channel i has the coefficients theta_i; the frequencies u (radians over
@@ -92,46 +130,53 @@ pub(super) struct Covariance {
     pub(super) unit: f64,
 }
 
-/// The derivative of a quantity by the parameters.
-struct Gradient {
-    /// By the coefficients of some channels, each of which occurs once.
-    channels: Vec<(usize, Mat)>,
-    /// By the frequencies, in radians over half the longest record.
-    frequencies: Mat,
+/// The logarithm of a phasor at the instant 0, or a difference of two, with its derivatives.
+struct LogPhasor {
+    amplitude: f64,
+    phase: f64,
+    /// By the cosine and the sine of the tone in some channels, each of which occurs once.
+    by_pairs: Vec<(usize, [Complex<f64>; 2])>,
+    /// Of the phase by the frequency in radians per sample.
+    by_frequency: f64,
 }
 
-impl Covariance {
-    /// The standard deviation of a quantity.
-    fn sigma(&self, gradient: &Gradient) -> f64 {
-        let mut common = gradient.frequencies.clone();
-        let mut variance = 0.0;
-        for (i, own) in &gradient.channels {
-            common -= self.couplings[*i].transpose() * own;
-            variance += self.variances[*i] * own.dot(&self.factors[*i].solve(own));
+impl LogPhasor {
+    /// The logarithm of a ratio.
+    fn over(mut self, other: Self) -> Self {
+        self.by_pairs.extend(other.by_pairs.into_iter().map(|(i, [a, b])| (i, [-a, -b])));
+        Self {
+            amplitude: self.amplitude / other.amplitude,
+            phase: wrapped(self.phase - other.phase),
+            by_frequency: self.by_frequency - other.by_frequency,
+            ..self
         }
-        (variance + common.dot(&(&self.frequencies * &common))).max(0.0).sqrt()
     }
 }
 
 impl SineFit {
-    pub(super) fn assemble(parts: Parts) -> Self {
-        let Parts { rate, cycles, linear, squares, lengths, centres, offsets, covariance, iterations } =
-            parts;
-        let channels = Vec::new();
-        let frequencies = Vec::new();
-        let mut fit =
-            Self { rate, frequencies, channels, iterations, cycles, linear, centres, offsets, covariance };
-        fit.frequencies = (0..fit.cycles.len()).map(|k| fit.frequency(k)).collect();
-        let channel = |(i, ((squares, used), length)): (usize, (&(f64, usize), &usize))| ChannelFit {
-            constant: fit.constant(i),
-            tones: (0..fit.cycles.len()).map(|k| fit.tone(i, k)).collect(),
-            residual_rms: (squares / *used as f64).sqrt(),
-            noise: fit.covariance.variances[i].sqrt(),
-            used: *used,
-            left_out: length - used,
+    /// With the estimates of all channels, whose residual energies and numbers of used samples are given.
+    pub(super) fn described(mut self, channels: &[Channel<'_>], squares: &[(f64, usize)]) -> Self {
+        let frequency = |k: usize| {
+            let sigma = self.covariance.frequencies[(k, k)].max(0.0).sqrt() / (TAU * self.covariance.unit);
+            Estimate { value: self.rate * self.cycles[k], sigma: self.rate * sigma }
         };
-        fit.channels = squares.iter().zip(&lengths).enumerate().map(channel).collect();
-        fit
+        self.frequencies = (0..self.tones()).map(frequency).collect();
+        let channel = |i: usize| {
+            let (squares, used) = squares[i];
+            let mut first = Mat::zeros(self.linear[i].len(), 1);
+            first[(0, 0)] = 1.0;
+            let sigma = self.covariance.sigma(&[(i, first)], &Mat::zeros(self.tones(), 1));
+            ChannelFit {
+                constant: Estimate { value: self.linear[i][0], sigma },
+                tones: (0..self.tones()).map(|k| self.phasor(Component::Real(i), k)).collect(),
+                residual_rms: (squares / used as f64).sqrt(),
+                noise: self.covariance.variances[i].sqrt(),
+                used,
+                left_out: channels[i].samples.len() - used,
+            }
+        };
+        self.channels = (0..channels.len()).map(channel).collect();
+        self
     }
 
     /// Samples minus fitted sines and constant, of channel `channel` (from 0) and from its first sample on.
@@ -140,7 +185,7 @@ impl SineFit {
     /// # Panics
     /// If there is no such channel.
     pub fn residual(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
-        self.subtracted(channel, samples, 0..self.cycles.len(), self.linear[channel][0])
+        self.subtracted(channel, samples, 0..self.tones(), self.linear[channel][0])
     }
 
     /// Samples minus some of the fitted tones (from 0) of channel `channel`; the constant stays.
@@ -152,14 +197,13 @@ impl SineFit {
     }
 
     fn subtracted(&self, channel: usize, samples: &[f64], tones: Range<usize>, constant: f64) -> Vec<f64> {
-        let linear = &self.linear[channel];
         let oscillators: Vec<_> = tones.clone().map(|k| Oscillator::new(self.cycles[k])).collect();
         let mut residual = samples.to_vec();
         let (mut cosines, mut sines) = (vec![0.0; BLOCK], vec![0.0; BLOCK]);
         for (number, block) in residual.chunks_mut(BLOCK).enumerate() {
             block.iter_mut().for_each(|r| *r -= constant);
             for (k, oscillator) in tones.clone().zip(&oscillators) {
-                let (a, b) = (linear[linear_count(k)], linear[linear_count(k) + 1]);
+                let [a, b] = self.coefficients(channel, k);
                 oscillator.fill((number * BLOCK) as f64 - self.centres[channel], &mut cosines, &mut sines);
                 let waves = cosines.iter().zip(&sines);
                 block.iter_mut().zip(waves).for_each(|(r, (c, s))| *r -= a * c + b * s);
@@ -168,7 +212,32 @@ impl SineFit {
         residual
     }
 
-    /// The delay by which tone `tone` comes later in `channel` than in `reference` (both from 0), beyond
+    /// Amplitude and phase of tone `tone` (from 0).
+    ///
+    /// # Panics
+    /// If there is no such tone or channel.
+    pub fn phasor(&self, wave: Component, tone: usize) -> ToneFit {
+        let log = self.log_phasor(wave, tone);
+        let Ratio { gain: amplitude, phase } = self.estimated(tone, &log);
+        ToneFit { amplitude, phase }
+    }
+
+    /// The phasor of tone `tone` (from 0) over that in `reference`. For equal noise and known frequencies
+    /// the standard deviations of ln gain and of the phase are sqrt(2 / (N SNR)) for sines, and sqrt(1 / (N
+    /// SNR)) for exponentials.
+    ///
+    /// # Panics
+    /// If there is no such channel or tone.
+    pub fn ratio(&self, wave: Component, reference: Component, tone: usize) -> Ratio {
+        if wave == reference {
+            let (zero, none) = (Radians(0.0), Estimate { value: 1.0, sigma: 0.0 });
+            return Ratio { gain: none, phase: Estimate { value: zero, sigma: zero } };
+        }
+        let log = self.log_phasor(wave, tone).over(self.log_phasor(reference, tone));
+        self.estimated(tone, &log)
+    }
+
+    /// The delay by which tone `tone` comes later in `channel` than in `reference` (all from 0), beyond
     /// what their offsets explain. It is known modulo the period of the tone; the value nearest to 0 is
     /// given:
     ///
@@ -182,47 +251,16 @@ impl SineFit {
     /// # Panics
     /// If there is no such channel or tone.
     pub fn lag_between(&self, channel: usize, reference: usize, tone: usize) -> Estimate<Seconds> {
-        let (own, other) = (self.channels[channel].tones[tone], self.channels[reference].tones[tone]);
-        let omega = TAU * self.frequencies[tone].value.0;
-        let difference = wrapped(own.phase.value.0 - other.phase.value.0);
         if channel == reference {
             return Estimate { value: Seconds(0.0), sigma: Seconds(0.0) };
         }
-        let mut one = self.phase_difference_gradient(channel, reference, tone);
+        let [one, two] = [channel, reference].map(|i| self.log_phasor(Component::Real(i), tone));
+        let mut log = one.over(two);
         // d(phase / omega) also contains the error of omega.
-        one.frequencies[(tone, 0)] -= difference / (TAU * self.cycles[tone] * self.covariance.unit);
-        Estimate {
-            value: Seconds(-difference / omega),
-            sigma: Seconds(self.covariance.sigma(&one) / omega.abs()),
-        }
-    }
-
-    /// The phase of tone `tone` in `channel` minus that in `reference` (all from 0), in -pi ..= pi.
-    ///
-    /// # Panics
-    /// If there is no such channel or tone.
-    pub fn phase_between(&self, channel: usize, reference: usize, tone: usize) -> Estimate<Radians> {
-        if channel == reference {
-            return Estimate { value: Radians(0.0), sigma: Radians(0.0) };
-        }
-        let sigma = self.covariance.sigma(&self.phase_difference_gradient(channel, reference, tone));
-        let difference = wrapped(self.phase(channel, tone) - self.phase(reference, tone));
-        Estimate { value: Radians(difference), sigma: Radians(sigma) }
-    }
-
-    /// The amplitude of tone `tone` in `channel` divided by that in `reference` (all from 0).
-    ///
-    /// # Panics
-    /// If there is no such channel or tone.
-    pub fn gain_between(&self, channel: usize, reference: usize, tone: usize) -> Estimate<f64> {
-        if channel == reference {
-            return Estimate { value: 1.0, sigma: 0.0 };
-        }
-        let ratio = self.amplitude(channel, tone) / self.amplitude(reference, tone);
-        let (mut one, two) =
-            (self.amplitude_gradient(channel, tone), self.amplitude_gradient(reference, tone));
-        one.channels.extend(two.channels.into_iter().map(|(i, own)| (i, own * -ratio)));
-        Estimate { value: ratio, sigma: self.covariance.sigma(&one) / self.amplitude(reference, tone) }
+        log.by_frequency -= log.phase / (TAU * self.cycles[tone]);
+        let omega = TAU * self.frequencies[tone].value.0;
+        let sigma = self.estimated(tone, &log).phase.sigma.0 / omega.abs();
+        Estimate { value: Seconds(-log.phase / omega), sigma: Seconds(sigma) }
     }
 
     /// The number of tones.
@@ -230,111 +268,73 @@ impl SineFit {
         self.cycles.len()
     }
 
-    pub(super) fn coefficients(&self, channel: usize, tone: usize) -> (f64, f64) {
-        let linear = &self.linear[channel];
-        (linear[linear_count(tone)], linear[linear_count(tone) + 1])
+    /// Cosine and sine of a tone at the centre of the record.
+    fn coefficients(&self, channel: usize, tone: usize) -> [f64; 2] {
+        [0, 1].map(|part| self.linear[channel][linear_count(tone) + part])
     }
 
-    fn amplitude(&self, channel: usize, tone: usize) -> f64 {
-        let (a, b) = self.coefficients(channel, tone);
-        a.hypot(b)
-    }
-
-    fn frequency(&self, tone: usize) -> Estimate<Hertz> {
-        let sigma = self.covariance.frequencies[(tone, tone)].max(0.0).sqrt() / (TAU * self.covariance.unit);
-        Estimate { value: self.rate * self.cycles[tone], sigma: self.rate * sigma }
-    }
-
-    fn constant(&self, channel: usize) -> Estimate<f64> {
-        let mut own = Mat::zeros(self.linear[channel].len(), 1);
-        own[(0, 0)] = 1.0;
-        Estimate {
-            value: self.linear[channel][0],
-            sigma: self.covariance.sigma(&self.gradient(channel, own)),
+    fn log_phasor(&self, wave: Component, tone: usize) -> LogPhasor {
+        // P = a - j b is the phasor of a cos + b sin; these are the weights of a and b in each channel.
+        let (weights, sign) = match wave {
+            Component::Real(i) => (vec![(i, [Complex::ONE, -J])], 1.0),
+            Component::Complex([real, imaginary], direction) => {
+                let (half, sign) = (Complex::from(0.5), direction.sign());
+                (vec![(real, [half, -J * half * sign]), (imaginary, [J * half, half * sign])], sign)
+            }
+        };
+        let term = |(i, [p, q]): &(usize, [Complex<f64>; 2])| {
+            let [a, b] = self.coefficients(*i, tone);
+            p * a + q * b
+        };
+        let value: Complex<f64> = weights.iter().map(term).sum();
+        let (first, samples) = (weights[0].0, self.starts[weights[0].0] * self.rate.0);
+        // From the instant 0 to the centre of the record, without whole cycles and with them.
+        let cycles = fractional_cycles(self.cycles[tone], self.centres[first])
+            + fractional_cycles(self.cycles[tone], samples);
+        LogPhasor {
+            amplitude: value.norm(),
+            phase: wrapped(value.arg() - sign * TAU * cycles),
+            by_pairs: weights.into_iter().map(|(i, [p, q])| (i, [p / value, q / value])).collect(),
+            by_frequency: -sign * (samples + self.centres[first]),
         }
     }
 
-    fn tone(&self, channel: usize, tone: usize) -> ToneFit {
-        let sigma = |gradient: Gradient| self.covariance.sigma(&gradient);
-        let amplitude = Estimate {
-            value: self.amplitude(channel, tone),
-            sigma: sigma(self.amplitude_gradient(channel, tone)),
+    /// Amplitude and phase with their standard deviations.
+    fn estimated(&self, tone: usize, log: &LogPhasor) -> Ratio {
+        let sigma = |part: fn(&Complex<f64>) -> f64, by_frequency: f64| {
+            let own = |(i, [a, b]): &(usize, [Complex<f64>; 2])| {
+                let mut own = Mat::zeros(self.linear[*i].len(), 1);
+                own[(linear_count(tone), 0)] = part(a);
+                own[(linear_count(tone) + 1, 0)] = part(b);
+                (*i, own)
+            };
+            let mut frequencies = Mat::zeros(self.tones(), 1);
+            frequencies[(tone, 0)] = by_frequency / self.covariance.unit;
+            let by_pairs: Vec<_> = log.by_pairs.iter().map(own).collect();
+            self.covariance.sigma(&by_pairs, &frequencies)
         };
-        let phase = Estimate {
-            value: Radians(self.phase(channel, tone)),
-            sigma: Radians(sigma(self.phase_gradient(channel, tone))),
-        };
-        ToneFit { amplitude, phase }
+        Ratio {
+            gain: Estimate { value: log.amplitude, sigma: log.amplitude * sigma(|x| x.re, 0.0) },
+            phase: Estimate { value: Radians(log.phase), sigma: Radians(sigma(|x| x.im, log.by_frequency)) },
+        }
     }
+}
 
-    /// Samples from the instant 0 to the centre of the record.
-    pub(super) fn distance(&self, channel: usize) -> f64 {
-        (self.offsets[channel] * self.rate.0).0 + self.centres[channel]
-    }
-
-    /// The phase at the instant 0; a cos + b sin has the phase atan2(-b, a) at the centre.
-    fn phase(&self, channel: usize, tone: usize) -> f64 {
-        let (a, b) = self.coefficients(channel, tone);
-        wrapped((-b).atan2(a) - self.phase_to_centre(channel, tone))
-    }
-
-    /// 2 pi f t from the instant 0 to the centre of the record, without whole turns.
-    pub(super) fn phase_to_centre(&self, channel: usize, tone: usize) -> f64 {
-        let whole = fraction_of_turn(self.cycles[tone], self.centres[channel])
-            + fraction_of_turn(self.cycles[tone], (self.offsets[channel] * self.rate.0).0);
-        TAU * whole
-    }
-
-    /// The standard deviation of a quantity with the derivatives `by_pairs` by the cosine and the sine of a
-    /// tone in some channels, and `by_frequency` by its frequency in radians per sample.
-    pub(super) fn sigma_of(&self, tone: usize, by_pairs: &[(usize, (f64, f64))], by_frequency: f64) -> f64 {
-        let own = |&(channel, (a, b)): &(usize, (f64, f64))| {
-            let mut own = Mat::zeros(self.linear[channel].len(), 1);
-            own[(linear_count(tone), 0)] = a;
-            own[(linear_count(tone) + 1, 0)] = b;
-            (channel, own)
-        };
-        let mut frequencies = Mat::zeros(self.cycles.len(), 1);
-        frequencies[(tone, 0)] = by_frequency / self.covariance.unit;
-        self.covariance.sigma(&Gradient { channels: by_pairs.iter().map(own).collect(), frequencies })
-    }
-
-    /// A gradient by the coefficients of one channel.
-    fn gradient(&self, channel: usize, own: Mat) -> Gradient {
-        Gradient { channels: vec![(channel, own)], frequencies: Mat::zeros(self.cycles.len(), 1) }
-    }
-
-    fn amplitude_gradient(&self, channel: usize, tone: usize) -> Gradient {
-        let (a, b) = self.coefficients(channel, tone);
-        let mut own = Mat::zeros(self.linear[channel].len(), 1);
-        own[(linear_count(tone), 0)] = a / a.hypot(b);
-        own[(linear_count(tone) + 1, 0)] = b / a.hypot(b);
-        self.gradient(channel, own)
-    }
-
-    fn phase_gradient(&self, channel: usize, tone: usize) -> Gradient {
-        let (a, b) = self.coefficients(channel, tone);
-        let square = a * a + b * b;
-        let mut own = Mat::zeros(self.linear[channel].len(), 1);
-        own[(linear_count(tone), 0)] = b / square;
-        own[(linear_count(tone) + 1, 0)] = -a / square;
-        let mut gradient = self.gradient(channel, own);
-        gradient.frequencies[(tone, 0)] = -self.distance(channel) / self.covariance.unit;
-        gradient
-    }
-
-    /// The gradient of the phase in `channel` minus that in `reference`, which is another one.
-    fn phase_difference_gradient(&self, channel: usize, reference: usize, tone: usize) -> Gradient {
-        let (mut one, mut two) = (self.phase_gradient(channel, tone), self.phase_gradient(reference, tone));
-        two.channels[0].1.neg_mut();
-        one.channels.append(&mut two.channels);
-        one.frequencies -= two.frequencies;
-        one
+impl Covariance {
+    /// The standard deviation of a quantity with these derivatives by the coefficients of some channels, each
+    /// of which occurs once, and by the frequencies in radians over half the longest record.
+    fn sigma(&self, by_channels: &[(usize, Mat)], by_frequencies: &Mat) -> f64 {
+        let mut common = by_frequencies.clone();
+        let mut variance = 0.0;
+        for (i, own) in by_channels {
+            common -= self.couplings[*i].transpose() * own;
+            variance += self.variances[*i] * own.dot(&self.factors[*i].solve(own));
+        }
+        (variance + common.dot(&(&self.frequencies * &common))).max(0.0).sqrt()
     }
 }
 
 /// An angle in -pi ..= pi.
-pub(super) fn wrapped(angle: f64) -> f64 {
-    let whole = (angle / TAU).round();
-    (angle - whole * TAU).clamp(-PI, PI)
+pub(crate) fn wrapped(angle: f64) -> f64 {
+    (angle - (angle / TAU).round() * TAU).clamp(-PI, PI)
 }

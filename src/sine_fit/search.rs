@@ -87,11 +87,14 @@ impl Power {
         let length = records.iter().map(Vec::len).min().unwrap_or(0);
         let mut bins = vec![0.0; length / 2 + 1];
         let mut largest: f64 = 0.0;
+        let step = TAU / length as f64;
+        let hann = |(n, x): (usize, f64)| x * 0.5 * (1.0 - (step * n as f64).cos());
         for record in records {
-            let finite = || record[..length].iter().filter(|x| x.is_finite());
-            let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
-            largest = finite().fold(largest, |most, x| most.max(x.abs()));
-            let spectrum = fourier::real_spectrum(&windowed(&record[..length], mean));
+            let finite = record[..length].iter().filter(|x| x.is_finite());
+            largest = finite.fold(largest, |most, x| most.max(x.abs()));
+            let deviations = Channel::new(&record[..length]).deviations();
+            let windowed: Vec<f64> = deviations.into_iter().enumerate().map(hann).collect();
+            let spectrum = fourier::real_spectrum(&windowed);
             bins.iter_mut().zip(&spectrum).for_each(|(bin, x)| *bin += x.norm_sqr());
         }
         Self { bins, length, largest }
@@ -138,14 +141,4 @@ impl Power {
         let shift = if right >= left { away } else { -away };
         (at as f64 + shift) / self.length as f64
     }
-}
-
-/// Deviations from the mean under a Hann window; 0 where a sample is not finite.
-fn windowed(samples: &[f64], mean: f64) -> Vec<f64> {
-    let step = TAU / samples.len() as f64;
-    let value = |(n, x): (usize, &f64)| match x.is_finite() {
-        true => (x - mean) * 0.5 * (1.0 - (step * n as f64).cos()),
-        false => 0.0,
-    };
-    samples.iter().enumerate().map(value).collect()
 }

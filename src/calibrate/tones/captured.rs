@@ -5,7 +5,7 @@
 
 use super::super::record::Record;
 use crate::linalg::Complex;
-use crate::sine_fit::{Channel, ComplexChannel, Direction, Estimate, SineFit, ToneFit};
+use crate::sine_fit::{Channel, Component, Direction, Estimate, SineFit, ToneFit};
 use std::f64::consts::TAU;
 
 /// Records of real or of complex samples.
@@ -46,10 +46,7 @@ impl<'a> Captures<'a> {
 
     /// Tone `t` of `sines` in record `i`: of complex records the exponential in `direction`.
     pub(super) fn tone(&self, sines: &SineFit, i: usize, t: usize, direction: Direction) -> ToneFit {
-        match self.is_complex {
-            true => sines.exponential(complex(self.parts(i)), t, direction),
-            false => sines.channels[i].tones[t],
-        }
+        sines.phasor(self.wave(i, direction), t)
     }
 
     /// The amplitude of tone `t` in record `i` as one of positive frequency.
@@ -61,13 +58,24 @@ impl<'a> Captures<'a> {
 
     /// Standard deviations of ln abs and of the phase of the ratio of the amplitudes in two records.
     pub(super) fn sigmas(&self, sines: &SineFit, i: usize, reference: usize, t: usize) -> (f64, f64) {
+        let ratio =
+            sines.ratio(self.wave(i, Direction::Forward), self.wave(reference, Direction::Forward), t);
+        let phase = match self.is_complex {
+            true => ratio.phase.sigma.0,
+            // A phase becomes a delay by the fitted frequency, whose error counts.
+            false => TAU * sines.frequencies[t].value.0 * sines.lag_between(i, reference, t).sigma.0,
+        };
+        (ratio.gain.sigma / ratio.gain.value, phase)
+    }
+
+    /// Where record `i` has its phasors.
+    fn wave(&self, i: usize, direction: Direction) -> Component {
+        let parts = self.parts(i);
         if self.is_complex {
-            let [own, other] = [i, reference].map(|i| complex(self.parts(i)));
-            let (gain, phase) = sines.exponential_ratio_sigmas(own, other, t);
-            return (gain, phase.0);
+            Component::Complex([parts.start, parts.start + 1], direction)
+        } else {
+            Component::Real(i)
         }
-        let (gain, lag) = (sines.gain_between(i, reference, t), sines.lag_between(i, reference, t));
-        (gain.sigma / gain.value, TAU * sines.frequencies[t].value.0 * lag.sigma.0)
     }
 
     /// The exponential that is the tone: the larger one over all records, forward for real samples.
@@ -90,8 +98,4 @@ impl<'a> Captures<'a> {
     ) -> impl Iterator<Item = Estimate<f64>> + use<'b> {
         sines.channels[self.parts(i)].iter().map(|part| part.constant)
     }
-}
-
-fn complex(parts: std::ops::Range<usize>) -> ComplexChannel {
-    [parts.start, parts.start + 1]
 }
