@@ -3,7 +3,8 @@
 use crate::{Mat, PositiveFactor};
 
 /// The normal equations of a problem that is linear around the present parameters: J'J, J'r and r'r of rows
-/// with the derivatives J and the residuals r. Of a likelihood they are the Fisher information and the score.
+/// with the derivatives J and the residuals r. Of a likelihood they are the Fisher information and the
+/// score.
 #[derive(Debug, Clone)]
 pub struct NormalEquations {
     /// J'J.
@@ -42,7 +43,8 @@ pub trait LeastSquares {
     type Error;
     /// Most steps.
     const MOST_STEPS: usize;
-    /// Largest diagonal of the inverse of J'J, scaled to a unit diagonal. Parameters beyond it are dependent.
+    /// Largest diagonal of the inverse of J'J, scaled to a unit diagonal. Parameters beyond it are
+    /// dependent.
     const WORST_CONDITION: f64 = f64::INFINITY;
 
     /// The normal equations at the present parameters.
@@ -96,8 +98,8 @@ impl NormalEquations {
         self.squares / self.rows.saturating_sub(self.gram.nrows()).max(1) as f64
     }
 
-    /// (J'J)^-1, the covariance of the parameters for residuals of unit variance. Rows and columns are scaled
-    /// to a unit diagonal first, since the units of the parameters differ.
+    /// (J'J)^-1, the covariance of the parameters for residuals of unit variance. Rows and columns are
+    /// scaled to a unit diagonal first, since the units of the parameters differ.
     ///
     /// # Errors
     /// [`NoMinimum`] if a parameter has no effect, or if the inverse has a diagonal above `worst`.

@@ -24,9 +24,10 @@
 //! sigma(2 pi f T)^2 = 12 / (SNR N (N^2 - 1))
 //! ```
 //!
-//! A complex record is two channels, its real and its imaginary part, fitted jointly: [`Component::Complex`]. The frequency of C joint channels has 1/C of that variance. Noise that repeats
-//! with the tone, such as the quantisation of few distinct phases, is not independent, and sigma is then too
-//! small.
+//! A complex record is two channels, its real and its imaginary part, fitted jointly:
+//! [`Component::Complex`]. The frequency of C joint channels has 1/C of that variance. Noise that repeats
+//! with the tone, such as the quantisation of few distinct phases, is not independent, and sigma is then
+//! too small.
 //!
 //! # Cost
 //!

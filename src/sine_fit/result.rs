@@ -1,7 +1,7 @@
 //! What a fit found.
 //!
-//! A tone of a complex record z[n] = x_0[n] + j x_1[n], whose parts are two channels, is two exponentials: the
-//! tone and its image at the negative frequency. With the phasors P_i = A_i e^{j phi_i} of both parts
+//! A tone of a complex record z[n] = x_0[n] + j x_1[n], whose parts are two channels, is two exponentials:
+//! the tone and its image at the negative frequency. With the phasors P_i = A_i e^{j phi_i} of both parts
 //!
 //! ```text
 //! z = a e^{2 pi j f t} + b e^{-2 pi j f t},    a = (P_0 + j P_1) / 2,    b = conj(P_0 - j P_1) / 2
@@ -321,8 +321,8 @@ impl SineFit {
 }
 
 impl Covariance {
-    /// The standard deviation of a quantity with these derivatives by the coefficients of some channels, each
-    /// of which occurs once, and by the frequencies in radians over half the longest record.
+    /// The standard deviation of a quantity with these derivatives by the coefficients of some channels,
+    /// each of which occurs once, and by the frequencies in radians over half the longest record.
     fn sigma(&self, by_channels: &[(usize, Mat)], by_frequencies: &Mat) -> f64 {
         let mut common = by_frequencies.clone();
         let mut variance = 0.0;
