@@ -19,14 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// The data folder, or `None` with a printed note.
 fn data(folder: &str) -> Option<PathBuf> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let root = std::env::var_os("HYBANK_DATA").map_or(beside, PathBuf::from);
-    let path = root.join("ibr").join(folder);
-    if !path.is_dir() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
+    trials::data(&format!("ibr/{folder}"))
 }
 
 struct Pair {

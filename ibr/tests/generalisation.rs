@@ -14,7 +14,6 @@ use hybank_ibr::partial::{Densify, densify};
 use hybank_ibr::pipeline::{Method, RenderSettings, rectified};
 use hybank_ibr::propagate::RectifiedView;
 use noise::noisy;
-use std::path::PathBuf;
 
 const WIDTH: usize = 200;
 const HEIGHT: usize = 120;
@@ -249,12 +248,7 @@ fn every_kind_of_scene_profits_from_segments_where_depth_is_coarse() {
 /// note, where the data are not there.
 #[test]
 fn teddy_from_one_view() {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let path = std::env::var_os("HYBANK_DATA").map_or(beside, PathBuf::from).join("ibr/teddy");
-    if !path.is_dir() {
-        println!("skipped: {} is not there", path.display());
-        return;
-    }
+    let Some(path) = trials::data("ibr/teddy") else { return };
     let load = |image: &str, map: &str| {
         let (width, height, stored) = read_map(&path.join(map)).unwrap();
         let mut map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();

@@ -1,8 +1,6 @@
 //! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and
 //! never panics. `fuzz/` looks deeper with the same checks.
 
-#[path = "../../tests/support/campaign.rs"]
-mod campaign;
 #[path = "../../tests/support/random.rs"]
 mod random;
 
@@ -54,7 +52,7 @@ fn mutated(seed: &[u8], round: u64) -> Vec<u8> {
 /// Runs `check` on every mutation of the seeds; it says whether the input was accepted. Both must occur, or
 /// the mutations would test nothing.
 fn survive(seeds: &[&[u8]], check: impl Fn(&[u8]) -> bool) {
-    survive_rounds(campaign::rounds(ROUNDS), seeds, check);
+    survive_rounds(trials::rounds(ROUNDS), seeds, check);
 }
 
 fn survive_rounds(rounds: usize, seeds: &[&[u8]], check: impl Fn(&[u8]) -> bool) {
@@ -159,7 +157,7 @@ fn images() {
     for name in ["a.png", "a.jpg", "a.ppm", "a.pgm", "a.pfm"] {
         let path = dir.path().join(name);
         let seed = encode(&colour, &path).unwrap();
-        survive_rounds(campaign::rounds(300), &[&seed], |bytes| {
+        survive_rounds(trials::rounds(300), &[&seed], |bytes| {
             std::fs::write(&path, bytes).unwrap();
             let named = |error: hybank_ibr::image::ImageError| {
                 let message = error.to_string();

@@ -38,10 +38,10 @@ print(json.dumps(report))
 
 
 def test_a_headless_flow_graph_has_the_bits_of_a_stream(filters, tmp_path):
-    python = os.environ.get("HYBANK_GNURADIO_PYTHON", "/usr/bin/python3")
+    python = "/usr/bin/python3"
     probe = [python, "-c", "import gnuradio.gr, numpy"]
     if not os.path.exists(python) or subprocess.run(probe, capture_output=True).returncode:
-        pytest.skip("GNU Radio is not installed for the Python that HYBANK_GNURADIO_PYTHON names, or /usr/bin/python3")
+        pytest.skip("GNU Radio is not installed for /usr/bin/python3")
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "python"), "HOME": str(tmp_path)}
     command = [python, "-c", GRAPH, filters / "thesis-fir.json"]
     run = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)

@@ -376,9 +376,8 @@ fn check_image(
     assert!(predicted <= image.db.0 + 1e-9, "seed {seed}: {predicted} dB above the largest, {image:?}");
 }
 
-/// Within 0.5 dB; `HYBANK_SWEEP` tries thirty systems.
+/// Within 0.5 dB; `HYBANK_TRIALS=30` tries thirty systems.
 #[test]
 fn predictions_agree_with_virtual_converters() {
-    let seeds = if std::env::var_os("HYBANK_SWEEP").is_some() { 30 } else { 3 };
-    (0..seeds).for_each(check_prediction);
+    trials::trials(3).for_each(check_prediction);
 }

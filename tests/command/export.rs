@@ -34,7 +34,7 @@ pub(crate) fn compiled(desk: &Desk, sample: &str, channels: usize, ratio: usize)
             true
         }
         Err(error) => {
-            println!("SKIPPED: no C compiler: {error}");
+            trials::skipped(&format_args!("compiled C code: no C compiler: {error}"));
             false
         }
     }
@@ -198,7 +198,7 @@ assert z['ratio'].item() == m['ratio'].item() == 2
     desk.write("read.py", script);
     let probe = Command::new("python3").args(["-c", "import numpy, scipy"]).output();
     if !probe.is_ok_and(|output| output.status.success()) {
-        println!("SKIPPED: no python3 with numpy and scipy");
+        trials::skipped(&"exported arrays in Python: no python3 with numpy and scipy");
         return;
     }
     let output = Command::new("python3").arg("read.py").current_dir(desk.path("")).output().unwrap();

@@ -7,7 +7,6 @@ mod turns;
 use crate::support::{Desk, TAPS, bytes, fused, interleaved, names, text, wav};
 use serde_json::json;
 use std::fs;
-use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// N = M = 2, m0 = 3.
@@ -151,11 +150,7 @@ fn an_interrupt_leaves_nothing_behind() {
 /// Real captures beside the checkout, if they are there: see the data's own description.
 #[test]
 fn speech_of_two_converters_opens() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/captures/speech-2x");
-    if !folder.is_dir() {
-        println!("skipped: no {}", folder.display());
-        return;
-    }
+    let Some(folder) = trials::data("captures/speech-2x") else { return };
     let desk = Desk::new();
     scale_bank(&desk, 1.0 / 48_000.0, 1.0 / 64.0);
     let file = |name: &str| folder.join(name).display().to_string();

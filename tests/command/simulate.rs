@@ -415,12 +415,11 @@ fn captures_at_gigahertz_are_sigmf_recordings() {
 
 #[test]
 fn captures_made_elsewhere_are_fused() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let (captures, speech) = (data.join("captures/speech-2x"), data.join("audio/Front_Center.wav"));
-    if !captures.is_dir() || !speech.is_file() {
-        println!("skipped: no data in {}", data.display());
+    let (Some(captures), Some(speech)) =
+        (trials::data("captures/speech-2x"), trials::data("audio/Front_Center.wav"))
+    else {
         return;
-    }
+    };
     let desk = Desk::with_spec(THESIS);
     let at = |name: &str| captures.join(name).to_string_lossy().into_owned();
     desk.good(&["design", &at("spec.toml"), "-o", "bank.json"]);

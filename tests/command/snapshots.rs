@@ -1,8 +1,8 @@
 //! Help and reports, word by word. What a number says is tested elsewhere: here each is a `#`, and runs of
 //! spaces are one.
 //!
-//! The texts lie in `snapshots/`; `HYBANK_SNAPSHOTS=write cargo test --test command snapshots` writes them
-//! again, for `git diff` to show.
+//! The texts lie in `snapshots/`. A test that fails leaves what is printed now in the folder of what is
+//! built, and says how to accept it.
 
 use crate::support::{Desk, THESIS, text};
 use std::fs;
@@ -89,14 +89,14 @@ fn check(name: &str, got: &str) {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/command/snapshots").join(format!("{name}.txt"));
     let got = redacted(got);
-    if std::env::var("HYBANK_SNAPSHOTS").is_ok_and(|word| word == "write") {
-        return fs::write(path, got).unwrap();
-    }
     let known = fs::read_to_string(&path).unwrap_or_default();
+    let printed = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.txt"));
+    fs::write(&printed, &got).unwrap();
     let differs = got.lines().zip(known.lines()).find(|(got, known)| got != known);
     assert!(
         got == known,
-        "{}: not what is printed now; first difference: {differs:?}\n\n{got}",
+        "not what is printed now; first difference: {differs:?}; accept it by\ncp {} {}",
+        printed.display(),
         path.display()
     );
 }

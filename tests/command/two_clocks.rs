@@ -1,6 +1,6 @@
 //! Two recordings of one event by free clocks become one, while the delay between them moves by many frames.
 //!
-//! `HYBANK_SWEEP=1` takes minutes of recordings with 20, 50 and 100 ppm, and prints the signal-to-noise
+//! `HYBANK_SLOW=1` takes minutes of recordings with 20, 50 and 100 ppm, and prints the signal-to-noise
 //! ratios.
 
 use crate::support::{Desk, text};
@@ -71,7 +71,7 @@ fn fused(desk: &Desk, ppm: f64, frames: usize) -> Ratios {
 fn recordings_with_clocks_of_their_own_become_one() {
     let desk = Desk::empty();
     desk.write("bank.json", BANK);
-    let is_sweep = std::env::var("HYBANK_SWEEP").is_ok();
+    let is_sweep = trials::is_slow("minutes of two recorders");
     let (seconds, rates) =
         if is_sweep { (180, vec![20.0, 50.0, 100.0, -100.0]) } else { (3, vec![100.0, -100.0]) };
     for ppm in rates {

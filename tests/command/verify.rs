@@ -2,7 +2,7 @@
 //!
 //! A mutation is any change of the text after which it no longer says the same: another number, key, text or
 //! structure. Changes of layout, and of digits beyond the precision of a double, are none.
-//! `HYBANK_MUTATIONS=100000` runs that many.
+//! `HYBANK_CAMPAIGN=50` makes 50 times as many.
 
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS};
@@ -126,11 +126,7 @@ fn says_the_same(original: &Value, text: &str) -> bool {
 
 #[test]
 fn every_mutation_of_a_bank_file_is_refused() {
-    let asked = std::env::var("HYBANK_MUTATIONS").ok().and_then(|count| count.parse().ok());
-    let count: usize = asked.unwrap_or_else(|| {
-        println!("2,000 mutations; HYBANK_MUTATIONS=100000 tries more");
-        2000
-    });
+    let count = trials::rounds(2000);
     let files: Vec<(String, String, Value)> = files()
         .into_iter()
         .map(|(name, text)| {

@@ -2,7 +2,7 @@
 //!
 //! The numbers are those of an independent computation: a doubling Riccati equation in 900-bit arithmetic
 //! and modal coordinates, true to 2e-6. Some of its 174 cases stand here; the whole table is read from the
-//! file named by `HYBANK_CAUSAL_OPTIMA` (JSON) where that is set.
+//! file `causal-optima.json` of the data where `HYBANK_SLOW` is set.
 
 use crate::support::specs::{alike, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
@@ -71,11 +71,11 @@ fn golden() -> Vec<Case> {
 
 /// The whole table, where it is given.
 fn table() -> Vec<Case> {
-    let Ok(path) = std::env::var("HYBANK_CAUSAL_OPTIMA") else {
-        println!("HYBANK_CAUSAL_OPTIMA is not set: only the cases of this file are tried");
+    if !trials::is_slow("the whole table of causal optima") {
         return Vec::new();
-    };
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    }
+    let Some(path) = trials::data("causal-optima.json") else { return Vec::new() };
+    let text = std::fs::read_to_string(path).unwrap();
     let document: serde_json::Value = serde_json::from_str(&text).unwrap();
     let family = |name: &str| match name {
         "butterworth" => Family::Butterworth,

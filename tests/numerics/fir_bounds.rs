@@ -1,8 +1,7 @@
 //! The proven interval of FIR banks: how wide it is, what class of banks its lower end bounds, and the time
-//! of search and proof. `HYBANK_FIR_BANKS=81` goes through all, `HYBANK_FIR_BANKS=17..18` through that one.
+//! of search and proof. `HYBANK_TRIALS=81` goes through all, `HYBANK_TRIALS=17..18` through that one.
 
 use crate::support::specs::{alike, butterworth, low_pass, with_taps};
-use crate::support::sweep::wanted;
 use hybank::design::design;
 use hybank::spec::{Family, Spec};
 use hybank::verify::{BoundedBanks, verify};
@@ -30,11 +29,7 @@ fn bank(number: usize) -> (String, Spec) {
 #[test]
 fn the_taps_of_long_fir_banks_are_bound() {
     let (mut counts, mut classes) = ([0; 5], [0; 3]);
-    let numbers = match std::env::var_os("HYBANK_FIR_BANKS") {
-        Some(_) => wanted("HYBANK_FIR_BANKS", 0),
-        None => 9..10,
-    };
-    for number in numbers {
+    for number in trials::asked_trials().unwrap_or(9..10) {
         let (name, spec) = bank(number as usize);
         let begin = Instant::now();
         let design = design(&spec).unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -1,10 +1,9 @@
 //! A latency that the spec leaves open: the shortest whose whole error, that of the signal and the rounding
-//! to 16 bits, is within 0.1 dB of the best, against designs at every latency. `HYBANK_LATENCIES=300` tries
-//! that many random plants, `HYBANK_LATENCIES=17..18` that one.
+//! to 16 bits, is within 0.1 dB of the best, against designs at every latency. `HYBANK_TRIALS=300` tries
+//! that many random plants, `HYBANK_TRIALS=17..18` that one.
 
 use crate::support::random::Random;
 use crate::support::specs::{butterworth, low_pass, with_taps};
-use crate::support::sweep::wanted;
 use hybank::design::{DesignError, ProofSearch, analyze_mean, design_with, latency};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, Method, Spec};
 use hybank::units::Seconds;
@@ -85,7 +84,7 @@ fn fault(errors: &[f64], chosen: usize) -> Option<String> {
 fn faults(method: Method, few: u64) -> Vec<String> {
     let mut faults = Vec::new();
     let (mut choices, mut designs) = (Duration::ZERO, Duration::ZERO);
-    for seed in wanted("HYBANK_LATENCIES", few) {
+    for seed in trials::trials(few) {
         let spec = plant(seed, method);
         let begin = Instant::now();
         let chosen = latency(&spec).unwrap_or_else(|error| panic!("plant {seed}: {error}"));

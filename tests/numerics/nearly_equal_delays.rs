@@ -1,10 +1,10 @@
 //! Two channels whose delays differ by less than the data's precision. What the samples' difference tells
 //! depends on digits that neither the spec nor a double has, so no bound may rest on it.
-//! `HYBANK_NEAR_DELAYS=200` tries that many random plants.
+//! `HYBANK_TRIALS=200` tries that many random plants.
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
-use crate::support::sweep::{each, wanted};
+use crate::support::sweep::each;
 use hybank::bank::Gamma;
 use hybank::design::{DesignError, ProofSearch, design_with};
 use hybank::spec::{DesignSpec, Family, Method, Spec};
@@ -72,7 +72,7 @@ fn end_of(number: u64) -> (i32, End) {
 
 #[test]
 fn no_bound_rests_on_differences_below_the_precision_of_delays() {
-    let ends = each(wanted("HYBANK_NEAR_DELAYS", 20), end_of);
+    let ends = each(trials::trials(20), end_of);
     for decade in (6..14).rev() {
         let of = |end: End| ends.iter().filter(|found| **found == (decade, end)).count();
         let [holds, unstated, beaten, refused] =

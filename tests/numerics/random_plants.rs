@@ -1,9 +1,9 @@
 //! Random plants, from one channel to eight, steep and flat, delays down to equal: each ends as a bank with
-//! an interval that holds, or as a refusal that says why. `HYBANK_PLANTS=1000` tries that many,
-//! `HYBANK_PLANTS=124..125` that one.
+//! an interval that holds, or as a refusal that says why. `HYBANK_TRIALS=1000` tries that many,
+//! `HYBANK_TRIALS=124..125` that one.
 
 use crate::support::random::Random;
-use crate::support::sweep::{each, wanted};
+use crate::support::sweep::each;
 use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, analyze, design};
 use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Reduction, Spec};
@@ -133,7 +133,7 @@ fn refused(seed: u64, refusal: &DesignError, end: End) -> End {
 
 #[test]
 fn every_plant_ends_as_a_proven_bank_or_as_a_refusal() {
-    let plants = wanted("HYBANK_PLANTS", 12);
+    let plants = trials::trials(12);
     let ends = each(plants.clone(), end_of);
     let count = |end: End| ends.iter().filter(|&&other| other == end).count();
     let (proven, unproven, refused) = (count(End::Proven), count(End::Unproven), count(End::Refused));

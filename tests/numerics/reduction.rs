@@ -1,7 +1,6 @@
 //! Order reduction as a user meets it: banks of few states, proven, beside FIR banks of the same cost.
 
 use crate::support::specs::{alike, amplified, butterworth, thesis};
-use crate::support::sweep::long_tests;
 use hybank::bank::{Bank, BlockFilter, SynthesisFilters};
 use hybank::design::{Design, analyze, design};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
@@ -142,7 +141,7 @@ fn nasty_front_ends_end_as_banks_of_that_order() {
         alike(&butterworth(2, 0.05), 2, 4, &[0.3, 1.1]),
     ];
     // One order each, in turn, unless all are asked for.
-    let all = long_tests();
+    let all = trials::is_slow("order reduction: all orders of each case");
     for (case, spec) in cases.into_iter().enumerate() {
         for order in
             [0, 1, 3].into_iter().enumerate().filter(|(k, _)| all || case % 3 == *k).map(|(_, order)| order)

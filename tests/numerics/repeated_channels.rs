@@ -1,9 +1,8 @@
 //! Channels that repeat what others measure: the same filter, up to a gain, sampled whole slow periods
-//! later. `HYBANK_SWEEP=200` tries so many random plants.
+//! later. `HYBANK_TRIALS=200` tries so many random plants.
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, amplify, low_pass, thesis};
-use crate::support::sweep::wanted;
 use hybank::design::{Design, analyze, design};
 use hybank::spec::{Family, FilterSpec, Method, Spec};
 use hybank::verify::verify;
@@ -112,7 +111,7 @@ fn plants(seed: u64) -> (Spec, Spec) {
 
 #[test]
 fn repeats_change_no_recursive_bank() {
-    let seeds = wanted("HYBANK_SWEEP", 12);
+    let seeds = trials::trials(12);
     let (mut worst, mut noncausal) = (0.0_f64, 0.0_f64);
     for seed in seeds.clone() {
         let (plain, repeated) = plants(seed);

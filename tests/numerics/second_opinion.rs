@@ -3,7 +3,6 @@
 
 use crate::golden::{g6, g8, g9, g10, g11, g12, g12c, g12d};
 use crate::support::specs::{alike, butterworth, tf, thesis, with_taps};
-use crate::support::sweep::long_tests;
 use hybank::bank::Gamma;
 use hybank::design::{DesignError, design};
 use hybank::spec::{Method, Solver, Spec};
@@ -55,12 +54,12 @@ fn a_bank_with_256_unknowns() {
     check("G12c", &g12c());
 }
 
-/// Unknowns up to which `kyp` is quick; the larger specs are tried where `HYBANK_LONG_TESTS` is set.
+/// Unknowns up to which `kyp` is quick; the larger specs are tried where `HYBANK_SLOW` is set.
 const QUICK: usize = 64;
 
 #[test]
 fn the_fir_specs_in_filters() {
-    let limit = if long_tests() { usize::MAX } else { QUICK };
+    let limit = if trials::is_slow("the bounded-real LMI of long banks") { usize::MAX } else { QUICK };
     for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("filters")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|extension| extension != "toml") {

@@ -3,7 +3,6 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
-use crate::support::sweep::wanted;
 use hybank::bank::{Bank, CausalWitness, Gamma, LowerProof, SynthesisFilters};
 use hybank::design::{certify, design};
 use hybank::spec::{DesignSpec, Method, Spec};
@@ -221,14 +220,14 @@ fn files_whose_gammas_are_false_are_refused() {
     }
 }
 
-/// Random factors on any of the numbers: what passes is true. `HYBANK_FACTORS=1000` tries that many.
+/// Random factors on any of the numbers: what passes is true. `HYBANK_TRIALS=1000` tries that many.
 #[test]
 fn statements_that_pass_are_true() {
     let mut random = Random(7);
     let (mut passed, mut refused) = (0, 0);
     for bank in examples() {
         let truth = verify(&bank).unwrap();
-        for _ in wanted("HYBANK_FACTORS", 50) {
+        for _ in trials::trials(50) {
             let mut forged = bank.clone();
             let size = 10f64.powf(-14.0 * random.part());
             let factor = 1.0 + if random.part() < 0.5 { -size } else { size };

@@ -1,9 +1,8 @@
 //! Steep front ends with hardly any latency, where a sample lies shortly after the beginning of the slow
-//! period and has almost no feedthrough. `HYBANK_SWEEP=200` tries so many random plants.
+//! period and has almost no feedthrough. `HYBANK_TRIALS=200` tries so many random plants.
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
-use crate::support::sweep::wanted;
 use hybank::design::{Design, ProofSearch, analyze, design, design_with};
 use hybank::spec::{Family, FilterSpec, Method, Spec};
 use hybank::verify::{EnclosedErrorSystem, Precision, Recursion};
@@ -80,7 +79,7 @@ fn plant(seed: u64) -> Spec {
 
 #[test]
 fn no_causal_bank_does_better_than_iir() {
-    let seeds = wanted("HYBANK_SWEEP", 10);
+    let seeds = trials::trials(10);
     let (mut worst, mut beyond) = (0.0_f64, Vec::new());
     for seed in seeds.clone() {
         let begin = std::time::Instant::now();

@@ -1,11 +1,11 @@
 //! Full disks: outputs of any length beyond a limit of the file size, and a small file system.
 
-use crate::support::campaign::rounds;
 use crate::support::jobs::Job;
 use crate::support::random::Random;
 use crate::support::text;
 use crate::work::{desk, jobs};
 use std::process::Command;
+use trials::rounds;
 
 /// Bytes of `ulimit -f` in POSIX.
 const BLOCK: usize = 512;
@@ -54,7 +54,7 @@ fn a_full_file_system_keeps_nothing() {
     let mounts = ["sh", "-c", "mount -t tmpfs -o size=64k none /mnt"];
     let may = Command::new(SPACE[0]).args(&SPACE[1..]).args(mounts).output();
     if !may.is_ok_and(|output| output.status.success()) {
-        println!("skipped: no file system may be mounted here");
+        trials::skipped(&"full file systems: none may be mounted here");
         return;
     }
     let desk = desk(20_000);

@@ -2,7 +2,6 @@
 //! must be true.
 
 use crate::norm::norm;
-use crate::support::campaign::rounds;
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
 use hybank::bank::{Bank, check_digest};
@@ -11,6 +10,7 @@ use hybank::spec::Spec;
 use hybank::verify::{Verified, verify};
 use serde_json::Value;
 use std::f64::consts::SQRT_2;
+use trials::rounds;
 
 /// Relative error of the oracle: its sum over aliases ends, and it may miss the top of a peak by a little.
 const ORACLE: f64 = 1e-6;

@@ -1,12 +1,12 @@
 //! Damaged inputs of the program: an answer or one message, never a crash and never without end.
 
 use crate::parsers::damage;
-use crate::support::campaign::rounds;
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS, names, text};
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+use trials::rounds;
 
 /// More than any of these runs takes.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -1,9 +1,9 @@
 //! Runs that are killed at random times.
 
 use crate::kill_campaign::campaign;
-use crate::support::campaign::rounds;
 use crate::support::random::Random;
 use crate::work::{desk, jobs};
+use trials::rounds;
 
 #[test]
 fn a_killed_run_leaves_old_or_whole_files_and_the_next_one_names_the_rest() {

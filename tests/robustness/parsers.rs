@@ -1,7 +1,6 @@
 //! Damaged files, by the thousand: every parser gives an answer or a message that names the file, and never
 //! panics. The seeds are those of the fuzz targets, the damage is the same in every run.
 
-use crate::support::campaign::rounds;
 use crate::support::random::Random;
 use hybank::analog::fit::{MeasuredResponse, vector_fit};
 use hybank::bank::Bank;
@@ -12,6 +11,7 @@ use hybank::spec::Spec;
 use std::fs;
 use std::io::{Cursor, Read};
 use std::path::Path;
+use trials::rounds;
 
 /// Damaged copies of each seed.
 const COPIES: usize = 3000;

@@ -1,6 +1,5 @@
 //! System calls that fail: one error at a time, injected by strace at any call of a run.
 
-use crate::support::campaign::rounds;
 use crate::support::jobs::Job;
 use crate::support::random::Random;
 use crate::support::text;
@@ -8,6 +7,7 @@ use crate::work::{desk, jobs};
 use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
+use trials::rounds;
 
 /// Calls with the errors that they may give.
 const CALLS: [(&str, &[&str]); 12] = [
@@ -90,7 +90,7 @@ struct Tally {
 #[test]
 fn a_failing_call_is_an_error_of_one_line_or_none_at_all() {
     if !is_there() {
-        println!("skipped: strace is not there or may not trace");
+        trials::skipped(&"failing system calls: strace is not there or may not trace");
         return;
     }
     let desk = desk(20_000);

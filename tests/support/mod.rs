@@ -2,7 +2,6 @@
 // Each test program uses a part of it.
 #![allow(dead_code, unused_imports)]
 
-pub(crate) mod campaign;
 mod desk;
 pub(crate) mod jobs;
 pub(crate) mod random;

@@ -7,19 +7,6 @@ use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::ScopedJoinHandle;
 
-/// The numbers that the environment variable asks for: so many (`1000`) or a range (`124..125`).
-pub(crate) fn wanted(variable: &str, usual: u64) -> Range<u64> {
-    let Ok(text) = std::env::var(variable) else { return 0..usual };
-    let (first, end) = text.split_once("..").unwrap_or(("0", &text));
-    let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("{variable}={text}: not a number"));
-    number(first)..number(end)
-}
-
-/// Whether `HYBANK_LONG_TESTS` asks for all cases of tests that try a few otherwise.
-pub(crate) fn long_tests() -> bool {
-    std::env::var_os("HYBANK_LONG_TESTS").is_some()
-}
-
 /// The results for all numbers of a range.
 pub(crate) fn each<T: Send>(range: Range<u64>, task: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let next = AtomicU64::new(range.start);

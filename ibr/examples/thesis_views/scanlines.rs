@@ -66,9 +66,7 @@ pub(crate) fn rows(effort: Effort) -> Outcome<Figure> {
 
 /// The folder of the photographs "Cones", if it is there.
 fn data() -> Option<PathBuf> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let root = std::env::var_os("HYBANK_DATA").map_or(beside, PathBuf::from);
-    Some(root.join("ibr/cones")).filter(|path| path.is_dir())
+    trials::data("ibr/cones")
 }
 
 fn photographs(folder: &Path) -> Outcome<Pair> {

@@ -168,11 +168,11 @@ fn placement(rig: &Rig, targets: &Rig) -> Placement {
 }
 
 fn sweep() -> bool {
-    std::env::var_os("HYBANK_SWEEP").is_some()
+    trials::is_slow("placements of 4 cameras at 20 sites")
 }
 
 /// 3 of 12 cameras, searched from greedy choices, against all 220 subsets by the predicted error; 4 of 20
-/// against 4845 in 10 scenes with `HYBANK_SWEEP=1`.
+/// against 4845 in 10 scenes with `HYBANK_SLOW=1`.
 #[test]
 fn a_searched_placement_is_close_to_the_best() {
     let (scenes, places, count) = if sweep() { (10, 20, 4) } else { (1, 12, 3) };
@@ -197,7 +197,7 @@ const STARTS: usize = 5;
 const FIRSTS: usize = 10;
 
 /// The same choice against the best of all subsets by rendering: 3 of 9 places, or 4 of 20 with
-/// `HYBANK_SWEEP=1`. The criterion knows surfaces and no textures, so it loses up to 2.4 dB. With the
+/// `HYBANK_SLOW=1`. The criterion knows surfaces and no textures, so it loses up to 2.4 dB. With the
 /// rendered views themselves as the criterion, a single greedy choice loses up to 0.7 dB. The best of ten
 /// with other first candidates loses less than 0.3 dB, and so do exchanges from several starts.
 #[test]

@@ -18,7 +18,6 @@ use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use random::Random;
-use std::path::PathBuf;
 
 /// Side of the blocks over which errors are ranked, in pixels.
 const BLOCK: usize = 16;
@@ -158,12 +157,7 @@ fn predict(name: &str, rig: &Rig, which: &[usize], position: f64, truth: &Image,
 }
 
 fn photographs(folder: &str) -> Option<(Rig, Option<Image>)> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let path = std::env::var_os("HYBANK_DATA").map_or(beside, PathBuf::from).join("ibr").join(folder);
-    if !path.is_dir() {
-        println!("skipped: {} is not there", path.display());
-        return None;
-    }
+    let path = trials::data(&format!("ibr/{folder}"))?;
     let map = |name: &str| {
         let (width, height, stored) = read_map(&path.join(name)).unwrap();
         let mut map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();
@@ -254,7 +248,7 @@ fn degraded(rig: &Rig, noise: f64, step: f32) -> Rig {
 /// Scenes that nothing was chosen on, with noise and coarse disparities, for positions between and beside.
 #[test]
 fn scenes_with_noise_and_coarse_disparities() {
-    let all = std::env::var_os("HYBANK_SWEEP").is_some();
+    let all = trials::is_slow("noise and coarse disparities of all scenes");
     let positions = [0.0, 1.0, 0.5, 0.3];
     let cases = [(vec![0, 1], 3), (vec![0, 1], 2), (vec![0, 1, 2], 3)];
     let (scenes, cases) = if all { (2, &cases[..]) } else { (1, &cases[..1]) };

@@ -1,10 +1,10 @@
 //! Runs that are disturbed: killed, without threads, without memory, beside what a killed run left.
 
 use super::*;
-use crate::support::campaign::rounds;
 use crate::support::jobs::Job;
 use crate::support::kills::campaign;
 use crate::support::random::Random;
+use trials::rounds;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_hybank-ibr");
 

@@ -1,7 +1,5 @@
 //! What both crates' tests share.
 
-#[path = "../../../tests/support/campaign.rs"]
-pub(crate) mod campaign;
 #[path = "../../../tests/support/jobs.rs"]
 pub(crate) mod jobs;
 #[path = "../../../tests/support/kills.rs"]

@@ -7,7 +7,6 @@ use crate::simulate::{Instants, Recording};
 use crate::spec::Spec;
 use crate::units::FastPeriods;
 use std::f64::consts::PI;
-use std::path::Path;
 
 const BLIND: Settings =
     Settings { fit: Fit { delay: true, gain: true, offset: true, cutoff: false }, reference: 0 };
@@ -136,11 +135,8 @@ fn offsets_are_relative_to_the_reference() {
 /// Speech, captured elsewhere in the frequency domain: 1.2 and 0.6 fast periods.
 #[test]
 fn speech_gives_its_delay_to_1e_5_fast_periods() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/captures/speech-2x");
-    let Ok(text) = std::fs::read_to_string(folder.join("spec.toml")) else {
-        println!("skipped: no data in {}", folder.display());
-        return;
-    };
+    let Some(folder) = trials::data("captures/speech-2x") else { return };
+    let text = std::fs::read_to_string(folder.join("spec.toml")).unwrap();
     let records = ["ch1.wav", "ch2.wav"].map(|name| {
         let mut wav = hound::WavReader::open(folder.join(name)).unwrap();
         Record::new(wav.samples::<f32>().map(|x| f64::from(x.unwrap())).collect())

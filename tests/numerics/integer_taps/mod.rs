@@ -1,11 +1,11 @@
-//! Integer taps of small banks against all integers at all scales. `HYBANK_INTEGER_CASES=926` tries that
-//! many random banks, `HYBANK_INTEGER_CASES=12..13` that one.
+//! Integer taps of small banks against all integers at all scales. `HYBANK_TRIALS=926` tries that
+//! many random banks, `HYBANK_TRIALS=12..13` that one.
 
 mod brute_force;
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, butterworth, with_taps};
-use crate::support::sweep::{each, wanted};
+use crate::support::sweep::each;
 use brute_force::BruteForce;
 use hybank::bank::SynthesisFilters;
 use hybank::design::{DesignError, LiftedPlant, Problem, ProofSearch, design_with};
@@ -81,7 +81,7 @@ fn outcome(spec: &Spec, bits: u32) -> Option<Outcome> {
 
 #[test]
 fn small_banks_are_within_a_tenth_of_a_decibel_of_all_integers() {
-    let cases = wanted("HYBANK_INTEGER_CASES", 5);
+    let cases = trials::trials(5);
     let tried = cases.end - cases.start;
     let all: Vec<Option<Outcome>> = each(cases, |number| {
         let (spec, bits) = case(number);

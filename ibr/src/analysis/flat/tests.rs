@@ -1,4 +1,4 @@
-//! Virtual experiments against the theorems, at all sizes of the thesis's figures. `HYBANK_SWEEP=1` makes
+//! Virtual experiments against the theorems, at all sizes of the thesis's figures. `HYBANK_SLOW=1` makes
 //! more draws.
 
 use super::scenes::{Board, Wave, board_before_wall, cameras, virtual_camera};
@@ -21,7 +21,7 @@ fn focals(first: i32, last: i32) -> impl Iterator<Item = f64> {
 
 /// So many draws, or eight times as many if asked for.
 fn draws(few: f64) -> u64 {
-    let many = std::env::var_os("HYBANK_SWEEP").is_some();
+    let many = trials::is_slow("all draws of the figures of chapter 3");
     (if many { 8.0 * few } else { few }).ceil() as u64
 }
 

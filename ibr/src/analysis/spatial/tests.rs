@@ -1,4 +1,4 @@
-//! Virtual experiments against the theorem. `HYBANK_SWEEP=1` runs all sizes of the thesis's figures.
+//! Virtual experiments against the theorem. `HYBANK_SLOW=1` runs all sizes of the thesis's figures.
 
 use super::scenes::{Hill, camera_at};
 use super::triangles::{Corners, Triangles};
@@ -11,7 +11,7 @@ use hybank::sampling::delaunay::{PoissonDelaunay, superposed_grids};
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector2, Vector3};
 
 fn sweep() -> bool {
-    std::env::var_os("HYBANK_SWEEP").is_some()
+    trials::is_slow("all sizes of the figures of chapter 4")
 }
 
 fn cameras(count: usize, focal: f64) -> Vec<Camera> {

@@ -89,18 +89,17 @@ fn pair(kind: Kind, seed: u64) -> Option<(Vec<Vote>, f64)> {
     Some((votes(&f, &matches, &points, &projective[0], [SIZE; 2]), sign))
 }
 
-/// Few pairs are wrong and some are decided, in every run a few of them; HYBANK_CAMPAIGN=10 makes ten
-/// times as many.
+/// Few pairs are wrong and some are decided, in every run a few of them; HYBANK_TRIALS=120 makes
+/// ten times as many.
 #[test]
 fn few_orders_are_wrong() {
-    let factor = std::env::var("HYBANK_CAMPAIGN").ok().and_then(|text| text.parse().ok()).unwrap_or(1);
     for (kind, most) in [
         (Kind::SideBySide, 0.005),
         (Kind::UnequalFocal, 0.005),
         (Kind::SlightlyCropped, 0.005),
         (Kind::Cropped, 0.01),
     ] {
-        let found: Vec<(f64, f64, f64)> = (0..12 * factor)
+        let found: Vec<(f64, f64, f64)> = trials::trials(12)
             .filter_map(|seed| pair(kind, seed))
             .filter_map(|(votes, truth)| mean_sign(&votes).map(|(mean, agreement)| (mean, agreement, truth)))
             .collect();

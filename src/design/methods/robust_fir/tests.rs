@@ -164,11 +164,11 @@ fn the_worst_case_of_taps_that_follow_is_stated_and_proven() {
     assert_eq!(refused, crate::verify::VerifyError::Tracked { stated: 0.98 * study.tracked.worst });
 }
 
-/// Four interleaved converters, with HYBANK_SWEEP set: within 0.2 % of a redesign for delays within 10 ps,
+/// Four interleaved converters, with HYBANK_SLOW set: within 0.2 % of a redesign for delays within 10 ps,
 /// and within 3 % for 50 ps.
 #[test]
 fn interleaved_converters_are_followed() {
-    if std::env::var_os("HYBANK_SWEEP").is_none() {
+    if !trials::is_slow("four interleaved converters that are followed") {
         return;
     }
     for (half, excess) in [(10e-12, 0.002), (50e-12, 0.03)] {
