@@ -94,8 +94,8 @@ fn trial(seed: u64, understated: f64) -> Vec<(f64, f64)> {
     found.sure.iter().enumerate().map(|(p, bound)| (error(p), f64::from(*bound))).collect()
 }
 
-/// No pixel of 200 random scenes (`HYBANK_TRIALS=4000` for more) exceeds its bound. The bound is not idle: its
-/// mean is 11 times that of the errors where surfaces are whole, and limits that are too small break it.
+/// No pixel of 200 random scenes (`HYBANK_TRIALS=4000` for more) exceeds its bound. The bound is not idle:
+/// its mean is 11 times that of the errors where surfaces are whole, and limits that are too small break it.
 #[test]
 fn no_pixel_exceeds_its_sure_bound() {
     let trials = trials::trials(200).end;
